@@ -1,0 +1,83 @@
+"""Every error eigassign raises on purpose; the command line turns each into its exit code."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+class EigassignError(Exception):
+    """Root of the tree. ``exit_code`` is what the command line returns for it."""
+
+    exit_code = 4
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing wrong with a case file: where, what, and what is allowed (1-based line, column)."""
+
+    file: str
+    line: int
+    column: int
+    path: str
+    message: str
+
+    def __str__(self) -> str:
+        where = f"{self.file}:{self.line}:{self.column}: "
+        return where + (f"{self.path}: " if self.path else "") + self.message
+
+
+class CaseError(EigassignError):
+    """The case file is wrong. ``problems`` lists everything found, in file order."""
+
+    exit_code = 2
+
+    def __init__(self, problems: tuple[Problem, ...]) -> None:
+        self.problems = tuple(sorted(problems, key=lambda p: (p.line, p.column, p.path)))
+        super().__init__("\n".join(str(p) for p in self.problems))
+
+
+class UsageError(EigassignError):
+    """A call that cannot be answered as asked: wrong length, unknown name, value out of range."""
+
+    exit_code = 2
+
+
+class MechanismError(EigassignError):
+    """The mechanism cannot be modelled; ``path`` names the key at fault in the case file."""
+
+    exit_code = 2
+
+    def __init__(self, path: str, message: str) -> None:
+        self.path = path
+        self.message = message
+        super().__init__(f"{path}: {message}")
+
+
+class TrajectoryError(MechanismError):
+    """The trajectory cannot be followed; ``sample`` is the first sample (0-based) that cannot."""
+
+    def __init__(self, path: str, message: str, sample: int) -> None:
+        self.sample = sample
+        super().__init__(path, message)
+
+
+class AccuracyError(EigassignError):
+    """A number was computed that cannot be vouched for, and is withheld."""
+
+    exit_code = 1
+
+
+class InfeasibleError(EigassignError):
+    """No design meets all constraints; ``constraints`` names those that contradict each other."""
+
+    exit_code = 1
+
+    def __init__(self, message: str, constraints: tuple[str, ...]) -> None:
+        self.constraints = constraints
+        super().__init__(message)
+
+
+class StorageError(EigassignError):
+    """Reading or writing failed: no permission, no space, a folder in the way."""
+
+    exit_code = 3

@@ -1,0 +1,1 @@
+"""From the case to the affine ERLS pencil: sections, elements, kinematics, assembly, paths."""

@@ -1,0 +1,1 @@
+"""Exact modes, their Taylor expansion, and what follows from them."""

@@ -1,0 +1,1 @@
+"""Run folders, caches, figures, reports; computes nothing."""

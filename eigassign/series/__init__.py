@@ -1,0 +1,1 @@
+"""Truncated power series over any lower set of multi-indices; knows no mechanics."""

@@ -1,0 +1,1 @@
+"""Many evaluations of the layers to the left, compared with one another."""
