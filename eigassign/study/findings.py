@@ -1,0 +1,146 @@
+"""What one run found, as plain numbers: the only thing the output layer is given to show.
+
+Shapes: n_t samples in time, n_q coordinates, n_y design parameters. SI units, frequencies in Hz,
+errors as fractions (0.01 is 1 %) of the frequency in Hz.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Poses:
+    """The mechanism drawn: ``lines[pose][link]`` is a polyline (n_points, 2 or 3) in m."""
+
+    time_s: Floats
+    lines: tuple[tuple[Floats, ...], ...]
+    link_names: tuple[str, ...]
+    bodies: tuple[tuple[str, Floats], ...]  # name, position per pose (n_poses, 2 or 3)
+    tip_path: Floats | None  # (n_t, 2 or 3)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Exact, full Taylor and linearised frequency of one mode at the same points, in Hz."""
+
+    exact_hz: Floats
+    taylor_hz: Floats
+    linearised_hz: Floats
+
+    @property
+    def taylor_error(self) -> Floats:
+        """Relative error in frequency of the full expansion, point by point."""
+        return np.asarray(self.taylor_hz / self.exact_hz - 1.0)
+
+    @property
+    def linearised_error(self) -> Floats:
+        """Relative error in frequency of the partially linearised expansion."""
+        return np.asarray(self.linearised_hz / self.exact_hz - 1.0)
+
+
+@dataclass(frozen=True)
+class DesignMap:
+    """A comparison over one or two design parameters, the others at the expansion point."""
+
+    names: tuple[str, ...]  # one or two
+    units: tuple[str, ...]
+    axes: tuple[Floats, ...]  # one or two grids, SI
+    values: Comparison  # (n_1,) or (n_1, n_2)
+
+
+@dataclass(frozen=True)
+class ModeStudy:
+    """How good the expansion of one mode is (the paper's Figure 3)."""
+
+    mode: int
+    order: int
+    q0: Floats
+    y0: Floats
+    over_time: Comparison | None  # (n_t,) along the trajectory, at the initial design
+    over_design: DesignMap | None  # at q0
+
+
+@dataclass(frozen=True)
+class DesignRow:
+    """One design parameter before and after, in SI ``unit``."""
+
+    name: str
+    parameter: str
+    unit: str
+    initial: float
+    optimal: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class ErrorRow:
+    """Distance to the target in Hz relative to the target: its maximum and root mean square."""
+
+    max_relative: float
+    rms_relative: float
+
+
+@dataclass(frozen=True)
+class TargetStudy:
+    """One assigned mode along the trajectory (the paper's Figure 4); arrays (n_t,) in Hz."""
+
+    mode: int
+    target_hz: Floats
+    initial_hz: Floats
+    predicted_hz: Floats
+    exact_hz: Floats
+    initial: ErrorRow
+    predicted: ErrorRow
+    exact: ErrorRow
+
+
+@dataclass(frozen=True)
+class OtherModes:
+    """Exact frequencies (n_t, n_modes) of the modes above the assigned one (Figure 5)."""
+
+    modes: tuple[int, ...]
+    initial_hz: Floats
+    optimal_hz: Floats
+
+
+@dataclass(frozen=True)
+class SolverRow:
+    """What the quadratic program's solver reached, residuals recomputed from the data."""
+
+    status: str
+    iterations: int
+    primal_residual: float
+    dual_residual: float
+    gap: float
+
+
+@dataclass(frozen=True)
+class Findings:
+    """Everything a run folder shows."""
+
+    title: str
+    reference: str | None
+    case_name: str
+    case_sha256: str
+    version: str
+    q_names: tuple[str, ...]
+    q_units: tuple[str, ...]
+    time_s: Floats
+    q: Floats  # (n_t, n_q)
+    poses: Poses
+    studies: tuple[ModeStudy, ...]
+    design: tuple[DesignRow, ...]
+    targets: tuple[TargetStudy, ...]
+    others: OtherModes | None
+    solver: SolverRow | None
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]  # what was chosen and why, one line each
+    timing_s: Mapping[str, float]
