@@ -1,0 +1,42 @@
+"""The numbers of a mechanism: plain floats, or expressions where they are design parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.case import CaseFile
+from eigassign.series.expression import Expression, Recorder, Scalar
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Variables z = (s, y): joint coordinates s in the order of the case's q, then design y."""
+
+    recorder: Recorder
+    coordinates: tuple[str, ...]
+    design: tuple[str, ...]
+    by_path: dict[str, Expression] = field(default_factory=dict)
+
+    def number(self, path: str, value: float) -> Scalar:
+        """The value at a key path of the case: the variable if it is a design parameter."""
+        return self.by_path.get(path, value)
+
+    def joint_coordinate(self, index: int) -> Expression:
+        """The relative joint coordinate s belonging to coordinate number ``index``."""
+        return self.recorder.variable(index)
+
+
+def parameters(case: CaseFile) -> Parameters:
+    """The variables of a case."""
+    recorder = Recorder()
+    coordinates, design = tuple(case.coordinates), tuple(case.design.parameters)
+    by_path = {
+        parameter.parameter: recorder.variable(len(coordinates) + k)
+        for k, parameter in enumerate(case.design.parameters.values())
+    }
+    return Parameters(recorder, coordinates, design, by_path)

@@ -1,0 +1,145 @@
+"""Scalar expressions written once and evaluated on numbers, on samples and on power series alike.
+
+An :class:`Expression` is a linear form  c + Σ c_k a_k  in *atoms* a_k: variables, products, powers,
+sines and cosines, each stored once by the :class:`Recorder` however often it is written. Plain
+floats mix freely with expressions, and what is constant folds away as it is written, so that code
+for a formula reads the same whether its inputs vary or not.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TypeAlias, overload
+
+Scalar: TypeAlias = "float | Expression"
+Node: TypeAlias = tuple[object, ...]
+
+
+class Recorder:
+    """Collects the atoms of a set of expressions; ``nodes[k]`` is the definition of atom k.
+
+    ``("variable", i)``, ``("linear", c, ((k, c_k), ...))``, ``("product", j, k)``,
+    ``("power", j, e)``, ``("sine", j)``, ``("cosine", j)``; arguments come before their users.
+    """
+
+    def __init__(self) -> None:
+        self.nodes: list[Node] = []
+        self._known: dict[Node, int] = {}
+
+    def variable(self, index: int) -> Expression:
+        """The independent variable number ``index``."""
+        return self._atom(("variable", index))
+
+    def _atom(self, node: Node) -> Expression:
+        at = self._known.get(node)
+        if at is None:
+            at = self._known[node] = len(self.nodes)
+            self.nodes.append(node)
+        return Expression(self, 0.0, {at: 1.0})
+
+
+class Expression:
+    """c + Σ c_k a_k over the atoms of one recorder; immutable."""
+
+    __slots__ = ("constant", "recorder", "terms")
+    __array_ufunc__ = None  # so that numpy scalars leave arithmetic to this class
+
+    def __init__(self, recorder: Recorder, constant: float, terms: dict[int, float]) -> None:
+        self.recorder = recorder
+        self.constant = constant
+        self.terms = terms
+
+    def single(self) -> tuple[float, int]:
+        """This expression as factor × atom, recording a linear form first where it is a sum."""
+        if self.constant == 0.0 and len(self.terms) == 1:
+            ((atom, factor),) = self.terms.items()
+            return factor, atom
+        ordered = sorted(self.terms.items())
+        factor = ordered[0][1]  # normalised so that proportional sums are one atom
+        scaled = tuple((atom, value / factor) for atom, value in ordered)
+        node = self.recorder._atom(("linear", self.constant / factor, scaled))
+        return factor, next(iter(node.terms))
+
+    def __add__(self, other: Scalar) -> Scalar:
+        if not isinstance(other, Expression):
+            return self if other == 0.0 else self._build(self.constant + other, self.terms)
+        terms = dict(self.terms)
+        for atom, value in other.terms.items():
+            terms[atom] = terms.get(atom, 0.0) + value
+        return self._build(self.constant + other.constant, terms)
+
+    __radd__ = __add__
+
+    def __neg__(self) -> Scalar:
+        return self * -1.0
+
+    def __sub__(self, other: Scalar) -> Scalar:
+        return self + other * -1.0
+
+    def __rsub__(self, other: float) -> Scalar:
+        return self * -1.0 + other
+
+    def __mul__(self, other: Scalar) -> Scalar:
+        if not isinstance(other, Expression):
+            factor = float(other)
+            if factor == 1.0:
+                return self
+            terms = {atom: value * factor for atom, value in self.terms.items()}
+            return self._build(self.constant * factor, terms)
+        (a, j), (b, k) = self.single(), other.single()
+        product = self.recorder._atom(("product", min(j, k), max(j, k)))
+        return product * (a * b)
+
+    __rmul__ = __mul__
+
+    def __pow__(self, exponent: float) -> Scalar:
+        if exponent == 1.0:
+            return self
+        if exponent in (2.0, 3.0, 4.0):
+            return self * self if exponent == 2.0 else self * self ** (exponent - 1.0)
+        factor, atom = self.single()
+        if factor < 0.0 and exponent != int(exponent):
+            return self._recorded() ** exponent
+        return self.recorder._atom(("power", atom, float(exponent))) * factor**exponent
+
+    def __truediv__(self, other: Scalar) -> Scalar:
+        if isinstance(other, Expression):
+            return self * other**-1.0
+        return self * (1.0 / other)
+
+    def __rtruediv__(self, other: float) -> Scalar:
+        return other * self**-1.0
+
+    def _recorded(self) -> Expression:
+        """The same value as one atom of factor 1."""
+        factor, atom = self.single()
+        return self.recorder._atom(("linear", 0.0, ((atom, factor),)))
+
+    def _build(self, constant: float, terms: dict[int, float]) -> Scalar:
+        kept = {atom: value for atom, value in terms.items() if value != 0.0}
+        return Expression(self.recorder, constant, kept) if kept else constant
+
+
+def _function(name: str, x: Expression) -> Expression:
+    factor, atom = x.single()
+    if factor != 1.0:
+        _, atom = x._recorded().single()
+    return x.recorder._atom((name, atom))
+
+
+@overload
+def sin(x: float) -> float: ...
+@overload
+def sin(x: Expression) -> Expression: ...
+def sin(x: Scalar) -> Scalar:
+    """Sine of an angle in rad."""
+    return _function("sine", x) if isinstance(x, Expression) else math.sin(x)
+
+
+@overload
+def cos(x: float) -> float: ...
+@overload
+def cos(x: Expression) -> Expression: ...
+def cos(x: Scalar) -> Scalar:
+    """Cosine of an angle in rad."""
+    return _function("cosine", x) if isinstance(x, Expression) else math.cos(x)

@@ -1,0 +1,190 @@
+"""Lower sets of multi-indices and the index tables of the product of two series over them.
+
+A set Λ is *lower* when γ ∈ Λ and δ ≤ γ (entrywise) imply δ ∈ Λ: exactly the sets over which
+truncated products are well defined. Members are sorted by total degree, then lexicographically
+with the first variable leading, so that all members of one degree are contiguous.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.errors import UsageError
+
+Ints = NDArray[np.intp]
+MAX_SIZE = 200_000
+
+
+@dataclass(frozen=True)
+class ProductTable:
+    """Pairs (left, right) with γ_left + γ_right = γ_target, sorted by target.
+
+    ``starts[k]`` is the first pair of target k; every target has at least the pair (0, k).
+    """
+
+    left: Ints
+    right: Ints
+    target: Ints
+    starts: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class LowerSet:
+    """A lower set Λ of N multi-indices over n variables."""
+
+    indices: NDArray[np.int64]  # (N, n)
+
+    def __len__(self) -> int:
+        return len(self.indices)
+
+    @property
+    def n_variables(self) -> int:
+        """Number of variables n."""
+        return int(self.indices.shape[1])
+
+    @cached_property
+    def degrees(self) -> Ints:
+        """Total degree |γ| of every member, ascending."""
+        return np.asarray(self.indices.sum(axis=1), dtype=np.intp)
+
+    @cached_property
+    def order(self) -> int:
+        """The largest total degree in the set."""
+        return int(self.degrees[-1])
+
+    @cached_property
+    def degree_starts(self) -> Ints:
+        """Members of degree d are ``degree_starts[d]:degree_starts[d + 1]``."""
+        return np.searchsorted(self.degrees, np.arange(self.order + 2)).astype(np.intp)
+
+    @cached_property
+    def table(self) -> ProductTable:
+        """The product table, made once per set."""
+        return _product_table(self)
+
+    @cached_property
+    def _keys(self) -> tuple[NDArray[np.uint64], NDArray[np.uint64], Ints]:
+        keys = _hash(self.indices)
+        order = np.argsort(keys, kind="stable")
+        return keys, keys[order], order.astype(np.intp)
+
+    def find(self, indices: NDArray[np.int64]) -> Ints:
+        """Position of every row of ``indices`` (k, n) in the set, or -1 where it is not a member."""
+        rows = np.asarray(indices, dtype=np.int64).reshape(-1, self.n_variables)
+        found = self._lookup(_hash(rows))
+        wrong = (self.indices[found] != rows).any(axis=1)
+        return np.where(wrong, -1, found)
+
+    def _lookup(self, keys: NDArray[np.uint64]) -> Ints:
+        _, ordered, order = self._keys
+        at = np.minimum(np.searchsorted(ordered, keys), len(self) - 1)
+        return np.where(ordered[at] == keys, order[at], 0)
+
+    def restrict(self, keep: NDArray[np.bool_]) -> LowerSet:
+        """The members where ``keep`` is true; they must form a lower set themselves."""
+        return lower_set(self.indices[keep])
+
+
+def _hash(indices: NDArray[np.int64]) -> NDArray[np.uint64]:
+    """Additive hash: key(γ + δ) = key(γ) + key(δ) modulo 2⁶⁴, whatever the number of variables."""
+    weights = np.random.default_rng(20211204).integers(1, 2**63, indices.shape[1], dtype=np.uint64)
+    return indices.astype(np.uint64) @ weights
+
+
+def _product_table(space: LowerSet) -> ProductTable:
+    keys = space._keys[0]
+    starts = space.degree_starts
+    lefts, rights, targets = [], [], []
+    for degree in range(space.order + 1):
+        left = np.arange(starts[degree], starts[degree + 1])
+        right = np.arange(starts[space.order - degree + 1])
+        i, j = (a.ravel() for a in np.meshgrid(left, right, indexing="ij"))
+        k = space._lookup(keys[i] + keys[j])
+        member = (space.indices[k] == space.indices[i] + space.indices[j]).all(axis=1)
+        lefts.append(i[member])
+        rights.append(j[member])
+        targets.append(k[member])
+    left, right, target = (np.concatenate(a).astype(np.intp) for a in (lefts, rights, targets))
+    by_target = np.argsort(target, kind="stable")
+    left, right, target = left[by_target], right[by_target], target[by_target]
+    first = np.searchsorted(target, np.arange(len(space))).astype(np.intp)
+    return ProductTable(left, right, target, first)
+
+
+def lower_set(indices: NDArray[np.int64] | Sequence[Sequence[int]]) -> LowerSet:
+    """A lower set from its members in any order; raises UsageError if it is not one."""
+    rows = np.unique(np.atleast_2d(np.asarray(indices, dtype=np.int64)), axis=0)
+    if rows.size and rows.min() < 0:
+        raise UsageError("multi-indices must not be negative")
+    if len(rows) > MAX_SIZE:
+        raise UsageError(f"{len(rows)} multi-indices; at most {MAX_SIZE}: lower the order")
+    rows = rows[np.lexsort((*(-rows.T[::-1]), rows.sum(axis=1)))]
+    space = LowerSet(_frozen(rows))
+    for variable in range(space.n_variables):
+        below = rows[rows[:, variable] > 0].copy()
+        below[:, variable] -= 1
+        if len(below) and (space.find(below) < 0).any():
+            raise UsageError("not a lower set: an index is present whose predecessor is not")
+    return space
+
+
+def _frozen(a: NDArray[np.int64]) -> NDArray[np.int64]:
+    a = np.ascontiguousarray(a)
+    a.setflags(write=False)
+    return a
+
+
+@lru_cache(maxsize=64)
+def total_degree(n: int, order: int) -> LowerSet:
+    """{γ : |γ| ≤ p} over n variables: C(n + p, p) members."""
+    return lower_set(_simplex(n, order))
+
+
+@lru_cache(maxsize=64)
+def partially_linear(n_q: int, n_y: int, order: int) -> LowerSet:
+    """{(α, β) : |α| + |β| ≤ p, |β| ≤ 1}, the terms kept by eqs. (7)-(9)."""
+    alpha = _simplex(n_q, order)
+    constant = np.hstack([alpha, np.zeros((len(alpha), n_y), dtype=np.int64)])
+    alpha = alpha[alpha.sum(axis=1) < order] if order else alpha[:0]
+    unit = np.eye(n_y, dtype=np.int64)
+    linear = np.hstack([np.repeat(alpha, n_y, axis=0), np.tile(unit, (len(alpha), 1))])
+    return lower_set(np.vstack([constant, linear]))
+
+
+@lru_cache(maxsize=64)
+def box(orders: tuple[int, ...]) -> LowerSet:
+    """{γ : γ_i ≤ orders_i}, a tensor-product set."""
+    return lower_set(list(itertools.product(*(range(o + 1) for o in orders))))
+
+
+@lru_cache(maxsize=64)
+def weighted_degree(weights: tuple[float, ...], order: float) -> LowerSet:
+    """{γ : Σ w_i γ_i ≤ p}, anisotropic: a variable of weight 2 is taken to half the order."""
+    if not all(w > 0 for w in weights):
+        raise UsageError("weights of an anisotropic set must be positive")
+    members = [np.zeros((1, 0), dtype=np.int64)]
+    for i, weight in enumerate(weights):
+        top = int(np.floor(order / weight + 1e-9))
+        grown = [np.hstack([members[-1], np.full((len(members[-1]), 1), k)]) for k in range(top + 1)]
+        rows = np.vstack(grown)
+        members.append(rows[rows @ np.array(weights[: i + 1]) <= order + 1e-9])
+    return lower_set(members[-1])
+
+
+def _simplex(n: int, order: int) -> NDArray[np.int64]:
+    """All multi-indices of n variables with total degree at most ``order``."""
+    rows = np.zeros((1, 0), dtype=np.int64)
+    for _ in range(n):
+        room = order - rows.sum(axis=1)
+        repeated = np.repeat(rows, room + 1, axis=0)
+        last = np.concatenate([np.arange(r + 1) for r in room])
+        rows = np.hstack([repeated, last[:, None]])
+        if len(rows) > MAX_SIZE:
+            raise UsageError(f"over {MAX_SIZE} multi-indices: lower the order or the set")
+    return rows

@@ -1,0 +1,250 @@
+"""Compiled expressions: a straight-line program evaluated level by level, many atoms a call.
+
+The same program runs in two algebras: over samples (values (n_atoms, n_samples)) and over
+truncated power series (values (n_atoms, N)), where the product is the Cauchy product.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from eigassign.errors import UsageError
+from eigassign.series.expression import Node, Recorder
+from eigassign.series.lower_set import LowerSet
+from eigassign.series.power_series import compose, cosine_taylor, multiply, power_taylor, sine_taylor
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+
+class Algebra(Protocol):
+    """What a program needs to run: rows of numbers standing for values."""
+
+    def constant(self, values: Floats) -> Floats:
+        """Numbers (n,) as rows (n, …)."""
+
+    def product(self, a: Floats, b: Floats) -> Floats:
+        """Row by row product."""
+
+    def power(self, a: Floats, exponents: Floats) -> Floats:
+        """Row by row power with one exponent a row."""
+
+    def sine(self, a: Floats) -> Floats:
+        """Row by row sine."""
+
+    def cosine(self, a: Floats) -> Floats:
+        """Row by row cosine."""
+
+
+class Samples:
+    """Ordinary numbers, many samples at once."""
+
+    def constant(self, values: Floats) -> Floats:
+        """(n,) → (n, 1), broadcast over samples."""
+        return values[:, None]
+
+    def product(self, a: Floats, b: Floats) -> Floats:
+        """Elementwise."""
+        return a * b
+
+    def power(self, a: Floats, exponents: Floats) -> Floats:
+        """Elementwise; a domain error shows as NaN, which callers refuse."""
+        with np.errstate(all="ignore"):
+            return np.power(a, exponents[:, None])
+
+    def sine(self, a: Floats) -> Floats:
+        """Elementwise."""
+        return np.sin(a)
+
+    def cosine(self, a: Floats) -> Floats:
+        """Elementwise."""
+        return np.cos(a)
+
+
+@dataclass(frozen=True)
+class Truncated:
+    """Power series truncated to ``space``."""
+
+    space: LowerSet
+
+    def constant(self, values: Floats) -> Floats:
+        """(n,) → (n, N): the constant series."""
+        rows = np.zeros((len(values), len(self.space)))
+        rows[:, 0] = values
+        return rows
+
+    def product(self, a: Floats, b: Floats) -> Floats:
+        """Cauchy product over the set."""
+        return multiply(self.space, a, b)
+
+    def power(self, a: Floats, exponents: Floats) -> Floats:
+        """Binomial series about the constant terms, one exponent a row."""
+        out = np.empty_like(a)
+        for exponent in np.unique(exponents):
+            rows = exponents == exponent
+            taylor = power_taylor(a[rows, 0], float(exponent), self.space.order)
+            out[rows] = compose(self.space, taylor, a[rows])
+        return out
+
+    def sine(self, a: Floats) -> Floats:
+        """Sine of each series."""
+        return compose(self.space, sine_taylor(a[:, 0], self.space.order), a)
+
+    def cosine(self, a: Floats) -> Floats:
+        """Cosine of each series."""
+        return compose(self.space, cosine_taylor(a[:, 0], self.space.order), a)
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """Atoms of one kind and one level: computed together from atoms of lower levels."""
+
+    kind: str
+    targets: Ints
+    left: Ints
+    right: Ints
+    numbers: Floats  # exponents of powers; constants of linear forms
+    matrix: sparse.csr_array | None  # of linear forms, over all atoms
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """Straight-line program from variables (n_variables,) to outputs (n_outputs,)."""
+
+    n_variables: int
+    n_atoms: int
+    inputs: Ints  # atom of each used variable
+    input_variables: Ints  # which variable it is
+    steps: tuple[Step, ...]
+    outputs: Ints  # atom of each output
+    dependence: NDArray[np.bool_]  # (n_outputs, n_variables): structural
+
+    def run(self, algebra: Algebra, variables: Floats) -> Floats:
+        """Outputs as rows, from the variables as rows (n_variables, …) of the algebra."""
+        values = np.empty((self.n_atoms, variables.shape[1]))
+        values[self.inputs] = variables[self.input_variables]
+        for step in self.steps:
+            values[step.targets] = _take(step, algebra, values)
+        return np.asarray(values[self.outputs])
+
+
+def _take(step: Step, algebra: Algebra, values: Floats) -> Floats:
+    if step.kind == "linear":
+        assert step.matrix is not None
+        return np.asarray(step.matrix @ values[step.left] + algebra.constant(step.numbers))
+    a = values[step.left]
+    if step.kind == "product":
+        return algebra.product(a, values[step.right])
+    if step.kind == "power":
+        return algebra.power(a, step.numbers)
+    return algebra.sine(a) if step.kind == "sine" else algebra.cosine(a)
+
+
+def compile_program(recorder: Recorder, outputs: Sequence[int], n_variables: int) -> Program:
+    """Schedule what the output atoms need; raises UsageError for an unknown variable."""
+    needed = _needed(recorder.nodes, outputs)
+    renumbered = {atom: k for k, atom in enumerate(needed)}
+    nodes = [_renumber(recorder.nodes[atom], renumbered) for atom in needed]
+    levels = _levels(nodes)
+    depends = _dependence(nodes, n_variables)
+    variables = [(k, int(str(node[1]))) for k, node in enumerate(nodes) if node[0] == "variable"]
+    final = np.array([renumbered[atom] for atom in outputs], dtype=np.intp)
+    return Program(
+        n_variables=n_variables,
+        n_atoms=len(nodes),
+        inputs=np.array([k for k, _ in variables], dtype=np.intp),
+        input_variables=np.array([v for _, v in variables], dtype=np.intp),
+        steps=_schedule(nodes, levels),
+        outputs=final,
+        dependence=depends[final] if len(final) else np.zeros((0, n_variables), dtype=bool),
+    )
+
+
+def _arguments(node: Node) -> tuple[int, ...]:
+    match node:
+        case ("variable", _):
+            return ()
+        case ("linear", _, terms):
+            return tuple(int(atom) for atom, _ in terms)  # type: ignore[attr-defined]
+        case ("product", int(a), int(b)):
+            return (a, b)
+        case (_, int(a), *_):
+            return (a,)
+    raise UsageError(f"unknown expression {node!r}")
+
+
+def _needed(nodes: Sequence[Node], outputs: Sequence[int]) -> list[int]:
+    wanted = set(outputs)
+    for atom in range(len(nodes) - 1, -1, -1):
+        if atom in wanted:
+            wanted.update(_arguments(nodes[atom]))
+    return sorted(wanted)
+
+
+def _renumber(node: Node, new: dict[int, int]) -> Node:
+    match node:
+        case ("variable", _):
+            return node
+        case ("linear", constant, terms):
+            return ("linear", constant, tuple((new[a], c) for a, c in terms))  # type: ignore[attr-defined]
+        case ("product", int(a), int(b)):
+            return ("product", new[a], new[b])
+        case (kind, int(a), *rest):
+            return (kind, new[a], *rest)
+    raise UsageError(f"unknown expression {node!r}")
+
+
+def _levels(nodes: Sequence[Node]) -> list[int]:
+    levels: list[int] = []
+    for node in nodes:
+        levels.append(1 + max((levels[a] for a in _arguments(node)), default=-1))
+    return levels
+
+
+def _dependence(nodes: Sequence[Node], n_variables: int) -> NDArray[np.bool_]:
+    depends = np.zeros((len(nodes), n_variables), dtype=bool)
+    for k, node in enumerate(nodes):
+        if node[0] == "variable":
+            depends[k, int(str(node[1]))] = True
+        for argument in _arguments(node):
+            depends[k] |= depends[argument]
+    return depends
+
+
+def _schedule(nodes: Sequence[Node], levels: Sequence[int]) -> tuple[Step, ...]:
+    groups: dict[tuple[int, str], list[int]] = {}
+    for k, (node, level) in enumerate(zip(nodes, levels, strict=True)):
+        if node[0] != "variable":
+            groups.setdefault((level, str(node[0])), []).append(k)
+    return tuple(_step(kind, atoms, nodes) for (_, kind), atoms in sorted(groups.items()))
+
+
+def _step(kind: str, atoms: list[int], nodes: Sequence[Node]) -> Step:
+    targets = np.array(atoms, dtype=np.intp)
+    empty = np.zeros(0, dtype=np.intp)
+    if kind == "linear":
+        return _linear_step(targets, [nodes[k] for k in atoms])
+    arguments = np.array([_arguments(nodes[k]) for k in atoms], dtype=np.intp)
+    numbers = [float(str(nodes[k][2])) for k in atoms] if kind == "power" else []
+    right = arguments[:, 1] if kind == "product" else empty
+    return Step(kind, targets, arguments[:, 0], right, np.array(numbers), None)
+
+
+def _linear_step(targets: Ints, nodes: list[Node]) -> Step:
+    rows, columns, values = [], [], []
+    for row, (_, _, terms) in enumerate(nodes):
+        for atom, value in terms:  # type: ignore[attr-defined]
+            rows.append(row)
+            columns.append(atom)
+            values.append(value)
+    sources, local = np.unique(np.array(columns, dtype=np.intp), return_inverse=True)
+    shape = (len(nodes), len(sources))
+    matrix = sparse.csr_array((values, (rows, local)), shape=shape, dtype=np.float64)
+    constants = np.array([float(str(node[1])) for node in nodes])
+    return Step("linear", targets, sources.astype(np.intp), targets[:0], constants, matrix)
