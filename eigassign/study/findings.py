@@ -44,10 +44,24 @@ class Comparison:
         """Relative error in frequency of the partially linearised expansion."""
         return np.asarray(self.linearised_hz / self.exact_hz - 1.0)
 
+    @property
+    def worst_taylor(self) -> float:
+        """Largest magnitude of ``taylor_error``."""
+        return _worst(self.taylor_error)
+
+    @property
+    def worst_linearised(self) -> float:
+        """Largest magnitude of ``linearised_error``."""
+        return _worst(self.linearised_error)
+
+
+def _worst(errors: Floats) -> float:
+    return float(np.max(np.abs(errors), initial=0.0))
+
 
 @dataclass(frozen=True)
 class DesignMap:
-    """A comparison over one or two design parameters, the others at the expansion point."""
+    """A comparison over one or two entries of x = (q, y), the others at the expansion point."""
 
     names: tuple[str, ...]  # one or two
     units: tuple[str, ...]
@@ -65,6 +79,7 @@ class ModeStudy:
     y0: Floats
     over_time: Comparison | None  # (n_t,) along the trajectory, at the initial design
     over_design: DesignMap | None  # at q0
+    over_q: DesignMap | None = None  # at y0, over the range the trajectory travels
 
 
 @dataclass(frozen=True)
@@ -89,6 +104,15 @@ class ErrorRow:
 
 
 @dataclass(frozen=True)
+class ErrorSummary:
+    """The distance to the target before, as predicted by the expansion, and as it truly is."""
+
+    initial: ErrorRow
+    predicted: ErrorRow
+    exact: ErrorRow
+
+
+@dataclass(frozen=True)
 class TargetStudy:
     """One assigned mode along the trajectory (the paper's Figure 4); arrays (n_t,) in Hz."""
 
@@ -100,6 +124,11 @@ class TargetStudy:
     initial: ErrorRow
     predicted: ErrorRow
     exact: ErrorRow
+
+    @property
+    def error(self) -> ErrorSummary:
+        """The three errors of this target together."""
+        return ErrorSummary(self.initial, self.predicted, self.exact)
 
 
 @dataclass(frozen=True)
@@ -144,3 +173,35 @@ class Findings:
     warnings: tuple[str, ...]
     notes: tuple[str, ...]  # what was chosen and why, one line each
     timing_s: Mapping[str, float]
+
+    @property
+    def error(self) -> ErrorSummary | None:
+        """Over all targets: the largest maximum and the root of the mean square; None without."""
+        if not self.targets:
+            return None
+        return ErrorSummary(
+            _over_all([target.initial for target in self.targets]),
+            _over_all([target.predicted for target in self.targets]),
+            _over_all([target.exact for target in self.targets]),
+        )
+
+
+def _over_all(rows: list[ErrorRow]) -> ErrorRow:
+    """All targets are sampled at the same times, so their mean squares average."""
+    mean_square = sum(row.rms_relative**2 for row in rows) / len(rows)
+    return ErrorRow(max(row.max_relative for row in rows), float(np.sqrt(mean_square)))
+
+
+@dataclass(frozen=True)
+class ValidationRow:
+    """One line of a validation: both expansions of one mode against exact, somewhere."""
+
+    case: str
+    mode: int
+    order: int
+    where: str  # "trajectory", "box of q and y", ...
+    points: int
+    worst_taylor: float  # relative error in Hz, fraction
+    worst_linearised: float
+    limit: float
+    passed: bool
