@@ -1,0 +1,189 @@
+"""Build, solve, judge: the design that brings the frequencies nearest to their targets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from eigassign.assignment.active_set import polish
+from eigassign.assignment.certificate import ACCEPT, Candidate, Certificate, candidate, judge
+from eigassign.assignment.checks import Floats, finite, frozen
+from eigassign.assignment.conflict import contradiction, feasible_point, refuse_impossible
+from eigassign.assignment.program import (
+    Bounds,
+    Goal,
+    LinearConstraint,
+    QuadraticProgram,
+    build_program,
+)
+from eigassign.assignment.scales import ScaledProgram, scaled_program
+from eigassign.assignment.solve import RawSolution, solve_osqp
+from eigassign.errors import AccuracyError
+
+
+@dataclass(frozen=True)
+class ActiveLimit:
+    """A bound or constraint that the optimum lies on.
+
+    ``multiplier`` ≥ 0: how much J falls per unit by which the limit is relaxed (to first order), in
+    1 / SI unit of the parameter or of the constraint; 0 if relaxing it gains nothing.
+    """
+
+    name: str
+    kind: str  # "bound" | "constraint"
+    side: str  # "lower" | "upper"
+    multiplier: float
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """The optimal design and the proof that it is.
+
+    ``y`` and ``dy = y − y0`` (n_y,) in SI units; ``lam`` (n_goals, n_t) in rad²/s², predicted by
+    the linear models. J as in `program`: the mean square relative error in λ. Residuals are
+    recomputed and dimensionless (`certificate`), each at most 1e-8. ``undetermined`` counts the
+    directions of the free parameters that change no target: there the initial design is kept as
+    nearly as the limits allow (`active_set`).
+    """
+
+    names: tuple[str, ...]
+    y: Floats
+    dy: Floats
+    lam: Floats
+    status: str
+    iterations: int
+    primal_residual: float
+    dual_residual: float
+    gap: float
+    objective_initial: float
+    objective_optimal: float
+    active: tuple[ActiveLimit, ...]
+    undetermined: int
+
+
+def solve_assignment(
+    goals: Sequence[Goal],
+    time_s: ArrayLike,
+    y0: ArrayLike,
+    y_initial: ArrayLike,
+    bounds: Bounds,
+    constraints: Sequence[LinearConstraint] = (),
+    names: Sequence[str] | None = None,
+) -> Assignment:
+    """The design y within its limits that minimises J of eqs. (13)–(14), in relative error.
+
+    ``time_s`` (n_t,) in s; ``y0`` (n_y,) is the point dy counts from, ``y_initial`` (n_y,) the
+    design to improve on; ``names`` of the parameters (y1, y2, … if not given) serve messages and
+    the list of active limits.
+
+    Raises:
+        UsageError: shapes that do not fit, values that are not finite, empty ranges.
+        InfeasibleError: no design meets all limits; ``constraints`` names those that contradict.
+        AccuracyError: the KKT residuals of the best answer found exceed 1e-8.
+        KeyboardInterrupt: Ctrl-C while the solver runs.
+    """
+    program = build_program(goals, time_s, y0, y_initial, bounds, constraints, names)
+    refuse_impossible(program)
+    solution = _solve(program)
+    dy = solution.answer.y - program.y0
+    return Assignment(
+        names=program.names,
+        y=frozen(solution.answer.y),
+        dy=frozen(dy),
+        lam=frozen([goal.model(dy) for goal in goals]),
+        status=solution.status,
+        iterations=solution.iterations,
+        primal_residual=solution.certificate.primal_residual,
+        dual_residual=solution.certificate.dual_residual,
+        gap=solution.certificate.gap,
+        objective_initial=program.objective(finite("initial design", y_initial, 1)),
+        objective_optimal=program.objective(solution.answer.y),
+        active=tuple(_active_limits(program, solution.answer)),
+        undetermined=solution.undetermined,
+    )
+
+
+@dataclass(frozen=True)
+class _Solution:
+    answer: Candidate
+    certificate: Certificate
+    status: str
+    iterations: int
+    undetermined: int
+
+
+def _solve(program: QuadraticProgram) -> _Solution:
+    """OSQP, polished by the active-set method; the first of the two that the judge accepts."""
+    scaled = scaled_program(program)
+    n = len(program.scales.free)
+    if n == 0:
+        answer = candidate(program, scaled, np.zeros(0), np.zeros(scaled.G.shape[0]))
+        return _Solution(answer, _accept(judge(program, answer)), "nothing is free", 0, 0)
+    raw = solve_osqp(scaled)
+    polished = polish(scaled, _start(program, scaled, raw))
+    answers = [candidate(program, scaled, polished.x, polished.mu)]
+    if raw.x is not None and raw.mu is not None:
+        answers.append(candidate(program, scaled, raw.x, raw.mu))
+    answer, certificate = _better(program, answers)
+    return _Solution(answer, certificate, _status(raw), raw.iterations, n - polished.rank)
+
+
+def _start(program: QuadraticProgram, scaled: ScaledProgram, raw: RawSolution) -> Floats:
+    """OSQP's answer; without one any feasible point, or the proof that there is none."""
+    if raw.x is not None:
+        return raw.x
+    point = feasible_point(scaled)
+    if point is None:
+        raise contradiction(program, scaled)
+    return point
+
+
+def _better(
+    program: QuadraticProgram, answers: Sequence[Candidate]
+) -> tuple[Candidate, Certificate]:
+    """The first answer the judge accepts: the polished one also settles what is undetermined."""
+    judged = [(answer, judge(program, answer)) for answer in answers]
+    for answer, certificate in judged:
+        if certificate.accepted:
+            return answer, certificate
+    answer, certificate = min(judged, key=lambda pair: pair[1].worst)
+    return answer, _accept(certificate)
+
+
+def _accept(certificate: Certificate) -> Certificate:
+    """The certificate, or AccuracyError with its figures."""
+    if not certificate.accepted:
+        raise AccuracyError(
+            f"the quadratic program's best answer has residuals primal "
+            f"{certificate.primal_residual:.1e}, dual {certificate.dual_residual:.1e}, gap "
+            f"{certificate.gap:.1e} where {ACCEPT:.0e} is accepted; wider bounds, or constraints "
+            "further from contradicting each other, may help"
+        )
+    return certificate
+
+
+def _status(raw: RawSolution) -> str:
+    return raw.status.words if raw.x is not None else f"solved (active set; {raw.status.words})"
+
+
+def _active_limits(program: QuadraticProgram, answer: Candidate) -> Iterator[ActiveLimit]:
+    """Bounds met exactly, then constraints met to 1e-8 of their unit."""
+    for j, name in enumerate(program.names):
+        near = np.array([program.lower[j], program.upper[j]]) == answer.y[j]
+        yield from _limit(name, "bound", near, answer.bound_multipliers[j])
+    row, reach = program.C @ answer.y, ACCEPT * program.scales.rows
+    for k, name in enumerate(program.constraint_names):
+        near = np.abs(np.array([program.c_lower[k], program.c_upper[k]]) - row[k]) <= reach[k]
+        yield from _limit(name, "constraint", near, answer.constraint_multipliers[k])
+
+
+def _limit(
+    name: str, kind: str, near: NDArray[np.bool_], multiplier: float
+) -> Iterator[ActiveLimit]:
+    """One entry if a limit is met; of two equal limits the one that bears the multiplier."""
+    if near.any():
+        upper = bool(multiplier > 0.0) if near.all() else bool(near[1])
+        yield ActiveLimit(name, kind, "upper" if upper else "lower", abs(float(multiplier)))

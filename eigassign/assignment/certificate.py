@@ -1,0 +1,126 @@
+"""The judge: Karush–Kuhn–Tucker residuals of an answer, recomputed from the unscaled data.
+
+No solver is believed. With g = dJ/dy, multipliers μ of the bounds and ν of the constraints
+(positive at an upper limit, negative at a lower one), the answer is optimal exactly if
+
+    dual:   g + μ + Cᵀν = 0,
+    primal: all limits are met,
+    gap:    a limit with a multiplier is active.
+
+All three are dimensionless, in the units of `Scales`, and J is convex: with all three at zero no
+design within the limits has a smaller J.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from eigassign.assignment.checks import Floats
+from eigassign.assignment.program import QuadraticProgram
+from eigassign.assignment.scales import ScaledProgram
+
+ACCEPT = 1e-8
+SNAP = 1e-10  # of a parameter's unit: this near to a bound is on it (a hundredth of ACCEPT)
+ROUNDING = 4.0 * np.finfo(np.float64).eps
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A design y (n_y,) with signed multipliers of bounds (n_y,) and constraints (n_c,).
+
+    Multipliers are in J per SI unit of y or of the constraint: positive at the upper limit,
+    negative at the lower one.
+    """
+
+    y: Floats
+    bound_multipliers: Floats
+    constraint_multipliers: Floats
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Residuals of optimality, dimensionless.
+
+    primal: the largest violation, of a bound in units of the parameter's scale, of a constraint in
+    those of its row. dual: the largest |g + μ + Cᵀν| · scale / (2 · objective scale) over the free
+    parameters. gap: Σ |multiplier| · distance to its limit / (2 · objective scale).
+    """
+
+    primal_residual: float
+    dual_residual: float
+    gap: float
+
+    @property
+    def worst(self) -> float:
+        """The largest of the three; infinite if any is not a number."""
+        figures = (self.primal_residual, self.dual_residual, self.gap)
+        return max(figures) if np.all(np.isfinite(figures)) else np.inf
+
+    @property
+    def accepted(self) -> bool:
+        """All three within 1e-8."""
+        return self.worst <= ACCEPT
+
+
+def candidate(program: QuadraticProgram, scaled: ScaledProgram, x: Floats, mu: Floats) -> Candidate:
+    """Back to SI units: x (n,) and mu (rows of G,) of the scaled program."""
+    scales, free = program.scales, list(program.scales.free)
+    n = len(free)
+    mu = _possible(mu, scaled.lower, scaled.upper)
+    y = program.y_start.copy()
+    y[free] = _snapped(program, scaled, x)
+    nu = 2.0 * scales.objective * mu[n:] / scales.rows
+    bound = -(program.gradient(y) + program.C.T @ nu)  # what a fixed parameter's bounds bear
+    bound[free] = 2.0 * scales.objective * mu[:n] / scales.y[free]
+    return Candidate(y, bound, nu)
+
+
+def _possible(mu: Floats, lower: Floats, upper: Floats) -> Floats:
+    """Without the multipliers of limits that do not exist."""
+    missing = ((mu > 0.0) & np.isinf(upper)) | ((mu < 0.0) & np.isinf(lower))
+    return np.where(missing, 0.0, mu)
+
+
+def _snapped(program: QuadraticProgram, scaled: ScaledProgram, x: Floats) -> Floats:
+    """y of the free parameters, exactly on a bound where x is within rounding of it."""
+    free, n = list(program.scales.free), x.size
+    lower, upper = program.lower[free], program.upper[free]
+    y = np.clip(program.y_start[free] + program.scales.y[free] * x, lower, upper)
+    y = np.where(np.abs(x - scaled.lower[:n]) <= SNAP, lower, y)
+    return np.where(np.abs(x - scaled.upper[:n]) <= SNAP, upper, y)
+
+
+def judge(program: QuadraticProgram, answer: Candidate) -> Certificate:
+    """Residuals of ``answer``, from the program's unscaled data only."""
+    scales, free = program.scales, list(program.scales.free)
+    y, mu, nu = answer.y, answer.bound_multipliers, answer.constraint_multipliers
+    row = program.C @ y
+    rounding = ROUNDING * (np.abs(program.C) @ np.abs(y))  # what evaluating C y costs in float64
+    excess_row = _violation(row, program.c_lower, program.c_upper) - rounding
+    excess = _violation(y, program.lower, program.upper) / scales.y
+    stationarity = (program.gradient(y) + mu + program.C.T @ nu) * scales.y
+    gap = _slackness(y, mu, program.lower, program.upper)
+    gap += _slackness(row, nu, program.c_lower, program.c_upper)
+    return Certificate(
+        primal_residual=_largest(np.append(excess, excess_row / scales.rows)),
+        dual_residual=_largest(np.abs(stationarity[free])) / (2.0 * scales.objective),
+        gap=gap / (2.0 * scales.objective),
+    )
+
+
+def _largest(values: Floats) -> float:
+    return float(np.max(values, initial=0.0))
+
+
+def _violation(value: Floats, lower: Floats, upper: Floats) -> Floats:
+    """How far each value is outside its limits; 0 inside."""
+    return np.asarray(np.maximum(np.maximum(lower - value, value - upper), 0.0))
+
+
+def _slackness(value: Floats, multiplier: Floats, lower: Floats, upper: Floats) -> float:
+    """Σ |multiplier| · |value − the limit it belongs to|."""
+    bears = multiplier != 0.0
+    side = np.where(multiplier > 0.0, upper, lower)[bears]
+    return float(np.sum(np.abs(multiplier[bears] * (side - value[bears]))))

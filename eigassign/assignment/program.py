@@ -1,0 +1,230 @@
+"""The quadratic program of eqs. (13)–(14), in relative error.
+
+Along the trajectory the eigenvalue of target i is, to first order in the design (eq. (9)),
+
+    λ_i(t, y) = l0_i(t) + l_i(t)·(y − y0),         e_i(t, y) = λ_i(t, y) / λ_d,i(t) − 1,
+
+and what is minimised is the weighted mean square of the relative error in λ,
+
+    J(y) = Σ_i w_i ∫ e_i² dt / (Σ_i w_i · ∫ dt)                                [dimensionless]
+
+by the trapezoidal rule. √J is the rms relative error in λ: near the target, twice that in Hz.
+
+**Against the paper.** Eqs. (13)–(14) weigh the absolute error, R = ∫ l lᵀ dt and
+h = ∫ (l0 − λ_d) l dt. For one target constant in time λ_d is a common factor,
+
+    J = (dyᵀ R dy + 2 hᵀ dy + const) / (λ_d² ∫ dt),
+
+and both have the same solution. They differ where λ_d differs: the absolute error lets a mode (or
+an instant) of twice the target frequency weigh sixteen times as much, for no other reason than
+being fast; here 1 % is 1 % in every mode and at every instant, and ``weight`` alone says what
+matters more. `quadratic_form` gives R and h of either: of a model as it is, or divided by its
+target.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from eigassign.assignment.checks import Floats, finite, frozen, limit, same_length
+from eigassign.assignment.scales import Scales, choose_scales
+from eigassign.assignment.targets import lam_from_hz, positive_hz, trapezoidal_weights
+from eigassign.errors import UsageError
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """λ along the trajectory, λ = l0 + l @ (y − y0).
+
+    ``l0`` (n_t,) in rad²/s²; ``l`` (n_t, n_y) in rad²/s² per SI unit of y.
+    """
+
+    l0: Floats
+    l: Floats  # noqa: E741 - the paper's symbol
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "l0", finite("l0", self.l0, 1))
+        object.__setattr__(self, "l", finite("l", self.l, 2))
+        same_length("l", self.l.shape[0], self.l0.size, "samples in l0")
+
+    def __call__(self, dy: Floats) -> Floats:
+        """λ (n_t,) at y = y0 + dy."""
+        return np.asarray(self.l0 + self.l @ dy)
+
+    def relative_to(self, lam_d: ArrayLike) -> LinearModel:
+        """The same model divided by the target's λ_d (n_t,): dimensionless, target 1."""
+        divisor = np.asarray(lam_d, dtype=np.float64)
+        return LinearModel(self.l0 / divisor, self.l / divisor[:, np.newaxis])
+
+
+@dataclass(frozen=True)
+class Goal:
+    """One assigned mode: its model, its wanted frequency (n_t,) in Hz, and its weight (> 0)."""
+
+    model: LinearModel
+    target_hz: Floats
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "target_hz", positive_hz(self.target_hz))
+        same_length("target frequency", self.target_hz.size, self.model.l0.size, "samples in l0")
+        if not (np.isfinite(self.weight) and self.weight > 0.0):
+            raise UsageError(f"target weight: {self.weight} given; must be finite and above 0")
+
+    @property
+    def lam_d(self) -> Floats:
+        """λ_d (n_t,) in rad²/s²."""
+        return lam_from_hz(self.target_hz)
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """lower ≤ y ≤ upper, (n_y,) in SI units; infinite where there is none, equal where fixed."""
+
+    lower: Floats
+    upper: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "lower", limit("lower bounds", self.lower, 1))
+        object.__setattr__(self, "upper", limit("upper bounds", self.upper, 1))
+        same_length("upper bounds", self.upper.size, self.lower.size, "lower bounds")
+        empty = (self.lower > self.upper) | (self.lower == np.inf) | (self.upper == -np.inf)
+        if empty.any():
+            j = int(np.argmax(empty))
+            raise UsageError(
+                f"bounds: [{self.lower[j]}, {self.upper[j]}] of parameter {j} is empty"
+            )
+
+
+@dataclass(frozen=True)
+class LinearConstraint:
+    """lower ≤ coefficients @ y ≤ upper, on y itself (not on y − y0); (n_y,), SI units."""
+
+    name: str
+    coefficients: Floats
+    lower: float = -np.inf
+    upper: float = np.inf
+
+    def __post_init__(self) -> None:
+        what = f"constraint {self.name!r}"
+        object.__setattr__(self, "coefficients", finite(what, self.coefficients, 1))
+        low, high = limit(what, self.lower, 0), limit(what, self.upper, 0)
+        if low > high or low == np.inf or high == -np.inf:
+            raise UsageError(f"{what}: no number is between {self.lower} and {self.upper}")
+
+
+@dataclass(frozen=True)
+class QuadraticProgram:
+    """min J(y) = ‖A (y − y0) + b‖²,  lower ≤ y ≤ upper,  c_lower ≤ C y ≤ c_upper.
+
+    Everything in SI units; ``scales`` says in which dimensionless ones it is solved and judged.
+    A (n_rows, n_y) and b (n_rows,) hold one row for each target and sample, weights included.
+    ``y_start`` is the initial design put inside the bounds.
+    """
+
+    names: tuple[str, ...]
+    A: Floats
+    b: Floats
+    y0: Floats
+    y_start: Floats
+    lower: Floats
+    upper: Floats
+    constraint_names: tuple[str, ...]
+    C: Floats
+    c_lower: Floats
+    c_upper: Floats
+    scales: Scales = field(repr=False)
+
+    def objective(self, y: Floats) -> float:
+        """J(y), the weighted mean square of the relative error in λ."""
+        residual = self.A @ (y - self.y0) + self.b
+        return float(residual @ residual)
+
+    def gradient(self, y: Floats) -> Floats:
+        """dJ/dy (n_y,), per SI unit of y."""
+        return np.asarray(2.0 * self.A.T @ (self.A @ (y - self.y0) + self.b))
+
+
+def error_rows(model: LinearModel, lam_d: ArrayLike, weights: Floats) -> tuple[Floats, Floats]:
+    """Rows A = √ω l and b = √ω (l0 − λ_d), so that ∫ (λ − λ_d)² dt = ‖A dy + b‖²."""
+    root = np.sqrt(weights)
+    return root[:, np.newaxis] * model.l, root * (model.l0 - np.asarray(lam_d))
+
+
+def quadratic_form(model: LinearModel, lam_d: ArrayLike, weights: Floats) -> tuple[Floats, Floats]:
+    """R = ∫ l lᵀ dt (n_y, n_y) and h = ∫ (l0 − λ_d) l dt (n_y,) of eqs. (13)–(14).
+
+    ``weights`` (n_t,) are those of the integral (`trapezoidal_weights`), λ_d is (n_t,) or a number.
+    """
+    A, b = error_rows(model, lam_d, weights)
+    return frozen(A.T @ A), frozen(A.T @ b)
+
+
+def build_program(
+    goals: Sequence[Goal],
+    time_s: ArrayLike,
+    y0: ArrayLike,
+    y_initial: ArrayLike,
+    bounds: Bounds,
+    constraints: Sequence[LinearConstraint] = (),
+    names: Sequence[str] | None = None,
+) -> QuadraticProgram:
+    """The program of all goals over one trajectory; arguments as in `solve_assignment`.
+
+    Raises:
+        UsageError: shapes that do not fit each other, values that are not finite.
+    """
+    y0, start = finite("expansion point y0", y0, 1), finite("initial design", y_initial, 1)
+    names = tuple(f"y{j + 1}" for j in range(y0.size)) if names is None else tuple(names)
+    _require_sizes(goals, y0.size, start, bounds, constraints, names)
+    A, b = _relative_rows(goals, trapezoidal_weights(time_s))
+    start = np.clip(start, bounds.lower, bounds.upper)
+    C = np.array([c.coefficients for c in constraints]).reshape(len(constraints), y0.size)
+    return QuadraticProgram(
+        names=names,
+        A=frozen(A),
+        b=frozen(b),
+        y0=y0,
+        y_start=frozen(start),
+        lower=bounds.lower,
+        upper=bounds.upper,
+        constraint_names=tuple(c.name for c in constraints),
+        C=frozen(C),
+        c_lower=frozen([c.lower for c in constraints]),
+        c_upper=frozen([c.upper for c in constraints]),
+        scales=choose_scales(A, A @ (start - y0) + b, bounds.lower, bounds.upper, C, y0),
+    )
+
+
+def _relative_rows(goals: Sequence[Goal], time_weights: Floats) -> tuple[Floats, Floats]:
+    """A and b of J: relative error, mean over time, weighted mean over the goals."""
+    total = sum(goal.weight for goal in goals) * time_weights.sum()
+    rows = []
+    for goal in goals:
+        same_length("target model", goal.model.l0.size, time_weights.size, "samples in time")
+        share = frozen(goal.weight / total * time_weights)
+        rows.append(error_rows(goal.model.relative_to(goal.lam_d), 1.0, share))
+    return np.vstack([A for A, _ in rows]), np.concatenate([b for _, b in rows])
+
+
+def _require_sizes(
+    goals: Sequence[Goal],
+    n_y: int,
+    start: Floats,
+    bounds: Bounds,
+    constraints: Sequence[LinearConstraint],
+    names: tuple[str, ...],
+) -> None:
+    if not goals:
+        raise UsageError("targets: none given, so there is nothing to assign")
+    for goal in goals:
+        same_length("columns of l", goal.model.l.shape[1], n_y, "design parameters")
+    same_length("initial design", start.size, n_y, "design parameters")
+    same_length("bounds", bounds.lower.size, n_y, "design parameters")
+    same_length("names", len(names), n_y, "design parameters")
+    for c in constraints:
+        same_length(f"constraint {c.name!r}", c.coefficients.size, n_y, "design parameters")

@@ -1,0 +1,127 @@
+"""Targets sampled in time, time weights, and the distance to a target in Hz."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from eigassign.assignment.checks import Floats, finite, frozen, same_length
+from eigassign.errors import AccuracyError, UsageError
+
+
+@dataclass(frozen=True)
+class RelativeError:
+    """Distance to the target in Hz, relative to the target: fractions, 0.01 is 1 %."""
+
+    max_relative: float
+    rms_relative: float
+
+
+def trapezoidal_weights(time_s: ArrayLike) -> Floats:
+    """Weights (n_t,) in s with ``∫ g dt ≈ weights @ g`` by the trapezoidal rule.
+
+    The weight of sample k is (t_{k+1} − t_{k−1})/2, one-sided at both ends; samples need not be
+    evenly spaced. A single sample has weight 1: the integral becomes the value there.
+
+    Raises:
+        UsageError: no samples, a time that is not finite, or times that do not increase.
+    """
+    time = finite("time", time_s, 1)
+    if time.size == 0:
+        raise UsageError("time: no samples")
+    steps = np.diff(time)
+    if np.any(steps <= 0.0):
+        sample = int(np.argmax(steps <= 0.0)) + 1
+        raise UsageError(f"time: sample {sample} is not later than the one before it")
+    if time.size == 1:
+        return frozen([1.0])
+    return frozen(0.5 * (np.append(steps, 0.0) + np.append(0.0, steps)))
+
+
+def sample_target(
+    time_s: ArrayLike, frequency_hz: ArrayLike, knot_time_s: ArrayLike | None = None
+) -> Floats:
+    """The wanted frequency in Hz at the samples, (n_t,).
+
+    ``frequency_hz`` is one number, held throughout; or values at ``knot_time_s``, between which
+    the frequency in Hz runs linearly in time. Nothing is extrapolated.
+
+    Raises:
+        UsageError: a frequency that is not positive, knots that do not increase, or knots that do
+            not cover the samples.
+    """
+    time = finite("time", time_s, 1)
+    if knot_time_s is None:
+        return positive_hz(np.full(time.shape, float(finite("target frequency", frequency_hz, 0))))
+    knots = finite("target time", knot_time_s, 1)
+    values = positive_hz(frequency_hz)
+    same_length("target frequency", values.size, knots.size, "times")
+    trapezoidal_weights(knots)
+    _require_cover(knots, time)
+    return frozen(np.interp(time, knots, values))
+
+
+def positive_hz(frequency_hz: ArrayLike) -> Floats:
+    """A frozen (n,) copy of target frequencies in Hz, finite and above 0, or UsageError."""
+    values = finite("target frequency", frequency_hz, 1)
+    if np.any(values <= 0.0):
+        sample = int(np.argmax(values <= 0.0))
+        raise UsageError(f"target frequency: {values[sample]} Hz at {sample}; must be above 0 Hz")
+    return values
+
+
+def _require_cover(knots: Floats, time: Floats) -> None:
+    """The trajectory lies within the knots, but for the rounding of a time grid's end."""
+    slack = 1e-12 * max(abs(knots[0]), abs(knots[-1]))
+    if time.size and (time[0] < knots[0] - slack or time[-1] > knots[-1] + slack):
+        raise UsageError(
+            f"target time: {knots[0]:g} … {knots[-1]:g} s does not cover the trajectory's "
+            f"{time[0]:g} … {time[-1]:g} s"
+        )
+
+
+def lam_from_hz(frequency_hz: ArrayLike) -> Floats:
+    """λ = (2π f)² in rad²/s² of frequencies in Hz, same shape."""
+    return frozen((2.0 * np.pi * np.asarray(frequency_hz, dtype=np.float64)) ** 2)
+
+
+def hz_from_lam(lam: ArrayLike) -> Floats:
+    """f = √λ / 2π in Hz of λ in rad²/s², same shape.
+
+    Raises:
+        AccuracyError: a negative or non-finite λ. A mechanism has none, so the linear model that
+            predicted it was used too far from its expansion point.
+    """
+    values = np.asarray(lam, dtype=np.float64)
+    bad = np.argwhere(~(values >= 0.0) | ~np.isfinite(values))
+    if bad.size:
+        where = tuple(int(i) for i in bad[0])
+        raise AccuracyError(
+            f"the linear model predicts λ = {values[where]:.6g} rad²/s² at sample {list(where)}, "
+            "which no mechanism has: the design is too far from the expansion point"
+        )
+    return frozen(np.sqrt(values) / (2.0 * np.pi))
+
+
+def relative_error(
+    frequency_hz: ArrayLike, target_hz: ArrayLike, weights: ArrayLike | None = None
+) -> RelativeError:
+    """Largest and root mean square of e = f / f_d − 1 over the samples.
+
+    rms = √(Σ w e² / Σ w), with ``weights`` such as `trapezoidal_weights` (the mean over time) or,
+    if none, equal ones. All arguments (n_t,).
+
+    Raises:
+        UsageError: lengths that differ, no samples, values that are not finite, a target of 0 Hz.
+    """
+    frequency, target = finite("frequency", frequency_hz, 1), positive_hz(target_hz)
+    w = np.ones(target.size) if weights is None else finite("weights", weights, 1)
+    same_length("frequency", frequency.size, target.size, "target samples")
+    same_length("weights", w.size, target.size, "target samples")
+    if target.size == 0 or np.any(w < 0.0) or w.sum() <= 0.0:
+        raise UsageError("weights: must not be negative, and not all be zero")
+    error = frequency / target - 1.0
+    rms = float(np.sqrt(w @ error**2 / w.sum()))
+    return RelativeError(max_relative=float(np.max(np.abs(error))), rms_relative=rms)
