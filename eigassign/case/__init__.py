@@ -1,0 +1,66 @@
+"""YAML case file → validated, frozen, SI-valued objects; every error with file:line:column."""
+
+from eigassign.case.casefile import CaseFile
+from eigassign.case.json_schema import json_schema
+from eigassign.case.loading import load, parse
+from eigassign.case.mechanism_parts import (
+    BareSection,
+    Body,
+    CircleSection,
+    Coordinate,
+    Drive,
+    FixedJoint,
+    Joint,
+    Link,
+    Material,
+    Mechanism,
+    RectangleSection,
+    RevoluteJoint,
+    Section,
+    TubeSection,
+)
+from eigassign.case.study_parts import (
+    Constraint,
+    Design,
+    Expansion,
+    FileTrajectory,
+    FrequencyProfile,
+    Parameter,
+    SampledTrajectory,
+    Target,
+    TipTrajectory,
+    Trajectory,
+    Validation,
+)
+
+__all__ = [
+    "BareSection",
+    "Body",
+    "CaseFile",
+    "CircleSection",
+    "Constraint",
+    "Coordinate",
+    "Design",
+    "Drive",
+    "Expansion",
+    "FileTrajectory",
+    "FixedJoint",
+    "FrequencyProfile",
+    "Joint",
+    "Link",
+    "Material",
+    "Mechanism",
+    "Parameter",
+    "RectangleSection",
+    "RevoluteJoint",
+    "SampledTrajectory",
+    "Section",
+    "Target",
+    "TipTrajectory",
+    "Trajectory",
+    "TubeSection",
+    "Validation",
+    "json_schema",
+    "load",
+    "parse",
+]

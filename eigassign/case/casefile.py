@@ -1,0 +1,66 @@
+"""The case file as the rest of the program sees it: frozen, SI-valued, aware of its lines."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from eigassign.case.document import Document
+from eigassign.case.mechanism_parts import Coordinate, Mechanism
+from eigassign.case.study_parts import Design, Expansion, Target, Trajectory, Validation
+from eigassign.case.yaml_reader import KeyPath, Mark, dotted
+from eigassign.errors import Problem
+
+_STEP = re.compile(r"\[(\d+)\]|([^.\[\]]+)")
+
+
+@dataclass(frozen=True)
+class CaseFile:
+    """One validated case. Two are equal when their content is, wherever they were read from.
+
+    ``path`` and ``sha256`` identify the file and its bytes; ``warnings`` are plausibility problems
+    that do not keep the case from being run.
+    """
+
+    title: str
+    reference: str | None
+    mechanism: Mechanism
+    coordinates: Mapping[str, Coordinate]
+    trajectory: Trajectory | None
+    design: Design
+    expansion: Expansion
+    targets: tuple[Target, ...]
+    validation: Validation
+    path: Path = field(compare=False)
+    sha256: str = field(compare=False)
+    warnings: tuple[Problem, ...] = field(compare=False)
+    marks: Mark = field(compare=False, repr=False)
+
+    def problem(self, key_path: str, message: str) -> Problem:
+        """Problem at the line and column of ``key_path`` (``mechanism.links.forearm.length``,
+        ``targets[0].mode``), or of the nearest key above it that the file has."""
+        path = undotted(key_path)
+        mark = self.marks.find(path)
+        return Problem(str(self.path), mark.line, mark.column, dotted(path), message)
+
+    def resolved(self) -> str:
+        """The case as canonical YAML: SI values, defaults filled in; reads back equal."""
+        from eigassign.case.resolved import to_yaml
+
+        names = Document.model_fields
+        return to_yaml({name: getattr(self, name) for name in names})
+
+    @staticmethod
+    def json_schema() -> dict[str, Any]:
+        """JSON Schema (2020-12) of case files, for editors and documentation."""
+        from eigassign.case.json_schema import json_schema
+
+        return json_schema()
+
+
+def undotted(text: str) -> KeyPath:
+    """``"targets[0].mode"`` → ``("targets", 0, "mode")``."""
+    return tuple(int(i) if i else name for i, name in _STEP.findall(text))

@@ -1,0 +1,186 @@
+"""The whole case file as one pydantic model, and its errors as readable findings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, get_args, get_origin
+
+from pydantic import Field, ValidationError
+
+from eigassign.case.mechanism_parts import JOINTS, SHAPES, Coordinate, Drive, Mechanism
+from eigassign.case.quantity import Frozen, FrozenDict, Part, Quantity
+from eigassign.case.study_parts import (
+    Design,
+    Expansion,
+    FileTrajectory,
+    FrequencyProfile,
+    SampledTrajectory,
+    Target,
+    TipTrajectory,
+    Trajectory,
+    Validation,
+)
+from eigassign.case.suggest import listed, shown, suggestion, unknown
+from eigassign.case.yaml_reader import Finding, KeyPath
+
+
+class Document(Part):
+    """Everything a case file may hold."""
+
+    title: Annotated[str, Field(min_length=1)]
+    reference: str | None = None
+    mechanism: Mechanism
+    coordinates: Annotated[Mapping[str, Coordinate], Frozen] = FrozenDict()
+    trajectory: Trajectory | None = None
+    design: Design = Design.model_construct()
+    expansion: Expansion = Expansion.model_construct()
+    targets: tuple[Target, ...] = ()
+    validation: Validation = Validation.model_construct()
+
+
+_TAGGED: dict[object, type[Part]] = {
+    **{f"<{name}>": model for name, model in (SHAPES | JOINTS).items()},
+    "<drive>": Drive,
+    "<tip>": TipTrajectory,
+    "<file>": FileTrajectory,
+    "<samples>": SampledTrajectory,
+    "<profile>": FrequencyProfile,
+}
+_LEAF_TAGS = {"<word>", "<one>", "<list>", "<constant>"}
+_TAGS = _LEAF_TAGS | set(_TAGGED)
+
+
+def validated(tree: Mapping[str, object]) -> tuple[Document | None, list[Finding]]:
+    """The document, or None and everything the schema has against it."""
+    try:
+        return Document.model_validate(tree), []
+    except ValidationError as error:
+        details = error.errors(include_url=False)
+        return None, [_finding(e) for e in details]
+
+
+def _finding(error: Any) -> Finding:
+    path = tuple(p for p in error["loc"] if p not in _TAGS and p != "[key]")
+    if path[:2] in (("design", "parameters"),):
+        path = (path[0], *path[2:])  # in the file the parameters stand directly under `design`
+    explain = _EXPLAIN.get(error["type"], _by_message)
+    suffix, message = explain(error)
+    return (*path, *suffix), message
+
+
+_Explained = tuple[KeyPath, str]  # keys to append to the path, message
+
+
+def _by_message(error: Any) -> _Explained:
+    return (), f"{error['msg']}, got {shown(error['input'])}"
+
+
+def _missing(error: Any) -> _Explained:
+    *parent, key = error["loc"]
+    field = _model_at(parent).model_fields[key]
+    kinds = [m.dimension for m in field.metadata if isinstance(m, Quantity) and m.dimension]
+    return (), "required key is missing" + "".join(f": {kind}" for kind in kinds)
+
+
+def _extra(error: Any) -> _Explained:
+    *parent, key = error["loc"]
+    known = _model_at(parent).model_fields
+    if tuple(parent) == ("design",):
+        known = {}
+    return (), f"unknown key{suggestion(key, known)}; allowed: {listed(known)}"
+
+
+def _model_at(loc: Any) -> type[Part]:
+    """Model whose keys stand at ``loc`` (a pydantic location, union tags included)."""
+    model: type[Part] = Document
+    in_container = False
+    for item in loc:
+        if in_container:
+            in_container = False
+        elif item in _TAGGED:
+            model = _TAGGED[item]
+        else:
+            annotation = model.model_fields[item].annotation
+            in_container = get_origin(annotation) in (Mapping, tuple)
+            model = next(_parts_in(annotation), model)
+    return model
+
+
+def _parts_in(annotation: object) -> Iterator[type[Part]]:
+    if isinstance(annotation, type) and issubclass(annotation, Part):
+        yield annotation
+    for argument in get_args(annotation):
+        yield from _parts_in(argument)
+
+
+def _choice(key: str, known: Mapping[str, object]) -> Any:
+    def explain(error: Any) -> _Explained:
+        if not isinstance(error["input"], Mapping):
+            return (), f"expected a mapping, got {shown(error['input'])}"
+        if key not in error["input"]:
+            return (key,), f"required key is missing: one of {listed(known)}"
+        value = error["input"][key]
+        if not isinstance(value, str):
+            return (key,), f"expected one of {listed(known)}, got {shown(value)}"
+        return (key,), unknown(key, value, known)
+
+    return explain
+
+
+def _motion(error: Any) -> _Explained:
+    if not isinstance(error["input"], Mapping):
+        return (), f"expected a mapping, got {shown(error['input'])}"
+    return (), (
+        "expected one of the keys tip (path of a link's end), q (joint samples) or file (CSV); "
+        f"got {listed(error['input'])}"
+    )
+
+
+def _expected(what: str) -> Any:
+    def explain(error: Any) -> _Explained:
+        return (), f"expected {what}, got {shown(error['input'])}"
+
+    return explain
+
+
+def _literal(error: Any) -> _Explained:
+    expected = error["ctx"]["expected"]
+    value = error["input"]
+    words = expected.replace("'", "").replace(" or ", ", ").split(", ")
+    also = {"<word>": ", or {stiffness: ...}", "<one>": ", or a list"}.get(error["loc"][-1], "")
+    hint = suggestion(value, words) if isinstance(value, str) else ""
+    return (), f"expected {expected}{also}, got {shown(value)}{hint}"
+
+
+_MAPPING = _expected("a mapping (key: value)")
+_LIST = _expected("a list")
+_EXPLAIN: dict[str, Any] = {
+    "quantity": lambda e: ((), e["ctx"]["text"]),
+    "at_key": lambda e: (e["ctx"]["keys"], e["ctx"]["text"]),
+    "missing": _missing,
+    "extra_forbidden": _extra,
+    "choice:shape": _choice("shape", SHAPES),
+    "choice:type": _choice("type", JOINTS),
+    "choice:motion": _motion,
+    "literal_error": _literal,
+    "model_type": _MAPPING,
+    "model_attributes_type": _MAPPING,
+    "dict_type": _MAPPING,
+    "mapping_type": _MAPPING,
+    "is_instance_of": _MAPPING,
+    "tuple_type": _LIST,
+    "int_type": _expected("a whole number"),
+    "int_from_float": _expected("a whole number"),
+    "string_type": _expected("text (in quotes if need be)"),
+    "string_too_short": _expected("some text"),
+    "too_short": lambda e: (
+        (),
+        f"needs at least {e['ctx']['min_length']} entries, got {e['ctx']['actual_length']}",
+    ),
+    "too_long": lambda e: (
+        (),
+        f"takes at most {e['ctx']['max_length']} entries, got {e['ctx']['actual_length']}",
+    ),
+    "greater_than_equal": lambda e: ((), f"must be >= {e['ctx']['ge']}, got {shown(e['input'])}"),
+    "less_than_equal": lambda e: ((), f"must be <= {e['ctx']['le']}, got {shown(e['input'])}"),
+}

@@ -1,0 +1,85 @@
+"""Path → CaseFile: read, put into SI, check against the schema and itself; or every problem."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+from collections.abc import Iterable
+from pathlib import Path
+
+from eigassign.case.casefile import CaseFile
+from eigassign.case.context import in_context
+from eigassign.case.document import Document, validated
+from eigassign.case.plausibility import implausible
+from eigassign.case.references import inconsistent
+from eigassign.case.yaml_reader import MAX_BYTES, Finding, Source, read_yaml
+from eigassign.errors import CaseError, Problem, StorageError, UsageError
+
+MOST_PROBLEMS = 100
+
+
+def load(path: str | Path) -> CaseFile:
+    """The case file at ``path``.
+
+    Raises CaseError with every problem of the file, UsageError if ``path`` is not a file, and
+    StorageError if it cannot be read.
+    """
+    return parse(_bytes_of(Path(path)), Path(path))
+
+
+def parse(data: bytes, path: str | Path) -> CaseFile:
+    """The case file with content ``data``; ``path`` names it and anchors relative paths in it."""
+    source = _read(data, Path(path))
+    tree, unit_findings = in_context(source.tree, Path(path).parent)
+    document, schema_findings = validated(tree)
+    findings = [*unit_findings, *schema_findings, *inconsistent(source.tree)]
+    problems = _unique([*source.problems, *(source.problem(*f) for f in findings)])
+    if problems or document is None:
+        raise CaseError(_capped(problems))
+    return _case_file(document, source, data, Path(path))
+
+
+def _read(data: bytes, path: Path) -> Source:
+    try:
+        return read_yaml(data, str(path))
+    except CaseError as error:
+        raise CaseError(_capped(list(error.problems))) from None
+
+
+def _case_file(document: Document, source: Source, data: bytes, path: Path) -> CaseFile:
+    content = {name: getattr(document, name) for name in Document.model_fields}
+    warnings = _located(implausible(document, source.tree), source)
+    digest = hashlib.sha256(data).hexdigest()
+    return CaseFile(**content, path=path, sha256=digest, warnings=warnings, marks=source.marks)
+
+
+def _located(findings: Iterable[Finding], source: Source) -> tuple[Problem, ...]:
+    problems = [source.problem(*finding) for finding in findings]
+    return tuple(sorted(problems, key=lambda p: (p.line, p.column, p.path)))
+
+
+def _unique(problems: list[Problem]) -> list[Problem]:
+    return list(dict.fromkeys(problems))
+
+
+def _capped(problems: list[Problem]) -> tuple[Problem, ...]:
+    if len(problems) <= MOST_PROBLEMS:
+        return tuple(problems)
+    first = sorted(problems, key=lambda p: (p.line, p.column))[:MOST_PROBLEMS]
+    last = first[-1]
+    more = f"… and {len(problems) - MOST_PROBLEMS} more problems below"
+    return (*first, Problem(last.file, last.line, last.column + 1, "", more))
+
+
+def _bytes_of(path: Path) -> bytes:
+    try:
+        if not stat.S_ISREG(os.stat(path).st_mode):
+            what = "a folder" if path.is_dir() else "not a regular file"
+            raise UsageError(f"{path}: expected a case file, but it is {what}")
+        with open(path, "rb") as file:
+            return file.read(MAX_BYTES + 1)
+    except (FileNotFoundError, NotADirectoryError, ValueError):
+        raise UsageError(f"{path}: no such case file") from None
+    except OSError as error:
+        raise StorageError(f"{path}: cannot be read: {error.strerror}") from error

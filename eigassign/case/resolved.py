@@ -1,0 +1,74 @@
+"""A case's content → canonical YAML 1.2 text that reads back equal."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from eigassign.case.mechanism_parts import FixedJoint, RevoluteJoint
+from eigassign.case.quantity import Part
+from eigassign.case.study_parts import Design
+from eigassign.case.yaml_reader import resolve
+
+_PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
+_WIDTH = 90
+
+
+def to_yaml(content: Mapping[str, object]) -> str:
+    """Block style for what is long, flow style for what fits on a line; None is left out."""
+    return "".join(_entry(key, plain(value), 0) for key, value in content.items())
+
+
+def plain(value: object) -> object:
+    """Objects → mappings, lists, numbers and text, in the shape of the file."""
+    if isinstance(value, Design):
+        apart = {"constraints": value.constraints} if value.constraints else {}
+        return plain({**value.parameters, **apart})
+    if isinstance(value, Part):
+        fields = {name: getattr(value, name) for name in type(value).model_fields}
+        if isinstance(value, (RevoluteJoint, FixedJoint)) and value.base != "ground":
+            del fields["position"]
+        return plain(fields)
+    if isinstance(value, Mapping):
+        return {key: plain(inner) for key, inner in value.items() if inner is not None}
+    if isinstance(value, (tuple, list)):
+        return [plain(inner) for inner in value]
+    return value
+
+
+def _entry(key: str, value: object, depth: int) -> str:
+    """One ``key: value`` of a block mapping."""
+    pad = "  " * depth
+    flow = _flow(value)
+    fits = len(pad) + len(key) + 2 + len(flow) <= _WIDTH
+    if value is None or value in ({}, []):
+        return f"{pad}{_word(key)}: {flow}\n" if value is not None else ""
+    if isinstance(value, dict) and not (fits and depth):
+        inner = "".join(_entry(k, v, depth + 1) for k, v in value.items())
+        return f"{pad}{_word(key)}:\n{inner}"
+    if isinstance(value, list) and not fits:
+        return f"{pad}{_word(key)}:\n" + "".join(f"{pad}  - {_flow(v)}\n" for v in value)
+    return f"{pad}{_word(key)}: {flow}\n"
+
+
+def _flow(value: object) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_word(k)}: {_flow(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(_flow(v) for v in value) + "]"
+    return _word(value) if isinstance(value, str) else repr(value)
+
+
+def _word(text: str) -> str:
+    """``text`` as it is where YAML reads it back as text, else in double quotes."""
+    if _PLAIN.fullmatch(text) and resolve(text) == text:
+        return text
+    return '"' + "".join(_escaped(c) for c in text) + '"'
+
+
+def _escaped(c: str) -> str:
+    if c in '"\\':
+        return "\\" + c
+    if c.isprintable():
+        return c
+    return f"\\U{ord(c):08x}"

@@ -1,0 +1,201 @@
+"""The keys behind the mechanism: `trajectory`, `design`, `expansion`, `targets`, `validation`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from eigassign.case.mechanism_parts import ANGLE, Point
+from eigassign.case.quantity import Frozen, FrozenDict, Part, Quantity, quantity, wrong
+
+DURATION = quantity("time", above=0)
+TIME = quantity("time")
+FREQUENCY = quantity("frequency", above=0)
+Q_VALUE = Quantity(elsewhere="angle (in rad when bare; or deg), or length, as its coordinate")
+Q_SPAN = Quantity(at_least=0, elsewhere=Q_VALUE.elsewhere)
+Y_VALUE = Quantity(elsewhere="quantity of the parameter's dimension (SI when bare)")
+Times: TypeAlias = Annotated[tuple[Annotated[float, TIME], ...], Field(min_length=2)]
+Coordinates: TypeAlias = tuple[Annotated[float, Q_VALUE], ...]
+Parameters: TypeAlias = tuple[Annotated[float, Y_VALUE], ...]
+Mode: TypeAlias = Annotated[int, Field(ge=1, le=1000)]
+Modes: TypeAlias = Annotated[tuple[Mode, ...], Field(min_length=1)]
+
+
+def _increasing(time: tuple[float, ...]) -> None:
+    for k, (before, after) in enumerate(pairwise(time), 1):
+        if after <= before:
+            raise wrong(f"time must increase: {after:g} s after {before:g} s", "time", k)
+
+
+class SampledTrajectory(Part):
+    """Joint samples: q (n_samples, n_q); `time` (s), or `duration` (s) for equal steps from 0."""
+
+    q: Annotated[tuple[Coordinates, ...], Field(min_length=2)]
+    time: Times | None = None
+    duration: Annotated[float, DURATION] | None = None
+
+    @model_validator(mode="after")
+    def _has_one_clock(self) -> SampledTrajectory:
+        if (self.time is None) == (self.duration is None):
+            raise wrong("give either time (one per sample) or duration, and not both")
+        if self.time is not None and len(self.time) != len(self.q):
+            raise wrong(f"{len(self.time)} times for {len(self.q)} samples of q", "time")
+        _increasing(self.time or ())
+        return self
+
+
+class FileTrajectory(Part):
+    """Joint samples in a CSV file: columns `time` (s) and one per coordinate (rad, or [deg])."""
+
+    file: str
+
+
+class TipTrajectory(Part):
+    """A path of a link's end through waypoints (m), with timing law, duration (s) and samples.
+
+    `branch` keeps relative joint angles within [low, high] (rad, modulo 2π); `start` is an optional
+    first guess of q.
+    """
+
+    tip: str
+    waypoints: Annotated[tuple[Point, ...], Field(min_length=2)]
+    path: Literal["spline", "straight"] = "spline"
+    timing: Literal["quintic", "cubic", "linear"] = "quintic"
+    duration: Annotated[float, DURATION] = 1.0
+    samples: Annotated[int, Field(ge=2, le=100_000)] = 101
+    branch: Annotated[
+        Mapping[str, tuple[Annotated[float, ANGLE], Annotated[float, ANGLE]]], Frozen
+    ] = FrozenDict()
+    start: Coordinates | None = None
+
+    @model_validator(mode="after")
+    def _goes_somewhere(self) -> TipTrajectory:
+        for k, (a, b) in enumerate(pairwise(self.waypoints), 1):
+            if a == b:
+                raise wrong("the same point as the one before it", "waypoints", k)
+        for joint, (low, high) in self.branch.items():
+            if not low < high:
+                raise wrong(f"low must be below high, got [{low:g}, {high:g}]", "branch", joint)
+            if high - low > 2 * math.pi:
+                message = "wider than one turn (an angle is in rad when bare; or write deg)"
+                raise wrong(message, "branch", joint)
+        return self
+
+
+def _trajectory_tag(value: object) -> str | None:
+    keys = value if isinstance(value, Mapping) else getattr(type(value), "model_fields", {})
+    tags = {"tip": "<tip>", "file": "<file>", "q": "<samples>"}
+    return next((tag for key, tag in tags.items() if key in keys), None)
+
+
+Trajectory: TypeAlias = Annotated[
+    Annotated[TipTrajectory, Tag("<tip>")]
+    | Annotated[FileTrajectory, Tag("<file>")]
+    | Annotated[SampledTrajectory, Tag("<samples>")],
+    Discriminator(_trajectory_tag, custom_error_type="choice:motion", custom_error_message="-"),
+]
+
+
+class Parameter(Part):
+    """One design parameter y: path of a numeric property, and its bounds in SI units."""
+
+    parameter: str
+    min: Annotated[float, Y_VALUE]
+    max: Annotated[float, Y_VALUE]
+
+    @model_validator(mode="after")
+    def _has_room(self) -> Parameter:
+        if self.min > self.max:
+            raise wrong(f"min {self.min:g} is above max {self.max:g} (SI units)", "min")
+        return self
+
+
+class Constraint(Part):
+    """min ≤ Σ coefficient · y ≤ max over the named design parameters."""
+
+    terms: Annotated[Mapping[str, Annotated[float, Quantity()]], Field(min_length=1), Frozen]
+    min: Annotated[float, Y_VALUE] | None = None
+    max: Annotated[float, Y_VALUE] | None = None
+
+    @model_validator(mode="after")
+    def _binds(self) -> Constraint:
+        if self.min is None and self.max is None:
+            raise wrong("a constraint needs min, max or both")
+        if self.min is not None and self.max is not None and self.min > self.max:
+            raise wrong(f"min {self.min:g} is above max {self.max:g} (SI units)", "min")
+        if not any(self.terms.values()):
+            raise wrong("all coefficients are zero", "terms")
+        return self
+
+
+class Design(Part):
+    """Design parameters y in the order of the file, and linear constraints between them."""
+
+    parameters: Annotated[Mapping[str, Parameter], Frozen] = FrozenDict()
+    constraints: Annotated[Mapping[str, Constraint], Frozen] = FrozenDict()
+
+
+def _list_tag(value: object) -> str:
+    return "<list>" if isinstance(value, (tuple, list)) else "<one>"
+
+
+_Auto: TypeAlias = Annotated[Literal["auto"], Tag("<one>")]
+_WORD_OR_LIST = Discriminator(_list_tag)
+
+
+class Expansion(Part):
+    """Order of the power series, its point (q, y), and the modes expanded; or `auto`."""
+
+    order: Annotated[int, Field(ge=1, le=20)] = 4
+    q: Annotated[_Auto | Annotated[Coordinates, Tag("<list>")], _WORD_OR_LIST] = "auto"
+    y: Annotated[_Auto | Annotated[Parameters, Tag("<list>")], _WORD_OR_LIST] = "auto"
+    modes: Annotated[_Auto | Annotated[Modes, Tag("<list>")], _WORD_OR_LIST] = "auto"
+
+
+class FrequencyProfile(Part):
+    """A wanted frequency (Hz) that changes in time (s), linear between the points given."""
+
+    time: Times
+    frequency: Annotated[tuple[Annotated[float, FREQUENCY], ...], Field(min_length=2)]
+
+    @model_validator(mode="after")
+    def _is_a_function(self) -> FrequencyProfile:
+        if len(self.time) != len(self.frequency):
+            raise wrong(f"{len(self.time)} times for {len(self.frequency)} frequencies", "time")
+        _increasing(self.time)
+        return self
+
+
+def _frequency_tag(value: object) -> str:
+    return "<profile>" if isinstance(value, (Mapping, FrequencyProfile)) else "<constant>"
+
+
+class Target(Part):
+    """Wanted frequency (Hz) of one elastic mode (1 is the lowest), and its weight."""
+
+    mode: Mode
+    frequency: Annotated[
+        Annotated[Annotated[float, FREQUENCY], Tag("<constant>")]
+        | Annotated[FrequencyProfile, Tag("<profile>")],
+        Discriminator(_frequency_tag),
+    ]
+    weight: Annotated[float, Quantity(above=0)] = 1.0
+
+
+class Validation(Part):
+    """How far from exact is too far (fraction), and the box in q that is sampled at random."""
+
+    max_error: Annotated[float, quantity("fraction", above=0)] = 0.02
+    q_span: (
+        Annotated[
+            Annotated[Annotated[float, Q_SPAN], Tag("<one>")]
+            | Annotated[tuple[Annotated[float, Q_SPAN], ...], Tag("<list>")],
+            Discriminator(_list_tag),
+        ]
+        | None
+    ) = None
+    samples: Annotated[int, Field(ge=1, le=1_000_000)] = 200

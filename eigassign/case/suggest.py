@@ -1,0 +1,45 @@
+"""Small words for error messages: what was found, and what was probably meant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+_LONGEST = 60
+_MOST_NAMES = 20
+
+
+def shown(value: object) -> str:
+    """A value as the file would write it, cut short."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Mapping):
+        return "a mapping"
+    if isinstance(value, (tuple, list)):
+        return "a list"
+    if isinstance(value, int) and abs(value) >= 10**_LONGEST:
+        return "a number of more than 60 digits"
+    text = repr(value)
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """``"; did you mean 'x'?"`` when something known is close, else nothing."""
+    from difflib import get_close_matches  # only needed once something is wrong
+
+    close = get_close_matches(name[:_LONGEST], list(known), n=1, cutoff=0.6)
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names for a message, at most twenty of them."""
+    all_names = list(names)
+    more = ", …" if len(all_names) > _MOST_NAMES else ""
+    return ", ".join(all_names[:_MOST_NAMES]) + more if all_names else "none"
+
+
+def unknown(kind: str, name: str, known: Iterable[str]) -> str:
+    """Sentence for a name that does not exist: closest match, and all that do exist."""
+    names = list(known)
+    return f"unknown {kind} {shown(name)}{suggestion(name, names)}; known: {listed(names)}"

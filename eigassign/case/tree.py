@@ -1,0 +1,42 @@
+"""Looking into a file's plain data before anything about it is known to be right."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+Tree = Mapping[str, object]
+
+
+def at(node: object, *keys: str) -> object:
+    """Value below ``keys``, or None where there is no such key."""
+    for key in keys:
+        node = node.get(key) if isinstance(node, Mapping) else None
+    return node
+
+
+def items(node: object, *keys: str) -> list[tuple[str, object]]:
+    """Entries of the mapping below ``keys``; none if it is not a mapping."""
+    inner = at(node, *keys)
+    return list(inner.items()) if isinstance(inner, Mapping) else []
+
+
+def names(node: object, *keys: str) -> list[str]:
+    """Keys of the mapping below ``keys``."""
+    return [name for name, _ in items(node, *keys)]
+
+
+def entries(node: object, *keys: str) -> tuple[object, ...]:
+    """Items of the list below ``keys``; none if it is not a list."""
+    inner = at(node, *keys)
+    return inner if isinstance(inner, tuple) else ()
+
+
+def text(node: object, *keys: str) -> str | None:
+    """Text below ``keys``, or None."""
+    inner = at(node, *keys)
+    return inner if isinstance(inner, str) else None
+
+
+def parameters(tree: object) -> list[tuple[str, object]]:
+    """Design parameters as the file has them: what stands under `design` but the constraints."""
+    return [(name, body) for name, body in items(tree, "design") if name != "constraints"]

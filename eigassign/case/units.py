@@ -1,0 +1,238 @@
+"""Quantities as people write them (`30 mm`, `69 GPa`, `104.1 deg`) → SI numbers, dimension-checked.
+
+A bare number is SI already. Angles and cycles are dimensions of their own, so that nothing converts
+between rad/s, 1/s and Hz silently: 5 rpm is neither 5 Hz nor 0.52 Hz here, it is an error.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from eigassign.case.suggest import shown, suggestion
+
+Exponents = tuple[int, int, int, int, int]  # of kg, m, s, rad, cycle
+
+
+class QuantityError(ValueError):
+    """A quantity that cannot be read; the message says what was expected and what was found."""
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """A physical dimension: its name, its SI unit, and other units worth mentioning."""
+
+    name: str
+    exponents: Exponents
+    si: str
+    examples: str
+
+    def __str__(self) -> str:
+        unit = f"in {self.si}" if self.si else "a plain number"
+        return f"{self.name} ({unit} when bare; or {self.examples})"
+
+
+@dataclass(frozen=True)
+class Unit:
+    """``factor = numerator / denominator · π^pi`` SI units; integers keep the rounding to one."""
+
+    numerator: int
+    denominator: int
+    pi: int
+    exponents: Exponents
+
+    def power(self, n: int) -> Unit:
+        """Unit to the integer power ``n``."""
+        top, bottom = (self.numerator, self.denominator)[:: 1 if n > 0 else -1]
+        k = tuple(n * e for e in self.exponents)
+        return Unit(top ** abs(n), bottom ** abs(n), n * self.pi, (k[0], k[1], k[2], k[3], k[4]))
+
+    def times(self, other: Unit) -> Unit:
+        """Product of two units, in lowest terms."""
+        top = self.numerator * other.numerator
+        bottom = self.denominator * other.denominator
+        k = tuple(a + b for a, b in zip(self.exponents, other.exponents, strict=True))
+        g = math.gcd(top, bottom)
+        pi = self.pi + other.pi
+        return Unit(top // g, bottom // g, pi, (k[0], k[1], k[2], k[3], k[4]))
+
+    def to_si(self, value: float) -> float:
+        """Value in SI, one rounding unless π is involved."""
+        return value * self.numerator / self.denominator * math.pi**self.pi
+
+
+_DIMENSIONS = (
+    Dimension("length", (0, 1, 0, 0, 0), "m", "mm, cm, km"),
+    Dimension("area", (0, 2, 0, 0, 0), "m2", "mm2, cm2"),
+    Dimension("second moment of area", (0, 4, 0, 0, 0), "m4", "mm4, cm4"),
+    Dimension("mass", (1, 0, 0, 0, 0), "kg", "g, t"),
+    Dimension("density", (1, -3, 0, 0, 0), "kg/m3", "g/cm3"),
+    Dimension("rotary inertia", (1, 2, 0, 0, 0), "kg m2", "g cm2, kg mm2"),
+    Dimension("pressure or modulus", (1, -1, -2, 0, 0), "Pa", "MPa, GPa, N/mm2"),
+    Dimension("angle", (0, 0, 0, 1, 0), "rad", "deg, mrad"),
+    Dimension("rotational stiffness", (1, 2, -2, -1, 0), "N m/rad", "kN m/rad, N m/deg"),
+    Dimension("time", (0, 0, 1, 0, 0), "s", "ms, min"),
+    Dimension("frequency", (0, 0, -1, 0, 1), "Hz", "kHz"),
+    Dimension("fraction", (0, 0, 0, 0, 0), "", "%"),
+    # never asked for; known so that a mistake can be called by its name
+    Dimension("angular rate", (0, 0, -1, 1, 0), "rad/s", "deg/s"),
+    Dimension("force", (1, 1, -2, 0, 0), "N", "kN"),
+    Dimension("torque or energy", (1, 2, -2, 0, 0), "N m", "kN m"),
+    Dimension("stiffness", (1, 0, -2, 0, 0), "N/m", "N/mm"),
+    Dimension("velocity", (0, 1, -1, 0, 0), "m/s", "mm/s"),
+    Dimension("volume", (0, 3, 0, 0, 0), "m3", "cm3"),
+    Dimension("mass per length", (1, -1, 0, 0, 0), "kg/m", "g/mm"),
+)
+DIMENSIONS = {d.name: d for d in _DIMENSIONS}
+_BY_EXPONENTS = {d.exponents: d for d in _DIMENSIONS}
+
+_KG: Exponents = (1, 0, 0, 0, 0)
+_M: Exponents = (0, 1, 0, 0, 0)
+_S: Exponents = (0, 0, 1, 0, 0)
+_RAD: Exponents = (0, 0, 0, 1, 0)
+_N: Exponents = (1, 1, -2, 0, 0)
+_PA: Exponents = (1, -1, -2, 0, 0)
+_HZ: Exponents = (0, 0, -1, 0, 1)
+UNITS: dict[str, Unit] = {
+    "nm": Unit(1, 10**9, 0, _M),
+    "um": Unit(1, 10**6, 0, _M),
+    "µm": Unit(1, 10**6, 0, _M),  # micro sign
+    "μm": Unit(1, 10**6, 0, _M),  # Greek mu
+    "mm": Unit(1, 1000, 0, _M),
+    "cm": Unit(1, 100, 0, _M),
+    "m": Unit(1, 1, 0, _M),
+    "km": Unit(1000, 1, 0, _M),
+    "mg": Unit(1, 10**6, 0, _KG),
+    "g": Unit(1, 1000, 0, _KG),
+    "kg": Unit(1, 1, 0, _KG),
+    "t": Unit(1000, 1, 0, _KG),
+    "us": Unit(1, 10**6, 0, _S),
+    "µs": Unit(1, 10**6, 0, _S),
+    "μs": Unit(1, 10**6, 0, _S),
+    "ms": Unit(1, 1000, 0, _S),
+    "s": Unit(1, 1, 0, _S),
+    "min": Unit(60, 1, 0, _S),
+    "h": Unit(3600, 1, 0, _S),
+    "mN": Unit(1, 1000, 0, _N),
+    "N": Unit(1, 1, 0, _N),
+    "kN": Unit(1000, 1, 0, _N),
+    "MN": Unit(10**6, 1, 0, _N),
+    "Pa": Unit(1, 1, 0, _PA),
+    "kPa": Unit(1000, 1, 0, _PA),
+    "MPa": Unit(10**6, 1, 0, _PA),
+    "GPa": Unit(10**9, 1, 0, _PA),
+    "TPa": Unit(10**12, 1, 0, _PA),
+    "mHz": Unit(1, 1000, 0, _HZ),
+    "Hz": Unit(1, 1, 0, _HZ),
+    "kHz": Unit(1000, 1, 0, _HZ),
+    "MHz": Unit(10**6, 1, 0, _HZ),
+    "mrad": Unit(1, 1000, 0, _RAD),
+    "rad": Unit(1, 1, 0, _RAD),
+    "deg": Unit(1, 180, 1, _RAD),
+    "°": Unit(1, 180, 1, _RAD),
+    "%": Unit(1, 100, 0, (0, 0, 0, 0, 0)),
+}
+_RPM = (
+    "rpm is a rate of rotation and is not converted: write the frequency you mean in Hz "
+    "(one cycle per turn would be rpm / 60)"
+)
+
+_NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+_FACTOR = re.compile(r"([^\W\d_]+|[%°])(?:(?:\^|\*\*)?([-+]?[1-9]))?")
+_SUPERSCRIPTS = str.maketrans("⁻¹²³⁴⁵⁶⁷⁸⁹", "-123456789")
+_LONGEST = 60  # characters of a quantity; keeps the integers of a nonsense unit small
+
+
+def read(value: object, dimension: Dimension | None) -> float:
+    """``value`` (number, or text with a unit) in SI units of ``dimension``.
+
+    ``None`` as dimension: whatever unit is written is accepted (used where an error elsewhere has
+    left the dimension unknown). Raises QuantityError for anything that is not a finite quantity.
+    """
+    if isinstance(value, str):
+        number, unit = _split(value, dimension)
+        si = _checked(value, unit, dimension).to_si(number) if unit else number
+    elif isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise QuantityError(f"{_expected(dimension)}, got {shown(value)}")
+    else:
+        si = _to_float(value)
+    if not math.isfinite(si):
+        raise QuantityError(f"must be a finite number, got {shown(value)}")
+    return si
+
+
+def _expected(dimension: Dimension | None) -> str:
+    if dimension is None:
+        return "expected a number"
+    article = "an" if dimension.name[0] in "aeiou" else "a"
+    return f"expected {article} {dimension}"
+
+
+def _to_float(value: int | float) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
+def _split(text: str, dimension: Dimension | None) -> tuple[float, str]:
+    """``"30 mm"`` → ``(30.0, "mm")``."""
+    stripped = text.strip()
+    match = _NUMBER.match(stripped)
+    if match is None or len(stripped) > _LONGEST:
+        raise QuantityError(f"{_expected(dimension)}, got text {shown(text)}")
+    rest = stripped[match.end() :].strip()
+    if re.match(r",\d", rest):
+        raise QuantityError(f"decimals take a point, not a comma: {shown(text)}")
+    return _to_float(float(match.group())), rest
+
+
+def _checked(text: str, unit_text: str, dimension: Dimension | None) -> Unit:
+    unit = parse_unit(unit_text, dimension)
+    if dimension is None or unit.exponents == dimension.exponents:
+        return unit
+    found = _BY_EXPONENTS.get(unit.exponents)
+    name = found.name if found else f"of dimension {_spelt(unit.exponents)}"
+    hint = ""
+    if dimension.name == "frequency" and name == "angular rate":
+        hint = "; an angular rate is never converted silently: divide by 2π and write Hz"
+    raise QuantityError(f"{_expected(dimension)}, got {shown(text)}, which is {name}{hint}")
+
+
+def _spelt(exponents: Exponents) -> str:
+    names = zip(("kg", "m", "s", "rad", "cycle"), exponents, strict=True)
+    return " ".join(f"{n}^{e}" for n, e in names if e) or "1"
+
+
+def parse_unit(text: str, dimension: Dimension | None = None) -> Unit:
+    """Unit of ``factor [factor...][/factor...]``: `N m/rad`, `kg/m3`, `cm^2`, `g·cm²`.
+
+    Every ``/`` divides by the one factor behind it; a product behind a slash is refused, since
+    people read `kg/m s` in two ways. Raises QuantityError.
+    """
+    over, *under = (part.strip() for part in text.translate(_SUPERSCRIPTS).split("/"))
+    factors = [(f, 1) for f in re.split(r"(?<!\*)\*(?!\*)|[\s·⋅]+", over)] + [
+        (f, -1) for f in under
+    ]
+    product = Unit(1, 1, 0, (0, 0, 0, 0, 0))
+    for factor, sign in factors:
+        product = product.times(_factor(factor, text, dimension).power(sign))
+    return product
+
+
+def _factor(factor: str, text: str, dimension: Dimension | None) -> Unit:
+    match = _FACTOR.fullmatch(factor)
+    symbol = match.group(1) if match else factor
+    if match is None or symbol not in UNITS:
+        raise QuantityError(_unknown(symbol, text, dimension))
+    return UNITS[symbol].power(int(match.group(2) or 1))
+
+
+def _unknown(symbol: str, text: str, dimension: Dimension | None) -> str:
+    if symbol.lower() in {"rpm", "rev", "u"}:
+        return _RPM
+    folded = {u.lower(): u for u in UNITS}.get(symbol.lower())
+    hint = f"; did you mean {folded!r}?" if folded else suggestion(symbol, UNITS)
+    allowed = f"; {_expected(dimension)}" if dimension else ""
+    return f"unknown unit {shown(symbol or text)}{hint}{allowed}"
