@@ -1,5 +1,30 @@
 """Assign the natural frequencies of moving, flexible mechanisms along their trajectory."""
 
-from eigassign._version import __version__
+from __future__ import annotations
 
-__all__ = ["__version__"]
+from typing import TYPE_CHECKING, Any
+
+from eigassign._version import __version__
+from eigassign.errors import CaseError, EigassignError
+
+if TYPE_CHECKING:
+    from eigassign.api import Case, assign, expand, load_case
+
+__all__ = [
+    "Case",
+    "CaseError",
+    "EigassignError",
+    "__version__",
+    "assign",
+    "expand",
+    "load_case",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the Python face on first use, so that ``eigassign --help`` is instant."""
+    if name in __all__:
+        from eigassign import api
+
+        return getattr(api, name)
+    raise AttributeError(f"module 'eigassign' has no attribute {name!r}")

@@ -81,9 +81,7 @@ class Accumulator:
         if not self.rows:
             none = np.zeros(0, dtype=np.intp)
             return none, none, none, np.zeros(0)
-        rows, columns, atoms = (
-            np.concatenate(a) for a in (self.rows, self.columns, self.atoms)
-        )
+        rows, columns, atoms = (np.concatenate(a) for a in (self.rows, self.columns, self.atoms))
         return rows, columns, atoms, np.concatenate(self.values)
 
 
@@ -115,9 +113,7 @@ def _add_elastic(target: Accumulator, term: Term, link: LocalLink) -> None:
     for slave, masters in link.carried.items():
         beside = (j == slave) & (own[i] >= 0)
         for column, carry in masters:
-            target.add_symmetric(
-                term.coefficient * carry, own[i[beside]], column, values[beside]
-            )
+            target.add_symmetric(term.coefficient * carry, own[i[beside]], column, values[beside])
     between = (own[i] < 0) & (own[j] < 0)
     for a, b, value in zip(i[between], j[between], values[between], strict=True):
         for row, left in link.carried.get(int(a), ()):
@@ -135,9 +131,7 @@ def _add_rigid_elastic(target: Accumulator, term: Term, link: LocalLink, n_u: in
             rows = np.flatnonzero((column != 0.0) & (link.own >= 0))
             for k, rate in enumerate(row):
                 if isinstance(rate, Expression) or rate != 0.0:
-                    _add_twist_column(
-                        target, coefficient * rate, link, column, rows, n_u + k
-                    )
+                    _add_twist_column(target, coefficient * rate, link, column, rows, n_u + k)
 
 
 def _add_twist_column(

@@ -113,7 +113,9 @@ def _repeat(n: int, element: Floats) -> sparse.csr_array:
     shift = PLANAR * np.arange(n)[:, None]
     size = PLANAR * (n + 1)
     values = np.tile(element[i, j], n)
-    return sparse.csr_array((values, ((shift + i).ravel(), (shift + j).ravel())), shape=(size, size))
+    return sparse.csr_array(
+        (values, ((shift + i).ravel(), (shift + j).ravel())), shape=(size, size)
+    )
 
 
 def _diagonal(n: int, positions: tuple[int, ...]) -> sparse.csr_array:

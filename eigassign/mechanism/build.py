@@ -66,9 +66,7 @@ def _carry(placement: Placement, nodes: NodeDofs) -> dict[int, list[tuple[int, S
     return {a: _combine(planar[a], base) for a in range(PLANAR)}
 
 
-def _combine(
-    row: list[Scalar], base: list[list[tuple[int, Scalar]]]
-) -> list[tuple[int, Scalar]]:
+def _combine(row: list[Scalar], base: list[list[tuple[int, Scalar]]]) -> list[tuple[int, Scalar]]:
     """Σ_b row_b × (combination of masters of base dof b)."""
     total: dict[int, Scalar] = {}
     for factor, masters in zip(row, base, strict=True):
@@ -181,6 +179,7 @@ def _compile(
         program=compile_program(parameters.recorder, atoms.tolist(), n_q + n_y),
         to_program=to_program,
         shift=np.concatenate([motion.offset, np.zeros(n_y)]),
+        n_q=n_q,
     )
 
 

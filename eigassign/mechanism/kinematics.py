@@ -65,9 +65,7 @@ def kinematics(case: CaseFile, parameters: Parameters) -> Kinematics:
     """Walk the tree of joints from the ground; raises MechanismError for a link out of reach."""
     order = _tree_order(case)
     relative, offset = _relative_coordinates(case, order)
-    columns = tuple(
-        i for i, c in enumerate(case.coordinates.values()) if c.drive != "locked"
-    )
+    columns = tuple(i for i, c in enumerate(case.coordinates.values()) if c.drive != "locked")
     rates = _joint_rates(relative, columns)
     placed: dict[str, Placement] = {}
     for joint in order:
@@ -114,7 +112,7 @@ def _coordinate_of(case: CaseFile, joint: str) -> int | None:
 
 
 def _relative_coordinates(case: CaseFile, order: list[str]) -> tuple[Floats, Floats]:
-    """s = A q + b: an absolute angle minus the absolute angle of the base and the mounting angle."""
+    """s = A q + b: absolute angle minus the base's absolute angle and the mounting angle."""
     n = len(case.coordinates)
     relative, offset = np.zeros((n, n)), np.zeros(n)
     absolute: dict[str, tuple[Floats, float]] = {"ground": (np.zeros(n), 0.0)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,3 +41,17 @@ def parameters(case: CaseFile) -> Parameters:
         for k, parameter in enumerate(case.design.parameters.values())
     }
     return Parameters(recorder, coordinates, design, by_path)
+
+
+def initial_design(case: CaseFile) -> Floats:
+    """y as the mechanism is written in the file, (n_y,) in SI units."""
+    paths = [p.parameter for p in case.design.parameters.values()]
+    return np.array([_value(case, path) for path in paths], dtype=np.float64)
+
+
+def _value(case: CaseFile, path: str) -> float:
+    head, name, *fields = path.split(".")
+    value: Any = case.coordinates[name] if head == "coordinates" else getattr(case.mechanism, head)[name]
+    for field_name in fields:
+        value = getattr(value, field_name)
+    return float(value)

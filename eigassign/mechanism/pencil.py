@@ -39,6 +39,7 @@ class Pencil:
     program: Program
     to_program: Floats  # (n_z, n_x)
     shift: Floats  # (n_z,)
+    n_q: int
 
     @property
     def n_theta(self) -> int:

@@ -95,8 +95,12 @@ class Expression:
     def __pow__(self, exponent: float) -> Scalar:
         if exponent == 1.0:
             return self
-        if exponent in (2.0, 3.0, 4.0):
-            return self * self if exponent == 2.0 else self * self ** (exponent - 1.0)
+        if exponent == 2.0:
+            return self * self
+        if exponent == 3.0:
+            return self * (self * self)
+        if exponent == 4.0:
+            return (self * self) ** 2.0
         factor, atom = self.single()
         if factor < 0.0 and exponent != int(exponent):
             return self._recorded() ** exponent

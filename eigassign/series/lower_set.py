@@ -75,7 +75,7 @@ class LowerSet:
         return keys, keys[order], order.astype(np.intp)
 
     def find(self, indices: NDArray[np.int64]) -> Ints:
-        """Position of every row of ``indices`` (k, n) in the set, or -1 where it is not a member."""
+        """Position of every row of ``indices`` (k, n) in the set, -1 where it is not a member."""
         rows = np.asarray(indices, dtype=np.int64).reshape(-1, self.n_variables)
         found = self._lookup(_hash(rows))
         wrong = (self.indices[found] != rows).any(axis=1)
@@ -171,7 +171,9 @@ def weighted_degree(weights: tuple[float, ...], order: float) -> LowerSet:
     members = [np.zeros((1, 0), dtype=np.int64)]
     for i, weight in enumerate(weights):
         top = int(np.floor(order / weight + 1e-9))
-        grown = [np.hstack([members[-1], np.full((len(members[-1]), 1), k)]) for k in range(top + 1)]
+        grown = [
+            np.hstack([members[-1], np.full((len(members[-1]), 1), k)]) for k in range(top + 1)
+        ]
         rows = np.vstack(grown)
         members.append(rows[rows @ np.array(weights[: i + 1]) <= order + 1e-9])
     return lower_set(members[-1])

@@ -70,7 +70,9 @@ def monomials(space: LowerSet, x: Floats) -> Floats:
     for variable in range(space.n_variables):
         exponents = space.indices[:, variable]
         powers = np.ones((len(x), int(exponents.max()) + 1))
-        np.cumprod(np.broadcast_to(x[:, [variable]], powers[:, 1:].shape), axis=1, out=powers[:, 1:])
+        np.cumprod(
+            np.broadcast_to(x[:, [variable]], powers[:, 1:].shape), axis=1, out=powers[:, 1:]
+        )
         result *= powers[:, exponents]
     return result
 

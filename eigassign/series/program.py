@@ -17,7 +17,13 @@ from scipy import sparse
 from eigassign.errors import UsageError
 from eigassign.series.expression import Node, Recorder
 from eigassign.series.lower_set import LowerSet
-from eigassign.series.power_series import compose, cosine_taylor, multiply, power_taylor, sine_taylor
+from eigassign.series.power_series import (
+    compose,
+    cosine_taylor,
+    multiply,
+    power_taylor,
+    sine_taylor,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

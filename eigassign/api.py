@@ -1,0 +1,119 @@
+"""The Python face: a case with its model, and the functions notebooks use (README, "Python")."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from eigassign.case import CaseFile, load
+from eigassign.errors import CaseError, MechanismError
+from eigassign.mechanism.build import build_pencil
+from eigassign.mechanism.kinematics import kinematics
+from eigassign.mechanism.parameters import initial_design, parameters
+from eigassign.mechanism.poses import build_poses, tip_chain
+from eigassign.mechanism.trajectory import Trajectory, build_trajectory
+from eigassign.modal import expansion as modal_expansion
+from eigassign.modal.expansion import Expansion
+from eigassign.modal.model import Model
+from eigassign.series.lower_set import LowerSet
+
+if TYPE_CHECKING:
+    from eigassign.run import Result
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A validated case file with what is built from it; frozen."""
+
+    file: CaseFile
+
+    def model(self) -> Model:
+        """The affine ERLS pencil of the mechanism, with exact frequencies."""
+        return self._model
+
+    @cached_property
+    def _model(self) -> Model:
+        with self.located():
+            numbers = parameters(self.file)
+            motion = kinematics(self.file, numbers)
+            pencil = build_pencil(self.file, numbers, motion)
+            poses = build_poses(self.file, numbers, motion)
+        return Model(pencil, poses, motion, numbers.coordinates, numbers.design)
+
+    @cached_property
+    def initial_design(self) -> Floats:
+        """y as the mechanism is written in the file, (n_y,) in SI units."""
+        return initial_design(self.file)
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """q(t); raises CaseError where the case has none or it cannot be followed."""
+        spec, model = self.file.trajectory, self.model()
+        if spec is None:
+            raise CaseError((self.file.problem("trajectory", "is needed here and missing"),))
+        with self.located():
+            self._refuse_moving_lengths()
+            return build_trajectory(
+                spec,
+                model.q_names,
+                lambda tip: tip_chain(model.poses, model.motion, tip, self.initial_design),
+                self.file.path.parent,
+            )
+
+    def _refuse_moving_lengths(self) -> None:
+        """A tip path moves q(t) when a length is designed: not modelled, so refused by name."""
+        tip = getattr(self.file.trajectory, "tip", None)
+        for name, parameter in self.file.design.parameters.items():
+            if tip is not None and parameter.parameter.endswith(".length"):
+                raise MechanismError(
+                    f"design.{name}.parameter",
+                    "a length changes the joint angles of a tip path; give joint samples instead",
+                )
+
+    @contextmanager
+    def located(self) -> Iterator[None]:
+        """Show an error of the mechanism at its line of the case file."""
+        try:
+            yield
+        except MechanismError as error:
+            raise CaseError((self.file.problem(error.path, error.message),)) from error
+
+
+def load_case(path: str | Path) -> Case:
+    """Read and validate a case file; raises CaseError with every problem found."""
+    return Case(load(Path(path)))
+
+
+def expand(
+    model: Model,
+    q0: ArrayLike,
+    y0: ArrayLike,
+    modes: Sequence[int] = (1,),
+    order: int = 4,
+    linear_in_y: bool = False,
+    space: LowerSet | None = None,
+    vector_order: int | None = None,
+) -> Expansion:
+    """Taylor expansion of the eigenvalues of ``modes`` about (q0, y0), eqs. (4)-(9).
+
+    See :func:`eigassign.modal.expansion.expand`.
+    """
+    return modal_expansion.expand(
+        model.pencil, q0, y0, modes, order, linear_in_y, space, vector_order
+    )
+
+
+def assign(case: Case) -> Result:
+    """The whole job of ``eigassign optimize``, without writing anything."""
+    from eigassign.run import solve_case
+
+    return solve_case(case)

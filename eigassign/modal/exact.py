@@ -1,0 +1,128 @@
+"""Exact elastic modes of the affine pencil, the rigid-body modes projected out exactly.
+
+With E the elastic unknowns (u and held coordinates) and F the free coordinates, K = diag(K_E, 0):
+
+    K_E φ_E = λ M_c φ_E,   M_c = M_EE − M_EF M_FF⁻¹ M_FE,   φ_F = −M_FF⁻¹ M_FE φ_E
+
+solved in the inverse form M_c z = μ K_E z, μ = 1/λ, so that massless unknowns (μ = 0) are harmless.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.errors import AccuracyError, MechanismError, UsageError
+from eigassign.mechanism.pencil import Pencil
+
+Floats = NDArray[np.float64]
+DENSE_LIMIT = 250  # n_dof up to which a batch of dense solves is faster than one sparse solve each
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Eigenvalues λ (n_samples, count) in rad²/s² and modes φ (n_samples, n_dof, count).
+
+    φᵀMφ = I at every sample; the entry of largest magnitude of every mode is positive.
+    """
+
+    lam: Floats
+    phi: Floats
+
+
+def eigenvalues(pencil: Pencil, x: Floats, count: int) -> Floats:
+    """λ (n_samples, count) of the lowest elastic modes at x (n_samples, n_x), in rad²/s².
+
+    Raises UsageError for more modes than there are, MechanismError where K_E or M_FF is singular.
+    """
+    return _solve(pencil, x, count, vectors=False).lam
+
+
+def modes(pencil: Pencil, x: Floats, count: int) -> Modes:
+    """Eigenvalues and mass-normalised modes of the lowest elastic modes."""
+    return _solve(pencil, x, count, vectors=True)
+
+
+def _solve(pencil: Pencil, x: Floats, count: int, vectors: bool) -> Modes:
+    elastic = pencil.n_dof - len(pencil.rigid)
+    if not 1 <= count <= elastic:
+        raise UsageError(f"{count} modes asked for; the model has 1 to {elastic} elastic ones")
+    theta = pencil.theta(x)
+    if not np.isfinite(theta).all():
+        raise UsageError("q or y is not finite, or outside the domain of a section or length")
+    if pencil.n_dof <= DENSE_LIMIT:
+        found = _dense(pencil, theta, count, vectors)
+    else:
+        from eigassign.modal.exact_sparse import solve_sparse
+
+        found = Modes(*solve_sparse(pencil, theta, count, vectors))
+    if not np.isfinite(found.lam).all():
+        raise MechanismError(
+            "mechanism", f"has fewer than {count} modes with mass: give it mass or ask for fewer"
+        )
+    return found
+
+
+def _dense(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
+    K, M = pencil.matrices(theta)
+    elastic = np.setdiff1d(np.arange(pencil.n_dof), pencil.rigid)
+    K_E = K[:, elastic[:, None], elastic]
+    coupling, M_c = condense(M, elastic, pencil.rigid)
+    L = _cholesky(K_E)
+    half = np.linalg.solve(L, M_c)
+    A = np.linalg.solve(L, np.swapaxes(half, 1, 2))
+    A = 0.5 * (A + np.swapaxes(A, 1, 2))
+    if not vectors:
+        mu = np.asarray(np.linalg.eigvalsh(A)[:, ::-1][:, :count], dtype=np.float64)
+        return Modes(_inverse(mu), np.zeros((len(mu), 0, count)))
+    mu, v = (a[..., ::-1][..., :count] for a in np.linalg.eigh(A))
+    z = np.linalg.solve(np.swapaxes(L, 1, 2), v) / np.sqrt(np.maximum(mu, 1e-300))[:, None, :]
+    phi = np.empty((len(mu), pencil.n_dof, count))
+    phi[:, elastic] = z
+    phi[:, pencil.rigid] = -coupling @ z
+    return Modes(_inverse(mu), _signed(phi))
+
+
+def condense(
+    M: Floats, elastic: NDArray[np.intp], rigid: NDArray[np.intp]
+) -> tuple[Floats, Floats]:
+    """M_FF⁻¹ M_FE and M_c = M_EE − M_EF M_FF⁻¹ M_FE for a batch of M (n_samples, n, n)."""
+    M_EE = M[:, elastic[:, None], elastic]
+    if not len(rigid):
+        return np.zeros((len(M), 0, len(elastic))), M_EE
+    M_FE, M_FF = M[:, rigid[:, None], elastic], M[:, rigid[:, None], rigid]
+    try:
+        np.linalg.cholesky(M_FF)
+        coupling = np.linalg.solve(M_FF, M_FE)
+    except np.linalg.LinAlgError as error:
+        raise MechanismError(
+            "mechanism", "a free coordinate moves no mass: give the mechanism mass or lock it"
+        ) from error
+    return np.asarray(coupling, dtype=np.float64), M_EE - np.swapaxes(M_FE, 1, 2) @ coupling
+
+
+def _cholesky(K: Floats) -> Floats:
+    try:
+        return np.asarray(np.linalg.cholesky(K), dtype=np.float64)
+    except np.linalg.LinAlgError as error:
+        raise MechanismError(
+            "mechanism", "the stiffness matrix is not positive definite: a link or drive is limp"
+        ) from error
+
+
+def _inverse(mu: Floats) -> Floats:
+    """λ = 1/μ, infinite where no mass moves; a clearly negative μ means an indefinite mass."""
+    scale = np.abs(mu).max(axis=1, keepdims=True)
+    if (mu < -1e-9 * scale).any():
+        raise AccuracyError("the mass matrix is not positive semidefinite")
+    with np.errstate(divide="ignore"):
+        return np.where(mu > 1e-15 * scale, 1.0 / np.maximum(mu, 1e-300), np.inf)
+
+
+def _signed(phi: Floats) -> Floats:
+    """Each mode with its entry of largest magnitude positive."""
+    at = np.abs(phi).argmax(axis=1)
+    largest = np.take_along_axis(phi, at[:, None, :], axis=1)
+    return np.asarray(phi * np.where(largest < 0.0, -1.0, 1.0))

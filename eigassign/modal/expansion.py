@@ -1,0 +1,296 @@
+"""The multivariate Taylor expansion of eigenvalues about x0 = (q0, y0) (eqs. (4)-(9)).
+
+The expansion is carried out in local variables w: the relative joint coordinates and design
+parameters on which anything depends, with w = V (x − x0). A coordinate that nothing depends on is
+dropped by construction; coefficients over (q, y) follow by substituting V (x − x0).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from eigassign.errors import UsageError
+from eigassign.mechanism.pencil import Pencil
+from eigassign.modal.exact import modes as exact_modes
+from eigassign.modal.rayleigh import eigenvalue_series, vector_members
+from eigassign.modal.recursion import expand_subspace
+from eigassign.modal.samples import samples
+from eigassign.modal.substitution import substitute
+from eigassign.series.lower_set import LowerSet, partially_linear, total_degree
+from eigassign.series.power_series import monomials
+
+Floats = NDArray[np.float64]
+CLUSTER_GAP = 0.02  # modes closer than this (relative in λ) are expanded together
+MAX_ORDER = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Cluster:
+    """Λ(w) (r, r, N) of the neighbouring ``modes``; r = 1 is a single eigenvalue."""
+
+    modes: tuple[int, ...]
+    coefficients: Floats  # rad²/s² over units of w
+
+
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """Taylor expansion of the eigenvalues of ``modes`` about (q0, y0); immutable."""
+
+    modes: tuple[int, ...]
+    clusters: tuple[Cluster, ...]
+    q0: Floats
+    y0: Floats
+    space: LowerSet  # over w
+    directions: Floats  # V (n_w, n_x): w = V (x − x0)
+    n_linear: int  # the last n_linear of w enter at most linearly, 0 for a full expansion
+    kept: Floats  # (n_x,): 1 where the variable matters
+    vectors: tuple[Floats, ...]  # per cluster, (N_H, n_dof, r)
+    vector_space: LowerSet
+    notes: tuple[str, ...]
+
+    def eigenvalues(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """λ (n_samples, n_modes) in rad²/s²; q (n_samples, n_q) or (n_q,), y likewise."""
+        w = (samples(q, y, len(self.q0), len(self.y0)) - self.x0) @ self.directions.T
+        powers = monomials(self.space, w)
+        return np.hstack([_evaluate(c, powers, self.modes) for c in self.clusters])
+
+    def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """f = √λ/2π in Hz, (n_samples, n_modes); NaN where the polynomial is negative."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.sqrt(self.eigenvalues(q, y)) / (2.0 * np.pi))
+
+    def linear_in_design(self, q: ArrayLike) -> tuple[Floats, Floats]:
+        """l_0 (n_samples, n_modes) and l (n_samples, n_modes, n_y) of eq. (9) at samples of q.
+
+        λ ≈ l_0(q) + Σ_j l_j(q) (y_j − y0_j), rad²/s² over units of y: the terms |β| ≤ 1.
+        """
+        w = (samples(q, self.y0, len(self.q0), len(self.y0)) - self.x0) @ self.directions.T
+        return _linear_part(self, monomials(self.space, w), w)
+
+    @property
+    def x0(self) -> Floats:
+        """(q0, y0)."""
+        return np.concatenate([self.q0, self.y0])
+
+    @property
+    def order(self) -> int:
+        """Total degree p of the expansion."""
+        return self.space.order
+
+    @property
+    def indices(self) -> NDArray[np.int64]:
+        """Multi-indices γ (n_coefficients, n_q + n_y) over (q, y)."""
+        return self._over_x[0].indices
+
+    @property
+    def coefficients(self) -> Floats:
+        """λ_γ = ∂^γ λ(x0)/γ! (n_modes, n_coefficients), rad²/s² over units of x.
+
+        Raises UsageError for clusters of several modes: a single eigenvalue has no series there;
+        ``clusters`` has the series of the small matrix whose eigenvalues they are.
+        """
+        together = [c.modes for c in self.clusters if len(c.modes) > 1]
+        if together:
+            raise UsageError(f"modes {together[0]} are expanded as a cluster: see .clusters")
+        return self._over_x[1]
+
+    @cached_property
+    def _over_x(self) -> tuple[LowerSet, Floats]:
+        singles = [c.coefficients[0, 0] for c in self.clusters if len(c.modes) == 1]
+        stacked = np.array(singles).reshape(-1, len(self.space))
+        x_space, values = substitute(
+            self.space, stacked, self.directions, len(self.q0), self.n_linear
+        )
+        values.setflags(write=False)
+        return x_space, values
+
+
+def _evaluate(cluster: Cluster, powers: Floats, wanted: tuple[int, ...]) -> Floats:
+    columns = [k for k, mode in enumerate(cluster.modes) if mode in wanted]
+    if len(cluster.modes) == 1:
+        return np.asarray((powers @ cluster.coefficients[0, 0])[:, None])
+    matrices = np.tensordot(powers, cluster.coefficients, axes=(1, 2))
+    return np.asarray(np.linalg.eigvalsh(matrices)[:, columns])
+
+
+def _linear_part(expansion: Expansion, powers: Floats, w: Floats) -> tuple[Floats, Floats]:
+    """Value and ∂/∂y at y = y0 of every mode, from the members with |β| = 0 and 1."""
+    space, n_q, n_y = expansion.space, len(expansion.q0), len(expansion.y0)
+    l0 = np.hstack([_evaluate(c, powers, expansion.modes) for c in expansion.clusters])
+    slopes = np.zeros((len(w), l0.shape[1], n_y))
+    for j in range(n_y):
+        (local,) = np.nonzero(expansion.directions[:, n_q + j])
+        if len(local):
+            derivative = _derivative_powers(space, powers, int(local[0]))
+            slopes[:, :, j] = np.hstack(
+                [_slope(c, powers, derivative, expansion.modes) for c in expansion.clusters]
+            )
+    return l0, slopes
+
+
+def _derivative_powers(space: LowerSet, powers: Floats, variable: int) -> Floats:
+    """∂ w^γ/∂w_j where w_j = 0: the powers of the other variables for γ_j = 1, else 0."""
+    out = np.zeros_like(powers)
+    once = np.flatnonzero(space.indices[:, variable] == 1)
+    lower = space.indices[once].copy()
+    lower[:, variable] = 0
+    out[:, once] = powers[:, space.find(lower)]
+    return out
+
+
+def _slope(
+    cluster: Cluster, powers: Floats, derivative: Floats, wanted: tuple[int, ...]
+) -> Floats:
+    """∂λ/∂y_j; in a cluster vᵀ (∂Λ/∂y_j) v with the eigenvectors v of Λ."""
+    if len(cluster.modes) == 1:
+        return np.asarray((derivative @ cluster.coefficients[0, 0])[:, None])
+    columns = [k for k, mode in enumerate(cluster.modes) if mode in wanted]
+    value, slope = (
+        np.tensordot(p, cluster.coefficients, axes=(1, 2)) for p in (powers, derivative)
+    )
+    v = np.linalg.eigh(value)[1]
+    return np.asarray(np.einsum("nik,nij,njk->nk", v, slope, v)[:, columns])
+
+
+def expand(
+    pencil: Pencil,
+    q0: ArrayLike,
+    y0: ArrayLike,
+    modes: Sequence[int] = (1,),
+    order: int = 4,
+    linear_in_y: bool = False,
+    space: LowerSet | None = None,
+    vector_order: int | None = None,
+    cluster_gap: float = CLUSTER_GAP,
+) -> Expansion:
+    """Expand the eigenvalues of ``modes`` (1 is the lowest elastic one) to total ``order``.
+
+    ``linear_in_y`` keeps |β| ≤ 1, the terms of eqs. (7)-(9). ``space`` is any other lower set over
+    (q, y). Eigenvectors are expanded to half the order, which suffices (2m + 1), or to
+    ``vector_order``. Raises UsageError for impossible arguments.
+    """
+    wanted = _checked_modes(modes, order)
+    n_y = pencil.to_program.shape[1] - pencil.n_q
+    x0 = samples(q0, y0, pencil.n_q, n_y)[0]
+    local = _local_space(pencil, order, linear_in_y, space)
+    theta = pencil.theta_series(local.space, x0, local.to_z)
+    found = exact_modes(pencil, x0[None], _count(pencil, wanted))
+    groups = clusters(found.lam[0], wanted, cluster_gap)
+    members = _vector_set(local, vector_order)
+    vector_space = local.space.restrict(members)
+    kept = np.flatnonzero(members)
+    parts, vectors = [], []
+    for group in groups:
+        pick = np.array(group) - 1
+        X = expand_subspace(
+            pencil, theta[:, kept], vector_space, found.lam[0, pick], found.phi[0][:, pick]
+        ).vectors
+        series = eigenvalue_series(pencil, theta, local.space, kept, X)
+        parts.append(Cluster(group, _frozen(series)))
+        vectors.append(_frozen(X))
+    return Expansion(
+        modes=tuple(m for g in groups for m in g if m in wanted),
+        clusters=tuple(parts),
+        q0=_frozen(x0[: len(x0) - n_y]),
+        y0=_frozen(x0[len(x0) - n_y :]),
+        space=local.space,
+        directions=_frozen(local.directions),
+        n_linear=local.n_linear,
+        kept=_frozen(local.kept.astype(np.float64)),
+        vectors=tuple(vectors),
+        vector_space=vector_space,
+        notes=_notes(groups, local, pencil),
+    )
+
+
+@dataclass(frozen=True)
+class _Local:
+    """The set over w, dz/dw and dw/dx."""
+
+    space: LowerSet
+    to_z: Floats
+    directions: Floats
+    n_linear: int
+    kept: NDArray[np.bool_]
+
+
+def _local_space(pencil: Pencil, order: int, linear_in_y: bool, space: LowerSet | None) -> _Local:
+    n_z, n_q = len(pencil.shift), pencil.n_q
+    active = pencil.active
+    if space is not None:
+        return _given_space(pencil, space)
+    n_a, n_b = int(active[:n_q].sum()), int(active[n_q:].sum())
+    chosen = partially_linear(n_a, n_b, order) if linear_in_y else total_degree(n_a + n_b, order)
+    to_z = np.eye(n_z)[:, active]
+    directions = pencil.to_program[active]
+    kept = (directions != 0.0).any(axis=0)
+    return _Local(chosen, to_z, directions, n_b if linear_in_y else 0, kept)
+
+
+def _given_space(pencil: Pencil, space: LowerSet) -> _Local:
+    """A set over x as it was given, the variables that do not matter taken out."""
+    n_x = pencil.to_program.shape[1]
+    if space.n_variables != n_x:
+        raise UsageError(f"the set has {space.n_variables} variables, the model {n_x}")
+    kept = (pencil.to_program[pencil.active] != 0.0).any(axis=0)
+    inside = (space.indices[:, ~kept] == 0).all(axis=1)
+    from eigassign.series.lower_set import lower_set
+
+    smaller = lower_set(space.indices[inside][:, kept])
+    selection = np.eye(n_x)[kept]
+    return _Local(smaller, pencil.to_program[:, kept], selection, 0, kept)
+
+
+def _vector_set(local: _Local, vector_order: int | None) -> NDArray[np.bool_]:
+    if vector_order is not None:
+        return np.asarray(local.space.degrees <= vector_order)
+    linear = np.zeros(local.space.n_variables, dtype=bool)
+    if local.n_linear:
+        linear[-local.n_linear :] = True
+    return vector_members(local.space, linear)
+
+
+def clusters(lam: Floats, wanted: Sequence[int], gap: float) -> tuple[tuple[int, ...], ...]:
+    """Modes (1-based) grouped where neighbours are closer than ``gap`` (relative in λ)."""
+    close = np.diff(lam) < gap * lam[1:]
+    bounds = np.flatnonzero(~close) + 1
+    groups = np.split(np.arange(1, len(lam) + 1), bounds)
+    return tuple(tuple(int(m) for m in g) for g in groups if set(g.tolist()) & set(wanted))
+
+
+def _count(pencil: Pencil, wanted: Sequence[int]) -> int:
+    """Modes to solve for: some above the highest wanted one, so that its cluster is whole."""
+    elastic = pencil.n_dof - len(pencil.rigid)
+    return min(max(wanted) + 5, elastic) if max(wanted) <= elastic else max(wanted)
+
+
+def _checked_modes(modes: Sequence[int], order: int) -> tuple[int, ...]:
+    wanted = tuple(sorted({int(m) for m in modes}))
+    if not wanted or wanted[0] < 1:
+        raise UsageError("modes count from 1, the lowest elastic one")
+    if not 1 <= order <= MAX_ORDER:
+        raise UsageError(f"order {order} is not within 1 to {MAX_ORDER}")
+    return wanted
+
+
+def _notes(groups: Sequence[tuple[int, ...]], local: _Local, pencil: Pencil) -> tuple[str, ...]:
+    lines = [
+        f"modes {g[0]}-{g[-1]} lie close together and are expanded as one cluster"
+        for g in groups
+        if len(g) > 1
+    ]
+    idle = int((~pencil.active).sum())
+    if idle:
+        lines.append(f"{idle} variable(s) on which no frequency depends are dropped")
+    return tuple(lines)
+
+
+def _frozen(a: Floats) -> Floats:
+    a = np.ascontiguousarray(a)
+    a.setflags(write=False)
+    return a

@@ -1,0 +1,55 @@
+"""The model of a case: its affine pencil with names, exact frequencies and matrices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from eigassign.mechanism.kinematics import Kinematics
+from eigassign.mechanism.pencil import Pencil
+from eigassign.mechanism.poses import Poses
+from eigassign.modal.exact import eigenvalues, modes
+from eigassign.modal.samples import samples
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A mechanism as functions of its coordinates q (rad) and design parameters y (SI)."""
+
+    pencil: Pencil
+    poses: Poses
+    motion: Kinematics
+    q_names: tuple[str, ...]
+    y_names: tuple[str, ...]
+
+    @property
+    def n_rigid(self) -> int:
+        """Number of rigid-body modes: the free coordinates."""
+        return len(self.pencil.rigid)
+
+    @property
+    def n_dof(self) -> int:
+        """Order of K and M of eq. (1)."""
+        return self.pencil.n_dof
+
+    def x(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """(q, y) as rows (n_samples, n_q + n_y); raises UsageError for a wrong shape."""
+        return samples(q, y, len(self.q_names), len(self.y_names))
+
+    def frequencies(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> Floats:
+        """Exact frequencies of the lowest elastic modes, (n_samples, count) in Hz."""
+        return np.sqrt(eigenvalues(self.pencil, self.x(q, y), count)) / (2.0 * np.pi)
+
+    def modes(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> tuple[Floats, Floats]:
+        """Frequencies (n_samples, count) in Hz and mass-normalised modes (…, n_dof, count)."""
+        found = modes(self.pencil, self.x(q, y), count)
+        return np.sqrt(found.lam) / (2.0 * np.pi), found.phi
+
+    def matrices(self, q: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
+        """M and K of eq. (1) for one sample, dense (n_dof, n_dof), unknowns [u; q̇]."""
+        K, M = self.pencil.matrices(self.pencil.theta(self.x(q, y)))
+        return M[0], K[0]
