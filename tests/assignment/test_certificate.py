@@ -1,0 +1,188 @@
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from assignment_problems import goal, random_problem
+
+from eigassign.assignment import (
+    Bounds,
+    LinearConstraint,
+    assign,
+    build_program,
+    solve_assignment,
+)
+from eigassign.assignment.active_set import Polished, polish
+from eigassign.assignment.certificate import Candidate, Certificate, candidate, judge
+from eigassign.assignment.scales import scaled_program
+from eigassign.assignment.solve import SETTINGS, Status, solve_osqp
+from eigassign.errors import AccuracyError, UsageError
+
+
+def small_program(upper=0.1):
+    """J = (0.2 − 0.5 y)² on [0, upper], y + 0 ≤ 5."""
+    box, free = Bounds(np.zeros(1), np.array([upper])), LinearConstraint("loose", [1.0], upper=5.0)
+    return build_program([goal([1.2e6], [[-5e5]], 1e6)], [0.0], [0.0], [0.0], box, [free])
+
+
+def answer(y, mu, nu=0.0):
+    return Candidate(np.array([y]), np.array([mu]), np.array([nu]))
+
+
+def test_the_optimum_by_hand_has_no_residual():
+    # at the bound 0.1: dJ/dy = −0.15, balanced by the bound's multiplier
+    assert judge(small_program(), answer(0.1, 0.15)).worst <= 1e-15
+
+
+# Units by hand: parameter 0.1 (its range), a = 0.5 · 0.1 = 0.05, e = 0.2, objective 0.05 · 0.2.
+# Constraint row: 1 · 0.1.
+@pytest.mark.parametrize(
+    ("wrong", "expected"),
+    [
+        (answer(0.1, 0.10), Certificate(0.0, 0.05 * 0.1 / 0.02, 0.0)),
+        (answer(0.08, 0.16), Certificate(0.0, 0.0, 0.16 * 0.02 / 0.02)),
+        (answer(0.12, 0.14), Certificate(0.02 / 0.1, 0.0, 0.14 * 0.02 / 0.02)),
+        (answer(5.2, -2.4), Certificate(51.0, 0.0, 2.4 * 5.2 / 0.02)),
+        (answer(0.1, 0.0, 0.15), Certificate(0.0, 0.0, 0.15 * 4.9 / 0.02)),
+        (answer(0.1, 0.3, -0.15), Certificate(0.0, 0.0, np.inf)),  # no lower limit there
+    ],
+)
+def test_each_residual_is_what_it_is_by_hand(wrong, expected):
+    found = judge(small_program(), wrong)
+    assert found.primal_residual == pytest.approx(expected.primal_residual, rel=1e-13, abs=1e-13)
+    assert found.dual_residual == pytest.approx(expected.dual_residual, abs=1e-13)
+    assert found.gap == pytest.approx(expected.gap, rel=1e-13, abs=1e-13)
+    assert not found.accepted
+
+
+def test_a_residual_that_is_not_a_number_is_never_accepted():
+    assert not Certificate(0.0, np.nan, 0.0).accepted
+    assert not Certificate(np.nan, 0.0, 0.0).accepted
+
+
+def test_what_is_accepted_is_as_sharp_as_promised():
+    assert Certificate(1e-8, 1e-8, 1e-8).accepted
+    for k in range(3):
+        figures = [0.0, 0.0, 0.0]
+        figures[k] = 1.1e-8
+        assert not Certificate(*figures).accepted
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_disturbed_optimum_is_rejected(seed):
+    problem = random_problem(seed)
+    program = build_program(*problem.arguments)
+    scaled = scaled_program(program)
+    best = polish(scaled, solve_osqp(scaled).x)
+    good = candidate(program, scaled, best.x, best.mu)
+    assert judge(program, good).accepted
+    width = problem.upper - problem.lower
+    inside = np.where(good.y > 0.5 * (problem.lower + problem.upper), -1.0, 1.0) * width
+    assert not judge(program, replace(good, y=good.y + 1e-3 * inside)).accepted
+    units = 2.0 * program.scales.objective / program.scales.y
+    off = replace(good, bound_multipliers=good.bound_multipliers + 1e-5 * units)
+    assert not judge(program, off).accepted
+
+
+# ---- OSQP's traps
+
+
+def test_osqp_is_asked_for_more_than_is_accepted():
+    assert SETTINGS["eps_abs"] <= 1e-9
+    assert SETTINGS["eps_rel"] <= 1e-9
+
+
+@pytest.mark.parametrize("part", ["A", "b", "G", "lower", "upper"])
+def test_not_a_number_never_reaches_the_solver(part, monkeypatch):
+    scaled = scaled_program(small_program())
+    poisoned = np.array(getattr(scaled, part))
+    poisoned.flat[0] = np.nan
+    monkeypatch.setitem(sys.modules, "osqp", SimpleNamespace(OSQP=None))  # cannot be called
+    with pytest.raises(UsageError):
+        solve_osqp(replace(scaled, **{part: poisoned}))
+
+
+def fake_osqp(monkeypatch, status, x=2143289344.0, y=2143289344.0):
+    """An OSQP that ends with ``status`` and these numbers; returns what it was called with."""
+    seen = {}
+
+    class Fake:
+        def setup(self, P, q, A, l, u, **settings):  # noqa: E741
+            seen.update(P=P.toarray(), settings=settings, shape=A.shape)
+
+        def solve(self, raise_error):
+            seen["raise_error"] = raise_error
+            m, n = seen["shape"]
+            info = SimpleNamespace(status_val=int(status), iter=25)
+            return SimpleNamespace(info=info, x=np.full(n, x), y=np.full(m, y))
+
+    monkeypatch.setitem(sys.modules, "osqp", SimpleNamespace(OSQP=Fake))
+    return seen
+
+
+def test_an_interrupt_that_osqp_swallowed_is_raised_again(monkeypatch):
+    fake_osqp(monkeypatch, Status.INTERRUPTED)
+    with pytest.raises(KeyboardInterrupt):
+        solve_assignment(*random_problem(0).arguments)
+
+
+def test_osqp_is_given_the_upper_triangle_and_told_not_to_raise(monkeypatch):
+    seen = fake_osqp(monkeypatch, Status.MAX_ITER_REACHED)
+    scaled = scaled_program(build_program(*random_problem(0, n_y=4).arguments))
+    solve_osqp(scaled)
+    np.testing.assert_array_equal(seen["P"], np.triu(scaled.P))
+    assert seen["raise_error"] is False
+    assert seen["settings"]["verbose"] is False
+
+
+FAILURES = [s for s in Status if s not in (Status.SOLVED, Status.INTERRUPTED)]
+
+
+@pytest.mark.parametrize("status", FAILURES)
+def test_without_help_from_osqp_the_active_set_finds_the_same_optimum(status, monkeypatch):
+    total = [LinearConstraint("c", [1.0, 1.0, 1.0], upper=1e12)]
+    for seed in range(3):
+        problem = random_problem(seed, n_y=3)
+        expected = solve_assignment(*problem.arguments, total)
+        with monkeypatch.context() as patch:
+            fake_osqp(patch, status)
+            found = solve_assignment(*problem.arguments, total)
+        width = problem.upper - problem.lower
+        assert np.max(np.abs(found.y - expected.y) / width) <= 1e-9
+        assert found.status == f"solved (active set; {status.words})"
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e-9, -1e-7, 1e-3])
+def test_what_osqp_calls_solved_is_polished_to_round_off(offset, monkeypatch):
+    problem = random_problem(3, n_y=3)
+    fake_osqp(monkeypatch, Status.SOLVED, x=offset, y=0.0)
+    found = solve_assignment(*problem.arguments)
+    assert max(found.primal_residual, found.dual_residual, found.gap) <= 1e-12
+
+
+def test_an_answer_that_cannot_be_vouched_for_is_withheld_with_its_figures(monkeypatch):
+    fake_osqp(monkeypatch, Status.SOLVED, x=0.5, y=0.0)
+    monkeypatch.setattr(assign, "polish", lambda scaled, x: Polished(x, 0.0 * scaled.lower, 1))
+    with pytest.raises(AccuracyError, match=r"primal .*e.*, dual .*e.*, gap .* 1e-08 is accepted"):
+        solve_assignment(*random_problem(3).arguments)
+
+
+def test_if_polishing_spoils_a_good_answer_the_good_one_is_kept(monkeypatch):
+    problem = random_problem(3, n_y=2, n_t=20)
+    expected = solve_assignment(*problem.arguments)
+    spoilt = Polished(np.full(2, 0.3), np.zeros(2), 2)
+    monkeypatch.setattr(assign, "polish", lambda scaled, x: spoilt)
+    found = solve_assignment(*problem.arguments)
+    width = problem.upper - problem.lower
+    assert np.max(np.abs(found.y - expected.y) / width) <= 1e-6
+    assert found.dual_residual <= 1e-8
+
+
+def test_solving_prints_nothing(capfd):
+    for seed in range(5):
+        solve_assignment(*random_problem(seed).arguments)
+    out, err = capfd.readouterr()
+    assert (out, err) == ("", "")

@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from assignment_problems import random_problem
+from scipy.optimize import linprog
+
+from eigassign.assignment import Bounds, LinearConstraint, solve_assignment
+from eigassign.errors import InfeasibleError
+
+
+def solve(constraints, lower=(0.0, 0.0), upper=(1.0, 1.0), seed=0):
+    p = random_problem(seed, n_y=2)
+    box = Bounds(np.array(lower), np.array(upper))
+    return solve_assignment(p.goals, p.time_s, [0.0, 0.0], [0.5, 0.5], box, constraints)
+
+
+def row(name, coefficients, lower=-np.inf, upper=np.inf):
+    return LinearConstraint(name, np.array(coefficients, dtype=float), lower, upper)
+
+
+def test_a_constraint_out_of_reach_is_named_with_what_can_be_reached():
+    with pytest.raises(
+        InfeasibleError, match=r"'total' asks for at least 3, .* allow 2 at most"
+    ) as e:
+        solve([row("fine", [1, 0], upper=0.5), row("total", [1, 1], lower=3.0)])
+    assert e.value.constraints == ("total",)
+
+
+def test_a_constraint_that_asks_for_too_little_is_named_too():
+    with pytest.raises(InfeasibleError, match=r"'gap' asks for at most -2, .* no less than -1"):
+        solve([row("gap", [1, -1], upper=-2.0)])
+
+
+def test_several_constraints_out_of_reach_are_all_named():
+    with pytest.raises(InfeasibleError) as e:
+        solve([row("a", [1, 0], lower=2), row("b", [1, 1], upper=1), row("c", [0, 1], upper=-1)])
+    assert e.value.constraints == ("a", "c")
+
+
+def test_two_constraints_that_contradict_each_other_are_named_and_no_third():
+    parts = [
+        row("at_least", [1, 1], lower=1.5),
+        row("innocent", [1, -1], upper=0.9),
+        row("at_most", [2, 2], upper=2.0),
+    ]
+    with pytest.raises(InfeasibleError, match="'at_least' and 'at_most' together") as e:
+        solve(parts)
+    assert e.value.constraints == ("at_least", "at_most")
+
+
+def test_a_contradiction_of_fixed_parameters_is_named():
+    with pytest.raises(InfeasibleError) as e:
+        solve([row("total", [1, 1], upper=0.5)], lower=(0.4, 0.4), upper=(0.4, 0.4))
+    assert e.value.constraints == ("total",)
+
+
+def test_a_constraint_without_terms_is_named_if_it_cannot_hold():
+    with pytest.raises(InfeasibleError) as e:
+        solve([row("empty", [0, 0], lower=1.0)])
+    assert e.value.constraints == ("empty",)
+
+
+def test_open_ranges_reach_everything():
+    result = solve([row("total", [1, -1], lower=1e3)], upper=(np.inf, np.inf))
+    assert result.y[0] - result.y[1] >= 1e3 * (1 - 1e-9)
+
+
+def test_a_constraint_that_only_one_corner_meets_is_feasible():
+    result = solve([row("total", [1, 1], lower=2.0)])
+    np.testing.assert_allclose(result.y, [1.0, 1.0], rtol=1e-9)
+
+
+def possible(constraints):
+    """Independent: the linear program over the unit box, in full."""
+    sides = [(c.coefficients, c.upper) for c in constraints]
+    sides += [(-c.coefficients, -c.lower) for c in constraints]
+    sides = [(a, b) for a, b in sides if np.isfinite(b)]
+    if not sides:
+        return True
+    A, b = (np.array(part) for part in zip(*sides, strict=True))
+    return linprog(np.zeros(A.shape[1]), A, b, bounds=(0.0, 1.0)).status == 0
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_infeasible_is_said_exactly_when_it_is_so_and_the_named_set_is_smallest(seed):
+    rng = np.random.default_rng(seed)
+    problem = random_problem(seed, n_y=3)
+    constraints = []
+    for k in range(6):
+        low = rng.normal()
+        constraints.append(row(f"c{k}", rng.normal(size=3), low - 0.5, low + rng.random()))
+    box = Bounds(np.zeros(3), np.ones(3))
+    constraints = constraints[: 2 + seed % 5]
+    arguments = (problem.goals, problem.time_s, np.zeros(3), 0.5 * np.ones(3), box, constraints)
+    if possible(constraints):
+        solve_assignment(*arguments)
+        return
+    with pytest.raises(InfeasibleError) as e:
+        solve_assignment(*arguments)
+    named = [c for c in constraints if c.name in e.value.constraints]
+    assert not possible(named)
+    if all(possible([c]) for c in named):  # else each named one is impossible on its own
+        for fewer in itertools.combinations(named, len(named) - 1):
+            assert possible(list(fewer))
+    else:
+        assert not any(possible([c]) for c in named)
+
+
+def test_the_random_sets_are_of_all_kinds():
+    kinds = {"possible": 0, "alone": 0, "together": 0}
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        rows = []
+        for k in range(6):
+            low = rng.normal()
+            rows.append(row(f"c{k}", rng.normal(size=3), low - 0.5, low + rng.random()))
+        rows = rows[: 2 + seed % 5]
+        alone = not all(possible([c]) for c in rows)
+        kinds["possible" if possible(rows) else "alone" if alone else "together"] += 1
+    assert min(kinds.values()) >= 3, kinds

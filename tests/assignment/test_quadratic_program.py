@@ -1,0 +1,175 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from assignment_problems import goal, random_problem
+from scipy.integrate import trapezoid
+
+from eigassign.assignment import (
+    Bounds,
+    Goal,
+    LinearConstraint,
+    LinearModel,
+    build_program,
+    quadratic_form,
+    trapezoidal_weights,
+)
+from eigassign.assignment.scales import scaled_program
+from eigassign.errors import UsageError
+
+
+def model_of(seed, n_t=30, n_y=3):
+    rng = np.random.default_rng(seed)
+    time = np.sort(rng.uniform(0.0, 2.0, n_t))
+    return time, LinearModel(1e6 * (1 + rng.random(n_t)), 1e6 * rng.normal(size=(n_t, n_y)))
+
+
+def test_R_and_h_are_the_integrals_of_equations_13_and_14():
+    time, model = model_of(1)
+    lam_d = 1.2e6 * (1.0 + 0.1 * np.sin(time))
+    R, h = quadratic_form(model, lam_d, trapezoidal_weights(time))
+    outer = np.einsum("ti,tj->tij", model.l, model.l)
+    np.testing.assert_allclose(R, trapezoid(outer, time, axis=0), rtol=1e-12)
+    residual = (model.l0 - lam_d)[:, np.newaxis] * model.l
+    # entries of h cancel to a tenth of their terms at most
+    np.testing.assert_allclose(h, trapezoid(residual, time, axis=0), rtol=1e-11)
+
+
+def test_the_program_of_one_constant_target_is_the_papers_up_to_a_factor():
+    time, model = model_of(2)
+    lam_d = 1.3e6
+    R, h = quadratic_form(model, lam_d, trapezoidal_weights(time))
+    program = build_program(
+        [goal(model.l0, model.l, lam_d, weight=7.0)],
+        time,
+        np.zeros(3),
+        np.zeros(3),
+        Bounds(-np.ones(3), np.ones(3)),
+    )
+    factor = lam_d**2 * (time[-1] - time[0])
+    np.testing.assert_allclose(program.A.T @ program.A, R / factor, rtol=1e-12)
+    np.testing.assert_allclose(program.A.T @ program.b, h / factor, rtol=1e-12)
+
+
+def test_the_objective_is_the_weighted_mean_square_relative_error_in_lambda():
+    problem = random_problem(3, n_y=2, n_t=9)
+    program = build_program(*problem.arguments)
+    y = 0.3 * problem.lower + 0.7 * problem.upper
+    time, total, expected = problem.time_s, 0.0, 0.0
+    for g in problem.goals:
+        error = (g.model.l0 + g.model.l @ (y - problem.y0)) / g.lam_d - 1.0
+        expected += g.weight * trapezoid(error**2, time) / (time[-1] - time[0])
+        total += g.weight
+    assert program.objective(y) == pytest.approx(expected / total, rel=1e-12)
+
+
+def test_the_gradient_is_the_slope_of_the_objective():
+    problem = random_problem(4, n_y=3)
+    program = build_program(*problem.arguments)
+    y, step = problem.y_initial, 1e-3 * (problem.upper - problem.lower)
+    for j in range(3):
+        forth, back = y.copy(), y.copy()
+        forth[j] += step[j]
+        back[j] -= step[j]
+        slope = (program.objective(forth) - program.objective(back)) / (2.0 * step[j])
+        # central differences of a quadratic are exact but for cancellation over the step
+        assert program.gradient(y)[j] == pytest.approx(slope, rel=1e-8)
+
+
+def test_one_percent_weighs_the_same_in_a_slow_and_in_a_fast_mode():
+    slow, fast = goal([1.01e4], np.zeros((1, 0)), 1e4), goal([1.01e12], np.zeros((1, 0)), 1e12)
+    nothing = np.zeros(0)
+    for g in (slow, fast):
+        program = build_program([g], [0.0], nothing, nothing, Bounds(nothing, nothing))
+        assert program.objective(nothing) == pytest.approx(1e-4, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_solver_is_given_numbers_of_order_one(seed):
+    problem = random_problem(seed)
+    scaled = scaled_program(build_program(*problem.arguments))
+    assert np.max(np.abs(scaled.P)) <= 1.0 + 1e-12
+    assert np.max(np.abs(scaled.c)) <= 1.0 + 1e-12
+    assert np.max(np.abs(scaled.G)) <= 1.0 + 1e-12
+
+
+def test_the_scaled_program_has_the_same_objective_up_to_its_scale_and_a_constant():
+    problem = random_problem(5, n_y=4)
+    limit = LinearConstraint("sum", 1.0 / (problem.upper - problem.lower), upper=3.0)
+    program = build_program(*problem.arguments, [limit])
+    scaled, unit = scaled_program(program), program.scales
+    rng = np.random.default_rng(0)
+    offsets = []
+    for _ in range(4):
+        x = rng.uniform(scaled.lower[:4], scaled.upper[:4])
+        y = program.y_start + unit.y * x
+        half = 0.5 * x @ scaled.P @ x + scaled.c @ x
+        offsets.append(program.objective(y) / (2.0 * unit.objective) - half)
+        inside = scaled.upper[4] - scaled.G[4] @ x
+        assert inside * unit.rows[0] == pytest.approx(3.0 - limit.coefficients @ y, abs=1e-12)
+    assert np.ptp(offsets) <= 1e-13 * max(1.0, abs(offsets[0]))
+
+
+def test_arrays_of_a_program_cannot_be_written_to():
+    program = build_program(*random_problem(6).arguments)
+    for array in (program.A, program.b, program.y0, program.y_start, program.C, program.scales.y):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0.0
+
+
+def model(n_t=2, n_y=1):
+    return LinearModel(np.ones(n_t), np.ones((n_t, n_y)))
+
+
+BOX = Bounds(np.zeros(1), np.ones(1))
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: LinearModel(np.array([1.0, np.nan]), np.ones((2, 1))), r"l0: nan at index \[1\]"),
+        (lambda: LinearModel(np.ones(2), np.array([[1.0], [np.inf]])), r"l: inf at index \[1, 0\]"),
+        (lambda: LinearModel(np.ones(2), np.ones((3, 1))), "3 given, but there are 2 samples"),
+        (lambda: LinearModel(np.ones(2), np.ones(2)), "1 axes, 2 expected"),
+        (lambda: Goal(model(), np.array([1.0, 0.0])), "above 0 Hz"),
+        (lambda: Goal(model(), np.ones(3)), "3 given, but there are 2 samples"),
+        (lambda: Goal(model(), np.ones(2), weight=0.0), "weight: 0.0"),
+        (lambda: Goal(model(), np.ones(2), weight=np.nan), "weight: nan"),
+        (lambda: Bounds(np.array([np.nan]), np.ones(1)), "not a number"),
+        (lambda: Bounds(np.ones(1), np.zeros(1)), "parameter 0 is empty"),
+        (lambda: Bounds(np.array([np.inf]), np.array([np.inf])), "parameter 0 is empty"),
+        (lambda: Bounds(np.zeros(1), np.ones(2)), "2 given"),
+        (lambda: LinearConstraint("sum", np.array([np.nan])), "constraint 'sum': nan"),
+        (lambda: LinearConstraint("sum", np.ones(1), lower=np.nan), "constraint 'sum': not a"),
+        (lambda: LinearConstraint("sum", np.ones(1), 2.0, 1.0), "no number is between 2.0 and 1.0"),
+    ],
+)
+def test_data_that_is_not_a_number_or_does_not_fit_is_refused(make, words):
+    with pytest.raises(UsageError, match=words):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"goals": []}, "targets: none given"),
+        ({"time_s": [0.0, 1.0, 2.0]}, "2 given, but there are 3 samples"),
+        ({"y0": [np.nan]}, "expansion point y0: nan"),
+        ({"y0": [0.0, 0.0]}, "2 design parameters"),
+        ({"y_initial": [np.inf]}, "initial design: inf"),
+        ({"y_initial": [0.0, 0.0]}, "initial design: 2 given"),
+        ({"bounds": Bounds(np.zeros(2), np.ones(2))}, "bounds: 2 given"),
+        ({"constraints": [LinearConstraint("sum", np.ones(2))]}, "constraint 'sum': 2 given"),
+        ({"names": ["m1", "m2"]}, "names: 2 given"),
+    ],
+)
+def test_parts_that_do_not_fit_each_other_are_refused(change, words):
+    whole = {
+        "goals": [Goal(model(), np.ones(2))],
+        "time_s": [0.0, 1.0],
+        "y0": [0.0],
+        "y_initial": [0.5],
+        "bounds": BOX,
+    }
+    with pytest.raises(UsageError, match=words):
+        build_program(**(whole | change))

@@ -1,0 +1,368 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from assignment_problems import Problem, bounded_least_squares, goal, random_problem
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import lsq_linear, minimize
+
+from eigassign.assignment import (
+    Bounds,
+    LinearConstraint,
+    build_program,
+    solve_assignment,
+)
+from eigassign.assignment.certificate import ACCEPT
+
+LAM = 1.0e6
+INF = np.inf
+
+
+def solve(l0, slope, lower, upper, y_initial=None, constraints=(), y0=None, names=None, time=None):
+    """One goal at λ_d = LAM; l0 and slope (l) relative to it, one row for each sample."""
+    slope = np.atleast_2d(np.asarray(slope, dtype=float))
+    zero = np.zeros(slope.shape[1])
+    return solve_assignment(
+        [goal(LAM * np.asarray(l0, dtype=float), LAM * slope, LAM)],
+        np.arange(slope.shape[0]) if time is None else time,
+        zero if y0 is None else y0,
+        zero if y_initial is None else y_initial,
+        Bounds(np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)),
+        constraints,
+        names,
+    )
+
+
+def residuals(result):
+    return max(result.primal_residual, result.dual_residual, result.gap)
+
+
+# ---- by hand
+
+
+def test_one_parameter_reaches_the_target_inside_its_range():
+    result = solve([1.2], [[-0.5]], [0.0], [1.0])
+    assert result.y[0] == pytest.approx(0.4, abs=1e-12)
+    assert result.objective_initial == pytest.approx(0.04, rel=1e-12)
+    assert result.objective_optimal == pytest.approx(0.0, abs=1e-24)
+    assert result.active == ()
+
+
+def test_one_parameter_stops_at_its_bound_and_the_multiplier_says_what_it_costs():
+    result = solve([1.2], [[-0.5]], [0.0], [0.1], names=["m1"])
+    assert result.y[0] == 0.1
+    assert result.objective_optimal == pytest.approx(0.15**2, rel=1e-12)
+    (limit,) = result.active
+    assert (limit.name, limit.kind, limit.side) == ("m1", "bound", "upper")
+    # J = (0.2 − 0.5 y)², −dJ/dy at 0.1 is 2 · 0.15 · 0.5
+    assert limit.multiplier == pytest.approx(0.15, rel=1e-12)
+
+
+def test_dy_counts_from_the_expansion_point_and_y_does_not():
+    result = solve([1.2], [[-0.5]], [0.0], [3.0], y0=np.array([2.0]))
+    assert result.dy[0] == pytest.approx(0.4, abs=1e-12)
+    assert result.y[0] == pytest.approx(2.4, abs=1e-12)
+    np.testing.assert_allclose(result.lam, [[LAM]], rtol=1e-12)
+
+
+def test_two_parameters_meet_a_sum_that_binds():
+    # J = mean over two samples of (y1 − 1)², (y2 − 2)²: with y1 + y2 = 2 the optimum is (½, 3/2)
+    total = LinearConstraint("total", [1.0, 1.0], upper=2.0)
+    result = solve([0.0, -1.0], np.eye(2), [-9, -9], [9, 9], constraints=[total])
+    np.testing.assert_allclose(result.y, [0.5, 1.5], atol=1e-12)
+    (limit,) = result.active
+    assert (limit.name, limit.kind, limit.side) == ("total", "constraint", "upper")
+    # J = ½((y1 − 1)² + (y2 − 2)²) = ½ · 2 · ((3 − s)/2)² falls by (3 − s)/2 = ½ per unit of s
+    assert limit.multiplier == pytest.approx(0.5, rel=1e-10)
+
+
+def test_an_equality_between_parameters_is_met_exactly():
+    same = LinearConstraint("same", [1.0, -1.0], 0.0, 0.0)
+    result = solve([0.0, -1.0], np.eye(2), [-9, -9], [9, 9], constraints=[same])
+    np.testing.assert_allclose(result.y, [1.5, 1.5], atol=1e-12)
+
+
+def test_a_constraint_is_on_y_and_not_on_its_change():
+    total = LinearConstraint("total", [1.0], upper=2.1)
+    result = solve([1.2], [[-0.5]], [0.0], [3.0], y0=np.array([2.0]), constraints=[total])
+    assert result.y[0] == pytest.approx(2.1, abs=1e-12)
+
+
+def test_a_multiplier_predicts_what_relaxing_its_limit_gains():
+    problem = random_problem(11, n_y=3)
+    result = solve_assignment(*problem.arguments)
+    limit = next(a for a in result.active if a.multiplier > 0.0)
+    j = int(limit.name[1:]) - 1
+    step = 1e-6 * (problem.upper - problem.lower)[j]
+    sides = {"lower": problem.lower.copy(), "upper": problem.upper.copy()}
+    sides[limit.side][j] += step if limit.side == "upper" else -step
+    relaxed = solve_assignment(*problem.arguments[:4], Bounds(**sides))
+    gained = result.objective_optimal - relaxed.objective_optimal
+    assert gained == pytest.approx(limit.multiplier * step, rel=1e-4)  # first order in the step
+
+
+# ---- independent oracles
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_the_answer_equals_an_independent_bounded_least_squares(seed):
+    problem = random_problem(seed)
+    result = solve_assignment(*problem.arguments)
+    oracle, width = bounded_least_squares(problem), problem.upper - problem.lower
+    assert np.max(np.abs(result.y - oracle) / width) <= 1e-6
+    assert residuals(result) <= ACCEPT
+
+
+def test_the_random_problems_reach_from_no_active_bound_to_all():
+    active = [
+        len(solve_assignment(*p.arguments).active) / p.y0.size
+        for p in map(random_problem, range(60))
+    ]
+    assert min(active) == 0.0
+    assert max(active) == 1.0
+    assert sum(0.0 < share < 1.0 for share in active) >= 20
+
+
+def with_constraints(seed):
+    """A problem of up to 6 parameters with constraints that its initial design meets."""
+    problem, rng = random_problem(seed), np.random.default_rng(1000 + seed)
+    width, constraints = problem.upper - problem.lower, []
+    for k in range(int(rng.integers(1, 4))):
+        row = rng.normal(size=width.size) / width
+        value = float(row @ problem.y_initial)
+        low = value if rng.random() < 0.3 else -INF
+        constraints.append(LinearConstraint(f"c{k}", row, low, value + rng.choice([0.0, 0.2])))
+    return problem, constraints
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_with_constraints_the_answer_equals_a_sequential_quadratic_method(seed):
+    problem, constraints = with_constraints(seed)
+    result = solve_assignment(*problem.arguments, constraints)
+    assert residuals(result) <= ACCEPT
+    program = build_program(*problem.arguments, constraints)
+    width = problem.upper - problem.lower
+    rows = [
+        {"type": "ineq", "fun": lambda z, c=c, s=s: s * (c.coefficients @ to_y(z) - edge(c, s))}
+        for c in constraints
+        for s in (1.0, -1.0)
+        if np.isfinite(edge(c, s))
+    ]
+
+    def to_y(z):
+        return problem.lower + width * z
+
+    start = (problem.y_initial - problem.lower) / width
+    found = minimize(
+        lambda z: program.objective(to_y(z)),
+        start,
+        jac=lambda z: program.gradient(to_y(z)) * width,
+        bounds=[(0.0, 1.0)] * width.size,
+        constraints=rows,
+        method="SLSQP",
+        options={"ftol": 1e-15, "maxiter": 500},
+    )
+    # the oracle stops at some 1e-8 of the objective, from above or through its own tolerance
+    assert result.objective_optimal <= found.fun * (1 + 1e-9) + 1e-9
+    assert result.objective_optimal == pytest.approx(found.fun, rel=1e-6, abs=1e-8)
+
+
+def edge(constraint, sign):
+    return constraint.lower if sign > 0.0 else constraint.upper
+
+
+# ---- properties
+
+repeatable = settings(derandomize=True, deadline=None, database=None, max_examples=40)
+seeds = st.integers(0, 10**6)
+
+
+@repeatable
+@given(seeds)
+def test_no_random_design_within_the_limits_is_better(seed):
+    problem = random_problem(seed)
+    result = solve_assignment(*problem.arguments)
+    program = build_program(*problem.arguments)
+    rng = np.random.default_rng(seed)
+    for share in (1.0, 1e-2, 1e-4):
+        y = result.y + share * (rng.uniform(problem.lower, problem.upper) - result.y)
+        assert result.objective_optimal <= program.objective(y) * (1 + 1e-12)
+
+
+@repeatable
+@given(seeds)
+def test_the_answer_is_within_its_limits_and_never_worse_than_the_start(seed):
+    problem, constraints = with_constraints(seed)
+    result = solve_assignment(*problem.arguments, constraints)
+    assert np.all((problem.lower <= result.y) & (result.y <= problem.upper))
+    assert result.objective_optimal <= result.objective_initial * (1 + 1e-9)
+    assert residuals(result) <= ACCEPT
+
+
+@repeatable
+@given(seeds, st.integers(-20, 20), st.integers(-20, 20))
+def test_units_of_y_and_of_time_and_the_size_of_lambda_do_not_matter(seed, y_power, lam_power):
+    p, unit, size = random_problem(seed), 2.0**y_power, 2.0**lam_power
+    goals = [
+        goal(size * g.model.l0, size / unit * g.model.l, size * g.lam_d, 3.0 * g.weight)
+        for g in p.goals
+    ]
+    other = Problem(
+        goals, 60 * p.time_s, unit * p.y0, unit * p.y_initial, unit * p.lower, unit * p.upper
+    )
+    one, two = solve_assignment(*p.arguments), solve_assignment(*other.arguments)
+    width = p.upper - p.lower
+    assert np.max(np.abs(two.y / unit - one.y) / width) <= 1e-9
+    assert two.objective_optimal == pytest.approx(one.objective_optimal, rel=1e-9)
+
+
+@repeatable
+@given(seeds)
+def test_the_expansion_point_and_the_start_do_not_change_a_determined_answer(seed):
+    p = random_problem(seed)
+    shift = 0.3 * (p.upper - p.lower)
+    goals = [goal(g.model.l0 + g.model.l @ shift, g.model.l, g.lam_d, g.weight) for g in p.goals]
+    one = solve_assignment(*p.arguments)
+    two = solve_assignment(goals, p.time_s, p.y0 + shift, p.lower, p.bounds)
+    assert np.max(np.abs(two.y - one.y) / (p.upper - p.lower)) <= 1e-8
+
+
+def test_the_answer_is_the_same_to_the_last_bit_on_every_call():
+    problem = random_problem(21, n_y=5)
+    one, two = (solve_assignment(*problem.arguments) for _ in range(2))
+    assert one.y.tobytes() == two.y.tobytes()
+    assert one.lam.tobytes() == two.lam.tobytes()
+
+
+# ---- corners
+
+
+def test_no_parameters_at_all_leave_the_frequencies_as_they_are():
+    result = solve([1.1, 0.9], np.zeros((2, 0)), [], [])
+    assert result.y.shape == (0,)
+    assert result.objective_optimal == pytest.approx(0.01, rel=1e-12)
+    assert residuals(result) == 0.0
+
+
+def test_a_fixed_parameter_stays_and_tells_what_freeing_it_would_gain():
+    result = solve([1.0, 1.2], [[1, 0], [0, -0.5]], [0.3, 0.0], [0.3, 1.0], names=["a", "b"])
+    np.testing.assert_allclose(result.y, [0.3, 0.4], atol=1e-12)
+    assert result.y[0] == 0.3
+    (limit,) = result.active
+    # J = ½ (y1² + …): dJ/dy1 = 0.3, so a smaller y1 is what would help
+    assert (limit.name, limit.side) == ("a", "lower")
+    assert limit.multiplier == pytest.approx(0.3, rel=1e-10)
+
+
+def test_with_everything_fixed_there_is_nothing_to_solve():
+    result = solve([1.2], [[-0.5, 1.0]], [0.2, 0.1], [0.2, 0.1])
+    np.testing.assert_array_equal(result.y, [0.2, 0.1])
+    assert result.status == "nothing is free"
+
+
+def test_a_range_open_on_one_or_both_sides_is_no_obstacle():
+    result = solve([1.2, 1.5], [[-0.5, 0], [0, 1e-6]], [0.0, -INF], [INF, INF])
+    np.testing.assert_allclose(result.y, [0.4, -5e5], rtol=1e-10)
+
+
+def test_a_huge_maximum_meant_as_none_does_not_drown_the_others():
+    result = solve([1.2, 1.5], [[-0.5, 0], [0, -0.7]], [0.0, 0.0], [1e12, 1.0])
+    np.testing.assert_allclose(result.y, [0.4, 0.5 / 0.7], rtol=1e-10)
+
+
+def test_a_single_sample_is_assigned_at_that_configuration():
+    result = solve([1.5], [[-1.0]], [0.0], [1.0], time=[0.7])
+    assert result.y[0] == pytest.approx(0.5, abs=1e-12)
+
+
+def test_uneven_samples_weigh_by_the_time_they_stand_for():
+    # samples at 0, 1, 4 stand for ½, 2, 3/2 s: the answer is the weighted mean of their wishes
+    result = solve([0.0, 1.0, 3.0], -np.ones((3, 1)), [-9], [9], time=[0.0, 1.0, 4.0])
+    wishes = np.array([-1.0, 0.0, 2.0])
+    assert result.y[0] == pytest.approx(wishes @ [0.5, 2.0, 1.5] / 4.0, rel=1e-12)
+
+
+def test_goals_share_by_their_weights():
+    goals = [goal([LAM], [[-LAM]], LAM, 3.0), goal([2 * LAM], [[-LAM]], LAM, 1.0)]
+    one = Bounds(np.zeros(1), np.ones(1))
+    result = solve_assignment(goals, [0.0], [0.0], [0.0], one)
+    assert result.y[0] == pytest.approx(0.25, abs=1e-12)  # (3 · 0 + 1 · 1) / 4
+    np.testing.assert_allclose(result.lam, [[0.75 * LAM], [1.75 * LAM]], rtol=1e-12)
+
+
+# ---- undetermined designs
+
+
+def test_fewer_samples_than_parameters_change_the_design_as_little_as_possible():
+    # one equation y1 + 2 y2 = 1 in ranges of 1: the nearest point to (0, 0) is (1, 2)/5
+    result = solve([2.0], [[-1.0, -2.0]], [0, 0], [1, 1])
+    # units are min(range, what changes λ by 100 %) = (1, ½): x = (½, ½), y = (½, ¼)
+    np.testing.assert_allclose(result.y, [0.5, 0.25], atol=1e-12)
+    assert result.undetermined == 1
+    assert residuals(result) <= ACCEPT
+
+
+def test_two_parameters_that_do_the_same_share_the_change_by_their_ranges():
+    slope = -0.1 * np.ones((3, 2))  # 10 % a unit: the ranges 1 and 3 are the units
+    result = solve([1.1, 1.1, 1.1], slope, [0, 0], [1, 3])
+    np.testing.assert_allclose(result.y, [0.1, 0.9], atol=1e-12)  # y ∝ range², in units of range
+    assert result.objective_optimal <= 1e-24
+
+
+def test_sharing_a_change_respects_the_bounds():
+    slope = -0.1 * np.ones((3, 2))
+    result = solve([1.15, 1.15, 1.15], slope, [0, 0], [1, 3], y_initial=[0.95, 0.0])
+    # without the bound the first would take a tenth of 0.55 and end at 1.005
+    np.testing.assert_allclose(result.y, [1.0, 0.5], atol=1e-12)
+
+
+def test_a_parameter_without_effect_is_left_where_it_was():
+    result = solve([1.2], [[-0.5, 0.0]], [0, 0], [1, 1], y_initial=[0.0, 0.7])
+    assert result.y[1] == 0.7
+
+
+def test_nothing_that_has_any_effect_leaves_the_initial_design():
+    result = solve([1.2], [[0.0, 0.0]], [0, 0], [1, INF], y_initial=[0.3, 0.7])
+    np.testing.assert_array_equal(result.y, [0.3, 0.7])
+    assert result.undetermined == 2
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_an_undetermined_answer_is_the_nearest_of_all_optima(seed):
+    """Independent: a bounded least squares pulled to the start by a vanishing weight."""
+    rng = np.random.default_rng(seed)
+    slope, start = 0.1 * rng.normal(size=(2, 5)), rng.random(5)
+    result = solve(1.0 + 0.2 * rng.normal(size=2), slope, np.zeros(5), np.ones(5), start)
+    pull = 1e-5
+    found = lsq_linear(
+        np.vstack([slope, pull * np.eye(5)]),
+        np.append(slope @ result.y, pull * start),  # what the optimum reaches, reached again
+        (0.0, 1.0),
+        method="bvls",
+        tol=1e-15,
+    )
+    # the pull spoils the fit by pull² / slope², some 1e-8, and more where bounds meet flatly
+    assert np.max(np.abs(found.x - result.y)) <= 1e-4
+    assert result.undetermined == 3
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_degenerate_corners_with_more_constraints_than_parameters_are_solved(seed):
+    """Many constraints through one point: working sets that are linearly dependent."""
+    rng = np.random.default_rng(seed)
+    rows = rng.integers(-2, 3, (12, 3)).astype(float)
+    rows = rows[np.any(rows != 0.0, axis=1)]
+    constraints = [
+        LinearConstraint(f"c{k}", row, upper=0.5 * row.sum()) for k, row in enumerate(rows)
+    ]
+    l0, slope = 1.0 + rng.normal(size=6), rng.normal(size=(6, 3))
+    result = solve(l0, slope, np.zeros(3), np.ones(3), constraints=constraints)
+    assert residuals(result) <= ACCEPT
+
+
+def test_fifty_parameters_of_which_some_hardly_matter_are_certified():
+    rng = np.random.default_rng(8)
+    slope = rng.normal(size=(152, 50)) * 10.0 ** rng.uniform(-6, 0, 50)
+    result = solve(1.0 + 0.3 * rng.normal(size=152), slope, np.zeros(50), np.ones(50))
+    assert residuals(result) <= ACCEPT
