@@ -18,7 +18,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eigassign.assignment.checks import Floats
 from eigassign.assignment.scales import ScaledProgram
@@ -99,16 +98,13 @@ def minimise(scaled: ScaledProgram, x: Floats) -> tuple[Floats, Floats]:
 
 
 def _descend(scaled: ScaledProgram, state: _State) -> _State:
-    """Algorithm 16.3 with limits relaxed just so much that x is feasible.
+    """Algorithm 16.3; if its steps run out, the last point is returned and the judge decides.
 
-    If the steps run out, the last point is returned and the judge decides.
+    A limit that x violates by a solver's tolerance stops the first step that makes it worse.
     """
-    row = scaled.G @ state.x
-    lower, upper = np.minimum(scaled.lower, row), np.maximum(scaled.upper, row)
-    relaxed = replace(scaled, lower=lower, upper=upper)
     most = 10 * sum(scaled.G.shape) + 50
     for step in range(most):
-        state = _step(relaxed, state, scaled.lower == scaled.upper, cautious=step > most // 2)
+        state = _step(scaled, state, cautious=step > most // 2)
         if state.done:
             break
     return replace(state, done=False)
@@ -132,7 +128,7 @@ def _null_space(rows: Floats) -> Floats:
     return np.asarray(np.linalg.qr(rows.T, mode="complete")[0][:, rows.shape[0] :])
 
 
-def _step(scaled: ScaledProgram, state: _State, equal: NDArray[np.bool_], cautious: bool) -> _State:
+def _step(scaled: ScaledProgram, state: _State, cautious: bool) -> _State:
     """Go to the minimum on the working set; meet a new limit, or drop a wrong one, or be done."""
     p = _direction(scaled, state)
     alpha, row, side = _longest(scaled, state, p)
@@ -140,7 +136,7 @@ def _step(scaled: ScaledProgram, state: _State, equal: NDArray[np.bool_], cautio
     if side:
         return state.with_side(row, side)
     mu = _multipliers(scaled, state)
-    wrong = np.where(equal, 0.0, -mu * np.array(state.side))
+    wrong = np.where(scaled.lower == scaled.upper, 0.0, -mu * np.array(state.side))
     if np.max(wrong, initial=0.0) <= SIGN:
         return replace(state, mu=mu, done=True)
     # Bland's rule cannot cycle; the largest is faster

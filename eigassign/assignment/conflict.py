@@ -85,4 +85,5 @@ def contradiction(program: QuadraticProgram, scaled: ScaledProgram) -> Infeasibl
             needed = rest
     names = tuple(program.constraint_names[k] for k in needed)
     listed = " and ".join(repr(name) for name in names)
-    return InfeasibleError(f"no design within the bounds meets {listed} together", names)
+    together = " together" if len(names) > 1 else ""
+    return InfeasibleError(f"no design within the bounds meets {listed}{together}", names)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import ctypes
 import sys
 from dataclasses import replace
 from types import SimpleNamespace
@@ -11,13 +12,14 @@ from assignment_problems import goal, random_problem
 from eigassign.assignment import (
     Bounds,
     LinearConstraint,
+    active_set,
     assign,
     build_program,
     solve_assignment,
 )
 from eigassign.assignment.active_set import Polished, polish
 from eigassign.assignment.certificate import Candidate, Certificate, candidate, judge
-from eigassign.assignment.scales import scaled_program
+from eigassign.assignment.scales import ScaledProgram, scaled_program
 from eigassign.assignment.solve import SETTINGS, Status, solve_osqp
 from eigassign.errors import AccuracyError, UsageError
 
@@ -58,6 +60,37 @@ def test_each_residual_is_what_it_is_by_hand(wrong, expected):
     assert not found.accepted
 
 
+def test_a_violated_constraint_is_measured_in_units_of_its_row():
+    box, tight = Bounds(np.zeros(1), np.array([0.1])), LinearConstraint("tight", [1.0], upper=0.05)
+    program = build_program([goal([1.2e6], [[-5e5]], 1e6)], [0.0], [0.0], [0.0], box, [tight])
+    assert judge(program, answer(0.08, 0.16)).primal_residual == pytest.approx(0.03 / 0.1)
+
+
+def test_the_rounding_of_a_sum_of_large_numbers_is_not_held_against_it():
+    low = np.full(3, 1e9)  # ranges of 1: a float64 at 1e9 is within 1e-7 of any number
+    share = np.array([0.1, 0.7, 1.0 / 3.0])
+    value = float(share @ (low + 0.3))
+    total = LinearConstraint("total", share, value, value)
+    model = goal(np.full(3, 1.2e6), -1e5 * np.eye(3), 1e6)
+    result = solve_assignment([model], [0.0, 1.0, 3.0], low, low, Bounds(low, low + 1), [total])
+    assert share @ result.dy == pytest.approx(0.3 * share.sum(), abs=1e-6)
+
+
+def test_a_multiplier_of_a_limit_that_does_not_exist_is_dropped():
+    program = small_program(upper=np.inf)
+    scaled = scaled_program(program)
+    found = candidate(program, scaled, np.array([0.1]), np.array([1e-3, -1e-3]))
+    np.testing.assert_array_equal(found.bound_multipliers, [0.0])
+    np.testing.assert_array_equal(found.constraint_multipliers, [0.0])
+
+
+def test_an_answer_within_rounding_of_a_bound_is_on_it():
+    program = small_program(upper=0.3)
+    scaled = scaled_program(program)
+    for x, y in ((1e-11, 0.0), (scaled.upper[0] - 1e-11, 0.3)):
+        assert candidate(program, scaled, np.array([x]), np.zeros(2)).y[0] == y
+
+
 def test_a_residual_that_is_not_a_number_is_never_accepted():
     assert not Certificate(0.0, np.nan, 0.0).accepted
     assert not Certificate(np.nan, 0.0, 0.0).accepted
@@ -93,6 +126,7 @@ def test_a_disturbed_optimum_is_rejected(seed):
 def test_osqp_is_asked_for_more_than_is_accepted():
     assert SETTINGS["eps_abs"] <= 1e-9
     assert SETTINGS["eps_rel"] <= 1e-9
+    assert SETTINGS["polishing"] is False  # it prints, and may spoil
 
 
 @pytest.mark.parametrize("part", ["A", "b", "G", "lower", "upper"])
@@ -155,6 +189,33 @@ def test_without_help_from_osqp_the_active_set_finds_the_same_optimum(status, mo
         assert found.status == f"solved (active set; {status.words})"
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_equality_is_held_whichever_way_it_is_pulled(sign):
+    scaled = ScaledProgram(
+        A=np.eye(2),
+        b=sign * np.array([0.0, 1.0]),
+        G=np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]]),
+        lower=np.array([-1.0, -1.0, 0.0]),
+        upper=np.array([1.0, 1.0, 0.0]),
+    )
+    state = active_set._first_guess(scaled, np.zeros(2))
+    after = active_set._step(scaled, state, cautious=False)
+    assert after.done
+    np.testing.assert_allclose(after.mu, [0.0, 0.0, -sign])
+
+
+def test_an_equality_said_twice_does_no_harm(monkeypatch):
+    fake_osqp(monkeypatch, Status.MAX_ITER_REACHED)
+    twice = [
+        LinearConstraint("same", [1.0, -1.0], 0.0, 0.0),
+        LinearConstraint("again", [-2.0, 2.0], 0.0, 0.0),
+    ]
+    model = goal([0.0, -1e6], 1e6 * np.eye(2), 1e6)
+    box = Bounds(np.full(2, -9.0), np.full(2, 9.0))
+    found = solve_assignment([model], [0.0, 1.0], [0.0, 0.0], [0.0, 0.0], box, twice)
+    np.testing.assert_allclose(found.y, [1.5, 1.5], rtol=1e-12)
+
+
 @pytest.mark.parametrize("offset", [0.0, 1e-9, -1e-7, 1e-3])
 def test_what_osqp_calls_solved_is_polished_to_round_off(offset, monkeypatch):
     problem = random_problem(3, n_y=3)
@@ -182,7 +243,8 @@ def test_if_polishing_spoils_a_good_answer_the_good_one_is_kept(monkeypatch):
 
 
 def test_solving_prints_nothing(capfd):
-    for seed in range(5):
+    for seed in range(30):
         solve_assignment(*random_problem(seed).arguments)
+    ctypes.CDLL(None).fflush(None)  # what C wrote, too
     out, err = capfd.readouterr()
     assert (out, err) == ("", "")

@@ -4,17 +4,18 @@ import itertools
 
 import numpy as np
 import pytest
-from assignment_problems import random_problem
+from assignment_problems import goal, random_problem
 from scipy.optimize import linprog
 
 from eigassign.assignment import Bounds, LinearConstraint, solve_assignment
 from eigassign.errors import InfeasibleError
 
 
-def solve(constraints, lower=(0.0, 0.0), upper=(1.0, 1.0), seed=0):
-    p = random_problem(seed, n_y=2)
+def solve(constraints, lower=(0.0, 0.0), upper=(1.0, 1.0)):
+    """Two parameters that change λ by some 10 % a unit."""
     box = Bounds(np.array(lower), np.array(upper))
-    return solve_assignment(p.goals, p.time_s, [0.0, 0.0], [0.5, 0.5], box, constraints)
+    model = goal([1.2e6, 1.1e6], [[-1e5, 2e4], [3e4, -1e5]], 1e6)
+    return solve_assignment([model], [0.0, 1.0], [0.0, 0.0], [0.5, 0.5], box, constraints)
 
 
 def row(name, coefficients, lower=-np.inf, upper=np.inf):
@@ -32,6 +33,24 @@ def test_a_constraint_out_of_reach_is_named_with_what_can_be_reached():
 def test_a_constraint_that_asks_for_too_little_is_named_too():
     with pytest.raises(InfeasibleError, match=r"'gap' asks for at most -2, .* no less than -1"):
         solve([row("gap", [1, -1], upper=-2.0)])
+
+
+@pytest.mark.parametrize("short", [1e-3, 1e-6])
+def test_a_constraint_just_out_of_reach_is_still_out_of_reach(short):
+    with pytest.raises(InfeasibleError, match="'total' asks for at least"):
+        solve([row("total", [1, 1], lower=2.0 + short)])
+
+
+def test_two_constraints_that_just_contradict_each_other_still_do():
+    parts = [row("at_least", [1, 1], lower=1.5), row("at_most", [1, 1], upper=1.5 - 1e-6)]
+    with pytest.raises(InfeasibleError) as e:
+        solve(parts)
+    assert e.value.constraints == ("at_least", "at_most")
+
+
+def test_an_open_range_that_a_constraint_does_not_use_does_not_hide_the_contradiction():
+    with pytest.raises(InfeasibleError, match="'first' asks for at least 2, the bounds allow 1"):
+        solve([row("first", [1, 0], lower=2.0)], upper=(1.0, np.inf))
 
 
 def test_several_constraints_out_of_reach_are_all_named():
