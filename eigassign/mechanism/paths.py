@@ -1,0 +1,157 @@
+"""Paths of the tip through waypoints in the plane or in space, as piecewise cubics.
+
+Both kinds are parameterised by the cumulative chord length, scaled to 0 ≤ s ≤ 1. For the polyline
+that is the arc length.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from eigassign.errors import MechanismError, UsageError
+
+Floats = NDArray[np.float64]
+
+WAYPOINTS = "trajectory.waypoints"  # key path in the case file
+_COINCIDENT = 1e-12  # of the chord length: round-off of coordinates, no distance anybody means
+_SMOOTH = 1e-9  # of the slope: a change of direction nobody sees
+_ROUND_OFF = 1e-12  # how far outside [0, 1] a parameter is still taken for its end
+
+
+@dataclass(frozen=True)
+class Path:
+    """p(s) = Σ_k c_k (s − s_i)^k on s_i ≤ s ≤ s_{i+1}, for m waypoints in d = 2 or 3 dimensions."""
+
+    knots: Floats  # (m,) s at the waypoints, from 0 to 1
+    coefficients: Floats  # (4, m - 1, d) in m, ascending powers
+    chord_length: float  # m, over all waypoints
+
+    def point(self, s: ArrayLike) -> Floats:
+        """Points on the path in m, (n, d) for s of shape (n,); UsageError outside [0, 1]."""
+        i, t = self._locate(s)
+        c0, c1, c2, c3 = self.coefficients
+        return np.asarray(c0[i] + t * (c1[i] + t * (c2[i] + t * c3[i])))
+
+    def derivative(self, s: ArrayLike) -> Floats:
+        """dp/ds in m, (n, d), from the right at a corner; UsageError outside [0, 1]."""
+        i, t = self._locate(s)
+        _, c1, c2, c3 = self.coefficients
+        return np.asarray(c1[i] + t * (2.0 * c2[i] + t * 3.0 * c3[i]))
+
+    def corners(self) -> Floats:
+        """Parameters s strictly inside (0, 1) at which dp/ds jumps, by more than round-off."""
+        _, c1, c2, c3 = self.coefficients
+        h = np.diff(self.knots)[:, None]
+        jump = c1[1:] - (c1 + 2.0 * h * c2 + 3.0 * h**2 * c3)[:-1]
+        sharp = np.abs(jump).max(axis=1) > _SMOOTH * np.abs(c1).max()
+        return np.asarray(self.knots[1:-1][sharp])
+
+    def _locate(self, s: ArrayLike) -> tuple[NDArray[np.intp], Floats]:
+        """Piece i and s − s_i (as a column) of each parameter; a path never extrapolates."""
+        asked = np.atleast_1d(np.asarray(s, dtype=np.float64))
+        if not np.all((asked >= -_ROUND_OFF) & (asked <= 1.0 + _ROUND_OFF)):
+            raise UsageError("a path is defined for 0 <= s <= 1 only")
+        inside = np.clip(asked, 0.0, 1.0)
+        piece = np.searchsorted(self.knots, inside, side="right") - 1
+        piece = np.minimum(piece, len(self.knots) - 2)  # the end belongs to the last piece
+        return piece, (inside - self.knots[piece])[:, None]
+
+
+def straight(waypoints: ArrayLike) -> Path:
+    """Polyline through the waypoints (m, d), in m, parameterised by arc length.
+
+    Raises MechanismError if there are fewer than two waypoints, if they are not finite, not (m, 2)
+    or (m, 3), or if two consecutive ones coincide.
+    """
+    points, knots, length = _measure(waypoints)
+    chords = np.diff(points, axis=0) / np.diff(knots)[:, None]
+    zero = np.zeros_like(chords)
+    return _path(knots, np.stack([points[:-1], chords, zero, zero]), length)
+
+
+def spline(waypoints: ArrayLike) -> Path:
+    """Cubic spline through the waypoints (m, d), in m, parameterised by cumulative chord length.
+
+    Twice continuously differentiable, with not-a-knot ends (the third derivative is continuous at
+    the second and at the last but one waypoint); the parabola through three waypoints, the line
+    through two. Raises the same errors as `straight`.
+    """
+    points, knots, length = _measure(waypoints)
+    slopes = _slopes(knots, points)
+    step = np.diff(knots)[:, None]
+    chords = np.diff(points, axis=0) / step
+    quadratic = (3.0 * chords - 2.0 * slopes[:-1] - slopes[1:]) / step
+    cubic = (slopes[:-1] + slopes[1:] - 2.0 * chords) / step**2
+    return _path(knots, np.stack([points[:-1], slopes[:-1], quadratic, cubic]), length)
+
+
+def _path(knots: Floats, coefficients: Floats, length: float) -> Path:
+    knots.setflags(write=False)
+    coefficients.setflags(write=False)
+    return Path(knots, coefficients, length)
+
+
+def _measure(waypoints: ArrayLike) -> tuple[Floats, Floats, float]:
+    """Checked points (m, d), knots s (m,) and the chord length in m."""
+    points = _checked(waypoints)
+    chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    length = float(chords.sum())
+    for i in np.flatnonzero(chords <= _COINCIDENT * length):
+        message = f"the same point as the one before it, {points[i].tolist()}; drop one of them"
+        raise MechanismError(f"{WAYPOINTS}[{i + 1}]", message)
+    knots = np.concatenate([[0.0], np.cumsum(chords)]) / length
+    knots[-1] = 1.0
+    return points, knots, length
+
+
+def _checked(waypoints: ArrayLike) -> Floats:
+    try:
+        points = np.array(waypoints, dtype=np.float64)
+    except ValueError:
+        points = np.empty(0)
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise MechanismError(WAYPOINTS, "must be a list of points, each [x, y] or each [x, y, z]")
+    if len(points) < 2:
+        raise MechanismError(WAYPOINTS, "a path needs at least two waypoints")
+    for i in np.flatnonzero(~np.isfinite(points).all(axis=1)):
+        raise MechanismError(f"{WAYPOINTS}[{i}]", f"{points[i].tolist()} is not finite")
+    return points
+
+
+def _slopes(knots: Floats, points: Floats) -> Floats:
+    """dp/ds at the waypoints (m, d) of the not-a-knot spline (de Boor 1978, chapter IV).
+
+    Inside, continuity of p'' with steps h_i and chord slopes δ_i:
+    h_i p'_{i-1} + 2 (h_{i-1} + h_i) p'_i + h_{i-1} p'_{i+1} = 3 (h_i δ_{i-1} + h_{i-1} δ_i).
+    """
+    h = np.diff(knots)
+    chords = np.diff(points, axis=0) / h[:, None]
+    if len(h) == 1:
+        return np.repeat(chords, 2, axis=0)
+    if len(h) == 2:
+        return _parabola_slopes(h, chords)
+    m = len(knots)
+    bands, rhs = np.zeros((3, m)), np.empty_like(points)  # rows: above, on, below the diagonal
+    bands[1, 1:-1] = 2.0 * (h[:-1] + h[1:])
+    bands[0, 2:], bands[2, :-2] = h[:-1], h[1:]
+    rhs[1:-1] = 3.0 * (h[1:, None] * chords[:-1] + h[:-1, None] * chords[1:])
+    bands[1, 0], bands[0, 1], rhs[0] = _end_row(h[0], h[1], chords[0], chords[1])
+    bands[1, -1], bands[2, -2], rhs[-1] = _end_row(h[-1], h[-2], chords[-1], chords[-2])
+    from scipy.linalg import solve_banded
+
+    return np.asarray(solve_banded((1, 1), bands, rhs))
+
+
+def _end_row(h0: float, h1: float, end: Floats, inner: Floats) -> tuple[float, float, Floats]:
+    """Not-a-knot: h1 p'_0 + (h0 + h1) p'_1 = ((3 h0 + 2 h1) h1 δ_0 + h0² δ_1) / (h0 + h1)."""
+    both = h0 + h1
+    return h1, both, ((h0 + 2.0 * both) * h1 * end + h0**2 * inner) / both
+
+
+def _parabola_slopes(h: Floats, chords: Floats) -> Floats:
+    """dp/ds of the parabola through three points: the chord slopes are its slopes midway."""
+    bend = (chords[1] - chords[0]) / h.sum()  # half its second derivative
+    return np.stack([chords[0] - h[0] * bend, chords[0] + h[0] * bend, chords[1] + h[1] * bend])

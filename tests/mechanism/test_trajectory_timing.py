@@ -1,0 +1,62 @@
+"""Timing laws s(τ)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from eigassign.errors import UsageError
+from eigassign.mechanism.timing import TIMING_LAWS, timing_law
+
+EVERY_LAW = pytest.mark.parametrize("law", TIMING_LAWS.values(), ids=lambda law: law.name)
+TAU = np.linspace(0.0, 1.0, 41)
+
+
+@pytest.mark.parametrize(
+    ("name", "formula"),
+    [
+        ("linear", lambda t: t),
+        ("cubic", lambda t: 3 * t**2 - 2 * t**3),
+        ("quintic", lambda t: 10 * t**3 - 15 * t**4 + 6 * t**5),
+    ],
+)
+def test_laws_are_the_polynomials_of_their_names(name, formula):
+    # terms up to 15, hence some 1e-15 of round-off
+    np.testing.assert_allclose(timing_law(name).position(TAU), formula(TAU), rtol=0, atol=1e-14)
+
+
+@EVERY_LAW
+def test_laws_run_from_0_to_1_without_turning_back(law):
+    s = law.position(TAU)
+    assert s[0] == 0.0
+    assert s[-1] == 1.0
+    assert (np.diff(s) > 0.0).all()
+
+
+@EVERY_LAW
+def test_derivatives_agree_with_central_differences(law):
+    h, tau = 1e-4, TAU[1:-1]
+    velocity = (law.position(tau + h) - law.position(tau - h)) / (2 * h)
+    acceleration = (law.velocity(tau + h) - law.velocity(tau - h)) / (2 * h)
+    # h²/6 times the third derivative, at most 60 (s''') and 360 (s'''' of the quintic)
+    np.testing.assert_allclose(law.velocity(tau), velocity, atol=h**2 * 11, rtol=0)
+    np.testing.assert_allclose(law.acceleration(tau), acceleration, atol=h**2 * 65, rtol=0)
+
+
+def test_cubic_rests_at_both_ends_and_quintic_is_not_accelerated_there_either():
+    ends = np.array([0.0, 1.0])
+    for name in ("cubic", "quintic"):
+        assert (timing_law(name).velocity(ends) == 0.0).all()
+    assert (timing_law("quintic").acceleration(ends) == 0.0).all()
+    assert (timing_law("cubic").acceleration(ends) == [6.0, -6.0]).all()
+
+
+@pytest.mark.parametrize("tau", [-1e-9, 1.0 + 1e-9, np.nan, np.inf])
+def test_laws_are_not_extrapolated(tau):
+    with pytest.raises(UsageError, match="0 <= tau <= 1"):
+        timing_law("quintic").position([0.5, tau])
+
+
+def test_an_unknown_law_is_refused_with_those_there_are():
+    with pytest.raises(UsageError, match=r"'septic'.*linear, cubic, quintic"):
+        timing_law("septic")
