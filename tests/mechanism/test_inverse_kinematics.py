@@ -1,0 +1,379 @@
+"""Inverse kinematics along paths, against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from planar_arms import serial_arm, two_link_angles
+
+from eigassign.errors import MechanismError, TrajectoryError
+from eigassign.mechanism.inverse_kinematics import (
+    RESIDUAL,
+    Course,
+    _interpolated,
+    _Trace,
+    follow,
+)
+from eigassign.mechanism.paths import Path, spline, straight
+from eigassign.mechanism.timing import timing_law
+from eigassign.mechanism.tip_chain import TipChain
+
+TAU = 2.0 * np.pi
+UP, DOWN = {"elbow": (0.0, np.pi)}, {"elbow": (np.pi, TAU)}
+PAPER = [(0.33, 0.12), (0.30, 0.19), (0.108, 0.2104), (0.02, 0.1845), (-0.01, 0.19)]
+PAPER_BRANCH = {"elbow": (np.pi, np.radians(217.0))}
+
+
+def course(path: Path, n: int = 50) -> Course:
+    s = np.linspace(0.0, 1.0, n)
+    return Course(path, s, 2.0 * s)
+
+
+def away(a: np.ndarray, b: np.ndarray) -> float:
+    """Largest difference of two sets of angles, modulo 2π."""
+    return float(np.abs((a - b + np.pi) % TAU - np.pi).max())
+
+
+def reachable_path(seed: int, l1: float, l2: float) -> Path:
+    """A random spline or polyline that stays off both ends of a two-link arm's reach."""
+    rng = np.random.default_rng(seed)
+    inner, outer = abs(l1 - l2), l1 + l2
+    while True:
+        r = rng.uniform(inner, outer, 5)
+        theta = np.cumsum(rng.uniform(-1.2, 1.2, 5))
+        points = np.stack([r * np.cos(theta), r * np.sin(theta)], axis=1)
+        path = (spline, straight)[seed % 2](points)
+        radius = np.linalg.norm(path.point(np.linspace(0.0, 1.0, 2000)), axis=1)
+        if radius.min() > inner + 0.02 * outer and radius.max() < 0.98 * outer:
+            return path
+
+
+@pytest.mark.parametrize(("branch", "sign"), [(UP, 1.0), (DOWN, -1.0)], ids=["up", "down"])
+@pytest.mark.parametrize("absolute", [True, False])
+@pytest.mark.parametrize("seed", range(8))
+def test_two_links_follow_random_paths_as_the_law_of_cosines_says(seed, absolute, branch, sign):
+    l1, l2 = np.random.default_rng(seed).uniform(0.3, 1.0, 2)
+    arm, path = serial_arm(l1, l2, absolute=absolute), reachable_path(seed, l1, l2)
+    samples = course(path, n=3 + 40 * (seed % 4))
+    q = follow(arm, samples, branch).q
+    relative = q @ arm.relative_map[0].T
+    # 1e-10 of the tip over a singular value of at least 0.02: 1e-8 rad
+    assert away(relative, two_link_angles(path.point(samples.s), l1, l2, sign)) < 1e-8
+
+
+def test_the_papers_arm_passes_its_expansion_point():
+    """Belotti et al. 2021: absolute angles (1.817, 5.312) rad lie on the path to 0.001 rad."""
+    q0, quintic, path = np.array([1.817, 5.312]), timing_law("quintic"), spline(PAPER)
+    arm = serial_arm(0.6, 0.45)
+    for n, distance in ((152, 1.2e-3), (2000, 1e-3)):  # the nearest of 152 samples is 1.17e-3 off
+        tau = np.linspace(0.0, 1.0, n)
+        followed = follow(arm, Course(path, quintic.position(tau), tau), PAPER_BRANCH)
+        assert np.abs(followed.q - q0).max(axis=1).min() < distance
+        elbow = np.degrees(followed.q[:, 1] - followed.q[:, 0])
+        assert elbow.min() == pytest.approx(192.0, abs=0.1)
+        assert elbow.max() == pytest.approx(216.6, abs=0.1)
+        assert followed.notes == ()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_tip_is_on_its_path_to_the_stated_residual(seed):
+    arm, path = serial_arm(0.6, 0.45), reachable_path(seed, 0.6, 0.45)
+    samples = course(path, 101)
+    tip = arm.position(follow(arm, samples, UP).q)
+    assert np.linalg.norm(tip - path.point(samples.s), axis=1).max() <= RESIDUAL * 0.6
+
+
+@pytest.mark.parametrize("absolute", [True, False])
+def test_angles_do_not_jump_at_half_turns_however_often_the_tip_goes_round(absolute):
+    theta = np.linspace(0.3, 0.3 + 3 * TAU, 80)
+    path = spline(0.8 * np.stack([np.cos(theta), np.sin(theta)], axis=1))
+    q = follow(serial_arm(0.6, 0.45, absolute=absolute), course(path, 400), UP).q
+    turns = [3 * TAU, 3 * TAU] if absolute else [3 * TAU, 0.0]
+    np.testing.assert_allclose(q[-1] - q[0], turns, atol=1e-8)
+    assert np.abs(np.diff(q, axis=0)).max() < 0.1
+
+
+def test_two_samples_are_joined_along_the_path_and_not_across_it():
+    theta = np.linspace(0.0, 1.4 * np.pi, 40)
+    path = spline(0.8 * np.stack([np.cos(theta), np.sin(theta)], axis=1))
+    q = follow(serial_arm(0.6, 0.45), course(path, 2), UP).q
+    np.testing.assert_allclose(q[1] - q[0], 1.4 * np.pi, atol=1e-8)
+
+
+def test_the_first_sample_is_normalised_to_one_turn_or_near_the_start():
+    arm, samples = serial_arm(0.6, 0.45), course(straight([(0.5, -0.4), (0.3, -0.5)]))
+    free = follow(arm, samples, UP).q
+    assert ((free[0] >= 0.0) & (free[0] < TAU)).all()
+    near = follow(arm, samples, UP, start=free[0] - [2 * TAU, TAU] + 0.3).q
+    np.testing.assert_allclose(near - free, np.tile([-2 * TAU, -TAU], (50, 1)), atol=1e-9)
+
+
+def test_round_off_below_zero_does_not_become_a_full_turn():
+    arm = serial_arm(0.6, 0.45)
+    for elbow in np.linspace(0.5, 2.5, 12):  # the shoulder comes out at 0 give or take 1e-16
+        path = straight([arm.position(np.array([[0.0, elbow]]))[0], (0.3, 0.5)])
+        assert abs(follow(arm, course(path, 2), UP).q[0, 0]) < 1e-9
+
+
+def test_the_first_sample_is_the_solution_nearest_to_any_start():
+    arm, path = serial_arm(0.6, 0.45, absolute=False), straight([(0.5, 0.2), (0.45, 0.3)])
+    both = [two_link_angles(path.point(0.0), 0.6, 0.45, sign)[0] for sign in (1.0, -1.0)]
+    for start in np.random.default_rng(3).uniform(-8.0, 8.0, (25, 2)):
+        near = [start + (q - start + np.pi) % TAU - np.pi for q in both]
+        nearest = min(near, key=lambda q: np.linalg.norm(q - start))
+        q = follow(arm, course(path, 2), start=start).q
+        np.testing.assert_allclose(q[0], nearest, atol=1e-9)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_start_chooses_the_nearer_solution(sign):
+    path = straight([(0.5, 0.2), (0.2, 0.5)])
+    expected = two_link_angles(path.point(0.0), 0.6, 0.45, sign)[0]
+    followed = follow(serial_arm(0.6, 0.45, absolute=False), course(path), start=expected + 0.4)
+    np.testing.assert_allclose(followed.q[0], expected, atol=1e-9)
+    assert followed.notes == ()
+
+
+def test_without_branch_or_start_the_elbow_bends_anticlockwise_and_a_note_says_so():
+    arm, path = serial_arm(0.6, 0.45, absolute=False), straight([(0.5, 0.2), (0.2, 0.5)])
+    followed = follow(arm, course(path))
+    assert ((followed.q[:, 1] > 0.0) & (followed.q[:, 1] < np.pi)).all()
+    assert "2 ways" in followed.notes[0]
+
+
+def test_another_first_solution_is_tried_if_the_preferred_one_leaves_the_branch():
+    # elbows from 60 to 300 deg allow both solutions; narrowed on one side only the other one stays
+    path = straight([(0.5, 0.2), (0.9, 0.3)])
+    elbow = np.degrees(two_link_angles(path.point([0.0, 1.0]), 0.6, 0.45, 1.0)[:, 1])
+    branch = {"elbow": (np.radians(elbow[1] + 5.0), np.radians(360.0 - elbow[1] + 5.0))}
+    q = follow(serial_arm(0.6, 0.45, absolute=False), course(path), branch).q
+    assert (q[:, 1] > np.pi).all()
+
+
+@pytest.mark.parametrize("turns", [-2, 0, 3])
+def test_a_branch_counts_modulo_full_turns(turns):
+    branch = {"elbow": tuple(np.array(DOWN["elbow"]) + turns * TAU)}
+    q = follow(serial_arm(0.6, 0.45), course(spline(PAPER)), branch).q
+    np.testing.assert_array_less(np.pi, (q[:, 1] - q[:, 0]) % TAU)
+
+
+# --- what cannot be followed ---
+
+
+def failure(arm: TipChain, path: Path, n: int = 50, **wishes: object) -> TrajectoryError:
+    with pytest.raises(TrajectoryError) as error:
+        follow(arm, course(path, n), **wishes)
+    return error.value
+
+
+@pytest.mark.parametrize(("last", "reach"), [(1.3, 1.05), (0.05, 0.15)], ids=["far", "near"])
+def test_a_point_out_of_reach_is_named_with_its_distance(last, reach):
+    path = straight([(0.5, 0.0), (last, 0.0)])
+    beyond = (path.point(np.linspace(0, 1, 50))[:, 0] - reach) * np.sign(last - reach)
+    sample = int(np.argmax(beyond > 0.0))
+    error = failure(serial_arm(0.6, 0.45), path)
+    assert error.sample == sample
+    assert error.path == "trajectory.waypoints"
+    x = path.point(sample / 49)[0, 0]
+    assert (
+        f"sample {sample} (t = {2 * sample / 49:.6g} s, point ({x:.6g}, 0) m) is" in error.message
+    )
+    distance = float(error.message.split(" is ")[1].split(" m out of reach")[0])
+    assert distance == pytest.approx(beyond[sample], rel=6e-3)  # printed with 3 digits
+
+
+def test_a_first_point_out_of_reach_is_sample_0():
+    error = failure(serial_arm(0.6, 0.45), straight([(1.2, 0.9), (0.5, 0.2)]))
+    assert error.sample == 0
+    assert "0.45 m out of reach; the tip comes to (0.84, 0.63) m" in error.message
+
+
+def test_an_excursion_out_of_reach_between_two_samples_is_found():
+    path = straight([(0.6, 0.0), (1.06, 0.0), (0.6, 0.3)])
+    error = failure(serial_arm(0.6, 0.45), path, n=2)
+    assert error.sample == 1
+    assert "stretched or folded" in error.message
+
+
+def test_a_sample_outside_the_branch_is_named_with_its_angle():
+    path = straight([(0.5, 0.2), (0.9, 0.4)])
+    elbow = np.degrees(two_link_angles(path.point(np.linspace(0, 1, 50)), 0.6, 0.45, 1.0)[:, 1])
+    branch = {"elbow": (np.radians(elbow[20] - 0.01), np.pi)}
+    error = failure(serial_arm(0.6, 0.45), path, branch=branch)
+    assert error.sample == 21
+    assert error.path == "trajectory.branch.elbow"
+    assert f"needs joint elbow at {elbow[21]:.6g} deg" in error.message
+
+
+def test_a_first_sample_with_no_solution_in_the_branch_is_named():
+    error = failure(
+        serial_arm(0.6, 0.45), straight([(0.5, 0.2), (0.2, 0.5)]), branch={"elbow": (1.0, 1.1)}
+    )
+    assert error.sample == 0
+    assert "[57.2958, 63.0254] deg" in error.message
+
+
+@pytest.mark.parametrize("branch", [UP, DOWN, {}], ids=["up", "down", "free"])
+@pytest.mark.parametrize("angle", [0.0, 0.7, 2.5])
+def test_a_path_through_full_stretch_is_refused_even_between_samples(angle, branch):
+    touch = 1.05 * np.array([np.cos(angle), np.sin(angle)])
+    path = straight([0.7 * touch, touch, 0.5 * touch[::-1]])
+    n = 30
+    assert path.corners()[0] * (n - 1) % 1 > 0.01  # no sample is stretched itself
+    error = failure(serial_arm(0.6, 0.45), path, n, branch=branch)
+    assert error.sample == int(path.corners()[0] * (n - 1)) + 1
+    assert "stretched or folded" in error.message
+
+
+def test_a_path_touching_full_stretch_smoothly_is_refused():
+    theta = np.linspace(-0.5, 0.5, 11)
+    r = 1.05 - 0.4 * theta**2  # the middle waypoint is the outermost point, by symmetry
+    path = spline(np.stack([r * np.cos(theta), r * np.sin(theta)], axis=1))
+    assert failure(serial_arm(0.6, 0.45), path, 20, branch=UP).sample == 10
+
+
+def test_a_path_through_the_folded_pose_of_equal_links_is_refused():
+    path = straight([(0.5, 0.1), (-0.5, -0.1)])
+    error = failure(serial_arm(0.5, 0.5), path, 50, branch=UP)
+    assert error.sample == 25
+    assert "stretched or folded" in error.message
+    x, y = map(float, error.message.split("near (")[1].split(")")[0].split(","))
+    assert np.hypot(x, y) < 1e-3  # that is where it stopped
+
+
+def test_a_path_just_short_of_full_stretch_is_followed_on_its_branch():
+    touch = 1.05 - 1e-5
+    path = straight([(0.7, 0.0), (touch, 0.0), (0.6, 0.3)])
+    q = follow(serial_arm(0.6, 0.45, absolute=False), course(path, 200), DOWN).q
+    expected = two_link_angles(path.point(np.linspace(0, 1, 200)), 0.6, 0.45, -1.0)
+    assert away(q, expected) < 1e-7
+
+
+def test_the_trace_is_interpolated_by_the_cubic_of_its_values_and_slopes():
+    s = np.array([0.0, 0.1, 0.4, 1.0])
+    cubic = np.polynomial.Polynomial([1.0, -2.0, 3.0, -4.0])
+    trace = _Trace(s, cubic(s)[:, None], cubic.deriv()(s)[:, None], 0.0)
+    fine = np.linspace(0.0, 1.0, 31)
+    np.testing.assert_allclose(_interpolated(trace, fine)[:, 0], cubic(fine), atol=1e-14)
+
+
+# --- more and fewer coordinates than the tip has components ---
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("lengths", [(0.5, 0.4, 0.3), (0.3, 0.3, 0.2, 0.2, 0.1, 0.1)])
+def test_redundant_arms_follow_random_paths_and_say_so(lengths, seed):
+    arm = serial_arm(*lengths, absolute=False)
+    path = reachable_path(seed, 0.6, 0.5)
+    samples = course(path, 80)
+    followed = follow(arm, samples)
+    tip = arm.position(followed.q)
+    np.testing.assert_allclose(tip, path.point(samples.s), atol=1e-10, rtol=0)
+    assert np.abs(np.diff(followed.q, axis=0)).max() < 0.5
+    assert f"fixes 2 of {len(lengths)} coordinates" in followed.notes[0]
+    assert (follow(arm, samples).q == followed.q).all()  # bit for bit
+
+
+def test_redundant_arms_take_the_steps_of_least_norm():
+    arm = serial_arm(0.5, 0.4, 0.3, absolute=False)
+    path = straight([(0.5, 0.3), (-0.2, 0.5)])
+    q = follow(arm, course(path, 2001)).q
+    middle, step = (q[1:] + q[:-1]) / 2, np.diff(q, axis=0)
+    along_null_space = np.linalg.svd(arm.jacobian(middle))[2][:, 2]
+    idle = np.abs(np.einsum("na,na->n", along_null_space, step))
+    # Euler steps of 0.2 rad with the corrector bend off the ideal line by some percent
+    assert (idle < 0.05 * np.linalg.norm(step, axis=1)).all()
+
+
+def test_the_branch_of_a_redundant_arm_holds_at_the_first_sample():
+    path = straight([(0.5, 0.3), (0.45, 0.35)])
+    branch = {"wrist": (np.radians(200.0), np.radians(300.0))}
+    q = follow(serial_arm(0.5, 0.4, 0.3, absolute=False), course(path), branch).q
+    wrist = np.degrees(q[:, 2]) % 360.0
+    assert ((wrist >= 200.0) & (wrist <= 300.0)).all()
+
+
+def test_one_link_follows_a_polyline_if_all_samples_lie_on_its_circle():
+    theta = np.linspace(0.2, 1.4, 9)
+    path = straight(0.5 * np.stack([np.cos(theta), np.sin(theta)], axis=1))
+    q = follow(serial_arm(0.5), course(path, 9)).q
+    np.testing.assert_allclose(q[:, 0], theta, atol=1e-9)
+
+
+def test_one_link_is_refused_a_sample_off_its_circle():
+    theta = np.linspace(0.2, 1.4, 9)
+    path = straight(0.5 * np.stack([np.cos(theta), np.sin(theta)], axis=1))
+    error = failure(serial_arm(0.5), path, 17)  # every other sample is halfway along a chord
+    assert error.sample == 1
+    assert f"{0.5 * (1 - np.cos(0.075)):.3g} m out of reach" in error.message
+
+
+def test_a_coordinate_that_does_not_move_the_tip_stays_at_its_start():
+    whole, upper = serial_arm(0.6, 0.45), serial_arm(0.6)
+    arm = TipChain(
+        lambda q: upper.position(q[:, :1]),
+        lambda q: np.concatenate([upper.jacobian(q[:, :1]), np.zeros((len(q), 2, 1))], axis=2),
+        whole.joints,
+        whole.relative_map,
+    )
+    theta = np.linspace(0.2, 1.4, 9)
+    samples = course(straight(upper.position(theta[:, None])), 9)
+    q = follow(arm, samples, start=[0.0, 2.5]).q
+    np.testing.assert_allclose(q, np.stack([theta, np.full(9, 2.5)], axis=1), atol=1e-9)
+    with pytest.raises(MechanismError, match="does not depend on coordinate 2") as error:
+        follow(arm, samples)
+    assert error.value.path == "trajectory.start"
+
+
+def test_three_joints_place_a_tip_in_space():
+    """Turntable and two links (yaw, shoulder, elbow): three coordinates, three components."""
+    planar = serial_arm(0.6, 0.45)
+
+    def position(q):
+        r, z = planar.position(q[:, 1:]).T
+        return np.stack([r * np.cos(q[:, 0]), r * np.sin(q[:, 0]), z], axis=1)
+
+    def jacobian(q):
+        r = planar.position(q[:, 1:])[:, 0]
+        c, s, J = np.cos(q[:, 0]), np.sin(q[:, 0]), planar.jacobian(q[:, 1:])
+        yaw = np.stack([-r * s, r * c, 0 * r], axis=1)
+        rest = np.stack([c[:, None] * J[:, 0], s[:, None] * J[:, 0], J[:, 1]], axis=1)
+        return np.concatenate([yaw[:, :, None], rest], axis=2)
+
+    relative = np.array([[1.0, 0, 0], [0, 1, 0], [0, -1, 1]])
+    arm = TipChain(position, jacobian, ("yaw", "shoulder", "elbow"), (relative, np.zeros(3)))
+    path = spline([(0.5, 0.1, 0.3), (0.3, 0.4, 0.5), (-0.2, 0.5, 0.2), (-0.5, 0.2, 0.3)])
+    samples = course(path, 60)
+    q = follow(arm, samples, UP, start=[0.2, 0.0, 1.0]).q
+    np.testing.assert_allclose(position(q), path.point(samples.s), atol=1e-10, rtol=0)
+    x, y, z = path.point(samples.s).T
+    assert away(q[:, 0], np.arctan2(y, x)) < 1e-8
+    expected = two_link_angles(np.stack([np.hypot(x, y), z], axis=1), 0.6, 0.45, 1.0)
+    assert away(q[:, 2] - q[:, 1], expected[:, 1]) < 1e-8
+
+
+# --- wishes that make no sense ---
+
+
+@pytest.mark.parametrize(
+    ("wishes", "key", "message"),
+    [
+        ({"branch": {"hip": (0.0, 1.0)}}, "trajectory.branch.hip", "shoulder, elbow"),
+        ({"branch": {"elbow": (2.0, 1.0)}}, "trajectory.branch.elbow", "must go upwards"),
+        ({"branch": {"elbow": (1.0, 1.0)}}, "trajectory.branch.elbow", "must go upwards"),
+        ({"branch": {"elbow": (np.nan, 1.0)}}, "trajectory.branch.elbow", "must go upwards"),
+        ({"start": [1.0]}, "trajectory.start", "2 finite coordinates"),
+        ({"start": [1.0, 2.0, 3.0]}, "trajectory.start", "2 finite coordinates"),
+        ({"start": [1.0, np.inf]}, "trajectory.start", "2 finite coordinates"),
+    ],
+)
+def test_wishes_that_make_no_sense_are_refused(wishes, key, message):
+    with pytest.raises(MechanismError, match=message) as error:
+        follow(serial_arm(0.6, 0.45), course(spline(PAPER)), **wishes)
+    assert error.value.path == key
+
+
+def test_results_are_frozen():
+    q = follow(serial_arm(0.6, 0.45), course(spline(PAPER)), PAPER_BRANCH).q
+    with pytest.raises(ValueError, match="read-only"):
+        q[0, 0] = 0.0
