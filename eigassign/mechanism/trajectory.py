@@ -1,0 +1,135 @@
+"""The trajectory q(t) of a case: joint samples, a CSV file of them, or a path of the tip.
+
+Shapes: n samples in time, n_q coordinates. SI units, angles in rad.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from eigassign.case import FileTrajectory, SampledTrajectory, TipTrajectory
+from eigassign.errors import MechanismError, TrajectoryError
+from eigassign.mechanism.inverse_kinematics import Course, follow
+from eigassign.mechanism.paths import WAYPOINTS, Path, spline, straight
+from eigassign.mechanism.timing import timing_law
+from eigassign.mechanism.tip_chain import Floats, TipChain
+from eigassign.mechanism.trajectory_file import read_samples
+
+_BACKWARDS = "time must increase, and goes from {:g} s to {:g} s"
+_PATHS: dict[str, Callable[[ArrayLike], Path]] = {"spline": spline, "straight": straight}
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Where the mechanism is when. ``tip`` is None unless the case gives a path of the tip."""
+
+    time_s: Floats  # (n,) strictly increasing, n >= 2
+    q: Floats  # (n, n_q) in rad
+    tip: Floats | None  # (n, 2 or 3) in m
+    notes: tuple[str, ...] = ()  # what a reader should know: choices made, columns ignored
+
+    def __post_init__(self) -> None:
+        for array in (self.time_s, self.q, self.tip):
+            if array is not None:
+                array.setflags(write=False)
+
+
+def build_trajectory(
+    spec: SampledTrajectory | FileTrajectory | TipTrajectory,
+    q_names: Sequence[str],
+    tip_chain: Callable[[str], TipChain],
+    folder: FilePath = FilePath(),
+) -> Trajectory:
+    """The trajectory that a case asks for, in the coordinates ``q_names``.
+
+    ``tip_chain(node)`` gives the chain of a tip path's node and is called for nothing else;
+    ``folder`` is what the name of a CSV file is relative to. Raises MechanismError for what is
+    wrong as a whole, TrajectoryError for what is wrong with one sample.
+    """
+    if isinstance(spec, TipTrajectory):
+        return _from_tip_path(spec, q_names, tip_chain)
+    if isinstance(spec, FileTrajectory):
+        return _from_file(spec, q_names, folder)
+    return _from_samples(spec, q_names)
+
+
+def _from_tip_path(
+    spec: TipTrajectory, q_names: Sequence[str], tip_chain: Callable[[str], TipChain]
+) -> Trajectory:
+    """q(t) with tip(q(t)) = p(s(t/T)) at equal steps in time."""
+    path, chain = _PATHS[spec.path](spec.waypoints), tip_chain(spec.tip)
+    _check_dimension(chain, path, len(q_names))
+    tau = np.linspace(0.0, 1.0, spec.samples)
+    s = np.clip(timing_law(spec.timing).position(tau), 0.0, 1.0)  # round-off at the ends
+    course = Course(path, np.maximum.accumulate(s), spec.duration * tau)
+    followed = follow(chain, course, spec.branch, spec.start)
+    tip = chain.position(followed.q)
+    return Trajectory(course.time_s, followed.q, tip, followed.notes)
+
+
+def _check_dimension(chain: TipChain, path: Path, n_q: int) -> None:
+    d = chain.position(np.zeros((1, n_q))).shape[1]
+    if path.coefficients.shape[2] != d:
+        raise MechanismError(WAYPOINTS, f"the tip moves in {d} dimensions: give {d} coordinates")
+
+
+def _from_file(spec: FileTrajectory, q_names: Sequence[str], folder: FilePath) -> Trajectory:
+    table = read_samples(folder / spec.file, q_names)
+    for k in _not_later(table.time_s):
+        message = f"{table.where(k)}: {_BACKWARDS.format(*table.time_s[k - 1 : k + 1])}"
+        raise TrajectoryError("trajectory.file", message, k)
+    notes = (*table.notes, *_jumps(table.q, q_names))
+    return Trajectory(table.time_s, table.q, None, notes)
+
+
+def _from_samples(spec: SampledTrajectory, q_names: Sequence[str]) -> Trajectory:
+    """Samples given in the case: times as given, or at equal steps over the duration from 0."""
+    for k, row in enumerate(spec.q):
+        _check_sample(row, q_names, k)
+    q = np.array(spec.q, dtype=np.float64)
+    if len(q) < 2:
+        raise MechanismError("trajectory.q", "a trajectory needs at least two samples")
+    if spec.time is None:
+        time_s = np.linspace(0.0, spec.duration or 1.0, len(q))
+    else:
+        time_s = _checked_time(spec.time, len(q))
+    return Trajectory(time_s, q, None, _jumps(q, q_names))
+
+
+def _check_sample(row: Sequence[float], q_names: Sequence[str], k: int) -> None:
+    names = ", ".join(q_names)
+    if len(row) != len(q_names):
+        message = f"sample {k} has {len(row)} values for the coordinates {names}"
+        raise TrajectoryError(f"trajectory.q[{k}]", message, k)
+    if not np.isfinite(row).all():
+        raise TrajectoryError(f"trajectory.q[{k}]", f"sample {k} is not finite", k)
+
+
+def _checked_time(time: Sequence[float], n: int) -> Floats:
+    time_s = np.array(time, dtype=np.float64)
+    if len(time_s) != n:
+        raise MechanismError("trajectory.time", f"{len(time_s)} times for {n} samples of q")
+    for k in _not_later(time_s):
+        message = f"sample {k}: {_BACKWARDS.format(*time_s[k - 1 : k + 1])}"
+        raise TrajectoryError(f"trajectory.time[{k}]", message, k)
+    return time_s
+
+
+def _not_later(time_s: Floats) -> list[int]:
+    """Samples that do not come after the one before them (NaN comes after nothing)."""
+    return [int(k) + 1 for k in np.flatnonzero(~(np.diff(time_s) > 0.0))]
+
+
+def _jumps(q: Floats, q_names: Sequence[str]) -> tuple[str, ...]:
+    """A note for each coordinate that moves by more than half a turn from sample to sample."""
+    steps = np.abs(np.diff(q, axis=0))
+    return tuple(
+        f"{name} jumps by {steps[k, i]:.3g} rad from sample {k} to {k + 1}; is it cut at 360 deg?"
+        for i, name in enumerate(q_names)
+        if steps[k := int(np.argmax(steps[:, i])), i] > np.pi
+    )

@@ -1,0 +1,133 @@
+"""Joint samples from CSV files, good and bad."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eigassign.errors import MechanismError, TrajectoryError
+from eigassign.mechanism.trajectory_file import read_samples
+
+Q = ("q1", "q2")
+
+
+def written(folder: Path, content: str | bytes) -> Path:
+    file = folder / "arm.csv"
+    file.write_bytes(content.encode() if isinstance(content, str) else content)
+    return file
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "time,q1,q2\n0,1,2\n0.5,3,4\n",
+        "time,q1,q2\n0,1,2\n0.5,3,4",  # no newline at the end
+        "q2,time,q1\n2,0,1\n4,0.5,3\n",
+        "time [s] , q1 [rad],q2[rad]\n0, 1, 2\n0.5, 3, 4\n",
+        "time [ms],q1,q2 [mrad]\n0,1,2000\n500,3,4e3\n",
+        "\ufefftime,q1,q2\r\n0,1,2\r\n0.5,3,4\r\n",  # as spreadsheets write it
+        '# measured\n\n"time","q1","q2"\n# run 7\n0,1,"2"\n\n+.5,3.,4\n',
+    ],
+)
+def test_files_are_read_in_any_order_unit_and_dress(tmp_path, content):
+    table = read_samples(written(tmp_path, content), Q)
+    np.testing.assert_array_equal(table.time_s, [0.0, 0.5])
+    np.testing.assert_array_equal(table.q, [[1.0, 2.0], [3.0, 4.0]])
+    assert table.notes == ()
+
+
+@pytest.mark.parametrize("unit", ["deg", "°"])
+def test_degrees_become_radians(tmp_path, unit):
+    table = read_samples(written(tmp_path, f"time,q1 [{unit}],q2\n0,180,1\n1,-90,1\n"), Q)
+    np.testing.assert_allclose(table.q, [[np.pi, 1.0], [-np.pi / 2, 1.0]], rtol=1e-15)
+
+
+def test_samples_know_the_line_they_stand_in(tmp_path):
+    table = read_samples(written(tmp_path, "# x\ntime,q1,q2\n0,1,2\n\n1,1,2\n"), Q)
+    assert [table.where(k) for k in (0, 1)] == ["arm.csv:3", "arm.csv:5"]
+
+
+def test_extra_columns_are_ignored_with_a_note(tmp_path):
+    table = read_samples(written(tmp_path, "time,q1,q2,torque [N m],\n0,1,2,x,\n1,1,2,,\n"), Q)
+    assert table.q.shape == (2, 2)
+    assert table.notes == ("arm.csv: ignored the columns torque, (no name)",)
+
+
+GOOD = "time,q1,q2\n0,1,2\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("", "arm.csv: is empty"),
+        ("\n\n# nothing\n", "arm.csv: is empty"),
+        ("time,q1,q2\n", "arm.csv: 0 samples; at least two"),
+        (GOOD, "arm.csv: 1 samples; at least two"),
+        ("0,1,2\n1,1,2\n", "arm.csv:1: no column time; the columns are 0, 1, 2"),
+        ("time,q1\n0,1\n1,2\n", "arm.csv:1: no column q2; the columns are time, q1"),
+        ("# x\ntimes,q1,q2\n0,1,2\n", "arm.csv:2: no column time; .* did you mean 'times'"),
+        ("time,Q1,q2\n0,1,2\n", "arm.csv:1: no column q1; the columns are time, Q1, q2"),
+        ("time;q1;q2\n0;1;2\n", "arm.csv:1: no column time; .* separated by commas"),
+        ("time\tq1\tq2\n0\t1\t2\n", "arm.csv:1: no column time; .* separated by commas"),
+        ("time,q1,q2,q1 [deg]\n0,1,2,3\n", "arm.csv:1: column q1 appears 2 times"),
+        ("time,q1 [degrees],q2\n0,1,2\n", "arm.csv:1: column q1: unknown unit 'degrees'"),
+        ("time,q1 [mm],q2\n0,1,2\n", r"arm.csv:1: column q1: \[mm\] is no unit of angle"),
+        ("time [rad],q1,q2\n0,1,2\n", r"arm.csv:1: column time: \[rad\] is no unit of time"),
+        ("time,q1 [rpm],q2\n0,1,2\n", "arm.csv:1: column q1: rpm "),
+        ("time,q1 [deg,q2\n0,1,2\n", r"arm.csv:1: column 'q1 \[deg' must read"),
+    ],
+)
+def test_files_that_are_wrong_as_a_whole(tmp_path, content, message):
+    with pytest.raises(MechanismError, match=message) as error:
+        read_samples(written(tmp_path, content), Q)
+    assert error.value.path == "trajectory.file"
+    assert not isinstance(error.value, TrajectoryError)
+    assert error.value.exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("1,x,2", "column q1: 'x' is not a finite number"),
+        ("1,,2", "column q1: '' is not a finite number"),
+        ("1,nan,2", "column q1: 'nan' is not a finite number"),
+        ("1,2,inf", "column q2: 'inf' is not a finite number"),
+        ("1,2,1e999", "column q2: '1e999' is not a finite number"),
+        ("1,1_000,2", "column q1: '1_000' is not a finite number"),
+        ("1,0x10,2", "column q1: '0x10' is not a finite number"),
+        ("1,30 deg,2", "column q1: '30 deg' is not a finite number"),
+        ("12:30,1,2", "column time: '12:30' is not a finite number"),
+        ("1,2", "2 values for 3 columns"),
+        ("1,2,3,4", "4 values for 3 columns"),
+        ("0,5,1,2", "4 values for 3 columns"),  # a decimal comma
+    ],
+)
+def test_lines_that_are_wrong_are_named(tmp_path, line, message):
+    with pytest.raises(TrajectoryError, match=f"arm.csv:4: {message}") as error:
+        read_samples(written(tmp_path, f"{GOOD}\n{line}\n"), Q)
+    assert error.value.sample == 1
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"time,q1,q2\n0,1,\xff\n", "not a text file in UTF-8"),
+        (b"\x89PNG\r\n\x1a\n\x00\x00", "not a text file in UTF-8"),
+        (b"time,q1,q2\n0,1,\x00\n", "zero bytes"),
+        ("time,q1,q2\n".encode("utf-16"), "not a text file in UTF-8"),
+        (b'time,q1,q2\n0,1,"2\n', "arm.csv:2: unexpected end of data"),
+        (b"time,q1,q2\n0,1," + b"9" * 200_000 + b"\n", "arm.csv:2: field larger"),
+    ],
+)
+def test_files_that_are_no_table_of_text(tmp_path, content, message):
+    with pytest.raises(MechanismError, match=message):
+        read_samples(written(tmp_path, content), Q)
+
+
+def test_a_file_that_cannot_be_read_is_named_with_the_reason(tmp_path):
+    with pytest.raises(MechanismError, match=r"none\.csv: cannot be read: No such file"):
+        read_samples(tmp_path / "none.csv", Q)
+    with pytest.raises(MechanismError, match="cannot be read: Is a directory"):
+        read_samples(tmp_path, Q)
