@@ -76,6 +76,15 @@ def test_the_rounding_of_a_sum_of_large_numbers_is_not_held_against_it():
     assert share @ result.dy == pytest.approx(0.3 * share.sum(), abs=1e-6)
 
 
+def test_the_last_bit_of_a_sum_of_large_numbers_is_no_violation_but_a_hundred_are():
+    model, box = goal([1.2e6], [[-5e5]], 1e6), Bounds(np.array([1e9]), np.array([1e9 + 1]))
+    for bits, met in ((1, True), (100, False)):
+        value = 1e9 + bits * np.spacing(1e9)
+        limit = LinearConstraint("limit", [1.0], lower=value)
+        program = build_program([model], [0.0], [1e9], [1e9], box, [limit])
+        assert (judge(program, answer(1e9, 0.0)).primal_residual == 0.0) is met
+
+
 def test_a_multiplier_of_a_limit_that_does_not_exist_is_dropped():
     program = small_program(upper=np.inf)
     scaled = scaled_program(program)
