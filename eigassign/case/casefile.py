@@ -41,8 +41,13 @@ class CaseFile:
 
     def problem(self, key_path: str, message: str) -> Problem:
         """Problem at the line and column of ``key_path`` (``mechanism.links.forearm.length``,
-        ``targets[0].mode``), or of the nearest key above it that the file has."""
+        ``targets[0].mode``), or of the nearest key above it that the file has.
+
+        ``key_path`` may start below `mechanism`, as the paths of design parameters do.
+        """
         path = undotted(key_path)
+        if path and self.marks.find(path[:1]) is self.marks:
+            path = ("mechanism", *path)  # paths of properties start below `mechanism`
         mark = self.marks.find(path)
         return Problem(str(self.path), mark.line, mark.column, dotted(path), message)
 

@@ -14,7 +14,7 @@ from eigassign.case.mechanism_parts import ANGLE
 from eigassign.case.properties import NoPropertyError, Property, find
 from eigassign.case.quantity import Quantity
 from eigassign.case.suggest import shown
-from eigassign.case.tree import Tree, at, items, parameters, text
+from eigassign.case.tree import Tree, at, items, names, parameters, text
 from eigassign.case.units import QuantityError, read
 from eigassign.case.yaml_reader import Finding, KeyPath
 
@@ -30,8 +30,9 @@ def in_context(tree: Tree, folder: Path) -> tuple[Tree, list[Finding]]:
         changed["design"] = _design(tree, properties, findings)
     _convert(changed, "expansion", _expansion(tree, properties, findings))
     _convert(changed, "trajectory", _trajectory(tree, folder, findings))
-    span = _angles(at(tree, "validation", "q_span"), ("validation", "q_span"), findings)
-    _convert(changed, "validation", {"q_span": span})
+    span, path = at(tree, "validation", "q_span"), ("validation", "q_span")
+    scalar = _si(span, ANGLE, path, findings)
+    _convert(changed, "validation", {"q_span": _angles(scalar, path, findings)})
     return changed, findings
 
 
@@ -60,9 +61,9 @@ def _design(
 ) -> dict[str, object]:
     changed: dict[str, object] = {}
     for name, body in parameters(tree):
-        prop = properties[name]
+        prop, known = properties[name], len(findings)
         changed[name] = _bounds(body, prop.quantity if prop else _ANY, ("design", name), findings)
-        if prop:
+        if prop and len(findings) == known:
             findings.extend(_outside(prop, changed[name], name, at(body, "parameter")))
     constraints = at(tree, "design", "constraints")
     if isinstance(constraints, Mapping):
@@ -72,13 +73,8 @@ def _design(
             )
             for name, body in constraints.items()
         }
-    apart = {"constraints": constraints} if "constraints" in names_of(tree) else {}
+    apart = {"constraints": constraints} if "constraints" in names(tree, "design") else {}
     return {"parameters": changed, **apart}
-
-
-def names_of(tree: Tree) -> list[str]:
-    """Keys under `design`."""
-    return [name for name, _ in items(tree, "design")]
 
 
 def _bounds(
@@ -108,7 +104,7 @@ def _outside(prop: Property, body: object, name: str, path: object) -> Iterable[
     initial, low, high = prop.initial(), at(body, "min"), at(body, "max")
     if initial is None or not isinstance(low, float) or not isinstance(high, float):
         return
-    if low <= high and not low <= initial <= high and (low, high) != (0.0, 0.0):
+    if low <= high and not low <= initial <= high:
         unit = prop.quantity.dimension.si if prop.quantity.dimension else ""
         message = (
             f"initial value {initial:g} {unit} of {path} is outside [{low:g}, {high:g}] {unit}"
@@ -131,19 +127,24 @@ def _trajectory(tree: Tree, folder: Path, findings: list[Finding]) -> dict[str, 
     body = at(tree, "trajectory")
     changed = {k: _angles(at(body, k), ("trajectory", k), findings) for k in ("q", "start")}
     file = text(body, "file")
-    if file is not None:
-        changed["file"] = os.path.abspath(folder / file)
+    if file is not None and at(body, "tip") is None:
+        path = os.path.abspath(folder / file)
+        changed["file"] = path
+        if not os.path.isfile(path):
+            findings.append((("trajectory", "file"), f"no such file: {shown(path)}"))
     return changed
 
 
 def _angles(value: object, path: KeyPath, findings: list[Finding]) -> object:
-    """Coordinates of revolute joints, in lists of any depth, in rad."""
-    if isinstance(value, tuple):
-        return tuple(
-            v if isinstance(v, (float, int)) else _angles(v, (*path, k), findings)
-            for k, v in enumerate(value)
-        )
-    return value if value == "auto" else _si(value, ANGLE, path, findings)
+    """Coordinates of revolute joints, in lists of any depth, in rad; anything else untouched."""
+    if not isinstance(value, tuple):
+        return value
+    return tuple(
+        _si(v, ANGLE, (*path, k), findings)
+        if isinstance(v, str)
+        else _angles(v, (*path, k), findings)
+        for k, v in enumerate(value)
+    )
 
 
 def _si(value: object, quantity: Quantity | None, path: KeyPath, findings: list[Finding]) -> object:

@@ -27,8 +27,8 @@ from eigassign.case.yaml_reader import Finding, KeyPath
 class Document(Part):
     """Everything a case file may hold."""
 
-    title: Annotated[str, Field(min_length=1)]
-    reference: str | None = None
+    title: Annotated[str, Field(min_length=1, max_length=200)]
+    reference: Annotated[str, Field(max_length=1000)] | None = None
     mechanism: Mechanism
     coordinates: Annotated[Mapping[str, Coordinate], Frozen] = FrozenDict()
     trajectory: Trajectory | None = None
@@ -46,6 +46,7 @@ _TAGGED: dict[object, type[Part]] = {
     "<samples>": SampledTrajectory,
     "<profile>": FrequencyProfile,
 }
+_MOST = 200  # errors explained; nobody reads more
 _LEAF_TAGS = {"<word>", "<one>", "<list>", "<constant>"}
 _TAGS = _LEAF_TAGS | set(_TAGGED)
 
@@ -56,7 +57,12 @@ def validated(tree: Mapping[str, object]) -> tuple[Document | None, list[Finding
         return Document.model_validate(tree), []
     except ValidationError as error:
         details = error.errors(include_url=False)
-        return None, [_finding(e) for e in details]
+        return None, [_finding(e) for e in details[:_MOST] if not _is_echo(e)]
+
+
+def _is_echo(error: Any) -> bool:
+    """Pydantic counts only valid entries; a list that is long enough had other errors."""
+    return error["type"] == "too_short" and bool(len(error["input"]) >= error["ctx"]["min_length"])
 
 
 def _finding(error: Any) -> Finding:
@@ -77,6 +83,8 @@ def _by_message(error: Any) -> _Explained:
 
 def _missing(error: Any) -> _Explained:
     *parent, key = error["loc"]
+    if isinstance(key, int):
+        return (), f"entry {key + 1} is missing"
     field = _model_at(parent).model_fields[key]
     kinds = [m.dimension for m in field.metadata if isinstance(m, Quantity) and m.dimension]
     return (), "required key is missing" + "".join(f": {kind}" for kind in kinds)
@@ -85,8 +93,6 @@ def _missing(error: Any) -> _Explained:
 def _extra(error: Any) -> _Explained:
     *parent, key = error["loc"]
     known = _model_at(parent).model_fields
-    if tuple(parent) == ("design",):
-        known = {}
     return (), f"unknown key{suggestion(key, known)}; allowed: {listed(known)}"
 
 
@@ -173,6 +179,7 @@ _EXPLAIN: dict[str, Any] = {
     "int_from_float": _expected("a whole number"),
     "string_type": _expected("text (in quotes if need be)"),
     "string_too_short": _expected("some text"),
+    "string_too_long": lambda e: ((), f"is longer than {e['ctx']['max_length']} characters"),
     "too_short": lambda e: (
         (),
         f"needs at least {e['ctx']['min_length']} entries, got {e['ctx']['actual_length']}",

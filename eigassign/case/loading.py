@@ -6,17 +6,18 @@ import hashlib
 import os
 import stat
 from collections.abc import Iterable
+from itertools import islice
 from pathlib import Path
 
 from eigassign.case.casefile import CaseFile
 from eigassign.case.context import in_context
 from eigassign.case.document import Document, validated
 from eigassign.case.plausibility import implausible
-from eigassign.case.references import inconsistent
+from eigassign.case.references import inconsistent, too_many
 from eigassign.case.yaml_reader import MAX_BYTES, Finding, Source, read_yaml
 from eigassign.errors import CaseError, Problem, StorageError, UsageError
 
-MOST_PROBLEMS = 100
+MOST_PROBLEMS = 100  # shown; of each kind of check twice as many are looked at
 
 
 def load(path: str | Path) -> CaseFile:
@@ -31,9 +32,12 @@ def load(path: str | Path) -> CaseFile:
 def parse(data: bytes, path: str | Path) -> CaseFile:
     """The case file with content ``data``; ``path`` names it and anchors relative paths in it."""
     source = _read(data, Path(path))
+    if crowded := [source.problem(*finding) for finding in too_many(source.tree)]:
+        raise CaseError(tuple(crowded))
     tree, unit_findings = in_context(source.tree, Path(path).parent)
     document, schema_findings = validated(tree)
-    findings = [*unit_findings, *schema_findings, *inconsistent(source.tree)]
+    findings = [*unit_findings, *islice(inconsistent(source.tree), 2 * MOST_PROBLEMS)]
+    findings += [f for f in schema_findings if not f[1].endswith("got nothing")]  # said: empty key
     problems = _unique([*source.problems, *(source.problem(*f) for f in findings)])
     if problems or document is None:
         raise CaseError(_capped(problems))
@@ -49,7 +53,7 @@ def _read(data: bytes, path: Path) -> Source:
 
 def _case_file(document: Document, source: Source, data: bytes, path: Path) -> CaseFile:
     content = {name: getattr(document, name) for name in Document.model_fields}
-    warnings = _located(implausible(document, source.tree), source)
+    warnings = _located(implausible(document), source)
     digest = hashlib.sha256(data).hexdigest()
     return CaseFile(**content, path=path, sha256=digest, warnings=warnings, marks=source.marks)
 
@@ -68,7 +72,7 @@ def _capped(problems: list[Problem]) -> tuple[Problem, ...]:
         return tuple(problems)
     first = sorted(problems, key=lambda p: (p.line, p.column))[:MOST_PROBLEMS]
     last = first[-1]
-    more = f"… and {len(problems) - MOST_PROBLEMS} more problems below"
+    more = "… and more problems; mend these first"
     return (*first, Problem(last.file, last.line, last.column + 1, "", more))
 
 

@@ -79,7 +79,7 @@ def given(value: object, key: str, default: object = None) -> object:
 
 def _shape_tag(value: object) -> str | None:
     shape = given(value, "shape", "bare")
-    return f"<{shape}>" if shape in SHAPES else None
+    return f"<{shape}>" if isinstance(shape, str) and shape in SHAPES else None
 
 
 Section: TypeAlias = Annotated[
@@ -172,6 +172,6 @@ class Mechanism(Part):
     space: Literal["planar", "spatial"]
     materials: Annotated[Mapping[str, Material], Frozen]
     sections: Annotated[Mapping[str, Section], Frozen]
-    links: Annotated[Mapping[str, Link], Frozen]
+    links: Annotated[Mapping[str, Link], Field(min_length=1), Frozen]
     joints: Annotated[Mapping[str, Joint], Frozen]
     bodies: Annotated[Mapping[str, Body], Frozen] = FrozenDict()

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import get_args
 
 from eigassign.case.mechanism_parts import SHAPES, Body, Drive, Link, Material
 from eigassign.case.quantity import Part, Quantity
 from eigassign.case.suggest import listed, suggestion, unknown
-from eigassign.case.tree import at, names, text
+from eigassign.case.tree import at, names
 from eigassign.case.units import QuantityError
 
 _GROUPS = ("materials", "sections", "links", "bodies")
@@ -56,10 +56,12 @@ def find(tree: object, path: str) -> Property | None:
 
 
 def _property(tree: object, group: str, name: str, key: str) -> Property | None:
-    known = names(tree, "mechanism", group)
-    if name not in known:
+    known = at(tree, "mechanism", group)
+    if known is None and group == "bodies":
+        known = {}
+    if isinstance(known, Mapping) and name not in known:
         raise NoPropertyError(unknown(_singular(group), name, known))
-    body = at(tree, "mechanism", group, name)
+    body = at(known, name)
     model = _model(group, body)
     if model is None:
         return None
@@ -69,8 +71,11 @@ def _property(tree: object, group: str, name: str, key: str) -> Property | None:
 
 
 def _model(group: str, body: object) -> type[Part] | None:
+    if not isinstance(body, Mapping):
+        return None
     if group == "sections":
-        return SHAPES.get(text(body, "shape") or "bare")
+        shape = body.get("shape", "bare")
+        return SHAPES.get(shape) if isinstance(shape, str) else None
     models: dict[str, type[Part]] = {"materials": Material, "links": Link, "bodies": Body}
     return models[group]
 

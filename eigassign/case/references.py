@@ -6,14 +6,16 @@ Works on the plain tree, so that it speaks up even where the schema has objectio
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from eigassign.case.suggest import listed, shown, unknown
+from eigassign.case.timing import uncovered
 from eigassign.case.topology import topology
-from eigassign.case.tree import Tree, at, entries, items, names, parameters, text
+from eigassign.case.tree import Tree, at, entries, items, lacks, names, parameters, text
 from eigassign.case.yaml_reader import Finding, KeyPath
 
 _NAME = re.compile(r"[^\W\d][\w-]{0,63}")
+_MOST_NAMED = 1000
 _NAMED = (
     *(("mechanism", key) for key in ("materials", "sections", "links", "joints", "bodies")),
     ("coordinates",),
@@ -24,7 +26,9 @@ _NAMED = (
 
 def inconsistent(tree: Tree) -> Iterator[Finding]:
     """Everything that does not fit together."""
+    yield from empty(tree)
     yield from _names(tree)
+    yield from _titles(tree)
     yield from _space(tree)
     yield from _materials_and_sections(tree)
     yield from topology(tree)
@@ -34,6 +38,27 @@ def inconsistent(tree: Tree) -> Iterator[Finding]:
     yield from _design(tree)
     yield from _expansion(tree)
     yield from _targets(tree)
+    yield from uncovered(tree)
+
+
+def too_many(tree: Tree) -> Iterator[Finding]:
+    """Groups so large that the file is not a mechanism's."""
+    for place in _NAMED:
+        if len(items(tree, *place)) > _MOST_NAMED:
+            yield place, f"more than {_MOST_NAMED} entries"
+
+
+def empty(node: object, path: KeyPath = ()) -> Iterator[Finding]:
+    """Keys and list entries without a value."""
+    if node is None:
+        comma = bool(path) and str(path[-1])[:1].isdigit()
+        hint = " (decimals take a point, not a comma)" if comma else ""
+        yield path, f"has no value: give one, or leave the key out{hint}"
+    for key, inner in node.items() if isinstance(node, Mapping) else ():
+        yield from empty(inner, (*path, key))
+    for k, inner in enumerate(node) if isinstance(node, tuple) else ():
+        if not isinstance(inner, (int, float)):
+            yield from empty(inner, (*path, k))
 
 
 def _names(tree: Tree) -> Iterator[Finding]:
@@ -49,6 +74,12 @@ def _names(tree: Tree) -> Iterator[Finding]:
         )
 
 
+def _titles(tree: Tree) -> Iterator[Finding]:
+    for key in ("title", "reference"):
+        if not (text(tree, key) or "").isprintable():
+            yield (key,), "expected one line of printable text"
+
+
 def _space(tree: Tree) -> Iterator[Finding]:
     if at(tree, "mechanism", "space") == "spatial":
         yield ("mechanism", "space"), "spatial mechanisms are not supported yet: only planar"
@@ -57,26 +88,27 @@ def _space(tree: Tree) -> Iterator[Finding]:
 def _materials_and_sections(tree: Tree) -> Iterator[Finding]:
     for link, body in items(tree, "mechanism", "links"):
         for kind in ("material", "section"):
-            name, known = text(body, kind), names(tree, "mechanism", f"{kind}s")
-            if name is not None and name not in known:
+            name, group = text(body, kind), ("mechanism", f"{kind}s")
+            if name is not None and lacks(tree, group, name):
+                known = names(tree, *group)
                 yield ("mechanism", "links", link, kind), unknown(kind, name, known)
 
 
-def end_of_link(tree: Tree, value: str, example: str = "end") -> str | None:
+def _end_of_link(tree: Tree, value: str) -> str | None:
     """What is wrong with ``value`` as a link's end; None if nothing is."""
-    links = names(tree, "mechanism", "links")
-    link, dot, end = value.partition(".")
-    if dot and link in links and end in ("start", "end"):
-        return None
-    if link not in links:
+    link, _, end = value.partition(".")
+    if lacks(tree, ("mechanism", "links"), link):
+        links = names(tree, "mechanism", "links")
         return f"{unknown('link', link, links)}; expected '<link>.start' or '<link>.end'"
-    return f"expected '{link}.start' or '{link}.end', got {shown(value)}; e.g. '{link}.{example}'"
+    if end in ("start", "end") or at(tree, "mechanism", "links", link) is None:
+        return None
+    return f"expected '{link}.start' or '{link}.end', got {shown(value)}"
 
 
 def _bodies(tree: Tree) -> Iterator[Finding]:
     for name, body in items(tree, "mechanism", "bodies"):
         place = text(body, "at")
-        message = end_of_link(tree, place) if place is not None else None
+        message = _end_of_link(tree, place) if place is not None else None
         if message:
             yield ("mechanism", "bodies", name, "at"), message
 
@@ -88,14 +120,15 @@ def _revolute(tree: Tree) -> list[str]:
 
 def _coordinates(tree: Tree) -> Iterator[Finding]:
     owner: dict[str, str] = {}
-    joints = names(tree, "mechanism", "joints")
+    where = ("mechanism", "joints")
+    complete = True
     for name, body in items(tree, "coordinates"):
         joint = text(body, "joint")
         path: KeyPath = ("coordinates", name, "joint")
-        if joint is None:
-            continue
-        if joint not in joints:
-            yield path, unknown("joint", joint, joints)
+        if joint is None or lacks(tree, where, joint):
+            complete = False
+            if joint is not None:
+                yield path, unknown("joint", joint, names(tree, *where))
         elif at(tree, "mechanism", "joints", joint, "type") == "fixed":
             yield (
                 path,
@@ -104,9 +137,9 @@ def _coordinates(tree: Tree) -> Iterator[Finding]:
             )
         elif joint in owner:
             yield path, f"joint {joint!r} has a coordinate already: {owner[joint]!r}"
-        owner.setdefault(joint, name)
+        owner.setdefault(joint or "", name)
     for joint in _revolute(tree):
-        if joint not in owner:
+        if complete and joint not in owner:
             message = f"no coordinate: add one under coordinates, e.g. q{len(owner) + 1}: "
             yield ("mechanism", "joints", joint), message + f"{{joint: {joint}}}"
 
@@ -128,12 +161,13 @@ def _trajectory(tree: Tree) -> Iterator[Finding]:
     span = at(tree, "validation", "q_span")
     yield from _length(tree, span, ("validation", "q_span"), "coordinate", q)
     tip = text(tree, "trajectory", "tip")
-    message = end_of_link(tree, tip) if tip is not None else None
+    message = _end_of_link(tree, tip) if tip is not None else None
     if message:
         yield ("trajectory", "tip"), message
+    revolute = _revolute(tree)
     for joint in names(tree, "trajectory", "branch"):
-        if joint not in _revolute(tree):
-            message = unknown("revolute joint", joint, _revolute(tree))
+        if joint not in revolute:
+            message = unknown("revolute joint", joint, revolute)
             yield ("trajectory", "branch", joint), message
 
 
@@ -141,11 +175,13 @@ def _design(tree: Tree) -> Iterator[Finding]:
     owner: dict[str, str] = {}
     for name, body in parameters(tree):
         path = text(body, "parameter")
+        if name.lower().startswith("constraint") and path is None:
+            yield ("design", name), "did you mean the reserved key 'constraints'?"
         if path is not None and path in owner:
             message = f"{path} is a design parameter already: {owner[path]!r}"
             yield ("design", name, "parameter"), message
         owner.setdefault(path or "", name)
-    known = [name for name, _ in parameters(tree)]
+    known = dict(parameters(tree))
     for name in names(tree, "design", "constraints"):
         for term in names(tree, "design", "constraints", name, "terms"):
             if term not in known:
@@ -157,8 +193,10 @@ def _expansion(tree: Tree) -> Iterator[Finding]:
     q, y = names(tree, "coordinates"), [name for name, _ in parameters(tree)]
     yield from _length(tree, at(tree, "expansion", "q"), ("expansion", "q"), "coordinate", q)
     yield from _length(tree, at(tree, "expansion", "y"), ("expansion", "y"), "design parameter", y)
-    seen: set[object] = set()
+    seen: set[int] = set()
     for k, mode in enumerate(entries(tree, "expansion", "modes")):
+        if not isinstance(mode, int):
+            continue
         if mode in seen:
             yield ("expansion", "modes", k), f"mode {shown(mode)} is listed twice"
         seen.add(mode)
@@ -166,11 +204,11 @@ def _expansion(tree: Tree) -> Iterator[Finding]:
 
 def _targets(tree: Tree) -> Iterator[Finding]:
     expanded = entries(tree, "expansion", "modes")
-    seen: set[object] = set()
+    seen: set[int] = set()
     for k, target in enumerate(entries(tree, "targets")):
         mode = at(target, "mode")
         path: KeyPath = ("targets", k, "mode")
-        if not isinstance(mode, int):
+        if not isinstance(mode, int) or mode < 1:
             continue
         if mode in seen:
             yield path, f"mode {mode} has a target already"

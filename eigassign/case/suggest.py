@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
+from itertools import islice
 
 _LONGEST = 60
 _MOST_NAMES = 20
+_MOST_CANDIDATES = 200  # names compared with a misspelt one: keeps hostile files cheap
 
 
 def shown(value: object) -> str:
@@ -14,6 +17,8 @@ def shown(value: object) -> str:
         return "nothing"
     if isinstance(value, bool):
         return "true" if value else "false"
+    if isinstance(value, float) and not math.isfinite(value):
+        return f".{value}".replace(".-", "-.")
     if isinstance(value, Mapping):
         return "a mapping"
     if isinstance(value, (tuple, list)):
@@ -28,7 +33,8 @@ def suggestion(name: str, known: Iterable[str]) -> str:
     """``"; did you mean 'x'?"`` when something known is close, else nothing."""
     from difflib import get_close_matches  # only needed once something is wrong
 
-    close = get_close_matches(name[:_LONGEST], list(known), n=1, cutoff=0.6)
+    candidates = islice(known, _MOST_CANDIDATES)
+    close = get_close_matches(name[:_LONGEST], list(candidates), n=1, cutoff=0.6)
     return f"; did you mean {close[0]!r}?" if close else ""
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from eigassign.case.suggest import shown, suggestion, unknown
-from eigassign.case.tree import Tree, at, items, names, text
+from eigassign.case.tree import Tree, at, items, text
 from eigassign.case.yaml_reader import Finding, KeyPath
 
 _LOOPS = "closed loops are not supported yet"
@@ -13,7 +13,9 @@ _LOOPS = "closed loops are not supported yet"
 
 def topology(tree: Tree) -> Iterator[Finding]:
     """Joint ends that do not exist, links held twice, not at all, or in a ring."""
-    links = names(tree, "mechanism", "links")
+    links = dict(items(tree, "mechanism", "links"))
+    if not links:
+        return
     holder: dict[str, str] = {}  # link → joint
     parent: dict[str, str] = {}  # link → link or "ground"
     sound = True
@@ -33,7 +35,7 @@ def topology(tree: Tree) -> Iterator[Finding]:
 
 
 def _ends(
-    body: object, path: KeyPath, links: list[str]
+    body: object, path: KeyPath, links: Mapping[str, object]
 ) -> tuple[str | None, str | None, list[Finding]]:
     """Base (a link or "ground") and follower of one joint, None where wrong."""
     base, follower = text(body, "base"), text(body, "follower")
@@ -53,7 +55,7 @@ def _ends(
     )
 
 
-def _base_problem(base: str, links: list[str]) -> str | None:
+def _base_problem(base: str, links: Mapping[str, object]) -> str | None:
     link, _, end = base.partition(".")
     if base == "ground" or (link in links and end in ("start", "end")):
         return None
@@ -63,7 +65,7 @@ def _base_problem(base: str, links: list[str]) -> str | None:
     return f"expected ground, '{link}.start' or '{link}.end', got {shown(base)}"
 
 
-def _follower_problem(follower: str, links: list[str]) -> str | None:
+def _follower_problem(follower: str, links: Mapping[str, object]) -> str | None:
     link, _, end = follower.partition(".")
     if link in links and end == "start":
         return None
@@ -75,29 +77,28 @@ def _follower_problem(follower: str, links: list[str]) -> str | None:
 
 
 def _loose(
-    links: list[str], holder: Mapping[str, str], parent: Mapping[str, str]
+    links: Mapping[str, object], holder: Mapping[str, str], parent: Mapping[str, str]
 ) -> Iterator[Finding]:
     """Links without a joint, and rings of links that hold each other but nothing holds."""
     for link in links:
-        if link not in holder:
+        if link not in holder and link != "ground":
             message = f"no joint holds this link: add one with follower: {link}.start"
             yield ("mechanism", "links", link), message
-    reported: set[str] = set()
+    walked: set[str] = set()
     for link in links:
-        ring = _ring(link, parent)
-        if ring and reported.isdisjoint(ring):
-            reported.update(ring)
+        ring = _ring(link, parent, walked)
+        if ring:
             joints = ", ".join(sorted(holder[member] for member in ring))
             path = ("mechanism", "joints", holder[ring[0]])
             yield path, f"{_LOOPS}: {joints} form a ring that no joint connects to the ground"
 
 
-def _ring(link: str, parent: Mapping[str, str]) -> list[str]:
-    """Links met twice when walking from ``link`` towards the ground."""
-    walked: list[str] = []
-    while link in parent:
-        if link in walked:
-            return walked[walked.index(link) :]
-        walked.append(link)
+def _ring(link: str, parent: Mapping[str, str], walked: set[str]) -> list[str]:
+    """Links that meet again when walking from ``link`` towards the ground over new ones only."""
+    path: dict[str, None] = {}
+    while link in parent and link not in walked:
+        walked.add(link)
+        path[link] = None
         link = parent[link]
-    return []
+    chain = list(path)
+    return chain[chain.index(link) :] if link in path else []

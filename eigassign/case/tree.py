@@ -25,6 +25,13 @@ def names(node: object, *keys: str) -> list[str]:
     return [name for name, _ in items(node, *keys)]
 
 
+def lacks(node: object, keys: tuple[str, ...], name: str) -> bool:
+    """Whether the mapping below ``keys`` has no ``name``; False where it is missing or no mapping
+    (one error is enough)."""
+    inner = at(node, *keys)
+    return isinstance(inner, Mapping) and name not in inner
+
+
 def entries(node: object, *keys: str) -> tuple[object, ...]:
     """Items of the list below ``keys``; none if it is not a list."""
     inner = at(node, *keys)

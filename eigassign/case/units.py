@@ -58,8 +58,26 @@ class Unit:
         return Unit(top // g, bottom // g, pi, (k[0], k[1], k[2], k[3], k[4]))
 
     def to_si(self, value: float) -> float:
-        """Value in SI, one rounding unless π is involved."""
+        """``value`` in SI."""
         return value * self.numerator / self.denominator * math.pi**self.pi
+
+    def decimal_to_si(self, number: str) -> float:
+        """Decimal ``number`` in SI, rounded once (a second time where π is involved).
+
+        `30 mm` is the very float 0.03; a min, a max and an initial value written in different
+        units then compare as their author expects.
+        """
+        digits, _, exponent = number.lower().partition("e")
+        whole, _, decimals = digits.partition(".")
+        shift = int(exponent or 0) - len(decimals)
+        if abs(shift) > _LARGEST_SHIFT:
+            return float(number)  # 0 or infinite, in any unit
+        top = int(whole + decimals) * self.numerator * 10 ** max(shift, 0)
+        bottom = self.denominator * 10 ** max(-shift, 0)
+        try:
+            return float(top / bottom * math.pi**self.pi)
+        except OverflowError:
+            return math.inf
 
 
 _DIMENSIONS = (
@@ -92,6 +110,7 @@ _M: Exponents = (0, 1, 0, 0, 0)
 _S: Exponents = (0, 0, 1, 0, 0)
 _RAD: Exponents = (0, 0, 0, 1, 0)
 _N: Exponents = (1, 1, -2, 0, 0)
+_NM: Exponents = (1, 2, -2, 0, 0)
 _PA: Exponents = (1, -1, -2, 0, 0)
 _HZ: Exponents = (0, 0, -1, 0, 1)
 UNITS: dict[str, Unit] = {
@@ -118,6 +137,8 @@ UNITS: dict[str, Unit] = {
     "N": Unit(1, 1, 0, _N),
     "kN": Unit(1000, 1, 0, _N),
     "MN": Unit(10**6, 1, 0, _N),
+    "Nm": Unit(1, 1, 0, _NM),
+    "kNm": Unit(1000, 1, 0, _NM),
     "Pa": Unit(1, 1, 0, _PA),
     "kPa": Unit(1000, 1, 0, _PA),
     "MPa": Unit(10**6, 1, 0, _PA),
@@ -133,14 +154,15 @@ UNITS: dict[str, Unit] = {
     "°": Unit(1, 180, 1, _RAD),
     "%": Unit(1, 100, 0, (0, 0, 0, 0, 0)),
 }
-_RPM = (
-    "rpm is a rate of rotation and is not converted: write the frequency you mean in Hz "
-    "(one cycle per turn would be rpm / 60)"
+_TURNS = (
+    "rpm and turns are not converted: write a frequency in Hz (one cycle per turn is rpm / 60), "
+    "an angle in deg or rad"
 )
 
 _NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _FACTOR = re.compile(r"([^\W\d_]+|[%°])(?:(?:\^|\*\*)?([-+]?[1-9]))?")
 _SUPERSCRIPTS = str.maketrans("⁻¹²³⁴⁵⁶⁷⁸⁹", "-123456789")
+_LARGEST_SHIFT = 1000  # decimal places
 _LONGEST = 60  # characters of a quantity; keeps the integers of a nonsense unit small
 
 
@@ -152,7 +174,7 @@ def read(value: object, dimension: Dimension | None) -> float:
     """
     if isinstance(value, str):
         number, unit = _split(value, dimension)
-        si = _checked(value, unit, dimension).to_si(number) if unit else number
+        si = _checked(value, unit, dimension).decimal_to_si(number) if unit else float(number)
     elif isinstance(value, bool) or not isinstance(value, (int, float)):
         raise QuantityError(f"{_expected(dimension)}, got {shown(value)}")
     else:
@@ -176,8 +198,8 @@ def _to_float(value: int | float) -> float:
         return math.inf
 
 
-def _split(text: str, dimension: Dimension | None) -> tuple[float, str]:
-    """``"30 mm"`` → ``(30.0, "mm")``."""
+def _split(text: str, dimension: Dimension | None) -> tuple[str, str]:
+    """``"30 mm"`` → ``("30", "mm")``."""
     stripped = text.strip()
     match = _NUMBER.match(stripped)
     if match is None or len(stripped) > _LONGEST:
@@ -185,7 +207,7 @@ def _split(text: str, dimension: Dimension | None) -> tuple[float, str]:
     rest = stripped[match.end() :].strip()
     if re.match(r",\d", rest):
         raise QuantityError(f"decimals take a point, not a comma: {shown(text)}")
-    return _to_float(float(match.group())), rest
+    return match.group(), rest
 
 
 def _checked(text: str, unit_text: str, dimension: Dimension | None) -> Unit:
@@ -230,9 +252,11 @@ def _factor(factor: str, text: str, dimension: Dimension | None) -> Unit:
 
 
 def _unknown(symbol: str, text: str, dimension: Dimension | None) -> str:
-    if symbol.lower() in {"rpm", "rev", "u"}:
-        return _RPM
-    folded = {u.lower(): u for u in UNITS}.get(symbol.lower())
+    if symbol.lower() in {"rpm", "rev", "turn", "turns"}:
+        return _TURNS
+    splits = ((symbol[:i], symbol[i:]) for i in range(1, len(symbol)))
+    pairs = (f"{a} {b}" for a, b in splits if a in UNITS and b in UNITS)
+    folded = next(pairs, None) or {u.lower(): u for u in UNITS}.get(symbol.lower())
     hint = f"; did you mean {folded!r}?" if folded else suggestion(symbol, UNITS)
     allowed = f"; {_expected(dimension)}" if dimension else ""
     return f"unknown unit {shown(symbol or text)}{hint}{allowed}"

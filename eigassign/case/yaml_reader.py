@@ -70,8 +70,12 @@ class Source:
 
 def dotted(path: KeyPath) -> str:
     """``("targets", 0, "mode")`` → ``"targets[0].mode"``."""
-    text = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in path)
+    text = "".join(f"[{p}]" if isinstance(p, int) else f".{_printable(p)}" for p in path)
     return text.removeprefix(".")
+
+
+def _printable(key: str) -> str:
+    return key if key.isprintable() and len(key) <= 80 else shown(key)
 
 
 def resolve(text: str) -> object:
@@ -95,7 +99,7 @@ def read_yaml(data: bytes, file: str) -> Source:
     builder = _Builder(file)
     try:
         tree, marks = builder.document(yaml.parse(text, Loader=_LOADER))
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise CaseError((_syntax_problem(error, text, file),)) from None
     if builder.fatal:
         raise CaseError(tuple(builder.fatal))
@@ -128,7 +132,7 @@ def _position(before: str) -> tuple[int, int]:
     return before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
 
 
-def _syntax_problem(error: yaml.YAMLError, text: str, file: str) -> Problem:
+def _syntax_problem(error: Exception, text: str, file: str) -> Problem:
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
     parts = (getattr(error, "context", None), getattr(error, "problem", None))

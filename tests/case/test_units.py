@@ -1,0 +1,137 @@
+"""Quantities: what each unit is worth, and what is refused."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from eigassign.case.units import DIMENSIONS, UNITS, QuantityError, parse_unit, read
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension", "si"),
+    [
+        ("30 mm", "length", 0.03),
+        ("30mm", "length", 0.03),
+        (" +3e1 mm ", "length", 0.03),
+        ("2.5 cm", "length", 0.025),
+        ("1.5 um", "length", 1.5e-6),
+        ("1.5 µm", "length", 1.5e-6),
+        ("1.5 μm", "length", 1.5e-6),
+        ("0.2 km", "length", 200.0),
+        ("-4", "length", -4.0),
+        ("7.06 cm2", "area", 7.06e-4),
+        ("7.06 cm^2", "area", 7.06e-4),
+        ("7.06 cm²", "area", 7.06e-4),
+        ("706 mm**2", "area", 7.06e-4),
+        ("39700 mm4", "second moment of area", 3.97e-8),
+        ("3.97 cm^4", "second moment of area", 3.97e-8),
+        ("250 g", "mass", 0.25),
+        ("0.1 t", "mass", 100.0),
+        ("2690 kg/m3", "density", 2690.0),
+        ("2690 kg m^-3", "density", 2690.0),
+        ("2.69 g/cm3", "density", 2690.0),
+        ("2.69 t/m3", "density", 2690.0),
+        ("5 kg m2", "rotary inertia", 5.0),
+        ("5 kg·m²", "rotary inertia", 5.0),
+        ("5 g*cm^2", "rotary inertia", 5e-7),
+        ("69 GPa", "pressure or modulus", 69e9),
+        ("69000 N/mm2", "pressure or modulus", 69e9),
+        ("1 kg/m/s2", "pressure or modulus", 1.0),
+        ("104.1 deg", "angle", math.radians(104.1)),
+        ("180 °", "angle", math.pi),
+        ("20 mrad", "angle", 0.02),
+        ("12 N m/rad", "rotational stiffness", 12.0),
+        ("12 Nm/rad", "rotational stiffness", 12.0),
+        ("1 N m/deg", "rotational stiffness", 180 / math.pi),
+        ("3 kN m/rad", "rotational stiffness", 3000.0),
+        ("200 ms", "time", 0.2),
+        ("2 min", "time", 120.0),
+        ("1.5 h", "time", 5400.0),
+        ("190 Hz", "frequency", 190.0),
+        ("0.19 kHz", "frequency", 190.0),
+        ("2 %", "fraction", 0.02),
+        ("2%", "fraction", 0.02),
+    ],
+)
+def test_a_quantity_with_a_unit_is_converted(text: str, dimension: str, si: float) -> None:
+    # one rounding at the division, one more where π is involved: 4 ulp is generous
+    assert read(text, DIMENSIONS[dimension]) == pytest.approx(si, rel=1e-15)
+
+
+@pytest.mark.parametrize("text", ["30 mm", "69 GPa", "250 g", "2 %", "7.06 cm2", "3.97 cm4"])
+def test_a_decimal_unit_costs_no_accuracy(text: str) -> None:
+    """`30 mm` must be the very float 0.03, or min, max and initial value would disagree."""
+    expected = {"30 mm": 0.03, "69 GPa": 69e9, "250 g": 0.25, "2 %": 0.02}
+    expected |= {"7.06 cm2": 7.06e-4, "3.97 cm4": 3.97e-8}
+    assert read(text, None) == expected[text]
+
+
+@pytest.mark.parametrize("value", [0.03, 3, -2.5e-7])
+def test_a_bare_number_is_si_already(value: float) -> None:
+    assert read(value, DIMENSIONS["length"]) == value
+
+
+@pytest.mark.parametrize(
+    ("value", "dimension", "message"),
+    [
+        ("190 rad/s", "frequency", "divide by 2π and write Hz"),
+        ("190 1/s", "frequency", "unknown unit"),
+        ("190 rpm", "frequency", "rpm and turns are not converted"),
+        ("30 rev", "angle", "rpm and turns are not converted"),
+        ("1 N m", "rotational stiffness", "got '1 N m', which is torque or energy"),
+        ("1 Hz", "angle", "expected an angle (in rad when bare; or deg, mrad), got '1 Hz'"),
+        ("1 kg m s", "mass", "which is of dimension kg^1 m^1 s^1"),
+        ("1 N/m s", "stiffness", "unknown unit 'm s'"),
+        ("3 Mm", "length", "did you mean 'mm'"),
+        ("3 gpa", "pressure or modulus", "did you mean 'GPa'"),
+        ("3 kgm2", "rotary inertia", "did you mean 'kg m'"),
+        ("3 mmm", "length", "did you mean 'm mm'"),
+        ("3 furlong", "length", "unknown unit 'furlong'; expected a length (in m"),
+        ("3 m12", "length", "unknown unit"),
+        ("3 m/", "length", "unknown unit"),
+        ("3 /m", "length", "unknown unit"),
+        ("3 m m^0", "area", "unknown unit"),
+        ("0,6 m", "length", "decimals take a point"),
+        ("mm", "length", "expected a length (in m when bare; or mm, cm, km), got text 'mm'"),
+        ("", "length", "expected a length"),
+        ("nan", "length", "expected a length"),
+        ("1e400 m", "length", "must be a finite number"),
+        (math.inf, "length", "must be a finite number, got .inf"),
+        (-math.inf, "length", "must be a finite number, got -.inf"),
+        (math.nan, "length", "must be a finite number, got .nan"),
+        (10**500, "length", "must be a finite number, got a number of more than 60 digits"),
+        (True, "length", "got true"),
+        (None, "length", "got nothing"),
+        ((1, 2), "length", "got a list"),
+        ({"a": 1}, "length", "got a mapping"),
+        ("1 " + "m " * 5000, "length", "expected a length"),
+    ],
+)
+def test_anything_else_is_refused_and_says_what_is_allowed(
+    value: object, dimension: str, message: str
+) -> None:
+    with pytest.raises(QuantityError) as caught:
+        read(value, DIMENSIONS[dimension])
+    assert message in str(caught.value)
+    assert len(str(caught.value)) < 300
+
+
+def test_hertz_and_radians_per_second_and_one_per_second_are_three_things() -> None:
+    hertz, rate, per_second = (parse_unit(u).exponents for u in ("Hz", "rad/s", "s^-1"))
+    assert len({hertz, rate, per_second}) == 3
+
+
+def test_every_unit_is_its_own_inverse_power() -> None:
+    for name, unit in UNITS.items():
+        product = unit.power(3).times(unit.power(-3))
+        assert (product.numerator, product.denominator, product.pi) == (1, 1, 0), name
+        assert product.exponents == (0, 0, 0, 0, 0), name
+
+
+def test_every_dimension_accepts_its_own_examples() -> None:
+    for dimension in DIMENSIONS.values():
+        for unit in (dimension.si, *dimension.examples.split(", ")):
+            if unit:
+                assert parse_unit(unit).exponents == dimension.exponents, unit
