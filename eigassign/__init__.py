@@ -8,7 +8,7 @@ from eigassign._version import __version__
 from eigassign.errors import CaseError, EigassignError
 
 if TYPE_CHECKING:
-    from eigassign.api import Case, assign, expand, load_case
+    from eigassign.api import Case, assign, expand, load_case, reduce
 
 __all__ = [
     "Case",
@@ -18,6 +18,7 @@ __all__ = [
     "assign",
     "expand",
     "load_case",
+    "reduce",
 ]
 
 

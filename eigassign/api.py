@@ -20,8 +20,10 @@ from eigassign.mechanism.parameters import initial_design, parameters
 from eigassign.mechanism.poses import build_poses, tip_chain
 from eigassign.mechanism.trajectory import Trajectory, build_trajectory
 from eigassign.modal import expansion as modal_expansion
+from eigassign.modal import reduced as modal_reduced
 from eigassign.modal.expansion import Expansion
 from eigassign.modal.model import Model
+from eigassign.modal.reduced import ReducedModel
 from eigassign.series.lower_set import LowerSet
 
 if TYPE_CHECKING:
@@ -110,6 +112,20 @@ def expand(
     return modal_expansion.expand(
         model.pencil, q0, y0, modes, order, linear_in_y, space, vector_order
     )
+
+
+def reduce(
+    model: Model,
+    q0: ArrayLike,
+    y0: ArrayLike,
+    modes: Sequence[int] = (1,),
+    half_order: int = 2,
+) -> ReducedModel:
+    """Reduced model on the Taylor vectors at one or several expansion points, with its own error.
+
+    See :func:`eigassign.modal.reduced.reduce`.
+    """
+    return modal_reduced.reduce(model.pencil, q0, y0, modes, half_order)
 
 
 def assign(case: Case) -> Result:

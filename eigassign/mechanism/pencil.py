@@ -18,6 +18,7 @@ from eigassign.series.lower_set import LowerSet
 from eigassign.series.program import Program, Samples, Truncated
 
 Floats = NDArray[np.float64]
+STACK_LIMIT = 500_000  # numbers: 4 MB
 Ints = NDArray[np.intp]
 
 
@@ -51,6 +52,18 @@ class Pencil:
         """Which variables z anything depends on: the others are dropped from every expansion."""
         return np.asarray(self.program.dependence.any(axis=0))
 
+    @cached_property
+    def elastic(self) -> Ints:
+        """The dofs that are not rigid-body coordinates: u and held coordinates."""
+        return np.setdiff1d(np.arange(self.n_dof), self.rigid)
+
+    @cached_property
+    def term_stacks(self) -> tuple[Floats, Floats] | None:
+        """All K_j and M_j dense, (n_theta, n_dof, n_dof) each, where that is small."""
+        if self.n_theta * self.n_dof**2 > STACK_LIMIT:
+            return None
+        return self._dense(self.stiffness.toarray()), self._dense(self.mass.toarray())
+
     def theta(self, x: Floats) -> Floats:
         """θ at samples x (n_samples, n_x): shape (n_theta, n_samples)."""
         z = self.to_program @ np.atleast_2d(x).T + self.shift[:, None]
@@ -60,9 +73,8 @@ class Pencil:
         """Coefficients of θ (n_theta, N) about x0 in w, where z = z0 + ``directions`` w."""
         z = np.zeros((len(self.shift), len(space)))
         z[:, 0] = self.to_program @ x0 + self.shift
-        units = space.find(np.eye(space.n_variables, dtype=np.int64))
-        present = units >= 0
-        z[:, units[present]] = directions[:, present]
+        present = space.units >= 0
+        z[:, space.units[present]] = directions[:, present]
         one = np.zeros((1, len(space)))
         one[0, 0] = 1.0
         return np.vstack([one, self.program.run(Truncated(space), z)])

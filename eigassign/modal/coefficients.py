@@ -7,13 +7,14 @@ matrix for each γ that is not zero (few are: each θ depends on few variables).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.mechanism.pencil import Pencil
-from eigassign.series.lower_set import LowerSet
+from eigassign.series.lower_set import LowerSet, first_of_each
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -37,14 +38,17 @@ class MatrixSeries:
 
     def _pairs(self, degree: int) -> tuple[Ints, Ints, Ints]:
         """Pairs (slot of δ, position of γ − δ, target) of one degree, sorted by target."""
-        table, starts = self.space.table, self.space.degree_starts
-        first, last = np.searchsorted(table.target, starts[degree : degree + 2])
-        left, right = table.left[first:last], table.right[first:last]
-        slot = np.searchsorted(self.present, left)
-        slot = np.minimum(slot, len(self.present) - 1)
-        keep = (self.present[slot] == left) & (left > 0)
-        target = table.target[first:last][keep] - starts[degree]
-        return slot[keep], right[keep], target
+        pairs = self.space.by_degree[degree]
+        slot = self._slots[pairs.left]
+        keep = slot >= 0
+        return slot[keep], pairs.right[keep], pairs.target[keep]
+
+    @cached_property
+    def _slots(self) -> Ints:
+        """Where each γ is stored, -1 for an absent one."""
+        slots = np.full(len(self.space), -1, dtype=np.intp)
+        slots[self.present] = np.arange(len(self.present))
+        return slots
 
     def _convolve_dense(self, stack: Floats, degree: int, phi: Floats) -> Floats:
         slot, right, target = self._pairs(degree)
@@ -55,8 +59,8 @@ class MatrixSeries:
         n, below = phi.shape[1], phi[: starts[degree]]
         columns = below.transpose(1, 0, 2).reshape(n, -1)
         products = (stack.reshape(-1, n) @ columns).reshape(len(stack), n, len(below), -1)
-        hit, first = np.unique(target, return_index=True)
-        out[hit] = np.add.reduceat(products[slot, :, right], first, axis=0)
+        first = first_of_each(target)
+        out[target[first]] = np.add.reduceat(products[slot, :, right], first, axis=0)
         return out
 
     def _convolve_sparse(self, degree: int, phi: Floats) -> Floats:

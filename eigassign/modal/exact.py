@@ -37,22 +37,26 @@ def eigenvalues(pencil: Pencil, x: Floats, count: int) -> Floats:
 
     Raises UsageError for more modes than there are, MechanismError where K_E or M_FF is singular.
     """
-    return _solve(pencil, x, count, vectors=False).lam
+    return _solve(pencil, pencil.theta(x), count, vectors=False).lam
 
 
 def modes(pencil: Pencil, x: Floats, count: int) -> Modes:
     """Eigenvalues and mass-normalised modes of the lowest elastic modes."""
-    return _solve(pencil, x, count, vectors=True)
+    return _solve(pencil, pencil.theta(x), count, vectors=True)
 
 
-def _solve(pencil: Pencil, x: Floats, count: int, vectors: bool) -> Modes:
-    elastic = pencil.n_dof - len(pencil.rigid)
+def modes_at(pencil: Pencil, theta: Floats, count: int) -> Modes:
+    """The same where θ (n_theta, n_samples) is known already."""
+    return _solve(pencil, theta, count, vectors=True)
+
+
+def _solve(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
+    elastic = len(pencil.elastic)
     if not 1 <= count <= elastic:
         raise UsageError(f"{count} modes asked for; the model has 1 to {elastic} elastic ones")
-    theta = pencil.theta(x)
     if not np.isfinite(theta).all():
         raise UsageError("q or y is not finite, or outside the domain of a section or length")
-    if pencil.n_dof <= DENSE_LIMIT:
+    if pencil.n_dof <= DENSE_LIMIT or 2 * count > elastic:  # Lanczos is for few modes of many
         found = _dense(pencil, theta, count, vectors)
     else:
         from eigassign.modal.exact_sparse import solve_sparse
@@ -67,7 +71,7 @@ def _solve(pencil: Pencil, x: Floats, count: int, vectors: bool) -> Modes:
 
 def _dense(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
     K, M = pencil.matrices(theta)
-    elastic = np.setdiff1d(np.arange(pencil.n_dof), pencil.rigid)
+    elastic = pencil.elastic
     K_E = K[:, elastic[:, None], elastic]
     coupling, M_c = condense(M, elastic, pencil.rigid)
     L = _cholesky(K_E)

@@ -24,7 +24,7 @@ def _one(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
     K = pencil.sparse(pencil.stiffness @ theta)
     M = pencil.sparse(pencil.mass @ theta)
     F = pencil.rigid
-    E = np.setdiff1d(np.arange(pencil.n_dof), F)
+    E = pencil.elastic
     K_E, M_EE = K[E][:, E].tocsc(), M[E][:, E].tocsc()
     M_EF, M_FF = M[E][:, F].toarray(), M[F][:, F].toarray()
     coupling = _coupling(M_FF, M_EF)

@@ -7,16 +7,17 @@ dropped by construction; coefficients over (q, y) follow by substituting V (x �
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import UsageError
 from eigassign.mechanism.pencil import Pencil
-from eigassign.modal.exact import modes as exact_modes
+from eigassign.modal.exact import modes_at
 from eigassign.modal.rayleigh import eigenvalue_series, vector_members
 from eigassign.modal.recursion import expand_subspace
 from eigassign.modal.samples import samples
@@ -143,9 +144,7 @@ def _derivative_powers(space: LowerSet, powers: Floats, variable: int) -> Floats
     return out
 
 
-def _slope(
-    cluster: Cluster, powers: Floats, derivative: Floats, wanted: tuple[int, ...]
-) -> Floats:
+def _slope(cluster: Cluster, powers: Floats, derivative: Floats, wanted: tuple[int, ...]) -> Floats:
     """∂λ/∂y_j; in a cluster vᵀ (∂Λ/∂y_j) v with the eigenvectors v of Λ."""
     if len(cluster.modes) == 1:
         return np.asarray((derivative @ cluster.coefficients[0, 0])[:, None])
@@ -179,18 +178,16 @@ def expand(
     x0 = samples(q0, y0, pencil.n_q, n_y)[0]
     local = _local_space(pencil, order, linear_in_y, space)
     theta = pencil.theta_series(local.space, x0, local.to_z)
-    found = exact_modes(pencil, x0[None], _count(pencil, wanted))
+    found = modes_at(pencil, theta[:, :1], _count(pencil, wanted))
     groups = clusters(found.lam[0], wanted, cluster_gap)
-    members = _vector_set(local, vector_order)
-    vector_space = local.space.restrict(members)
-    kept = np.flatnonzero(members)
+    vector_space, kept = _vector_set(local.space, local.n_linear, vector_order)
     parts, vectors = [], []
     for group in groups:
         pick = np.array(group) - 1
         X = expand_subspace(
             pencil, theta[:, kept], vector_space, found.lam[0, pick], found.phi[0][:, pick]
         ).vectors
-        series = eigenvalue_series(pencil, theta, local.space, kept, X)
+        series = eigenvalue_series(pencil, theta, local.space, vector_space, X)
         parts.append(Cluster(group, _frozen(series)))
         vectors.append(_frozen(X))
     return Expansion(
@@ -246,21 +243,29 @@ def _given_space(pencil: Pencil, space: LowerSet) -> _Local:
     return _Local(smaller, pencil.to_program[:, kept], selection, 0, kept)
 
 
-def _vector_set(local: _Local, vector_order: int | None) -> NDArray[np.bool_]:
-    if vector_order is not None:
-        return np.asarray(local.space.degrees <= vector_order)
-    linear = np.zeros(local.space.n_variables, dtype=bool)
-    if local.n_linear:
-        linear[-local.n_linear :] = True
-    return vector_members(local.space, linear)
+@lru_cache(maxsize=64)
+def _vector_set(
+    space: LowerSet, n_linear: int, vector_order: int | None
+) -> tuple[LowerSet, NDArray[np.intp]]:
+    """The set of eigenvector coefficients and its positions in the set of eigenvalues."""
+    linear = np.arange(space.n_variables) >= space.n_variables - n_linear
+    if vector_order is None:
+        members = vector_members(space, linear)
+    else:
+        members = np.asarray(space.degrees <= vector_order)
+    half = space.restrict(members)
+    return half, space.find(half.indices)
 
 
 def clusters(lam: Floats, wanted: Sequence[int], gap: float) -> tuple[tuple[int, ...], ...]:
     """Modes (1-based) grouped where neighbours are closer than ``gap`` (relative in λ)."""
-    close = np.diff(lam) < gap * lam[1:]
-    bounds = np.flatnonzero(~close) + 1
-    groups = np.split(np.arange(1, len(lam) + 1), bounds)
-    return tuple(tuple(int(m) for m in g) for g in groups if set(g.tolist()) & set(wanted))
+    groups = [[1]]
+    for k, (below, above) in enumerate(itertools.pairwise(lam.tolist()), 2):
+        if above - below < gap * above:
+            groups[-1].append(k)
+        else:
+            groups.append([k])
+    return tuple(tuple(g) for g in groups if not set(wanted).isdisjoint(g))
 
 
 def _count(pencil: Pencil, wanted: Sequence[int]) -> int:

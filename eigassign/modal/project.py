@@ -15,6 +15,9 @@ Floats = NDArray[np.float64]
 
 def project(pencil: Pencil, basis: Floats) -> tuple[Floats, Floats]:
     """(n_theta, k, k) projections of the stiffness and the mass terms on ``basis`` (n_dof, k)."""
+    stacks = pencil.term_stacks
+    if stacks is not None:
+        return basis.T @ (stacks[0] @ basis), basis.T @ (stacks[1] @ basis)
     return (
         _project(pencil, pencil.stiffness, basis),
         _project(pencil, pencil.mass, basis),

@@ -10,12 +10,15 @@ has the eigenvalues of the exact invariant subspace up to products of two missin
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.project import project
-from eigassign.series.lower_set import LowerSet
+from eigassign.series.lower_set import LowerSet, first_of_each
 from eigassign.series.power_series import compose, multiply, power_taylor
 
 Floats = NDArray[np.float64]
@@ -36,14 +39,14 @@ def vector_members(space: LowerSet, linear: NDArray[np.bool_]) -> NDArray[np.boo
 
 
 def eigenvalue_series(
-    pencil: Pencil, theta: Floats, space: LowerSet, members: Ints, vectors: Floats
+    pencil: Pencil, theta: Floats, space: LowerSet, half: LowerSet, vectors: Floats
 ) -> Floats:
-    """Λ's coefficients (r, r, N), symmetric, from X (N_H, n, r) at the positions ``members``."""
+    """Λ's coefficients (r, r, N), symmetric, from X (N_H, n, r) over the set ``half``."""
     n_h, n, r = vectors.shape
     basis = vectors.transpose(1, 0, 2).reshape(n, n_h * r)
     stiffness, mass = project(pencil, basis)
-    numerator = _quadratic(space, theta, stiffness, members, r)
-    denominator = _quadratic(space, theta, mass, members, r)
+    numerator = _quadratic(space, half, theta, stiffness)
+    denominator = _quadratic(space, half, theta, mass)
     if r == 1:
         inverse = compose(
             space, power_taylor(denominator[0, :, 0], -1.0, space.order), denominator[0]
@@ -53,32 +56,48 @@ def eigenvalue_series(
     return matrix_product(space, root, matrix_product(space, numerator, root))
 
 
-def _quadratic(space: LowerSet, theta: Floats, projected: Floats, members: Ints, r: int) -> Floats:
-    """Series (r, r, N) of Σ_j θ_j(w) Σ_{a,b} (X_aᵀ A_j X_b) w^{a+b}."""
+@dataclass(frozen=True)
+class _Pairs:
+    """Index tables of the quotient: which products of two vectors meet in which coefficient."""
+
+    a: Ints  # slots of the two vectors, sorted by the coefficient of their product
+    b: Ints
+    begin: Ints
+    left: Ints  # coefficient of θ, slot of the product, sorted by the coefficient of the result
+    right: Ints
+    end: Ints
+
+
+@lru_cache(maxsize=64)
+def _pairs(space: LowerSet, half: LowerSet) -> _Pairs:
+    members = space.find(half.indices)
     slot = np.full(len(space), -1, dtype=np.intp)
     slot[members] = np.arange(len(members))
     table = space.table
     inside = (slot[table.left] >= 0) & (slot[table.right] >= 0)
-    a, b = slot[table.left[inside]], slot[table.right[inside]]
-    hit, begin = np.unique(table.target[inside], return_index=True)
-    blocks = projected.reshape(len(theta), len(members), r, len(members), r)
-    pairs = blocks[:, a, :, b, :]  # (pairs, n_theta, r, r)
-    sums = np.add.reduceat(pairs, begin, axis=0)
-    outer = np.tensordot(theta, sums, axes=(0, 1))  # (N, hits, r, r)
-    return _collect(space, outer, hit)
-
-
-def _collect(space: LowerSet, outer: Floats, hit: Ints) -> Floats:
-    """Σ over pairs i + hit_j = k of outer[i, j]: (r, r, N)."""
-    table = space.table
+    begin = first_of_each(table.target[inside])
+    hit = table.target[inside][begin]
     where = np.full(len(space), -1, dtype=np.intp)
     where[hit] = np.arange(len(hit))
-    j = where[table.right]
-    keep = j >= 0
-    target = table.target[keep]
-    begin = np.searchsorted(target, np.arange(len(space)))  # (k, 0) is always kept
-    values = outer[table.left[keep], j[keep]]
-    return np.asarray(np.add.reduceat(values, begin, axis=0).transpose(1, 2, 0))
+    right = where[table.right]
+    keep = right >= 0
+    end = first_of_each(table.target[keep])  # every coefficient: (k, 0) is always kept
+    a, b = slot[table.left[inside]], slot[table.right[inside]]
+    return _Pairs(a, b, begin, table.left[keep], right[keep], end)
+
+
+def _quadratic(space: LowerSet, half: LowerSet, theta: Floats, projected: Floats) -> Floats:
+    """Series (r, r, N) of Σ_j θ_j(w) Σ_{a,b} (X_aᵀ A_j X_b) w^{a+b}."""
+    p, count = _pairs(space, half), len(half)
+    r = projected.shape[1] // count
+    blocks = projected.reshape(len(theta), count, r, count, r)
+    products = blocks[:, p.a, :, p.b, :]  # (pairs, n_theta, r, r)
+    sums = np.add.reduceat(products, p.begin, axis=0)
+    hits = len(p.begin)
+    flat = sums.transpose(1, 0, 2, 3).reshape(len(theta), -1)
+    outer = (theta.T @ flat).reshape(len(space), hits, r, r)
+    values = outer[p.left, p.right]
+    return np.asarray(np.add.reduceat(values, p.end, axis=0).transpose(1, 2, 0))
 
 
 def matrix_product(space: LowerSet, a: Floats, b: Floats) -> Floats:

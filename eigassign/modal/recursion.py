@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.bordered import Solve, factor_dense, factor_sparse
 from eigassign.modal.coefficients import MatrixSeries, matrix_series
-from eigassign.series.lower_set import LowerSet
+from eigassign.series.lower_set import LowerSet, first_of_each
 
 Floats = NDArray[np.float64]
 
@@ -98,14 +98,11 @@ def _apply(M0: object, block: Floats) -> Floats:
 
 def _products_below(space: LowerSet, degree: int, X: Floats, L: Floats) -> Floats:
     """Σ_{0<δ<γ} X_{γ−δ} Λ_δ for every |γ| = degree."""
-    table, starts = space.table, space.degree_starts
-    first, last = np.searchsorted(table.target, starts[degree : degree + 2])
-    left, right = table.left[first:last], table.right[first:last]
-    proper = (left > 0) & (right > 0)
+    starts, pairs = space.degree_starts, space.by_degree[degree]
     out = np.zeros((starts[degree + 1] - starts[degree], *X.shape[1:]))
-    if proper.any():
-        target = table.target[first:last][proper] - starts[degree]
-        hit, begin = np.unique(target, return_index=True)
-        products = X[right[proper]] @ L[left[proper]]
-        out[hit] = np.add.reduceat(products, begin, axis=0)
+    if degree > 1:
+        proper = pairs.right > 0
+        left, right, target = pairs.left[proper], pairs.right[proper], pairs.target[proper]
+        first = first_of_each(target)
+        out[target[first]] = np.add.reduceat(X[right] @ L[left], first, axis=0)
     return out

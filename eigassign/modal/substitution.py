@@ -16,7 +16,7 @@ def substitute(
 ) -> tuple[LowerSet, Floats]:
     """The set over x and coefficients (k, N_x) of Σ c_γ (V (x − x0))^γ, c (k, N)."""
     selection = (np.count_nonzero(directions, axis=1) == 1).all()
-    if selection and (directions.max(axis=1) == 1.0).all():
+    if selection and (directions.max(axis=1, initial=0.0) == 1.0).all():
         return _embed(space, coefficients, directions)
     used = np.flatnonzero((directions != 0.0).any(axis=0))
     n_y = int((used >= n_q).sum())

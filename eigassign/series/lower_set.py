@@ -34,6 +34,15 @@ class ProductTable:
     starts: Ints
 
 
+@dataclass(frozen=True)
+class DegreePairs:
+    """Pairs with left ≠ 0 of all targets of one degree, ``target`` counted from its first."""
+
+    left: Ints
+    right: Ints
+    target: Ints
+
+
 @dataclass(frozen=True, eq=False)
 class LowerSet:
     """A lower set Λ of N multi-indices over n variables."""
@@ -69,6 +78,23 @@ class LowerSet:
         return _product_table(self)
 
     @cached_property
+    def units(self) -> Ints:
+        """Position of each variable's own index e_i, -1 for one the set leaves out."""
+        return self.find(np.eye(self.n_variables, dtype=np.int64))
+
+    @cached_property
+    def by_degree(self) -> tuple[DegreePairs, ...]:
+        """All pairs with left ≠ 0, degree by degree of their target."""
+        table, starts = self.table, self.degree_starts
+        cuts = np.searchsorted(table.target, starts)
+        pairs = []
+        for degree, (first, last) in enumerate(itertools.pairwise(cuts)):
+            keep = np.flatnonzero(table.left[first:last] > 0) + first
+            target = table.target[keep] - starts[degree]
+            pairs.append(DegreePairs(table.left[keep], table.right[keep], target))
+        return tuple(pairs)
+
+    @cached_property
     def _keys(self) -> tuple[NDArray[np.uint64], NDArray[np.uint64], Ints]:
         keys = _hash(self.indices)
         order = np.argsort(keys, kind="stable")
@@ -76,7 +102,7 @@ class LowerSet:
 
     def find(self, indices: NDArray[np.int64]) -> Ints:
         """Position of every row of ``indices`` (k, n) in the set, -1 where it is not a member."""
-        rows = np.asarray(indices, dtype=np.int64).reshape(-1, self.n_variables)
+        rows = np.atleast_2d(np.asarray(indices, dtype=np.int64))
         found = self._lookup(_hash(rows))
         wrong = (self.indices[found] != rows).any(axis=1)
         return np.where(wrong, -1, found)
@@ -89,6 +115,16 @@ class LowerSet:
     def restrict(self, keep: NDArray[np.bool_]) -> LowerSet:
         """The members where ``keep`` is true; they must form a lower set themselves."""
         return lower_set(self.indices[keep])
+
+
+def first_of_each(sorted_values: Ints) -> Ints:
+    """Positions where a sorted array takes a new value."""
+    if not len(sorted_values):
+        return sorted_values
+    changes = np.empty(len(sorted_values), dtype=bool)
+    changes[0] = True
+    np.not_equal(sorted_values[1:], sorted_values[:-1], out=changes[1:])
+    return np.flatnonzero(changes)
 
 
 def _hash(indices: NDArray[np.int64]) -> NDArray[np.uint64]:

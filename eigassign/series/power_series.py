@@ -38,9 +38,13 @@ def compose(space: LowerSet, taylor: Floats, a: Floats) -> Floats:
     """
     small = a.copy()
     small[:, 0] = 0.0
-    result = np.zeros_like(a)
-    result[:, 0] = taylor[-1]
-    for coefficient in taylor[-2::-1]:
+    if len(taylor) == 1:
+        result = np.zeros_like(a)
+        result[:, 0] = taylor[0]
+        return result
+    result = taylor[-1][:, None] * small
+    result[:, 0] = taylor[-2]
+    for coefficient in taylor[-3::-1]:
         result = multiply(space, result, small)
         result[:, 0] += coefficient
     return result

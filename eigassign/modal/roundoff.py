@@ -1,0 +1,29 @@
+"""Round-off of an exact eigenvalue: how many digits the stiffness matrix itself still holds.
+
+A relative perturbation ε of the entries of K changes zᵀKz by at most ε |z|ᵀ|K||z|. In a fine mesh
+the strain energy is a small difference of large terms, and this, not the eigensolver, is the limit:
+
+    |δλ|/λ ≲ ε ( |z|ᵀ|K||z| / zᵀKz + |z|ᵀ|M||z| / zᵀMz ) .
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.mechanism.pencil import Pencil
+from eigassign.modal.exact import modes
+
+Floats = NDArray[np.float64]
+
+
+def rounding_error(pencil: Pencil, x: Floats, count: int) -> float:
+    """Relative round-off in frequency of the lowest ``count`` modes at x (n_x,), the largest."""
+    found = modes(pencil, x[None], count)
+    theta = pencil.theta(x[None])[:, 0]
+    z, lam = np.abs(found.phi[0]), found.lam[0]
+    K = np.abs(pencil.stiffness @ theta)
+    M = np.abs(pencil.mass @ theta)
+    pairs = z[pencil.rows] * z[pencil.columns]
+    amplification = (K @ pairs) / lam + M @ pairs
+    return float(0.5 * np.finfo(float).eps * amplification.max())
