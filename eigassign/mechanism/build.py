@@ -139,16 +139,13 @@ def _add_drives(
     motion: Kinematics,
     n_u: int,
 ) -> None:
-    """Drive stiffness k on its joint coordinate: K_qq += Gᵀ k G with ṡ = G q̇."""
-    for i, (name, coordinate) in enumerate(case.coordinates.items()):
-        if isinstance(coordinate.drive, str):
-            continue
-        path = f"coordinates.{name}.drive.stiffness"
-        stiffness = parameters.number(path, coordinate.drive.stiffness)
-        rate = motion.rates[i]
-        for k in np.flatnonzero(rate):
-            for j in np.flatnonzero(rate):
-                target.add_small(n_u + int(k), n_u + int(j), stiffness * float(rate[k] * rate[j]))
+    """Drive stiffness k on the deflection of its joint, which is that coordinate's unknown."""
+    for column, i in enumerate(motion.columns):
+        name, coordinate = tuple(case.coordinates.items())[i]
+        if not isinstance(coordinate.drive, str):
+            path = f"coordinates.{name}.drive.stiffness"
+            stiffness = parameters.number(path, coordinate.drive.stiffness)
+            target.add_small(n_u + column, n_u + column, stiffness)
 
 
 def _compile(

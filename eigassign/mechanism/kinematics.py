@@ -51,7 +51,8 @@ class Kinematics:
 
     s = ``relative`` q + ``offset`` gives the relative joint coordinates; ``columns`` are the
     indices of the coordinates that are not locked: the q̇ of eq. (1); and per those q̇ the joint
-    rates are ṡ = ``rates`` q̇ (locked joints have zero rows).
+    rates are ṡ = ``rates`` q̇ (locked joints have zero rows). The unknown of a held coordinate is
+    the deflection of its drive, so that K = diag(K_E, 0) exactly whatever it rides on.
     """
 
     placements: tuple[Placement, ...]
@@ -65,8 +66,9 @@ def kinematics(case: CaseFile, parameters: Parameters) -> Kinematics:
     """Walk the tree of joints from the ground; raises MechanismError for a link out of reach."""
     order = _tree_order(case)
     relative, offset = _relative_coordinates(case, order)
-    columns = tuple(i for i, c in enumerate(case.coordinates.values()) if c.drive != "locked")
-    rates = _joint_rates(relative, columns)
+    drives = [c.drive for c in case.coordinates.values()]
+    columns = tuple(i for i, drive in enumerate(drives) if drive != "locked")
+    rates = _joint_rates(relative, columns, tuple(i for i in columns if drives[i] == "free"))
     placed: dict[str, Placement] = {}
     for joint in order:
         placement = _place(case, parameters, joint, rates, placed)
@@ -129,17 +131,15 @@ def _relative_coordinates(case: CaseFile, order: list[str]) -> tuple[Floats, Flo
     return relative, offset
 
 
-def _joint_rates(relative: Floats, columns: tuple[int, ...]) -> Floats:
-    """ṡ per q̇ of the free coordinates while the locked joints stand still (ṡ = 0).
+def _joint_rates(relative: Floats, columns: tuple[int, ...], free: tuple[int, ...]) -> Floats:
+    """ṡ per q̇: a held joint's own deflection, and free coordinates while all others stand still.
 
     q̇ = A⁻¹ ṡ; restricted to the free ones, ṡ_F = [(A⁻¹)_FF]⁻¹ q̇_F.
     """
-    free = list(columns)
-    rates = np.zeros((len(relative), len(free)))
-    if free:
-        rates[free] = np.linalg.inv(np.linalg.inv(relative)[np.ix_(free, free)])
+    rates = np.eye(len(relative))
+    rates[np.ix_(free, free)] = np.linalg.inv(np.linalg.inv(relative)[np.ix_(free, free)])
     rates[np.abs(rates) < 1e-12] = 0.0  # round-off of the two inverses of a matrix of 0, ±1
-    return rates
+    return np.asarray(rates[:, list(columns)])
 
 
 def _place(
@@ -187,6 +187,7 @@ def carried_twist(rotation: Objects, origin: Objects, twist: Objects) -> Objects
 
 def _cross_columns(a: Objects, b: Objects) -> Objects:
     """a_k × b for every column a_k of a (3, n)."""
+    b = b[:, None]  # an expression alone would not spread over a row
     return np.array(
         [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]],
         dtype=object,
