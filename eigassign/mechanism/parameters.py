@@ -51,7 +51,8 @@ def initial_design(case: CaseFile) -> Floats:
 
 def _value(case: CaseFile, path: str) -> float:
     head, name, *fields = path.split(".")
-    value: Any = case.coordinates[name] if head == "coordinates" else getattr(case.mechanism, head)[name]
+    table: Any = case.coordinates if head == "coordinates" else getattr(case.mechanism, head)
+    value = table[name]
     for field_name in fields:
         value = getattr(value, field_name)
     return float(value)
