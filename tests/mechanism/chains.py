@@ -1,0 +1,169 @@
+"""Cases for tests, written as plain trees: the paper's arm, bars, and random planar chains."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from eigassign.api import Case
+from eigassign.case.loading import parse
+from eigassign.modal.model import Model
+
+Tree = dict[str, Any]
+I_PAPER = 3.97e-8  # m4
+# The reference frequencies belong to a solid rod of 1.9 kg/m; its area is only printed rounded.
+A_PAPER = float(np.sqrt(4.0 * np.pi * I_PAPER))
+
+
+def case_of(tree: Tree) -> Case:
+    """A tree as a case file would hold it (JSON is YAML)."""
+    return Case(parse(json.dumps({"title": "test", **tree}).encode(), "test.yaml"))
+
+
+def model_of(tree: Tree) -> Model:
+    return case_of(tree).model()
+
+
+def two_link(
+    elements: tuple[int, int] = (4, 3),
+    drives: tuple[Any, Any] = ("free", "free"),
+    angles: tuple[str, str] = ("relative", "absolute"),
+    masses: tuple[float, float] = (0.0, 0.0),
+    tip_inertia: float = 0.0,
+    design: Tree | None = None,
+) -> Tree:
+    """The paper's arm; by default m1 and m2 are its design parameters."""
+    at, end = "bodies.elbow_mass.mass", "bodies.tool_mass.mass"
+    box = {
+        "m1": {"parameter": at, "min": 0.0, "max": 0.25},
+        "m2": {"parameter": end, "min": 0.0, "max": 0.25},
+    }
+    return {
+        "mechanism": {
+            "space": "planar",
+            "materials": {"al": {"youngs_modulus": 69e9, "density": 1.9 / A_PAPER}},
+            "sections": {"rod": {"area": A_PAPER, "bending_inertia": I_PAPER}},
+            "links": {
+                "upper": {
+                    "length": 0.6,
+                    "material": "al",
+                    "section": "rod",
+                    "elements": elements[0],
+                },
+                "fore": {
+                    "length": 0.45,
+                    "material": "al",
+                    "section": "rod",
+                    "elements": elements[1],
+                },
+            },
+            "joints": {
+                "shoulder": {"type": "revolute", "base": "ground", "follower": "upper.start"},
+                "elbow": {"type": "revolute", "base": "upper.end", "follower": "fore.start"},
+            },
+            "bodies": {
+                "elbow_mass": {"at": "upper.end", "mass": masses[0]},
+                "tool_mass": {"at": "fore.end", "mass": masses[1], "inertia": tip_inertia},
+            },
+        },
+        "coordinates": {
+            "q1": {"joint": "shoulder", "angle": angles[0], "drive": drives[0]},
+            "q2": {"joint": "elbow", "angle": angles[1], "drive": drives[1]},
+        },
+        "design": box if design is None else design,
+    }
+
+
+def bar(
+    elements: int,
+    length: float,
+    E: float,
+    density: float,
+    section: Tree,
+    root: str = "fixed",
+    drive: Any = "free",
+) -> Tree:
+    """One straight link on the ground, clamped (``fixed``) or on a revolute joint."""
+    tree: Tree = {
+        "mechanism": {
+            "space": "planar",
+            "materials": {"m": {"youngs_modulus": E, "density": density}},
+            "sections": {"s": section},
+            "links": {
+                "bar": {"length": length, "material": "m", "section": "s", "elements": elements}
+            },
+            "joints": {"root": {"type": root, "base": "ground", "follower": "bar.start"}},
+        },
+        "coordinates": {},
+    }
+    if root == "revolute":
+        tree["coordinates"] = {"q1": {"joint": "root", "drive": drive}}
+    return tree
+
+
+def random_chain(seed: int) -> tuple[Tree, np.ndarray]:
+    """A random planar tree of 1 to 5 links with every kind of joint and drive, and a pose q."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 6))
+    tree: Tree = {
+        "mechanism": {
+            "space": "planar",
+            "materials": {
+                "steel": {"youngs_modulus": 210e9, "density": 7850.0},
+                "alloy": {"youngs_modulus": 70e9, "density": 2700.0},
+            },
+            "sections": {
+                "round": {"shape": "circle", "diameter": float(rng.uniform(0.01, 0.03))},
+                "flat": {
+                    "shape": "rectangle",
+                    "width": 0.02,
+                    "height": float(rng.uniform(5e-3, 0.02)),
+                },
+                "pipe": {"shape": "tube", "outer_diameter": 0.03, "thickness": 0.004},
+                "bare": {"area": 3e-4, "bending_inertia": 8e-9},
+            },
+            "links": {},
+            "joints": {},
+            "bodies": {},
+        },
+        "coordinates": {},
+    }
+    for k in range(n):
+        _random_link(tree, k, rng)
+    coordinates = tree["coordinates"]
+    return tree, rng.uniform(-3.0, 3.0, len(coordinates))
+
+
+def _random_link(tree: Tree, k: int, rng: np.random.Generator) -> None:
+    mechanism, name = tree["mechanism"], f"l{k}"
+    mechanism["links"][name] = {
+        "length": float(rng.uniform(0.2, 0.8)),
+        "material": str(rng.choice(["steel", "alloy"])),
+        "section": str(rng.choice(["round", "flat", "pipe", "bare"])),
+        "elements": int(rng.integers(1, 4)),
+    }
+    grounded = k == 0 or rng.random() < 0.15
+    base = "ground" if grounded else f"l{rng.integers(k)}.{rng.choice(['start', 'end', 'end'])}"
+    kind = "revolute" if k == 0 or rng.random() < 0.8 else "fixed"
+    joint: Tree = {"type": kind, "base": base, "follower": f"{name}.start"}
+    if rng.random() < 0.6:
+        joint["angle"] = float(rng.uniform(-2.0, 2.0))
+    if grounded:
+        joint["position"] = rng.uniform(-1.0, 1.0, 2).tolist()
+    mechanism["joints"][f"j{k}"] = joint
+    if kind == "revolute":
+        drive: Any = ["free", "free", "locked", {"stiffness": float(10 ** rng.uniform(3, 5))}]
+        tree["coordinates"][f"q{k}"] = {
+            "joint": f"j{k}",
+            "angle": str(rng.choice(["relative", "absolute"])),
+            "drive": drive[rng.integers(4)],
+        }
+    for node in ("start", "end"):
+        if rng.random() < 0.5:
+            mechanism["bodies"][f"{name}_{node}"] = {
+                "at": f"{name}.{node}",
+                "mass": float(rng.uniform(0.0, 2.0)),
+                "inertia": float(rng.choice([0.0, 3e-3])),
+            }

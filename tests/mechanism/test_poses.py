@@ -1,0 +1,43 @@
+"""World poses of the links and their Jacobians."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from chains import model_of, random_chain, two_link
+from frame_oracle import frame
+
+
+def test_a_two_link_arm_reaches_where_trigonometry_says() -> None:
+    model = model_of(two_link())
+    q = np.array([[0.4, 1.7], [-1.0, 3.0]])
+    tip = model.poses.position(model.x(q, [0.0, 0.0]), "fore", "end")
+    np.testing.assert_allclose(tip[:, 0], 0.6 * np.cos(q[:, 0]) + 0.45 * np.cos(q[:, 1]))
+    np.testing.assert_allclose(tip[:, 1], 0.6 * np.sin(q[:, 0]) + 0.45 * np.sin(q[:, 1]))
+    np.testing.assert_array_equal(tip[:, 2], 0.0)
+
+
+@pytest.mark.parametrize("seed", range(0, 60, 3))
+def test_jacobians_are_the_derivatives_of_positions(seed: int) -> None:
+    tree, q = random_chain(seed)
+    model = model_of(tree)
+    h = 1e-6  # central differences: error about h² and 1e-16/h
+    for link in model.poses.links:
+        for node in ("start", "end"):
+            exact = model.poses.jacobian(q[None], link, node)[0]
+            for i, step in enumerate(h * np.eye(len(q))):
+                ahead = model.poses.position((q + step)[None], link, node)[0]
+                behind = model.poses.position((q - step)[None], link, node)[0]
+                np.testing.assert_allclose(exact[:, i], (ahead - behind) / (2 * h), atol=1e-8)
+
+
+def test_a_designed_length_moves_the_links_it_carries() -> None:
+    design = {"a": {"parameter": "links.upper.length", "min": 0.1, "max": 2.0}}
+    model = model_of(two_link(design=design))
+    for length in (0.3, 1.5):
+        tree = two_link(design={})
+        tree["mechanism"]["links"]["upper"]["length"] = length
+        expected = frame(tree, np.array([0.4, 1.7]))
+        lines = model.poses.lines(model.x([0.4, 1.7], [length]))[0]
+        np.testing.assert_allclose(lines[0, 1, :2], expected.ends["upper"])
+        np.testing.assert_allclose(lines[1, 1, :2], expected.ends["fore"])
