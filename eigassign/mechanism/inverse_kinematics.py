@@ -1,7 +1,7 @@
 """Numerical inverse kinematics of any serial chain: the coordinates q along a path of its tip.
 
 The first sample is solved from many seeds at once. From there the path is traced with steps in q
-of a bounded size (Euler predictor, Newton corrector), whatever the samples are; Hermite
+of a bounded size (predictor and Newton corrector), whatever the samples are; Hermite
 interpolation of that trace seeds one Newton iteration over all samples together.
 
 Shapes: n samples or seeds, n_q coordinates, n_j joints, d = 2 or 3 components of the tip.
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from eigassign.errors import TrajectoryError
-from eigassign.mechanism.paths import WAYPOINTS, Path
+from eigassign.mechanism.paths import WAYPOINTS, Course
 from eigassign.mechanism.tip_chain import (
     ROUND_OFF,
     Arm,
@@ -30,8 +30,9 @@ from eigassign.mechanism.tip_chain import (
 )
 
 RESIDUAL = 1e-10  # largest distance of the tip from its path, relative to the longest lever arm
-_SINGULAR = 1e-4  # of the longest lever: a smaller singular value of J is a stretched chain. At a
-# singular pose angles are known to the root of the distance, so RESIDUAL is enough to tell it.
+_TRACE = 1e-7  # the same for the trace, which only seeds the samples
+_SINGULAR = 1e-3  # of the lever: a smaller singular value of J is a chain stretched or folded;
+# angles are known there to the root of the distance, 3e-4, so that _TRACE can tell it
 _TURNS = (0.2, 0.02)  # rad: largest step of the trace, and of a second try where that was too bold
 _STRAY = 0.5  # of a trace's largest step: a corrector that moves further has left the branch
 _MAX_ADVANCE = 0.125  # of the path, a trace step
@@ -42,25 +43,20 @@ _ATTEMPTS = 4  # first solutions that are followed before giving up
 
 
 @dataclass(frozen=True)
-class Course:
-    """When the tip has to be where: sample k at path parameter ``s[k]`` and time ``time_s[k]``."""
-
-    path: Path
-    s: Floats  # (n,) not decreasing, from 0 to 1
-    time_s: Floats  # (n,)
-
-    def label(self, k: int) -> str:
-        """Sample, time and point in words."""
-        point = ", ".join(f"{x:.6g}" for x in self.path.point(self.s[k])[0])
-        return f"sample {k} (t = {self.time_s[k]:.6g} s, point ({point}) m)"
-
-
-@dataclass(frozen=True)
 class Followed:
     """The coordinates q (n, n_q) in rad along a course, and what is worth telling about them."""
 
     q: Floats
     notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Pose:
+    """A solution q (1, n_q) at path parameter s, with dq/ds."""
+
+    s: float
+    q: Floats
+    slope: Floats
 
 
 @dataclass(frozen=True)
@@ -111,7 +107,7 @@ def _first_solutions(arm: Arm, course: Course) -> list[Floats]:
     """Solutions q (n_q,) of the first sample within the branch, the preferred one first."""
     target = course.path.point(course.s[0])
     q = arm.seeds if arm.start is None else np.vstack([arm.start, arm.seeds])
-    for iterations in (15, 100):  # the second for targets at the end of the reach
+    for iterations in (8, 20, 100):  # the last for targets at the end of the reach
         q, miss = levenberg(arm, q, target, iterations)
         reached = miss <= RESIDUAL * arm.lever
         wanted = reached & arm.inside(q).all(axis=1)
@@ -174,32 +170,42 @@ def _along(arm: Arm, course: Course, q0: Floats) -> Floats:
 
 
 def _trace(arm: Arm, course: Course, q0: Floats, turn: float) -> _Trace:
-    """dq/ds = J⁺ dp/ds from q0 in steps of at most ``turn`` rad, corrected back onto the path.
+    """dq/ds = J⁺ dp/ds from q0 in steps of about ``turn`` rad, corrected back onto the path.
 
     It steps onto every corner of the path, lest it cuts one that is out of reach.
     """
-    s, stops = float(course.s[0]), np.append(course.path.corners(), course.s[-1])
-    q, J = q0[None], arm.chain.jacobian(q0[None])
+    stops = np.append(course.path.corners(), course.s[-1])
+    J = arm.chain.jacobian(q0[None])
     sense = float(orientation(arm, J)[0])
-    slope = least_norm(J, course.path.derivative(s), arm.rank)
-    rows, advance = [(s, q, slope)], _MAX_ADVANCE
-    while s < stops[-1]:
-        advance = min(advance, turn / max(float(np.abs(slope).max()), turn))
-        ahead = min(s + advance, float(stops[np.searchsorted(stops, s, side="right")]))
-        guess = q + (ahead - s) * slope
-        q_new, J, settled = newton(arm, guess, course.path.point(ahead), RESIDUAL)
-        strayed = np.abs(q_new - guess).max() > _STRAY * turn
-        strayed |= orientation(arm, J)[0] * sense < 0.0 or regularity(arm, J)[0] < _SINGULAR
-        if not settled[0] or strayed:
-            advance *= 0.5
-            if advance < _MIN_ADVANCE:
-                break
+    here = _pose(arm, course, float(course.s[0]), q0[None], J)
+    poses, advance, bend = [here], _MAX_ADVANCE, np.zeros_like(here.q)
+    while here.s < stops[-1] and advance >= _MIN_ADVANCE:
+        advance = min(advance, turn / max(float(np.abs(here.slope).max()), turn))
+        stop = float(stops[np.searchsorted(stops, here.s, side="right")])
+        there = _step(arm, course, here, min(here.s + advance, stop), bend, sense, turn)
+        if there is None:
+            advance = 0.5 * min(advance, stop - here.s)
             continue
-        s, q, slope = ahead, q_new, least_norm(J, course.path.derivative(ahead), arm.rank)
-        rows.append((s, q, slope))
-        advance = min(2.0 * advance, _MAX_ADVANCE)
-    knots, poses, slopes = zip(*rows, strict=True)
-    return _Trace(np.array(knots), np.vstack(poses), np.vstack(slopes), sense)
+        bend = 0.5 * (there.slope - here.slope) / (there.s - here.s) * (there.s < stop)
+        poses.append(there)
+        here, advance = there, min(2.0 * advance, _MAX_ADVANCE)
+    q, slopes = np.vstack([p.q for p in poses]), np.vstack([p.slope for p in poses])
+    return _Trace(np.array([p.s for p in poses]), q, slopes, sense)
+
+
+def _step(
+    arm: Arm, course: Course, here: _Pose, s: float, bend: Floats, sense: float, turn: float
+) -> _Pose | None:
+    """The pose at s ahead: a quadratic guess, corrected; None if that is not the same branch."""
+    guess = here.q + (s - here.s) * (here.slope + (s - here.s) * bend)
+    q, J, settled = newton(arm, guess, course.path.point(s), _TRACE)
+    strayed = np.abs(q - guess).max() > _STRAY * turn
+    crossed = orientation(arm, J)[0] * sense < 0.0 or regularity(arm, J)[0] < _SINGULAR
+    return _pose(arm, course, s, q, J) if settled[0] and not strayed and not crossed else None
+
+
+def _pose(arm: Arm, course: Course, s: float, q: Floats, J: Floats) -> _Pose:
+    return _Pose(s, q, least_norm(J, course.path.derivative(s), arm.rank))
 
 
 def _interpolated(trace: _Trace, s: Floats) -> Floats:

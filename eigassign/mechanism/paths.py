@@ -60,6 +60,20 @@ class Path:
         return piece, (inside - self.knots[piece])[:, None]
 
 
+@dataclass(frozen=True)
+class Course:
+    """When the tip has to be where: sample k at path parameter ``s[k]`` and time ``time_s[k]``."""
+
+    path: Path
+    s: Floats  # (n,) not decreasing, from 0 to 1
+    time_s: Floats  # (n,)
+
+    def label(self, k: int) -> str:
+        """Sample, time and point in words."""
+        point = ", ".join(f"{x:.6g}" for x in self.path.point(self.s[k])[0])
+        return f"sample {k} (t = {self.time_s[k]:.6g} s, point ({point}) m)"
+
+
 def straight(waypoints: ArrayLike) -> Path:
     """Polyline through the waypoints (m, d), in m, parameterised by arc length.
 
@@ -133,16 +147,29 @@ def _slopes(knots: Floats, points: Floats) -> Floats:
         return np.repeat(chords, 2, axis=0)
     if len(h) == 2:
         return _parabola_slopes(h, chords)
-    m = len(knots)
-    bands, rhs = np.zeros((3, m)), np.empty_like(points)  # rows: above, on, below the diagonal
-    bands[1, 1:-1] = 2.0 * (h[:-1] + h[1:])
-    bands[0, 2:], bands[2, :-2] = h[:-1], h[1:]
+    below, on, above = np.zeros((3, len(knots)))  # row i: below[i], on[i], above[i]
+    rhs = np.empty_like(points)
+    below[1:-1], on[1:-1], above[1:-1] = h[1:], 2.0 * (h[:-1] + h[1:]), h[:-1]
     rhs[1:-1] = 3.0 * (h[1:, None] * chords[:-1] + h[:-1, None] * chords[1:])
-    bands[1, 0], bands[0, 1], rhs[0] = _end_row(h[0], h[1], chords[0], chords[1])
-    bands[1, -1], bands[2, -2], rhs[-1] = _end_row(h[-1], h[-2], chords[-1], chords[-2])
-    from scipy.linalg import solve_banded
+    on[0], above[0], rhs[0] = _end_row(h[0], h[1], chords[0], chords[1])
+    on[-1], below[-1], rhs[-1] = _end_row(h[-1], h[-2], chords[-1], chords[-2])
+    return _tridiagonal(below, on, above, rhs)
 
-    return np.asarray(solve_banded((1, 1), bands, rhs))
+
+def _tridiagonal(below: Floats, on: Floats, above: Floats, rhs: Floats) -> Floats:
+    """Solution (m, d) by elimination without exchanges, stable for these rows (de Boor's CUBSPL).
+
+    Not scipy.linalg: importing that would take longer than all the rest of a trajectory.
+    """
+    pivot, x = on.copy(), rhs.copy()
+    for i in range(1, len(x)):
+        factor = below[i] / pivot[i - 1]
+        pivot[i] -= factor * above[i - 1]
+        x[i] -= factor * x[i - 1]
+    x[-1] /= pivot[-1]
+    for i in range(len(x) - 2, -1, -1):
+        x[i] = (x[i] - above[i] * x[i + 1]) / pivot[i]
+    return x
 
 
 def _end_row(h0: float, h1: float, end: Floats, inner: Floats) -> tuple[float, float, Floats]:

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 from eigassign.case import FileTrajectory, SampledTrajectory, TipTrajectory
 from eigassign.errors import MechanismError, TrajectoryError
-from eigassign.mechanism.inverse_kinematics import Course, follow
-from eigassign.mechanism.paths import WAYPOINTS, Path, spline, straight
+from eigassign.mechanism.inverse_kinematics import follow
+from eigassign.mechanism.paths import WAYPOINTS, Course, Path, spline, straight
 from eigassign.mechanism.timing import timing_law
 from eigassign.mechanism.tip_chain import Floats, TipChain
 from eigassign.mechanism.trajectory_file import read_samples

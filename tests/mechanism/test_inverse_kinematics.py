@@ -9,12 +9,11 @@ from planar_arms import serial_arm, two_link_angles
 from eigassign.errors import MechanismError, TrajectoryError
 from eigassign.mechanism.inverse_kinematics import (
     RESIDUAL,
-    Course,
     _interpolated,
     _Trace,
     follow,
 )
-from eigassign.mechanism.paths import Path, spline, straight
+from eigassign.mechanism.paths import Course, Path, spline, straight
 from eigassign.mechanism.timing import timing_law
 from eigassign.mechanism.tip_chain import TipChain
 
@@ -281,7 +280,7 @@ def test_redundant_arms_take_the_steps_of_least_norm():
     middle, step = (q[1:] + q[:-1]) / 2, np.diff(q, axis=0)
     along_null_space = np.linalg.svd(arm.jacobian(middle))[2][:, 2]
     idle = np.abs(np.einsum("na,na->n", along_null_space, step))
-    # Euler steps of 0.2 rad with the corrector bend off the ideal line by some percent
+    # trace steps of 0.2 rad with the corrector bend off the ideal line by some percent
     assert (idle < 0.05 * np.linalg.norm(step, axis=1)).all()
 
 

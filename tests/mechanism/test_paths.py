@@ -30,6 +30,20 @@ def test_spline_equals_that_of_scipy(m, d):
     assert path.chord_length == pytest.approx(chord[-1], rel=1e-14)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_spline_stands_very_uneven_chords(seed):
+    from scipy.interpolate import CubicSpline
+
+    steps = 10.0 ** np.random.default_rng(seed).uniform(-5.0, 0.0, 30)
+    turns = np.random.default_rng(seed + 100).uniform(0.0, 2.0 * np.pi, 30)
+    points = np.cumsum(steps[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1), axis=0)
+    path = spline(points)
+    reference = CubicSpline(path.knots, points)(S)
+    np.testing.assert_allclose(
+        path.point(S), reference, rtol=0, atol=1e-13 * np.abs(reference).max()
+    )
+
+
 @BOTH
 def test_paths_go_through_their_waypoints(path):
     points = waypoints(7, 3)
