@@ -56,7 +56,9 @@ class Comparison:
 
 
 def _worst(errors: Floats) -> float:
-    return float(np.max(np.abs(errors), initial=0.0))
+    """The largest magnitude; infinite where a polynomial gave no frequency (NaN)."""
+    worst = float(np.max(np.abs(errors), initial=0.0))
+    return worst if worst == worst else float("inf")
 
 
 @dataclass(frozen=True)
@@ -130,6 +132,11 @@ class TargetStudy:
         """The three errors of this target together."""
         return ErrorSummary(self.initial, self.predicted, self.exact)
 
+    @property
+    def approximation_error(self) -> float:
+        """Largest |predicted / exact − 1| along the trajectory, at the optimum."""
+        return _worst(np.asarray(self.predicted_hz / self.exact_hz - 1.0))
+
 
 @dataclass(frozen=True)
 class OtherModes:
@@ -173,6 +180,20 @@ class Findings:
     warnings: tuple[str, ...]
     notes: tuple[str, ...]  # what was chosen and why, one line each
     timing_s: Mapping[str, float]
+    tolerance: float = 0.02  # the largest approximation error the case accepts, a fraction
+
+    @property
+    def approximation_error(self) -> float | None:
+        """How far the predicted frequencies are from the exact ones at most; None without."""
+        if not self.targets:
+            return None
+        return max(target.approximation_error for target in self.targets)
+
+    @property
+    def within_tolerance(self) -> bool:
+        """Whether the prediction that the optimum rests on is as exact as the case asks for."""
+        error = self.approximation_error
+        return error is None or error <= self.tolerance
 
     @property
     def error(self) -> ErrorSummary | None:
@@ -201,7 +222,9 @@ class ValidationRow:
     order: int
     where: str  # "trajectory", "box of q and y", ...
     points: int
-    worst_taylor: float  # relative error in Hz, fraction
+    worst_taylor: float  # relative error in Hz, fraction; infinite where λ came out negative
     worst_linearised: float
+    rms_taylor: float
+    rms_linearised: float
     limit: float
     passed: bool

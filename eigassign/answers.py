@@ -1,0 +1,128 @@
+"""Quick questions about a case: is it right, and what are its frequencies at one point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign import values
+from eigassign.api import Case, load_case
+from eigassign.errors import CaseError, Problem, UsageError
+from eigassign.study.assignment_study import target_frequencies
+from eigassign.study.plan import plan_expansion
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ModesAnswer:
+    """Exact frequencies (Hz) of the lowest elastic modes; rigid-body modes are only counted."""
+
+    rigid_modes: int
+    frequencies_hz: list[float]
+    q: tuple[tuple[str, float], ...]  # where: name and value, SI
+    y: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
+class CheckAnswer:
+    """What a case amounts to; ``warnings`` are plausibility problems that do not stop a run."""
+
+    title: str
+    n_dof: int
+    n_rigid: int
+    q_names: tuple[str, ...]
+    y_names: tuple[str, ...]
+    samples: int  # of the trajectory, 0 without one
+    duration_s: float
+    targets: int
+    notes: tuple[str, ...]
+    warnings: tuple[Problem, ...]
+
+
+def modes(
+    path: str | Path,
+    q: Sequence[float] | str | None = None,
+    y: Sequence[float] | str | None = None,
+    count: int = 3,
+) -> ModesAnswer:
+    """Exact modes of the case at q (rad) and y (SI units), given as numbers or as text with units.
+
+    Without ``q`` at the expansion point that the case gives, else where its trajectory starts;
+    without ``y`` with the design as it is written in the file. Raises UsageError for wrong lengths
+    or counts, and where there is no pose to take.
+    """
+    case = load_case(path)
+    q = values.coordinates(case.file, q) if isinstance(q, str) else q
+    y = values.design(case.file, y) if isinstance(y, str) else y
+    with case.located():
+        model = case.model()
+        at_q = np.asarray(_default_q(case) if q is None else q, dtype=np.float64)
+        at_y = np.asarray(case.initial_design if y is None else y, dtype=np.float64)
+        hz = model.frequencies(at_q, at_y, count)[0]
+    return ModesAnswer(
+        model.n_rigid,
+        [float(value) for value in hz],
+        _pairs(model.q_names, at_q),
+        _pairs(model.y_names, at_y),
+    )
+
+
+def _pairs(names: Sequence[str], numbers: Floats) -> tuple[tuple[str, float], ...]:
+    return tuple((name, float(number)) for name, number in zip(names, numbers, strict=True))
+
+
+def _default_q(case: Case) -> Sequence[float]:
+    file = case.file
+    if file.expansion.q != "auto":
+        return [float(value) for value in file.expansion.q]
+    if file.trajectory is not None:
+        return [float(value) for value in case.trajectory.q[0]]
+    if file.coordinates:
+        names = ", ".join(file.coordinates)
+        raise UsageError(f"q: give a value for {names}; the case has no expansion point to take")
+    return []
+
+
+def check(path: str | Path) -> CheckAnswer:
+    """Validate the file, build its model, follow its trajectory, and settle its expansion point.
+
+    Raises CaseError with every problem found by the first of these steps that finds any.
+    """
+    case = load_case(path)
+    file, model = case.file, case.model()
+    trajectory = case.trajectory if file.trajectory is not None else None
+    notes = () if trajectory is None else trajectory.notes
+    if trajectory is not None:
+        target_frequencies(file, trajectory.time_s)
+    if trajectory is not None or file.expansion.q != "auto":
+        notes += plan_expansion(file, model, trajectory).notes
+    _require_regular(case, trajectory.q[:1] if trajectory is not None else None)
+    return CheckAnswer(
+        title=file.title,
+        n_dof=model.n_dof,
+        n_rigid=model.n_rigid,
+        q_names=model.q_names,
+        y_names=model.y_names,
+        samples=0 if trajectory is None else len(trajectory.time_s),
+        duration_s=0.0 if trajectory is None else float(np.ptp(trajectory.time_s)),
+        targets=len(file.targets),
+        notes=tuple(notes),
+        warnings=file.warnings,
+    )
+
+
+def _require_regular(case: Case, q: Floats | None) -> None:
+    """One exact solve: a mechanism without mass or stiffness is found here, at its line."""
+    if q is None:
+        given = case.file.expansion.q
+        q = np.array([given if given != "auto" else [0.0] * len(case.file.coordinates)])
+    with case.located():
+        try:
+            case.model().frequencies(q, case.initial_design, 1)
+        except UsageError as error:
+            raise CaseError((case.file.problem("mechanism", str(error)),)) from error

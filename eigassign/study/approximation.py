@@ -1,0 +1,132 @@
+"""How good an expansion is: exact, full Taylor and linearised frequency at the same points.
+
+Only the exact solves cost anything, so all points of one study are solved in one batch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.modal.expansion import Expansion
+from eigassign.modal.model import Model
+from eigassign.study.findings import Comparison, DesignMap
+
+Floats = NDArray[np.float64]
+GRID = 13  # points along each axis of a map, both ends included; odd, so that the middle is one
+LINE = 61  # points of a map over one variable
+
+
+@dataclass(frozen=True)
+class Expansions:
+    """The full and the partially linearised expansion of the same modes about the same point."""
+
+    full: Expansion
+    linear: Expansion
+
+    @property
+    def modes(self) -> tuple[int, ...]:
+        """The modes that both hold, in the order of their columns."""
+        return self.full.modes
+
+    def column(self, mode: int) -> int:
+        """Column of ``mode`` in what the expansions evaluate to."""
+        return self.modes.index(mode)
+
+
+def compare(
+    model: Model,
+    expansions: Expansions,
+    x: Floats,
+    exact_hz: Floats | None = None,
+) -> tuple[Comparison, ...]:
+    """One comparison for each expanded mode at the points x (n, n_x), arrays (n,) in Hz.
+
+    ``exact_hz`` (n, at least the highest mode) are exact frequencies already known there.
+    """
+    q, y = _split(model, x)
+    if exact_hz is None:
+        exact_hz = model.frequencies(q, y, max(expansions.modes))
+    taylor, linearised = (e.frequencies(q, y) for e in (expansions.full, expansions.linear))
+    return tuple(
+        Comparison(_frozen(exact_hz[:, mode - 1]), _frozen(taylor[:, k]), _frozen(linearised[:, k]))
+        for k, mode in enumerate(expansions.modes)
+    )
+
+
+def _split(model: Model, x: Floats) -> tuple[Floats, Floats]:
+    n_q = len(model.q_names)
+    return x[:, :n_q], x[:, n_q:]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A tensor grid over one or two entries of x, the others as in ``x0``."""
+
+    entries: tuple[int, ...]
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    axes: tuple[Floats, ...]
+    x0: Floats
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Points along each axis."""
+        return tuple(len(axis) for axis in self.axes)
+
+    def points(self) -> Floats:
+        """All of them, (n, n_x), the last axis varying fastest."""
+        mesh = np.meshgrid(*self.axes, indexing="ij")
+        x = np.tile(self.x0, (mesh[0].size, 1))
+        for entry, values in zip(self.entries, mesh, strict=True):
+            x[:, entry] = values.ravel()
+        return x
+
+
+def grid_over(
+    entries: Sequence[int],
+    names: Sequence[str],
+    units: Sequence[str],
+    lower: Floats,
+    upper: Floats,
+    x0: Floats,
+) -> Grid | None:
+    """A grid over the first two of ``entries`` of x that have room between their bounds.
+
+    ``names``, ``units``, ``lower`` and ``upper`` belong to the entries. None without room.
+    """
+    chosen = [k for k in range(len(entries)) if upper[k] > lower[k]][:2]
+    if not chosen:
+        return None
+    count = LINE if len(chosen) == 1 else GRID
+    return Grid(
+        tuple(entries[k] for k in chosen),
+        tuple(names[k] for k in chosen),
+        tuple(units[k] for k in chosen),
+        tuple(_frozen(np.linspace(lower[k], upper[k], count)) for k in chosen),
+        x0,
+    )
+
+
+def map_over(model: Model, expansions: Expansions, grid: Grid | None) -> tuple[DesignMap, ...]:
+    """One map for each expanded mode; none without a grid."""
+    if grid is None:
+        return ()
+    return tuple(
+        DesignMap(grid.names, grid.units, grid.axes, _reshaped(values, grid.shape))
+        for values in compare(model, expansions, grid.points())
+    )
+
+
+def _reshaped(values: Comparison, shape: tuple[int, ...]) -> Comparison:
+    parts = (values.exact_hz, values.taylor_hz, values.linearised_hz)
+    return Comparison(*(part.reshape(shape) for part in parts))
+
+
+def _frozen(array: Floats) -> Floats:
+    array = np.ascontiguousarray(array)
+    array.setflags(write=False)
+    return array

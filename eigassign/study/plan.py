@@ -1,0 +1,155 @@
+"""What is expanded, about which point and why: the case's wishes with every "auto" settled."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from eigassign.case import CaseFile
+from eigassign.errors import CaseError
+from eigassign.mechanism.trajectory import Trajectory
+from eigassign.modal.model import Model
+
+Floats = NDArray[np.float64]
+_MANY = 500  # samples up to which every distance between two of them counts
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Expansion point x0 = (q0, y0), order p and modes; ``notes`` say what was chosen and why."""
+
+    q0: Floats
+    y0: Floats
+    order: int
+    modes: tuple[int, ...]
+    notes: tuple[str, ...]
+
+
+def plan_expansion(
+    file: CaseFile,
+    model: Model,
+    trajectory: Trajectory | None,
+    order: int | None = None,
+    modes: Sequence[int] | None = None,
+) -> Plan:
+    """Settle the expansion; ``order`` and ``modes`` override the file's.
+
+    Raises CaseError at the key at fault: lengths that differ from the model's, modes it does not
+    have, an automatic expansion point without a trajectory to be central in.
+    """
+    q0, q_note = _q0(file, model, trajectory)
+    y0, y_note = _y0(file, model)
+    chosen, modes_note = _modes(file, modes)
+    _check_modes(file, model, chosen)
+    order = file.expansion.order if order is None else order
+    notes = [q_note, y_note, modes_note, *_outside(file, q0, y0, model, trajectory)]
+    return Plan(q0, y0, order, chosen, tuple(note for note in notes if note))
+
+
+def _q0(file: CaseFile, model: Model, trajectory: Trajectory | None) -> tuple[Floats, str]:
+    n_q, given = len(model.q_names), file.expansion.q
+    if given != "auto":
+        q0 = np.array(given, dtype=np.float64)
+        if len(q0) != n_q:
+            raise _wrong(file, "expansion.q", f"{len(q0)} values for {n_q} coordinates")
+        return q0, f"expansion point: {shown_point(model.q_names, q0)}, as the case asks"
+    if trajectory is None:
+        if n_q == 0:
+            return np.zeros(0), ""
+        message = "auto needs a trajectory to be central in, and the case has none: give values"
+        raise _wrong(file, "expansion.q", message)
+    k = central_sample(trajectory.q @ joint_map(model).T)
+    q0, t = trajectory.q[k], trajectory.time_s[k]
+    point = shown_point(model.q_names, q0)
+    why = "the most central: its farthest other sample is nearer than any other's"
+    return q0, f"expansion point: {point}, sample {k} of the trajectory (t = {t:.4g} s), {why}"
+
+
+def joint_map(model: Model) -> Floats:
+    """From q to the relative joint coordinates on which a frequency depends, (n_s, n_q)."""
+    n_q = len(model.q_names)
+    return np.asarray(model.pencil.to_program[:n_q, :n_q][model.pencil.active[:n_q]])
+
+
+def central_sample(points: ArrayLike) -> int:
+    """The row k of ``points`` (n, d) that minimises max_l |p_k − p_l|; the first of equals."""
+    rows = np.asarray(points, dtype=np.float64)
+    if rows.shape[1] == 0:
+        return len(rows) // 2
+    others = rows[:: 1 + len(rows) // _MANY]  # a very long trajectory is seen at every n-th sample
+    farthest = np.zeros(len(rows))
+    for other in others:
+        distance: Floats = np.square(rows - other).sum(axis=1)
+        np.maximum(farthest, distance, out=farthest)
+    return int(np.argmin(farthest))
+
+
+def _y0(file: CaseFile, model: Model) -> tuple[Floats, str]:
+    n_y, given = len(model.y_names), file.expansion.y
+    if n_y == 0 and given in ("auto", ()):
+        return np.zeros(0), ""
+    if given != "auto":
+        y0 = np.array(given, dtype=np.float64)
+        if len(y0) != n_y:
+            raise _wrong(file, "expansion.y", f"{len(y0)} values for {n_y} design parameters")
+        return y0, f"expansion design: {shown_point(model.y_names, y0)}, as the case asks"
+    y0 = np.array([0.5 * (p.min + p.max) for p in file.design.parameters.values()])
+    return y0, f"expansion design: {shown_point(model.y_names, y0)}, the middle of the bounds"
+
+
+def _modes(file: CaseFile, override: Sequence[int] | None) -> tuple[tuple[int, ...], str]:
+    """Modes to expand: those asked for, and always those with a target."""
+    targets = {target.mode for target in file.targets}
+    given = override if override is not None else file.expansion.modes
+    if given == "auto":
+        if targets:
+            return tuple(sorted(targets)), f"modes {_listed(targets)}: those with a target"
+        return (1,), "mode 1: the lowest, for there is no target"
+    asked = {int(str(mode)) for mode in given}
+    if override is not None or targets <= asked:
+        return tuple(sorted(asked)), ""
+    added = f"modes {_listed(targets - asked)} are expanded too, because they have a target"
+    return tuple(sorted(asked | targets)), added
+
+
+def _check_modes(file: CaseFile, model: Model, modes: Sequence[int]) -> None:
+    available = model.n_dof - model.n_rigid
+    places = {t.mode: f"targets[{k}].mode" for k, t in enumerate(file.targets)}
+    for mode in modes:
+        if mode > available:
+            where = places.get(mode, "expansion.modes")
+            message = f"mode {mode} asked for; with these elements the model has 1 to {available}"
+            raise _wrong(file, where, message)
+
+
+def _outside(
+    file: CaseFile, q0: Floats, y0: Floats, model: Model, trajectory: Trajectory | None
+) -> list[str]:
+    """Notes on an expansion point that lies outside what it is meant to stand for."""
+    notes = [
+        f"the expansion design has {name} = {value:g} outside its bounds {p.min:g} … {p.max:g}"
+        for (name, p), value in zip(file.design.parameters.items(), y0, strict=True)
+        if not p.min <= value <= p.max
+    ]
+    if trajectory is not None:
+        s, s0 = trajectory.q @ joint_map(model).T, joint_map(model) @ q0
+        reach = np.ptp(s, axis=0)
+        if np.any((s0 < s.min(axis=0) - reach) | (s0 > s.max(axis=0) + reach)):
+            notes.append("the expansion point is farther from the trajectory than that travels")
+    return notes
+
+
+def shown_point(names: Sequence[str], values: Floats) -> str:
+    """``"q1 = 1.817, q2 = 5.312"``."""
+    return ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, values, strict=True)) or "none"
+
+
+def _listed(modes: set[int]) -> str:
+    return ", ".join(str(mode) for mode in sorted(modes))
+
+
+def _wrong(file: CaseFile, key_path: str, message: str) -> CaseError:
+    return CaseError((file.problem(key_path, message),))
