@@ -1,0 +1,212 @@
+"""One expression on floats, on samples and on series: the same numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from eigassign.errors import UsageError
+from eigassign.series.expression import Expression, Recorder, cos, sin
+from eigassign.series.lower_set import total_degree
+from eigassign.series.power_series import PowerSeries
+from eigassign.series.program import Samples, Truncated, compile_program
+from eigassign.series.table import compile_table
+
+N = 3
+SPACE = total_degree(N, 4)
+Tree = tuple[Any, ...]
+
+numbers = st.sampled_from([-2.0, -1.0, -0.5, 0.0, 0.25, 1.0, 1.5, 3.0])
+leaves = st.one_of(
+    st.tuples(st.just("variable"), st.integers(0, N - 1)), st.tuples(st.just("number"), numbers)
+)
+
+
+def branches(inner: st.SearchStrategy[Tree]) -> st.SearchStrategy[Tree]:
+    return st.one_of(
+        st.tuples(st.sampled_from(["add", "subtract", "multiply", "divide"]), inner, inner),
+        st.tuples(st.sampled_from(["sine", "cosine", "negative"]), inner),
+        st.tuples(st.just("whole"), inner, st.sampled_from([1.0, 2.0, 3.0, 4.0])),
+        st.tuples(st.just("root"), inner, st.sampled_from([0.5, -0.5, 1.5, -1.0, -3.0])),
+    )
+
+
+trees = st.recursive(leaves, branches, max_leaves=12)
+
+
+def value(tree: Tree, x: list[Any], sine: Callable[..., Any], cosine: Callable[..., Any]) -> Any:
+    """The tree in whatever algebra x belongs to; divisors and roots are kept off zero by a square."""
+    kind, *rest = tree
+    if kind == "variable":
+        return x[rest[0]]
+    if kind == "number":
+        return rest[0]
+    a = value(rest[0], x, sine, cosine)
+    if kind in ("sine", "cosine"):
+        return (sine if kind == "sine" else cosine)(a)
+    if kind == "negative":
+        return -a
+    if kind == "whole":
+        return a ** rest[1] if isinstance(a, float | Expression) else whole(a, rest[1])
+    if kind == "root":
+        return (1.25 + a * a) ** rest[1]
+    b = value(rest[1], x, sine, cosine)
+    if kind == "divide":
+        return a / (1.25 + b * b)
+    return {"add": lambda: a + b, "subtract": lambda: a - b, "multiply": lambda: a * b}[kind]()
+
+
+def whole(a: Any, exponent: float) -> Any:
+    out = a
+    for _ in range(int(exponent) - 1):
+        out = out * a
+    return out
+
+
+def series_sine(a: Any) -> Any:
+    return a.sin() if isinstance(a, PowerSeries) else math.sin(a)
+
+
+def series_cosine(a: Any) -> Any:
+    return a.cos() if isinstance(a, PowerSeries) else math.cos(a)
+
+
+def coefficients(a: Any) -> np.ndarray:
+    return a.coefficients if isinstance(a, PowerSeries) else a * np.eye(len(SPACE))[0]
+
+
+AT = np.array([[0.3, -0.7, 1.1], [0.0, 0.4, -0.2]])
+
+
+@given(trees)
+def test_samples_agree_with_plain_floats(tree: Tree) -> None:
+    recorder = Recorder()
+    recorded = value(tree, [recorder.variable(i) for i in range(N)], sin, cos)
+    table = compile_table(recorder, [recorded], N)
+    found = np.broadcast_to(table.evaluate(Samples(), AT.T), (1, 2))[0]
+    expected = [value(tree, row.tolist(), math.sin, math.cos) for row in AT]
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+@given(trees)
+def test_series_agree_with_series_arithmetic(tree: Tree) -> None:
+    recorder = Recorder()
+    recorded = value(tree, [recorder.variable(i) for i in range(N)], sin, cos)
+    variables = [PowerSeries.variable(SPACE, i, AT[0, i]) for i in range(N)]
+    found = compile_table(recorder, [recorded], N).evaluate(
+        Truncated(SPACE), np.array([v.coefficients for v in variables])
+    )[0]
+    expected = coefficients(value(tree, variables, series_sine, series_cosine))
+    size = max(1.0, float(np.abs(expected).max()))
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * size)
+
+
+@given(trees)
+def test_what_a_tree_does_not_depend_on_structurally_does_not_change_it(tree: Tree) -> None:
+    recorder = Recorder()
+    recorded = value(tree, [recorder.variable(i) for i in range(N)], sin, cos)
+    table = compile_table(recorder, [recorded], N)
+    idle = ~table.program.dependence.any(axis=0)
+    moved = AT[:1] + np.where(idle, 0.9, 0.0)
+    before, after = (
+        np.broadcast_to(table.evaluate(Samples(), x.T), (1, 1)) for x in (AT[:1], moved)
+    )
+    np.testing.assert_array_equal(before, after)
+
+
+def test_constants_fold_away_as_they_are_written() -> None:
+    recorder = Recorder()
+    x = recorder.variable(0)
+    assert x * 0.0 == 0.0
+    assert x - x == 0.0
+    assert (2.0 * x + 1.0) - x * 2.0 == 1.0
+    assert sin(0.5) == math.sin(0.5)
+    assert cos(0.5) == math.cos(0.5)
+    assert len(recorder.nodes) == 1
+    assert x + 0.0 is x
+    assert x * 1.0 is x
+
+
+def test_equal_subexpressions_are_recorded_once() -> None:
+    recorder = Recorder()
+    x, y = recorder.variable(0), recorder.variable(1)
+    _ = sin(x + y) * cos(x)
+    before = len(recorder.nodes)
+    _ = cos(x) * sin(y + x)
+    _ = 3.0 * (sin(x + y) * cos(x))
+    assert len(recorder.nodes) == before
+    (a, i), (b, j) = (x + 2.0 * y).single(), (-2.0 * x - 4.0 * y).single()
+    assert i == j
+    assert b == -2.0 * a
+
+
+def test_roots_of_negative_multiples_are_roots_of_the_product() -> None:
+    recorder = Recorder()
+    x = recorder.variable(0)
+    table = compile_table(recorder, [(-2.0 * x) ** 0.5, (-2.0 * x) ** -1.0], 1)
+    found = table.evaluate(Samples(), np.array([[-8.0]]))
+    np.testing.assert_allclose(found[:, 0], [4.0, 1.0 / 16.0])
+
+
+def test_numpy_numbers_mix_with_expressions_from_both_sides() -> None:
+    recorder = Recorder()
+    x, two = recorder.variable(0), np.float64(2.0)
+    table = compile_table(recorder, [two * x, x * two, two - x, x / two, two / x, two + x], 1)
+    found = table.evaluate(Samples(), np.array([[4.0]]))[:, 0]
+    np.testing.assert_allclose(found, [8.0, 8.0, -2.0, 2.0, 0.5, 6.0])
+
+
+def test_dependence_is_structural() -> None:
+    recorder = Recorder()
+    x, y, z = (recorder.variable(i) for i in range(3))
+    outputs = [sin(x) * y, z**0.5, (x + y) * 1.0]
+    atoms = [expression.single()[1] for expression in outputs]
+    program = compile_program(recorder, atoms, 4)
+    expected = [[1, 1, 0, 0], [0, 0, 1, 0], [1, 1, 0, 0]]
+    np.testing.assert_array_equal(program.dependence, np.array(expected, dtype=bool))
+
+
+def test_only_what_the_outputs_need_is_computed() -> None:
+    recorder = Recorder()
+    x, y = recorder.variable(0), recorder.variable(1)
+    _ = sin(y) ** 0.5
+    (_, atom), _ = cos(x).single(), sin(x)
+    program = compile_program(recorder, [atom], 2)
+    assert program.n_atoms == 2
+    np.testing.assert_array_equal(program.input_variables, [0])
+
+
+def test_a_table_mixes_numbers_and_expressions_and_may_hold_numbers_only() -> None:
+    recorder = Recorder()
+    x = recorder.variable(0)
+    points = np.array([[0.1, 0.2, 0.3]])
+    mixed = compile_table(recorder, [2.0, 3.0 * x - 1.0, sin(x)], 1)
+    expected = [2.0 + 0 * points[0], 3.0 * points[0] - 1.0, np.sin(points[0])]
+    np.testing.assert_allclose(mixed.evaluate(Samples(), points), expected)
+    plain = compile_table(recorder, [2.0, -1.0], 1).evaluate(Samples(), points)
+    np.testing.assert_array_equal(np.broadcast_to(plain, (2, 3)), [[2.0] * 3, [-1.0] * 3])
+    series = compile_table(recorder, [2.0, x], 1).evaluate(
+        Truncated(total_degree(1, 2)), np.array([[0.5, 1.0, 0.0]])
+    )
+    np.testing.assert_array_equal(series, [[2.0, 0.0, 0.0], [0.5, 1.0, 0.0]])
+
+
+def test_a_domain_error_shows_as_not_a_number_without_a_warning() -> None:
+    recorder = Recorder()
+    root = recorder.variable(0) ** 0.5
+    found = compile_table(recorder, [root], 1).evaluate(Samples(), np.array([[-1.0, 4.0]]))
+    assert np.isnan(found[0, 0])
+    assert found[0, 1] == 2.0
+
+
+def test_an_unknown_kind_of_node_is_refused() -> None:
+    recorder = Recorder()
+    recorder.nodes.append(("nonsense",))
+    with pytest.raises(UsageError, match="unknown expression"):
+        compile_program(recorder, [0], 1)

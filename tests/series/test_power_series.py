@@ -1,0 +1,207 @@
+"""The algebra of truncated series: identities that hold coefficient by coefficient."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from eigassign.errors import UsageError
+from eigassign.series import power_series
+from eigassign.series.lower_set import (
+    LowerSet,
+    box,
+    lower_set,
+    partially_linear,
+    total_degree,
+    weighted_degree,
+)
+from eigassign.series.power_series import PowerSeries, compose, monomials, multiply
+
+SETS = {
+    "total degree": total_degree(3, 5),
+    "one variable": total_degree(1, 8),
+    "box": box((3, 2, 2)),
+    "partially linear": partially_linear(2, 2, 4),
+    "weighted": weighted_degree((1.0, 2.0), 5.0),
+    "corner": lower_set([[0, 0], [1, 0], [2, 0], [3, 0], [0, 1], [0, 2], [1, 1]]),
+    "constant": total_degree(2, 0),
+}
+spaces = pytest.mark.parametrize("space", SETS.values(), ids=SETS.keys())
+
+
+def some(space: LowerSet, seed: int, constant: float | None = None) -> PowerSeries:
+    values = np.random.default_rng(seed).standard_normal(len(space))
+    if constant is not None:
+        values[0] = constant
+    return PowerSeries(space, values)
+
+
+def same(a: PowerSeries, b: PowerSeries | float, size: float = 1.0) -> None:
+    """Equal to round-off of terms of the given size."""
+    other = b.coefficients if isinstance(b, PowerSeries) else np.eye(len(a.space))[0] * b
+    np.testing.assert_allclose(a.coefficients, other, atol=2e-13 * size, rtol=2e-13)
+
+
+@spaces
+def test_products_are_cauchy_products(space: LowerSet) -> None:
+    a, b = some(space, 1), some(space, 2)
+    members = space.indices.tolist()
+    expected = np.zeros(len(space))
+    for i, j in itertools.product(range(len(space)), repeat=2):
+        total = [x + y for x, y in zip(members[i], members[j], strict=True)]
+        if total in members:
+            expected[members.index(total)] += a.coefficients[i] * b.coefficients[j]
+    np.testing.assert_allclose((a * b).coefficients, expected, atol=1e-13)
+
+
+@spaces
+def test_products_commute_associate_and_distribute(space: LowerSet) -> None:
+    a, b, c = (some(space, k) for k in range(3))
+    same(a * b, b * a)
+    same((a * b) * c, a * (b * c), 1e3)
+    same(a * (b + c), a * b + a * c, 1e2)
+    same((a + b) * (a + b), a * a + 2.0 * (a * b) + b * b, 1e2)
+    same((a - b) * (a + b), a * a - b * b, 1e2)
+
+
+@spaces
+def test_sine_and_cosine_square_to_one_and_add_angles(space: LowerSet) -> None:
+    a, b = some(space, 3), some(space, 4)
+    same(a.sin() * a.sin() + a.cos() * a.cos(), 1.0, 1e3)
+    same((a + b).sin(), a.sin() * b.cos() + a.cos() * b.sin(), 1e3)
+    same((a + b).cos(), a.cos() * b.cos() - a.sin() * b.sin(), 1e3)
+    same((-a).sin(), -a.sin(), 1e2)
+    assert a.sin().coefficients[0] == pytest.approx(math.sin(a.coefficients[0]), abs=1e-16)
+
+
+@spaces
+def test_powers_undo_each_other(space: LowerSet) -> None:
+    a = some(space, 5, 1.7)
+    same(a * (1.0 / a), 1.0, 1e3)
+    same(a / a, 1.0, 1e3)
+    same((a**0.5) * (a**0.5), a, 1e2)
+    same(a**3.0, a * a * a, 1e3)
+    same(a**-2.0 * (a * a), 1.0, 1e4)
+    same((a**2.5) * (a**-1.5), a, 1e4)
+    same(a / 4.0, a * 0.25)
+    same(2.0 - a, -(a - 2.0))
+    same(a**0.0, 1.0)
+
+
+@spaces
+def test_a_negative_constant_term_has_whole_powers(space: LowerSet) -> None:
+    a = some(space, 6, -1.3)
+    same(a**3.0, a * a * a, 1e3)
+    same(a * a**-1.0, 1.0, 1e3)
+
+
+def test_eulers_four_squares_hold_in_eight_variables() -> None:
+    # (a²+b²+c²+d²)(e²+f²+g²+h²) is a sum of four squares; degree 4 in 8 variables
+    space = total_degree(8, 4)
+    x = [PowerSeries.variable(space, i) for i in range(8)]
+    a, b, c, d, e, f, g, h = x
+    left = (a * a + b * b + c * c + d * d) * (e * e + f * f + g * g + h * h)
+    rows = [
+        a * e + b * f + c * g + d * h,
+        a * f - b * e + c * h - d * g,
+        a * g - b * h - c * e + d * f,
+        a * h + b * g - c * f - d * e,
+    ]
+    right = rows[0] * rows[0] + rows[1] * rows[1] + rows[2] * rows[2] + rows[3] * rows[3]
+    np.testing.assert_array_equal(left.coefficients, right.coefficients)  # small integers: exact
+    assert np.count_nonzero(left.coefficients) == 16
+
+
+def test_series_have_the_published_coefficients() -> None:
+    space = total_degree(1, 8)
+    x = PowerSeries.variable(space, 0)
+    k = np.arange(9)
+    sine = [0, 1, 0, -1 / 6, 0, 1 / 120, 0, -1 / 5040, 0]
+    np.testing.assert_allclose(x.sin().coefficients, sine, atol=1e-16)
+    np.testing.assert_allclose((1.0 / (1.0 - x)).coefficients, 1.0, rtol=1e-14)
+    catalan = [math.comb(2 * i, i) / (i + 1) for i in k]  # (1 − √(1−4x)) / 2x
+    root = (1.0 - 4.0 * x) ** 0.5
+    np.testing.assert_allclose(-0.5 * root.coefficients[1:], catalan[:-1], rtol=1e-12)
+
+
+def test_composition_is_the_derivative_over_the_factorial() -> None:
+    # sin(x + 2y + xy) about (0.3, −0.2): ∂^γ/γ! by the closed form of its low derivatives
+    space = total_degree(2, 2)
+    x, y = PowerSeries.variable(space, 0, 0.3), PowerSeries.variable(space, 1, -0.2)
+    z = 0.3 - 0.4 - 0.06
+    zx, zy = 1.0 - 0.2, 2.0 + 0.3
+    s, c = math.sin(z), math.cos(z)
+    expected = [s, c * zx, c * zy, -s * zx**2 / 2, -s * zx * zy + c, -s * zy**2 / 2]
+    np.testing.assert_allclose((x + 2.0 * y + x * y).sin().coefficients, expected, rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["total degree", "one variable"])
+def test_values_converge_to_the_function_with_the_order(name: str) -> None:
+    space = SETS[name]
+    x = [PowerSeries.variable(space, i, 0.2) for i in range(space.n_variables)]
+    f = (1.5 + sum(x[1:], x[0])).sin() * (2.0 + x[0]) ** 0.5
+    direction = np.linspace(1.0, 0.5, space.n_variables)
+
+    def error(h: float) -> float:
+        at = 0.2 + h * direction
+        return abs(f(h * direction) - math.sin(1.5 + at.sum()) * math.sqrt(2.0 + at[0]))
+
+    slope = math.log(error(0.2) / error(0.1)) / math.log(2.0)
+    assert slope == pytest.approx(space.order + 1, abs=0.2)
+
+
+def test_monomials_are_powers() -> None:
+    space = total_degree(3, 4)
+    x = np.random.default_rng(0).standard_normal((6, 3))
+    expected = np.prod(x[:, None, :] ** space.indices[None], axis=2)
+    np.testing.assert_allclose(monomials(space, x), expected, rtol=1e-13)
+    assert monomials(space, np.zeros((2, 3)))[:, 0].tolist() == [1.0, 1.0]
+
+
+def test_one_point_and_many_points_evaluate_alike() -> None:
+    a = some(total_degree(2, 3), 7)
+    points = np.array([[0.1, 0.2], [0.3, -0.4]])
+    np.testing.assert_allclose(a(points), [a(points[0]), a(points[1])], rtol=1e-14)
+    assert np.ndim(a(points[0])) == 0
+
+
+def test_long_stacks_are_multiplied_in_parts_with_the_same_result(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    space = total_degree(3, 4)
+    a, b = np.random.default_rng(0).standard_normal((2, 7, len(space)))
+    whole = multiply(space, a, b)
+    monkeypatch.setattr(power_series, "CHUNK", 2 * len(space.table.left))
+    np.testing.assert_array_equal(multiply(space, a, b), whole)
+
+
+def test_stacks_are_composed_row_by_row() -> None:
+    space = total_degree(2, 4)
+    a = np.random.default_rng(0).standard_normal((3, len(space)))
+    taylor = power_series.sine_taylor(a[:, 0], space.order)
+    for row, series in zip(compose(space, taylor, a), a, strict=True):
+        same(PowerSeries(space, row), PowerSeries(space, series).sin(), 10.0)
+
+
+def test_mixing_sets_wrong_sizes_and_zero_to_a_power_are_refused() -> None:
+    a, b = some(total_degree(2, 3), 1), some(box((3, 3)), 1)
+    with pytest.raises(UsageError, match="different sets"):
+        _ = a + b
+    with pytest.raises(UsageError, match="different sets"):
+        _ = a * b
+    with pytest.raises(UsageError, match="coefficients for a set"):
+        PowerSeries(total_degree(2, 3), np.zeros(3))
+    with pytest.raises(UsageError, match="non-zero constant"):
+        _ = 1.0 / PowerSeries.variable(a.space, 0)
+
+
+def test_a_series_cannot_be_changed_and_does_not_share_its_numbers() -> None:
+    numbers = np.ones(10)
+    a = PowerSeries(total_degree(2, 3), numbers)
+    numbers[0] = 7.0
+    assert a.coefficients[0] == 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        a.coefficients[0] = 2.0
