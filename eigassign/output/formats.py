@@ -1,0 +1,27 @@
+"""Numbers as people read them: on the console, in the report and in the figures."""
+
+from __future__ import annotations
+
+import math
+
+
+def number(value: float) -> str:
+    """Six significant digits: ``0.228713``."""
+    return f"{value:.6g}"
+
+
+def percent(fraction: float) -> str:
+    """Three significant digits: ``1.55 %`` for 0.0155; ``n/a`` where there is no number."""
+    if not math.isfinite(fraction):
+        return "n/a"
+    return f"{100.0 * fraction:#.3g}".rstrip(".") + " %"
+
+
+def seconds(value: float) -> str:
+    """``12.3 ms`` below a second, ``4.56 s`` above."""
+    return f"{1000.0 * value:.3g} ms" if abs(value) < 1.0 else f"{value:.3g} s"
+
+
+def residual(value: float) -> str:
+    """Two digits and a power of ten: ``3.1e-17``."""
+    return f"{value:.1e}"

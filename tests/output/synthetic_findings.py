@@ -1,0 +1,174 @@
+"""Findings that no mechanics produced: shapes, names and magnitudes of every kind to draw."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.study.findings import (
+    Comparison,
+    DesignMap,
+    DesignRow,
+    ErrorRow,
+    Findings,
+    ModeStudy,
+    OtherModes,
+    Poses,
+    SolverRow,
+    TargetStudy,
+)
+
+Floats = NDArray[np.float64]
+
+
+def make_findings(
+    *,
+    n_t: int = 152,
+    n_q: int = 2,
+    n_y: int = 2,
+    n_links: int = 2,
+    n_targets: int = 1,
+    scale_hz: float = 1.0,
+    scale_m: float = 1.0,
+    title: str = "Two-link pick-and-place manipulator",
+    prefix: str = "",
+    varies: bool = True,
+    spatial: bool = False,
+) -> Findings:
+    time = np.linspace(0.0, 1.0, n_t) if n_t > 1 else np.zeros(n_t)
+    names = tuple(f"{prefix}q{i + 1}" for i in range(n_q))
+    q = _joint_motion(time, n_q)
+    studies = tuple(_study(i + 1, time, n_y, n_q, scale_hz, prefix, varies) for i in range(1))
+    targets = tuple(_target(i + 1, time, scale_hz) for i in range(n_targets if n_t else 0))
+    return Findings(
+        title=title,
+        reference="Belotti et al., Appl. Sci. 11 (2021) 11558",
+        case_name="two_link",
+        case_sha256="0123456789abcdef" * 4,
+        version="0.1.0",
+        q_names=names,
+        q_units=tuple("m" if i % 4 == 3 else "rad" for i in range(n_q)),
+        time_s=time,
+        q=q,
+        poses=_poses(time, n_links, scale_m, prefix, spatial),
+        studies=studies,
+        design=tuple(_design_row(i, prefix) for i in range(n_y)),
+        targets=targets,
+        others=_others(time, n_targets, scale_hz) if n_t else None,
+        solver=SolverRow("solved", 25, 3.1e-17, 2.2e-14, 1.5e-16) if n_y else None,
+        warnings=("section 'rod': <area> & inertia look odd",),
+        notes=("order 4: asked for", "q1 dropped: no frequency depends on it"),
+        timing_s={"model": 0.004, "expansion": 0.0061, "assignment": 0.0123, "exact": 0.05},
+    )
+
+
+def _joint_motion(time: Floats, n_q: int) -> Floats:
+    blend = 10 * time**3 - 15 * time**4 + 6 * time**5
+    starts, travels = 1.1 + 1.3 * np.arange(n_q), 0.8 * np.cos(np.arange(n_q))
+    return starts + np.outer(blend, travels) + 0.1 * np.outer(np.sin(5 * blend), np.ones(n_q))
+
+
+def _poses(time: Floats, n_links: int, scale: float, prefix: str, spatial: bool) -> Poses:
+    if time.size == 0 or n_links == 0:
+        return Poses(np.zeros(0), (), (), (), None)
+    chosen = np.unique(np.linspace(0, time.size - 1, 6).round().astype(int))
+    every = [_chain(_joint_motion(time[[k]], n_links)[0], scale, spatial) for k in range(time.size)]
+    lines = tuple(every[k] for k in chosen)
+    bodies = tuple(
+        (f"{prefix}{name}", np.array([pose[link][-1] for pose in lines]))
+        for name, link in (("elbow_mass", 0), ("tool_mass", -1))
+    )
+    names = tuple(f"{prefix}link_{i + 1}" for i in range(n_links))
+    return Poses(time[chosen], lines, names, bodies, np.array([pose[-1][-1] for pose in every]))
+
+
+def _chain(angles: Floats, scale: float, spatial: bool) -> tuple[Floats, ...]:
+    point, links = np.zeros(3 if spatial else 2), []
+    for number, angle in enumerate(angles):
+        direction = np.array([np.cos(angle), np.sin(angle), 0.3 * np.sin(2 * angle)])
+        end = point + scale * 0.6 / (1 + 0.3 * number) * direction[: point.size]
+        links.append(np.linspace(point, end, 3))
+        point = end
+    return tuple(links)
+
+
+def _frequency(shift: Floats, scale: float) -> Floats:
+    return scale * (200.0 - 9.0 * shift + 4.0 * shift**2)
+
+
+def _compare(shift: Floats, other: Floats, scale: float, varies: bool) -> Comparison:
+    exact = _frequency(shift, scale) * (1.0 + 0.02 * other)
+    if not varies:
+        exact = np.full(shift.shape, 190.0 * scale)
+        return Comparison(exact, exact, exact)
+    return Comparison(
+        exact, exact * (1 + 9e-4 * shift**4), exact * (1 + 0.016 * shift**2 - 0.004 * shift)
+    )
+
+
+def _study(
+    mode: int, time: Floats, n_y: int, n_q: int, scale: float, prefix: str, varies: bool
+) -> ModeStudy:
+    angle = 2.0 * np.pi * time
+    over_time = _compare(np.sin(angle), np.cos(angle), scale, varies) if time.size else None
+    return ModeStudy(
+        mode=mode,
+        order=4,
+        q0=np.linspace(1.8, 5.3, n_q),
+        y0=np.full(n_y, 0.125),
+        over_time=over_time,
+        over_design=_map(n_y, ("m", "kg"), scale, prefix, varies),
+        over_q=_map(min(n_q, 2) if time.size else 0, ("q", "rad"), scale, prefix, varies),
+    )
+
+
+def _map(
+    count: int, kind: tuple[str, str], scale: float, prefix: str, varies: bool
+) -> DesignMap | None:
+    if count == 0:
+        return None
+    count = min(count, 2)
+    axes = tuple(np.linspace(0.0, 0.25, 21 + 4 * i) for i in range(count))
+    grid = np.meshgrid(*(8 * (axis - 0.125) for axis in axes), indexing="ij")
+    values = _compare(grid[0], grid[-1], scale, varies)
+    names = tuple(f"{prefix}{kind[0]}{i + 1}" for i in range(count))
+    return DesignMap(names, (kind[1],) * count, axes, values)
+
+
+def _target(mode: int, time: Floats, scale: float) -> TargetStudy:
+    wave = np.sin(3.0 * time)
+    target = np.full(time.size, 190.0 * scale * mode)
+    initial = target * (1.06 - 0.05 * wave)
+    exact = target * (1.01 - 0.02 * wave)
+    predicted = exact * (1.0 + 1e-3 * wave)
+    return TargetStudy(
+        mode,
+        target,
+        initial,
+        predicted,
+        exact,
+        *(_error(hz / target - 1.0) for hz in (initial, predicted, exact)),
+    )
+
+
+def _error(relative: Floats) -> ErrorRow:
+    return ErrorRow(float(np.abs(relative).max()), float(np.sqrt(np.mean(relative**2))))
+
+
+def _others(time: Floats, n_targets: int, scale: float) -> OtherModes:
+    modes = tuple(range(n_targets + 1, n_targets + 4))
+    levels = scale * np.array([490.0, 720.0, 1100.0])
+    initial = levels * (1.0 + 0.05 * np.outer(np.sin(4 * time), [1.0, -0.4, 0.3]))
+    return OtherModes(modes, initial, initial * np.array([0.93, 0.97, 0.99]))
+
+
+def _design_row(index: int, prefix: str) -> DesignRow:
+    return DesignRow(
+        name=f"{prefix}m{index + 1}",
+        parameter=f"bodies.{prefix}mass_{index + 1}.mass",
+        unit="kg",
+        initial=0.0,
+        optimal=0.2287 if index == 0 else 0.0,
+        lower=0.0,
+        upper=0.25,
+    )
