@@ -1,0 +1,36 @@
+"""report.html: one file that needs no other, no network and no script."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from eigassign.output.figures import FigurePlan
+from eigassign.output.formats import percent
+from eigassign.output.summary import tables
+from eigassign.study.findings import Findings
+
+_TEMPLATES = Path(__file__).parent / "templates"
+
+
+def to_html(findings: Findings, plans: Sequence[FigurePlan], images: Mapping[str, bytes]) -> bytes:
+    """The report as UTF-8; ``images`` holds the PNG file of every plan by its file name."""
+    environment = Environment(
+        loader=FileSystemLoader(_TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["percent"] = percent
+    html = environment.get_template("report.html.j2").render(
+        f=findings,
+        error=findings.error,
+        tables=tables(findings),
+        plans=plans,
+        images={name: base64.b64encode(data).decode() for name, data in images.items()},
+    )
+    return (html + "\n").encode("utf-8", "xmlcharrefreplace")

@@ -1,0 +1,168 @@
+"""results.json: what a run found, for programs. Same findings, same bytes."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from eigassign.errors import EigassignError
+from eigassign.study.findings import (
+    Comparison,
+    ErrorSummary,
+    Findings,
+    ModeStudy,
+    OtherModes,
+    TargetStudy,
+)
+
+SCHEMA = 1
+_NESTED = (Mapping, list, tuple, str, np.ndarray)
+
+
+def results(findings: Findings) -> dict[str, Any]:
+    """Plain values in a fixed order. ``frequencies`` is of the first target, ``error`` of all.
+
+    What the run did not ask for (no target, no trajectory) is null, and so is what an expansion
+    cannot say: it predicts no frequency where its eigenvalue comes out negative.
+    """
+    first = findings.targets[0] if findings.targets else None
+    return {
+        "schema": SCHEMA,
+        "eigassign_version": findings.version,
+        "case": {
+            "name": findings.case_name,
+            "title": findings.title,
+            "reference": findings.reference,
+            "sha256": findings.case_sha256,
+        },
+        "design": {
+            row.name: {k: v for k, v in asdict(row).items() if k != "name"}
+            for row in findings.design
+        },
+        "error": _error(findings.error) if findings.error else None,
+        "frequencies": _frequencies(findings, first) if first else None,
+        "targets": [_target(findings, target) for target in findings.targets],
+        "other_modes": _other_modes(findings.others),
+        "approximation": [_study(study) for study in findings.studies],
+        "trajectory": {
+            "time_s": findings.time_s,
+            "coordinates": _coordinates(findings),
+        },
+        "solver": asdict(findings.solver) if findings.solver else None,
+        "warnings": findings.warnings,
+        "notes": findings.notes,
+        "timing_s": dict(findings.timing_s),
+    }
+
+
+def _error(summary: ErrorSummary) -> dict[str, Any]:
+    predicted = {name: _said(value) for name, value in asdict(summary.predicted).items()}
+    return {**asdict(summary), "predicted": predicted}
+
+
+def _said(value: Any) -> Any:
+    """A number, or numbers, of an expansion: null for what is not finite."""
+    if isinstance(value, np.ndarray):
+        return [_said(one) for one in value.tolist()]
+    return value if math.isfinite(value) else None
+
+
+def _frequencies(findings: Findings, target: TargetStudy) -> dict[str, Any]:
+    return {
+        "time_s": findings.time_s,
+        "target_hz": target.target_hz,
+        "initial_hz": target.initial_hz,
+        "predicted_hz": _said(target.predicted_hz),
+        "exact_hz": target.exact_hz,
+    }
+
+
+def _target(findings: Findings, target: TargetStudy) -> dict[str, Any]:
+    return {
+        "mode": target.mode,
+        "error": _error(target.error),
+        "frequencies": _frequencies(findings, target),
+    }
+
+
+def _other_modes(others: OtherModes | None) -> list[dict[str, Any]]:
+    if others is None:
+        return []
+    columns = zip(others.modes, others.initial_hz.T, others.optimal_hz.T, strict=True)
+    return [{"mode": m, "initial_hz": before, "optimal_hz": after} for m, before, after in columns]
+
+
+def _study(study: ModeStudy) -> dict[str, Any]:
+    over_q = study.over_q.values if study.over_q else None
+    over_design = study.over_design.values if study.over_design else None
+    return {
+        "mode": study.mode,
+        "order": study.order,
+        "q0": study.q0,
+        "y0": study.y0,
+        "max_relative": {
+            "over_time": _worst(study.over_time),
+            "over_q": _worst(over_q),
+            "over_design": _worst(over_design),
+        },
+    }
+
+
+def _worst(comparison: Comparison | None) -> dict[str, float | None] | None:
+    if comparison is None:
+        return None
+    taylor, linearised = comparison.worst_taylor, comparison.worst_linearised
+    return {"taylor": _said(taylor), "linearised": _said(linearised)}
+
+
+def _coordinates(findings: Findings) -> dict[str, Any]:
+    return {
+        name: {"unit": unit, "values": findings.q[:, i]}
+        for i, (name, unit) in enumerate(zip(findings.q_names, findings.q_units, strict=True))
+    }
+
+
+def to_json(findings: Findings) -> bytes:
+    """results.json as UTF-8 with a newline at its end; numbers as ``repr`` writes them.
+
+    Raises EigassignError, naming the field, for a number that is not finite.
+    """
+    return (dumps(results(findings)) + "\n").encode()
+
+
+def dumps(value: Any) -> str:
+    """JSON, two spaces a level, a list of numbers on one line; NaN and infinity are refused."""
+    return _text(value, "", "")
+
+
+def _text(value: Any, indent: str, path: str) -> str:
+    inner = indent + "  "
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        pairs = (f"{_leaf(k, path)}: {_text(v, inner, f'{path}.{k}')}" for k, v in value.items())
+        return _block("{}", list(pairs), indent)
+    if isinstance(value, (list, tuple)) and any(isinstance(v, _NESTED) for v in value):
+        items = [_text(v, inner, f"{path}[{i}]") for i, v in enumerate(value)]
+        return _block("[]", items, indent)
+    return _leaf(value, path)
+
+
+def _block(brackets: str, items: list[str], indent: str) -> str:
+    if not items:
+        return brackets
+    inside = ",\n".join(f"{indent}  {item}" for item in items)
+    return f"{brackets[0]}\n{inside}\n{indent}{brackets[1]}"
+
+
+def _leaf(value: Any, path: str) -> str:
+    try:
+        return json.dumps(value, allow_nan=False, ensure_ascii=False)
+    except ValueError as error:
+        where = path.lstrip(".")
+        raise EigassignError(f"results.json: {where} holds a number that is not finite") from error

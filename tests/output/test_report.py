@@ -1,0 +1,119 @@
+"""report.html needs nothing but itself and believes no text it shows."""
+
+from __future__ import annotations
+
+import base64
+import re
+from html.parser import HTMLParser
+
+import pytest
+from synthetic_findings import make_findings
+
+from eigassign.output import figures, report
+from eigassign.output.write import write_run
+
+VOID = {"meta", "img", "br"}
+EVIL = '"><script>alert(1)</script>&amp;\x27 {{ 7*7 }}'
+
+
+class Page(HTMLParser):
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.words: list[str] = []
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join(" ".join(self.words).split())
+
+
+def page(findings) -> tuple[str, Page, dict[str, bytes]]:
+    plans = figures.plan(findings)
+    images = {plan.file: f"PNG of {plan.file}".encode() for plan in plans}
+    html = report.to_html(findings, plans, images).decode()
+    parsed = Page(html)
+    assert parsed.open == []
+    return html, parsed, images
+
+
+def test_the_report_asks_nothing_of_the_network():
+    html, parsed, _ = page(make_findings(title="see https://example.org/x.png"))
+    for tag, attributes in parsed.tags:
+        assert tag not in ("script", "link", "iframe", "object", "base", "form"), tag
+        assert not any(name.startswith("on") for name in attributes)
+        assert (attributes.get("src") or "data:image/png;base64,").startswith(
+            "data:image/png;base64,"
+        )
+        assert "href" not in attributes
+    assert not re.search(r"url\(|@import", html)
+
+
+def test_every_figure_is_inside_with_its_alternative_text_and_caption():
+    findings = make_findings()
+    _, parsed, images = page(findings)
+    shown = [attributes for tag, attributes in parsed.tags if tag == "img"]
+    inside = [base64.b64decode((a["src"] or "").split(",", 1)[1]) for a in shown]
+    assert inside == list(images.values())
+    plans = figures.plan(findings)
+    assert [a["alt"] for a in shown] == [plan.alt for plan in plans]
+    for plan in plans:
+        assert plan.caption in parsed.text
+
+
+def test_numbers_of_the_run_stand_in_the_tables():
+    findings = make_findings()
+    _, parsed, _ = page(findings)
+    for text in ("0.2287", "6.00 %", "1.00 %", "3.1e-17", "solved", "12.3 ms", "0.25", "kg"):
+        assert text in parsed.text
+    for line in (*findings.warnings, *findings.notes, findings.case_sha256):
+        assert line in parsed.text
+
+
+def test_text_from_the_case_is_never_markup():
+    _, parsed, _ = page(make_findings(title=EVIL, prefix=EVIL))
+    assert not any(tag == "script" for tag, _ in parsed.tags)
+    assert " ".join(EVIL.split()) in parsed.text
+    assert all(set(a) <= {"src", "alt"} for tag, a in parsed.tags if tag == "img")
+
+
+def test_unpaired_surrogates_do_not_stop_the_report():
+    html, _, _ = page(make_findings(title="a\udcffb"))
+    assert "a&#56575;b" in html
+
+
+@pytest.mark.parametrize(
+    ("options", "absent"),
+    [({"n_t": 0, "n_y": 0}, "Worst distance"), ({"n_t": 0}, "Mechanism")],
+)
+def test_what_was_not_asked_for_is_left_out(options, absent):
+    _, parsed, _ = page(make_findings(**options))
+    assert absent not in parsed.text
+
+
+def test_several_targets_are_listed_and_summed_up():
+    _, parsed, _ = page(make_findings(n_targets=3))
+    for label in ("mode 1", "mode 2", "mode 3", "all"):
+        assert label in parsed.text
+
+
+def test_a_run_leaves_results_report_and_figures(tmp_path):
+    findings = make_findings()
+    write_run(findings, tmp_path)
+    names = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.*")}
+    expected = {f"figures/{plan.file}" for plan in figures.plan(findings)}
+    assert names == expected | {"results.json", "report.html"}
+    picture = (tmp_path / "figures" / "mechanism.png").read_bytes()
+    assert base64.b64encode(picture).decode() in (tmp_path / "report.html").read_text()
