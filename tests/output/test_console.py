@@ -1,0 +1,138 @@
+"""Results reach any terminal, pipe or log whole and unchanged."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from synthetic_findings import make_findings
+
+from eigassign.output import console
+from eigassign.output.formats import number, percent, residual, seconds
+from eigassign.study.findings import ValidationRow
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def piped(encoding: str = "utf-8") -> io.TextIOWrapper:
+    return io.TextIOWrapper(io.BytesIO(), encoding=encoding, newline="")
+
+
+def read(stream: io.TextIOWrapper) -> str:
+    stream.flush()
+    return stream.buffer.getvalue().decode(stream.encoding)
+
+
+def test_an_assignment_shows_its_numbers_without_colour_codes_in_a_pipe():
+    out = piped()
+    console.print_assignment(make_findings(), stream=out)
+    text = read(out)
+    assert "\x1b" not in text
+    for words in ("0.2287", "6.00 %", "1.00 %", "solved", "3.1e-17", "over m1 and m2"):
+        assert words in text
+    assert not any(line != line.rstrip() for line in text.splitlines())
+
+
+def test_an_ascii_locale_gets_ascii():
+    out = piped("ascii")
+    console.print_table("Größe δ", ("名",), [("Zweigelenkarm ä",)], stream=out)
+    text = read(out)
+    assert "Zweigelenkarm ?" in text
+    assert "Gr??e" in text
+
+
+def test_brackets_are_text_and_not_markup():
+    out = piped()
+    console.print_table("[bold]", ("a",), [("[case.yaml]",), ("[/red]",), (":smile:",)], stream=out)
+    text = read(out)
+    for words in ("[bold]", "[case.yaml]", "[/red]", ":smile:"):
+        assert words in text
+
+
+def test_long_cells_are_neither_wrapped_nor_cut_off_terminal(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    out, path = piped(), "/a/very/long/path" * 30
+    console.print_table("paths", ("name", "path"), [("x", path)], stream=out)
+    assert f" {path}" in read(out)
+
+
+def test_a_terminal_gets_whole_cells_too(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "30")
+    monkeypatch.setenv("TERM", "xterm-256color")
+    out = Terminal()
+    console.print_table("paths", ("name", "path"), [("x", "y" * 100)], stream=out)
+    assert out.getvalue().count("y") == 100
+
+
+def test_control_characters_do_not_reach_the_terminal():
+    out = piped()
+    console.print_table("a\x1b]0;b", ("n",), [("x\x1b[2Jy\r",)], stream=out)
+    assert "\x1b" not in read(out)
+    assert "\r" not in read(out)
+
+
+def test_modes_are_numbered_from_the_first_elastic_one():
+    out = piped()
+    console.print_modes([202.21961234567, 513.2], rigid_modes=2, q=[("q1", 1.8)], stream=out)
+    text = read(out)
+    assert "202.2196123" in text
+    assert "2 rigid-body modes not counted" in text
+    assert "q1 = 1.8" in text
+
+
+def test_a_validation_says_which_line_failed():
+    out = piped()
+    common = {"case": "arm", "mode": 1, "order": 4, "limit": 0.02}
+    spread = {"worst_linearised": 0.1, "rms_taylor": 1e-4, "rms_linearised": 0.01}
+    rows = [
+        ValidationRow(
+            where=where, points=152, worst_taylor=worst, passed=passed, **common, **spread
+        )
+        for where, worst, passed in (("trajectory", 9e-4, True), ("box", 0.05, False))
+    ]
+    console.print_validation(rows, stream=out)
+    lines = read(out).splitlines()
+    assert any("trajectory" in line and "0.0900 %" in line and "ok" in line for line in lines)
+    assert any("box" in line and "5.00 %" in line and "FAILED" in line for line in lines)
+
+
+def test_a_batch_lists_every_case():
+    out = piped()
+    good = ("arm", "ok", 1.25, 0.0155, "")
+    bad = ("leg", "error", 0.5, None, "leg.yaml:3:1: [what] is wrong")
+    console.print_batch([good, bad], stream=out)
+    text = read(out)
+    for words in ("arm", "1.55 %", "1.25 s", "leg.yaml:3:1: [what] is wrong"):
+        assert words in text
+
+
+def test_progress_counts_in_lines_off_terminal_and_in_place_on_one():
+    log, terminal = piped(), Terminal()
+    for stream in (log, terminal):
+        with console.progress("cases", 2, stream=stream) as advance:
+            advance("arm")
+            advance("leg\n")
+    assert read(log) == "cases 1/2 arm\ncases 2/2 leg\n"
+    assert "\n" not in terminal.getvalue()
+    assert terminal.getvalue().endswith("\r\x1b[2K")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (percent(0.0155), "1.55 %"),
+        (percent(0.0), "0.00 %"),
+        (percent(1.0), "100 %"),
+        (percent(float("inf")), "n/a"),
+        (percent(1.1e-11), "1.10e-09 %"),
+        (number(0.22871234), "0.228712"),
+        (seconds(0.0123), "12.3 ms"),
+        (seconds(4.5678), "4.57 s"),
+        (residual(3.14e-17), "3.1e-17"),
+    ],
+)
+def test_numbers_are_written_as_people_read_them(text, expected):
+    assert text == expected
