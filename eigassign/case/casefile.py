@@ -46,7 +46,8 @@ class CaseFile:
         ``key_path`` may start below `mechanism`, as the paths of design parameters do.
         """
         path = undotted(key_path)
-        if path and self.marks.find(path[:1]) is self.marks:
+        mechanism = self.marks.find(("mechanism",))
+        if mechanism.find(path[:1]) is not mechanism:
             path = ("mechanism", *path)  # paths of properties start below `mechanism`
         mark = self.marks.find(path)
         return Problem(str(self.path), mark.line, mark.column, dotted(path), message)

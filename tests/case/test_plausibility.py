@@ -1,0 +1,116 @@
+# ruff: noqa: E501  (a table)
+"""Warnings: slips are caught, real mechanisms are left alone."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from small_case import TEXT, edited, unmarked
+
+from eigassign.case import parse
+
+
+def warnings_of(text: str) -> list[tuple[int, int, str]]:
+    return [(w.line, w.column, w.message) for w in parse(text.encode(), "case.yaml").warnings]
+
+
+# fmt: off
+SLIPS = {
+    "misprint of the paper": ("bending_inertia: 3.97e-8", "¦bending_inertia: 3.97e-4", "cannot belong"),
+    "inertia in mm4": ("bending_inertia: 3.97e-8", "¦bending_inertia: 39700", "cannot belong"),
+    "area in mm2": ("area: 7.0632e-4, bending", "area: 706.32, ¦bending", "cannot belong"),
+    "modulus in GPa": ("youngs_modulus: 69 GPa", "¦youngs_modulus: 69", "is the unit right?"),
+    "modulus times 1000": ("youngs_modulus: 69 GPa", "¦youngs_modulus: 69 TPa", "is the unit right?"),
+    "density in g/mm3": ("density: 2700", "¦density: 0.0027", "is the unit right?"),
+    "density times 1000": ("density: 2700", "¦density: 2.7e6", "is the unit right?"),
+    "no density": ("density: 2700", "¦density: 0", "massless"),
+    "length in mm": ("length: 0.45", "¦length: 450", "is the unit right?"),
+    "stubby": ("length: 0.45", "¦length: 0.3", "7.5 times the depth of section 'pipe'"),
+    "angle in degrees": ("angle: 10 deg", "¦angle: 30", "was it meant in deg?"),
+    "point in degrees": ("order: 4", "order: 4, ¦q: [104, 304]", "304 rad is more than two turns"),
+    "start in degrees": ("tip: hand.end", "tip: hand.end\n  ¦start: [0, -90]", "was it meant in deg?"),
+    "target in mHz": ("frequency: 190 Hz", "¦frequency: 1.9e8", "is the unit right?"),
+    "tolerance of 200 %": ("max_error: 2 %", "¦max_error: 2", "this is 200 %"),
+    "point outside the bounds": ("order: 4", "order: 4, y: [0.1, ¦50 mm]", "outside the bounds of 'd'"),
+    "unused section": ("sections:\n", "sections:\n    ¦x: {shape: circle, diameter: 1 cm}\n", "no link uses"),
+    "unused material": ("materials:\n", "materials:\n    ¦x: {youngs_modulus: 1e9, density: 1e3}\n", "no link uses"),
+}
+# fmt: on
+
+
+@pytest.mark.parametrize(("old", "new", "message"), SLIPS.values(), ids=SLIPS)
+def test_a_slip_is_warned_of_at_its_place(old: str, new: str, message: str) -> None:
+    text, (place,) = unmarked(edited(old, new))
+    assert (*place, message) in [
+        (line, column, message if message in text else text)
+        for line, column, text in warnings_of(text)
+    ]
+
+
+def test_an_ordinary_arm_gives_no_warning() -> None:
+    assert warnings_of(TEXT) == []
+
+
+def bare(area: float, inertia: float) -> list[str]:
+    old = "area: 7.0632e-4, bending_inertia: 3.97e-8"
+    found = warnings_of(edited(old, f"area: {area!r}, bending_inertia: {inertia!r}"))
+    return [message for _, _, message in found if "cannot belong" in message]
+
+
+def ring(outer: float, wall: float) -> tuple[float, float]:
+    inner = outer - 2 * wall
+    area = math.pi / 4 * (outer**2 - inner**2)
+    return area, math.pi / 64 * (outer**4 - inner**4)
+
+
+@pytest.mark.parametrize(
+    ("area", "inertia"),
+    [
+        (7.0632e-4, 3.97e-8),  # the paper's rod, misprint mended
+        ring(30e-3, 1e-3),
+        ring(300e-3, 0.5e-3),  # D/t = 600
+        ring(66e-3, 0.1e-3),  # a drink can
+        (20e-3 * 4e-3, 20e-3 * 4e-3**3 / 12),  # flat bar, bent over its flat
+        (20e-3 * 4e-3, 4e-3 * 20e-3**3 / 12),  # and on edge
+        (200e-3 * 0.5e-3, 200e-3 * 0.5e-3**3 / 12),  # leaf spring
+        (156e-4, 92080e-8),  # IPE 600, strong axis (EN 10365)
+        (156e-4, 3387e-8),  # and weak axis
+        (7.64e-4, 80.1e-8),  # IPE 80
+        (1e-8, 1e-17),  # a wire of 0.1 mm
+        (2.0, 0.3),  # a bridge girder
+    ],
+)
+def test_a_real_section_is_left_alone(area: float, inertia: float) -> None:
+    assert bare(area, inertia) == []
+
+
+def test_the_misprint_is_explained_with_the_value_that_was_meant() -> None:
+    (message,) = bare(7.0632e-4, 3.97e-4)
+    assert "radius of gyration would be 0.75 m" in message
+    assert "a solid round bar of that area has 3.97e-08 m4" in message
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e-4, 1e4, 1e6])
+@pytest.mark.parametrize("area", [1e-10, 1e-4, 10.0])
+def test_any_large_slip_of_the_exponent_of_a_round_bar_is_seen_at_any_size(
+    area: float, factor: float
+) -> None:
+    assert len(bare(area, factor * area**2 / (4 * math.pi))) == 1
+
+
+def test_a_link_of_the_misprinted_section_is_seen_to_be_deeper_than_long() -> None:
+    found = warnings_of(edited("bending_inertia: 3.97e-8", "bending_inertia: 3.97e-4"))
+    assert any("at most 0.2 times the depth of section 'bar'" in message for *_, message in found)
+
+
+def test_bounds_within_which_a_tube_loses_its_wall_are_warned_of() -> None:
+    new = "{parameter: sections.pipe.thickness, min: 1 mm, max: 25 mm}"
+    text = edited("{parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}", new)
+    assert any("wall can vanish or exceed" in message for *_, message in warnings_of(text))
+
+
+def test_a_design_parameter_without_effect_is_warned_of() -> None:
+    text = edited("sections:\n", "sections:\n    spare: {shape: circle, diameter: 30 mm}\n")
+    text = text.replace("parameter: sections.rod.", "parameter: sections.spare.")
+    assert any("has no effect" in message for *_, message in warnings_of(text))
