@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.bordered import Solve, factor_dense, factor_sparse
-from eigassign.modal.coefficients import MatrixSeries, matrix_series
+from eigassign.modal.coefficients import DENSE_LIMIT, MatrixSeries, matrix_series
 from eigassign.series.lower_set import LowerSet, first_of_each
 
 Floats = NDArray[np.float64]
@@ -53,7 +53,7 @@ def _factor(
     pencil: Pencil, theta0: Floats, lam0: Floats, phi0: Floats
 ) -> tuple[list[Solve], object]:
     """One bordered factorisation a column, and M0."""
-    dense = pencil.n_dof <= 250
+    dense = pencil.n_dof <= DENSE_LIMIT
     k, m = pencil.stiffness @ theta0, pencil.mass @ theta0
     if dense:
         shape = (pencil.n_dof, pencil.n_dof)
