@@ -41,7 +41,7 @@ trees = st.recursive(leaves, branches, max_leaves=12)
 
 
 def value(tree: Tree, x: list[Any], sine: Callable[..., Any], cosine: Callable[..., Any]) -> Any:
-    """The tree in whatever algebra x belongs to; divisors and roots are kept off zero by a square."""
+    """The tree in whatever algebra x belongs to; divisors and roots keep off zero by a square."""
     kind, *rest = tree
     if kind == "variable":
         return x[rest[0]]
