@@ -73,9 +73,7 @@ def _dense(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
     K, M = pencil.matrices(theta)
     elastic = pencil.elastic
     K_E = _block(K, elastic, elastic)
-    if np.array_equal(
-        K_E, np.broadcast_to(K_E[:1], K_E.shape)
-    ):  # as for added masses: one factor serves all samples
+    if len(K_E) and not np.ptp(K_E, axis=0).any():  # as for added masses: one factor serves all
         K_E = K_E[:1]
     coupling, M_c = condense(M, elastic, pencil.rigid)
     L_inverse = np.linalg.inv(_cholesky(K_E))
@@ -113,7 +111,7 @@ def condense(
 def _block(A: Floats, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Floats:
     """A[:, rows, columns] of a batch in C order, which fancy indexing would transpose in memory."""
     flat = (rows[:, None] * A.shape[2] + columns).ravel()
-    taken = A.reshape(len(A), -1).take(flat, axis=1)
+    taken = A.reshape(len(A), A.shape[1] * A.shape[2]).take(flat, axis=1)
     return np.asarray(taken.reshape(len(A), len(rows), len(columns)))
 
 
