@@ -123,6 +123,15 @@ def test_these_mechanisms_are_brought_nearer_to_their_targets_within_tolerance(
     assert findings.warnings == ()
 
 
+def test_a_heavier_target_is_met_more_closely(tmp_path: Path) -> None:
+    def second_mode(weight: str) -> float:
+        both = f"{TARGET}\n  - {{mode: 2, frequency: 450 Hz, weight: {weight}}}"
+        findings = solved(tmp_path, automatic((TARGET, both))).findings
+        return findings.targets[1].predicted.rms_relative
+
+    assert second_mode("20") < 0.9 * second_mode("0.05")
+
+
 def test_the_active_constraint_is_met_exactly_and_named(tmp_path: Path) -> None:
     result = solved(tmp_path, MECHANISMS["a constraint between masses"])
     assert sum(result.design.values()) == pytest.approx(0.15, abs=1e-12)
