@@ -20,7 +20,7 @@ from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.exact import Modes, modes_at
 from eigassign.modal.rayleigh import eigenvalue_series, vector_members
 from eigassign.modal.recursion import expand_subspace
-from eigassign.modal.samples import samples
+from eigassign.modal.samples import point, samples
 from eigassign.modal.substitution import substitute
 from eigassign.series.lower_set import LowerSet, partially_linear, total_degree
 from eigassign.series.power_series import monomials
@@ -175,7 +175,7 @@ def expand(
     """
     wanted = _checked_modes(modes, order)
     n_y = pencil.to_program.shape[1] - pencil.n_q
-    x0 = samples(q0, y0, pencil.n_q, n_y)[0]
+    x0 = point(q0, y0, pencil.n_q, n_y)
     local = _local_space(pencil, order, linear_in_y, space)
     theta = pencil.theta_series(local.space, x0, local.to_z)
     found, groups = _whole_clusters(pencil, theta[:, :1], wanted, cluster_gap)
@@ -216,15 +216,12 @@ class _Local:
 
 
 def _local_space(pencil: Pencil, order: int, linear_in_y: bool, space: LowerSet | None) -> _Local:
-    n_z, n_q = len(pencil.shift), pencil.n_q
-    active = pencil.active
     if space is not None:
         return _given_space(pencil, space)
-    n_a, n_b = int(active[:n_q].sum()), int(active[n_q:].sum())
+    to_z, directions, kept = pencil.local_directions
+    n_a = int(np.count_nonzero(pencil.active[: pencil.n_q]))
+    n_b = to_z.shape[1] - n_a
     chosen = partially_linear(n_a, n_b, order) if linear_in_y else total_degree(n_a + n_b, order)
-    to_z = np.eye(n_z)[:, active]
-    directions = pencil.to_program[active]
-    kept = (directions != 0.0).any(axis=0)
     return _Local(chosen, to_z, directions, n_b if linear_in_y else 0, kept)
 
 
@@ -296,7 +293,7 @@ def _notes(groups: Sequence[tuple[int, ...]], local: _Local, pencil: Pencil) -> 
         for g in groups
         if len(g) > 1
     ]
-    idle = int((~pencil.active).sum())
+    idle = len(pencil.active) - np.count_nonzero(pencil.active)
     if idle:
         lines.append(f"{idle} variable(s) on which no frequency depends are dropped")
     return tuple(lines)

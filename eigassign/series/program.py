@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -19,14 +20,15 @@ from eigassign.series.expression import Node, Recorder
 from eigassign.series.lower_set import LowerSet
 from eigassign.series.power_series import (
     compose,
-    cosine_taylor,
     multiply,
     power_taylor,
-    sine_taylor,
+    wave_taylor,
 )
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+WAVES: dict[object, str] = {"sine": "wave", "cosine": "wave"}
+DENSE_FORMS = 2_000  # entries up to which the matrix of a linear step is kept dense
 
 
 class Algebra(Protocol):
@@ -35,17 +37,17 @@ class Algebra(Protocol):
     def constant(self, values: Floats) -> Floats:
         """Numbers (n,) as rows (n, …)."""
 
+    def linear(self, step: Step, values: Floats) -> Floats:
+        """Linear forms of rows."""
+
     def product(self, a: Floats, b: Floats) -> Floats:
         """Row by row product."""
 
     def power(self, a: Floats, exponents: Floats) -> Floats:
         """Row by row power with one exponent a row."""
 
-    def sine(self, a: Floats) -> Floats:
-        """Row by row sine."""
-
-    def cosine(self, a: Floats) -> Floats:
-        """Row by row cosine."""
+    def wave(self, a: Floats, quarters: Ints) -> Floats:
+        """Row by row sin(a + quarters π/2): the sine for 0, the cosine for 1."""
 
 
 class Samples:
@@ -54,6 +56,11 @@ class Samples:
     def constant(self, values: Floats) -> Floats:
         """(n,) → (n, 1), broadcast over samples."""
         return values[:, None]
+
+    def linear(self, step: Step, values: Floats) -> Floats:
+        """A sum for each form."""
+        assert step.matrix is not None
+        return np.asarray(step.matrix @ values + step.numbers[:, None])
 
     def product(self, a: Floats, b: Floats) -> Floats:
         """Elementwise."""
@@ -64,13 +71,11 @@ class Samples:
         with np.errstate(all="ignore"):
             return np.power(a, exponents[:, None])
 
-    def sine(self, a: Floats) -> Floats:
+    def wave(self, a: Floats, quarters: Ints) -> Floats:
         """Elementwise."""
-        return np.sin(a)
-
-    def cosine(self, a: Floats) -> Floats:
-        """Elementwise."""
-        return np.cos(a)
+        out = np.sin(a)
+        out[quarters == 1] = np.cos(a[quarters == 1])
+        return out
 
 
 @dataclass(frozen=True)
@@ -83,6 +88,12 @@ class Truncated:
         """(n,) → (n, N): the constant series."""
         rows = np.zeros((len(values), len(self.space)))
         rows[:, 0] = values
+        return rows
+
+    def linear(self, step: Step, values: Floats) -> Floats:
+        """The sum of each coefficient; numbers enter the constant terms."""
+        rows = np.asarray(step.weights @ values)
+        rows[:, 0] += step.numbers
         return rows
 
     def product(self, a: Floats, b: Floats) -> Floats:
@@ -98,25 +109,31 @@ class Truncated:
             out[rows] = compose(self.space, taylor, a[rows])
         return out
 
-    def sine(self, a: Floats) -> Floats:
-        """Sine of each series."""
-        return compose(self.space, sine_taylor(a[:, 0], self.space.order), a)
-
-    def cosine(self, a: Floats) -> Floats:
-        """Cosine of each series."""
-        return compose(self.space, cosine_taylor(a[:, 0], self.space.order), a)
+    def wave(self, a: Floats, quarters: Ints) -> Floats:
+        """Sine or cosine of each series."""
+        return compose(self.space, wave_taylor(a[:, 0], quarters, self.space.order), a)
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """Atoms of one kind and one level: computed together from atoms of lower levels."""
+    """Atoms of one kind and one level: computed together from atoms of lower levels.
+
+    Kinds are "linear", "product", "power" and "wave": sines and cosines together.
+    """
 
     kind: str
     targets: Ints
     left: Ints
-    right: Ints
+    right: Ints  # second factors of products; of waves 0 for a sine and 1 for a cosine
     numbers: Floats  # exponents of powers; constants of linear forms
-    matrix: sparse.csr_array | None  # of linear forms, over all atoms
+    matrix: sparse.csr_array | None  # of linear forms, over the atoms ``left``
+
+    @cached_property
+    def weights(self) -> sparse.csr_array | Floats:
+        """The matrix of linear forms, dense where it is so small that this is quicker."""
+        assert self.matrix is not None
+        size = self.matrix.shape[0] * self.matrix.shape[1]
+        return self.matrix.toarray() if size <= DENSE_FORMS else self.matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,15 +158,14 @@ class Program:
 
 
 def _take(step: Step, algebra: Algebra, values: Floats) -> Floats:
-    if step.kind == "linear":
-        assert step.matrix is not None
-        return np.asarray(step.matrix @ values[step.left] + algebra.constant(step.numbers))
-    a = values[step.left]
+    a = values.take(step.left, axis=0)
     if step.kind == "product":
-        return algebra.product(a, values[step.right])
+        return algebra.product(a, values.take(step.right, axis=0))
+    if step.kind == "linear":
+        return algebra.linear(step, a)
     if step.kind == "power":
         return algebra.power(a, step.numbers)
-    return algebra.sine(a) if step.kind == "sine" else algebra.cosine(a)
+    return algebra.wave(a, step.right)
 
 
 def compile_program(recorder: Recorder, outputs: Sequence[int], n_variables: int) -> Program:
@@ -227,7 +243,7 @@ def _schedule(nodes: Sequence[Node], levels: Sequence[int]) -> tuple[Step, ...]:
     groups: dict[tuple[int, str], list[int]] = {}
     for k, (node, level) in enumerate(zip(nodes, levels, strict=True)):
         if node[0] != "variable":
-            groups.setdefault((level, str(node[0])), []).append(k)
+            groups.setdefault((level, WAVES.get(node[0], str(node[0]))), []).append(k)
     return tuple(_step(kind, atoms, nodes) for (_, kind), atoms in sorted(groups.items()))
 
 
@@ -239,6 +255,8 @@ def _step(kind: str, atoms: list[int], nodes: Sequence[Node]) -> Step:
     arguments = np.array([_arguments(nodes[k]) for k in atoms], dtype=np.intp)
     numbers = [float(str(nodes[k][2])) for k in atoms] if kind == "power" else []
     right = arguments[:, 1] if kind == "product" else empty
+    if kind == "wave":
+        right = np.array([nodes[k][0] == "cosine" for k in atoms], dtype=np.intp)
     return Step(kind, targets, arguments[:, 0], right, np.array(numbers), None)
 
 
