@@ -67,6 +67,11 @@ class Pencil:
         return np.ascontiguousarray(dense.transpose(2, 0, 1, 3))
 
     @cached_property
+    def by_term(self) -> tuple[sparse.csc_array, sparse.csc_array]:
+        """The weights of K and of M term by term."""
+        return self.stiffness.tocsc(), self.mass.tocsc()
+
+    @cached_property
     def local_directions(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """dz/dw, dw/dx for w the active ones of z, and which of x they depend on."""
         directions = self.to_program[self.active]

@@ -31,7 +31,7 @@ def whole_clusters(
 ) -> tuple[Modes, tuple[tuple[int, ...], ...]]:
     """The wanted modes' clusters, and modes up to above the last: a cluster cut short is wrong."""
     elastic = len(pencil.elastic)
-    count = min(max(wanted) + 5, elastic) if max(wanted) <= elastic else max(wanted)
+    count = min(max(wanted) + 1, elastic) if max(wanted) <= elastic else max(wanted)
     while True:
         found = modes_at(pencil, theta0, count)
         groups = clusters(found.lam[0], wanted, gap)

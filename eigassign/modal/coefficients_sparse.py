@@ -98,20 +98,20 @@ def sparse_series(pencil: Pencil, theta: Floats, space: LowerSet) -> SparseSerie
     """The coefficients over ``space`` from θ's own (n_theta, N)."""
     stored = np.flatnonzero(theta.any(axis=0))
     M0 = pencil.mass @ theta[:, 0]
+    K_terms, M_terms = pencil.by_term
     return SparseSeries(
         pencil,
         pairs(space, stored.tobytes()),
-        _terms(pencil, pencil.stiffness, theta[:, stored]),
-        _terms(pencil, pencil.mass, theta[:, stored]),
+        _terms(pencil, K_terms, theta[:, stored]),
+        _terms(pencil, M_terms, theta[:, stored]),
         pencil.stiffness @ theta[:, 0],
         M0,
         pencil.sparse(M0),
     )
 
 
-def _terms(pencil: Pencil, weights: sparse.csr_array, theta: Floats) -> Terms:
+def _terms(pencil: Pencil, columns: sparse.csc_array, theta: Floats) -> Terms:
     """All but the first of the stored coefficients, θ (n_theta, n_stored)."""
-    columns = weights.tocsc()
     bodies: dict[int, Body] = {}
     slots: list[int] = []
     dofs: list[int] = []

@@ -23,7 +23,7 @@ from eigassign.modal.products import add_product
 from eigassign.series.lower_set import LowerSet
 
 Floats = NDArray[np.float64]
-BLOCK = 32  # right-hand sides solved at once
+BLOCK = 16  # right-hand sides solved at once: more fall out of the cache (dense_or_sparse.py)
 
 
 @dataclass(frozen=True, eq=False)

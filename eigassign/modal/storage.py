@@ -18,7 +18,7 @@ from eigassign.series.program import Step
 
 Array = NDArray[Any]
 _KINDS = {"f": np.float64, "i": np.int64, "u": np.uint8}
-ALGORITHM = "expansion 1"  # raise it whenever the numbers an expansion is made of may change
+ALGORITHM = "expansion 2"  # raise it whenever the numbers an expansion is made of may change
 
 
 def expansion_arrays(expansion: Expansion) -> dict[str, Array]:
