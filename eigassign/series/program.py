@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from eigassign.errors import UsageError
+from eigassign.errors import SingularityError, UsageError
 from eigassign.series.expression import Node, Recorder
 from eigassign.series.lower_set import LowerSet
 from eigassign.series.power_series import (
@@ -24,6 +24,9 @@ from eigassign.series.power_series import (
     power_taylor,
     sine_taylor,
 )
+
+if TYPE_CHECKING:
+    from eigassign.series.implicit import ImplicitFunction
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -46,6 +49,10 @@ class Algebra(Protocol):
 
     def cosine(self, a: Floats) -> Floats:
         """Row by row cosine."""
+
+
+    def solve(self, A: Floats, B: Floats, n: int) -> Floats:
+        """X as rows (n m, …) of A X = B, entries as rows (n², …) and (n m, …)."""
 
 
 class Samples:
@@ -71,6 +78,14 @@ class Samples:
     def cosine(self, a: Floats) -> Floats:
         """Elementwise."""
         return np.cos(a)
+
+    def solve(self, A: Floats, B: Floats, n: int) -> Floats:
+        """Sample by sample; raises SingularityError where A is singular."""
+        left, right = A.T.reshape(-1, n, n), B.T.reshape(A.shape[1], n, -1)
+        try:
+            return np.asarray(np.linalg.solve(left, right).reshape(A.shape[1], -1).T)
+        except np.linalg.LinAlgError as error:
+            raise SingularityError("the mechanism is at a dead point") from error
 
 
 @dataclass(frozen=True)
@@ -106,6 +121,23 @@ class Truncated:
         """Cosine of each series."""
         return compose(self.space, cosine_taylor(a[:, 0], self.space.order), a)
 
+    def solve(self, A: Floats, B: Floats, n: int) -> Floats:
+        """Each chord step X ← X + A_0⁻¹ (B − A X) gains one degree."""
+        m, size = len(B) // n, len(self.space)
+        inverse = np.linalg.inv(A[:, 0].reshape(n, n))
+        right = B.reshape(n, m * size)
+        X = inverse @ right
+        for _ in range(self.space.order):
+            X = X + inverse @ (right - self._matrix_product(A, X, n, m).reshape(n, -1))
+        return np.asarray(X.reshape(n * m, size))
+
+    def _matrix_product(self, A: Floats, X: Floats, n: int, m: int) -> Floats:
+        size = len(self.space)
+        shape = (n, n, m, size)
+        left = np.broadcast_to(A.reshape(n, n, 1, size), shape).reshape(-1, size)
+        right = np.broadcast_to(X.reshape(1, n, m, size), shape).reshape(-1, size)
+        return np.asarray(multiply(self.space, left, right).reshape(shape).sum(axis=1))
+
 
 @dataclass(frozen=True, eq=False)
 class Step:
@@ -116,7 +148,9 @@ class Step:
     left: Ints
     right: Ints
     numbers: Floats  # exponents of powers; constants of linear forms
-    matrix: sparse.csr_array | None  # of linear forms, over all atoms
+    matrix: sparse.csr_array | None  # of linear forms, over ``left``
+    picked: Ints  # which components of a solution are wanted
+    function: ImplicitFunction | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,6 +179,12 @@ def _take(step: Step, algebra: Algebra, values: Floats) -> Floats:
         assert step.matrix is not None
         return np.asarray(step.matrix @ values[step.left] + algebra.constant(step.numbers))
     a = values[step.left]
+    if step.kind == "solve":
+        return algebra.solve(a, values[step.right], int(step.numbers[0]))[step.picked]
+    if step.function is not None:
+        from eigassign.series.implicit import evaluate
+
+        return evaluate(step.function, algebra, a)[step.picked]
     if step.kind == "product":
         return algebra.product(a, values[step.right])
     if step.kind == "power":
@@ -180,6 +220,10 @@ def _arguments(node: Node) -> tuple[int, ...]:
             return tuple(int(atom) for atom, _ in terms)  # type: ignore[attr-defined]
         case ("product", int(a), int(b)):
             return (a, b)
+        case ("solve", tuple(left), tuple(right), *_):
+            return left + right
+        case ("implicit", tuple(arguments), *_):
+            return arguments
         case (_, int(a), *_):
             return (a,)
     raise UsageError(f"unknown expression {node!r}")
@@ -201,6 +245,10 @@ def _renumber(node: Node, new: dict[int, int]) -> Node:
             return ("linear", constant, tuple((new[a], c) for a, c in terms))  # type: ignore[attr-defined]
         case ("product", int(a), int(b)):
             return ("product", new[a], new[b])
+        case ("solve", tuple(left), tuple(right), *rest):
+            return ("solve", tuple(new[a] for a in left), tuple(new[a] for a in right), *rest)
+        case ("implicit", tuple(arguments), *rest):
+            return ("implicit", tuple(new[a] for a in arguments), *rest)
         case (kind, int(a), *rest):
             return (kind, new[a], *rest)
     raise UsageError(f"unknown expression {node!r}")
@@ -224,11 +272,15 @@ def _dependence(nodes: Sequence[Node], n_variables: int) -> NDArray[np.bool_]:
 
 
 def _schedule(nodes: Sequence[Node], levels: Sequence[int]) -> tuple[Step, ...]:
-    groups: dict[tuple[int, str], list[int]] = {}
+    groups: dict[tuple[int, str, int], list[int]] = {}
+    systems: dict[Node, int] = {}
     for k, (node, level) in enumerate(zip(nodes, levels, strict=True)):
-        if node[0] != "variable":
-            groups.setdefault((level, str(node[0])), []).append(k)
-    return tuple(_step(kind, atoms, nodes) for (_, kind), atoms in sorted(groups.items()))
+        if node[0] in ("solve", "implicit"):  # one step for each system of equations
+            system = systems.setdefault(node[:-1], len(systems))
+            groups.setdefault((level, str(node[0]), system), []).append(k)
+        elif node[0] != "variable":
+            groups.setdefault((level, str(node[0]), -1), []).append(k)
+    return tuple(_step(kind, atoms, nodes) for (_, kind, _), atoms in sorted(groups.items()))
 
 
 def _step(kind: str, atoms: list[int], nodes: Sequence[Node]) -> Step:
@@ -236,10 +288,26 @@ def _step(kind: str, atoms: list[int], nodes: Sequence[Node]) -> Step:
     empty = np.zeros(0, dtype=np.intp)
     if kind == "linear":
         return _linear_step(targets, [nodes[k] for k in atoms])
+    if kind in ("solve", "implicit"):
+        return _system_step(targets, [nodes[k] for k in atoms])
     arguments = np.array([_arguments(nodes[k]) for k in atoms], dtype=np.intp)
     numbers = [float(str(nodes[k][2])) for k in atoms] if kind == "power" else []
     right = arguments[:, 1] if kind == "product" else empty
-    return Step(kind, targets, arguments[:, 0], right, np.array(numbers), None)
+    return Step(kind, targets, arguments[:, 0], right, np.array(numbers), None, empty, None)
+
+
+def _system_step(targets: Ints, nodes: list[Node]) -> Step:
+    empty = np.zeros(0, dtype=np.intp)
+    picked = np.array([int(str(node[-1])) for node in nodes], dtype=np.intp)
+    match nodes[0]:
+        case ("solve", tuple(left), tuple(right), int(n), _):
+            a, b = np.array(left, dtype=np.intp), np.array(right, dtype=np.intp)
+            return Step("solve", targets, a, b, np.array([float(n)]), None, picked, None)
+        case ("implicit", tuple(arguments), function, _):
+            a = np.array(arguments, dtype=np.intp)
+            numbers = np.zeros(0)
+            return Step("implicit", targets, a, empty, numbers, None, picked, function)  # type: ignore[arg-type]
+    raise UsageError(f"unknown system {nodes[0]!r}")
 
 
 def _linear_step(targets: Ints, nodes: list[Node]) -> Step:
@@ -253,4 +321,4 @@ def _linear_step(targets: Ints, nodes: list[Node]) -> Step:
     shape = (len(nodes), len(sources))
     matrix = sparse.csr_array((values, (rows, local)), shape=shape, dtype=np.float64)
     constants = np.array([float(str(node[1])) for node in nodes])
-    return Step("linear", targets, sources.astype(np.intp), targets[:0], constants, matrix)
+    return Step("linear", targets, sources.astype(np.intp), targets[:0], constants, matrix, targets[:0], None)
