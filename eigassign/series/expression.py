@@ -228,3 +228,8 @@ def _rule(
         case ("cosine", int(a)):
             return inner(a) * sin(value(a)) * -1.0
     raise UsageError(f"no derivative of {node[0]}")
+
+
+def is_constant(x: Scalar) -> bool:
+    """Whether x is a plain number."""
+    return not isinstance(x, Expression)

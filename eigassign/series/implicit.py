@@ -56,15 +56,16 @@ class ImplicitFunction:
         ok = np.ones(a.shape[1], dtype=bool)
         start = self.a0[:, None]
         for t in np.linspace(0.0, 1.0, steps + 1)[1:]:
-            p, regular = self._newton(start + t * (a - start), p)
+            p, regular = self.newton(start + t * (a - start), p)
             ok &= regular
-        F, check, _ = self._equations(a, p)
+        F, check, _ = self.equations(a, p)
         missed = np.abs(np.concatenate([F, check])).max(axis=0, initial=0.0)
         return p, ok & (missed < ACCEPT)
 
-    def _newton(self, a: Floats, p: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    def newton(self, a: Floats, p: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+        """Newton from p at fixed a; whether each sample is regular there."""
         for _ in range(12):
-            F, _, J = self._equations(a, p)
+            F, _, J = self.equations(a, p)
             if not np.isfinite(J).all():
                 return p, np.zeros(p.shape[1], dtype=bool)
             step = -(np.linalg.pinv(J) @ F.T[:, :, None])[:, :, 0].T
@@ -74,7 +75,7 @@ class ImplicitFunction:
         s = np.linalg.svd(J, compute_uv=False)
         return p, np.asarray(s[:, -1] > SINGULAR * s[:, 0])
 
-    def _equations(self, a: Floats, p: Floats) -> tuple[Floats, Floats, Floats]:
+    def equations(self, a: Floats, p: Floats) -> tuple[Floats, Floats, Floats]:
         """F (n_equations, n), check (n_checks, n), ∂F/∂p (n, n_equations, size)."""
         rows = self.program.run(Samples(), np.concatenate([a, p]))
         m, c = self.n_equations, self.n_checks
@@ -84,7 +85,7 @@ class ImplicitFunction:
     def series(self, algebra: Truncated, a: Floats) -> Floats:
         """p (size, N) as power series: each chord step gains one degree."""
         p0 = self.samples(a[:, :1])
-        _, _, J = self._equations(a[:, :1], p0)
+        _, _, J = self.equations(a[:, :1], p0)
         inverse = np.linalg.pinv(J[0])
         p = algebra.constant(p0[:, 0])
         for _ in range(algebra.space.order + 1):
