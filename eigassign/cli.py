@@ -162,13 +162,17 @@ def optimize(case: Path, as_json: bool, **how: Any) -> int:
 def expand(
     case: Path, order: int | None, linear: bool, modes: tuple[int, ...], as_json: bool, **how: Any
 ) -> int:
-    """Expand eigenvalues in q and y: coefficients and their accuracy, in a run folder."""
+    """Expand eigenvalues in q and y: coefficients and their accuracy, in a run folder.
+
+    That is results/<case>_expansion unless --out says otherwise.
+    """
     from eigassign import run
 
     def expanded(path: Path, options: Options) -> Outcome:
         return run.expand_case(path, options, order=order, modes=modes or None, linear=linear)
 
-    return _finished(expanded, case, as_json, how)
+    out = how["out"] or Path("results", f"{case.stem}_expansion")
+    return _finished(expanded, case, as_json, {**how, "out": out})
 
 
 def _finished(
@@ -278,7 +282,9 @@ def _watched(
         outcomes = run_and_summarise(
             jobs, workers, out, lambda row: advance(f"{row['name']}: {row['status']}")
         )
-    console.print_batch(outcomes)
+    console.print_batch(
+        [(o.name, o.status, o.seconds, o.exact_max_relative, o.message) for o in outcomes]
+    )
     return outcomes
 
 
@@ -299,7 +305,8 @@ def cache_path(cache_dir: Path | None) -> int:
 @options.cache_dir
 def cache_clear(cache_dir: Path | None) -> int:
     """Delete everything that is in the cache."""
-    click.echo(f"{_cache(cache_dir).clear()} files deleted")
+    count = _cache(cache_dir).clear()
+    click.echo(f"{count} file{'' if count == 1 else 's'} deleted")
     return 0
 
 

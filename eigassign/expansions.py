@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from math import comb
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from eigassign.errors import UsageError
 from eigassign.modal.expansion import CLUSTER_GAP, Expansion, expand
@@ -16,7 +18,9 @@ from eigassign.modal.storage import (
     ALGORITHM,
     expansion_arrays,
     expansion_from_arrays,
+    flatten,
     pencil_parts,
+    unflatten,
 )
 from eigassign.study.approximation import Expansions
 from eigassign.study.plan import Plan
@@ -35,18 +39,17 @@ def expand_plan(model: Model, plan: Plan, cache: Cache | None) -> tuple[Expansio
     is there to compare with, and of a lower order where its set would be too large.
     """
     full_order = affordable_order(model, plan.order)
-    full, full_known = _expansion(model, plan, full_order, False, cache)
-    linear, linear_known = _expansion(model, plan, plan.order, True, cache)
+    expansions, known = _expansions(model, plan, full_order, cache)
+    full, linear = expansions.full, expansions.linear
     notes = [_size_note(full, linear), *dict.fromkeys(full.notes + linear.notes)]
     if full_order < plan.order:
         notes.append(
             f"the full expansion, only there to compare with, stops at order {full_order}: order "
             f"{plan.order} in so many variables has over {FULL_LIMIT} coefficients"
         )
-    known = [name for name, hit in (("full", full_known), ("linear", linear_known)) if hit]
     if known:
-        notes.append(f"coefficients taken from the cache: {' and '.join(known)}")
-    return Expansions(full, linear), notes
+        notes.append("the expansion coefficients come from the cache")
+    return expansions, notes
 
 
 def _size_note(full: Expansion, linear: Expansion) -> str:
@@ -64,34 +67,58 @@ def affordable_order(model: Model, order: int) -> int:
     return fitting[-1] if fitting else 1
 
 
-def _expansion(
-    model: Model, plan: Plan, order: int, linear: bool, cache: Cache | None
-) -> tuple[Expansion, bool]:
-    """The expansion, and whether it was known."""
-    entry = "" if cache is None else expansion_key(model, plan, order, linear)
-    if cache is not None and (found := _stored(cache, entry)) is not None:
+def _expansions(
+    model: Model, plan: Plan, full_order: int, cache: Cache | None
+) -> tuple[Expansions, bool]:
+    """Both expansions, and whether they were known."""
+    if cache is None:
+        return _computed(model, plan, full_order), False
+    entry = expansion_key(model, plan, full_order)
+    if (found := _stored(cache, entry)) is not None:
         return found, True
-    fresh = expand(model.pencil, plan.q0, plan.y0, plan.modes, order, linear)
-    if cache is not None:
-        cache.store(entry, expansion_arrays(fresh), _meta(plan, order, linear))
+    fresh = _computed(model, plan, full_order)
+    cache.store(entry, flatten(_named(fresh)), _meta(plan))
     return fresh, False
 
 
-def _stored(cache: Cache, entry: str) -> Expansion | None:
+def _computed(model: Model, plan: Plan, full_order: int) -> Expansions:
+    point = (model.pencil, plan.q0, plan.y0, plan.modes)
+    return Expansions(
+        full=expand(*point, full_order, linear_in_y=False),
+        linear=expand(*point, plan.order, linear_in_y=True),
+    )
+
+
+def _named(expansions: Expansions) -> dict[str, NDArray[Any]]:
+    parts = {"full": expansions.full, "linear": expansions.linear}
+    return {
+        f"{part}.{name}": array
+        for part, expansion in parts.items()
+        for name, array in expansion_arrays(expansion).items()
+    }
+
+
+def _stored(cache: Cache, entry: str) -> Expansions | None:
     arrays = cache.load(entry)
     if arrays is None:
         return None
     try:
-        return expansion_from_arrays(arrays)
+        named = unflatten(arrays)
+        return Expansions(*(_part(named, part) for part in ("full", "linear")))
     except UsageError as error:
         _log.warning("cache entry %s cannot be used (%s); computed anew", entry[:12], error)
         return None
 
 
-def expansion_key(model: Model, plan: Plan, order: int, linear: bool) -> str:
-    """SHA-256 over all that the numbers of an expansion follow from.
+def _part(named: Mapping[str, NDArray[Any]], part: str) -> Expansion:
+    own = {n.removeprefix(f"{part}."): a for n, a in named.items() if n.startswith(f"{part}.")}
+    return expansion_from_arrays(own)
 
-    The pencil's arrays, the point, the modes, the set, and the versions of this algorithm and of
+
+def expansion_key(model: Model, plan: Plan, full_order: int) -> str:
+    """SHA-256 over all that the numbers of both expansions follow from.
+
+    The pencil's arrays, the point, the modes, the sets, and the versions of this algorithm and of
     the libraries that do its arithmetic: where any of them differs, so may the last bit.
     """
     from eigassign.output.cache import key
@@ -101,20 +128,16 @@ def expansion_key(model: Model, plan: Plan, order: int, linear: bool) -> str:
         plan.q0,
         plan.y0,
         list(plan.modes),
-        order,
-        linear,
-        CLUSTER_GAP,
-        np.__version__,
-        scipy.__version__,
+        [full_order, plan.order, CLUSTER_GAP],
+        [np.__version__, scipy.__version__],
     ]
     return key(parts, algorithm=ALGORITHM)
 
 
-def _meta(plan: Plan, order: int, linear: bool) -> dict[str, str]:
+def _meta(plan: Plan) -> dict[str, str]:
     """For people who list the cache."""
     return {
-        "what": "partially linearised expansion" if linear else "full expansion",
-        "order": str(order),
+        "what": f"expansion of order {plan.order}",
         "modes": ", ".join(map(str, plan.modes)),
         "q0": ", ".join(f"{value:.6g}" for value in plan.q0),
         "y0": ", ".join(f"{value:.6g}" for value in plan.y0),

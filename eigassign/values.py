@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -58,12 +59,13 @@ def _read(
 def split(text: str) -> list[str]:
     """``"104 deg, 5.3"`` → ``["104 deg", "5.3"]``; spaces, commas or semicolons in between.
 
-    A word that does not begin like a number is the unit of the number before it.
+    A word behind a space that does not begin like a number is the unit of the number before it.
     """
     values: list[str] = []
-    for word in text.replace(",", " ").replace(";", " ").split():
-        if values and word[0] not in "+-.0123456789":
-            values[-1] += f" {word}"
-        else:
-            values.append(word)
+    for part in re.split("[,;]", text):
+        for k, word in enumerate(part.split()):
+            if k and word[0] not in "+-.0123456789":
+                values[-1] += f" {word}"
+            else:
+                values.append(word)
     return values

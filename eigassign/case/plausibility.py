@@ -175,6 +175,6 @@ def _tube_walls(document: Document) -> Iterator[Finding]:
         outer, _ = reach.get(path + "outer_diameter", (tube.outer_diameter, 0.0))
         _, inner = reach.get(path + "inner_diameter", (0.0, tube.inner_diameter or 0.0))
         _, wall = reach.get(path + "thickness", (0.0, tube.thickness or 0.0))
-        if max(inner, 2 * wall) > outer or inner == outer:
+        if 2 * wall > outer or inner >= outer:
             message = "within the design bounds this tube's wall can vanish or exceed its radius"
             yield ("mechanism", "sections", name), message

@@ -75,7 +75,6 @@ class Quantity:
     dimension: Dimension | None = None
     above: float | None = None
     at_least: float | None = None
-    at_most: float | None = None
     elsewhere: str = ""
 
     def read(self, value: object) -> float:
@@ -91,8 +90,6 @@ class Quantity:
             raise QuantityError(f"must be > {self._limit(self.above)}, got {given}")
         if self.at_least is not None and not si >= self.at_least:
             raise QuantityError(f"must be >= {self._limit(self.at_least)}, got {given}")
-        if self.at_most is not None and not si <= self.at_most:
-            raise QuantityError(f"must be <= {self._limit(self.at_most)}, got {given}")
         return si
 
     def _limit(self, value: float) -> str:
@@ -118,8 +115,6 @@ class Quantity:
             number["exclusiveMinimum"] = self.above
         if self.at_least is not None:
             number["minimum"] = self.at_least
-        if self.at_most is not None:
-            number["maximum"] = self.at_most
         if self.dimension is None and not self.elsewhere:
             return number
         text = {"type": "string", "pattern": r"^\s*[-+]?(\.\d|\d).*$"}

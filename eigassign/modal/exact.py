@@ -72,17 +72,18 @@ def _solve(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
 def _dense(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
     K, M = pencil.matrices(theta)
     elastic = pencil.elastic
-    K_E = K[:, elastic[:, None], elastic]
+    K_E = _block(K, elastic, elastic)
+    if len(K_E) and not np.ptp(K_E, axis=0).any():  # as for added masses: one factor serves all
+        K_E = K_E[:1]
     coupling, M_c = condense(M, elastic, pencil.rigid)
-    L = _cholesky(K_E)
-    half = np.linalg.solve(L, M_c)
-    A = np.linalg.solve(L, np.swapaxes(half, 1, 2))
+    L_inverse = np.linalg.inv(_cholesky(K_E))
+    A = L_inverse @ np.swapaxes(L_inverse @ M_c, 1, 2)  # M_c is symmetric
     A = 0.5 * (A + np.swapaxes(A, 1, 2))
     if not vectors:
         mu = np.asarray(np.linalg.eigvalsh(A)[:, ::-1][:, :count], dtype=np.float64)
         return Modes(_inverse(mu), np.zeros((len(mu), 0, count)))
     mu, v = (a[..., ::-1][..., :count] for a in np.linalg.eigh(A))
-    z = np.linalg.solve(np.swapaxes(L, 1, 2), v) / np.sqrt(np.maximum(mu, 1e-300))[:, None, :]
+    z = np.swapaxes(L_inverse, 1, 2) @ v / np.sqrt(np.maximum(mu, 1e-300))[:, None, :]
     phi = np.empty((len(mu), pencil.n_dof, count))
     phi[:, elastic] = z
     phi[:, pencil.rigid] = -coupling @ z
@@ -93,10 +94,10 @@ def condense(
     M: Floats, elastic: NDArray[np.intp], rigid: NDArray[np.intp]
 ) -> tuple[Floats, Floats]:
     """M_FF⁻¹ M_FE and M_c = M_EE − M_EF M_FF⁻¹ M_FE for a batch of M (n_samples, n, n)."""
-    M_EE = M[:, elastic[:, None], elastic]
+    M_EE = _block(M, elastic, elastic)
     if not len(rigid):
         return np.zeros((len(M), 0, len(elastic))), M_EE
-    M_FE, M_FF = M[:, rigid[:, None], elastic], M[:, rigid[:, None], rigid]
+    M_FE, M_FF = _block(M, rigid, elastic), _block(M, rigid, rigid)
     try:
         np.linalg.cholesky(M_FF)
         coupling = np.linalg.solve(M_FF, M_FE)
@@ -105,6 +106,13 @@ def condense(
             "mechanism", "a free coordinate moves no mass: give the mechanism mass or lock it"
         ) from error
     return np.asarray(coupling, dtype=np.float64), M_EE - np.swapaxes(M_FE, 1, 2) @ coupling
+
+
+def _block(A: Floats, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Floats:
+    """A[:, rows, columns] of a batch in C order, which fancy indexing would transpose in memory."""
+    flat = (rows[:, None] * A.shape[2] + columns).ravel()
+    taken = A.reshape(len(A), A.shape[1] * A.shape[2]).take(flat, axis=1)
+    return np.asarray(taken.reshape(len(A), len(rows), len(columns)))
 
 
 def _cholesky(K: Floats) -> Floats:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import UsageError
 from eigassign.mechanism.pencil import Pencil
-from eigassign.modal.exact import modes_at
+from eigassign.modal.exact import Modes, modes_at
 from eigassign.modal.rayleigh import eigenvalue_series, vector_members
 from eigassign.modal.recursion import expand_subspace
 from eigassign.modal.samples import samples
@@ -178,8 +178,7 @@ def expand(
     x0 = samples(q0, y0, pencil.n_q, n_y)[0]
     local = _local_space(pencil, order, linear_in_y, space)
     theta = pencil.theta_series(local.space, x0, local.to_z)
-    found = modes_at(pencil, theta[:, :1], _count(pencil, wanted))
-    groups = clusters(found.lam[0], wanted, cluster_gap)
+    found, groups = _whole_clusters(pencil, theta[:, :1], wanted, cluster_gap)
     vector_space, kept = _vector_set(local.space, local.n_linear, vector_order)
     parts, vectors = [], []
     for group in groups:
@@ -268,10 +267,18 @@ def clusters(lam: Floats, wanted: Sequence[int], gap: float) -> tuple[tuple[int,
     return tuple(tuple(g) for g in groups if not set(wanted).isdisjoint(g))
 
 
-def _count(pencil: Pencil, wanted: Sequence[int]) -> int:
-    """Modes to solve for: some above the highest wanted one, so that its cluster is whole."""
-    elastic = pencil.n_dof - len(pencil.rigid)
-    return min(max(wanted) + 5, elastic) if max(wanted) <= elastic else max(wanted)
+def _whole_clusters(
+    pencil: Pencil, theta0: Floats, wanted: Sequence[int], gap: float
+) -> tuple[Modes, tuple[tuple[int, ...], ...]]:
+    """The wanted modes' clusters, and modes up to above the last: a cluster cut short is wrong."""
+    elastic = len(pencil.elastic)
+    count = min(max(wanted) + 5, elastic) if max(wanted) <= elastic else max(wanted)
+    while True:
+        found = modes_at(pencil, theta0, count)
+        groups = clusters(found.lam[0], wanted, gap)
+        if count == elastic or groups[-1][-1] < count:
+            return found, groups
+        count = min(2 * count, elastic)
 
 
 def _checked_modes(modes: Sequence[int], order: int) -> tuple[int, ...]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,7 @@ from eigassign.series.lower_set import LowerSet
 from eigassign.series.program import Step
 
 Array = NDArray[Any]
+_KINDS = {"f": np.float64, "i": np.int64, "u": np.uint8}
 ALGORITHM = "expansion 1"  # raise it whenever the numbers an expansion is made of may change
 
 
@@ -100,6 +103,44 @@ def _frozen(array: Array) -> Array:
     array = np.ascontiguousarray(array)
     array.setflags(write=False)
     return array
+
+
+def flatten(arrays: Mapping[str, Array]) -> dict[str, Array]:
+    """Any number of named int64, float64 and byte arrays as three: one read, not one for each.
+
+    ``integers`` and ``numbers`` hold the values one array after the other, ``layout`` as JSON in
+    bytes says what they are: name, kind and shape of each.
+    """
+    layout: list[list[Any]] = []
+    integers: list[Array] = []
+    numbers: list[Array] = []
+    for name, array in arrays.items():
+        floating = array.dtype == np.float64
+        if not floating and array.dtype not in (np.int64, np.uint8):
+            raise UsageError(f"{name}: arrays of dtype {array.dtype} cannot be stored")
+        layout.append([name, array.dtype.kind, list(array.shape)])
+        (numbers if floating else integers).append(array.ravel())
+    return {
+        "layout": np.frombuffer(json.dumps(layout).encode(), dtype=np.uint8),
+        "integers": np.concatenate([np.zeros(0, dtype=np.int64), *integers], dtype=np.int64),
+        "numbers": np.concatenate([np.zeros(0), *numbers]),
+    }
+
+
+def unflatten(flat: Mapping[str, Array]) -> dict[str, Array]:
+    """What `flatten` took together; raises UsageError if that is not what it is given."""
+    try:
+        taken = {"f": 0, "i": 0}
+        found: dict[str, Array] = {}
+        for name, kind, shape in json.loads(flat["layout"].tobytes()):
+            store = "f" if kind == "f" else "i"
+            end = taken[store] + prod(shape)
+            piece = flat["numbers" if store == "f" else "integers"][taken[store] : end]
+            found[name] = piece.reshape(shape).astype(_KINDS[kind], copy=False)
+            taken[store] = end
+    except (KeyError, ValueError, TypeError) as error:
+        raise UsageError(f"these arrays are not what was stored: {error}") from error
+    return found
 
 
 def pencil_parts(pencil: Pencil) -> list[Any]:

@@ -91,6 +91,15 @@ def test_the_misprint_is_explained_with_the_value_that_was_meant() -> None:
     assert "a solid round bar of that area has 3.97e-08 m4" in message
 
 
+@pytest.mark.parametrize(
+    ("inertia", "doubted"), [(0.99e-4, 1), (1.01e-4, 0), (99.0, 0), (101.0, 1)]
+)
+def test_stoutness_may_lie_between_a_thin_strip_and_a_thin_walled_tube(
+    inertia: float, doubted: int
+) -> None:
+    assert len(bare(1.0, inertia)) == doubted
+
+
 @pytest.mark.parametrize("factor", [1e-6, 1e-4, 1e4, 1e6])
 @pytest.mark.parametrize("area", [1e-10, 1e-4, 10.0])
 def test_any_large_slip_of_the_exponent_of_a_round_bar_is_seen_at_any_size(
@@ -105,9 +114,29 @@ def test_a_link_of_the_misprinted_section_is_seen_to_be_deeper_than_long() -> No
 
 
 def test_bounds_within_which_a_tube_loses_its_wall_are_warned_of() -> None:
-    new = "{parameter: sections.pipe.thickness, min: 1 mm, max: 25 mm}"
-    text = edited("{parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}", new)
-    assert any("wall can vanish or exceed" in message for *_, message in warnings_of(text))
+    for bounds, doubted in [
+        ("thickness, min: 1 mm, max: 21 mm", True),
+        ("thickness, min: 1 mm, max: 20 mm", False),  # solid
+        ("outer_diameter, min: 3 mm, max: 50 mm", True),
+        ("outer_diameter, min: 5 mm, max: 50 mm", False),
+    ]:
+        assert doubted is wall_is_doubted(
+            edited(DIAMETER, f"{{parameter: sections.pipe.{bounds}}}")
+        )
+
+
+def test_an_inner_diameter_that_can_reach_the_outer_one_is_warned_of() -> None:
+    hollow = edited("thickness: 2 mm", "inner_diameter: 36 mm")
+    for largest, doubted in [("40 mm", True), ("39 mm", False)]:
+        new = f"{{parameter: sections.pipe.inner_diameter, min: 1 mm, max: {largest}}}"
+        assert doubted is wall_is_doubted(hollow.replace(DIAMETER, new))
+
+
+DIAMETER = "{parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}"
+
+
+def wall_is_doubted(text: str) -> bool:
+    return any("wall can vanish or exceed" in message for *_, message in warnings_of(text))
 
 
 def test_a_design_parameter_without_effect_is_warned_of() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 import pytest
 
@@ -121,6 +122,32 @@ def test_anything_else_is_refused_and_says_what_is_allowed(
 def test_hertz_and_radians_per_second_and_one_per_second_are_three_things() -> None:
     hertz, rate, per_second = (parse_unit(u).exponents for u in ("Hz", "rad/s", "s^-1"))
     assert len({hertz, rate, per_second}) == 3
+
+
+def test_every_prefix_is_worth_what_its_letter_says() -> None:
+    prefixes = {
+        "n": -9,
+        "u": -6,
+        "µ": -6,
+        "μ": -6,
+        "m": -3,
+        "c": -2,
+        "k": 3,
+        "M": 6,
+        "G": 9,
+        "T": 12,
+    }
+    whole = ("m", "g", "s", "N", "Nm", "Pa", "Hz", "rad", "deg")
+    prefixed = [name for name in UNITS if name[1:] in whole and name not in (*whole, "min")]
+    assert len(prefixed) == 25
+    for name in prefixed:
+        power = prefixes[name[0]]
+        one, other = UNITS[name], UNITS[name[1:]]
+        ratio = Fraction(one.numerator, one.denominator) / Fraction(
+            other.numerator, other.denominator
+        )
+        assert ratio == Fraction(10) ** power, name
+        assert (one.pi, one.exponents) == (other.pi, other.exponents), name
 
 
 def test_every_unit_is_its_own_inverse_power() -> None:

@@ -124,6 +124,14 @@ def test_an_expansion_that_fails_somewhere_is_still_drawn(paper):
     assert len(figures.render(figures.plan(found))) == 7
 
 
+def test_a_map_on_which_nothing_varies_is_filled_and_not_left_blank():
+    found = make_findings(varies=False)
+    plans = [p for p in figures.plan(found) if p.file.endswith("_design.png")]
+    (image,) = map(pixels, figures.render(plans).values())
+    middle = image[image.shape[0] // 2]
+    assert (middle < 200).all(axis=1).mean() > 0.5
+
+
 def test_a_curve_is_drawn_where_its_numbers_say():
     with settings():
         sheet = Sheet(1.0, 1.0)

@@ -1,0 +1,242 @@
+"""Each command by its result: text and JSON on stdout, everything else on stderr."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from commands import TWO_LINK
+from wrong_inputs import GOOD
+
+from eigassign import __version__
+from eigassign.cli import main
+from eigassign.errors import UsageError
+from eigassign.values import split
+
+# Belotti et al. 2021, recomputed with an independent frame program (same mesh)
+REFERENCE = {
+    "0 0": [202.219554, 513.156239, 736.419559],
+    "0.125 0.125": [193.113002, 427.149912, 708.216892],
+}
+
+Captured = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("EIGASSIGN_CACHE_DIR", str(tmp_path / "cache"))
+    Path("good.yaml").write_text(GOOD)
+
+
+def answer(capsys: Captured, *args: object, code: int = 0) -> str:
+    """What the command prints on stdout."""
+    assert main([str(arg) for arg in args]) == code
+    return capsys.readouterr().out
+
+
+@pytest.mark.parametrize("y", list(REFERENCE))
+def test_modes_prints_the_reference_frequencies_as_json_and_nothing_else(
+    y: str, capsys: Captured
+) -> None:
+    args = ("--q", "1.817, 5.312", "--y", y, "--count", 3, "--json")
+    found = json.loads(answer(capsys, "modes", TWO_LINK, *args))
+    assert list(found) == ["rigid_modes", "frequencies_hz"]
+    assert found["rigid_modes"] == 2
+    assert found["frequencies_hz"] == pytest.approx(REFERENCE[y], rel=1e-6)
+
+
+def test_modes_takes_units_negative_numbers_and_either_separator(capsys: Captured) -> None:
+    ways = [
+        ("1.817 -0.971185307179586", "0.125;0"),
+        ("1.817,-0.971185307179586", "125 g, 0"),
+        ("1817 mrad 5.312", "125 g 0 kg"),
+    ]
+    found = [
+        json.loads(answer(capsys, "modes", TWO_LINK, "--q", q, "--y", y, "--json")) for q, y in ways
+    ]
+    for other in found[1:]:
+        assert other["frequencies_hz"] == pytest.approx(found[0]["frequencies_hz"], rel=1e-12)
+
+
+def test_modes_without_q_and_y_is_at_the_expansion_point_and_the_design_of_the_file(
+    capsys: Captured,
+) -> None:
+    found = json.loads(answer(capsys, "modes", TWO_LINK, "--count", 3, "--json"))
+    assert found["frequencies_hz"] == pytest.approx(REFERENCE["0 0"], rel=1e-6)
+
+
+def test_modes_as_text_lists_the_modes_from_one(capsys: Captured) -> None:
+    out = answer(capsys, "modes", TWO_LINK, "--count", 2)
+    assert re.search(r"^ *1 +202\.21955", out, re.MULTILINE)
+    assert re.search(r"^ *2 +513\.1562", out, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "says"),
+    [
+        ("--q", "1.8", "--q: expected 2 (q1, q2) values, got 1 in '1.8'"),
+        ("--q", "1,817 5,312", "expected 2 (q1, q2) values, got 4"),
+        ("--q", "1.8 m, 2", "--q: q1: expected an angle"),
+        ("--q", "1.8, nan", "--q: q2: expected an angle"),
+        ("--q", "nan 1.8", "--q: q1: expected an angle"),
+        ("--y", "1", "--y: expected 2 (m1, m2) values, got 1"),
+        ("--y", "0 -1", "--y: m2: must be >= 0 kg"),
+        ("--y", "0 1e999", "--y: m2: must be a finite number"),
+        ("--y", "1 deg, 1", "--y: m1: expected a mass"),
+        ("--y", "", "expected 2 (m1, m2) values, got 0"),
+    ],
+)
+def test_a_wrong_point_is_refused_by_its_name(
+    option: str, value: str, says: str, capsys: Captured
+) -> None:
+    assert main(["modes", str(TWO_LINK), option, value]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert says in err
+
+
+def test_values_split_at_numbers_and_keep_their_units() -> None:
+    assert split("104 deg, -5.3") == ["104 deg", "-5.3"]
+    assert split("1e3 N m/rad;.5") == ["1e3 N m/rad", ".5"]
+    assert split("") == []
+
+
+def test_check_describes_a_case_and_warns_with_its_line(capsys: Captured) -> None:
+    misprint = TWO_LINK.read_text(encoding="utf-8").replace("3.97e-8}", "3.97e-4}")
+    Path("misprint.yaml").write_text(misprint, encoding="utf-8")
+    assert main(["check", "misprint.yaml", "good.yaml"]) == 0
+    out, err = capsys.readouterr()
+    assert "misprint.yaml: Two-link pick-and-place manipulator" in out
+    assert "good.yaml: A small arm" in out
+    assert re.search(r"^misprint\.yaml:\d+:\d+: warning: mechanism\.sections\.rod", err)
+
+
+def test_check_goes_on_after_a_wrong_case(capsys: Captured) -> None:
+    Path("wrong.yaml").write_text("title: x")
+    assert main(["check", "wrong.yaml", "good.yaml", "--json"]) == 2
+    out, err = capsys.readouterr()
+    assert list(json.loads(out)) == ["good.yaml"]
+    assert "wrong.yaml:1:1: mechanism: required key is missing" in err
+
+
+def test_optimize_leaves_a_run_folder_and_prints_what_it_found(capsys: Captured) -> None:
+    assert main(["optimize", "good.yaml"]) == 0
+    out, err = capsys.readouterr()
+    written = {path.name for path in Path("results/good").iterdir()}
+    assert {"results.json", "report.html", "figures", "case.yaml", "log.txt"} <= written
+    assert "results/good written in" in out
+    assert "bodies.tool.mass" in out
+    assert "expanding the eigenvalues" in err
+
+
+def test_optimize_as_json_prints_the_results_file_and_where_it_is(capsys: Captured) -> None:
+    printed = json.loads(answer(capsys, "optimize", "good.yaml", "--out", "run", "--json"))
+    kept = json.loads(Path("run/results.json").read_text(encoding="utf-8"))
+    assert printed.pop("run_folder") == "run"
+    assert printed == kept
+    assert kept["eigassign_version"] == __version__
+
+
+def test_quiet_leaves_stderr_empty(capsys: Captured) -> None:
+    assert main(["optimize", "good.yaml", "--quiet"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_optimize_ends_with_1_when_the_expansion_is_over_the_asked_tolerance(
+    capsys: Captured,
+) -> None:
+    Path("strict.yaml").write_text(GOOD.replace("50 %", "1e-9"))
+    assert main(["optimize", "strict.yaml"]) == 1
+    assert "validation.max_error" in capsys.readouterr().err
+    assert Path("results/strict/results.json").exists()
+
+
+def test_optimize_ends_with_1_and_names_the_constraint_that_cannot_be_met(
+    capsys: Captured,
+) -> None:
+    bound = "max: 1}\n  constraints: {heavy: {terms: {m: 1}, min: 3}}"
+    Path("infeasible.yaml").write_text(GOOD.replace("max: 1}", bound))
+    assert main(["optimize", "infeasible.yaml"]) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "heavy" in err
+    assert not list(Path().glob("results/*"))
+
+
+def test_optimize_leaves_a_foreign_folder_alone_unless_forced(capsys: Captured) -> None:
+    Path("mine").mkdir()
+    Path("mine/thesis.txt").write_text("years of work")
+    args = ["optimize", "good.yaml", "--out", "mine"]
+    assert main(args) == 3
+    assert "mine is not a run folder of eigassign" in capsys.readouterr().err
+    assert [path.name for path in Path("mine").iterdir()] == ["thesis.txt"]
+    assert main([*args, "--force"]) == 0
+    assert Path("mine.1/thesis.txt").read_text() == "years of work"
+
+
+def test_no_cache_leaves_no_cache_and_a_cache_is_listed_and_cleared(capsys: Captured) -> None:
+    assert main(["optimize", "good.yaml", "--no-cache"]) == 0
+    assert not Path("cache").exists()
+    assert main(["optimize", "good.yaml", "--cache-dir", "elsewhere"]) == 0
+    capsys.readouterr()
+    listed = answer(capsys, "cache", "list", "--cache-dir", "elsewhere")
+    assert "order 3" in listed
+    count = len(list(Path("elsewhere").iterdir()))
+    cleared = answer(capsys, "cache", "clear", "--cache-dir", "elsewhere")
+    assert cleared.startswith(f"{count} file")
+    assert list(Path("elsewhere").iterdir()) == []
+    assert answer(capsys, "cache", "path") == f"{Path('cache').absolute()}\n"
+
+
+def test_expand_writes_coefficients_of_the_order_asked_for_beside_a_run(capsys: Captured) -> None:
+    assert main(["optimize", "good.yaml"]) == 0
+    assert main(["expand", "good.yaml", "--order", "2"]) == 0
+    assert "results/good_expansion written in" in capsys.readouterr().out
+    assert Path("results/good_expansion/coefficients.json").exists()
+    assert Path("results/good/results.json").exists()
+
+
+def test_validate_takes_all_of_cases_when_none_is_named(capsys: Captured) -> None:
+    Path("cases").mkdir()
+    Path("cases/a.yaml").write_text(GOOD)
+    Path("cases/b.yml").write_text(GOOD)
+    rows = json.loads(answer(capsys, "validate", "--json"))
+    assert {row["case"] for row in rows} == {"a", "b"}
+    assert all(row["passed"] for row in rows)
+
+
+def test_validate_ends_with_1_above_the_tolerance_and_still_shows_the_table(
+    capsys: Captured,
+) -> None:
+    Path("strict.yaml").write_text(GOOD.replace("50 %", "1e-9"))
+    out = answer(capsys, "validate", "strict.yaml", "good.yaml", code=1)
+    assert "strict" in out
+    assert "good" in out
+
+
+def test_validate_goes_on_after_a_wrong_case_and_ends_with_its_code(capsys: Captured) -> None:
+    Path("wrong.yaml").write_text("title: x")
+    rows = json.loads(answer(capsys, "validate", "wrong.yaml", "good.yaml", "--json", code=2))
+    assert {row["case"] for row in rows} == {"good"}
+
+
+def test_schema_prints_a_json_schema(capsys: Captured) -> None:
+    found = json.loads(answer(capsys, "schema"))
+    assert found["$schema"].endswith("2020-12/schema")
+    assert {"mechanism", "targets", "validation"} <= set(found["properties"])
+
+
+def test_version_and_help_are_results(capsys: Captured) -> None:
+    assert __version__ in answer(capsys, "--version")
+    assert "Exit codes" in answer(capsys, "-h")
+    assert "--no-cache" in answer(capsys, "optimize", "--help")
+
+
+def test_errors_of_the_python_face_are_those_of_the_command_line() -> None:
+    import eigassign as ea
+
+    with pytest.raises(UsageError, match="no such case file"):
+        ea.load_case("gone.yaml")

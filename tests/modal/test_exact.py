@@ -1,0 +1,219 @@
+"""Exact elastic modes: certificates, both solvers, closed forms and an independent program."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from chains import bar, model_of, random_chain, two_link
+
+from eigassign.errors import UsageError
+from eigassign.modal import exact
+from eigassign.modal.model import Model
+
+POSES = np.array([[0.3, 1.9], [1.0, 0.2], [-2.0, 0.5]])
+DESIGN = np.array([[0.0, 0.1], [0.2, 0.0], [0.25, 0.25]])
+SQUARE = {"shape": "rectangle", "width": 0.125, "height": 0.125}
+
+
+def certify(model: Model, q: np.ndarray, y: np.ndarray, f: np.ndarray, phi: np.ndarray) -> None:
+    """Residual, normalisation, orthogonality and sign of the modes of one sample."""
+    M, K = model.matrices(q, y)
+    lam = (2.0 * np.pi * f) ** 2
+    residual = K @ phi - (M @ phi) * lam
+    # backward stable: small against ‖K‖‖φ‖
+    assert np.abs(residual).max() < 1e-12 * np.abs(K).max() * np.abs(phi).max()
+    np.testing.assert_allclose(phi.T @ M @ phi, np.eye(len(f)), atol=1e-9)
+    rigid = np.eye(model.n_dof)[:, model.pencil.rigid]
+    np.testing.assert_allclose(rigid.T @ M @ phi, 0.0, atol=1e-11)
+    assert (phi[np.abs(phi).argmax(axis=0), np.arange(len(f))] > 0).all()
+    assert (np.diff(f) > 0).all()
+
+
+def test_dense_modes_are_modes() -> None:
+    model = model_of(two_link())
+    f, phi = model.modes(POSES, DESIGN, 6)
+    for k in range(3):
+        certify(model, POSES[k], DESIGN[k], f[k], phi[k])
+    np.testing.assert_allclose(f, model.frequencies(POSES, DESIGN, 6), rtol=1e-12)
+
+
+def test_sparse_modes_are_modes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(exact, "DENSE_LIMIT", 0)
+    model = model_of(two_link())
+    f, phi = model.modes(POSES, DESIGN, 6)
+    for k in range(3):
+        certify(model, POSES[k], DESIGN[k], f[k], phi[k])
+
+
+@pytest.mark.parametrize("drives", [("free", "free"), ("locked", {"stiffness": 3e3})])
+def test_dense_and_sparse_solvers_agree(
+    drives: tuple[object, object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = model_of(two_link((12, 9), drives=drives))
+    f, phi = model.modes(POSES, DESIGN, 5)
+    monkeypatch.setattr(exact, "DENSE_LIMIT", 0)
+    found, vectors = model.modes(POSES, DESIGN, 5)
+    np.testing.assert_allclose(found, f, rtol=1e-10)
+    np.testing.assert_allclose(vectors, phi, atol=1e-7 * np.abs(phi).max())
+    np.testing.assert_array_equal(model.modes(POSES, DESIGN, 5)[1], vectors)  # no random start
+
+
+def test_a_chain_of_600_unknowns_agrees_in_both_solvers(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = model_of(two_link((110, 88)))
+    assert model.n_dof > 2 * exact.DENSE_LIMIT
+    f = model.frequencies(POSES[0], DESIGN[0], 4)
+    monkeypatch.setattr(exact, "DENSE_LIMIT", 10_000)
+    # round-off in K itself: 1e-16 × (elements)⁴
+    np.testing.assert_allclose(f, model.frequencies(POSES[0], DESIGN[0], 4), rtol=1e-8)
+
+
+def test_all_modes_of_a_large_model_can_be_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = model_of(two_link())
+    f = model.frequencies(POSES, DESIGN, 21)
+    monkeypatch.setattr(exact, "DENSE_LIMIT", 0)
+    np.testing.assert_allclose(model.frequencies(POSES, DESIGN, 21), f, rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(0, 60, 5))
+def test_modes_of_random_chains_are_modes(seed: int) -> None:
+    tree, q = random_chain(seed)
+    model = model_of(tree)
+    count = min(5, model.n_dof - model.n_rigid)
+    f, phi = model.modes(q, [], count)
+    certify(model, q, np.zeros(0), f[0], phi[0])
+
+
+def test_a_thousand_elements_a_link_do_not_lift_the_rigid_modes() -> None:
+    # in the naive pencil round-off makes 1.8 Hz of them, and moves the first elastic modes
+    fine = model_of(two_link((1000, 1000))).frequencies([0.3, 1.9], [0.0, 0.1], 2)
+    coarse = model_of(two_link((24, 18))).frequencies([0.3, 1.9], [0.0, 0.1], 2)
+    # of the coarse mesh (βh)⁴/1440 < 1e-6; of the fine one round-off in K, 1e-16 × 1000⁴ = 1e-4
+    np.testing.assert_allclose(fine, coarse, rtol=1e-4)
+
+
+# Closed forms: f = (βL)² / (2πL²) √(EI/ρA)
+
+
+def beam_frequencies(beta_l: list[float], length: float = 10.0) -> np.ndarray:
+    return np.square(beta_l) / (2.0 * np.pi * length**2) * 5000.0 * 0.125 / np.sqrt(12.0)
+
+
+CLAMPED = [1.8751040687, 4.6940911330, 7.8547574382]
+PINNED_FREE = [3.9266023120, 7.0685827456, 10.2101761228]
+PINNED_PINNED = [np.pi, 2.0 * np.pi, 3.0 * np.pi]
+
+
+def beam(elements: int, kind: str) -> Model:
+    tree = bar(elements, 10.0, 200e9, 8000.0, SQUARE, "fixed" if kind == "clamped" else "revolute")
+    if kind == "held":
+        tree["coordinates"]["q1"]["drive"] = {"stiffness": 1e16}
+    if kind == "pinned":  # an enormous mass holds the far end, and lets it turn
+        tree["mechanism"]["bodies"] = {"anchor": {"at": "bar.end", "mass": 1e10}}
+    return model_of(tree)
+
+
+@pytest.mark.parametrize(
+    ("kind", "beta_l"),
+    [
+        ("clamped", CLAMPED),
+        ("held", CLAMPED),
+        ("pinned-free", PINNED_FREE),
+        ("pinned", PINNED_PINNED),
+    ],
+)
+def test_beams_converge_to_closed_forms_with_the_fourth_power_of_the_mesh(
+    kind: str, beta_l: list[float]
+) -> None:
+    exact_hz, meshes, errors = beam_frequencies(beta_l), (10, 14, 20), []
+    for elements in meshes:
+        model = beam(elements, kind)
+        q = np.zeros(len(model.q_names))
+        skip = 1 if kind == "pinned" else 0  # the mass bouncing on the bar's axial stiffness
+        errors.append(model.frequencies(q, [], 3 + skip)[0, skip:] / exact_hz - 1.0)
+    slopes = np.polyfit(np.log(meshes), np.log(errors), 1)[0]
+    np.testing.assert_allclose(slopes, -4.0, atol=0.1)
+    assert (np.array(errors) > 0.0).all()  # consistent mass: from above
+    np.testing.assert_allclose(errors[-1], np.array(beta_l) ** 4 / 20**4 / 1440, rtol=0.1)
+
+
+def test_nafems_fv71_cantilever_has_its_published_frequencies() -> None:
+    # NAFEMS R0015, FV71: all six are bending in the plane; the first axial one is at 125 Hz
+    published = [1.010, 6.327, 17.716, 34.717, 57.390, 85.730]
+    f = beam(80, "clamped").frequencies([], [], 8)[0]
+    np.testing.assert_allclose(f[:6], published, atol=5.1e-4)
+    np.testing.assert_allclose(f[7], 5000.0 / 40.0, rtol=2e-4)
+
+
+# Frequencies of an independent frame program (global coordinates, joints as linear constraints;
+# checked against OpenSees 3.7.1, consistent mass) for the same mesh.
+REFERENCE = {
+    "at q0": (
+        (1.817, 5.312), {}, [202.219554, 513.156239, 736.419559, 1322.403962]),
+    "at q0 with masses": (
+        (1.817, 5.312), {"masses": (0.125, 0.125)},
+        [193.113002, 427.149912, 708.216892, 1186.668413]),
+    "stretched": (
+        (0.4, 0.4), {"masses": (0.0, 0.25), "tip_inertia": 1e-3},
+        [200.471324, 397.17344, 738.915064, 1020.726241]),
+    "locked": (
+        (1.817, 5.312), {"masses": (0.125, 0.125), "drives": ("locked", "locked")},
+        [36.102253, 56.159893, 347.487029, 515.012919]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFERENCE)
+def test_two_link_arms_agree_with_an_independent_program(name: str) -> None:
+    q, options, expected = REFERENCE[name]
+    model = model_of(two_link(design={}, angles=("absolute", "absolute"), **options))
+    np.testing.assert_allclose(model.frequencies(q, [], 4)[0], expected, rtol=1e-6)
+    assert model.n_rigid == (0 if "drives" in options else 2)
+
+
+# Shapes and refusals
+
+
+def test_one_sample_and_many_samples_mix() -> None:
+    model = model_of(two_link())
+    f = model.frequencies(POSES, [0.1, 0.1], 2)
+    assert f.shape == (3, 2)
+    np.testing.assert_allclose(model.frequencies(POSES[1], [0.1, 0.1], 2), f[1:2], rtol=1e-13)
+    one = model.frequencies(POSES[0], DESIGN, 2)
+    np.testing.assert_allclose(one[2], model.frequencies(POSES[0], DESIGN[2], 2)[0], rtol=1e-13)
+    assert model.frequencies(np.zeros((0, 2)), [0.0, 0.0], 2).shape == (0, 2)
+
+
+@pytest.mark.parametrize(
+    ("q", "y", "words"),
+    [
+        ([0.1], [0.0, 0.0], "q has 1 values; expected 2"),
+        ([[0.1, 0.2, 0.3]], [0.0, 0.0], "q has shape"),
+        ([0.1, 0.2], [0.0], "y has 1 values; expected 2"),
+        (np.zeros((3, 2)), np.zeros((2, 2)), "3 samples of q against 2 of y"),
+        ([0.1, np.nan], [0.0, 0.0], "q must be finite"),
+        ([0.1, 0.2], [np.inf, 0.0], "y must be finite"),
+        (np.zeros((1, 1, 2)), [0.0, 0.0], "q has shape"),
+    ],
+)
+def test_samples_of_a_wrong_shape_are_refused(q: object, y: object, words: str) -> None:
+    with pytest.raises(UsageError, match=words):
+        model_of(two_link()).frequencies(q, y, 1)
+
+
+@pytest.mark.parametrize("count", [0, -1, 22])
+def test_impossible_numbers_of_modes_are_refused(count: int) -> None:
+    with pytest.raises(UsageError, match="1 to 21 elastic"):
+        model_of(two_link()).frequencies([0.1, 0.2], [0.0, 0.0], count)
+
+
+def test_a_mechanism_without_coordinates_and_design_has_modes() -> None:
+    model = beam(3, "clamped")
+    assert model.n_rigid == 0
+    assert model.frequencies([], [], 2).shape == (1, 2)
+    assert model.frequencies(np.zeros((3, 0)), np.zeros((3, 0)), 2).shape == (3, 2)
+
+
+def test_a_design_outside_the_domain_of_a_formula_is_refused() -> None:
+    design = {"a": {"parameter": "links.upper.length", "min": 0.1, "max": 2.0}}
+    model = model_of(two_link(design=design))
+    with pytest.raises(UsageError, match="outside the domain"):
+        model.frequencies([0.1, 0.2], [0.0], 1)

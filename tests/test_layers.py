@@ -1,0 +1,110 @@
+"""The layout, held by a test: packages import from their left only, third parties have owners."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import eigassign
+
+ROOT = Path(eigassign.__file__).parent
+LEFT_TO_RIGHT = ("case", "mechanism", "modal", "assignment", "study", "output")
+BELOW_ALL = ("errors", "_version")
+OWNERS = {
+    "yaml": {"case"},
+    "pydantic": {"case"},
+    "pydantic_core": {"case"},
+    "osqp": {"assignment"},
+    "h5py": {"output"},
+    "matplotlib": {"output"},
+    "rich": {"output"},
+    "jinja2": {"output"},
+    "click": {"cli", "cli_options"},
+}
+EVERYWHERE = {"numpy", "scipy"}
+PRINTING = {"cli", "output.console"}
+MODULES = sorted(ROOT.rglob("*.py"))
+
+
+def name_of(path: Path) -> str:
+    """``modal/exact.py`` → ``modal.exact``."""
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def imports(tree: ast.AST) -> Iterator[str]:
+    """Full names of the modules imported anywhere below ``tree``, except for type checking."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            continue
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "relative import"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        yield from imports(node)
+
+
+def ours(name: str) -> str | None:
+    """``eigassign.modal.exact.x`` → ``modal``; None for another's module."""
+    head, *rest = name.split(".")
+    return (rest[0] if rest else "") if head == "eigassign" else None
+
+
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_a_package_imports_only_from_its_left(path: Path) -> None:
+    package = name_of(path).split(".")[0]
+    used = {part for name in imports(parsed(path)) if (part := ours(name)) is not None}
+    if package == "series":
+        assert used <= {"series", *BELOW_ALL}
+    elif package in LEFT_TO_RIGHT:
+        left = LEFT_TO_RIGHT[: LEFT_TO_RIGHT.index(package) + 1]
+        assert used <= {*left, "series", *BELOW_ALL}
+
+
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_a_third_party_is_imported_by_its_owner_only(path: Path) -> None:
+    package = name_of(path).split(".")[0]
+    for name in imports(parsed(path)):
+        party = name.split(".")[0]
+        assert package in OWNERS.get(party, {package}), f"{party} belongs to {OWNERS[party]}"
+
+
+def test_the_case_layer_needs_no_numerical_package() -> None:
+    for path in MODULES:
+        if name_of(path).startswith("case"):
+            assert not {name.split(".")[0] for name in imports(parsed(path))} & EVERYWHERE
+
+
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_only_the_command_line_and_the_console_print(path: Path) -> None:
+    called = {
+        ast.unparse(node.func) for node in ast.walk(parsed(path)) if isinstance(node, ast.Call)
+    }
+    if name_of(path) not in PRINTING:
+        assert not called & {"print", "click.echo", "sys.stdout.write"}
+
+
+def test_only_the_command_line_sets_exit_codes() -> None:
+    for path in MODULES:
+        if name_of(path) not in {"cli", "__main__"}:
+            calls = [ast.unparse(n.func) for n in ast.walk(parsed(path)) if isinstance(n, ast.Call)]
+            assert not {"sys.exit", "exit", "quit", "os._exit"} & set(calls), path
+
+
+def test_the_command_line_imports_only_click_and_light_modules_at_its_top() -> None:
+    at_top = {
+        name.removeprefix("eigassign.")
+        for node in parsed(ROOT / "cli.py").body
+        if isinstance(node, (ast.Import, ast.ImportFrom))
+        for name in imports(ast.Module(body=[node], type_ignores=[]))
+    }
+    light = {"click", "cli_options", "failures", "signals", "_version", "errors", "teller"}
+    standard = {"sys", "__future__", "collections", "contextlib", "pathlib", "typing"}
+    assert {name.split(".")[0] for name in at_top} <= light | standard
