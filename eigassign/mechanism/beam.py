@@ -7,8 +7,8 @@ An element of length h has matrices that are affine in few scalars; per plane of
     m = ρA h m_a + ρI_p h m_t + ρA/(1+Φ)² Σ_{i,j} Φ^i h^{j+1} m_ij  (+ rotary inertia with shear)
 
 (cubic Hermite bending; Przemieniecki, Theory of Matrix Structural Analysis, §5.6 and §11.7 with
-shear and rotary inertia). Dofs of an element: (u_x, u_y, u_z, θ_x, θ_y, θ_z) at both nodes; a planar
-mechanism keeps (u_x, u_y, θ_z).
+shear and rotary inertia). Dofs of an element: (u_x, u_y, u_z, θ_x, θ_y, θ_z) at both nodes; a
+planar mechanism keeps (u_x, u_y, θ_z).
 """
 
 from __future__ import annotations
@@ -52,8 +52,9 @@ def element_stiffness(beam: BeamValues, h: Scalar) -> list[ElementTerm]:
         phi = _phi(beam, EI, h)
         stiff = EI if _is_zero(phi) else EI / (phi + 1.0)
         coefficients = (stiff / h**3.0, stiff / h**2.0, stiff / h, stiff * phi / h)
-        terms += [ElementTerm(c, m) for c, m in zip(coefficients, bending_stiffness(plane),
-                                                     strict=True)]
+        terms += [
+            ElementTerm(c, m) for c, m in zip(coefficients, bending_stiffness(plane), strict=True)
+        ]
     return [t for t in terms if not _is_zero(t.coefficient)]
 
 

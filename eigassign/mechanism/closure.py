@@ -65,14 +65,20 @@ def _bind_passive(
     program = _reordered(recorder, scalars, used, n_q + n_y, n_p)
     names = (*parameters.coordinates, *parameters.design)
     function = ImplicitFunction(
-        program, n_p, len(F), len(check), np.zeros(len(used)), np.zeros(n_p),
-        tuple(names[v] for v in used), "the mechanism",
+        program,
+        n_p,
+        len(F),
+        len(check),
+        np.zeros(len(used)),
+        np.zeros(n_p),
+        tuple(names[v] for v in used),
+        "the mechanism",
     )
     a0, p0 = choose_branch(case, tree, function, used, parameters)
     solved = replace(function, a0=a0, p0=p0)
-    return parameters.with_passive(parameters.recorder.implicit(
-        solved, [parameters.recorder.variable(v) for v in used]
-    ))
+    return parameters.with_passive(
+        parameters.recorder.implicit(solved, [parameters.recorder.variable(v) for v in used])
+    )
 
 
 def _equations(
@@ -139,16 +145,14 @@ def _passive_rates(recorder: Recorder, motion: Kinematics, n: int, planar: bool)
 def _narrowed(motion: Kinematics, P: Objects) -> Kinematics:
     """Twists over q̇ alone: T = T_q + T_p P."""
     n = P.shape[1]
-    placements = tuple(
-        replace(p, twist=_combined(p.twist, P, n)) for p in motion.placements
-    )
+    placements = tuple(replace(p, twist=_combined(p.twist, P, n)) for p in motion.placements)
     return replace(motion, placements=placements)
 
 
 def _combined(twist: Objects, P: Objects, n: int) -> Objects:
     if not n or not len(P):
         return twist[:, :n]
-    return twist[:, :n] + multiply(twist[:, n:], P)
+    return np.asarray(twist[:, :n] + multiply(twist[:, n:], P))
 
 
 def rank(J: Floats) -> int:

@@ -61,8 +61,9 @@ def _relative(case: CaseFile, tree: Tree) -> tuple[Floats, Floats]:
             mount = float(case.mechanism.joints[edge.joint].angle)
             relative[i], offset[i] = relative[i] - below[0], -below[1] - mount
         absolute[edge.follower[0]] = (
-            None if passive or below is None else _carried_angle(case, edge.joint, i, below,
-                                                                 relative, offset)
+            None
+            if passive or below is None
+            else _carried_angle(case, edge.joint, i, below, relative, offset)
         )
     return relative, offset
 

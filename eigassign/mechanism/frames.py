@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.mechanism.beam import element_mass, element_stiffness
-from eigassign.mechanism.links import _add_bodies, _rolled, beam_values
+from eigassign.mechanism.links import add_bodies, beam_values, rolled
 from eigassign.mechanism.mesh import DOFS, Entries, LinkMesh, node_dofs, rigid_motion
 from eigassign.mechanism.parameters import Parameters
 from eigassign.mechanism.rotations import vector
@@ -19,7 +20,8 @@ Floats = NDArray[np.float64]
 
 def frame_mesh(case: CaseFile, parameters: Parameters, name: str) -> LinkMesh:
     """Nodes joined by beams, each in as many elements as asked for; nodes are rigid connections."""
-    space, link = case.mechanism.space, case.mechanism.links[name]
+    space = case.mechanism.space
+    link: Any = case.mechanism.links[name]
     width = len(DOFS[space])
     points = [np.array([*map(float, X), 0.0][:3]) for X in link.nodes.values()]
     at = {key: k for k, key in enumerate(link.nodes)}
@@ -35,7 +37,7 @@ def frame_mesh(case: CaseFile, parameters: Parameters, name: str) -> LinkMesh:
     slots = [node_dofs(width * k, space) for k in range(count)]
     nodes = {key: slots[k] for key, k in at.items()}
     places = {key: vector(points[k].tolist()) for key, k in at.items()}
-    _add_bodies(case, parameters, name, mass, nodes)
+    add_bodies(case, parameters, name, mass, nodes)
     rigid = rigid_motion([vector(p.tolist()) for p in points], slots, width * count, space)
     return LinkMesh(width * count, nodes, places, stiffness.terms(), mass.terms(), rigid)
 
@@ -53,14 +55,16 @@ def _add_beam(
     along = points[ends[-1]] - points[ends[0]]
     h = float(np.linalg.norm(along)) / (len(ends) - 1)
     values = beam_values(case, parameters, beam, beam.section)
-    turn = _rolled(float(getattr(beam, "roll", 0.0) or 0.0)) @ np.kron(np.eye(4), axes(along))
+    turn = rolled(float(getattr(beam, "roll", 0.0) or 0.0)) @ np.kron(np.eye(4), axes(along))
     width = len(DOFS[space])
-    for terms, target in ((element_stiffness(values, h), stiffness),
-                          (element_mass(values, h), mass)):
+    for terms, target in (
+        (element_stiffness(values, h), stiffness),
+        (element_mass(values, h), mass),
+    ):
         for coefficient, matrix in terms:
             turned = turn.T @ matrix @ turn
             turned[np.abs(turned) < 1e-14 * np.abs(turned).max()] = 0.0
-            for a, b in zip(ends[:-1], ends[1:], strict=True):
+            for a, b in itertools.pairwise(ends):
                 dofs = np.concatenate([node_dofs(width * a, space), node_dofs(width * b, space)])
                 target.add_block(coefficient, dofs, turned)
 

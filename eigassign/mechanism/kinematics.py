@@ -15,7 +15,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
@@ -110,9 +109,7 @@ def kinematics(case: CaseFile, parameters: Parameters) -> Kinematics:
     return replayed(case, parameters, tree, coordinates(case, tree))
 
 
-def replayed(
-    case: CaseFile, parameters: Parameters, tree: Tree, coords: Coordinates
-) -> Kinematics:
+def replayed(case: CaseFile, parameters: Parameters, tree: Tree, coords: Coordinates) -> Kinematics:
     """The motion for any choice of columns."""
     if tree.loops:
         from eigassign.mechanism.closure import close_loops
@@ -169,7 +166,7 @@ def mounting(joint: object) -> Objects:
 def _lever(case: CaseFile, edge: Edge, motion: JointMotion) -> Objects:
     """From the base node to the follower's joint node, base axes, m."""
     position = getattr(case.mechanism.joints[edge.joint], "position", None) or (0.0, 0.0)
-    return vector(position) + motion.translation
+    return np.asarray(vector(position) + motion.translation)
 
 
 def _place(

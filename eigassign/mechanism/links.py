@@ -86,7 +86,7 @@ def _chain(
     places = {"start": positions[0], "end": positions[-1]}
     if rider is not None:
         nodes[rider], places[rider] = slots[pieces[0][2]], positions[pieces[0][2]]
-    _add_bodies(case, parameters, name, mass, nodes)
+    add_bodies(case, parameters, name, mass, nodes)
     rigid = _chain_rigid(pieces, space)
     return LinkMesh(width * count, nodes, places, stiffness.terms(), mass.terms(), rigid)
 
@@ -125,7 +125,7 @@ def _segment(
     """n equal elements from node ``first`` on; with a taper each has its own section."""
     link = case.mechanism.links[name]
     h = span * (1.0 / n)
-    turn = _rolled(float(getattr(link, "roll", 0.0) or 0.0))
+    turn = rolled(float(getattr(link, "roll", 0.0) or 0.0))
     if isinstance(link.section, str):
         beam = beam_values(case, parameters, link, link.section)
         _tile(stiffness, element_stiffness(beam, h), turn, first, n, space)
@@ -155,10 +155,10 @@ def _tile(
             entries.add(coefficient, rows, columns, np.tile(turned[i, j], n))
 
 
-def _rolled(angle: float) -> Floats:
+def rolled(angle: float) -> Floats:
     """(12, 12) turn of the section's axes about the beam's."""
     R = np.asarray(rotation(np.array([1.0, 0.0, 0.0]), angle), dtype=np.float64).T
-    return np.kron(np.eye(4), R)
+    return np.asarray(np.kron(np.eye(4), R), dtype=np.float64)
 
 
 def beam_values(case: CaseFile, parameters: Parameters, beam: Any, section: str) -> BeamValues:
@@ -196,7 +196,7 @@ def _shear_modulus(
     case: CaseFile, parameters: Parameters, beam: Any, E: Scalar, sheared: bool
 ) -> Scalar:
     """G = E/(2(1 + ν)), or as given; not needed by planar beams without shear."""
-    data = case.mechanism.materials[beam.material]
+    data: Any = case.mechanism.materials[beam.material]
     path = f"materials.{beam.material}."
     if getattr(data, "shear_modulus", None) is not None:
         return parameters.number(path + "shear_modulus", data.shear_modulus)
@@ -224,7 +224,7 @@ def _tapered(case: CaseFile, parameters: Parameters, link: Any, share: float) ->
 # --- bodies and rigid links ---
 
 
-def _add_bodies(
+def add_bodies(
     case: CaseFile, parameters: Parameters, name: str, mass: Entries, nodes: dict[str, Ints]
 ) -> None:
     """The point masses and rigid bodies fixed to a link's nodes."""
@@ -235,9 +235,7 @@ def _add_bodies(
             add_scalars(mass, nodes[node], _body(case, parameters, f"bodies.{key}", body, lever))
 
 
-def _body(
-    case: CaseFile, parameters: Parameters, path: str, body: Any, lever: Objects
-) -> Objects:
+def _body(case: CaseFile, parameters: Parameters, path: str, body: Any, lever: Objects) -> Objects:
     value = parameters.number(f"{path}.mass", body.mass)
     return body_block(value, _inertia(parameters, path, body.inertia), lever)
 
@@ -251,7 +249,7 @@ def _inertia(parameters: Parameters, path: str, given: Any) -> list[Scalar]:
 
 
 def _rigid(case: CaseFile, parameters: Parameters, name: str) -> LinkMesh:
-    """A rigid link: one node at its origin that carries its mass; named nodes hang on it rigidly."""
+    """A rigid link: one node at its origin carries its mass, named nodes hang on it rigidly."""
     space, link = case.mechanism.space, case.mechanism.links[name]
     width, kept = len(DOFS[space]), node_dofs(0, case.mechanism.space)
     mass = Entries((width, width))

@@ -91,9 +91,9 @@ def node_dofs(first: int, space: str) -> Ints:
     return slots
 
 
-def rigid_motion(positions: Sequence[Objects], dofs: Sequence[Ints], n: int, space: str) -> list[
-    Term
-]:
+def rigid_motion(
+    positions: Sequence[Objects], dofs: Sequence[Ints], n: int, space: str
+) -> list[Term]:
     """N: node motion v + ω × X, ω per twist (v, ω) of the origin, as affine terms."""
     kept = list(DOFS[space])
     entries = Entries((n, len(kept)))

@@ -82,7 +82,7 @@ class NodeMotions:
         self.own[link] = own
 
     def rows(self, node: Node) -> Rows:
-        """Six rows of a node's elastic motion in its link's axes (missing components stay empty)."""
+        """Six rows of a node's elastic motion in its link's axes; missing components stay empty."""
         if node == GROUND:
             return [{} for _ in range(6)]
         if node not in self.known:
@@ -124,20 +124,17 @@ class NodeMotions:
 
     def _closed(self, edge: Edge, follower: bool) -> Rows:
         """A loop's carried node: u_f = X u_b + A δ, or u_b = X⁻¹ (u_f − A δ)."""
-        loop = next(l for l in self.motion.loops if l.edge == edge)
+        loop = next(one for one in self.motion.loops if one.edge == edge)
         if follower:
             return self._joined(edge, carried(loop.rotation, loop.lever), loop.freedoms)
         moved = self._with_passive(
             [dict(row) for row in self.rows(edge.follower)], edge, loop.freedoms * -1.0
         )
-        # back to the base: turn by Rᵀ, lever reversed and seen in the follower's axes
-        R = loop.rotation.T
         back = np.zeros((6, 6), dtype=object)
         forward = carried(loop.rotation, loop.lever)
         back[:3, :3] = forward[:3, :3].T
         back[3:, 3:] = forward[3:, 3:].T
         back[:3, 3:] = _reverse(loop.rotation, loop.lever)
-        del R
         return apply(back, moved)
 
     def _on_rigid(self, node: Node, root: Node, mesh: LinkMesh) -> Rows:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +67,7 @@ class Poses:
 
         p = self.motion.placement(link)
         X = node_position(self.case, self.parameters, self.motion.tree, (link, node))
-        return p.world_origin + multiply(p.world_rotation, X)
+        return np.asarray(p.world_origin + multiply(p.world_rotation, X))
 
     def segments(self, x: Floats) -> tuple[Floats, ...]:
         """Per link its straight lines, (n, n_lines, 2 ends, 3) in m."""
@@ -118,7 +119,7 @@ def build_poses(case: CaseFile, parameters: Parameters, motion: Kinematics) -> P
 
 def _lines(case: CaseFile, motion: Kinematics, link: str) -> tuple[tuple[str, str], ...]:
     """What to draw of a link: its axis, its beams, or spokes from its joint node."""
-    data = case.mechanism.links[link]
+    data: Any = case.mechanism.links[link]
     kind = link_type(case, link)
     if kind == "beam":
         return (("start", "end"),)

@@ -78,5 +78,5 @@ def carried(R: Objects | Floats, lever: Objects) -> Objects:
     out = np.zeros((6, 6), dtype=object)
     out[:3, :3] = R.T
     out[3:, 3:] = R.T
-    out[:3, 3:] = multiply(np.asarray(R.T), skew(lever) * -1.0)
+    out[:3, 3:] = multiply(R.T.astype(object), skew(lever) * -1.0)
     return out

@@ -30,8 +30,8 @@ class SectionValues(NamedTuple):
 def section_values(section: Any, number: Number) -> SectionValues:
     """Properties of a section of the case; ``number(key, value)`` yields a float or an expression.
 
-    circle: A = πd²/4, I = πd⁴/64, J = 2I; tube: differences of two circles; rectangle b × h (h along
-    y): A = bh, I_z = bh³/12, I_y = hb³/12, J by Saint-Venant's series as fitted by Roark
+    circle: A = πd²/4, I = πd⁴/64, J = 2I; tube: differences of two circles; rectangle b × h (h
+    along y): A = bh, I_z = bh³/12, I_y = hb³/12, J by Saint-Venant's series as fitted by Roark
     (Formulas for Stress and Strain, table 10.7); I-profile: three rectangles, J = Σ bt³/3.
     """
     kappa = getattr(section, "shear_coefficient", None) or SHEAR.get(section.shape, 5.0 / 6.0)
@@ -101,10 +101,3 @@ def _bare(section: Any, number: Number, kappa: float) -> SectionValues:
     return SectionValues(
         number("area", section.area), I_z, I_y, J, given("polar_inertia", I_z + I_y), kappa
     )
-
-
-def midway(a: SectionValues, b: SectionValues, share: float) -> SectionValues:
-    """Properties between two sections of one shape are interpolated on their dimensions elsewhere;
-    this is the linear mix used only for the shear coefficient."""
-    mixed = [x * (1.0 - share) + y * share for x, y in zip(a[:5], b[:5], strict=True)]
-    return SectionValues(*mixed, a.shear_coefficient)

@@ -31,7 +31,8 @@ def add_springs(
     nodes: NodeMotions,
 ) -> None:
     """Add every spring of the case to K."""
-    for name, spring in case.mechanism.springs.items():
+    springs: Any = case.mechanism.springs  # type: ignore[attr-defined]
+    for name, spring in springs.items():
         ends = [GROUND if end == "ground" else split(end) for end in spring.between]
         rows = _relative(case, parameters, motion, nodes, spring, ends)
         values = _stiffness(parameters, f"springs.{name}", spring, case.mechanism.space)
@@ -69,14 +70,10 @@ def _relative(
     link = ends[0][0]
     turn = mounted(getattr(spring, "orientation", None), float(getattr(spring, "angle", 0) or 0))
     R = multiply(motion.placement(link).world_rotation, turn.astype(object))
-    first, second = (
-        _world_rows(case, parameters, motion, nodes, end) for end in ends
-    )
+    first, second = (_world_rows(case, parameters, motion, nodes, end) for end in ends)
     none = np.zeros(3, dtype=object)
     seen = carried(R, none)
-    return [
-        _difference(b, a) for a, b in zip(apply(seen, first), apply(seen, second), strict=True)
-    ]
+    return [_difference(b, a) for a, b in zip(apply(seen, first), apply(seen, second), strict=True)]
 
 
 def _world_rows(

@@ -1,4 +1,4 @@
-"""The graph of links and joints: a spanning tree from the ground, and the joints that close loops."""
+"""The graph of links and joints: a spanning tree from the ground, and what closes loops."""
 
 from __future__ import annotations
 
@@ -74,28 +74,30 @@ def _edge(case: CaseFile, name: str) -> Edge:
 
 
 def split(node: str) -> Node:
-    """"link.node" → (link, node)."""
+    """ "link.node" → (link, node)."""
     link, _, name = node.partition(".")
     return link, name
 
 
 def _walk(waiting: list[Edge]) -> tuple[list[Edge], list[Edge]]:
-    placed, tree, loops = {"ground"}, [], []
+    placed, tree = {"ground"}, list[Edge]()
     while waiting:
-        step = next((e for e in waiting if e.base[0] in placed and e.follower[0] not in placed),
-                    None)
+        step = next(
+            (e for e in waiting if e.base[0] in placed and e.follower[0] not in placed), None
+        )
         if step is None:
             closing = [e for e in waiting if e.base[0] in placed and e.follower[0] in placed]
-            backward = next((e for e in waiting if e.follower[0] in placed and e not in closing),
-                            None)
+            backward = next(
+                (e for e in waiting if e.follower[0] in placed and e not in closing), None
+            )
             if backward is None:
-                return tree, loops + closing
+                return tree, closing
             message = "hangs its base on its follower: swap base and follower"
             raise MechanismError(f"mechanism.joints.{backward.joint}", message)
         waiting = [e for e in waiting if e is not step]
         tree.append(step)
         placed.add(step.follower[0])
-    return tree, loops
+    return tree, []
 
 
 def _freedoms(case: CaseFile) -> tuple[Freedom, ...]:

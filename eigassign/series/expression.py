@@ -41,12 +41,11 @@ class Recorder:
         n, m = len(A), len(B[0])
         left = tuple(self.atom(entry) for row in A for entry in row)
         right = tuple(self.atom(entry) for row in B for entry in row)
-        return [[self._atom(("solve", left, right, n, i * m + j)) for j in range(m)]
-                for i in range(n)]
+        return [
+            [self._atom(("solve", left, right, n, i * m + j)) for j in range(m)] for i in range(n)
+        ]
 
-    def implicit(
-        self, function: ImplicitFunction, arguments: Sequence[Scalar]
-    ) -> list[Expression]:
+    def implicit(self, function: ImplicitFunction, arguments: Sequence[Scalar]) -> list[Expression]:
         """The components of an implicit function of ``arguments``."""
         atoms = tuple(self.atom(a) for a in arguments)
         return [self._atom(("implicit", atoms, function, i)) for i in range(function.size)]
@@ -120,7 +119,7 @@ class Expression:
             return self._build(self.constant * factor, terms)
         (a, j), (b, k) = self.single(), other.single()
         product = self.recorder._atom(("product", min(j, k), max(j, k)))
-        return product * (a * b)
+        return Expression(self.recorder, 0.0, {next(iter(product.terms)): a * b})
 
     __rmul__ = __mul__
 
@@ -136,7 +135,8 @@ class Expression:
         factor, atom = self.single()
         if factor < 0.0 and exponent != int(exponent):
             return self._recorded() ** exponent
-        return self.recorder._atom(("power", atom, float(exponent))) * factor**exponent
+        power = self.recorder._atom(("power", atom, float(exponent)))
+        return Expression(self.recorder, 0.0, {next(iter(power.terms)): factor**exponent})
 
     def __truediv__(self, other: Scalar) -> Scalar:
         if isinstance(other, Expression):

@@ -50,7 +50,6 @@ class Algebra(Protocol):
     def cosine(self, a: Floats) -> Floats:
         """Row by row cosine."""
 
-
     def solve(self, A: Floats, B: Floats, n: int) -> Floats:
         """X as rows (n m, …) of A X = B, entries as rows (n², …) and (n m, …)."""
 
@@ -321,4 +320,13 @@ def _linear_step(targets: Ints, nodes: list[Node]) -> Step:
     shape = (len(nodes), len(sources))
     matrix = sparse.csr_array((values, (rows, local)), shape=shape, dtype=np.float64)
     constants = np.array([float(str(node[1])) for node in nodes])
-    return Step("linear", targets, sources.astype(np.intp), targets[:0], constants, matrix, targets[:0], None)
+    return Step(
+        "linear",
+        targets,
+        sources.astype(np.intp),
+        targets[:0],
+        constants,
+        matrix,
+        targets[:0],
+        None,
+    )
