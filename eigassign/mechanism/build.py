@@ -22,16 +22,23 @@ Objects = NDArray[np.object_]
 
 def build_pencil(case: CaseFile, parameters: Parameters, motion: Kinematics) -> Pencil:
     """Assemble K and M of eq. (1) for a mechanism; raises MechanismError naming what is wrong."""
-    meshes = {p.link: link_mesh(case, parameters, motion.tree, p.link) for p in motion.placements}
-    nodes = NodeMotions(motion, meshes, case.mechanism.space)
-    nodes.number()
+    links, nodes = local_links(case, parameters, motion)
     stiffness, mass = Accumulator(), Accumulator()
-    for placement in motion.placements:
-        link = _local_link(placement, meshes[placement.link], nodes)
+    for link in links:
         add_link(stiffness, mass, link, nodes.count)
     _add_springs(stiffness, case, parameters, motion, nodes)
     _add_drives(stiffness, case, parameters, motion, nodes.count)
     return _compile(stiffness, mass, case, parameters, motion, nodes.count)
+
+
+def local_links(
+    case: CaseFile, parameters: Parameters, motion: Kinematics
+) -> tuple[list[LocalLink], NodeMotions]:
+    """Every link's matrices in its own frame, and how its nodes hang on the unknowns."""
+    meshes = {p.link: link_mesh(case, parameters, motion.tree, p.link) for p in motion.placements}
+    nodes = NodeMotions(motion, meshes, case.mechanism.space)
+    nodes.number()
+    return [_local_link(p, meshes[p.link], nodes) for p in motion.placements], nodes
 
 
 def _local_link(placement: Placement, mesh: LinkMesh, nodes: NodeMotions) -> LocalLink:

@@ -12,7 +12,7 @@ p(q, y), and the loops' twists J_p ṗ + J_q q̇ = 0 give ṗ = P q̇.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -121,6 +121,16 @@ def replayed(case: CaseFile, parameters: Parameters, tree: Tree, coords: Coordin
         raise MechanismError(f"mechanism.joints.{name}", message)
     values = [parameters.freedom(k) for k in range(len(tree.freedoms))]
     return walk(case, parameters, tree, coords, values, coords.rates.astype(object))
+
+
+def all_moving(case: CaseFile, parameters: Parameters, motion: Kinematics) -> Kinematics:
+    """The same motion with every coordinate among the columns, locked ones too."""
+    c = motion.coordinates
+    n = len(c.relative)
+    rates = np.zeros((len(motion.tree.freedoms), n))
+    rates[:n] = c.relative
+    coords = replace(c, columns=tuple(range(n)), rates=rates)
+    return replayed(case, parameters, motion.tree, coords)
 
 
 def walk(

@@ -7,7 +7,7 @@ a node per q̇ is v + ω × X of its link's twist with every coordinate free to 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.mechanism.geometry import link_type, node_position
-from eigassign.mechanism.kinematics import Kinematics, replayed
+from eigassign.mechanism.kinematics import Kinematics, all_moving
 from eigassign.mechanism.parameters import Parameters
 from eigassign.mechanism.tip_chain import TipChain
 from eigassign.mechanism.tree import split
@@ -103,11 +103,7 @@ class Poses:
     @cached_property
     def _all_moving(self) -> Kinematics:
         """The same motion with every coordinate among the columns."""
-        c = self.motion.coordinates
-        rates = np.zeros((len(self.motion.tree.freedoms), len(c.relative)))
-        rates[: len(c.relative)] = c.relative
-        coords = replace(c, columns=tuple(range(len(c.relative))), rates=rates)
-        return replayed(self.case, self.parameters, self.motion.tree, coords)
+        return all_moving(self.case, self.parameters, self.motion)
 
 
 def build_poses(case: CaseFile, parameters: Parameters, motion: Kinematics) -> Poses:
