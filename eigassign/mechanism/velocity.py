@@ -11,6 +11,7 @@ differences of the kinematics along the motion q(t), q̇(t), q̈(t).
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -150,7 +151,7 @@ def velocity_terms(case: CaseFile, parameters: Parameters, motion: Kinematics) -
             [t.coefficient for t in link.mass],
         ]
         cuts = np.cumsum([len(scalars), *(len(p) for p in parts)]).tolist()
-        slices = [slice(a, b) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+        slices = [slice(a, b) for a, b in itertools.pairwise(cuts)]
         scalars += [s for part in parts for s in part]
         tables.append(_LinkTable(link, *slices))
     n = len(parameters.coordinates) + len(parameters.design)
