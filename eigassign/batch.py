@@ -300,7 +300,10 @@ def _prepare_worker() -> None:
 
 
 def _follow_parent() -> None:
+    """End this worker after its parent's death: the pool's own loop may swallow the first try."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
-        os.kill(os.getpid(), signal.SIGTERM)
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGTERM)
+        time.sleep(_PATIENCE_S)
+        os.kill(os.getpid(), signal.SIGKILL)

@@ -41,7 +41,7 @@ def expand_plan(model: Model, plan: Plan, cache: Cache | None) -> tuple[Expansio
     full_order = affordable_order(model, plan.order)
     expansions, known = _expansions(model, plan, full_order, cache)
     full, linear = expansions.full, expansions.linear
-    notes = [_size_note(full, linear), *dict.fromkeys(full.notes + linear.notes)]
+    notes = [_size_note(expansions), *dict.fromkeys(full.notes + linear.notes)]
     if full_order < plan.order:
         notes.append(
             f"the full expansion, only there to compare with, stops at order {full_order}: order "
@@ -52,11 +52,11 @@ def expand_plan(model: Model, plan: Plan, cache: Cache | None) -> tuple[Expansio
     return expansions, notes
 
 
-def _size_note(full: Expansion, linear: Expansion) -> str:
-    sizes = (len(full.space), len(linear.space))
+def _size_note(expansions: Expansions) -> str:
+    full, linear = expansions.full.space, expansions.linear.space
     return (
-        f"order {full.order}: {sizes[0]} coefficients in full, {sizes[1]} partially linearised "
-        f"(order {linear.order}), in {full.space.n_variables} variables"
+        f"order {expansions.order} in {full.n_variables} variables: {len(linear)} coefficients "
+        f"partially linearised, {len(full)} in full"
     )
 
 
@@ -74,7 +74,7 @@ def _expansions(
     if cache is None:
         return _computed(model, plan, full_order), False
     entry = expansion_key(model, plan, full_order)
-    if (found := _stored(cache, entry)) is not None:
+    if (found := _stored(cache, entry, plan, full_order)) is not None:
         return found, True
     fresh = _computed(model, plan, full_order)
     cache.store(entry, flatten(_named(fresh)), _meta(plan))
@@ -86,6 +86,8 @@ def _computed(model: Model, plan: Plan, full_order: int) -> Expansions:
     return Expansions(
         full=expand(*point, full_order, linear_in_y=False),
         linear=expand(*point, plan.order, linear_in_y=True),
+        order=plan.order,
+        full_order=full_order,
     )
 
 
@@ -98,13 +100,13 @@ def _named(expansions: Expansions) -> dict[str, NDArray[Any]]:
     }
 
 
-def _stored(cache: Cache, entry: str) -> Expansions | None:
+def _stored(cache: Cache, entry: str, plan: Plan, full_order: int) -> Expansions | None:
     arrays = cache.load(entry)
     if arrays is None:
         return None
     try:
         named = unflatten(arrays)
-        return Expansions(*(_part(named, part) for part in ("full", "linear")))
+        return Expansions(_part(named, "full"), _part(named, "linear"), plan.order, full_order)
     except UsageError as error:
         _log.warning("cache entry %s cannot be used (%s); computed anew", entry[:12], error)
         return None

@@ -131,7 +131,8 @@ def _trajectory(tree: Tree, folder: Path, findings: list[Finding]) -> dict[str, 
         path = os.path.abspath(folder / file)
         changed["file"] = path
         if not os.path.isfile(path):
-            findings.append((("trajectory", "file"), f"no such file: {shown(path)}"))
+            named = path if path.isprintable() else ascii(path)
+            findings.append((("trajectory", "file"), f"no such file: {named}"))
     return changed
 
 

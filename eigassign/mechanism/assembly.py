@@ -124,7 +124,7 @@ def _add_elastic(target: Accumulator, term: Term, link: LocalLink) -> None:
 def _add_rigid_elastic(target: Accumulator, term: Term, link: LocalLink, n_u: int) -> None:
     """The u-q̇ part: Qᵀ m N T."""
     for spread in link.rigid:
-        coupling = np.asarray((term.matrix @ spread.matrix).todense())
+        coupling = np.asarray(term.matrix @ spread.matrix.toarray())
         coefficient = term.coefficient * spread.coefficient
         for component, row in enumerate(link.twist):
             column = coupling[:, component]
@@ -163,11 +163,13 @@ def rigid_inertia(link: LocalLink) -> Objects:
     """Nᵀ m N: the link's rigid inertia about the origin of its frame, (n_twist, n_twist)."""
     size = link.twist.shape[0]
     total = np.zeros((size, size), dtype=object)
+    spreads = [(spread.coefficient, spread.matrix.toarray()) for spread in link.rigid]
     for term in link.mass:
-        for left in link.rigid:
-            for right in link.rigid:
-                constant = (left.matrix.T @ term.matrix @ right.matrix).todense()
-                coefficient = term.coefficient * left.coefficient * right.coefficient
+        for right_factor, right in spreads:
+            momentum = term.matrix @ right  # dense from here on: three columns, however many nodes
+            for left_factor, left in spreads:
+                constant = left.T @ momentum
+                coefficient = term.coefficient * left_factor * right_factor
                 for a, b in zip(*np.nonzero(constant), strict=True):
                     total[a, b] = total[a, b] + coefficient * float(constant[a, b])
     return total

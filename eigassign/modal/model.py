@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from eigassign.errors import UsageError
 from eigassign.mechanism.kinematics import Kinematics
 from eigassign.mechanism.pencil import Pencil
 from eigassign.mechanism.poses import Poses
@@ -50,6 +51,12 @@ class Model:
         return np.sqrt(found.lam) / (2.0 * np.pi), found.phi
 
     def matrices(self, q: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
-        """M and K of eq. (1) for one sample, dense (n_dof, n_dof), unknowns [u; q̇]."""
-        K, M = self.pencil.matrices(self.pencil.theta(self.x(q, y)))
+        """M and K of eq. (1) for one sample, dense (n_dof, n_dof), unknowns [u; q̇].
+
+        Raises UsageError for several samples.
+        """
+        x = self.x(q, y)
+        if len(x) != 1:
+            raise UsageError(f"matrices are for one sample of q and y, not {len(x)}")
+        K, M = self.pencil.matrices(self.pencil.theta(x))
         return M[0], K[0]

@@ -1,8 +1,8 @@
-"""The reduced model: Ritz on the Taylor vectors, with the exact affine pencil.
+"""Building the reduced model: Taylor vectors, guards and probes, rank, projection, residual.
 
-The pencil is projected on span{φ_γ : |γ| ≤ m} ⊕ [0; I]: K̂(x) = Σ θ_j(x) VᵀK_jV and likewise M̂.
-Its eigenvalues share every derivative the Taylor vectors give, but stay accurate far beyond the
-radius of convergence. Rigid-body motion is projected out exactly, as in the exact solve.
+The basis holds the Taylor vectors of the wanted modes to order m; those of the modes below them
+and of the next one above to order m − 1; and a few modes above those as they are, so that one that
+comes down is seen.
 """
 
 from __future__ import annotations
@@ -13,122 +13,26 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.errors import UsageError
+from eigassign.errors import MechanismError, UsageError
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.basis import orthonormal
-from eigassign.modal.estimate import frequency_error
-from eigassign.modal.exact import condense
+from eigassign.modal.exact import Modes, modes_at
 from eigassign.modal.expansion import expand
+from eigassign.modal.half_norm import accurate_factors
+from eigassign.modal.pose import joint_rows, pose
 from eigassign.modal.project import project
-from eigassign.modal.residual import Residual, residual_factors
-from eigassign.modal.roundoff import rounding_error
+from eigassign.modal.reduced_model import ReducedModel
+from eigassign.modal.roundoff import rounding_weights
 from eigassign.modal.samples import samples
-from eigassign.series.program import Program, Samples
+from eigassign.series.program import Samples
+
+__all__ = ["ReducedModel", "reduce"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-CHUNK = 2048  # samples evaluated at once
-
-
-@dataclass(frozen=True, eq=False)
-class ReducedModel:
-    """Frequencies of ``modes`` from k + f unknowns; needs neither mesh nor mechanism. Immutable."""
-
-    modes: tuple[int, ...]
-    n_q: int
-    n_y: int
-    half_order: int
-    points: Floats  # (n_points, n_x): the expansion points
-    program: Program
-    to_program: Floats
-    shift: Floats
-    stiffness_terms: Ints  # indices of θ with a stiffness term
-    stiffness: Floats  # (n_terms, k, k)
-    mass_terms: Ints
-    mass: Floats  # (n_terms, k + f, k + f)
-    residual: Residual
-    material_terms: Ints  # indices of θ with a stiffness term that no joint coordinate enters
-    material: Floats  # their values at the first expansion point
-    rounding: float  # relative round-off of an exact solve of this pencil
-
-    @property
-    def size(self) -> int:
-        """Number k of basis vectors."""
-        return int(self.stiffness.shape[1])
-
-    def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
-        """(n_samples, n_modes) in Hz; ``error_estimate`` says how far to trust them."""
-        wanted = np.array(self.modes) - 1
-        parts = [self._ritz(theta, False)[0] for theta in self._theta(q, y)]
-        mu = np.concatenate(parts)[:, wanted]
-        return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(mu)))
-
-    def error_estimate(self, q: ArrayLike, y: ArrayLike) -> Floats:
-        """Estimate of the relative error in frequency, (n_samples, n_modes); no exact solve.
-
-        Infinite where it is refused: a neighbouring mode is not represented, so that not even the
-        identity of the mode is certain.
-        """
-        return np.concatenate([self._estimate(theta) for theta in self._theta(q, y)])
-
-    def _theta(self, q: ArrayLike, y: ArrayLike) -> list[Floats]:
-        x = samples(q, y, self.n_q, self.n_y)
-        chunks = [x[i : i + CHUNK] for i in range(0, len(x), CHUNK)]
-        return [self._theta_at(chunk) for chunk in chunks]
-
-    def _theta_at(self, x: Floats) -> Floats:
-        z = self.to_program @ x.T + self.shift[:, None]
-        theta = np.vstack([np.ones((1, len(x))), self.program.run(Samples(), z)])
-        if not np.isfinite(theta).all():
-            raise UsageError("q or y is outside the domain of a section or length")
-        return theta
-
-    def _matrices(self, theta: Floats) -> tuple[Floats, Floats, Floats]:
-        """K̂, M̂_c (n, k, k) and the coupling M̂_FF⁻¹ M̂_FE (n, f, k)."""
-        k = self.size
-        K = np.tensordot(theta[self.stiffness_terms].T, self.stiffness, axes=1)
-        M = np.tensordot(theta[self.mass_terms].T, self.mass, axes=1)
-        elastic, rigid = np.arange(k), np.arange(k, M.shape[1])
-        coupling, M_c = condense(M, elastic, rigid)
-        return K, M_c, coupling
-
-    def _ritz(self, theta: Floats, vectors: bool) -> tuple[Floats, Floats, Floats]:
-        """Ritz values μ̂ descending (n, k), vectors z (n, k, k) with zᵀK̂z = 1, and coupling."""
-        K, M_c, coupling = self._matrices(theta)
-        L = np.linalg.cholesky(K)
-        half = np.linalg.solve(L, M_c)
-        A = np.linalg.solve(L, np.swapaxes(half, 1, 2))
-        if not vectors:
-            return np.linalg.eigvalsh(A)[:, ::-1], A[:, :0], coupling
-        mu, v = np.linalg.eigh(A)
-        z = np.linalg.solve(np.swapaxes(L, 1, 2), v)
-        return mu[:, ::-1], z[:, :, ::-1], coupling
-
-    def _estimate(self, theta: Floats) -> Floats:
-        mu, z, coupling = self._ritz(theta, True)
-        count = min(max(self.modes) + 1, mu.shape[1])
-        norms = self._residual_norms(theta, mu[:, :count], z[:, :, :count], coupling)
-        error = frequency_error(mu[:, :count], norms / np.sqrt(self._softest(theta))[:, None])
-        return np.asarray(error[:, np.array(self.modes) - 1] + self.rounding)
-
-    def _softest(self, theta: Floats) -> Floats:
-        """How much softer than at x0 the softest part of the links is, (n,), at most 1.
-
-        ‖ρ‖ is measured in K(x0)⁻¹; K(x) ≥ α K(x0) makes ‖ρ‖²/α a bound in K(x)⁻¹. Joint angles
-        only turn the links against each other; material and section scale them.
-        """
-        if not len(self.material_terms):
-            return np.ones(theta.shape[1])
-        ratio = theta[self.material_terms] / self.material[:, None]
-        return np.asarray(np.clip(ratio.min(axis=0), 1e-300, 1.0))
-
-    def _residual_norms(self, theta: Floats, mu: Floats, z: Floats, coupling: Floats) -> Floats:
-        """‖M_c z − μ̂ K z‖ in K_E(x0)⁻¹ for every Ritz pair, (n, count)."""
-        wide = np.concatenate([z, -coupling @ z], axis=1)
-        r = self.residual
-        K = np.tensordot(theta[r.stiffness_terms].T, r.stiffness, axes=1)
-        M = np.tensordot(theta[r.mass_terms].T, r.mass, axes=1)
-        return np.asarray(np.linalg.norm(M @ wide - (K @ z) * mu[:, None, :], axis=1))
+MAX_HALF_ORDER = 10
+PROBES = 6  # modes above the guard that may join as they are at the expansion point
+DISTANT = 10.0  # λ beyond this multiple of the highest wanted one needs no probe
 
 
 def reduce(
@@ -141,32 +45,32 @@ def reduce(
 ) -> ReducedModel:
     """Reduced model from the Taylor vectors of ``modes`` to order m at one or several points.
 
-    q0 (n_q,) or (n_points, n_q), y0 likewise. With ``guard`` the modes below and the next one above
-    join to order m − 1: they cost little, sharpen the result, and let the error estimate see them.
+    q0 (n_q,) or (n_points, n_q), y0 likewise. ``guard=False`` leaves out all vectors but those of
+    ``modes`` and the modes below them as they are: smaller, but its estimate refuses far sooner.
     Raises UsageError for impossible arguments, AccuracyError where no basis can be made.
     """
+    wanted = tuple(sorted({int(m) for m in modes}))
     n_y = pencil.to_program.shape[1] - pencil.n_q
     points = samples(q0, y0, pencil.n_q, n_y)
-    if not 0 <= half_order <= 10:
-        raise UsageError(f"half_order {half_order} is not within 0 to 10")
-    elastic = pencil.elastic
-    vectors = [_taylor_vectors(pencil, x, modes, half_order, guard)[elastic] for x in points]
-    K0 = pencil.sparse(pencil.stiffness @ pencil.theta(points[:1])[:, 0])[elastic][:, elastic]
-    V = orthonormal(K0, np.hstack(vectors))
-    wide = np.zeros((pencil.n_dof, V.shape[1] + len(pencil.rigid)))
-    wide[elastic, : V.shape[1]] = V
-    wide[pencil.rigid, V.shape[1] :] = np.eye(len(pencil.rigid))
-    stiffness, mass = project(pencil, wide)
-    k_terms, m_terms = (
-        np.flatnonzero(np.diff(w.tocsc().indptr)) for w in (pencil.stiffness, pencil.mass)
-    )
-    theta0 = pencil.theta(points[:1])[:, 0]
-    joints = pencil.program.dependence[:, : pencil.n_q]
-    jointless = ~np.asarray(joints.any(axis=1))
-    scaled = [t for t in k_terms.tolist() if t and jointless[t - 1] and theta0[t]]
-    material = np.array(scaled, dtype=np.intp)
+    if not 0 <= half_order <= MAX_HALF_ORDER:
+        raise UsageError(f"half_order {half_order} is not within 0 to {MAX_HALF_ORDER}")
+    theta0 = pencil.theta(points)
+    found = lowest_modes(pencil, theta0, wanted[-1], 2 + PROBES if guard else 1)
+    count = _represented(found.lam, wanted[-1]) if guard else wanted[-1]
+    plan = _plan(pencil, wanted, half_order, guard)
+    vectors = [
+        np.hstack([_taylor_vectors(pencil, x, plan), phi[:, :count]])
+        for x, phi in zip(points, found.phi, strict=True)
+    ]
+    theta_mean = _mean_theta(pencil, points)
+    K = pencil.sparse(pencil.stiffness @ theta_mean)[pencil.elastic][:, pencil.elastic].tocsc()
+    V = orthonormal(K, np.hstack(vectors)[pencil.elastic])
+    at = joint_rows(pencil, K)
+    projected = _project(pencil, V, at.responses, theta0[:, 0])
+    k_terms = projected.stiffness_terms
+    material = _material_terms(pencil, k_terms, theta0[:, 0])
     return ReducedModel(
-        modes=tuple(sorted({int(m) for m in modes})),
+        modes=wanted,
         n_q=pencil.n_q,
         n_y=n_y,
         half_order=half_order,
@@ -175,31 +79,134 @@ def reduce(
         to_program=pencil.to_program,
         shift=pencil.shift,
         stiffness_terms=k_terms,
-        stiffness=stiffness[k_terms][:, : V.shape[1], : V.shape[1]],
-        mass_terms=m_terms,
-        mass=mass[m_terms],
-        residual=residual_factors(pencil, K0.tocsc(), V, elastic),
+        stiffness=projected.stiffness,
+        mass_terms=projected.mass_terms,
+        mass=projected.mass,
+        residual=accurate_factors(pencil, K, V, pencil.elastic),
+        pose=pose(pencil, at, theta_mean, projected.stiffness_rows, projected.mass_rows),
         material_terms=material,
-        material=theta0[material],
-        rounding=3.0 * rounding_error(pencil, points[0], max(modes)),
+        material=theta0[material, 0],
+        anchors=_anchors(found.lam, count),
+        stiffness_rounding=projected.stiffness_rounding,
+        mass_rounding=projected.mass_rounding,
     )
 
 
+def lowest_modes(pencil: Pencil, theta: Floats, least: int, extra: int) -> Modes:
+    """At least the lowest ``least`` modes, and up to ``extra`` more where so many have mass."""
+    most = max(min(least + extra, len(pencil.elastic)), least)
+    for count in range(most, least, -1):
+        try:
+            return modes_at(pencil, theta, count)
+        except MechanismError:
+            continue
+    return modes_at(pencil, theta, least)
+
+
+def _represented(lam: Floats, highest: int) -> int:
+    """How many modes join the basis at least as they are: a guard, and probes up to DISTANT."""
+    near = (lam < DISTANT * lam[:, [highest - 1]]).any(axis=0)
+    wished = max(int(near.sum()), highest + 1)
+    return int(min(wished, highest + 1 + PROBES, lam.shape[1]))
+
+
+def _anchors(lam: Floats, count: int) -> Floats:
+    """μ of the represented modes and of the next one; 0 where there is none."""
+    following = 1.0 / lam[:, count : count + 1] if lam.shape[1] > count else np.zeros((len(lam), 1))
+    return np.hstack([1.0 / lam[:, :count], following])
+
+
+def _plan(
+    pencil: Pencil, wanted: tuple[int, ...], half_order: int, guard: bool
+) -> list[tuple[tuple[int, ...], int]]:
+    """(modes, order) of their Taylor vectors: the wanted ones and, to one order less, guards."""
+    guards = [m for m in range(1, wanted[-1] + 2) if m not in wanted and m <= len(pencil.elastic)]
+    if not guard or not guards or half_order < 2:
+        return [(wanted, half_order)]
+    return [(wanted, half_order), (tuple(guards), half_order - 1)]
+
+
 def _taylor_vectors(
-    pencil: Pencil, x0: Floats, modes: Sequence[int], half_order: int, guard: bool
+    pencil: Pencil, x0: Floats, plan: Sequence[tuple[Sequence[int], int]]
 ) -> Floats:
-    """Columns φ_γ (n_dof, N) of the modes and, to one order less, of their guards."""
-    wanted = sorted({int(m) for m in modes})
-    elastic = pencil.n_dof - len(pencil.rigid)
-    others = [m for m in range(1, min(wanted[-1] + 1, elastic) + 1) if m not in wanted]
-    columns = [_columns(pencil, x0, wanted, half_order)]
-    if guard and others:
-        columns.append(_columns(pencil, x0, others, max(half_order - 1, 0)))
+    """Columns φ_γ (n_dof, N)."""
+    columns = []
+    for modes, order in plan:
+        q0, y0 = x0[: pencil.n_q], x0[pencil.n_q :]
+        found = expand(pencil, q0, y0, modes, order=max(order, 1), vector_order=order)
+        columns += [X.transpose(1, 0, 2).reshape(pencil.n_dof, -1) for X in found.vectors]
     return np.hstack(columns)
 
 
-def _columns(pencil: Pencil, x0: Floats, modes: Sequence[int], order: int) -> Floats:
-    q0, y0 = x0[: pencil.n_q], x0[pencil.n_q :]
-    found = expand(pencil, q0, y0, modes, order=max(order, 1), vector_order=order)
-    blocks = [X.transpose(1, 0, 2).reshape(pencil.n_dof, -1) for X in found.vectors]
-    return np.hstack(blocks)
+def _mean_theta(pencil: Pencil, points: Floats) -> Floats:
+    """θ averaged over turned poses; its K_E is the inner product of basis and residual.
+
+    A vector smooth in one pose kinks the joints of another, with a strain energy many times that of
+    a mode. In K_E(x0) numbers of that size would have to cancel; in the mean stiffness they do not.
+    """
+    z = points @ pencil.to_program.T + pencil.shift
+    z[:, pencil.n_q :] = z[0, pencil.n_q :]
+    turns = np.zeros(len(pencil.shift))
+    turns[: pencil.n_q] = _periodic(pencil, z[0])
+    turned = np.concatenate([z + k * turns * (np.pi / 2.0) for k in range(4)])
+    theta = _theta_at(pencil, turned)
+    return np.asarray(theta[:, np.isfinite(theta).all(axis=0)].mean(axis=1))
+
+
+def _theta_at(pencil: Pencil, z: Floats) -> Floats:
+    """θ (n_theta, n) at program variables z (n, n_z)."""
+    return np.vstack([np.ones((1, len(z))), pencil.program.run(Samples(), z.T)])
+
+
+def _periodic(pencil: Pencil, z: Floats) -> NDArray[np.bool_]:
+    """Which joint coordinates are angles (n_q,): a full turn changes nothing but round-off."""
+    turned = z + 2.0 * np.pi * np.vstack([np.zeros(len(z)), np.eye(len(z))[: pencil.n_q]])
+    theta = _theta_at(pencil, turned)
+    same = np.abs(theta[:, 1:] - theta[:, :1]) <= 1e-9 * np.abs(theta).max(axis=1, keepdims=True)
+    return np.asarray(same.all(axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class _Projected:
+    """Non-zero terms of K̂ on V and of M̂ on [V, I_F], and their rows on other vectors."""
+
+    stiffness_terms: Ints
+    stiffness: Floats
+    stiffness_rows: Floats
+    mass_terms: Ints
+    mass: Floats
+    mass_rows: Floats
+    stiffness_rounding: Floats
+    mass_rounding: Floats
+
+
+def _project(pencil: Pencil, V: Floats, others: Floats, theta0: Floats) -> _Projected:
+    """Project on V (n_elastic, k) with the rigid-body modes; ``others`` (n_dof, j) for the rows."""
+    k, f = V.shape[1], len(pencil.rigid)
+    wide = np.zeros((pencil.n_dof, k + f + others.shape[1]))
+    wide[pencil.elastic, :k] = V
+    wide[pencil.rigid, k : k + f] = np.eye(f)
+    wide[:, k + f :] = others
+    stiffness, mass = project(pencil, wide)
+    k_terms, m_terms = (
+        np.flatnonzero(np.diff(w.tocsc().indptr)) for w in (pencil.stiffness, pencil.mass)
+    )
+    d_K, d_M = rounding_weights(pencil, theta0)
+    basis = wide[:, : k + f]
+    return _Projected(
+        k_terms,
+        stiffness[k_terms, :k, :k],
+        stiffness[k_terms, k + f :, :k],
+        m_terms,
+        mass[m_terms, : k + f, : k + f],
+        mass[m_terms, k + f :, : k + f],
+        (basis[:, :k].T * d_K) @ basis[:, :k],
+        (basis.T * d_M) @ basis,
+    )
+
+
+def _material_terms(pencil: Pencil, k_terms: Ints, theta0: Floats) -> Ints:
+    """Indices of θ with a stiffness term that design parameters scale and no joint enters."""
+    jointless = ~np.asarray(pencil.program.dependence[:, : pencil.n_q].any(axis=1))
+    scaled = [t for t in k_terms.tolist() if t and jointless[t - 1] and theta0[t]]
+    return np.array(scaled, dtype=np.intp)

@@ -5,7 +5,7 @@ Only the exact solves cost anything, so all points of one study are solved in on
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,16 +16,25 @@ from eigassign.modal.model import Model
 from eigassign.study.findings import Comparison, DesignMap
 
 Floats = NDArray[np.float64]
-GRID = 13  # points along each axis of a map, both ends included; odd, so that the middle is one
-LINE = 61  # points of a map over one variable
+# Points along the axes of a map of one and of two variables, both ends included; odd, so that the
+# middle is one of them; fewer where a single exact solve takes milliseconds.
+AXES = {1: 61, 2: 13}
+COARSE = {1: 21, 2: 7}
 
 
 @dataclass(frozen=True)
 class Expansions:
-    """The full and the partially linearised expansion of the same modes about the same point."""
+    """The full and the partially linearised expansion of the same modes about the same point.
+
+    ``order`` is that of the linearised one, as asked for; ``full_order`` may be lower, where the
+    full set would be too large. (The degree of a set may be lower still: where no coordinate
+    matters, the linearised set is linear whatever its order.)
+    """
 
     full: Expansion
     linear: Expansion
+    order: int
+    full_order: int
 
     @property
     def modes(self) -> tuple[int, ...]:
@@ -93,15 +102,17 @@ def grid_over(
     lower: Floats,
     upper: Floats,
     x0: Floats,
+    counts: Mapping[int, int] = AXES,
 ) -> Grid | None:
     """A grid over the first two of ``entries`` of x that have room between their bounds.
 
-    ``names``, ``units``, ``lower`` and ``upper`` belong to the entries. None without room.
+    ``names``, ``units``, ``lower`` and ``upper`` belong to the entries, ``counts`` are points an
+    axis by the number of axes. None without room.
     """
     chosen = [k for k in range(len(entries)) if upper[k] > lower[k]][:2]
     if not chosen:
         return None
-    count = LINE if len(chosen) == 1 else GRID
+    count = counts[len(chosen)]
     return Grid(
         tuple(entries[k] for k in chosen),
         tuple(names[k] for k in chosen),

@@ -86,13 +86,52 @@ def _warnings(scene: Scene, assigned: Assigned | None) -> Iterator[str]:
     modes = tuple(sorted({target.mode for target in assigned.targets}))
     for hz, design in ((assigned.initial_hz, "initial"), (assigned.exact_hz, "optimal")):
         yield from crossing_warnings(hz, modes, scene.path.time_s, design)
-    limit = scene.file.validation.max_error
-    for target in assigned.targets:
-        if target.approximation_error > limit:
-            yield (
-                f"mode {target.mode}: the linearised frequency that the optimum rests on is up to "
-                f"{100 * target.approximation_error:.3g} % off the exact one, over the "
-                f"{100 * limit:g} % of validation.max_error; the exact frequencies hold, but a "
-                "better design may exist: expand nearer to it (expansion.y), narrow the bounds, or "
-                "raise expansion.order"
-            )
+    yield from _accuracy_warnings(scene, assigned)
+    yield from _worsening(scene, assigned)
+
+
+def _accuracy_warnings(scene: Scene, assigned: Assigned) -> Iterator[str]:
+    """For each target whose predicted frequency is farther off than the case accepts."""
+    limit, y = scene.file.validation.max_error, assigned.assignment.y
+    off = [t for t in assigned.targets if not t.approximation_error <= limit]
+    for target in off:
+        taylor = scene.expansions.full.frequencies(scene.path.q, y)
+        taylor_hz = taylor[:, scene.expansions.column(target.mode)]
+        enough = np.all(np.abs(taylor_hz / target.exact_hz - 1.0) <= limit)
+        point = ", ".join(f"{value:.4g}" for value in y)
+        advice = (
+            f"λ is not linear enough in the design: try expansion.y: [{point}], or narrower bounds"
+            if enough
+            else "so is the full expansion: narrow the bounds, expand nearer or to a higher order"
+        )
+        yield (
+            f"mode {target.mode}: the prediction that the optimum rests on is up to "
+            f"{100 * target.approximation_error:.3g} % off the exact frequency, over the "
+            f"{100 * limit:g} % of validation.max_error ({advice}); the exact frequencies hold, "
+            "but there may be a better design"
+        )
+
+
+def _worsening(scene: Scene, assigned: Assigned) -> Iterator[str]:
+    """Where, in truth, the initial design was nearer to the targets than the optimum is."""
+    weighed = list(zip(scene.file.targets, assigned.targets, strict=True))
+    before = sum(file.weight * target.initial.rms_relative**2 for file, target in weighed)
+    after = sum(file.weight * target.exact.rms_relative**2 for file, target in weighed)
+    if after > before and _is_feasible(scene):
+        yield (
+            "the initial design is nearer to the targets than this optimum is, when both are "
+            "solved exactly: the expansion misleads here; do not use this design"
+        )
+
+
+def _is_feasible(scene: Scene) -> bool:
+    """Whether the initial design meets the constraints (its bounds it always does)."""
+    names = scene.model.y_names
+    initial = dict(zip(names, scene.initial, strict=True))
+    for constraint in scene.file.design.constraints.values():
+        total = sum(factor * initial[name] for name, factor in constraint.terms.items())
+        low = -np.inf if constraint.min is None else constraint.min
+        high = np.inf if constraint.max is None else constraint.max
+        if not low <= total <= high:
+            return False
+    return True

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import zip_longest
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.study.approximation import Grid, compare, grid_over, map_over
+from eigassign.modal.exact import DENSE_LIMIT
+from eigassign.study.approximation import AXES, COARSE, Grid, compare, grid_over, map_over
 from eigassign.study.findings import Comparison, ModeStudy
 from eigassign.study.plan import joint_map
 from eigassign.study.scene import Scene
@@ -27,8 +29,11 @@ def study_modes(scene: Scene, initial_hz: Floats | None = None) -> tuple[ModeStu
     over_q = map_over(model, expansions, q_grid(scene))
     x0 = (expansions.full.q0, expansions.full.y0)
     parts = zip_longest(expansions.modes, over_time, over_design, over_q)
-    order = expansions.linear.order
-    return tuple(ModeStudy(m, order, *x0, time, y, q) for m, time, y, q in parts)
+    return tuple(ModeStudy(m, expansions.order, *x0, time, y, q) for m, time, y, q in parts)
+
+
+def _counts(scene: Scene) -> Mapping[int, int]:
+    return AXES if scene.model.n_dof <= DENSE_LIMIT else COARSE
 
 
 def design_grid(scene: Scene) -> Grid | None:
@@ -41,6 +46,7 @@ def design_grid(scene: Scene) -> Grid | None:
         lower,
         upper,
         scene.expansions.full.x0,
+        _counts(scene),
     )
 
 
@@ -66,4 +72,5 @@ def q_grid(scene: Scene) -> Grid | None:
         lower,
         upper,
         scene.expansions.full.x0,
+        _counts(scene),
     )

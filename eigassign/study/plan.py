@@ -14,6 +14,7 @@ from eigassign.mechanism.trajectory import Trajectory
 from eigassign.modal.model import Model
 
 Floats = NDArray[np.float64]
+_SHOWN = 8
 _MANY = 500  # samples up to which every distance between two of them counts
 
 
@@ -101,18 +102,14 @@ def _y0(file: CaseFile, model: Model) -> tuple[Floats, str]:
 
 
 def _modes(file: CaseFile, override: Sequence[int] | None) -> tuple[tuple[int, ...], str]:
-    """Modes to expand: those asked for, and always those with a target."""
-    targets = {target.mode for target in file.targets}
-    given = override if override is not None else file.expansion.modes
-    if given == "auto":
-        if targets:
-            return tuple(sorted(targets)), f"modes {_listed(targets)}: those with a target"
-        return (1,), "mode 1: the lowest, for there is no target"
-    asked = {int(str(mode)) for mode in given}
-    if override is not None or targets <= asked:
-        return tuple(sorted(asked)), ""
-    added = f"modes {_listed(targets - asked)} are expanded too, because they have a target"
-    return tuple(sorted(asked | targets)), added
+    """Modes to expand; that they hold those with a target is the case file's own rule."""
+    given = file.expansion.modes if override is None else override
+    if given != "auto":
+        return tuple(sorted({int(mode) for mode in given})), ""
+    targets = sorted({target.mode for target in file.targets})
+    if not targets:
+        return (1,), "expanded mode: 1, the lowest, for there is no target"
+    return tuple(targets), f"expanded modes: {', '.join(map(str, targets))}, those with a target"
 
 
 def _check_modes(file: CaseFile, model: Model, modes: Sequence[int]) -> None:
@@ -143,12 +140,10 @@ def _outside(
 
 
 def shown_point(names: Sequence[str], values: Floats) -> str:
-    """``"q1 = 1.817, q2 = 5.312"``."""
-    return ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, values, strict=True)) or "none"
-
-
-def _listed(modes: set[int]) -> str:
-    return ", ".join(str(mode) for mode in sorted(modes))
+    """``"q1 = 1.817, q2 = 5.312"``; of many the first."""
+    shown = [f"{n} = {v:.6g}" for n, v in zip(names, values, strict=True)]
+    rest = f" and {len(shown) - _SHOWN} more" if len(shown) > _SHOWN else ""
+    return (", ".join(shown[:_SHOWN]) or "none") + rest
 
 
 def _wrong(file: CaseFile, key_path: str, message: str) -> CaseError:

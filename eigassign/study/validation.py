@@ -131,12 +131,12 @@ def _spans(file: CaseFile, n_q: int) -> Floats:
 
 def _row(scene: Scene, k: int, where: str, values: Comparison) -> ValidationRow:
     expansions, limit = scene.expansions, scene.file.validation.max_error
-    counts = expansions.full.order == expansions.linear.order
+    counts = expansions.full_order == expansions.order
     counted = [values.worst_linearised, *([values.worst_taylor] if counts else [])]
     return ValidationRow(
         case=scene.file.path.stem,
         mode=expansions.modes[k],
-        order=expansions.linear.order,
+        order=expansions.order,
         where=where,
         points=values.exact_hz.size,
         worst_taylor=values.worst_taylor,

@@ -130,10 +130,13 @@ def random_chain(seed: int) -> tuple[Tree, np.ndarray]:
         },
         "coordinates": {},
     }
+    mechanism = tree["mechanism"]
     for k in range(n):
         _random_link(tree, k, rng)
-    coordinates = tree["coordinates"]
-    return tree, rng.uniform(-3.0, 3.0, len(coordinates))
+    if seed % 2:  # the order in the file means nothing
+        for where, key in ((tree, "coordinates"), (mechanism, "joints"), (mechanism, "links")):
+            where[key] = dict(reversed(where[key].items()))
+    return tree, rng.uniform(-3.0, 3.0, len(tree["coordinates"]))
 
 
 def _random_link(tree: Tree, k: int, rng: np.random.Generator) -> None:

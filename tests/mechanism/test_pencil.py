@@ -7,7 +7,7 @@ import pytest
 from chains import A_PAPER, bar, model_of, random_chain, two_link
 from frame_oracle import frame
 
-from eigassign.errors import CaseError, MechanismError
+from eigassign.errors import CaseError, MechanismError, UsageError
 from eigassign.modal.model import Model
 
 SEEDS = range(0, 60, 4)
@@ -69,6 +69,23 @@ def test_two_of_three_coordinates_locked_leave_the_rate_of_the_third() -> None:
     a, b, c = 0.6, 0.45, np.cos(q[1] - q[0])
     about_root = L * a**3 / 3 + L * b**3 / 3 + L * b * a * a + L * b * b * a * c
     np.testing.assert_allclose(M[-1, -1], about_root, rtol=1e-13)
+
+
+def test_an_absolute_rate_beyond_a_locked_joint_is_that_of_its_link_in_the_world() -> None:
+    tree = two_link(drives=("free", "locked"), angles=("absolute", "absolute"), design={})
+    rod = {"length": 0.3, "material": "al", "section": "rod", "elements": 2}
+    tree["mechanism"]["links"]["hand"] = rod
+    wrist = {"type": "revolute", "base": "fore.end", "follower": "hand.start"}
+    tree["mechanism"]["joints"]["wrist"] = wrist
+    tree["coordinates"]["q3"] = {"joint": "wrist", "angle": "absolute"}
+    q, line, a, b, c = np.array([0.4, 1.7, -0.5]), 1.9, 0.6, 0.45, 0.3
+    M, _ = model_of(tree).matrices(q, [])
+    # q̇1 = 1, q̇3 = 0: the locked pair turns about the ground, the hand only travels with the wrist
+    bend = np.cos(q[1] - q[0])
+    wrist_squared = a * a + b * b + 2 * a * b * bend
+    pair = line * (a**3 / 3 + b**3 / 3 + b * a * a + b * b * a * bend)
+    np.testing.assert_allclose(M[-2, -2], pair + line * c * wrist_squared, rtol=1e-13)
+    np.testing.assert_allclose(M[-1, -1], line * c**3 / 3, rtol=1e-13)
 
 
 def test_a_stiff_drive_tends_to_a_locked_joint_and_a_soft_one_to_a_free_joint() -> None:
@@ -194,6 +211,11 @@ def test_every_measure_of_a_section_can_be_designed(
     for at in (0.9 * value, 1.1 * value):
         lam = (2.0 * np.pi * model.frequencies([0.2], [at], 3)[0]) ** 2
         np.testing.assert_allclose(lam, frame(tree(at), np.array([0.2])).eigenvalues(3), rtol=1e-9)
+
+
+def test_matrices_are_for_one_sample() -> None:
+    with pytest.raises(UsageError, match="one sample of q and y, not 3"):
+        model_of(two_link()).matrices(np.zeros((3, 2)), [0.0, 0.0])
 
 
 def test_a_link_without_mass_that_moves_freely_is_refused_by_name() -> None:

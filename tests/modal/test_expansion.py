@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -13,12 +14,21 @@ from pencils import crossing
 
 from eigassign.api import expand
 from eigassign.errors import UsageError
-from eigassign.modal import coefficients, exact, expansion, recursion
+from eigassign.modal import coefficients, exact, expansion
 from eigassign.modal.expansion import Expansion, clusters
 from eigassign.modal.expansion import expand as expand_pencil
 from eigassign.modal.model import Model
+from eigassign.modal.rayleigh import vector_members
 from eigassign.modal.recursion import expand_subspace
-from eigassign.series.lower_set import box, lower_set, total_degree, weighted_degree
+from eigassign.modal.substitution import substitute
+from eigassign.series.lower_set import (
+    box,
+    lower_set,
+    partially_linear,
+    total_degree,
+    weighted_degree,
+)
+from eigassign.series.power_series import monomials
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 HELD = {"stiffness": 2e3}
@@ -139,6 +149,24 @@ def test_the_quotient_has_the_eigenvalues_of_the_recursion() -> None:
     vectors = exact.modes(model.pencil, found.x0[None], 1)
     series = expand_subspace(model.pencil, theta, found.space, vectors.lam[0], vectors.phi[0])
     agree(found.clusters[0].coefficients[0, 0], series.values[:, 0, 0], 1e-10)
+
+
+def test_only_a_set_that_is_linear_in_some_variables_may_leave_out_their_vectors() -> None:
+    design = np.array([False, True, True])
+    linear, full = partially_linear(1, 2, 4), total_degree(3, 4)
+    members = linear.indices[vector_members(linear, design)]
+    assert members.tolist() == [[k, 0, 0] for k in range(5)]
+    np.testing.assert_array_equal(vector_members(full, design), full.degrees <= 2)
+
+
+def test_variables_may_be_renamed_in_another_order() -> None:
+    space = total_degree(2, 3)
+    values = np.random.default_rng(0).standard_normal((1, len(space)))
+    swapped, found = substitute(space, values, np.array([[0.0, 1.0], [1.0, 0.0]]), 2, 0)
+    x = np.array([[0.3, -0.7]])
+    np.testing.assert_allclose(
+        found @ monomials(swapped, x).T, values @ monomials(space, x[:, ::-1]).T
+    )
 
 
 def test_too_few_vectors_do_not_give_the_order() -> None:
@@ -362,9 +390,10 @@ def test_linear_in_design_holds_for_clusters_and_for_parameters_that_do_not_matt
     model, y0 = model_of(tree), np.array([*Y0, 69e9])
     e = expand_pencil(model.pencil, Q0, y0, (1, 2), 3, cluster_gap=0.9)
     assert e.clusters[0].modes[:2] == (1, 2)
-    l0, slopes = e.linear_in_design(Q0[None] + 0.05)
+    q = Q0 + np.array([0.0, 0.15])  # off the point, where the small matrix is not diagonal
+    l0, slopes = e.linear_in_design(q)
     np.testing.assert_array_equal(slopes[:, :, 2], 0.0)
-    at = lambda h: e.eigenvalues(Q0 + 0.05, y0 + h * np.eye(3)[0])  # noqa: E731
+    at = lambda h: e.eigenvalues(q, y0 + h * np.eye(3)[0])  # noqa: E731
     np.testing.assert_allclose(l0, at(0.0), rtol=1e-12)
     expected = richardson(lambda h: (at(h) - at(-h)) / (2 * h), 0.02)
     np.testing.assert_allclose(slopes[:, :, 0], expected, rtol=1e-8)
@@ -410,13 +439,24 @@ def test_a_structure_without_variables_has_a_constant_expansion() -> None:
 # Large pencils
 
 
+def treat_as_large(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every dense limit of the modal package to nothing, wherever it has been imported to."""
+    limited = [
+        module
+        for name, module in list(sys.modules.items())
+        if name.startswith("eigassign.modal.") and hasattr(module, "DENSE_LIMIT")
+    ]
+    assert {exact, coefficients} <= set(limited)
+    for module in limited:
+        monkeypatch.setattr(module, "DENSE_LIMIT", 0)
+
+
 def test_a_large_chain_is_expanded_sparsely_to_the_same_series(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     model = model_of(two_link((12, 9)))
     dense = expand(model, Q0, Y0, (1, 2), 4)
-    for module in (coefficients, exact, recursion):
-        monkeypatch.setattr(module, "DENSE_LIMIT", 0)
+    treat_as_large(monkeypatch)
     thin = expand(model, Q0, Y0, (1, 2), 4)
     agree(thin.coefficients, dense.coefficients, 1e-9)
     for a, b in zip(thin.vectors, dense.vectors, strict=True):
@@ -432,8 +472,7 @@ def test_six_hundred_unknowns_have_the_series_of_a_coarser_mesh() -> None:
 def test_a_cluster_is_expanded_sparsely_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
     pencil = crossing(1e-2)
     dense = expand_pencil(pencil, [0.0, 0.1], [], (1, 2), 5)
-    for module in (coefficients, recursion):
-        monkeypatch.setattr(module, "DENSE_LIMIT", 0)
+    treat_as_large(monkeypatch)
     thin = expand_pencil(pencil, [0.0, 0.1], [], (1, 2), 5)
     np.testing.assert_allclose(
         thin.clusters[0].coefficients, dense.clusters[0].coefficients, atol=1e-10

@@ -187,7 +187,7 @@ def test_stacks_are_composed_row_by_row() -> None:
 
 
 def test_mixing_sets_wrong_sizes_and_zero_to_a_power_are_refused() -> None:
-    a, b = some(total_degree(2, 3), 1), some(box((3, 3)), 1)
+    a, b = some(total_degree(2, 3), 1), some(box((4, 1)), 1)  # as many members
     with pytest.raises(UsageError, match="different sets"):
         _ = a + b
     with pytest.raises(UsageError, match="different sets"):

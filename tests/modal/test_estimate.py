@@ -1,0 +1,119 @@
+"""The error estimate: its parts by independent computation, and its coverage."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from chains import model_of, random_chain, two_link
+
+from eigassign.modal.estimate import frequency_error
+from eigassign.modal.reduced import reduce
+from eigassign.modal.roundoff import rounding_error, rounding_weights
+
+Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
+
+
+def symmetric_pencil(seed: int, gap: float) -> tuple[np.ndarray, np.ndarray]:
+    """μ of a random matrix diag(H1, H2) + coupling, with two Ritz values ``gap`` apart."""
+    rng = np.random.default_rng(seed)
+    H = np.diag([1.0, 1.0 - gap, 0.4, 0.2, 0.1])
+    H[:2, 2:] = rng.uniform(-0.02, 0.02, (2, 3))
+    H[2:, :2] = H[:2, 2:].T
+    return H, H[:2, 2:]
+
+
+@pytest.mark.parametrize("gap", [0.3, 1e-2, 1e-4, 1e-8, 0.0])
+@pytest.mark.parametrize("seed", range(20))
+def test_the_bound_holds_for_pairs_that_cross_inside_the_basis(gap, seed):
+    H, coupling = symmetric_pencil(seed, gap)
+    mu = np.diag(H)[None, :2]
+    exact = np.linalg.eigvalsh(H)[::-1][:2]
+    error = frequency_error(mu, (coupling @ coupling.T)[None], np.array([0.41]), mu)
+    true = np.sqrt(exact / mu[0]) - 1.0
+    assert (error[0] >= true - 1e-15).all()
+    assert error.max() < 100.0 * true.max()  # quadratic in the residual, however close they are
+
+
+def test_a_mode_outside_the_basis_that_may_lie_below_is_refused():
+    mu, gram = np.array([[1.0, 0.5]]), 1e-8 * np.eye(2)[None]
+    assert np.isfinite(frequency_error(mu, gram, np.array([0.1]), mu)).all()
+    assert np.isinf(frequency_error(mu, gram, np.array([0.6]), mu)).tolist() == [[False, True]]
+
+
+def test_a_mode_that_has_left_the_basis_is_missed():
+    """Three modes lay close together at the expansion point; now there are two, and one is lost."""
+    anchors = np.array([[1.0, 0.95, 0.5, 0.01]])
+    mu, gram = np.array([[1.0, 0.5, 0.02]]), np.diag([1e-10, 1e-10, 1e-2])[None]
+    refused = np.isinf(frequency_error(mu, gram, np.array([0.01]), anchors))
+    assert refused.all()
+    whole = np.diag([1e-10, 1e-10, 1e-10])[None]
+    assert np.isfinite(frequency_error(mu, whole, np.array([0.01]), anchors)).all()
+
+
+@pytest.mark.parametrize("seed", [2, 33, 46, 44, 9])
+def test_the_residual_is_measured_in_the_stiffness_of_the_pose_at_hand(seed):
+    """Against K_E(q)⁻¹ applied to the full residual; no design parameter, so it is exact."""
+    tree, q0 = random_chain(seed)
+    pencil = model_of(tree).pencil
+    reduced = reduce(pencil, q0, [], (1,), 1)
+    q = q0 + np.random.default_rng(seed).uniform(-1.0, 1.0, (3, len(q0)))
+    theta = reduced._theta(q)
+    mu, z, coupling = reduced._ritz(theta, True)
+    count = reduced.anchors.shape[1] - 1
+    wide = np.concatenate([z, -coupling @ z], axis=1)[:, :, :count]
+    gram = reduced._residual_gram(q, theta, mu[:, :count], wide)
+    expected = full_gram(pencil, q, q0, mu[:, :count], count)
+    # A residual below 1e-10 of μ is round-off and may differ.
+    scale = np.maximum(np.sqrt(np.einsum("nii->ni", expected)), 1e-5 * mu[:, :count])
+    pairs = scale[:, :, None] * scale[:, None, :]
+    np.testing.assert_allclose(gram / pairs, expected / pairs, atol=1e-5)
+
+
+def full_gram(pencil, q, q0, mu, count):
+    """ρᵀ K_E(q)⁻¹ ρ with full matrices and an own Ritz step on the same vectors."""
+    import eigassign.modal.reduced as module
+
+    kept = {}
+    original = module.accurate_factors
+    module.accurate_factors = lambda *a: kept.setdefault("V", a[2]) is None or original(*a)
+    try:
+        module.reduce(pencil, q0, [], (1,), 1)
+    finally:
+        module.accurate_factors = original
+    V, E, F = kept["V"], pencil.elastic, pencil.rigid
+    grams = []
+    for row in q:
+        K, M = (a[0] for a in pencil.matrices(pencil.theta(row[None])))
+        M_c = M[np.ix_(E, E)]
+        if len(F):
+            M_c = M_c - M[np.ix_(E, F)] @ np.linalg.solve(M[np.ix_(F, F)], M[np.ix_(F, E)])
+        K_E = K[np.ix_(E, E)]
+        L = np.linalg.inv(np.linalg.cholesky(V.T @ K_E @ V))
+        values, v = np.linalg.eigh(L @ (V.T @ M_c @ V) @ L.T)
+        z = V @ (L.T @ v)[:, ::-1][:, :count]
+        rho = M_c @ z - K_E @ z * values[::-1][:count]
+        gram = rho.T @ np.linalg.solve(K_E, rho)
+        grams.append(gram)
+    return np.array(grams)
+
+
+def test_the_weights_bound_the_round_off_of_a_mode():
+    model = model_of(two_link())
+    x = np.concatenate([Q0, Y0])
+    theta = model.pencil.theta(x[None])[:, 0]
+    d_K, d_M = rounding_weights(model.pencil, theta)
+    K, M = (a[0] for a in model.pencil.matrices(theta[:, None]))
+    z = np.abs(model.modes(Q0, Y0, 3)[1][0])
+    for column in z.T:
+        assert column @ np.abs(K) @ column <= d_K @ column**2 * (1.0 + 1e-12)
+        assert column @ np.abs(M) @ column <= d_M @ column**2 * (1.0 + 1e-12)
+
+
+def test_a_fine_mesh_has_a_larger_round_off_and_states_it():
+    x = np.concatenate([Q0, Y0])
+    coarse, fine = (
+        rounding_error(model_of(two_link(elements=(n, n))).pencil, x, 1) for n in (4, 100)
+    )
+    assert fine > 1e3 * coarse
+    model = model_of(two_link(elements=(100, 100)))
+    assert reduce(model.pencil, Q0, Y0).error_estimate(Q0, Y0)[0, 0] > fine

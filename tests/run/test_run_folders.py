@@ -1,0 +1,191 @@
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from run_cases import SHIPPED, UNCACHED, chain, shipped, without, written
+
+from eigassign.api import load_case
+from eigassign.errors import InfeasibleError, StorageError
+from eigassign.run import Options, Outcome, expand_case, optimize, solve_case
+
+
+def in_folder(path: Path) -> Options:
+    return Options(out=path, use_cache=False)
+
+
+@pytest.fixture(scope="module")
+def outcome(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
+    return optimize(SHIPPED, in_folder(tmp_path_factory.mktemp("runs") / "two_link"))
+
+
+def folder_of(outcome: Outcome) -> Path:
+    assert outcome.folder is not None
+    return outcome.folder
+
+
+def test_a_run_leaves_results_report_figures_resolved_case_and_log(outcome: Outcome) -> None:
+    folder = folder_of(outcome)
+    names = {path.name for path in folder.iterdir()}
+    assert names >= {"results.json", "report.html", "figures", "case.yaml", "log.txt"}
+    assert len(list((folder / "figures").glob("*.png"))) >= 5
+    assert outcome.within_tolerance
+    assert outcome.warnings == ()
+    assert outcome.seconds > 0.0
+
+
+def test_results_json_has_what_programs_rely_on(outcome: Outcome) -> None:
+    results = json.loads((folder_of(outcome) / "results.json").read_text())
+    assert set(results["design"]) == {"m1", "m2"}
+    assert set(results["design"]["m1"]) >= {"initial", "optimal", "lower", "upper"}
+    for when in ("initial", "predicted", "exact"):
+        assert set(results["error"][when]) == {"max_relative", "rms_relative"}
+    assert set(results["frequencies"]) == {
+        "time_s",
+        "target_hz",
+        "initial_hz",
+        "predicted_hz",
+        "exact_hz",
+    }
+    assert set(results["solver"]) >= {"status", "iterations", "primal_residual", "dual_residual"}
+    assert results["case"]["sha256"] == load_case(SHIPPED).file.sha256
+    assert results["timing_s"]["expansion"] > 0.0
+
+
+def test_the_resolved_case_solves_to_the_same_bits(outcome: Outcome) -> None:
+    again = solve_case(load_case(folder_of(outcome) / "case.yaml"), UNCACHED)
+    design = {row.name: row.optimal for row in outcome.findings.design}
+    assert again.design == design
+
+
+def test_the_log_tells_choices_outcome_and_times(outcome: Outcome) -> None:
+    log = (folder_of(outcome) / "log.txt").read_text()
+    for line in (
+        "note      expansion point: q1 = 1.817, q2 = 5.312, as the case asks",
+        "design    m2 = 0 kg (before: 0)",
+        "distance  initial: max 8.309 %",
+        "accuracy  predicted against exact: 0.3198 %, within 2 %",
+        "time      verification: ",
+    ):
+        assert line in log
+
+
+def test_an_infeasible_case_leaves_no_folder(tmp_path: Path) -> None:
+    limits = "    total: {terms: {m1: 1, m2: 1}, min: 450 g}\n    m: {terms: {m1: 1}, max: 100 g}\n"
+    text = shipped(("\nexpansion:", "  constraints:\n" + limits + "\nexpansion:"))
+    with pytest.raises(InfeasibleError):
+        optimize(written(tmp_path, text), in_folder(tmp_path / "out"))
+    assert [path.name for path in tmp_path.iterdir()] == ["case.yaml"]
+
+
+def test_the_folder_of_another_case_is_refused_before_anything_is_computed(tmp_path: Path) -> None:
+    optimize(written(tmp_path, chain(2), "one.yaml"), in_folder(tmp_path / "out"))
+    before = (tmp_path / "out" / "results.json").read_bytes()
+    told: list[str] = []
+    other = written(tmp_path, chain(2, target=300), "other.yaml")
+    with pytest.raises(StorageError, match="another case"):
+        optimize(other, Options(tmp_path / "out", use_cache=False, progress=told.append))
+    assert told == []
+    assert (tmp_path / "out" / "results.json").read_bytes() == before
+
+
+def test_the_default_folder_is_named_after_the_case_below_the_current_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    outcome = optimize(written(tmp_path, chain(2), "arm.yaml"), UNCACHED)
+    assert outcome.folder == Path("results/arm")
+    assert (tmp_path / "results" / "arm" / "results.json").is_file()
+
+
+def test_a_run_over_tolerance_is_kept_and_says_so(tmp_path: Path) -> None:
+    text = shipped(("max_error: 2 %", "max_error: 0.1 %"))
+    outcome = optimize(written(tmp_path, text), in_folder(tmp_path / "out"))
+    assert not outcome.within_tolerance
+    assert "OVER 0.1 %" in (tmp_path / "out" / "log.txt").read_text()
+    assert "0.32 % off" in outcome.warnings[0]
+
+
+def test_an_expansion_run_holds_its_coefficients_as_json_and_hdf5(tmp_path: Path) -> None:
+    outcome = expand_case(SHIPPED, in_folder(tmp_path / "out"))
+    document = json.loads((tmp_path / "out" / "coefficients.json").read_text())
+    assert document["x_names"] == ["q1", "q2", "m1", "m2"]
+    result = solve_case(load_case(SHIPPED), UNCACHED)
+    data = (tmp_path / "out" / "coefficients.h5").read_bytes()
+    with h5py.File(io.BytesIO(data)) as file:
+        for part, expansion in (("full", result.expansion), ("linearised", result.linearised)):
+            for name in ("indices", "coefficients"):
+                expected = getattr(expansion, name)
+                np.testing.assert_array_equal(file[f"{part}_{name}"], expected)
+                np.testing.assert_array_equal(document[part][name], expected)
+    assert outcome.findings.targets == ()
+    assert outcome.within_tolerance
+    assert {path.name for path in (tmp_path / "out").iterdir()} >= {"report.html", "results.json"}
+
+
+def test_order_modes_and_set_can_be_asked_for(tmp_path: Path) -> None:
+    options = in_folder(tmp_path / "out")
+    outcome = expand_case(SHIPPED, options, order=2, modes=(3, 1), linear=True)
+    document = json.loads((tmp_path / "out" / "coefficients.json").read_text())
+    assert "full" not in document
+    assert document["linearised"]["modes"] == [1, 3]
+    assert max(map(sum, document["linearised"]["indices"])) == 2
+    assert [(study.mode, study.order) for study in outcome.findings.studies] == [(1, 2), (3, 2)]
+
+
+def test_a_case_without_design_is_expanded_in_q_alone(tmp_path: Path) -> None:
+    text = without(chain(3), "design", "targets")
+    expand_case(written(tmp_path, text), in_folder(tmp_path / "out"))
+    document = json.loads((tmp_path / "out" / "coefficients.json").read_text())
+    assert document["x_names"] == ["q0", "q1", "q2"]
+    assert document["y0"] == []
+    assert document["full"]["coefficients"] == document["linearised"]["coefficients"]
+
+
+def test_a_case_without_trajectory_is_expanded_where_it_says(tmp_path: Path) -> None:
+    text = without(chain(3), "trajectory", "targets") + "expansion: {q: [0.3, 0.5, 0.7]}\n"
+    outcome = expand_case(written(tmp_path, text), in_folder(tmp_path / "out"))
+    (study,) = outcome.findings.studies
+    assert study.over_time is None
+    assert study.over_design is not None
+    assert outcome.findings.poses.tip_path is None
+
+
+def test_modes_expanded_together_are_kept_as_the_series_of_their_matrix(tmp_path: Path) -> None:
+    """Two equal cantilevers side by side have equal frequencies: one cluster."""
+    options = in_folder(tmp_path / "out")
+    outcome = expand_case(written(tmp_path, TWINS), options, order=2, modes=(1, 2))
+    document = json.loads((tmp_path / "out" / "coefficients.json").read_text())
+    assert document["full"]["cluster_0_modes"] == [1, 2]
+    assert np.shape(document["full"]["cluster_0_coefficients"])[:2] == (2, 2)
+    assert any("one cluster" in note for note in outcome.findings.notes)
+
+
+TWINS = """
+title: Twins
+mechanism:
+  space: planar
+  materials:
+    steel: {youngs_modulus: 210 GPa, density: 7850}
+  sections:
+    bar: {shape: circle, diameter: 10 mm}
+  links:
+    left: {length: 0.5, material: steel, section: bar, elements: 3}
+    right: {length: 0.5, material: steel, section: bar, elements: 3}
+  joints:
+    a: {type: revolute, base: ground, follower: left.start}
+    b: {type: revolute, base: ground, follower: right.start, position: [1, 0]}
+  bodies:
+    tip: {at: left.end, mass: 0.1}
+    twin: {at: right.end, mass: 0.1}
+coordinates:
+  qa: {joint: a, drive: locked}
+  qb: {joint: b, drive: locked}
+design:
+  m: {parameter: bodies.tip.mass, min: 0, max: 0.2}
+expansion: {q: [0, 0]}
+"""

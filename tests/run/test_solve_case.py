@@ -1,0 +1,255 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from run_cases import (
+    TARGET,
+    TOOL_MASS,
+    UNCACHED,
+    automatic,
+    case_of,
+    chain,
+    moving,
+    shipped,
+    solved,
+    without,
+)
+
+import eigassign as ea
+from eigassign.errors import CaseError, InfeasibleError
+from eigassign.run import Result, solve_case
+
+ROD = "{area: 7.0632e-4, bending_inertia: 3.97e-8}"
+SHOULDER = "{joint: shoulder}"
+POSES = ((1.75, 5.2), (1.8, 5.3), (1.83, 5.35))
+
+MECHANISMS = {
+    "the shipped arm": shipped(),
+    "a chain of one link": chain(1, target=150),
+    "a chain of three": chain(3, target=280),
+    "a chain of three in absolute angles, locked": chain(3, "locked", "absolute", 30),
+    "a chain of three on a spring": chain(3, "{stiffness: 3000}", target=60),
+    "a locked shoulder": automatic(
+        (SHOULDER, "{joint: shoulder, drive: locked}"), ("190 Hz", "38 Hz")
+    ),
+    "a designed drive stiffness": automatic(
+        (SHOULDER, "{joint: shoulder, drive: {stiffness: 5000}}"),
+        (TOOL_MASS, "k: {parameter: coordinates.q1.drive.stiffness, min: 4000, max: 6000}"),
+        ("190 Hz", "19.5 Hz"),
+    ),
+    "a designed diameter": automatic(
+        (ROD, "{shape: circle, diameter: 30 mm}"),
+        (TOOL_MASS, "d: {parameter: sections.rod.diameter, min: 28 mm, max: 32 mm}"),
+    ),
+    "a designed modulus": automatic(
+        (TOOL_MASS, "E: {parameter: materials.aluminium.youngs_modulus, min: 65 GPa, max: 72 GPa}"),
+    ),
+    "a designed length": moving(
+        *POSES,
+        text=automatic((TOOL_MASS, "L: {parameter: links.forearm.length, min: 0.43, max: 0.47}")),
+    ),
+    "two samples": moving((1.8, 5.2), (1.9, 5.4), text=automatic()),
+    "a mechanism that stands still": moving((1.8, 5.2), (1.8, 5.2), text=automatic()),
+    "two targets": automatic(
+        (TARGET, TARGET + "\n  - {mode: 2, frequency: 450 Hz, weight: 0.5}"),
+        ("max: 250 g", "max: 100 g"),
+        ("max_error: 2 %", "max_error: 8 %"),
+    ),
+    "a target that moves": automatic(("190 Hz", "{time: [0, 1], frequency: [196, 190]}")),
+    "a constraint between masses": automatic(
+        (TOOL_MASS, TOOL_MASS + "\n  constraints:\n    total: {terms: {m1: 1, m2: 1}, max: 150 g}"),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_what_a_result_says_is_what_its_parts_compute(name: str, tmp_path: Path) -> None:
+    result = solved(tmp_path, MECHANISMS[name])
+    case = case_of(tmp_path, MECHANISMS[name])
+    q, y = case.trajectory.q, list(result.design.values())
+    for k, target in enumerate(result.findings.targets):
+        column = result.linearised.modes.index(target.mode)
+        exact = case.model().frequencies(q, y, target.mode)[:, -1]
+        before = case.model().frequencies(q, case.initial_design, target.mode)[:, -1]
+        predicted = result.linearised.frequencies(q, y)[:, column]
+        np.testing.assert_allclose(target.exact_hz, exact, rtol=1e-12)
+        np.testing.assert_allclose(target.initial_hz, before, rtol=1e-12)
+        np.testing.assert_allclose(target.predicted_hz, predicted, rtol=1e-9)  # another sum
+        assert target.exact.max_relative == np.abs(target.exact_hz / target.target_hz - 1).max()
+        assert result.assignment.lam[k].shape == (len(q),)
+    np.testing.assert_array_equal(result.exact_hz, result.findings.targets[0].exact_hz)
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_no_random_design_within_the_limits_is_predicted_to_be_better(
+    name: str, tmp_path: Path
+) -> None:
+    result = solved(tmp_path, MECHANISMS[name])
+    case = case_of(tmp_path, MECHANISMS[name])
+    best = _objective(result, case, np.array(list(result.design.values())))
+    rows = result.findings.design
+    random = np.random.default_rng(1)
+    lower, upper = (np.array([getattr(r, side) for r in rows]) for side in ("lower", "upper"))
+    designs = random.uniform(lower, upper, (60, len(rows)))
+    feasible = [y for y in designs if name != "a constraint between masses" or y.sum() <= 0.15]
+    assert len(feasible) > 5
+    for y in feasible:
+        assert _objective(result, case, y) >= best * (1.0 - 1e-8)
+    for row in rows:
+        assert row.lower <= row.optimal <= row.upper
+
+
+def _objective(result: Result, case: ea.Case, y: np.ndarray) -> float:
+    """Weighted mean square of the relative error in λ, by hand."""
+    lam = result.linearised.eigenvalues(case.trajectory.q, y)
+    total = 0.0
+    for target, study in zip(case.file.targets, result.findings.targets, strict=True):
+        wanted = (2.0 * np.pi * study.target_hz) ** 2
+        error = lam[:, result.linearised.modes.index(target.mode)] / wanted - 1.0
+        total += target.weight * np.trapezoid(error**2, result.time_s)
+    return total
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_these_mechanisms_are_brought_nearer_to_their_targets_within_tolerance(
+    name: str, tmp_path: Path
+) -> None:
+    findings = solved(tmp_path, MECHANISMS[name]).findings
+    assert findings.error is not None
+    assert findings.error.exact.rms_relative < findings.error.initial.rms_relative
+    assert findings.within_tolerance
+    assert findings.warnings == ()
+
+
+def test_a_heavier_target_is_met_more_closely(tmp_path: Path) -> None:
+    def second_mode(weight: str) -> float:
+        both = f"{TARGET}\n  - {{mode: 2, frequency: 450 Hz, weight: {weight}}}"
+        findings = solved(tmp_path, automatic((TARGET, both))).findings
+        return findings.targets[1].predicted.rms_relative
+
+    assert second_mode("20") < 0.9 * second_mode("0.05")
+
+
+def test_the_active_constraint_is_met_exactly_and_named(tmp_path: Path) -> None:
+    result = solved(tmp_path, MECHANISMS["a constraint between masses"])
+    assert sum(result.design.values()) == pytest.approx(0.15, abs=1e-12)
+    assert any("upper constraint of total" in note for note in result.findings.notes)
+
+
+def test_constraints_that_contradict_each_other_are_named(tmp_path: Path) -> None:
+    limits = "\n  constraints:\n    total: {terms: {m1: 1, m2: 1}, max: 100 g}"
+    limits += "\n    least: {terms: {m1: 1}, min: 200 g}"
+    with pytest.raises(InfeasibleError) as caught:
+        solved(tmp_path, shipped((TOOL_MASS, TOOL_MASS + limits)))
+    assert set(caught.value.constraints) == {"total", "least"}
+
+
+@pytest.mark.parametrize("key", ["trajectory", "design", "targets"])
+def test_what_optimize_needs_and_lacks_is_named(key: str, tmp_path: Path) -> None:
+    text = without(automatic(), key)
+    with pytest.raises(CaseError, match=f"{key}: is missing, and optimize needs it") as caught:
+        solved(tmp_path, text)
+    assert len(caught.value.problems) == 1
+
+
+def test_everything_that_optimize_lacks_is_said_at_once(tmp_path: Path) -> None:
+    with pytest.raises(CaseError) as caught:
+        solved(tmp_path, without(automatic(), "trajectory", "design", "targets"))
+    assert {problem.path for problem in caught.value.problems} == {
+        "trajectory",
+        "design",
+        "targets",
+    }
+
+
+def test_a_mode_that_the_mesh_does_not_have_is_refused_at_its_line(tmp_path: Path) -> None:
+    text = automatic((TARGET, "{mode: 22, frequency: 190 Hz}"))
+    with pytest.raises(CaseError, match=r"targets\[0\].mode: mode 22 .* 1 to 21"):
+        solved(tmp_path, text)
+
+
+def test_the_highest_mode_of_all_can_be_assigned(tmp_path: Path) -> None:
+    text = automatic((TARGET, "{mode: 21, frequency: 19 kHz}"))
+    findings = solved(tmp_path, text).findings
+    assert findings.others is None
+    assert findings.targets[0].mode == 21
+
+
+def test_the_three_modes_above_the_assigned_one_are_shown(tmp_path: Path) -> None:
+    result = solved(tmp_path, shipped())
+    case = case_of(tmp_path, shipped())
+    others = result.findings.others
+    assert others is not None
+    assert others.modes == (2, 3, 4)
+    exact = case.model().frequencies(case.trajectory.q, list(result.design.values()), 4)
+    np.testing.assert_allclose(others.optimal_hz, exact[:, 1:], rtol=1e-12)
+
+
+def test_a_prediction_over_the_tolerance_is_said_with_advice_that_helps(tmp_path: Path) -> None:
+    text = shipped(("max_error: 2 %", "max_error: 0.1 %"))
+    findings = solved(tmp_path, text).findings
+    assert not findings.within_tolerance
+    (warning,) = findings.warnings
+    assert "0.32 % off" in warning
+    assert "try expansion.y: [0.2287, 0]" in warning
+    again = solved(tmp_path, changed_point(text, "[0.2287, 0]")).findings
+    assert again.approximation_error is not None
+    assert findings.approximation_error is not None
+    assert again.approximation_error < findings.approximation_error
+
+
+def changed_point(text: str, y: str) -> str:
+    assert "y: [0.125, 0.125]" in text
+    return text.replace("y: [0.125, 0.125]", f"y: {y}")
+
+
+def test_an_optimum_that_is_worse_than_the_initial_design_is_not_passed_off_as_one(
+    tmp_path: Path,
+) -> None:
+    text = automatic(
+        (
+            "elbow_mass: {at: upper_arm.end, mass: 0}",
+            "elbow_mass: {at: upper_arm.end, mass: 220 g}",
+        ),
+        ("elbow_mass.mass, min: 0, max: 250 g", "elbow_mass.mass, min: 0, max: 1"),
+    )
+    findings = solved(tmp_path, text).findings
+    assert findings.error is not None
+    assert findings.error.exact.rms_relative > findings.error.initial.rms_relative
+    assert any("do not use this design" in warning for warning in findings.warnings)
+
+
+def test_solving_twice_gives_the_same_bits(tmp_path: Path) -> None:
+    case = case_of(tmp_path, shipped())
+    first, second = (solve_case(case, UNCACHED) for _ in range(2))
+    assert first.design == second.design
+    np.testing.assert_array_equal(first.exact_hz, second.exact_hz)
+    np.testing.assert_array_equal(first.predicted_hz, second.predicted_hz)
+
+
+def test_stages_are_announced_in_order_and_timed(tmp_path: Path) -> None:
+    from eigassign.run import Options
+
+    told: list[str] = []
+    result = solve_case(
+        case_of(tmp_path, shipped()), Options(use_cache=False, progress=told.append)
+    )
+    assert len(told) == len(result.findings.timing_s) == 7
+    assert list(result.findings.timing_s) == [
+        "model",
+        "trajectory",
+        "expansion",
+        "initial",
+        "assignment",
+        "verification",
+        "comparison",
+    ]
+
+
+def test_a_plausibility_warning_reaches_the_findings(tmp_path: Path) -> None:
+    misprint = ("bending_inertia: 3.97e-8", "bending_inertia: 3.97e-4")
+    text = shipped(misprint, ("190 Hz", "19 kHz"))
+    findings = solved(tmp_path, text).findings
+    assert any("bending_inertia" in warning for warning in findings.warnings)

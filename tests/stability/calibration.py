@@ -1,0 +1,142 @@
+"""Random (mechanism, q, y): what an error estimate says beside the true error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from chains import Tree, model_of, random_chain
+
+from eigassign.errors import EigassignError, MechanismError
+from eigassign.modal.model import Model
+from eigassign.modal.roundoff import rounding_error
+
+SPAN = np.pi / 3.0  # rad: q is drawn within this of q0, coordinate by coordinate
+Floats = np.ndarray
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """One random mechanism with its design box and the poses it is judged at."""
+
+    seed: int
+    model: Model
+    q0: Floats
+    y0: Floats
+    q: Floats
+    y: Floats
+    modes: tuple[int, ...]
+    half_order: int
+
+
+@dataclass(frozen=True)
+class Tally:
+    """Estimates and true relative errors in Hz, with the floor that rounding sets, all flat."""
+
+    estimate: Floats
+    error: Floats
+    floor: Floats
+    seeds: Floats
+    half_orders: Floats
+
+    @property
+    def refused(self) -> Floats:
+        return ~np.isfinite(self.estimate)
+
+    @property
+    def covered(self) -> float:
+        """Share of the answers given whose estimate is not below the error."""
+        given = ~self.refused
+        return float((self.estimate >= self.error)[given].mean())
+
+    @property
+    def overestimate(self) -> Floats:
+        """estimate / max(error, floor) of the answers given."""
+        given = ~self.refused
+        return self.estimate[given] / np.maximum(self.error, self.floor)[given]
+
+
+def draw(seed: int, samples: int) -> Drawn | None:
+    """A planar tree of 1 to 5 links, up to four design parameters; None where it has no mode."""
+    tree, q0 = random_chain(seed)
+    rng = np.random.default_rng([seed, 1])
+    tree["design"] = _design(tree, rng)
+    try:
+        model = model_of(tree)
+    except MechanismError:
+        return None
+    box = np.array([[p["min"], p["max"]] for p in tree["design"].values()]).reshape(-1, 2)
+    y0 = box.mean(axis=1)
+    y = rng.uniform(box[:, 0], box[:, 1], (samples, len(box)))
+    q = q0 + rng.uniform(-SPAN, SPAN, (samples, len(q0)))
+    elastic = model.n_dof - model.n_rigid
+    modes = tuple(range(1, 1 + int(rng.integers(1, min(4, elastic + 1)))))
+    return Drawn(
+        seed,
+        model,
+        q0,
+        y0,
+        q,
+        y,
+        modes[-1:] if rng.random() < 0.5 else modes,
+        int(rng.integers(1, 4)),
+    )
+
+
+def _design(tree: Tree, rng: np.random.Generator) -> Tree:
+    """Up to four parameters of every kind, each with a box of a factor of up to four."""
+    choices = _candidates(tree)
+    rng.shuffle(choices)
+    design = {}
+    for k, (path, value) in enumerate(choices[: rng.integers(0, 5)]):
+        low, high = value * rng.uniform(0.5, 0.95), value * rng.uniform(1.05, 2.0)
+        design[f"y{k}"] = {"parameter": path, "min": low, "max": high}
+    return design
+
+
+def _candidates(tree: Tree) -> list[tuple[str, float]]:
+    mechanism = tree["mechanism"]
+    links = mechanism["links"]
+    found = [(f"links.{n}.length", link["length"]) for n, link in links.items()]
+    found += [(f"bodies.{n}.mass", b["mass"]) for n, b in mechanism["bodies"].items()]
+    for m in sorted({link["material"] for link in links.values()}):
+        for key in ("youngs_modulus", "density"):
+            found.append((f"materials.{m}.{key}", mechanism["materials"][m][key]))
+    for s in sorted({link["section"] for link in links.values()}):
+        section = mechanism["sections"][s]
+        keys = ("diameter", "height", "bending_inertia")
+        found += [(f"sections.{s}.{key}", section[key]) for key in keys if key in section]
+    for n, c in tree["coordinates"].items():
+        if isinstance(c["drive"], dict):
+            found.append((f"coordinates.{n}.drive.stiffness", c["drive"]["stiffness"]))
+    return found
+
+
+def tally(seeds: range, samples: int, judge: Callable[[Drawn], tuple[Floats, Floats]]) -> Tally:
+    """``judge`` gives frequencies and estimates (samples, n_modes) of one drawn mechanism."""
+    parts: list[list[Any]] = []
+    for seed in seeds:
+        drawn = draw(seed, samples)
+        if drawn is not None:
+            part = _judged(drawn, judge)
+            if part is not None:
+                parts.append(part)
+    return Tally(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def _judged(drawn: Drawn, judge: Callable[[Drawn], tuple[Floats, Floats]]) -> list[Any] | None:
+    pick = np.array(drawn.modes) - 1
+    try:
+        exact = drawn.model.frequencies(drawn.q, drawn.y, max(drawn.modes))[:, pick]
+    except EigassignError:
+        return None
+    f, estimate = judge(drawn)
+    x = drawn.model.x(drawn.q, drawn.y)
+    floor = [rounding_error(drawn.model.pencil, row, max(drawn.modes)) for row in x]
+    floor = np.broadcast_to(np.array(floor)[:, None], f.shape)
+    error = np.abs(f / exact - 1.0)
+    seeds = np.full(f.shape, drawn.seed)
+    half_orders = np.full(f.shape, drawn.half_order)
+    return [a.ravel() for a in (estimate, error, floor, seeds, half_orders)]

@@ -1,0 +1,33 @@
+"""Scenes of the shipped arm and of its variants, ready to be studied."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from eigassign.api import load_case
+from eigassign.run import prepare
+from eigassign.stages import Stages
+from eigassign.study.scene import Scene
+
+SHIPPED = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
+HEAD = SHIPPED[: SHIPPED.index("# The paper draws")]  # mechanism and coordinates only
+
+
+def scene_of(folder: Path, text: str) -> Scene:
+    path = folder / "arm.yaml"
+    path.write_text(text)
+    case = load_case(path)
+    with case.located():
+        return prepare(case, Stages(lambda line: None), None)
+
+
+def changed(*changes: tuple[str, str], text: str = SHIPPED) -> str:
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new)
+    return text
+
+
+def automatic(*changes: tuple[str, str]) -> str:
+    start, end = SHIPPED.index("expansion:"), SHIPPED.index("targets:")
+    return changed(*changes, text=SHIPPED[:start] + SHIPPED[end:])

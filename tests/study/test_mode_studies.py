@@ -1,0 +1,110 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenes import HEAD, SHIPPED, changed, scene_of
+
+from eigassign.study.approximation import COARSE, compare, grid_over
+from eigassign.study.drawing import draw_poses, spread_samples
+from eigassign.study.mode_studies import q_grid, study_modes
+from eigassign.study.units import PROPERTY_UNITS, design_units
+
+
+def test_a_map_holds_at_each_point_what_a_solve_there_gives(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, SHIPPED)
+    (study,) = study_modes(scene)
+    chart = study.over_design
+    assert chart is not None
+    assert (chart.names, chart.units) == (("m1", "m2"), ("kg", "kg"))
+    for i, k in ((0, 0), (0, 12), (12, 0), (5, 7)):
+        y = [chart.axes[0][i], chart.axes[1][k]]
+        exact = scene.model.frequencies(scene.q0, y, 1)[0, 0]
+        assert chart.values.exact_hz[i, k] == pytest.approx(exact, rel=1e-12)
+        taylor = scene.expansions.full.frequencies(scene.q0, y)[0, 0]
+        assert chart.values.taylor_hz[i, k] == pytest.approx(taylor, rel=1e-12)
+    assert chart.axes[0][[0, -1]].tolist() == [0.0, 0.25]
+
+
+def test_the_map_over_q_moves_the_elbow_over_what_it_travels(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, SHIPPED)
+    chart = study_modes(scene)[0].over_q
+    assert chart is not None
+    assert (chart.names, chart.units) == (("q2",), ("rad",))
+    travelled = scene.path.q[:, 1] - scene.path.q[:, 0]
+    elbow = chart.axes[0] - scene.q0[0]
+    np.testing.assert_allclose([elbow[0], elbow[-1]], [travelled.min(), travelled.max()])
+
+
+def test_known_exact_frequencies_are_used_and_not_solved_again(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, SHIPPED)
+    marked = np.full((152, 4), 100.0)
+    (study,) = study_modes(scene, marked)
+    assert study.over_time is not None
+    assert (study.over_time.exact_hz == 100.0).all()
+
+
+def test_each_mode_gets_its_own_columns(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, changed(("modes: [1]", "modes: [1, 3]")))
+    one, three = compare(scene.model, scene.expansions, scene.model.x(scene.q0, [0.125, 0.125]))
+    for comparison, hz in ((one, 193.1130), (three, 708.2169)):
+        for value in (comparison.exact_hz, comparison.taylor_hz, comparison.linearised_hz):
+            assert value[0] == pytest.approx(hz, abs=6e-5)
+
+
+def test_variables_without_room_are_left_out_of_a_map() -> None:
+    low, high, x0 = np.array([0.0, 1.0, 2.0]), np.array([1.0, 1.0, 5.0]), np.array([9.0, 8.0, 7.0])
+    grid = grid_over((0, 1, 2), "abc", "xyz", low, high, x0, COARSE)
+    assert grid is not None
+    assert (grid.names, grid.units, grid.shape) == (("a", "c"), ("x", "z"), (7, 7))
+    assert grid.points()[:, 1].tolist() == [8.0] * 49
+    assert grid.points()[-1].tolist() == [1.0, 8.0, 5.0]
+    assert grid_over((0, 1, 2), "abc", "xyz", low, low, x0) is None
+
+
+def test_the_expansion_point_is_on_the_map_even_if_the_path_misses_it(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, changed(("q: [1.817, 5.312]", "q: [1.817, 4.8]")))
+    grid = q_grid(scene)
+    assert grid is not None
+    assert grid.axes[0][0] == 4.8
+
+
+def test_without_trajectory_and_design_there_is_nothing_to_map(tmp_path: Path) -> None:
+    (study,) = study_modes(scene_of(tmp_path, HEAD + "expansion: {q: [1.8, 5.2]}\n"))
+    assert (study.over_time, study.over_design, study.over_q) == (None, None, None)
+
+
+def test_poses_are_the_rigid_links_where_kinematics_puts_them(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, SHIPPED)
+    poses = draw_poses(scene.file, scene.model, scene.path, scene.initial)
+    k = int(np.flatnonzero(scene.path.time_s == poses.time_s[3])[0])
+    q1, q2 = scene.path.q[k]
+    elbow = 0.6 * np.array([np.cos(q1), np.sin(q1)])
+    tip = elbow + 0.45 * np.array([np.cos(q2), np.sin(q2)])
+    np.testing.assert_allclose(poses.lines[3][0], [[0, 0], elbow], atol=1e-12)
+    np.testing.assert_allclose(poses.lines[3][1], [elbow, tip], atol=1e-12)
+    bodies = dict(poses.bodies)
+    np.testing.assert_allclose(bodies["elbow_mass"][3], elbow, atol=1e-12)
+    np.testing.assert_allclose(bodies["tool_mass"][3], tip, atol=1e-12)
+    assert poses.tip_path is not None
+    np.testing.assert_allclose(poses.tip_path[k], tip, atol=1e-9)
+
+
+def test_poses_are_spread_over_the_way_and_include_both_ends() -> None:
+    q = np.array([[0.0], [0.0], [0.01], [0.5], [0.99], [1.0], [1.0]])
+    assert spread_samples(q, 3) == [0, 3, 5]
+    assert spread_samples(np.zeros((4, 2)), 3) == [0]
+
+
+def test_every_property_that_can_be_designed_has_a_unit(tmp_path: Path) -> None:
+    from eigassign.case import mechanism_parts as parts
+    from eigassign.case.properties import _quantities
+
+    models = [parts.Material, parts.Link, parts.Body, parts.Drive, *parts.SHAPES.values()]
+    quantities = {name: q for model in models for name, q in _quantities(model).items()}
+    assert len(quantities) > 10
+    for name, quantity in quantities.items():
+        assert quantity.dimension is not None
+        assert quantity.dimension.si.replace("·", " ") == PROPERTY_UNITS[name], name
+    assert design_units(scene_of(tmp_path, SHIPPED).file) == ("kg", "kg")
