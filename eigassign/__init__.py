@@ -8,7 +8,7 @@ from eigassign._version import __version__
 from eigassign.errors import CaseError, EigassignError
 
 if TYPE_CHECKING:
-    from eigassign.api import Case, assign, expand, load_case, reduce
+    from eigassign.api import Case, assign, expand, load_case, load_reduced, reduce, save_reduced
 
 __all__ = [
     "Case",
@@ -18,7 +18,9 @@ __all__ = [
     "assign",
     "expand",
     "load_case",
+    "load_reduced",
     "reduce",
+    "save_reduced",
 ]
 
 

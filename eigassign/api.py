@@ -133,3 +133,17 @@ def assign(case: Case) -> Result:
     from eigassign.run import solve_case
 
     return solve_case(case)
+
+
+def save_reduced(reduced: ReducedModel, path: str | Path) -> None:
+    """Keep a reduced model in an HDF5 file, for use without its mechanism."""
+    from eigassign.output import reduced_file
+
+    reduced_file.save_reduced(reduced, path)
+
+
+def load_reduced(path: str | Path) -> ReducedModel:
+    """Read a reduced model, checked before use; raises StorageError for a damaged file."""
+    from eigassign.output import reduced_file
+
+    return reduced_file.load_reduced(path)

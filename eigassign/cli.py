@@ -33,6 +33,8 @@ _CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the command line on ``args`` (default: those of the process); returns the exit code."""
+    if args is None:
+        signals.expect_to_be_brief()
     arguments = sys.argv[1:] if args is None else list(args)
     signals.prefer_one_thread()
     signals.never_fail_to_encode()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
+from dataclasses import replace
 from math import comb
 from typing import TYPE_CHECKING, Any
 
@@ -74,7 +75,7 @@ def _expansions(
     if cache is None:
         return _computed(model, plan, full_order), False
     entry = expansion_key(model, plan, full_order)
-    if (found := _stored(cache, entry, plan, full_order)) is not None:
+    if (found := _stored(cache, entry, model, plan, full_order)) is not None:
         return found, True
     fresh = _computed(model, plan, full_order)
     cache.store(entry, flatten(_named(fresh)), _meta(plan))
@@ -100,13 +101,16 @@ def _named(expansions: Expansions) -> dict[str, NDArray[Any]]:
     }
 
 
-def _stored(cache: Cache, entry: str, plan: Plan, full_order: int) -> Expansions | None:
+def _stored(
+    cache: Cache, entry: str, model: Model, plan: Plan, full_order: int
+) -> Expansions | None:
     arrays = cache.load(entry)
     if arrays is None:
         return None
     try:
         named = unflatten(arrays)
-        return Expansions(_part(named, "full"), _part(named, "linear"), plan.order, full_order)
+        full, linear = (replace(_part(named, p), pencil=model.pencil) for p in ("full", "linear"))
+        return Expansions(full, linear, plan.order, full_order)
     except UsageError as error:
         _log.warning("cache entry %s cannot be used (%s); computed anew", entry[:12], error)
         return None

@@ -1,8 +1,10 @@
-"""The process around a command: signals, standard streams, threads of the linear algebra."""
+"""The process around a command: signals, streams, threads of the linear algebra, collections."""
 
 from __future__ import annotations
 
+import atexit
 import contextlib
+import gc
 import os
 import signal
 import sys
@@ -66,6 +68,15 @@ def prefer_one_thread() -> None:
     """
     for name, value in ONE_THREAD.items():
         os.environ.setdefault(name, value)
+
+
+def expect_to_be_brief() -> None:
+    """Spare a process its walks over all that it imported: fewer while it runs, none at its end.
+
+    Worth a fifth of a short run. Memory is freed by reference counts as ever.
+    """
+    gc.set_threshold(50_000, 10, 10)
+    atexit.register(gc.freeze)
 
 
 @contextlib.contextmanager

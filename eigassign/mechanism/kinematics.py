@@ -20,7 +20,7 @@ from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.coordinates import Coordinates, coordinates
 from eigassign.mechanism.geometry import node_position
-from eigassign.mechanism.joints import JointMotion, joint_motion
+from eigassign.mechanism.joints import RIDING, JointMotion, joint_motion
 from eigassign.mechanism.parameters import Parameters
 from eigassign.mechanism.rotations import (
     Floats,
@@ -157,12 +157,20 @@ def _own_motion(
     own = tree.of_joint(edge.joint)
     motion = joint_motion(joint, [values[k] for k in own])
     mount = mounting(joint)
-    turned = JointMotion(
-        multiply(mount, motion.rotation), multiply(mount, motion.translation), motion.freedoms
-    )
+    turned = _mounted(joint, mount, motion)
     if not own:
         return turned, np.zeros((6, rates.shape[1]), dtype=object)
-    return turned, multiply(motion.freedoms, rates[own])
+    return turned, multiply(turned.freedoms, rates[own])
+
+
+def _mounted(joint: object, mount: Objects, motion: JointMotion) -> JointMotion:
+    """The joint turned as a whole; what rides on a beam keeps the beam's axis instead."""
+    if getattr(joint, "type", "") not in RIDING:
+        R, d = multiply(mount, motion.rotation), multiply(mount, motion.translation)
+        return JointMotion(R, d, motion.freedoms)
+    R = multiply(motion.rotation, mount)
+    A = np.concatenate([multiply(mount.T, motion.freedoms[k : k + 3]) for k in (0, 3)])
+    return JointMotion(R, motion.translation, A)
 
 
 def mounting(joint: object) -> Objects:

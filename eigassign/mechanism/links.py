@@ -80,7 +80,7 @@ def _chain(
     for start, span, n in pieces:
         first = len(positions) - 1
         positions += [vector([start + span * (k / n)]) for k in range(1, n + 1)]
-        _segment(case, parameters, name, stiffness, mass, first, span, n, space)
+        _segment(case, parameters, name, stiffness, mass, first, (start, span), n, space)
     slots = [node_dofs(width * k, space) for k in range(count)]
     nodes = {"start": slots[0], "end": slots[-1]}
     places = {"start": positions[0], "end": positions[-1]}
@@ -118,11 +118,12 @@ def _segment(
     stiffness: Entries,
     mass: Entries,
     first: int,
-    span: Scalar,
+    piece: tuple[Scalar, Scalar],
     n: int,
     space: str,
 ) -> None:
     """n equal elements from node ``first`` on; with a taper each has its own section."""
+    start, span = piece
     link = case.mechanism.links[name]
     h = span * (1.0 / n)
     turn = rolled(float(getattr(link, "roll", 0.0) or 0.0))
@@ -131,8 +132,12 @@ def _segment(
         _tile(stiffness, element_stiffness(beam, h), turn, first, n, space)
         _tile(mass, element_mass(beam, h), turn, first, n, space)
         return
+    total = length(case, parameters, name)
     for k in range(n):
-        beam = _tapered(case, parameters, link, (k + 0.5) / n)
+        share: Scalar = (k + 0.5) / n
+        if span is not total:  # a rider splits the beam
+            share = (start + span * share) / total
+        beam = _tapered(case, parameters, link, share)
         _tile(stiffness, element_stiffness(beam, h), turn, first + k, 1, space)
         _tile(mass, element_mass(beam, h), turn, first + k, 1, space)
 
@@ -209,14 +214,14 @@ def _shear_modulus(
     raise MechanismError(f"mechanism.materials.{beam.material}", message)
 
 
-def _tapered(case: CaseFile, parameters: Parameters, link: Any, share: float) -> BeamValues:
+def _tapered(case: CaseFile, parameters: Parameters, link: Any, share: Scalar) -> BeamValues:
     """Values at a share of the length, the sections' dimensions running linearly."""
     a, b = case.mechanism.sections[link.section.start], case.mechanism.sections[link.section.end]
 
     def number(key: str, value: float) -> Scalar:
         low = parameters.number(f"sections.{link.section.start}.{key}", value)
         high = parameters.number(f"sections.{link.section.end}.{key}", getattr(b, key))
-        return low * (1.0 - share) + high * share
+        return low + (high - low) * share
 
     return _values(case, parameters, link, section_values(a, number))
 

@@ -14,11 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.series.algebra import Samples, Truncated
 from eigassign.series.lower_set import LowerSet
-from eigassign.series.program import Program, Samples, Truncated
+from eigassign.series.program import Program
 
 Floats = NDArray[np.float64]
 STACK_LIMIT = 500_000  # numbers: 4 MB
+TINY_STACK = 20_000
 Ints = NDArray[np.intp]
 
 
@@ -58,11 +60,23 @@ class Pencil:
         return np.setdiff1d(np.arange(self.n_dof), self.rigid)
 
     @cached_property
-    def term_stacks(self) -> tuple[Floats, Floats] | None:
-        """All K_j and M_j dense, (n_theta, n_dof, n_dof) each, where that is small."""
+    def term_stacks(self) -> Floats | None:
+        """All K_j and M_j dense, as (row, 2, n_theta, column), where that is small."""
         if self.n_theta * self.n_dof**2 > STACK_LIMIT:
             return None
-        return self._dense(self.stiffness.toarray()), self._dense(self.mass.toarray())
+        dense = self._pair(np.stack([self.stiffness.toarray(), self.mass.toarray()]))
+        return np.ascontiguousarray(dense.transpose(2, 0, 1, 3))
+
+    @cached_property
+    def by_term(self) -> tuple[sparse.csc_array, sparse.csc_array]:
+        """The weights of K and of M term by term."""
+        return self.stiffness.tocsc(), self.mass.tocsc()
+
+    @cached_property
+    def local_directions(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+        """dz/dw, dw/dx for w the active ones of z, and which of x they depend on."""
+        directions = self.to_program[self.active]
+        return np.eye(len(self.shift))[:, self.active], directions, (directions != 0.0).any(axis=0)
 
     def theta(self, x: Floats) -> Floats:
         """θ at samples x (n_samples, n_x): shape (n_theta, n_samples)."""
@@ -73,20 +87,44 @@ class Pencil:
         """Coefficients of θ (n_theta, N) about x0 in w, where z = z0 + ``directions`` w."""
         z = np.zeros((len(self.shift), len(space)))
         z[:, 0] = self.to_program @ x0 + self.shift
-        present = space.units >= 0
+        present = (space.units >= 0).nonzero()[0]
         z[:, space.units[present]] = directions[:, present]
-        one = np.zeros((1, len(space)))
-        one[0, 0] = 1.0
-        return np.vstack([one, self.program.run(Truncated(space), z)])
+        theta = np.zeros((self.n_theta, len(space)))
+        theta[0, 0] = 1.0
+        theta[1:] = self.program.run(Truncated(space), z)
+        return theta
 
     def matrices(self, theta: Floats) -> tuple[Floats, Floats]:
         """Dense K, M (n_samples, n_dof, n_dof) for θ (n_theta, n_samples)."""
-        return self._dense(self.stiffness @ theta), self._dense(self.mass @ theta)
+        if self._stack is not None:
+            K, M = (theta.T @ self._stack).reshape(2, -1, self.n_dof, self.n_dof)
+        else:
+            K, M = self._pair((self._both @ theta).reshape(2, -1, theta.shape[1]))
+        return K, M
 
-    def _dense(self, data: Floats) -> Floats:
-        full = np.zeros((data.shape[1], self.n_dof * self.n_dof))
-        full[:, self.rows * self.n_dof + self.columns] = data.T
-        return full.reshape(-1, self.n_dof, self.n_dof)
+    @cached_property
+    def _stack(self) -> Floats | None:
+        """All K_j and M_j dense, (2, n_theta, n_dof²), where products with zeros cost nothing."""
+        if self.n_theta * self.n_dof**2 > TINY_STACK:
+            return None
+        dense = self._pair(np.stack([self.stiffness.toarray(), self.mass.toarray()]))
+        return dense.reshape(2, self.n_theta, -1)
+
+    @cached_property
+    def _both(self) -> sparse.csr_array:
+        """Weights of K above those of M: one product for both."""
+        return sparse.csr_array(sparse.vstack([self.stiffness, self.mass]))
+
+    @cached_property
+    def _flat(self) -> Ints:
+        """Place of each non-zero in a dense matrix read row by row."""
+        return self.rows * self.n_dof + self.columns
+
+    def _pair(self, data: Floats) -> Floats:
+        """Dense (2, k, n_dof, n_dof) from the non-zeros of k matrices each, (2, n_nonzeros, k)."""
+        full = np.zeros((2, data.shape[2], self.n_dof * self.n_dof))
+        full[:, :, self._flat] = data.transpose(0, 2, 1)
+        return full.reshape(2, -1, self.n_dof, self.n_dof)
 
     def sparse(self, data: Floats) -> sparse.csc_array:
         """One sparse matrix from its non-zeros (n_nonzeros,) on the common pattern."""

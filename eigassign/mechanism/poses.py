@@ -20,8 +20,8 @@ from eigassign.mechanism.kinematics import Kinematics, all_moving
 from eigassign.mechanism.parameters import Parameters
 from eigassign.mechanism.tip_chain import TipChain
 from eigassign.mechanism.tree import split
+from eigassign.series.algebra import Samples
 from eigassign.series.expression import Scalar
-from eigassign.series.program import Samples
 from eigassign.series.table import Table, compile_table
 
 Floats = NDArray[np.float64]

@@ -1,7 +1,9 @@
 """Springs between two nodes, or from a node to the ground, along axes fixed in the first link.
 
-The spring is stress-free in every pose; it resists the relative motion of its ends,
-k_t |Δv|² + k_r |Δω|², where each end moves with the elastic *and* the rigid motion of its link.
+The spring is stress-free in every pose; it resists the relative motion of its ends where the second
+one is, k_t |v_2 − v_1 − ω_1 × d|² + k_r |ω_2 − ω_1|²: a rigid arm d on the first node reaches there,
+so that the spring's forces balance and turning everything strains nothing. Each end moves with the
+elastic *and* the rigid motion of its link.
 """
 
 from __future__ import annotations
@@ -72,8 +74,19 @@ def _relative(
     R = multiply(motion.placement(link).world_rotation, turn.astype(object))
     first, second = (_world_rows(case, parameters, motion, nodes, end) for end in ends)
     none = np.zeros(3, dtype=object)
+    if ends[1] != GROUND:
+        here, there = (_world_position(case, parameters, motion, end) for end in ends)
+        first = apply(carried(np.eye(3).astype(object), there - here), first)
     seen = carried(R, none)
     return [_difference(b, a) for a, b in zip(apply(seen, first), apply(seen, second), strict=True)]
+
+
+def _world_position(
+    case: CaseFile, parameters: Parameters, motion: Kinematics, end: Node
+) -> Objects:
+    placement = motion.placement(end[0])
+    X = node_position(case, parameters, motion.tree, end)
+    return np.asarray(placement.world_origin + multiply(placement.world_rotation, X))
 
 
 def _world_rows(

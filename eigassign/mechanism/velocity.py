@@ -24,8 +24,8 @@ from eigassign.mechanism.build import local_links
 from eigassign.mechanism.kinematics import Kinematics, all_moving
 from eigassign.mechanism.mesh import DOFS
 from eigassign.mechanism.parameters import Parameters
+from eigassign.series.algebra import Samples
 from eigassign.series.expression import Scalar
-from eigassign.series.program import Samples
 from eigassign.series.table import Table, compile_table
 
 Floats = NDArray[np.float64]

@@ -13,51 +13,34 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
+from scipy.linalg import lapack
+
+from eigassign.errors import AccuracyError
 
 Floats = NDArray[np.float64]
 Solve = Callable[[Floats], tuple[Floats, Floats]]
 
 
 def factor_dense(A: Floats, border: Floats) -> Solve:
-    """Solver for [[A, −B], [−Bᵀ, 0]], B = ``border`` (n, r): rhs (n, k) → x (n, k), l (r, k)."""
-    from scipy.linalg import lu_factor, lu_solve
+    """Solver for [[A, −Bᵀ], [−B, 0]], B = ``border`` (r, n): rows (k, n) → x (k, n), l (k, r).
 
-    n, r = border.shape
-    scale = _scale(float(np.abs(A).max()), border)
+    Raises AccuracyError where the system is singular: the border misses a mode with the same λ.
+    """
+    r, n = border.shape
+    scale = float(np.abs(A).max() / np.abs(border).max())
     full = np.zeros((n + r, n + r))
     full[:n, :n] = A
-    full[:n, n:] = -scale * border
-    full[n:, :n] = -scale * border.T
-    factors = lu_factor(full, check_finite=False)
+    full[n:, :n] = border
+    full[n:] *= -scale
+    full[:n, n:] = full[n:, :n].T
+    lu, pivots, info = lapack.dgetrf(full.T, overwrite_a=1)
+    if info:
+        raise AccuracyError("the bordered system is singular: a mode of the cluster is missing")
 
-    def solve(rhs: Floats) -> tuple[Floats, Floats]:
-        padded = np.zeros((n + r, rhs.shape[1]))
-        padded[:n] = rhs
-        solution = lu_solve(factors, padded, check_finite=False)
-        return solution[:n], scale * solution[n:]
-
-    return solve
-
-
-def factor_sparse(A: sparse.csc_array, border: Floats) -> Solve:
-    """The same with a sparse A; the border goes last, where its dense rows cost no fill-in."""
-    from scipy.sparse.linalg import splu
-
-    n, r = border.shape
-    scale = _scale(float(np.abs(A.data).max()), border)
-    edge = sparse.csc_array(-scale * border)
-    full = sparse.block_array([[A, edge], [edge.T, None]], format="csc")
-    factors = splu(full, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-
-    def solve(rhs: Floats) -> tuple[Floats, Floats]:
-        padded = np.zeros((n + r, rhs.shape[1]))
-        padded[:n] = rhs
-        solution = factors.solve(padded)
-        return solution[:n], scale * solution[n:]
+    def solve(rows: Floats) -> tuple[Floats, Floats]:
+        padded = np.zeros((len(rows), n + r))
+        padded[:, :n] = rows
+        solution = lapack.dgetrs(lu, pivots, padded.T, overwrite_b=1)[0].T
+        return solution[:, :n], scale * solution[:, n:]
 
     return solve
-
-
-def _scale(size: float, border: Floats) -> float:
-    return size / float(np.abs(border).max())

@@ -1,100 +1,125 @@
-"""Power-series coefficients K_γ, M_γ of the pencil and their products with vector coefficients.
+"""Power-series coefficients K_γ, M_γ of the pencil, and what the recursion asks of them.
 
-Small pencils keep one dense stack and form every product in one call; large ones keep a sparse
-matrix for each γ that is not zero (few are: each θ depends on few variables).
+Vectors stand in rows: X (N, r, n) holds r vectors of length n for every multi-index, contiguous, so
+that products and solves run over memory in order. Small pencils keep one dense stack of all
+coefficients; large ones only what each coefficient touches (``coefficients_sparse``).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from eigassign.mechanism.pencil import Pencil
+from eigassign.modal.bordered import Solve, factor_dense
+from eigassign.modal.sizes import DENSE_LIMIT
 from eigassign.series.lower_set import LowerSet, first_of_each
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-DENSE_LIMIT = 250  # n_dof up to which the coefficients are kept dense
+
+
+class PencilSeries(Protocol):
+    """K(w) = Σ_γ K_γ w^γ and M(w) likewise, over one lower set."""
+
+    def convolve(self, degree: int, X: Floats, Y: Floats, out: Floats) -> None:
+        """out_γ = Σ_{0<δ≤γ} M_δ Y_{γ−δ} − K_δ X_{γ−δ} for |γ| = degree; out (N_degree, r, n)."""
+
+    def mass_times(self, X: Floats) -> Floats:
+        """M_0 X for rows X (k, n)."""
+
+    def factor(self, lam: float, border: Floats, phi: Floats) -> Solve:
+        """The bordered system of K_0 − λ M_0, ``border`` M_0 Φ_0 and Φ_0 as rows (r, n)."""
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Products A_δ X_β of all β + δ = γ with |γ| and |δ| fixed, sorted by γ.
+
+    The δ are among the ``slots`` of what is stored and the β among ``below``; ``left``, ``right``
+    count from the first of these, ``into`` from the first γ of that degree. ``first`` is the first
+    pair of each γ that there is, and ``target`` that γ.
+    """
+
+    slots: slice
+    below: slice
+    left: Ints
+    right: Ints
+    into: Ints
+    first: Ints
+    target: Ints
+
+
+@lru_cache(maxsize=64)
+def pairs(space: LowerSet, stored: bytes) -> tuple[tuple[Pairs, ...], ...]:
+    """For every degree the pairs with δ among the ``stored`` positions, by ascending |δ|."""
+    present = np.frombuffer(stored, dtype=np.intp)
+    slot = np.full(len(space), -1, dtype=np.intp)
+    slot[present] = np.arange(len(present))
+    degrees = range(space.order + 1)
+    return tuple(
+        tuple(p for e in range(1, d + 1) if len((p := _pairs(space, slot, d, e)).left))
+        for d in degrees
+    )
+
+
+def _pairs(space: LowerSet, slot: Ints, degree: int, of_delta: int) -> Pairs:
+    table, starts = space.by_degree[degree], space.degree_starts
+    keep = (slot[table.left] >= 0) & (space.degrees[table.left] == of_delta)
+    stored = slot[table.left[keep]]
+    target = table.target[keep]
+    first = first_of_each(target)
+    low = int(stored.min(initial=len(space)))
+    below = slice(int(starts[degree - of_delta]), int(starts[degree - of_delta + 1]))
+    return Pairs(
+        slice(low, int(stored.max(initial=-1)) + 1),
+        below,
+        stored - low,
+        table.right[keep] - below.start,
+        target,
+        first,
+        target[first],
+    )
 
 
 @dataclass(frozen=True, eq=False)
-class MatrixSeries:
-    """A(w) = Σ_γ A_γ w^γ over ``space``; only the ``present`` A_γ are stored."""
+class DenseSeries:
+    """All coefficients that are not zero in two dense stacks; the first is that of w = 0."""
 
-    space: LowerSet
-    present: Ints  # positions γ with A_γ ≠ 0, ascending
-    dense: Floats | None  # (n_present, n, n)
-    matrices: tuple[sparse.csr_array, ...]
+    pairs: tuple[tuple[Pairs, ...], ...]
+    stiffness: Floats  # (n_stored, n, n)
+    mass: Floats
 
-    def convolve(self, degree: int, phi: Floats) -> Floats:
-        """Σ_{0 < δ ≤ γ} A_δ φ_{γ−δ} for every |γ| = degree: (N_degree, n, r) from (N, n, r)."""
-        if self.dense is not None:
-            return self._convolve_dense(self.dense, degree, phi)
-        return self._convolve_sparse(degree, phi)
+    def convolve(self, degree: int, X: Floats, Y: Floats, out: Floats) -> None:
+        """See :class:`PencilSeries`; the coefficients are symmetric, so rows multiply from left."""
+        out[...] = 0.0
+        for p in self.pairs[degree]:
+            count, r, n = Y[p.below].shape
+            x, y = X[p.below].reshape(-1, n), Y[p.below].reshape(-1, n)
+            products = y @ self.mass[p.slots]
+            products -= x @ self.stiffness[p.slots]
+            chosen = products.reshape(-1, count, r, n)[p.left, p.right]
+            out[p.target] += np.add.reduceat(chosen, p.first, axis=0)
 
-    def _pairs(self, degree: int) -> tuple[Ints, Ints, Ints]:
-        """Pairs (slot of δ, position of γ − δ, target) of one degree, sorted by target."""
-        pairs = self.space.by_degree[degree]
-        slot = self._slots[pairs.left]
-        keep = slot >= 0
-        return slot[keep], pairs.right[keep], pairs.target[keep]
+    def mass_times(self, X: Floats) -> Floats:
+        """M_0 X for rows X (k, n)."""
+        return np.asarray(X @ self.mass[0])
 
-    @cached_property
-    def _slots(self) -> Ints:
-        """Where each γ is stored, -1 for an absent one."""
-        slots = np.full(len(self.space), -1, dtype=np.intp)
-        slots[self.present] = np.arange(len(self.present))
-        return slots
-
-    def _convolve_dense(self, stack: Floats, degree: int, phi: Floats) -> Floats:
-        slot, right, target = self._pairs(degree)
-        starts = self.space.degree_starts
-        out = np.zeros((starts[degree + 1] - starts[degree], *phi.shape[1:]))
-        if not len(slot):
-            return out
-        n, below = phi.shape[1], phi[: starts[degree]]
-        columns = below.transpose(1, 0, 2).reshape(n, -1)
-        products = (stack.reshape(-1, n) @ columns).reshape(len(stack), n, len(below), -1)
-        first = first_of_each(target)
-        out[target[first]] = np.add.reduceat(products[slot, :, right], first, axis=0)
-        return out
-
-    def _convolve_sparse(self, degree: int, phi: Floats) -> Floats:
-        slot, right, target = self._pairs(degree)
-        starts = self.space.degree_starts
-        _, n, r = phi.shape
-        out = np.zeros((starts[degree + 1] - starts[degree], n, r))
-        for k in np.unique(slot):
-            chosen = slot == k
-            block = phi[right[chosen]].transpose(1, 0, 2).reshape(n, -1)
-            product = (self.matrices[k] @ block).reshape(n, -1, r)
-            out[target[chosen]] += product.transpose(1, 0, 2)
-        return out
+    def factor(self, lam: float, border: Floats, phi: Floats) -> Solve:
+        """The bordered system of K_0 − λ M_0."""
+        return factor_dense(self.stiffness[0] - lam * self.mass[0], border)
 
 
-def matrix_series(
-    pencil: Pencil, weights: sparse.csr_array, theta: Floats, space: LowerSet
-) -> MatrixSeries:
-    """Σ_γ (weights θ_γ) w^γ for θ (n_theta, N) over ``space``."""
-    used = np.flatnonzero(theta.any(axis=0))
-    n = pencil.n_dof
-    if n <= DENSE_LIMIT:
-        stack = np.zeros((len(used), n * n))
-        stack[:, pencil.rows * n + pencil.columns] = (weights @ theta[:, used]).T
-        return MatrixSeries(space, used, stack.reshape(-1, n, n), ())
-    built = [_sparse_term(pencil, weights, theta[:, k]) for k in used]
-    keep = [k for k, matrix in enumerate(built) if matrix.nnz]
-    return MatrixSeries(space, used[keep], None, tuple(built[k] for k in keep))
+def pencil_series(pencil: Pencil, theta: Floats, space: LowerSet) -> PencilSeries:
+    """The pencil's coefficients over ``space`` from θ's own (n_theta, N)."""
+    if pencil.n_dof > DENSE_LIMIT:
+        from eigassign.modal.coefficients_sparse import sparse_series
 
-
-def _sparse_term(pencil: Pencil, weights: sparse.csr_array, theta: Floats) -> sparse.csr_array:
-    """One coefficient, with only the entries that its θ touch."""
-    atoms = np.flatnonzero(theta)
-    data = weights[:, atoms] @ theta[atoms]
-    hit = np.flatnonzero(data)
-    shape = (pencil.n_dof, pencil.n_dof)
-    return sparse.csr_array((data[hit], (pencil.rows[hit], pencil.columns[hit])), shape=shape)
+        return sparse_series(pencil, theta, space)
+    stored = np.flatnonzero(theta.any(axis=0))  # θ_0 = 1: position 0 is always there
+    K, M = pencil.matrices(theta[:, stored])
+    return DenseSeries(pairs(space, stored.tobytes()), K, M)

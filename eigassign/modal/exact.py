@@ -16,9 +16,12 @@ from numpy.typing import NDArray
 
 from eigassign.errors import AccuracyError, MechanismError, UsageError
 from eigassign.mechanism.pencil import Pencil
+from eigassign.modal.exact_single import solve_single
+from eigassign.modal.sizes import DENSE_LIMIT
+
+__all__ = ["DENSE_LIMIT", "Modes", "condense", "eigenvalues", "modes", "modes_at"]
 
 Floats = NDArray[np.float64]
-DENSE_LIMIT = 250  # n_dof up to which a batch of dense solves is faster than one sparse solve each
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,10 @@ def _solve(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
 
 
 def _dense(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
+    if vectors and theta.shape[1] == 1:
+        mu, phi = solve_single(pencil, theta, count)
+        plain = mu[-1] > 1e-15 * mu[0]
+        return Modes(1.0 / mu[None] if plain else _inverse(mu[None]), phi[None])
     K, M = pencil.matrices(theta)
     elastic = pencil.elastic
     K_E = _block(K, elastic, elastic)

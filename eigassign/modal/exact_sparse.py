@@ -9,6 +9,7 @@ from scipy.sparse import linalg
 
 from eigassign.errors import AccuracyError, MechanismError
 from eigassign.mechanism.pencil import Pencil
+from eigassign.modal.symmetric import block, factorise, principal
 
 Floats = NDArray[np.float64]
 
@@ -21,14 +22,13 @@ def solve_sparse(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> tu
 
 
 def _one(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
-    K = pencil.sparse(pencil.stiffness @ theta)
-    M = pencil.sparse(pencil.mass @ theta)
-    F = pencil.rigid
-    E = pencil.elastic
-    K_E, M_EE = K[E][:, E].tocsc(), M[E][:, E].tocsc()
-    M_EF, M_FF = M[E][:, F].toarray(), M[F][:, F].toarray()
-    coupling = _coupling(M_FF, M_EF)
-    mu, z = _lanczos(K_E, M_EE, M_EF, coupling, count)
+    E, F = pencil.elastic, pencil.rigid
+    K_E = principal(pencil, pencil.stiffness @ theta, E)
+    mass = pencil.mass @ theta
+    M_EE, M_F = principal(pencil, mass, E), block(pencil, mass, F)
+    M_FE = M_F[:, E]
+    coupling = _coupling(M_F[:, F], M_FE)
+    mu, z = _lanczos(K_E, M_EE, M_FE, coupling, count)
     phi = np.empty((pencil.n_dof, count))
     phi[E] = z / np.sqrt(mu)
     phi[F] = -coupling @ phi[E]
@@ -37,20 +37,20 @@ def _one(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
     return 1.0 / mu, phi
 
 
-def _coupling(M_FF: Floats, M_EF: Floats) -> Floats:
+def _coupling(M_FF: Floats, M_FE: Floats) -> Floats:
     if not len(M_FF):
-        return M_EF.T
+        return M_FE
     try:
         np.linalg.cholesky(M_FF)
     except np.linalg.LinAlgError as error:
         raise MechanismError(
             "mechanism", "a free coordinate moves no mass: give the mechanism mass or lock it"
         ) from error
-    return np.asarray(np.linalg.solve(M_FF, M_EF.T))
+    return np.asarray(np.linalg.solve(M_FF, M_FE))
 
 
 def _lanczos(
-    K_E: sparse.csc_array, M_EE: sparse.csc_array, M_EF: Floats, coupling: Floats, count: int
+    K_E: sparse.csc_array, M_EE: sparse.csc_array, M_FE: Floats, coupling: Floats, count: int
 ) -> tuple[Floats, Floats]:
     """Largest μ of M_c z = μ K_E z, descending, z with unit K_E-norm."""
     n = K_E.shape[0]
@@ -60,18 +60,13 @@ def _lanczos(
         raise MechanismError(
             "mechanism", "the stiffness matrix is singular: a link or drive is limp"
         ) from error
-    M_c = linalg.LinearOperator((n, n), matvec=lambda v: M_EE @ v - M_EF @ (coupling @ v))
+    K_rows, M_rows = K_E.T, M_EE.T  # symmetric: products run faster row by row
+    M_c = linalg.LinearOperator((n, n), matvec=lambda v: M_rows @ v - (coupling @ v) @ M_FE)
     inverse = linalg.LinearOperator((n, n), matvec=factor.solve)
     start = np.random.default_rng(0).standard_normal(n)
     try:
-        mu, z = linalg.eigsh(M_c, count, M=K_E, Minv=inverse, which="LM", v0=start)
+        mu, z = linalg.eigsh(M_c, count, M=K_rows, Minv=inverse, which="LM", v0=start)
     except linalg.ArpackNoConvergence as error:
         raise AccuracyError(f"the exact modes did not converge: {error}") from error
     order = np.argsort(-mu)
     return mu[order], z[:, order]
-
-
-def factorise(matrix: sparse.csc_array) -> linalg.SuperLU:
-    """LU without pivoting off the diagonal: right for definite matrices, cheap in fill-in."""
-    options = {"SymmetricMode": True}
-    return linalg.splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)

@@ -7,26 +7,31 @@ dropped by construction; coefficients over (q, y) follow by substituting V (x �
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import UsageError
 from eigassign.mechanism.pencil import Pencil
-from eigassign.modal.exact import Modes, modes_at
-from eigassign.modal.rayleigh import eigenvalue_series, vector_members
+from eigassign.modal.clusters import CLUSTER_GAP, clusters, whole_clusters
+from eigassign.modal.local import Local, local_space, vector_set
+from eigassign.modal.rayleigh import eigenvalue_series
 from eigassign.modal.recursion import expand_subspace
-from eigassign.modal.samples import samples
+from eigassign.modal.samples import point, samples
 from eigassign.modal.substitution import substitute
-from eigassign.series.lower_set import LowerSet, partially_linear, total_degree
+from eigassign.series.lower_set import LowerSet
 from eigassign.series.power_series import monomials
 
+__all__ = ["CLUSTER_GAP", "MAX_ORDER", "Cluster", "Expansion", "clusters", "expand"]
+
+if TYPE_CHECKING:
+    from eigassign.modal.reduced_model import ReducedModel
+
 Floats = NDArray[np.float64]
-CLUSTER_GAP = 0.02  # modes closer than this (relative in λ) are expanded together
 MAX_ORDER = 20
 
 
@@ -53,6 +58,7 @@ class Expansion:
     vectors: tuple[Floats, ...]  # per cluster, (N_H, n_dof, r)
     vector_space: LowerSet
     notes: tuple[str, ...]
+    pencil: Pencil | None = None  # what was expanded; not stored, needed by ``error_estimate``
 
     def eigenvalues(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """λ (n_samples, n_modes) in rad²/s²; q (n_samples, n_q) or (n_q,), y likewise."""
@@ -64,6 +70,25 @@ class Expansion:
         """f = √λ/2π in Hz, (n_samples, n_modes); NaN where the polynomial is negative."""
         with np.errstate(invalid="ignore"):
             return np.asarray(np.sqrt(self.eigenvalues(q, y)) / (2.0 * np.pi))
+
+    def error_estimate(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """Estimate of the relative error of ``frequencies``, (n_samples, n_modes); no exact solve.
+
+        Measured against a reduced model on the same Taylor vectors, made at the first call.
+        Infinite where λ < 0, or where not even the reduced model vouches for the mode.
+        """
+        from eigassign.modal.taylor_estimate import polynomial_error
+
+        f = self.frequencies(q, y)
+        beside = self.reduced
+        return polynomial_error(f, beside.frequencies(q, y), beside.error_estimate(q, y))
+
+    @cached_property
+    def reduced(self) -> ReducedModel:
+        """The reduced model on these Taylor vectors; UsageError without the pencil."""
+        from eigassign.modal.taylor_estimate import companion
+
+        return companion(self.pencil, self.q0, self.y0, self.modes, self.vector_space, self.vectors)
 
     def linear_in_design(self, q: ArrayLike) -> tuple[Floats, Floats]:
         """l_0 (n_samples, n_modes) and l (n_samples, n_modes, n_y) of eq. (9) at samples of q.
@@ -175,11 +200,11 @@ def expand(
     """
     wanted = _checked_modes(modes, order)
     n_y = pencil.to_program.shape[1] - pencil.n_q
-    x0 = samples(q0, y0, pencil.n_q, n_y)[0]
-    local = _local_space(pencil, order, linear_in_y, space)
+    x0 = point(q0, y0, pencil.n_q, n_y)
+    local = local_space(pencil, order, linear_in_y, space)
     theta = pencil.theta_series(local.space, x0, local.to_z)
-    found, groups = _whole_clusters(pencil, theta[:, :1], wanted, cluster_gap)
-    vector_space, kept = _vector_set(local.space, local.n_linear, vector_order)
+    found, groups = whole_clusters(pencil, theta[:, :1], wanted, cluster_gap)
+    vector_space, kept = vector_set(local.space, local.n_linear, vector_order)
     parts, vectors = [], []
     for group in groups:
         pick = np.array(group) - 1
@@ -201,84 +226,8 @@ def expand(
         vectors=tuple(vectors),
         vector_space=vector_space,
         notes=_notes(groups, local, pencil),
+        pencil=pencil,
     )
-
-
-@dataclass(frozen=True)
-class _Local:
-    """The set over w, dz/dw and dw/dx."""
-
-    space: LowerSet
-    to_z: Floats
-    directions: Floats
-    n_linear: int
-    kept: NDArray[np.bool_]
-
-
-def _local_space(pencil: Pencil, order: int, linear_in_y: bool, space: LowerSet | None) -> _Local:
-    n_z, n_q = len(pencil.shift), pencil.n_q
-    active = pencil.active
-    if space is not None:
-        return _given_space(pencil, space)
-    n_a, n_b = int(active[:n_q].sum()), int(active[n_q:].sum())
-    chosen = partially_linear(n_a, n_b, order) if linear_in_y else total_degree(n_a + n_b, order)
-    to_z = np.eye(n_z)[:, active]
-    directions = pencil.to_program[active]
-    kept = (directions != 0.0).any(axis=0)
-    return _Local(chosen, to_z, directions, n_b if linear_in_y else 0, kept)
-
-
-def _given_space(pencil: Pencil, space: LowerSet) -> _Local:
-    """A set over x as it was given, the variables that do not matter taken out."""
-    n_x = pencil.to_program.shape[1]
-    if space.n_variables != n_x:
-        raise UsageError(f"the set has {space.n_variables} variables, the model {n_x}")
-    kept = (pencil.to_program[pencil.active] != 0.0).any(axis=0)
-    inside = (space.indices[:, ~kept] == 0).all(axis=1)
-    from eigassign.series.lower_set import lower_set
-
-    smaller = lower_set(space.indices[inside][:, kept])
-    selection = np.eye(n_x)[kept]
-    return _Local(smaller, pencil.to_program[:, kept], selection, 0, kept)
-
-
-@lru_cache(maxsize=64)
-def _vector_set(
-    space: LowerSet, n_linear: int, vector_order: int | None
-) -> tuple[LowerSet, NDArray[np.intp]]:
-    """The set of eigenvector coefficients and its positions in the set of eigenvalues."""
-    linear = np.arange(space.n_variables) >= space.n_variables - n_linear
-    if vector_order is None:
-        members = vector_members(space, linear)
-    else:
-        members = np.asarray(space.degrees <= vector_order)
-    half = space.restrict(members)
-    return half, space.find(half.indices)
-
-
-def clusters(lam: Floats, wanted: Sequence[int], gap: float) -> tuple[tuple[int, ...], ...]:
-    """Modes (1-based) grouped where neighbours are closer than ``gap`` (relative in λ)."""
-    groups = [[1]]
-    for k, (below, above) in enumerate(itertools.pairwise(lam.tolist()), 2):
-        if above - below < gap * above:
-            groups[-1].append(k)
-        else:
-            groups.append([k])
-    return tuple(tuple(g) for g in groups if not set(wanted).isdisjoint(g))
-
-
-def _whole_clusters(
-    pencil: Pencil, theta0: Floats, wanted: Sequence[int], gap: float
-) -> tuple[Modes, tuple[tuple[int, ...], ...]]:
-    """The wanted modes' clusters, and modes up to above the last: a cluster cut short is wrong."""
-    elastic = len(pencil.elastic)
-    count = min(max(wanted) + 5, elastic) if max(wanted) <= elastic else max(wanted)
-    while True:
-        found = modes_at(pencil, theta0, count)
-        groups = clusters(found.lam[0], wanted, gap)
-        if count == elastic or groups[-1][-1] < count:
-            return found, groups
-        count = min(2 * count, elastic)
 
 
 def _checked_modes(modes: Sequence[int], order: int) -> tuple[int, ...]:
@@ -290,13 +239,13 @@ def _checked_modes(modes: Sequence[int], order: int) -> tuple[int, ...]:
     return wanted
 
 
-def _notes(groups: Sequence[tuple[int, ...]], local: _Local, pencil: Pencil) -> tuple[str, ...]:
+def _notes(groups: Sequence[tuple[int, ...]], local: Local, pencil: Pencil) -> tuple[str, ...]:
     lines = [
         f"modes {g[0]}-{g[-1]} lie close together and are expanded as one cluster"
         for g in groups
         if len(g) > 1
     ]
-    idle = int((~pencil.active).sum())
+    idle = len(pencil.active) - np.count_nonzero(pencil.active)
     if idle:
         lines.append(f"{idle} variable(s) on which no frequency depends are dropped")
     return tuple(lines)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +15,9 @@ from eigassign.mechanism.pencil import Pencil
 from eigassign.mechanism.poses import Poses
 from eigassign.modal.exact import eigenvalues, modes
 from eigassign.modal.samples import samples
+
+if TYPE_CHECKING:
+    from eigassign.modal.tracking import Tracked
 
 Floats = NDArray[np.float64]
 
@@ -49,6 +54,15 @@ class Model:
         """Frequencies (n_samples, count) in Hz and mass-normalised modes (…, n_dof, count)."""
         found = modes(self.pencil, self.x(q, y), count)
         return np.sqrt(found.lam) / (2.0 * np.pi), found.phi
+
+    def tracked(self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)) -> Tracked:
+        """``modes`` of the first sample followed along the samples by their shapes.
+
+        ``.frequencies`` (n_samples, n_modes) in Hz, ``.swaps``, ``.encounters`` and ``.notes``.
+        """
+        from eigassign.modal.tracking import track
+
+        return track(self.pencil, self.x(q, y), modes)
 
     def matrices(self, q: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
         """M and K of eq. (1) for one sample, dense (n_dof, n_dof), unknowns [u; q̇].

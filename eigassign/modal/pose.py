@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.mechanism.pencil import Pencil
-from eigassign.modal.exact_sparse import factorise
+from eigassign.modal.symmetric import factorise
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.mechanism.pencil import Pencil
-from eigassign.modal.project import project
+from eigassign.modal.project import project_rows
 from eigassign.series.lower_set import LowerSet, first_of_each
-from eigassign.series.power_series import compose, multiply, power_taylor
+from eigassign.series.power_series import multiply, power_taylor, reciprocal
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -42,16 +42,11 @@ def eigenvalue_series(
     pencil: Pencil, theta: Floats, space: LowerSet, half: LowerSet, vectors: Floats
 ) -> Floats:
     """Λ's coefficients (r, r, N), symmetric, from X (N_H, n, r) over the set ``half``."""
-    n_h, n, r = vectors.shape
-    basis = vectors.transpose(1, 0, 2).reshape(n, n_h * r)
-    stiffness, mass = project(pencil, basis)
-    numerator = _quadratic(space, half, theta, stiffness)
-    denominator = _quadratic(space, half, theta, mass)
+    r = vectors.shape[2]
+    rows = vectors.transpose(0, 2, 1).reshape(-1, vectors.shape[1])
+    numerator, denominator = _quadratic(space, half, theta, project_rows(pencil, rows), r)
     if r == 1:
-        inverse = compose(
-            space, power_taylor(denominator[0, :, 0], -1.0, space.order), denominator[0]
-        )
-        return multiply(space, numerator[0], inverse)[:, None]
+        return multiply(space, numerator[0], reciprocal(space, denominator[0]))[:, None]
     root = inverse_root(space, denominator)
     return matrix_product(space, root, matrix_product(space, numerator, root))
 
@@ -63,41 +58,52 @@ class _Pairs:
     a: Ints  # slots of the two vectors, sorted by the coefficient of their product
     b: Ints
     begin: Ints
-    left: Ints  # coefficient of θ, slot of the product, sorted by the coefficient of the result
+    left: Ints  # slots of the coefficient of θ and of the product, sorted by the result
     right: Ints
     end: Ints
+    into: Ints | slice  # which coefficients of the result these are; short of vectors, not all
 
 
 @lru_cache(maxsize=64)
-def _pairs(space: LowerSet, half: LowerSet) -> _Pairs:
-    members = space.find(half.indices)
-    slot = np.full(len(space), -1, dtype=np.intp)
-    slot[members] = np.arange(len(members))
+def _pairs(space: LowerSet, half: LowerSet, stored: bytes) -> _Pairs:
+    """``stored``: positions where θ has a coefficient."""
+    slot = _slots(space, space.find(half.indices))
     table = space.table
     inside = (slot[table.left] >= 0) & (slot[table.right] >= 0)
     begin = first_of_each(table.target[inside])
-    hit = table.target[inside][begin]
-    where = np.full(len(space), -1, dtype=np.intp)
-    where[hit] = np.arange(len(hit))
-    right = where[table.right]
-    keep = right >= 0
-    end = first_of_each(table.target[keep])  # every coefficient: (k, 0) is always kept
+    left = _slots(space, np.frombuffer(stored, dtype=np.intp))[table.left]
+    right = _slots(space, table.target[inside][begin])[table.right]
+    keep = (left >= 0) & (right >= 0)
+    end = first_of_each(table.target[keep])
+    into = slice(None) if len(end) == len(space) else table.target[keep][end]
     a, b = slot[table.left[inside]], slot[table.right[inside]]
-    return _Pairs(a, b, begin, table.left[keep], right[keep], end)
+    return _Pairs(a, b, begin, left[keep], right[keep], end, into)
 
 
-def _quadratic(space: LowerSet, half: LowerSet, theta: Floats, projected: Floats) -> Floats:
-    """Series (r, r, N) of Σ_j θ_j(w) Σ_{a,b} (X_aᵀ A_j X_b) w^{a+b}."""
-    p, count = _pairs(space, half), len(half)
-    r = projected.shape[1] // count
-    blocks = projected.reshape(len(theta), count, r, count, r)
-    products = blocks[:, p.a, :, p.b, :]  # (pairs, n_theta, r, r)
-    sums = np.add.reduceat(products, p.begin, axis=0)
-    hits = len(p.begin)
-    flat = sums.transpose(1, 0, 2, 3).reshape(len(theta), -1)
-    outer = (theta.T @ flat).reshape(len(space), hits, r, r)
-    values = outer[p.left, p.right]
-    return np.asarray(np.add.reduceat(values, p.end, axis=0).transpose(1, 2, 0))
+def _slots(space: LowerSet, positions: Ints) -> Ints:
+    """For every member its place among ``positions``, -1 where it is not one of them."""
+    slots = np.full(len(space), -1, dtype=np.intp)
+    slots[positions] = np.arange(len(positions))
+    return slots
+
+
+def _quadratic(
+    space: LowerSet, half: LowerSet, theta: Floats, projected: Floats, r: int
+) -> tuple[Floats, Floats]:
+    """Series (r, r, N) of Σ_j θ_j(w) Σ_{a,b} (X_aᵀ A_j X_b) w^{a+b} for A = K and A = M."""
+    stored = np.flatnonzero(theta.any(axis=0))
+    p = _pairs(space, half, stored.tobytes())
+    factors = theta.T[stored]
+    count = len(half)
+    blocks = projected.reshape(2, len(theta), count, r, count, r)
+    out = np.zeros((2, r, r, len(space)))
+    for i in range(r):
+        for j in range(i + 1):
+            products = blocks[:, :, :, i, :, j][:, :, p.a, p.b]
+            sums = np.add.reduceat(products, p.begin, axis=2)
+            pairs = (factors @ sums)[:, p.left, p.right]
+            out[:, i, j, p.into] = out[:, j, i, p.into] = np.add.reduceat(pairs, p.end, axis=1)
+    return out[0], out[1]
 
 
 def matrix_product(space: LowerSet, a: Floats, b: Floats) -> Floats:

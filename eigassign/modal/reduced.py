@@ -24,7 +24,7 @@ from eigassign.modal.project import project
 from eigassign.modal.reduced_model import ReducedModel
 from eigassign.modal.roundoff import rounding_weights
 from eigassign.modal.samples import samples
-from eigassign.series.program import Samples
+from eigassign.series.algebra import Samples
 
 __all__ = ["ReducedModel", "reduce"]
 
@@ -42,11 +42,13 @@ def reduce(
     modes: Sequence[int] = (1,),
     half_order: int = 2,
     guard: bool = True,
+    given: Floats | None = None,
 ) -> ReducedModel:
     """Reduced model from the Taylor vectors of ``modes`` to order m at one or several points.
 
     q0 (n_q,) or (n_points, n_q), y0 likewise. ``guard=False`` leaves out all vectors but those of
     ``modes`` and the modes below them as they are: smaller, but its estimate refuses far sooner.
+    ``given`` are Taylor vectors (n_dof, N) of ``modes`` at the one point that are known already.
     Raises UsageError for impossible arguments, AccuracyError where no basis can be made.
     """
     wanted = tuple(sorted({int(m) for m in modes}))
@@ -58,13 +60,13 @@ def reduce(
     found = lowest_modes(pencil, theta0, wanted[-1], 2 + PROBES if guard else 1)
     count = _represented(found.lam, wanted[-1]) if guard else wanted[-1]
     plan = _plan(pencil, wanted, half_order, guard)
-    vectors = [
-        np.hstack([_taylor_vectors(pencil, x, plan), phi[:, :count]])
-        for x, phi in zip(points, found.phi, strict=True)
-    ]
+    columns = [_taylor_vectors(pencil, x, plan) for x in points] if given is None else [given]
+    if given is not None:
+        columns.append(_taylor_vectors(pencil, points[0], plan[1:]))
+    columns += [phi[:, :count] for phi in found.phi]
     theta_mean = _mean_theta(pencil, points)
     K = pencil.sparse(pencil.stiffness @ theta_mean)[pencil.elastic][:, pencil.elastic].tocsc()
-    V = orthonormal(K, np.hstack(vectors)[pencil.elastic])
+    V = orthonormal(K, np.hstack(columns)[pencil.elastic])
     at = joint_rows(pencil, K)
     projected = _project(pencil, V, at.responses, theta0[:, 0])
     k_terms = projected.stiffness_terms
@@ -130,7 +132,7 @@ def _taylor_vectors(
     pencil: Pencil, x0: Floats, plan: Sequence[tuple[Sequence[int], int]]
 ) -> Floats:
     """Columns φ_γ (n_dof, N)."""
-    columns = []
+    columns = [np.zeros((pencil.n_dof, 0))]
     for modes, order in plan:
         q0, y0 = x0[: pencil.n_q], x0[pencil.n_q :]
         found = expand(pencil, q0, y0, modes, order=max(order, 1), vector_order=order)

@@ -20,6 +20,16 @@ def samples(q: ArrayLike, y: ArrayLike, n_q: int, n_y: int) -> Floats:
     return np.hstack([np.broadcast_to(r, (n, r.shape[1])) for r in rows])
 
 
+def point(q: ArrayLike, y: ArrayLike, n_q: int, n_y: int) -> Floats:
+    """One point x = (q, y) as (n_q + n_y,)."""
+    a, b = np.asarray(q, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    if a.shape == (n_q,) and b.shape == (n_y,):
+        x = np.concatenate([a, b])
+        if np.isfinite(x).all():
+            return x
+    return np.asarray(samples(a, b, n_q, n_y)[0])
+
+
 def _rows(values: ArrayLike, width: int, name: str) -> Floats:
     array = np.asarray(values, dtype=np.float64)
     if array.ndim > 2 or (array.ndim == 2 and array.shape[1] != width):

@@ -10,25 +10,45 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import UsageError
-from eigassign.series.lower_set import LowerSet
+from eigassign.series.lower_set import LowerSet, ProductTable, first_of_each
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 CHUNK = 4_000_000  # numbers gathered at once in a product: 32 MB
+SMALL_TABLE = 1_000  # pairs up to which looking for zeros costs more than it saves
 
 
 def multiply(space: LowerSet, a: Floats, b: Floats) -> Floats:
     """(ab)_γ = Σ_{δ ≤ γ} a_δ b_{γ-δ} for stacks a, b of shape (n, N)."""
     table = space.table
-    rows = max(1, CHUNK // len(table.left))
-    if len(a) <= rows:
-        return np.add.reduceat(a[:, table.left] * b[:, table.right], table.starts, axis=1)
-    parts = [multiply(space, a[i : i + rows], b[i : i + rows]) for i in range(0, len(a), rows)]
-    return np.concatenate(parts)
+    if len(table.left) > SMALL_TABLE:
+        return _multiply_present(table, a, b)
+    products = a.take(table.left, axis=1)
+    products *= b.take(table.right, axis=1)
+    return np.add.reduceat(products, table.starts, axis=1)
+
+
+def _multiply_present(table: ProductTable, a: Floats, b: Floats) -> Floats:
+    """The same, over the pairs of coefficients that any row of a and any row of b has."""
+    used_a, used_b = (np.asarray(stack.any(axis=0)) for stack in (a, b))
+    keep = used_a[table.left] & used_b[table.right]
+    left, right, target = table.left[keep], table.right[keep], table.target[keep]
+    result = np.zeros_like(a)
+    if not len(target):
+        return result
+    first = first_of_each(target)
+    rows = max(1, CHUNK // len(left))
+    for i in range(0, len(a), rows):
+        products = a[i : i + rows].take(left, axis=1)
+        products *= b[i : i + rows].take(right, axis=1)
+        result[i : i + rows, target[first]] = np.add.reduceat(products, first, axis=1)
+    return result
 
 
 def compose(space: LowerSet, taylor: Floats, a: Floats) -> Floats:
@@ -36,28 +56,68 @@ def compose(space: LowerSet, taylor: Floats, a: Floats) -> Floats:
 
     f(a_0 + ã) = Σ_k f_k ã^k by Horner's rule, exact because ã is nilpotent of order p + 1.
     """
+    rows, columns = a[:, 1:].nonzero()
+    if len(rows) == len(a) and (rows[1:] > rows[:-1]).all():
+        variables = space.variable_of[columns + 1]
+        if (variables >= 0).all():
+            return _compose_lone(space, taylor, variables, a[rows, columns + 1])
     small = a.copy()
     small[:, 0] = 0.0
-    if len(taylor) == 1:
-        result = np.zeros_like(a)
-        result[:, 0] = taylor[0]
-        return result
-    result = taylor[-1][:, None] * small
-    result[:, 0] = taylor[-2]
+    result = np.asarray(taylor[-1][:, None] * small)  # small is zero where p = 0
+    result[:, 0] = taylor[-2:][0]
     for coefficient in taylor[-3::-1]:
         result = multiply(space, result, small)
         result[:, 0] += coefficient
     return result
 
 
+def _compose_lone(space: LowerSet, taylor: Floats, variables: Ints, slopes: Floats) -> Floats:
+    """Σ_k f_k (s x_i)^k: every row depends on one variable x_i, and linearly."""
+    at = space.powers[variables].T
+    values = taylor * slopes ** np.arange(len(taylor))[:, None]
+    result = np.zeros((len(slopes), len(space)))
+    power, row = (at >= 0).nonzero()
+    result[row, at[power, row]] = values[power, row]
+    return result
+
+
+def reciprocal(space: LowerSet, a: Floats) -> Floats:
+    """1/a for stacks a (n, N): with a = a_0 (1 − d) the sum 1 + d (1 + d (1 + …)), d nilpotent."""
+    small = a / -a[:, :1]
+    small[:, 0] = 0.0
+    result = small.copy()
+    result[:, 0] = 1.0
+    for _ in range(space.order - 1):
+        result = multiply(space, result, small)
+        result[:, 0] += 1.0
+    return result / a[:, :1]
+
+
 def sine_taylor(at: Floats, order: int) -> Floats:
     """sin^(k)(a)/k! for k = 0…p: shape (p + 1, n)."""
-    return np.array([np.sin(at + k * (np.pi / 2)) / math.factorial(k) for k in range(order + 1)])
+    return wave_taylor(at, np.zeros(len(at), dtype=np.intp), order)
 
 
 def cosine_taylor(at: Floats, order: int) -> Floats:
     """cos^(k)(a)/k! for k = 0…p: shape (p + 1, n)."""
-    return np.array([np.cos(at + k * (np.pi / 2)) / math.factorial(k) for k in range(order + 1)])
+    return wave_taylor(at, np.ones(len(at), dtype=np.intp), order)
+
+
+def wave_taylor(at: Floats, quarters: Ints, order: int) -> Floats:
+    """Derivatives of sin(a + quarters π/2) over k!, k = 0…p: shape (p + 1, n).
+
+    Every derivative is a quarter turn more: sin, cos, −sin, −cos, and again.
+    """
+    s, c = np.sin(at), np.cos(at)
+    turns = np.arange(order + 1)[:, None] + quarters
+    values = np.array([s, c, -s, -c])[turns % 4, np.arange(len(at))]
+    return np.asarray(values / _factorials(order))
+
+
+@lru_cache(maxsize=64)
+def _factorials(order: int) -> Floats:
+    """k! for k = 0…p as a column."""
+    return np.array([[math.factorial(k)] for k in range(order + 1)], dtype=np.float64)
 
 
 def power_taylor(at: Floats, exponent: float, order: int) -> Floats:

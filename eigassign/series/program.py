@@ -8,148 +8,48 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from eigassign.errors import SingularityError, UsageError
+from eigassign.errors import UsageError
+from eigassign.series.algebra import Algebra
 from eigassign.series.expression import Node, Recorder
-from eigassign.series.lower_set import LowerSet
-from eigassign.series.power_series import (
-    compose,
-    cosine_taylor,
-    multiply,
-    power_taylor,
-    sine_taylor,
-)
 
 if TYPE_CHECKING:
     from eigassign.series.implicit import ImplicitFunction
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-
-
-class Algebra(Protocol):
-    """What a program needs to run: rows of numbers standing for values."""
-
-    def constant(self, values: Floats) -> Floats:
-        """Numbers (n,) as rows (n, …)."""
-
-    def product(self, a: Floats, b: Floats) -> Floats:
-        """Row by row product."""
-
-    def power(self, a: Floats, exponents: Floats) -> Floats:
-        """Row by row power with one exponent a row."""
-
-    def sine(self, a: Floats) -> Floats:
-        """Row by row sine."""
-
-    def cosine(self, a: Floats) -> Floats:
-        """Row by row cosine."""
-
-    def solve(self, A: Floats, B: Floats, n: int) -> Floats:
-        """X as rows (n m, …) of A X = B, entries as rows (n², …) and (n m, …)."""
-
-
-class Samples:
-    """Ordinary numbers, many samples at once."""
-
-    def constant(self, values: Floats) -> Floats:
-        """(n,) → (n, 1), broadcast over samples."""
-        return values[:, None]
-
-    def product(self, a: Floats, b: Floats) -> Floats:
-        """Elementwise."""
-        return a * b
-
-    def power(self, a: Floats, exponents: Floats) -> Floats:
-        """Elementwise; a domain error shows as NaN, which callers refuse."""
-        with np.errstate(all="ignore"):
-            return np.power(a, exponents[:, None])
-
-    def sine(self, a: Floats) -> Floats:
-        """Elementwise."""
-        return np.sin(a)
-
-    def cosine(self, a: Floats) -> Floats:
-        """Elementwise."""
-        return np.cos(a)
-
-    def solve(self, A: Floats, B: Floats, n: int) -> Floats:
-        """Sample by sample; raises SingularityError where A is singular."""
-        left, right = A.T.reshape(-1, n, n), B.T.reshape(A.shape[1], n, -1)
-        try:
-            return np.asarray(np.linalg.solve(left, right).reshape(A.shape[1], -1).T)
-        except np.linalg.LinAlgError as error:
-            raise SingularityError("the mechanism is at a dead point") from error
-
-
-@dataclass(frozen=True)
-class Truncated:
-    """Power series truncated to ``space``."""
-
-    space: LowerSet
-
-    def constant(self, values: Floats) -> Floats:
-        """(n,) → (n, N): the constant series."""
-        rows = np.zeros((len(values), len(self.space)))
-        rows[:, 0] = values
-        return rows
-
-    def product(self, a: Floats, b: Floats) -> Floats:
-        """Cauchy product over the set."""
-        return multiply(self.space, a, b)
-
-    def power(self, a: Floats, exponents: Floats) -> Floats:
-        """Binomial series about the constant terms, one exponent a row."""
-        out = np.empty_like(a)
-        for exponent in np.unique(exponents):
-            rows = exponents == exponent
-            taylor = power_taylor(a[rows, 0], float(exponent), self.space.order)
-            out[rows] = compose(self.space, taylor, a[rows])
-        return out
-
-    def sine(self, a: Floats) -> Floats:
-        """Sine of each series."""
-        return compose(self.space, sine_taylor(a[:, 0], self.space.order), a)
-
-    def cosine(self, a: Floats) -> Floats:
-        """Cosine of each series."""
-        return compose(self.space, cosine_taylor(a[:, 0], self.space.order), a)
-
-    def solve(self, A: Floats, B: Floats, n: int) -> Floats:
-        """Each chord step X ← X + A_0⁻¹ (B − A X) gains one degree."""
-        m, size = len(B) // n, len(self.space)
-        inverse = np.linalg.inv(A[:, 0].reshape(n, n))
-        right = B.reshape(n, m * size)
-        X = inverse @ right
-        for _ in range(self.space.order):
-            X = X + inverse @ (right - self._matrix_product(A, X, n, m).reshape(n, -1))
-        return np.asarray(X.reshape(n * m, size))
-
-    def _matrix_product(self, A: Floats, X: Floats, n: int, m: int) -> Floats:
-        size = len(self.space)
-        shape = (n, n, m, size)
-        left = np.broadcast_to(A.reshape(n, n, 1, size), shape).reshape(-1, size)
-        right = np.broadcast_to(X.reshape(1, n, m, size), shape).reshape(-1, size)
-        return np.asarray(multiply(self.space, left, right).reshape(shape).sum(axis=1))
+WAVES: dict[object, str] = {"sine": "wave", "cosine": "wave"}
+DENSE_FORMS = 2_000  # entries up to which the matrix of a linear step is kept dense
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """Atoms of one kind and one level: computed together from atoms of lower levels."""
+    """Atoms of one kind and one level: computed together from atoms of lower levels.
+
+    Kinds are "linear", "product", "power" and "wave": sines and cosines together.
+    """
 
     kind: str
     targets: Ints
     left: Ints
-    right: Ints
+    right: Ints  # second factors of products; of waves 0 for a sine and 1 for a cosine
     numbers: Floats  # exponents of powers; constants of linear forms
-    matrix: sparse.csr_array | None  # of linear forms, over ``left``
-    picked: Ints  # which components of a solution are wanted
-    function: ImplicitFunction | None
+    matrix: sparse.csr_array | None  # of linear forms, over the atoms ``left``
+    picked: Ints  # which components of a system's solution are wanted
+    function: ImplicitFunction | None  # of an implicit step
+
+    @cached_property
+    def weights(self) -> sparse.csr_array | Floats:
+        """The matrix of linear forms, dense where it is so small that this is quicker."""
+        assert self.matrix is not None
+        size = self.matrix.shape[0] * self.matrix.shape[1]
+        return self.matrix.toarray() if size <= DENSE_FORMS else self.matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,21 +74,21 @@ class Program:
 
 
 def _take(step: Step, algebra: Algebra, values: Floats) -> Floats:
+    a = values.take(step.left, axis=0)
+    if step.kind == "product":
+        return algebra.product(a, values.take(step.right, axis=0))
     if step.kind == "linear":
-        assert step.matrix is not None
-        return np.asarray(step.matrix @ values[step.left] + algebra.constant(step.numbers))
-    a = values[step.left]
+        return algebra.linear(step, a)
+    if step.kind == "power":
+        return algebra.power(a, step.numbers)
     if step.kind == "solve":
-        return algebra.solve(a, values[step.right], int(step.numbers[0]))[step.picked]
+        right = values.take(step.right, axis=0)
+        return algebra.solve(a, right, int(step.numbers[0]))[step.picked]
     if step.function is not None:
         from eigassign.series.implicit import evaluate
 
         return evaluate(step.function, algebra, a)[step.picked]
-    if step.kind == "product":
-        return algebra.product(a, values[step.right])
-    if step.kind == "power":
-        return algebra.power(a, step.numbers)
-    return algebra.sine(a) if step.kind == "sine" else algebra.cosine(a)
+    return algebra.wave(a, step.right)
 
 
 def compile_program(recorder: Recorder, outputs: Sequence[int], n_variables: int) -> Program:
@@ -278,7 +178,7 @@ def _schedule(nodes: Sequence[Node], levels: Sequence[int]) -> tuple[Step, ...]:
             system = systems.setdefault(node[:-1], len(systems))
             groups.setdefault((level, str(node[0]), system), []).append(k)
         elif node[0] != "variable":
-            groups.setdefault((level, str(node[0]), -1), []).append(k)
+            groups.setdefault((level, WAVES.get(node[0], str(node[0])), -1), []).append(k)
     return tuple(_step(kind, atoms, nodes) for (_, kind, _), atoms in sorted(groups.items()))
 
 
@@ -292,6 +192,8 @@ def _step(kind: str, atoms: list[int], nodes: Sequence[Node]) -> Step:
     arguments = np.array([_arguments(nodes[k]) for k in atoms], dtype=np.intp)
     numbers = [float(str(nodes[k][2])) for k in atoms] if kind == "power" else []
     right = arguments[:, 1] if kind == "product" else empty
+    if kind == "wave":
+        right = np.array([nodes[k][0] == "cosine" for k in atoms], dtype=np.intp)
     return Step(kind, targets, arguments[:, 0], right, np.array(numbers), None, empty, None)
 
 

@@ -197,6 +197,12 @@ def test_every_array_of_the_pencil_counts(tmp_path: Path) -> None:
         (value.data if name in ("stiffness", "mass") else value.reshape(-1))[-1:] += 1
         other = replace(model, pencil=replace(pencil, **{name: value}))
         assert expansion_key(other, plan, 4) != plain, name
+    steps = pencil.program.steps
+    for k, step in enumerate(steps):
+        changed = replace(step, left=step.left[::-1] + 1)
+        program = replace(pencil.program, steps=(*steps[:k], changed, *steps[k + 1 :]))
+        other = replace(model, pencil=replace(pencil, program=program))
+        assert expansion_key(other, plan, 4) != plain, step.kind
     assert sum(array.size for array in _numbers(pencil_parts(pencil))) > 1000
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from calibration import Drawn, Floats, Tally, tally
 
+from eigassign.modal.expansion import expand
 from eigassign.modal.reduced import reduce
 
 COVERED, OVERESTIMATE = 0.999, 30.0
@@ -13,6 +14,12 @@ COVERED, OVERESTIMATE = 0.999, 30.0
 
 def reduced_model(drawn: Drawn) -> tuple[Floats, Floats]:
     model = reduce(drawn.model.pencil, drawn.q0, drawn.y0, drawn.modes, drawn.half_order)
+    return model.frequencies(drawn.q, drawn.y), model.error_estimate(drawn.q, drawn.y)
+
+
+def polynomial(drawn: Drawn) -> tuple[Floats, Floats]:
+    order = 2 * drawn.half_order
+    model = expand(drawn.model.pencil, drawn.q0, drawn.y0, drawn.modes, order)
     return model.frequencies(drawn.q, drawn.y), model.error_estimate(drawn.q, drawn.y)
 
 
@@ -27,6 +34,12 @@ def check(found: Tally) -> None:
 
 def test_the_estimate_of_the_reduced_model_is_not_below_the_error():
     check(tally(range(20_000, 20_150), 3, reduced_model))
+
+
+def test_the_estimate_of_a_polynomial_is_not_below_the_error():
+    found = tally(range(30_000, 30_060), 3, polynomial)
+    assert found.covered >= COVERED
+    assert np.median(found.overestimate) < OVERESTIMATE
 
 
 @pytest.mark.slow

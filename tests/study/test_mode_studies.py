@@ -91,6 +91,13 @@ def test_poses_are_the_rigid_links_where_kinematics_puts_them(tmp_path: Path) ->
     np.testing.assert_allclose(poses.tip_path[k], tip, atol=1e-9)
 
 
+def test_a_body_at_the_start_of_a_link_is_drawn_there(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, changed(("at: forearm.end", "at: forearm.start")))
+    poses = draw_poses(scene.file, scene.model, scene.path, scene.initial)
+    bodies = dict(poses.bodies)
+    np.testing.assert_allclose(bodies["tool_mass"], bodies["elbow_mass"], atol=1e-12)
+
+
 def test_poses_are_spread_over_the_way_and_include_both_ends() -> None:
     q = np.array([[0.0], [0.0], [0.01], [0.5], [0.99], [1.0], [1.0]])
     assert spread_samples(q, 3) == [0, 3, 5]

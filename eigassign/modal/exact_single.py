@@ -1,0 +1,67 @@
+"""Exact elastic modes of one small dense sample, through LAPACK without detours.
+
+The reduction of ``exact``: K_E = C Cᵀ, A = C⁻¹ M_c C⁻ᵀ, A v = μ v, z = C⁻ᵀ v.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+
+from eigassign.errors import AccuracyError, MechanismError
+from eigassign.mechanism.pencil import Pencil
+
+Floats = NDArray[np.float64]
+ALL_AT_ONCE = 64  # unknowns up to which all eigenpairs cost no more than the wanted ones
+
+
+def solve_single(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
+    """μ = 1/λ (count,), descending, and modes (n_dof, count) with φᵀMφ = 1 for θ (n_theta, 1).
+
+    The entry of largest magnitude of every mode is positive.
+    """
+    (K,), (M,) = pencil.matrices(theta)
+    order, n = np.concatenate([pencil.elastic, pencil.rigid]), len(pencil.elastic)
+    if n < len(order) and order[n] != n:  # rigid coordinates usually come last anyway
+        K, M = K[order[:, None], order], M[order[:, None], order]
+    E, F = slice(n), slice(n, len(order))
+    C, info = lapack.dpotrf(K[E, E].T, lower=1, overwrite_a=1)
+    if info:
+        raise MechanismError(
+            "mechanism", "the stiffness matrix is not positive definite: a link or drive is limp"
+        )
+    coupling = _coupling(M[F, F], M[F, E])
+    M_c = M[E, E] - M[E, F] @ coupling
+    A, _ = lapack.dsygst(M_c.T, C, lower=1, overwrite_a=1)
+    mu, v = _largest(A, count)
+    z, _ = lapack.dtrtrs(C, v, lower=1, trans=1)
+    z = z / np.sqrt(np.maximum(mu, 1e-300))
+    phi = np.empty((len(order), count))
+    phi[order] = np.concatenate([z, -coupling @ z])
+    top = phi[np.abs(phi).argmax(axis=0), np.arange(count)]
+    return mu, phi * np.copysign(1.0, top)
+
+
+def _coupling(M_FF: Floats, M_FE: Floats) -> Floats:
+    if not len(M_FF):
+        return M_FE
+    L, info = lapack.dpotrf(M_FF, lower=1)
+    if info:
+        raise MechanismError(
+            "mechanism", "a free coordinate moves no mass: give the mechanism mass or lock it"
+        )
+    return np.asarray(lapack.dpotrs(L, M_FE, lower=1)[0])
+
+
+def _largest(A: Floats, count: int) -> tuple[Floats, Floats]:
+    """The largest eigenvalues of A, descending, and their vectors."""
+    n = len(A)
+    if n <= ALL_AT_ONCE:
+        mu, v, info = lapack.dsyevd(A, lower=1, overwrite_a=1)
+    else:
+        mu, v, found, _, info = lapack.dsyevr(A, range="I", il=n - count + 1, iu=n, lower=1)
+        mu, v = mu[:found], v[:, :found]
+    if info or len(mu) < count:
+        raise AccuracyError("the exact modes did not converge")
+    return np.asarray(mu[::-1][:count]), np.asarray(v[:, ::-1][:, :count])

@@ -1,0 +1,42 @@
+"""A reduced model in one HDF5 file, checked byte for byte before it is believed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from eigassign.errors import StorageError, UsageError
+from eigassign.modal.reduced_model import ReducedModel
+from eigassign.modal.reduced_storage import FORMAT, reduced_arrays, reduced_from_arrays
+from eigassign.output.cache_format import DamagedError, key, pack, unpack
+from eigassign.output.files import replace_synced
+
+
+def save_reduced(reduced: ReducedModel, path: str | Path) -> None:
+    """Write ``reduced`` to ``path``, whole or not at all; raises StorageError if that fails."""
+    path = Path(path)
+    meta = {
+        "what": "reduced model",
+        "modes": ", ".join(map(str, reduced.modes)),
+        "size": str(reduced.size),
+        "expansion points": str(len(reduced.points)),
+    }
+    data = pack(_key(), reduced_arrays(reduced), meta)
+    try:
+        replace_synced(path, data)
+    except OSError as error:
+        raise StorageError(f"cannot write {path}: {error.strerror}") from error
+
+
+def load_reduced(path: str | Path) -> ReducedModel:
+    """Read what `save_reduced` wrote; StorageError for a missing, damaged or other file."""
+    path = Path(path)
+    try:
+        return reduced_from_arrays(unpack(_key(), path.read_bytes())[0])
+    except OSError as error:
+        raise StorageError(f"cannot read {path}: {error.strerror}") from error
+    except (DamagedError, UsageError) as error:
+        raise StorageError(f"{path} is not an intact reduced model: {error}") from error
+
+
+def _key() -> str:
+    return key(("file of a reduced model",), algorithm=FORMAT)

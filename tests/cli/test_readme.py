@@ -1,0 +1,52 @@
+"""The README, held to what it describes."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from commands import TWO_LINK
+
+from eigassign.case import json_schema, parse
+from eigassign.cli import cli
+
+ROOT = TWO_LINK.parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", README, re.DOTALL | re.MULTILINE)
+
+
+def test_the_case_shown_is_the_case_shipped() -> None:
+    shown = next(block for block in blocks("yaml") if block.startswith("title:"))
+    shipped = TWO_LINK.read_bytes()
+    assert parse(shown.encode(), TWO_LINK) == parse(shipped, TWO_LINK)
+
+
+def test_every_key_of_a_case_file_is_explained() -> None:
+    definitions = json_schema()["$defs"].values()
+    keys = {key for each in definitions for key in each.get("properties", {})}
+    assert {key for key in keys if key not in README} == set()
+
+
+def test_every_command_and_shared_option_is_listed() -> None:
+    for name, command in cli.commands.items():
+        assert f"`eigassign {name}" in README
+        long = {o for p in command.params for o in p.opts if o.startswith("--")}
+        assert {o for o in long if o not in README} <= {"--verbose", "--linear", "--mode"}
+
+
+def test_the_python_shown_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    names: dict[str, object] = {}
+    for block in blocks("python"):
+        exec(block, names)
+    assert names["q"].shape == (152, 2)  # type: ignore[attr-defined]
+
+
+def test_every_file_that_is_linked_is_there() -> None:
+    links = re.findall(r"\]\((?!https?:)([^)#]+)\)", README)
+    assert links
+    assert all(Path(ROOT, link).exists() for link in links)

@@ -1,0 +1,90 @@
+"""A reduced model outlives its process bit for bit, and a damaged file is not believed."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chains import model_of, random_chain, two_link
+
+from eigassign import api
+from eigassign.errors import StorageError, UsageError
+from eigassign.modal.reduced import reduce
+from eigassign.modal.reduced_storage import reduced_arrays, reduced_from_arrays
+
+Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
+Q = Q0 + np.column_stack([np.zeros(9), np.linspace(-0.5, 0.5, 9)])
+
+
+@pytest.fixture(scope="module")
+def reduced():
+    return reduce(model_of(two_link()).pencil, Q0, Y0, (1, 2), 2)
+
+
+def test_a_file_gives_the_same_numbers_bit_for_bit(reduced, tmp_path):
+    api.save_reduced(reduced, tmp_path / "arm.h5")
+    loaded = api.load_reduced(tmp_path / "arm.h5")
+    assert loaded.frequencies(Q, Y0).tobytes() == reduced.frequencies(Q, Y0).tobytes()
+    assert loaded.error_estimate(Q, Y0).tobytes() == reduced.error_estimate(Q, Y0).tobytes()
+    assert loaded.modes == reduced.modes
+
+
+@pytest.mark.parametrize("seed", [1, 4, 12])
+def test_any_mechanism_survives_as_arrays(seed):
+    tree, q0 = random_chain(seed)
+    built = reduce(model_of(tree).pencil, q0, [], (1,), 1)
+    back = reduced_from_arrays(reduced_arrays(built))
+    assert back.frequencies(q0 + 0.1, []).tobytes() == built.frequencies(q0 + 0.1, []).tobytes()
+
+
+def test_it_is_evaluated_where_there_is_no_mechanism(reduced, tmp_path):
+    api.save_reduced(reduced, tmp_path / "arm.h5")
+    code = (
+        "import sys; from eigassign.output.reduced_file import load_reduced\n"
+        "f = load_reduced(sys.argv[1]).frequencies([1.817, 5.4], [0.1, 0.1])\n"
+        "assert not any(m.startswith('eigassign.case') for m in sys.modules)\n"
+        "print(float(f[0, 0]).hex())"
+    )
+    run = [sys.executable, "-c", code, str(tmp_path / "arm.h5")]
+    out = subprocess.run(run, capture_output=True, text=True, check=True).stdout
+    assert float.fromhex(out.strip()) == reduced.frequencies([1.817, 5.4], [0.1, 0.1])[0, 0]
+
+
+@pytest.mark.parametrize("at", [0.02, 0.5, 0.97])
+def test_one_flipped_bit_is_noticed(reduced, tmp_path, at):
+    path = tmp_path / "arm.h5"
+    api.save_reduced(reduced, path)
+    data = bytearray(path.read_bytes())
+    data[int(at * len(data))] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(StorageError, match="not an intact reduced model"):
+        api.load_reduced(path)
+
+
+def test_a_missing_file_and_a_missing_folder_are_named(reduced, tmp_path: Path):
+    with pytest.raises(StorageError, match="cannot read"):
+        api.load_reduced(tmp_path / "none.h5")
+    with pytest.raises(StorageError, match="cannot write"):
+        api.save_reduced(reduced, tmp_path / "none" / "arm.h5")
+
+
+def test_arrays_of_another_version_are_refused(reduced):
+    arrays = reduced_arrays(reduced)
+    tree = json.loads(arrays["tree"].tobytes())
+    tree["format"] = "reduced model 0"
+    arrays["tree"] = np.frombuffer(json.dumps(tree).encode(), dtype=np.uint8)
+    with pytest.raises(UsageError, match="reduced model 0"):
+        reduced_from_arrays(arrays)
+
+
+def test_only_known_classes_are_made(reduced):
+    arrays = reduced_arrays(reduced)
+    tree = json.loads(arrays["tree"].tobytes())
+    tree["model"]["class"] = "Path"
+    arrays["tree"] = np.frombuffer(json.dumps(tree).encode(), dtype=np.uint8)
+    with pytest.raises(UsageError, match="not a reduced model"):
+        reduced_from_arrays(arrays)
