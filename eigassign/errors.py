@@ -81,3 +81,9 @@ class StorageError(EigassignError):
     """Reading or writing failed: no permission, no space, a folder in the way."""
 
     exit_code = 3
+
+
+class SingularityError(EigassignError):
+    """A configuration where the mechanism's equations have no unique solution: a dead point."""
+
+    exit_code = 2

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from eigassign.mechanism.beam import Term
+from eigassign.mechanism.mesh import Term
 from eigassign.series.expression import Expression, Scalar
 
 Floats = NDArray[np.float64]

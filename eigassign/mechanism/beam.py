@@ -1,12 +1,14 @@
-"""Planar Euler-Bernoulli beam elements with axial and bending motion, consistent mass.
+"""Beam elements: axial, torsion and two bendings, Euler-Bernoulli or Timoshenko, consistent mass.
 
-A chain of n equal elements of length h = L/n has matrices that are affine in few scalars:
+An element of length h has matrices that are affine in few scalars; per plane of bending, with
+Φ = 12EI/(κGA h²) (0 for Euler-Bernoulli),
 
-    k = (EA/h) k_a + (EI/h³) k_0 + (EI/h²) k_1 + (EI/h) k_2
-    m = ρA (h m_0 + h² m_1 + h³ m_2)
+    k = (EA/h) k_a + (GJ/h) k_t + EI/(1+Φ) (h⁻³ k_0 + h⁻² k_1 + h⁻¹ k_2 + Φ h⁻¹ k_3)
+    m = ρA h m_a + ρI_p h m_t + ρA/(1+Φ)² Σ_{i,j} Φ^i h^{j+1} m_ij  (+ rotary inertia with shear)
 
-with constant k_·, m_· (cubic Hermite bending, linear axial; any text on structural dynamics).
-Degrees of freedom of a node: u_x, u_y [m], θ_z [rad], in the frame of the link.
+(cubic Hermite bending; Przemieniecki, Theory of Matrix Structural Analysis, §5.6 and §11.7 with
+shear and rotary inertia). Dofs of an element: (u_x, u_y, u_z, θ_x, θ_y, θ_z) at both nodes; a
+planar mechanism keeps (u_x, u_y, θ_z).
 """
 
 from __future__ import annotations
@@ -16,109 +18,182 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
-from eigassign.series.expression import Scalar
+from eigassign.series.expression import Scalar, is_constant
 
 Floats = NDArray[np.float64]
-PLANAR = 3  # degrees of freedom of a planar node
 
 
-class Term(NamedTuple):
-    """coefficient × constant matrix; one term of an affine local matrix."""
+class ElementTerm(NamedTuple):
+    """coefficient × constant 12 × 12 matrix."""
 
     coefficient: Scalar
-    matrix: sparse.csr_array
+    matrix: Floats
 
 
-def beam_stiffness(n: int, E: Scalar, A: Scalar, I: Scalar, length: Scalar) -> list[Term]:  # noqa: E741
-    """Affine terms of k (3(n + 1))²; E in Pa, A in m², I in m⁴, length in m."""
-    h = length * (1.0 / n)
-    EI = E * I
-    coefficients = (E * A / h, EI / h**3.0, EI / h**2.0, EI / h)
-    return [Term(c, m) for c, m in zip(coefficients, _chain_stiffness(n), strict=True)]
+class BeamValues(NamedTuple):
+    """Stiffnesses EA [N], EI_z, EI_y, GJ [N m²], shear κGA [N] or None; ρA, ρI_p, ρI_z, ρI_y."""
+
+    EA: Scalar
+    EI_z: Scalar
+    EI_y: Scalar
+    GJ: Scalar
+    shear: Scalar | None
+    mass: Scalar
+    polar: Scalar
+    rotary_z: Scalar
+    rotary_y: Scalar
 
 
-def beam_mass(n: int, mass_per_length: Scalar, length: Scalar) -> list[Term]:
-    """Affine terms of the consistent m; ρA in kg/m, length in m."""
-    h = length * (1.0 / n)
-    coefficients = (mass_per_length * h, mass_per_length * h**2.0, mass_per_length * h**3.0)
-    return [Term(c, m) for c, m in zip(coefficients, _chain_mass(n), strict=True)]
+def element_stiffness(beam: BeamValues, h: Scalar) -> list[ElementTerm]:
+    """Affine terms of k; h in m."""
+    terms = [ElementTerm(beam.EA / h, _pair(0)), ElementTerm(beam.GJ / h, _pair(3))]
+    for EI, plane in ((beam.EI_z, "z"), (beam.EI_y, "y")):
+        phi = _phi(beam, EI, h)
+        stiff = EI if _is_zero(phi) else EI / (phi + 1.0)
+        coefficients = (stiff / h**3.0, stiff / h**2.0, stiff / h, stiff * phi / h)
+        terms += [
+            ElementTerm(c, m) for c, m in zip(coefficients, bending_stiffness(plane), strict=True)
+        ]
+    return [t for t in terms if not _is_zero(t.coefficient)]
 
 
-def node_mass(n: int, node: int, mass: Scalar, inertia: Scalar) -> list[Term]:
-    """Point mass in kg and rotary inertia in kg m² at one node of a chain of n elements."""
-    at = PLANAR * node
-    return [
-        Term(mass, _diagonal(n, (at, at + 1))),
-        Term(inertia, _diagonal(n, (at + 2,))),
+def element_mass(beam: BeamValues, h: Scalar) -> list[ElementTerm]:
+    """Affine terms of the consistent m."""
+    terms = [
+        ElementTerm(beam.mass * h, _spread(0)),
+        ElementTerm(beam.polar * h, _spread(3)),
     ]
+    for EI, rotary, plane in ((beam.EI_z, beam.rotary_z, "z"), (beam.EI_y, beam.rotary_y, "y")):
+        phi = _phi(beam, EI, h)
+        scale = 1.0 if _is_zero(phi) else (phi + 1.0) ** -2.0
+        terms += _translation(beam.mass * scale, phi, h, plane)
+        if beam.shear is not None:
+            terms += _rotary(rotary * scale, phi, h, plane)
+    return [t for t in terms if not _is_zero(t.coefficient)]
 
 
-def rigid_modes(n: int) -> tuple[sparse.csr_array, sparse.csr_array]:
-    """N_0, N_1 of N = N_0 + L N_1: nodal motion per twist (v_x, v_y, ω_z), (3(n + 1)) × 3.
+def _phi(beam: BeamValues, EI: Scalar, h: Scalar) -> Scalar:
+    """Φ = 12EI/(κGA h²)."""
+    return 0.0 if beam.shear is None else EI * 12.0 / (beam.shear * h**2.0)
 
-    v_node = v + ω × (ξL, 0, 0): u_y gains ωξL; θ_z = ω.
+
+def _translation(scale: Scalar, phi: Scalar, h: Scalar, plane: str) -> list[ElementTerm]:
+    return _polynomial(scale, phi, bending_mass(plane), (h, h**2.0, h**3.0))
+
+
+def _rotary(scale: Scalar, phi: Scalar, h: Scalar, plane: str) -> list[ElementTerm]:
+    return _polynomial(scale, phi, rotary_mass(plane), (h**-1.0, 1.0, h))
+
+
+def _polynomial(
+    scale: Scalar,
+    phi: Scalar,
+    matrices: tuple[tuple[Floats, ...], ...],
+    lengths: tuple[Scalar, ...],
+) -> list[ElementTerm]:
+    """Σ_i Φ^i Σ_j length_j matrix_ij."""
+    terms: list[ElementTerm] = []
+    power: Scalar = 1.0
+    for row in matrices:
+        terms += [
+            ElementTerm(scale * power * length, m) for length, m in zip(lengths, row, strict=True)
+        ]
+        power = power * phi
+        if _is_zero(power):
+            break
+    return terms
+
+
+def _is_zero(x: Scalar) -> bool:
+    return is_constant(x) and x == 0.0
+
+
+def _pair(dof: int) -> Floats:
+    """[[1, −1], [−1, 1]] on one dof of both nodes."""
+    out = np.zeros((12, 12))
+    out[np.ix_([dof, dof + 6], [dof, dof + 6])] = [[1.0, -1.0], [-1.0, 1.0]]
+    return out
+
+
+def _spread(dof: int) -> Floats:
+    """Consistent mass of a linear field: [[1/3, 1/6], [1/6, 1/3]]."""
+    out = np.zeros((12, 12))
+    out[np.ix_([dof, dof + 6], [dof, dof + 6])] = [[1 / 3, 1 / 6], [1 / 6, 1 / 3]]
+    return out
+
+
+def _embed(small: Floats, plane: str) -> Floats:
+    """A 4 × 4 bending matrix (w1, slope1, w2, slope2) in the element's dofs.
+
+    In the x-y plane θ_z = dv/dx; in the x-z plane θ_y = −dw/dx.
     """
-    return _rigid_modes(n)
+    dofs, sign = ([1, 5, 7, 11], 1.0) if plane == "z" else ([2, 4, 8, 10], -1.0)
+    turn = np.diag([1.0, sign, 1.0, sign])
+    out = np.zeros((12, 12))
+    out[np.ix_(dofs, dofs)] = turn @ small @ turn
+    return out
 
 
-@lru_cache(maxsize=256)
-def _rigid_modes(n: int) -> tuple[sparse.csr_array, sparse.csr_array]:
-    size = PLANAR * (n + 1)
-    constant = sparse.csr_array(
-        (np.ones(size), (np.arange(size), np.tile(np.arange(PLANAR), n + 1))), shape=(size, PLANAR)
+def _blocks(ww: Floats, wt: Floats, tt: Floats) -> tuple[Floats, Floats, Floats]:
+    """Split a bending matrix by its powers of h: deflections, mixed, slopes."""
+    a, b, c = (np.zeros((4, 4)) for _ in range(3))
+    a[np.ix_([0, 2], [0, 2])] = ww
+    b[np.ix_([0, 2], [1, 3])] = wt
+    b[np.ix_([1, 3], [0, 2])] = wt.T
+    c[np.ix_([1, 3], [1, 3])] = tt
+    return a, b, c
+
+
+@lru_cache(maxsize=2)
+def bending_stiffness(plane: str) -> tuple[Floats, ...]:
+    """k_0, k_1, k_2, k_3 of one plane."""
+    a, b, c = _blocks(
+        np.array([[12.0, -12.0], [-12.0, 12.0]]),
+        np.array([[6.0, 6.0], [-6.0, -6.0]]),
+        np.array([[4.0, 2.0], [2.0, 4.0]]),
     )
-    xi = np.linspace(0.0, 1.0, n + 1)[1:]
-    rows = PLANAR * np.arange(1, n + 1) + 1
-    per_length = sparse.csr_array((xi, (rows, np.full(n, 2))), shape=(size, PLANAR))
-    return constant, per_length
+    d = np.zeros((4, 4))
+    d[np.ix_([1, 3], [1, 3])] = [[1.0, -1.0], [-1.0, 1.0]]
+    return tuple(_embed(m, plane) for m in (a, b, c, d))
 
 
-@lru_cache(maxsize=256)
-def _chain_stiffness(n: int) -> tuple[sparse.csr_array, ...]:
-    return tuple(_repeat(n, e) for e in _element_stiffness())
+@lru_cache(maxsize=2)
+def bending_mass(plane: str) -> tuple[tuple[Floats, ...], ...]:
+    """m_ij of one plane: rows i the powers of Φ, columns j those of h."""
+    rows = (
+        ((13 / 35, 9 / 70), (11 / 210, -13 / 420), (1 / 105, -1 / 140)),
+        ((7 / 10, 3 / 10), (11 / 120, -3 / 40), (1 / 60, -1 / 60)),
+        ((1 / 3, 1 / 6), (1 / 24, -1 / 24), (1 / 120, -1 / 120)),
+    )
+    return tuple(tuple(_embed(m, plane) for m in _symmetric(*row)) for row in rows)
 
 
-@lru_cache(maxsize=256)
-def _chain_mass(n: int) -> tuple[sparse.csr_array, ...]:
-    return tuple(_repeat(n, e) for e in _element_mass())
-
-
-def _element_stiffness() -> tuple[Floats, ...]:
-    """k_a, k_0, k_1, k_2 of one element, dofs (u1, v1, θ1, u2, v2, θ2)."""
-    axial, cubic, square, linear = (np.zeros((6, 6)) for _ in range(4))
-    axial[np.ix_([0, 3], [0, 3])] = [[1, -1], [-1, 1]]
-    cubic[np.ix_([1, 4], [1, 4])] = [[12, -12], [-12, 12]]
-    square[1, [2, 5]] = square[[2, 5], 1] = 6
-    square[4, [2, 5]] = square[[2, 5], 4] = -6
-    linear[np.ix_([2, 5], [2, 5])] = [[4, 2], [2, 4]]
-    return axial, cubic, square, linear
-
-
-def _element_mass() -> tuple[Floats, ...]:
-    """m_0, m_1, m_2 of one element."""
-    zeroth, first, second = (np.zeros((6, 6)) for _ in range(3))
-    zeroth[np.ix_([0, 3], [0, 3])] = [[1 / 3, 1 / 6], [1 / 6, 1 / 3]]
-    zeroth[np.ix_([1, 4], [1, 4])] = np.array([[156, 54], [54, 156]]) / 420
-    first[1, [2, 5]] = first[[2, 5], 1] = np.array([22, -13]) / 420
-    first[4, [2, 5]] = first[[2, 5], 4] = np.array([13, -22]) / 420
-    second[np.ix_([2, 5], [2, 5])] = np.array([[4, -3], [-3, 4]]) / 420
-    return zeroth, first, second
-
-
-def _repeat(n: int, element: Floats) -> sparse.csr_array:
-    """The same element matrix between every pair of neighbouring nodes."""
-    i, j = np.nonzero(element)
-    shift = PLANAR * np.arange(n)[:, None]
-    size = PLANAR * (n + 1)
-    values = np.tile(element[i, j], n)
-    return sparse.csr_array(
-        (values, ((shift + i).ravel(), (shift + j).ravel())), shape=(size, size)
+def _symmetric(
+    ww: tuple[float, float], wt: tuple[float, float], tt: tuple[float, float]
+) -> tuple[Floats, Floats, Floats]:
+    """Mass blocks of an element that looks the same from both ends."""
+    return _blocks(
+        np.array([[ww[0], ww[1]], [ww[1], ww[0]]]),
+        np.array([[wt[0], wt[1]], [-wt[1], -wt[0]]]),
+        np.array([[tt[0], tt[1]], [tt[1], tt[0]]]),
     )
 
 
-def _diagonal(n: int, positions: tuple[int, ...]) -> sparse.csr_array:
-    size = PLANAR * (n + 1)
-    at = np.array(positions)
-    return sparse.csr_array((np.ones(len(at)), (at, at)), shape=(size, size))
+@lru_cache(maxsize=2)
+def rotary_mass(plane: str) -> tuple[tuple[Floats, ...], ...]:
+    """Rotary inertia ρI of one plane: powers of Φ by powers 1/h, 1, h."""
+    rows = (
+        (6 / 5, 1 / 10, 2 / 15, -1 / 30),
+        (0.0, -1 / 2, 1 / 6, -1 / 6),
+        (0.0, 0.0, 1 / 3, 1 / 6),
+    )
+    out = []
+    for ww, wt, tt, cross in rows:
+        blocks = _blocks(
+            np.array([[ww, -ww], [-ww, ww]]),
+            np.array([[wt, wt], [-wt, -wt]]),
+            np.array([[tt, cross], [cross, tt]]),
+        )
+        out.append(tuple(_embed(m, plane) for m in blocks))
+    return tuple(out)

@@ -1,4 +1,4 @@
-"""From a case to its affine pencil: dofs, links, drives, and the compiled coefficient functions."""
+"""From a case to its affine pencil: unknowns, links, springs, drives, coefficient functions."""
 
 from __future__ import annotations
 
@@ -6,130 +6,73 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
+from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly import Accumulator, LocalLink, add_link, pattern
-from eigassign.mechanism.beam import (
-    PLANAR,
-    Term,
-    beam_mass,
-    beam_stiffness,
-    node_mass,
-    rigid_modes,
-)
-from eigassign.mechanism.kinematics import PLANAR_TWIST, Kinematics, Placement
+from eigassign.mechanism.kinematics import Kinematics, Placement
+from eigassign.mechanism.links import link_mesh
+from eigassign.mechanism.mesh import DOFS, LinkMesh
+from eigassign.mechanism.nodes import NodeMotions
 from eigassign.mechanism.parameters import Parameters
 from eigassign.mechanism.pencil import Pencil
-from eigassign.mechanism.sections import section_values
-from eigassign.series.expression import Scalar
 from eigassign.series.program import compile_program
 
 Ints = NDArray[np.intp]
 Objects = NDArray[np.object_]
-NodeDofs = dict[tuple[str, str], list[list[tuple[int, Scalar]]]]
 
 
 def build_pencil(case: CaseFile, parameters: Parameters, motion: Kinematics) -> Pencil:
-    """Assemble K and M of eq. (1) for a tree of planar beam links."""
+    """Assemble K and M of eq. (1) for a mechanism; raises MechanismError naming what is wrong."""
+    links, nodes = local_links(case, parameters, motion)
     stiffness, mass = Accumulator(), Accumulator()
-    links, n_u = _local_links(case, parameters, motion)
     for link in links:
-        add_link(stiffness, mass, link, n_u)
-    _add_drives(stiffness, case, parameters, motion, n_u)
-    return _compile(stiffness, mass, case, parameters, motion, n_u)
+        add_link(stiffness, mass, link, nodes.count)
+    _add_springs(stiffness, case, parameters, motion, nodes)
+    _add_drives(stiffness, case, parameters, motion, nodes.count)
+    return _compile(stiffness, mass, case, parameters, motion, nodes.count)
 
 
-def _local_links(
+def local_links(
     case: CaseFile, parameters: Parameters, motion: Kinematics
-) -> tuple[list[LocalLink], int]:
-    """Number the unknowns link by link; a link's first node is carried by its base."""
-    links: list[LocalLink] = []
-    nodes: NodeDofs = {}
-    count = 0
-    for placement in motion.placements:
-        n = case.mechanism.links[placement.link].elements
-        own = np.full(PLANAR * (n + 1), -1, dtype=np.intp)
-        own[PLANAR:] = count + np.arange(PLANAR * n)
-        count += PLANAR * n
-        carried = _carry(placement, nodes)
-        nodes[placement.link, "start"] = [carried[a] for a in range(PLANAR)]
-        nodes[placement.link, "end"] = [[(int(g), 1.0)] for g in own[-PLANAR:]]
-        links.append(_local_link(case, parameters, placement, own, carried))
-    return links, count
+) -> tuple[list[LocalLink], NodeMotions]:
+    """Every link's matrices in its own frame, and how its nodes hang on the unknowns."""
+    meshes = {p.link: link_mesh(case, parameters, motion.tree, p.link) for p in motion.placements}
+    nodes = NodeMotions(motion, meshes, case.mechanism.space)
+    nodes.number()
+    return [_local_link(p, meshes[p.link], nodes) for p in motion.placements], nodes
 
 
-def _carry(placement: Placement, nodes: NodeDofs) -> dict[int, list[tuple[int, Scalar]]]:
-    """Motion of the follower's first node from that of the base node: u_f = Rᵀ u_b."""
-    if placement.base is None:
-        return {a: [] for a in range(PLANAR)}
-    base = nodes[placement.base]
-    R = placement.rotation
-    planar = [[R[0, 0], R[1, 0], 0.0], [R[0, 1], R[1, 1], 0.0], [0.0, 0.0, 1.0]]
-    return {a: _combine(planar[a], base) for a in range(PLANAR)}
-
-
-def _combine(row: list[Scalar], base: list[list[tuple[int, Scalar]]]) -> list[tuple[int, Scalar]]:
-    """Σ_b row_b × (combination of masters of base dof b)."""
-    total: dict[int, Scalar] = {}
-    for factor, masters in zip(row, base, strict=True):
-        for index, carry in masters:
-            product = carry * factor
-            if isinstance(product, float) and product == 0.0:
-                continue
-            total[index] = total.get(index, 0.0) + product
-    return list(total.items())
-
-
-def _local_link(
-    case: CaseFile,
-    parameters: Parameters,
-    placement: Placement,
-    own: Ints,
-    carried: dict[int, list[tuple[int, Scalar]]],
-) -> LocalLink:
-    name = placement.link
-    link = case.mechanism.links[name]
-    n = link.elements
-    length = parameters.number(f"links.{name}.length", link.length)
-    constant, per_length = rigid_modes(n)
+def _local_link(placement: Placement, mesh: LinkMesh, nodes: NodeMotions) -> LocalLink:
+    """The link's matrices with its own unknowns and the motion of its carried nodes."""
+    own = nodes.own[placement.link]
+    carried = {}
+    for name, slots in mesh.nodes.items():
+        present = slots[slots >= 0]
+        if (own[present] < 0).any():
+            rows = nodes.rows((placement.link, name))
+            for component, slot in enumerate(slots):
+                if slot >= 0:
+                    carried[int(slot)] = list(rows[component].items())
     return LocalLink(
-        stiffness=_stiffness(case, parameters, name, length),
-        mass=_mass(case, parameters, name, length),
-        rigid=[Term(1.0, constant), Term(length, per_length)],
-        twist=placement.twist[list(PLANAR_TWIST)],
+        stiffness=mesh.stiffness,
+        mass=mesh.mass,
+        rigid=mesh.rigid,
+        twist=placement.twist[list(DOFS[nodes.space])],
         own=own,
         carried=carried,
     )
 
 
-def _area_inertia(case: CaseFile, parameters: Parameters, name: str) -> tuple[Scalar, Scalar]:
-    key = case.mechanism.links[name].section
+def _add_springs(
+    target: Accumulator,
+    case: CaseFile,
+    parameters: Parameters,
+    motion: Kinematics,
+    nodes: NodeMotions,
+) -> None:
+    if getattr(case.mechanism, "springs", None):
+        from eigassign.mechanism.springs import add_springs
 
-    def number(field: str, value: float) -> Scalar:
-        return parameters.number(f"sections.{key}.{field}", value)
-
-    return section_values(case.mechanism.sections[key], number)
-
-
-def _stiffness(case: CaseFile, parameters: Parameters, name: str, length: Scalar) -> list[Term]:
-    link = case.mechanism.links[name]
-    area, inertia = _area_inertia(case, parameters, name)
-    path = f"materials.{link.material}.youngs_modulus"
-    modulus = parameters.number(path, case.mechanism.materials[link.material].youngs_modulus)
-    return beam_stiffness(link.elements, modulus, area, inertia, length)
-
-
-def _mass(case: CaseFile, parameters: Parameters, name: str, length: Scalar) -> list[Term]:
-    link = case.mechanism.links[name]
-    area, _ = _area_inertia(case, parameters, name)
-    path = f"materials.{link.material}.density"
-    density = parameters.number(path, case.mechanism.materials[link.material].density)
-    terms = beam_mass(link.elements, density * area, length)
-    for key, body in case.mechanism.bodies.items():
-        owner, _, node = body.at.partition(".")
-        if owner == name:
-            mass = parameters.number(f"bodies.{key}.mass", body.mass)
-            inertia = parameters.number(f"bodies.{key}.inertia", body.inertia)
-            terms += node_mass(link.elements, link.elements * (node == "end"), mass, inertia)
-    return terms
+        add_springs(target, case, parameters, motion, nodes)
 
 
 def _add_drives(
@@ -157,6 +100,8 @@ def _compile(
     n_u: int,
 ) -> Pencil:
     n_dof = n_u + len(motion.columns)
+    if not n_dof:
+        raise MechanismError("mechanism.links", "nothing can move: every link is rigid and locked")
     entries = [stiffness.finish(n_u), mass.finish(n_u)]
     atoms = np.unique(np.concatenate([entry[2] for entry in entries]))
     atoms = atoms[atoms >= 0]
@@ -168,7 +113,7 @@ def _compile(
     return Pencil(
         n_dof=n_dof,
         n_u=n_u,
-        rigid=_rigid(case, motion, n_u),
+        rigid=_rigid(case, motion, n_u, entries[0]),
         rows=rows,
         columns=columns,
         stiffness=weights[0],
@@ -180,8 +125,11 @@ def _compile(
     )
 
 
-def _rigid(case: CaseFile, motion: Kinematics, n_u: int) -> Ints:
-    """Free coordinates among the columns of q̇; held ones are elastic."""
+def _rigid(
+    case: CaseFile, motion: Kinematics, n_u: int, stiffness: tuple[Ints, Ints, Ints, object]
+) -> Ints:
+    """Columns of q̇ without stiffness: the rigid-body modes. Held and sprung ones are elastic."""
     drives = [c.drive for c in case.coordinates.values()]
     free = [n_u + k for k, i in enumerate(motion.columns) if drives[i] == "free"]
-    return np.array(free, dtype=np.intp)
+    sprung = set(stiffness[0].tolist()) if getattr(case.mechanism, "springs", None) else set()
+    return np.array([k for k in free if k not in sprung], dtype=np.intp)

@@ -1,199 +1,264 @@
-"""Kinematics of the equivalent rigid-link system (ERLS): a tree of links joined at nodes.
+"""Kinematics of the equivalent rigid-link system (ERLS), written on numbers and expressions alike.
 
-Everything is written on scalars that may be numbers or expressions, in three dimensions; a planar
-mechanism uses the components (v_x, v_y, ω_z) of a twist.
+A follower joined to a base at lever r (base axes), with R from follower to base axes and motion
+subspace A of the joint in the follower's axes, has at its joint node the twist
 
-For a follower link joined to a base at the point X_b (in the base's frame), with R the rotation
-from follower to base axes, Rᵀ of both twists and a the joint axis in the follower's frame:
+    ω_f = Rᵀ ω_b + A_ω ċ,    v_f = Rᵀ (v_b + ω_b × r) + A_v ċ .
 
-    ω_f = Rᵀ ω_b + a ṡ,    v_f = Rᵀ (v_b + ω_b × X_b)
+The passive freedoms p of closed loops follow from the coordinates: closure F(p; q, y) = 0 defines
+p(q, y), and the loops' twists J_p ṗ + J_q q̇ = 0 give ṗ = P q̇.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
+from eigassign.mechanism.coordinates import Coordinates, coordinates
+from eigassign.mechanism.geometry import node_position
+from eigassign.mechanism.joints import RIDING, JointMotion, joint_motion
 from eigassign.mechanism.parameters import Parameters
-from eigassign.series.expression import Scalar, cos, sin
+from eigassign.mechanism.rotations import (
+    Floats,
+    Objects,
+    carried,
+    cross,
+    euler,
+    multiply,
+    rotation,
+    vector,
+)
+from eigassign.mechanism.tree import Edge, Node, Tree, build_tree
+from eigassign.series.expression import Scalar
 
-Objects = NDArray[np.object_]  # arrays of floats and expressions
-Floats = NDArray[np.float64]
 PLANAR_TWIST = (0, 1, 5)  # v_x, v_y, ω_z among (v, ω)
+SPATIAL_TWIST = (0, 1, 2, 3, 4, 5)
 
 
 @dataclass(frozen=True)
 class Placement:
-    """How one link hangs on its base.
+    """How one link hangs on its base, and its motion.
 
-    ``base`` is (link, node name) or None for the ground; ``rotation`` turns follower components
-    into base components; ``twist`` (6, n_columns) is the link's twist per q̇ in its own frame.
+    ``rotation`` turns the link's components into base components; ``lever`` runs from the base node
+    to the joint node of the link (base axes); ``freedoms`` is A (6, k). ``twist`` (6, n_columns) is
+    that of the link's own origin per column, in its own axes.
     """
 
     link: str
-    joint: str
-    base: tuple[str, str] | None
+    edge: Edge
     rotation: Objects
-    origin: Objects  # of the follower, in the base's frame
-    axis: Objects  # of the joint, in the follower's frame
-    coordinate: int | None  # index of the joint's coordinate in q
+    lever: Objects
+    freedoms: Objects
+    world_rotation: Objects
+    world_origin: Objects
     twist: Objects
 
 
 @dataclass(frozen=True)
-class Kinematics:
-    """Placements in an order where every base precedes its followers, and the coordinate maps.
+class Loop:
+    """One loop-closing joint: pose and twist of its follower node, reached along both sides."""
 
-    s = ``relative`` q + ``offset`` gives the relative joint coordinates; ``columns`` are the
-    indices of the coordinates that are not locked: the q̇ of eq. (1); and per those q̇ the joint
-    rates are ṡ = ``rates`` q̇ (locked joints have zero rows). The unknown of a held coordinate is
-    the deflection of its drive, so that K = diag(K_E, 0) exactly whatever it rides on.
+    edge: Edge
+    rotation: Objects  # from the follower's axes to the base link's axes
+    lever: Objects  # from base node to follower node, base axes
+    freedoms: Objects
+    position_gap: Objects  # (3,) world: along the base side minus along the follower side
+    misalignment: Objects  # (3, 3): R_baseᵀ R_follower, the identity when closed
+    twist_gap: Objects  # (6, n_columns): follower's own twist minus the carried and joint twist
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """Placements base before follower, loops, and the maps between coordinates and freedoms.
+
+    Columns of every twist are q̇ of the coordinates that are not locked.
     """
 
     placements: tuple[Placement, ...]
-    relative: Floats  # (n_q, n_q)
-    offset: Floats  # (n_q,)
-    columns: tuple[int, ...]
-    rates: Floats  # (n_q, n_columns)
+    loops: tuple[Loop, ...]
+    tree: Tree
+    coordinates: Coordinates
+
+    @property
+    def columns(self) -> tuple[int, ...]:
+        """Indices of the coordinates that are not locked: the q̇ of eq. (1)."""
+        return self.coordinates.columns
+
+    @property
+    def relative(self) -> Floats:
+        """A of s = A q + b."""
+        return self.coordinates.relative
+
+    @property
+    def offset(self) -> Floats:
+        """b of s = A q + b."""
+        return self.coordinates.offset
+
+    def placement(self, link: str) -> Placement:
+        """The placement of one link."""
+        return next(p for p in self.placements if p.link == link)
 
 
 def kinematics(case: CaseFile, parameters: Parameters) -> Kinematics:
-    """Walk the tree of joints from the ground; raises MechanismError for a link out of reach."""
-    order = _tree_order(case)
-    relative, offset = _relative_coordinates(case, order)
-    drives = [c.drive for c in case.coordinates.values()]
-    columns = tuple(i for i, drive in enumerate(drives) if drive != "locked")
-    rates = _joint_rates(relative, columns, tuple(i for i in columns if drives[i] == "free"))
+    """ERLS motion of a case; raises MechanismError for what cannot be placed, moved or closed."""
+    tree = build_tree(case)
+    return replayed(case, parameters, tree, coordinates(case, tree))
+
+
+def replayed(case: CaseFile, parameters: Parameters, tree: Tree, coords: Coordinates) -> Kinematics:
+    """The motion for any choice of columns."""
+    if tree.loops:
+        from eigassign.mechanism.closure import close_loops
+
+        return close_loops(case, parameters, tree, coords)
+    if tree.passive:
+        name = tree.passive[0].joint
+        message = "moves without a coordinate in an open chain: give it one, or make it fixed"
+        raise MechanismError(f"mechanism.joints.{name}", message)
+    values = [parameters.freedom(k) for k in range(len(tree.freedoms))]
+    return walk(case, parameters, tree, coords, values, coords.rates.astype(object))
+
+
+def all_moving(case: CaseFile, parameters: Parameters, motion: Kinematics) -> Kinematics:
+    """The same motion with every coordinate among the columns, locked ones too."""
+    c = motion.coordinates
+    n = len(c.relative)
+    rates = np.zeros((len(motion.tree.freedoms), n))
+    rates[:n] = c.relative
+    coords = replace(c, columns=tuple(range(n)), rates=rates)
+    return replayed(case, parameters, motion.tree, coords)
+
+
+def walk(
+    case: CaseFile,
+    parameters: Parameters,
+    tree: Tree,
+    coords: Coordinates,
+    values: Sequence[Scalar],
+    rates: Objects,
+) -> Kinematics:
+    """Place every link for the freedoms' ``values``, moving at ċ = ``rates`` (n_freedoms, n)."""
     placed: dict[str, Placement] = {}
-    for joint in order:
-        placement = _place(case, parameters, joint, rates, placed)
-        placed[placement.link] = placement
-    return Kinematics(tuple(placed.values()), relative, offset, columns, rates)
+    for edge in tree.edges:
+        placed[edge.follower[0]] = _place(case, parameters, tree, edge, values, rates, placed)
+    loops = tuple(_loop(case, parameters, tree, e, values, rates, placed) for e in tree.loops)
+    return Kinematics(tuple(placed.values()), loops, tree, coords)
 
 
-def follower_link(case: CaseFile, joint: str) -> str:
-    """Name of the link that a joint carries."""
-    return str(case.mechanism.joints[joint].follower).partition(".")[0]
+def _own_motion(
+    case: CaseFile, tree: Tree, edge: Edge, values: Sequence[Scalar], rates: Objects
+) -> tuple[JointMotion, Objects]:
+    """The joint's R, d, A with its mounting, and A ċ per column."""
+    joint = case.mechanism.joints[edge.joint]
+    own = tree.of_joint(edge.joint)
+    motion = joint_motion(joint, [values[k] for k in own])
+    mount = mounting(joint)
+    turned = _mounted(joint, mount, motion)
+    if not own:
+        return turned, np.zeros((6, rates.shape[1]), dtype=object)
+    return turned, multiply(turned.freedoms, rates[own])
 
 
-def base_node(case: CaseFile, joint: str) -> tuple[str, str] | None:
-    """(link, node) that a joint is mounted on, None for the ground."""
-    base = str(case.mechanism.joints[joint].base)
-    if base == "ground":
-        return None
-    link, _, node = base.partition(".")
-    return link, node
+def _mounted(joint: object, mount: Objects, motion: JointMotion) -> JointMotion:
+    """The joint turned as a whole; what rides on a beam keeps the beam's axis instead."""
+    if getattr(joint, "type", "") not in RIDING:
+        R, d = multiply(mount, motion.rotation), multiply(mount, motion.translation)
+        return JointMotion(R, d, motion.freedoms)
+    R = multiply(motion.rotation, mount)
+    A = np.concatenate([multiply(mount.T, motion.freedoms[k : k + 3]) for k in (0, 3)])
+    return JointMotion(R, motion.translation, A)
 
 
-def _tree_order(case: CaseFile) -> list[str]:
-    """Joints sorted so that each base link is carried by an earlier joint."""
-    waiting, order, placed = list(case.mechanism.joints), [], {"ground"}
-    while waiting:
-        ready = [j for j in waiting if (base_node(case, j) or ("ground", ""))[0] in placed]
-        if not ready:
-            raise MechanismError(f"mechanism.joints.{waiting[0]}", "is not connected to the ground")
-        placed.update(follower_link(case, j) for j in ready)
-        order += ready
-        waiting = [j for j in waiting if j not in ready]
-    loose = [link for link in case.mechanism.links if link not in placed]
-    if loose:
-        raise MechanismError(f"mechanism.links.{loose[0]}", "no joint carries this link")
-    return order
+def mounting(joint: object) -> Objects:
+    """Rotation of the joint's zero position in its base: planar ``angle`` or spatial angles."""
+    orientation = getattr(joint, "orientation", None)
+    if orientation is not None:
+        return euler(orientation).astype(object)
+    return rotation(np.array([0.0, 0.0, 1.0]), float(getattr(joint, "angle", 0.0) or 0.0))
 
 
-def _coordinate_of(case: CaseFile, joint: str) -> int | None:
-    for i, coordinate in enumerate(case.coordinates.values()):
-        if coordinate.joint == joint:
-            return i
-    return None
-
-
-def _relative_coordinates(case: CaseFile, order: list[str]) -> tuple[Floats, Floats]:
-    """s = A q + b: absolute angle minus the base's absolute angle and the mounting angle."""
-    n = len(case.coordinates)
-    relative, offset = np.zeros((n, n)), np.zeros(n)
-    absolute: dict[str, tuple[Floats, float]] = {"ground": (np.zeros(n), 0.0)}
-    for joint in order:
-        row, constant = absolute[(base_node(case, joint) or ("ground", ""))[0]]
-        constant = constant + case.mechanism.joints[joint].angle
-        i = _coordinate_of(case, joint)
-        if i is not None:
-            unit = np.eye(n)[i]
-            own = tuple(case.coordinates.values())[i].angle == "absolute"
-            relative[i], offset[i] = (unit - row, -constant) if own else (unit, 0.0)
-            row, constant = row + relative[i], constant + offset[i]
-        absolute[follower_link(case, joint)] = (row, constant)
-    return relative, offset
-
-
-def _joint_rates(relative: Floats, columns: tuple[int, ...], free: tuple[int, ...]) -> Floats:
-    """ṡ per q̇: a held joint's own deflection, and free coordinates while all others stand still.
-
-    q̇ = A⁻¹ ṡ; restricted to the free ones, ṡ_F = [(A⁻¹)_FF]⁻¹ q̇_F.
-    """
-    rates = np.eye(len(relative))
-    rates[np.ix_(free, free)] = np.linalg.inv(np.linalg.inv(relative)[np.ix_(free, free)])
-    rates[np.abs(rates) < 1e-12] = 0.0  # round-off of the two inverses of a matrix of 0, ±1
-    return np.asarray(rates[:, list(columns)])
+def _lever(case: CaseFile, edge: Edge, motion: JointMotion) -> Objects:
+    """From the base node to the follower's joint node, base axes, m."""
+    position = getattr(case.mechanism.joints[edge.joint], "position", None) or (0.0, 0.0)
+    return np.asarray(vector(position) + motion.translation)
 
 
 def _place(
     case: CaseFile,
     parameters: Parameters,
-    joint: str,
-    rates: Floats,
+    tree: Tree,
+    edge: Edge,
+    values: Sequence[Scalar],
+    rates: Objects,
     placed: Mapping[str, Placement],
 ) -> Placement:
-    data = case.mechanism.joints[joint]
-    index = _coordinate_of(case, joint)
-    angle: Scalar = data.angle
-    if index is not None:
-        angle = parameters.joint_coordinate(index) + data.angle
-    rotation, axis = rotation_z(angle), np.array([0.0, 0.0, 1.0], dtype=object)
-    base = base_node(case, joint)
-    if base is None:
-        origin = np.array([*data.position, 0.0], dtype=object)
-        twist = np.zeros((6, rates.shape[1]), dtype=object)
-    else:
-        origin = node_position(case, parameters, *base)
-        twist = carried_twist(rotation, origin, placed[base[0]].twist)
-    if index is not None:
-        twist = _add_joint_rate(twist, axis, rates[index])
-    return Placement(follower_link(case, joint), joint, base, rotation, origin, axis, index, twist)
-
-
-def node_position(case: CaseFile, parameters: Parameters, link: str, node: str) -> Objects:
-    """Position of a named node in its link's frame, m."""
-    length = parameters.number(f"links.{link}.length", case.mechanism.links[link].length)
-    return np.array([length if node == "end" else 0.0, 0.0, 0.0], dtype=object)
-
-
-def rotation_z(angle: Scalar) -> Objects:
-    """Rotation by ``angle`` rad about z, (3, 3)."""
-    c, s = cos(angle), sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], dtype=object)
-
-
-def carried_twist(rotation: Objects, origin: Objects, twist: Objects) -> Objects:
-    """Twist (6, n) of the base as seen at the joint, in the follower's frame."""
-    velocity = twist[:3] + _cross_columns(twist[3:], origin)
-    return np.concatenate([rotation.T @ velocity, rotation.T @ twist[3:]])
-
-
-def _cross_columns(a: Objects, b: Objects) -> Objects:
-    """a_k × b for every column a_k of a (3, n)."""
-    b = b[:, None]  # an expression alone would not spread over a row
-    return np.array(
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]],
-        dtype=object,
+    link = edge.follower[0]
+    motion, own = _own_motion(case, tree, edge, values, rates)
+    lever = _lever(case, edge, motion)
+    R_base, o_base, twist_base = _base_motion(case, parameters, tree, edge.base, placed, rates)
+    node = node_position(case, parameters, tree, edge.follower)
+    R_world = multiply(R_base, motion.rotation)
+    at_node = multiply(carried(motion.rotation, lever), twist_base) + own
+    return Placement(
+        link=link,
+        edge=edge,
+        rotation=motion.rotation,
+        lever=lever,
+        freedoms=motion.freedoms,
+        world_rotation=R_world,
+        world_origin=o_base + multiply(R_base, lever) - multiply(R_world, node),
+        twist=_shifted(at_node, node * -1.0),
     )
 
 
-def _add_joint_rate(twist: Objects, axis: Objects, rate: Floats) -> Objects:
-    spin = np.outer(axis, rate.astype(object))
-    return np.concatenate([twist[:3], twist[3:] + spin])
+def _base_motion(
+    case: CaseFile,
+    parameters: Parameters,
+    tree: Tree,
+    base: Node,
+    placed: Mapping[str, Placement],
+    rates: Objects,
+) -> tuple[Objects, Objects, Objects]:
+    """World rotation, world position and twist (own axes) of a base node."""
+    if base[0] == "ground":
+        zero = np.zeros((6, rates.shape[1]), dtype=object)
+        return np.eye(3).astype(object), np.zeros(3, dtype=object), zero
+    p = placed[base[0]]
+    X = node_position(case, parameters, tree, base)
+    position = p.world_origin + multiply(p.world_rotation, X)
+    return p.world_rotation, position, _shifted(p.twist, X)
+
+
+def _shifted(twist: Objects, lever: Objects) -> Objects:
+    """The twist at another point of the same body: v + ω × lever."""
+    return np.concatenate([twist[:3] + cross(twist[3:], lever), twist[3:]])
+
+
+def _loop(
+    case: CaseFile,
+    parameters: Parameters,
+    tree: Tree,
+    edge: Edge,
+    values: Sequence[Scalar],
+    rates: Objects,
+    placed: Mapping[str, Placement],
+) -> Loop:
+    motion, own = _own_motion(case, tree, edge, values, rates)
+    lever = _lever(case, edge, motion)
+    R_base, x_base, twist_base = _base_motion(case, parameters, tree, edge.base, placed, rates)
+    R_end, x_end, twist_end = _base_motion(case, parameters, tree, edge.follower, placed, rates)
+    R_joint = multiply(R_base, motion.rotation)
+    reached = multiply(carried(motion.rotation, lever), twist_base) + own
+    return Loop(
+        edge=edge,
+        rotation=motion.rotation,
+        lever=lever,
+        freedoms=motion.freedoms,
+        position_gap=x_base + multiply(R_base, lever) - x_end,
+        misalignment=multiply(R_joint.T, R_end),
+        twist_gap=twist_end - reached,
+    )

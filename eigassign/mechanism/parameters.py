@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,10 @@ class Parameters:
     recorder: Recorder
     coordinates: tuple[str, ...]
     design: tuple[str, ...]
+    relative: Floats  # A of s = A q + b
+    offset: Floats
     by_path: dict[str, Expression] = field(default_factory=dict)
+    passive: tuple[Scalar, ...] = ()
 
     def number(self, path: str, value: float) -> Scalar:
         """The value at a key path of the case: the variable if it is a design parameter."""
@@ -31,16 +34,39 @@ class Parameters:
         """The relative joint coordinate s belonging to coordinate number ``index``."""
         return self.recorder.variable(index)
 
+    def freedom(self, k: int) -> Scalar:
+        """Joint freedom k: a coordinate, or a passive one behind them."""
+        n_q = len(self.coordinates)
+        return self.joint_coordinate(k) if k < n_q else self.passive[k - n_q]
+
+    def with_passive(self, values: list[Expression]) -> Parameters:
+        """The same with the passive freedoms known."""
+        return replace(self, passive=tuple(values))
+
+    def rerecorded(self, recorder: Recorder, n_passive: int) -> Parameters:
+        """The same on another recorder, the passive freedoms being its last variables."""
+        n = len(self.coordinates) + len(self.design)
+        moved = {
+            path: recorder.variable(len(self.coordinates) + k)
+            for k, path in enumerate(self.by_path)
+        }
+        passive = tuple(recorder.variable(n + k) for k in range(n_passive))
+        return replace(self, recorder=recorder, by_path=moved, passive=passive)
+
 
 def parameters(case: CaseFile) -> Parameters:
     """The variables of a case."""
+    from eigassign.mechanism.coordinates import coordinates
+    from eigassign.mechanism.tree import build_tree
+
     recorder = Recorder()
-    coordinates, design = tuple(case.coordinates), tuple(case.design.parameters)
+    names, design = tuple(case.coordinates), tuple(case.design.parameters)
     by_path = {
-        parameter.parameter: recorder.variable(len(coordinates) + k)
+        parameter.parameter: recorder.variable(len(names) + k)
         for k, parameter in enumerate(case.design.parameters.values())
     }
-    return Parameters(recorder, coordinates, design, by_path)
+    maps = coordinates(case, build_tree(case))
+    return Parameters(recorder, names, design, maps.relative, maps.offset, by_path)
 
 
 def initial_design(case: CaseFile) -> Floats:
@@ -51,8 +77,8 @@ def initial_design(case: CaseFile) -> Floats:
 
 def _value(case: CaseFile, path: str) -> float:
     head, name, *fields = path.split(".")
-    table: Any = case.coordinates if head == "coordinates" else getattr(case.mechanism, head)
-    value = table[name]
+    group = case.coordinates if head == "coordinates" else getattr(case.mechanism, head)
+    value: Any = group[name]
     for field_name in fields:
         value = getattr(value, field_name)
     return float(value)

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.series.algebra import Samples, Truncated
 from eigassign.series.lower_set import LowerSet
-from eigassign.series.program import Program, Samples, Truncated
+from eigassign.series.program import Program
 
 Floats = NDArray[np.float64]
 STACK_LIMIT = 500_000  # numbers: 4 MB

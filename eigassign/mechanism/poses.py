@@ -1,112 +1,149 @@
 """Where the rigid links are in the world: for drawing, and for inverse kinematics.
 
-For each link the world rotation R_w = R_w,base R and origin o_w = o_w,base + R_w,base X_b follow
-down the tree of joints.
+World rotation and origin of every link come from the same kinematics as the pencil; the motion of
+a node per q̇ is v + ω × X of its link's twist with every coordinate free to move.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
-from eigassign.mechanism.kinematics import Kinematics, node_position
+from eigassign.mechanism.geometry import link_type, node_position
+from eigassign.mechanism.kinematics import Kinematics, all_moving
 from eigassign.mechanism.parameters import Parameters
 from eigassign.mechanism.tip_chain import TipChain
-from eigassign.series.program import Samples
+from eigassign.mechanism.tree import split
+from eigassign.series.algebra import Samples
+from eigassign.series.expression import Scalar
 from eigassign.series.table import Table, compile_table
 
 Floats = NDArray[np.float64]
+PER_LINK = 12  # rotation (9) and origin (3)
 
 
 @dataclass(frozen=True, eq=False)
 class Poses:
     """World frames of all links as functions of x = (q, y)."""
 
+    case: CaseFile
+    parameters: Parameters
+    motion: Kinematics
     links: tuple[str, ...]
-    bases: tuple[int, ...]  # index of the base link, -1 for the ground
-    coordinates: tuple[int | None, ...]  # of each link's joint
-    joints: tuple[str, ...]
-    axes: Floats  # (n_links, 3) of each link's joint, in its frame
-    table: Table  # per link: R_w (9), o_w (3), end position in the link's frame (3)
-    to_program: Floats
-    shift: Floats
-    relative: Floats  # (n_q, n_q)
+    drawn: tuple[tuple[tuple[str, str], ...], ...]  # per link: the node pairs of its lines
 
-    def frames(self, x: Floats) -> tuple[Floats, Floats, Floats]:
-        """R_w (n, n_links, 3, 3), o_w and end nodes in world (n, n_links, 3), at x (n, n_x)."""
-        z = self.to_program @ np.atleast_2d(x).T + self.shift[:, None]
-        rows = self.table.evaluate(Samples(), z).T
-        rows = np.broadcast_to(rows, (z.shape[1], rows.shape[1])).reshape(z.shape[1], -1, 15)
-        R, origin = rows[..., :9].reshape(*rows.shape[:2], 3, 3), rows[..., 9:12]
-        end = origin + np.einsum("...ij,...j->...i", R, rows[..., 12:])
-        return R, origin, end
+    def _variables(self, x: Floats) -> Floats:
+        q, y = np.split(np.atleast_2d(x), [len(self.parameters.coordinates)], axis=1)
+        s = q @ self.motion.relative.T + self.motion.offset
+        return np.hstack([s, y]).T
+
+    def _compile(self, scalars: Sequence[Scalar]) -> Table:
+        n = len(self.parameters.coordinates) + len(self.parameters.design)
+        return compile_table(self.parameters.recorder, scalars, n)
+
+    def _evaluate(self, table: Table, x: Floats) -> Floats:
+        """(n_samples, n_scalars)."""
+        z = self._variables(x)
+        rows = table.evaluate(Samples(), z)
+        return np.broadcast_to(rows, (len(rows), z.shape[1])).T
+
+    @cached_property
+    def _ends(self) -> Table:
+        """World positions of both ends of every drawn line."""
+        scalars: list[Scalar] = []
+        for link, pairs in zip(self.links, self.drawn, strict=True):
+            for node in (name for pair in pairs for name in pair):
+                scalars += list(self._world(link, node))
+        return self._compile(scalars)
+
+    def _world(self, link: str, node: str) -> NDArray[np.object_]:
+        from eigassign.mechanism.rotations import multiply
+
+        p = self.motion.placement(link)
+        X = node_position(self.case, self.parameters, self.motion.tree, (link, node))
+        return np.asarray(p.world_origin + multiply(p.world_rotation, X))
+
+    def segments(self, x: Floats) -> tuple[Floats, ...]:
+        """Per link its straight lines, (n, n_lines, 2 ends, 3) in m."""
+        values = self._evaluate(self._ends, x)
+        points = values.reshape(len(values), -1, 2, 3)
+        cuts = np.cumsum([len(pairs) for pairs in self.drawn])[:-1]
+        return tuple(np.split(points, cuts, axis=1))
 
     def lines(self, x: Floats) -> Floats:
-        """Start and end of every link, (n, n_links, 2, 3) in m."""
-        _, origin, end = self.frames(x)
-        return np.stack([origin, end], axis=2)
+        """Start and end of every link, (n, n_links, 2, 3) in m: the first and last point drawn."""
+        pieces = self.segments(x)
+        ends = [np.stack([p[:, 0, 0], p[:, -1, 1]], axis=1) for p in pieces]
+        return np.stack(ends, axis=1)
 
     def position(self, x: Floats, link: str, node: str) -> Floats:
-        """World position (n, 3) of a link's start or end, in m."""
-        lines = self.lines(x)
-        return np.asarray(lines[:, self.links.index(link), 1 if node == "end" else 0])
+        """World position (n, 3) of a named node, in m."""
+        return self._evaluate(self._compile(list(self._world(link, node))), x)
 
     def jacobian(self, x: Floats, link: str, node: str) -> Floats:
-        """∂position/∂q (n, 3, n_q): Σ over the joints below of (axis × lever) ∂s/∂q."""
-        R, origin, end = self.frames(x)
-        k = self.links.index(link)
-        tip = end[:, k] if node == "end" else origin[:, k]
-        by_joint = np.zeros((len(tip), 3, len(self.relative)))
-        while k >= 0:
-            at = self.coordinates[k]
-            if at is not None:
-                by_joint[:, :, at] = np.cross(R[:, k] @ self.axes[k], tip - origin[:, k])
-            k = self.bases[k]
-        return np.asarray(by_joint @ self.relative)
+        """∂position/∂q (n, 3, n_q)."""
+        values = self._evaluate(self._compile(self._velocity(link, node)), x)
+        return values.reshape(len(values), 3, -1)
+
+    def _velocity(self, link: str, node: str) -> list[Scalar]:
+        """R_w (v + ω × X) per q̇, row by row."""
+        from eigassign.mechanism.rotations import cross, multiply
+
+        p = self._all_moving.placement(link)
+        X = node_position(self.case, self.parameters, self.motion.tree, (link, node))
+        velocity = p.twist[:3] + cross(p.twist[3:], X)
+        return list(multiply(p.world_rotation, velocity).ravel())
+
+    @cached_property
+    def _all_moving(self) -> Kinematics:
+        """The same motion with every coordinate among the columns."""
+        return all_moving(self.case, self.parameters, self.motion)
 
 
 def build_poses(case: CaseFile, parameters: Parameters, motion: Kinematics) -> Poses:
-    """Compile the world frames of every link."""
-    frames: dict[str, tuple[NDArray[np.object_], NDArray[np.object_]]] = {}
-    scalars: list[object] = []
-    for p in motion.placements:
-        R, o = p.rotation, p.origin
-        if p.base is not None:
-            R_base, o_base = frames[p.base[0]]
-            R, o = R_base @ R, o_base + R_base @ o
-        frames[p.link] = (R, o)
-        scalars += [*R.ravel(), *o, *node_position(case, parameters, p.link, "end")]
-    n_q, n_y = len(parameters.coordinates), len(parameters.design)
+    """The poses of a case's mechanism."""
     links = tuple(p.link for p in motion.placements)
-    to_program = np.eye(n_q + n_y)
-    to_program[:n_q, :n_q] = motion.relative
-    return Poses(
-        links=links,
-        bases=tuple(-1 if p.base is None else links.index(p.base[0]) for p in motion.placements),
-        coordinates=tuple(p.coordinate for p in motion.placements),
-        joints=tuple(p.joint for p in motion.placements),
-        axes=np.array([p.axis for p in motion.placements], dtype=np.float64),
-        table=compile_table(parameters.recorder, scalars, n_q + n_y),  # type: ignore[arg-type]
-        to_program=to_program,
-        shift=np.concatenate([motion.offset, np.zeros(n_y)]),
-        relative=motion.relative,
-    )
+    drawn = tuple(_lines(case, motion, link) for link in links)
+    return Poses(case, parameters, motion, links, drawn)
+
+
+def _lines(case: CaseFile, motion: Kinematics, link: str) -> tuple[tuple[str, str], ...]:
+    """What to draw of a link: its axis, its beams, or spokes from its joint node."""
+    data: Any = case.mechanism.links[link]
+    kind = link_type(case, link)
+    if kind == "beam":
+        return (("start", "end"),)
+    if kind == "frame":
+        return tuple((b.from_node, b.to_node) for b in data.beams.values())
+    root = motion.placement(link).edge.follower[1]
+    names = list(getattr(data, "nodes", None) or {})
+    if getattr(data, "length", None) is not None:
+        names.append("end")
+    others = [name for name in names if name != root]
+    return tuple((root, name) for name in others) or ((root, root),)
 
 
 def tip_chain(poses: Poses, motion: Kinematics, tip: str, y: Floats) -> TipChain:
     """The chain that carries the node ``tip`` ("link.end"), at design y, for inverse kinematics."""
-    link, _, node = tip.partition(".")
+    link, node = split(tip)
+    position = poses._compile(list(poses._world(link, node)))
+    velocity = poses._compile(poses._velocity(link, node))
+    d = 2 if poses.case.mechanism.space == "planar" else 3
+    n_q = len(motion.offset)
+    names = [c.joint for c in poses.case.coordinates.values()]
 
     def at(q: Floats) -> Floats:
         return np.hstack([q, np.broadcast_to(y, (len(q), len(y)))])
 
-    names = {p.coordinate: p.joint for p in motion.placements if p.coordinate is not None}
     return TipChain(
-        position=lambda q: poses.position(at(q), link, node)[:, :2],
-        jacobian=lambda q: poses.jacobian(at(q), link, node)[:, :2],
-        joints=tuple(names[i] for i in range(len(motion.offset))),
+        position=lambda q: poses._evaluate(position, at(q))[:, :d],
+        jacobian=lambda q: poses._evaluate(velocity, at(q)).reshape(-1, 3, n_q)[:, :d],
+        joints=tuple(names),
         relative_map=(motion.relative, motion.offset),
     )

@@ -1,4 +1,8 @@
-"""Area and bending inertia of a cross-section, written once for numbers and for series."""
+"""Properties of cross-sections, written once for numbers and for series.
+
+Local axes: x along the beam, y in the plane of a planar mechanism, z out of it. I_z resists bending
+in the x-y plane, I_y in the x-z plane.
+"""
 
 from __future__ import annotations
 
@@ -6,46 +10,94 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from eigassign.series.expression import Scalar
+from eigassign.series.expression import Scalar, is_constant
 
 Number = Callable[[str, float], Scalar]
+SHEAR = {"circle": 0.9, "tube": 0.5, "rectangle": 5.0 / 6.0, "i_profile": 0.44}  # Cowper, ν ≈ 0.3
 
 
 class SectionValues(NamedTuple):
-    """Area A in m² and second moment of area I in m⁴ about the in-plane bending axis."""
+    """A in m²; I_z, I_y, torsion constant J and polar inertia I_p in m⁴; shear coefficient κ."""
 
     area: Scalar
-    bending_inertia: Scalar
+    inertia_z: Scalar
+    inertia_y: Scalar
+    torsion_constant: Scalar
+    polar_inertia: Scalar
+    shear_coefficient: float
 
 
 def section_values(section: Any, number: Number) -> SectionValues:
-    """A and I of a section of the case; ``number(key, value)`` yields a float or an expression.
+    """Properties of a section of the case; ``number(key, value)`` yields a float or an expression.
 
-    circle: A = πd²/4, I = πd⁴/64; tube: differences of two circles; rectangle: A = bh,
-    I = bh³/12 with h in the plane of motion; bare values are taken as they are.
+    circle: A = πd²/4, I = πd⁴/64, J = 2I; tube: differences of two circles; rectangle b × h (h
+    along y): A = bh, I_z = bh³/12, I_y = hb³/12, J by Saint-Venant's series as fitted by Roark
+    (Formulas for Stress and Strain, table 10.7); I-profile: three rectangles, J = Σ bt³/3.
     """
+    kappa = getattr(section, "shear_coefficient", None) or SHEAR.get(section.shape, 5.0 / 6.0)
     match section.shape:
         case "circle":
-            return _circle(number("diameter", section.diameter))
+            area, inertia = _circle(number("diameter", section.diameter))
+            return _round(area, inertia, kappa)
         case "tube":
-            return _tube(section, number)
+            return _round(*_tube(section, number), kappa)
         case "rectangle":
-            width, height = number("width", section.width), number("height", section.height)
-            return SectionValues(width * height, width * height**3.0 * (1.0 / 12.0))
-    return SectionValues(
-        number("area", section.area), number("bending_inertia", section.bending_inertia)
-    )
+            return _rectangle(section, number, kappa)
+        case "i_profile":
+            return _i_profile(section, number, kappa)
+    return _bare(section, number, kappa)
 
 
-def _circle(diameter: Scalar) -> SectionValues:
-    return SectionValues(diameter**2.0 * (math.pi / 4.0), diameter**4.0 * (math.pi / 64.0))
+def _round(area: Scalar, inertia: Scalar, kappa: float) -> SectionValues:
+    return SectionValues(area, inertia, inertia, inertia * 2.0, inertia * 2.0, kappa)
 
 
-def _tube(section: Any, number: Number) -> SectionValues:
+def _circle(diameter: Scalar) -> tuple[Scalar, Scalar]:
+    return diameter**2.0 * (math.pi / 4.0), diameter**4.0 * (math.pi / 64.0)
+
+
+def _tube(section: Any, number: Number) -> tuple[Scalar, Scalar]:
     outer = number("outer_diameter", section.outer_diameter)
     if section.inner_diameter is not None:
         inner = number("inner_diameter", section.inner_diameter)
     else:
         inner = outer - number("thickness", section.thickness) * 2.0
     (a, i), (b, j) = _circle(outer), _circle(inner)
-    return SectionValues(a - b, i - j)
+    return a - b, i - j
+
+
+def _rectangle(section: Any, number: Number, kappa: float) -> SectionValues:
+    b, h = number("width", section.width), number("height", section.height)
+    area = b * h
+    I_z, I_y = b * h**3.0 * (1.0 / 12.0), h * b**3.0 * (1.0 / 12.0)
+    long, short = (h, b) if section.height >= section.width else (b, h)
+    ratio = short / long
+    fitted = (ratio * (1.0 - ratio**4.0 * (1.0 / 12.0)) * -0.21) + 1.0 / 3.0
+    return SectionValues(area, I_z, I_y, long * short**3.0 * fitted, I_z + I_y, kappa)
+
+
+def _i_profile(section: Any, number: Number, kappa: float) -> SectionValues:
+    h, b = number("height", section.height), number("width", section.width)
+    t = number("flange_thickness", section.flange_thickness)
+    w = number("web_thickness", section.web_thickness)
+    web = h - t * 2.0
+    area = b * t * 2.0 + web * w
+    I_z = (b * h**3.0 - (b - w) * web**3.0) * (1.0 / 12.0)
+    I_y = (t * b**3.0 * 2.0 + web * w**3.0) * (1.0 / 12.0)
+    J = (b * t**3.0 * 2.0 + web * w**3.0) * (1.0 / 3.0)
+    return SectionValues(area, I_z, I_y, J, I_z + I_y, kappa)
+
+
+def _bare(section: Any, number: Number, kappa: float) -> SectionValues:
+    def given(key: str, default: Scalar) -> Scalar:
+        value = getattr(section, key, None)
+        return default if value is None else number(key, value)
+
+    I_z = given("inertia_z", 0.0)
+    if is_constant(I_z) and I_z == 0.0:
+        I_z = given("bending_inertia", 0.0)
+    I_y = given("inertia_y", 0.0)
+    J = given("torsion_constant", 0.0)
+    return SectionValues(
+        number("area", section.area), I_z, I_y, J, given("polar_inertia", I_z + I_y), kappa
+    )

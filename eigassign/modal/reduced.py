@@ -24,7 +24,7 @@ from eigassign.modal.project import project
 from eigassign.modal.reduced_model import ReducedModel
 from eigassign.modal.roundoff import rounding_weights
 from eigassign.modal.samples import samples
-from eigassign.series.program import Samples
+from eigassign.series.algebra import Samples
 
 __all__ = ["ReducedModel", "reduce"]
 

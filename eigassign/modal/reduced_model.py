@@ -18,7 +18,8 @@ from eigassign.modal.exact import condense
 from eigassign.modal.pose import Pose, corrected
 from eigassign.modal.residual import Residual
 from eigassign.modal.samples import samples
-from eigassign.series.program import Program, Samples
+from eigassign.series.algebra import Samples
+from eigassign.series.program import Program
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -20,11 +20,13 @@ from eigassign.modal.pose import Pose
 from eigassign.modal.reduced_model import ReducedModel
 from eigassign.modal.residual import Residual
 from eigassign.modal.storage import flatten, unflatten
+from eigassign.series.implicit import ImplicitFunction
 from eigassign.series.program import Program, Step
 
 Array = NDArray[Any]
 FORMAT = "reduced model 1"  # raise it whenever what the arrays mean changes
-CLASSES: dict[str, type] = {c.__name__: c for c in (ReducedModel, Residual, Pose, Program, Step)}
+STORED = (ReducedModel, Residual, Pose, Program, Step, ImplicitFunction)
+CLASSES: dict[str, type] = {c.__name__: c for c in STORED}
 
 
 def reduced_arrays(reduced: ReducedModel) -> dict[str, Array]:

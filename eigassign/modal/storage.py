@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from eigassign.errors import UsageError
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.expansion import Cluster, Expansion
+from eigassign.series.implicit import ImplicitFunction
 from eigassign.series.lower_set import LowerSet
-from eigassign.series.program import Step
+from eigassign.series.program import Program, Step
 
 Array = NDArray[Any]
 _KINDS = {"f": np.float64, "i": np.int64, "u": np.uint8}
@@ -149,7 +150,6 @@ def pencil_parts(pencil: Pencil) -> list[Any]:
     Two pencils with equal parts have bit for bit equal K and M everywhere, and their expansions
     agree: this is what a stored expansion is filed under.
     """
-    program = pencil.program
     return [
         pencil.n_dof,
         pencil.n_u,
@@ -160,6 +160,12 @@ def pencil_parts(pencil: Pencil) -> list[Any]:
         *(_csr(weights) for weights in (pencil.stiffness, pencil.mass)),
         pencil.to_program,
         pencil.shift,
+        _program(pencil.program),
+    ]
+
+
+def _program(program: Program) -> list[Any]:
+    return [
         [program.n_variables, program.n_atoms, program.inputs, program.input_variables],
         [program.outputs, program.dependence],
         [_step(step) for step in program.steps],
@@ -168,7 +174,13 @@ def pencil_parts(pencil: Pencil) -> list[Any]:
 
 def _step(step: Step) -> list[Any]:
     matrix = None if step.matrix is None else _csr(step.matrix)
-    return [step.kind, step.targets, step.left, step.right, step.numbers, matrix]
+    solved = [step.picked, None if step.function is None else _implicit(step.function)]
+    return [step.kind, step.targets, step.left, step.right, step.numbers, matrix, *solved]
+
+
+def _implicit(function: ImplicitFunction) -> list[Any]:
+    counts = [function.size, function.n_equations, function.n_checks]
+    return [_program(function.program), *counts, function.a0, function.p0]
 
 
 def _csr(matrix: Any) -> list[Any]:

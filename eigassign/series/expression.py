@@ -9,7 +9,13 @@ for a formula reads the same whether its inputs vary or not.
 from __future__ import annotations
 
 import math
-from typing import TypeAlias, overload
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, TypeAlias, overload
+
+from eigassign.errors import UsageError
+
+if TYPE_CHECKING:
+    from eigassign.series.implicit import ImplicitFunction
 
 Scalar: TypeAlias = "float | Expression"
 Node: TypeAlias = tuple[object, ...]
@@ -19,12 +25,37 @@ class Recorder:
     """Collects the atoms of a set of expressions; ``nodes[k]`` is the definition of atom k.
 
     ``("variable", i)``, ``("linear", c, ((k, c_k), ...))``, ``("product", j, k)``,
-    ``("power", j, e)``, ``("sine", j)``, ``("cosine", j)``; arguments come before their users.
+    ``("power", j, e)``, ``("sine", j)``, ``("cosine", j)``; entry i of the solution of A X = B is
+    ``("solve", atoms of A, atoms of B, n, i)``, component i of an implicit function of its
+    arguments ``("implicit", atoms, function, i)``. Arguments come before their users.
     """
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
         self._known: dict[Node, int] = {}
+
+    def solve(
+        self, A: Sequence[Sequence[Scalar]], B: Sequence[Sequence[Scalar]]
+    ) -> list[list[Expression]]:
+        """X (n, m) of A X = B for square A (n, n) and B (n, m)."""
+        n, m = len(A), len(B[0])
+        left = tuple(self.atom(entry) for row in A for entry in row)
+        right = tuple(self.atom(entry) for row in B for entry in row)
+        return [
+            [self._atom(("solve", left, right, n, i * m + j)) for j in range(m)] for i in range(n)
+        ]
+
+    def implicit(self, function: ImplicitFunction, arguments: Sequence[Scalar]) -> list[Expression]:
+        """The components of an implicit function of ``arguments``."""
+        atoms = tuple(self.atom(a) for a in arguments)
+        return [self._atom(("implicit", atoms, function, i)) for i in range(function.size)]
+
+    def atom(self, x: Scalar) -> int:
+        """A scalar as one atom of factor 1, a number as a constant atom."""
+        if not isinstance(x, Expression):
+            return next(iter(self._atom(("linear", float(x), ())).terms))
+        factor, atom = x.single()
+        return atom if factor == 1.0 else x._recorded().single()[1]
 
     def variable(self, index: int) -> Expression:
         """The independent variable number ``index``."""
@@ -88,7 +119,7 @@ class Expression:
             return self._build(self.constant * factor, terms)
         (a, j), (b, k) = self.single(), other.single()
         product = self.recorder._atom(("product", min(j, k), max(j, k)))
-        return product * (a * b)
+        return Expression(self.recorder, 0.0, {next(iter(product.terms)): a * b})
 
     __rmul__ = __mul__
 
@@ -104,7 +135,8 @@ class Expression:
         factor, atom = self.single()
         if factor < 0.0 and exponent != int(exponent):
             return self._recorded() ** exponent
-        return self.recorder._atom(("power", atom, float(exponent))) * factor**exponent
+        power = self.recorder._atom(("power", atom, float(exponent)))
+        return Expression(self.recorder, 0.0, {next(iter(power.terms)): factor**exponent})
 
     def __truediv__(self, other: Scalar) -> Scalar:
         if isinstance(other, Expression):
@@ -147,3 +179,57 @@ def cos(x: Expression) -> Expression: ...
 def cos(x: Scalar) -> Scalar:
     """Cosine of an angle in rad."""
     return _function("cosine", x) if isinstance(x, Expression) else math.cos(x)
+
+
+def derivative(x: Scalar, variable: int) -> Scalar:
+    """∂x/∂(variable number ``variable``), an expression again; solved atoms are not supported."""
+    if not isinstance(x, Expression):
+        return 0.0
+    memo: dict[int, Scalar] = {}
+    total: Scalar = 0.0
+    for atom, factor in x.terms.items():
+        total = total + _atom_derivative(x.recorder, atom, variable, memo) * factor
+    return total
+
+
+def _atom_derivative(
+    recorder: Recorder, atom: int, variable: int, memo: dict[int, Scalar]
+) -> Scalar:
+    if atom not in memo:
+        memo[atom] = _rule(recorder, recorder.nodes[atom], atom, variable, memo)
+    return memo[atom]
+
+
+def _rule(
+    recorder: Recorder, node: Node, atom: int, variable: int, memo: dict[int, Scalar]
+) -> Scalar:
+    """The chain rule for one kind of atom."""
+
+    def inner(k: int) -> Scalar:
+        return _atom_derivative(recorder, k, variable, memo)
+
+    def value(k: int) -> Expression:
+        return Expression(recorder, 0.0, {k: 1.0})
+
+    match node:
+        case ("variable", index):
+            return 1.0 if index == variable else 0.0
+        case ("linear", _, terms):
+            total: Scalar = 0.0
+            for k, factor in terms:  # type: ignore[attr-defined]
+                total = total + inner(k) * factor
+            return total
+        case ("product", int(a), int(b)):
+            return inner(a) * value(b) + inner(b) * value(a)
+        case ("power", int(a), float(e)):
+            return inner(a) * (value(a) ** (e - 1.0)) * e
+        case ("sine", int(a)):
+            return inner(a) * cos(value(a))
+        case ("cosine", int(a)):
+            return inner(a) * sin(value(a)) * -1.0
+    raise UsageError(f"no derivative of {node[0]}")
+
+
+def is_constant(x: Scalar) -> bool:
+    """Whether x is a plain number."""
+    return not isinstance(x, Expression)

@@ -9,109 +9,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.errors import UsageError
+from eigassign.series.algebra import Algebra
 from eigassign.series.expression import Node, Recorder
-from eigassign.series.lower_set import LowerSet
-from eigassign.series.power_series import (
-    compose,
-    multiply,
-    power_taylor,
-    wave_taylor,
-)
+
+if TYPE_CHECKING:
+    from eigassign.series.implicit import ImplicitFunction
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 WAVES: dict[object, str] = {"sine": "wave", "cosine": "wave"}
 DENSE_FORMS = 2_000  # entries up to which the matrix of a linear step is kept dense
-
-
-class Algebra(Protocol):
-    """What a program needs to run: rows of numbers standing for values."""
-
-    def constant(self, values: Floats) -> Floats:
-        """Numbers (n,) as rows (n, …)."""
-
-    def linear(self, step: Step, values: Floats) -> Floats:
-        """Linear forms of rows."""
-
-    def product(self, a: Floats, b: Floats) -> Floats:
-        """Row by row product."""
-
-    def power(self, a: Floats, exponents: Floats) -> Floats:
-        """Row by row power with one exponent a row."""
-
-    def wave(self, a: Floats, quarters: Ints) -> Floats:
-        """Row by row sin(a + quarters π/2): the sine for 0, the cosine for 1."""
-
-
-class Samples:
-    """Ordinary numbers, many samples at once."""
-
-    def constant(self, values: Floats) -> Floats:
-        """(n,) → (n, 1), broadcast over samples."""
-        return values[:, None]
-
-    def linear(self, step: Step, values: Floats) -> Floats:
-        """A sum for each form."""
-        assert step.matrix is not None
-        return np.asarray(step.matrix @ values + step.numbers[:, None])
-
-    def product(self, a: Floats, b: Floats) -> Floats:
-        """Elementwise."""
-        return a * b
-
-    def power(self, a: Floats, exponents: Floats) -> Floats:
-        """Elementwise; a domain error shows as NaN, which callers refuse."""
-        with np.errstate(all="ignore"):
-            return np.power(a, exponents[:, None])
-
-    def wave(self, a: Floats, quarters: Ints) -> Floats:
-        """Elementwise."""
-        out = np.sin(a)
-        out[quarters == 1] = np.cos(a[quarters == 1])
-        return out
-
-
-@dataclass(frozen=True)
-class Truncated:
-    """Power series truncated to ``space``."""
-
-    space: LowerSet
-
-    def constant(self, values: Floats) -> Floats:
-        """(n,) → (n, N): the constant series."""
-        rows = np.zeros((len(values), len(self.space)))
-        rows[:, 0] = values
-        return rows
-
-    def linear(self, step: Step, values: Floats) -> Floats:
-        """The sum of each coefficient; numbers enter the constant terms."""
-        rows = np.asarray(step.weights @ values)
-        rows[:, 0] += step.numbers
-        return rows
-
-    def product(self, a: Floats, b: Floats) -> Floats:
-        """Cauchy product over the set."""
-        return multiply(self.space, a, b)
-
-    def power(self, a: Floats, exponents: Floats) -> Floats:
-        """Binomial series about the constant terms, one exponent a row."""
-        out = np.empty_like(a)
-        for exponent in np.unique(exponents):
-            rows = exponents == exponent
-            taylor = power_taylor(a[rows, 0], float(exponent), self.space.order)
-            out[rows] = compose(self.space, taylor, a[rows])
-        return out
-
-    def wave(self, a: Floats, quarters: Ints) -> Floats:
-        """Sine or cosine of each series."""
-        return compose(self.space, wave_taylor(a[:, 0], quarters, self.space.order), a)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +41,8 @@ class Step:
     right: Ints  # second factors of products; of waves 0 for a sine and 1 for a cosine
     numbers: Floats  # exponents of powers; constants of linear forms
     matrix: sparse.csr_array | None  # of linear forms, over the atoms ``left``
+    picked: Ints  # which components of a system's solution are wanted
+    function: ImplicitFunction | None  # of an implicit step
 
     @cached_property
     def weights(self) -> sparse.csr_array | Floats:
@@ -165,6 +81,13 @@ def _take(step: Step, algebra: Algebra, values: Floats) -> Floats:
         return algebra.linear(step, a)
     if step.kind == "power":
         return algebra.power(a, step.numbers)
+    if step.kind == "solve":
+        right = values.take(step.right, axis=0)
+        return algebra.solve(a, right, int(step.numbers[0]))[step.picked]
+    if step.function is not None:
+        from eigassign.series.implicit import evaluate
+
+        return evaluate(step.function, algebra, a)[step.picked]
     return algebra.wave(a, step.right)
 
 
@@ -196,6 +119,10 @@ def _arguments(node: Node) -> tuple[int, ...]:
             return tuple(int(atom) for atom, _ in terms)  # type: ignore[attr-defined]
         case ("product", int(a), int(b)):
             return (a, b)
+        case ("solve", tuple(left), tuple(right), *_):
+            return left + right
+        case ("implicit", tuple(arguments), *_):
+            return arguments
         case (_, int(a), *_):
             return (a,)
     raise UsageError(f"unknown expression {node!r}")
@@ -217,6 +144,10 @@ def _renumber(node: Node, new: dict[int, int]) -> Node:
             return ("linear", constant, tuple((new[a], c) for a, c in terms))  # type: ignore[attr-defined]
         case ("product", int(a), int(b)):
             return ("product", new[a], new[b])
+        case ("solve", tuple(left), tuple(right), *rest):
+            return ("solve", tuple(new[a] for a in left), tuple(new[a] for a in right), *rest)
+        case ("implicit", tuple(arguments), *rest):
+            return ("implicit", tuple(new[a] for a in arguments), *rest)
         case (kind, int(a), *rest):
             return (kind, new[a], *rest)
     raise UsageError(f"unknown expression {node!r}")
@@ -240,11 +171,15 @@ def _dependence(nodes: Sequence[Node], n_variables: int) -> NDArray[np.bool_]:
 
 
 def _schedule(nodes: Sequence[Node], levels: Sequence[int]) -> tuple[Step, ...]:
-    groups: dict[tuple[int, str], list[int]] = {}
+    groups: dict[tuple[int, str, int], list[int]] = {}
+    systems: dict[Node, int] = {}
     for k, (node, level) in enumerate(zip(nodes, levels, strict=True)):
-        if node[0] != "variable":
-            groups.setdefault((level, WAVES.get(node[0], str(node[0]))), []).append(k)
-    return tuple(_step(kind, atoms, nodes) for (_, kind), atoms in sorted(groups.items()))
+        if node[0] in ("solve", "implicit"):  # one step for each system of equations
+            system = systems.setdefault(node[:-1], len(systems))
+            groups.setdefault((level, str(node[0]), system), []).append(k)
+        elif node[0] != "variable":
+            groups.setdefault((level, WAVES.get(node[0], str(node[0])), -1), []).append(k)
+    return tuple(_step(kind, atoms, nodes) for (_, kind, _), atoms in sorted(groups.items()))
 
 
 def _step(kind: str, atoms: list[int], nodes: Sequence[Node]) -> Step:
@@ -252,12 +187,28 @@ def _step(kind: str, atoms: list[int], nodes: Sequence[Node]) -> Step:
     empty = np.zeros(0, dtype=np.intp)
     if kind == "linear":
         return _linear_step(targets, [nodes[k] for k in atoms])
+    if kind in ("solve", "implicit"):
+        return _system_step(targets, [nodes[k] for k in atoms])
     arguments = np.array([_arguments(nodes[k]) for k in atoms], dtype=np.intp)
     numbers = [float(str(nodes[k][2])) for k in atoms] if kind == "power" else []
     right = arguments[:, 1] if kind == "product" else empty
     if kind == "wave":
         right = np.array([nodes[k][0] == "cosine" for k in atoms], dtype=np.intp)
-    return Step(kind, targets, arguments[:, 0], right, np.array(numbers), None)
+    return Step(kind, targets, arguments[:, 0], right, np.array(numbers), None, empty, None)
+
+
+def _system_step(targets: Ints, nodes: list[Node]) -> Step:
+    empty = np.zeros(0, dtype=np.intp)
+    picked = np.array([int(str(node[-1])) for node in nodes], dtype=np.intp)
+    match nodes[0]:
+        case ("solve", tuple(left), tuple(right), int(n), _):
+            a, b = np.array(left, dtype=np.intp), np.array(right, dtype=np.intp)
+            return Step("solve", targets, a, b, np.array([float(n)]), None, picked, None)
+        case ("implicit", tuple(arguments), function, _):
+            a = np.array(arguments, dtype=np.intp)
+            numbers = np.zeros(0)
+            return Step("implicit", targets, a, empty, numbers, None, picked, function)  # type: ignore[arg-type]
+    raise UsageError(f"unknown system {nodes[0]!r}")
 
 
 def _linear_step(targets: Ints, nodes: list[Node]) -> Step:
@@ -271,4 +222,13 @@ def _linear_step(targets: Ints, nodes: list[Node]) -> Step:
     shape = (len(nodes), len(sources))
     matrix = sparse.csr_array((values, (rows, local)), shape=shape, dtype=np.float64)
     constants = np.array([float(str(node[1])) for node in nodes])
-    return Step("linear", targets, sources.astype(np.intp), targets[:0], constants, matrix)
+    return Step(
+        "linear",
+        targets,
+        sources.astype(np.intp),
+        targets[:0],
+        constants,
+        matrix,
+        targets[:0],
+        None,
+    )

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.series.algebra import Algebra
 from eigassign.series.expression import Expression, Recorder, Scalar
-from eigassign.series.program import Algebra, Program, compile_program
+from eigassign.series.program import Program, compile_program
 
 Floats = NDArray[np.float64]
 

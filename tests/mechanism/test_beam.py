@@ -2,26 +2,45 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace as Given
+
 import numpy as np
 import pytest
 from frame_oracle import element
 
-from eigassign.mechanism.beam import beam_mass, beam_stiffness, node_mass, rigid_modes
+from eigassign.mechanism.links import link_mesh
+from eigassign.mechanism.mesh import LinkMesh
+from eigassign.mechanism.parameters import Parameters
+from eigassign.mechanism.tree import Tree
+from eigassign.series.expression import Recorder
 
 E, A, I, RHO, L = 70e9, 3e-4, 5e-9, 2700.0, 0.8  # noqa: E741
 
 
+def chain(n: int, bodies: dict[str, Given] | None = None) -> LinkMesh:
+    """The mesh of one planar beam of n elements."""
+    beam = Given(type="beam", length=L, material="m", section="s", elements=n)
+    mechanism = Given(
+        space="planar",
+        materials={"m": Given(youngs_modulus=E, density=RHO)},
+        sections={"s": Given(shape="bare", area=A, bending_inertia=I)},
+        links={"beam": beam},
+        bodies=bodies or {},
+    )
+    numbers = Parameters(Recorder(), (), (), np.zeros((0, 0)), np.zeros(0))
+    return link_mesh(Given(mechanism=mechanism), numbers, Tree((), (), ()), "beam")
+
+
 def stiffness(n: int) -> np.ndarray:
-    return sum(t.coefficient * t.matrix.toarray() for t in beam_stiffness(n, E, A, I, L))
+    return sum(t.coefficient * t.matrix.toarray() for t in chain(n).stiffness)
 
 
 def mass(n: int) -> np.ndarray:
-    return sum(t.coefficient * t.matrix.toarray() for t in beam_mass(n, RHO * A, L))
+    return sum(t.coefficient * t.matrix.toarray() for t in chain(n).mass)
 
 
 def spread(n: int) -> np.ndarray:
-    constant, per_length = rigid_modes(n)
-    return constant.toarray() + L * per_length.toarray()
+    return sum(t.coefficient * t.matrix.toarray() for t in chain(n).rigid)
 
 
 def test_one_element_has_the_published_hermite_matrices() -> None:
@@ -90,6 +109,8 @@ def test_cubic_deflection_has_its_exact_kinetic_energy(n: int) -> None:
 
 
 def test_a_point_mass_moves_with_both_translations_and_a_rotary_inertia_with_the_rotation() -> None:
-    total = sum(t.coefficient * t.matrix.toarray() for t in node_mass(2, 1, 5.0, 0.25))
-    np.testing.assert_array_equal(np.diag(total), [0, 0, 0, 5.0, 5.0, 0.25, 0, 0, 0])
-    assert np.count_nonzero(total) == 3
+    body = {"b": Given(at="beam.end", mass=5.0, inertia=0.25)}
+    heavy = sum(t.coefficient * t.matrix.toarray() for t in chain(2, body).mass)
+    added = heavy - mass(2)
+    np.testing.assert_allclose(np.diag(added), [0, 0, 0, 0, 0, 0, 5.0, 5.0, 0.25], atol=1e-13)
+    assert np.abs(added - np.diag(np.diag(added))).max() < 1e-15

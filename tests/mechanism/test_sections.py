@@ -34,11 +34,11 @@ CASES = [
 
 @pytest.mark.parametrize(("section", "expected"), CASES)
 def test_area_and_inertia_are_the_integrals(section: Shape, expected: tuple[float, float]) -> None:
-    np.testing.assert_allclose(section_values(section, as_written), expected, rtol=1e-12)
+    np.testing.assert_allclose(section_values(section, as_written)[:2], expected, rtol=1e-12)
 
 
 def test_the_papers_rod_of_30_mm_weighs_what_the_paper_says() -> None:
     # Belotti et al. 2021, Table 1: 1.9 kg/m of aluminium, I = 3.97e-8 m⁴ (printed e-4: a misprint)
-    area, inertia = section_values(Shape(shape="circle", diameter=0.03), as_written)
+    area, inertia = section_values(Shape(shape="circle", diameter=0.03), as_written)[:2]
     np.testing.assert_allclose(inertia, 3.97e-8, rtol=2e-3)
     np.testing.assert_allclose(area * 2690.0, 1.9, rtol=2e-3)

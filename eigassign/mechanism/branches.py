@@ -1,0 +1,130 @@
+"""The assembly branch of a mechanism with loops: from the user's guess, or found and asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from eigassign.case import CaseFile
+from eigassign.errors import MechanismError
+from eigassign.mechanism.parameters import Parameters, initial_design
+from eigassign.mechanism.rotations import Floats
+from eigassign.mechanism.tree import Tree
+from eigassign.series.implicit import ACCEPT, ImplicitFunction
+
+TRIES = 64  # starting points where no guess is given
+SAME = 1e-6  # rad or m
+
+
+def choose_branch(
+    case: CaseFile,
+    tree: Tree,
+    function: ImplicitFunction,
+    used: Sequence[int],
+    parameters: Parameters,
+) -> tuple[Floats, Floats]:
+    """A solution (a_0, p_0) of the closure at the reference configuration.
+
+    Raises MechanismError when there is none, when the passive freedoms are not determined, or when
+    several branches exist and the case gives no guess; the branches are then listed.
+    """
+    assembly = getattr(case.mechanism, "assembly", None)
+    a0 = _reference(case, used, parameters, assembly)
+    guess = _guess(tree, assembly)
+    starts = guess[None] if guess is not None else _starts(function.size)
+    found = _solutions(function, a0, starts)
+    if not len(found):
+        raise MechanismError(
+            "mechanism.assembly" if assembly else "mechanism.joints",
+            f"the loops cannot be closed at {_at(function.names, a0)}",
+        )
+    _check_determined(tree, function, a0, found[0])
+    if guess is None and len(found) > 1:
+        raise MechanismError("mechanism.joints", _ambiguous(tree, function.names, a0, found))
+    return a0, found[0]
+
+
+def _reference(
+    case: CaseFile, used: Sequence[int], parameters: Parameters, assembly: object
+) -> Floats:
+    """Where the branch is chosen: ``assembly.at``, the expansion's q, or zero; y as written."""
+    n_q = len(parameters.coordinates)
+    q = np.zeros(n_q)
+    given = getattr(case.expansion, "q", "auto")
+    if not isinstance(given, str):
+        q[:] = given
+    for name, value in dict(getattr(assembly, "at", None) or {}).items():
+        q[parameters.coordinates.index(name)] = value
+    full = np.concatenate([parameters.relative @ q + parameters.offset, initial_design(case)])
+    return full[list(used)]
+
+
+def _guess(tree: Tree, assembly: object) -> Floats | None:
+    given = dict(getattr(assembly, "guess", None) or {})
+    if not given:
+        return None
+    out = np.zeros(len(tree.passive))
+    for k, freedom in enumerate(tree.passive):
+        value = given.get(freedom.joint, 0.0)
+        out[k] = value[freedom.component] if isinstance(value, (tuple, list)) else value
+    return out
+
+
+def _starts(n: int) -> Floats:
+    """Evenly spread starting points (Kronecker sequence) over a turn or a metre each way."""
+    root = 2.0
+    for _ in range(60):
+        root = (1.0 + root) ** (1.0 / (n + 1.0))
+    steps = root ** -np.arange(1.0, n + 1.0)
+    fractions = np.mod(0.5 + np.arange(TRIES)[:, None] * steps, 1.0)
+    return np.asarray(np.pi * (2.0 * fractions - 1.0))
+
+
+def _solutions(function: ImplicitFunction, a0: Floats, starts: Floats) -> Floats:
+    """Distinct solutions from many starting points, the nearest to the first start first."""
+    n = len(starts)
+    a = np.repeat(a0[:, None], n, axis=1)
+    p = starts.T
+    for _ in range(6):
+        p, _ = function.newton(a, p)
+    F, check, _ = function.equations(a, p)
+    good = np.abs(np.concatenate([F, check])).max(axis=0) < ACCEPT
+    distinct: list[Floats] = []
+    for candidate in p.T[good]:
+        turned = np.mod(candidate + np.pi, 2.0 * np.pi) - np.pi
+        near = turned if n > 1 else candidate
+        if all(np.abs(np.sin((near - d) / 2.0)).max() > SAME for d in distinct):
+            distinct.append(near)
+    return np.array(distinct).reshape(-1, function.size)
+
+
+def _check_determined(tree: Tree, function: ImplicitFunction, a0: Floats, p0: Floats) -> None:
+    from eigassign.mechanism.closure import rank
+
+    J = function.equations(a0[:, None], p0[:, None])[2][0]
+    missing = function.size - rank(J)
+    if missing:
+        joints = ", ".join(sorted({f.joint for f in tree.passive}))
+        raise MechanismError(
+            "coordinates",
+            f"{missing} more coordinate(s) needed: the joints {joints} are not determined by the "
+            f"coordinates, or {_at(function.names, a0)} is a dead point",
+        )
+
+
+def _at(names: Sequence[str], a: Floats) -> str:
+    return ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, a, strict=True)) or "its only pose"
+
+
+def _ambiguous(tree: Tree, names: Sequence[str], a0: Floats, found: Floats) -> str:
+    """All branches in words."""
+    lines = [
+        "; ".join(f"{f.joint}: {v:.4g}" for f, v in zip(tree.passive, p, strict=True))
+        for p in found
+    ]
+    listed = " | ".join(f"({line})" for line in lines)
+    return (
+        f"the loops close in {len(found)} ways at {_at(names, a0)}: {listed}; choose one with "
+        "mechanism.assembly: {at: …, guess: {joint: value, …}} (rad, m)"
+    )

@@ -1,0 +1,287 @@
+"""Each kind of link as a mesh in its own frame: beam, rigid body, frame of beams, superelement."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.case import CaseFile
+from eigassign.errors import MechanismError
+from eigassign.mechanism.beam import BeamValues, ElementTerm, element_mass, element_stiffness
+from eigassign.mechanism.geometry import length, link_type, station
+from eigassign.mechanism.mesh import (
+    DOFS,
+    Entries,
+    LinkMesh,
+    add_scalars,
+    body_block,
+    node_dofs,
+    rigid_motion,
+)
+from eigassign.mechanism.parameters import Parameters
+from eigassign.mechanism.rotations import Objects, euler, rotation, vector
+from eigassign.mechanism.sections import SectionValues, section_values
+from eigassign.mechanism.tree import Tree
+from eigassign.series.expression import Scalar, is_constant
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+
+def link_mesh(case: CaseFile, parameters: Parameters, tree: Tree, name: str) -> LinkMesh:
+    """The mesh of one link, its bodies included."""
+    match link_type(case, name):
+        case "rigid":
+            return _rigid(case, parameters, name)
+        case "frame":
+            from eigassign.mechanism.frames import frame_mesh
+
+            return frame_mesh(case, parameters, name)
+        case "superelement":
+            from eigassign.mechanism.superelement import superelement_mesh
+
+            return superelement_mesh(case, parameters, name)
+    return _beam(case, parameters, tree, name)
+
+
+# --- beams ---
+
+
+def _beam(case: CaseFile, parameters: Parameters, tree: Tree, name: str) -> LinkMesh:
+    """A straight beam along x, in two segments where a carriage or nut rides on it."""
+    space, link = case.mechanism.space, case.mechanism.links[name]
+    total, n = length(case, parameters, name), link.elements
+    riders = [e for e in (*tree.edges, *tree.loops) if e.base[0] == name and e.base[1][:1] == "@"]
+    if len(riders) > 1:
+        message = "carries more than one carriage or nut; one is supported"
+        raise MechanismError(f"mechanism.links.{name}", message)
+    pieces: list[tuple[Scalar, Scalar, int]] = [(0.0, total, n)]
+    if riders:
+        at, first = station(parameters, tree, riders[0].joint), max(1, n // 2)
+        pieces = [(0.0, at, first), (at, total - at, max(1, n - first))]
+    return _chain(case, parameters, name, space, pieces, riders[0].base[1] if riders else None)
+
+
+def _chain(
+    case: CaseFile,
+    parameters: Parameters,
+    name: str,
+    space: str,
+    pieces: Sequence[tuple[Scalar, Scalar, int]],
+    rider: str | None,
+) -> LinkMesh:
+    width = len(DOFS[space])
+    count = sum(n for _, _, n in pieces) + 1
+    stiffness, mass = Entries((width * count,) * 2), Entries((width * count,) * 2)
+    positions: list[Objects] = [vector([0.0])]
+    for start, span, n in pieces:
+        first = len(positions) - 1
+        positions += [vector([start + span * (k / n)]) for k in range(1, n + 1)]
+        _segment(case, parameters, name, stiffness, mass, first, (start, span), n, space)
+    slots = [node_dofs(width * k, space) for k in range(count)]
+    nodes = {"start": slots[0], "end": slots[-1]}
+    places = {"start": positions[0], "end": positions[-1]}
+    if rider is not None:
+        nodes[rider], places[rider] = slots[pieces[0][2]], positions[pieces[0][2]]
+    add_bodies(case, parameters, name, mass, nodes)
+    rigid = _chain_rigid(pieces, space)
+    return LinkMesh(width * count, nodes, places, stiffness.terms(), mass.terms(), rigid)
+
+
+def _chain_rigid(pieces: Sequence[tuple[Scalar, Scalar, int]], space: str) -> list[Any]:
+    """N of a straight chain, node positions start + span ξ, assembled per piece at once."""
+    width, kept = len(DOFS[space]), list(DOFS[space])
+    count = sum(n for _, _, n in pieces) + 1
+    entries = Entries((width * count, width))
+    every = np.arange(width * count)
+    entries.add(1.0, every, np.tile(np.arange(width), count), np.ones(width * count))
+    first = 0
+    for start, span, n in pieces:
+        k = np.arange(1, n + 1)
+        for part, values in ((start, np.ones(n)), (span, k / n)):
+            for dof, turn, sign in ((1, 5, 1.0), (2, 4, -1.0)):  # ω × x e_x = (0, ω_z x, −ω_y x)
+                if dof in kept and turn in kept and not (is_constant(part) and part == 0.0):
+                    rows = width * (first + k) + kept.index(dof)
+                    columns = np.full(n, kept.index(turn))
+                    entries.add(part, rows, columns, sign * values)
+        first += n
+    return entries.terms()
+
+
+def _segment(
+    case: CaseFile,
+    parameters: Parameters,
+    name: str,
+    stiffness: Entries,
+    mass: Entries,
+    first: int,
+    piece: tuple[Scalar, Scalar],
+    n: int,
+    space: str,
+) -> None:
+    """n equal elements from node ``first`` on; with a taper each has its own section."""
+    start, span = piece
+    link = case.mechanism.links[name]
+    h = span * (1.0 / n)
+    turn = rolled(float(getattr(link, "roll", 0.0) or 0.0))
+    if isinstance(link.section, str):
+        beam = beam_values(case, parameters, link, link.section)
+        _tile(stiffness, element_stiffness(beam, h), turn, first, n, space)
+        _tile(mass, element_mass(beam, h), turn, first, n, space)
+        return
+    total = length(case, parameters, name)
+    for k in range(n):
+        share: Scalar = (k + 0.5) / n
+        if span is not total:  # a rider splits the beam
+            share = (start + span * share) / total
+        beam = _tapered(case, parameters, link, share)
+        _tile(stiffness, element_stiffness(beam, h), turn, first + k, 1, space)
+        _tile(mass, element_mass(beam, h), turn, first + k, 1, space)
+
+
+def _tile(
+    entries: Entries, terms: Sequence[ElementTerm], turn: Floats, first: int, n: int, space: str
+) -> None:
+    """The same element between n pairs of neighbouring nodes, all at once."""
+    width = len(DOFS[space])
+    local = np.concatenate([node_dofs(0, space), node_dofs(width, space)])
+    local[6:][node_dofs(0, space) < 0] = -1
+    for coefficient, matrix in terms:
+        turned = turn.T @ matrix @ turn
+        i, j = np.nonzero(turned)
+        keep = (local[i] >= 0) & (local[j] >= 0)
+        i, j = i[keep], j[keep]
+        if len(i):
+            shift = width * (first + np.arange(n))[:, None]
+            rows, columns = (shift + local[i]).ravel(), (shift + local[j]).ravel()
+            entries.add(coefficient, rows, columns, np.tile(turned[i, j], n))
+
+
+def rolled(angle: float) -> Floats:
+    """(12, 12) turn of the section's axes about the beam's."""
+    R = np.asarray(rotation(np.array([1.0, 0.0, 0.0]), angle), dtype=np.float64).T
+    return np.asarray(np.kron(np.eye(4), R), dtype=np.float64)
+
+
+def beam_values(case: CaseFile, parameters: Parameters, beam: Any, section: str) -> BeamValues:
+    """Stiffness and mass values of a beam of the case with one section."""
+
+    def number(key: str, value: float) -> Scalar:
+        return parameters.number(f"sections.{section}.{key}", value)
+
+    return _values(case, parameters, beam, section_values(case.mechanism.sections[section], number))
+
+
+def _values(
+    case: CaseFile, parameters: Parameters, beam: Any, section: SectionValues
+) -> BeamValues:
+    data = case.mechanism.materials[beam.material]
+    path = f"materials.{beam.material}."
+    E = parameters.number(path + "youngs_modulus", data.youngs_modulus)
+    rho = parameters.number(path + "density", data.density)
+    sheared = bool(getattr(beam, "shear", False))
+    G = _shear_modulus(case, parameters, beam, E, sheared)
+    return BeamValues(
+        EA=E * section.area,
+        EI_z=E * section.inertia_z,
+        EI_y=E * section.inertia_y,
+        GJ=G * section.torsion_constant,
+        shear=G * section.area * section.shear_coefficient if sheared else None,
+        mass=rho * section.area,
+        polar=rho * section.polar_inertia,
+        rotary_z=rho * section.inertia_z,
+        rotary_y=rho * section.inertia_y,
+    )
+
+
+def _shear_modulus(
+    case: CaseFile, parameters: Parameters, beam: Any, E: Scalar, sheared: bool
+) -> Scalar:
+    """G = E/(2(1 + ν)), or as given; not needed by planar beams without shear."""
+    data: Any = case.mechanism.materials[beam.material]
+    path = f"materials.{beam.material}."
+    if getattr(data, "shear_modulus", None) is not None:
+        return parameters.number(path + "shear_modulus", data.shear_modulus)
+    if getattr(data, "poissons_ratio", None) is not None:
+        nu = parameters.number(path + "poissons_ratio", data.poissons_ratio)
+        return E / ((nu + 1.0) * 2.0)
+    if case.mechanism.space == "planar" and not sheared:
+        return 0.0
+    message = "needs poissons_ratio or shear_modulus for torsion or shear"
+    raise MechanismError(f"mechanism.materials.{beam.material}", message)
+
+
+def _tapered(case: CaseFile, parameters: Parameters, link: Any, share: Scalar) -> BeamValues:
+    """Values at a share of the length, the sections' dimensions running linearly."""
+    a, b = case.mechanism.sections[link.section.start], case.mechanism.sections[link.section.end]
+
+    def number(key: str, value: float) -> Scalar:
+        low = parameters.number(f"sections.{link.section.start}.{key}", value)
+        high = parameters.number(f"sections.{link.section.end}.{key}", getattr(b, key))
+        return low + (high - low) * share
+
+    return _values(case, parameters, link, section_values(a, number))
+
+
+# --- bodies and rigid links ---
+
+
+def add_bodies(
+    case: CaseFile, parameters: Parameters, name: str, mass: Entries, nodes: dict[str, Ints]
+) -> None:
+    """The point masses and rigid bodies fixed to a link's nodes."""
+    for key, body in case.mechanism.bodies.items():
+        link, _, node = body.at.partition(".")
+        if link == name:
+            lever = vector(getattr(body, "offset", None) or (0.0,))
+            add_scalars(mass, nodes[node], _body(case, parameters, f"bodies.{key}", body, lever))
+
+
+def _body(case: CaseFile, parameters: Parameters, path: str, body: Any, lever: Objects) -> Objects:
+    value = parameters.number(f"{path}.mass", body.mass)
+    return body_block(value, _inertia(parameters, path, body.inertia), lever)
+
+
+def _inertia(parameters: Parameters, path: str, given: Any) -> list[Scalar]:
+    """(Ixx, Iyy, Izz, Ixy, Ixz, Iyz): a number is I_zz of a planar body."""
+    if isinstance(given, (tuple, list)):
+        return [*(float(v) for v in given), *([0.0] * (6 - len(given)))]
+    zz = parameters.number(f"{path}.inertia", given)
+    return [0.0, 0.0, zz, 0.0, 0.0, 0.0]
+
+
+def _rigid(case: CaseFile, parameters: Parameters, name: str) -> LinkMesh:
+    """A rigid link: one node at its origin carries its mass, named nodes hang on it rigidly."""
+    space, link = case.mechanism.space, case.mechanism.links[name]
+    width, kept = len(DOFS[space]), node_dofs(0, case.mechanism.space)
+    mass = Entries((width, width))
+    center = vector(getattr(link, "center", None) or (0.0,))
+    add_scalars(mass, kept, _body(case, parameters, f"links.{name}", link, center))
+    places = rigid_nodes(case, parameters, name)
+    for key, body in case.mechanism.bodies.items():
+        owner, _, node = body.at.partition(".")
+        if owner == name:
+            lever = places[node] + vector(getattr(body, "offset", None) or (0.0,))
+            add_scalars(mass, kept, _body(case, parameters, f"bodies.{key}", body, lever))
+    rigid = rigid_motion([vector([0.0])], [kept], width, space)
+    return LinkMesh(width, {"@origin": kept}, places, [], mass.terms(), rigid)
+
+
+def rigid_nodes(case: CaseFile, parameters: Parameters, name: str) -> dict[str, Objects]:
+    """Named nodes of a rigid link in its frame, m."""
+    link = case.mechanism.links[name]
+    places = {"start": vector([0.0])}
+    if getattr(link, "length", None) is not None:
+        places["end"] = vector([length(case, parameters, name)])
+    given = getattr(link, "nodes", None) or {}
+    return places | {key: vector([float(c) for c in X]) for key, X in given.items()}
+
+
+def mounted(orientation: Sequence[float] | None, angle: float) -> Floats:
+    """A constant rotation from spatial angles or a planar one."""
+    if orientation is not None:
+        return euler(orientation)
+    return np.asarray(rotation(np.array([0.0, 0.0, 1.0]), angle), dtype=np.float64)

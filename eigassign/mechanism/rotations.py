@@ -1,0 +1,82 @@
+"""Rotations and rigid transformations on scalars that may be numbers or expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.series.expression import Expression, Scalar, cos, sin
+
+Objects = NDArray[np.object_]
+Floats = NDArray[np.float64]
+
+
+def vector(values: Sequence[Scalar]) -> Objects:
+    """Three components; a planar vector gets z = 0."""
+    padded = [*values, 0.0, 0.0][:3]
+    return np.array(padded, dtype=object)
+
+
+def rotation(axis: Floats, angle: Scalar) -> Objects:
+    """Rotation by ``angle`` rad about the unit ``axis``: I cos + (1 − cos) aaᵀ + sin [a]×."""
+    c, s = cos(angle), sin(angle)
+    outer, cross, eye = np.outer(axis, axis), skew(axis), np.eye(3)
+    R = np.zeros((3, 3), dtype=object)
+    for i in range(3):
+        for j in range(3):
+            constant = float(outer[i, j])
+            R[i, j] = c * float(eye[i, j] - constant) + s * float(cross[i, j]) + constant
+    return R
+
+
+def euler(angles: Sequence[float]) -> Floats:
+    """R = Rz(rz) Ry(ry) Rx(rx) for (rx, ry, rz) in rad."""
+    x, y, z = (rotation(axis, a) for axis, a in zip(np.eye(3), angles, strict=True))
+    return np.asarray(multiply(z, multiply(y, x)), dtype=np.float64)
+
+
+def skew(a: Sequence[Scalar] | Objects | Floats) -> NDArray[np.object_]:
+    """[a]× with [a]× b = a × b."""
+    x, y, z = a
+    return np.array([[0.0, z * -1.0, y], [z, 0.0, x * -1.0], [y * -1.0, x, 0.0]], dtype=object)
+
+
+def cross(a: Objects, b: Objects) -> Objects:
+    """a × b, for a (3,) or columns (3, n)."""
+    if a.ndim == 2:
+        b = b[:, None] if b.ndim == 1 else b
+    x = a[1] * b[2] - a[2] * b[1]
+    y = a[2] * b[0] - a[0] * b[2]
+    z = a[0] * b[1] - a[1] * b[0]
+    return np.array([x, y, z], dtype=object)
+
+
+def multiply(a: Objects | Floats, b: Objects | Floats) -> Objects:
+    """Product of matrices of scalars, skipping plain zeros (most entries of these)."""
+    columns = b[:, None] if b.ndim == 1 else b
+    out = np.zeros((a.shape[0], columns.shape[1]), dtype=object)
+    some = present(columns)
+    for i, k in zip(*np.nonzero(present(a)), strict=True):
+        for j in np.flatnonzero(some[k]):
+            out[i, j] = out[i, j] + a[i, k] * columns[k, j]
+    return out[:, 0] if b.ndim == 1 else out
+
+
+def present(a: Objects | Floats) -> NDArray[np.bool_]:
+    """Which entries are not the plain number zero."""
+    flags = [isinstance(value, Expression) or value != 0.0 for value in a.ravel()]
+    return np.array(flags, dtype=bool).reshape(a.shape)
+
+
+def carried(R: Objects | Floats, lever: Objects) -> Objects:
+    """(6, 6) map of a motion (v, ω) of a base point to a point at ``lever`` (base axes), turned.
+
+    v_f = Rᵀ (v + ω × lever), ω_f = Rᵀ ω, with R from follower to base axes.
+    """
+    out = np.zeros((6, 6), dtype=object)
+    out[:3, :3] = R.T
+    out[3:, 3:] = R.T
+    out[:3, 3:] = multiply(R.T.astype(object), skew(lever) * -1.0)
+    return out

@@ -1,0 +1,118 @@
+"""Springs between two nodes, or from a node to the ground, along axes fixed in the first link.
+
+The spring is stress-free in every pose; it resists the relative motion of its ends where the second
+one is, k_t |v_2 − v_1 − ω_1 × d|² + k_r |ω_2 − ω_1|²: a rigid arm d on the first node reaches there,
+so that the spring's forces balance and turning everything strains nothing. Each end moves with the
+elastic *and* the rigid motion of its link.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from eigassign.case import CaseFile
+from eigassign.mechanism.assembly import Accumulator
+from eigassign.mechanism.geometry import node_position
+from eigassign.mechanism.kinematics import Kinematics
+from eigassign.mechanism.links import mounted
+from eigassign.mechanism.mesh import DOFS
+from eigassign.mechanism.nodes import NodeMotions, Rows, apply
+from eigassign.mechanism.parameters import Parameters
+from eigassign.mechanism.rotations import Objects, carried, cross, multiply, present
+from eigassign.mechanism.tree import GROUND, Node, split
+from eigassign.series.expression import Scalar
+
+
+def add_springs(
+    target: Accumulator,
+    case: CaseFile,
+    parameters: Parameters,
+    motion: Kinematics,
+    nodes: NodeMotions,
+) -> None:
+    """Add every spring of the case to K."""
+    springs: Any = case.mechanism.springs  # type: ignore[attr-defined]
+    for name, spring in springs.items():
+        ends = [GROUND if end == "ground" else split(end) for end in spring.between]
+        rows = _relative(case, parameters, motion, nodes, spring, ends)
+        values = _stiffness(parameters, f"springs.{name}", spring, case.mechanism.space)
+        for row, k in zip(rows, values, strict=True):
+            for i, left in row.items():
+                for j, right in row.items():
+                    target.add_small(i, j, k * left * right)
+
+
+def _stiffness(parameters: Parameters, path: str, spring: Any, space: str) -> list[Scalar]:
+    """Six values k_t, k_r per axis; a number stands for every axis of the space."""
+    out: list[Scalar] = []
+    for key, first in (("translational", 0), ("rotational", 3)):
+        given = getattr(spring, key, None) or 0.0
+        axes = [d - first for d in DOFS[space] if first <= d < first + 3]
+        values: list[Scalar] = [0.0, 0.0, 0.0]
+        for position, axis in enumerate(axes):
+            if isinstance(given, (tuple, list)):
+                values[axis] = float(given[position])
+            else:
+                values[axis] = parameters.number(f"{path}.{key}", given)
+        out += values
+    return out
+
+
+def _relative(
+    case: CaseFile,
+    parameters: Parameters,
+    motion: Kinematics,
+    nodes: NodeMotions,
+    spring: Any,
+    ends: list[Node],
+) -> Rows:
+    """Motion of the second end minus the first, in the spring's axes, over [u; q̇]."""
+    link = ends[0][0]
+    turn = mounted(getattr(spring, "orientation", None), float(getattr(spring, "angle", 0) or 0))
+    R = multiply(motion.placement(link).world_rotation, turn.astype(object))
+    first, second = (_world_rows(case, parameters, motion, nodes, end) for end in ends)
+    none = np.zeros(3, dtype=object)
+    if ends[1] != GROUND:
+        here, there = (_world_position(case, parameters, motion, end) for end in ends)
+        first = apply(carried(np.eye(3).astype(object), there - here), first)
+    seen = carried(R, none)
+    return [_difference(b, a) for a, b in zip(apply(seen, first), apply(seen, second), strict=True)]
+
+
+def _world_position(
+    case: CaseFile, parameters: Parameters, motion: Kinematics, end: Node
+) -> Objects:
+    placement = motion.placement(end[0])
+    X = node_position(case, parameters, motion.tree, end)
+    return np.asarray(placement.world_origin + multiply(placement.world_rotation, X))
+
+
+def _world_rows(
+    case: CaseFile, parameters: Parameters, motion: Kinematics, nodes: NodeMotions, end: Node
+) -> Rows:
+    """Full motion of a node in world axes: elastic rows and N T columns."""
+    if end == GROUND:
+        return [{} for _ in range(6)]
+    placement = motion.placement(end[0])
+    X = node_position(case, parameters, motion.tree, end)
+    rigid = np.concatenate(
+        [placement.twist[:3] + cross(placement.twist[3:], X), placement.twist[3:]]
+    )
+    rows = [dict(row) for row in nodes.rows(end)]
+    for a, k in zip(*np.nonzero(_some(rigid)), strict=True):
+        rows[a][nodes.count + int(k)] = rigid[a, k]
+    to_world = carried(placement.world_rotation.T, np.zeros(3, dtype=object))
+    return apply(to_world, rows)
+
+
+def _some(a: Objects) -> np.ndarray:
+    return present(a) if a.size else np.zeros(a.shape, dtype=bool)
+
+
+def _difference(b: dict[int, Scalar], a: dict[int, Scalar]) -> dict[int, Scalar]:
+    out = dict(b)
+    for key, value in a.items():
+        out[key] = out.get(key, 0.0) - value
+    return out

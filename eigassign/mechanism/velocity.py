@@ -1,0 +1,166 @@
+"""The velocity terms of eq. (1), which the method neglects: built here so that they can be checked.
+
+With the local motion w = B x of a link whose frame turns at ω(t), the velocity of its nodes in its
+own axes is B ẋ + P x, P = Ḃ + ω̃ B. From the kinetic energy ½ (Bẋ + Px)ᵀ m (Bẋ + Px),
+
+    M = Bᵀ m B,   C = Ṁ + Bᵀ m P − Pᵀ m B,   K_v = d(Bᵀ m P)/dt − Pᵀ m P .
+
+C is gyroscopic up to Ṁ; K_v holds the centrifugal and Euler terms. Derivatives in time are central
+differences of the kinematics along the motion q(t), q̇(t), q̈(t).
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from eigassign.case import CaseFile
+from eigassign.mechanism.assembly import LocalLink
+from eigassign.mechanism.build import local_links
+from eigassign.mechanism.kinematics import Kinematics, all_moving
+from eigassign.mechanism.mesh import DOFS
+from eigassign.mechanism.parameters import Parameters
+from eigassign.series.algebra import Samples
+from eigassign.series.expression import Scalar
+from eigassign.series.table import Table, compile_table
+
+Floats = NDArray[np.float64]
+STEP = 1e-4  # of the time in which the fastest coordinate moves by one rad or metre
+
+
+@dataclass(frozen=True, eq=False)
+class _LinkTable:
+    """One link with everything about it that varies, in one table of scalars."""
+
+    link: LocalLink
+    spin: slice  # rows of ω per q̇, all coordinates moving
+    carries: slice
+    twist: slice
+    rigid: slice
+    mass: slice
+
+
+@dataclass(frozen=True, eq=False)
+class VelocityTerms:
+    """C and K_v of a mechanism along a motion; built once, evaluated at instants."""
+
+    links: tuple[_LinkTable, ...]
+    table: Table
+    relative: Floats
+    offset: Floats
+    n_u: int
+    n_dof: int
+    space: str
+
+    def at(
+        self, q: Floats, y: Floats, rate: Floats, acceleration: Floats
+    ) -> tuple[sparse.csr_array, sparse.csr_array]:
+        """C [N s/m] and K_v [N/m] (n_dof, n_dof) for q, q̇, q̈ (n_q,) of one instant."""
+        h = STEP / max(float(np.abs(rate).max(initial=0.0)), 1e-12)
+        instants = [(k * h) for k in (-2, -1, 0, 1, 2)]
+        values = [self._values(q + rate * t + acceleration * (t * t / 2.0), y) for t in instants]
+        rates = [rate + acceleration * t for t in instants]
+        C = sparse.csr_array((self.n_dof, self.n_dof))
+        K = sparse.csr_array((self.n_dof, self.n_dof))
+        for one in self.links:
+            c, k = self._link_terms(one, values, rates, h)
+            C, K = C + c, K + k
+        return sparse.csr_array(C), sparse.csr_array(K)
+
+    def _values(self, q: Floats, y: Floats) -> Floats:
+        z = np.concatenate([self.relative @ q + self.offset, y])
+        return self.table.evaluate(Samples(), z[:, None])[:, 0]
+
+    def _link_terms(
+        self, one: _LinkTable, values: list[Floats], rates: list[Floats], h: float
+    ) -> tuple[sparse.csr_array, sparse.csr_array]:
+        B = [self._motion(one, v) for v in values]
+        m = _sum(one.link.mass, values[2][one.mass])
+        P = [
+            (B[k + 1] - B[k - 1]) * (0.5 / h) + self._spin(one, values[k], rates[k]) @ B[k]
+            for k in (1, 2, 3)
+        ]
+        momentum = [B[k].T @ m @ P[k - 1] for k in (1, 2, 3)]
+        growth = (B[3].T @ m @ B[3] - B[1].T @ m @ B[1]) * (0.5 / h)
+        C = growth + momentum[1] - momentum[1].T
+        return C, (momentum[2] - momentum[0]) * (0.5 / h) - P[1].T @ m @ P[1]
+
+    def _motion(self, one: _LinkTable, values: Floats) -> sparse.csr_array:
+        """B (n_local, n_dof): own unknowns, carried nodes, and N T."""
+        link = one.link
+        own = np.flatnonzero(link.own >= 0)
+        rows, columns, data = [own], [link.own[own]], [np.ones(len(own))]
+        pairs = [
+            (slot, unknown) for slot, masters in link.carried.items() for unknown, _ in masters
+        ]
+        if pairs:
+            slots, unknowns = (np.array(p) for p in zip(*pairs, strict=True))
+            rows, columns = [*rows, slots], [*columns, unknowns]
+            data.append(values[one.carries])
+        shape = (len(link.own), self.n_dof)
+        entries = (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns)))
+        B = sparse.csr_array(entries, shape=shape)
+        if link.twist.shape[1]:
+            N = _sum(link.rigid, values[one.rigid])
+            T = values[one.twist].reshape(link.twist.shape)
+            wide = sparse.csr_array((shape[0], self.n_u))
+            B = B + sparse.hstack([wide, sparse.csr_array(N @ T)], format="csr")
+        return B
+
+    def _spin(self, one: _LinkTable, values: Floats, rate: Floats) -> sparse.csr_array:
+        """ω̃ on the translations and rotations of every node, in the link's axes."""
+        wx, wy, wz = values[one.spin].reshape(3, -1) @ rate
+        tilde = np.array([[0.0, -wz, wy], [wz, 0.0, -wx], [-wy, wx, 0.0]])
+        kept = list(DOFS[self.space])
+        block = np.kron(np.eye(2), tilde)[np.ix_(kept, kept)]
+        n = len(one.link.own) // len(kept)
+        turned = sparse.kron(sparse.eye_array(n), block, format="csr")
+        extra = len(one.link.own) - n * len(kept)
+        return sparse.csr_array(
+            sparse.block_diag([turned, sparse.csr_array((extra, extra))], format="csr")
+            if extra
+            else turned
+        )
+
+
+def _sum(terms: object, values: Floats) -> sparse.csr_array:
+    matrices = [t.matrix * float(v) for t, v in zip(terms, values, strict=True)]  # type: ignore[call-overload]
+    total = matrices[0]
+    for matrix in matrices[1:]:
+        total = total + matrix
+    return sparse.csr_array(total)
+
+
+def velocity_terms(case: CaseFile, parameters: Parameters, motion: Kinematics) -> VelocityTerms:
+    """Collect what varies along a motion: carried nodes, twists, spins, mass coefficients."""
+    links, nodes = local_links(case, parameters, motion)
+    moving = all_moving(case, parameters, motion)
+    scalars: list[Scalar] = []
+    tables = []
+    for link, placement in zip(links, motion.placements, strict=True):
+        spin = moving.placement(placement.link).twist[3:]
+        parts = [
+            list(spin.ravel()),
+            [carry for masters in link.carried.values() for _, carry in masters],
+            list(link.twist.ravel()),
+            [t.coefficient for t in link.rigid],
+            [t.coefficient for t in link.mass],
+        ]
+        cuts = np.cumsum([len(scalars), *(len(p) for p in parts)]).tolist()
+        slices = [slice(a, b) for a, b in itertools.pairwise(cuts)]
+        scalars += [s for part in parts for s in part]
+        tables.append(_LinkTable(link, *slices))
+    n = len(parameters.coordinates) + len(parameters.design)
+    return VelocityTerms(
+        links=tuple(tables),
+        table=compile_table(parameters.recorder, scalars, n),
+        relative=motion.relative,
+        offset=motion.offset,
+        n_u=nodes.count,
+        n_dof=nodes.count + len(motion.columns),
+        space=case.mechanism.space,
+    )

@@ -1,0 +1,130 @@
+"""The two algebras a program runs in: ordinary samples, and truncated power series."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.errors import SingularityError
+from eigassign.series.lower_set import LowerSet
+from eigassign.series.power_series import compose, multiply, power_taylor, wave_taylor
+
+if TYPE_CHECKING:
+    from eigassign.series.program import Step
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+
+class Algebra(Protocol):
+    """What a program needs to run: rows of numbers standing for values."""
+
+    def constant(self, values: Floats) -> Floats:
+        """Numbers (n,) as rows (n, …)."""
+
+    def linear(self, step: Step, values: Floats) -> Floats:
+        """Linear forms of rows."""
+
+    def product(self, a: Floats, b: Floats) -> Floats:
+        """Row by row product."""
+
+    def power(self, a: Floats, exponents: Floats) -> Floats:
+        """Row by row power with one exponent a row."""
+
+    def wave(self, a: Floats, quarters: Ints) -> Floats:
+        """Row by row sin(a + quarters π/2): the sine for 0, the cosine for 1."""
+
+    def solve(self, A: Floats, B: Floats, n: int) -> Floats:
+        """X as rows (n m, …) of A X = B, entries as rows (n², …) and (n m, …)."""
+
+
+class Samples:
+    """Ordinary numbers, many samples at once."""
+
+    def constant(self, values: Floats) -> Floats:
+        """(n,) → (n, 1), broadcast over samples."""
+        return values[:, None]
+
+    def linear(self, step: Step, values: Floats) -> Floats:
+        """A sum for each form."""
+        assert step.matrix is not None
+        return np.asarray(step.matrix @ values + step.numbers[:, None])
+
+    def product(self, a: Floats, b: Floats) -> Floats:
+        """Elementwise."""
+        return a * b
+
+    def power(self, a: Floats, exponents: Floats) -> Floats:
+        """Elementwise; a domain error shows as NaN, which callers refuse."""
+        with np.errstate(all="ignore"):
+            return np.power(a, exponents[:, None])
+
+    def wave(self, a: Floats, quarters: Ints) -> Floats:
+        """Elementwise."""
+        out = np.sin(a)
+        out[quarters == 1] = np.cos(a[quarters == 1])
+        return out
+
+    def solve(self, A: Floats, B: Floats, n: int) -> Floats:
+        """Sample by sample; raises SingularityError where A is singular."""
+        left, right = A.T.reshape(-1, n, n), B.T.reshape(A.shape[1], n, -1)
+        try:
+            return np.asarray(np.linalg.solve(left, right).reshape(A.shape[1], -1).T)
+        except np.linalg.LinAlgError as error:
+            raise SingularityError("the mechanism is at a dead point") from error
+
+
+@dataclass(frozen=True)
+class Truncated:
+    """Power series truncated to ``space``."""
+
+    space: LowerSet
+
+    def constant(self, values: Floats) -> Floats:
+        """(n,) → (n, N): the constant series."""
+        rows = np.zeros((len(values), len(self.space)))
+        rows[:, 0] = values
+        return rows
+
+    def linear(self, step: Step, values: Floats) -> Floats:
+        """The sum of each coefficient; numbers enter the constant terms."""
+        rows = np.asarray(step.weights @ values)
+        rows[:, 0] += step.numbers
+        return rows
+
+    def product(self, a: Floats, b: Floats) -> Floats:
+        """Cauchy product over the set."""
+        return multiply(self.space, a, b)
+
+    def power(self, a: Floats, exponents: Floats) -> Floats:
+        """Binomial series about the constant terms, one exponent a row."""
+        out = np.empty_like(a)
+        for exponent in np.unique(exponents):
+            rows = exponents == exponent
+            taylor = power_taylor(a[rows, 0], float(exponent), self.space.order)
+            out[rows] = compose(self.space, taylor, a[rows])
+        return out
+
+    def wave(self, a: Floats, quarters: Ints) -> Floats:
+        """Sine or cosine of each series."""
+        return compose(self.space, wave_taylor(a[:, 0], quarters, self.space.order), a)
+
+    def solve(self, A: Floats, B: Floats, n: int) -> Floats:
+        """Each chord step X ← X + A_0⁻¹ (B − A X) gains one degree."""
+        m, size = len(B) // n, len(self.space)
+        inverse = np.linalg.inv(A[:, 0].reshape(n, n))
+        right = B.reshape(n, m * size)
+        X = inverse @ right
+        for _ in range(self.space.order):
+            X = X + inverse @ (right - self._matrix_product(A, X, n, m).reshape(n, -1))
+        return np.asarray(X.reshape(n * m, size))
+
+    def _matrix_product(self, A: Floats, X: Floats, n: int, m: int) -> Floats:
+        size = len(self.space)
+        shape = (n, n, m, size)
+        left = np.broadcast_to(A.reshape(n, n, 1, size), shape).reshape(-1, size)
+        right = np.broadcast_to(X.reshape(1, n, m, size), shape).reshape(-1, size)
+        return np.asarray(multiply(self.space, left, right).reshape(shape).sum(axis=1))

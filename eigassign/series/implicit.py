@@ -1,0 +1,107 @@
+"""Implicit functions p(a) defined by F(p, a) = 0: on samples by continuation, on series by Newton.
+
+The solution followed is the one through a known pair (a_0, p_0), never another branch: samples are
+reached from a_0 in small steps, and a passage through a singular ∂F/∂p is refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.errors import SingularityError
+from eigassign.series.algebra import Algebra, Samples, Truncated
+from eigassign.series.program import Program
+
+Floats = NDArray[np.float64]
+STEP = 0.15  # largest change of an argument in one continuation step (rad or m)
+TOLERANCE = 1e-13  # on Newton's step, relative to 1 (rad or m)
+ACCEPT = 1e-9  # on F and on the check rows afterwards
+SINGULAR = 1e-5  # smallest over largest singular value of ∂F/∂p that is refused
+
+
+@dataclass(frozen=True, eq=False)
+class ImplicitFunction:
+    """p (size,) of arguments a (n_arguments,); ``program`` maps (a, p) to rows F, check, ∂F/∂p.
+
+    F has ``n_equations`` ≥ size rows (consistent if more), ``check`` rows must vanish too, and
+    ∂F/∂p follows row by row. ``a0``, ``p0`` is a known solution, ``names`` those of the arguments.
+    """
+
+    program: Program
+    size: int
+    n_equations: int
+    n_checks: int
+    a0: Floats
+    p0: Floats
+    names: tuple[str, ...]
+    title: str
+
+    def samples(self, a: Floats) -> Floats:
+        """p (size, n_samples) at a (n_arguments, n_samples).
+
+        Raises SingularityError naming the first sample where the equations are singular or have no
+        solution on this branch.
+        """
+        steps = int(np.ceil(np.abs(a - self.a0[:, None]).max(initial=0.0) / STEP)) or 1
+        for refinement in (1, 8):
+            p, ok = self._continue(a, steps * refinement)
+            if ok.all():
+                return p
+        raise self._failure(a[:, np.flatnonzero(~ok)[0]])
+
+    def _continue(self, a: Floats, steps: int) -> tuple[Floats, NDArray[np.bool_]]:
+        p = np.repeat(self.p0[:, None], a.shape[1], axis=1)
+        ok = np.ones(a.shape[1], dtype=bool)
+        start = self.a0[:, None]
+        for t in np.linspace(0.0, 1.0, steps + 1)[1:]:
+            p, regular = self.newton(start + t * (a - start), p)
+            ok &= regular
+        F, check, _ = self.equations(a, p)
+        missed = np.abs(np.concatenate([F, check])).max(axis=0, initial=0.0)
+        return p, ok & (missed < ACCEPT)
+
+    def newton(self, a: Floats, p: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+        """Newton from p at fixed a; whether each sample is regular there."""
+        for _ in range(12):
+            F, _, J = self.equations(a, p)
+            if not np.isfinite(J).all():
+                return p, np.zeros(p.shape[1], dtype=bool)
+            step = -(np.linalg.pinv(J) @ F.T[:, :, None])[:, :, 0].T
+            p = p + np.clip(step, -0.5, 0.5)
+            if np.abs(step).max(initial=0.0) < TOLERANCE:
+                break
+        s = np.linalg.svd(J, compute_uv=False)
+        return p, np.asarray(s[:, -1] > SINGULAR * s[:, 0])
+
+    def equations(self, a: Floats, p: Floats) -> tuple[Floats, Floats, Floats]:
+        """F (n_equations, n), check (n_checks, n), ∂F/∂p (n, n_equations, size)."""
+        rows = self.program.run(Samples(), np.concatenate([a, p]))
+        m, c = self.n_equations, self.n_checks
+        J = rows[m + c :].T.reshape(-1, m, self.size)
+        return rows[:m], rows[m : m + c], J
+
+    def series(self, algebra: Truncated, a: Floats) -> Floats:
+        """p (size, N) as power series: each chord step gains one degree."""
+        p0 = self.samples(a[:, :1])
+        _, _, J = self.equations(a[:, :1], p0)
+        inverse = np.linalg.pinv(J[0])
+        p = algebra.constant(p0[:, 0])
+        for _ in range(algebra.space.order + 1):
+            F = self.program.run(algebra, np.concatenate([a, p]))[: self.n_equations]
+            F[:, 0] = 0.0  # solved already, to round-off
+            p = p - inverse @ F
+        return p
+
+    def _failure(self, a: Floats) -> SingularityError:
+        at = ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.names, a, strict=True))
+        return SingularityError(f"{self.title} cannot be closed, or is at a dead point, at {at}")
+
+
+def evaluate(function: ImplicitFunction, algebra: Algebra, a: Floats) -> Floats:
+    """The function in either algebra."""
+    if isinstance(algebra, Truncated):
+        return function.series(algebra, a)
+    return function.samples(a)
