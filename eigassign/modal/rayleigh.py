@@ -123,11 +123,12 @@ def _quadratics(
     for i, j in _lower(r):
         out[:, i, j, plan.constant.into] = _meet(constant, plan.constant, i, j, r)
     if len(stored):
-        terms = project_terms(pencil, rows[: plan.low * r], rows, which)
         factors = varying.T[stored]
-        for i, j in _lower(r):
-            sums = (factors @ _meet(terms, plan.varying, i, j, r))[:, plan.left, plan.right]
-            out[:, i, j, plan.into] += np.add.reduceat(sums, plan.end, axis=1)
+        for part in project_terms(pencil, rows[: plan.low * r], rows, which):
+            for i, j in _lower(r):
+                met = _meet(part.values, plan.varying, i, j, r)
+                sums = (factors[:, part.terms] @ met)[:, plan.left, plan.right]
+                out[part.matrices, i, j, plan.into] += np.add.reduceat(sums, plan.end, axis=1)
     for i, j in _lower(r):
         out[:, j, i] = out[:, i, j]
     return out[0], out[1]
