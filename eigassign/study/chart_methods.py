@@ -18,10 +18,9 @@ from eigassign.modal.model import Model
 from eigassign.modal.reduced import ReducedModel, reduce
 from eigassign.series.evaluation import polynomials
 from eigassign.series.power_series import PowerSeries
-from eigassign.study.chart_question import Features, Points
+from eigassign.study.chart_question import Points
 from eigassign.study.drawing import spread_samples
 from eigassign.study.scene import Scene
-from eigassign.study.surrogates import adaptive
 
 Floats = NDArray[np.float64]
 Evaluator = Callable[[Points], Floats]  # → Hz (n, n_modes)
@@ -241,51 +240,3 @@ def solves_per_point(scene: Scene, m: int, guard: bool) -> int:
     modes, elastic = scene.expansions.full.modes, len(scene.model.pencil.elastic)
     others = set(range(1, min(max(modes) + 1, elastic) + 1)) - set(modes)
     return 3 if guard and others and m >= 2 else 2
-
-
-def distilled_methods(
-    scene: Scene,
-    features: Features,
-    tolerances: Sequence[float],
-    sources: Sequence[tuple[int, int, bool]],
-    most: int,
-) -> Iterator[Method]:
-    """A Chebyshev polynomial through a reduced model: cheap to train, cheap to evaluate.
-
-    ``sources`` are (m, expansion points, guard) of the reduced models; the polynomial's degree on
-    every axis is what the tolerance needs there, and the grid has at most ``most`` points.
-    """
-    for m, count, guard in sources:
-        q, y = points_along(scene, count)
-        name = f"reduced m = {m}, {len(q)} point{'s' if len(q) > 1 else ''}"
-        for tolerance in tolerances:
-            yield Method(
-                f"{name} → polynomial {tolerance:.0e}",
-                f"{name} → polynomial",
-                True,
-                {"half_order": m, "guard": guard, "q": q, "y": y, "tolerance": tolerance,
-                 "features": features.names},
-                partial(_distilled, scene, features, m, q, y, guard, tolerance, most),
-                solves=len(q) * solves_per_point(scene, m, guard),
-            )  # fmt: skip
-
-
-def _distilled(
-    scene: Scene,
-    features: Features,
-    m: int,
-    q: Floats,
-    y: Floats,
-    guard: bool,
-    tolerance: float,
-    most: int,
-    _: Floats,
-) -> Evaluator:
-    made = reduced_model(scene, m, q, y, guard)
-
-    def hz(u: Floats) -> Floats:
-        x = features.x(u)
-        return made.frequencies(x[:, : made.n_q], x[:, made.n_q :])
-
-    polynomial, _used = adaptive(hz, features.d, tolerance, most)
-    return lambda points: polynomial(points.u)

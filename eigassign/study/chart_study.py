@@ -23,6 +23,7 @@ from eigassign.study.chart_data import Advice, Asked, ChartPoint, Front
 from eigassign.study.chart_effort import Effort
 from eigassign.study.chart_front import advise_accuracy, advise_budget, front, front_notes
 from eigassign.study.chart_methods import Method
+from eigassign.study.chart_polynomials import distilled_methods, economised_methods
 from eigassign.study.chart_question import SEED, Features, Points, build_features, build_points
 from eigassign.study.chart_timing import timed
 from eigassign.study.scene import Scene
@@ -156,9 +157,9 @@ def _methods(
     yield from own.reciprocal_methods(scene, orders)
     yield from own.piecewise_methods(scene, orders[1:], effort.expansion_points[1:])
     yield from own.reduced_methods(scene, effort.half_orders, effort.expansion_points)
-    yield from own.distilled_methods(
-        scene, features, effort.tolerances, DISTILLED, effort.most_nodes
-    )
+    ladder = [each for each in effort.economised if each[0] in orders]
+    yield from economised_methods(scene, features, ladder, effort.most_nodes)
+    yield from distilled_methods(scene, features, effort.tolerances, DISTILLED, effort.most_nodes)
     yield from _rivals(scene, features, points, effort, most)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from itertools import product
 from typing import Literal
 
@@ -15,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import UsageError
-from eigassign.series.lower_set import total_degree
+from eigassign.series.evaluation import polynomials
+from eigassign.series.lower_set import lower_set, total_degree
 from eigassign.series.power_series import monomials
 
 Floats = NDArray[np.float64]
@@ -63,7 +65,8 @@ def response_surface(u: Floats, f: Floats, degree: int) -> Surrogate:
     if len(space) > len(u):
         raise UsageError(f"{len(space)} coefficients from {len(u)} training points")
     beta = np.linalg.lstsq(monomials(space, 2.0 * u - 1.0), f, rcond=None)[0]
-    return lambda at: np.asarray(monomials(space, 2.0 * at - 1.0) @ beta)
+    made = polynomials(space, np.asarray(beta.T, dtype=np.float64))
+    return lambda at: made(2.0 * at - 1.0)
 
 
 Kernel = Literal["thin_plate_spline", "quintic"]
@@ -94,19 +97,26 @@ def grid_interpolation(k: int, d: int, f: Floats, cubic: bool) -> Surrogate:
 
 def chebyshev(sizes: Sequence[int], f: Floats) -> Surrogate:
     """The tensor polynomial through f (Π k_i, n_modes) on `chebyshev_nodes` of each axis."""
-    coefficients = f.reshape(*sizes, f.shape[1])
-    for axis, k in enumerate(sizes):
-        made = np.tensordot(_inverse_cosines(k), coefficients, (1, axis))
-        coefficients = np.moveaxis(made, 0, axis)
+    coefficients = _coefficients(sizes, f)
     return lambda at: np.concatenate(
         [_tensor_polynomial(coefficients, at[i : i + BLOCK]) for i in range(0, len(at), BLOCK)]
     )
 
 
+def _coefficients(sizes: Sequence[int], f: Floats) -> Floats:
+    """Of the Chebyshev series, (k_0, k_1, …, n_modes)."""
+    coefficients = f.reshape(*sizes, f.shape[1])
+    for axis, k in enumerate(sizes):
+        made = np.tensordot(_inverse_cosines(k), coefficients, (1, axis))
+        coefficients = np.moveaxis(made, 0, axis)
+    return coefficients
+
+
+@lru_cache(maxsize=64)
 def _inverse_cosines(k: int) -> Floats:
     """From values at the k nodes to coefficients of T_0 … T_{k−1}."""
     cosines = np.cos(np.pi * np.outer(np.arange(k), np.arange(k)) / max(k - 1, 1))[::-1]
-    return np.asarray(np.linalg.inv(cosines))
+    return _frozen(np.linalg.inv(cosines))
 
 
 def _tensor_polynomial(coefficients: Floats, u: Floats) -> Floats:
@@ -160,10 +170,54 @@ def adaptive(
     Raises UsageError where its grid would have more than ``most`` points.
     """
     sizes, used = needed_nodes(f, d, tolerance)
+    return thinned_through(f, sizes, tolerance, most), used + math.prod(sizes)
+
+
+def thinned_through(
+    f: Callable[[Floats], Floats], sizes: Sequence[int], tolerance: float, most: int
+) -> Surrogate:
+    """The polynomial through f on a grid of ``sizes``, with the terms that a tolerance needs.
+
+    Raises UsageError where the grid would have more than ``most`` points.
+    """
     if math.prod(sizes) > most:
         raise UsageError(f"a grid of {' x '.join(map(str, sizes))} points is over {most}")
-    u = tensor_points(sizes)
-    return chebyshev(sizes, f(u)), used + len(u)
+    return _thinned(_coefficients(sizes, f(tensor_points(sizes))), 0.5 * tolerance)
+
+
+def _thinned(coefficients: Floats, tolerance: float) -> Surrogate:
+    """The polynomial without terms that sum up to less than ``tolerance`` of its largest one.
+
+    What is left is closed downwards to a lower set and written in powers of 2u − 1, which are
+    evaluated quickly and, to the degrees at hand, without loss.
+    """
+    sizes = np.abs(coefficients).max(axis=-1)
+    order = np.argsort(sizes, axis=None)
+    small = np.cumsum(sizes.ravel()[order]) < tolerance * sizes.max()
+    keep = np.ones(sizes.size, dtype=bool)
+    keep[order[small]] = False
+    mask = keep.reshape(sizes.shape)
+    for axis in range(mask.ndim):
+        mask = np.flip(np.logical_or.accumulate(np.flip(mask, axis), axis=axis), axis)
+    powers = np.where(mask[..., None], coefficients, 0.0)
+    for axis, k in enumerate(sizes.shape):
+        powers = np.moveaxis(np.tensordot(_to_powers(k), powers, (1, axis)), 0, axis)
+    space = lower_set(np.argwhere(mask))
+    made = polynomials(space, powers[tuple(space.indices.T)].T)
+    return lambda at: made(2.0 * at - 1.0)
+
+
+@lru_cache(maxsize=64)
+def _to_powers(k: int) -> Floats:
+    """From coefficients of T_0 … T_{k−1} to those of 1, v, … v^(k−1)."""
+    columns = [np.polynomial.chebyshev.cheb2poly(unit) for unit in np.eye(k)]
+    return _frozen(np.array([np.pad(c, (0, k - len(c))) for c in columns]).T)
+
+
+def _frozen(table: Floats) -> Floats:
+    """Shared by all who ask again."""
+    table.setflags(write=False)
+    return table
 
 
 def tensor_points(sizes: Sequence[int]) -> Floats:
