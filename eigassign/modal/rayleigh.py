@@ -113,7 +113,8 @@ def _quadratics(
 ) -> tuple[Floats, Floats]:
     """Series (r, r, N) of Xᵀ K X and Xᵀ M X: at w = 0, and Σ_j θ_j(w) Xᵀ A_j X for the rest."""
     n, r = vectors.shape[1:]
-    rows = vectors.transpose(0, 2, 1).reshape(-1, n)
+    columns = np.ascontiguousarray(vectors.transpose(1, 0, 2).reshape(n, -1))
+    rows = columns.T  # products with sparse matrices run along the rows of the other
     varying = theta.copy()
     varying[:, 0] = 0.0
     stored, which = np.flatnonzero(varying.any(axis=0)), np.asarray(varying.any(axis=1))
