@@ -89,6 +89,7 @@ def reduce(
         material_terms=material,
         material=theta0[material, 0],
         anchors=_anchors(found.lam, count),
+        shapes=np.array([V.T @ (K @ phi[pencil.elastic, :count]) for phi in found.phi]),
         stiffness_rounding=projected.stiffness_rounding,
         mass_rounding=projected.mass_rounding,
     )

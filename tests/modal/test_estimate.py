@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from chains import model_of, random_chain, two_link
 from scipy import sparse
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "stability"))
+
+from calibration import draw
+
 from eigassign.errors import AccuracyError
-from eigassign.modal.estimate import frequency_error
+from eigassign.modal.estimate import frequency_error, gone
 from eigassign.modal.half_norm import half_solve
 from eigassign.modal.reduced import reduce
 from eigassign.modal.roundoff import rounding_error, rounding_weights
@@ -161,3 +168,31 @@ def test_half_a_solve_refuses_what_is_not_definite():
     K = sparse.csc_array(np.diag([1.0, -1.0, 2.0]))
     with pytest.raises(AccuracyError, match="not positive definite"):
         half_solve(K, np.eye(3))
+
+
+def test_a_mode_is_gone_when_its_shape_and_one_frequency_are_missing():
+    """Modes at 1, 4, 9 and 35; the second is no longer there, the others moved little."""
+    anchors = 1.0 / np.array([[1.0, 4.0, 9.0, 35.0]]) ** 2
+    present = 1.0 / np.array([[1.1, 8.8, 30.0, 90.0, 400.0]]) ** 2
+    gram = np.zeros((1, 3, 3))
+    shares = np.zeros((1, 1, 3, 5))
+    shares[0, 0, [0, 1, 2], [0, 4, 1]] = 1.0  # the second shape is in a pair that is far too stiff
+    assert gone(present, gram, shares, anchors).tolist() == [[False, True, False]]
+    kept = shares[:, :, :, [0, 4, 1, 2, 3]]  # now it is in the second pair: merely faster
+    assert not gone(present, gram, kept, anchors).any()
+    whole = 1.0 / np.array([[1.1, 4.2, 8.8, 30.0, 90.0]]) ** 2  # none is missing, shapes changed
+    assert not gone(whole, gram, shares, anchors).any()
+
+
+@pytest.mark.parametrize("seed", [832, 1172, 2531])
+def test_links_that_know_nothing_of_each_other_hide_no_mode(seed):
+    """Here the residuals are at round-off although a mode of another branch is missing."""
+    drawn = draw(seed, 3)
+    assert drawn is not None
+    reduced = reduce(drawn.model.pencil, drawn.q0, drawn.y0, drawn.modes, drawn.half_order)
+    pick = np.array(drawn.modes) - 1
+    exact = drawn.model.frequencies(drawn.q, drawn.y, max(drawn.modes))[:, pick]
+    error = np.abs(reduced.frequencies(drawn.q, drawn.y) / exact - 1.0)
+    estimate = reduced.error_estimate(drawn.q, drawn.y)
+    assert error.max() > 0.2
+    assert (estimate >= error).all()
