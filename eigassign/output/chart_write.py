@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from eigassign.output import figures, report
 from eigassign.output.chart_figures import plan
@@ -29,7 +31,16 @@ def write_chart(chart: Chart, folder: Path) -> None:
 
 def to_json(chart: Chart) -> str:
     """All that a chart holds; every point can be computed again from its parameters."""
-    return dumps({"schema": SCHEMA, **asdict(chart)}) + "\n"
+    return dumps(_finite({"schema": SCHEMA, **asdict(chart)})) + "\n"
+
+
+def _finite(value: Any) -> Any:
+    """Numbers that JSON has not, of methods that gave none, as null."""
+    if isinstance(value, dict):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def to_html(chart: Chart, plans: Sequence[FigurePlan], images: Mapping[str, bytes]) -> bytes:

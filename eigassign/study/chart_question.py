@@ -23,6 +23,7 @@ from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 SEED = 20211204
+STILL = 1e-9  # rad or m: a coordinate that travels less stands still
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +130,7 @@ def build_features(scene: Scene) -> Features:
 def _place(scene: Scene) -> tuple[Floats | None, Callable[[Floats], Floats]]:
     S, q = joint_map(scene.model), scene.path.q
     s = q @ S.T
-    if not len(S) or not np.ptp(s, axis=0).any():
+    if not len(S) or np.ptp(s, axis=0).max() <= STILL:
         return None, lambda u: np.tile(q[0], (len(u), 1))
     if len(S) == 1:
         low, reach = s.min(), np.ptp(s)

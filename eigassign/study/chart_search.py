@@ -37,7 +37,7 @@ class Watched:
     """An objective that remembers its best design, and when it was found."""
 
     objective: Callable[[Floats], tuple[float, Floats | None]]
-    allowed: Callable[[Floats], bool]
+    allowed: Callable[[Floats], NDArray[np.bool_]]
     most: int
     start: float = field(default_factory=perf_counter)
     calls: int = 0
@@ -69,11 +69,11 @@ class Limits:
     lower: Floats
     upper: Floats
 
-    def met(self, v: Floats) -> bool:
-        """Up to rounding."""
-        row = self.C @ v
-        slack = 1e-7 * (1.0 + np.abs(row))
-        return bool(np.all((row >= self.lower - slack) & (row <= self.upper + slack)))
+    def met(self, v: Floats) -> NDArray[np.bool_]:
+        """Whether designs v (…, n) keep them, up to rounding."""
+        row = v @ self.C.T
+        slack = 1e-8 * (1.0 + np.abs(row))
+        return np.asarray(((row >= self.lower - slack) & (row <= self.upper + slack)).all(axis=-1))
 
 
 def by_gradient(watched: Watched, start: Floats, limits: Limits, analytic: bool) -> None:
@@ -148,7 +148,8 @@ def _improving(model: Kriging, f: Floats, random: np.random.Generator, limits: L
         -4, -1, (CANDIDATES, 1)
     )
     every = np.clip(np.vstack([random.random((CANDIDATES, n)), near]), 0.0, 1.0)
-    every = np.array([v for v in every if limits.met(v)] or [best])
+    every = every[limits.met(every)]
+    every = every if len(every) else best[None]
     mean, sigma = model(every), np.maximum(model.deviation(every), 1e-12)
     z = (f.min() - mean) / sigma
     gain = sigma * (z * ndtr(z) + np.exp(-0.5 * z * z) / np.sqrt(2.0 * np.pi))

@@ -85,14 +85,27 @@ def radial_basis(u: Floats, f: Floats, kernel: Kernel) -> Surrogate:
 
 def grid_interpolation(k: int, d: int, f: Floats, cubic: bool) -> Surrogate:
     """Linear or cubic-spline interpolation on the grid of `equal_nodes`; f (k^d, n_modes)."""
+    values = f.reshape(*([k] * d), f.shape[1])
+    if cubic:
+        return _tensor_spline(k, d, values)
     from scipy.interpolate import RegularGridInterpolator
 
     axes = tuple(equal_nodes(k) for _ in range(d))
-    values = f.reshape(*([k] * d), f.shape[1])
-    method: Literal["cubic", "linear"] = "cubic" if cubic else "linear"
-    # on the last node, rounding may put a point an ulp outside
-    interpolant = RegularGridInterpolator(axes, values, method, bounds_error=False, fill_value=None)
+    # rounding may put a point an ulp beyond the last node
+    interpolant = RegularGridInterpolator(axes, values, bounds_error=False, fill_value=None)
     return lambda at: np.asarray(interpolant(at))
+
+
+def _tensor_spline(k: int, d: int, values: Floats) -> Surrogate:
+    """Spline coefficients axis by axis, solved directly: SciPy's own grid solver is iterative."""
+    from scipy.interpolate import NdBSpline, make_interp_spline
+
+    knots, coefficients = equal_nodes(k), values
+    for axis in range(d):
+        spline = make_interp_spline(equal_nodes(k), coefficients, k=3, axis=axis)
+        knots, coefficients = spline.t, np.moveaxis(spline.c, 0, axis)
+    made = NdBSpline((knots,) * d, np.ascontiguousarray(coefficients), 3)
+    return lambda at: np.asarray(made(at))
 
 
 def chebyshev(sizes: Sequence[int], f: Floats) -> Surrogate:
