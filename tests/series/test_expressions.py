@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from eigassign.errors import UsageError
+from eigassign.series.algebra import Samples, Truncated
 from eigassign.series.expression import Expression, Recorder, cos, sin
 from eigassign.series.lower_set import total_degree
 from eigassign.series.power_series import PowerSeries
-from eigassign.series.algebra import Samples, Truncated
 from eigassign.series.program import compile_program
 from eigassign.series.table import compile_table
 
