@@ -223,7 +223,9 @@ class _Builder:
         self, key: object, seen: dict[str, object], marks: dict[Any, Mark], path: KeyPath, at: Mark
     ) -> bool:
         if not isinstance(key, str):
-            message = f"keys must be text, got {shown(key)}: put it in quotes"
+            number = isinstance(key, (int, float)) and not isinstance(key, bool)
+            comma = " (decimals take a point, not a comma)" if number else ""
+            message = f"keys must be text, got {shown(key)}: put it in quotes{comma}"
         elif key in seen:
             message = f"{shown(key)} is given twice; first in line {marks[key].line}"
         else:

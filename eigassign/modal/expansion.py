@@ -23,6 +23,7 @@ from eigassign.modal.rayleigh import eigenvalue_series
 from eigassign.modal.recursion import expand_subspace
 from eigassign.modal.samples import point, samples
 from eigassign.modal.substitution import substitute
+from eigassign.series.evaluation import Polynomials, polynomials
 from eigassign.series.lower_set import LowerSet
 from eigassign.series.power_series import monomials
 
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 MAX_ORDER = 20
+MANY = 1000  # samples from which preparing the polynomials pays
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +65,21 @@ class Expansion:
     def eigenvalues(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """λ (n_samples, n_modes) in rad²/s²; q (n_samples, n_q) or (n_q,), y likewise."""
         w = (samples(q, y, len(self.q0), len(self.y0)) - self.x0) @ self.directions.T
-        powers = monomials(self.space, w)
-        return np.hstack([_evaluate(c, powers, self.modes) for c in self.clusters])
+        if len(w) < MANY:
+            powers = monomials(self.space, w)
+            return np.hstack([_evaluate(c, powers, self.modes) for c in self.clusters])
+        return np.hstack(
+            [
+                _eigenvalues(c, made(w).reshape(len(w), *c.coefficients.shape[:2]), self.modes)
+                for c, made in zip(self.clusters, self._prepared, strict=True)
+            ]
+        )
+
+    @cached_property
+    def _prepared(self) -> tuple[Polynomials, ...]:
+        """The entries of every cluster's matrix, made ready for many samples."""
+        n = len(self.space)
+        return tuple(polynomials(self.space, c.coefficients.reshape(-1, n)) for c in self.clusters)
 
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """f = √λ/2π in Hz, (n_samples, n_modes); NaN where the polynomial is negative."""
@@ -137,10 +152,15 @@ class Expansion:
 
 
 def _evaluate(cluster: Cluster, powers: Floats, wanted: tuple[int, ...]) -> Floats:
-    columns = [k for k, mode in enumerate(cluster.modes) if mode in wanted]
-    if len(cluster.modes) == 1:
-        return np.asarray((powers @ cluster.coefficients[0, 0])[:, None])
     matrices = np.tensordot(powers, cluster.coefficients, axes=(1, 2))
+    return _eigenvalues(cluster, matrices, wanted)
+
+
+def _eigenvalues(cluster: Cluster, matrices: Floats, wanted: tuple[int, ...]) -> Floats:
+    """Of the small matrices (n, r, r), those of the wanted modes."""
+    if len(cluster.modes) == 1:
+        return matrices[:, 0]
+    columns = [k for k, mode in enumerate(cluster.modes) if mode in wanted]
     return np.asarray(np.linalg.eigvalsh(matrices)[:, columns])
 
 

@@ -13,7 +13,6 @@ from scipy import sparse
 
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.pencil import Pencil
-from eigassign.modal.exact_sparse import factorise
 from eigassign.modal.residual import (
     UNIT_LIMIT,
     Residual,
@@ -23,6 +22,7 @@ from eigassign.modal.residual import (
     _with_rigid,
     residual_factors,
 )
+from eigassign.modal.symmetric import factorise
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -48,10 +48,16 @@ def _given_space(pencil: Pencil, space: LowerSet) -> Local:
     if space.n_variables != n_x:
         raise UsageError(f"the set has {space.n_variables} variables, the model {n_x}")
     kept = (pencil.to_program[pencil.active] != 0.0).any(axis=0)
-    inside = (space.indices[:, ~kept] == 0).all(axis=1)
-    smaller = lower_set(space.indices[inside][:, kept])
     selection = np.eye(n_x)[kept]
-    return Local(smaller, pencil.to_program[:, kept], selection, 0, kept)
+    return Local(_over(space, kept.tobytes()), pencil.to_program[:, kept], selection, 0, kept)
+
+
+@lru_cache(maxsize=64)
+def _over(space: LowerSet, kept: bytes) -> LowerSet:
+    """The members without the variables that are not kept, over those that are."""
+    columns = np.frombuffer(kept, dtype=bool)
+    inside = (space.indices[:, ~columns] == 0).all(axis=1)
+    return lower_set(space.indices[inside][:, columns])
 
 
 @lru_cache(maxsize=64)

@@ -1,68 +1,86 @@
-"""Projection of every term of the affine pencil on a basis: Vᵀ K_j V, Vᵀ M_j V."""
+"""Projections of the pencil on a basis, term by term: Vᵀ K_j W, Vᵀ M_j W, or at one θ."""
 
 from __future__ import annotations
-
-import itertools
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.mechanism.pencil import Pencil
+from eigassign.modal.sizes import DENSE_LIMIT
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-
-
-CHUNK = 4_000  # rows of the stacked terms multiplied at once, so that the products stay in cache
+CHUNK = 4_000  # rows multiplied at once, so that the products stay in the cache
 
 
 def project(pencil: Pencil, basis: Floats) -> tuple[Floats, Floats]:
     """(n_theta, k, k) projections of the stiffness and the mass terms on ``basis`` (n_dof, k)."""
-    stiffness, mass = project_rows(pencil, basis.T)
+    every = np.ones(pencil.n_theta, dtype=bool)
+    stiffness, mass = project_terms(pencil, basis.T, basis.T, every)
     return stiffness, mass
 
 
-def project_rows(pencil: Pencil, rows: Floats) -> Floats:
-    """The same for a basis in rows (k, n_dof), as one array (2, n_theta, k, k)."""
+def project_terms(pencil: Pencil, left: Floats, right: Floats, wanted: NDArray[np.bool_]) -> Floats:
+    """L K_j Rᵀ and L M_j Rᵀ of the ``wanted`` terms, (2, n_theta, l, r), for rows L, R (·, n_dof).
+
+    The others are zero, or as they are where that is no extra work.
+    """
     stacks = pencil.term_stacks
     if stacks is None:
-        basis = np.ascontiguousarray(rows.T)
-        return np.array([_project(pencil, terms, basis) for terms in pencil.by_term])
-    k, n = rows.shape
-    half = rows @ stacks.reshape(n, -1)  # every term at once
-    full = half.reshape(-1, n) @ rows.T
-    return np.asarray(full.reshape(k, 2, -1, k).transpose(1, 2, 0, 3))
+        W, V = np.ascontiguousarray(left.T), np.ascontiguousarray(right.T)
+        return np.array([_project(pencil, terms, W, V, wanted) for terms in pencil.by_term])
+    n = pencil.n_dof
+    half = left @ stacks.reshape(n, -1)  # every term at once
+    full = half.reshape(-1, n) @ right.T
+    return np.asarray(full.reshape(len(left), 2, -1, len(right)).transpose(1, 2, 0, 3))
 
 
-def _project(pencil: Pencil, terms: sparse.csc_array, basis: Floats) -> Floats:
-    """Σ over the non-zeros of each term of value × basis[row]ᵀ basis[column].
+def project_at(pencil: Pencil, theta: Floats, rows: Floats) -> Floats:
+    """R K Rᵀ and R M Rᵀ at θ (n_theta, 1), (2, k, k), for rows R (k, n_dof)."""
+    if pencil.n_dof <= DENSE_LIMIT:
+        K, M = pencil.matrices(theta)
+        return np.array([rows @ K[0] @ rows.T, rows @ M[0] @ rows.T])
+    V = np.ascontiguousarray(rows.T)
+    weights = (pencil.stiffness, pencil.mass)
+    return np.array([_square(pencil.sparse(w @ theta[:, 0]).T, V) for w in weights])
 
-    The terms are stacked by their non-zero rows only, so that memory follows the non-zeros.
-    """
-    tall, rows, bounds = _stacked(pencil, terms)
-    k = basis.shape[1]
-    out = np.zeros((terms.shape[1], k, k))
-    for term, (first, last) in enumerate(itertools.pairwise(bounds.tolist())):
-        for i in range(first, last, CHUNK):
-            j = min(i + CHUNK, last)
-            first_row, last_row = rows[i], rows[j - 1] + 1
-            whole = last_row - first_row == j - i  # no row is missing: a view will do
-            left = basis[first_row:last_row] if whole else basis[rows[i:j]]
-            out[term] += left.T @ (tall[i:j] @ basis)
+
+def _square(matrix: sparse.csr_array, V: Floats) -> Floats:
+    """Vᵀ A V."""
+    out = np.zeros((V.shape[1], V.shape[1]))
+    for i in range(0, len(V), CHUNK):
+        out += V[i : i + CHUNK].T @ (matrix[i : i + CHUNK] @ V)
     return out
 
 
-def _stacked(pencil: Pencil, terms: sparse.csc_array) -> tuple[sparse.csr_array, Ints, Ints]:
-    """The non-zero rows of all terms below each other, which rows they are, where terms begin."""
+def _project(
+    pencil: Pencil, terms: sparse.csc_array, W: Floats, V: Floats, wanted: NDArray[np.bool_]
+) -> Floats:
+    """Wᵀ A_j V of every wanted term, over its non-zero rows only."""
+    tall, rows, term = _stacked(pencil, terms, wanted)
+    out = np.zeros((terms.shape[1], W.shape[1], V.shape[1]))
+    for i in range(0, len(rows), CHUNK):
+        here = term[i : i + CHUNK]
+        products, others = tall[i : i + CHUNK] @ W, V[rows[i : i + CHUNK]]
+        cuts = np.flatnonzero(np.diff(here)) + 1
+        for a, b in zip([0, *cuts.tolist()], [*cuts.tolist(), len(here)], strict=True):
+            out[here[a]] += products[a:b].T @ others[a:b]
+    return out
+
+
+def _stacked(
+    pencil: Pencil, terms: sparse.csc_array, wanted: NDArray[np.bool_]
+) -> tuple[sparse.csr_array, Ints, Ints]:
+    """The non-zero rows of all wanted terms below each other; of each, its number and its term."""
     theta = np.repeat(np.arange(terms.shape[1]), np.diff(terms.indptr))
-    row, column = pencil.rows[terms.indices], pencil.columns[terms.indices]
-    new = np.empty(len(row), dtype=bool)  # entries of one term run row by row
-    new[:1] = True
+    keep = np.flatnonzero(wanted[theta])
+    theta, entries = theta[keep], terms.indices[keep]
+    row, column = pencil.rows[entries], pencil.columns[entries]
+    new = np.ones(len(row), dtype=bool)  # entries of one term run row by row
     new[1:] = (row[1:] != row[:-1]) | (theta[1:] != theta[:-1])
-    first = new.nonzero()[0]
-    starts = np.append(first, len(row))
+    first = np.flatnonzero(new)
     shape = (len(first), pencil.n_dof)
-    tall = sparse.csr_array((terms.data, column, starts), shape=shape)
-    bounds = np.searchsorted(theta[first], np.arange(terms.shape[1] + 1))
-    return tall, row[first], bounds.astype(np.intp)
+    starts = np.append(first, len(row))
+    tall = sparse.csr_array((terms.data[keep], column, starts), shape=shape)
+    return tall, row[first], theta[first]

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.mechanism.pencil import Pencil
-from eigassign.modal.project import project_rows
+from eigassign.modal.project import project_at, project_terms
 from eigassign.series.lower_set import LowerSet, first_of_each
 from eigassign.series.power_series import multiply, power_taylor, reciprocal
 
@@ -42,42 +42,63 @@ def eigenvalue_series(
     pencil: Pencil, theta: Floats, space: LowerSet, half: LowerSet, vectors: Floats
 ) -> Floats:
     """Λ's coefficients (r, r, N), symmetric, from X (N_H, n, r) over the set ``half``."""
-    r = vectors.shape[2]
-    rows = vectors.transpose(0, 2, 1).reshape(-1, vectors.shape[1])
-    numerator, denominator = _quadratic(space, half, theta, project_rows(pencil, rows), r)
-    if r == 1:
+    numerator, denominator = _quadratics(pencil, theta, space, half, vectors)
+    if len(numerator) == 1:
         return multiply(space, numerator[0], reciprocal(space, denominator[0]))[:, None]
     root = inverse_root(space, denominator)
     return matrix_product(space, root, matrix_product(space, numerator, root))
 
 
 @dataclass(frozen=True)
-class _Pairs:
-    """Index tables of the quotient: which products of two vectors meet in which coefficient."""
+class _Products:
+    """Which products of two vectors meet in which coefficient: a ≤ b, sorted by the result."""
 
-    a: Ints  # slots of the two vectors, sorted by the coefficient of their product
+    a: Ints
     b: Ints
+    weight: Floats  # 2 where a and b also stand for b and a
     begin: Ints
+    into: Ints | slice  # positions of the results; a slice where these are all
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """Tables of the quotient for one pair of sets and one pattern of θ."""
+
+    constant: _Products  # up to the order p: for K and M at w = 0
+    low: int  # vectors of degree ≤ (p − 1)/2: of two that meet below p, one is among them
+    varying: _Products  # below p: for the terms that vary
     left: Ints  # slots of the coefficient of θ and of the product, sorted by the result
     right: Ints
     end: Ints
-    into: Ints | slice  # which coefficients of the result these are; short of vectors, not all
+    into: Ints
 
 
 @lru_cache(maxsize=64)
-def _pairs(space: LowerSet, half: LowerSet, stored: bytes) -> _Pairs:
-    """``stored``: positions where θ has a coefficient."""
+def _plan(space: LowerSet, half: LowerSet, stored: bytes) -> _Plan:
+    """``stored``: positions but the first where θ has a coefficient."""
     slot = _slots(space, space.find(half.indices))
-    table = space.table
-    inside = (slot[table.left] >= 0) & (slot[table.right] >= 0)
-    begin = first_of_each(table.target[inside])
+    table, below = space.table, int(space.degree_starts[space.order])
+    varying, hit = _products(space, slot, below)
     left = _slots(space, np.frombuffer(stored, dtype=np.intp))[table.left]
-    right = _slots(space, table.target[inside][begin])[table.right]
+    right = _slots(space, hit)[table.right]
     keep = (left >= 0) & (right >= 0)
     end = first_of_each(table.target[keep])
-    into = slice(None) if len(end) == len(space) else table.target[keep][end]
-    a, b = slot[table.left[inside]], slot[table.right[inside]]
-    return _Pairs(a, b, begin, left[keep], right[keep], end, into)
+    low = int(np.count_nonzero(half.degrees <= (space.order - 1) // 2))
+    constant, _ = _products(space, slot, len(space))
+    into = table.target[keep][end]
+    return _Plan(constant, low, varying, left[keep], right[keep], end, into)
+
+
+def _products(space: LowerSet, slot: Ints, stop: int) -> tuple[_Products, Ints]:
+    """Pairs of vectors that meet in the first ``stop`` members, and in which of these."""
+    table = space.table
+    a, b = slot[table.left], slot[table.right]
+    keep = (a >= 0) & (b >= a) & (table.target < stop)
+    begin = first_of_each(table.target[keep])
+    hit = table.target[keep][begin]
+    weight = np.where(a[keep] == b[keep], 1.0, 2.0)
+    into = slice(None) if len(hit) == len(space) else hit
+    return _Products(a[keep], b[keep], weight, begin, into), hit
 
 
 def _slots(space: LowerSet, positions: Ints) -> Ints:
@@ -87,23 +108,41 @@ def _slots(space: LowerSet, positions: Ints) -> Ints:
     return slots
 
 
-def _quadratic(
-    space: LowerSet, half: LowerSet, theta: Floats, projected: Floats, r: int
+def _quadratics(
+    pencil: Pencil, theta: Floats, space: LowerSet, half: LowerSet, vectors: Floats
 ) -> tuple[Floats, Floats]:
-    """Series (r, r, N) of Σ_j θ_j(w) Σ_{a,b} (X_aᵀ A_j X_b) w^{a+b} for A = K and A = M."""
-    stored = np.flatnonzero(theta.any(axis=0))
-    p = _pairs(space, half, stored.tobytes())
-    factors = theta.T[stored]
-    count = len(half)
-    blocks = projected.reshape(2, len(theta), count, r, count, r)
+    """Series (r, r, N) of Xᵀ K X and Xᵀ M X: at w = 0, and Σ_j θ_j(w) Xᵀ A_j X for the rest."""
+    n, r = vectors.shape[1:]
+    rows = vectors.transpose(0, 2, 1).reshape(-1, n)
+    varying = theta.copy()
+    varying[:, 0] = 0.0
+    stored, which = np.flatnonzero(varying.any(axis=0)), np.asarray(varying.any(axis=1))
+    plan = _plan(space, half, stored.tobytes())
+    constant = project_at(pencil, theta[:, :1], rows)
     out = np.zeros((2, r, r, len(space)))
-    for i in range(r):
-        for j in range(i + 1):
-            products = blocks[:, :, :, i, :, j][:, :, p.a, p.b]
-            sums = np.add.reduceat(products, p.begin, axis=2)
-            pairs = (factors @ sums)[:, p.left, p.right]
-            out[:, i, j, p.into] = out[:, j, i, p.into] = np.add.reduceat(pairs, p.end, axis=1)
+    for i, j in _lower(r):
+        out[:, i, j, plan.constant.into] = _meet(constant, plan.constant, i, j, r)
+    if len(stored):
+        terms = project_terms(pencil, rows[: plan.low * r], rows, which)
+        factors = varying.T[stored]
+        for i, j in _lower(r):
+            sums = (factors @ _meet(terms, plan.varying, i, j, r))[:, plan.left, plan.right]
+            out[:, i, j, plan.into] += np.add.reduceat(sums, plan.end, axis=1)
+    for i, j in _lower(r):
+        out[:, j, i] = out[:, i, j]
     return out[0], out[1]
+
+
+def _lower(r: int) -> list[tuple[int, int]]:
+    return [(i, j) for i in range(r) for j in range(i + 1)]
+
+
+def _meet(projected: Floats, p: _Products, i: int, j: int, r: int) -> Floats:
+    """Σ over pairs of X_a,iᵀ A X_b,j + X_b,iᵀ A X_a,j, for a stack (…, l r, k r) of projections."""
+    pairs = projected[..., p.a * r + i, p.b * r + j] if r > 1 else projected[..., p.a, p.b]
+    if i != j:
+        pairs = 0.5 * (pairs + projected[..., p.a * r + j, p.b * r + i])
+    return np.add.reduceat(pairs * p.weight, p.begin, axis=-1)
 
 
 def matrix_product(space: LowerSet, a: Floats, b: Floats) -> Floats:

@@ -59,7 +59,7 @@ def run_folder(
     run = RunOf(_relative(case_path, target), case_sha256)
     with _storage_errors(target):
         require_replaceable(target, run, force=force, case_path=case_path)
-        target.parent.mkdir(parents=True, exist_ok=True)
+        made = _make_parents(target.parent)
         _remove_leftovers(target)
         folder = target.with_name(temporary_name(target.name))
         folder.mkdir()
@@ -69,6 +69,21 @@ def run_folder(
                 _publish(folder, target, run, force=force)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
+            _remove_empty(made)
+
+
+def _make_parents(folder: Path) -> list[Path]:
+    """Create a folder with what is missing above it; the created ones, deepest first."""
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    return missing
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    """Take back folders that were made for a run that left nothing."""
+    for folder in folders:
+        with contextlib.suppress(OSError):
+            folder.rmdir()
 
 
 @contextlib.contextmanager

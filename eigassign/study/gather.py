@@ -42,7 +42,7 @@ def gather(
     return Findings(
         title=file.title,
         reference=file.reference,
-        case_name=file.path.stem,
+        case_name=file.path.stem.encode("utf-8", "replace").decode("utf-8"),
         case_sha256=file.sha256,
         version=__version__,
         q_names=scene.model.q_names,

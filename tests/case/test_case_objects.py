@@ -163,6 +163,33 @@ def test_any_real_property_may_be_a_design_parameter(path: str, low: str, high: 
     assert parameter.min < parameter.max
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("thickness: 2 mm", "thickness: 19 mm"),
+        ("thickness: 2 mm", "thickness: 20 mm"),
+        ("thickness: 2 mm", "inner_diameter: 39 mm"),
+        ("max: 200 g", "min: 200 g, max: 200 g"),
+        ("min: 20 mm, max: 40 mm", "min: 30 mm, max: 0.03"),
+        ("min: 20 mm, max: 40 mm", "min: 0.03, max: 3 cm"),
+        ("frequency: 190 Hz", "frequency: {time: [0, 1], frequency: [1, 2]}"),
+        ("frequency: 190 Hz", "frequency: {time: [-1, 0, 2], frequency: [1, 2, 3]}"),
+        ("elements: 4", "elements: 100000"),
+        ("order: 4", "order: 20"),
+        ("elbow: [10 deg, 170 deg]", "elbow: [0 deg, 360 deg]"),
+        ("max_error: 2 %", "q_span: 0"),
+    ],
+)
+def test_what_lies_just_within_the_rules_is_accepted(old: str, new: str) -> None:
+    assert read(edited(old, new)) != read(TEXT)
+
+
+def test_a_body_has_no_mass_unless_one_is_given() -> None:
+    case = read(edited("bodies:\n", "bodies:\n    rotor: {at: fore.start, inertia: 1 g m2}\n"))
+    assert case.mechanism.bodies["rotor"].mass == 0
+    assert case.mechanism.bodies["rotor"].inertia == 1e-3
+
+
 def test_a_problem_is_placed_at_the_line_of_its_key() -> None:
     case = read(TEXT)
     absolute = case.problem("mechanism.links.fore.length", "too long")

@@ -52,6 +52,25 @@ def test_an_ordinary_arm_gives_no_warning() -> None:
     assert warnings_of(TEXT) == []
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("youngs_modulus: 69 GPa", "youngs_modulus: 1.2 TPa"),  # diamond
+        ("youngs_modulus: 69 GPa", "youngs_modulus: 1.5 MPa"),  # rubber
+        ("density: 2700", "density: 22590"),  # osmium
+        ("density: 2700", "density: 20"),  # foam
+        ("angle: 10 deg", "angle: 720 deg"),
+        ("order: 4", "order: 4, y: [0, 40 mm]"),
+        ("order: 4", "order: 4, y: [250 g, 20 mm]"),
+        ("frequency: 190 Hz", "frequency: 0.01"),
+        ("frequency: 190 Hz", "frequency: 900 kHz"),
+        ("max_error: 2 %", "max_error: 50 %"),
+    ],
+)
+def test_an_unusual_but_possible_value_gives_no_warning(old: str, new: str) -> None:
+    assert warnings_of(edited(old, new)) == []
+
+
 def bare(area: float, inertia: float) -> list[str]:
     old = "area: 7.0632e-4, bending_inertia: 3.97e-8"
     found = warnings_of(edited(old, f"area: {area!r}, bending_inertia: {inertia!r}"))

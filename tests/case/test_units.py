@@ -54,6 +54,9 @@ from eigassign.case.units import DIMENSIONS, UNITS, QuantityError, parse_unit, r
         ("0.19 kHz", "frequency", 190.0),
         ("2 %", "fraction", 0.02),
         ("2%", "fraction", 0.02),
+        ("." + "0" * 30 + "5e31 m", "length", 5.0),
+        ("0e5000 m", "length", 0.0),
+        ("1e-400 m", "length", 0.0),
     ],
 )
 def test_a_quantity_with_a_unit_is_converted(text: str, dimension: str, si: float) -> None:
@@ -117,6 +120,12 @@ def test_anything_else_is_refused_and_says_what_is_allowed(
         read(value, DIMENSIONS[dimension])
     assert message in str(caught.value)
     assert len(str(caught.value)) < 300
+
+
+def test_a_column_of_numbers_is_converted_by_its_unit_alone() -> None:
+    assert parse_unit("deg").to_si(90.0) == pytest.approx(math.pi / 2, rel=1e-15)
+    assert parse_unit("mm").to_si(30.0) == pytest.approx(0.03, rel=1e-15)
+    assert parse_unit("N m/deg").to_si(1.0) == pytest.approx(180 / math.pi, rel=1e-15)
 
 
 def test_hertz_and_radians_per_second_and_one_per_second_are_three_things() -> None:

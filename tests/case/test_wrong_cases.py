@@ -143,6 +143,8 @@ STUDY = [
     Wrong("no modes", "modes: [1, 2]", "¦modes: []", "expansion.modes", "needs at least 1 entries"),
     Wrong("target mode that is not expanded", "{mode: 1,", "{¦mode: 3,", "targets[0].mode", "not among expansion.modes"),
     Wrong("two targets for a mode", "- {mode: 1, frequency: 190 Hz}", "- {mode: 1, frequency: 190 Hz}\n  - {¦mode: 1, frequency: 200 Hz}", "targets[1].mode", "has a target already"),
+    Wrong("empty entry of a list", "{mode: 1, frequency: 190 Hz}", "¦~", "targets[0]", "has no value: give one, or leave the key out"),
+    Wrong("body where none is", "parameter: bodies.tool.mass", "¦parameter: bodies.hand.mass", "design.m.parameter", "unknown body 'hand'; known: tool"),
     Wrong("targets without list", "targets:\n  - {mode: 1, frequency: 190 Hz}", "¦targets: {mode: 1, frequency: 190 Hz}", "targets", "expected a list, got a mapping"),
     Wrong("target in rad/s", "frequency: 190 Hz", "¦frequency: 190 rad/s", "targets[0].frequency", "divide by 2π and write Hz"),
     Wrong("target in rpm", "frequency: 190 Hz", "¦frequency: 190 rpm", "targets[0].frequency", "rpm and turns are not converted"),
@@ -198,3 +200,35 @@ def test_a_mistake_is_told_once_where_it_is_and_what_is_allowed(
 def test_names_of_the_table_are_unique() -> None:
     names = [wrong.name for wrong in (*MECHANISM, *STUDY, *SAMPLED)]
     assert len(names) == len(set(names)) > 100
+
+
+def messages(old: str, new: str, path: Path) -> list[str]:
+    return [message for *_, message in problems_of(edited(old, new), path / "case.yaml")]
+
+
+def test_a_decimal_comma_between_braces_is_recognised(tmp_path: Path) -> None:
+    for number in ("0,03", "0,03 m"):
+        found = messages("diameter: 30 mm", f"diameter: {number}", tmp_path)
+        assert any("decimals take a point, not a comma" in message for message in found)
+
+
+def test_misspelt_constraints_are_recognised(tmp_path: Path) -> None:
+    found = messages("  constraints:", "  constraint:", tmp_path)
+    assert "did you mean the reserved key 'constraints'?" in found
+
+
+def test_bodies_that_no_file_has_are_unknown(tmp_path: Path) -> None:
+    found = messages("  bodies:\n    tool: {at: hand.end, mass: 0.1}\n", "", tmp_path)
+    assert "unknown body 'tool'; known: none" in found
+
+
+def test_a_bound_that_is_wrong_is_not_compared_with_the_other(tmp_path: Path) -> None:
+    (found,) = messages("min: 20 mm", "min: 20 Hz", tmp_path)
+    assert "which is frequency" in found
+
+
+def test_long_lists_of_names_are_cut_short(tmp_path: Path) -> None:
+    many = "".join(f"    s{k}: {{shape: circle, diameter: 1}}\n" for k in range(40))
+    text = edited("sections:\n", "sections:\n" + many).replace("section: pipe", "section: zzz")
+    ((*_, message),) = problems_of(text, tmp_path / "case.yaml")
+    assert message.endswith("s18, s19, …")

@@ -34,4 +34,5 @@ def python(*args: object, **how: Any) -> subprocess.CompletedProcess[str]:
     if "stderr" not in given:
         given |= {"stderr": subprocess.PIPE}
     command = [sys.executable, *map(str, args)]
-    return subprocess.run(command, text=True, timeout=SECONDS, check=False, **given)
+    how_read = {"text": True, "errors": "backslashreplace", "timeout": SECONDS, "check": False}
+    return subprocess.run(command, **how_read, **given)

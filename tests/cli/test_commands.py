@@ -6,6 +6,7 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from commands import TWO_LINK
 from wrong_inputs import GOOD
@@ -13,6 +14,7 @@ from wrong_inputs import GOOD
 from eigassign import __version__
 from eigassign.cli import main
 from eigassign.errors import UsageError
+from eigassign.plain_json import dumps
 from eigassign.values import split
 
 # Belotti et al. 2021, recomputed with an independent frame program (same mesh)
@@ -233,6 +235,11 @@ def test_version_and_help_are_results(capsys: Captured) -> None:
     assert __version__ in answer(capsys, "--version")
     assert "Exit codes" in answer(capsys, "-h")
     assert "--no-cache" in answer(capsys, "optimize", "--help")
+
+
+def test_json_is_ascii_and_has_null_for_what_is_not_finite() -> None:
+    value = {"ω": [np.array([1.5, np.inf]), float("nan"), Path("a/b"), np.float64(2.0)]}
+    assert dumps(value) == '{"\\u03c9": [[1.5, null], null, "a/b", 2.0]}'
 
 
 def test_errors_of_the_python_face_are_those_of_the_command_line() -> None:

@@ -124,10 +124,14 @@ def test_a_full_disk_behind_stdout_is_told() -> None:
 
 @pytest.mark.parametrize(
     "locale",
-    [{"LC_ALL": "C"}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}],
-    ids=["coerced", "ascii"],
+    [
+        {"LC_ALL": "C"},
+        {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+        {"PYTHONIOENCODING": "latin-1"},
+    ],
+    ids=["coerced", "ascii", "latin-1"],
 )
-def test_an_ascii_locale_is_enough(locale: dict[str, str], tmp_path: Path) -> None:
+def test_any_character_set_is_enough(locale: dict[str, str], tmp_path: Path) -> None:
     title = "Kraftfahrzeug-Übergröße → ω"
     for name in ("ω.yaml", "omega.yaml"):
         Path(name).write_text(GOOD.replace("A small arm", title), encoding="utf-8")

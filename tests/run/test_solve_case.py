@@ -21,7 +21,7 @@ import eigassign as ea
 from eigassign.errors import CaseError, InfeasibleError
 from eigassign.run import Result, solve_case
 
-ROD = "{area: 7.0632e-4, bending_inertia: 3.97e-8}"
+ROD = "{area: 7.06317856e-4, bending_inertia: 3.97e-8}"
 SHOULDER = "{joint: shoulder}"
 POSES = ((1.75, 5.2), (1.8, 5.3), (1.83, 5.35))
 

@@ -1,0 +1,104 @@
+"""Expansion points, order and basis chosen from error estimates, never more than is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.errors import AccuracyError
+from eigassign.mechanism.pencil import Pencil
+from eigassign.modal.reduced import reduce
+from eigassign.modal.reduced_model import ReducedModel
+
+Floats = NDArray[np.float64]
+MAX_SIZE = 200  # basis vectors
+MAX_POINTS = 12
+HALF_ORDERS = (1, 2, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class AdaptiveReduction:
+    """A reduced model whose estimate is within ``accuracy`` at every sample, and why this one."""
+
+    reduced: ReducedModel
+    estimate: Floats  # (n, n_modes)
+    accuracy: float
+    reasons: tuple[str, ...]
+
+
+def reduce_adaptively(
+    pencil: Pencil,
+    x: Floats,
+    accuracy: float,
+    modes: Sequence[int] = (1,),
+    max_size: int = MAX_SIZE,
+    half_orders: Sequence[int] = HALF_ORDERS,
+) -> AdaptiveReduction:
+    """The smallest reduced model found whose estimate is ≤ ``accuracy`` at samples x (n, n_x).
+
+    For each half order, expansion points are added where the estimate is largest. Raises
+    AccuracyError, naming the sample, where ``max_size`` vectors do not suffice.
+    """
+    best: AdaptiveReduction | None = None
+    reasons: list[str] = []
+    worst = (np.inf, 0)
+    for half_order in half_orders:
+        limit = max_size if best is None else best.reduced.size - 1
+        found, lines, left = _greedy(pencil, x, accuracy, modes, half_order, limit)
+        reasons += lines
+        worst = min(worst, left)
+        if found is not None:
+            best = AdaptiveReduction(*found, accuracy, ())
+    if best is None:
+        error, k = worst
+        raise AccuracyError(
+            f"no reduced model of up to {max_size} vectors reaches {accuracy:.1e}: at sample {k}, "
+            f"(q, y) = {shown(x[k])}, the estimated error is {error:.1e}"
+        )
+    return AdaptiveReduction(best.reduced, best.estimate, accuracy, tuple(reasons))
+
+
+def _greedy(
+    pencil: Pencil, x: Floats, accuracy: float, modes: Sequence[int], half_order: int, limit: int
+) -> tuple[tuple[ReducedModel, Floats] | None, list[str], tuple[float, int]]:
+    """Add the worst sample as an expansion point until it fits, or grows beyond ``limit``."""
+    points, n_q = [central(x)], pencil.n_q
+    lines: list[str] = []
+    best = (np.inf, 0)
+    while len(points) <= MAX_POINTS:
+        at = x[points]
+        reduced = reduce(pencil, at[:, :n_q], at[:, n_q:], modes, half_order)
+        estimate = reduced.error_estimate(x[:, :n_q], x[:, n_q:])
+        highest = estimate.max(axis=1)
+        k = int(np.argmax(highest))
+        best = min(best, (float(highest[k]), k))
+        lines.append(_line(half_order, len(points), reduced.size, float(highest[k]), k))
+        if reduced.size > limit:
+            break
+        if highest[k] <= accuracy:
+            return (reduced, estimate), lines, best
+        if k in points:
+            break
+        points.append(k)
+    return None, lines, best
+
+
+def _line(half_order: int, points: int, size: int, error: float, sample: int) -> str:
+    where = f"{points} point{'s' if points > 1 else ''}"
+    what = f"at most {error:.1e}" if np.isfinite(error) else "refused"
+    return f"vectors to order {half_order} at {where} ({size} in all): {what} (sample {sample})"
+
+
+def central(x: Floats) -> int:
+    """The sample nearest to the middle of the ranges of x (n, n_x), each range taken as 1."""
+    low, high = x.min(axis=0), x.max(axis=0)
+    width = np.where(high > low, high - low, 1.0)
+    return int(np.argmin((((x - 0.5 * (low + high)) / width) ** 2).sum(axis=1)))
+
+
+def shown(x: Floats) -> str:
+    """Numbers for a message."""
+    return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"

@@ -1,0 +1,137 @@
+"""What ``auto`` chooses meets what was asked for, by exact solves, and is not more than that."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from chains import model_of, two_link
+
+from eigassign.api import load_case
+from eigassign.errors import AccuracyError, UsageError
+from eigassign.modal.adaptive import central, reduce_adaptively
+from eigassign.modal.auto import settle
+from eigassign.modal.convergence import radius_share
+from eigassign.modal.expansion import expand
+from eigassign.modal.expansion_choice import choose_expansion
+from eigassign.modal.mesh_choice import choose_mesh, mesh_error
+from eigassign.modal.model import Model
+
+FREE = {"upper": None, "fore": None}
+
+
+def build(elements) -> Model:
+    return model_of(two_link(elements=(elements["upper"], elements["fore"])))
+
+
+@pytest.fixture(scope="module")
+def x() -> np.ndarray:
+    """Every fourth pose of the paper's trajectory with random masses of its design box."""
+    q = load_case("cases/two_link.yaml").trajectory.q[::4]
+    return np.hstack([q, np.random.default_rng(5).uniform(0.0, 0.25, (len(q), 2))])
+
+
+def exact(model: Model, x: np.ndarray, modes) -> np.ndarray:
+    return model.frequencies(x[:, :2], x[:, 2:], max(modes))[:, np.array(modes) - 1]
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("modes", [(1,), (1, 2)])
+def test_mesh_and_expansion_together_meet_the_accuracy(x, accuracy, modes):
+    settled = settle(build, FREE, x, accuracy, modes)
+    true = exact(build({"upper": 40, "fore": 40}), x, modes)
+    f = settled.expansion.frequencies(x[:, :2], x[:, 2:])
+    assert np.abs(f / true - 1.0).max() <= accuracy
+    assert settled.mesh_error + settled.approximation_error <= accuracy * (1.0 + 1e-12)
+
+
+def test_it_says_what_it_chose_and_why(x):
+    settled = settle(build, FREE, x, 1e-3)
+    assert settled.reasons[0] == "2 elements: mode 1 moves 0.36 % with 4"
+    assert settled.expansion.order == 5
+    assert any(line.startswith("order 4: error at most") for line in settled.reasons)
+    assert "discretisation error" in settled.reasons[-1]
+
+
+def test_what_is_fixed_stays(x):
+    settled = settle(build, {"upper": 4, "fore": 3}, x, 5e-3, orders=(4,), start=x[0])
+    assert dict(settled.mesh.elements) == {"upper": 4, "fore": 3}
+    assert settled.expansion.order == 4
+    np.testing.assert_array_equal(settled.expansion.expansions[0].x0, x[0])
+
+
+def test_a_fixed_mesh_that_is_too_coarse_is_refused(x):
+    with pytest.raises(AccuracyError, match=r"the mesh leaves .* mode 1 moves 0.36 % with 4"):
+        choose_mesh(build, {"upper": 2, "fore": 2}, x, 1e-4)
+
+
+def test_the_mesh_error_is_not_below_the_true_one(x):
+    true = exact(build({"upper": 40, "fore": 40}), x, (1, 2, 3))
+    for n in (2, 3, 5, 8):
+        elements = {"upper": n, "fore": n}
+        error = np.abs(exact(build(elements), x, (1, 2, 3)) / true - 1.0)
+        estimate = mesh_error(build, elements, x, (1, 2, 3))
+        assert (estimate >= error).all()
+        assert np.median(estimate / error) < 2.0
+
+
+def test_a_mesh_that_round_off_forbids_is_refused(x):
+    with pytest.raises(AccuracyError, match="round-off"):
+        choose_mesh(build, FREE, x, 1e-13)
+
+
+def test_several_points_do_where_one_does_not(x):
+    """Two modes to 1e-3 over the whole trajectory: no single series of order up to 4 reaches it."""
+    model = build({"upper": 4, "fore": 3})
+    chosen = choose_expansion(model.pencil, x, 1e-3, (1, 2), orders=(3, 4))
+    assert len(chosen.expansions) > 1
+    f = chosen.frequencies(x[:, :2], x[:, 2:])
+    error = np.abs(f / exact(model, x, (1, 2)) - 1.0)
+    assert error.max() <= 1e-3
+    assert (chosen.error_estimate(x[:, :2], x[:, 2:]) >= error).all()
+
+
+def test_an_order_that_cannot_do_it_is_refused_at_the_worst_sample(x):
+    model = build({"upper": 4, "fore": 3})
+    with pytest.raises(AccuracyError, match=r"no expansion of order up to 2 .* at sample \d+"):
+        choose_expansion(model.pencil, x, 1e-7, (1, 2), orders=(2,))
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-6, 1e-9])
+def test_the_reduced_model_is_as_small_as_the_accuracy_allows(x, accuracy):
+    model = build({"upper": 4, "fore": 3})
+    found = reduce_adaptively(model.pencil, x, accuracy, (1,))
+    f = found.reduced.frequencies(x[:, :2], x[:, 2:])
+    error = np.abs(f / exact(model, x, (1,)) - 1.0)
+    assert (error <= found.estimate).all()
+    assert found.estimate.max() <= accuracy
+    assert found.reduced.size <= 15
+
+
+def test_a_reduced_model_that_may_not_grow_is_refused_at_the_worst_sample(x):
+    model = build({"upper": 4, "fore": 3})
+    with pytest.raises(AccuracyError, match=r"up to 8 vectors .* at sample \d+, \(q, y\) = \("):
+        reduce_adaptively(model.pencil, x, 1e-9, (1, 2), max_size=8)
+
+
+@pytest.mark.parametrize("accuracy", [0.0, 1.0, -1e-3, float("nan")])
+def test_an_impossible_accuracy_is_refused(x, accuracy):
+    with pytest.raises(UsageError, match="accuracy"):
+        settle(build, FREE, x, accuracy)
+
+
+def test_the_central_sample_is_nearest_to_the_middle_in_every_coordinate():
+    x = np.array([[0.0, 0.0], [10.0, 1.0], [5.0, 0.1], [4.0, 0.5]])
+    assert central(x) == 3
+
+
+def test_the_radius_of_convergence_is_that_of_a_pole():
+    """An almost massless bar with a tip mass y: λ = k/(m0 + y), a pole at y = −m0."""
+    tree = two_link(elements=(2, 2), drives=("locked", "locked"))
+    tree["mechanism"]["materials"]["al"]["density"] = 1e-6
+    tree["mechanism"]["bodies"]["elbow_mass"]["mass"] = 1e-6
+    tree["design"] = {"m": {"parameter": "bodies.tool_mass.mass", "min": 0.0, "max": 1.0}}
+    model = model_of(tree)
+    expansion = expand(model.pencil, [0.0, 1.0], [0.2], (1,), order=9)
+    y = np.array([[0.1], [0.3], [0.5]])
+    share = radius_share(expansion, [0.0, 1.0], y)[:, 0]
+    np.testing.assert_allclose(share, np.abs(y[:, 0] - 0.2) / 0.2, rtol=1e-3)

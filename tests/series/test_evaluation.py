@@ -1,0 +1,42 @@
+"""Prepared polynomials agree with the sum over all monomials."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from eigassign.series.evaluation import BLOCK, monomials_of, polynomials
+from eigassign.series.lower_set import LowerSet, box, partially_linear, total_degree
+from eigassign.series.power_series import monomials
+
+SETS = [
+    total_degree(1, 5),
+    total_degree(2, 0),
+    total_degree(3, 4),
+    total_degree(5, 3),
+    partially_linear(2, 3, 4),
+    partially_linear(0, 3, 4),
+    box((2, 0, 3, 1)),
+]
+
+
+@pytest.mark.parametrize("space", SETS, ids=lambda s: f"{s.n_variables}x{len(s)}")
+def test_prepared_polynomials_are_the_sum_over_monomials(space: LowerSet) -> None:
+    random = np.random.default_rng(1)
+    coefficients = random.standard_normal((2, len(space)))
+    x = random.uniform(-1.5, 1.5, (BLOCK + 7, space.n_variables))
+    powers = monomials(space, x)
+    size = np.abs(powers) @ np.abs(coefficients).T  # what a sum's round-off is relative to
+    found = polynomials(space, coefficients)(x)
+    assert np.all(np.abs(found - powers @ coefficients.T) <= 1e-14 * size)
+
+
+def test_monomials_follow_the_order_of_their_set() -> None:
+    space, x = total_degree(3, 3), np.array([[2.0], [3.0], [5.0]])
+    expected = (np.array([2.0, 3.0, 5.0]) ** space.indices).prod(axis=1)
+    assert np.array_equal(monomials_of(space)(x)[:, 0], expected)
+
+
+def test_no_points_give_no_values() -> None:
+    space = total_degree(2, 2)
+    assert polynomials(space, np.ones((3, len(space))))(np.zeros((0, 2))).shape == (0, 3)
