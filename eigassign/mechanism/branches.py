@@ -37,10 +37,13 @@ def choose_branch(
     starts = guess[None] if guess is not None else _starts(function.size)
     found = _solutions(function, a0, starts, _turning(case, tree))
     if not len(found):
-        raise MechanismError(
-            "mechanism.assembly" if assembly else "mechanism.joints",
-            f"the loops cannot be closed at {_at(function.names, a0)}",
-        )
+        others = _solutions(function, a0, _starts(function.size), _turning(case, tree))
+        message = f"the loops cannot be closed at {_at(function.names, a0)}"
+        if guess is not None and len(others):
+            message = "the guess leads to no closed pose: " + _ambiguous(
+                tree, function.names, a0, others
+            )
+        raise MechanismError("mechanism.assembly" if assembly else "mechanism.joints", message)
     _check_determined(tree, function, a0, found[0])
     if guess is None and len(found) > 1:
         raise MechanismError("mechanism.joints", _ambiguous(tree, function.names, a0, found))
