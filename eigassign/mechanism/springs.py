@@ -33,7 +33,7 @@ def add_springs(
     nodes: NodeMotions,
 ) -> None:
     """Add every spring of the case to K."""
-    springs: Any = case.mechanism.springs  # type: ignore[attr-defined]
+    springs: Any = case.mechanism.springs
     for name, spring in springs.items():
         ends = [GROUND if end == "ground" else split(end) for end in spring.between]
         rows = _relative(case, parameters, motion, nodes, spring, ends)
