@@ -45,6 +45,11 @@ def of_freedom(freedom: str | None) -> Quantity:
     return PLACE if freedom == "translation" else ANGLE
 
 
+def freedom_of(kind: str, component: object) -> str:
+    """Name of the freedom that a valid coordinate of a joint of this kind is."""
+    return FREEDOMS[kind][0] if component is None else str(component)
+
+
 def coordinate_quantities(tree: Tree) -> list[Quantity]:
     """What each coordinate is, in the order of q."""
     return [of_freedom(driven(tree, body)) for _, body in items(tree, "coordinates")]

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 
 from eigassign.case.document import Document
-from eigassign.case.freedoms import FREEDOMS
+from eigassign.case.freedoms import freedom_of
 from eigassign.case.mechanism_parts import Coordinate, Mechanism
 from eigassign.case.plausible_parts import implausible_parts, outside
 from eigassign.case.study_parts import FrequencyProfile, SampledTrajectory, TipTrajectory
@@ -55,8 +55,7 @@ def _angular(document: Document, q: Sequence[float]) -> list[float]:
 
 def _is_angle(mechanism: Mechanism, coordinate: Coordinate) -> bool:
     kind = mechanism.joints[coordinate.joint].type
-    freedom = str(coordinate.component or FREEDOMS[kind][0])
-    return kind != "screw" and freedom != "translation"
+    return kind != "screw" and freedom_of(kind, coordinate.component) != "translation"
 
 
 def _turned(angles: Iterable[float], path: KeyPath) -> Iterator[Finding]:
