@@ -17,6 +17,7 @@ from eigassign.series.program import Program
 
 Floats = NDArray[np.float64]
 STEP = 0.15  # largest change of an argument in one continuation step (rad or m)
+FARTHEST = 500.0  # rad or m from the known solution: 80 turns
 REFINEMENTS = (1, 4, 16, 64)  # of the steps, where ∂F/∂p changes too much for one
 TOLERANCE = 1e-13  # on Newton's step, relative to 1 (rad or m)
 CONVERGED = 1e-8  # last step of a regular solution; at a dead point Newton only creeps
@@ -47,7 +48,12 @@ class ImplicitFunction:
         Raises SingularityError naming the first sample where the equations are singular or have no
         solution on this branch.
         """
-        steps = int(np.ceil(np.abs(a - self.a0[:, None]).max(initial=0.0) / STEP)) or 1
+        farthest = float(np.abs(a - self.a0[:, None]).max(initial=0.0))
+        if not farthest < FARTHEST:
+            worst = np.abs(a - self.a0[:, None]).max(axis=0)
+            at = self._named(a[:, int(np.nanargmax(worst))])
+            raise SingularityError(f"{self.title} cannot be followed as far as {at}")
+        steps = int(np.ceil(farthest / STEP)) or 1
         p = np.empty((self.size, a.shape[1]))
         left = np.arange(a.shape[1])
         for refinement in REFINEMENTS:

@@ -129,6 +129,12 @@ def test_beyond_the_reach_the_last_place_on_the_way_is_named() -> None:
         f.samples(np.array([[1.5]]))
 
 
+@pytest.mark.parametrize("far", [1e9, np.inf, 1e300])
+def test_what_lies_absurdly_far_is_refused_at_once(far: float) -> None:
+    with pytest.raises(SingularityError, match=r"cannot be followed as far as a0 = (1e|inf)"):
+        implicit(circle, [0.2], [np.sqrt(0.96)]).samples(np.array([[0.1, far]]))
+
+
 def test_crossing_branches_are_not_passed_unseen() -> None:
     # p² = a²: p = a and p = −a meet at 0, where Newton may leave on either
     f = implicit(lambda a, p: [p[0] * p[0] - a[0] * a[0]], [-1.0], [-1.0])
