@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.case import CaseFile, load
 from eigassign.errors import CaseError, MechanismError
-from eigassign.mechanism.build import build_pencil
+from eigassign.mechanism.build import build_pencil, with_elements
 from eigassign.mechanism.kinematics import kinematics
 from eigassign.mechanism.parameters import initial_design, parameters
 from eigassign.mechanism.poses import build_poses, tip_chain
@@ -27,6 +27,7 @@ from eigassign.modal.reduced import ReducedModel
 from eigassign.series.lower_set import LowerSet
 
 if TYPE_CHECKING:
+    from eigassign.modal.mesh_choice import MeshChoice
     from eigassign.run import Result
 
 Floats = NDArray[np.float64]
@@ -44,12 +45,36 @@ class Case:
 
     @cached_property
     def _model(self) -> Model:
+        mesh = self.mesh
+        return self._meshed(mesh.elements if mesh is not None else {})
+
+    def _meshed(self, elements: Mapping[str, int]) -> Model:
+        """The model with given numbers of elements for some of the links."""
+        file = with_elements(self.file, elements)
         with self.located():
-            numbers = parameters(self.file)
-            motion = kinematics(self.file, numbers)
-            pencil = build_pencil(self.file, numbers, motion)
-            poses = build_poses(self.file, numbers, motion)
+            numbers = parameters(file)
+            motion = kinematics(file, numbers)
+            pencil = build_pencil(file, numbers, motion)
+            poses = build_poses(file, numbers, motion)
         return Model(pencil, poses, motion, numbers.coordinates, numbers.design)
+
+    @cached_property
+    def mesh(self) -> MeshChoice | None:
+        """The elements chosen for links that leave them to ``auto``; None where none does.
+
+        Raises AccuracyError where no mesh meets ``expansion.accuracy``.
+        """
+        from eigassign.study.choices import automatic_elements, looked_at, settle_mesh
+
+        wanted = automatic_elements(self.file)
+        if None not in wanted.values():
+            return None
+        trial = self._meshed({name: 2 for name, n in wanted.items() if n is None})
+        path = None if self.file.trajectory is None else self._path(trial)
+        given = self.file.expansion.q
+        q0 = np.zeros(len(trial.q_names)) if given == "auto" else np.array(given, dtype=float)
+        x = looked_at(self.file, trial, path, q0, self.initial_design)
+        return settle_mesh(self.file, self._meshed, x)
 
     @cached_property
     def initial_design(self) -> Floats:
@@ -59,7 +84,10 @@ class Case:
     @cached_property
     def trajectory(self) -> Trajectory:
         """q(t); raises CaseError where the case has none or it cannot be followed."""
-        spec, model = self.file.trajectory, self.model()
+        return self._path(self.model())
+
+    def _path(self, model: Model) -> Trajectory:
+        spec = self.file.trajectory
         if spec is None:
             raise CaseError((self.file.problem("trajectory", "is needed here and missing"),))
         with self.located():

@@ -290,6 +290,42 @@ def _watched(
     return outcomes
 
 
+@cli.command()
+@options.case
+@click.option("--quick", is_flag=True, help="In seconds: fewer methods, points and repeats.")
+@click.option("--accuracy", type=options.POSITIVE, help="Advise for this worst relative error.")
+@click.option("--budget", "budget_s", type=options.POSITIVE, help="Advise for so many seconds.")
+@click.option("--evaluations", type=options.POSITIVE, help="How many evaluations are wanted.")
+@click.option("--out", type=options.PATH, help="Folder (default: results/<case>_chart).")
+@click.option("--force", is_flag=True, help="Move what is in the way aside, whatever it is.")
+@options.json
+@options.common
+def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
+    """Chart time against accuracy of every way to the frequencies of this case.
+
+    Exact solves, expansions, reduced models, interpolation and surrogates, all against the same
+    exact answers on this machine; the mesh; and ways to a design. Leaves figures, chart.json and
+    report.html, and says what to choose.
+    """
+    from eigassign import charting
+    from eigassign.study.chart_study import Wish
+
+    wish = Wish(how["accuracy"], how["budget_s"], how["evaluations"])
+    out = how["out"] or Path("results", f"{case.stem}_chart")
+    with _telling(how) as tell:
+        given = _options({**how, "out": out, "cache_dir": None, "no_cache": True}, tell)
+        made = charting.chart(case, given, quick, wish)
+        tell.warn(made.chart.warnings)
+    if as_json:
+        _print_json({"run_folder": str(made.folder), **vars(made.chart)})
+    else:
+        from eigassign.output.console import print_chart
+
+        print_chart(made.chart)
+        click.echo(f"{made.folder} written in {made.chart.seconds:.1f} s")
+    return 0
+
+
 @cli.group()
 def cache() -> None:
     """The expansions kept from earlier runs."""

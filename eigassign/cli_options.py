@@ -23,6 +23,7 @@ def several(*options: Callable[[F], F]) -> Callable[[F], F]:
 
 
 PATH = click.Path(path_type=Path)
+POSITIVE = click.FloatRange(0.0, min_open=True)
 case = click.argument("case", type=PATH)
 json = click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 common = several(

@@ -28,6 +28,10 @@ def coefficient_files(scene: Scene, linear_only: bool) -> dict[str, bytes]:
     parts = {"linearised": expansions.linear}
     if not linear_only:
         parts["full"] = expansions.full
+    for k, other in enumerate(expansions.others, 2):  # further expansion points
+        parts[f"linearised_at_point_{k}"] = other.linear
+        if not linear_only:
+            parts[f"full_at_point_{k}"] = other.full
     tables = {name: _table(expansion) for name, expansion in parts.items()}
     names = [*scene.model.q_names, *scene.model.y_names]
     point = {"q0": expansions.full.q0, "y0": expansions.full.y0}
@@ -48,7 +52,12 @@ def coefficient_files(scene: Scene, linear_only: bool) -> dict[str, bytes]:
 
 def _table(expansion: Expansion) -> dict[str, Array]:
     """What an expansion is, by the names of the Python face."""
-    modes = {"modes": np.array(expansion.modes), "order": np.array(expansion.order)}
+    modes = {
+        "modes": np.array(expansion.modes),
+        "order": np.array(expansion.order),
+        "q0": expansion.q0,
+        "y0": expansion.y0,
+    }
     if all(len(cluster.modes) == 1 for cluster in expansion.clusters):
         return {
             **modes,

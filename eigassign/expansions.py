@@ -41,6 +41,9 @@ def expand_plan(model: Model, plan: Plan, cache: Cache | None) -> tuple[Expansio
     """
     full_order = affordable_order(model, plan.order)
     expansions, known = _expansions(model, plan, full_order, cache)
+    further = [replace(plan, q0=np.array(q), more_q=()) for q in plan.more_q]
+    others = [_expansions(model, at, full_order, cache)[0] for at in further]
+    expansions = replace(expansions, others=tuple(others))
     full, linear = expansions.full, expansions.linear
     notes = [_size_note(expansions), *dict.fromkeys(full.notes + linear.notes)]
     if full_order < plan.order:

@@ -144,7 +144,9 @@ def prepare(
         plan = plan_expansion(file, model, trajectory, order, modes)
         expansions, notes = expand_plan(model, plan, cache)
     moving = () if trajectory is None else trajectory.notes
-    return Scene(file, model, initial, trajectory, expansions, (*moving, *plan.notes, *notes))
+    mesh = () if case.mesh is None else case.mesh.reasons
+    notes = [*mesh, *moving, *plan.notes, *notes]
+    return Scene(file, model, initial, trajectory, expansions, tuple(notes))
 
 
 def _result(findings: Findings, expansions: Expansions, assignment: Assignment) -> Result:

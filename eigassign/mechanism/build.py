@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,6 +33,19 @@ def build_pencil(case: CaseFile, parameters: Parameters, motion: Kinematics) -> 
     _add_springs(stiffness, case, parameters, motion, nodes)
     _add_drives(stiffness, case, parameters, motion, nodes.count)
     return _compile(stiffness, mass, case, parameters, motion, nodes.count)
+
+
+def with_elements(case: CaseFile, elements: Mapping[str, int]) -> CaseFile:
+    """The case with other numbers of elements for the named beam links."""
+    if not elements:
+        return case
+    links = {
+        name: link.model_copy(update={"elements": elements[name]}) if name in elements else link
+        for name, link in case.mechanism.links.items()
+    }
+    same_kind: Any = type(case.mechanism.links)
+    mechanism = case.mechanism.model_copy(update={"links": same_kind(links)})
+    return replace(case, mechanism=mechanism)
 
 
 def local_links(

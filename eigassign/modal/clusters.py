@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.mechanism.pencil import Pencil
-from eigassign.modal.exact import Modes, modes_at
+from eigassign.modal.exact import Modes
+from eigassign.modal.lowest import lowest_modes
 
 Floats = NDArray[np.float64]
 CLUSTER_GAP = 0.02  # modes closer than this (relative in λ) are expanded together
@@ -33,8 +34,9 @@ def whole_clusters(
     elastic = len(pencil.elastic)
     count = min(max(wanted) + 1, elastic) if max(wanted) <= elastic else max(wanted)
     while True:
-        found = modes_at(pencil, theta0, count)
+        found = lowest_modes(pencil, theta0, max(wanted), count - max(wanted))
+        there = found.lam.shape[1]  # fewer than asked for where no more have mass
         groups = clusters(found.lam[0], wanted, gap)
-        if count == elastic or groups[-1][-1] < count:
+        if there < count or count == elastic or groups[-1][-1] < count:
             return found, groups
         count = min(2 * count, elastic)

@@ -12,7 +12,7 @@ from eigassign.modal.exact import Modes, eigenvalues
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-NEAR = 0.1  # relative distance in frequency above which two modes do not meet
+NEAR = 0.15  # relative distance in frequency above which two modes do not meet
 EXCHANGED = 0.1  # share of identity given away from which a veering is reported
 CROSSES = 1e-9  # least relative distance in frequency that is taken for zero
 SECTIONS = 60  # of the golden-section search for the least distance

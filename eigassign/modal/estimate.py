@@ -19,6 +19,8 @@ Floats = NDArray[np.float64]
 SAFETY = 4.0  # on ‖ρ‖²: its norm is taken at an expansion point, not at x
 LOST = 0.2  # residual relative to μ̂ above which a pair stands for no mode
 MARGIN = 2.0  # how far μ of a mode may have moved since the expansion point, as a factor
+RANGE = 4.0  # how far μ of a mode that is no longer represented may have moved, as a factor
+HELD = 0.5  # share of a shape's mass in the Ritz pairs below which its mode has left the basis
 REFUSED = 0.5  # relative error in frequency above which an answer is refused
 
 
@@ -51,6 +53,26 @@ def _missing(mu: Floats, norms: Floats, anchors: Floats) -> NDArray[np.bool_]:
     there = (anchors[:, None, None, :] * MARGIN >= mu[:, :, None]).sum(axis=3).max(axis=0)
     some_lost = np.any(~sure, axis=1, keepdims=True)
     return np.asarray(some_lost & (there > found))
+
+
+def gone(mu: Floats, gram: Floats, shares: Floats, anchors: Floats) -> NDArray[np.bool_]:
+    """Pairs (n, c) beside or below which a mode of every expansion point is missing.
+
+    μ̂ (n, k) and ``shares`` (n_points, n, c, k) of all Ritz pairs in the mass of each shape of a
+    point. A shape with less than half of it in pairs that may stand for a mode has changed or left:
+    it has left where there are also fewer pairs within RANGE than there were modes.
+    """
+    c = gram.shape[1]
+    sure = np.ones(mu.shape, dtype=bool)
+    sure[:, :c] = np.sqrt(SAFETY * np.einsum("nii->ni", gram)) < LOST * mu[:, :c]
+    was = anchors[:, None, :-1, None]
+    like = sure[None, :, None, :] & (mu[None, :, None, :] * RANGE**2 >= was)
+    weak = (shares * like).sum(axis=3) < HELD
+    pair = mu[:, :c]
+    within = was * RANGE >= pair[None, :, None, :]
+    found = (sure[:, None, :] & (mu[:, None, :] * RANGE >= pair[:, :, None])).sum(axis=2)
+    fewer = within.sum(axis=2) > found
+    return np.asarray((fewer & (weak[..., None] & within).any(axis=2)).all(axis=0))
 
 
 def _shifts(mu: Floats, gram: Floats, outside: Floats, kept: int) -> Floats:

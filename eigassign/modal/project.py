@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -14,26 +16,38 @@ Ints = NDArray[np.intp]
 CHUNK = 4_000  # rows multiplied at once, so that the products stay in the cache
 
 
+@dataclass(frozen=True)
+class Terms:
+    """L A_j Rᵀ (n_matrices, n_terms, l, r) of ``terms`` j of the ``matrices``: 0 is K, 1 is M."""
+
+    matrices: slice
+    terms: Ints | slice
+    values: Floats
+
+
 def project(pencil: Pencil, basis: Floats) -> tuple[Floats, Floats]:
     """(n_theta, k, k) projections of the stiffness and the mass terms on ``basis`` (n_dof, k)."""
+    out = np.zeros((2, pencil.n_theta, basis.shape[1], basis.shape[1]))
     every = np.ones(pencil.n_theta, dtype=bool)
-    stiffness, mass = project_terms(pencil, basis.T, basis.T, every)
-    return stiffness, mass
+    for part in project_terms(pencil, basis.T, basis.T, every):
+        out[part.matrices, part.terms] = part.values
+    return out[0], out[1]
 
 
-def project_terms(pencil: Pencil, left: Floats, right: Floats, wanted: NDArray[np.bool_]) -> Floats:
-    """L K_j Rᵀ and L M_j Rᵀ of the ``wanted`` terms, (2, n_theta, l, r), for rows L, R (·, n_dof).
-
-    The others are zero, or as they are where that is no extra work.
-    """
+def project_terms(
+    pencil: Pencil, left: Floats, right: Floats, wanted: NDArray[np.bool_]
+) -> list[Terms]:
+    """The ``wanted`` terms of K and M projected on rows L, R (·, n_dof), small pencils' at once."""
     stacks = pencil.term_stacks
     if stacks is None:
         W, V = np.ascontiguousarray(left.T), np.ascontiguousarray(right.T)
-        return np.array([_project(pencil, terms, W, V, wanted) for terms in pencil.by_term])
+        both = enumerate(pencil.by_term)
+        return [_project(pencil, which, terms, W, V, wanted) for which, terms in both]
     n = pencil.n_dof
-    half = left @ stacks.reshape(n, -1)  # every term at once
+    half = left @ stacks.reshape(n, -1)
     full = half.reshape(-1, n) @ right.T
-    return np.asarray(full.reshape(len(left), 2, -1, len(right)).transpose(1, 2, 0, 3))
+    values = full.reshape(len(left), 2, -1, len(right)).transpose(1, 2, 0, 3)
+    return [Terms(slice(0, 2), slice(None), values)]
 
 
 def project_at(pencil: Pencil, theta: Floats, rows: Floats) -> Floats:
@@ -55,32 +69,40 @@ def _square(matrix: sparse.csr_array, V: Floats) -> Floats:
 
 
 def _project(
-    pencil: Pencil, terms: sparse.csc_array, W: Floats, V: Floats, wanted: NDArray[np.bool_]
-) -> Floats:
-    """Wᵀ A_j V of every wanted term, over its non-zero rows only."""
-    tall, rows, term = _stacked(pencil, terms, wanted)
-    out = np.zeros((terms.shape[1], W.shape[1], V.shape[1]))
+    pencil: Pencil,
+    which: int,
+    terms: sparse.csc_array,
+    W: Floats,
+    V: Floats,
+    wanted: NDArray[np.bool_],
+) -> Terms:
+    """Wᵀ A_j V of every wanted term that there is, over its non-zero rows only."""
+    there = np.flatnonzero(wanted & (np.diff(terms.indptr) > 0))
+    tall, rows, bounds = _stacked(pencil, terms, there)
+    out = np.zeros((1, len(there), W.shape[1], V.shape[1]))
     for i in range(0, len(rows), CHUNK):
-        here = term[i : i + CHUNK]
         products, others = tall[i : i + CHUNK] @ W, V[rows[i : i + CHUNK]]
-        cuts = np.flatnonzero(np.diff(here)) + 1
-        for a, b in zip([0, *cuts.tolist()], [*cuts.tolist(), len(here)], strict=True):
-            out[here[a]] += products[a:b].T @ others[a:b]
-    return out
+        first, last = np.searchsorted(bounds, [i + 1, i + len(others)], side="left") - 1
+        for k in range(first, last + 1):
+            a, b = max(bounds[k] - i, 0), bounds[k + 1] - i
+            out[0, k] += products[a:b].T @ others[a:b]
+    return Terms(slice(which, which + 1), there, out)
 
 
 def _stacked(
-    pencil: Pencil, terms: sparse.csc_array, wanted: NDArray[np.bool_]
+    pencil: Pencil, terms: sparse.csc_array, there: Ints
 ) -> tuple[sparse.csr_array, Ints, Ints]:
-    """The non-zero rows of all wanted terms below each other; of each, its number and its term."""
-    theta = np.repeat(np.arange(terms.shape[1]), np.diff(terms.indptr))
-    keep = np.flatnonzero(wanted[theta])
-    theta, entries = theta[keep], terms.indices[keep]
-    row, column = pencil.rows[entries], pencil.columns[entries]
+    """The non-zero rows of the terms below each other, their numbers, and where terms begin."""
+    starts = np.concatenate([[0], np.cumsum(np.diff(terms.indptr)[there])])
+    entries = np.concatenate(
+        [np.arange(terms.indptr[t], terms.indptr[t + 1]) for t in there.tolist()] or [starts[:0]]
+    )
+    row, column = pencil.rows[terms.indices[entries]], pencil.columns[terms.indices[entries]]
     new = np.ones(len(row), dtype=bool)  # entries of one term run row by row
-    new[1:] = (row[1:] != row[:-1]) | (theta[1:] != theta[:-1])
+    new[1:] = row[1:] != row[:-1]
+    new[starts[:-1]] = True
     first = np.flatnonzero(new)
     shape = (len(first), pencil.n_dof)
-    starts = np.append(first, len(row))
-    tall = sparse.csr_array((terms.data[keep], column, starts), shape=shape)
-    return tall, row[first], theta[first]
+    limits = np.append(first, len(row))
+    tall = sparse.csr_array((terms.data[entries], column, limits), shape=shape)
+    return tall, row[first], np.searchsorted(first, starts).astype(np.intp)

@@ -113,7 +113,8 @@ def _quadratics(
 ) -> tuple[Floats, Floats]:
     """Series (r, r, N) of Xᵀ K X and Xᵀ M X: at w = 0, and Σ_j θ_j(w) Xᵀ A_j X for the rest."""
     n, r = vectors.shape[1:]
-    rows = vectors.transpose(0, 2, 1).reshape(-1, n)
+    columns = np.ascontiguousarray(vectors.transpose(1, 0, 2).reshape(n, -1))
+    rows = columns.T  # products with sparse matrices run along the rows of the other
     varying = theta.copy()
     varying[:, 0] = 0.0
     stored, which = np.flatnonzero(varying.any(axis=0)), np.asarray(varying.any(axis=1))
@@ -123,11 +124,12 @@ def _quadratics(
     for i, j in _lower(r):
         out[:, i, j, plan.constant.into] = _meet(constant, plan.constant, i, j, r)
     if len(stored):
-        terms = project_terms(pencil, rows[: plan.low * r], rows, which)
         factors = varying.T[stored]
-        for i, j in _lower(r):
-            sums = (factors @ _meet(terms, plan.varying, i, j, r))[:, plan.left, plan.right]
-            out[:, i, j, plan.into] += np.add.reduceat(sums, plan.end, axis=1)
+        for part in project_terms(pencil, rows[: plan.low * r], rows, which):
+            for i, j in _lower(r):
+                met = _meet(part.values, plan.varying, i, j, r)
+                sums = (factors[:, part.terms] @ met)[:, plan.left, plan.right]
+                out[part.matrices, i, j, plan.into] += np.add.reduceat(sums, plan.end, axis=1)
     for i, j in _lower(r):
         out[:, j, i] = out[:, i, j]
     return out[0], out[1]

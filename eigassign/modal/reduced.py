@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.errors import MechanismError, UsageError
+from eigassign.errors import UsageError
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.basis import orthonormal
-from eigassign.modal.exact import Modes, modes_at
 from eigassign.modal.expansion import expand
 from eigassign.modal.half_norm import accurate_factors
+from eigassign.modal.lowest import lowest_modes
 from eigassign.modal.pose import joint_rows, pose
 from eigassign.modal.project import project
 from eigassign.modal.reduced_model import ReducedModel
@@ -89,20 +89,10 @@ def reduce(
         material_terms=material,
         material=theta0[material, 0],
         anchors=_anchors(found.lam, count),
+        shapes=np.array([V.T @ (K @ phi[pencil.elastic, :count]) for phi in found.phi]),
         stiffness_rounding=projected.stiffness_rounding,
         mass_rounding=projected.mass_rounding,
     )
-
-
-def lowest_modes(pencil: Pencil, theta: Floats, least: int, extra: int) -> Modes:
-    """At least the lowest ``least`` modes, and up to ``extra`` more where so many have mass."""
-    most = max(min(least + extra, len(pencil.elastic)), least)
-    for count in range(most, least, -1):
-        try:
-            return modes_at(pencil, theta, count)
-        except MechanismError:
-            continue
-    return modes_at(pencil, theta, least)
 
 
 def _represented(lam: Floats, highest: int) -> int:

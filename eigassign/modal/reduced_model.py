@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import UsageError
-from eigassign.modal.estimate import frequency_error
+from eigassign.modal.estimate import frequency_error, gone
 from eigassign.modal.exact import condense
 from eigassign.modal.pose import Pose, corrected
 from eigassign.modal.residual import Residual
@@ -49,6 +49,7 @@ class ReducedModel:
     material_terms: Ints  # indices of θ with a stiffness term that no joint coordinate enters
     material: Floats  # their values at the first expansion point
     anchors: Floats  # (n_points, c + 1): the largest μ at each point, one more than are represented
+    shapes: Floats  # (n_points, k, c): those c modes in the basis
     stiffness_rounding: Floats  # Vᵀ d_K V (k, k), round-off weights of `roundoff` at x0
     mass_rounding: Floats  # (k + f, k + f)
 
@@ -106,13 +107,14 @@ class ReducedModel:
 
     def _estimate(self, x: Floats) -> Floats:
         theta = self._theta(x)
-        mu, z, coupling = self._ritz(theta, True)
-        count = min(self.anchors.shape[1] - 1, mu.shape[1])
-        mu, z = mu[:, :count], z[:, :, :count]
+        all_mu, all_z, coupling = self._ritz(theta, True)
+        count = min(self.anchors.shape[1] - 1, all_mu.shape[1])
+        mu, z = all_mu[:, :count], all_z[:, :, :count]
         wide = np.concatenate([z, -coupling @ z], axis=1)
         softest, hardest = self._scaling(theta)
         gram = self._residual_gram(x, theta, mu, wide) / softest[:, None, None]
         error = frequency_error(mu, gram, self._outside(mu, softest), self.anchors)
+        error[self._gone(theta, all_mu, all_z, gram)] = np.inf
         error += self._rounding(theta, mu, wide, hardest)
         return np.asarray(error[:, np.array(self.modes) - 1])
 
@@ -126,6 +128,20 @@ class ReducedModel:
         growth = np.max(mu[:, None, :] / known, axis=2)
         grown = self.anchors[:, -1] * np.maximum(growth, 1.0 / softest[:, None])
         return np.asarray(grown.min(axis=1))
+
+    def _gone(self, theta: Floats, mu: Floats, z: Floats, gram: Floats) -> NDArray[np.bool_]:
+        """Where a mode may be missing because the basis no longer holds it, (n, c): see `estimate`.
+
+        A shape a of an expansion point keeps its mass in any pose: the shares of the Ritz pairs in
+        it, (aᵀM̂_c z_i)² / (μ̂_i aᵀM̂_c a), say whether it is still among them.
+        """
+        M_c = self._matrices(theta)[1]
+        shares = []
+        for a in self.shapes:
+            moved = M_c @ a
+            weight = (np.swapaxes(moved, 1, 2) @ z) ** 2 / np.maximum(mu, 1e-300)[:, None, :]
+            shares.append(weight / np.einsum("kc,nkc->nc", a, moved)[:, :, None])
+        return gone(mu, gram, np.array(shares), self.anchors)
 
     def _scaling(self, theta: Floats) -> tuple[Floats, Floats]:
         """Least and largest stiffness of a link relative to x0, (n,): α ≤ 1 ≤ β.

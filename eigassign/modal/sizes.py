@@ -5,4 +5,4 @@ Measured by ``benchmarks/dense_or_sparse.py``: dense arrays win below, sparse on
 
 from __future__ import annotations
 
-DENSE_LIMIT = 250  # n_dof up to which matrices are kept dense
+DENSE_LIMIT = 220  # n_dof up to which matrices are kept dense

@@ -22,7 +22,7 @@ from eigassign.errors import UsageError
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.encounters import Encounter, find_encounters
 from eigassign.modal.exact import Modes
-from eigassign.modal.reduced import lowest_modes
+from eigassign.modal.lowest import lowest_modes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -6,7 +6,7 @@ import contextlib
 import io
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from rich import box
 from rich.console import Console
@@ -16,6 +16,9 @@ from rich.text import Text
 from eigassign.output import summary
 from eigassign.output.formats import number, percent
 from eigassign.study.findings import Findings, ValidationRow
+
+if TYPE_CHECKING:
+    from eigassign.study.chart_data import Chart
 
 _ENDLESS = 100_000  # columns: off a terminal nothing is wrapped or cut
 
@@ -93,6 +96,16 @@ def print_assignment(findings: Findings, *, stream: TextIO | None = None) -> Non
 def print_validation(rows: Sequence[ValidationRow], *, stream: TextIO | None = None) -> None:
     """Both expansions against exact, one line a mode and place."""
     _print_summary(summary.validation(tuple(rows)), stream)
+
+
+def print_chart(chart: Chart, *, stream: TextIO | None = None) -> None:
+    """What to choose, the fronts and the ways to a design; the report has the rest."""
+    from eigassign.output import chart_tables
+
+    fronts = [chart_tables.front(chart, each) for each in chart.fronts]
+    for table in (*fronts, chart_tables.designs(chart), chart_tables.advice(chart)):
+        if table.rows:
+            _print_summary(table, stream)
 
 
 def _print_summary(table: summary.Table, stream: TextIO | None) -> None:

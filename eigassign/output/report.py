@@ -5,19 +5,34 @@ from __future__ import annotations
 import base64
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from eigassign.output.figures import FigurePlan
 from eigassign.output.formats import percent
-from eigassign.output.summary import tables
-from eigassign.study.findings import Findings
+from eigassign.output.summary import Table, tables
+from eigassign.study.findings import ErrorSummary, Findings
+
+if TYPE_CHECKING:
+    from eigassign.study.chart_data import Chart
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
 def to_html(findings: Findings, plans: Sequence[FigurePlan], images: Mapping[str, bytes]) -> bytes:
     """The report as UTF-8; ``images`` holds the PNG file of every plan by its file name."""
+    return page(findings, findings.error, tables(findings), plans, images)
+
+
+def page(
+    f: Findings | Chart,
+    error: ErrorSummary | None,
+    shown: Sequence[Table],
+    plans: Sequence[FigurePlan],
+    images: Mapping[str, bytes],
+) -> bytes:
+    """Any page of ours: what ``f`` is about, then tables, warnings and notes, then figures."""
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES),
         autoescape=True,
@@ -27,9 +42,9 @@ def to_html(findings: Findings, plans: Sequence[FigurePlan], images: Mapping[str
     )
     environment.filters["percent"] = percent
     html = environment.get_template("report.html.j2").render(
-        f=findings,
-        error=findings.error,
-        tables=tables(findings),
+        f=f,
+        error=error,
+        tables=shown,
         plans=plans,
         images={name: base64.b64encode(data).decode() for name, data in images.items()},
     )

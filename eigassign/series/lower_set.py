@@ -145,8 +145,14 @@ def first_of_each(sorted_values: Ints) -> Ints:
 
 def _hash(indices: NDArray[np.int64]) -> NDArray[np.uint64]:
     """Additive hash: key(γ + δ) = key(γ) + key(δ) modulo 2⁶⁴, whatever the number of variables."""
-    weights = np.random.default_rng(20211204).integers(1, 2**63, indices.shape[1], dtype=np.uint64)
-    return indices.astype(np.uint64) @ weights
+    return indices.astype(np.uint64) @ _weights(indices.shape[1])
+
+
+@lru_cache(maxsize=64)
+def _weights(n: int) -> NDArray[np.uint64]:
+    weights = np.random.default_rng(20211204).integers(1, 2**63, n, dtype=np.uint64)
+    weights.setflags(write=False)
+    return weights
 
 
 def _product_table(space: LowerSet) -> ProductTable:

@@ -16,6 +16,7 @@ from eigassign.modal.model import Model
 from eigassign.study.findings import Comparison, DesignMap
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 # Points along the axes of a map of one and of two variables, both ends included; odd, so that the
 # middle is one of them; fewer where a single exact solve takes milliseconds.
 AXES = {1: 61, 2: 13}
@@ -35,11 +36,46 @@ class Expansions:
     linear: Expansion
     order: int
     full_order: int
+    others: tuple[Expansions, ...] = ()  # about further points along the trajectory, same y0
 
     @property
     def modes(self) -> tuple[int, ...]:
         """The modes that both hold, in the order of their columns."""
         return self.full.modes
+
+    @property
+    def all(self) -> tuple[Expansions, ...]:
+        """One for each expansion point, the first being this one."""
+        return (self, *self.others)
+
+    def owners(self, q: Floats) -> Ints:
+        """Which point each sample of q (n, n_q) is nearest to, in the variables of the series."""
+        V = self.full.directions[:, : len(self.full.q0)]
+        away = [np.square((q - part.full.q0) @ V.T).sum(axis=1) for part in self.all]
+        return np.asarray(np.argmin(away, axis=0), dtype=np.intp)
+
+    def taylor_hz(self, q: Floats, y: Floats) -> Floats:
+        """Full expansion at samples, (n, n_modes) in Hz; each by the nearest point."""
+        return self._pick(q, [part.full.frequencies(q, y) for part in self.all])
+
+    def linearised_hz(self, q: Floats, y: Floats) -> Floats:
+        """Partially linearised expansion at samples, (n, n_modes) in Hz."""
+        return self._pick(q, [part.linear.frequencies(q, y) for part in self.all])
+
+    def linear_in_design(self, q: Floats) -> tuple[Floats, Floats]:
+        """l_0 (n, n_modes) and l (n, n_modes, n_y) of eq. (9); all points share y0."""
+        found = [part.linear.linear_in_design(q) for part in self.all]
+        return self._pick(q, [f[0] for f in found]), self._pick(q, [f[1] for f in found])
+
+    def estimate(self, q: Floats, y: Floats) -> Floats:
+        """Error estimate of the full expansion, relative in Hz, (n, n_modes)."""
+        return self._pick(q, [part.full.error_estimate(q, y) for part in self.all])
+
+    def _pick(self, q: Floats, values: list[Floats]) -> Floats:
+        if len(values) == 1:
+            return values[0]
+        owner = self.owners(np.atleast_2d(q))
+        return np.asarray(np.array(values)[owner, np.arange(len(owner))])
 
     def column(self, mode: int) -> int:
         """Column of ``mode`` in what the expansions evaluate to."""
@@ -59,7 +95,7 @@ def compare(
     q, y = _split(model, x)
     if exact_hz is None:
         exact_hz = model.frequencies(q, y, max(expansions.modes))
-    taylor, linearised = (e.frequencies(q, y) for e in (expansions.full, expansions.linear))
+    taylor, linearised = expansions.taylor_hz(q, y), expansions.linearised_hz(q, y)
     return tuple(
         Comparison(_frozen(exact_hz[:, mode - 1]), _frozen(taylor[:, k]), _frozen(linearised[:, k]))
         for k, mode in enumerate(expansions.modes)

@@ -66,9 +66,9 @@ def assign_design(scene: Scene, target_hz: tuple[Floats, ...]) -> Assignment:
 
     Raises InfeasibleError with the names of the constraints that contradict each other.
     """
-    file, path, expansion = scene.file, scene.path, scene.expansions.linear
-    l0, slope = expansion.linear_in_design(path.q)
-    column = expansion.modes.index
+    file, path = scene.file, scene.path
+    l0, slope = scene.expansions.linear_in_design(path.q)
+    column = scene.expansions.column
     goals = [
         Goal(
             LinearModel(l0[:, column(target.mode)], slope[:, column(target.mode)]),
@@ -80,7 +80,7 @@ def assign_design(scene: Scene, target_hz: tuple[Floats, ...]) -> Assignment:
     return solve_assignment(
         goals,
         path.time_s,
-        expansion.y0,
+        scene.expansions.linear.y0,
         scene.initial,
         Bounds(*scene.bounds),
         _constraints(file),

@@ -14,6 +14,7 @@ from eigassign.study.assignment_study import design_rows, limit_notes, solver_ro
 from eigassign.study.crossings import crossing_warnings
 from eigassign.study.drawing import draw_poses, rest_pose
 from eigassign.study.findings import Findings, ModeStudy, OtherModes, Poses, TargetStudy
+from eigassign.study.motion_study import study_motion
 from eigassign.study.scene import Scene
 from eigassign.study.units import coordinate_units
 
@@ -38,6 +39,7 @@ def gather(
 ) -> Findings:
     """The findings of a run; without ``assigned`` those of an expansion only."""
     file, trajectory = scene.file, scene.trajectory
+    motion = _motion(scene, assigned)
     n_q = len(scene.model.q_names)
     return Findings(
         title=file.title,
@@ -55,11 +57,22 @@ def gather(
         targets=() if assigned is None else assigned.targets,
         others=None if assigned is None else _others(scene, assigned),
         solver=None if assigned is None else solver_row(assigned.assignment),
-        warnings=(*scene.warnings, *_warnings(scene, assigned)),
-        notes=(*scene.notes, *(limit_notes(assigned.assignment) if assigned else ())),
+        warnings=(*scene.warnings, *_warnings(scene, assigned), *motion[1]),
+        notes=(*scene.notes, *(limit_notes(assigned.assignment) if assigned else ()), *motion[0]),
         timing_s=dict(timing_s),
         tolerance=file.validation.max_error,
     )
+
+
+def _motion(scene: Scene, assigned: Assigned | None) -> tuple[list[str], list[str]]:
+    """Notes and warnings on the speed of the motion."""
+    if assigned is None:
+        return [], []
+    lowest = float(assigned.initial_hz.min())
+    study = study_motion(scene, (2.0 * np.pi * lowest) ** 2)
+    if study is None:
+        return [], []
+    return [study.note] if study.note else [], [study.warning] if study.warning else []
 
 
 def _poses(scene: Scene) -> Poses:
@@ -95,7 +108,7 @@ def _accuracy_warnings(scene: Scene, assigned: Assigned) -> Iterator[str]:
     limit, y = scene.file.validation.max_error, assigned.assignment.y
     off = [t for t in assigned.targets if not t.approximation_error <= limit]
     for target in off:
-        taylor = scene.expansions.full.frequencies(scene.path.q, y)
+        taylor = scene.expansions.taylor_hz(scene.path.q, y)
         taylor_hz = taylor[:, scene.expansions.column(target.mode)]
         enough = np.all(np.abs(taylor_hz / target.exact_hz - 1.0) <= limit)
         point = ", ".join(f"{value:.4g}" for value in y)

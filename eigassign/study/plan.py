@@ -12,6 +12,7 @@ from eigassign.case import CaseFile
 from eigassign.errors import CaseError
 from eigassign.mechanism.trajectory import Trajectory
 from eigassign.modal.model import Model
+from eigassign.study.choices import choose_order
 
 Floats = NDArray[np.float64]
 _SHOWN = 8
@@ -27,6 +28,7 @@ class Plan:
     order: int
     modes: tuple[int, ...]
     notes: tuple[str, ...]
+    more_q: tuple[tuple[float, ...], ...] = ()  # further expansion points along the trajectory
 
 
 def plan_expansion(
@@ -45,9 +47,13 @@ def plan_expansion(
     y0, y_note = _y0(file, model)
     chosen, modes_note = _modes(file, modes)
     _check_modes(file, model, chosen)
-    order = file.expansion.order if order is None else order
     notes = [q_note, y_note, modes_note, *_outside(file, q0, y0, model, trajectory)]
-    return Plan(q0, y0, order, chosen, tuple(note for note in notes if note))
+    wanted: int | str = file.expansion.order if order is None else order
+    if isinstance(wanted, int):
+        return Plan(q0, y0, wanted, chosen, tuple(note for note in notes if note))
+    found = choose_order(file, model, trajectory, q0, y0, chosen)
+    said = tuple(note for note in (*notes, *found.reasons) if note)
+    return Plan(q0, y0, found.order, chosen, said, found.more_q)
 
 
 def _q0(file: CaseFile, model: Model, trajectory: Trajectory | None) -> tuple[Floats, str]:

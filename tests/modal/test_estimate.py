@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from chains import model_of, random_chain, two_link
+from scipy import sparse
 
-from eigassign.modal.estimate import frequency_error
+sys.path.insert(0, str(Path(__file__).parents[1] / "stability"))
+
+from calibration import draw
+
+from eigassign.errors import AccuracyError
+from eigassign.modal.estimate import frequency_error, gone
+from eigassign.modal.half_norm import half_solve
 from eigassign.modal.reduced import reduce
 from eigassign.modal.roundoff import rounding_error, rounding_weights
 
@@ -117,3 +127,72 @@ def test_a_fine_mesh_has_a_larger_round_off_and_states_it():
     assert fine > 1e3 * coarse
     model = model_of(two_link(elements=(100, 100)))
     assert reduce(model.pencil, Q0, Y0).error_estimate(Q0, Y0)[0, 0] > fine
+
+
+def test_pairs_that_coincide_may_move_by_what_both_miss_together(monkeypatch):
+    """Two equal μ̂ with the same coupling c to one mode move by 2c²/gap, not by c²/gap each."""
+    monkeypatch.setattr("eigassign.modal.estimate.SAFETY", 1.0)
+    c = 1e-3
+    H = np.array([[1.0, 0.0, c], [0.0, 1.0, c], [c, c, 0.5]])
+    mu, gram = np.ones((1, 2)), np.full((1, 2, 2), c * c)
+    error = frequency_error(mu, gram, np.array([0.5]), mu)
+    true = np.sqrt(np.linalg.eigvalsh(H)[-1]) - 1.0
+    assert error[0, 0] >= true * (1.0 - 1e-4)
+
+
+def test_modes_outside_the_basis_are_taken_to_grow_as_those_inside_or_as_the_softest_link():
+    reduced = reduce(model_of(two_link()).pencil, Q0, Y0, (1,), 1)
+    count = reduced.anchors.shape[1] - 1
+    mu, last = reduced.anchors[:, :count].copy(), reduced.anchors[0, -1]
+    one, soft = np.ones(1), np.array([0.25])
+    assert reduced._outside(mu, one) == pytest.approx(last)
+    assert reduced._outside(mu, soft) == pytest.approx(4.0 * last)
+    mu[0, -1] *= 3.0
+    assert reduced._outside(mu, one) == pytest.approx(3.0 * last)
+    assert reduced._outside(mu, soft) == pytest.approx(4.0 * last)
+
+
+def test_half_a_solve_measures_in_the_inverse():
+    pencil = model_of(two_link(elements=(20, 15))).pencil
+    x = np.concatenate([Q0, Y0])
+    K = pencil.sparse(pencil.stiffness @ pencil.theta(x[None])[:, 0])
+    K_E = K[pencil.elastic][:, pencil.elastic].tocsc()
+    A = np.random.default_rng(3).standard_normal((K_E.shape[0], 4))
+    half = half_solve(K_E, A)
+    expected = A.T @ np.linalg.solve(K_E.toarray(), A)
+    # The condition number of K_E, 1e11, leaves five digits of its inverse.
+    np.testing.assert_allclose(half.T @ half, expected, rtol=1e-4, atol=1e-4 * expected.max())
+
+
+def test_half_a_solve_refuses_what_is_not_definite():
+    K = sparse.csc_array(np.diag([1.0, -1.0, 2.0]))
+    with pytest.raises(AccuracyError, match="not positive definite"):
+        half_solve(K, np.eye(3))
+
+
+def test_a_mode_is_gone_when_its_shape_and_one_frequency_are_missing():
+    """Modes at 1, 4, 9 and 35; the second is no longer there, the others moved little."""
+    anchors = 1.0 / np.array([[1.0, 4.0, 9.0, 35.0]]) ** 2
+    present = 1.0 / np.array([[1.1, 8.8, 30.0, 90.0, 400.0]]) ** 2
+    gram = np.zeros((1, 3, 3))
+    shares = np.zeros((1, 1, 3, 5))
+    shares[0, 0, [0, 1, 2], [0, 4, 1]] = 1.0  # the second shape is in a pair that is far too stiff
+    assert gone(present, gram, shares, anchors).tolist() == [[False, True, False]]
+    kept = shares[:, :, :, [0, 4, 1, 2, 3]]  # now it is in the second pair: merely faster
+    assert not gone(present, gram, kept, anchors).any()
+    whole = 1.0 / np.array([[1.1, 4.2, 8.8, 30.0, 90.0]]) ** 2  # none is missing, shapes changed
+    assert not gone(whole, gram, shares, anchors).any()
+
+
+@pytest.mark.parametrize("seed", [832, 1172, 2531])
+def test_links_that_know_nothing_of_each_other_hide_no_mode(seed):
+    """Here the residuals are at round-off although a mode of another branch is missing."""
+    drawn = draw(seed, 3)
+    assert drawn is not None
+    reduced = reduce(drawn.model.pencil, drawn.q0, drawn.y0, drawn.modes, drawn.half_order)
+    pick = np.array(drawn.modes) - 1
+    exact = drawn.model.frequencies(drawn.q, drawn.y, max(drawn.modes))[:, pick]
+    error = np.abs(reduced.frequencies(drawn.q, drawn.y) / exact - 1.0)
+    estimate = reduced.error_estimate(drawn.q, drawn.y)
+    assert error.max() > 0.2
+    assert (estimate >= error).all()

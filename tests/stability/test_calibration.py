@@ -29,7 +29,7 @@ def check(found: Tally) -> None:
     # One derivative of one mode over ±60° of every joint often loses a mode: then it must refuse.
     by_order = [found.refused[found.half_orders == m].mean() for m in (1, 2, 3)]
     assert by_order[0] < 0.45
-    assert max(by_order[1:]) < 0.02
+    assert max(by_order[1:]) < 0.05
 
 
 def test_the_estimate_of_the_reduced_model_is_not_below_the_error():

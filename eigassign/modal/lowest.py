@@ -1,0 +1,23 @@
+"""The lowest modes and some more, where the mechanism has so many with mass."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.errors import MechanismError
+from eigassign.mechanism.pencil import Pencil
+from eigassign.modal.exact import Modes, modes_at
+
+Floats = NDArray[np.float64]
+
+
+def lowest_modes(pencil: Pencil, theta: Floats, least: int, extra: int) -> Modes:
+    """At least the lowest ``least`` modes, and up to ``extra`` more where so many have mass."""
+    most = max(min(least + extra, len(pencil.elastic)), least)
+    for count in range(most, least, -1):
+        try:
+            return modes_at(pencil, theta, count)
+        except MechanismError:
+            continue
+    return modes_at(pencil, theta, least)

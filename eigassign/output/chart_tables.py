@@ -1,0 +1,128 @@
+"""The tables of a chart, as text: for the console, the report and Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from eigassign.output.summary import Table
+from eigassign.study.chart_data import Chart, ChartPoint, Front, Timing
+
+
+def tables(chart: Chart) -> tuple[Table, ...]:
+    """What to choose, the fronts, all methods, the mesh, the designs: those there are."""
+    made = (advice(chart), *(front(chart, f) for f in chart.fronts), methods(chart),
+            mesh(chart), designs(chart), machine(chart))  # fmt: skip
+    return tuple(table for table in made if table.rows)
+
+
+def time(seconds: float) -> str:
+    """Three digits with a unit: ``12.3 µs``."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds / 1e-9:.3g} ns" if seconds > 0.0 else "0"
+
+
+def spread(timing: Timing) -> str:
+    """Median and quartiles; one run alone is marked."""
+    if not timing.median_s:
+        return "0"
+    if not timing.repeats:
+        return f"{time(timing.median_s)} (once)"
+    return f"{time(timing.median_s)} ({time(timing.low_s)}–{time(timing.high_s)})"
+
+
+def advice(chart: Chart) -> Table:
+    """The recommendations."""
+    rows = []
+    for a in chart.advice:
+        asked = f"{a.accuracy:.0e}" if a.accuracy is not None else f"in {time(a.budget_s or 0.0)}"
+        found = ("none", "", "") if a.method is None else (
+            a.method, f"{a.worst_relative:.1e}", time(a.total_s or 0.0),
+        )  # fmt: skip
+        rows.append((asked, f"{a.evaluations:,.0f}", *found))
+    columns = ("asked for", "evaluations", "choose", "worst error", "time in all")
+    caption = "Accuracy is the worst relative error in Hz; time is set-up and all evaluations."
+    return Table("What to choose", columns, tuple(rows), caption)
+
+
+def front(chart: Chart, each: Front) -> Table:
+    """The methods of one front, the quickest first."""
+    known = {p.method: p for p in chart.points}
+    rows = tuple(
+        (name, "yes" if known[name].ours else "no", *_cost(known[name], each),
+         f"{known[name].everywhere.worst_hz:.2e}", f"{known[name].everywhere.worst_relative:.1e}")
+        for name in reversed(each.methods)
+    )  # fmt: skip
+    columns = ("method", "eigassign's", "time", "worst error [Hz]", "relative")
+    what = "one evaluation" if each.evaluations is None else f"{each.evaluations:,.0f} evaluations"
+    caption = f"Nothing charted is both quicker and more accurate; time is that of {what}."
+    return Table(f"Front: {each.name}", columns, rows, caption)
+
+
+def _cost(point: ChartPoint, each: Front) -> tuple[str]:
+    if each.evaluations is None:
+        return (time(point.online.median_s),)
+    return (time(point.total_s(each.evaluations)),)
+
+
+def methods(chart: Chart) -> Table:
+    """Every method, the most accurate first."""
+    ordered = sorted(chart.points, key=lambda p: p.everywhere.worst_hz)
+    columns = (
+        "method", "set-up", "one evaluation", "exact solves", "worst [Hz]", "rms [Hz]",
+        "worst along the trajectory [Hz]", "no number", "pays from",
+    )  # fmt: skip
+    caption = (
+        'Time as median (quartiles); errors against the same exact solves; "pays from" is the '
+        "number of evaluations from which it beats exact solves."
+    )
+    return Table("All methods", columns, tuple(_methods(ordered)), caption)
+
+
+def _methods(points: Sequence[ChartPoint]) -> Iterator[tuple[str, ...]]:
+    for p in points:
+        along = "" if p.trajectory is None else f"{p.trajectory.worst_hz:.2e}"
+        gain = "never" if p.break_even is None else f"{p.break_even:,.0f}"
+        solves = f"{p.solves}" + (f" + {p.solves_online:.2g} each" if p.solves_online else "")
+        yield (
+            p.method, spread(p.offline), spread(p.online), solves, f"{p.everywhere.worst_hz:.2e}",
+            f"{p.everywhere.rms_hz:.2e}", along, str(p.everywhere.failed or ""), gain,
+        )  # fmt: skip
+
+
+def mesh(chart: Chart) -> Table:
+    """Meshes from coarse to fine."""
+    columns = ("elements", "factor", "dof", "worst error [Hz]", "relative", "order", "exact solve")
+    rows = tuple(
+        (str(r.elements), f"{r.factor:g}", str(r.n_dof), f"{r.worst_hz:.2e}",
+         f"{r.worst_relative:.1e}", "" if r.order is None else f"{r.order:.2f}", spread(r.solve))
+        for r in chart.mesh
+    )  # fmt: skip
+    caption = "Against the limit extrapolated from the two finest; factor 1 is the case's own mesh."
+    return Table("Mesh", columns, rows, caption)
+
+
+def designs(chart: Chart) -> Table:
+    """Ways to a design, the best objective first."""
+    columns = ("method", "time", "exact solves", "objective", "above best", "worst", "rms", "")
+    rows = tuple(
+        (r.method, spread(r.seconds), str(r.solves), f"{r.objective:.6e}", f"{r.excess:.1e}",
+         f"{100 * r.max_relative:.4f} %", f"{100 * r.rms_relative:.4f} %", r.note)
+        for r in sorted(chart.designs, key=lambda r: r.excess)
+    )  # fmt: skip
+    caption = "Objective and distances to the target by exact solves along the trajectory."
+    return Table("Designs", columns, rows, caption)
+
+
+def machine(chart: Chart) -> Table:
+    """What the times are from."""
+    m = chart.machine
+    rows = (
+        ("processor", m.processor),
+        ("cores", str(m.cores)),
+        ("system", m.system),
+        ("versions", ", ".join(f"{name} {version}" for name, version in m.versions.items())),
+        ("linear algebra", f"{m.blas}, threads: {m.threads}"),
+    )
+    return Table("Machine", ("", ""), rows)

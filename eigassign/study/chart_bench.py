@@ -1,0 +1,179 @@
+"""One question with its exact answers, put to every method: fitted, evaluated, timed, compared."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.errors import EigassignError
+from eigassign.study.chart_data import NOTHING, ChartPoint, Errors, Timing
+from eigassign.study.chart_front import break_even
+from eigassign.study.chart_methods import Method
+from eigassign.study.chart_question import Points
+from eigassign.study.chart_timing import Patience, take_turns, timed
+from eigassign.study.scene import Scene
+
+Floats = NDArray[np.float64]
+BATCH = 4096  # evaluations in one call, where methods are timed
+LONG_BATCH_S = 0.05  # a batch that would take longer is timed on the question's own points only
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """The question with its exact answers (n, n_modes) in Hz."""
+
+    scene: Scene
+    points: Points
+    exact_hz: Floats
+    patience: Patience
+
+    def solved(self, x: Floats) -> Floats:
+        """Exact answers elsewhere, for training."""
+        return exact_frequencies(self.scene, x)
+
+
+def exact_frequencies(scene: Scene, x: Floats) -> Floats:
+    """The charted modes at x (n, n_x) by the product's own exact solve, (n, n_modes) in Hz."""
+    model, modes = scene.model, scene.expansions.modes
+    if not len(x):
+        return np.zeros((0, len(modes)))
+    n_q = len(model.q_names)
+    hz = model.frequencies(x[:, :n_q], x[:, n_q:], max(modes))
+    return np.asarray(hz[:, np.array(modes) - 1])
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A method that has run once: what it answered, and the jobs to time."""
+
+    method: Method
+    trained: int  # exact solves of its training
+    hz: Floats
+    points: Points
+    fit: Callable[[], object]
+    evaluate: Callable[[], object]
+    evaluations: int  # in one call of ``evaluate``
+    first: tuple[float, float]  # seconds of both, the first time
+
+
+def chart_methods(
+    bench: Bench, methods: Iterable[Method], progress: Callable[[str], None]
+) -> tuple[tuple[ChartPoint, ...], tuple[tuple[str, str], ...]]:
+    """A point for every method, and (method, why) for those that cannot answer.
+
+    First all run once, which gives the answers and warms caches; then they are timed in turns.
+    """
+    trials, skipped, family = [], [], ""
+    for method in methods:
+        if method.family != family:
+            family = method.family
+            progress(f"charting {family}")
+        try:
+            trials.append(_trial(bench, method))
+        except EigassignError as error:
+            skipped.append((method.name, str(error)))
+    progress("timing all methods in turns")
+    jobs = [job for t in trials for job in ((t.fit, t.first[0]), (t.evaluate, t.first[1]))]
+    spent = take_turns(jobs, bench.patience)
+    online = [s.times(1.0 / t.evaluations) for s, t in zip(spent[1::2], trials, strict=True)]
+    exact = [s for s, t in zip(online, trials, strict=True) if t.method.exact]
+    solve = min(exact, key=lambda s: s.median_s)
+    made = [_point(bench, *each, solve) for each in zip(trials, spent[::2], online, strict=True)]
+    return tuple(made), tuple(skipped)
+
+
+def _trial(bench: Bench, method: Method) -> _Trial:
+    points = bench.points.runs() if method.per_design else bench.points
+    points = points.head(method.most or len(points.x))
+    x = method.train(bench.points)
+    answers = bench.solved(x)
+    evaluator, fitting = timed(lambda: method.fit(answers))
+    hz, once = timed(lambda: evaluator(points))
+    copies = -(-BATCH // len(points.x))
+    if method.per_design or once * copies > LONG_BATCH_S:
+        copies = 1
+    many = points.repeated(copies) if copies > 1 else points
+    return _Trial(
+        method,
+        len(x),
+        hz,
+        points,
+        lambda: method.fit(answers),
+        lambda: evaluator(many),
+        len(many.x),
+        (fitting, once * copies),
+    )
+
+
+def _point(
+    bench: Bench, trial: _Trial, fitting: Timing, online: Timing, solve: Timing
+) -> ChartPoint:
+    method, trained = trial.method, trial.trained
+    offline, solves_online = fitting.plus(solve.times(trained)) if trained else fitting, 0.0
+    if method.exact:
+        offline, solves_online, trained = NOTHING, 1.0, 0
+    elif method.per_design:
+        solves_online = trained / (bench.points.designs * len(bench.scene.path.q))
+        online = online.plus(solve.times(solves_online))
+        online = online.plus(fitting.times(1.0 / len(trial.points.x)))
+        offline, trained = NOTHING, 0
+    gain = break_even(offline.median_s, online.median_s, solve.median_s)
+    return ChartPoint(
+        method.name,
+        method.family,
+        method.ours,
+        method.parameters,
+        offline,
+        online,
+        method.solves + trained,
+        solves_online,
+        *_errors(bench, trial.points, trial.hz),
+        None if method.exact else gain,
+        method.note,
+    )
+
+
+def _errors(
+    bench: Bench, points: Points, hz: Floats
+) -> tuple[Errors, Errors | None, Errors | None]:
+    """Everywhere, at the random points, and along the trajectory."""
+    start = 0 if points.n_random else bench.points.n_random
+    exact = bench.exact_hz[start : start + len(hz)]
+    n = points.n_random
+    return (
+        errors(hz, exact),
+        errors(hz[:n], exact[:n]) if n else None,
+        errors(hz[n:], exact[n:]) if len(hz) > n else None,
+    )
+
+
+def errors(hz: Floats, exact: Floats) -> Errors:
+    """Worst and root mean square of |f − f_exact|, infinite where a method gives no number."""
+    off = np.abs(hz - exact)
+    failed = ~np.isfinite(off)
+    off = np.where(failed, np.inf, off)
+    return Errors(
+        float(off.max()),
+        float(np.sqrt(np.mean(np.square(off)))),
+        float((off / exact).max()),
+        len(hz),
+        int(failed.any(axis=1).sum()),
+    )
+
+
+def spread_rows(n: int, count: int) -> NDArray[np.intp]:
+    """At most ``count`` of n rows, evenly spread."""
+    return np.unique(np.linspace(0, n - 1, min(n, count)).astype(np.intp))
+
+
+def with_floor(points: Sequence[ChartPoint], floor_hz: float) -> tuple[ChartPoint, ...]:
+    """The error of an exact method is at least the disagreement of two exact solvers."""
+    return tuple(
+        replace(p, everywhere=replace(p.everywhere, worst_hz=max(p.everywhere.worst_hz, floor_hz)))
+        if p.solves_online == 1.0
+        else p
+        for p in points
+    )

@@ -1,0 +1,188 @@
+"""What a chart holds, as plain numbers: time against accuracy of every way to get frequencies.
+
+Seconds and Hz; errors of a frequency, over all charted modes. Every number can be computed again
+from ``parameters``, the seeds and the case file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Seconds: median and quartiles of ``repeats`` runs after a warm-up.
+
+    ``repeats`` is 0 where the first run took so long that it alone was timed.
+    """
+
+    median_s: float
+    low_s: float
+    high_s: float
+    repeats: int
+
+    def times(self, factor: float) -> Timing:
+        """The same for ``factor`` as many runs."""
+        low, high = factor * self.low_s, factor * self.high_s
+        return Timing(factor * self.median_s, low, high, self.repeats)
+
+    def plus(self, other: Timing) -> Timing:
+        """One after the other; quartiles add, which overstates the spread."""
+        return Timing(
+            self.median_s + other.median_s,
+            self.low_s + other.low_s,
+            self.high_s + other.high_s,
+            min(self.repeats, other.repeats),
+        )
+
+
+NOTHING = Timing(0.0, 0.0, 0.0, 0)
+
+
+@dataclass(frozen=True)
+class Errors:
+    """|f − f_exact| over ``samples`` points; ``failed`` gave no number and are infinitely wrong."""
+
+    worst_hz: float
+    rms_hz: float
+    worst_relative: float
+    samples: int
+    failed: int
+
+
+@dataclass(frozen=True)
+class ChartPoint:
+    """One way to get the frequencies: what it costs and how wrong it is."""
+
+    method: str  # unique in its chart
+    family: str
+    ours: bool  # offered by eigassign; the others are what people do without it
+    parameters: Mapping[str, Any]
+    offline: Timing  # set-up, exact solves included
+    online: Timing  # one evaluation out of a batch of `Errors.samples`
+    solves: int  # exact eigensolves of the set-up
+    solves_online: float  # exact eigensolves of one evaluation
+    everywhere: Errors
+    random: Errors | None  # over random samples of trajectory × design box; None: not possible
+    trajectory: Errors | None  # along the trajectory at several designs
+    break_even: float | None  # evaluations from which it beats exact solves; None: never
+    note: str = ""
+
+    def total_s(self, evaluations: float) -> float:
+        """Seconds for set-up and so many evaluations."""
+        return self.offline.median_s + evaluations * self.online.median_s
+
+
+@dataclass(frozen=True)
+class Front:
+    """Methods that no other beats in cost and error at once, the most accurate first.
+
+    The cost is that of ``evaluations`` with the set-up, or of one evaluation where it is None.
+    """
+
+    name: str
+    evaluations: float | None
+    methods: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Advice:
+    """The cheapest method for an accuracy, or the most accurate for a budget."""
+
+    asked: str  # "accuracy" | "budget"
+    accuracy: float | None  # worst relative error in Hz
+    budget_s: float | None
+    evaluations: float
+    method: str | None  # None: nothing charted does it
+    parameters: Mapping[str, Any]
+    worst_relative: float | None
+    total_s: float | None
+    words: str
+
+
+@dataclass(frozen=True)
+class MeshRow:
+    """One mesh: ``elements`` in all, against the limit that the meshes converge to."""
+
+    factor: float
+    elements: int
+    n_dof: int
+    worst_hz: float
+    worst_relative: float
+    order: float | None  # observed order of convergence to the next finer mesh
+    solve: Timing  # one exact solve
+
+
+@dataclass(frozen=True)
+class DesignRun:
+    """One way to a design: time against the exact objective reached.
+
+    ``objective`` is the mean square relative error in λ by exact solves; ``trace`` the best one so
+    far against seconds, for methods that solve exactly as they go.
+    """
+
+    method: str
+    ours: bool
+    parameters: Mapping[str, Any]
+    seconds: Timing
+    solves: int
+    design: tuple[float, ...]
+    objective: float
+    max_relative: float  # distance to the target in Hz, exact
+    rms_relative: float
+    excess: float  # objective over the best one found by any method, relative to that
+    trace: tuple[tuple[float, float], ...]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Machine:
+    """What the times were measured on."""
+
+    processor: str
+    cores: int
+    system: str
+    versions: Mapping[str, str]
+    blas: str
+    threads: str
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The evaluation question that every method is put."""
+
+    modes: tuple[int, ...]
+    n_dof: int
+    features: tuple[str, ...]  # what surrogates and grids are functions of
+    random_points: int
+    designs: int
+    samples_per_design: int
+    trajectory_samples: int
+    seed: int
+    typical_hz: float
+    floor_hz: float  # disagreement of the two exact solvers: no error below it means anything
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Everything that one chart shows."""
+
+    title: str
+    case_name: str
+    case_sha256: str
+    reference: str | None
+    version: str
+    quick: bool
+    machine: Machine
+    asked: Asked
+    points: tuple[ChartPoint, ...]
+    skipped: tuple[tuple[str, str], ...]  # method, why
+    fronts: tuple[Front, ...]
+    advice: tuple[Advice, ...]
+    mesh: tuple[MeshRow, ...]
+    designs: tuple[DesignRun, ...]
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+    seconds: float

@@ -1,0 +1,73 @@
+"""How much of everything a chart tries."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from eigassign.study.chart_timing import Patience
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Sizes of the question, of the methods' ladders, and how long things may take."""
+
+    random_points: int = 600
+    designs: int = 5
+    samples_per_design: int = 152
+    orders: tuple[int, ...] = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12)
+    half_orders: tuple[int, ...] = (0, 1, 2, 3)
+    expansion_points: tuple[int, ...] = (1, 3, 5)
+    nodes: tuple[int, ...] = (2, 3, 4, 5, 6, 7, 9, 11)
+    stations: tuple[int, ...] = (5, 9, 17, 33, 65)
+    economised: tuple[tuple[int, float], ...] = (
+        (2, 1e-2), (3, 5e-3), (3, 2e-3), (4, 1e-3), (4, 5e-4), (5, 2e-4), (5, 1e-4), (6, 5e-5),
+        (7, 2e-5), (8, 1e-5), (8, 5e-6), (9, 2e-6), (10, 1e-6), (10, 5e-7), (12, 2e-7), (12, 1e-7),
+    )  # fmt: skip
+    tolerances: tuple[float, ...] = (
+        1e-2,
+        1e-3,
+        1e-4,
+        1e-5,
+        1e-6,
+        3e-7,
+        1e-7,
+        3e-8,
+        1e-8,
+        3e-9,
+        1e-9,
+    )
+    most_nodes: int = 20_000  # of a grid on which a reduced model is sampled
+    training: tuple[int, ...] = (27, 64, 125, 343)
+    kriging: int = 343  # training points up to which Kriging is fitted
+    reference_s: float = 120.0  # for the exact answers
+    training_s: float = 60.0  # for the exact solves of one method's training
+    most_dense: int = 2500  # n_dof up to which SciPy's dense solver is tried
+    most_dof: int = 40_000  # of the mesh axis
+    factors: tuple[float, ...] = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+    patience: Patience = field(default_factory=Patience)
+    objectives: int = 600  # exact evaluations of the objective in a gradient-free search
+    searched_s: float = 60.0  # exact solves of one search may take about this long
+
+
+QUICK = Effort(
+    random_points=150,
+    designs=3,
+    samples_per_design=31,
+    orders=(1, 2, 3, 4, 6, 8),
+    expansion_points=(1, 3),
+    nodes=(3, 5, 7),
+    stations=(5, 17),
+    economised=((3, 1e-2), (4, 3e-3), (6, 3e-4), (8, 1e-4), (8, 1e-5)),
+    tolerances=(1e-2, 1e-4, 1e-6, 1e-8),
+    most_nodes=3000,
+    training=(27, 125),
+    kriging=125,
+    reference_s=3.0,
+    training_s=1.0,
+    most_dense=300,
+    most_dof=2500,
+    factors=(0.5, 1.0, 2.0, 4.0),
+    patience=Patience(rounds=5, seconds=0.0, long_s=0.2),
+    objectives=60,
+    searched_s=1.0,
+)

@@ -1,0 +1,179 @@
+"""The question that every charted method is put: frequencies along the trajectory, over designs.
+
+Two sets of points, answered exactly once for all: random samples of trajectory × design box, and
+the whole trajectory at several designs. Surrogates and grids are functions of few *features* in
+[0, 1]: one for the place along the trajectory and one for each design parameter with room. The
+place is the joint coordinate itself where only one matters to any frequency, else the distance
+travelled in joint coordinates; either way the best choice for them, for they need not learn the
+poses that the trajectory never takes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.errors import CaseError
+from eigassign.study.plan import joint_map
+from eigassign.study.scene import Scene
+
+Floats = NDArray[np.float64]
+SEED = 20211204
+STILL = 1e-9  # rad or m: a coordinate that travels less stands still
+
+
+@dataclass(frozen=True, eq=False)
+class Features:
+    """From features u (n, d) in [0, 1] to x = (q, y); ``place`` (n_t,) is u_0 of the samples."""
+
+    names: tuple[str, ...]
+    place: Floats | None
+    q: Floats  # (n_t, n_q)
+    travel: Callable[[Floats], Floats]  # u_0 (n,) → q (n, n_q)
+    lower: Floats  # (n_y,)
+    upper: Floats
+    fixed_y: Floats  # what parameters without room are kept at
+
+    @property
+    def d(self) -> int:
+        """How many features there are."""
+        return len(self.names)
+
+    @cached_property
+    def free(self) -> NDArray[np.intp]:
+        """Design parameters with room."""
+        return np.flatnonzero(self.upper > self.lower)
+
+    def x(self, u: Floats) -> Floats:
+        """(n, n_x) at features u (n, d)."""
+        shift = self.d - len(self.free)
+        y = np.tile(self.fixed_y, (len(u), 1))
+        y[:, self.free] = self._spread(u[:, shift:])
+        q = self.travel(u[:, 0]) if shift else np.tile(self.q[0], (len(u), 1))
+        return np.hstack([q, y])
+
+    def _spread(self, unit: Floats) -> Floats:
+        lower, upper = self.lower[self.free], self.upper[self.free]
+        return np.asarray((1.0 - unit) * lower + unit * upper)
+
+    def at_samples(self, samples: NDArray[np.intp], y: Floats) -> tuple[Floats, Floats]:
+        """x and u at samples of the trajectory (n,) and designs (n, n_y)."""
+        lower, upper = self.lower[self.free], self.upper[self.free]
+        u = (y[:, self.free] - lower) / (upper - lower)
+        if self.place is not None:
+            u = np.hstack([self.place[samples, None], u])
+        return np.hstack([self.q[samples], y]), u
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """x (n, n_x) and u (n, d): first random ones, then ``designs`` runs along the trajectory."""
+
+    x: Floats
+    u: Floats
+    n_random: int
+    designs: int
+    n_q: int
+
+    @property
+    def q(self) -> Floats:
+        """(n, n_q)."""
+        return self.x[:, : self.n_q]
+
+    @property
+    def y(self) -> Floats:
+        """(n, n_y)."""
+        return self.x[:, self.n_q :]
+
+    def head(self, count: int) -> Points:
+        """The first points only, for methods that are too slow for all."""
+        if count >= len(self.x):
+            return self
+        return Points(self.x[:count], self.u[:count], min(self.n_random, count), 0, self.n_q)
+
+    def repeated(self, copies: int) -> Points:
+        """The same points several times over, to time large batches."""
+        x, u = np.tile(self.x, (copies, 1)), np.tile(self.u, (copies, 1))
+        return Points(x, u, len(x), 0, self.n_q)
+
+    def runs(self) -> Points:
+        """The runs along the trajectory only."""
+        return Points(self.x[self.n_random :], self.u[self.n_random :], 0, self.designs, self.n_q)
+
+
+def build_features(scene: Scene) -> Features:
+    """Raises CaseError where nothing varies that a frequency could depend on."""
+    lower, upper = scene.bounds
+    place, travel = _place(scene)
+    free = np.flatnonzero(upper > lower)
+    names = [scene.model.y_names[k] for k in free]
+    if place is not None:
+        names.insert(0, "place along the trajectory")
+    if not names:
+        message = "nothing to chart: no coordinate or design parameter changes a frequency"
+        raise CaseError((scene.file.problem("trajectory", message),))
+    return Features(
+        tuple(names),
+        place,
+        scene.path.q,
+        travel,
+        lower,
+        upper,
+        np.clip(scene.initial, lower, upper),
+    )
+
+
+def _place(scene: Scene) -> tuple[Floats | None, Callable[[Floats], Floats]]:
+    S, q = joint_map(scene.model), scene.path.q
+    s = q @ S.T
+    if not len(S) or np.ptp(s, axis=0).max() <= STILL:
+        return None, lambda u: np.tile(q[0], (len(u), 1))
+    if len(S) == 1:
+        low, reach = s.min(), np.ptp(s)
+        back, base = np.linalg.pinv(S)[:, 0], q[0]
+        return (
+            s[:, 0] - low
+        ) / reach, lambda u: base + (low + np.outer(u, [reach]) - s[0]) * back[None, :]
+    return _distance(s, q)
+
+
+def _distance(s: Floats, q: Floats) -> tuple[Floats, Callable[[Floats], Floats]]:
+    """Distance travelled, as a fraction; poses between samples by a cubic spline over it."""
+    from scipy.interpolate import CubicSpline
+
+    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(s, axis=0), axis=1))])
+    place = travelled / travelled[-1]
+    apart = np.concatenate([[True], np.diff(place) > 1e-9])
+    spline = CubicSpline(place[apart], q[apart])
+    return place, lambda u: np.asarray(spline(u))
+
+
+def build_points(
+    scene: Scene, features: Features, n_random: int, designs: int, per_design: int, seed: int = SEED
+) -> Points:
+    """Seeded points; the designs are the initial one, the expansion's, then random ones."""
+    random = np.random.default_rng(seed)
+    n_t, n_y = len(scene.path.q), len(features.lower)
+    samples = random.integers(0, n_t, n_random)
+    y = _box(features, random.random((n_random, n_y)))
+    runs = _designs(scene, features, designs, random)
+    along = np.unique(np.linspace(0, n_t - 1, min(per_design, n_t)).round().astype(np.intp))
+    samples = np.concatenate([samples, np.tile(along, designs)])
+    x, u = features.at_samples(samples, np.vstack([y, np.repeat(runs, len(along), axis=0)]))
+    return Points(x, u, n_random, designs, len(scene.model.q_names))
+
+
+def _box(features: Features, unit: Floats) -> Floats:
+    y = np.tile(features.fixed_y, (len(unit), 1))
+    y[:, features.free] = features._spread(unit[:, features.free])
+    return y
+
+
+def _designs(scene: Scene, features: Features, count: int, random: np.random.Generator) -> Floats:
+    first = np.vstack([scene.initial, scene.expansions.full.y0])
+    inside = np.clip(first, features.lower, features.upper)
+    return np.vstack([inside, _box(features, random.random((count, len(features.lower))))])[:count]

@@ -1,0 +1,201 @@
+"""The chart of one case: every method put the same question, timed, and compared."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.modal.exact import DENSE_LIMIT
+from eigassign.study import chart_methods as own
+from eigassign.study import rivals
+from eigassign.study.chart_bench import (
+    Bench,
+    chart_methods,
+    exact_frequencies,
+    spread_rows,
+    with_floor,
+)
+from eigassign.study.chart_data import Advice, Asked, ChartPoint, Front
+from eigassign.study.chart_effort import Effort
+from eigassign.study.chart_front import advise_accuracy, advise_budget, front, front_notes
+from eigassign.study.chart_methods import Method
+from eigassign.study.chart_polynomials import distilled_methods, economised_methods
+from eigassign.study.chart_question import SEED, Features, Points, build_features, build_points
+from eigassign.study.chart_timing import timed
+from eigassign.study.scene import Scene
+
+Floats = NDArray[np.float64]
+COEFFICIENTS = 5000  # largest set that is expanded for a chart
+DISTILLED = ((2, 1, False), (2, 3, True))  # half order, expansion points, guard
+ACCURACIES = (1e-2, 1e-4, 1e-6, 1e-8)
+MANY = 1000.0  # trajectories of the second front: a search over designs
+
+
+@dataclass(frozen=True)
+class Compared:
+    """All methods on one case."""
+
+    asked: Asked
+    points: tuple[ChartPoint, ...]
+    skipped: tuple[tuple[str, str], ...]
+    fronts: tuple[Front, ...]
+    advice: tuple[Advice, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What a recommendation is wanted for, beside the usual accuracies."""
+
+    accuracy: float | None = None  # worst relative error in Hz
+    budget_s: float | None = None
+    evaluations: float | None = None  # the samples of one trajectory if None
+
+
+def compare_methods(
+    scene: Scene, effort: Effort, wish: Wish, progress: Callable[[str], None]
+) -> Compared:
+    """Time against error of every method. Raises CaseError where nothing varies."""
+    features = build_features(scene)
+    solve_s = _solve_cost(scene)
+    points = _affordable_points(scene, features, effort, solve_s)
+    progress(f"solving {len(points.x)} points exactly")
+    bench = Bench(scene, points, exact_frequencies(scene, points.x), effort.patience)
+    floor = _floor(bench)
+    charted, skipped = chart_methods(
+        bench, _methods(scene, features, points, effort, solve_s), progress
+    )
+    charted = with_floor(charted, floor)
+    asked = _asked(bench, features, floor)
+    fronts = _fronts(charted, asked, wish)
+    advice = tuple(_advice(charted, asked, wish))
+    notes = (*_size_notes(scene, features, effort, solve_s), *front_notes(charted, fronts))
+    return Compared(asked, charted, skipped, fronts, advice, notes)
+
+
+def _fronts(charted: Sequence[ChartPoint], asked: Asked, wish: Wish) -> tuple[Front, ...]:
+    once = float(asked.trajectory_samples)
+    counts = {"one trajectory": once, f"{MANY:.0f} trajectories": MANY * once}
+    if wish.evaluations is not None:
+        counts[f"{wish.evaluations:g} evaluations"] = wish.evaluations
+    made = [front(charted, name, n, asked.floor_hz) for name, n in counts.items()]
+    return (*made, front(charted, "online alone", None, asked.floor_hz))
+
+
+def _advice(charted: Sequence[ChartPoint], asked: Asked, wish: Wish) -> Iterator[Advice]:
+    floor, once = asked.floor_hz / asked.typical_hz, float(asked.trajectory_samples)
+    counts = (once, MANY * once) if wish.evaluations is None else (wish.evaluations,)
+    accuracies = ACCURACIES if wish.accuracy is None else (wish.accuracy,)
+    for n in counts:
+        yield from (advise_accuracy(charted, accuracy, n, floor) for accuracy in accuracies)
+        if wish.budget_s is not None:
+            yield advise_budget(charted, wish.budget_s, n)
+
+
+def _solve_cost(scene: Scene) -> float:
+    """Seconds of one exact solve, roughly: to decide how many can be afforded."""
+    few = 1 if scene.model.n_dof > 1000 else 16
+    x = scene.model.x(scene.path.q[spread_rows(len(scene.path.q), few)], scene.initial)
+    exact_frequencies(scene, x[:1])
+    return max(timed(lambda: exact_frequencies(scene, x))[1] / len(x), 1e-6)
+
+
+def _affordable_points(scene: Scene, features: Features, effort: Effort, solve_s: float) -> Points:
+    along = effort.designs * effort.samples_per_design
+    share = min(1.0, effort.reference_s / ((effort.random_points + along) * solve_s))
+    designs = max(2, round(effort.designs * share**0.5))
+    n_random, per_design = int(effort.random_points * share), int(along * share / designs)
+    return build_points(scene, features, max(4, n_random), designs, max(4, per_design))
+
+
+def _floor(bench: Bench) -> float:
+    """How far two exact solvers disagree on a few of the points, in Hz."""
+    scene, small = bench.scene, bench.scene.model.n_dof <= DENSE_LIMIT
+    few = spread_rows(len(bench.points.x), 40 if small else 2)
+    x, modes = bench.points.x[few], scene.expansions.modes
+    if small:
+        other = own.sparse_frequencies(scene.model, x, max(modes))
+    elif scene.model.n_dof <= rivals.MOST_DENSE:
+        other = rivals.lapack_frequencies(scene.model, x, max(modes))
+    else:  # another Krylov space: one more mode
+        other = own.sparse_frequencies(scene.model, x, max(modes) + 1)
+    off = np.abs(other[:, np.array(modes) - 1] - bench.exact_hz[few])
+    return float(max(off.max(), np.finfo(float).eps * bench.exact_hz.max()))
+
+
+def _asked(bench: Bench, features: Features, floor: float) -> Asked:
+    scene, points = bench.scene, bench.points
+    return Asked(
+        modes=scene.expansions.modes,
+        n_dof=scene.model.n_dof,
+        features=features.names,
+        random_points=points.n_random,
+        designs=points.designs,
+        samples_per_design=(len(points.x) - points.n_random) // points.designs,
+        trajectory_samples=len(scene.path.q),
+        seed=SEED,
+        typical_hz=float(np.median(bench.exact_hz)),
+        floor_hz=floor,
+    )
+
+
+def _methods(
+    scene: Scene, features: Features, points: Points, effort: Effort, solve_s: float
+) -> Iterator[Method]:
+    model, modes = scene.model, scene.expansions.modes
+    most = max(4, int(effort.training_s / solve_s))  # exact solves that a training may take
+    orders = _orders(scene, effort)
+    few = max(1, min(len(points.x), int(0.2 * effort.reference_s / solve_s), 200))
+    yield from own.exact_methods(model, modes, few)
+    if model.n_dof <= min(effort.most_dense, rivals.MOST_DENSE):
+        yield rivals.lapack(model, modes, max(1, min(40, int(4e9 / model.n_dof**3))))
+    yield from own.taylor_methods(scene, orders, orders)
+    yield from own.reciprocal_methods(scene, orders)
+    yield from own.piecewise_methods(scene, orders[1:], effort.expansion_points[1:])
+    yield from own.reduced_methods(scene, effort.half_orders, effort.expansion_points)
+    ladder = [each for each in effort.economised if each[0] in orders]
+    yield from economised_methods(scene, features, ladder, effort.most_nodes)
+    yield from distilled_methods(scene, features, effort.tolerances, DISTILLED, effort.most_nodes)
+    yield from _rivals(scene, features, points, effort, most)
+
+
+def _rivals(
+    scene: Scene, features: Features, points: Points, effort: Effort, most: int
+) -> Iterator[Method]:
+    stations = [k for k in effort.stations if k * points.designs <= most]
+    yield from rivals.trajectory_methods(features, stations, len(scene.model.q_names))
+    yield from rivals.grid_methods(features, _powers(effort.nodes, features.d, most))
+    counts = [n for n in effort.training if n <= most] or [most]
+    kriging = [n for n in counts if n <= effort.kriging]
+    yield from rivals.surrogate_methods(features, counts, kriging)
+
+
+def _powers(nodes: Iterable[int], d: int, most: int) -> list[int]:
+    """Nodes an axis whose grid has at most ``most`` points."""
+    return [k for k in nodes if k**d <= most]
+
+
+def _orders(scene: Scene, effort: Effort) -> list[int]:
+    n = int(scene.model.pencil.active.sum())
+    wanted = {*effort.orders, scene.expansions.order}
+    return sorted(p for p in wanted if comb(n + p, p) <= COEFFICIENTS)
+
+
+def _size_notes(scene: Scene, features: Features, effort: Effort, solve_s: float) -> Iterator[str]:
+    """What was left out, or thinned, because it would take too long."""
+    most, d = max(4, int(effort.training_s / solve_s)), features.d
+    dropped = [k for k in effort.nodes if k**d > most]
+    if dropped:
+        yield (
+            f"grids of {', '.join(map(str, dropped))} nodes an axis in {d} dimensions are left "
+            f"out: over {most} exact solves"
+        )
+    fewer = [n for n in effort.training if n > most]
+    if fewer:
+        yield f"no surrogate is trained on over {most} exact solves: {effort.training_s:g} s"
+    if scene.model.n_dof > min(effort.most_dense, rivals.MOST_DENSE):
+        yield f"no dense solve one by one: {scene.model.n_dof} degrees of freedom"

@@ -1,0 +1,72 @@
+"""Is the motion slow? What the velocity terms of eq. (1), which the method neglects, would change.
+
+Where the links only turn, (5 Ω² + |Ω̇|)/λ_1 with the sum Ω of all joint rates bounds the order of
+the relative change of λ; where that is far below the accuracy asked for, nothing more is computed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.mechanism.velocity import velocity_terms
+from eigassign.modal.motion import motion_effect
+from eigassign.study.scene import Scene
+
+Floats = NDArray[np.float64]
+NEGLIGIBLE = 0.05  # share of validation.max_error below which the simple estimate settles it
+SHIFTS = ("prismatic", "cylindrical", "screw", "carriage", "nut")  # joints that also translate
+
+
+@dataclass(frozen=True)
+class MotionStudy:
+    """Largest relative change of an expanded mode's frequency, and the words for it."""
+
+    change: float
+    note: str
+    warning: str | None
+
+
+def study_motion(scene: Scene, lam: float) -> MotionStudy | None:
+    """Check the case's own timed trajectory; ``lam`` is its lowest exact λ, rad²/s²."""
+    if scene.trajectory is None or len(scene.trajectory.time_s) < 3:
+        return None
+    limit = scene.file.validation.max_error
+    simple = _simple_estimate(scene, lam)
+    if simple is not None and simple < NEGLIGIBLE * limit:
+        note = f"slow motion: the neglected velocity terms change λ by less than about {simple:.1g}"
+        return MotionStudy(simple, note, None)
+    return _stated(_effect(scene), limit)
+
+
+def _simple_estimate(scene: Scene, lam: float) -> float | None:
+    """(5 Ω² + |Ω̇|)/λ_1, or None where joints translate."""
+    if any(joint.type in SHIFTS for joint in scene.file.mechanism.joints.values()):
+        return None
+    time_s, q = scene.path.time_s, scene.path.q
+    rate = np.gradient(q, time_s, axis=0, edge_order=2)
+    speed = np.abs(rate).sum(axis=1)
+    push = np.abs(np.gradient(rate, time_s, axis=0, edge_order=2)).sum(axis=1)
+    return float((5.0 * speed**2 + push).max(initial=0.0) / lam)
+
+
+def _effect(scene: Scene) -> float:
+    model = scene.model
+    terms = velocity_terms(scene.file, model.poses.parameters, model.motion)
+    path, modes = scene.path, scene.expansions.modes
+    return motion_effect(
+        model.pencil, terms, path.time_s, path.q, scene.initial, tuple(modes)
+    ).worst
+
+
+def _stated(change: float, limit: float) -> MotionStudy:
+    text = f"the neglected velocity terms change a frequency by up to {100 * change:.2g} %"
+    if change <= limit:
+        return MotionStudy(change, f"speed of the motion: {text} along the trajectory", None)
+    warning = (
+        f"the motion is not slow: {text} along the trajectory, over the {100 * limit:g} % of "
+        "validation.max_error; the frequencies are those of the mechanism held still at each pose"
+    )
+    return MotionStudy(change, "", warning)

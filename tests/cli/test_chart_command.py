@@ -1,0 +1,63 @@
+"""The chart command: its folder, its JSON, its exit codes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from eigassign.charting import chart
+from eigassign.cli import main
+from eigassign.run import Options
+
+ARM = Path(__file__).parents[2] / "cases" / "two_link.yaml"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("runs")
+
+
+@pytest.mark.slow
+def test_a_quick_chart_leaves_a_whole_folder_and_advises(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "chart"
+    asked = ["--accuracy", "1e-6", "--budget", "10", "--evaluations", "5000"]
+    code = main(["chart", str(ARM), "--quick", "--json", "--quiet", "--out", str(out), *asked])
+    shown = json.loads(capsys.readouterr().out)
+    assert code == 0
+    kept = json.loads((out / "chart.json").read_text())
+    assert [p["method"] for p in shown["points"]] == [p["method"] for p in kept["points"]]
+    assert {a["evaluations"] for a in kept["advice"]} == {5000.0}
+    assert {a["asked"] for a in kept["advice"]} == {"accuracy", "budget"}
+    names = {p.name for p in out.iterdir()}
+    assert names >= {"chart.json", "report.html", "figures", "case.yaml", "run.json"}
+    assert len(list((out / "figures").glob("*.png"))) == 6
+
+
+def test_a_case_without_a_trajectory_is_refused_and_leaves_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = ARM.read_text()
+    start, end = text.index("trajectory:"), text.index("design:")
+    case = tmp_path / "still.yaml"
+    case.write_text(text[:start] + text[end:])
+    assert main(["chart", str(case), "--quick", "--out", str(tmp_path / "out")]) == 2
+    assert "trajectory" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_wishes_must_be_positive(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["chart", str(ARM), "--accuracy", "0"]) == 2
+    assert "--accuracy" in capsys.readouterr().err
+
+
+def test_a_folder_of_something_else_is_not_replaced(tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_text("keep")
+    from eigassign.errors import StorageError
+
+    with pytest.raises(StorageError):
+        chart(ARM, Options(out=tmp_path), quick=True)
+    assert (tmp_path / "mine.txt").read_text() == "keep"

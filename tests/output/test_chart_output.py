@@ -1,0 +1,159 @@
+"""What a chart leaves: figures, tables, a page and JSON, all from the same numbers."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "study"))
+
+from eigassign.output import chart_figures, chart_tables, figures
+from eigassign.output.chart_scatter import Ladder, decades, scatter
+from eigassign.output.chart_write import write_chart
+from eigassign.study.chart_data import (
+    Advice,
+    Asked,
+    Chart,
+    ChartPoint,
+    DesignRun,
+    Errors,
+    Front,
+    Machine,
+    MeshRow,
+    Timing,
+)
+
+
+def timing(seconds: float, repeats: int = 5) -> Timing:
+    return Timing(seconds, 0.9 * seconds, 1.1 * seconds, repeats)
+
+
+def point(name: str, family: str, ours: bool, online: float, worst: float) -> ChartPoint:
+    errors = Errors(worst, worst / 3.0, worst / 200.0, 100, 0)
+    return ChartPoint(
+        name, family, ours, {"order": 4, "q0": np.zeros(2)}, timing(1e-3), timing(online), 1, 0.0,
+        errors, errors, errors, 12.5,
+    )  # fmt: skip
+
+
+def design(name: str, excess: float, trace: tuple[tuple[float, float], ...] = ()) -> DesignRun:
+    return DesignRun(
+        name, not trace, {}, timing(0.1), 3, (0.1, 0.2), 1e-4 * (1 + excess), 0.02, 0.01, excess,
+        trace,
+    )  # fmt: skip
+
+
+CHART = Chart(
+    title="An <arm> & more",
+    case_name="arm",
+    case_sha256="ab" * 32,
+    reference=None,
+    version="1.0",
+    quick=True,
+    machine=Machine("CPU", 2, "Linux x86_64", {"Python": "3.12"}, "blas 1", "1"),
+    asked=Asked((1,), 23, ("place", "m1"), 30, 2, 9, 152, 7, 200.0, 1e-10),
+    points=(
+        point("exact dense", "exact", True, 1e-4, 0.0),
+        point("Taylor 4 full", "Taylor, full", True, 1e-7, 1e-1),
+        point("grid linear 4", "grid, linear", False, 2e-7, 1e-2),
+        point("hopeless", "grid, linear", False, 2e-7, np.inf),
+    ),
+    skipped=(("RBF", "too few points"),),
+    fronts=(
+        Front("one trajectory", 152.0, ("exact dense", "Taylor 4 full")),
+        Front("online alone", None, ("exact dense", "grid linear 4", "Taylor 4 full")),
+    ),
+    advice=(
+        Advice("accuracy", 1e-4, None, 152.0, "exact dense", {}, 0.0, 0.0152, "words"),
+        Advice("budget", None, 1e-9, 152.0, None, {}, None, None, "nothing"),
+    ),
+    mesh=(
+        MeshRow(1.0, 7, 23, 0.06, 3e-4, 4.0, timing(1e-4)),
+        MeshRow(2.0, 14, 44, 0.004, 2e-5, None, timing(2e-4, 0)),
+    ),
+    designs=(design("program", 0.02), design("search", 0.0, ((0.1, 1e-3), (0.4, 1e-4)))),
+    notes=("a note",),
+    warnings=(),
+    seconds=3.0,
+)
+
+
+def test_every_figure_has_a_name_of_its_own_and_is_drawn() -> None:
+    plans = chart_figures.plan(CHART)
+    files = figures.render(plans)
+    assert set(files) == {
+        "cost_one_trajectory.png", "online_alone.png", "mesh.png", "designs.png",
+    }  # fmt: skip
+    assert all(data.startswith(b"\x89PNG") for data in files.values())
+    assert figures.render(plans) == files
+
+
+def test_captions_tell_what_is_not_drawn() -> None:
+    plans = {plan.file: plan.caption for plan in chart_figures.plan(CHART)}
+    assert "1 methods are wrong by over 100 %" in plans["cost_one_trajectory.png"]
+    assert "0.06 Hz from the limit" in plans["mesh.png"]
+
+
+def test_a_chart_without_meshes_or_designs_has_no_such_figures() -> None:
+    bare = replace(CHART, mesh=(), designs=())
+    assert {p.file for p in chart_figures.plan(bare)} == {
+        "cost_one_trajectory.png",
+        "online_alone.png",
+    }
+    assert "Designs" not in [table.title for table in chart_tables.tables(bare)]
+
+
+def test_the_json_holds_every_point_and_no_numbers_that_json_has_not(tmp_path: Path) -> None:
+    write_chart(CHART, tmp_path)
+    data = json.loads((tmp_path / "chart.json").read_text(), parse_constant=pytest.fail)
+    assert [p["method"] for p in data["points"]] == [p.method for p in CHART.points]
+    assert data["points"][3]["everywhere"]["worst_hz"] is None
+    assert data["points"][1]["parameters"] == {"order": 4, "q0": [0.0, 0.0]}
+    assert data["schema"] == 1
+
+
+def test_the_page_shows_tables_and_figures_and_escapes_titles(tmp_path: Path) -> None:
+    write_chart(CHART, tmp_path)
+    page = (tmp_path / "report.html").read_text()
+    assert "An &lt;arm&gt; &amp; more" in page
+    assert page.count("data:image/png;base64") == 4
+    for word in ("What to choose", "Front: one trajectory", "All methods", "Mesh", "Machine"):
+        assert word in page
+    assert len(list((tmp_path / "figures").iterdir())) == 4
+
+
+def test_fronts_are_listed_from_the_quickest_with_whose_they_are() -> None:
+    table = chart_tables.front(CHART, CHART.fronts[1])
+    assert [row[0] for row in table.rows] == ["Taylor 4 full", "grid linear 4", "exact dense"]
+    assert [row[1] for row in table.rows] == ["yes", "no", "yes"]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(2.5, "2.5 s"), (2.5e-3, "2.5 ms"), (2.5e-6, "2.5 µs"), (2e-8, "20 ns"), (0, "0")],
+)
+def test_times_are_written_with_a_fitting_unit(seconds: float, text: str) -> None:
+    assert chart_tables.time(seconds) == text
+
+
+def test_a_time_measured_once_says_so() -> None:
+    assert chart_tables.spread(timing(2.0, 0)) == "2 s (once)"
+    assert chart_tables.spread(timing(2.0)) == "2 s (1.8 s–2.2 s)"
+
+
+def test_decades_hold_all_values_and_label_few() -> None:
+    scale = decades([np.array([3e-11, 5.0, np.inf, 0.0])])
+    assert (scale.low, scale.high) == (1e-11, 10.0)
+    assert 4 <= len(scale.labels) <= 9
+    one = decades([np.array([1.0])])
+    assert one.low < 1.0 < one.high
+
+
+def test_points_without_a_front_and_a_single_ladder_can_be_drawn() -> None:
+    sheet = scatter("t", ("x", "s"), ("y", "Hz"), [Ladder("a", np.ones(1), np.ones(1), True)])
+    assert sheet.pixels().shape[2] == 4

@@ -1,0 +1,53 @@
+"""An elbow that unfolds over 150°: no one series of mode 2 reaches from end to end."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from stress import answered, case, judged
+
+from eigassign.errors import AccuracyError
+from eigassign.modal.adaptive import reduce_adaptively
+from eigassign.modal.convergence import radius_share
+from eigassign.modal.expansion import expand
+from eigassign.modal.expansion_choice import choose_expansion
+
+ELBOW = np.deg2rad(np.linspace(20.0, 170.0, 61))
+Q = np.column_stack([np.zeros(61), ELBOW])
+X = np.column_stack([Q, np.full(61, 0.1)])
+POINT = ([0.0, np.deg2rad(40.0)], [0.1])
+
+
+@pytest.mark.parametrize("order", [4, 8, 14, 20])
+def test_a_polynomial_beyond_its_radius_is_not_believed(order):
+    model = case("wide_motion").model()
+    expansion = expand(model.pencil, *POINT, (1, 2), order=order)
+    error = judged(model, expansion, Q, [0.1])
+    assert not np.nanmax(expansion.error_estimate(Q, [0.1])) < 0.05
+    near = np.abs(ELBOW - POINT[0][1]) < 0.25
+    assert error[near].max() < 1e-3
+
+
+def test_the_coefficients_show_where_the_series_ends():
+    model = case("wide_motion").model()
+    expansion = expand(model.pencil, *POINT, (2,), order=14)
+    share = radius_share(expansion, Q, [0.1])[:, 0]
+    assert share[np.abs(ELBOW - POINT[0][1]) < 0.2].max() < 1.0
+    assert share.max() > 1.0
+
+
+def test_several_points_reach_over_it():
+    model = case("wide_motion").model()
+    chosen = choose_expansion(model.pencil, X, 1e-3, (1, 2))
+    exact = model.frequencies(Q, [0.1], 2)
+    assert np.abs(chosen.frequencies(Q, [0.1]) / exact - 1.0).max() <= 1e-3
+    assert len(chosen.expansions) > 1
+    with pytest.raises(AccuracyError, match="at sample"):
+        choose_expansion(model.pencil, X, 1e-7, (1, 2), orders=(4,))
+
+
+def test_one_reduced_model_reaches_over_it():
+    model = case("wide_motion").model()
+    found = reduce_adaptively(model.pencil, X, 1e-6, (1, 2))
+    assert judged(model, found.reduced, Q, [0.1]).max() <= 1e-6
+    assert answered(found.reduced, Q, [0.1]) == 1.0

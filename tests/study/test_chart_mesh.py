@@ -1,0 +1,53 @@
+"""The mesh axis: beams converge with the fourth power of the element length."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenes import SHIPPED
+
+from eigassign.api import Case, load_case
+from eigassign.charting import _meshes, refined
+from eigassign.study.chart_mesh import mesh_axis
+from eigassign.study.chart_timing import Patience
+
+ONCE = Patience(rounds=1, seconds=0.0)
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory: pytest.TempPathFactory) -> Case:
+    path: Path = tmp_path_factory.mktemp("arm") / "arm.yaml"
+    path.write_text(SHIPPED)
+    return load_case(path)
+
+
+def test_links_are_refined_together_and_keep_an_element(arm: Case) -> None:
+    assert refined(arm.file, 2.0)[1] == (8, 6)
+    assert refined(arm.file, 0.5)[1] == (2, 2)
+    assert refined(arm.file, 0.01)[1] == (1, 1)
+    assert arm.file.mechanism.links["forearm"].elements == 3
+
+
+def test_errors_fall_with_the_fourth_power_and_the_own_mesh_is_that_far_off(arm: Case) -> None:
+    meshes = list(_meshes(arm, (1.0, 2.0, 4.0, 8.0)))
+    x = np.array([[1.817, 5.312, 0.125, 0.125]])
+    rows = mesh_axis(meshes, x, (1,), 10_000, ONCE)
+    assert [row.elements for row in rows] == [7, 14, 28, 56]
+    # a known figure: 193.1130 Hz on the paper's mesh, 193.0537 Hz converged
+    assert rows[0].worst_hz == pytest.approx(193.1130 - 193.0537, abs=1e-4)
+    assert rows[0].order == pytest.approx(4.0, abs=0.1)
+    assert rows[1].order == pytest.approx(4.0, abs=0.1)
+    assert rows[-1].order is None
+
+
+def test_meshes_that_would_be_too_large_are_left_out(arm: Case) -> None:
+    x = np.array([[1.817, 5.312, 0.125, 0.125]])
+    rows = mesh_axis(list(_meshes(arm, (1.0, 2.0, 4.0))), x, (1,), 50, ONCE)
+    assert [row.factor for row in rows] == [1.0, 2.0]
+    assert mesh_axis(list(_meshes(arm, (1.0, 2.0))), x, (1,), 30, ONCE) == ()
+
+
+def test_factors_that_give_the_same_mesh_count_once(arm: Case) -> None:
+    assert [mesh.factor for mesh in _meshes(arm, (0.01, 0.02, 1.0))] == [0.01, 1.0]

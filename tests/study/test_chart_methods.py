@@ -1,0 +1,184 @@
+"""Every charted method answers the same question, at the price it states."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chart_scenes import TINY
+from scenes import SHIPPED, scene_of
+
+from eigassign.errors import CaseError
+from eigassign.modal import exact
+from eigassign.modal.expansion import expand
+from eigassign.study import chart_methods as own
+from eigassign.study import rivals
+from eigassign.study.chart_bench import errors, exact_frequencies
+from eigassign.study.chart_polynomials import distilled_methods, economised_methods
+from eigassign.study.chart_question import Points, build_features, build_points
+from eigassign.study.chart_study import Compared, Wish, compare_methods
+from eigassign.study.scene import Scene
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    return scene_of(tmp_path_factory.mktemp("arm"), SHIPPED)
+
+
+@pytest.fixture(scope="module")
+def points(scene: Scene) -> Points:
+    return build_points(scene, build_features(scene), 25, 2, 7)
+
+
+@pytest.fixture(scope="module")
+def compared(scene: Scene) -> Compared:
+    return compare_methods(scene, TINY, Wish(budget_s=10.0, evaluations=1e4), lambda line: None)
+
+
+class Spy:
+    """Counts the exact eigenproblems solved while it watches."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.solved = 0
+        solve = exact._solve
+
+        def counted(pencil, theta, count, vectors):  # type: ignore[no-untyped-def]
+            self.solved += theta.shape[1]
+            return solve(pencil, theta, count, vectors)
+
+        monkeypatch.setattr(exact, "_solve", counted)
+
+
+def _methods(scene: Scene) -> Iterator[own.Method]:
+    features = build_features(scene)
+    yield from own.taylor_methods(scene, [2], [3])
+    yield from own.reciprocal_methods(scene, [2])
+    yield from own.piecewise_methods(scene, [2], [3])
+    yield from own.reduced_methods(scene, [0, 1, 2], [1, 3])
+    yield from economised_methods(scene, features, [(3, 1e-2)], 1000)
+    yield from distilled_methods(scene, features, [1e-2], [(2, 1, False), (2, 3, True)], 1000)
+
+
+def test_methods_solve_exactly_as_often_as_they_say(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for method in _methods(scene):
+        with monkeypatch.context() as patch:
+            spy = Spy(patch)
+            method.fit(np.zeros((0, 1)))
+            assert spy.solved == method.solves, method.name
+
+
+def test_evaluating_solves_nothing_exactly(
+    scene: Scene, points: Points, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = [method.fit(np.zeros((0, 1))) for method in _methods(scene)]
+    spy = Spy(monkeypatch)
+    for evaluate in made:
+        assert evaluate(points).shape == (len(points.x), 1)
+    assert spy.solved == 0
+
+
+def test_the_reciprocal_series_has_the_same_derivatives(scene: Scene) -> None:
+    full = scene.expansions.full
+    made = expand(scene.model.pencil, full.q0, full.y0, (1,), order=4)
+    off = []
+    for h in (0.02, 0.01):
+        x = np.hstack([full.q0 + np.array([0.0, h]), full.y0 + h])[None]
+        there = Points(x, x, 1, 0, 2)
+        hz = exact_frequencies(scene, x)
+        off.append(float(np.abs(own.reciprocal(made)(there) - hz)[0, 0]))
+    assert np.log2(off[0] / off[1]) == pytest.approx(5.0, abs=0.5)  # order p + 1
+
+
+def test_all_exact_solvers_agree(scene: Scene, points: Points) -> None:
+    hz = exact_frequencies(scene, points.x)
+    for method in (
+        *own.exact_methods(scene.model, (1,), None),
+        rivals.lapack(scene.model, (1,), 9),
+    ):
+        found = method.fit(np.zeros((0, 1)))(points)
+        np.testing.assert_allclose(found, hz, rtol=1e-10)
+
+
+def test_several_modes_have_a_column_each(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, SHIPPED.replace("modes: [1]", "modes: [1, 2]"))
+    features = build_features(scene)
+    points = build_points(scene, features, 10, 2, 5)
+    exact_hz = exact_frequencies(scene, points.x)
+    assert exact_hz.shape == (20, 2)
+    rivals_too = rivals.surrogate_methods(features, [27], [27])
+    for method in (*_methods(scene), *rivals_too, *rivals.grid_methods(features, [4])):
+        x = method.train(points)
+        assert method.fit(exact_frequencies(scene, x) if len(x) else x)(points).shape == (20, 2)
+
+
+def test_errors_count_what_gives_no_number_as_infinitely_wrong() -> None:
+    found = errors(np.array([[1.0], [np.nan], [4.0]]), np.array([[1.0], [2.0], [2.0]]))
+    assert (found.worst_hz, found.failed, found.samples) == (np.inf, 1, 3)
+    found = errors(np.array([[1.0], [4.0]]), np.array([[1.0], [2.0]]))
+    assert found.worst_hz == 2.0
+    assert found.rms_hz == pytest.approx(2.0**0.5)
+    assert found.worst_relative == 1.0
+
+
+def test_every_method_of_a_chart_has_numbers_and_a_name_of_its_own(compared: Compared) -> None:
+    names = [p.method for p in compared.points]
+    assert len(set(names)) == len(names)
+    assert not compared.skipped
+    for p in compared.points:
+        assert np.isfinite(p.everywhere.worst_hz), p.method
+        assert p.everywhere.rms_hz <= p.everywhere.worst_hz
+        assert p.online.median_s > 0.0
+        assert p.trajectory is not None or p.solves_online == 1.0
+
+
+def test_a_chart_shows_what_is_known_of_the_arm(compared: Compared) -> None:
+    by_name = {p.method: p for p in compared.points}
+    worst = {name: p.everywhere.worst_relative for name, p in by_name.items()}
+    assert worst["Taylor 4 full"] < worst["Taylor 2 full"] < worst["Taylor 1 full"] < 0.03
+    assert worst["1/λ 4 full"] < worst["Taylor 4 full"]
+    assert worst["reduced m = 2, 1 point"] < 1e-9
+    assert worst["grid Chebyshev 4"] < worst["grid linear 4"]
+    assert by_name["stations cubic 5"].random is None
+    assert by_name["stations cubic 5"].solves_online == pytest.approx(5 / 152)
+    assert by_name["grid linear 4"].solves == 64
+
+
+def test_fronts_and_advice_are_made_of_charted_methods(compared: Compared) -> None:
+    names = {p.method for p in compared.points}
+    assert {f.evaluations for f in compared.fronts} == {152.0, 152000.0, 1e4, None}
+    for each in compared.fronts:
+        assert set(each.methods) <= names
+        assert not any(name.startswith("stations") for name in each.methods)
+    assert {a.asked for a in compared.advice} == {"accuracy", "budget"}
+    assert all(a.method in names for a in compared.advice if a.method)
+
+
+def test_a_point_can_be_computed_again_from_its_parameters(
+    scene: Scene, compared: Compared
+) -> None:
+    features, asked = build_features(scene), compared.asked
+    points = build_points(
+        scene, features, asked.random_points, asked.designs, asked.samples_per_design, asked.seed
+    )
+    hz = exact_frequencies(scene, points.x)
+    for p in compared.points:
+        if p.family in ("Taylor, full", "Taylor, linearised"):
+            how = p.parameters
+            made = expand(
+                scene.model.pencil, how["q0"], how["y0"], asked.modes, how["order"],
+                how["linear_in_y"],
+            )  # fmt: skip
+            off = np.abs(made.frequencies(points.q, points.y) - hz).max()
+            assert off == pytest.approx(p.everywhere.worst_hz, rel=1e-9)
+
+
+def test_a_case_without_trajectory_cannot_be_charted(tmp_path: Path) -> None:
+    from scenes import HEAD
+
+    scene = scene_of(tmp_path, HEAD + "expansion: {q: [1.8, 5.3]}\n")
+    with pytest.raises(CaseError, match="trajectory"):
+        build_features(scene)

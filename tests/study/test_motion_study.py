@@ -1,0 +1,48 @@
+"""The speed of the motion is judged, and said when it is not slow."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eigassign.api import load_case
+from eigassign.run import solve_case
+
+CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"
+
+
+def timed(tmp_path: Path, duration: str) -> Path:
+    text = CASE.read_text(encoding="utf-8").replace("duration: 1 s", f"duration: {duration}")
+    path = tmp_path / "timed.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_the_papers_motion_is_slow_and_that_is_noted() -> None:
+    findings = solve_case(load_case(CASE)).findings
+    assert any(note.startswith("slow motion") for note in findings.notes)
+    assert not any("not slow" in warning for warning in findings.warnings)
+
+
+@pytest.mark.parametrize(("duration", "expected"), [("8 ms", True), ("200 ms", False)])
+def test_a_motion_in_milliseconds_is_warned_of(
+    tmp_path: Path, duration: str, expected: bool
+) -> None:
+    findings = solve_case(load_case(timed(tmp_path, duration))).findings
+    assert any("not slow" in warning for warning in findings.warnings) is expected
+
+
+def test_the_effect_grows_with_the_square_of_the_speed(tmp_path: Path) -> None:
+    from eigassign.mechanism.velocity import velocity_terms
+    from eigassign.modal.motion import motion_effect
+
+    case = load_case(CASE)
+    model, path = case.model(), case.trajectory
+    terms = velocity_terms(case.file, model.poses.parameters, model.motion)
+    effects = [
+        motion_effect(model.pencil, terms, path.time_s * t, path.q, np.zeros(2), (1, 2), 5).worst
+        for t in (0.2, 0.1)
+    ]
+    assert effects[1] / effects[0] == pytest.approx(4.0, rel=0.02)

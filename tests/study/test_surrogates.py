@@ -1,0 +1,146 @@
+"""Surrogates: exact where they must be, and converging as they should."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from eigassign.errors import UsageError
+from eigassign.study.surrogates import (
+    adaptive,
+    along,
+    chebyshev,
+    chebyshev_nodes,
+    equal_nodes,
+    grid_interpolation,
+    grid_points,
+    radial_basis,
+    response_surface,
+    spread_points,
+    tensor_points,
+    thinned_through,
+)
+from eigassign.study.surrogates_kriging import _likelihood, fit_kriging
+
+Floats = NDArray[np.float64]
+AT = np.random.default_rng(5).random((300, 3))
+
+
+def cubic(u: Floats) -> Floats:
+    x, y, z = u.T
+    return np.column_stack([1.0 + x - 2 * y * z + x**2 * y, z**3 - x * y * z])
+
+
+def smooth(u: Floats) -> Floats:
+    return np.exp(-u[:, :1]) * np.cos(2.0 * u[:, 1:2]) + 1.0 / (2.0 + u[:, 2:])
+
+
+def test_a_response_surface_of_the_right_degree_is_exact() -> None:
+    u = spread_points(40, 3)
+    np.testing.assert_allclose(response_surface(u, cubic(u), 3)(AT), cubic(AT), atol=1e-12)
+    assert np.abs(response_surface(u, cubic(u), 2)(AT) - cubic(AT)).max() > 1e-3
+
+
+def test_a_response_surface_needs_as_many_points_as_coefficients() -> None:
+    u = spread_points(9, 3)
+    with pytest.raises(UsageError, match="10 coefficients from 9"):
+        response_surface(u, cubic(u), 2)
+
+
+def test_a_chebyshev_polynomial_of_the_right_degree_is_exact() -> None:
+    u = tensor_points([4, 3, 4])
+    f = cubic(u)
+    np.testing.assert_allclose(chebyshev([4, 3, 4], f)(AT), cubic(AT), atol=1e-13)
+    made = thinned_through(cubic, [4, 3, 4], 1e-12, 100)
+    np.testing.assert_allclose(made(AT), cubic(AT), atol=1e-10)
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6, 1e-8, 1e-10])
+def test_an_adaptive_polynomial_meets_its_tolerance(tolerance: float) -> None:
+    made, used = adaptive(smooth, 3, tolerance, 10_000)
+    # the tolerance is of sums of coefficients along the axes: mixed terms may add as much again
+    assert np.abs(made(AT) - smooth(AT)).max() <= 5.0 * tolerance * smooth(AT).max()
+    assert used > 50
+
+
+def test_a_grid_that_would_be_too_large_is_refused() -> None:
+    with pytest.raises(UsageError, match="is over 10"):
+        adaptive(smooth, 3, 1e-8, 10)
+
+
+@pytest.mark.parametrize(("kind", "rate"), [(False, 2.0), (True, 4.0)], ids=["linear", "cubic"])
+def test_grid_interpolation_converges_as_it_should(kind: bool, rate: float) -> None:
+    off = []
+    for k in (9, 17):
+        f = smooth(grid_points(equal_nodes(k), 3))
+        off.append(np.abs(grid_interpolation(k, 3, f, kind)(AT) - smooth(AT)).max())
+    assert math.log2(off[0] / off[1]) == pytest.approx(rate, abs=0.5)
+
+
+@pytest.mark.parametrize(("kind", "rate"), [(False, 2.0), (True, 4.0)], ids=["linear", "cubic"])
+def test_interpolation_along_one_variable_converges_as_it_should(kind: bool, rate: float) -> None:
+    off = []
+    for k in (17, 33):
+        t = equal_nodes(k)
+        made = along(t, np.column_stack([np.sin(3.0 * t), np.exp(t)]), kind)
+        exact = np.column_stack([np.sin(3.0 * AT[:, 0]), np.exp(AT[:, 0])])
+        off.append(np.abs(made(AT[:, :1]) - exact).max())
+    assert math.log2(off[0] / off[1]) == pytest.approx(rate, abs=0.6)
+
+
+@pytest.mark.parametrize("kernel", ["thin_plate_spline", "quintic"])
+def test_radial_basis_functions_interpolate(kernel: str) -> None:
+    u = spread_points(60, 3)
+    made = radial_basis(u, smooth(u), kernel)  # type: ignore[arg-type]
+    np.testing.assert_allclose(made(u), smooth(u), atol=1e-9)
+    assert np.abs(made(AT) - smooth(AT)).max() < 0.06
+
+
+def test_radial_basis_functions_refuse_too_few_points() -> None:
+    u = spread_points(5, 3)
+    with pytest.raises(UsageError, match="radial"):
+        radial_basis(u, smooth(u), "quintic")
+
+
+def test_kriging_interpolates_and_knows_where_it_does_not_know() -> None:
+    u = spread_points(60, 3)
+    model = fit_kriging(u, smooth(u)[:, 0])
+    np.testing.assert_allclose(model(u), smooth(u)[:, 0], atol=1e-6)
+    assert np.abs(model(AT) - smooth(AT)[:, 0]).max() < 2e-3
+    far = np.full((1, 3), 3.0)
+    assert model.deviation(u).max() < 1e-2 * model.deviation(far)[0]
+
+
+def test_kriging_of_a_constant_is_the_constant() -> None:
+    u = spread_points(12, 2)
+    np.testing.assert_allclose(fit_kriging(u, np.full(12, 7.0))(AT[:, :2]), 7.0, rtol=1e-9)
+
+
+def test_the_likelihood_has_the_gradient_it_says() -> None:
+    u = spread_points(15, 3)
+    f = smooth(u)[:, 0] - smooth(u).mean()
+    squares = np.square(u[:, None, :] - u[None, :, :])
+    log_l = np.log(np.array([0.3, 0.5, 0.4]))
+    _, slope = _likelihood(squares, f, log_l)
+    for k in range(3):
+        step = np.zeros(3)
+        step[k] = 1e-5
+        up, down = (_likelihood(squares, f, log_l + s * step)[0] for s in (1, -1))
+        assert slope[k] == pytest.approx((up - down) / 2e-5, rel=1e-5)
+
+
+def test_training_points_fill_the_box_evenly_and_hold_its_corners() -> None:
+    u = spread_points(200, 3)
+    assert u.shape == (200, 3)
+    assert u.min() >= 0.0
+    assert u.max() <= 1.0
+    assert {tuple(c) for c in grid_points(np.array([0.0, 1.0]), 3)} <= {tuple(row) for row in u}
+    counts = np.histogramdd(u[8:], bins=2, range=[(0, 1)] * 3)[0]
+    assert counts.min() >= 20  # of 192 in 8 octants
+
+
+def test_chebyshev_nodes_include_both_ends() -> None:
+    assert chebyshev_nodes(5)[[0, 2, 4]] == pytest.approx([0.0, 0.5, 1.0])
