@@ -12,7 +12,7 @@ from scipy.io import mmwrite
 from spatial_cases import ALLOY, built
 from spatial_oracle import Tree, element, section
 
-from eigassign.errors import MechanismError
+from eigassign.errors import CaseError, MechanismError
 
 FLAT = {"shape": "rectangle", "width": 0.02, "height": 0.03}
 LENGTH, ELEMENTS = 0.6, 8
@@ -153,12 +153,21 @@ def good(tmp_path: Path) -> Tree:
     return part("planar", write(tmp_path, "npy", *exported("planar")))
 
 
-@pytest.mark.parametrize("dofs", [[24, 25, 27], [24, 25, 25], [-1, 25, 26], [0, 1, 2]])
-def test_dof_numbers_outside_the_matrix_or_twice_are_refused(
-    tmp_path: Path, good: Tree, dofs: list[int]
+def test_dof_numbers_outside_the_matrix_are_refused(tmp_path: Path, good: Tree) -> None:
+    good["nodes"]["end"]["dofs"] = [24, 25, 27]
+    refused(tmp_path, good, "nodes", "different and within 0 to 26")
+
+
+@pytest.mark.parametrize(
+    ("dofs", "message"),
+    [([24, 25, 25], "belongs to"), ([-1, 25, 26], ">= 0"), ([0, 1, 2], "belongs to node 'start'")],
+)
+def test_dof_numbers_that_cannot_be_are_refused_in_the_file(
+    tmp_path: Path, good: Tree, dofs: list[int], message: str
 ) -> None:
     good["nodes"]["end"]["dofs"] = dofs
-    refused(tmp_path, good, "nodes", "different and within 0 to 26")
+    with pytest.raises(CaseError, match=message):
+        built(arm("planar", {"part": good}), tmp_path / "case.yaml")
 
 
 @pytest.mark.parametrize("dofs", [[25, 24, 26], [24, 26, 25], [21, 22, 23], [24, 22, 26]])
@@ -199,7 +208,8 @@ def test_a_matrix_that_is_not_square_is_refused(tmp_path: Path) -> None:
 
 def test_a_missing_file_is_refused_by_name(tmp_path: Path, good: Tree) -> None:
     good["mass"] = "gone.mtx"
-    refused(tmp_path, good, "mass", r"cannot read gone\.mtx")
+    with pytest.raises(CaseError, match=r"links\.part\.mass: no such file.*gone\.mtx"):
+        built(arm("planar", {"part": good}), tmp_path / "case.yaml")
 
 
 def test_a_file_that_is_no_matrix_is_refused(tmp_path: Path, good: Tree) -> None:

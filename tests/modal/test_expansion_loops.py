@@ -23,7 +23,7 @@ from eigassign.series.lower_set import total_degree
 
 
 def with_design(tree: Tree, **paths: str) -> Tree:
-    design = {n: {"parameter": p, "min": 0.0, "max": 1e30} for n, p in paths.items()}
+    design = {n: {"parameter": p, "min": 1e-9, "max": 1e15} for n, p in paths.items()}
     return {**tree, "design": design}
 
 
