@@ -146,7 +146,7 @@ def _slenderness(document: Document, link: BeamLink, path: KeyPath) -> Iterator[
             path,
             f"length is {at_most}{slenderness:.2g} times the depth of section "
             f"{name!r}; below {SLENDER:g} the Euler–Bernoulli beam, which neglects "
-            "shear, is doubtful: shear: true",
+            "shear, is doubtful; write shear: true",
         )
 
 
