@@ -97,6 +97,7 @@ class Case:
                 model.q_names,
                 lambda tip: tip_chain(model.poses, model.motion, tip, self.initial_design),
                 self.file.path.parent,
+                self.file.coordinate_units,
             )
 
     def _refuse_moving_lengths(self) -> None:

@@ -25,9 +25,10 @@ def point(case: Path, q: str | None, y: str | None) -> tuple[Numbers, Numbers]:
 
 
 def coordinates(case: CaseFile, text: str | None) -> Numbers:
-    """q in rad, one value per coordinate of the case; raises UsageError."""
-    names = list(case.coordinates)
-    return None if text is None else _read(text, "--q", names, [quantity("angle")] * len(names))
+    """q in rad or m, one value per coordinate of the case; raises UsageError."""
+    kinds = {"rad": quantity("angle"), "m": quantity("length")}
+    quantities = [kinds[unit] for unit in case.coordinate_units]
+    return None if text is None else _read(text, "--q", list(case.coordinates), quantities)
 
 
 def design(case: CaseFile, text: str | None) -> Numbers:

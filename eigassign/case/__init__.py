@@ -1,21 +1,37 @@
 """YAML case file → validated, frozen, SI-valued objects; every error with file:line:column."""
 
 from eigassign.case.casefile import CaseFile
-from eigassign.case.json_schema import json_schema
-from eigassign.case.loading import load, parse
-from eigassign.case.mechanism_parts import (
-    BareSection,
-    Body,
-    CircleSection,
-    Coordinate,
-    Drive,
+from eigassign.case.joint_parts import (
+    CarriageJoint,
+    CylindricalJoint,
     FixedJoint,
     Joint,
-    Link,
-    Material,
-    Mechanism,
-    RectangleSection,
+    NutJoint,
+    PrismaticJoint,
     RevoluteJoint,
+    ScrewJoint,
+    SphericalJoint,
+    UniversalJoint,
+)
+from eigassign.case.json_schema import json_schema
+from eigassign.case.link_parts import (
+    BeamLink,
+    FrameBeam,
+    FrameLink,
+    Link,
+    RigidLink,
+    SuperelementLink,
+    SuperelementNode,
+    Taper,
+)
+from eigassign.case.loading import load, parse
+from eigassign.case.mechanism_parts import Assembly, Body, Coordinate, Drive, Mechanism, Spring
+from eigassign.case.section_parts import (
+    BareSection,
+    CircleSection,
+    IProfileSection,
+    Material,
+    RectangleSection,
     Section,
     TubeSection,
 )
@@ -34,31 +50,48 @@ from eigassign.case.study_parts import (
 )
 
 __all__ = [
+    "Assembly",
     "BareSection",
+    "BeamLink",
     "Body",
+    "CarriageJoint",
     "CaseFile",
     "CircleSection",
     "Constraint",
     "Coordinate",
+    "CylindricalJoint",
     "Design",
     "Drive",
     "Expansion",
     "FileTrajectory",
     "FixedJoint",
+    "FrameBeam",
+    "FrameLink",
     "FrequencyProfile",
+    "IProfileSection",
     "Joint",
     "Link",
     "Material",
     "Mechanism",
+    "NutJoint",
     "Parameter",
+    "PrismaticJoint",
     "RectangleSection",
     "RevoluteJoint",
+    "RigidLink",
     "SampledTrajectory",
+    "ScrewJoint",
     "Section",
+    "SphericalJoint",
+    "Spring",
+    "SuperelementLink",
+    "SuperelementNode",
+    "Taper",
     "Target",
     "TipTrajectory",
     "Trajectory",
     "TubeSection",
+    "UniversalJoint",
     "Validation",
     "json_schema",
     "load",

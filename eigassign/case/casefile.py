@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from eigassign.case.document import Document
+from eigassign.case.freedoms import freedom_of
 from eigassign.case.mechanism_parts import Coordinate, Mechanism
 from eigassign.case.study_parts import Design, Expansion, Target, Trajectory, Validation
 from eigassign.case.yaml_reader import KeyPath, Mark, dotted
@@ -51,6 +52,13 @@ class CaseFile:
             path = ("mechanism", *path)  # paths of properties start below `mechanism`
         mark = self.marks.find(path)
         return Problem(str(self.path), mark.line, mark.column, dotted(path), message)
+
+    @property
+    def coordinate_units(self) -> tuple[str, ...]:
+        """SI unit of each coordinate, in the order of q: rad, or m where its joint slides."""
+        joints = self.mechanism.joints
+        moved = (freedom_of(joints[c.joint].type, c.component) for c in self.coordinates.values())
+        return tuple("m" if freedom == "translation" else "rad" for freedom in moved)
 
     def resolved(self) -> str:
         """The case as canonical YAML: SI values, defaults filled in; reads back equal."""

@@ -6,19 +6,16 @@ objects: `design` with its constraints apart, the trajectory file as an absolute
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from eigassign.case.mechanism_parts import ANGLE
+from eigassign.case.freedoms import ANY, coordinate_quantities, freedoms, of_freedom
+from eigassign.case.mechanism_context import coordinates, found, mechanism
 from eigassign.case.properties import NoPropertyError, Property, find
 from eigassign.case.quantity import Quantity
-from eigassign.case.suggest import shown
+from eigassign.case.si import si
 from eigassign.case.tree import Tree, at, items, names, parameters, text
-from eigassign.case.units import QuantityError, read
 from eigassign.case.yaml_reader import Finding, KeyPath
-
-_ANY = Quantity()  # dimension unknown because of an error elsewhere
 
 
 def in_context(tree: Tree, folder: Path) -> tuple[Tree, list[Finding]]:
@@ -30,9 +27,10 @@ def in_context(tree: Tree, folder: Path) -> tuple[Tree, list[Finding]]:
         changed["design"] = _design(tree, properties, findings)
     _convert(changed, "expansion", _expansion(tree, properties, findings))
     _convert(changed, "trajectory", _trajectory(tree, folder, findings))
-    span, path = at(tree, "validation", "q_span"), ("validation", "q_span")
-    scalar = _si(span, ANGLE, path, findings)
-    _convert(changed, "validation", {"q_span": _angles(scalar, path, findings)})
+    _convert(changed, "validation", {"q_span": _span(tree, findings)})
+    _convert(changed, "mechanism", mechanism(tree, folder, findings))
+    if isinstance(at(tree, "coordinates"), Mapping):
+        changed["coordinates"] = coordinates(tree, findings)
     return changed, findings
 
 
@@ -62,7 +60,7 @@ def _design(
     changed: dict[str, object] = {}
     for name, body in parameters(tree):
         prop, known = properties[name], len(findings)
-        changed[name] = _bounds(body, prop.quantity if prop else _ANY, ("design", name), findings)
+        changed[name] = _bounds(body, prop.quantity if prop else ANY, ("design", name), findings)
         if prop and len(findings) == known:
             findings.extend(_outside(prop, changed[name], name, at(body, "parameter")))
     constraints = at(tree, "design", "constraints")
@@ -85,7 +83,7 @@ def _bounds(
         return body
     known = len(findings)
     pairs = [(key, body[key]) for key in ("min", "max") if key in body]
-    values = {key: _si(value, quantity, (*path, key), findings) for key, value in pairs}
+    values = {key: si(value, quantity, (*path, key), findings) for key, value in pairs}
     if len(findings) > known:
         values = dict.fromkeys(values, 0.0)
     return {**body, **values}
@@ -97,7 +95,7 @@ def _of_sum(body: object, properties: Mapping[str, Property | None]) -> Quantity
     dimensions = {t.quantity.dimension for t in terms if t}
     if len(dimensions) > 1:
         return None
-    return Quantity(dimensions.pop()) if dimensions else _ANY
+    return Quantity(dimensions.pop()) if dimensions else ANY
 
 
 def _outside(prop: Property, body: object, name: str, path: object) -> Iterable[Finding]:
@@ -117,53 +115,59 @@ def _expansion(
 ) -> dict[str, object]:
     q, y = at(tree, "expansion", "q"), at(tree, "expansion", "y")
     if isinstance(y, tuple):
-        known = [p.quantity if p else _ANY for p in properties.values()]
-        each = [*known, *[_ANY] * len(y)]
-        y = tuple(_si(v, each[k], ("expansion", "y", k), findings) for k, v in enumerate(y))
-    return {"q": _angles(q, ("expansion", "q"), findings), "y": y}
+        known = [p.quantity if p else ANY for p in properties.values()]
+        each = [*known, *[ANY] * len(y)]
+        y = tuple(si(v, each[k], ("expansion", "y", k), findings) for k, v in enumerate(y))
+    kinds = coordinate_quantities(tree)
+    return {"q": _coordinates(q, kinds, ("expansion", "q"), findings), "y": y}
+
+
+def _span(tree: Tree, findings: list[Finding]) -> object:
+    span, path = at(tree, "validation", "q_span"), ("validation", "q_span")
+    kinds = coordinate_quantities(tree)
+    return _coordinates(si(span, _common(kinds), path, findings), kinds, path, findings)
 
 
 def _trajectory(tree: Tree, folder: Path, findings: list[Finding]) -> dict[str, object]:
-    body = at(tree, "trajectory")
-    changed = {k: _angles(at(body, k), ("trajectory", k), findings) for k in ("q", "start")}
+    body, kinds = at(tree, "trajectory"), coordinate_quantities(tree)
+    changed = {
+        k: _coordinates(at(body, k), kinds, ("trajectory", k), findings) for k in ("q", "start")
+    }
+    if isinstance(at(body, "branch"), Mapping):
+        changed["branch"] = {
+            joint: _coordinates(
+                limits, _range(tree, joint), ("trajectory", "branch", joint), findings
+            )
+            for joint, limits in items(body, "branch")
+        }
     file = text(body, "file")
     if file is not None and at(body, "tip") is None:
-        path = os.path.abspath(folder / file)
-        changed["file"] = path
-        if not os.path.isfile(path):
-            named = path if path.isprintable() else ascii(path)
-            findings.append((("trajectory", "file"), f"no such file: {named}"))
+        changed["file"] = found(file, folder, ("trajectory", "file"), findings)
     return changed
 
 
-def _angles(value: object, path: KeyPath, findings: list[Finding]) -> object:
-    """Coordinates of revolute joints, in lists of any depth, in rad; anything else untouched."""
+def _range(tree: Tree, joint: str) -> list[Quantity]:
+    """What both ends of a joint's range are."""
+    known = freedoms(tree, joint) or ()
+    return [of_freedom(known[0] if len(known) == 1 else None)] * 2
+
+
+def _coordinates(
+    value: object, kinds: Sequence[Quantity], path: KeyPath, findings: list[Finding]
+) -> object:
+    """Text among the coordinates of a list, or of a list of lists, in SI; the rest untouched."""
     if not isinstance(value, tuple):
         return value
     return tuple(
-        _si(v, ANGLE, (*path, k), findings)
+        si(v, kinds[k] if k < len(kinds) else ANY, (*path, k), findings)
         if isinstance(v, str)
-        else _angles(v, (*path, k), findings)
+        else _coordinates(v, kinds, (*path, k), findings)
         for k, v in enumerate(value)
     )
 
 
-def _si(value: object, quantity: Quantity | None, path: KeyPath, findings: list[Finding]) -> object:
-    """``value`` in SI; zero, and a finding, if it is not such a quantity; non-scalars untouched."""
-    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
-        return value
-    try:
-        if quantity is None:
-            return _bare(value)
-        return quantity.checked(read(value, quantity.dimension), shown(value))
-    except QuantityError as error:
-        findings.append((path, str(error)))
-        return 0.0
-
-
-def _bare(value: object) -> float:
-    if isinstance(value, str):
-        raise QuantityError(
-            f"terms of different dimensions: give a plain number in SI units, got {shown(value)}"
-        )
-    return read(value, None)
+def _common(kinds: Sequence[Quantity]) -> Quantity | None:
+    """What one number for all coordinates is; None if they are not alike."""
+    if len({kind.dimension for kind in kinds}) > 1:
+        return None
+    return kinds[0] if kinds else ANY

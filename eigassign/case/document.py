@@ -7,8 +7,11 @@ from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import Field, ValidationError
 
-from eigassign.case.mechanism_parts import JOINTS, SHAPES, Coordinate, Drive, Mechanism
-from eigassign.case.quantity import Frozen, FrozenDict, Part, Quantity
+from eigassign.case.joint_parts import JOINTS
+from eigassign.case.link_parts import LINKS, Taper
+from eigassign.case.mechanism_parts import Coordinate, Drive, Mechanism
+from eigassign.case.quantity import Frozen, FrozenDict, Part, Quantity, keys_of
+from eigassign.case.section_parts import SHAPES
 from eigassign.case.study_parts import (
     Design,
     Expansion,
@@ -39,7 +42,8 @@ class Document(Part):
 
 
 _TAGGED: dict[object, type[Part]] = {
-    **{f"<{name}>": model for name, model in (SHAPES | JOINTS).items()},
+    **{f"<{name}>": model for name, model in (SHAPES | LINKS | JOINTS).items()},
+    "<taper>": Taper,
     "<drive>": Drive,
     "<tip>": TipTrajectory,
     "<file>": FileTrajectory,
@@ -85,14 +89,14 @@ def _missing(error: Any) -> _Explained:
     *parent, key = error["loc"]
     if isinstance(key, int):
         return (), f"entry {key + 1} is missing"
-    field = _model_at(parent).model_fields[key]
+    field = keys_of(_model_at(parent))[key]
     kinds = [m.dimension for m in field.metadata if isinstance(m, Quantity) and m.dimension]
     return (), "required key is missing" + "".join(f": {kind}" for kind in kinds)
 
 
 def _extra(error: Any) -> _Explained:
     *parent, key = error["loc"]
-    known = _model_at(parent).model_fields
+    known = keys_of(_model_at(parent))
     return (), f"unknown key{suggestion(key, known)}; allowed: {listed(known)}"
 
 
@@ -106,7 +110,7 @@ def _model_at(loc: Any) -> type[Part]:
         elif item in _TAGGED:
             model = _TAGGED[item]
         else:
-            annotation = model.model_fields[item].annotation
+            annotation = keys_of(model)[item].annotation
             in_container = get_origin(annotation) in (Mapping, tuple)
             model = next(_parts_in(annotation), model)
     return model
@@ -166,7 +170,8 @@ _EXPLAIN: dict[str, Any] = {
     "missing": _missing,
     "extra_forbidden": _extra,
     "choice:shape": _choice("shape", SHAPES),
-    "choice:type": _choice("type", JOINTS),
+    "choice:link": _choice("type", LINKS),
+    "choice:joint": _choice("type", JOINTS),
     "choice:motion": _motion,
     "literal_error": _literal,
     "model_type": _MAPPING,
@@ -175,6 +180,7 @@ _EXPLAIN: dict[str, Any] = {
     "mapping_type": _MAPPING,
     "is_instance_of": _MAPPING,
     "tuple_type": _LIST,
+    "bool_type": _expected("true or false"),
     "int_type": _expected("a whole number"),
     "int_from_float": _expected("a whole number"),
     "string_type": _expected("text (in quotes if need be)"),

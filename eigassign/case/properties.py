@@ -4,19 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import get_args
+from typing import get_args, get_origin
 
-from eigassign.case.mechanism_parts import SHAPES, Body, Drive, Link, Material
-from eigassign.case.quantity import Part, Quantity
+from eigassign.case.freedoms import driven
+from eigassign.case.link_parts import LINKS
+from eigassign.case.mechanism_parts import Body, Spring
+from eigassign.case.nodes import kind_of
+from eigassign.case.quantity import Part, Quantity, quantity
+from eigassign.case.section_parts import SHAPES, Material
 from eigassign.case.suggest import listed, suggestion, unknown
-from eigassign.case.tree import at, names
+from eigassign.case.tree import Tree, at, names, text
 from eigassign.case.units import QuantityError
 
-_GROUPS = ("materials", "sections", "links", "bodies")
+_GROUPS = ("materials", "sections", "links", "bodies", "springs")
+_OPTIONAL = ("materials", "sections", "bodies", "springs")
 _FORMS = (
     "expected materials.<name>.<property>, sections.<name>.<property>, links.<name>.length, "
-    "bodies.<name>.<property> or coordinates.<name>.drive.stiffness"
+    "bodies.<name>.<property>, springs.<name>.<property> or coordinates.<name>.drive.stiffness"
 )
+_FIXED = {"roll", "reduce_to", "angle"}  # real numbers that the mechanism is built with
+_HELD = quantity("rotational stiffness", above=0)
+_HELD_SLIDE = quantity("stiffness", above=0)
 
 
 class NoPropertyError(ValueError):
@@ -38,7 +46,7 @@ class Property:
             return None
 
 
-def find(tree: object, path: str) -> Property | None:
+def find(tree: Tree, path: str) -> Property | None:
     """Property at ``path`` (relative to `mechanism`, or from `coordinates` on).
 
     None where the path may be right but the file has another error there; raises NoPropertyError
@@ -55,9 +63,9 @@ def find(tree: object, path: str) -> Property | None:
     return _property(tree, group, *rest)
 
 
-def _property(tree: object, group: str, name: str, key: str) -> Property | None:
+def _property(tree: Tree, group: str, name: str, key: str) -> Property | None:
     known = at(tree, "mechanism", group)
-    if known is None and group == "bodies":
+    if known is None and group in _OPTIONAL:
         known = {}
     if isinstance(known, Mapping) and name not in known:
         raise NoPropertyError(unknown(_singular(group), name, known))
@@ -67,6 +75,8 @@ def _property(tree: object, group: str, name: str, key: str) -> Property | None:
         return None
     if key not in _quantities(model):
         raise NoPropertyError(_not_real(model, key, f"{group}.{name}"))
+    if key == "inertia" and text(tree, "mechanism", "space") == "spatial":
+        raise NoPropertyError(f"{group}.{name}.inertia is a tensor in space and cannot vary")
     return _written(model, key, body, f"{group}.{name}.{key}")
 
 
@@ -76,24 +86,40 @@ def _model(group: str, body: object) -> type[Part] | None:
     if group == "sections":
         shape = body.get("shape", "bare")
         return SHAPES.get(shape) if isinstance(shape, str) else None
-    models: dict[str, type[Part]] = {"materials": Material, "links": Link, "bodies": Body}
+    if group == "links":
+        return LINKS.get(kind_of(body) or "")
+    models: dict[str, type[Part]] = {"materials": Material, "bodies": Body, "springs": Spring}
     return models[group]
 
 
 def _quantities(model: type[Part]) -> dict[str, Quantity]:
+    """The real-valued properties that a mechanism can be built with as variables."""
     return {
         key: quantity
         for key, field in model.model_fields.items()
         for quantity in _in_metadata(field.metadata, field.annotation)
+        if key not in _FIXED
     }
 
 
 def _in_metadata(metadata: object, annotation: object) -> Iterator[Quantity]:
+    """Quantities of one number; those of the entries of a list are left out."""
     for item in metadata if isinstance(metadata, (list, tuple)) else ():
         if isinstance(item, Quantity):
             yield item
+    if get_origin(annotation) in (tuple, Mapping):
+        return
     for argument in get_args(annotation):
-        yield from _in_metadata(getattr(argument, "__metadata__", ()), None)
+        yield from _in_metadata(getattr(argument, "__metadata__", ()), _bare(argument))
+
+
+def _bare(annotation: object) -> object:
+    """The type within any ``Annotated``."""
+    return getattr(annotation, "__origin__", annotation) if _annotated(annotation) else annotation
+
+
+def _annotated(annotation: object) -> bool:
+    return hasattr(annotation, "__metadata__")
 
 
 def _not_real(model: type[Part], key: str, owner: str) -> str:
@@ -108,19 +134,29 @@ def _written(model: type[Part], key: str, body: object, path: str) -> Property:
     written = at(body, key)
     if written is None and (field.is_required() or field.default is None):
         raise NoPropertyError(f"{path} has no value in this file: give it an initial value")
+    if isinstance(written, tuple):
+        raise NoPropertyError(f"{path} is a list in this file and cannot vary: give one number")
     return Property(_quantities(model)[key], field.default if written is None else written)
 
 
-def _stiffness(tree: object, name: str) -> Property:
+def held(tree: Tree, coordinate: object) -> Quantity:
+    """What the drive stiffness of a coordinate is."""
+    freedom = driven(tree, coordinate)
+    if freedom is None:
+        return Quantity(above=0)
+    return _HELD_SLIDE if freedom == "translation" else _HELD
+
+
+def _stiffness(tree: Tree, name: str) -> Property:
     known = names(tree, "coordinates")
     if name not in known:
         raise NoPropertyError(unknown("coordinate", name, known))
-    drive = at(tree, "coordinates", name, "drive")
-    if at(drive, "stiffness") is None:
+    written = at(tree, "coordinates", name, "drive", "stiffness")
+    if written is None:
         raise NoPropertyError(
             f"coordinate {name!r} has no drive stiffness: write drive: {{stiffness: ... N m/rad}}"
         )
-    return _written(Drive, "stiffness", drive, f"coordinates.{name}.drive.stiffness")
+    return Property(held(tree, at(tree, "coordinates", name)), written)
 
 
 def _singular(group: str) -> str:

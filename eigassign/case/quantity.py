@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict
+from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from eigassign.case.suggest import shown
@@ -19,6 +20,11 @@ class Part(BaseModel):
     """Base of everything in a case file: frozen, strict, no unknown keys, built with its parent."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, defer_build=True)
+
+
+def keys_of(model: type[Part]) -> dict[str, FieldInfo]:
+    """Fields of a model by the key a file gives them with."""
+    return {field.alias or name: field for name, field in model.model_fields.items()}
 
 
 class FrozenDict(Mapping[str, V]):
@@ -75,6 +81,7 @@ class Quantity:
     dimension: Dimension | None = None
     above: float | None = None
     at_least: float | None = None
+    below: float | None = None
     elsewhere: str = ""
 
     def read(self, value: object) -> float:
@@ -90,6 +97,8 @@ class Quantity:
             raise QuantityError(f"must be > {self._limit(self.above)}, got {given}")
         if self.at_least is not None and not si >= self.at_least:
             raise QuantityError(f"must be >= {self._limit(self.at_least)}, got {given}")
+        if self.below is not None and not si < self.below:
+            raise QuantityError(f"must be < {self._limit(self.below)}, got {given}")
         return si
 
     def _limit(self, value: float) -> str:
@@ -115,6 +124,8 @@ class Quantity:
             number["exclusiveMinimum"] = self.above
         if self.at_least is not None:
             number["minimum"] = self.at_least
+        if self.below is not None:
+            number["exclusiveMaximum"] = self.below
         if self.dimension is None and not self.elsewhere:
             return number
         text = {"type": "string", "pattern": r"^\s*[-+]?(\.\d|\d).*$"}

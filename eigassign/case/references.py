@@ -1,4 +1,4 @@
-"""Names that must agree: every reference of the file, and whether the joints make one chain.
+"""Names that must agree: every reference of the file, and whether the joints make one mechanism.
 
 Works on the plain tree, so that it speaks up even where the schema has objections elsewhere.
 """
@@ -8,16 +8,30 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 
-from eigassign.case.suggest import listed, shown, unknown
+from eigassign.case.coordinate_rules import (
+    assembly,
+    branches,
+    coordinates,
+    one_for_each,
+    per_coordinate,
+)
+from eigassign.case.link_rules import links
+from eigassign.case.nodes import node_problem
+from eigassign.case.space_rules import misfits
+from eigassign.case.suggest import shown, unknown
 from eigassign.case.timing import uncovered
 from eigassign.case.topology import topology
-from eigassign.case.tree import Tree, at, entries, items, lacks, names, parameters, text
+from eigassign.case.tree import Tree, at, entries, items, names, parameters, text
 from eigassign.case.yaml_reader import Finding, KeyPath
 
 _NAME = re.compile(r"[^\W\d][\w-]{0,63}")
 _MOST_NAMED = 1000
+_MOST_INSIDE = 10_000  # nodes or beams of one frame
 _NAMED = (
-    *(("mechanism", key) for key in ("materials", "sections", "links", "joints", "bodies")),
+    *(
+        ("mechanism", key)
+        for key in ("materials", "sections", "links", "joints", "bodies", "springs")
+    ),
     ("coordinates",),
     ("design",),
     ("design", "constraints"),
@@ -29,12 +43,14 @@ def inconsistent(tree: Tree) -> Iterator[Finding]:
     yield from empty(tree)
     yield from _names(tree)
     yield from _titles(tree)
-    yield from _space(tree)
-    yield from _materials_and_sections(tree)
+    yield from misfits(tree)
+    yield from links(tree)
     yield from topology(tree)
-    yield from _bodies(tree)
-    yield from _coordinates(tree)
-    yield from _trajectory(tree)
+    yield from _on_nodes(tree)
+    yield from coordinates(tree)
+    yield from assembly(tree)
+    yield from per_coordinate(tree)
+    yield from branches(tree)
     yield from _design(tree)
     yield from _expansion(tree)
     yield from _targets(tree)
@@ -46,6 +62,9 @@ def too_many(tree: Tree) -> Iterator[Finding]:
     for place in _NAMED:
         if len(items(tree, *place)) > _MOST_NAMED:
             yield place, f"more than {_MOST_NAMED} entries"
+    for place in _inside_links(tree):
+        if len(items(tree, *place)) > _MOST_INSIDE:
+            yield place, f"more than {_MOST_INSIDE} entries: make it a superelement"
 
 
 def empty(node: object, path: KeyPath = ()) -> Iterator[Finding]:
@@ -63,7 +82,7 @@ def empty(node: object, path: KeyPath = ()) -> Iterator[Finding]:
 
 def _names(tree: Tree) -> Iterator[Finding]:
     rule = "names start with a letter and hold letters, digits, _ and - only (at most 64)"
-    for place in _NAMED:
+    for place in (*_NAMED, *_inside_links(tree)):
         for name in names(tree, *place):
             if not _NAME.fullmatch(name):
                 yield (*place, name), f"not a usable name: {rule}"
@@ -74,101 +93,43 @@ def _names(tree: Tree) -> Iterator[Finding]:
         )
 
 
+def _inside_links(tree: Tree) -> list[tuple[str, ...]]:
+    named = names(tree, "mechanism", "links")
+    return [("mechanism", "links", n, key) for n in named for key in ("nodes", "beams")]
+
+
 def _titles(tree: Tree) -> Iterator[Finding]:
     for key in ("title", "reference"):
         if not (text(tree, key) or "").isprintable():
             yield (key,), "expected one line of printable text"
 
 
-def _space(tree: Tree) -> Iterator[Finding]:
-    if at(tree, "mechanism", "space") == "spatial":
-        yield ("mechanism", "space"), "spatial mechanisms are not supported yet: only planar"
-
-
-def _materials_and_sections(tree: Tree) -> Iterator[Finding]:
-    for link, body in items(tree, "mechanism", "links"):
-        for kind in ("material", "section"):
-            name, group = text(body, kind), ("mechanism", f"{kind}s")
-            if name is not None and lacks(tree, group, name):
-                known = names(tree, *group)
-                yield ("mechanism", "links", link, kind), unknown(kind, name, known)
-
-
-def _end_of_link(tree: Tree, value: str) -> str | None:
-    """What is wrong with ``value`` as a link's end; None if nothing is."""
-    link, _, end = value.partition(".")
-    if lacks(tree, ("mechanism", "links"), link):
-        links = names(tree, "mechanism", "links")
-        return f"{unknown('link', link, links)}; expected '<link>.start' or '<link>.end'"
-    if end in ("start", "end") or at(tree, "mechanism", "links", link) is None:
-        return None
-    return f"expected '{link}.start' or '{link}.end', got {shown(value)}"
-
-
-def _bodies(tree: Tree) -> Iterator[Finding]:
+def _on_nodes(tree: Tree) -> Iterator[Finding]:
+    """Bodies, springs and the tip, which stand on nodes."""
     for name, body in items(tree, "mechanism", "bodies"):
-        place = text(body, "at")
-        message = _end_of_link(tree, place) if place is not None else None
-        if message:
-            yield ("mechanism", "bodies", name, "at"), message
+        yield from _node(tree, text(body, "at"), ("mechanism", "bodies", name, "at"))
+    for name, spring in items(tree, "mechanism", "springs"):
+        yield from _spring(tree, spring, ("mechanism", "springs", name))
+    yield from _node(tree, text(tree, "trajectory", "tip"), ("trajectory", "tip"))
 
 
-def _revolute(tree: Tree) -> list[str]:
-    joints = items(tree, "mechanism", "joints")
-    return [name for name, body in joints if at(body, "type") == "revolute"]
-
-
-def _coordinates(tree: Tree) -> Iterator[Finding]:
-    owner: dict[str, str] = {}
-    where = ("mechanism", "joints")
-    complete = True
-    for name, body in items(tree, "coordinates"):
-        joint = text(body, "joint")
-        path: KeyPath = ("coordinates", name, "joint")
-        if joint is None or lacks(tree, where, joint):
-            complete = False
-            if joint is not None:
-                yield path, unknown("joint", joint, names(tree, *where))
-        elif at(tree, "mechanism", "joints", joint, "type") == "fixed":
-            yield (
-                path,
-                f"joint {joint!r} is fixed and has no coordinate; revolute: "
-                + listed(_revolute(tree)),
-            )
-        elif joint in owner:
-            yield path, f"joint {joint!r} has a coordinate already: {owner[joint]!r}"
-        owner.setdefault(joint or "", name)
-    for joint in _revolute(tree):
-        if complete and joint not in owner:
-            message = f"no coordinate: add one under coordinates, e.g. q{len(owner) + 1}: "
-            yield ("mechanism", "joints", joint), message + f"{{joint: {joint}}}"
-
-
-def _length(tree: Tree, value: object, path: KeyPath, kind: str, known: list[str]) -> list[Finding]:
-    """A finding if list ``value`` has not one entry for each of ``known``."""
-    if not isinstance(value, tuple) or len(value) == len(known):
-        return []
-    message = f"needs {len(known)} entries, one for each {kind} ({listed(known)}); got {len(value)}"
-    return [(path, message)]
-
-
-def _trajectory(tree: Tree) -> Iterator[Finding]:
-    q = names(tree, "coordinates")
-    for k, row in enumerate(entries(tree, "trajectory", "q")):
-        yield from _length(tree, row, ("trajectory", "q", k), "coordinate", q)
-    start = at(tree, "trajectory", "start")
-    yield from _length(tree, start, ("trajectory", "start"), "coordinate", q)
-    span = at(tree, "validation", "q_span")
-    yield from _length(tree, span, ("validation", "q_span"), "coordinate", q)
-    tip = text(tree, "trajectory", "tip")
-    message = _end_of_link(tree, tip) if tip is not None else None
+def _node(tree: Tree, place: str | None, path: KeyPath) -> Iterator[Finding]:
+    message = node_problem(tree, place) if place is not None else None
     if message:
-        yield ("trajectory", "tip"), message
-    revolute = _revolute(tree)
-    for joint in names(tree, "trajectory", "branch"):
-        if joint not in revolute:
-            message = unknown("revolute joint", joint, revolute)
-            yield ("trajectory", "branch", joint), message
+        yield path, message
+
+
+def _spring(tree: Tree, spring: object, path: KeyPath) -> Iterator[Finding]:
+    ends = entries(spring, "between")
+    for k, end in enumerate(ends):
+        if isinstance(end, str) and not (k == 1 and end == "ground"):
+            hint = "write the ground second" if end == "ground" else node_problem(tree, end)
+            if hint:
+                yield (*path, "between", k), hint
+    if len(ends) == 2 and ends[0] == ends[1]:
+        yield (*path, "between"), "both ends are the same node"
+    if isinstance(spring, Mapping) and not {"translational", "rotational"} & set(spring):
+        yield path, "a spring needs translational, rotational or both"
 
 
 def _design(tree: Tree) -> Iterator[Finding]:
@@ -190,9 +151,9 @@ def _design(tree: Tree) -> Iterator[Finding]:
 
 
 def _expansion(tree: Tree) -> Iterator[Finding]:
-    q, y = names(tree, "coordinates"), [name for name, _ in parameters(tree)]
-    yield from _length(tree, at(tree, "expansion", "q"), ("expansion", "q"), "coordinate", q)
-    yield from _length(tree, at(tree, "expansion", "y"), ("expansion", "y"), "design parameter", y)
+    y = [name for name, _ in parameters(tree)]
+    path: KeyPath = ("expansion", "y")
+    yield from one_for_each(at(tree, *path), path, "design parameter", y)  # type: ignore[arg-type]
     seen: set[int] = set()
     for k, mode in enumerate(entries(tree, "expansion", "modes")):
         if not isinstance(mode, int):

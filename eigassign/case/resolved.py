@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from eigassign.case.mechanism_parts import FixedJoint, RevoluteJoint
-from eigassign.case.quantity import Part
+from eigassign.case.joint_parts import JointBase
+from eigassign.case.mechanism_parts import Spring
+from eigassign.case.quantity import Part, keys_of
 from eigassign.case.study_parts import Design
 from eigassign.case.yaml_reader import resolve
 
@@ -25,15 +26,25 @@ def plain(value: object) -> object:
         apart = {"constraints": value.constraints} if value.constraints else {}
         return plain({**value.parameters, **apart})
     if isinstance(value, Part):
-        fields = {name: getattr(value, name) for name in type(value).model_fields}
-        if isinstance(value, (RevoluteJoint, FixedJoint)) and value.base != "ground":
-            del fields["position"]
-        return plain(fields)
+        names = zip(keys_of(type(value)), type(value).model_fields, strict=True)
+        fields = {key: getattr(value, name) for key, name in names}
+        return plain({key: v for key, v in fields.items() if key not in _superfluous(value)})
     if isinstance(value, Mapping):
         return {key: plain(inner) for key, inner in value.items() if inner is not None}
     if isinstance(value, (tuple, list)):
         return [plain(inner) for inner in value]
     return value
+
+
+def _superfluous(value: Part) -> set[str]:
+    """Keys of a joint that say nothing: zero offsets from a link's node, the other space's turn."""
+    if isinstance(value, (JointBase, Spring)) and value.orientation is not None:
+        keys = {"angle"}
+    else:
+        keys = set()
+    if isinstance(value, JointBase) and value.base != "ground" and not any(value.position or ()):
+        keys.add("position")
+    return keys
 
 
 def _entry(key: str, value: object, depth: int) -> str:

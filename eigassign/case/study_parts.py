@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from eigassign.case.mechanism_parts import ANGLE, Point
+from eigassign.case.mechanism_parts import Q_VALUE
 from eigassign.case.quantity import Frozen, FrozenDict, Part, Quantity, quantity, wrong
+from eigassign.case.vectors import Vector, one_or_list
 
 DURATION = quantity("time", above=0)
 TIME = quantity("time")
 FREQUENCY = quantity("frequency", above=0)
-Q_VALUE = Quantity(elsewhere="angle (in rad when bare; or deg), or length, as its coordinate")
 Q_SPAN = Quantity(at_least=0, elsewhere=Q_VALUE.elsewhere)
 Y_VALUE = Quantity(elsewhere="quantity of the parameter's dimension (SI when bare)")
 Times: TypeAlias = Annotated[tuple[Annotated[float, TIME], ...], Field(min_length=2)]
@@ -57,18 +56,18 @@ class FileTrajectory(Part):
 class TipTrajectory(Part):
     """A path of a link's end through waypoints (m), with timing law, duration (s) and samples.
 
-    `branch` keeps relative joint angles within [low, high] (rad, modulo 2π); `start` is an optional
-    first guess of q.
+    `branch` keeps joints within [low, high] (relative angle in rad, modulo 2π; or m); `start` is an
+    optional first guess of q.
     """
 
     tip: str
-    waypoints: Annotated[tuple[Point, ...], Field(min_length=2)]
+    waypoints: Annotated[tuple[Vector, ...], Field(min_length=2)]
     path: Literal["spline", "straight"] = "spline"
     timing: Literal["quintic", "cubic", "linear"] = "quintic"
     duration: Annotated[float, DURATION] = 1.0
     samples: Annotated[int, Field(ge=2, le=100_000)] = 101
     branch: Annotated[
-        Mapping[str, tuple[Annotated[float, ANGLE], Annotated[float, ANGLE]]], Frozen
+        Mapping[str, tuple[Annotated[float, Q_VALUE], Annotated[float, Q_VALUE]]], Frozen
     ] = FrozenDict()
     start: Coordinates | None = None
 
@@ -80,9 +79,6 @@ class TipTrajectory(Part):
         for joint, (low, high) in self.branch.items():
             if not low < high:
                 raise wrong(f"low must be below high, got [{low:g}, {high:g}]", "branch", joint)
-            if high - low > 2 * math.pi:
-                message = "wider than one turn (an angle is in rad when bare; or write deg)"
-                raise wrong(message, "branch", joint)
         return self
 
 
@@ -139,12 +135,8 @@ class Design(Part):
     constraints: Annotated[Mapping[str, Constraint], Frozen] = FrozenDict()
 
 
-def _list_tag(value: object) -> str:
-    return "<list>" if isinstance(value, (tuple, list)) else "<one>"
-
-
 _Auto: TypeAlias = Annotated[Literal["auto"], Tag("<one>")]
-_WORD_OR_LIST = Discriminator(_list_tag)
+_WORD_OR_LIST = Discriminator(one_or_list)
 
 
 class Expansion(Part):
@@ -194,7 +186,7 @@ class Validation(Part):
         Annotated[
             Annotated[Annotated[float, Q_SPAN], Tag("<one>")]
             | Annotated[tuple[Annotated[float, Q_SPAN], ...], Tag("<list>")],
-            Discriminator(_list_tag),
+            Discriminator(one_or_list),
         ]
         | None
     ) = None

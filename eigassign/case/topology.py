@@ -1,104 +1,143 @@
-"""Whether the joints hold every link exactly once, in chains that start on the ground."""
+"""How the joints connect the links: from the ground outwards, some of them closing loops."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
-from eigassign.case.suggest import shown, suggestion, unknown
-from eigassign.case.tree import Tree, at, items, text
+from eigassign.case.freedoms import RIDING
+from eigassign.case.nodes import kind_of, node_problem
+from eigassign.case.suggest import listed, shown, suggestion
+from eigassign.case.tree import Tree, items, names, text
 from eigassign.case.yaml_reader import Finding, KeyPath
 
-_LOOPS = "closed loops are not supported yet"
+
+@dataclass(frozen=True)
+class Edge:
+    """A joint between two links, or the ground and a link."""
+
+    joint: str
+    base: str
+    follower: str
+
+
+@dataclass(frozen=True)
+class Walk:
+    """The joints sorted: those that place a link, those that close loops, and the rest."""
+
+    placed: frozenset[str]
+    loops: tuple[Edge, ...]
+    left: tuple[Edge, ...]  # their base is reached from nowhere
 
 
 def topology(tree: Tree) -> Iterator[Finding]:
-    """Joint ends that do not exist, links held twice, not at all, or in a ring."""
+    """Joint ends that do not exist, and links that no joint connects to the ground."""
     links = dict(items(tree, "mechanism", "links"))
     if not links:
         return
-    holder: dict[str, str] = {}  # link → joint
-    parent: dict[str, str] = {}  # link → link or "ground"
-    sound = True
     for joint, body in items(tree, "mechanism", "joints"):
-        path: KeyPath = ("mechanism", "joints", joint)
-        base, link, findings = _ends(body, path, links)
-        yield from findings
-        sound = sound and base is not None and link is not None
-        if link is not None and link in holder:
-            message = f"{_LOOPS}: link {link!r} is already held by joint {holder[link]!r}"
-            yield (*path, "follower"), message
-        elif link is not None:
-            holder[link] = joint
-            parent[link] = base or "ground"
-    if sound:
-        yield from _loose(links, holder, parent)
+        yield from _ends(tree, body, ("mechanism", "joints", joint))
+    walk = walked(tree)
+    if walk is not None:
+        yield from _loose(links, walk, edges(tree) or [])
 
 
-def _ends(
-    body: object, path: KeyPath, links: Mapping[str, object]
-) -> tuple[str | None, str | None, list[Finding]]:
-    """Base (a link or "ground") and follower of one joint, None where wrong."""
+def has_loops(tree: Tree) -> bool | None:
+    """Whether joints close loops; None where the joints are not sound."""
+    walk = walked(tree)
+    return None if walk is None else bool(walk.loops)
+
+
+def edges(tree: Tree) -> list[Edge] | None:
+    """All joints as edges; None if one of them lacks an end that exists."""
+    links = set(names(tree, "mechanism", "links"))
+    bases = links | {"ground"}
+    found = []
+    for joint, body in items(tree, "mechanism", "joints"):
+        ends = [(text(body, key) or "").partition(".")[0] for key in ("base", "follower")]
+        if ends[0] not in bases or ends[1] not in links:
+            return None
+        found.append(Edge(joint, *ends))
+    return found
+
+
+def walked(tree: Tree) -> Walk | None:
+    """Place link after link from the ground on, joints in the order of the file."""
+    waiting = edges(tree)
+    if waiting is None:
+        return None
+    placed = {"ground"}
+    while step := next((e for e in waiting if e.base in placed and e.follower not in placed), None):
+        placed.add(step.follower)
+        waiting.remove(step)
+    loops = tuple(e for e in waiting if e.base in placed)
+    return Walk(frozenset(placed), loops, tuple(e for e in waiting if e.base not in placed))
+
+
+def _ends(tree: Tree, body: object, path: KeyPath) -> Iterator[Finding]:
     base, follower = text(body, "base"), text(body, "follower")
-    findings: list[Finding] = []
-    problem = base is not None and _base_problem(base, links)
-    if problem:
-        findings.append(((*path, "base"), problem))
-    if base is not None and base != "ground" and at(body, "position") is not None:
-        findings.append(((*path, "position"), "only a joint whose base is ground has a position"))
-    held = follower is not None and _follower_problem(follower, links)
-    if held:
-        findings.append(((*path, "follower"), held))
-    return (
-        None if problem or base is None else base.partition(".")[0],
-        None if held or follower is None else follower.partition(".")[0],
-        findings,
-    )
+    if base is not None:
+        riding = text(body, "type") in RIDING
+        problem = _rail_problem(tree, base) if riding else _base_problem(tree, base)
+        if problem:
+            yield (*path, "base"), problem
+    if follower is not None:
+        problem = _follower_problem(tree, follower)
+        if problem:
+            yield (*path, "follower"), problem
+        elif base is not None and base.partition(".")[0] == follower.partition(".")[0]:
+            yield path, "base and follower are the same link: a joint connects two"
 
 
-def _base_problem(base: str, links: Mapping[str, object]) -> str | None:
-    link, _, end = base.partition(".")
-    if base == "ground" or (link in links and end in ("start", "end")):
+def _base_problem(tree: Tree, base: str) -> str | None:
+    return None if base == "ground" else node_problem(tree, base, "ground")
+
+
+def _rail_problem(tree: Tree, base: str) -> str | None:
+    """A carriage or nut rides on a whole beam, not on a node of it."""
+    links = dict(items(tree, "mechanism", "links"))
+    beams = [name for name, link in links.items() if kind_of(link) == "beam"]
+    if base in beams or (base in links and kind_of(links[base]) is None):
         return None
-    if link not in links:
-        allowed = "; expected ground, '<link>.start' or '<link>.end'"
-        return unknown("link", link, ["ground", *links]) + allowed
-    return f"expected ground, '{link}.start' or '{link}.end', got {shown(base)}"
+    hint = suggestion(base.partition(".")[0], beams)
+    return f"rides along a beam: expected one of {listed(beams)}, got {shown(base)}{hint}"
 
 
-def _follower_problem(follower: str, links: Mapping[str, object]) -> str | None:
-    link, _, end = follower.partition(".")
-    if link in links and end == "start":
-        return None
-    if link in links:
-        return f"a link is held at its start: write '{link}.start', got {shown(follower)}"
-    if link == "ground":
+def _follower_problem(tree: Tree, follower: str) -> str | None:
+    if follower.partition(".")[0] == "ground":
         return "ground cannot follow: make it the base"
-    return f"unknown link {shown(link)}{suggestion(link, links)}; expected '<link>.start'"
+    return node_problem(tree, follower)
 
 
-def _loose(
-    links: Mapping[str, object], holder: Mapping[str, str], parent: Mapping[str, str]
-) -> Iterator[Finding]:
-    """Links without a joint, and rings of links that hold each other but nothing holds."""
+def _loose(links: Mapping[str, object], walk: Walk, joints: list[Edge]) -> Iterator[Finding]:
+    """Links that the walk from the ground does not reach, each told once and at its cause."""
+    for edge in walk.left:
+        if edge.follower in walk.placed:
+            message = "hangs its base on its follower: swap base and follower"
+            yield ("mechanism", "joints", edge.joint), message
+    held = {e.follower for e in joints}
+    reversed_bases = {e.base for e in walk.left if e.follower in walk.placed}
     for link in links:
-        if link not in holder and link != "ground":
-            message = f"no joint holds this link: add one with follower: {link}.start"
+        if link not in walk.placed | held | reversed_bases | {"ground"}:
+            message = f"no joint holds this link: add one with follower: {link}.<node>"
             yield ("mechanism", "links", link), message
-    walked: set[str] = set()
+    yield from _rings(links, walk)
+
+
+def _rings(links: Mapping[str, object], walk: Walk) -> Iterator[Finding]:
+    """Links that hold each other while nothing connects them to the ground."""
+    holders: dict[str, Edge] = {}
+    for edge in walk.left:
+        holders.setdefault(edge.follower, edge)
+    seen: set[str] = set(walk.placed)
     for link in links:
-        ring = _ring(link, parent, walked)
-        if ring:
-            joints = ", ".join(sorted(holder[member] for member in ring))
-            path = ("mechanism", "joints", holder[ring[0]])
-            yield path, f"{_LOOPS}: {joints} form a ring that no joint connects to the ground"
-
-
-def _ring(link: str, parent: Mapping[str, str], walked: set[str]) -> list[str]:
-    """Links that meet again when walking from ``link`` towards the ground over new ones only."""
-    path: dict[str, None] = {}
-    while link in parent and link not in walked:
-        walked.add(link)
-        path[link] = None
-        link = parent[link]
-    chain = list(path)
-    return chain[chain.index(link) :] if link in path else []
+        chain: list[str] = []
+        while link in holders and link not in seen:
+            seen.add(link)
+            chain.append(link)
+            link = holders[link].base
+        if link in chain:
+            ring = sorted(holders[member].joint for member in chain[chain.index(link) :])
+            path = ("mechanism", "joints", holders[link].joint)
+            message = f"{', '.join(ring)} form a ring that no joint connects to the ground"
+            yield path, message

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
+from eigassign.mechanism.joints import COMPONENTS
 from eigassign.mechanism.parameters import Parameters, initial_design
 from eigassign.mechanism.rotations import Floats
 from eigassign.mechanism.tree import Tree
@@ -33,12 +35,15 @@ def choose_branch(
     a0 = _reference(case, used, parameters, assembly)
     guess = _guess(tree, assembly)
     starts = guess[None] if guess is not None else _starts(function.size)
-    found = _solutions(function, a0, starts)
+    found = _solutions(function, a0, starts, _turning(case, tree))
     if not len(found):
-        raise MechanismError(
-            "mechanism.assembly" if assembly else "mechanism.joints",
-            f"the loops cannot be closed at {_at(function.names, a0)}",
-        )
+        others = _solutions(function, a0, _starts(function.size), _turning(case, tree))
+        message = f"the loops cannot be closed at {_at(function.names, a0)}"
+        if guess is not None and len(others):
+            message = "the guess leads to no closed pose: " + _ambiguous(
+                tree, function.names, a0, others
+            )
+        raise MechanismError("mechanism.assembly" if assembly else "mechanism.joints", message)
     _check_determined(tree, function, a0, found[0])
     if guess is None and len(found) > 1:
         raise MechanismError("mechanism.joints", _ambiguous(tree, function.names, a0, found))
@@ -81,7 +86,15 @@ def _starts(n: int) -> Floats:
     return np.asarray(np.pi * (2.0 * fractions - 1.0))
 
 
-def _solutions(function: ImplicitFunction, a0: Floats, starts: Floats) -> Floats:
+def _turning(case: CaseFile, tree: Tree) -> NDArray[np.bool_]:
+    """Which passive freedoms are angles, the same after a full turn."""
+    kinds = [COMPONENTS[case.mechanism.joints[f.joint].type][f.component] for f in tree.passive]
+    return np.array([kind != "translation" for kind in kinds], dtype=bool)
+
+
+def _solutions(
+    function: ImplicitFunction, a0: Floats, starts: Floats, turning: NDArray[np.bool_]
+) -> Floats:
     """Distinct solutions from many starting points, the nearest to the first start first."""
     n = len(starts)
     a = np.repeat(a0[:, None], n, axis=1)
@@ -93,10 +106,16 @@ def _solutions(function: ImplicitFunction, a0: Floats, starts: Floats) -> Floats
     distinct: list[Floats] = []
     for candidate in p.T[good]:
         turned = np.mod(candidate + np.pi, 2.0 * np.pi) - np.pi
-        near = turned if n > 1 else candidate
-        if all(np.abs(np.sin((near - d) / 2.0)).max() > SAME for d in distinct):
+        near = np.where(turning & (n > 1), turned, candidate)
+        if all(_apart(near - d, turning) > SAME for d in distinct):
             distinct.append(near)
     return np.array(distinct).reshape(-1, function.size)
+
+
+def _apart(difference: Floats, turning: NDArray[np.bool_]) -> float:
+    """Largest difference of two solutions, rad or m, full turns not counted."""
+    turned = 2.0 * np.sin(difference / 2.0)
+    return float(np.abs(np.where(turning, turned, difference)).max())
 
 
 def _check_determined(tree: Tree, function: ImplicitFunction, a0: Floats, p0: Floats) -> None:

@@ -52,6 +52,7 @@ def local_links(
     case: CaseFile, parameters: Parameters, motion: Kinematics
 ) -> tuple[list[LocalLink], NodeMotions]:
     """Every link's matrices in its own frame, and how its nodes hang on the unknowns."""
+    parameters = parameters.with_passive(motion.passive)
     meshes = {p.link: link_mesh(case, parameters, motion.tree, p.link) for p in motion.placements}
     nodes = NodeMotions(motion, meshes, case.mechanism.space)
     nodes.number()

@@ -40,7 +40,7 @@ def close_loops(
     values = [bound.freedom(k) for k in range(len(tree.freedoms))]
     unit = np.eye(len(tree.freedoms), dtype=object)[:, len(coords.relative) :]
     rates = np.concatenate([coords.rates.astype(object), unit], axis=1)
-    free = walk(case, bound, tree, coords, values, rates)
+    free = replace(walk(case, bound, tree, coords, values, rates), passive=bound.passive)
     n = len(coords.columns)
     if not n:
         return _narrowed(free, np.zeros((0, 0), dtype=object))

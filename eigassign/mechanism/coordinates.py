@@ -49,7 +49,7 @@ def _relative(case: CaseFile, tree: Tree) -> tuple[Floats, Floats]:
     if not any(wanted):
         return relative, offset
     absolute: dict[str, tuple[Floats, float] | None] = {"ground": (np.zeros(n), 0.0)}
-    for edge in tree.edges:
+    for edge in (*tree.edges, *tree.loops):
         below = absolute[edge.base[0]]
         i = next((f.coordinate for f in tree.freedoms if f.joint == edge.joint), None)
         passive = any(f.joint == edge.joint for f in tree.passive)
@@ -60,6 +60,8 @@ def _relative(case: CaseFile, tree: Tree) -> tuple[Floats, Floats]:
                 raise MechanismError(f"coordinates.{name}.angle", message)
             mount = float(case.mechanism.joints[edge.joint].angle)
             relative[i], offset[i] = relative[i] - below[0], -below[1] - mount
+        if edge in tree.loops:
+            continue
         absolute[edge.follower[0]] = (
             None
             if passive or below is None

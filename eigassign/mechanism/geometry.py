@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from eigassign.case import CaseFile
@@ -18,8 +20,8 @@ def link_type(case: CaseFile, link: str) -> str:
 
 def length(case: CaseFile, parameters: Parameters, link: str) -> Scalar:
     """Length of a link in m: a number, or a design parameter."""
-    value = case.mechanism.links[link].length
-    return parameters.number(f"links.{link}.length", value)
+    data: Any = case.mechanism.links[link]
+    return parameters.number(f"links.{link}.length", data.length)
 
 
 def node_position(case: CaseFile, parameters: Parameters, tree: Tree, node: Node) -> Objects:

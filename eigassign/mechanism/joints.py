@@ -14,23 +14,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.case.freedoms import FREEDOMS, RIDING
 from eigassign.mechanism.rotations import Objects, multiply, rotation
 from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]
 X, Y, Z = np.eye(3)
-COMPONENTS: dict[str, tuple[str, ...]] = {
-    "fixed": (),
-    "revolute": ("rotation",),
-    "prismatic": ("translation",),
-    "carriage": ("translation",),
-    "nut": ("translation",),
-    "screw": ("rotation",),
-    "cylindrical": ("translation", "rotation"),
-    "universal": ("1", "2"),
-    "spherical": ("1", "2", "3"),
-}
-RIDING = ("carriage", "nut")  # their base node travels along a link with the coordinate
+__all__ = ["COMPONENTS", "RIDING", "JointMotion", "joint_motion", "unit"]
+
+COMPONENTS = FREEDOMS
 
 
 class JointMotion(NamedTuple):

@@ -82,6 +82,7 @@ class Kinematics:
     loops: tuple[Loop, ...]
     tree: Tree
     coordinates: Coordinates
+    passive: tuple[Scalar, ...] = ()  # the loops' passive freedoms as functions of (q, y)
 
     @property
     def columns(self) -> tuple[int, ...]:

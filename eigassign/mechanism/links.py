@@ -52,7 +52,8 @@ def link_mesh(case: CaseFile, parameters: Parameters, tree: Tree, name: str) -> 
 
 def _beam(case: CaseFile, parameters: Parameters, tree: Tree, name: str) -> LinkMesh:
     """A straight beam along x, in two segments where a carriage or nut rides on it."""
-    space, link = case.mechanism.space, case.mechanism.links[name]
+    space = case.mechanism.space
+    link: Any = case.mechanism.links[name]
     total, n = length(case, parameters, name), link.elements
     riders = [e for e in (*tree.edges, *tree.loops) if e.base[0] == name and e.base[1][:1] == "@"]
     if len(riders) > 1:
@@ -124,7 +125,7 @@ def _segment(
 ) -> None:
     """n equal elements from node ``first`` on; with a taper each has its own section."""
     start, span = piece
-    link = case.mechanism.links[name]
+    link: Any = case.mechanism.links[name]
     h = span * (1.0 / n)
     turn = rolled(float(getattr(link, "roll", 0.0) or 0.0))
     if isinstance(link.section, str):

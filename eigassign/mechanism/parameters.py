@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -39,7 +40,7 @@ class Parameters:
         n_q = len(self.coordinates)
         return self.joint_coordinate(k) if k < n_q else self.passive[k - n_q]
 
-    def with_passive(self, values: list[Expression]) -> Parameters:
+    def with_passive(self, values: Sequence[Scalar]) -> Parameters:
         """The same with the passive freedoms known."""
         return replace(self, passive=tuple(values))
 

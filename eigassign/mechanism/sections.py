@@ -24,7 +24,7 @@ class SectionValues(NamedTuple):
     inertia_y: Scalar
     torsion_constant: Scalar
     polar_inertia: Scalar
-    shear_coefficient: float
+    shear_coefficient: Scalar
 
 
 def section_values(section: Any, number: Number) -> SectionValues:
@@ -34,7 +34,7 @@ def section_values(section: Any, number: Number) -> SectionValues:
     along y): A = bh, I_z = bh³/12, I_y = hb³/12, J by Saint-Venant's series as fitted by Roark
     (Formulas for Stress and Strain, table 10.7); I-profile: three rectangles, J = Σ bt³/3.
     """
-    kappa = getattr(section, "shear_coefficient", None) or SHEAR.get(section.shape, 5.0 / 6.0)
+    kappa = SHEAR.get(section.shape, 5.0 / 6.0)
     match section.shape:
         case "circle":
             area, inertia = _circle(number("diameter", section.diameter))
@@ -99,5 +99,10 @@ def _bare(section: Any, number: Number, kappa: float) -> SectionValues:
     I_y = given("inertia_y", 0.0)
     J = given("torsion_constant", 0.0)
     return SectionValues(
-        number("area", section.area), I_z, I_y, J, given("polar_inertia", I_z + I_y), kappa
+        number("area", section.area),
+        I_z,
+        I_y,
+        J,
+        given("polar_inertia", I_z + I_y),
+        given("shear_coefficient", kappa),
     )

@@ -1,9 +1,9 @@
 """Springs between two nodes, or from a node to the ground, along axes fixed in the first link.
 
-The spring is stress-free in every pose; it resists the relative motion of its ends where the second
-one is, k_t |v_2 − v_1 − ω_1 × d|² + k_r |ω_2 − ω_1|²: a rigid arm d on the first node reaches there,
-so that the spring's forces balance and turning everything strains nothing. Each end moves with the
-elastic *and* the rigid motion of its link.
+The spring is stress-free in every pose; it resists the relative motion of its ends at the place of
+the second, k_t |v_2 − v_1 − ω_1 × d|² + k_r |ω_2 − ω_1|²: the first node reaches there by a rigid
+arm d, so that the spring's forces balance and turning everything strains nothing. Each end moves
+with the elastic *and* the rigid motion of its link.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def add_springs(
     nodes: NodeMotions,
 ) -> None:
     """Add every spring of the case to K."""
-    springs: Any = case.mechanism.springs  # type: ignore[attr-defined]
+    springs: Any = case.mechanism.springs
     for name, spring in springs.items():
         ends = [GROUND if end == "ground" else split(end) for end in spring.between]
         rows = _relative(case, parameters, motion, nodes, spring, ends)

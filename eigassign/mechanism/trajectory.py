@@ -29,7 +29,7 @@ class Trajectory:
     """Where the mechanism is when. ``tip`` is None unless the case gives a path of the tip."""
 
     time_s: Floats  # (n,) strictly increasing, n >= 2
-    q: Floats  # (n, n_q) in rad
+    q: Floats  # (n, n_q) in rad or m
     tip: Floats | None  # (n, 2 or 3) in m
     notes: tuple[str, ...] = ()  # what a reader should know: choices made, columns ignored
 
@@ -44,18 +44,20 @@ def build_trajectory(
     q_names: Sequence[str],
     tip_chain: Callable[[str], TipChain],
     folder: FilePath = FilePath(),
+    q_units: Sequence[str] = (),
 ) -> Trajectory:
     """The trajectory that a case asks for, in the coordinates ``q_names``.
 
     ``tip_chain(node)`` gives the chain of a tip path's node and is called for nothing else;
-    ``folder`` is what the name of a CSV file is relative to. Raises MechanismError for what is
+    ``folder`` is what the name of a CSV file is relative to; ``q_units`` are "rad" or "m" for each
+    coordinate, all rad if empty. Raises MechanismError for what is
     wrong as a whole, TrajectoryError for what is wrong with one sample.
     """
     if isinstance(spec, TipTrajectory):
         return _from_tip_path(spec, q_names, tip_chain)
     if isinstance(spec, FileTrajectory):
-        return _from_file(spec, q_names, folder)
-    return _from_samples(spec, q_names)
+        return _from_file(spec, q_names, q_units, folder)
+    return _from_samples(spec, q_names, q_units)
 
 
 def _from_tip_path(
@@ -78,16 +80,20 @@ def _check_dimension(chain: TipChain, path: Path, n_q: int) -> None:
         raise MechanismError(WAYPOINTS, f"the tip moves in {d} dimensions: give {d} coordinates")
 
 
-def _from_file(spec: FileTrajectory, q_names: Sequence[str], folder: FilePath) -> Trajectory:
-    table = read_samples(folder / spec.file, q_names)
+def _from_file(
+    spec: FileTrajectory, q_names: Sequence[str], q_units: Sequence[str], folder: FilePath
+) -> Trajectory:
+    table = read_samples(folder / spec.file, q_names, q_units)
     for k in _not_later(table.time_s):
         message = f"{table.where(k)}: {_BACKWARDS.format(*table.time_s[k - 1 : k + 1])}"
         raise TrajectoryError("trajectory.file", message, k)
-    notes = (*table.notes, *_jumps(table.q, q_names))
+    notes = (*table.notes, *_jumps(table.q, q_names, q_units))
     return Trajectory(table.time_s, table.q, None, notes)
 
 
-def _from_samples(spec: SampledTrajectory, q_names: Sequence[str]) -> Trajectory:
+def _from_samples(
+    spec: SampledTrajectory, q_names: Sequence[str], q_units: Sequence[str]
+) -> Trajectory:
     """Samples given in the case: times as given, or at equal steps over the duration from 0."""
     for k, row in enumerate(spec.q):
         _check_sample(row, q_names, k)
@@ -98,7 +104,7 @@ def _from_samples(spec: SampledTrajectory, q_names: Sequence[str]) -> Trajectory
         time_s = np.linspace(0.0, spec.duration or 1.0, len(q))
     else:
         time_s = _checked_time(spec.time, len(q))
-    return Trajectory(time_s, q, None, _jumps(q, q_names))
+    return Trajectory(time_s, q, None, _jumps(q, q_names, q_units))
 
 
 def _check_sample(row: Sequence[float], q_names: Sequence[str], k: int) -> None:
@@ -125,11 +131,13 @@ def _not_later(time_s: Floats) -> list[int]:
     return [int(k) + 1 for k in np.flatnonzero(~(np.diff(time_s) > 0.0))]
 
 
-def _jumps(q: Floats, q_names: Sequence[str]) -> tuple[str, ...]:
-    """A note for each coordinate that moves by more than half a turn from sample to sample."""
+def _jumps(q: Floats, q_names: Sequence[str], q_units: Sequence[str]) -> tuple[str, ...]:
+    """A note for each angle that moves by more than half a turn from sample to sample."""
     steps = np.abs(np.diff(q, axis=0))
     return tuple(
         f"{name} jumps by {steps[k, i]:.3g} rad from sample {k} to {k + 1}; is it cut at 360 deg?"
-        for i, name in enumerate(q_names)
-        if steps[k := int(np.argmax(steps[:, i])), i] > np.pi
+        for i, (name, unit) in enumerate(
+            zip(q_names, q_units or ["rad"] * len(q_names), strict=True)
+        )
+        if unit == "rad" and steps[k := int(np.argmax(steps[:, i])), i] > np.pi
     )

@@ -1,7 +1,8 @@
 """Joint samples from a CSV file: a header `time [ms], q1 [deg], q2`, then one line a sample.
 
-Columns may stand in any order; s and rad are meant where no unit is written. Columns with other
-names are ignored with a note. Blank lines and lines that begin with `#` are skipped.
+Columns may stand in any order; s and rad (m for strokes) are meant where no unit is written.
+Columns with other names are ignored with a note. Blank lines and lines that begin with `#` are
+skipped.
 """
 
 from __future__ import annotations
@@ -17,12 +18,13 @@ from pathlib import Path
 import numpy as np
 
 from eigassign.case.suggest import listed, shown, suggestion
-from eigassign.case.units import DIMENSIONS, QuantityError, Unit, parse_unit
+from eigassign.case.units import DIMENSIONS, Dimension, QuantityError, Unit, parse_unit
 from eigassign.errors import MechanismError, TrajectoryError
 from eigassign.mechanism.tip_chain import Floats
 
 _KEY = "trajectory.file"
 _TIME = "time"
+_KINDS = {"rad": "angle", "m": "length"}
 _HEADER_CELL = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _LARGEST = 100_000_000  # bytes: far more than anybody's trajectory, less than memory
@@ -34,7 +36,7 @@ class SampleTable:
     """Samples as a file gives them, in SI units, and the line each stands in."""
 
     time_s: Floats  # (n,)
-    q: Floats  # (n, n_q) in rad
+    q: Floats  # (n, n_q) in rad or m
     file: str
     lines: tuple[int, ...]  # (n,) counted from 1
     notes: tuple[str, ...]
@@ -51,8 +53,10 @@ class _Column:
     unit: Unit
 
 
-def read_samples(file: Path, q_names: Sequence[str]) -> SampleTable:
+def read_samples(file: Path, q_names: Sequence[str], q_units: Sequence[str] = ()) -> SampleTable:
     """Samples of the coordinates ``q_names`` from a CSV file, in SI units.
+
+    ``q_units`` are those of the coordinates, "rad" or "m"; all rad if empty.
 
     Raises MechanismError if the file cannot be read, has a wrong header or too few samples, and
     TrajectoryError for a line that does not hold one finite number a column; both name the line.
@@ -63,7 +67,9 @@ def read_samples(file: Path, q_names: Sequence[str]) -> SampleTable:
         raise MechanismError(_KEY, f"{file.name}: is empty; a header and samples are expected")
     where = f"{file.name}:{line}"
     names = [_split(cell, where) for cell in header]
-    columns = [_column(name, names, where) for name in (_TIME, *q_names)]
+    kinds = ["time", *(_KINDS[unit] for unit in q_units or ["rad"] * len(q_names))]
+    wanted = zip((_TIME, *q_names), kinds, strict=True)
+    columns = [_column(name, names, where, DIMENSIONS[kind]) for name, kind in wanted]
     lines, values = [], []
     for k, (number, row) in enumerate(rows):
         values.append(_values(row, columns, len(header), f"{file.name}:{number}", k))
@@ -117,13 +123,14 @@ def _split(cell: str, where: str) -> tuple[str, str]:
     return match.group(1), match.group(2) or ""
 
 
-def _column(name: str, names: Sequence[tuple[str, str]], where: str) -> _Column:
+def _column(
+    name: str, names: Sequence[tuple[str, str]], where: str, dimension: Dimension
+) -> _Column:
     """The one column called ``name``, with its unit."""
     known = [other for other, _ in names]
     if known.count(name) != 1:
         raise MechanismError(_KEY, f"{where}: {_miscounted(name, known)}")
     index = known.index(name)
-    dimension = DIMENSIONS["time" if name == _TIME else "angle"]
     try:
         unit = parse_unit(names[index][1] or dimension.si, dimension)
     except QuantityError as error:

@@ -29,7 +29,7 @@ from eigassign.series.expression import Scalar
 from eigassign.series.table import Table, compile_table
 
 Floats = NDArray[np.float64]
-STEP = 1e-4  # of the time in which the fastest coordinate moves by one rad or metre
+STEP = 1e-4  # of the time in which the fastest coordinate moves, or would start to, by 1 rad or m
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,8 @@ class VelocityTerms:
         self, q: Floats, y: Floats, rate: Floats, acceleration: Floats
     ) -> tuple[sparse.csr_array, sparse.csr_array]:
         """C [N s/m] and K_v [N/m] (n_dof, n_dof) for q, q̇, q̈ (n_q,) of one instant."""
-        h = STEP / max(float(np.abs(rate).max(initial=0.0)), 1e-12)
+        speed = max(*np.abs(rate), *np.sqrt(np.abs(acceleration)), 0.0, 0.0)
+        h = STEP / speed if speed > 0.0 else STEP
         instants = [(k * h) for k in (-2, -1, 0, 1, 2)]
         values = [self._values(q + rate * t + acceleration * (t * t / 2.0), y) for t in instants]
         rates = [rate + acceleration * t for t in instants]

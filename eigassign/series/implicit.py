@@ -17,7 +17,10 @@ from eigassign.series.program import Program
 
 Floats = NDArray[np.float64]
 STEP = 0.15  # largest change of an argument in one continuation step (rad or m)
+FARTHEST = 500.0  # rad or m from the known solution: 80 turns
+REFINEMENTS = (1, 4, 16, 64)  # of the steps, where ∂F/∂p changes too much for one
 TOLERANCE = 1e-13  # on Newton's step, relative to 1 (rad or m)
+CONVERGED = 1e-8  # last step of a regular solution; at a dead point Newton only creeps
 ACCEPT = 1e-9  # on F and on the check rows afterwards
 SINGULAR = 1e-5  # smallest over largest singular value of ∂F/∂p that is refused
 
@@ -45,23 +48,44 @@ class ImplicitFunction:
         Raises SingularityError naming the first sample where the equations are singular or have no
         solution on this branch.
         """
-        steps = int(np.ceil(np.abs(a - self.a0[:, None]).max(initial=0.0) / STEP)) or 1
-        for refinement in (1, 8):
-            p, ok = self._continue(a, steps * refinement)
-            if ok.all():
+        farthest = float(np.abs(a - self.a0[:, None]).max(initial=0.0))
+        if not farthest < FARTHEST:
+            worst = np.abs(a - self.a0[:, None]).max(axis=0)
+            at = self._named(a[:, int(np.nanargmax(worst))])
+            raise SingularityError(f"{self.title} cannot be followed as far as {at}")
+        steps = int(np.ceil(farthest / STEP)) or 1
+        p = np.empty((self.size, a.shape[1]))
+        left = np.arange(a.shape[1])
+        for refinement in REFINEMENTS:
+            found, ok, reached = self._continue(a[:, left], steps * refinement)
+            p[:, left[ok]] = found[:, ok]
+            left, reached = left[~ok], reached[:, ~ok]
+            if not len(left):
                 return p
-        raise self._failure(a[:, np.flatnonzero(~ok)[0]])
+        raise self._failure(a[:, left[0]], reached[:, 0])
 
-    def _continue(self, a: Floats, steps: int) -> tuple[Floats, NDArray[np.bool_]]:
+    def _continue(self, a: Floats, steps: int) -> tuple[Floats, NDArray[np.bool_], Floats]:
+        """p after ``steps`` equal steps from a_0, where no step could have changed the branch, and
+        how far each sample got.
+
+        ∂F/∂p is regular from one step to the next if it changes by less than its smallest
+        singular value: then no other branch has been met.
+        """
         p = np.repeat(self.p0[:, None], a.shape[1], axis=1)
         ok = np.ones(a.shape[1], dtype=bool)
-        start = self.a0[:, None]
+        start, reached = self.a0[:, None], a.copy()
+        before = self.equations(start, self.p0[:, None])[2]
         for t in np.linspace(0.0, 1.0, steps + 1)[1:]:
-            p, regular = self.newton(start + t * (a - start), p)
-            ok &= regular
+            here = start + t * (a - start)
+            p, regular = self.newton(here, p)
+            J = self.equations(here, p)[2]
+            good = regular & _near(before, J)
+            reached = np.where(ok & ~good, here, reached)
+            ok &= good
+            before = J
         F, check, _ = self.equations(a, p)
         missed = np.abs(np.concatenate([F, check])).max(axis=0, initial=0.0)
-        return p, ok & (missed < ACCEPT)
+        return p, ok & (missed < ACCEPT), reached
 
     def newton(self, a: Floats, p: Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """Newton from p at fixed a; whether each sample is regular there."""
@@ -74,7 +98,8 @@ class ImplicitFunction:
             if np.abs(step).max(initial=0.0) < TOLERANCE:
                 break
         s = np.linalg.svd(J, compute_uv=False)
-        return p, np.asarray(s[:, -1] > SINGULAR * s[:, 0])
+        converged = np.abs(step).max(axis=0, initial=0.0) < CONVERGED
+        return p, np.asarray(converged & (s[:, -1] > SINGULAR * s[:, 0]))
 
     def equations(self, a: Floats, p: Floats) -> tuple[Floats, Floats, Floats]:
         """F (n_equations, n), check (n_checks, n), ∂F/∂p (n, n_equations, size)."""
@@ -95,9 +120,22 @@ class ImplicitFunction:
             p = p - inverse @ F
         return p
 
-    def _failure(self, a: Floats) -> SingularityError:
-        at = ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.names, a, strict=True))
-        return SingularityError(f"{self.title} cannot be closed, or is at a dead point, at {at}")
+    def _failure(self, a: Floats, reached: Floats) -> SingularityError:
+        message = f"{self.title} cannot be closed, or is at a dead point, at {self._named(reached)}"
+        if not np.array_equal(a, reached):
+            message += f" on the way to {self._named(a)}"
+        return SingularityError(message)
+
+    def _named(self, a: Floats) -> str:
+        return ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.names, a, strict=True))
+
+
+def _near(before: Floats, J: Floats) -> NDArray[np.bool_]:
+    """‖J − J_before‖ < σ_min(J_before), sample by sample."""
+    if not np.isfinite(J).all():
+        return np.zeros(len(J), dtype=bool)
+    smallest = np.linalg.svd(before, compute_uv=False)[:, -1]
+    return np.asarray(np.linalg.norm(J - before, axis=(1, 2)) < smallest)
 
 
 def evaluate(function: ImplicitFunction, algebra: Algebra, a: Floats) -> Floats:

@@ -42,19 +42,22 @@ def accepts(schema: dict[str, Any], value: Any) -> bool:
 def _typed(schema: dict[str, Any], value: Any) -> bool:
     kinds = {"object": dict, "array": tuple, "string": str, "number": (int, float), "integer": int}
     kind = schema.get("type")
+    if kind == "boolean" or isinstance(value, bool):
+        return kind == "boolean" and isinstance(value, bool)
     if kind and not isinstance(value, kinds[kind]):
         return False
     if kind == "object":
         return _object(schema, value)
     if kind == "array":
-        short = len(value) < schema.get("minItems", 0)
+        short = not schema.get("minItems", 0) <= len(value) <= schema.get("maxItems", 10**9)
         each = schema.get("prefixItems") or [schema.get("items", {})] * len(value)
         return not short and len(each) == len(value) and all(map(accepts, each, value))
     if kind == "string":
         return re.search(schema.get("pattern", ""), value) is not None
     low, high = schema.get("minimum", -1e99), schema.get("maximum", 1e99)
     above = schema.get("exclusiveMinimum", -1e99)
-    return kind is None or (low <= value <= high and value > above)
+    below = schema.get("exclusiveMaximum", 1e99)
+    return kind is None or (low <= value <= high and above < value < below)
 
 
 def _object(schema: dict[str, Any], value: dict[str, Any]) -> bool:

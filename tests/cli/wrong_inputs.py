@@ -229,12 +229,12 @@ def wrong_inputs() -> Iterator[Wrong]:
     yield Wrong(
         "a loop of links",
         _edited(("base: ground", "base: fore.end")),
-        "closed loops are not supported yet",
+        "form a ring that no joint connects to the ground",
     )
     yield Wrong(
         "a spatial mechanism",
         _edited(("space: planar", "space: spatial")),
-        "spatial mechanisms are not supported yet",
+        "needs 3 components (x, y, z), got 2",
     )
     yield Wrong(
         "a body nowhere",

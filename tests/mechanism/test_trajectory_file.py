@@ -131,3 +131,11 @@ def test_a_file_that_cannot_be_read_is_named_with_the_reason(tmp_path):
         read_samples(tmp_path / "none.csv", Q)
     with pytest.raises(MechanismError, match="cannot be read: Is a directory"):
         read_samples(tmp_path, Q)
+
+
+def test_strokes_are_lengths(tmp_path: Path) -> None:
+    file = written(tmp_path, "time,q1 [deg],q2 [mm]\n0,180,1\n1,-90,2\n")
+    table = read_samples(file, Q, ("rad", "m"))
+    np.testing.assert_allclose(table.q, [[np.pi, 1e-3], [-np.pi / 2, 2e-3]])
+    with pytest.raises(MechanismError, match=r"\[deg\] is no unit of length"):
+        read_samples(file, Q, ("m", "m"))

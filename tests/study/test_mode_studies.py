@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scenes import HEAD, SHIPPED, changed, scene_of
 
+from eigassign.case import parse
 from eigassign.study.approximation import COARSE, compare, grid_over
 from eigassign.study.drawing import draw_poses, spread_samples
 from eigassign.study.mode_studies import q_grid, study_modes
-from eigassign.study.units import PROPERTY_UNITS, design_units
+from eigassign.study.units import PROPERTY_UNITS, coordinate_units, design_units
 
 
 def test_a_map_holds_at_each_point_what_a_solve_there_gives(tmp_path: Path) -> None:
@@ -105,13 +106,27 @@ def test_poses_are_spread_over_the_way_and_include_both_ends() -> None:
 
 
 def test_every_property_that_can_be_designed_has_a_unit(tmp_path: Path) -> None:
-    from eigassign.case import mechanism_parts as parts
+    from eigassign.case.link_parts import LINKS
+    from eigassign.case.mechanism_parts import Body, Spring
     from eigassign.case.properties import _quantities
+    from eigassign.case.section_parts import SHAPES, Material
 
-    models = [parts.Material, parts.Link, parts.Body, parts.Drive, *parts.SHAPES.values()]
+    models = [Material, Body, Spring, *LINKS.values(), *SHAPES.values()]
     quantities = {name: q for model in models for name, q in _quantities(model).items()}
-    assert len(quantities) > 10
+    assert len(quantities) > 20
     for name, quantity in quantities.items():
-        assert quantity.dimension is not None
-        assert quantity.dimension.si.replace("·", " ") == PROPERTY_UNITS[name], name
+        unit = quantity.dimension.si.replace("·", " ") if quantity.dimension else ""
+        assert unit == PROPERTY_UNITS.get(name, ""), name
     assert design_units(scene_of(tmp_path, SHIPPED).file) == ("kg", "kg")
+
+
+def test_what_slides_is_measured_in_metres() -> None:
+    text = changed(
+        ("{type: revolute, base: upper_arm.end", "{type: prismatic, base: upper_arm.end"),
+        ("angle: absolute}", "drive: {stiffness: 1 kN/m}}"),
+        text=HEAD,
+    )
+    text += "design: {k: {parameter: coordinates.q2.drive.stiffness, min: 1, max: 1e5}}"
+    file = parse(text.encode(), "case.yaml")
+    assert coordinate_units(file) == ("rad", "m")
+    assert design_units(file) == ("N/m",)

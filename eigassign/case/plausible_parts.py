@@ -1,0 +1,209 @@
+"""Parts of a mechanism that are allowed but look like a slip: wrong exponent, forgotten unit.
+
+Warnings only. Each limit is wide enough that real mechanisms stay inside; the reasons stand beside
+the limits.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from eigassign.case.document import Document
+from eigassign.case.link_parts import BeamLink, FrameBeam, FrameLink, RigidLink, Taper
+from eigassign.case.mechanism_parts import Body
+from eigassign.case.section_parts import BareSection, CircleSection, Section, TubeSection
+from eigassign.case.vectors import semidefinite, spread
+from eigassign.case.yaml_reader import Finding, KeyPath
+
+MODULUS = (1e6, 1.5e12)  # Pa: soft rubber … above diamond (1.2e12)
+DENSITY = (1.0, 25_000.0)  # kg/m3: aerogel … above osmium (22 590)
+LENGTH = (1e-3, 100.0)  # m: a link of 30 bare "mm" or of 1e-4 m is a slip
+SLENDER = 10.0  # length / depth below which shear deformation moves the first modes by percents
+SHEAR = (0.05, 1.2)  # κ: thin-walled profiles … solid ones (5/6, 9/10), with a margin
+# I / A² has no dimension: 1/12 for a square, a/12 and 1/(12 a) for a flat bar of aspect a on edge
+# and on its flat, D/(8π t) for a thin tube. The limits are a bar of aspect 1200 (or a tube of
+# D/t = 2500) and a strip of aspect 830; rolled sections lie between 0.3 and 10.
+STOUTNESS = (1e-4, 100.0)
+
+
+def implausible_parts(document: Document) -> Iterator[Finding]:
+    """Everything in a valid mechanism that is probably not meant."""
+    yield from _materials(document)
+    yield from _sections(document)
+    yield from _links(document)
+    yield from _inertias(document)
+    yield from _unused(document)
+    yield from _tube_walls(document)
+
+
+def outside(
+    value: float, limits: tuple[float, float], path: KeyPath, what: str
+) -> Iterator[Finding]:
+    """A warning if ``value`` lies outside ``limits``."""
+    low, high = limits
+    if not low <= value <= high:
+        yield path, f"{value:g} {what} is outside {low:g} … {high:g}: is the unit right?"
+
+
+def _materials(document: Document) -> Iterator[Finding]:
+    for name, material in document.mechanism.materials.items():
+        path: KeyPath = ("mechanism", "materials", name)
+        yield from outside(material.youngs_modulus, MODULUS, (*path, "youngs_modulus"), "Pa")
+        if material.density == 0:
+            yield (*path, "density"), "links of this material are massless"
+        else:
+            yield from outside(material.density, DENSITY, (*path, "density"), "kg/m3")
+        if material.shear_modulus is not None:
+            yield from _auxetic(material.youngs_modulus / material.shear_modulus, path)
+
+
+def _auxetic(ratio: float, path: KeyPath) -> Iterator[Finding]:
+    """E/G = 2 (1 + ν) lies between 2 and 3 for ν from 0 to 0.5; fibres along the beam raise it."""
+    if not 1.9 <= ratio <= 60.0:
+        message = f"E / G is {ratio:.3g}; isotropic materials have 2 (1 + ν), from 2 to 3"
+        yield (*path, "shear_modulus"), message
+
+
+def _sections(document: Document) -> Iterator[Finding]:
+    for name, section in document.mechanism.sections.items():
+        if not isinstance(section, BareSection):
+            continue
+        path: KeyPath = ("mechanism", "sections", name)
+        for key in ("bending_inertia", "inertia_z", "inertia_y"):
+            inertia = getattr(section, key)
+            if inertia is not None:
+                yield from _stoutness(section.area, inertia, (*path, key))
+        yield from _twist(section, path)
+        if section.shear_coefficient is not None:
+            yield from outside(section.shear_coefficient, SHEAR, (*path, "shear_coefficient"), "")
+
+
+def _stoutness(area: float, inertia: float, path: KeyPath) -> Iterator[Finding]:
+    low, high = STOUTNESS
+    # divided twice, since area² underflows where area itself does not
+    if not low <= inertia / area / area <= high:
+        yield (
+            path,
+            f"area {area:g} m2 and {path[-1]} {inertia:g} m4 cannot belong to one "
+            f"section: its radius of gyration would be {math.sqrt(inertia / area):.3g} m, and "
+            f"a solid round bar of that area has {area * area / (4 * math.pi):.3g} m4; "
+            "check the exponents",
+        )
+
+
+def _twist(section: BareSection, path: KeyPath) -> Iterator[Finding]:
+    """Saint-Venant: J ≤ I_y + I_z, with equality for round sections."""
+    if section.torsion_constant is None or section.inertia_y is None:
+        return
+    polar = section.inertia_y + section.in_plane
+    if section.torsion_constant > 1.001 * polar:  # three printed digits
+        message = f"torsion_constant {section.torsion_constant:g} m4 is above inertia_y + inertia_z"
+        yield (*path, "torsion_constant"), f"{message} = {polar:g} m4, which no section can have"
+
+
+def depth(section: Section, spatial: bool = False) -> float:
+    """Depth in the plane of bending, m, in space the larger one; for a bare section the least.
+
+    No section of depth h has a radius of gyration above h/2 (a mean square distance from the
+    centroid over an interval of length h is at most h²/4), so h ≥ 2 √(I/A).
+    """
+    if isinstance(section, BareSection):
+        inertia = max(section.in_plane, (section.inertia_y or 0.0) if spatial else 0.0)
+        return 2 * math.sqrt(inertia / section.area)
+    if isinstance(section, CircleSection):
+        return section.diameter
+    if isinstance(section, TubeSection):
+        return section.outer_diameter
+    return max(section.height, section.width) if spatial else section.height
+
+
+def _links(document: Document) -> Iterator[Finding]:
+    for name, link in document.mechanism.links.items():
+        path: KeyPath = ("mechanism", "links", name)
+        if isinstance(link, BeamLink):
+            yield from outside(link.length, LENGTH, (*path, "length"), "m")
+            yield from _slenderness(document, link, (*path, "length"))
+        elif isinstance(link, RigidLink) and link.length is not None:
+            yield from outside(link.length, LENGTH, (*path, "length"), "m")
+        elif isinstance(link, FrameLink):
+            for beam, inner in link.beams.items():
+                ends = (link.nodes[inner.from_node], link.nodes[inner.to_node])
+                place = (*path, "beams", beam)
+                yield from outside(math.dist(*ends), LENGTH, place, "m of length")
+
+
+def _slenderness(document: Document, link: BeamLink, path: KeyPath) -> Iterator[Finding]:
+    if link.shear:
+        return
+    spatial = document.mechanism.space == "spatial"
+    sections = document.mechanism.sections
+    name = max(_ends(link.section), key=lambda n: depth(sections[n], spatial))
+    slenderness = link.length / depth(sections[name], spatial)
+    if slenderness < SLENDER:
+        at_most = "at most " if isinstance(sections[name], BareSection) else ""
+        yield (
+            path,
+            f"length is {at_most}{slenderness:.2g} times the depth of section "
+            f"{name!r}; below {SLENDER:g} the Euler–Bernoulli beam, which neglects "
+            "shear, is doubtful; write shear: true",
+        )
+
+
+def _ends(section: str | Taper) -> tuple[str, ...]:
+    return (section,) if isinstance(section, str) else (section.start, section.end)
+
+
+def _inertias(document: Document) -> Iterator[Finding]:
+    """Principal moments of a body obey the triangle inequality; a point has none without mass."""
+    groups = {"bodies": document.mechanism.bodies, "links": document.mechanism.links}
+    for group, parts in groups.items():
+        for name, part in parts.items():
+            if not isinstance(part, (Body, RigidLink)) or isinstance(part.inertia, float):
+                continue
+            path: KeyPath = ("mechanism", group, name, "inertia")
+            if not semidefinite(spread(part.inertia)):
+                message = "no body has this inertia: a principal moment exceeds the other two's sum"
+                yield path, message
+
+
+def _unused(document: Document) -> Iterator[Finding]:
+    beams = list(_beams(document))
+    used = {
+        "materials": {beam.material for beam in beams},
+        "sections": {name for beam in beams for name in _ends(beam.section)},
+    }
+    unused = [
+        (group, name)
+        for group, names in used.items()
+        for name in getattr(document.mechanism, group)
+        if name not in names
+    ]
+    for group, name in unused:
+        yield ("mechanism", group, name), "no link uses it"
+    for name, parameter in document.design.parameters.items():
+        if tuple(parameter.parameter.split(".")[:2]) in unused:
+            yield ("design", name, "parameter"), "has no effect: no link uses it"
+
+
+def _beams(document: Document) -> Iterator[BeamLink | FrameBeam]:
+    for link in document.mechanism.links.values():
+        if isinstance(link, BeamLink):
+            yield link
+        elif isinstance(link, FrameLink):
+            yield from link.beams.values()
+
+
+def _tube_walls(document: Document) -> Iterator[Finding]:
+    """Bounds within which a tube's wall can vanish or overfill it."""
+    reach = {p.parameter: (p.min, p.max) for p in document.design.parameters.values()}
+    for name, tube in document.mechanism.sections.items():
+        if not isinstance(tube, TubeSection):
+            continue
+        path = f"sections.{name}."
+        outer, _ = reach.get(path + "outer_diameter", (tube.outer_diameter, 0.0))
+        _, inner = reach.get(path + "inner_diameter", (0.0, tube.inner_diameter or 0.0))
+        _, wall = reach.get(path + "thickness", (0.0, tube.thickness or 0.0))
+        if 2 * wall > outer or inner >= outer:
+            message = "within the design bounds this tube's wall can vanish or exceed its radius"
+            yield ("mechanism", "sections", name), message

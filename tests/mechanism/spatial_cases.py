@@ -1,0 +1,80 @@
+"""Mechanisms for tests in the language of a case file, and what is built from them."""
+
+from __future__ import annotations
+
+import copy
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from eigassign.case import CaseFile
+from eigassign.case.loading import parse
+from eigassign.mechanism.build import build_pencil
+from eigassign.mechanism.kinematics import Kinematics, kinematics
+from eigassign.mechanism.parameters import Parameters, initial_design, parameters
+from eigassign.mechanism.pencil import Pencil
+from eigassign.mechanism.poses import Poses, build_poses
+from eigassign.modal.exact import eigenvalues
+
+Tree = dict[str, Any]
+STEEL = {"youngs_modulus": 210e9, "density": 7850.0, "poissons_ratio": 0.3}
+ALLOY = {"youngs_modulus": 70e9, "density": 2700.0, "shear_modulus": 26e9}
+
+
+def case_of(tree: Tree, path: Path = Path("test.yaml")) -> CaseFile:
+    """The case of a tree as a case file would hold it (JSON is YAML)."""
+    return parse(json.dumps({"title": "test", **tree}).encode(), path)
+
+
+@dataclass(frozen=True)
+class Built:
+    """A case with everything the mechanism layer makes of it."""
+
+    case: CaseFile
+    numbers: Parameters
+    motion: Kinematics
+
+    @cached_property
+    def pencil(self) -> Pencil:
+        return build_pencil(self.case, self.numbers, self.motion)
+
+    @cached_property
+    def poses(self) -> Poses:
+        return build_poses(self.case, self.numbers, self.motion)
+
+    @cached_property
+    def y(self) -> np.ndarray:
+        return initial_design(self.case)
+
+    def x(self, q: Any) -> np.ndarray:
+        q = np.atleast_2d(np.asarray(q, float))
+        return np.hstack([q, np.broadcast_to(self.y, (len(q), len(self.y)))])
+
+    def lam(self, q: Any, count: int) -> np.ndarray:
+        """λ (count,) at one q and the design of the case."""
+        return eigenvalues(self.pencil, self.x(q), count)[0]
+
+    @property
+    def n_elastic(self) -> int:
+        return len(self.pencil.elastic)
+
+
+def built(tree: Tree, path: Path = Path("test.yaml")) -> Built:
+    case = case_of(tree, path)
+    numbers = parameters(case)
+    return Built(case, numbers, kinematics(case, numbers))
+
+
+def changed(tree: Tree, path: str, value: Any) -> Tree:
+    """A copy with the number at a key path of the mechanism (or a drive) replaced."""
+    out = copy.deepcopy(tree)
+    at = out if path.startswith("coordinates.") else out["mechanism"]
+    *keys, last = path.split(".")
+    for key in keys:
+        at = at[key]
+    at[last] = value
+    return out

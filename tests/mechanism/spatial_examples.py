@@ -1,0 +1,107 @@
+"""Well-known mechanisms in the language of a case file: those of the reference program."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+Tree = dict[str, Any]
+STEEL = {"youngs_modulus": 200e9, "density": 7800.0, "poissons_ratio": 0.3}
+TUBE = {"shape": "tube", "outer_diameter": 0.04, "inner_diameter": 0.034}
+
+
+def straight(length: float, elements: int, section: str = "s", material: str = "m") -> Tree:
+    return {"length": length, "elements": elements, "section": section, "material": material}
+
+
+def four_bar(drive: Any) -> Tree:
+    return {
+        "mechanism": {
+            "space": "planar",
+            "materials": {"m": STEEL},
+            "sections": {"s": {"shape": "rectangle", "height": 0.004, "width": 0.02}},
+            "links": {
+                "crank": straight(0.12, 2), "coupler": straight(0.45, 4), "rocker": straight(0.4, 4)
+            },
+            "joints": {
+                "A": {"type": "revolute", "base": "ground", "follower": "crank.start"},
+                "B": {"type": "revolute", "base": "crank.end", "follower": "coupler.start"},
+                "D": {"type": "revolute", "base": "ground", "follower": "rocker.start",
+                      "position": [0.5, 0.0]},
+                "E": {"type": "revolute", "base": "coupler.end", "follower": "rocker.end"},
+            },
+            "assembly": {"guess": {"B": 1.0, "D": 2.0, "E": 0.0}},
+        },
+        "coordinates": {"th": {"joint": "A", "drive": drive}},
+    }  # fmt: skip
+
+
+def slider_crank(drive: Any) -> Tree:
+    return {
+        "mechanism": {
+            "space": "planar",
+            "materials": {"m": STEEL},
+            "sections": {"s": {"shape": "circle", "diameter": 0.012}},
+            "links": {
+                "crank": straight(0.15, 2), "rod": straight(0.45, 6),
+                "slider": {"type": "rigid", "mass": 0.5},
+            },
+            "joints": {
+                "A": {"type": "revolute", "base": "ground", "follower": "crank.start"},
+                "B": {"type": "revolute", "base": "crank.end", "follower": "rod.start"},
+                "P": {"type": "prismatic", "base": "ground", "follower": "slider.start",
+                      "axis": [1.0, 0.0]},
+                "E": {"type": "revolute", "base": "rod.end", "follower": "slider.start"},
+            },
+            "assembly": {"guess": {"P": 0.6}},
+        },
+        "coordinates": {"th": {"joint": "A", "drive": drive}},
+    }  # fmt: skip
+
+
+def arm3r(drive: Any) -> Tree:
+    return {
+        "mechanism": {
+            "space": "spatial",
+            "materials": {"m": {"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.33}},
+            "sections": {"s": TUBE},
+            "links": {"col": straight(0.3, 2), "up": straight(0.5, 4), "fo": straight(0.4, 4)},
+            "joints": {
+                "yaw": {"type": "revolute", "base": "ground", "follower": "col.start",
+                        "axis": [1.0, 0.0, 0.0], "orientation": [0.0, -np.pi / 2, 0.0]},
+                "pitch": {"type": "revolute", "base": "col.end", "follower": "up.start",
+                          "axis": [0.0, -1.0, 0.0], "orientation": [0.0, np.pi / 2, 0.0]},
+                "elbow": {"type": "revolute", "base": "up.end", "follower": "fo.start",
+                          "axis": [0.0, -1.0, 0.0]},
+            },
+            "bodies": {"tip": {"at": "fo.end", "mass": 1.0}},
+        },
+        "coordinates": {n: {"joint": n, "drive": drive} for n in ("yaw", "pitch", "elbow")},
+    }  # fmt: skip
+
+
+def gantry(drive: Any) -> Tree:
+    return {
+        "mechanism": {
+            "space": "planar",
+            "materials": {"m": {"youngs_modulus": 210e9, "density": 7850.0}},
+            "sections": {"s": {"shape": "rectangle", "height": 0.05, "width": 0.05}},
+            "links": {
+                "left": straight(0.8, 6), "girder": straight(1.6, 12), "right": straight(0.8, 6),
+                "trolley": {"type": "rigid", "mass": 3.0},
+            },
+            "joints": {
+                "f1": {"type": "fixed", "base": "ground", "follower": "left.start",
+                       "angle": np.pi / 2},
+                "f2": {"type": "fixed", "base": "left.end", "follower": "girder.start",
+                       "angle": -np.pi / 2},
+                "f3": {"type": "fixed", "base": "girder.end", "follower": "right.start",
+                       "angle": -np.pi / 2},
+                "f4": {"type": "fixed", "base": "ground", "follower": "right.end",
+                       "position": [1.6, 0.0], "angle": -np.pi / 2},
+                "car": {"type": "carriage", "base": "girder", "follower": "trolley.start"},
+            },
+        },
+        "coordinates": {"x": {"joint": "car", "drive": drive}},
+    }  # fmt: skip

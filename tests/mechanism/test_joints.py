@@ -1,0 +1,220 @@
+"""Joints by differences: freedoms from their own motion, twists and Jacobians from world frames."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace as Given
+from typing import Any
+
+import numpy as np
+import pytest
+from spatial_cases import Built, built, changed
+from spatial_examples import arm3r, four_bar, gantry, straight
+from spatial_oracle import FREEDOMS, Tree, world
+from spatial_random import nodes, random_closed, random_open
+
+from eigassign.mechanism.joints import COMPONENTS, JointMotion, joint_motion
+from eigassign.mechanism.kinematics import Kinematics, all_moving
+from eigassign.series.algebra import Samples
+from eigassign.series.table import compile_table
+
+H = 1e-5  # central differences: error about H² = 1e-10 times third derivatives of order 1
+JOINTS = [
+    Given(type="fixed"),
+    Given(type="revolute", axis=None),
+    Given(type="revolute", axis=(1.0, -2.0, 0.5)),
+    Given(type="prismatic", axis=(0.3, 1.0)),
+    Given(type="prismatic", axis=(0.3, 1.0, -4.0)),
+    Given(type="cylindrical", axis=(0.2, 0.4, -1.0)),
+    Given(type="screw", axis=(1.0, 1.0, 0.0), lead=0.3),
+    Given(type="universal", axes=((0.0, 1.0, 0.0), (1.0, 0.0, 0.0))),
+    Given(type="universal", axes=((0.3, 1.0, 0.2), (1.0, -0.1, 0.7))),
+    Given(type="spherical"),
+]
+KINDS = [j.type for j in JOINTS]
+
+
+def numbers(motion: JointMotion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    R, d, A = (np.asarray(part, float) for part in motion)
+    return R, d, A
+
+
+def vee(W: np.ndarray) -> np.ndarray:
+    return 0.5 * np.array([W[2, 1] - W[1, 2], W[0, 2] - W[2, 0], W[1, 0] - W[0, 1]])
+
+
+@pytest.mark.parametrize("joint", JOINTS, ids=KINDS)
+def test_a_joints_freedoms_are_the_derivatives_of_its_rotation_and_travel(joint: Any) -> None:
+    rng = np.random.default_rng(0)
+    for c in rng.uniform(-1.3, 1.3, (4, FREEDOMS[joint.type])):
+        R, _, A = numbers(joint_motion(joint, c.tolist()))
+        for k in range(len(c)):
+            e = H * np.eye(len(c))[k]
+            ahead, behind = (numbers(joint_motion(joint, (c + s * e).tolist())) for s in (1, -1))
+            v = R.T @ (ahead[1] - behind[1]) / (2 * H)
+            w = vee(R.T @ (ahead[0] - behind[0]) / (2 * H))
+            np.testing.assert_allclose(A[:, k], [*v, *w], atol=1e-9)
+
+
+@pytest.mark.parametrize("joint", JOINTS, ids=KINDS)
+def test_a_joint_turns_rigidly(joint: Any) -> None:
+    c = np.linspace(0.4, -0.9, FREEDOMS[joint.type])
+    R, _, _ = numbers(joint_motion(joint, c.tolist()))
+    np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(R) == pytest.approx(1.0)
+
+
+def test_every_joint_of_the_language_has_its_freedoms() -> None:
+    assert {kind: len(parts) for kind, parts in COMPONENTS.items()} == FREEDOMS
+
+
+def test_a_screw_travels_its_lead_in_one_turn() -> None:
+    screw = Given(type="screw", axis=(0.0, 0.0, 2.0), lead=0.005)
+    R, d, _ = numbers(joint_motion(screw, [2.0 * np.pi]))
+    np.testing.assert_allclose(d, [0.0, 0.0, 0.005], atol=1e-18)
+    np.testing.assert_allclose(R, np.eye(3), atol=1e-15)
+
+
+def test_a_nut_turns_once_while_it_travels_its_lead() -> None:
+    R, _, A = numbers(joint_motion(Given(type="nut", lead=0.02), [0.005]))
+    np.testing.assert_allclose(R @ [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], atol=1e-15)
+    np.testing.assert_allclose(A[:, 0], [1.0, 0, 0, 2.0 * np.pi / 0.02, 0, 0])
+
+
+# World frames of every link against their twists
+
+
+def frames(
+    model: Built, motion: Kinematics, q: np.ndarray
+) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """World rotation, origin and twist per q̇ of every link, evaluated."""
+    n = len(model.numbers.coordinates)
+    scalars: list[Any] = []
+    for p in motion.placements:
+        scalars += [*p.world_rotation.ravel(), *p.world_origin, *p.twist.ravel()]
+    table = compile_table(model.numbers.recorder, scalars, n)
+    z = (model.numbers.relative @ q + model.numbers.offset)[:, None]
+    values = np.broadcast_to(table.evaluate(Samples(), z), (len(scalars), 1))[:, 0]
+    cut = values.reshape(len(motion.placements), 12 + 6 * n)
+    return [(v[:9].reshape(3, 3), v[9:12], v[12:].reshape(6, n)) for v in cut]
+
+
+def twists_agree(tree: Tree, q: np.ndarray) -> None:
+    model = built(tree)
+    if not len(q):
+        return
+    motion = all_moving(model.case, model.numbers, model.motion)
+    here = frames(model, motion, q)
+    for i in range(len(q)):
+        e = H * np.eye(len(q))[i]
+        ahead, behind = frames(model, motion, q + e), frames(model, motion, q - e)
+        for (R, _, T), (R1, o1, _), (R0, o0, _) in zip(here, ahead, behind, strict=True):
+            v, w = R.T @ (o1 - o0) / (2 * H), vee(R.T @ (R1 - R0) / (2 * H))
+            # third derivatives of loops near a dead point reach some 100
+            np.testing.assert_allclose(T[:, i], [*v, *w], rtol=1e-6, atol=3e-8)
+
+
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+@pytest.mark.parametrize("seed", range(20))
+def test_twists_of_trees_are_the_derivatives_of_the_world_frames(seed: int, space: str) -> None:
+    twists_agree(*random_open(seed, space))
+
+
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+@pytest.mark.parametrize("seed", range(10))
+def test_twists_of_loops_are_the_derivatives_of_the_world_frames(seed: int, space: str) -> None:
+    tree, q0, _ = random_closed(seed, space)
+    twists_agree(tree, q0)
+
+
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+@pytest.mark.parametrize("seed", range(10))
+def test_the_jacobian_of_any_node_is_the_derivative_of_its_position(seed: int, space: str) -> None:
+    for tree, q, *_ in (random_open(seed, space), random_closed(seed, space)):
+        model = built(tree)
+        for link in tree["mechanism"]["links"]:
+            for node in nodes(tree, link):
+                J = model.poses.jacobian(model.x(q), link, node)[0]
+                for i in range(len(q)):
+                    e = H * np.eye(len(q))[i]
+                    a, b = (
+                        model.poses.position(model.x(q + s * e), link, node)[0] for s in (1, -1)
+                    )
+                    np.testing.assert_allclose(J[:, i], (a - b) / (2 * H), rtol=1e-6, atol=3e-8)
+
+
+# What the mounting means
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7, np.pi / 2, -2.0])
+def test_a_carriage_travels_along_its_beam_however_its_follower_is_mounted(angle: float) -> None:
+    tree = gantry("free")
+    tree["mechanism"]["joints"]["car"]["angle"] = angle
+    tree["mechanism"]["links"]["trolley"] |= {"nodes": {"hook": [0.1, -0.2]}, "inertia": 0.05}
+    model = built(tree)
+    J = model.poses.jacobian(model.x([0.5]), "trolley", "hook")[0]
+    np.testing.assert_allclose(J[:, 0], [1.0, 0.0, 0.0], atol=1e-12)
+    frame = world(tree, [0.5])
+    np.testing.assert_allclose(model.lam([0.5], 6), frame.spectrum(6), rtol=1e-9)
+
+
+def ball_screw(orientation: list[float]) -> Tree:
+    """A screw shaft with a travelling nut that carries a table's arm."""
+    return {
+        "mechanism": {
+            "space": "spatial",
+            "materials": {"m": {"youngs_modulus": 210e9, "density": 7850.0, "poissons_ratio": 0.3}},
+            "sections": {"s": {"shape": "circle", "diameter": 0.02}},
+            "links": {"shaft": straight(1.0, 4), "arm": straight(0.2, 2)},
+            "joints": {
+                "bearing": {"type": "fixed", "base": "ground", "follower": "shaft.start"},
+                "nut": {"type": "nut", "base": "shaft", "follower": "arm.start", "lead": 0.05,
+                        "orientation": orientation},
+            },
+            "bodies": {"table": {"at": "arm.end", "mass": 2.0, "inertia": [0.01, 0.02, 0.02]}},
+        },
+        "coordinates": {"s": {"joint": "nut", "drive": {"stiffness": 1e7}}},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("orientation", [[0, 0, 0], [0.3, 0, 0], [0, 0, np.pi / 2], [0.4, -1, 2]])
+def test_a_nut_turns_about_its_screw_however_its_follower_is_mounted(
+    orientation: list[float],
+) -> None:
+    tree = ball_screw([float(a) for a in orientation])
+    model, frame = built(tree), world(tree, [0.43])
+    np.testing.assert_allclose(model.lam([0.43], 6), frame.spectrum(6), rtol=1e-8)
+    tip = [model.poses.position(model.x([s]), "arm", "start")[0] for s in (0.3, 0.43)]
+    np.testing.assert_allclose(tip[1] - tip[0], [0.13, 0.0, 0.0], atol=1e-14)
+
+
+def test_a_tapered_beam_keeps_its_taper_where_a_carriage_splits_it() -> None:
+    tree = gantry("locked")
+    tree["mechanism"]["sections"]["t"] = {"shape": "rectangle", "height": 0.02, "width": 0.03}
+    tree["mechanism"]["links"]["girder"]["section"] = {"start": "s", "end": "t"}
+    model = built(tree)
+    for x in (0.4, 0.5, 1.1):
+        np.testing.assert_allclose(model.lam([x], 5), world(tree, [x]).spectrum(5), rtol=1e-8)
+
+
+def test_an_absolute_angle_is_the_worlds_wherever_the_joint_is_in_the_file() -> None:
+    tree = four_bar("locked")
+    joints = tree["mechanism"]["joints"]
+    tree["mechanism"]["joints"] = {
+        "D": joints["D"],
+        "E": {"type": "revolute", "base": "rocker.end", "follower": "coupler.end"},
+        "B": {"type": "revolute", "base": "coupler.start", "follower": "crank.end"},
+        "A": {**joints["A"], "angle": 0.4},  # closes the loop
+    }
+    tree["mechanism"]["assembly"] = {"guess": {"D": 2.0, "E": -1.0, "B": -1.0}}
+    tree["coordinates"]["th"]["angle"] = "absolute"
+    model, th = built(tree), 0.5
+    crank = model.poses.position(model.x([th]), "crank", "end")[0]
+    np.testing.assert_allclose(crank, [0.12 * np.cos(th), 0.12 * np.sin(th), 0.0], atol=1e-12)
+
+
+def test_turning_and_moving_the_whole_mechanism_changes_no_frequency() -> None:
+    tree = arm3r("free")
+    moved = changed(tree, "joints.yaw.orientation", [0.7, -1.1, 0.4])
+    moved = changed(moved, "joints.yaw.position", [0.3, 2.0, -1.0])
+    q = [0.3, 0.5, -0.9]
+    np.testing.assert_allclose(built(moved).lam(q, 5), built(tree).lam(q, 5), rtol=1e-9)

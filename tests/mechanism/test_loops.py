@@ -1,0 +1,319 @@
+"""Closed loops: branches kept and named, dead points refused, what cannot be closed or moved."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+from spatial_cases import Built, built, changed
+from spatial_examples import arm3r, four_bar, gantry, slider_crank, straight
+from spatial_oracle import Tree, world
+
+from eigassign.errors import CaseError, MechanismError, SingularityError
+
+
+def ends(model: Built, q: Any, link: str) -> np.ndarray:
+    return np.array([model.poses.position(model.x(q), link, node) for node in ("start", "end")])
+
+
+# Branches
+
+
+@pytest.mark.parametrize("guess", [1.0, -1.0])
+def test_a_crank_rocker_keeps_its_branch_through_whole_turns(guess: float) -> None:
+    tree = four_bar("locked")
+    tree["mechanism"]["assembly"] = {"guess": {"B": guess, "D": 2 * guess, "E": guess}}
+    model, th = built(tree), np.linspace(-2 * np.pi, 2 * np.pi, 121)[:, None]
+    crank = 0.12 * np.hstack([np.cos(th), np.sin(th), 0 * th])
+    pin = ends(model, th, "rocker")[1]
+    np.testing.assert_allclose(ends(model, th, "crank")[1], crank, atol=1e-13)
+    np.testing.assert_allclose(np.linalg.norm(pin - crank, axis=1), 0.45, rtol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(pin - [0.5, 0, 0], axis=1), 0.4, rtol=1e-12)
+    side = np.cross(np.array([0.5, 0, 0]) - crank, pin - crank)[:, 2]
+    assert (side * guess > 0.0).all()  # the pin stays on its side of the line crank to pivot
+    turns = ends(model, th[[0, 60, 120]], "rocker")
+    np.testing.assert_allclose(turns[:, 1], turns[:, 0], atol=1e-12)
+
+
+def test_a_whole_turn_of_the_crank_brings_back_every_frequency() -> None:
+    model = built(four_bar("free"))
+    for q in (0.3, 2.0, 4.5):
+        np.testing.assert_allclose(
+            model.lam([q], 4), model.lam([q + 2 * np.pi], 4), rtol=1e-8, err_msg=str(q)
+        )
+
+
+def test_both_branches_are_listed_where_none_is_chosen() -> None:
+    tree = four_bar("free")
+    del tree["mechanism"]["assembly"]
+    with pytest.raises(MechanismError) as caught:
+        built(tree)
+    text = caught.value.message
+    assert "close in 2 ways at th = 0" in text
+    assert "(B: 0.9926; D: 1.913; E: 0.92) | (B: -0.9926; D: -1.913; E: -0.92)" in text
+    assert "mechanism.assembly" in text
+
+
+def test_the_listed_branches_close_the_loop_where_they_are_given_back() -> None:
+    for B, D, E in ((0.9926, 1.913, 0.92), (-0.9926, -1.913, -0.92)):
+        tree = four_bar("free")
+        tree["mechanism"]["assembly"] = {"at": {"th": 0.0}, "guess": {"B": B, "D": D, "E": E}}
+        pin = ends(built(tree), [0.0], "rocker")[1, 0]
+        np.testing.assert_allclose(pin, [0.5 + 0.4 * np.cos(D), 0.4 * np.sin(D), 0], atol=2e-4)
+
+
+def test_a_slide_longer_than_a_turn_is_not_taken_for_an_angle() -> None:
+    tree = slider_crank("locked")
+    tree["mechanism"]["links"]["crank"]["length"] = 1.5
+    tree["mechanism"]["links"]["rod"]["length"] = 4.5
+    del tree["mechanism"]["assembly"]
+    with pytest.raises(MechanismError, match=r"P: 6.* P: -3"):
+        built(tree)
+
+
+def test_a_guess_that_leads_nowhere_is_answered_with_the_ways_there_are() -> None:
+    tree = slider_crank("locked")
+    tree["mechanism"]["assembly"] = {"at": {"th": 0.7}, "guess": {"P": 80.0}}
+    with pytest.raises(
+        MechanismError, match=r"the guess leads to no closed pose.* 2 ways"
+    ) as caught:
+        built(tree)
+    assert caught.value.path == "mechanism.assembly"
+
+
+def test_the_guess_chooses_the_branch_where_it_is_said_to_hold() -> None:
+    tree = four_bar("locked")
+    tree["mechanism"]["assembly"] = {"at": {"th": 2.5}, "guess": {"B": -1.0, "D": 2.0, "E": 0.5}}
+    there = built(tree)
+    frame = world(tree, [0.4])
+    np.testing.assert_allclose(there.lam([0.4], 4), frame.spectrum(4), rtol=1e-8)
+
+
+# Dead points
+
+
+def parallelogram(at: float = 1.0) -> Tree:
+    tree = four_bar("locked")
+    m = tree["mechanism"]
+    m["links"]["crank"]["length"] = m["links"]["rocker"]["length"] = 0.3
+    m["links"]["coupler"]["length"] = 0.8
+    m["joints"]["D"]["position"] = [0.8, 0.0]
+    m["assembly"] = {"at": {"th": at}, "guess": {"B": -at, "D": at, "E": at}}
+    return tree
+
+
+def test_a_parallelogram_moves_in_parallel_on_either_side_of_the_fold() -> None:
+    for at in (1.0, -1.0, 4.0):
+        model = built(parallelogram(at))
+        q = at + np.array([[-0.7], [0.0], [0.7]])
+        crank, rocker = (ends(model, q, link) for link in ("crank", "rocker"))
+        np.testing.assert_allclose(rocker - crank, np.full((2, 3, 3), [0.8, 0, 0]), atol=1e-12)
+
+
+@pytest.mark.parametrize("th", [np.pi, np.pi - 1e-5, 0.0, 1e-7])
+def test_the_folded_parallelogram_is_a_dead_point(th: float) -> None:
+    with pytest.raises(SingularityError, match=f"dead point, at th = {th:.6g}"):
+        built(parallelogram()).lam([th], 1)
+
+
+def test_a_parallelogram_is_not_driven_through_its_fold() -> None:
+    with pytest.raises(SingularityError, match=r"at th = 3\.1\d* on the way to th = 4"):
+        built(parallelogram()).lam([4.0], 1)
+
+
+def driven_by_the_slider() -> Tree:
+    tree = slider_crank("locked")
+    tree["coordinates"] = {"x": {"joint": "P", "drive": "locked"}}
+    tree["mechanism"]["assembly"] = {"at": {"x": 0.5}, "guess": {"A": 0.8, "B": -1.0, "E": 0.2}}
+    return tree
+
+
+def test_a_slider_crank_driven_by_its_slider_has_the_crank_of_the_cosine_rule() -> None:
+    model, x = built(driven_by_the_slider()), np.linspace(0.35, 0.59, 13)[:, None]
+    cosine = (x**2 + 0.15**2 - 0.45**2) / (2 * 0.15 * x)
+    pin = ends(model, x, "crank")[1]
+    np.testing.assert_allclose(pin[:, 0], 0.15 * cosine[:, 0], atol=1e-12)
+    assert (pin[:, 1] > 0.0).all()
+
+
+@pytest.mark.parametrize(("x", "where"), [(0.6, "0.6"), (0.61, r"0\.60\d* on the way to x = 0.61")])
+def test_a_slider_crank_driven_by_its_slider_stops_at_the_dead_centre(x: float, where: str) -> None:
+    with pytest.raises(SingularityError, match=f"dead point, at x = {where}"):
+        built(driven_by_the_slider()).lam([x], 1)
+
+
+def test_only_the_sample_at_the_dead_point_is_named() -> None:
+    with pytest.raises(SingularityError, match=r"x = 0\.6$"):
+        built(driven_by_the_slider()).poses.lines(np.array([[0.5], [0.6], [0.4]]))
+
+
+# What cannot be closed or moved
+
+
+def test_a_loop_that_cannot_be_closed_is_refused_with_its_configuration() -> None:
+    tree = changed(four_bar("free"), "links.coupler.length", 0.05)
+    tree = changed(tree, "links.rocker.length", 0.2)
+    with pytest.raises(MechanismError, match="cannot be closed at th = 0") as caught:
+        built(tree)
+    assert caught.value.path == "mechanism.assembly"
+
+
+def test_clamped_loops_whose_sides_do_not_meet_are_refused_at_the_joint() -> None:
+    tree = gantry("free")
+    tree["mechanism"]["joints"]["f4"]["position"] = [1.61, 0.0]
+    with pytest.raises(MechanismError, match="two sides do not meet") as caught:
+        built(tree)
+    assert caught.value.path == "mechanism.joints.f4"
+
+
+def test_missing_coordinates_are_counted_and_the_moving_joints_named() -> None:
+    tree = four_bar("free")
+    tree["coordinates"] = {}
+    with pytest.raises(MechanismError, match=r"1 more .*joints A, B, D, E") as caught:
+        built(tree)
+    assert caught.value.path == "coordinates"
+
+
+def test_two_missing_coordinates_of_a_five_bar_are_counted() -> None:
+    tree = five_bar()
+    tree["coordinates"] = {}
+    del tree["mechanism"]["assembly"]["at"]
+    with pytest.raises(MechanismError, match="2 more coordinate"):
+        built(tree)
+
+
+def test_a_joint_without_coordinate_in_an_open_chain_is_named() -> None:
+    tree = arm3r("free")
+    del tree["coordinates"]["pitch"]
+    with pytest.raises(CaseError, match=r"mechanism\.joints\.pitch: no coordinate"):
+        built(tree)
+
+
+def test_a_side_chain_that_swings_freely_beside_a_loop_is_not_determined() -> None:
+    tree = four_bar("free")
+    tree["mechanism"]["links"]["pendulum"] = straight(0.2, 2)
+    tree["mechanism"]["joints"]["P"] = {
+        "type": "revolute", "base": "rocker.start", "follower": "pendulum.start"
+    }  # fmt: skip
+    tree["mechanism"]["assembly"]["guess"]["P"] = 0.0
+    with pytest.raises(MechanismError, match="1 more coordinate"):
+        built(tree)
+
+
+def test_an_absolute_angle_carried_by_a_passive_joint_is_refused_by_name() -> None:
+    tree = four_bar("free")
+    tree["mechanism"]["links"]["tool"] = straight(0.2, 2)
+    tree["mechanism"]["joints"]["T"] = {
+        "type": "revolute", "base": "rocker.end", "follower": "tool.start"
+    }  # fmt: skip
+    tree["coordinates"]["tool"] = {"joint": "T", "angle": "absolute"}
+    with pytest.raises(MechanismError, match="absolute angle") as caught:
+        built(tree)
+    assert caught.value.path == "coordinates.tool.angle"
+
+
+def test_a_loop_of_rigid_links_alone_is_refused_at_the_joint_that_closes_it() -> None:
+    tree = four_bar("free")
+    for link, data in tree["mechanism"]["links"].items():
+        rigid = {"type": "rigid", "length": data["length"], "mass": 1.0, "inertia": 0.01}
+        tree["mechanism"]["links"][link] = rigid
+    with pytest.raises(MechanismError, match="cannot deform") as caught:
+        _ = built(tree).pencil
+    assert caught.value.path == "mechanism.joints.E"
+
+
+# More mechanisms
+
+
+def five_bar() -> Tree:
+    tree = four_bar("free")
+    m = tree["mechanism"]
+    m["links"] = {n: straight(L, 3) for n, L in
+                  (("a", 0.2), ("b", 0.35), ("c", 0.35), ("d", 0.2))}  # fmt: skip
+    m["joints"] = {
+        "A": {"type": "revolute", "base": "ground", "follower": "a.start"},
+        "B": {"type": "revolute", "base": "a.end", "follower": "b.start"},
+        "D": {"type": "revolute", "base": "ground", "follower": "d.start", "position": [0.25, 0]},
+        "C": {"type": "revolute", "base": "d.end", "follower": "c.start"},
+        "E": {"type": "revolute", "base": "b.end", "follower": "c.end"},
+    }
+    m["assembly"] = {"at": {"q1": 2.0, "q2": 1.1}, "guess": {"B": -1.0, "C": 1.0, "E": 1.5}}
+    tree["coordinates"] = {"q1": {"joint": "A"}, "q2": {"joint": "D"}}
+    return tree
+
+
+def six_bar() -> Tree:
+    """Watt's chain: a second loop hangs on the rocker's pin."""
+    tree = four_bar("free")
+    m = tree["mechanism"]
+    m["links"] |= {"bar": straight(0.5, 3), "swing": straight(0.45, 3)}
+    m["joints"] |= {
+        "F": {"type": "revolute", "base": "rocker.end", "follower": "bar.start"},
+        "H": {"type": "revolute", "base": "ground", "follower": "swing.start", "position": [1, 0]},
+        "G": {"type": "revolute", "base": "bar.end", "follower": "swing.end"},
+    }
+    m["assembly"]["guess"] |= {"F": -1.5, "H": 1.5, "G": 1.5}
+    return tree
+
+
+def slotted_lever(drive: Any) -> Tree:
+    """A crank whose block rides, passively, along a flexible lever (quick return)."""
+    tree = four_bar(drive)
+    m = tree["mechanism"]
+    m["links"] = {"crank": straight(0.12, 2), "block": {"type": "rigid", "mass": 0.1,
+                  "inertia": 1e-4}, "lever": straight(0.7, 6)}  # fmt: skip
+    m["joints"] = {
+        "A": {"type": "revolute", "base": "ground", "follower": "crank.start"},
+        "L": {"type": "revolute", "base": "ground", "follower": "lever.start",
+              "position": [0.0, -0.3]},
+        "S": {"type": "carriage", "base": "lever", "follower": "block.start"},
+        "B": {"type": "revolute", "base": "crank.end", "follower": "block.start"},
+    }  # fmt: skip
+    m["assembly"] = {"at": {"th": 0.0}, "guess": {"L": 1.2, "S": 0.3, "B": 1.0}}
+    return tree
+
+
+@pytest.mark.parametrize("make", [five_bar, six_bar, lambda: slotted_lever("free")])
+def test_known_linkages_have_the_spectrum_of_the_plain_frame(make: Any) -> None:
+    tree = make()
+    model = built(tree)
+    at = list(tree["mechanism"]["assembly"].get("at", {"th": 0.0}).values())
+    for shift in (0.0, 0.25, -0.3):
+        q = np.array(at) + shift
+        np.testing.assert_allclose(model.lam(q, 5), world(tree, q).spectrum(5), rtol=1e-7)
+
+
+def test_a_block_rides_along_the_lever_it_leads() -> None:
+    model, th = built(slotted_lever("locked")), np.linspace(-2.0, 2.0, 9)[:, None]
+    pin = ends(model, th, "crank")[1]
+    lever = ends(model, th, "lever")
+    gap = np.cross(pin - lever[0], lever[1] - lever[0])
+    np.testing.assert_allclose(gap, 0.0, atol=1e-12)
+
+
+def test_a_planar_linkage_is_the_same_in_space_where_its_loop_is_overconstrained() -> None:
+    tree = four_bar("free")
+    spatial = copy.deepcopy(tree)
+    spatial["mechanism"]["space"] = "spatial"
+    spatial["mechanism"]["joints"]["D"]["position"] = [0.5, 0.0, 0.0]
+    flat, deep = built(tree).lam([1.0], 4), built(spatial).lam([1.0], 12)
+    for lam in flat:  # the spatial one has modes out of the plane as well
+        assert np.abs(deep / lam - 1.0).min() < 1e-8
+    np.testing.assert_allclose(deep, world(spatial, [1.0]).spectrum(12), rtol=1e-7)
+
+
+def test_a_linkage_does_not_care_which_of_its_joints_closes_the_loop() -> None:
+    tree = four_bar("free")
+    turned = copy.deepcopy(tree)
+    joints = tree["mechanism"]["joints"]
+    turned["mechanism"]["joints"] = {
+        "D": joints["D"],
+        "E": {"type": "revolute", "base": "rocker.end", "follower": "coupler.end"},
+        "A": joints["A"],
+        "B": {"type": "revolute", "base": "coupler.start", "follower": "crank.end"},
+    }
+    turned["mechanism"]["assembly"] = {"guess": {"D": 1.9, "E": -0.9, "B": -1.0}}
+    for q in (0.3, 1.4):
+        np.testing.assert_allclose(built(turned).lam([q], 5), built(tree).lam([q], 5), rtol=1e-8)

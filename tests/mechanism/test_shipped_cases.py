@@ -1,0 +1,72 @@
+"""The shipped cases: what the references know of them, and that each can be followed."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eigassign.api import Case, load_case
+
+CASES = Path(__file__).parents[2] / "cases"
+SHIPPED = sorted(path.stem for path in CASES.glob("*.yaml"))
+KNOWN = {  # of the independent program; see test_reference_frequencies.py
+    "four_bar": ((math.radians(120),), (45.444569, 61.60197, 182.088799, 234.94075)),
+    "arm_3r": ((0.3, 0.5, -0.9), (81.590203, 137.473761, 301.577356, 434.514977)),
+    "gantry": ((0.5,), (41.041292, 71.718492, 200.065698, 324.872396)),
+}
+
+
+def shipped(name: str) -> Case:
+    return load_case(CASES / f"{name}.yaml")
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_a_shipped_mechanism_has_the_known_frequencies(name: str) -> None:
+    case, (q, known) = shipped(name), KNOWN[name]
+    found = case.model().frequencies(q, case.initial_design, count=4)[0]
+    np.testing.assert_allclose(found, known, rtol=5e-8)
+
+
+def test_the_superelement_arm_is_the_beam_arm_it_was_exported_from() -> None:
+    beam, exported = shipped("two_link"), shipped("superelement_arm")
+    q, y = beam.trajectory.q[::50], (0.125, 0.05)
+    found, wanted = (
+        case.model().frequencies(q, np.tile(y, (len(q), 1)), count=6) for case in (exported, beam)
+    )
+    np.testing.assert_allclose(found, wanted, rtol=1e-8)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_shipped_case_can_be_followed_and_its_targets_reached(name: str) -> None:
+    case = shipped(name)
+    model, q = case.model(), case.trajectory.q
+    y = np.tile(case.initial_design, (len(q), 1))
+    for target in case.file.targets:
+        found = model.frequencies(q, y, count=target.mode)[:, target.mode - 1]
+        assert np.isfinite(found).all()
+        assert isinstance(target.frequency, float)
+        assert 0.8 < target.frequency / found.mean() < 1.25
+
+
+def test_a_carriage_in_the_middle_of_a_symmetric_portal_sees_the_same_on_both_sides() -> None:
+    case = shipped("gantry")
+    left, right = (case.model().frequencies((x,), case.initial_design, 5) for x in (0.4, 1.2))
+    np.testing.assert_allclose(left, right, rtol=1e-9)
+
+
+def test_the_first_mode_of_a_ball_screw_is_that_of_two_masses_and_two_springs() -> None:
+    """Table and rotor, measured at the table; the shaft turns as one and is light: within 1 %."""
+    case = shipped("ball_screw")
+    found = case.model().frequencies((0.3,), case.initial_design, 1)[0, 0]
+    E, G, rho, d, x, p = 210e9, 210e9 / 2.6, 7850.0, 0.025, 0.3, 0.01 / (2 * math.pi)
+    axial, twist = E * math.pi * d**2 / 4 / x, G * math.pi * d**4 / 32 / x
+    shaft = 1 / (1 / axial + p**2 / twist)
+    servo = 4000 / p**2
+    turning = (6e-4 + rho * math.pi * d**4 / 32 * 0.6) / p**2
+    table = 120.0 + rho * math.pi * d**2 / 4 * x / 3  # a third of the bar that stretches
+    K = np.array([[shaft, -shaft], [-shaft, shaft + servo]])
+    lam = np.linalg.eigvals(K / np.array([[table], [turning]])).min()
+    assert found == pytest.approx(math.sqrt(lam) / 2 / math.pi, rel=0.01)

@@ -1,0 +1,224 @@
+"""Superelements: an exported beam is the beam again, reduced it converges, wrong ones are named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import sparse
+from scipy.io import mmwrite
+from spatial_cases import ALLOY, built
+from spatial_oracle import Tree, element, section
+
+from eigassign.errors import CaseError, MechanismError
+
+FLAT = {"shape": "rectangle", "width": 0.02, "height": 0.03}
+LENGTH, ELEMENTS = 0.6, 8
+KEPT = {"planar": [0, 1, 5], "spatial": [0, 1, 2, 3, 4, 5]}
+
+
+def exported(space: str) -> tuple[np.ndarray, np.ndarray]:
+    """Free-free K, M of a beam as another program would write them."""
+    n = 6 * (ELEMENTS + 1)
+    K, M = np.zeros((n, n)), np.zeros((n, n))
+    k, m = element(ALLOY, section(FLAT), LENGTH / ELEMENTS, False)
+    for e in range(ELEMENTS):
+        at = slice(6 * e, 6 * e + 12)
+        K[at, at] += k
+        M[at, at] += m
+    keep = np.add.outer(6 * np.arange(ELEMENTS + 1), KEPT[space]).ravel()
+    return K[np.ix_(keep, keep)], M[np.ix_(keep, keep)]
+
+
+def write(folder: Path, kind: str, K: np.ndarray, M: np.ndarray) -> tuple[str, str]:
+    for name, A in (("K", K), ("M", M)):
+        if kind == "npy":
+            np.save(folder / f"{name}.npy", A)
+        elif kind == "npz":
+            sparse.save_npz(folder / f"{name}.npz", sparse.csr_array(A))
+        else:
+            mmwrite(folder / f"{name}.mtx", sparse.coo_array(A), symmetry="symmetric")
+    return f"K.{kind}", f"M.{kind}"
+
+
+def arm(space: str, links: Tree) -> Tree:
+    """A beam, the link "part" hanging on it, and a tip mass on that."""
+    turn = {} if space == "planar" else {"axis": [0.3, 1.0, -0.5]}
+    return {
+        "mechanism": {
+            "space": space,
+            "materials": {"m": ALLOY},
+            "sections": {"s": FLAT},
+            "links": {
+                "upper": {"length": 0.5, "elements": 2, "material": "m", "section": "s"}, **links
+            },
+            "joints": {
+                "a": {"type": "revolute", "base": "ground", "follower": "upper.start", **turn},
+                "b": {"type": "revolute", "base": "upper.end", "follower": "part.start"},
+            },
+            "bodies": {"tip": {"at": "part.end", "mass": 0.5}},
+        },
+        "coordinates": {"q1": {"joint": "a"}, "q2": {"joint": "b", "drive": {"stiffness": 4e3}}},
+    }  # fmt: skip
+
+
+def beam_arm(space: str) -> Tree:
+    part = {"length": LENGTH, "elements": ELEMENTS, "material": "m", "section": "s"}
+    return arm(space, {"part": part})
+
+
+def part(space: str, files: tuple[str, str], **more: Any) -> Tree:
+    width = len(KEPT[space])
+    pad = [0.0] * (1 if space == "planar" else 2)
+    last = width * ELEMENTS
+    nodes = {
+        "start": {"position": [0.0, *pad], "dofs": list(range(width))},
+        "end": {"position": [LENGTH, *pad], "dofs": list(range(last, last + width))},
+    }
+    return {"type": "superelement", "stiffness": files[0], "mass": files[1], "nodes": nodes, **more}
+
+
+def lam(folder: Path, tree: Tree, count: int = 6) -> np.ndarray:
+    return built(tree, folder / "case.yaml").lam([0.4, 0.9], count)
+
+
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+@pytest.mark.parametrize("kind", ["mtx", "npy", "npz"])
+def test_an_exported_beam_is_the_beam_it_was_exported_from(
+    tmp_path: Path, space: str, kind: str
+) -> None:
+    files = write(tmp_path, kind, *exported(space))
+    tree = arm(space, {"part": part(space, files)})
+    exact = built(beam_arm(space)).lam([0.4, 0.9], 8)
+    np.testing.assert_allclose(lam(tmp_path, tree, 8), exact, rtol=1e-8)
+
+
+def test_the_order_of_the_other_programs_dofs_does_not_matter(tmp_path: Path) -> None:
+    K, M = exported("spatial")
+    p = np.random.default_rng(0).permutation(len(K))
+    at = np.argsort(p)
+    link = part("spatial", write(tmp_path, "npy", K[np.ix_(p, p)], M[np.ix_(p, p)]))
+    for node in link["nodes"].values():
+        node["dofs"] = [int(at[d]) for d in node["dofs"]]
+    exact = built(beam_arm("spatial")).lam([0.4, 0.9], 6)
+    np.testing.assert_allclose(lam(tmp_path, arm("spatial", {"part": link})), exact, rtol=1e-8)
+
+
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+def test_craig_bampton_converges_from_above_with_the_modes_it_keeps(
+    tmp_path: Path, space: str
+) -> None:
+    files = write(tmp_path, "npy", *exported(space))
+    exact = built(beam_arm(space)).lam([0.4, 0.9], 4)
+    error, size = [], []
+    for hertz in (50.0, 1500.0, 5000.0, 20000.0, 1e9):
+        tree = arm(space, {"part": part(space, files, reduce_to=hertz)})
+        model = built(tree, tmp_path / "case.yaml")
+        error.append(model.lam([0.4, 0.9], 4) / exact - 1.0)
+        size.append(model.pencil.n_dof)
+    assert size == sorted(set(size))  # each keeps more
+    assert (np.array(error) > -1e-8).all()
+    assert (np.diff(np.array(error), axis=0) < 1e-8).all()
+    assert error[0].max() > 1e-2
+    assert error[3].max() < 1e-4
+    np.testing.assert_allclose(error[-1], 0.0, atol=1e-8)
+
+
+def test_the_whole_mass_and_inertia_survive_the_reduction(tmp_path: Path) -> None:
+    files = write(tmp_path, "npy", *exported("planar"))
+    tree = arm("planar", {"part": part("planar", files, reduce_to=50.0)})
+    full = built(beam_arm("planar"))
+    model = built(tree, tmp_path / "case.yaml")
+    at = []
+    for one in (model, full):  # M of the free coordinate: the inertia of the whole arm
+        M = one.pencil.matrices(one.pencil.theta(one.x([0.4, 0.9])))[1]
+        (k,) = one.pencil.rigid
+        at.append(M[0][k, k])
+    assert at[0] == pytest.approx(at[1], rel=1e-9)
+
+
+# Wrong ones
+
+
+def refused(tmp_path: Path, link: Tree, path: str, message: str) -> None:
+    with pytest.raises(MechanismError, match=message) as caught:
+        _ = built(arm("planar", {"part": link}), tmp_path / "case.yaml").pencil
+    assert caught.value.path == f"mechanism.links.part.{path}"
+
+
+@pytest.fixture
+def good(tmp_path: Path) -> Tree:
+    return part("planar", write(tmp_path, "npy", *exported("planar")))
+
+
+def test_dof_numbers_outside_the_matrix_are_refused(tmp_path: Path, good: Tree) -> None:
+    good["nodes"]["end"]["dofs"] = [24, 25, 27]
+    refused(tmp_path, good, "nodes", "different and within 0 to 26")
+
+
+@pytest.mark.parametrize(
+    ("dofs", "message"),
+    [([24, 25, 25], "belongs to"), ([-1, 25, 26], ">= 0"), ([0, 1, 2], "belongs to node 'start'")],
+)
+def test_dof_numbers_that_cannot_be_are_refused_in_the_file(
+    tmp_path: Path, good: Tree, dofs: list[int], message: str
+) -> None:
+    good["nodes"]["end"]["dofs"] = dofs
+    with pytest.raises(CaseError, match=message):
+        built(arm("planar", {"part": good}), tmp_path / "case.yaml")
+
+
+@pytest.mark.parametrize("dofs", [[25, 24, 26], [24, 26, 25], [21, 22, 23], [24, 22, 26]])
+def test_dof_numbers_that_do_not_fit_the_matrix_are_refused(
+    tmp_path: Path, good: Tree, dofs: list[int]
+) -> None:
+    good["nodes"]["end"]["dofs"] = dofs
+    refused(tmp_path, good, "stiffness", "strains under rigid motion")
+
+
+@pytest.mark.parametrize("place", [[0.5, 0.0], [0.6, 0.1], [-0.6, 0.0], [600.0, 0.0]])
+def test_a_wrong_position_is_refused(tmp_path: Path, good: Tree, place: list[float]) -> None:
+    good["nodes"]["end"]["position"] = place
+    refused(tmp_path, good, "stiffness", "positions or dof numbers")
+
+
+def test_a_part_on_its_own_supports_is_refused(tmp_path: Path) -> None:
+    K, M = exported("planar")
+    K[1, 1] += 1e6
+    refused(tmp_path, part("planar", write(tmp_path, "npy", K, M)), "stiffness", "supports")
+
+
+def test_an_asymmetric_matrix_is_refused(tmp_path: Path) -> None:
+    K, M = exported("planar")
+    K[0, 4] += 1e6
+    refused(tmp_path, part("planar", write(tmp_path, "npy", K, M)), "stiffness", "symmetric")
+
+
+def test_matrices_of_different_size_are_refused(tmp_path: Path) -> None:
+    K, M = exported("planar")
+    refused(tmp_path, part("planar", write(tmp_path, "npy", K, M[:-1, :-1])), "mass", "24|26")
+
+
+def test_a_matrix_that_is_not_square_is_refused(tmp_path: Path) -> None:
+    K, M = exported("planar")
+    refused(tmp_path, part("planar", write(tmp_path, "npy", K[:-1], M)), "stiffness", "square")
+
+
+def test_a_missing_file_is_refused_by_name(tmp_path: Path, good: Tree) -> None:
+    good["mass"] = "gone.mtx"
+    with pytest.raises(CaseError, match=r"links\.part\.mass: no such file.*gone\.mtx"):
+        built(arm("planar", {"part": good}), tmp_path / "case.yaml")
+
+
+def test_a_file_that_is_no_matrix_is_refused(tmp_path: Path, good: Tree) -> None:
+    (tmp_path / "K.mtx").write_text("hello\n")
+    good["stiffness"] = "K.mtx"
+    refused(tmp_path, good, "stiffness", "cannot read K")
+
+
+def test_an_entry_that_is_not_finite_is_refused(tmp_path: Path) -> None:
+    K, M = exported("planar")
+    M[0, 0] = np.nan
+    refused(tmp_path, part("planar", write(tmp_path, "npy", K, M)), "mass", "finite")

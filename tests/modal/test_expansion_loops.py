@@ -1,0 +1,245 @@
+"""The expansion over loops, spatial arms and travelling carriages: residuals, slopes, derivatives.
+
+Also over every kind of design parameter: section dimensions, modulus, body mass, spring and drive
+stiffness, and a length in an open chain and in a loop, where it moves the passive joints too.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from spatial_cases import Built, built, changed
+from spatial_examples import arm3r, four_bar, gantry, slider_crank
+from spatial_oracle import Tree, world
+from spatial_random import random_closed, random_open
+
+from eigassign.modal.exact import eigenvalues, modes
+from eigassign.modal.expansion import Expansion, expand
+from eigassign.modal.recursion import expand_subspace
+from eigassign.series.lower_set import total_degree
+
+
+def with_design(tree: Tree, **paths: str) -> Tree:
+    design = {n: {"parameter": p, "min": 1e-9, "max": 1e15} for n, p in paths.items()}
+    return {**tree, "design": design}
+
+
+def loop() -> Tree:
+    tree = four_bar("free")
+    tree["mechanism"]["bodies"] = {"pin": {"at": "coupler.end", "mass": 0.3, "inertia": 1e-4}}
+    return with_design(
+        tree, length="links.coupler.length", pin="bodies.pin.mass", height="sections.s.height"
+    )
+
+
+def slider() -> Tree:
+    tree = slider_crank("free")
+    tree["mechanism"]["springs"] = {
+        "seat": {"between": ["rod.end", "ground"], "translational": [0.0, 2e4]}
+    }
+    return with_design(tree, block="links.slider.mass", rod="links.rod.length")
+
+
+def spatial_arm() -> Tree:
+    tree = arm3r("free")
+    tree["coordinates"]["elbow"]["drive"] = {"stiffness": 5e3}
+    return with_design(
+        tree,
+        wall="sections.s.inner_diameter",
+        modulus="materials.m.youngs_modulus",
+        length="links.up.length",
+        drive="coordinates.elbow.drive.stiffness",
+    )
+
+
+def portal() -> Tree:
+    tree = gantry("free")
+    tree["mechanism"]["springs"] = {
+        "stop": {"between": ["girder.start", "ground"], "translational": 4e5}
+    }
+    return with_design(tree, trolley="links.trolley.mass", stop="springs.stop.translational")
+
+
+# name, tree, q0, half-widths of the box in (q, y)
+CASES: list[tuple[Any, list[float], list[float]]] = [
+    (loop, [2.1], [1.0, 0.05, 0.1, 5e-4]),
+    (slider, [1.0], [1.0, 0.2, 0.05]),
+    (spatial_arm, [0.3, 0.5, -0.9], [1.0, 1.0, 1.0, 1e-3, 1e10, 0.05, 1e3]),
+    (portal, [0.6], [0.8, 3.0, 4e5]),
+]
+IDS = [case[0].__name__ for case in CASES]
+STEPS = {1: 0.01, 2: 0.03, 3: 0.06, 4: 0.09, 5: 0.12}
+
+
+def truncation(model: Built, e: Expansion, span: np.ndarray, h: float) -> float:
+    """Root mean square error over random directions, both ways, at distance h of ``span``."""
+    rng = np.random.default_rng(5)
+    d = rng.standard_normal((10, len(span)))
+    d = np.vstack([d, -d]) / np.linalg.norm(d, axis=1).max() * span * h
+    x = e.x0 + d
+    q, y = np.split(x, [len(e.q0)], axis=1)
+    exact = eigenvalues(model.pencil, x, 1)
+    return float(np.sqrt(np.mean((e.eigenvalues(q, y) / exact - 1.0) ** 2)))
+
+
+@pytest.mark.parametrize("order", STEPS)
+@pytest.mark.parametrize(("make", "q0", "span"), CASES, ids=IDS)
+def test_the_truncation_error_falls_with_one_power_more_than_the_order(
+    make: Any, q0: list[float], span: list[float], order: int
+) -> None:
+    model = built(make())
+    e = expand(model.pencil, q0, model.y, order=order)
+    coarse, fine = (truncation(model, e, np.array(span), STEPS[order] * s) for s in (1.0, 0.5))
+    assert fine > 1e-13
+    assert math.log2(coarse / fine) == pytest.approx(order + 1, abs=0.2)
+
+
+@pytest.mark.parametrize(("make", "q0", "span"), CASES, ids=IDS)
+def test_first_derivatives_are_those_of_the_plain_frame_rebuilt(
+    make: Any, q0: list[float], span: list[float]
+) -> None:
+    """The oracle is built anew for every value: a design parameter that reaches only part of the
+    model, or a passive joint that does not follow a length, would show."""
+    tree = make()
+    model = built(tree)
+    e = expand(model.pencil, q0, model.y, order=1)
+    paths = [d["parameter"] for d in tree["design"].values()]
+    for k, width in enumerate(span):
+        h = 1e-3 * width
+        rigid = len(model.pencil.rigid)  # springs hold free coordinates too
+        lam = [_moved(tree, paths, q0, model.y, k, s * h, rigid) for s in (1, -1)]
+        at = np.flatnonzero((e.indices == np.eye(len(span), dtype=int)[k]).all(axis=1))
+        found = float(e.coefficients[0, at[0]]) if len(at) else 0.0
+        # differences: h² from truncation, 1e-10/1e-3 from round-off, of the change over the box
+        size = abs(e.coefficients[0, 0])
+        assert found * width == pytest.approx((lam[0] - lam[1]) / 2e-3, rel=1e-4, abs=3e-6 * size)
+
+
+def _moved(
+    tree: Tree, paths: list[str], q0: list[float], y: np.ndarray, k: int, h: float, rigid: int
+) -> float:
+    q = np.array(q0)
+    if k < len(q):
+        q[k] += h
+    else:
+        tree = changed(tree, paths[k - len(q)], float(y[k - len(q)] + h))
+    frame = world(tree, q)
+    frame.n_free = rigid
+    return float(frame.spectrum(1)[0])
+
+
+@pytest.mark.parametrize(("make", "q0", "span"), CASES, ids=IDS)
+def test_second_derivatives_are_differences_of_first_ones(
+    make: Any, q0: list[float], span: list[float]
+) -> None:
+    model = built(make())
+    n = len(q0)
+    x0 = np.concatenate([q0, model.y])
+    e = expand(model.pencil, q0, model.y, order=2)
+    second = _tensor(e, len(x0)) * np.outer(span, span)
+    scale = np.abs(second).max()
+    for k, width in enumerate(span):
+        x = np.array([x0 + s * 2e-3 * width * np.eye(len(x0))[k] for s in (1, -1)])
+        g = [_gradient(expand(model.pencil, p[:n], p[n:], order=1), len(x0)) for p in x]
+        found = (g[0] - g[1]) / 4e-3 * np.array(span)
+        np.testing.assert_allclose(second[k], found, rtol=2e-4, atol=2e-5 * scale)
+
+
+def _gradient(e: Expansion, n: int) -> np.ndarray:
+    out = np.zeros(n)
+    for index, value in zip(e.indices, e.coefficients[0], strict=True):
+        if index.sum() == 1:
+            out[int(np.argmax(index))] = value
+    return out
+
+
+def _tensor(e: Expansion, n: int) -> np.ndarray:
+    """∂²λ/∂x_i∂x_j."""
+    out = np.zeros((n, n))
+    for index, value in zip(e.indices, e.coefficients[0], strict=True):
+        if index.sum() == 2:
+            i, j = np.repeat(np.arange(n), index)
+            out[i, j] = out[j, i] = value * (2.0 if i == j else 1.0)
+    return out
+
+
+@pytest.mark.parametrize(("make", "q0", "span"), CASES, ids=IDS)
+def test_the_recursion_leaves_no_residual_at_any_multi_index(
+    make: Any, q0: list[float], span: list[float]
+) -> None:
+    """Σ K_δ X_{γ−δ} = Σ M_δ X_ε Λ_ζ with plain loops; scaled by the box so that all weigh alike."""
+    model = built(make())
+    pencil, order = model.pencil, 3
+    x0 = np.concatenate([q0, model.y])
+    space = total_degree(len(x0), order)
+    theta = pencil.theta_series(space, x0, pencil.to_program * np.array(span))
+    found = modes(pencil, x0[None], 2)
+    series = expand_subspace(pencil, theta, space, found.lam[0], found.phi[0])
+    K, M = (
+        [pencil.sparse(weights @ theta[:, k]).toarray() for k in range(len(space))]
+        for weights in (pencil.stiffness, pencil.mass)
+    )
+    members = [tuple(row) for row in space.indices.tolist()]
+    place = {row: k for k, row in enumerate(members)}
+    X, L = series.vectors, series.values
+    pairs = [
+        (a, b, place[c])
+        for a, ra in enumerate(members)
+        for b, rb in enumerate(members)
+        if (c := tuple(i + j for i, j in zip(ra, rb, strict=True))) in place
+    ]
+    left, right, product = (np.zeros_like(X) for _ in range(3))
+    size = np.zeros(len(members))
+    for a, b, c in pairs:
+        left[c] += K[a] @ X[b]
+        product[c] += X[a] @ L[b]
+        size[c] = max(size[c], np.abs(K[a] @ X[b]).max())
+    for a, b, c in pairs:
+        right[c] += M[a] @ product[b]
+    residual = np.abs(left - right).max(axis=(1, 2)) / np.maximum(size, 1e-12 * size.max())
+    assert residual.max() < 1e-8, members[int(residual.argmax())]
+
+
+@pytest.mark.parametrize(
+    ("seed", "space"), [(s, "planar") for s in (0, 1, 5)] + [(s, "spatial") for s in (0, 1, 2, 3)]
+)
+def test_random_loops_are_expanded_to_their_order(seed: int, space: str) -> None:
+    tree, q0, _ = random_closed(seed, space)
+    slopes(tree, q0)
+
+
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5, 6, 7, 8])
+def test_random_trees_are_expanded_to_their_order(seed: int, space: str) -> None:
+    slopes(*random_open(seed, space))
+
+
+def slopes(tree: Tree, q0: np.ndarray) -> None:
+    model = built(tree)
+    e = expand(model.pencil, q0, [], order=2)
+    assert len(e.clusters[0].modes) == 1
+    assert model.pencil.active.any()
+    span = np.full(len(q0), 0.3)
+    coarse, fine = (truncation(model, e, span, h) for h in (0.02, 0.01))
+    if coarse < 1e-11:
+        return  # a polynomial of this order already
+    assert math.log2(coarse / fine) == pytest.approx(3.0, abs=0.3)
+
+
+def test_a_coordinate_that_turns_the_whole_mechanism_is_dropped() -> None:
+    model = built(arm3r("free"))
+    e = expand(model.pencil, [0.3, 0.5, -0.9], [], order=3)
+    yaw = e.indices[:, 0]
+    np.testing.assert_allclose(e.coefficients[:, yaw > 0], 0.0)
+
+
+def test_the_partially_linear_expansion_of_a_loop_has_the_full_ones_coefficients() -> None:
+    model = built(loop())
+    full = expand(model.pencil, [2.1], model.y, order=4)
+    part = expand(model.pencil, [2.1], model.y, order=4, linear_in_y=True)
+    place = {tuple(row): k for k, row in enumerate(full.indices.tolist())}
+    same = [place[tuple(row)] for row in part.indices.tolist()]
+    np.testing.assert_allclose(part.coefficients, full.coefficients[:, same], rtol=1e-7)
