@@ -89,7 +89,7 @@ def _chart(
         case_sha256=file.sha256,
         reference=file.reference,
         version=__version__,
-        quick=effort is QUICK,
+        quick=effort.brief,
         machine=machine(),
         asked=compared.asked,
         points=compared.points,

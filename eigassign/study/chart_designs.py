@@ -23,7 +23,7 @@ from eigassign.modal.expansion import expand
 from eigassign.study.approximation import Expansions
 from eigassign.study.assignment_study import assign_design
 from eigassign.study.chart_data import DesignRun, Timing
-from eigassign.study.chart_effort import Effort
+from eigassign.study.chart_effort import Effort, suited
 from eigassign.study.chart_gradient import eigenvalue_slopes
 from eigassign.study.chart_methods import points_along, reduced_model, solves_per_point
 from eigassign.study.chart_search import Limits, Watched, by_evolution, by_gradient, by_kriging
@@ -47,6 +47,7 @@ def chart_designs(
     lower, upper = scene.bounds
     if not scene.file.targets or not len(lower) or not np.isfinite(upper - lower).all():
         return (), ()
+    effort = suited(effort, scene.model.n_dof)
     task, runs, notes = task_of(scene, effort, solve_s), [], []
     if len(task.rows) < len(scene.path.time_s):
         notes.append(
@@ -70,6 +71,8 @@ def _ways(
 ) -> Iterator[tuple[str, Callable[[], DesignRun]]]:
     yield "program on the expansion", partial(_one_shot, task, effort)
     for m, count, guard in ((2, 1, False), (2, 3, True)):
+        if count > max(effort.expansion_points):
+            continue
         for rounds, kind in ((1, "program"), (ROUNDS, "programs in a row")):
             name = f"{kind} on reduced m = {m}, {count} point{'s' if count > 1 else ''}"
             yield name, partial(_on_reduced, task, effort, name, (m, count, guard), rounds)

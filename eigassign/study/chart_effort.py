@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from eigassign.study.chart_timing import Patience
+
+LARGE = 1000  # n_dof from which a quick chart tries less
 
 
 @dataclass(frozen=True)
 class Effort:
     """Sizes of the question, of the methods' ladders, and how long things may take."""
 
+    brief: bool = False
     random_points: int = 600
     designs: int = 5
     samples_per_design: int = 152
     orders: tuple[int, ...] = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12)
+    coefficients: int = 5000  # largest set that is expanded
     half_orders: tuple[int, ...] = (0, 1, 2, 3)
     expansion_points: tuple[int, ...] = (1, 3, 5)
     nodes: tuple[int, ...] = (2, 3, 4, 5, 6, 7, 9, 11)
@@ -49,11 +53,20 @@ class Effort:
     searched_s: float = 60.0  # exact solves of one search may take about this long
 
 
+def suited(effort: Effort, n_dof: int) -> Effort:
+    """The effort for a model of this size: a quick chart of a large one leaves out what is slow."""
+    if not effort.brief or n_dof <= LARGE:
+        return effort
+    return replace(effort, orders=(1, 2, 3, 4), half_orders=(1, 2), expansion_points=(1,))
+
+
 QUICK = Effort(
+    brief=True,
     random_points=150,
     designs=3,
     samples_per_design=31,
     orders=(1, 2, 3, 4, 6, 8),
+    coefficients=1000,
     expansion_points=(1, 3),
     nodes=(3, 5, 7),
     stations=(5, 17),
@@ -67,7 +80,7 @@ QUICK = Effort(
     most_dense=300,
     most_dof=2500,
     factors=(0.5, 1.0, 2.0, 4.0),
-    patience=Patience(rounds=5, seconds=0.0, long_s=0.2),
+    patience=Patience(rounds=5, seconds=0.0, long_s=0.06),
     objectives=60,
     searched_s=1.0,
 )

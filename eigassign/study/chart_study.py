@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from eigassign.modal.exact import DENSE_LIMIT
+from eigassign.modal.model import Model
 from eigassign.study import chart_methods as own
 from eigassign.study import rivals
 from eigassign.study.chart_bench import (
@@ -20,7 +22,7 @@ from eigassign.study.chart_bench import (
     with_floor,
 )
 from eigassign.study.chart_data import Advice, Asked, ChartPoint, Front
-from eigassign.study.chart_effort import Effort
+from eigassign.study.chart_effort import Effort, suited
 from eigassign.study.chart_front import advise_accuracy, advise_budget, front, front_notes
 from eigassign.study.chart_methods import Method
 from eigassign.study.chart_polynomials import distilled_methods, economised_methods
@@ -29,7 +31,6 @@ from eigassign.study.chart_timing import timed
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
-COEFFICIENTS = 5000  # largest set that is expanded for a chart
 DISTILLED = ((2, 1, False), (2, 3, True))  # half order, expansion points, guard
 ACCURACIES = (1e-2, 1e-4, 1e-6, 1e-8)
 MANY = 1000.0  # trajectories of the second front: a search over designs
@@ -60,7 +61,7 @@ def compare_methods(
     scene: Scene, effort: Effort, wish: Wish, progress: Callable[[str], None]
 ) -> Compared:
     """Time against error of every method. Raises CaseError where nothing varies."""
-    features = build_features(scene)
+    features, effort = build_features(scene), suited(effort, scene.model.n_dof)
     solve_s = _solve_cost(scene)
     points = _affordable_points(scene, features, effort, solve_s)
     progress(f"solving {len(points.x)} points exactly")
@@ -113,18 +114,36 @@ def _affordable_points(scene: Scene, features: Features, effort: Effort, solve_s
 
 
 def _floor(bench: Bench) -> float:
-    """How far two exact solvers disagree on a few of the points, in Hz."""
+    """What rounding does to the exact answers, in Hz: no error below it means anything.
+
+    The larger of two: how far two exact solvers disagree on a few of the points, and what it does
+    there to change every entry of the K_j and M_j by one unit in its last place.
+    """
     scene, small = bench.scene, bench.scene.model.n_dof <= DENSE_LIMIT
     few = spread_rows(len(bench.points.x), 40 if small else 2)
-    x, modes = bench.points.x[few], scene.expansions.modes
+    x, exact, modes = bench.points.x[few], bench.exact_hz[few], scene.expansions.modes
+    pick = np.array(modes) - 1
+    others = [exact_frequencies(replace(scene, model=_rounded(scene.model)), x)]
     if small:
-        other = own.sparse_frequencies(scene.model, x, max(modes))
+        others.append(own.sparse_frequencies(scene.model, x, max(modes))[:, pick])
     elif scene.model.n_dof <= rivals.MOST_DENSE:
-        other = rivals.lapack_frequencies(scene.model, x, max(modes))
-    else:  # another Krylov space: one more mode
-        other = own.sparse_frequencies(scene.model, x, max(modes) + 1)
-    off = np.abs(other[:, np.array(modes) - 1] - bench.exact_hz[few])
-    return float(max(off.max(), np.finfo(float).eps * bench.exact_hz.max()))
+        others.append(rivals.lapack_frequencies(scene.model, x, max(modes))[:, pick])
+    off = [float(np.abs(other - exact).max()) for other in others]
+    return float(max(*off, np.finfo(float).eps * bench.exact_hz.max()))
+
+
+def _rounded(model: Model) -> Model:
+    """The model with its numbers changed in the last place, up or down at random."""
+    random, eps = np.random.default_rng(SEED), np.finfo(float).eps
+
+    def changed(weights: sparse.csr_array) -> sparse.csr_array:
+        signs = random.choice(np.array([-1.0, 1.0]), len(weights.data))
+        data = weights.data * (1.0 + eps * signs)
+        return sparse.csr_array((data, weights.indices, weights.indptr), shape=weights.shape)
+
+    pencil = model.pencil
+    rounded = replace(pencil, stiffness=changed(pencil.stiffness), mass=changed(pencil.mass))
+    return replace(model, pencil=rounded)
 
 
 def _asked(bench: Bench, features: Features, floor: float) -> Asked:
@@ -157,9 +176,10 @@ def _methods(
     yield from own.reciprocal_methods(scene, orders)
     yield from own.piecewise_methods(scene, orders[1:], effort.expansion_points[1:])
     yield from own.reduced_methods(scene, effort.half_orders, effort.expansion_points)
+    sources = [each for each in DISTILLED if each[1] <= max(effort.expansion_points)]
     ladder = [each for each in effort.economised if each[0] in orders]
     yield from economised_methods(scene, features, ladder, effort.most_nodes)
-    yield from distilled_methods(scene, features, effort.tolerances, DISTILLED, effort.most_nodes)
+    yield from distilled_methods(scene, features, effort.tolerances, sources, effort.most_nodes)
     yield from _rivals(scene, features, points, effort, most)
 
 
@@ -182,7 +202,7 @@ def _powers(nodes: Iterable[int], d: int, most: int) -> list[int]:
 def _orders(scene: Scene, effort: Effort) -> list[int]:
     n = int(scene.model.pencil.active.sum())
     wanted = {*effort.orders, scene.expansions.order}
-    return sorted(p for p in wanted if comb(n + p, p) <= COEFFICIENTS)
+    return sorted(p for p in wanted if comb(n + p, p) <= effort.coefficients)
 
 
 def _size_notes(scene: Scene, features: Features, effort: Effort, solve_s: float) -> Iterator[str]:

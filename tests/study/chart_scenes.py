@@ -2,14 +2,8 @@
 
 from __future__ import annotations
 
-from functools import cache
-from pathlib import Path
-
-from scenes import SHIPPED, scene_of
-
 from eigassign.study.chart_effort import Effort
 from eigassign.study.chart_timing import Patience
-from eigassign.study.scene import Scene
 
 TINY = Effort(
     random_points=30,
@@ -31,8 +25,3 @@ TINY = Effort(
     objectives=40,
     searched_s=1e9,
 )
-
-
-@cache
-def arm(folder: Path) -> Scene:
-    return scene_of(folder, SHIPPED)
