@@ -51,7 +51,7 @@ _TAGGED: dict[object, type[Part]] = {
     "<profile>": FrequencyProfile,
 }
 _MOST = 200  # errors explained; nobody reads more
-_LEAF_TAGS = {"<word>", "<one>", "<list>", "<constant>"}
+_LEAF_TAGS = {"<word>", "<one>", "<list>", "<constant>", "<number>", "<auto>"}
 _TAGS = _LEAF_TAGS | set(_TAGGED)
 
 
@@ -157,7 +157,9 @@ def _literal(error: Any) -> _Explained:
     expected = error["ctx"]["expected"]
     value = error["input"]
     words = expected.replace("'", "").replace(" or ", ", ").split(", ")
-    also = {"<word>": ", or {stiffness: ...}", "<one>": ", or a list"}.get(error["loc"][-1], "")
+    others = {"<word>": "{stiffness: ...}", "<one>": "a list", "<auto>": "a whole number"}
+    also = others.get(error["loc"][-1], "")
+    also = f", or {also}" if also else ""
     hint = suggestion(value, words) if isinstance(value, str) else ""
     return (), f"expected {expected}{also}, got {shown(value)}{hint}"
 

@@ -9,9 +9,20 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from eigassign.case.quantity import Frozen, FrozenDict, Part, quantity
 from eigassign.case.section_parts import given
-from eigassign.case.vectors import LENGTH, Angle, Inertia, Vector, check_inertia
+from eigassign.case.vectors import (
+    LENGTH,
+    Angle,
+    Inertia,
+    Vector,
+    check_inertia,
+    word_or_number,
+)
 
 Elements: TypeAlias = Annotated[int, Field(ge=1, le=100_000)]
+ElementsOrAuto: TypeAlias = Annotated[
+    Annotated[Elements, Tag("<number>")] | Annotated[Literal["auto"], Tag("<auto>")],
+    Discriminator(word_or_number),
+]
 Nodes: TypeAlias = Annotated[Mapping[str, Vector], Frozen]
 Dof: TypeAlias = Annotated[int, Field(ge=0)]
 
@@ -41,7 +52,7 @@ class BeamLink(Part):
         Annotated[str, Tag("<word>")] | Annotated[Taper, Tag("<taper>")],
         Discriminator(_section_tag),
     ]
-    elements: Elements
+    elements: ElementsOrAuto
     shear: bool = False
     roll: Angle = 0.0
 

@@ -10,7 +10,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from eigassign.case.mechanism_parts import Q_VALUE
 from eigassign.case.quantity import Frozen, FrozenDict, Part, Quantity, quantity, wrong
-from eigassign.case.vectors import Vector, one_or_list
+from eigassign.case.vectors import Vector, one_or_list, word_or_number
 
 DURATION = quantity("time", above=0)
 TIME = quantity("time")
@@ -140,9 +140,17 @@ _WORD_OR_LIST = Discriminator(one_or_list)
 
 
 class Expansion(Part):
-    """Order of the power series, its point (q, y), and the modes expanded; or `auto`."""
+    """Order of the power series, its point (q, y), and the modes expanded; or `auto`.
 
-    order: Annotated[int, Field(ge=1, le=20)] = 4
+    `accuracy` (relative error in Hz) is what an `auto` order, and `auto` elements, have to meet.
+    """
+
+    order: Annotated[
+        Annotated[Annotated[int, Field(ge=1, le=20)], Tag("<number>")]
+        | Annotated[Literal["auto"], Tag("<auto>")],
+        Discriminator(word_or_number),
+    ] = 4
+    accuracy: Annotated[float, quantity("fraction", above=0)] = 1e-3
     q: Annotated[_Auto | Annotated[Coordinates, Tag("<list>")], _WORD_OR_LIST] = "auto"
     y: Annotated[_Auto | Annotated[Parameters, Tag("<list>")], _WORD_OR_LIST] = "auto"
     modes: Annotated[_Auto | Annotated[Modes, Tag("<list>")], _WORD_OR_LIST] = "auto"

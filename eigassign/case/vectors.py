@@ -30,6 +30,11 @@ Angle: TypeAlias = Annotated[float, ANGLE]
 Orientation: TypeAlias = tuple[Angle, Angle, Angle]
 
 
+def word_or_number(value: object) -> str:
+    """Tag of a value that may be a word or a number."""
+    return "<auto>" if isinstance(value, str) else "<number>"
+
+
 def one_or_list(value: object) -> str:
     """Tag of a value that may be one number or a list."""
     return "<list>" if isinstance(value, (tuple, list)) else "<one>"

@@ -128,7 +128,7 @@ STUDY = [
     Wrong("sum of unlike things", "terms: {m: 1}, max: 200 g", "terms: {m: 1, d: 1}, ¦max: 200 g", "design.constraints.budget.max", "terms of different dimensions"),
     Wrong("order 0", "order: 4", "¦order: 0", "expansion.order", "must be >= 1, got 0"),
     Wrong("order 40", "order: 4", "¦order: 40", "expansion.order", "must be <= 20, got 40"),
-    Wrong("order as text", "order: 4", "¦order: four", "expansion.order", "expected a whole number, got 'four'"),
+    Wrong("order as text", "order: 4", "¦order: four", "expansion.order", "expected 'auto', or a whole number, got 'four'"),
     Wrong("expansion point too short", "order: 4", "order: 4, ¦q: [1.8]", "expansion.q", "needs 2 entries, one for each coordinate (q1, q2); got 1"),
     Wrong("expansion point in Hz", "order: 4", "order: 4, q: [1.8, ¦2 Hz]", "expansion.q[1]", "expected an angle"),
     Wrong("misspelt auto", "order: 4", "order: 4, ¦q: atuo", "expansion.q", "did you mean 'auto'"),

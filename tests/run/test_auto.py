@@ -1,0 +1,73 @@
+"""Mesh, order and expansion points left to auto meet the accuracy asked for, and say why."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eigassign.api import load_case
+from eigassign.errors import AccuracyError
+from eigassign.run import solve_case
+
+CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"
+
+
+def automatic(tmp_path: Path, accuracy: str, *changes: tuple[str, str]) -> Path:
+    text = CASE.read_text(encoding="utf-8")
+    for old, new in (
+        ("elements: 4", "elements: auto"),
+        ("elements: 3", "elements: auto"),
+        ("  order: 4", f"  order: auto\n  accuracy: {accuracy}"),
+        *changes,
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "auto.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(("accuracy", "limit"), [("1 %", 1e-2), ("0.2 %", 2e-3)])
+def test_the_choice_is_within_the_accuracy_of_a_fine_mesh(
+    tmp_path: Path, accuracy: str, limit: float
+) -> None:
+    fine = load_case(CASE)._meshed({"upper_arm": 16, "forearm": 16})
+    case = load_case(automatic(tmp_path, accuracy))
+    q, y = case.trajectory.q, np.zeros(2)
+    expansions = solve_case(case).findings.studies[0].over_time
+    assert expansions is not None
+    exact = fine.frequencies(q, y, 1)[:, 0]
+    assert np.abs(expansions.taylor_hz / exact - 1.0).max() <= limit
+
+
+def test_the_reasons_are_among_the_notes(tmp_path: Path) -> None:
+    notes = solve_case(load_case(automatic(tmp_path, "0.2 %"))).findings.notes
+    assert any(note.startswith("2 elements: mode 1 moves") for note in notes)
+    assert any(note.startswith("order 2: error at most") for note in notes)
+
+
+def test_a_looser_accuracy_takes_a_lower_order_and_a_coarser_mesh(tmp_path: Path) -> None:
+    cases = [load_case(automatic(tmp_path, accuracy)) for accuracy in ("3 %", "0.2 %")]
+    loose, tight = (solve_case(case).findings.studies[0].order for case in cases)
+    assert loose < tight
+    coarse, fine = (case.model().n_dof for case in cases)
+    assert coarse < fine
+
+
+def test_where_one_point_cannot_do_several_share_the_trajectory(tmp_path: Path) -> None:
+    path = automatic(
+        tmp_path, "0.001 %", ("elements: auto", "elements: 4"), ("max: 250 g", "max: 1 g"),
+        ("  y: [0.125, 0.125] # kg, the middle of the box", "  y: [0, 0]"),
+    )  # fmt: skip
+    result = solve_case(load_case(path))
+    study = result.findings.studies[0].over_time
+    assert study is not None
+    assert study.worst_taylor <= 1e-5
+
+
+def test_an_accuracy_out_of_reach_is_refused_with_the_reason(tmp_path: Path) -> None:
+    case = load_case(automatic(tmp_path, "1e-14"))
+    with pytest.raises(AccuracyError, match="elements"):
+        case.model()
