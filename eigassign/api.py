@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from eigassign.run import Result
 
 Floats = NDArray[np.float64]
+LARGE = 1000  # dofs above which the mesh is not doubled to judge it
 
 
 @dataclass(frozen=True)
@@ -80,6 +81,22 @@ class Case:
     def initial_design(self) -> Floats:
         """y as the mechanism is written in the file, (n_y,) in SI units."""
         return initial_design(self.file)
+
+    def discretisation_error(self, x: Floats, modes: Sequence[int]) -> Floats | None:
+        """Estimated error (n_samples, n_modes) of the mesh, relative in Hz, from a twice finer one.
+
+        None for a mechanism without beam links, or one so large that twice its size is too costly.
+        """
+        from eigassign.modal.mesh_choice import mesh_error
+        from eigassign.study.choices import automatic_elements
+
+        model = self.model()
+        chosen = {} if self.mesh is None else dict(self.mesh.elements)
+        elements = {n: chosen.get(n) or k for n, k in automatic_elements(self.file).items()}
+        if not elements or model.n_dof > LARGE:
+            return None
+        fixed = {name: int(n) for name, n in elements.items() if n is not None}
+        return mesh_error(lambda e: model if e == fixed else self._meshed(e), fixed, x, modes)
 
     @cached_property
     def trajectory(self) -> Trajectory:

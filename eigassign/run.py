@@ -7,7 +7,7 @@ the commands of the same names do.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +22,7 @@ from eigassign.expansions import expand_plan
 from eigassign.keeping import Kept, keep
 from eigassign.modal.expansion import Expansion
 from eigassign.stages import Stages
+from eigassign.study.accuracy import accuracy_notes
 from eigassign.study.approximation import Expansions
 from eigassign.study.assignment_study import (
     assign_design,
@@ -121,6 +122,7 @@ def solve_case(case: Case, options: Options = DEFAULT) -> Result:
             exact_hz = scene.exact(assignment.y)
         with stages("comparison", "comparing the expansion with exact frequencies"):
             studies = study_modes(scene, initial_hz)
+            scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene)))
         targets = study_targets(scene, wanted, assignment, initial_hz, exact_hz)
     found = Assigned(assignment, targets, initial_hz, exact_hz)
     findings = gather(scene, studies, found, stages.timing_s)
@@ -147,6 +149,10 @@ def prepare(
     mesh = () if case.mesh is None else case.mesh.reasons
     notes = [*mesh, *moving, *plan.notes, *notes]
     return Scene(file, model, initial, trajectory, expansions, tuple(notes))
+
+
+def _accuracy(case: Case, scene: Scene) -> list[str]:
+    return accuracy_notes(scene, case.discretisation_error)
 
 
 def _result(findings: Findings, expansions: Expansions, assignment: Assignment) -> Result:
@@ -197,6 +203,7 @@ def expand_case(
         scene = prepare(case, watch, _cache(options), order, modes)
         with watch("comparison", "comparing the expansion with exact frequencies"):
             studies = study_modes(scene)
+            scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene)))
         findings = gather(scene, studies, None, watch.timing_s)
         options.progress("writing the report")
         folder.write(findings, coefficient_files(scene, linear))
