@@ -128,14 +128,12 @@ def _draw_levels(sheet: Sheet, frame: Frame, levels: Sequence[tuple[str, float]]
 
 def _draw_front(sheet: Sheet, frame: Frame, front: Floats) -> None:
     """Steps: what can be had for each cost."""
-    order = np.argsort(front[:, 0])
-    places = frame.place(front[order, 0], front[order, 1])
-    corners = np.repeat(places, 2, axis=0)
-    corners[1:, 1] = np.repeat(places[:, 1], 2)[:-1]
     left, bottom, width, height = frame.box
-    first, last = corners[:1].copy(), corners[-1:].copy()
-    first[0, 1], last[0, 0] = bottom + height, left + width
-    sheet.line(np.vstack([first, corners[:-1], last]), _FRONT, frame.box)
+    places = frame.place(*front[np.argsort(front[:, 0])].T)
+    steps = [(places[0, 0], bottom + height)]
+    for (x, y), following in zip(places, [*places[1:, 0], left + width], strict=True):
+        steps += [(x, y), (following, y)]
+    sheet.line(np.array(steps), _FRONT, frame.box)
 
 
 def _draw_ladder(sheet: Sheet, frame: Frame, ladder: Ladder, look: Style) -> None:

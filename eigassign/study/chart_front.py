@@ -31,8 +31,12 @@ def pareto(cost: Floats, error: Floats) -> list[int]:
 def front(
     points: Sequence[ChartPoint], name: str, evaluations: float | None, floor: float
 ) -> Front:
-    """The front of points that answer the whole question; errors below ``floor`` count as equal."""
-    able = [p for p in points if p.random is not None]
+    """The front of these points; errors below ``floor`` (Hz) count as equal.
+
+    A method that is set up anew for every design answers whole trajectories only: it has no part in
+    the front of single evaluations.
+    """
+    able = [p for p in points if p.random is not None or evaluations is not None]
     cost = np.array([_cost(p, evaluations) for p in able])
     error = np.array([max(p.everywhere.worst_hz, floor) for p in able])
     return Front(name, evaluations, tuple(able[k].method for k in pareto(cost, error)))
@@ -56,11 +60,7 @@ def cheapest(
 
     ``floor`` (relative) is what no method can be seen to be better than.
     """
-    good = [
-        p
-        for p in points
-        if p.random is not None and p.everywhere.worst_relative <= max(accuracy, floor)
-    ]
+    good = [p for p in points if p.everywhere.worst_relative <= max(accuracy, floor)]
     return min(good, key=lambda p: p.total_s(evaluations), default=None)
 
 
@@ -68,7 +68,7 @@ def most_accurate(
     points: Sequence[ChartPoint], budget_s: float, evaluations: float
 ) -> ChartPoint | None:
     """The method of least worst error that is done within ``budget_s``; the quicker of equals."""
-    able = [p for p in points if p.random is not None and p.total_s(evaluations) <= budget_s]
+    able = [p for p in points if p.total_s(evaluations) <= budget_s]
     return min(able, key=lambda p: (p.everywhere.worst_hz, p.total_s(evaluations)), default=None)
 
 
@@ -101,7 +101,8 @@ def _advice(
             kind, accuracy, budget_s, evaluations, None, {}, None, None, f"{asked}: nothing charted"
         )
     total, worst = found.total_s(evaluations), found.everywhere.worst_relative
-    words = f"{asked}: {found.method}, {_time(total)} in all, worst error {worst:.1e}"
+    anew = "" if found.random else ", solved anew for every design"
+    words = f"{asked}: {found.method}{anew}, {_time(total)} in all, worst error {worst:.1e}"
     return Advice(
         kind, accuracy, budget_s, evaluations, found.method, found.parameters, worst, total, words
     )

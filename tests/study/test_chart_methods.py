@@ -152,7 +152,8 @@ def test_fronts_and_advice_are_made_of_charted_methods(compared: Compared) -> No
     assert {f.evaluations for f in compared.fronts} == {152.0, 152000.0, 1e4, None}
     for each in compared.fronts:
         assert set(each.methods) <= names
-        assert not any(name.startswith("stations") for name in each.methods)
+        if each.evaluations is None:
+            assert not any(name.startswith("stations") for name in each.methods)
     assert {a.asked for a in compared.advice} == {"accuracy", "budget"}
     assert all(a.method in names for a in compared.advice if a.method)
 

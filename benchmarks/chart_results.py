@@ -1,0 +1,83 @@
+"""The charts of three cases: the paper's arm, an arm of six links, a scene of 10⁴ dof.
+
+What `eigassign chart` writes goes to ``results/chart_<case>/``; here are its fronts and advice as
+Markdown. The last case is charted with less of everything, since exact solves take a tenth of a
+second there: what is left out is said in its notes.
+"""
+
+from __future__ import annotations
+
+import common  # first: settles the threads
+
+# isort: split
+import shutil
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import chart_cases
+
+from eigassign import charting
+from eigassign.api import load_case
+from eigassign.output.chart_tables import tables
+from eigassign.output.chart_write import write_chart
+from eigassign.output.summary import Table
+from eigassign.run import Options
+from eigassign.study.chart_effort import QUICK, Effort
+from eigassign.study.chart_study import Wish
+
+WHOLE = Effort()
+LARGE = replace(
+    QUICK,
+    brief=False,
+    orders=(1, 2, 3, 4, 6, 8),
+    half_orders=(1, 2, 3),
+    expansion_points=(1,),
+    economised=WHOLE.economised,
+    tolerances=WHOLE.tolerances,
+    reference_s=20.0,
+    training_s=30.0,
+    searched_s=60.0,
+    objectives=100,
+)
+CASES = {
+    "two_link": (chart_cases.paper, WHOLE),
+    "six_links": (chart_cases.six, WHOLE),
+    "large": (chart_cases.large, LARGE),
+}
+
+
+def main(names: list[str]) -> None:
+    for name in names or list(CASES):
+        text, effort = CASES[name]
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / f"{name}.yaml"
+            path.write_text(text(), encoding="utf-8")
+            chart = charting.chart_case(
+                load_case(path), Options(use_cache=False, progress=_say), effort, Wish()
+            )
+        chart = replace(chart, warnings=())
+        target = common.RESULTS / f"chart_{name}"
+        shutil.rmtree(target, ignore_errors=True)
+        target.mkdir(parents=True)
+        write_chart(chart, target)
+        (target / "report.html").unlink()  # the same figures again, in base64
+        parts = [f"# {chart.title}", *(_markdown(table) for table in tables(chart))]
+        parts += ["\n".join(f"- {note}" for note in chart.notes)]
+        (target / "README.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+
+
+def _say(line: str) -> None:
+    print(line, file=sys.stderr)
+
+
+def _markdown(table: Table) -> str:
+    rows = [table.columns, tuple("---" for _ in table.columns), *table.rows]
+    lines = ["| " + " | ".join(cell.replace("|", "/") for cell in row) + " |" for row in rows]
+    caption = [table.caption, ""] if table.caption else []
+    return "\n".join([f"## {table.title}", "", *caption, *lines])
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
