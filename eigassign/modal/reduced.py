@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.errors import UsageError
+from eigassign.errors import SingularityError, UsageError
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.basis import orthonormal
 from eigassign.modal.expansion import expand
@@ -141,7 +141,10 @@ def _mean_theta(pencil: Pencil, points: Floats) -> Floats:
     turns = np.zeros(len(pencil.shift))
     turns[: pencil.n_q] = _periodic(pencil, z[0])
     turned = np.concatenate([z + k * turns * (np.pi / 2.0) for k in range(4)])
-    theta = _theta_at(pencil, turned)
+    try:
+        theta = _theta_at(pencil, turned)
+    except SingularityError:  # a loop that does not close all round: the poses at hand must do
+        theta = _theta_at(pencil, z)
     return np.asarray(theta[:, np.isfinite(theta).all(axis=0)].mean(axis=1))
 
 
@@ -152,10 +155,18 @@ def _theta_at(pencil: Pencil, z: Floats) -> Floats:
 
 def _periodic(pencil: Pencil, z: Floats) -> NDArray[np.bool_]:
     """Which joint coordinates are angles (n_q,): a full turn changes nothing but round-off."""
-    turned = z + 2.0 * np.pi * np.vstack([np.zeros(len(z)), np.eye(len(z))[: pencil.n_q]])
-    theta = _theta_at(pencil, turned)
-    same = np.abs(theta[:, 1:] - theta[:, :1]) <= 1e-9 * np.abs(theta).max(axis=1, keepdims=True)
-    return np.asarray(same.all(axis=0))
+    return np.array([_turns(pencil, z, k) for k in range(pencil.n_q)], dtype=bool)
+
+
+def _turns(pencil: Pencil, z: Floats, k: int) -> bool:
+    turned = np.array([z, z])
+    turned[1, k] += 2.0 * np.pi
+    try:
+        here, there = _theta_at(pencil, turned).T
+    except SingularityError:
+        return False
+    scale = np.maximum(np.abs(here), np.abs(there))
+    return bool((np.abs(there - here) <= 1e-9 * scale).all())
 
 
 @dataclass(frozen=True, eq=False)
