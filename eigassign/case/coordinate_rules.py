@@ -56,7 +56,9 @@ def _coordinate(
         yield (*path, "joint"), f"{which} has a coordinate already: {owner[joint, freedom]!r}"
         owner[joint, name] = name
     owner.setdefault((joint, freedom), name)
-    if at(body, "angle") == "absolute" and text(tree, *_JOINTS, joint, "type") != "revolute":
+    planar = text(tree, "mechanism", "space") == "planar"
+    revolute = text(tree, *_JOINTS, joint, "type") == "revolute"
+    if planar and at(body, "angle") == "absolute" and not revolute:
         yield (*path, "angle"), "only the angle of a revolute joint can be absolute"
 
 

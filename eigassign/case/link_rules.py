@@ -201,6 +201,8 @@ def _bare(tree: Tree) -> Iterator[Finding]:
         missing = "required key is missing: second moment of area (in m4 when bare; or mm4, cm4)"
         if not spatial and not has & {"bending_inertia", "inertia_z"}:
             yield (*path, "bending_inertia"), missing
+        if {"bending_inertia", "inertia_z"} <= has:
+            continue  # told by the schema
         if spatial and "bending_inertia" in has:
             message = "is for planar mechanisms: in space write inertia_z (bending in the local "
             yield (*path, "bending_inertia"), message + "x-y plane) and inertia_y (x-z)"

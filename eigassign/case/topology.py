@@ -49,13 +49,13 @@ def has_loops(tree: Tree) -> bool | None:
 
 
 def edges(tree: Tree) -> list[Edge] | None:
-    """All joints as edges; None if one of them lacks an end that exists."""
+    """All joints as edges; None if one of them does not join two that exist."""
     links = set(names(tree, "mechanism", "links"))
     bases = links | {"ground"}
     found = []
     for joint, body in items(tree, "mechanism", "joints"):
         ends = [(text(body, key) or "").partition(".")[0] for key in ("base", "follower")]
-        if ends[0] not in bases or ends[1] not in links:
+        if ends[0] not in bases or ends[1] not in links or ends[0] == ends[1]:
             return None
         found.append(Edge(joint, *ends))
     return found

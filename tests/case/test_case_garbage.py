@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_case import TEXT
+from wide_cases import PLANAR, SPATIAL
 
 from eigassign.case import CaseFile, parse
 from eigassign.errors import CaseError, Problem
@@ -124,22 +127,29 @@ def test_the_small_case_with_some_lines_missing_and_one_repeated(
     survives("".join([*kept, LINES[twice]]).encode())
 
 
-def test_every_value_of_the_small_case_replaced_by_every_stray_word() -> None:
+MATRICES = Path(__file__).parents[2] / "cases" / "superelement_arm"
+WITH_FILES = PLANAR.replace("K.mtx", str(MATRICES / "stiffness.mtx")).replace(
+    "M.npz", str(MATRICES / "mass.mtx")
+)
+WORDS = ("~", "true", "-1", "1e999", ".nan", "x", "[1, 2]", "[[[1]]]", "{a: 1}", "[{}]")
+VALUE = re.compile(r"(?<=: )([\w.%-]+(?: \w+)?|\[[^\]]*\]|\{[^}]*\})")
+
+
+@pytest.mark.parametrize("text", [TEXT, WITH_FILES, SPATIAL], ids=["small", "planar", "spatial"])
+def test_every_value_of_a_case_replaced_by_every_stray_word(text: str) -> None:
     """Exhaustive where it matters: each value in turn is a number, a list, a mapping, nothing, …"""
-    values = [
-        m.span(1) for m in re.finditer(r"(?<=: )([\w.%-]+(?: \w+)?|\[[^\]]*\]|\{[^}]*\})", TEXT)
-    ]
-    for start, end in values:
-        for word in (
-            "~",
-            "true",
-            "-1",
-            "1e999",
-            ".nan",
-            "x",
-            "[1, 2]",
-            "[[[1]]]",
-            "{a: 1}",
-            "[{}]",
-        ):
-            survives((TEXT[:start] + word + TEXT[end:]).encode())
+    for start, end in [m.span(1) for m in VALUE.finditer(text)]:
+        for word in WORDS:
+            survives((text[:start] + word + text[end:]).encode())
+
+
+@pytest.mark.parametrize("text", [WITH_FILES, SPATIAL], ids=["planar", "spatial"])
+def test_the_wide_cases_are_valid_to_begin_with(text: str) -> None:
+    assert isinstance(outcome(text.encode()), CaseFile)
+
+
+@pytest.mark.parametrize("text", [WITH_FILES, SPATIAL], ids=["planar", "spatial"])
+def test_every_line_of_a_case_left_out(text: str) -> None:
+    lines = text.splitlines(keepends=True)
+    for k in range(len(lines)):
+        survives("".join(lines[:k] + lines[k + 1 :]).encode())

@@ -173,6 +173,21 @@ def test_a_whirling_mass_has_its_closed_form() -> None:
     )
 
 
+def test_a_mass_whirling_about_any_axis_has_its_closed_form() -> None:
+    """C = 2 m ω̃ and K_v = m (ω̃ ω̃ + α̃) in the beam's axes, which the joint carries around."""
+    tree = blade(1, "spatial")
+    axis = np.array([0.6, -0.5, 0.4]) / np.linalg.norm([0.6, -0.5, 0.4])
+    tree["mechanism"]["joints"]["r"]["axis"] = axis.tolist()
+    tree["mechanism"]["materials"] = {"m": {**ALLOY, "density": 1e-6}}
+    tree["mechanism"]["bodies"] = {"tip": {"at": "b.end", "mass": 2.0}}
+    C, K_v = at(built(tree), [0.7], [6.0], [1.5])
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    np.testing.assert_allclose(C[:3, :3], 2 * 2.0 * 6.0 * cross, rtol=1e-5, atol=1e-4)
+    expected = 2.0 * (36.0 * cross @ cross + 1.5 * cross)
+    np.testing.assert_allclose(K_v[:3, :3], expected, rtol=1e-5, atol=1e-4)
+
+
 # Along a motion
 
 
