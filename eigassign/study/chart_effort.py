@@ -22,7 +22,7 @@ class Effort:
     half_orders: tuple[int, ...] = (0, 1, 2, 3)
     expansion_points: tuple[int, ...] = (1, 3, 5)
     nodes: tuple[int, ...] = (2, 3, 4, 5, 6, 7, 9, 11)
-    stations: tuple[int, ...] = (5, 9, 17, 33, 65)
+    stations: tuple[int, ...] = (3, 5, 9, 17, 33, 65)
     economised: tuple[tuple[int, float], ...] = (
         (2, 1e-2), (3, 5e-3), (3, 2e-3), (4, 1e-3), (4, 5e-4), (5, 2e-4), (5, 1e-4), (6, 5e-5),
         (7, 2e-5), (8, 1e-5), (8, 5e-6), (9, 2e-6), (10, 1e-6), (10, 5e-7), (12, 2e-7), (12, 1e-7),

@@ -29,6 +29,7 @@ from eigassign.study.surrogates import (
 from eigassign.study.surrogates_kriging import fit_kriging
 
 Floats = NDArray[np.float64]
+MOST_NODES = 20  # of one Chebyshev polynomial along the trajectory
 MOST_DENSE = 2500  # n_dof up to which a dense solve is tried
 
 
@@ -67,37 +68,51 @@ def trajectory_methods(features: Features, stations: Sequence[int], n_q: int) ->
     if features.place is None:
         return
     for k in stations:
-        for cubic in (False, True):
-            kind = "cubic" if cubic else "linear"
+        for kind in ("linear", "cubic", "Chebyshev"):
+            if kind == "Chebyshev" and k > MOST_NODES:
+                continue
             yield Method(
                 f"stations {kind} {k}",
                 f"stations, {kind}",
                 False,
                 {"stations": k, "interpolation": kind},
-                partial(_per_run, k, cubic),
-                partial(_stations, features, k, n_q),
+                partial(_per_run, kind, k),
+                partial(_stations, features, station_nodes(kind, k), n_q),
                 per_design=True,
                 note="solved anew for every design: answers the runs along the trajectory only",
             )
 
 
-def _stations(features: Features, k: int, n_q: int, points: Points) -> Floats:
+def station_nodes(kind: str, k: int) -> Floats:
+    """Where along the trajectory the stations are, (k,) in [0, 1]."""
+    return chebyshev_nodes(k) if kind == "Chebyshev" else equal_nodes(k)
+
+
+def _stations(features: Features, nodes: Floats, n_q: int, points: Points) -> Floats:
     """x (designs · k, n_x)."""
-    runs = points.runs()
-    q = features.travel(equal_nodes(k))
+    runs, k = points.runs(), len(nodes)
+    q = features.travel(nodes)
     y = runs.x[:: len(runs.x) // runs.designs, n_q:]
     return np.hstack([np.tile(q, (len(y), 1)), np.repeat(y, k, axis=0)])
 
 
-def _per_run(k: int, cubic: bool, f: Floats) -> Evaluator:
+def _per_run(kind: str, k: int, f: Floats) -> Evaluator:
     by_design = f.reshape(-1, k, f.shape[1])
 
     def evaluate(points: Points) -> Floats:
         u = points.u.reshape(len(by_design), -1, points.u.shape[1])
-        made = [along(equal_nodes(k), own, cubic)(at) for own, at in zip(by_design, u, strict=True)]
-        return np.vstack(made)
+        pairs = zip(by_design, u, strict=True)
+        return np.vstack([_interpolated(kind, own)(at) for own, at in pairs])
 
     return evaluate
+
+
+def _interpolated(kind: str, f: Floats) -> Surrogate:
+    """Through stations f (k, n_modes) of one design."""
+    if kind == "Chebyshev":
+        line = chebyshev([len(f)], f)
+        return lambda at: line(at[:, :1])
+    return along(equal_nodes(len(f)), f, kind == "cubic")
 
 
 def grid_methods(features: Features, nodes: Sequence[int]) -> Iterator[Method]:
