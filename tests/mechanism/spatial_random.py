@@ -238,7 +238,7 @@ def random_open(seed: int, space: str) -> tuple[Tree, np.ndarray]:
 
 def random_closed(seed: int, space: str, loops: int = 1) -> tuple[Tree, np.ndarray, np.ndarray]:
     """A mechanism with loops, the q it was closed at, and a q nearby on the same branch."""
-    for attempt in range(400):
+    for attempt in range(3000):
         rng = np.random.default_rng([seed, space == "spatial", loops, attempt])
         tree, values = empty(space, rng), {}
         done = True
