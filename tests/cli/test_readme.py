@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import re
+import shutil
 from pathlib import Path
 
 import pytest
 from commands import TWO_LINK
 
 from eigassign.case import json_schema, parse
+from eigassign.case.joint_parts import JOINTS
+from eigassign.case.link_parts import LINKS
+from eigassign.case.section_parts import SHAPES
 from eigassign.cli import cli
 
 ROOT = TWO_LINK.parents[1]
@@ -31,6 +35,17 @@ def test_every_key_of_a_case_file_is_explained() -> None:
     assert {key for key in keys if key not in README} == set()
 
 
+def test_every_type_of_link_joint_and_section_is_explained() -> None:
+    for names in (JOINTS, LINKS, SHAPES):
+        for name in names:
+            assert re.search(rf"`{name}`|: {name}`|^\| {name},", README, re.MULTILINE), name
+
+
+def test_every_case_shipped_is_listed() -> None:
+    for case in (ROOT / "cases").glob("*.yaml"):
+        assert f"[{case.stem}](cases/{case.name})" in README
+
+
 def test_every_command_and_shared_option_is_listed() -> None:
     for name, command in cli.commands.items():
         assert f"`eigassign {name}" in README
@@ -38,8 +53,10 @@ def test_every_command_and_shared_option_is_listed() -> None:
         assert {o for o in long if o not in README} <= {"--verbose", "--linear", "--mode"}
 
 
-def test_the_python_shown_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(ROOT)
+def test_the_python_shown_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "cases").mkdir()
+    shutil.copy(TWO_LINK, tmp_path / "cases")
+    monkeypatch.chdir(tmp_path)  # what it saves goes there
     names: dict[str, object] = {}
     for block in blocks("python"):
         exec(block, names)
