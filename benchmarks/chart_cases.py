@@ -1,4 +1,4 @@
-"""The cases that are charted: the paper's arm, an arm of six links, a scene of 10⁴ dof."""
+"""The cases that are charted: the paper's arm, a spatial arm of six joints, a scene of 10⁴ dof."""
 
 from __future__ import annotations
 
@@ -16,15 +16,8 @@ def paper() -> str:
 
 
 def six() -> str:
-    """Six revolute joints, five of which matter; two masses on the way."""
-    masses = {
-        "m2": {"parameter": "bodies.mass2.mass", "min": 0.0, "max": 1.0},
-        "m5": {"parameter": "bodies.mass5.mass", "min": 0.0, "max": 1.0},
-    }
-    data = arms.serial_arm(4, masses)
-    start = np.array([0.2, 0.6, -0.9, 0.8, 0.5, -0.4])
-    end = start + np.array([0.5, 0.5, -0.4, 0.3, 0.4, 0.3])
-    return _with_motion(data, start, end, 61, 1)
+    """The shipped spatial arm of six joints."""
+    return (CASES / "arm_6r.yaml").read_text(encoding="utf-8")
 
 
 def large() -> str:

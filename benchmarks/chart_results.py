@@ -1,4 +1,4 @@
-"""The charts of three cases: the paper's arm, an arm of six links, a scene of 10⁴ dof.
+"""The charts of three cases: the paper's arm, a spatial arm of six joints, a scene of 10⁴ dof.
 
 What `eigassign chart` writes goes to ``results/chart_<case>/``; here are its fronts and advice as
 Markdown. The last case is charted with less of everything, since exact solves take a tenth of a
@@ -43,7 +43,7 @@ LARGE = replace(
 )
 CASES = {
     "two_link": (chart_cases.paper, WHOLE),
-    "six_links": (chart_cases.six, WHOLE),
+    "arm_6r": (chart_cases.six, WHOLE),
     "large": (chart_cases.large, LARGE),
 }
 
