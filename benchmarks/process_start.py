@@ -13,6 +13,7 @@ import json
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 CASE = common.CASES / "two_link.yaml"
@@ -64,7 +65,7 @@ def main() -> None:
             "--help": lambda: run("-m", "eigassign", "--help"),
             "python alone": lambda: run("-c", ""),
         }
-        times = common.medians(jobs, 15)
+        times = common.medians(jobs, 15, time.perf_counter)
     rows = [
         {"process": name, "median": f"{t:.3g} s", "ratio": t / times["bare imports"]}
         for name, t in times.items()

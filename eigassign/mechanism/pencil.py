@@ -68,6 +68,12 @@ class Pencil:
         return np.ascontiguousarray(dense.transpose(2, 0, 1, 3))
 
     @cached_property
+    def elastic_first(self) -> Ints | None:
+        """All dofs, the rigid ones last; None where they are in this order anyway."""
+        order = np.concatenate([self.elastic, self.rigid])
+        return None if (order == np.arange(self.n_dof)).all() else order
+
+    @cached_property
     def by_term(self) -> tuple[sparse.csc_array, sparse.csc_array]:
         """The weights of K and of M term by term."""
         return self.stiffness.tocsc(), self.mass.tocsc()
@@ -96,11 +102,14 @@ class Pencil:
 
     def matrices(self, theta: Floats) -> tuple[Floats, Floats]:
         """Dense K, M (n_samples, n_dof, n_dof) for θ (n_theta, n_samples)."""
-        if self._stack is not None:
-            K, M = (theta.T @ self._stack).reshape(2, -1, self.n_dof, self.n_dof)
-        else:
-            K, M = self._pair((self._both @ theta).reshape(2, -1, theta.shape[1]))
+        K, M = self.both_matrices(theta)
         return K, M
+
+    def both_matrices(self, theta: Floats) -> Floats:
+        """The same as one array (2, n_samples, n_dof, n_dof)."""
+        if self._stack is not None:
+            return np.asarray((theta.T @ self._stack).reshape(2, -1, self.n_dof, self.n_dof))
+        return self._pair((self._both @ theta).reshape(2, -1, theta.shape[1]))
 
     @cached_property
     def _stack(self) -> Floats | None:

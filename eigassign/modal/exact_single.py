@@ -22,10 +22,10 @@ def solve_single(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Flo
     The entry of largest magnitude of every mode is positive.
     """
     (K,), (M,) = pencil.matrices(theta)
-    order, n = np.concatenate([pencil.elastic, pencil.rigid]), len(pencil.elastic)
-    if n < len(order) and order[n] != n:  # rigid coordinates usually come last anyway
+    order, n = pencil.elastic_first, len(pencil.elastic)
+    if order is not None:
         K, M = K[order[:, None], order], M[order[:, None], order]
-    E, F = slice(n), slice(n, len(order))
+    E, F = slice(n), slice(n, pencil.n_dof)
     C, info = lapack.dpotrf(K[E, E].T, lower=1, overwrite_a=1)
     if info:
         raise MechanismError(
@@ -37,8 +37,9 @@ def solve_single(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Flo
     mu, v = _largest(A, count)
     z, _ = lapack.dtrtrs(C, v, lower=1, trans=1)
     z = z / np.sqrt(np.maximum(mu, 1e-300))
-    phi = np.empty((len(order), count))
-    phi[order] = np.concatenate([z, -coupling @ z])
+    phi = np.concatenate([z, -coupling @ z])
+    if order is not None:
+        phi[order] = phi.copy()
     top = phi[np.abs(phi).argmax(axis=0), np.arange(count)]
     return mu, phi * np.copysign(1.0, top)
 

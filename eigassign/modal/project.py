@@ -28,15 +28,12 @@ class Terms:
 def project(pencil: Pencil, basis: Floats) -> tuple[Floats, Floats]:
     """(n_theta, k, k) projections of the stiffness and the mass terms on ``basis`` (n_dof, k)."""
     out = np.zeros((2, pencil.n_theta, basis.shape[1], basis.shape[1]))
-    every = np.ones(pencil.n_theta, dtype=bool)
-    for part in project_terms(pencil, basis.T, basis.T, every):
+    for part in project_terms(pencil, basis.T, basis.T, np.arange(pencil.n_theta)):
         out[part.matrices, part.terms] = part.values
     return out[0], out[1]
 
 
-def project_terms(
-    pencil: Pencil, left: Floats, right: Floats, wanted: NDArray[np.bool_]
-) -> list[Terms]:
+def project_terms(pencil: Pencil, left: Floats, right: Floats, wanted: Ints) -> list[Terms]:
     """The ``wanted`` terms of K and M projected on rows L, R (·, n_dof), small pencils' at once."""
     stacks = pencil.term_stacks
     if stacks is None:
@@ -53,8 +50,7 @@ def project_terms(
 def project_at(pencil: Pencil, theta: Floats, rows: Floats) -> Floats:
     """R K Rᵀ and R M Rᵀ at θ (n_theta, 1), (2, k, k), for rows R (k, n_dof)."""
     if pencil.n_dof <= DENSE_LIMIT:
-        K, M = pencil.matrices(theta)
-        return np.array([rows @ K[0] @ rows.T, rows @ M[0] @ rows.T])
+        return np.asarray(rows @ pencil.both_matrices(theta)[:, 0] @ rows.T)
     V = np.ascontiguousarray(rows.T)
     weights = (pencil.stiffness, pencil.mass)
     return np.array([_square(pencil.sparse(w @ theta[:, 0]).T, V) for w in weights])
@@ -74,10 +70,10 @@ def _project(
     terms: sparse.csc_array,
     W: Floats,
     V: Floats,
-    wanted: NDArray[np.bool_],
+    wanted: Ints,
 ) -> Terms:
     """Wᵀ A_j V of every wanted term that there is, over its non-zero rows only."""
-    there = np.flatnonzero(wanted & (np.diff(terms.indptr) > 0))
+    there = wanted[np.diff(terms.indptr)[wanted] > 0]
     tall, rows, bounds = _stacked(pencil, terms, there)
     out = np.zeros((1, len(there), W.shape[1], V.shape[1]))
     for i in range(0, len(rows), CHUNK):

@@ -115,17 +115,17 @@ def _quadratics(
     n, r = vectors.shape[1:]
     columns = np.ascontiguousarray(vectors.transpose(1, 0, 2).reshape(n, -1))
     rows = columns.T  # products with sparse matrices run along the rows of the other
-    varying = theta.copy()
-    varying[:, 0] = 0.0
-    stored, which = np.flatnonzero(varying.any(axis=0)), np.asarray(varying.any(axis=1))
+    present = theta != 0.0
+    present[:, 0] = False
+    stored = np.flatnonzero(present.any(axis=0))
     plan = _plan(space, half, stored.tobytes())
     constant = project_at(pencil, theta[:, :1], rows)
     out = np.zeros((2, r, r, len(space)))
     for i, j in _lower(r):
         out[:, i, j, plan.constant.into] = _meet(constant, plan.constant, i, j, r)
     if len(stored):
-        factors = varying.T[stored]
-        for part in project_terms(pencil, rows[: plan.low * r], rows, which):
+        factors, varying = theta.T[stored], np.flatnonzero(present.any(axis=1))
+        for part in project_terms(pencil, rows[: plan.low * r], rows, varying):
             for i, j in _lower(r):
                 met = _meet(part.values, plan.varying, i, j, r)
                 sums = (factors[:, part.terms] @ met)[:, plan.left, plan.right]
