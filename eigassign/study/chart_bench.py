@@ -46,6 +46,14 @@ def exact_frequencies(scene: Scene, x: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
+class _Job:
+    """What is timed, and the seconds it took the first time."""
+
+    run: Callable[[], object]
+    first: float
+
+
+@dataclass(frozen=True)
 class _Trial:
     """A method that has run once: what it answered, and the jobs to time."""
 
@@ -53,10 +61,8 @@ class _Trial:
     trained: int  # exact solves of its training
     hz: Floats
     points: Points
-    fit: Callable[[], object]
-    evaluate: Callable[[], object]
-    evaluations: int  # in one call of ``evaluate``
-    first: tuple[float, float]  # seconds of both, the first time
+    jobs: tuple[_Job, _Job, _Job]  # training, of one design if it is done for each; fit; evaluate
+    evaluations: int  # in one call of the last job
 
 
 def chart_methods(
@@ -67,59 +73,61 @@ def chart_methods(
     First all run once, which gives the answers and warms caches; then they are timed in turns.
     """
     trials, skipped, family = [], [], ""
+    known: dict[bytes, tuple[Floats, float]] = {}
     for method in methods:
         if method.family != family:
             family = method.family
             progress(f"charting {family}")
         try:
-            trials.append(_trial(bench, method))
+            trials.append(_trial(bench, method, known))
         except EigassignError as error:
             skipped.append((method.name, str(error)))
     progress("timing all methods in turns")
-    jobs = [job for t in trials for job in ((t.fit, t.first[0]), (t.evaluate, t.first[1]))]
-    spent = take_turns(jobs, bench.patience)
-    online = [s.times(1.0 / t.evaluations) for s, t in zip(spent[1::2], trials, strict=True)]
-    exact = [s for s, t in zip(online, trials, strict=True) if t.method.exact]
+    spent = take_turns([(j.run, j.first) for t in trials for j in t.jobs], bench.patience)
+    exact = [
+        spent[3 * k + 2].times(1.0 / t.evaluations) for k, t in enumerate(trials) if t.method.exact
+    ]
     solve = min(exact, key=lambda s: s.median_s)
-    made = [_point(bench, *each, solve) for each in zip(trials, spent[::2], online, strict=True)]
+    made = [_point(bench, trial, spent[3 * k : 3 * k + 3], solve) for k, trial in enumerate(trials)]
     return tuple(made), tuple(skipped)
 
 
-def _trial(bench: Bench, method: Method) -> _Trial:
+def _trial(bench: Bench, method: Method, known: dict[bytes, tuple[Floats, float]]) -> _Trial:
+    """Train, fit and evaluate once; answers that are ``known`` are not solved for again."""
     points = bench.points.runs() if method.per_design else bench.points
     points = points.head(method.most or len(points.x))
     x = method.train(bench.points)
-    answers = bench.solved(x)
+    key = x.tobytes()
+    if key not in known:
+        known[key] = timed(lambda: bench.solved(x))
+    answers, solving = known[key]
+    parts = bench.points.designs if method.per_design else 1
+    once = x[: len(x) // parts]
     evaluator, fitting = timed(lambda: method.fit(answers))
-    hz, once = timed(lambda: evaluator(points))
+    hz, evaluating = timed(lambda: evaluator(points))
     copies = -(-BATCH // len(points.x))
-    if method.per_design or once * copies > LONG_BATCH_S:
+    if method.per_design or evaluating * copies > LONG_BATCH_S:
         copies = 1
     many = points.repeated(copies) if copies > 1 else points
-    return _Trial(
-        method,
-        len(x),
-        hz,
-        points,
-        lambda: method.fit(answers),
-        lambda: evaluator(many),
-        len(many.x),
-        (fitting, once * copies),
+    jobs = (
+        _Job(lambda: bench.solved(once), solving / parts),
+        _Job(lambda: method.fit(answers), fitting),
+        _Job(lambda: evaluator(many), evaluating * copies),
     )
+    return _Trial(method, len(x), hz, points, jobs, len(many.x))
 
 
-def _point(
-    bench: Bench, trial: _Trial, fitting: Timing, online: Timing, solve: Timing
-) -> ChartPoint:
+def _point(bench: Bench, trial: _Trial, spent: Sequence[Timing], solve: Timing) -> ChartPoint:
     method, trained = trial.method, trial.trained
-    offline, solves_online = fitting.plus(solve.times(trained)) if trained else fitting, 0.0
+    training, fitting, online = spent[0], spent[1], spent[2].times(1.0 / trial.evaluations)
+    offline, solves_online = fitting.plus(training) if trained else fitting, 0.0
     if method.exact:
         offline, solves_online, trained = NOTHING, 1.0, 0
     elif method.per_design:
-        solves_online = trained / (bench.points.designs * len(bench.scene.path.q))
-        online = online.plus(solve.times(solves_online))
-        online = online.plus(fitting.times(1.0 / len(trial.points.x)))
-        offline, trained = NOTHING, 0
+        designs, samples = bench.points.designs, len(bench.scene.path.q)
+        solves_online = trained / (designs * samples)
+        anew = training.plus(fitting.times(1.0 / designs))
+        online, offline, trained = online.plus(anew.times(1.0 / samples)), NOTHING, 0
     gain = break_even(offline.median_s, online.median_s, solve.median_s)
     return ChartPoint(
         method.name,
