@@ -17,7 +17,7 @@ from eigassign.errors import CaseError, MechanismError
 from eigassign.mechanism.build import build_pencil, with_elements
 from eigassign.mechanism.kinematics import kinematics
 from eigassign.mechanism.parameters import initial_design, parameters
-from eigassign.mechanism.poses import build_poses, tip_chain
+from eigassign.mechanism.poses import build_poses, design_dependence, tip_chain
 from eigassign.mechanism.trajectory import Trajectory, build_trajectory
 from eigassign.modal import expansion as modal_expansion
 from eigassign.modal import reduced as modal_reduced
@@ -108,7 +108,7 @@ class Case:
         if spec is None:
             raise CaseError((self.file.problem("trajectory", "is needed here and missing"),))
         with self.located():
-            self._refuse_moving_lengths()
+            self._refuse_moving_tip(model)
             return build_trajectory(
                 spec,
                 model.q_names,
@@ -117,14 +117,18 @@ class Case:
                 self.file.coordinate_units,
             )
 
-    def _refuse_moving_lengths(self) -> None:
-        """A tip path moves q(t) when a length is designed: not modelled, so refused by name."""
+    def _refuse_moving_tip(self, model: Model) -> None:
+        """A tip path moves q(t) where a design parameter moves the tip: refused by name."""
         tip = getattr(self.file.trajectory, "tip", None)
-        for name, parameter in self.file.design.parameters.items():
-            if tip is not None and parameter.parameter.endswith(".length"):
+        if tip is None:
+            return
+        moved = design_dependence(model.poses, tip)
+        for name, moves in zip(model.y_names, moved, strict=True):
+            if moves:
                 raise MechanismError(
                     f"design.{name}.parameter",
-                    "a length changes the joint angles of a tip path; give joint samples instead",
+                    "moves the tip, so the joint angles of the tip path would change with it; "
+                    "give joint samples instead",
                 )
 
     @contextmanager

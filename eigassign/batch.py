@@ -86,6 +86,15 @@ def _failure(error: Exception) -> Row:
     return {"status": "failed" if failure.exit_code == 1 else "error", "message": failure.text}
 
 
+def default_cases() -> list[Path]:
+    """The case files of ./cases itself; UsageError where there is none."""
+    folder = Path("cases")
+    found = sorted(p for p in folder.glob("*.y*ml") if p.suffix in (".yaml", ".yml"))
+    if not found:
+        raise UsageError("cases: no such file or folder, or no case files in it; name some")
+    return found
+
+
 def cases_in(paths: Sequence[Path]) -> list[Path]:
     """`find_cases`; UsageError where a path does not exist or there is no case at all."""
     for path in paths:

@@ -86,7 +86,7 @@ def check(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
     """Check case files: every problem with its line, and what is implausible."""
     from eigassign.answers import check as checked
 
-    codes, answers = [0], {}
+    codes, answers = [0], dict[str, Any]()
     with _telling(how) as tell:
         for case in cases:
             try:
@@ -94,6 +94,8 @@ def check(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
                 tell.warn(answer.warnings)
             except EigassignError as error:
                 codes.append(failures.report(error))
+                if as_json:
+                    answers[str(case)] = {"problems": failures.problems(error)}
     if as_json:
         _print_json(answers)
     else:
@@ -222,16 +224,16 @@ def _show(outcome: Outcome, as_json: bool) -> None:
 def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
     """Compare both expansions with exact frequencies, along the trajectory and over boxes.
 
-    CASES are files or folders; all of ./cases when none is named. Exit code 1 where an expansion
-    is further off than the case's validation.max_error.
+    CASES are files or folders; the files of ./cases (not of folders below it) when none is named.
+    Exit code 1 where an expansion is further off than the case's validation.max_error.
     """
     from eigassign import run
-    from eigassign.batch import cases_in
+    from eigassign.batch import cases_in, default_cases
 
     rows: list[ValidationRow] = []
     codes = [0]
     with _telling(how) as tell:
-        for case in cases_in(cases or (Path("cases"),)):
+        for case in cases_in(cases or default_cases()):
             try:
                 answer = run.validate(case, _options(how, tell))
             except EigassignError as error:

@@ -118,3 +118,9 @@ def _internal(error: BaseException) -> str:
         f"internal error: {what}{place}. This is a bug of eigassign: please report it with the "
         "case file (--debug shows the traceback)"
     )
+
+
+def problems(error: BaseException) -> list[Problem]:
+    """What is wrong, for programs: the problems with their lines, or the message without a line."""
+    failure = judged(error)
+    return list(failure.problems) or [Problem("", 0, 0, "", str(error))]

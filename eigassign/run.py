@@ -115,11 +115,11 @@ def solve_case(case: Case, options: Options = DEFAULT) -> Result:
         scene = prepare(case, stages, _cache(options))
         wanted = target_frequencies(file, scene.path.time_s)
         with stages("initial", "solving the initial design exactly"):
-            initial_hz = scene.exact(scene.initial)
+            initial_hz = scene.exact(scene.initial, stages.advance)
         with stages("assignment", "assigning the frequencies"):
             assignment = assign_design(scene, wanted)
         with stages("verification", "solving the optimal design exactly"):
-            exact_hz = scene.exact(assignment.y)
+            exact_hz = scene.exact(assignment.y, stages.advance)
         with stages("comparison", "comparing the expansion with exact frequencies"):
             studies = study_modes(scene, initial_hz)
             scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene)))

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import perf_counter
 
+EVERY_S = 2.0
+
 
 class Stages:
     """A stopwatch with a lap for each stage; ``timing_s`` holds them in the order they ran."""
@@ -14,6 +16,7 @@ class Stages:
         self.timing_s: dict[str, float] = {}
         self._progress = progress
         self._start = perf_counter()
+        self._told = self._start
 
     @contextmanager
     def __call__(self, name: str, announcement: str) -> Iterator[None]:
@@ -22,6 +25,13 @@ class Stages:
         start = perf_counter()
         yield
         self.timing_s[name] = self.timing_s.get(name, 0.0) + perf_counter() - start
+
+    def advance(self, done: int, of: int) -> None:
+        """Tell how far a long stage is, at most every two seconds."""
+        now = perf_counter()
+        if now - self._told >= EVERY_S:
+            self._told = now
+            self._progress(f"  {done} of {of}")
 
     @property
     def total_s(self) -> float:

@@ -129,6 +129,13 @@ def _lines(case: CaseFile, motion: Kinematics, link: str) -> tuple[tuple[str, st
     return tuple((root, name) for name in others) or ((root, root),)
 
 
+def design_dependence(poses: Poses, tip: str) -> NDArray[np.bool_]:
+    """Which design parameters the position of a node depends on, (n_y,): structural."""
+    table = poses._compile(list(poses._world(*split(tip))))
+    depends = np.asarray(table.program.dependence.any(axis=0))
+    return depends[len(poses.parameters.coordinates) :]
+
+
 def tip_chain(poses: Poses, motion: Kinematics, tip: str, y: Floats) -> TipChain:
     """The chain that carries the node ``tip`` ("link.end"), at design y, for inverse kinematics."""
     link, node = split(tip)

@@ -18,7 +18,7 @@ from eigassign.assignment import (
     trapezoidal_weights,
 )
 from eigassign.case import CaseFile, Target
-from eigassign.errors import CaseError, UsageError
+from eigassign.errors import AccuracyError, CaseError, UsageError
 from eigassign.study.findings import DesignRow, ErrorRow, SolverRow, TargetStudy
 from eigassign.study.scene import Scene
 from eigassign.study.units import design_units
@@ -68,6 +68,7 @@ def assign_design(scene: Scene, target_hz: tuple[Floats, ...]) -> Assignment:
     """
     file, path = scene.file, scene.path
     l0, slope = scene.expansions.linear_in_design(path.q)
+    _require_near(scene, l0)
     column = scene.expansions.column
     goals = [
         Goal(
@@ -86,6 +87,20 @@ def assign_design(scene: Scene, target_hz: tuple[Floats, ...]) -> Assignment:
         _constraints(file),
         _names(file),
     )
+
+
+def _require_near(scene: Scene, l0: Floats) -> None:
+    """Raise AccuracyError where the expansion is so far from a pose that it predicts λ ≤ 0."""
+    bad = np.argwhere(~(l0 > 0.0))
+    if len(bad):
+        k, column = (int(i) for i in bad[0])
+        problem = scene.file.problem(
+            "expansion.q",
+            f"too far from the motion: the expansion predicts a negative λ of mode "
+            f"{scene.expansions.modes[column]} at sample {k} (t = {scene.path.time_s[k]:.4g} s); "
+            "give a pose of the trajectory, or auto",
+        )
+        raise AccuracyError(str(problem))
 
 
 def _names(file: CaseFile) -> tuple[str, ...]:

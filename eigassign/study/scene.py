@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,12 @@ from eigassign.modal.model import Model
 from eigassign.study.approximation import Expansions
 
 Floats = NDArray[np.float64]
+BLOCK = 2_000_000  # numbers of a batch of matrices: a second or so of dense solves
 OTHERS = 3  # modes shown above the highest assigned one
+
+
+def _untold(done: int, of: int) -> None:
+    """Progress that nobody watches."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +64,15 @@ class Scene:
         available = self.model.n_dof - self.model.n_rigid
         return tuple(range(1, min(max(self.expansions.modes) + OTHERS, available) + 1))
 
-    def exact(self, y: Floats) -> Floats:
+    def exact(self, y: Floats, tell: Callable[[int, int], None] = _untold) -> Floats:
         """Exact frequencies (n_t, n_shown_modes) in Hz on every sample of the trajectory."""
-        hz = self.model.frequencies(self.path.q, y, len(self.shown_modes))
+        q, count = self.path.q, len(self.shown_modes)
+        block = max(1, BLOCK // self.model.n_dof**2)
+        parts = []
+        for start in range(0, len(q), block):  # a signal is heard, and progress told, in between
+            parts.append(self.model.frequencies(q[start : start + block], y, count))
+            if start + block < len(q):
+                tell(start + block, len(q))
+        hz = np.concatenate(parts)
         hz.setflags(write=False)
         return hz

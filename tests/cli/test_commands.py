@@ -120,7 +120,9 @@ def test_check_goes_on_after_a_wrong_case(capsys: Captured) -> None:
     Path("wrong.yaml").write_text("title: x")
     assert main(["check", "wrong.yaml", "good.yaml", "--json"]) == 2
     out, err = capsys.readouterr()
-    assert list(json.loads(out)) == ["good.yaml"]
+    answers = json.loads(out)
+    assert list(answers) == ["wrong.yaml", "good.yaml"]
+    assert answers["wrong.yaml"]["problems"][0]["line"] > 0
     assert "wrong.yaml:1:1: mechanism: required key is missing" in err
 
 

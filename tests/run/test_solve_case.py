@@ -253,3 +253,30 @@ def test_a_plausibility_warning_reaches_the_findings(tmp_path: Path) -> None:
     text = shipped(misprint, ("190 Hz", "19 kHz"))
     findings = solved(tmp_path, text).findings
     assert any("bending_inertia" in warning for warning in findings.warnings)
+
+
+def test_a_length_that_moves_the_tip_is_refused_with_a_tip_path_and_another_is_not(
+    tmp_path: Path,
+) -> None:
+    text = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text(encoding="utf-8")
+    side = "    side: {length: 0.1, material: aluminium, section: rod, elements: 1}\n"
+    text = text.replace("  joints:\n", side + "  joints:\n", 1).replace(
+        "  bodies:",
+        "    branch: {type: fixed, base: upper_arm.end, follower: side.start}\n  bodies:",
+        1,
+    )
+    for link, refused in (("side", False), ("forearm", True)):
+        path = tmp_path / f"{link}.yaml"
+        lower, upper = ("0.05", "0.2") if link == "side" else ("0.4", "0.5")
+        design = f"  l: {{parameter: links.{link}.length, min: {lower}, max: {upper}}}\n"
+        path.write_text(
+            text.replace("  m2: {", design + "  m2: {", 1).replace(
+                "y: [0.125, 0.125]", f"y: [0.125, {lower}, 0.125]"
+            ),
+            encoding="utf-8",
+        )
+        if refused:
+            with pytest.raises(CaseError, match="moves the tip"):
+                _ = ea.load_case(path).trajectory
+        else:
+            assert len(ea.load_case(path).trajectory.time_s) == 152
