@@ -13,7 +13,9 @@ from typing import Any, NamedTuple
 from eigassign.series.expression import Scalar, is_constant
 
 Number = Callable[[str, float], Scalar]
-SHEAR = {"circle": 0.9, "tube": 0.5, "rectangle": 5.0 / 6.0, "i_profile": 0.44}  # Cowper, ν ≈ 0.3
+# Energy values of κ for a solid circle and a rectangle, the thin-walled limit for a tube, a typical
+# rolled profile; they do not depend on ν. A bare section may state its own.
+SHEAR = {"circle": 0.9, "tube": 0.5, "rectangle": 5.0 / 6.0, "i_profile": 0.44}
 
 
 class SectionValues(NamedTuple):

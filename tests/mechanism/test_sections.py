@@ -42,3 +42,20 @@ def test_the_papers_rod_of_30_mm_weighs_what_the_paper_says() -> None:
     area, inertia = section_values(Shape(shape="circle", diameter=0.03), as_written)[:2]
     np.testing.assert_allclose(inertia, 3.97e-8, rtol=2e-3)
     np.testing.assert_allclose(area * 2690.0, 1.9, rtol=2e-3)
+
+
+def test_a_design_that_swaps_the_sides_of_a_rectangle_is_refused() -> None:
+    from eigassign.errors import MechanismError
+    from eigassign.mechanism.links import _refuse_square
+
+    def case(low: float, high: float) -> Shape:
+        height = Shape(parameter="sections.s.height", min=low, max=high)
+        section = Shape(shape="rectangle", width=0.02, height=0.03)
+        return Shape(
+            mechanism=Shape(space="spatial", sections={"s": section}),
+            design=Shape(parameters={"h": height}),
+        )
+
+    _refuse_square(case(0.021, 0.05), "s")
+    with pytest.raises(MechanismError, match="change places"):
+        _refuse_square(case(0.015, 0.05), "s")
