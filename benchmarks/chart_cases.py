@@ -1,4 +1,4 @@
-"""The cases that are charted: the paper's arm, a spatial arm of six joints, a scene of 10⁴ dof."""
+"""The cases that are charted: two arms, and scenes of 10⁴ and 5 · 10⁴ degrees of freedom."""
 
 from __future__ import annotations
 
@@ -20,12 +20,17 @@ def six() -> str:
     return (CASES / "arm_6r.yaml").read_text(encoding="utf-8")
 
 
-def large() -> str:
-    """A trunk with short chains: 10⁴ degrees of freedom, three locked joints, four masses."""
-    data = arms.tree(166)
+def large(branches: int = 33) -> str:
+    """A trunk with short chains: 10⁴ degrees of freedom, three locked joints, two masses."""
+    data = arms.tree(branches, links=3, elements=34)
     data["design"] = {name: part for name, part in data["design"].items() if name in ("m1", "m3")}
     start = np.array([0.0, 0.7, -0.8, 0.5])
     return _with_motion(data, start, start + np.array([0.3, 0.3, -0.3, 0.3]), 21, 1)
+
+
+def larger() -> str:
+    """The same with 5 · 10⁴."""
+    return large(166)
 
 
 def _with_motion(

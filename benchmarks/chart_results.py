@@ -1,8 +1,8 @@
-"""The charts of three cases: the paper's arm, a spatial arm of six joints, a scene of 10⁴ dof.
+"""The charts of the paper's arm, a spatial arm of six joints, scenes of 10⁴ and 5 · 10⁴ dof.
 
 What `eigassign chart` writes goes to ``results/chart_<case>/``; here are its fronts and advice as
-Markdown. The last case is charted with less of everything, since exact solves take a tenth of a
-second there: what is left out is said in its notes.
+Markdown. The last two are charted with less of everything, since exact solves take long there:
+what is left out is said in their notes.
 """
 
 from __future__ import annotations
@@ -45,6 +45,7 @@ CASES = {
     "two_link": (chart_cases.paper, WHOLE),
     "arm_6r": (chart_cases.six, WHOLE),
     "large": (chart_cases.large, LARGE),
+    "larger": (chart_cases.larger, LARGE),
 }
 
 
