@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.mechanism.mesh import Term
+from eigassign.mechanism.rotations import multiply
 from eigassign.series.expression import Expression, Scalar
 
 Floats = NDArray[np.float64]
@@ -149,8 +150,8 @@ def _add_twist_column(
 def _add_rigid(target: Accumulator, link: LocalLink, n_u: int) -> None:
     """The q̇-q̇ part: Tᵀ (Nᵀ m N) T."""
     inertia = rigid_inertia(link)
-    momentum = _multiply(inertia, link.twist)
-    block = _multiply(link.twist.T, momentum)
+    momentum = multiply(inertia, link.twist)
+    block = multiply(link.twist.T, momentum)
     n = block.shape[0]
     for k in range(n):
         for l in range(k, n):  # noqa: E741
@@ -173,20 +174,6 @@ def rigid_inertia(link: LocalLink) -> Objects:
                 for a, b in zip(*np.nonzero(constant), strict=True):
                     total[a, b] = total[a, b] + coefficient * float(constant[a, b])
     return total
-
-
-def _multiply(a: Objects, b: Objects) -> Objects:
-    """Product of matrices of scalars, skipping plain zeros (most entries of a planar twist)."""
-    out = np.zeros((a.shape[0], b.shape[1]), dtype=object)
-    for i, k in zip(*np.nonzero(_present(a)), strict=True):
-        for j in np.flatnonzero(_present(b[k])):
-            out[i, j] = out[i, j] + a[i, k] * b[k, j]
-    return out
-
-
-def _present(a: Objects) -> NDArray[np.bool_]:
-    flags = [isinstance(value, Expression) or value != 0.0 for value in a.ravel()]
-    return np.array(flags, dtype=bool).reshape(a.shape)
 
 
 def pattern(

@@ -60,7 +60,7 @@ def _bind_passive(
     trial = parameters.rerecorded(recorder, n_p)
     F, check = _equations(case, trial, tree, coords, planar)
     J = [[derivative(f, n_q + n_y + k) for k in range(n_p)] for f in F]
-    used = _used_variables(recorder, [*F, *check], n_q + n_y)
+    used = _used_variables(recorder, [*F, *check], n_q + n_y, n_p)
     scalars = [*F, *check, *(entry for row in J for entry in row)]
     program = _reordered(recorder, scalars, used, n_q + n_y, n_p)
     names = (*parameters.coordinates, *parameters.design)
@@ -111,9 +111,10 @@ def _check_rigid_loops(
             )
 
 
-def _used_variables(recorder: Recorder, scalars: Sequence[Scalar], n: int) -> list[int]:
+def _used_variables(recorder: Recorder, scalars: Sequence[Scalar], n: int, n_p: int) -> list[int]:
+    """Which of the first n variables the closure depends on; n_p passive ones follow them."""
     atoms = sorted({a for s in scalars if isinstance(s, Expression) for a in s.terms})
-    depends = compile_program(recorder, atoms, 10_000_000 if n > 10**6 else n + 1000).dependence
+    depends = compile_program(recorder, atoms, n + n_p).dependence
     return [v for v in range(n) if depends[:, v].any()]
 
 
