@@ -9,6 +9,7 @@ from frame_oracle import frame
 
 from eigassign.errors import CaseError, MechanismError, UsageError
 from eigassign.modal.model import Model
+from eigassign.modal.roundoff import rounding_error
 
 SEEDS = range(0, 60, 4)
 
@@ -114,8 +115,13 @@ def test_the_error_of_a_stiff_drive_falls_like_its_compliance() -> None:
 def test_the_shoulder_angle_of_a_planar_arm_drops_out_by_structure() -> None:
     model = model_of(two_link())
     assert model.pencil.active.tolist() == [False, True, True, True]
-    f = model.frequencies([[0.0, 1.0], [2.0, 3.0], [-1.0, 0.0]], [0.0, 0.1], 3)
-    np.testing.assert_array_equal(f[1:], np.broadcast_to(f[:1], (2, 3)))
+    q, y = np.array([[0.0, 1.0], [2.0, 3.0], [-1.0, 0.0]]), [0.0, 0.1]
+    theta = model.pencil.theta(np.column_stack([q, np.tile(y, (3, 1))]))
+    np.testing.assert_array_equal(theta, np.broadcast_to(theta[:, :1], theta.shape))
+    # equal matrices; a sample's place in the batch may round its eigenvalues differently
+    digits = rounding_error(model.pencil, np.array([*q[0], *y]), 3)
+    f = model.frequencies(q, y, 3)
+    np.testing.assert_allclose(f[1:], np.broadcast_to(f[:1], (2, 3)), rtol=2 * digits)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

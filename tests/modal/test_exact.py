@@ -9,6 +9,7 @@ from chains import bar, model_of, random_chain, two_link
 from eigassign.errors import UsageError
 from eigassign.modal import exact
 from eigassign.modal.model import Model
+from eigassign.modal.roundoff import rounding_error
 
 POSES = np.array([[0.3, 1.9], [1.0, 0.2], [-2.0, 0.5]])
 DESIGN = np.array([[0.0, 0.1], [0.2, 0.0], [0.25, 0.25]])
@@ -176,9 +177,11 @@ def test_one_sample_and_many_samples_mix() -> None:
     model = model_of(two_link())
     f = model.frequencies(POSES, [0.1, 0.1], 2)
     assert f.shape == (3, 2)
-    np.testing.assert_allclose(model.frequencies(POSES[1], [0.1, 0.1], 2), f[1:2], rtol=1e-13)
+    # a sample's place in the batch may round it differently, within the round-off that we state
+    digits = 2 * rounding_error(model.pencil, np.array([*POSES[1], 0.1, 0.1]), 2)
+    np.testing.assert_allclose(model.frequencies(POSES[1], [0.1, 0.1], 2), f[1:2], rtol=digits)
     one = model.frequencies(POSES[0], DESIGN, 2)
-    np.testing.assert_allclose(one[2], model.frequencies(POSES[0], DESIGN[2], 2)[0], rtol=1e-13)
+    np.testing.assert_allclose(one[2], model.frequencies(POSES[0], DESIGN[2], 2)[0], rtol=digits)
     assert model.frequencies(np.zeros((0, 2)), [0.0, 0.0], 2).shape == (0, 2)
 
 
