@@ -39,14 +39,16 @@ from eigassign.case.study_parts import (
     Constraint,
     Design,
     Expansion,
-    FileTrajectory,
     FrequencyProfile,
     Parameter,
-    SampledTrajectory,
     Target,
+    Validation,
+)
+from eigassign.case.trajectory_parts import (
+    FileTrajectory,
+    SampledTrajectory,
     TipTrajectory,
     Trajectory,
-    Validation,
 )
 
 __all__ = [

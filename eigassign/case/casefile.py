@@ -11,7 +11,8 @@ from typing import Any
 from eigassign.case.document import Document
 from eigassign.case.freedoms import freedom_of
 from eigassign.case.mechanism_parts import Coordinate, Mechanism
-from eigassign.case.study_parts import Design, Expansion, Target, Trajectory, Validation
+from eigassign.case.study_parts import Design, Expansion, Target, Validation
+from eigassign.case.trajectory_parts import Trajectory
 from eigassign.case.yaml_reader import KeyPath, Mark, dotted
 from eigassign.errors import Problem
 

@@ -15,15 +15,17 @@ from eigassign.case.section_parts import SHAPES
 from eigassign.case.study_parts import (
     Design,
     Expansion,
-    FileTrajectory,
     FrequencyProfile,
-    SampledTrajectory,
     Target,
-    TipTrajectory,
-    Trajectory,
     Validation,
 )
 from eigassign.case.suggest import listed, shown, suggestion, unknown
+from eigassign.case.trajectory_parts import (
+    FileTrajectory,
+    SampledTrajectory,
+    TipTrajectory,
+    Trajectory,
+)
 from eigassign.case.yaml_reader import Finding, KeyPath
 
 

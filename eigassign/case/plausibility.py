@@ -13,7 +13,8 @@ from eigassign.case.document import Document
 from eigassign.case.freedoms import freedom_of
 from eigassign.case.mechanism_parts import Coordinate, Mechanism
 from eigassign.case.plausible_parts import implausible_parts, outside
-from eigassign.case.study_parts import FrequencyProfile, SampledTrajectory, TipTrajectory
+from eigassign.case.study_parts import FrequencyProfile
+from eigassign.case.trajectory_parts import SampledTrajectory, TipTrajectory
 from eigassign.case.yaml_reader import Finding, KeyPath
 
 LARGEST_ANGLE = 4 * math.pi  # rad: two turns; a bare 30 was meant in degrees

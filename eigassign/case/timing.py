@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from eigassign.case.quantity import Quantity
-from eigassign.case.study_parts import DURATION, TIME, TipTrajectory
+from eigassign.case.trajectory_parts import DURATION, TIME, TipTrajectory
 from eigassign.case.tree import Tree, at, entries
 from eigassign.case.units import QuantityError
 from eigassign.case.yaml_reader import Finding
