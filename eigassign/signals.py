@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import errno
 import gc
+import io
 import os
 import signal
 import sys
@@ -92,6 +94,25 @@ def environment(changes: Mapping[str, str]) -> Iterator[None]:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
+
+
+class _ClosedOutput(io.TextIOBase):
+    """Stands for a stdout that was closed before the process began: an answer would be lost."""
+
+    def write(self, _text: str) -> int:
+        raise OSError(errno.EBADF, "standard output is closed")
+
+
+def mind_closed_streams() -> None:
+    """Let writing to a closed stdout fail, and no file opened later take its descriptor.
+
+    Python leaves ``sys.stdout`` None then, and what is printed vanishes without an error.
+    """
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(descriptor)
+    if sys.stdout is None:
+        sys.stdout = _ClosedOutput()
 
 
 def never_fail_to_encode() -> None:

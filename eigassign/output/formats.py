@@ -6,8 +6,8 @@ import math
 
 
 def number(value: float) -> str:
-    """Six significant digits: ``0.228713``."""
-    return f"{value:.6g}"
+    """Six significant digits: ``0.228713``; no sign on a zero."""
+    return f"{value + 0.0:.6g}"
 
 
 def percent(fraction: float) -> str:

@@ -113,6 +113,17 @@ def test_a_closed_pipe_ends_in_silence(command: list[str]) -> None:
     assert done.returncode == 3
 
 
+@pytest.mark.parametrize("args", [["--json"], []], ids=["json", "text"])
+def test_a_stdout_that_is_closed_from_the_start_is_told(args: list[str]) -> None:
+    command = [sys.executable, "-m", "eigassign", "modes", str(TWO_LINK), *args]
+    shell = ["sh", "-c", 'exec "$@" >&-', "sh", *command]
+    done = subprocess.run(
+        shell, env=environment(), stderr=subprocess.PIPE, text=True, timeout=SECONDS, check=False
+    )
+    assert done.returncode == 3
+    assert done.stderr == "eigassign: error: standard output is closed\n"
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
 def test_a_full_disk_behind_stdout_is_told() -> None:
     with open("/dev/full", "w") as full:

@@ -129,6 +129,7 @@ def test_progress_counts_in_lines_off_terminal_and_in_place_on_one():
         (percent(float("inf")), "n/a"),
         (percent(1.1e-11), "1.10e-09 %"),
         (number(0.22871234), "0.228712"),
+        (number(-0.0), "0"),
         (seconds(0.0123), "12.3 ms"),
         (seconds(4.5678), "4.57 s"),
         (residual(3.14e-17), "3.1e-17"),

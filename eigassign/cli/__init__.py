@@ -1,0 +1,74 @@
+"""The command line: the only place that prints, catches errors and sets exit codes.
+
+stdout carries results, stderr everything else. Only click is imported here at the top; what a
+command needs is imported when it runs, so that ``--help`` is instant.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+
+import click
+
+from eigassign import failures, signals
+from eigassign._version import __version__
+from eigassign.cli.caches import cache
+from eigassign.cli.many import batch
+from eigassign.cli.questions import check, modes, schema
+from eigassign.cli.runs import chart, expand, optimize, validate
+
+_CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the command line on ``args`` (default: those of the process); returns the exit code."""
+    if args is None:
+        signals.expect_to_be_brief()
+    arguments = sys.argv[1:] if args is None else list(args)
+    signals.prefer_one_thread()
+    signals.mind_closed_streams()
+    signals.never_fail_to_encode()
+    try:
+        with signals.terminable():
+            code = _invoke(arguments)
+            signals.flush_streams()
+            return code
+    except BaseException as error:
+        return _reported(error, debug="--debug" in arguments)
+
+
+def _reported(error: BaseException, debug: bool) -> int:
+    code = failures.report(error, debug)
+    with suppress(OSError):  # the streams are silenced then, and the code is that of the error
+        signals.flush_streams()
+    return code
+
+
+def _invoke(arguments: list[str]) -> int:
+    """Not click's own ``main``, which would exit with codes of its own."""
+    try:
+        with cli.make_context("eigassign", arguments) as context:
+            return int(cli.invoke(context) or 0)
+    except click.exceptions.Exit as done:
+        return done.exit_code
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+
+
+@click.group(context_settings=_CONTEXT)
+@click.version_option(__version__, prog_name="eigassign")
+def cli() -> None:
+    """Assign the natural frequencies of moving, flexible mechanisms along their trajectory.
+
+    \b
+    Exit codes: 0 fine; 1 infeasible, over the asked tolerance, or some cases
+    failed; 2 wrong usage or wrong input; 3 environment or I/O; 4 a bug of
+    eigassign; 130 and 143 interrupted and terminated.
+    """
+
+
+for command in (check, modes, optimize, expand, validate, chart, batch, cache, schema):
+    cli.add_command(command)

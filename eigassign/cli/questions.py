@@ -1,0 +1,90 @@
+"""Quick questions about a case: `check`, `modes`, `schema`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from eigassign import failures
+from eigassign.cli import options
+from eigassign.cli.speech import print_json, telling
+from eigassign.errors import EigassignError
+
+if TYPE_CHECKING:
+    from eigassign.answers import CheckAnswer
+
+
+@click.command()
+@click.argument("cases", nargs=-1, required=True, type=options.PATH)
+@options.json
+@options.common
+def check(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
+    """Check case files: every problem with its line, and what is implausible."""
+    from eigassign.answers import check as checked
+
+    codes, answers = [0], dict[str, Any]()
+    with telling(how) as tell:
+        for case in cases:
+            try:
+                answers[str(case)] = answer = checked(case)
+                tell.warn(answer.warnings)
+            except EigassignError as error:
+                codes.append(failures.report(error))
+                if as_json:
+                    answers[str(case)] = {"problems": failures.problems(error)}
+    if as_json:
+        print_json(answers)
+    else:
+        for name, answer in answers.items():
+            click.echo(_described(name, answer))
+    return max(codes)
+
+
+def _described(name: str, answer: CheckAnswer) -> str:
+    q, y = (", ".join(names) or "none" for names in (answer.q_names, answer.y_names))
+    lines = [
+        f"{name}: {answer.title}",
+        f"  {answer.n_dof} degrees of freedom, {answer.n_rigid} of them rigid",
+        f"  coordinates {q}; design {y}; targets {answer.targets}",
+        f"  trajectory: {answer.samples} samples in {answer.duration_s:g} s",
+    ]
+    return "\n".join([*lines, *(f"  {note}" for note in answer.notes)])
+
+
+@click.command()
+@options.case
+@click.option("--q", metavar="VALUES", help="Pose, as '1.817, 5.312' or '104 deg 304 deg'.")
+@click.option("--y", metavar="VALUES", help="Design, as '0.125 0.125' or '125 g, 0'.")
+@click.option("--count", type=click.IntRange(1), default=4, show_default=True, help="Modes.")
+@options.json
+@options.common
+def modes(case: Path, q: str | None, y: str | None, count: int, as_json: bool, **how: Any) -> int:
+    """Exact natural frequencies of the elastic modes at one pose and design.
+
+    Without --q at the case's expansion point, or where its trajectory starts; without --y for the
+    design written in the file.
+    """
+    from eigassign.answers import modes as solved
+    from eigassign.values import point
+
+    with telling(how):
+        answer = solved(case, *point(case, q, y), count)
+    hz = list(answer.frequencies_hz)
+    if as_json:
+        print_json({"rigid_modes": answer.rigid_modes, "frequencies_hz": hz})
+    else:
+        from eigassign.output.console import print_modes
+
+        print_modes(hz, rigid_modes=answer.rigid_modes)
+    return 0
+
+
+@click.command()
+def schema() -> int:
+    """Print the JSON Schema of case files, for editors."""
+    from eigassign.case import json_schema
+
+    print_json(json_schema(), indent=2)
+    return 0

@@ -1,0 +1,163 @@
+"""The work on cases: `optimize`, `expand`, `validate`, `chart`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from eigassign import failures
+from eigassign.cli import options
+from eigassign.cli.speech import print_json, telling
+from eigassign.errors import EigassignError
+from eigassign.teller import Teller
+
+if TYPE_CHECKING:
+    from eigassign.run import Options, Outcome
+    from eigassign.study.findings import ValidationRow
+
+
+@click.command()
+@options.case
+@options.running
+@options.json
+@options.common
+def optimize(case: Path, as_json: bool, **how: Any) -> int:
+    """Assign the frequencies: the best design, proved by exact solves, in a run folder."""
+    from eigassign import run
+
+    return _finished(run.optimize, case, as_json, how)
+
+
+@click.command()
+@options.case
+@click.option("--order", type=click.IntRange(1, 20), help="Order, instead of the case's.")
+@click.option("--linear", is_flag=True, help="Keep the partially linearised set only.")
+@click.option("--mode", "modes", type=click.IntRange(1), multiple=True, help="Mode (repeatable).")
+@options.running
+@options.json
+@options.common
+def expand(
+    case: Path, order: int | None, linear: bool, modes: tuple[int, ...], as_json: bool, **how: Any
+) -> int:
+    """Expand eigenvalues in q and y: coefficients and their accuracy, in a run folder.
+
+    That is results/<case>_expansion unless --out says otherwise.
+    """
+    from eigassign import run
+
+    def expanded(path: Path, options: Options) -> Outcome:
+        return run.expand_case(path, options, order=order, modes=modes or None, linear=linear)
+
+    out = how["out"] or Path("results", f"{case.stem}_expansion")
+    return _finished(expanded, case, as_json, {**how, "out": out})
+
+
+def _finished(
+    work: Callable[[Path, Options], Outcome], case: Path, as_json: bool, how: Mapping[str, Any]
+) -> int:
+    """Run one case into its folder and show what it found; the exit code."""
+    with telling(how) as tell:
+        outcome = work(case, _options(how, tell))
+        tell.warn(outcome.warnings)
+        _show(outcome, as_json)
+        if not outcome.within_tolerance:
+            tell.error("the expansion is further from exact than validation.max_error allows")
+    return 0 if outcome.within_tolerance else 1
+
+
+def _options(how: Mapping[str, Any], tell: Teller) -> Options:
+    from eigassign.run import Options
+
+    return Options(
+        out=how.get("out"),
+        cache_dir=how["cache_dir"],
+        use_cache=not how["no_cache"],
+        force=how.get("force", False),
+        progress=tell.stage,
+    )
+
+
+def _show(outcome: Outcome, as_json: bool) -> None:
+    if as_json:
+        from eigassign.output.results_json import results
+
+        print_json({"run_folder": str(outcome.folder), **results(outcome.findings)})
+    else:
+        from eigassign.output.console import print_assignment
+
+        print_assignment(outcome.findings)
+        click.echo(f"{outcome.folder} written in {outcome.seconds:.2f} s")
+
+
+@click.command()
+@click.argument("cases", nargs=-1, type=options.PATH)
+@options.caching
+@options.json
+@options.common
+def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
+    """Compare both expansions with exact frequencies, along the trajectory and over boxes.
+
+    CASES are files or folders; the files of ./cases (not of folders below it) when none is named.
+    Exit code 1 where an expansion is further off than the case's validation.max_error.
+    """
+    from eigassign import run
+    from eigassign.batch import cases_in, default_cases
+
+    rows: list[ValidationRow] = []
+    codes = [0]
+    with telling(how) as tell:
+        for case in cases_in(cases or default_cases()):
+            try:
+                answer = run.validate(case, _options(how, tell))
+            except EigassignError as error:
+                codes.append(failures.report(error))
+                continue
+            tell.warn(answer.warnings)
+            rows.extend(answer.rows)
+            codes.append(0 if answer.passed else 1)
+    if as_json:
+        print_json(rows)
+    elif rows:
+        from eigassign.output.console import print_validation
+
+        print_validation(rows)
+    return max(codes)
+
+
+@click.command()
+@options.case
+@click.option("--quick", is_flag=True, help="In seconds: fewer methods, points and repeats.")
+@click.option("--accuracy", type=options.POSITIVE, help="Advise for this worst relative error.")
+@click.option("--budget", "budget_s", type=options.POSITIVE, help="Advise for so many seconds.")
+@click.option("--evaluations", type=options.POSITIVE, help="How many evaluations are wanted.")
+@click.option("--out", type=options.PATH, help="Folder (default: results/<case>_chart).")
+@click.option("--force", is_flag=True, help="Move what is in the way aside, whatever it is.")
+@options.json
+@options.common
+def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
+    """Chart time against accuracy of every way to the frequencies of this case.
+
+    Exact solves, expansions, reduced models, interpolation and surrogates, all against the same
+    exact answers on this machine; the mesh; and ways to a design. Leaves figures, chart.json and
+    report.html, and says what to choose.
+    """
+    from eigassign import charting
+    from eigassign.study.chart_study import Wish
+
+    wish = Wish(how["accuracy"], how["budget_s"], how["evaluations"])
+    out = how["out"] or Path("results", f"{case.stem}_chart")
+    with telling(how) as tell:
+        given = _options({**how, "out": out, "cache_dir": None, "no_cache": True}, tell)
+        made = charting.chart(case, given, quick, wish)
+        tell.warn(made.chart.warnings)
+    if as_json:
+        print_json({"run_folder": str(made.folder), **vars(made.chart)})
+    else:
+        from eigassign.output.console import print_chart
+
+        print_chart(made.chart)
+        click.echo(f"{made.folder} written in {made.chart.seconds:.1f} s")
+    return 0
