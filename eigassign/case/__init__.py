@@ -46,6 +46,7 @@ from eigassign.case.study_parts import (
 )
 from eigassign.case.trajectory_parts import (
     FileTrajectory,
+    PointTrajectory,
     SampledTrajectory,
     TipTrajectory,
     Trajectory,
@@ -77,6 +78,7 @@ __all__ = [
     "Mechanism",
     "NutJoint",
     "Parameter",
+    "PointTrajectory",
     "PrismaticJoint",
     "RectangleSection",
     "RevoluteJoint",

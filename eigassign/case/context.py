@@ -131,7 +131,8 @@ def _span(tree: Tree, findings: list[Finding]) -> object:
 def _trajectory(tree: Tree, folder: Path, findings: list[Finding]) -> dict[str, object]:
     body, kinds = at(tree, "trajectory"), coordinate_quantities(tree)
     changed = {
-        k: _coordinates(at(body, k), kinds, ("trajectory", k), findings) for k in ("q", "start")
+        k: _coordinates(at(body, k), kinds, ("trajectory", k), findings)
+        for k in ("q", "points", "start")
     }
     if isinstance(at(body, "branch"), Mapping):
         changed["branch"] = {

@@ -104,8 +104,9 @@ def one_for_each(value: object, path: KeyPath, kind: str, known: list[str]) -> l
 def per_coordinate(tree: Tree) -> Iterator[Finding]:
     """Lists with one entry for each coordinate."""
     q = names(tree, "coordinates")
-    for k, row in enumerate(entries(tree, "trajectory", "q")):
-        yield from one_for_each(row, ("trajectory", "q", k), "coordinate", q)
+    for key in ("q", "points"):
+        for k, row in enumerate(entries(tree, "trajectory", key)):
+            yield from one_for_each(row, ("trajectory", key, k), "coordinate", q)
     for path in (("trajectory", "start"), ("validation", "q_span"), ("expansion", "q")):
         yield from one_for_each(at(tree, *path), path, "coordinate", q)
 
@@ -117,8 +118,13 @@ def branches(tree: Tree) -> Iterator[Finding]:
         path: KeyPath = ("trajectory", "branch", joint)
         if joint not in ranged:
             yield path, unknown("joint with one freedom", joint, ranged)
-        elif freedoms(tree, joint) == ("rotation",) and _width(limits) > 2 * math.pi:
+        elif _repeats(tree, joint) and _width(limits) > 2 * math.pi:
             yield path, "wider than one turn (an angle is in rad when bare; or write deg)"
+
+
+def _repeats(tree: Tree, joint: str) -> bool:
+    """Whether a full turn of the joint leads back; a screw advances meanwhile."""
+    return text(tree, *_JOINTS, joint, "type") == "revolute"
 
 
 def _width(limits: object) -> float:

@@ -22,6 +22,7 @@ from eigassign.case.study_parts import (
 from eigassign.case.suggest import listed, shown, suggestion, unknown
 from eigassign.case.trajectory_parts import (
     FileTrajectory,
+    PointTrajectory,
     SampledTrajectory,
     TipTrajectory,
     Trajectory,
@@ -50,6 +51,7 @@ _TAGGED: dict[object, type[Part]] = {
     "<tip>": TipTrajectory,
     "<file>": FileTrajectory,
     "<samples>": SampledTrajectory,
+    "<points>": PointTrajectory,
     "<profile>": FrequencyProfile,
 }
 _MOST = 200  # errors explained; nobody reads more
@@ -143,7 +145,8 @@ def _motion(error: Any) -> _Explained:
     if not isinstance(error["input"], Mapping):
         return (), f"expected a mapping, got {shown(error['input'])}"
     return (), (
-        "expected one of the keys tip (path of a link's end), q (joint samples) or file (CSV); "
+        "expected one of the keys tip (path of a link's node), points (point to point), q (joint "
+        "samples) or file (CSV); "
         f"got {listed(error['input'])}"
     )
 

@@ -14,7 +14,7 @@ from eigassign.case.freedoms import freedom_of
 from eigassign.case.mechanism_parts import Coordinate, Mechanism
 from eigassign.case.plausible_parts import implausible_parts, outside
 from eigassign.case.study_parts import FrequencyProfile
-from eigassign.case.trajectory_parts import SampledTrajectory, TipTrajectory
+from eigassign.case.trajectory_parts import PointTrajectory, SampledTrajectory, TipTrajectory
 from eigassign.case.yaml_reader import Finding, KeyPath
 
 LARGEST_ANGLE = 4 * math.pi  # rad: two turns; a bare 30 was meant in degrees
@@ -40,7 +40,12 @@ def _angles(document: Document) -> Iterator[Finding]:
     if isinstance(motion, SampledTrajectory):
         samples = (v for row in motion.q for v in _angular(document, row))
         yield from _turned(samples, ("trajectory", "q"))
+    if isinstance(motion, PointTrajectory):
+        points = (v for row in motion.points for v in _angular(document, row))
+        yield from _turned(points, ("trajectory", "points"))
     if isinstance(motion, TipTrajectory):
+        yield from _turned(_flat(motion.angle), ("trajectory", "angle"))
+        yield from _turned(_flat(motion.orientation), ("trajectory", "orientation"))
         if motion.start is not None:
             yield from _turned(_angular(document, motion.start), ("trajectory", "start"))
         for name, interval in motion.branch.items():
@@ -57,6 +62,15 @@ def _angular(document: Document, q: Sequence[float]) -> list[float]:
 def _is_angle(mechanism: Mechanism, coordinate: Coordinate) -> bool:
     kind = mechanism.joints[coordinate.joint].type
     return kind != "screw" and freedom_of(kind, coordinate.component) != "translation"
+
+
+def _flat(value: object) -> Iterator[float]:
+    """The numbers of a nest of tuples."""
+    if isinstance(value, tuple):
+        for inner in value:
+            yield from _flat(inner)
+    elif isinstance(value, (int, float)):
+        yield value
 
 
 def _turned(angles: Iterable[float], path: KeyPath) -> Iterator[Finding]:

@@ -82,6 +82,7 @@ class Quantity:
     above: float | None = None
     at_least: float | None = None
     below: float | None = None
+    at_most: float | None = None
     elsewhere: str = ""
 
     def read(self, value: object) -> float:
@@ -99,6 +100,8 @@ class Quantity:
             raise QuantityError(f"must be >= {self._limit(self.at_least)}, got {given}")
         if self.below is not None and not si < self.below:
             raise QuantityError(f"must be < {self._limit(self.below)}, got {given}")
+        if self.at_most is not None and not si <= self.at_most:
+            raise QuantityError(f"must be <= {self._limit(self.at_most)}, got {given}")
         return si
 
     def _limit(self, value: float) -> str:
@@ -126,6 +129,8 @@ class Quantity:
             number["minimum"] = self.at_least
         if self.below is not None:
             number["exclusiveMaximum"] = self.below
+        if self.at_most is not None:
+            number["maximum"] = self.at_most
         if self.dimension is None and not self.elsewhere:
             return number
         text = {"type": "string", "pattern": r"^\s*[-+]?(\.\d|\d).*$"}

@@ -9,6 +9,7 @@ from eigassign.case.joint_parts import JointBase
 from eigassign.case.mechanism_parts import Spring
 from eigassign.case.quantity import Part, keys_of
 from eigassign.case.study_parts import Design
+from eigassign.case.trajectory_parts import Timed
 from eigassign.case.yaml_reader import resolve
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
@@ -37,13 +38,16 @@ def plain(value: object) -> object:
 
 
 def _superfluous(value: Part) -> set[str]:
-    """Keys of a joint that say nothing: zero offsets from a link's node, the other space's turn."""
+    """Keys that say nothing: zero offsets from a link's node, the other space's turn, a share of
+    time for a timing law that has none."""
     if isinstance(value, (JointBase, Spring)) and value.orientation is not None:
         keys = {"angle"}
     else:
         keys = set()
     if isinstance(value, JointBase) and value.base != "ground" and not any(value.position or ()):
         keys.add("position")
+    if isinstance(value, Timed) and value.timing != "trapezoidal":
+        keys.add("acceleration_share")
     return keys
 
 

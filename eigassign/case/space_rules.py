@@ -25,6 +25,7 @@ def misfits(tree: Tree) -> Iterator[Finding]:
         place: KeyPath = ("mechanism", "springs", name)
         yield from _turning(spring, place, space)
         yield from _spring_axes(spring, place, space)
+    yield from _turning(at(tree, "trajectory"), ("trajectory",), space)
     for name, coordinate in items(tree, "coordinates"):
         if space == "spatial" and at(coordinate, "angle") == "absolute":
             message = "an absolute angle is for planar mechanisms: in space angles are relative"

@@ -30,16 +30,17 @@ def uncovered(tree: Tree) -> Iterator[Finding]:
 
 
 def _span_of_motion(trajectory: object) -> tuple[float, float] | None:
-    if at(trajectory, "time") is not None:
-        return _span(trajectory)
+    for key in ("time", "times"):
+        if at(trajectory, key) is not None:
+            return _span(trajectory, key)
     default = TipTrajectory.model_fields["duration"].default
     tip = at(trajectory, "tip") is not None
     duration = _number(at(trajectory, "duration") or (default if tip else None), DURATION)
     return None if duration is None else (0.0, duration)
 
 
-def _span(node: object) -> tuple[float, float] | None:
-    times = entries(node, "time")
+def _span(node: object, key: str = "time") -> tuple[float, float] | None:
+    times = entries(node, key)
     if not times:
         return None
     first, last = _number(times[0], TIME), _number(times[-1], TIME)

@@ -12,35 +12,47 @@ from numpy.typing import ArrayLike, NDArray
 from eigassign.errors import UsageError
 
 Floats = NDArray[np.float64]
+SHARE = 1.0 / 3.0  # of the time in which a trapezoidal motion accelerates, and as much it brakes
 
 
 @dataclass(frozen=True)
 class TimingLaw:
-    """A polynomial s(τ) = Σ c_k τ^k with s(0) = 0 and s(1) = 1, defined on 0 ≤ τ ≤ 1 only."""
+    """Polynomials s(τ) = Σ c_k (τ − τ_i)^k on τ_i ≤ τ ≤ τ_{i+1}, from s(0) = 0 to s(1) = 1.
+
+    Defined on 0 ≤ τ ≤ 1 only; ``ends`` are the τ_{i+1} of all pieces but the last.
+    """
 
     name: str
-    coefficients: tuple[float, ...]  # c_0, c_1, ...
+    pieces: tuple[tuple[float, ...], ...]  # c_0, c_1, ... of each
+    ends: tuple[float, ...] = ()
 
     def position(self, tau: ArrayLike) -> Floats:
         """s(τ), dimensionless, same shape as ``tau``; UsageError outside [0, 1]."""
-        return self._evaluate(self.coefficients, tau)
+        return self._evaluate(self.pieces, tau)
 
     def velocity(self, tau: ArrayLike) -> Floats:
         """ds/dτ, dimensionless (divide by the duration for 1/s); UsageError outside [0, 1]."""
-        return self._evaluate(_derivative(self.coefficients), tau)
+        return self._evaluate(tuple(map(_derivative, self.pieces)), tau)
 
     def acceleration(self, tau: ArrayLike) -> Floats:
-        """d²s/dτ² (divide by the duration squared for 1/s²); UsageError outside [0, 1]."""
-        return self._evaluate(_derivative(_derivative(self.coefficients)), tau)
+        """d²s/dτ² (divide by the duration squared for 1/s²), from the right where it jumps."""
+        return self._evaluate(tuple(_derivative(_derivative(p)) for p in self.pieces), tau)
 
-    def _evaluate(self, coefficients: tuple[float, ...], tau: ArrayLike) -> Floats:
+    def _evaluate(self, pieces: tuple[tuple[float, ...], ...], tau: ArrayLike) -> Floats:
         relative_time = np.asarray(tau, dtype=np.float64)
         if not np.all((relative_time >= 0.0) & (relative_time <= 1.0)):
             raise UsageError(f"the {self.name} timing law is defined for 0 <= tau <= 1 only")
-        value = np.zeros_like(relative_time)
-        for coefficient in reversed(coefficients):  # Horner
-            value = value * relative_time + coefficient
+        value = _horner(pieces[0], relative_time)
+        for start, piece in zip(self.ends, pieces[1:], strict=True):
+            value = np.where(relative_time >= start, _horner(piece, relative_time - start), value)
         return value
+
+
+def _horner(coefficients: tuple[float, ...], t: Floats) -> Floats:
+    value = np.zeros_like(t)
+    for coefficient in reversed(coefficients):
+        value = value * t + coefficient
+    return value
 
 
 def _derivative(coefficients: tuple[float, ...]) -> tuple[float, ...]:
@@ -48,20 +60,39 @@ def _derivative(coefficients: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(k * c for k, c in enumerate(coefficients))[1:]
 
 
-TIMING_LAWS: Mapping[str, TimingLaw] = MappingProxyType(
+POLYNOMIALS: Mapping[str, TimingLaw] = MappingProxyType(
     {
-        "linear": TimingLaw("linear", (0.0, 1.0)),
-        "cubic": TimingLaw("cubic", (0.0, 0.0, 3.0, -2.0)),
-        "quintic": TimingLaw("quintic", (0.0, 0.0, 0.0, 10.0, -15.0, 6.0)),
+        "linear": TimingLaw("linear", ((0.0, 1.0),)),
+        "cubic": TimingLaw("cubic", ((0.0, 0.0, 3.0, -2.0),)),
+        "quintic": TimingLaw("quintic", ((0.0, 0.0, 0.0, 10.0, -15.0, 6.0),)),
     }
 )
 
 
-def timing_law(name: str) -> TimingLaw:
-    """The law called ``name``: linear s = τ, cubic 3τ² − 2τ³, quintic 10τ³ − 15τ⁴ + 6τ⁵.
+def trapezoidal(share: float) -> TimingLaw:
+    """Constant acceleration for the ``share`` a of the time, constant velocity, and braking for a.
 
-    Cubic starts and stops at rest, quintic also without acceleration. UsageError for other names.
+    s = v τ²/(2a), then v (τ − a/2), then 1 − v (1 − τ)²/(2a), at the peak velocity v = 1/(1 − a).
+    UsageError unless 0 < a ≤ 1/2.
     """
-    if name not in TIMING_LAWS:
-        raise UsageError(f"unknown timing law {name!r}; there are {', '.join(TIMING_LAWS)}")
-    return TIMING_LAWS[name]
+    if not 0.0 < share <= 0.5:
+        raise UsageError(f"the share of time spent accelerating must be in (0, 0.5], got {share:g}")
+    v, a = 1.0 / (1.0 - share), share
+    ramp = 0.5 * v * a  # covered while accelerating, and while braking
+    pieces = ((0.0, 0.0, 0.5 * v / a), (ramp, v), (1.0 - ramp, v, -0.5 * v / a))
+    return TimingLaw("trapezoidal", pieces, (a, 1.0 - a))
+
+
+def timing_law(name: str, acceleration_share: float = SHARE) -> TimingLaw:
+    """The law called ``name``: linear s = τ, cubic 3τ² − 2τ³, quintic 10τ³ − 15τ⁴ + 6τ⁵, or
+    trapezoidal with the share of its time that it accelerates.
+
+    All but linear start and stop at rest, quintic also without acceleration. UsageError for other
+    names.
+    """
+    if name == "trapezoidal":
+        return trapezoidal(acceleration_share)
+    if name not in POLYNOMIALS:
+        known = ", ".join((*POLYNOMIALS, "trapezoidal"))
+        raise UsageError(f"unknown timing law {name!r}; there are {known}")
+    return POLYNOMIALS[name]

@@ -12,10 +12,11 @@ from pathlib import Path as FilePath
 import numpy as np
 from numpy.typing import ArrayLike
 
-from eigassign.case import FileTrajectory, SampledTrajectory, TipTrajectory
+from eigassign.case import FileTrajectory, PointTrajectory, SampledTrajectory, TipTrajectory
 from eigassign.errors import MechanismError, TrajectoryError
 from eigassign.mechanism.inverse_kinematics import follow
 from eigassign.mechanism.paths import WAYPOINTS, Course, Path, spline, straight
+from eigassign.mechanism.point_to_point import point_to_point, shared_times
 from eigassign.mechanism.timing import timing_law
 from eigassign.mechanism.tip_chain import Floats, TipChain
 from eigassign.mechanism.trajectory_file import read_samples
@@ -40,7 +41,7 @@ class Trajectory:
 
 
 def build_trajectory(
-    spec: SampledTrajectory | FileTrajectory | TipTrajectory,
+    spec: SampledTrajectory | FileTrajectory | PointTrajectory | TipTrajectory,
     q_names: Sequence[str],
     tip_chain: Callable[[str], TipChain],
     folder: FilePath = FilePath(),
@@ -57,6 +58,8 @@ def build_trajectory(
         return _from_tip_path(spec, q_names, tip_chain)
     if isinstance(spec, FileTrajectory):
         return _from_file(spec, q_names, q_units, folder)
+    if isinstance(spec, PointTrajectory):
+        return _from_points(spec, q_names)
     return _from_samples(spec, q_names, q_units)
 
 
@@ -64,10 +67,15 @@ def _from_tip_path(
     spec: TipTrajectory, q_names: Sequence[str], tip_chain: Callable[[str], TipChain]
 ) -> Trajectory:
     """q(t) with tip(q(t)) = p(s(t/T)) at equal steps in time."""
+    for key in ("angle", "orientation"):
+        if getattr(spec, key) is not None:
+            raise MechanismError(f"trajectory.{key}", "tip paths have positions only")
     path, chain = _PATHS[spec.path](spec.waypoints), tip_chain(spec.tip)
     _check_dimension(chain, path, len(q_names))
     tau = np.linspace(0.0, 1.0, spec.samples)
-    s = np.clip(timing_law(spec.timing).position(tau), 0.0, 1.0)  # round-off at the ends
+    s = np.clip(
+        timing_law(spec.timing, spec.acceleration_share).position(tau), 0.0, 1.0
+    )  # round-off at the ends
     course = Course(path, np.maximum.accumulate(s), spec.duration * tau)
     followed = follow(chain, course, spec.branch, spec.start)
     tip = chain.position(followed.q)
@@ -95,34 +103,53 @@ def _from_samples(
     spec: SampledTrajectory, q_names: Sequence[str], q_units: Sequence[str]
 ) -> Trajectory:
     """Samples given in the case: times as given, or at equal steps over the duration from 0."""
-    for k, row in enumerate(spec.q):
-        _check_sample(row, q_names, k)
-    q = np.array(spec.q, dtype=np.float64)
-    if len(q) < 2:
-        raise MechanismError("trajectory.q", "a trajectory needs at least two samples")
+    q = _checked_rows(spec.q, q_names, "q", "sample")
     if spec.time is None:
         time_s = np.linspace(0.0, spec.duration or 1.0, len(q))
     else:
-        time_s = _checked_time(spec.time, len(q))
+        time_s = _checked_time(spec.time, len(q), "time", "sample")
     return Trajectory(time_s, q, None, _jumps(q, q_names, q_units))
 
 
-def _check_sample(row: Sequence[float], q_names: Sequence[str], k: int) -> None:
-    names = ", ".join(q_names)
-    if len(row) != len(q_names):
-        message = f"sample {k} has {len(row)} values for the coordinates {names}"
-        raise TrajectoryError(f"trajectory.q[{k}]", message, k)
-    if not np.isfinite(row).all():
-        raise TrajectoryError(f"trajectory.q[{k}]", f"sample {k} is not finite", k)
+def _from_points(spec: PointTrajectory, q_names: Sequence[str]) -> Trajectory:
+    """Point to point, in equal steps of time."""
+    points = _checked_rows(spec.points, q_names, "points", "point")
+    if spec.times is None:
+        reached = shared_times(points, spec.duration or 1.0)
+        said: tuple[str, ...] = (
+            f"the points are reached at {', '.join(f'{t:.6g}' for t in reached)} s: time shared in "
+            "proportion to the largest move of a coordinate relative to its range",
+        )
+    else:
+        reached, said = _checked_time(spec.times, len(points), "times", "point"), ()
+    law = timing_law(spec.timing, spec.acceleration_share)
+    motion = point_to_point(points, reached, law, spec.samples)
+    return Trajectory(motion.time_s, motion.q, None, said if len(points) > 2 else ())
 
 
-def _checked_time(time: Sequence[float], n: int) -> Floats:
+def _checked_rows(
+    rows: Sequence[Sequence[float]], q_names: Sequence[str], key: str, what: str
+) -> Floats:
+    """Rows of finite coordinates (n, n_q), at least two."""
+    for k, row in enumerate(rows):
+        path = f"trajectory.{key}[{k}]"
+        if len(row) != len(q_names):
+            message = f"{what} {k} has {len(row)} values for the coordinates {', '.join(q_names)}"
+            raise TrajectoryError(path, message, k)
+        if not np.isfinite(row).all():
+            raise TrajectoryError(path, f"{what} {k} is not finite", k)
+    if len(rows) < 2:
+        raise MechanismError(f"trajectory.{key}", f"a trajectory needs at least two {what}s")
+    return np.array(rows, dtype=np.float64)
+
+
+def _checked_time(time: Sequence[float], n: int, key: str, what: str) -> Floats:
     time_s = np.array(time, dtype=np.float64)
     if len(time_s) != n:
-        raise MechanismError("trajectory.time", f"{len(time_s)} times for {n} samples of q")
+        raise MechanismError(f"trajectory.{key}", f"{len(time_s)} times for {n} {what}s")
     for k in _not_later(time_s):
-        message = f"sample {k}: {_BACKWARDS.format(*time_s[k - 1 : k + 1])}"
-        raise TrajectoryError(f"trajectory.time[{k}]", message, k)
+        message = f"{what} {k}: {_BACKWARDS.format(*time_s[k - 1 : k + 1])}"
+        raise TrajectoryError(f"trajectory.{key}[{k}]", message, k)
     return time_s
 
 

@@ -32,6 +32,14 @@ VARIANTS = {
     "many samples": edited(
         MOTION, f"  q: {[[0.1 * k, 1 / 3] for k in range(60)]}\n  duration: 1\n"
     ),
+    "points": edited(
+        MOTION, "  points: [[0, 90 deg], [1, 2]]\n  times: [0, 0.3 s]\n  samples: 7\n"
+    ),
+    "trapezoid": edited(
+        MOTION, "  points: [[0, 0], [1, 2]]\n  duration: 2\n  timing: trapezoidal\n"
+    ),
+    "kept angle": edited(MOTION, MOTION + "  angle: 30 deg\n"),
+    "angles": edited(MOTION, MOTION + "  angle: [30 deg, 1]\n"),
     "profile": edited("190 Hz", "{time: [0, 0.1, 1], frequency: [150, 160, 1 kHz]}"),
     "span": edited("max_error: 2 %", "max_error: 0.1, q_span: [1 deg, 0]"),
     "point": edited("order: 4", "order: 7, q: [1, 2 deg], y: [3 g, 0.03]"),
