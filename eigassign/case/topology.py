@@ -23,11 +23,11 @@ class Edge:
 
 @dataclass(frozen=True)
 class Walk:
-    """The joints sorted: those that place a link, those that close loops, and the rest."""
+    """Links that joints connect to the ground, and the joints sorted."""
 
     placed: frozenset[str]
-    loops: tuple[Edge, ...]
-    left: tuple[Edge, ...]  # their base is reached from nowhere
+    loops: tuple[Edge, ...]  # both their links are placed by others
+    left: tuple[Edge, ...]  # neither of their links is
 
 
 def topology(tree: Tree) -> Iterator[Finding]:
@@ -39,7 +39,7 @@ def topology(tree: Tree) -> Iterator[Finding]:
         yield from _ends(tree, body, ("mechanism", "joints", joint))
     walk = walked(tree)
     if walk is not None:
-        yield from _loose(links, walk, edges(tree) or [])
+        yield from _loose(links, walk)
 
 
 def has_loops(tree: Tree) -> bool | None:
@@ -67,8 +67,8 @@ def walked(tree: Tree) -> Walk | None:
     if waiting is None:
         return None
     placed = {"ground"}
-    while step := next((e for e in waiting if e.base in placed and e.follower not in placed), None):
-        placed.add(step.follower)
+    while step := next((e for e in waiting if (e.base in placed) != (e.follower in placed)), None):
+        placed |= {step.base, step.follower}
         waiting.remove(step)
     loops = tuple(e for e in waiting if e.base in placed)
     return Walk(frozenset(placed), loops, tuple(e for e in waiting if e.base not in placed))
@@ -109,35 +109,30 @@ def _follower_problem(tree: Tree, follower: str) -> str | None:
     return node_problem(tree, follower)
 
 
-def _loose(links: Mapping[str, object], walk: Walk, joints: list[Edge]) -> Iterator[Finding]:
-    """Links that the walk from the ground does not reach, each told once and at its cause."""
-    for edge in walk.left:
-        if edge.follower in walk.placed:
-            message = "hangs its base on its follower: swap base and follower"
-            yield ("mechanism", "joints", edge.joint), message
-    held = {e.follower for e in joints}
-    reversed_bases = {e.base for e in walk.left if e.follower in walk.placed}
-    for link in links:
-        if link not in walk.placed | held | reversed_bases | {"ground"}:
-            message = f"no joint holds this link: add one with follower: {link}.<node>"
-            yield ("mechanism", "links", link), message
-    yield from _rings(links, walk)
+def _loose(links: Mapping[str, object], walk: Walk) -> Iterator[Finding]:
+    """Links that hang together while nothing connects them to the ground: each group told once."""
+    left = [link for link in links if link not in walk.placed]
+    while left:
+        group, joints = _together(left[0], walk.left)
+        if joints:
+            message = f"{listed(joints)} join {listed([n for n in left if n in group])}"
+            path = ("mechanism", "joints", joints[0])
+            yield path, f"{message}, but no joint connects these to the ground"
+        else:
+            message = f"no joint holds this link: add one with follower: {left[0]}.<node>"
+            yield ("mechanism", "links", left[0]), message
+        left = [link for link in left if link not in group]
 
 
-def _rings(links: Mapping[str, object], walk: Walk) -> Iterator[Finding]:
-    """Links that hold each other while nothing connects them to the ground."""
-    holders: dict[str, Edge] = {}
-    for edge in walk.left:
-        holders.setdefault(edge.follower, edge)
-    seen: set[str] = set(walk.placed)
-    for link in links:
-        chain: list[str] = []
-        while link in holders and link not in seen:
-            seen.add(link)
-            chain.append(link)
-            link = holders[link].base
-        if link in chain:
-            ring = sorted(holders[member].joint for member in chain[chain.index(link) :])
-            path = ("mechanism", "joints", holders[link].joint)
-            message = f"{', '.join(ring)} form a ring that no joint connects to the ground"
-            yield path, message
+def _together(link: str, joints: tuple[Edge, ...]) -> tuple[set[str], list[str]]:
+    """All links that joints connect with one, and these joints."""
+    group: set[str] = set()
+    new = {link}
+    while new:
+        group |= new
+        new = {end for e in joints for end in (e.base, e.follower) if _meets(e, group)} - group
+    return group, [e.joint for e in joints if _meets(e, group)]
+
+
+def _meets(edge: Edge, group: set[str]) -> bool:
+    return edge.base in group or edge.follower in group

@@ -32,7 +32,7 @@ def choose_branch(
     several branches exist and the case gives no guess; the branches are then listed.
     """
     assembly = getattr(case.mechanism, "assembly", None)
-    a0 = _reference(case, used, parameters, assembly)
+    a0 = reference(case, parameters)[list(used)]
     guess = _guess(tree, assembly)
     starts = guess[None] if guess is not None else _starts(function.size)
     found = _solutions(function, a0, starts, _turning(case, tree))
@@ -50,19 +50,17 @@ def choose_branch(
     return a0, found[0]
 
 
-def _reference(
-    case: CaseFile, used: Sequence[int], parameters: Parameters, assembly: object
-) -> Floats:
-    """Where the branch is chosen: ``assembly.at``, the expansion's q, or zero; y as written."""
-    n_q = len(parameters.coordinates)
-    q = np.zeros(n_q)
+def reference(case: CaseFile, parameters: Parameters) -> Floats:
+    """z = (s, y) where the branch is chosen: ``assembly.at``, the expansion's q, or zero; y as
+    written."""
+    assembly = getattr(case.mechanism, "assembly", None)
+    q = np.zeros(len(parameters.coordinates))
     given = getattr(case.expansion, "q", "auto")
     if not isinstance(given, str):
         q[:] = given
     for name, value in dict(getattr(assembly, "at", None) or {}).items():
         q[parameters.coordinates.index(name)] = value
-    full = np.concatenate([parameters.relative @ q + parameters.offset, initial_design(case)])
-    return full[list(used)]
+    return np.concatenate([parameters.relative @ q + parameters.offset, initial_design(case)])
 
 
 def _guess(tree: Tree, assembly: object) -> Floats | None:

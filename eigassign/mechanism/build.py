@@ -56,6 +56,13 @@ def local_links(
     meshes = {p.link: link_mesh(case, parameters, motion.tree, p.link) for p in motion.placements}
     nodes = NodeMotions(motion, meshes, case.mechanism.space)
     nodes.number()
+    if motion.tree.n_elastic < len(motion.tree.loops):
+        from eigassign.mechanism.branches import reference
+        from eigassign.mechanism.rigid_loops import close_rigid_loops
+
+        close_rigid_loops(nodes, parameters, reference(case, parameters))
+    else:
+        nodes.number_passive(motion.tree.passive)
     return [_local_link(p, meshes[p.link], nodes) for p in motion.placements], nodes
 
 

@@ -133,14 +133,18 @@ def _passive_rates(recorder: Recorder, motion: Kinematics, n: int, planar: bool)
     keep = [0, 1, 5] if planar else list(range(6))
     gaps = np.concatenate([loop.twist_gap[keep] for loop in motion.loops])
     J_q, J_p = gaps[:, :n], gaps[:, n:]
-    if not J_p.shape[1]:
-        return np.zeros((0, n), dtype=object)
-    if len(J_p) == J_p.shape[1]:
-        A, B = J_p, J_q * -1.0
-    else:
-        A, B = multiply(J_p.T, J_p), multiply(J_p.T, J_q) * -1.0
+    return passive_motion(recorder, J_p, J_q)
+
+
+def passive_motion(recorder: Recorder, J: Objects, right: Objects) -> Objects:
+    """X of J X + ``right`` = 0, by normal equations where rows are redundant."""
+    if not J.shape[1] or not right.shape[1]:
+        return np.zeros((J.shape[1], right.shape[1]), dtype=object)
+    A, B = J, right * -1.0
+    if len(J) != J.shape[1]:
+        A, B = multiply(J.T, J), multiply(J.T, B)
     solved = recorder.solve(A.tolist(), B.tolist())
-    return np.array(solved, dtype=object).reshape(A.shape[0], n)
+    return np.array(solved, dtype=object).reshape(B.shape)
 
 
 def _narrowed(motion: Kinematics, P: Objects) -> Kinematics:

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
-from eigassign.mechanism.tree import Tree
+from eigassign.mechanism.tree import Edge, Tree
 
 Floats = NDArray[np.float64]
+Angles = dict[str, tuple[Floats, float] | None]  # per link: row over q and constant, or unknown
 
 
 @dataclass(frozen=True)
@@ -48,41 +49,57 @@ def _relative(case: CaseFile, tree: Tree) -> tuple[Floats, Floats]:
     wanted = [c.angle == "absolute" for c in case.coordinates.values()]
     if not any(wanted):
         return relative, offset
-    absolute: dict[str, tuple[Floats, float] | None] = {"ground": (np.zeros(n), 0.0)}
+    absolute: Angles = {"ground": (np.zeros(n), 0.0)}
     for edge in (*tree.edges, *tree.loops):
-        below = absolute[edge.base[0]]
         i = next((f.coordinate for f in tree.freedoms if f.joint == edge.joint), None)
-        passive = any(f.joint == edge.joint for f in tree.passive)
         if i is not None and wanted[i]:
-            if below is None:
-                name = tuple(case.coordinates)[i]
-                message = "an absolute angle needs a base that no passive joint carries"
-                raise MechanismError(f"coordinates.{name}.angle", message)
-            mount = float(case.mechanism.joints[edge.joint].angle)
-            relative[i], offset[i] = relative[i] - below[0], -below[1] - mount
-        if edge in tree.loops:
-            continue
-        absolute[edge.follower[0]] = (
-            None
-            if passive or below is None
-            else _carried_angle(case, edge.joint, i, below, relative, offset)
-        )
+            under = _absolute_base(case, tree, edge, i, absolute)
+            relative[i], offset[i] = relative[i] - under[0], -under[1] - _mount(case, edge)
+        if edge in tree.edges:
+            absolute[edge.follower[0]] = _carried_angle(
+                case, tree, edge, absolute, relative, offset
+            )
     return relative, offset
+
+
+def _mount(case: CaseFile, edge: Edge) -> float:
+    return float(getattr(case.mechanism.joints[edge.joint], "angle", 0.0))
+
+
+def _absolute_base(
+    case: CaseFile, tree: Tree, edge: Edge, i: int, absolute: Angles
+) -> tuple[Floats, float]:
+    """Absolute angle of the base of a joint whose coordinate i is the follower's."""
+    path, (base, _) = f"coordinates.{tuple(case.coordinates)[i]}.angle", edge.written.base
+    if edge.turned and edge in tree.edges:
+        message = (
+            f"joint {edge.joint!r} hangs its base on its follower, whose absolute angle is thus "
+            "that of other joints: write relative, or exchange base and follower"
+        )
+        raise MechanismError(path, message)
+    under = absolute[base]
+    if under is None:
+        raise MechanismError(path, "an absolute angle needs a base that no passive joint carries")
+    return under
 
 
 def _carried_angle(
     case: CaseFile,
-    joint: str,
-    i: int | None,
-    below: tuple[Floats, float],
+    tree: Tree,
+    edge: Edge,
+    absolute: Angles,
     relative: Floats,
     offset: Floats,
-) -> tuple[Floats, float]:
-    """Absolute angle (row over q, constant) of a follower."""
-    row, constant = below[0], below[1] + float(getattr(case.mechanism.joints[joint], "angle", 0.0))
-    if i is not None and case.mechanism.joints[joint].type == "revolute":
-        row, constant = row + relative[i], constant + offset[i]
-    return row, constant
+) -> tuple[Floats, float] | None:
+    """Absolute angle of the link that a tree joint hangs; None where a passive joint is below."""
+    below, own = absolute[edge.base[0]], tree.of_joint(edge.joint)
+    if below is None or any(tree.freedoms[k].coordinate is None for k in own):
+        return None
+    turn, constant = np.zeros(len(relative)), _mount(case, edge)
+    if own and case.mechanism.joints[edge.joint].type == "revolute":
+        turn, constant = relative[own[0]], constant + offset[own[0]]
+    sign = -1.0 if edge.turned else 1.0
+    return below[0] + sign * turn, below[1] + sign * constant
 
 
 def _joint_rates(relative: Floats, columns: tuple[int, ...], free: tuple[int, ...]) -> Floats:

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.freedoms import FREEDOMS, RIDING
-from eigassign.mechanism.rotations import Objects, multiply, rotation
+from eigassign.mechanism.rotations import Objects, carried, multiply, rotation
 from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]
 X, Y, Z = np.eye(3)
-__all__ = ["COMPONENTS", "RIDING", "JointMotion", "joint_motion", "unit"]
+__all__ = ["COMPONENTS", "RIDING", "JointMotion", "joint_motion", "turned", "unit"]
 
 COMPONENTS = FREEDOMS
 
@@ -61,6 +61,16 @@ def joint_motion(joint: Any, values: Sequence[Scalar]) -> JointMotion:
         case "spherical":
             return _spherical(values)
     return JointMotion(_eye(), none, np.zeros((6, 0), dtype=object))
+
+
+def turned(motion: JointMotion) -> JointMotion:
+    """The base's motion relative to the follower: Rᵀ, −Rᵀ d, and −X⁻¹ A in the base's axes.
+
+    X carries a motion from base to follower, X⁻¹ = carried(Rᵀ, −Rᵀ d).
+    """
+    back = motion.rotation.T
+    lever = multiply(back, motion.translation) * -1.0
+    return JointMotion(back, lever, multiply(carried(back, lever), motion.freedoms) * -1.0)
 
 
 def _universal(joint: Any, values: Sequence[Scalar]) -> JointMotion:

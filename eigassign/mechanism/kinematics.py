@@ -20,7 +20,7 @@ from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.coordinates import Coordinates, coordinates
 from eigassign.mechanism.geometry import node_position
-from eigassign.mechanism.joints import RIDING, JointMotion, joint_motion
+from eigassign.mechanism.joints import RIDING, JointMotion, joint_motion, turned
 from eigassign.mechanism.parameters import Parameters
 from eigassign.mechanism.rotations import (
     Floats,
@@ -32,7 +32,8 @@ from eigassign.mechanism.rotations import (
     rotation,
     vector,
 )
-from eigassign.mechanism.tree import Edge, Node, Tree, build_tree
+from eigassign.mechanism.spanning import build_tree
+from eigassign.mechanism.tree import Edge, Node, Tree
 from eigassign.series.expression import Scalar
 
 PLANAR_TWIST = (0, 1, 5)  # v_x, v_y, ω_z among (v, ω)
@@ -153,15 +154,16 @@ def walk(
 def _own_motion(
     case: CaseFile, tree: Tree, edge: Edge, values: Sequence[Scalar], rates: Objects
 ) -> tuple[JointMotion, Objects]:
-    """The joint's R, d, A with its mounting, and A ċ per column."""
+    """R, lever and A of a joint as it is walked, mounting and position included; A ċ per column."""
     joint = case.mechanism.joints[edge.joint]
     own = tree.of_joint(edge.joint)
-    motion = joint_motion(joint, [values[k] for k in own])
-    mount = mounting(joint)
-    turned = _mounted(joint, mount, motion)
+    motion = _mounted(joint, mounting(joint), joint_motion(joint, [values[k] for k in own]))
+    position = vector(getattr(joint, "position", None) or (0.0, 0.0))
+    motion = motion._replace(translation=position + motion.translation)
+    motion = turned(motion) if edge.turned else motion
     if not own:
-        return turned, np.zeros((6, rates.shape[1]), dtype=object)
-    return turned, multiply(turned.freedoms, rates[own])
+        return motion, np.zeros((6, rates.shape[1]), dtype=object)
+    return motion, multiply(motion.freedoms, rates[own])
 
 
 def _mounted(joint: object, mount: Objects, motion: JointMotion) -> JointMotion:
@@ -182,12 +184,6 @@ def mounting(joint: object) -> Objects:
     return rotation(np.array([0.0, 0.0, 1.0]), float(getattr(joint, "angle", 0.0) or 0.0))
 
 
-def _lever(case: CaseFile, edge: Edge, motion: JointMotion) -> Objects:
-    """From the base node to the follower's joint node, base axes, m."""
-    position = getattr(case.mechanism.joints[edge.joint], "position", None) or (0.0, 0.0)
-    return np.asarray(vector(position) + motion.translation)
-
-
 def _place(
     case: CaseFile,
     parameters: Parameters,
@@ -199,7 +195,7 @@ def _place(
 ) -> Placement:
     link = edge.follower[0]
     motion, own = _own_motion(case, tree, edge, values, rates)
-    lever = _lever(case, edge, motion)
+    lever = motion.translation
     R_base, o_base, twist_base = _base_motion(case, parameters, tree, edge.base, placed, rates)
     node = node_position(case, parameters, tree, edge.follower)
     R_world = multiply(R_base, motion.rotation)
@@ -249,7 +245,7 @@ def _loop(
     placed: Mapping[str, Placement],
 ) -> Loop:
     motion, own = _own_motion(case, tree, edge, values, rates)
-    lever = _lever(case, edge, motion)
+    lever = motion.translation
     R_base, x_base, twist_base = _base_motion(case, parameters, tree, edge.base, placed, rates)
     R_end, x_end, twist_end = _base_motion(case, parameters, tree, edge.follower, placed, rates)
     R_joint = multiply(R_base, motion.rotation)

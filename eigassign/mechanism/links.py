@@ -55,15 +55,15 @@ def _beam(case: CaseFile, parameters: Parameters, tree: Tree, name: str) -> Link
     space = case.mechanism.space
     link: Any = case.mechanism.links[name]
     total, n = length(case, parameters, name), link.elements
-    riders = [e for e in (*tree.edges, *tree.loops) if e.base[0] == name and e.base[1][:1] == "@"]
+    riders = tree.riders(name)
     if len(riders) > 1:
         message = "carries more than one carriage or nut; one is supported"
         raise MechanismError(f"mechanism.links.{name}", message)
     pieces: list[tuple[Scalar, Scalar, int]] = [(0.0, total, n)]
     if riders:
-        at, first = station(parameters, tree, riders[0].joint), max(1, n // 2)
+        at, first = station(parameters, tree, riders[0]), max(1, n // 2)
         pieces = [(0.0, at, first), (at, total - at, max(1, n - first))]
-    return _chain(case, parameters, name, space, pieces, riders[0].base[1] if riders else None)
+    return _chain(case, parameters, name, space, pieces, f"@{riders[0]}" if riders else None)
 
 
 def _chain(

@@ -8,16 +8,16 @@ too), and a loop-closing joint carries one node of the loop likewise. A motion i
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics import Kinematics
-from eigassign.mechanism.mesh import DOFS, LinkMesh
+from eigassign.mechanism.mesh import LinkMesh
 from eigassign.mechanism.rotations import Objects, carried, present
-from eigassign.mechanism.tree import GROUND, Edge, Node
+from eigassign.mechanism.tree import GROUND, Edge, Freedom, Node
 from eigassign.series.expression import Expression, Scalar
 
 Ints = NDArray[np.intp]
@@ -33,40 +33,27 @@ class NodeMotions:
     meshes: dict[str, LinkMesh]
     space: str
     own: dict[str, Ints] = field(default_factory=dict)  # per link: unknown of each local dof or −1
-    slaves: dict[Node, tuple[Edge, bool]] = field(default_factory=dict)
-    passive: dict[tuple[str, int], int] = field(default_factory=dict)
+    slaves: dict[Node, Edge] = field(default_factory=dict)
+    passive: dict[tuple[str, int], Row] = field(default_factory=dict)  # δ over the unknowns
     count: int = 0
     known: dict[Node, Rows] = field(default_factory=dict)
-    pending: set[Node] = field(default_factory=set)
 
     def number(self) -> None:
-        """Choose the carried nodes of the loops, then number what is left link by link."""
-        for edge in self.motion.tree.loops:
-            self._choose_slave(edge)
+        """Number what no other node carries, link by link."""
+        tree = self.motion.tree
+        self.slaves = {edge.follower: edge for edge in tree.loops[: tree.n_elastic]}
         for placement in self.motion.placements:
             self._number_link(placement.link, placement.edge)
-        for freedom in self.motion.tree.passive:
-            self.passive[freedom.joint, freedom.component] = self.count
+
+    def number_passive(self, freedoms: Iterable[Freedom]) -> None:
+        """Unknowns for the elastic motions of these passive joints."""
+        for freedom in freedoms:
+            self.passive[freedom.joint, freedom.component] = {self.count: 1.0}
             self.count += 1
 
-    def _is_own(self, node: Node) -> bool:
-        """Whether a node's dofs are unknowns of its link."""
-        if node == GROUND or node in self.slaves:
-            return False
-        root = self.motion.placement(node[0]).edge.follower
-        return node != root and node[1] in self.meshes[node[0]].nodes
-
-    def _choose_slave(self, edge: Edge) -> None:
-        if self._is_own(edge.follower):
-            self.slaves[edge.follower] = (edge, True)
-        elif self._is_own(edge.base):
-            self.slaves[edge.base] = (edge, False)
-        else:
-            message = (
-                "closes a loop between nodes that cannot deform: give the link on one side "
-                "elements, or hang the loop on another joint"
-            )
-            raise MechanismError(f"mechanism.joints.{edge.joint}", message)
+    def forget(self) -> None:
+        """Derive every motion anew: what passive joints do has changed."""
+        self.known.clear()
 
     def _number_link(self, link: str, edge: Edge) -> None:
         mesh = self.meshes[link]
@@ -86,56 +73,36 @@ class NodeMotions:
         if node == GROUND:
             return [{} for _ in range(6)]
         if node not in self.known:
-            if node in self.pending:
-                raise MechanismError(
-                    f"mechanism.links.{node[0]}", "lies in a loop that only rigid links close"
-                )
-            self.pending.add(node)
             self.known[node] = self._derive(node)
-            self.pending.discard(node)
         return self.known[node]
 
     def _derive(self, node: Node) -> Rows:
         if node in self.slaves:
-            return self._closed(*self.slaves[node])
+            return self.closed(self.slaves[node])
         placement = self.motion.placement(node[0])
         mesh = self.meshes[node[0]]
         if node == placement.edge.follower:
             X = carried(placement.rotation, placement.lever)
-            return self._joined(placement.edge, X, placement.freedoms)
+            return self.joined(placement.edge, X, placement.freedoms)
         if "@origin" in mesh.nodes:
             return self._on_rigid(node, placement.edge.follower, mesh)
         slots = mesh.nodes[node[1]]
         own = self.own[node[0]]
         return [{int(own[s]): 1.0} if s >= 0 else {} for s in slots]
 
-    def _joined(self, edge: Edge, X: Objects, freedoms: Objects) -> Rows:
+    def joined(self, edge: Edge, X: Objects, freedoms: Objects) -> Rows:
         """X u_b + A δ."""
         rows = apply(X, self.rows(edge.base))
-        return self._with_passive(rows, edge, freedoms)
-
-    def _with_passive(self, rows: Rows, edge: Edge, freedoms: Objects) -> Rows:
-        for component in range(freedoms.shape[1]):
-            unknown = self.passive.get((edge.joint, component))
-            if unknown is not None:
-                for i in np.flatnonzero(present(freedoms[:, component])):
-                    rows[i] = {**rows[i], unknown: freedoms[i, component]}
+        for component, column in enumerate(freedoms.T):
+            moving = self.passive.get((edge.joint, component), {})
+            for i in np.flatnonzero(present(column)):
+                rows[i] = combined(rows[i], moving, column[i])
         return rows
 
-    def _closed(self, edge: Edge, follower: bool) -> Rows:
-        """A loop's carried node: u_f = X u_b + A δ, or u_b = X⁻¹ (u_f − A δ)."""
+    def closed(self, edge: Edge) -> Rows:
+        """What a loop's joint demands of its follower node."""
         loop = next(one for one in self.motion.loops if one.edge == edge)
-        if follower:
-            return self._joined(edge, carried(loop.rotation, loop.lever), loop.freedoms)
-        moved = self._with_passive(
-            [dict(row) for row in self.rows(edge.follower)], edge, loop.freedoms * -1.0
-        )
-        back = np.zeros((6, 6), dtype=object)
-        forward = carried(loop.rotation, loop.lever)
-        back[:3, :3] = forward[:3, :3].T
-        back[3:, 3:] = forward[3:, 3:].T
-        back[:3, 3:] = _reverse(loop.rotation, loop.lever)
-        return apply(back, moved)
+        return self.joined(edge, carried(loop.rotation, loop.lever), loop.freedoms)
 
     def _on_rigid(self, node: Node, root: Node, mesh: LinkMesh) -> Rows:
         """Another point of the same rigid body: v + ω × (X − X_root)."""
@@ -145,11 +112,12 @@ class NodeMotions:
         return apply(carried(eye, lever), self.rows(root))
 
 
-def _reverse(R: Objects, lever: Objects) -> Objects:
-    """The (v, ω) block of X⁻¹: v_b = R v_f − (R ω_f) × lever = R v_f + [lever]× R ω_f."""
-    from eigassign.mechanism.rotations import multiply, skew
-
-    return multiply(skew(lever), R)
+def combined(row: Row, other: Row, factor: Scalar) -> Row:
+    """row + factor × other."""
+    out = dict(row)
+    for unknown, value in other.items():
+        out[unknown] = out.get(unknown, 0.0) + value * factor
+    return out
 
 
 def apply(X: Objects, rows: Rows) -> Rows:
@@ -163,8 +131,3 @@ def apply(X: Objects, rows: Rows) -> Rows:
                 total[unknown] = total.get(unknown, 0.0) + carry * X[a, b]
         out.append({k: v for k, v in total.items() if isinstance(v, Expression) or v != 0.0})
     return out
-
-
-def planar_rows(rows: Rows, space: str) -> Rows:
-    """The components a mechanism of this space has."""
-    return [rows[a] for a in DOFS[space]]

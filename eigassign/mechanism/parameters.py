@@ -58,7 +58,7 @@ class Parameters:
 def parameters(case: CaseFile) -> Parameters:
     """The variables of a case."""
     from eigassign.mechanism.coordinates import coordinates
-    from eigassign.mechanism.tree import build_tree
+    from eigassign.mechanism.spanning import build_tree
 
     recorder = Recorder()
     names, design = tuple(case.coordinates), tuple(case.design.parameters)

@@ -18,7 +18,7 @@ from eigassign.mechanism.geometry import node_position
 from eigassign.mechanism.kinematics import Kinematics
 from eigassign.mechanism.links import mounted
 from eigassign.mechanism.mesh import DOFS
-from eigassign.mechanism.nodes import NodeMotions, Rows, apply
+from eigassign.mechanism.nodes import NodeMotions, Rows, apply, combined
 from eigassign.mechanism.parameters import Parameters
 from eigassign.mechanism.rotations import Objects, carried, cross, multiply, present
 from eigassign.mechanism.tree import GROUND, Node, split
@@ -78,7 +78,9 @@ def _relative(
         here, there = (_world_position(case, parameters, motion, end) for end in ends)
         first = apply(carried(np.eye(3).astype(object), there - here), first)
     seen = carried(R, none)
-    return [_difference(b, a) for a, b in zip(apply(seen, first), apply(seen, second), strict=True)]
+    return [
+        combined(b, a, -1.0) for a, b in zip(apply(seen, first), apply(seen, second), strict=True)
+    ]
 
 
 def _world_position(
@@ -109,10 +111,3 @@ def _world_rows(
 
 def _some(a: Objects) -> np.ndarray:
     return present(a) if a.size else np.zeros(a.shape, dtype=bool)
-
-
-def _difference(b: dict[int, Scalar], a: dict[int, Scalar]) -> dict[int, Scalar]:
-    out = dict(b)
-    for key, value in a.items():
-        out[key] = out.get(key, 0.0) - value
-    return out

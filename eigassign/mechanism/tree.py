@@ -1,12 +1,11 @@
-"""The graph of links and joints: a spanning tree from the ground, and what closes loops."""
+"""The graph of links and joints as it is walked: tree edges, loop edges, freedoms."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from eigassign.case import CaseFile
-from eigassign.errors import MechanismError
-from eigassign.mechanism.joints import COMPONENTS, RIDING
+from eigassign.mechanism.joints import COMPONENTS
 
 Node = tuple[str, str]  # (link, node); the ground is ("ground", "")
 GROUND: Node = ("ground", "")
@@ -14,11 +13,25 @@ GROUND: Node = ("ground", "")
 
 @dataclass(frozen=True)
 class Edge:
-    """One joint between a base node and a follower node; ``link`` hangs on it if in the tree."""
+    """One joint as it is walked: ``follower`` hangs on ``base``.
+
+    ``turned`` where the file names the two the other way round: the joint is then walked against
+    its own direction, its freedoms keep their meaning.
+    """
 
     joint: str
     base: Node
     follower: Node
+    turned: bool = False
+
+    def reversed(self) -> Edge:
+        """The same joint walked the other way."""
+        return Edge(self.joint, self.follower, self.base, not self.turned)
+
+    @property
+    def written(self) -> Edge:
+        """The same joint as the file has it."""
+        return self.reversed() if self.turned else self
 
 
 @dataclass(frozen=True)
@@ -32,10 +45,15 @@ class Freedom:
 
 @dataclass(frozen=True)
 class Tree:
-    """Tree edges in an order where every base is placed first; loop edges; freedoms."""
+    """Tree edges in an order where every base is placed first; loop edges; freedoms.
+
+    The first ``n_elastic`` loops end in a node that deforms and carries nothing else: it follows.
+    The others close between nodes that are rigid, or carried themselves.
+    """
 
     edges: tuple[Edge, ...]
     loops: tuple[Edge, ...]
+    n_elastic: int
     freedoms: tuple[Freedom, ...]  # the coordinates in their order, then the passive ones
 
     @property
@@ -48,29 +66,10 @@ class Tree:
         own = [(f.component, k) for k, f in enumerate(self.freedoms) if f.joint == joint]
         return [k for _, k in sorted(own)]
 
-
-def build_tree(case: CaseFile) -> Tree:
-    """Breadth first from the ground, joints in the order of the file.
-
-    Raises MechanismError for a link that no joint connects to the ground.
-    """
-    edges, loops = _walk([_edge(case, joint) for joint in case.mechanism.joints])
-    placed = {edge.follower[0] for edge in edges}
-    for link in case.mechanism.links:
-        if link not in placed:
-            message = "is not connected to the ground by joints"
-            raise MechanismError(f"mechanism.links.{link}", message)
-    return Tree(tuple(edges), tuple(loops), _freedoms(case))
-
-
-def _edge(case: CaseFile, name: str) -> Edge:
-    joint = case.mechanism.joints[name]
-    base = GROUND
-    if joint.type in RIDING:
-        base = (joint.base, f"@{name}")
-    elif joint.base != "ground":
-        base = split(joint.base)
-    return Edge(name, base, split(joint.follower))
+    def riders(self, link: str) -> list[str]:
+        """The carriages and nuts that travel along a link."""
+        written = (edge.written for edge in (*self.edges, *self.loops))
+        return [e.joint for e in written if e.base == (link, f"@{e.joint}")]
 
 
 def split(node: str) -> Node:
@@ -79,28 +78,8 @@ def split(node: str) -> Node:
     return link, name
 
 
-def _walk(waiting: list[Edge]) -> tuple[list[Edge], list[Edge]]:
-    placed, tree = {"ground"}, list[Edge]()
-    while waiting:
-        step = next(
-            (e for e in waiting if e.base[0] in placed and e.follower[0] not in placed), None
-        )
-        if step is None:
-            closing = [e for e in waiting if e.base[0] in placed and e.follower[0] in placed]
-            backward = next(
-                (e for e in waiting if e.follower[0] in placed and e not in closing), None
-            )
-            if backward is None:
-                return tree, closing
-            message = "hangs its base on its follower: swap base and follower"
-            raise MechanismError(f"mechanism.joints.{backward.joint}", message)
-        waiting = [e for e in waiting if e is not step]
-        tree.append(step)
-        placed.add(step.follower[0])
-    return tree, []
-
-
-def _freedoms(case: CaseFile) -> tuple[Freedom, ...]:
+def freedoms(case: CaseFile) -> tuple[Freedom, ...]:
+    """The driven freedoms in the order of the coordinates, then the passive ones."""
     driven = [
         Freedom(c.joint, component_index(case, c), i)
         for i, c in enumerate(case.coordinates.values())

@@ -76,7 +76,7 @@ MECHANISM = [
     Wrong("unknown follower", "follower: hand.start", "¦follower: hnd.start", "mechanism.joints.wrist.follower", "did you mean 'hand'"),
     Wrong("ground as follower", "follower: hand.start", "¦follower: ground", "mechanism.joints.wrist.follower", "make it the base"),
     Wrong("position of one number", "base: ground,", "base: ground, ¦position: [1],", "mechanism.joints.shoulder.position", "planar: needs 2 components (x, y), got 1"),
-    Wrong("ring", "shoulder: {type: revolute, base: ground", "¦shoulder: {type: revolute, base: hand.end", "mechanism.joints.shoulder", "elbow, shoulder, wrist form a ring that no joint connects to the ground"),
+    Wrong("ring", "shoulder: {type: revolute, base: ground", "¦shoulder: {type: revolute, base: hand.end", "mechanism.joints.shoulder", "shoulder, elbow, wrist join upper, fore, hand, but no joint connects these to the ground"),
     Wrong("body off its link", "at: hand.end", "¦at: hand", "mechanism.bodies.tool.at", "expected 'hand.start' or 'hand.end'"),
     Wrong("body on nothing", "at: hand.end", "¦at: haand.end", "mechanism.bodies.tool.at", "did you mean 'hand'"),
     Wrong("negative mass", "mass: 0.1", "¦mass: -0.1", "mechanism.bodies.tool.mass", "must be >= 0 kg"),

@@ -229,7 +229,7 @@ def wrong_inputs() -> Iterator[Wrong]:
     yield Wrong(
         "a loop of links",
         _edited(("base: ground", "base: fore.end")),
-        "form a ring that no joint connects to the ground",
+        "but no joint connects these to the ground",
     )
     yield Wrong(
         "a spatial mechanism",

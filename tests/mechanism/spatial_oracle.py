@@ -169,11 +169,7 @@ def walk(tree: Tree, q: dict[str, float], passive: dict[tuple[str, int], float])
     pose = Pose({"ground": np.eye(3)}, {"ground": np.zeros(3)}, {}, np.zeros(0), [], [])
     waiting, gaps = dict(joints), []
     while waiting:
-        name = next(
-            (n for n, j in waiting.items()
-             if j["base"].split(".")[0] in pose.R and j["follower"].split(".")[0] not in pose.R),
-            None,
-        )  # fmt: skip
+        name, backward = following(waiting, pose)
         closing = name is None
         name = next(iter(waiting)) if closing else name
         joint = waiting.pop(name)
@@ -188,6 +184,13 @@ def walk(tree: Tree, q: dict[str, float], passive: dict[tuple[str, int], float])
                     c[k] -= np.arctan2(x[1], x[0])
         pose.values[name] = c
         R, d = placed(joint, c)
+        if backward:
+            pose.order.append(name)
+            pose.R[base] = pose.R[follower] @ R.T
+            at = pose.node(tree, joint["follower"])
+            at = at - pose.R[base] @ (point(joint.get("position")) + d)
+            pose.o[base] = at - pose.R[base] @ place(tree, base_of(name, joint), pose.values)
+            continue
         here = pose.node(tree, base_of(name, joint))
         at = here + pose.R[base] @ (point(joint.get("position")) + d)
         R = pose.R[base] @ R
@@ -201,6 +204,15 @@ def walk(tree: Tree, q: dict[str, float], passive: dict[tuple[str, int], float])
             pose.o[follower] = at - R @ place(tree, joint["follower"], pose.values)
     pose.gaps = np.concatenate(gaps) if gaps else np.zeros(0)
     return pose
+
+
+def following(waiting: Tree, pose: Pose) -> tuple[str | None, bool]:
+    """The next joint with one end placed, and whether that is its follower."""
+    for backward, (near, far) in enumerate((("base", "follower"), ("follower", "base"))):
+        for name, joint in waiting.items():
+            if joint[near].split(".")[0] in pose.R and joint[far].split(".")[0] not in pose.R:
+                return name, bool(backward)
+    return None, False
 
 
 def solve_pose(tree: Tree, q: Array) -> Pose:

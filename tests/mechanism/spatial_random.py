@@ -65,9 +65,8 @@ def vector(space: str, rng: Random, size: float) -> list[float]:
 def add_link(tree: Tree, rng: Random, kinds: tuple[str, ...] = ("beam", "rigid", "frame")) -> str:
     m, space = tree["mechanism"], tree["mechanism"]["space"]
     name = f"l{len(m['links'])}"
-    kind = str(
-        rng.choice(kinds, p=np.array([6, 2, 2][: len(kinds)]) / sum([6, 2, 2][: len(kinds)]))
-    )
+    weights = np.array([{"beam": 6, "rigid": 2, "frame": 2}[kind] for kind in kinds])
+    kind = str(rng.choice(kinds, p=weights / sum(weights)))
     material = str(rng.choice(["steel", "alloy"]))
     if kind == "beam":
         link = beam(m, space, material, rng)
@@ -106,7 +105,7 @@ def nodes(tree: Tree, link: str) -> list[str]:
     data = tree["mechanism"]["links"][link]
     if data.get("type", "beam") == "beam":
         return ["start", "end"]
-    return list({"start": 0, **data["nodes"], **({"end": 0} if "length" in data else {})})
+    return list({"start": 0, **data.get("nodes", {}), **({"end": 0} if "length" in data else {})})
 
 
 def joint_of(space: str, kind: str, rng: Random) -> Tree:
@@ -141,10 +140,21 @@ def ridden(tree: Tree) -> set[str]:
 
 
 def add_joint(
-    tree: Tree, rng: Random, link: str, base: str, drives: tuple[Any, ...], absolute: bool
+    tree: Tree,
+    rng: Random,
+    link: str,
+    base: str,
+    drives: tuple[Any, ...],
+    absolute: bool,
+    swap: bool = False,
 ) -> dict[str, float]:
-    """Hang ``link`` on the link ``base`` or "ground" by a random joint; its coordinates' values."""
+    """Hang ``link`` on the link ``base`` or "ground" by a random joint; its coordinates' values.
+
+    With ``swap`` the joint's own base may be ``link``.
+    """
     m, space = tree["mechanism"], tree["mechanism"]["space"]
+    if swap and base != "ground" and rng.random() < 0.5:
+        link, base, absolute = base, link, False
     kind = str(rng.choice(PLANAR if space == "planar" else SPATIAL))
     rides = kind in ("carriage", "nut")
     beam = m["links"].get(base, {}).get("type", "beam") == "beam" and base != "ground"
@@ -219,7 +229,7 @@ def add_springs(tree: Tree, rng: Random) -> None:
         m["springs"][f"s{k}"] = data
 
 
-def random_open(seed: int, space: str) -> tuple[Tree, np.ndarray]:
+def random_open(seed: int, space: str, swap: bool = False) -> tuple[Tree, np.ndarray]:
     """A tree of 1 to 4 links, every joint and drive; springs only where nothing is free."""
     rng = np.random.default_rng([seed, space == "spatial"])
     tree, values = empty(space, rng), {}
@@ -229,21 +239,30 @@ def random_open(seed: int, space: str) -> tuple[Tree, np.ndarray]:
         link = add_link(tree, rng, ("beam",) if k == 0 else ("beam", "rigid", "frame"))
         grounded = k == 0 or rng.random() < 0.1
         base = "ground" if grounded else f"l{rng.integers(k)}"
-        values |= add_joint(tree, rng, link, base, drives, absolute=space == "planar")
+        values |= add_joint(tree, rng, link, base, drives, space == "planar", swap)
     add_bodies(tree, rng)
     if sprung:
         add_springs(tree, rng)
     return tree, np.array(list(values.values()))
 
 
-def random_closed(seed: int, space: str, loops: int = 1) -> tuple[Tree, np.ndarray, np.ndarray]:
-    """A mechanism with loops, the q it was closed at, and a q nearby on the same branch."""
+def random_closed(
+    seed: int,
+    space: str,
+    loops: int = 1,
+    swap: bool = False,
+    kinds: tuple[str, ...] = ("beam", "rigid", "frame"),
+) -> tuple[Tree, np.ndarray, np.ndarray]:
+    """A mechanism with loops, the q it was closed at, and a q nearby on the same branch.
+
+    ``kinds`` are those of the links in the loops; loops of rigid links alone hang on a beam.
+    """
     for attempt in range(3000):
         rng = np.random.default_rng([seed, space == "spatial", loops, attempt])
         tree, values = empty(space, rng), {}
         done = True
         for _ in range(loops):
-            done = done and _close(tree, rng, values)
+            done = done and _close(tree, rng, values, swap, kinds)
         if done:
             add_bodies(tree, rng)
             found = _nearby(tree, rng, values)
@@ -252,19 +271,22 @@ def random_closed(seed: int, space: str, loops: int = 1) -> tuple[Tree, np.ndarr
     raise AssertionError("no mechanism found")
 
 
-def _close(tree: Tree, rng: Random, values: dict[str, float]) -> bool:
+def _close(
+    tree: Tree, rng: Random, values: dict[str, float], swap: bool, kinds: tuple[str, ...]
+) -> bool:
     """Add a chain of links and the joint that closes it; False where that fails."""
     m, space = tree["mechanism"], tree["mechanism"]["space"]
+    drives = ("free", "locked", "held")
+    if "beam" not in kinds and not m["links"]:
+        values |= add_joint(tree, rng, add_link(tree, rng, ("beam",)), "ground", drives, False)
     size, before = (3, 6)[space == "spatial"], len(m["links"])
     old = list(m["links"])
     base = str(rng.choice(["ground", *old]))
     for k in range(int(rng.integers(1, 4))):
-        last = add_link(tree, rng, ("beam", "rigid", "frame"))
-        drives = ("free", "locked", "held")
-        values |= add_joint(
-            tree, rng, last, base if k == 0 else f"l{before + k - 1}", drives, False
-        )
-    if m["links"][last].get("type") == "rigid":
+        last = add_link(tree, rng, kinds)
+        onto = base if k == 0 else f"l{before + k - 1}"
+        values |= add_joint(tree, rng, last, onto, drives, False, swap)
+    if m["links"][last].get("type") == "rigid" and "beam" in kinds:
         return False
     taken = {j["base"] for j in m["joints"].values()} | {
         j["follower"] for j in m["joints"].values()

@@ -28,7 +28,7 @@ def chain(n: int, bodies: dict[str, Given] | None = None) -> LinkMesh:
         bodies=bodies or {},
     )
     numbers = Parameters(Recorder(), (), (), np.zeros((0, 0)), np.zeros(0))
-    return link_mesh(Given(mechanism=mechanism), numbers, Tree((), (), ()), "beam")
+    return link_mesh(Given(mechanism=mechanism), numbers, Tree((), (), 0, ()), "beam")
 
 
 def stiffness(n: int) -> np.ndarray:

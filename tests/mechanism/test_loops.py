@@ -214,16 +214,6 @@ def test_an_absolute_angle_carried_by_a_passive_joint_is_refused_by_name() -> No
     assert caught.value.path == "coordinates.tool.angle"
 
 
-def test_a_loop_of_rigid_links_alone_is_refused_at_the_joint_that_closes_it() -> None:
-    tree = four_bar("free")
-    for link, data in tree["mechanism"]["links"].items():
-        rigid = {"type": "rigid", "length": data["length"], "mass": 1.0, "inertia": 0.01}
-        tree["mechanism"]["links"][link] = rigid
-    with pytest.raises(MechanismError, match="cannot deform") as caught:
-        _ = built(tree).pencil
-    assert caught.value.path == "mechanism.joints.E"
-
-
 # More mechanisms
 
 
