@@ -16,6 +16,8 @@ Floats = NDArray[np.float64]
 DEPENDENT = 1e-9  # remainder, relative to the vector, below which it is taken as dependent
 ORTHONORMAL = 1e-8  # post-condition on |VᵀKV − I|, beyond round-off of K itself
 
+INDEFINITE = "the stiffness matrix is not positive definite at an expansion point"
+
 
 def orthonormal(K: sparse.csc_array | Floats, vectors: Floats) -> Floats:
     """V (n, k) with VᵀKV = I spanning the columns of ``vectors`` (n, N), by Gram-Schmidt twice.
@@ -54,5 +56,5 @@ def _rounding(K: sparse.csc_array | Floats, Q: Floats) -> float:
 def _square(K: sparse.csc_array | Floats, v: Floats) -> float:
     square = float(v @ (K @ v))
     if square < 0.0 or not np.isfinite(square):
-        raise AccuracyError("the stiffness matrix is not positive definite at an expansion point")
+        raise AccuracyError(INDEFINITE)
     return square

@@ -60,13 +60,15 @@ def gone(mu: Floats, gram: Floats, shares: Floats, anchors: Floats) -> NDArray[n
 
     μ̂ (n, k) and ``shares`` (n_points, n, c, k) of all Ritz pairs in the mass of each shape of a
     point. A shape with less than half of it in pairs that may stand for a mode has changed or left:
-    it has left where there are also fewer pairs within RANGE than there were modes.
+    it has left where there are also fewer pairs within RANGE than there were modes. Beyond the
+    first c the residuals are not known: such a pair may stand for a shape only within RANGE.
     """
     c = gram.shape[1]
     sure = np.ones(mu.shape, dtype=bool)
     sure[:, :c] = np.sqrt(SAFETY * np.einsum("nii->ni", gram)) < LOST * mu[:, :c]
     was = anchors[:, None, :-1, None]
-    like = sure[None, :, None, :] & (mu[None, :, None, :] * RANGE**2 >= was)
+    reach = np.where(np.arange(mu.shape[1]) < c, RANGE**2, RANGE)
+    like = sure[None, :, None, :] & ((mu * reach)[None, :, None, :] >= was)
     weak = (shares * like).sum(axis=3) < HELD
     pair = mu[:, :c]
     within = was * RANGE >= pair[None, :, None, :]

@@ -13,6 +13,7 @@ from scipy import sparse
 
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.pencil import Pencil
+from eigassign.modal.basis import INDEFINITE
 from eigassign.modal.residual import (
     UNIT_LIMIT,
     Residual,
@@ -53,7 +54,7 @@ def half_solve(K0: sparse.csc_array, A: Floats) -> Floats:
     factors = factorise(K0)
     pivots = factors.U.diagonal()
     if (factors.perm_r != factors.perm_c).any() or not (pivots > 0.0).all():
-        raise AccuracyError("the stiffness matrix is not positive definite at an expansion point")
+        raise AccuracyError(INDEFINITE)
     permuted = np.empty_like(A)
     permuted[factors.perm_r] = A
     lower = factors.L.tocsr()

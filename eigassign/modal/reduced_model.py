@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.errors import UsageError
+from eigassign.errors import SingularityError, UsageError
 from eigassign.modal.estimate import frequency_error, gone
 from eigassign.modal.exact import condense
 from eigassign.modal.pose import Pose, corrected
@@ -112,8 +112,10 @@ class ReducedModel:
         mu, z = all_mu[:, :count], all_z[:, :, :count]
         wide = np.concatenate([z, -coupling @ z], axis=1)
         softest, hardest = self._scaling(theta)
-        gram = self._residual_gram(x, theta, mu, wide) / softest[:, None, None]
+        turned, closes = self._at_first_design(x)
+        gram = self._residual_gram(turned, theta, mu, wide) / softest[:, None, None]
         error = frequency_error(mu, gram, self._outside(mu, softest), self.anchors)
+        error[~closes] = np.inf
         error[self._gone(theta, all_mu, all_z, gram)] = np.inf
         error += self._rounding(theta, mu, wide, hardest)
         return np.asarray(error[:, np.array(self.modes) - 1])
@@ -168,8 +170,32 @@ class ReducedModel:
         amplification = strain + (inertia + SOLVER * mu[:, :1]) / mu
         return np.asarray(ROUNDING * np.finfo(float).eps * amplification)
 
-    def _residual_gram(self, x: Floats, theta: Floats, mu: Floats, wide: Floats) -> Floats:
-        """ρ_iᵀ K_E(q, y0)⁻¹ ρ_j, ρ = M_c z − μ̂ K z, between the leading Ritz pairs, (n, c, c)."""
+    def _at_first_design(self, x: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+        """θ(q, y0) (n_theta, n), and where there is one: a loop may not close with other lengths.
+
+        θ(x0) stands where there is none.
+        """
+        turned = x.copy()
+        turned[:, self.n_q :] = self.points[0, self.n_q :]
+        try:
+            return self._theta(turned), np.ones(len(x), dtype=bool)
+        except SingularityError:
+            closes = np.array([self._has_pose(row) for row in turned])
+            turned[~closes] = self.points[0]
+            return self._theta(turned), closes
+
+    def _has_pose(self, x: Floats) -> bool:
+        try:
+            self._theta(x[None])
+        except SingularityError:
+            return False
+        return True
+
+    def _residual_gram(self, turned: Floats, theta: Floats, mu: Floats, wide: Floats) -> Floats:
+        """ρ_iᵀ K_E(q, y0)⁻¹ ρ_j, ρ = M_c z − μ̂ K z, between the leading Ritz pairs, (n, c, c).
+
+        ``theta`` at (q, y), ``turned`` at (q, y0).
+        """
         r, p, z = self.residual, self.pose, wide[:, : self.size]
 
         def apply(K_at: Ints, K_terms: Floats, M_at: Ints, M_terms: Floats) -> Floats:
@@ -181,10 +207,8 @@ class ReducedModel:
         gram = np.asarray(np.swapaxes(rho, 1, 2) @ rho)
         if not len(p.terms):
             return gram
-        turned = x.copy()
-        turned[:, self.n_q :] = self.points[0, self.n_q :]
         g = apply(self.stiffness_terms, p.stiffness_rows, self.mass_terms, p.mass_rows)
-        return corrected(gram, p, self._theta(turned), g)
+        return corrected(gram, p, turned, g)
 
 
 def _forms(A: Floats, z: Floats) -> Floats:

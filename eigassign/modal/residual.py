@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.errors import AccuracyError
 from eigassign.mechanism.pencil import Pencil
+from eigassign.modal.basis import INDEFINITE
 from eigassign.modal.symmetric import factorise
 
 Floats = NDArray[np.float64]
@@ -46,7 +48,7 @@ def residual_factors(pencil: Pencil, K0: sparse.csc_array, V: Floats, elastic: I
     stiff = _blocks(pencil, pencil.stiffness, wide[:, : V.shape[1]], elastic)
     heavy = _blocks(pencil, pencil.mass, wide, elastic)
     if len(elastic) <= UNIT_LIMIT:
-        L = np.linalg.cholesky(K0.toarray())
+        L = _root_of(K0.toarray())
         return Residual(*_dense(stiff, L, len(elastic)), *_dense(heavy, L, len(elastic)))
     A, coordinates = _span(stiff + heavy, len(elastic))
     R = _root(A, factorise(K0).solve(A))
@@ -154,6 +156,13 @@ def _coordinates(parts: list[tuple[int, Floats]], a: int, k: int) -> Floats:
     for at, row in parts:
         out[at] += row
     return out
+
+
+def _root_of(K: Floats) -> Floats:
+    try:
+        return np.asarray(np.linalg.cholesky(K))
+    except np.linalg.LinAlgError as error:
+        raise AccuracyError(INDEFINITE) from error
 
 
 def _root(A: Floats, solved: Floats) -> Floats:

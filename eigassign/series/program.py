@@ -64,6 +64,11 @@ class Program:
     outputs: Ints  # atom of each output
     dependence: NDArray[np.bool_]  # (n_outputs, n_variables): structural
 
+    @cached_property
+    def is_implicit(self) -> bool:
+        """Whether anything in it solves equations: it may then have no value at all."""
+        return any(step.function is not None for step in self.steps)
+
     def run(self, algebra: Algebra, variables: Floats) -> Floats:
         """Outputs as rows, from the variables as rows (n_variables, …) of the algebra."""
         values = np.empty((self.n_atoms, variables.shape[1]))

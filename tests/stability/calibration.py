@@ -52,6 +52,12 @@ class Tally:
         return float((self.estimate >= self.error)[given].mean())
 
     @property
+    def above_rounding(self) -> Floats:
+        """Which of the answers given err by more than ten times the round-off of an exact solve."""
+        given = ~self.refused
+        return self.error[given] > 10.0 * self.floor[given]
+
+    @property
     def overestimate(self) -> Floats:
         """estimate / max(error, floor) of the answers given."""
         given = ~self.refused
@@ -62,7 +68,7 @@ def draw(seed: int, samples: int) -> Drawn | None:
     """A planar tree of 1 to 5 links, up to four design parameters; None where it has no mode."""
     tree, q0 = random_chain(seed)
     rng = np.random.default_rng([seed, 1])
-    tree["design"] = _design(tree, rng)
+    tree["design"] = with_box(_candidates(tree), rng, {})
     try:
         model = model_of(tree)
     except MechanismError:
@@ -85,14 +91,20 @@ def draw(seed: int, samples: int) -> Drawn | None:
     )
 
 
-def _design(tree: Tree, rng: np.random.Generator) -> Tree:
-    """Up to four parameters of every kind, each with a box of a factor of up to four."""
-    choices = _candidates(tree)
+def with_box(
+    choices: list[tuple[str, float]], rng: np.random.Generator, narrow: dict[str, float]
+) -> Tree:
+    """Up to four of the parameters, each with a box of a factor of up to four.
+
+    ``narrow`` holds, for the last word of a path, the share that such a box stays within.
+    """
     rng.shuffle(choices)
     design = {}
     for k, (path, value) in enumerate(choices[: rng.integers(0, 5)]):
-        low, high = value * rng.uniform(0.5, 0.95), value * rng.uniform(1.05, 2.0)
-        design[f"y{k}"] = {"parameter": path, "min": low, "max": high}
+        low, high = rng.uniform(0.5, 0.95), rng.uniform(1.05, 2.0)
+        share = narrow.get(path.rpartition(".")[2], 1.0)
+        low, high = max(low, 1.0 - share), min(high, 1.0 + share)
+        design[f"y{k}"] = {"parameter": path, "min": value * low, "max": value * high}
     return design
 
 
@@ -114,12 +126,17 @@ def _candidates(tree: Tree) -> list[tuple[str, float]]:
     return found
 
 
-def tally(seeds: range, samples: int, judge: Callable[[Drawn], tuple[Floats, Floats]]) -> Tally:
+def tally(
+    seeds: range,
+    samples: int,
+    judge: Callable[[Drawn], tuple[Floats, Floats]],
+    draw: Callable[[int, int], Drawn | None] = draw,
+) -> Tally:
     """``judge`` gives frequencies and estimates (samples, n_modes) of one drawn mechanism."""
     parts: list[list[Any]] = []
     for seed in seeds:
         drawn = draw(seed, samples)
-        if drawn is not None:
+        if drawn is not None and len(drawn.q):
             part = _judged(drawn, judge)
             if part is not None:
                 parts.append(part)
