@@ -8,15 +8,29 @@ from eigassign._version import __version__
 from eigassign.errors import CaseError, EigassignError
 
 if TYPE_CHECKING:
-    from eigassign.api import Case, assign, expand, load_case, load_reduced, reduce, save_reduced
+    from eigassign.api import (
+        Box,
+        Case,
+        Fit,
+        assign,
+        expand,
+        fit,
+        load_case,
+        load_reduced,
+        reduce,
+        save_reduced,
+    )
 
 __all__ = [
+    "Box",
     "Case",
     "CaseError",
     "EigassignError",
+    "Fit",
     "__version__",
     "assign",
     "expand",
+    "fit",
     "load_case",
     "load_reduced",
     "reduce",

@@ -22,9 +22,24 @@ from eigassign.mechanism.trajectory import Trajectory, build_trajectory
 from eigassign.modal import expansion as modal_expansion
 from eigassign.modal import reduced as modal_reduced
 from eigassign.modal.expansion import Expansion
+from eigassign.modal.fit import Fit, fit
 from eigassign.modal.model import Model
 from eigassign.modal.reduced import ReducedModel
+from eigassign.modal.region import Box
 from eigassign.series.lower_set import LowerSet
+
+__all__ = [
+    "Box",
+    "Case",
+    "Fit",
+    "assign",
+    "expand",
+    "fit",
+    "load_case",
+    "load_reduced",
+    "reduce",
+    "save_reduced",
+]
 
 if TYPE_CHECKING:
     from eigassign.modal.mesh_choice import MeshChoice

@@ -30,6 +30,7 @@ from eigassign.series.power_series import monomials
 __all__ = ["CLUSTER_GAP", "MAX_ORDER", "Cluster", "Expansion", "clusters", "expand"]
 
 if TYPE_CHECKING:
+    from eigassign.modal.inverse import InverseExpansion
     from eigassign.modal.reduced_model import ReducedModel
 
 Floats = NDArray[np.float64]
@@ -104,6 +105,13 @@ class Expansion:
         from eigassign.modal.taylor_estimate import companion
 
         return companion(self.pencil, self.q0, self.y0, self.modes, self.vector_space, self.vectors)
+
+    @cached_property
+    def inverse(self) -> InverseExpansion:
+        """The expansion of 1/λ with the same coefficients; UsageError for clusters."""
+        from eigassign.modal.inverse import inverse
+
+        return inverse(self)
 
     def linear_in_design(self, q: ArrayLike) -> tuple[Floats, Floats]:
         """l_0 (n_samples, n_modes) and l (n_samples, n_modes, n_y) of eq. (9) at samples of q.

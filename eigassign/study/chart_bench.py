@@ -58,6 +58,7 @@ class _Trial:
     """A method that has run once: what it answered, and the jobs to time."""
 
     method: Method
+    trains: bool  # on exact answers that are given to it
     trained: int  # exact solves of its training
     hz: Floats
     points: Points
@@ -93,7 +94,11 @@ def chart_methods(
 
 
 def _trial(bench: Bench, method: Method, known: dict[bytes, tuple[Floats, float]]) -> _Trial:
-    """Train, fit and evaluate once; answers that are ``known`` are not solved for again."""
+    """Train, fit and evaluate once; answers that are ``known`` are not solved for again.
+
+    Evaluations are timed in batches of whole runs along the trajectory, as a search over designs
+    asks for them; a method that was fitted in its own way says how many ``solves`` that took.
+    """
     points = bench.points.runs() if method.per_design else bench.points
     points = points.head(method.most or len(points.x))
     x = method.train(bench.points)
@@ -104,29 +109,33 @@ def _trial(bench: Bench, method: Method, known: dict[bytes, tuple[Floats, float]
     parts = bench.points.designs if method.per_design else 1
     once = x[: len(x) // parts]
     evaluator, fitting = timed(lambda: method.fit(answers))
-    hz, evaluating = timed(lambda: evaluator(points))
-    copies = -(-BATCH // len(points.x))
-    if method.per_design or evaluating * copies > LONG_BATCH_S:
+    hz = evaluator(points)
+    asked = points if method.most or method.per_design else points.runs()
+    evaluating = timed(lambda: evaluator(asked))[1]
+    copies = 1 if method.most or method.per_design else -(-BATCH // len(asked.x))
+    if evaluating * copies > LONG_BATCH_S:
         copies = 1
-    many = points.repeated(copies) if copies > 1 else points
+    many = asked.repeated(copies) if copies > 1 else asked
     jobs = (
         _Job(lambda: bench.solved(once), solving / parts),
         _Job(lambda: method.fit(answers), fitting),
         _Job(lambda: evaluator(many), evaluating * copies),
     )
-    return _Trial(method, len(x), hz, points, jobs, len(many.x))
+    trained = len(x) + getattr(evaluator, "solves", 0)
+    return _Trial(method, len(x) > 0, trained, hz, points, jobs, len(many.x))
 
 
 def _point(bench: Bench, trial: _Trial, spent: Sequence[Timing], solve: Timing) -> ChartPoint:
     method, trained = trial.method, trial.trained
     training, fitting, online = spent[0], spent[1], spent[2].times(1.0 / trial.evaluations)
-    offline, solves_online = fitting.plus(training) if trained else fitting, 0.0
+    offline, solves_online = fitting.plus(training) if trial.trains else fitting, 0.0
     if method.exact:
         offline, solves_online, trained = NOTHING, 1.0, 0
     elif method.per_design:
         designs, samples = bench.points.designs, len(bench.scene.path.q)
         solves_online = trained / (designs * samples)
-        anew = training.plus(fitting.times(1.0 / designs))
+        anew = fitting.times(1.0 / designs)
+        anew = anew.plus(training) if trial.trains else anew
         online, offline, trained = online.plus(anew.times(1.0 / samples)), NOTHING, 0
     gain = break_even(offline.median_s, online.median_s, solve.median_s)
     return ChartPoint(

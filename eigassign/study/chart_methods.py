@@ -10,14 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.errors import UsageError
 from eigassign.modal.exact import DENSE_LIMIT
 from eigassign.modal.exact_sparse import solve_sparse
-from eigassign.modal.expansion import Expansion, expand
+from eigassign.modal.expansion import expand
 from eigassign.modal.model import Model
 from eigassign.modal.reduced import ReducedModel, reduce
-from eigassign.series.evaluation import polynomials
-from eigassign.series.power_series import PowerSeries
 from eigassign.study.chart_question import Points
 from eigassign.study.drawing import spread_samples
 from eigassign.study.scene import Scene
@@ -125,8 +122,8 @@ def _reciprocal(scene: Scene, order: int, linear: bool) -> Method:
     point = scene.expansions.full
 
     def fit(_: Floats) -> Evaluator:
-        made = expand(scene.model.pencil, point.q0, point.y0, point.modes, order, linear)
-        return reciprocal(made)
+        made = expand(scene.model.pencil, point.q0, point.y0, point.modes, order, linear).inverse
+        return lambda points: made.frequencies(points.q, points.y)
 
     return Method(
         f"1/λ {order} {kind}",
@@ -136,24 +133,6 @@ def _reciprocal(scene: Scene, order: int, linear: bool) -> Method:
         fit,
         solves=1,
     )
-
-
-def reciprocal(expansion: Expansion) -> Evaluator:
-    """f = 1/(2π √μ), μ the truncated series of 1/λ; UsageError for clusters of several modes."""
-    if any(len(cluster.modes) > 1 for cluster in expansion.clusters):
-        raise UsageError("modes expanded as a cluster have no series of 1/λ each")
-    inverse = [
-        (1.0 / PowerSeries(expansion.space, cluster.coefficients[0, 0])).coefficients
-        for cluster in expansion.clusters
-    ]
-    made = polynomials(expansion.space, np.array(inverse))
-
-    def evaluate(points: Points) -> Floats:
-        w = (points.x - expansion.x0) @ expansion.directions.T
-        with np.errstate(invalid="ignore"):
-            return np.asarray(0.5 / np.pi / np.sqrt(made(w)))
-
-    return evaluate
 
 
 def points_along(scene: Scene, count: int) -> tuple[Floats, Floats]:

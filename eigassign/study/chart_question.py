@@ -11,7 +11,7 @@ poses that the trajectory never takes.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -78,6 +78,7 @@ class Points:
     n_random: int
     designs: int
     n_q: int
+    along: NDArray[np.intp]  # samples of the trajectory in every run
 
     @property
     def q(self) -> Floats:
@@ -93,16 +94,17 @@ class Points:
         """The first points only, for methods that are too slow for all."""
         if count >= len(self.x):
             return self
-        return Points(self.x[:count], self.u[:count], min(self.n_random, count), 0, self.n_q)
+        n_random = min(self.n_random, count)
+        return replace(self, x=self.x[:count], u=self.u[:count], n_random=n_random, designs=0)
 
     def repeated(self, copies: int) -> Points:
-        """The same points several times over, to time large batches."""
+        """The same runs several times over, to time large batches."""
         x, u = np.tile(self.x, (copies, 1)), np.tile(self.u, (copies, 1))
-        return Points(x, u, len(x), 0, self.n_q)
+        return replace(self, x=x, u=u, designs=copies * self.designs)
 
     def runs(self) -> Points:
         """The runs along the trajectory only."""
-        return Points(self.x[self.n_random :], self.u[self.n_random :], 0, self.designs, self.n_q)
+        return replace(self, x=self.x[self.n_random :], u=self.u[self.n_random :], n_random=0)
 
 
 def build_features(scene: Scene) -> Features:
@@ -164,7 +166,7 @@ def build_points(
     along = np.unique(np.linspace(0, n_t - 1, min(per_design, n_t)).round().astype(np.intp))
     samples = np.concatenate([samples, np.tile(along, designs)])
     x, u = features.at_samples(samples, np.vstack([y, np.repeat(runs, len(along), axis=0)]))
-    return Points(x, u, n_random, designs, len(scene.model.q_names))
+    return Points(x, u, n_random, designs, len(scene.model.q_names), along)
 
 
 def _box(features: Features, unit: Floats) -> Floats:

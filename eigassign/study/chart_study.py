@@ -23,15 +23,15 @@ from eigassign.study.chart_bench import (
 )
 from eigassign.study.chart_data import Advice, Asked, ChartPoint, Front
 from eigassign.study.chart_effort import Effort, suited
+from eigassign.study.chart_fits import fit_methods
 from eigassign.study.chart_front import advise_accuracy, advise_budget, front, front_notes
 from eigassign.study.chart_methods import Method
-from eigassign.study.chart_polynomials import distilled_methods, economised_methods
 from eigassign.study.chart_question import SEED, Features, Points, build_features, build_points
 from eigassign.study.chart_timing import timed
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
-DISTILLED = ((2, 1, False), (2, 3, True))  # half order, expansion points, guard
+FITTED = ((1, 3), (2, 1))  # half order and expansion points of the reduced models fitted
 ACCURACIES = (1e-2, 1e-4, 1e-6, 1e-8)
 MANY = 1000.0  # trajectories of the second front: a search over designs
 
@@ -176,10 +176,8 @@ def _methods(
     yield from own.reciprocal_methods(scene, orders)
     yield from own.piecewise_methods(scene, orders[1:], effort.expansion_points[1:])
     yield from own.reduced_methods(scene, effort.half_orders, effort.expansion_points)
-    sources = [each for each in DISTILLED if each[1] <= max(effort.expansion_points)]
-    ladder = [each for each in effort.economised if each[0] in orders]
-    yield from economised_methods(scene, features, ladder, effort.most_nodes)
-    yield from distilled_methods(scene, features, effort.tolerances, sources, effort.most_nodes)
+    sources = [each for each in FITTED if each[1] <= max(effort.expansion_points)]
+    yield from fit_methods(scene, features, points, effort.accuracies, sources, most)
     yield from _rivals(scene, features, points, effort, most)
 
 

@@ -6,7 +6,6 @@ Every fit takes u (n, d) in [0, 1] and f (n, n_modes) and gives a function of u 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from itertools import product
@@ -17,29 +16,25 @@ from numpy.typing import NDArray
 
 from eigassign.errors import UsageError
 from eigassign.series.evaluation import polynomials
-from eigassign.series.lower_set import lower_set, total_degree
+from eigassign.series.lower_set import total_degree
+from eigassign.series.newton import spread_steps
 from eigassign.series.power_series import monomials
 
 Floats = NDArray[np.float64]
 Surrogate = Callable[[Floats], Floats]
-PROBES = (9, 17, 33)  # nodes on which an axis is looked at
 BLOCK = 1024  # points at once: what they need stays in the cache
 
 
 def spread_points(count: int, d: int) -> Floats:
     """Training points (count, d): the corners where they are few, then the R_d sequence.
 
-    u_k = (1/2 + k α) mod 1 with α_i = g^-i and g the root of g^(d+1) = g + 1 (Roberts 2018), which
-    fills the box evenly for every count.
+    u_k = (1/2 + k α) mod 1 fills the box evenly for every count.
     """
-    g = 2.0
-    for _ in range(60):
-        g = (1.0 + g) ** (1.0 / (d + 1.0))
     corners = (
         np.array(list(product((0.0, 1.0), repeat=d))) if 3 * 2**d <= count else np.zeros((0, d))
     )
     k = np.arange(1, count - len(corners) + 1)[:, None]
-    inside = (0.5 + k * g ** -np.arange(1.0, d + 1.0)) % 1.0
+    inside = (0.5 + k * spread_steps(d)) % 1.0
     return np.vstack([corners, inside])
 
 
@@ -147,96 +142,10 @@ def _polynomials(u: Floats, k: int) -> Floats:
     return np.asarray(np.polynomial.chebyshev.chebvander(2.0 * u - 1.0, k - 1), dtype=np.float64)
 
 
-def needed_nodes(f: Surrogate, d: int, tolerance: float) -> tuple[list[int], int]:
-    """Nodes an axis for a relative ``tolerance``, and how many values of f it took to find out.
-
-    Along every axis, at two opposite corners of the others, f is sampled on 9, 17 or 33 nodes, the
-    fewest whose last quarter of coefficients is below the tolerance; beyond the k kept they sum up
-    to less than it.
-    """
-    sizes, used = [], 0
-    for axis in range(d):
-        for probes in PROBES:
-            tails = _tails(f, d, axis, probes)
-            used += 2 * probes
-            if tails[-(probes // 4) :].max() < 0.1 * tolerance / d:
-                break
-        sizes.append(max(2, int(np.argmax(np.append(tails, 0.0) < tolerance / d))))
-    return sizes, used
-
-
-def _tails(f: Callable[[Floats], Floats], d: int, axis: int, probes: int) -> Floats:
-    """Σ_{j ≥ k} |c_j| (probes,) of the Chebyshev series along an axis, over max |f|; the larger."""
-    u = np.repeat(np.array([0.0, 1.0]), probes)[:, None] * np.ones(d)
-    u[:, axis] = np.tile(chebyshev_nodes(probes), 2)
-    values = f(u)
-    lines = values.reshape(2, probes, -1) / np.abs(values).max()
-    sizes = np.abs(np.einsum("ij,ljm->lim", _inverse_cosines(probes), lines)).max(axis=(0, 2))
-    return np.asarray(np.cumsum(sizes[::-1])[::-1])
-
-
-def adaptive(
-    f: Callable[[Floats], Floats], d: int, tolerance: float, most: int
-) -> tuple[Surrogate, int]:
-    """The Chebyshev polynomial of f for a relative tolerance, and the values of f it took.
-
-    Raises UsageError where its grid would have more than ``most`` points.
-    """
-    sizes, used = needed_nodes(f, d, tolerance)
-    return thinned_through(f, sizes, tolerance, most), used + math.prod(sizes)
-
-
-def thinned_through(
-    f: Callable[[Floats], Floats], sizes: Sequence[int], tolerance: float, most: int
-) -> Surrogate:
-    """The polynomial through f on a grid of ``sizes``, with the terms that a tolerance needs.
-
-    Raises UsageError where the grid would have more than ``most`` points.
-    """
-    if math.prod(sizes) > most:
-        raise UsageError(f"a grid of {' x '.join(map(str, sizes))} points is over {most}")
-    return _thinned(_coefficients(sizes, f(tensor_points(sizes))), 0.5 * tolerance)
-
-
-def _thinned(coefficients: Floats, tolerance: float) -> Surrogate:
-    """The polynomial without terms that sum up to less than ``tolerance`` of its largest one.
-
-    What is left is closed downwards to a lower set and written in powers of 2u − 1, which are
-    evaluated quickly and, to the degrees at hand, without loss.
-    """
-    sizes = np.abs(coefficients).max(axis=-1)
-    order = np.argsort(sizes, axis=None)
-    small = np.cumsum(sizes.ravel()[order]) < tolerance * sizes.max()
-    keep = np.ones(sizes.size, dtype=bool)
-    keep[order[small]] = False
-    mask = keep.reshape(sizes.shape)
-    for axis in range(mask.ndim):
-        mask = np.flip(np.logical_or.accumulate(np.flip(mask, axis), axis=axis), axis)
-    powers = np.where(mask[..., None], coefficients, 0.0)
-    for axis, k in enumerate(sizes.shape):
-        powers = np.moveaxis(np.tensordot(_to_powers(k), powers, (1, axis)), 0, axis)
-    space = lower_set(np.argwhere(mask))
-    made = polynomials(space, powers[tuple(space.indices.T)].T)
-    return lambda at: made(2.0 * at - 1.0)
-
-
-@lru_cache(maxsize=64)
-def _to_powers(k: int) -> Floats:
-    """From coefficients of T_0 … T_{k−1} to those of 1, v, … v^(k−1)."""
-    columns = [np.polynomial.chebyshev.cheb2poly(unit) for unit in np.eye(k)]
-    return _frozen(np.array([np.pad(c, (0, k - len(c))) for c in columns]).T)
-
-
 def _frozen(table: Floats) -> Floats:
     """Shared by all who ask again."""
     table.setflags(write=False)
     return table
-
-
-def tensor_points(sizes: Sequence[int]) -> Floats:
-    """The grid of Chebyshev nodes with its own number on each axis, (Π k_i, d)."""
-    mesh = np.meshgrid(*[chebyshev_nodes(k) for k in sizes], indexing="ij")
-    return np.stack([axis.ravel() for axis in mesh], axis=1)
 
 
 def along(place: Floats, f: Floats, cubic: bool) -> Surrogate:

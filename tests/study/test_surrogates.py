@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from eigassign.errors import UsageError
 from eigassign.study.surrogates import (
-    adaptive,
     along,
     chebyshev,
     chebyshev_nodes,
@@ -20,8 +19,6 @@ from eigassign.study.surrogates import (
     radial_basis,
     response_surface,
     spread_points,
-    tensor_points,
-    thinned_through,
 )
 from eigassign.study.surrogates_kriging import _likelihood, fit_kriging
 
@@ -51,24 +48,8 @@ def test_a_response_surface_needs_as_many_points_as_coefficients() -> None:
 
 
 def test_a_chebyshev_polynomial_of_the_right_degree_is_exact() -> None:
-    u = tensor_points([4, 3, 4])
-    f = cubic(u)
-    np.testing.assert_allclose(chebyshev([4, 3, 4], f)(AT), cubic(AT), atol=1e-13)
-    made = thinned_through(cubic, [4, 3, 4], 1e-12, 100)
-    np.testing.assert_allclose(made(AT), cubic(AT), atol=1e-10)
-
-
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6, 1e-8, 1e-10])
-def test_an_adaptive_polynomial_meets_its_tolerance(tolerance: float) -> None:
-    made, used = adaptive(smooth, 3, tolerance, 10_000)
-    # the tolerance is of sums of coefficients along the axes: mixed terms may add as much again
-    assert np.abs(made(AT) - smooth(AT)).max() <= 5.0 * tolerance * smooth(AT).max()
-    assert used > 50
-
-
-def test_a_grid_that_would_be_too_large_is_refused() -> None:
-    with pytest.raises(UsageError, match="is over 10"):
-        adaptive(smooth, 3, 1e-8, 10)
+    u = grid_points(chebyshev_nodes(4), 3)
+    np.testing.assert_allclose(chebyshev([4, 4, 4], cubic(u))(AT), cubic(AT), atol=1e-13)
 
 
 @pytest.mark.parametrize(("kind", "rate"), [(False, 2.0), (True, 4.0)], ids=["linear", "cubic"])

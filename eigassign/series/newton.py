@@ -1,0 +1,136 @@
+"""Newton's interpolation on lower sets of multi-indices, at Leja points: every value is a check.
+
+On each axis the nodes v_0, v_1, … are Leja points: each maximises Π_i |v − v_i| over the
+candidates, so that the basis functions
+
+    h_k(v) = Π_{i<k} (v − v_i) / (v_k − v_i)
+
+are at most 1 there, and so are their products h_γ(v) = Π_j h_{γ_j}(v_j). The interpolant on a lower
+set is Σ_γ c_γ h_γ, and c_γ is what the interpolant on the members below γ was wrong by at the
+node of γ: an error at a point not seen before. Adding members changes no coefficient.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.series.evaluation import Monomials, Polynomials, monomials_of
+from eigassign.series.lower_set import LowerSet, lower_set
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+CANDIDATES = 129  # of an interval, as dense at its ends as Chebyshev points
+
+
+@lru_cache(maxsize=1)
+def interval() -> Floats:
+    """Candidates on [−1, 1], (`CANDIDATES`,)."""
+    nodes = -np.cos(np.pi * np.arange(CANDIDATES) / (CANDIDATES - 1))
+    nodes[CANDIDATES // 2] = 0.0
+    nodes.setflags(write=False)
+    return nodes
+
+
+def leja(candidates: Floats, count: int) -> Ints:
+    """Places of ``count`` Leja points among distinct candidates; the most central is the first."""
+    middle = 0.5 * (candidates.min() + candidates.max())
+    chosen = [int(np.abs(candidates - middle).argmin())]
+    product = np.ones(len(candidates))
+    while len(chosen) < min(count, len(candidates)):
+        product *= np.abs(candidates - candidates[chosen[-1]])
+        chosen.append(int(product.argmax()))
+    return np.array(chosen, dtype=np.intp)
+
+
+def basis(nodes: Floats, v: Floats) -> Floats:
+    """h_k(v_i) (n, K) for the nodes (K,) in their order."""
+    table = np.ones((len(v), len(nodes)))
+    for k in range(1, len(nodes)):
+        scale = nodes[k] - nodes[:k]
+        table[:, k] = np.prod((v[:, None] - nodes[:k]) / scale, axis=1)
+    return table
+
+
+def products(tables: Sequence[Floats], rows: Ints, columns: Ints) -> Floats:
+    """Π_j tables[j][rows[a, j], columns[b, j]] as (n_rows, n_columns)."""
+    out = np.ones((len(rows), len(columns)))
+    for j, table in enumerate(tables):
+        out *= table[rows[:, j, None], columns[:, j]]
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class NewtonRows(Monomials):
+    """All Π_j Π_{i<γ_j} (v_j − v_ji) of one lower set, as rows."""
+
+    shifts: tuple[Floats, ...] = ()
+
+    def __call__(self, x: Floats) -> Floats:
+        """(N, n_points) at points x (n, n_points), one row a variable."""
+        rows = np.empty((self.size, x.shape[1]))
+        rows[0] = 1.0
+        for (first, last, parents, variables), shift in zip(self.steps, self.shifts, strict=True):
+            factor = x[variables]
+            factor -= shift
+            np.multiply(rows[parents], factor, out=rows[first:last])
+        return rows
+
+
+def newton_rows(space: LowerSet, nodes: Sequence[Floats]) -> NewtonRows:
+    """How the basis functions of a set follow from one another."""
+    plain = monomials_of(space)
+    shifts = []
+    for first, last, _, variables in plain.steps:
+        degree = space.indices[np.arange(first, last), variables]
+        shift = [nodes[j][k - 1] for j, k in zip(variables, degree, strict=True)]
+        shifts.append(np.array(shift)[:, None])
+    return NewtonRows(plain.size, plain.n_variables, plain.steps, tuple(shifts))
+
+
+def newton_polynomials(members: Ints, nodes: Sequence[Floats], c: Floats) -> Polynomials:
+    """Σ_γ c_γ h_γ ready for many points: c (n_polynomials, N) over members (N, d); d ≥ 1."""
+    heads, row = _part(members[:, :1])
+    tails, column = _part(members[:, 1:])
+    first, second = newton_rows(heads, nodes[:1]), newton_rows(tails, nodes[1:])
+    table = np.zeros((len(c), second.size, first.size))
+    table[:, column, row] = c / _scales(members, nodes)
+    return Polynomials(first, second, table)
+
+
+def _part(members: Ints) -> tuple[LowerSet, Ints]:
+    space = lower_set(members)
+    return space, space.find(members)
+
+
+def _scales(members: Ints, nodes: Sequence[Floats]) -> Floats:
+    """Π_j Π_{i<γ_j} (v_{jγ_j} − v_ji), (N,)."""
+    out = np.ones(len(members))
+    for j, v in enumerate(nodes):
+        each = np.array([np.prod(v[k] - v[:k]) for k in range(int(members[:, j].max()) + 1)])
+        out *= each[members[:, j]]
+    return out
+
+
+def spread_steps(d: int) -> Floats:
+    """α_i = g^-i, g the root of g^(d+1) = g + 1: (k α) mod 1 fills the unit box (Roberts 2018)."""
+    g = 2.0
+    for _ in range(60):
+        g = (1.0 + g) ** (1.0 / (d + 1.0))
+    return np.asarray(g ** -np.arange(1.0, d + 1.0))
+
+
+def ordered(members: Ints) -> Ints:
+    """Distinct rows, predecessors first."""
+    rows = np.unique(members, axis=0)
+    return np.asarray(rows[np.argsort(rows.sum(axis=1), kind="stable")])
+
+
+def cross(d: int, degree: int) -> Ints:
+    """{k e_j : k ≤ degree}: the axes alone."""
+    lines = np.arange(degree + 1)[:, None, None] * np.eye(d, dtype=np.intp)
+    return ordered(lines.reshape(-1, d))

@@ -1,0 +1,78 @@
+"""Interpolants to a stated accuracy: met, estimated, no dearer than they must be, or refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from eigassign.errors import AccuracyError
+from eigassign.series.adaptive_newton import Interpolant, interpolate
+from eigassign.series.newton import basis, interval, leja, newton_polynomials
+
+Function = Callable[[np.ndarray], np.ndarray]
+NODES = interval()[leja(interval(), 20)]
+
+
+def smooth(v: np.ndarray) -> np.ndarray:
+    return np.exp(-0.4 * v[:, :1]) / (2.0 + 0.5 * v[:, 1:2]) + 0.1 * np.cos(2.0 * v[:, 2:])
+
+
+def made(f: Function, d: int, accuracy: float, most: int = 3000) -> tuple[Interpolant, float, int]:
+    """The interpolant, its true error and how many values were asked for."""
+    asked = 0
+
+    def sample(members: np.ndarray) -> np.ndarray:
+        nonlocal asked
+        asked += len(members)
+        return f(NODES[members])
+
+    found = interpolate(sample, [basis(NODES, NODES)] * d, accuracy, most)
+    at = np.random.default_rng(0).uniform(-1.0, 1.0, (500, d))
+    at[:100] = np.sign(at[:100])
+    g = newton_polynomials(found.members, [NODES] * d, found.coefficients)(at)
+    return found, float(np.abs(g ** (1.0 / found.power) / f(at) - 1.0).max()), asked
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-4, 1e-6, 1e-8, 1e-10])
+def test_the_accuracy_is_met_and_estimated(accuracy: float) -> None:
+    found, off, asked = made(smooth, 3, accuracy)
+    assert off <= found.error <= accuracy
+    assert found.asked == asked
+
+
+def test_a_higher_accuracy_takes_more_values_but_far_fewer_than_a_grid() -> None:
+    counts = [made(smooth, 3, accuracy)[2] for accuracy in (1e-2, 1e-5, 1e-8)]
+    assert counts == sorted(counts)
+    assert counts[-1] < 600  # a tensor grid of the same degrees has over 2000
+
+
+def test_an_axis_that_nothing_depends_on_takes_no_degrees() -> None:
+    found, off, _ = made(lambda v: np.exp(v[:, :1]), 3, 1e-8)
+    assert off <= 1e-8
+    assert (found.members[:, 1:] > 0).any(axis=1).sum() <= 12  # those it started with
+    assert found.rates[1:].tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("power", [1.0, 2.0, -2.0])
+def test_the_power_that_is_a_polynomial_is_found(power: float) -> None:
+    found, off, _ = made(lambda v: (3.0 + v[:, :1] + v[:, 1:]) ** (1.0 / power), 2, 1e-9)
+    assert found.power == power
+    assert off < 1e-12
+    assert len(found.members) <= 12
+
+
+def test_an_even_function_does_not_look_finished_before_it_is() -> None:
+    found, off, _ = made(lambda v: 1.0 / (1.5 + np.cos(3.0 * v[:, :1])), 1, 1e-5)
+    assert off <= found.error <= 1e-5
+
+
+def test_a_kink_is_refused() -> None:
+    with pytest.raises(AccuracyError, match="leave an estimated error of"):
+        made(lambda v: 2.0 + np.abs(v[:, :1] - 0.3 + 0.1 * v[:, 1:]), 2, 1e-4, 800)
+
+
+def test_too_few_values_are_refused() -> None:
+    with pytest.raises(AccuracyError, match="over 30 are not allowed"):
+        made(smooth, 3, 1e-8, 30)
