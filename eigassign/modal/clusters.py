@@ -13,11 +13,16 @@ from eigassign.modal.exact import Modes
 from eigassign.modal.lowest import lowest_modes
 
 Floats = NDArray[np.float64]
+LEAST_GAP = 1e-10  # modes that round-off hardly tells apart have no series of their own
 CLUSTER_GAP = 0.02  # modes closer than this (relative in λ) are expanded together
 
 
 def clusters(lam: Floats, wanted: Sequence[int], gap: float) -> tuple[tuple[int, ...], ...]:
-    """Modes (1-based) grouped where neighbours are closer than ``gap`` (relative in λ)."""
+    """Modes (1-based) grouped where neighbours are closer than ``gap`` (relative in λ).
+
+    Never less than LEAST_GAP: of modes that coincide any mixture is a mode.
+    """
+    gap = max(gap, LEAST_GAP)
     groups = [[1]]
     for k, (below, above) in enumerate(itertools.pairwise(lam.tolist()), 2):
         if above - below < gap * above:

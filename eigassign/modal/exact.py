@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from eigassign.errors import AccuracyError, MechanismError, UsageError
 from eigassign.mechanism.pencil import Pencil
+from eigassign.modal.arguments import whole
 from eigassign.modal.exact_single import solve_single
 from eigassign.modal.sizes import DENSE_LIMIT
 
@@ -54,7 +55,7 @@ def modes_at(pencil: Pencil, theta: Floats, count: int) -> Modes:
 
 
 def _solve(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
-    elastic = len(pencil.elastic)
+    elastic, count = len(pencil.elastic), whole(count, "count")
     if not 1 <= count <= elastic:
         raise UsageError(f"{count} modes asked for; the model has 1 to {elastic} elastic ones")
     if not np.isfinite(theta).all():

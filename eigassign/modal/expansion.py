@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import UsageError
 from eigassign.mechanism.pencil import Pencil
+from eigassign.modal.arguments import mode_numbers, relative_gap, whole_within
 from eigassign.modal.clusters import CLUSTER_GAP, clusters, whole_clusters
 from eigassign.modal.local import Local, local_space, vector_set
 from eigassign.modal.rayleigh import eigenvalue_series
@@ -224,9 +225,14 @@ def expand(
 
     ``linear_in_y`` keeps |β| ≤ 1, the terms of eqs. (7)-(9). ``space`` is any other lower set over
     (q, y). Eigenvectors are expanded to half the order, which suffices (2m + 1), or to
-    ``vector_order``. Raises UsageError for impossible arguments.
+    ``vector_order``. Modes closer than ``cluster_gap`` (relative in λ) are expanded together.
+    Raises UsageError for impossible arguments.
     """
-    wanted = _checked_modes(modes, order)
+    wanted = mode_numbers(modes)
+    order = whole_within(order, "order", 1, MAX_ORDER)
+    if vector_order is not None:
+        vector_order = whole_within(vector_order, "vector_order", 0, MAX_ORDER)
+    cluster_gap = relative_gap(cluster_gap)
     n_y = pencil.to_program.shape[1] - pencil.n_q
     x0 = point(q0, y0, pencil.n_q, n_y)
     local = local_space(pencil, order, linear_in_y, space)
@@ -256,15 +262,6 @@ def expand(
         notes=_notes(groups, local, pencil),
         pencil=pencil,
     )
-
-
-def _checked_modes(modes: Sequence[int], order: int) -> tuple[int, ...]:
-    wanted = tuple(sorted({int(m) for m in modes}))
-    if not wanted or wanted[0] < 1:
-        raise UsageError("modes count from 1, the lowest elastic one")
-    if not 1 <= order <= MAX_ORDER:
-        raise UsageError(f"order {order} is not within 1 to {MAX_ORDER}")
-    return wanted
 
 
 def _notes(groups: Sequence[tuple[int, ...]], local: Local, pencil: Pencil) -> tuple[str, ...]:

@@ -34,6 +34,8 @@ class Local:
 def local_space(pencil: Pencil, order: int, linear_in_y: bool, space: LowerSet | None) -> Local:
     """The set over w that was asked for; raises UsageError for one of the wrong width."""
     if space is not None:
+        if not isinstance(space, LowerSet):
+            raise UsageError(f"space must be a lower set, not {type(space).__name__}")
         return _given_space(pencil, space)
     to_z, directions, kept = pencil.local_directions
     n_a = int(np.count_nonzero(pencil.active[: pencil.n_q]))

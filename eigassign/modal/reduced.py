@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.errors import UsageError
 from eigassign.mechanism.pencil import Pencil
+from eigassign.modal.arguments import mode_numbers, whole_within
 from eigassign.modal.basis import orthonormal
 from eigassign.modal.expansion import expand
 from eigassign.modal.half_norm import accurate_factors
@@ -51,11 +51,10 @@ def reduce(
     ``given`` are Taylor vectors (n_dof, N) of ``modes`` at the one point that are known already.
     Raises UsageError for impossible arguments, AccuracyError where no basis can be made.
     """
-    wanted = tuple(sorted({int(m) for m in modes}))
+    wanted = mode_numbers(modes)
+    half_order = whole_within(half_order, "half_order", 0, MAX_HALF_ORDER)
     n_y = pencil.to_program.shape[1] - pencil.n_q
     points = samples(q0, y0, pencil.n_q, n_y)
-    if not 0 <= half_order <= MAX_HALF_ORDER:
-        raise UsageError(f"half_order {half_order} is not within 0 to {MAX_HALF_ORDER}")
     theta0 = pencil.theta(points)
     found = lowest_modes(pencil, theta0, wanted[-1], 2 + PROBES if guard else 1)
     count = _represented(found.lam, wanted[-1]) if guard else wanted[-1]

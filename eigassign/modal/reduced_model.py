@@ -75,7 +75,7 @@ class ReducedModel:
 
     def _chunks(self, q: ArrayLike, y: ArrayLike) -> list[Floats]:
         x = samples(q, y, self.n_q, self.n_y)
-        return [x[i : i + CHUNK] for i in range(0, len(x), CHUNK)]
+        return [x[i : i + CHUNK] for i in range(0, max(len(x), 1), CHUNK)]
 
     def _theta(self, x: Floats) -> Floats:
         z = self.to_program @ x.T + self.shift[:, None]

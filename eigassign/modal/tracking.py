@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.errors import UsageError
 from eigassign.mechanism.pencil import Pencil
+from eigassign.modal.arguments import mode_numbers
 from eigassign.modal.encounters import Encounter, find_encounters
 from eigassign.modal.exact import Modes
 from eigassign.modal.lowest import lowest_modes
@@ -87,9 +87,7 @@ def track(pencil: Pencil, x: Floats, modes: Sequence[int], extra: int = EXTRA) -
 
     Raises UsageError for modes that there are not.
     """
-    wanted = tuple(sorted({int(m) for m in modes}))
-    if not wanted or wanted[0] < 1:
-        raise UsageError("modes count from 1, the lowest elastic one")
+    wanted = mode_numbers(modes)
     found = lowest_modes(pencil, pencil.theta(x), wanted[-1], extra)
     first = np.array(wanted, dtype=np.intp) - 1
     path = [_Here(x[0], found.phi[0][:, first], first, np.ones(len(first)))]

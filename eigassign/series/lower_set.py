@@ -177,7 +177,9 @@ def _product_table(space: LowerSet) -> ProductTable:
 
 def lower_set(indices: NDArray[np.int64] | Sequence[Sequence[int]]) -> LowerSet:
     """A lower set from its members in any order; raises UsageError if it is not one."""
-    rows = np.unique(np.atleast_2d(np.asarray(indices, dtype=np.int64)), axis=0)
+    rows = np.unique(_whole(indices), axis=0)
+    if not len(rows):
+        raise UsageError("a lower set holds the constant at least: one row of zeros")
     if rows.size and rows.min() < 0:
         raise UsageError("multi-indices must not be negative")
     if len(rows) > MAX_SIZE:
@@ -190,6 +192,18 @@ def lower_set(indices: NDArray[np.int64] | Sequence[Sequence[int]]) -> LowerSet:
         if len(below) and (space.find(below) < 0).any():
             raise UsageError("not a lower set: an index is present whose predecessor is not")
     return space
+
+
+def _whole(indices: object) -> NDArray[np.int64]:
+    """(N, n) whole numbers."""
+    try:
+        given = np.asarray(indices, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise UsageError("multi-indices must be rows of whole numbers, all as long") from error
+    rows = given if given.ndim != 1 else given.reshape(-1, max(len(given), 1))
+    if rows.ndim != 2 or not (np.isfinite(rows) & (rows == np.floor(rows))).all():
+        raise UsageError("multi-indices must be rows of whole numbers, all as long")
+    return rows.astype(np.int64)
 
 
 def _frozen(a: NDArray[np.int64]) -> NDArray[np.int64]:

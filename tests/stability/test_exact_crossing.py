@@ -21,6 +21,14 @@ def test_a_cluster_is_right_on_both_sides_of_the_crossing():
     assert answered(expansion, [], E) == 1.0
 
 
+def test_modes_that_coincide_are_a_cluster_even_where_none_is_wanted():
+    """Each by itself would be some mixture of the two: 2.4 % wrong at 5 % more E."""
+    model = case("exact_crossing").model()
+    expansion = expand(model.pencil, [], CROSSING, (1, 2), order=8, cluster_gap=0.0)
+    assert [c.modes for c in expansion.clusters] == [(1, 2)]
+    assert judged(model, expansion, [], E).max() < 1e-11
+
+
 def test_a_single_mode_goes_straight_on_and_says_that_it_is_no_longer_mode_1():
     """λ of the second bar is linear in E: beyond 70 GPa that line is mode 2."""
     model = case("exact_crossing").model()
