@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.case import CaseFile, load
+from eigassign.case import CaseFile, TipTrajectory, load
 from eigassign.errors import CaseError, MechanismError
 from eigassign.mechanism.build import build_pencil, with_elements
 from eigassign.mechanism.kinematics import kinematics
 from eigassign.mechanism.parameters import initial_design, parameters
-from eigassign.mechanism.poses import build_poses, design_dependence, tip_chain
+from eigassign.mechanism.poses import build_poses, design_dependence
+from eigassign.mechanism.tip_motion import tip_chain
 from eigassign.mechanism.trajectory import Trajectory, build_trajectory
 from eigassign.modal import expansion as modal_expansion
 from eigassign.modal import reduced as modal_reduced
@@ -127,17 +128,25 @@ class Case:
             return build_trajectory(
                 spec,
                 model.q_names,
-                lambda tip: tip_chain(model.poses, model.motion, tip, self.initial_design),
+                lambda tip, oriented: tip_chain(
+                    self.file,
+                    model.poses.parameters,
+                    model.motion,
+                    tip,
+                    self.initial_design,
+                    oriented,
+                ),
                 self.file.path.parent,
                 self.file.coordinate_units,
             )
 
     def _refuse_moving_tip(self, model: Model) -> None:
         """A tip path moves q(t) where a design parameter moves the tip: refused by name."""
-        tip = getattr(self.file.trajectory, "tip", None)
-        if tip is None:
+        spec = self.file.trajectory
+        if not isinstance(spec, TipTrajectory):
             return
-        moved = design_dependence(model.poses, tip)
+        oriented = spec.angle is not None or spec.orientation is not None
+        moved = design_dependence(model.poses, spec.tip, oriented)
         for name, moves in zip(model.y_names, moved, strict=True):
             if moves:
                 raise MechanismError(

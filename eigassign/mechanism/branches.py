@@ -51,16 +51,21 @@ def choose_branch(
 
 
 def reference(case: CaseFile, parameters: Parameters) -> Floats:
-    """z = (s, y) where the branch is chosen: ``assembly.at``, the expansion's q, or zero; y as
-    written."""
-    assembly = getattr(case.mechanism, "assembly", None)
-    q = np.zeros(len(parameters.coordinates))
+    """z = (s, y) where the branch is chosen, y as written."""
+    s = parameters.relative @ reference_coordinates(case) + parameters.offset
+    return np.concatenate([s, initial_design(case)])
+
+
+def reference_coordinates(case: CaseFile) -> Floats:
+    """q (n_q,) at which the assembly is chosen: ``assembly.at``, the expansion's q, or zero."""
+    q = np.zeros(len(case.coordinates))
     given = getattr(case.expansion, "q", "auto")
     if not isinstance(given, str):
         q[:] = given
-    for name, value in dict(getattr(assembly, "at", None) or {}).items():
-        q[parameters.coordinates.index(name)] = value
-    return np.concatenate([parameters.relative @ q + parameters.offset, initial_design(case)])
+    at = getattr(getattr(case.mechanism, "assembly", None), "at", None) or {}
+    for name, value in at.items():
+        q[list(case.coordinates).index(name)] = value
+    return q
 
 
 def _guess(tree: Tree, assembly: object) -> Floats | None:

@@ -88,6 +88,11 @@ def _equations(
     values = [parameters.freedom(k) for k in range(len(tree.freedoms))]
     still = np.zeros((len(tree.freedoms), 0), dtype=object)
     motion = walk(case, parameters, tree, coords, values, still)
+    return closure_rows(motion, planar)
+
+
+def closure_rows(motion: Kinematics, planar: bool) -> tuple[list[Scalar], list[Scalar]]:
+    """F = 0 of all loops, per loop the gap in m and the sines of the turns, and the check rows."""
     F: list[Scalar] = []
     check: list[Scalar] = []
     for loop in motion.loops:

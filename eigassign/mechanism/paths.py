@@ -6,7 +6,7 @@ that is the arc length.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,7 +27,7 @@ class Path:
 
     knots: Floats  # (m,) s at the waypoints, from 0 to 1
     coefficients: Floats  # (4, m - 1, d) in m, ascending powers
-    chord_length: float  # m, over all waypoints
+    chord_length: float = 0.0  # m, over all waypoints
 
     def point(self, s: ArrayLike) -> Floats:
         """Points on the path in m, (n, d) for s of shape (n,); UsageError outside [0, 1]."""
@@ -60,20 +60,6 @@ class Path:
         return piece, (inside - self.knots[piece])[:, None]
 
 
-@dataclass(frozen=True)
-class Course:
-    """When the tip has to be where: sample k at path parameter ``s[k]`` and time ``time_s[k]``."""
-
-    path: Path
-    s: Floats  # (n,) not decreasing, from 0 to 1
-    time_s: Floats  # (n,)
-
-    def label(self, k: int) -> str:
-        """Sample, time and point in words."""
-        point = ", ".join(f"{x:.6g}" for x in self.path.point(self.s[k])[0])
-        return f"sample {k} (t = {self.time_s[k]:.6g} s, point ({point}) m)"
-
-
 def straight(waypoints: ArrayLike) -> Path:
     """Polyline through the waypoints (m, d), in m, parameterised by arc length.
 
@@ -81,9 +67,14 @@ def straight(waypoints: ArrayLike) -> Path:
     or (m, 3), or if two consecutive ones coincide.
     """
     points, knots, length = _measure(waypoints)
-    chords = np.diff(points, axis=0) / np.diff(knots)[:, None]
+    return replace(polyline(knots, points), chord_length=length)
+
+
+def polyline(knots: Floats, values: Floats) -> Path:
+    """The piecewise linear curve with ``values`` (m, d) at ``knots`` (m,)."""
+    chords = np.diff(values, axis=0) / np.diff(knots)[:, None]
     zero = np.zeros_like(chords)
-    return _path(knots, np.stack([points[:-1], chords, zero, zero]), length)
+    return _path(knots, np.stack([values[:-1], chords, zero, zero]))
 
 
 def spline(waypoints: ArrayLike) -> Path:
@@ -94,18 +85,23 @@ def spline(waypoints: ArrayLike) -> Path:
     through two. Raises the same errors as `straight`.
     """
     points, knots, length = _measure(waypoints)
-    slopes = _slopes(knots, points)
+    return replace(smooth(knots, points), chord_length=length)
+
+
+def smooth(knots: Floats, values: Floats) -> Path:
+    """The not-a-knot cubic spline with ``values`` (m, d) at ``knots`` (m,)."""
+    slopes = _slopes(knots, values)
     step = np.diff(knots)[:, None]
-    chords = np.diff(points, axis=0) / step
+    chords = np.diff(values, axis=0) / step
     quadratic = (3.0 * chords - 2.0 * slopes[:-1] - slopes[1:]) / step
     cubic = (slopes[:-1] + slopes[1:] - 2.0 * chords) / step**2
-    return _path(knots, np.stack([points[:-1], slopes[:-1], quadratic, cubic]), length)
+    return _path(knots, np.stack([values[:-1], slopes[:-1], quadratic, cubic]))
 
 
-def _path(knots: Floats, coefficients: Floats, length: float) -> Path:
+def _path(knots: Floats, coefficients: Floats) -> Path:
     knots.setflags(write=False)
     coefficients.setflags(write=False)
-    return Path(knots, coefficients, length)
+    return Path(knots, coefficients)
 
 
 def _measure(waypoints: ArrayLike) -> tuple[Floats, Floats, float]:

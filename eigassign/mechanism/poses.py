@@ -18,7 +18,6 @@ from eigassign.case import CaseFile
 from eigassign.mechanism.geometry import link_type, node_position
 from eigassign.mechanism.kinematics import Kinematics, all_moving
 from eigassign.mechanism.parameters import Parameters
-from eigassign.mechanism.tip_chain import TipChain
 from eigassign.mechanism.tree import split
 from eigassign.series.algebra import Samples
 from eigassign.series.expression import Scalar
@@ -129,28 +128,12 @@ def _lines(case: CaseFile, motion: Kinematics, link: str) -> tuple[tuple[str, st
     return tuple((root, name) for name in others) or ((root, root),)
 
 
-def design_dependence(poses: Poses, tip: str) -> NDArray[np.bool_]:
-    """Which design parameters the position of a node depends on, (n_y,): structural."""
-    table = poses._compile(list(poses._world(*split(tip))))
+def design_dependence(poses: Poses, tip: str, oriented: bool = False) -> NDArray[np.bool_]:
+    """Which design parameters a node's place, and its turning, depend on (n_y,): structural."""
+    link, node = split(tip)
+    scalars = list(poses._world(link, node))
+    if oriented:
+        scalars += list(poses.motion.placement(link).world_rotation.ravel())
+    table = poses._compile(scalars)
     depends = np.asarray(table.program.dependence.any(axis=0))
     return depends[len(poses.parameters.coordinates) :]
-
-
-def tip_chain(poses: Poses, motion: Kinematics, tip: str, y: Floats) -> TipChain:
-    """The chain that carries the node ``tip`` ("link.end"), at design y, for inverse kinematics."""
-    link, node = split(tip)
-    position = poses._compile(list(poses._world(link, node)))
-    velocity = poses._compile(poses._velocity(link, node))
-    d = 2 if poses.case.mechanism.space == "planar" else 3
-    n_q = len(motion.offset)
-    names = [c.joint for c in poses.case.coordinates.values()]
-
-    def at(q: Floats) -> Floats:
-        return np.hstack([q, np.broadcast_to(y, (len(q), len(y)))])
-
-    return TipChain(
-        position=lambda q: poses._evaluate(position, at(q))[:, :d],
-        jacobian=lambda q: poses._evaluate(velocity, at(q)).reshape(-1, 3, n_q)[:, :d],
-        joints=tuple(names),
-        relative_map=(motion.relative, motion.offset),
-    )

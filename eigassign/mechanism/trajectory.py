@@ -14,8 +14,10 @@ from numpy.typing import ArrayLike
 
 from eigassign.case import FileTrajectory, PointTrajectory, SampledTrajectory, TipTrajectory
 from eigassign.errors import MechanismError, TrajectoryError
+from eigassign.mechanism.attitudes import planar_attitude, spatial_attitude
+from eigassign.mechanism.course import Course
 from eigassign.mechanism.inverse_kinematics import follow
-from eigassign.mechanism.paths import WAYPOINTS, Course, Path, spline, straight
+from eigassign.mechanism.paths import WAYPOINTS, Path, spline, straight
 from eigassign.mechanism.point_to_point import point_to_point, shared_times
 from eigassign.mechanism.timing import timing_law
 from eigassign.mechanism.tip_chain import Floats, TipChain
@@ -43,13 +45,14 @@ class Trajectory:
 def build_trajectory(
     spec: SampledTrajectory | FileTrajectory | PointTrajectory | TipTrajectory,
     q_names: Sequence[str],
-    tip_chain: Callable[[str], TipChain],
+    tip_chain: Callable[[str, bool], TipChain],
     folder: FilePath = FilePath(),
     q_units: Sequence[str] = (),
 ) -> Trajectory:
     """The trajectory that a case asks for, in the coordinates ``q_names``.
 
-    ``tip_chain(node)`` gives the chain of a tip path's node and is called for nothing else;
+    ``tip_chain(node, oriented)`` gives the chain of a tip path's node, its turning looked at if
+    oriented, and is called for nothing else;
     ``folder`` is what the name of a CSV file is relative to; ``q_units`` are "rad" or "m" for each
     coordinate, all rad if empty. Raises MechanismError for what is
     wrong as a whole, TrajectoryError for what is wrong with one sample.
@@ -64,26 +67,26 @@ def build_trajectory(
 
 
 def _from_tip_path(
-    spec: TipTrajectory, q_names: Sequence[str], tip_chain: Callable[[str], TipChain]
+    spec: TipTrajectory, q_names: Sequence[str], tip_chain: Callable[[str, bool], TipChain]
 ) -> Trajectory:
-    """q(t) with tip(q(t)) = p(s(t/T)) at equal steps in time."""
-    for key in ("angle", "orientation"):
-        if getattr(spec, key) is not None:
-            raise MechanismError(f"trajectory.{key}", "tip paths have positions only")
-    path, chain = _PATHS[spec.path](spec.waypoints), tip_chain(spec.tip)
-    _check_dimension(chain, path, len(q_names))
+    """q(t) with tip(q(t)) = p(s(t/T)), turned as asked for, at equal steps in time."""
+    path, attitude = _PATHS[spec.path](spec.waypoints), None
+    if spec.angle is not None:
+        attitude = planar_attitude(path, spec.angle, spec.path)
+    elif spec.orientation is not None:
+        attitude = spatial_attitude(path, spec.orientation, spec.path)
+    chain = tip_chain(spec.tip, attitude is not None)
+    _check_dimension(chain, path)
     tau = np.linspace(0.0, 1.0, spec.samples)
-    s = np.clip(
-        timing_law(spec.timing, spec.acceleration_share).position(tau), 0.0, 1.0
-    )  # round-off at the ends
-    course = Course(path, np.maximum.accumulate(s), spec.duration * tau)
+    s = timing_law(spec.timing, spec.acceleration_share).position(tau)
+    s = np.maximum.accumulate(np.clip(s, 0.0, 1.0))  # round-off at the ends
+    course = Course(path, s, spec.duration * tau, attitude)
     followed = follow(chain, course, spec.branch, spec.start)
-    tip = chain.position(followed.q)
-    return Trajectory(course.time_s, followed.q, tip, followed.notes)
+    return Trajectory(course.time_s, followed.q, followed.tip, followed.notes)
 
 
-def _check_dimension(chain: TipChain, path: Path, n_q: int) -> None:
-    d = chain.position(np.zeros((1, n_q))).shape[1]
+def _check_dimension(chain: TipChain, path: Path) -> None:
+    d = chain.look(np.zeros((1, len(chain.kinds)))).point.shape[1]
     if path.coefficients.shape[2] != d:
         raise MechanismError(WAYPOINTS, f"the tip moves in {d} dimensions: give {d} coordinates")
 

@@ -4,25 +4,37 @@ from __future__ import annotations
 
 import numpy as np
 
-from eigassign.mechanism.tip_chain import TipChain
+from eigassign.mechanism.tip_chain import Look, TipChain
+
+NAMES = ("shoulder", "elbow", "wrist", "j4", "j5", "j6")
 
 
-def serial_arm(*lengths: float, absolute: bool = True) -> TipChain:
+def serial_arm(*lengths: float, absolute: bool = True, oriented: bool = False) -> TipChain:
     """Links of the given lengths; q are absolute link angles, or angles between the links."""
     L, n = np.array(lengths), len(lengths)
     to_absolute = np.eye(n) if absolute else np.tril(np.ones((n, n)))
 
-    def position(q: np.ndarray) -> np.ndarray:
+    def look(q: np.ndarray) -> Look:
         a = q @ to_absolute.T
-        return np.stack([np.cos(a) @ L, np.sin(a) @ L], axis=1)
-
-    def jacobian(q: np.ndarray) -> np.ndarray:
-        a = q @ to_absolute.T
-        return np.stack([(-np.sin(a) * L) @ to_absolute, (np.cos(a) * L) @ to_absolute], axis=1)
+        c, s = np.cos(a), np.sin(a)
+        J = [(-s * L) @ to_absolute, (c * L) @ to_absolute]
+        R = None
+        if oriented:
+            R = np.zeros((len(q), 3, 3))
+            R[:, 0, 0] = R[:, 1, 1] = c[:, -1]
+            R[:, 1, 0], R[:, 0, 1], R[:, 2, 2] = s[:, -1], -s[:, -1], 1.0
+            J.append(np.broadcast_to(to_absolute[-1], q.shape))
+        return open_look(np.stack([c @ L, s @ L], axis=1), np.stack(J, axis=1), R)
 
     relative = np.eye(n) - np.eye(n, k=-1) if absolute else np.eye(n)
-    names = ("shoulder", "elbow", "wrist", "j4", "j5", "j6")[:n]
-    return TipChain(position, jacobian, names, (relative, np.zeros(n)))
+    turned_by = (2,) if oriented else ()
+    return TipChain(look, NAMES[:n], (relative, np.zeros(n)), ("turn",) * n, turned_by)
+
+
+def open_look(point: np.ndarray, J: np.ndarray, R: np.ndarray | None = None) -> Look:
+    """What a chain without loops shows."""
+    n = len(point)
+    return Look(point, R, J, np.zeros((n, 0)), np.zeros((n, 0, J.shape[2])))
 
 
 def two_link_angles(points: np.ndarray, l1: float, l2: float, sign: float) -> np.ndarray:

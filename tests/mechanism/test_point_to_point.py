@@ -15,7 +15,7 @@ POINTS = ((0.0, 0.2), (1.0, 0.2), (0.5, 0.6), (0.5, 0.7))
 
 
 def motion(**changes: object) -> object:
-    def no_chain(node: str) -> object:
+    def no_chain(node: str, oriented: bool) -> object:
         raise AssertionError("points in the joints need no kinematics")
 
     keys = {"points": POINTS, "duration": 4.0, "samples": 401}

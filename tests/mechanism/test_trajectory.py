@@ -15,12 +15,12 @@ Q = ("q1", "q2")
 PAPER = ((0.33, 0.12), (0.30, 0.19), (0.108, 0.2104), (0.02, 0.1845), (-0.01, 0.19))
 
 
-def arm(node: str) -> TipChain:
+def arm(node: str, oriented: bool) -> TipChain:
     assert node == "forearm.end"
-    return serial_arm(0.6, 0.45)
+    return serial_arm(0.6, 0.45, oriented=oriented)
 
 
-def no_arm(node: str) -> TipChain:
+def no_arm(node: str, oriented: bool) -> TipChain:
     raise AssertionError("joint samples need no kinematics")
 
 

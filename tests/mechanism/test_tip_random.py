@@ -1,0 +1,102 @@
+"""Random mechanisms follow random tip paths, judged by an independent oracle."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from spatial_cases import built
+from spatial_oracle import Tree
+from spatial_random import Random, random_closed, random_open
+from test_tip_motion import last_node
+from tip_paths import between, chain_of, course, states, tips
+
+from eigassign.mechanism.arm import reduced
+from eigassign.mechanism.inverse_kinematics import follow
+
+SIZE = 1e-9  # of the path's size: a tip on its path
+
+
+def regularity(tree: Tree, q: np.ndarray, oriented: bool) -> float:
+    """The smallest singular value of J at q, in m and rad; 0 if the tip cannot move every way."""
+    chain = chain_of(built(tree), last_node(tree), oriented)
+    J = reduced(chain.look(states(chain, q)), chain.n_q).J[0]
+    s = np.linalg.svd(J, compute_uv=False)
+    return float(s[-1]) if len(s) == J.shape[0] else 0.0
+
+
+def arm_on(tree: Tree, q: np.ndarray, rng: Random, count: int) -> tuple[Tree, np.ndarray]:
+    """The mechanism with ``count`` more links, one on the other, on turning or sliding joints."""
+    tree = copy.deepcopy(tree)
+    m, values = tree["mechanism"], [*q]
+    space = m["space"]
+    for k in range(count):
+        node, link = last_node(tree), f"arm{k}"
+        end = [0.4, *rng.uniform(-0.1, 0.1, 1 if space == "planar" else 2)]
+        mass = {"mass": 1.0, "inertia": 0.1 if space == "planar" else [0.1, 0.1, 0.1]}
+        m["links"][link] = {"type": "rigid", "nodes": {"end": end}, **mass}
+        slides = rng.random() < 0.2
+        joint = {"type": "prismatic" if slides else "revolute", "base": node}
+        if space == "spatial" or slides:
+            joint["axis"] = rng.normal(size=2 if space == "planar" else 3).tolist()
+        m["joints"][f"arm{k}"] = joint | {"follower": f"{link}.start"}
+        tree["coordinates"][f"arm{k}"] = {"joint": f"arm{k}"}
+        values.append(float(rng.uniform(-0.2, 0.2) if slides else rng.uniform(-1.2, 1.2)))
+    return tree, np.array(values)
+
+
+def mechanism(seed: int, space: str, oriented: bool, closed: bool) -> tuple[Tree, np.ndarray]:
+    """A random mechanism whose tip, on an arm it carries, can be moved every way."""
+    wanted = {"planar": 2 + oriented, "spatial": 3 + 3 * oriented}[space]
+    tree, q = random_closed(seed, space)[:2] if closed else random_open(seed, space)
+    for attempt in range(20):
+        rng = np.random.default_rng([seed, attempt])
+        longer = arm_on(tree, q, rng, wanted - 1 + attempt // 4)
+        if regularity(*longer, oriented) > 0.1:
+            return longer
+    raise AssertionError("no mechanism found")
+
+
+@pytest.mark.parametrize("oriented", [False, True])
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+@pytest.mark.parametrize("seed", range(8))
+def test_open_chains_stay_on_their_paths(seed: int, space: str, oriented: bool) -> None:
+    follow_and_judge(*mechanism(seed, space, oriented, closed=False), seed, oriented)
+
+
+@pytest.mark.parametrize("oriented", [False, True])
+@pytest.mark.parametrize(
+    ("seed", "space"), [(0, "planar"), (1, "planar"), (2, "planar"), (1, "spatial")]
+)
+def test_mechanisms_with_loops_stay_on_their_paths(seed: int, space: str, oriented: bool) -> None:
+    follow_and_judge(*mechanism(seed, space, oriented, closed=True), seed, oriented)
+
+
+def follow_and_judge(tree: Tree, q: np.ndarray, seed: int, oriented: bool) -> None:
+    """From the tip's place at q along a short bent path, turning a little if oriented."""
+    tip, rng = last_node(tree), np.random.default_rng(seed)
+    chain = chain_of(built(tree), tip, oriented)
+    seen = chain.look(states(chain, q))
+    d = seen.point.shape[1]
+    far = min(0.02, 0.1 * regularity(tree, q, oriented) ** 2)  # within reach, to second order
+    points = seen.point + np.vstack([np.zeros(d), rng.uniform(-far, far, (2, d))])
+    wish = {}
+    if oriented and d == 2:
+        angle = np.arctan2(seen.rotation[0, 1, 0], seen.rotation[0, 0, 0])
+        wish["angle"] = angle + np.array([0.0, *rng.uniform(-far, far, 2)])
+    elif oriented:
+        turns = Rotation.from_rotvec(np.vstack([np.zeros(3), rng.uniform(-far, far, (2, 3))]))
+        wish["orientation"] = (turns * Rotation.from_matrix(seen.rotation)).as_euler("xyz")
+    due = course(points, 9, "spline", **wish)
+    followed = follow(chain, due, start=q)
+    np.testing.assert_allclose(followed.q[0], q, atol=1e-6)  # it starts where it was told to
+    place, R = tips(tree, followed.q, tip)
+    target = due.target(due.s)
+    # the oracle closes its loops to 1e-10 and this is its error, too
+    assert np.abs(place[:, :d] - target.point).max() < SIZE * max(1.0, due.size)
+    if oriented:
+        assert between(target.rotation, R).max() < 1e-8  # the angle of a cosine near 1
+    steps = np.abs(np.diff(followed.q, axis=0)).max(axis=0)
+    assert (steps < 0.3 * np.maximum(1.0, np.abs(followed.q).max(axis=0))).all()  # no jump
