@@ -12,6 +12,7 @@ from eigassign.case.document import Document
 from eigassign.case.freedoms import freedom_of
 from eigassign.case.mechanism_parts import Coordinate, Mechanism
 from eigassign.case.study_parts import Design, Expansion, Target, Validation
+from eigassign.case.trajectory_list import named_trajectories
 from eigassign.case.trajectory_parts import Trajectory
 from eigassign.case.yaml_reader import KeyPath, Mark, dotted
 from eigassign.errors import Problem
@@ -31,7 +32,7 @@ class CaseFile:
     reference: str | None
     mechanism: Mechanism
     coordinates: Mapping[str, Coordinate]
-    trajectory: Trajectory | None
+    trajectory: Trajectory | tuple[Trajectory, ...] | None
     design: Design
     expansion: Expansion
     targets: tuple[Target, ...]
@@ -60,6 +61,12 @@ class CaseFile:
         joints = self.mechanism.joints
         moved = (freedom_of(joints[c.joint].type, c.component) for c in self.coordinates.values())
         return tuple("m" if freedom == "translation" else "rad" for freedom in moved)
+
+    @property
+    def trajectories(self) -> tuple[tuple[str, str, Trajectory], ...]:
+        """Key path, name ("1", "2", … where the file gives none) and content of each trajectory."""
+        named = named_trajectories(self.trajectory)
+        return tuple((dotted(path), name, trajectory) for path, name, trajectory in named)
 
     def resolved(self) -> str:
         """The case as canonical YAML: SI values, defaults filled in; reads back equal."""

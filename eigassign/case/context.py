@@ -14,7 +14,7 @@ from eigassign.case.mechanism_context import coordinates, found, mechanism
 from eigassign.case.properties import NoPropertyError, Property, find
 from eigassign.case.quantity import Quantity
 from eigassign.case.si import si
-from eigassign.case.tree import Tree, at, items, names, parameters, text
+from eigassign.case.tree import Tree, at, items, names, parameters, text, trajectories
 from eigassign.case.yaml_reader import Finding, KeyPath
 
 
@@ -26,7 +26,8 @@ def in_context(tree: Tree, folder: Path) -> tuple[Tree, list[Finding]]:
     if isinstance(at(tree, "design"), Mapping):
         changed["design"] = _design(tree, properties, findings)
     _convert(changed, "expansion", _expansion(tree, properties, findings))
-    _convert(changed, "trajectory", _trajectory(tree, folder, findings))
+    if "trajectory" in tree:
+        changed["trajectory"] = _trajectories(tree, folder, findings)
     _convert(changed, "validation", {"q_span": _span(tree, findings)})
     _convert(changed, "mechanism", mechanism(tree, folder, findings))
     if isinstance(at(tree, "coordinates"), Mapping):
@@ -128,22 +129,29 @@ def _span(tree: Tree, findings: list[Finding]) -> object:
     return _coordinates(si(span, _common(kinds), path, findings), kinds, path, findings)
 
 
-def _trajectory(tree: Tree, folder: Path, findings: list[Finding]) -> dict[str, object]:
-    body, kinds = at(tree, "trajectory"), coordinate_quantities(tree)
-    changed = {
-        k: _coordinates(at(body, k), kinds, ("trajectory", k), findings)
-        for k in ("q", "points", "start")
-    }
+def _trajectories(tree: Tree, folder: Path, findings: list[Finding]) -> object:
+    converted = tuple(
+        _trajectory(tree, body, path, folder, findings) for path, body in trajectories(tree)
+    )
+    return converted if isinstance(tree["trajectory"], tuple) else next(iter(converted), None)
+
+
+def _trajectory(
+    tree: Tree, body: object, path: KeyPath, folder: Path, findings: list[Finding]
+) -> object:
+    if not isinstance(body, Mapping):
+        return body
+    kinds, changed = coordinate_quantities(tree), dict(body)
+    for k in {"q", "points", "start"} & set(body):
+        changed[k] = _coordinates(body[k], kinds, (*path, k), findings)
     if isinstance(at(body, "branch"), Mapping):
         changed["branch"] = {
-            joint: _coordinates(
-                limits, _range(tree, joint), ("trajectory", "branch", joint), findings
-            )
+            joint: _coordinates(limits, _range(tree, joint), (*path, "branch", joint), findings)
             for joint, limits in items(body, "branch")
         }
     file = text(body, "file")
     if file is not None and at(body, "tip") is None:
-        changed["file"] = found(file, folder, ("trajectory", "file"), findings)
+        changed["file"] = found(file, folder, (*path, "file"), findings)
     return changed
 
 

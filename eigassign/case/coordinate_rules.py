@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from eigassign.case.freedoms import FREEDOMS, freedoms
 from eigassign.case.suggest import listed, shown, unknown
 from eigassign.case.topology import has_loops
-from eigassign.case.tree import Tree, at, entries, items, lacks, names, text
+from eigassign.case.tree import Tree, at, entries, items, lacks, names, text, trajectories
 from eigassign.case.units import QuantityError
 from eigassign.case.vectors import ANGLE
 from eigassign.case.yaml_reader import Finding, KeyPath
@@ -104,22 +104,25 @@ def one_for_each(value: object, path: KeyPath, kind: str, known: list[str]) -> l
 def per_coordinate(tree: Tree) -> Iterator[Finding]:
     """Lists with one entry for each coordinate."""
     q = names(tree, "coordinates")
-    for key in ("q", "points"):
-        for k, row in enumerate(entries(tree, "trajectory", key)):
-            yield from one_for_each(row, ("trajectory", key, k), "coordinate", q)
-    for path in (("trajectory", "start"), ("validation", "q_span"), ("expansion", "q")):
-        yield from one_for_each(at(tree, *path), path, "coordinate", q)
+    for path, body in trajectories(tree):
+        for key in ("q", "points"):
+            for k, row in enumerate(entries(body, key)):
+                yield from one_for_each(row, (*path, key, k), "coordinate", q)
+        yield from one_for_each(at(body, "start"), (*path, "start"), "coordinate", q)
+    for place in (("validation", "q_span"), ("expansion", "q")):
+        yield from one_for_each(at(tree, *place), place, "coordinate", q)
 
 
 def branches(tree: Tree) -> Iterator[Finding]:
     """Ranges of joints that keep a tip path in its branch."""
     ranged = [name for name in moving(tree) if len(freedoms(tree, name) or ()) == 1]
-    for joint, limits in items(tree, "trajectory", "branch"):
-        path: KeyPath = ("trajectory", "branch", joint)
-        if joint not in ranged:
-            yield path, unknown("joint with one freedom", joint, ranged)
-        elif _repeats(tree, joint) and _width(limits) > 2 * math.pi:
-            yield path, "wider than one turn (an angle is in rad when bare; or write deg)"
+    for place, body in trajectories(tree):
+        for joint, limits in items(body, "branch"):
+            path: KeyPath = (*place, "branch", joint)
+            if joint not in ranged:
+                yield path, unknown("joint with one freedom", joint, ranged)
+            elif _repeats(tree, joint) and _width(limits) > 2 * math.pi:
+                yield path, "wider than one turn (an angle is in rad when bare; or write deg)"
 
 
 def _repeats(tree: Tree, joint: str) -> bool:

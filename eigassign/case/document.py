@@ -20,12 +20,12 @@ from eigassign.case.study_parts import (
     Validation,
 )
 from eigassign.case.suggest import listed, shown, suggestion, unknown
+from eigassign.case.trajectory_list import Trajectories
 from eigassign.case.trajectory_parts import (
     FileTrajectory,
     PointTrajectory,
     SampledTrajectory,
     TipTrajectory,
-    Trajectory,
 )
 from eigassign.case.yaml_reader import Finding, KeyPath
 
@@ -37,7 +37,7 @@ class Document(Part):
     reference: Annotated[str, Field(max_length=1000)] | None = None
     mechanism: Mechanism
     coordinates: Annotated[Mapping[str, Coordinate], Frozen] = FrozenDict()
-    trajectory: Trajectory | None = None
+    trajectory: Trajectories | None = None
     design: Design = Design.model_construct()
     expansion: Expansion = Expansion.model_construct()
     targets: tuple[Target, ...] = ()
@@ -113,6 +113,8 @@ def _model_at(loc: Any) -> type[Part]:
             in_container = False
         elif item in _TAGGED:
             model = _TAGGED[item]
+        elif item in _LEAF_TAGS:
+            in_container = item == "<list>"
         else:
             annotation = keys_of(model)[item].annotation
             in_container = get_origin(annotation) in (Mapping, tuple)

@@ -14,7 +14,13 @@ from eigassign.case.freedoms import freedom_of
 from eigassign.case.mechanism_parts import Coordinate, Mechanism
 from eigassign.case.plausible_parts import implausible_parts, outside
 from eigassign.case.study_parts import FrequencyProfile
-from eigassign.case.trajectory_parts import PointTrajectory, SampledTrajectory, TipTrajectory
+from eigassign.case.trajectory_list import named_trajectories
+from eigassign.case.trajectory_parts import (
+    PointTrajectory,
+    SampledTrajectory,
+    TipTrajectory,
+    Trajectory,
+)
 from eigassign.case.yaml_reader import Finding, KeyPath
 
 LARGEST_ANGLE = 4 * math.pi  # rad: two turns; a bare 30 was meant in degrees
@@ -36,21 +42,25 @@ def _angles(document: Document) -> Iterator[Finding]:
         yield from _turned(turn, ("mechanism", "joints", name, "orientation"))
     if document.expansion.q != "auto":
         yield from _turned(_angular(document, document.expansion.q), ("expansion", "q"))
-    motion = document.trajectory
+    for path, _, motion in named_trajectories(document.trajectory):
+        yield from _along(document, motion, path)
+
+
+def _along(document: Document, motion: Trajectory, path: KeyPath) -> Iterator[Finding]:
     if isinstance(motion, SampledTrajectory):
         samples = (v for row in motion.q for v in _angular(document, row))
-        yield from _turned(samples, ("trajectory", "q"))
+        yield from _turned(samples, (*path, "q"))
     if isinstance(motion, PointTrajectory):
         points = (v for row in motion.points for v in _angular(document, row))
-        yield from _turned(points, ("trajectory", "points"))
+        yield from _turned(points, (*path, "points"))
     if isinstance(motion, TipTrajectory):
-        yield from _turned(_flat(motion.angle), ("trajectory", "angle"))
-        yield from _turned(_flat(motion.orientation), ("trajectory", "orientation"))
+        yield from _turned(_flat(motion.angle), (*path, "angle"))
+        yield from _turned(_flat(motion.orientation), (*path, "orientation"))
         if motion.start is not None:
-            yield from _turned(_angular(document, motion.start), ("trajectory", "start"))
+            yield from _turned(_angular(document, motion.start), (*path, "start"))
         for name, interval in motion.branch.items():
             if document.mechanism.joints[name].type == "revolute":
-                yield from _turned(interval, ("trajectory", "branch", name))
+                yield from _turned(interval, (*path, "branch", name))
 
 
 def _angular(document: Document, q: Sequence[float]) -> list[float]:

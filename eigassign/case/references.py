@@ -21,10 +21,24 @@ from eigassign.case.space_rules import misfits
 from eigassign.case.suggest import shown, unknown
 from eigassign.case.timing import uncovered
 from eigassign.case.topology import topology
-from eigassign.case.tree import Tree, at, entries, items, names, parameters, text
+from eigassign.case.tree import (
+    Tree,
+    at,
+    entries,
+    items,
+    names,
+    parameters,
+    text,
+    trajectories,
+    trajectory_names,
+)
 from eigassign.case.yaml_reader import Finding, KeyPath
 
 _NAME = re.compile(r"[^\W\d][\w-]{0,63}")
+_UNUSABLE = (
+    "not a usable name: names start with a letter and hold letters, digits, _ and - only "
+    "(at most 64)"
+)
 _MOST_NAMED = 1000
 _MOST_INSIDE = 10_000  # nodes or beams of one frame
 _NAMED = (
@@ -42,6 +56,7 @@ def inconsistent(tree: Tree) -> Iterator[Finding]:
     """Everything that does not fit together."""
     yield from empty(tree)
     yield from _names(tree)
+    yield from _names_of_trajectories(tree)
     yield from _titles(tree)
     yield from misfits(tree)
     yield from links(tree)
@@ -81,16 +96,33 @@ def empty(node: object, path: KeyPath = ()) -> Iterator[Finding]:
 
 
 def _names(tree: Tree) -> Iterator[Finding]:
-    rule = "names start with a letter and hold letters, digits, _ and - only (at most 64)"
     for place in (*_NAMED, *_inside_links(tree)):
         for name in names(tree, *place):
             if not _NAME.fullmatch(name):
-                yield (*place, name), f"not a usable name: {rule}"
+                yield (*place, name), _UNUSABLE
     if "ground" in names(tree, "mechanism", "links"):
         yield (
             ("mechanism", "links", "ground"),
             "'ground' is the fixed frame: name the link otherwise",
         )
+
+
+def _names_of_trajectories(tree: Tree) -> Iterator[Finding]:
+    """Each is the only one of its name: it names files, and some file systems ignore case."""
+    seen: dict[str, str] = {}
+    for path, body in trajectories(tree):
+        name = text(body, "name")
+        if name is None:
+            continue
+        if not _NAME.fullmatch(name):
+            yield (*path, "name"), _UNUSABLE
+        elif name.casefold() in seen:
+            same = seen[name.casefold()]
+            hint = (
+                "" if same == name else f" (as {same!r}: they name files, where case may be lost)"
+            )
+            yield (*path, "name"), f"a trajectory has this name already{hint}"
+        seen.setdefault(name.casefold(), name)
 
 
 def _inside_links(tree: Tree) -> list[tuple[str, ...]]:
@@ -110,7 +142,8 @@ def _on_nodes(tree: Tree) -> Iterator[Finding]:
         yield from _node(tree, text(body, "at"), ("mechanism", "bodies", name, "at"))
     for name, spring in items(tree, "mechanism", "springs"):
         yield from _spring(tree, spring, ("mechanism", "springs", name))
-    yield from _node(tree, text(tree, "trajectory", "tip"), ("trajectory", "tip"))
+    for path, body in trajectories(tree):
+        yield from _node(tree, text(body, "tip"), (*path, "tip"))
 
 
 def _node(tree: Tree, place: str | None, path: KeyPath) -> Iterator[Finding]:
@@ -165,14 +198,19 @@ def _expansion(tree: Tree) -> Iterator[Finding]:
 
 def _targets(tree: Tree) -> Iterator[Finding]:
     expanded = entries(tree, "expansion", "modes")
-    seen: set[int] = set()
+    known, seen = trajectory_names(tree), set[tuple[int, str]]()
     for k, target in enumerate(entries(tree, "targets")):
-        mode = at(target, "mode")
+        mode, where = at(target, "mode"), text(target, "trajectory")
         path: KeyPath = ("targets", k, "mode")
+        if where is not None and where not in known:
+            yield ("targets", k, "trajectory"), unknown("trajectory", where, known)
+            continue
         if not isinstance(mode, int) or mode < 1:
             continue
-        if mode in seen:
-            yield path, f"mode {mode} has a target already"
+        held = {(mode, name) for name in ([where] if where else known or [""])}
+        if both := sorted(name for _, name in held & seen):
+            along = f" along trajectory {both[0]!r}" if len(known) > 1 else ""
+            yield path, f"mode {mode} has a target already{along}"
         elif expanded and mode not in expanded:
             yield path, f"mode {mode} is not among expansion.modes: add it there, or leave it auto"
-        seen.add(mode)
+        seen |= held

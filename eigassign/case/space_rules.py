@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from eigassign.case.freedoms import FREEDOMS, PLANAR
 from eigassign.case.suggest import listed
-from eigassign.case.tree import Tree, at, entries, items, text
+from eigassign.case.tree import Tree, at, entries, items, text, trajectories
 from eigassign.case.yaml_reader import Finding, KeyPath
 
 _AXES = {"planar": "x, y", "spatial": "x, y, z"}
@@ -56,8 +56,9 @@ def _vectors(tree: Tree) -> Iterator[tuple[KeyPath, object]]:
             yield inner, place if nested is None else nested
     for name, body in items(tree, "mechanism", "bodies"):
         yield ("mechanism", "bodies", name, "offset"), at(body, "offset")
-    for k, point in enumerate(entries(tree, "trajectory", "waypoints")):
-        yield ("trajectory", "waypoints", k), point
+    for place, body in trajectories(tree):
+        for k, point in enumerate(entries(body, "waypoints")):
+            yield (*place, "waypoints", k), point
 
 
 def _joint(joint: object, path: KeyPath, space: str) -> Iterator[Finding]:

@@ -99,7 +99,10 @@ def _frequency_tag(value: object) -> str:
 
 
 class Target(Part):
-    """Wanted frequency (Hz) of one elastic mode (1 is the lowest), and its weight."""
+    """Wanted frequency (Hz) of one elastic mode (1 is the lowest), and its weight.
+
+    It holds along every trajectory, or along the one that `trajectory` names.
+    """
 
     mode: Mode
     frequency: Annotated[
@@ -108,6 +111,7 @@ class Target(Part):
         Discriminator(_frequency_tag),
     ]
     weight: Annotated[float, Quantity(above=0)] = 1.0
+    trajectory: str | None = None
 
 
 class Validation(Part):

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from eigassign.case.quantity import Quantity
 from eigassign.case.trajectory_parts import DURATION, TIME, TipTrajectory
-from eigassign.case.tree import Tree, at, entries
+from eigassign.case.tree import Tree, at, entries, text, trajectories, trajectory_names
 from eigassign.case.units import QuantityError
 from eigassign.case.yaml_reader import Finding
 
@@ -15,18 +15,27 @@ _SLACK = 1e-9  # of the duration: rounding of the ends, far below a sampling ste
 
 def uncovered(tree: Tree) -> Iterator[Finding]:
     """Targets whose profile does not reach both ends of the trajectory."""
-    motion = _span_of_motion(at(tree, "trajectory"))
     for k, target in enumerate(entries(tree, "targets")):
         span = _span(at(target, "frequency"))
-        if motion is None or span is None:
-            continue
-        slack = _SLACK * (motion[1] - motion[0])
-        if span[0] > motion[0] + slack or span[1] < motion[1] - slack:
-            yield (
-                ("targets", k, "frequency", "time"),
-                f"covers {span[0]:g} … {span[1]:g} s only; "
-                f"the trajectory lasts from {motion[0]:g} to {motion[1]:g} s",
-            )
+        for which, motion in _motions(tree, text(target, "trajectory")):
+            if span is None:
+                continue
+            slack = _SLACK * (motion[1] - motion[0])
+            if span[0] > motion[0] + slack or span[1] < motion[1] - slack:
+                yield (
+                    ("targets", k, "frequency", "time"),
+                    f"covers {span[0]:g} … {span[1]:g} s only; "
+                    f"{which} lasts from {motion[0]:g} to {motion[1]:g} s",
+                )
+
+
+def _motions(tree: Tree, wanted: str | None) -> Iterator[tuple[str, tuple[float, float]]]:
+    """What to call each trajectory that a target holds along, and its first and last time."""
+    several = len(trajectories(tree)) > 1
+    for name, (_, body) in zip(trajectory_names(tree), trajectories(tree), strict=True):
+        span = _span_of_motion(body)
+        if span is not None and wanted in (None, name):
+            yield f"trajectory {name!r}" if several else "the trajectory", span
 
 
 def _span_of_motion(trajectory: object) -> tuple[float, float] | None:

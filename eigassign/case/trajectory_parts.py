@@ -35,7 +35,17 @@ def _one_or_many(value: object) -> str:
     return "<list>" if nested else "<one>"
 
 
-class SampledTrajectory(Part):
+class Named(Part):
+    """What every trajectory may have: a `name`, and what each of its seconds weighs beside others.
+
+    Without a name it is called by its place: "1", "2", …
+    """
+
+    name: str | None = None
+    weight: Annotated[float, Quantity(above=0)] = 1.0
+
+
+class SampledTrajectory(Named):
     """Joint samples: q (n_samples, n_q); `time` (s), or `duration` (s) for equal steps from 0."""
 
     q: Annotated[tuple[Coordinates, ...], Field(min_length=2)]
@@ -52,13 +62,13 @@ class SampledTrajectory(Part):
         return self
 
 
-class FileTrajectory(Part):
+class FileTrajectory(Named):
     """Joint samples in a CSV file: columns `time` (s) and one per coordinate (rad, or [deg])."""
 
     file: str
 
 
-class Timed(Part):
+class Timed(Named):
     """What moves by a timing law: from rest to rest, but for `linear`, in equal steps of time."""
 
     timing: Timing = "quintic"

@@ -44,6 +44,20 @@ def text(node: object, *keys: str) -> str | None:
     return inner if isinstance(inner, str) else None
 
 
+def trajectories(tree: object) -> list[tuple[tuple[str | int, ...], object]]:
+    """Key path and content of each trajectory: the one below `trajectory`, or those of the list."""
+    given = at(tree, "trajectory")
+    if isinstance(given, tuple):
+        return [(("trajectory", k), body) for k, body in enumerate(given)]
+    return [] if given is None else [(("trajectory",), given)]
+
+
+def trajectory_names(tree: object) -> list[str]:
+    """What each trajectory is called: its name, or its place counted from 1."""
+    bodies = [body for _, body in trajectories(tree)]
+    return [text(body, "name") or str(k) for k, body in enumerate(bodies, start=1)]
+
+
 def parameters(tree: object) -> list[tuple[str, object]]:
     """Design parameters as the file has them: what stands under `design` but the constraints."""
     return [(name, body) for name, body in items(tree, "design") if name != "constraints"]
