@@ -37,8 +37,9 @@ class CheckAnswer:
     n_rigid: int
     q_names: tuple[str, ...]
     y_names: tuple[str, ...]
-    samples: int  # of the trajectory, 0 without one
+    samples: int  # of all trajectories, 0 without one
     duration_s: float
+    trajectories: tuple[tuple[str, int, float], ...]  # of each its name, samples and duration
     targets: int
     notes: tuple[str, ...]
     warnings: tuple[Problem, ...]
@@ -97,8 +98,10 @@ def check(path: str | Path) -> CheckAnswer:
     file, model = case.file, case.model()
     trajectory = case.trajectory if file.trajectory is not None else None
     notes = () if trajectory is None else trajectory.notes
+    parts = () if trajectory is None else trajectory.parts
+    each = tuple((p.name, len(p.trajectory.q), float(np.ptp(p.trajectory.time_s))) for p in parts)
     if trajectory is not None:
-        target_frequencies(file, trajectory.time_s)
+        target_frequencies(file, trajectory)
     if trajectory is not None or file.expansion.q != "auto":
         notes += plan_expansion(file, model, trajectory).notes
     _require_regular(case, trajectory.q[:1] if trajectory is not None else None)
@@ -108,8 +111,9 @@ def check(path: str | Path) -> CheckAnswer:
         n_rigid=model.n_rigid,
         q_names=model.q_names,
         y_names=model.y_names,
-        samples=0 if trajectory is None else len(trajectory.time_s),
-        duration_s=0.0 if trajectory is None else float(np.ptp(trajectory.time_s)),
+        samples=sum(samples for _, samples, _ in each),
+        duration_s=float(sum(duration for *_, duration in each)),
+        trajectories=each,
         targets=len(file.targets),
         notes=tuple(notes),
         warnings=file.warnings,

@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.case import CaseFile, TipTrajectory, load
+from eigassign.case import Trajectory as TrajectoryKeys
 from eigassign.errors import CaseError, MechanismError
 from eigassign.mechanism.build import build_pencil, with_elements
 from eigassign.mechanism.kinematics import kinematics
 from eigassign.mechanism.parameters import initial_design, parameters
 from eigassign.mechanism.poses import build_poses, design_dependence
 from eigassign.mechanism.tip_motion import tip_chain
+from eigassign.mechanism.trajectories import NamedTrajectory, Trajectories
 from eigassign.mechanism.trajectory import Trajectory, build_trajectory
 from eigassign.modal import expansion as modal_expansion
 from eigassign.modal import reduced as modal_reduced
@@ -87,7 +89,7 @@ class Case:
         if None not in wanted.values():
             return None
         trial = self._meshed({name: 2 for name, n in wanted.items() if n is None})
-        path = None if self.file.trajectory is None else self._path(trial)
+        path = self._path(trial) if self.file.trajectories else None
         given = self.file.expansion.q
         q0 = np.zeros(len(trial.q_names)) if given == "auto" else np.array(given, dtype=float)
         x = looked_at(self.file, trial, path, q0, self.initial_design)
@@ -115,18 +117,35 @@ class Case:
         return mesh_error(lambda e: model if e == fixed else self._meshed(e), fixed, x, modes)
 
     @cached_property
-    def trajectory(self) -> Trajectory:
-        """q(t); raises CaseError where the case has none or it cannot be followed."""
+    def trajectory(self) -> Trajectories:
+        """q(t), of several trajectories all samples one after the other.
+
+        Raises CaseError where the case has none or one cannot be followed.
+        """
         return self._path(self.model())
 
-    def _path(self, model: Model) -> Trajectory:
-        spec = self.file.trajectory
-        if spec is None:
+    @property
+    def trajectories(self) -> tuple[NamedTrajectory, ...]:
+        """Each trajectory by itself: ``(name, trajectory, weight)``."""
+        return self.trajectory.parts
+
+    def _path(self, model: Model) -> Trajectories:
+        given = self.file.trajectories
+        if not given:
             raise CaseError((self.file.problem("trajectory", "is needed here and missing"),))
-        with self.located():
-            self._refuse_moving_tip(model)
+        return Trajectories(
+            tuple(
+                NamedTrajectory(name, self._followed(model, keys, path), keys.weight)
+                for path, name, keys in given
+            )
+        )
+
+    def _followed(self, model: Model, keys: TrajectoryKeys, path: str) -> Trajectory:
+        """One trajectory, which stands at ``path`` of the case file."""
+        with self.located(path):
+            self._refuse_moving_tip(model, keys)
             return build_trajectory(
-                spec,
+                keys,
                 model.q_names,
                 lambda tip, oriented: tip_chain(
                     self.file,
@@ -140,13 +159,12 @@ class Case:
                 self.file.coordinate_units,
             )
 
-    def _refuse_moving_tip(self, model: Model) -> None:
+    def _refuse_moving_tip(self, model: Model, keys: TrajectoryKeys) -> None:
         """A tip path moves q(t) where a design parameter moves the tip: refused by name."""
-        spec = self.file.trajectory
-        if not isinstance(spec, TipTrajectory):
+        if not isinstance(keys, TipTrajectory):
             return
-        oriented = spec.angle is not None or spec.orientation is not None
-        moved = design_dependence(model.poses, spec.tip, oriented)
+        oriented = keys.angle is not None or keys.orientation is not None
+        moved = design_dependence(model.poses, keys.tip, oriented)
         for name, moves in zip(model.y_names, moved, strict=True):
             if moves:
                 raise MechanismError(
@@ -156,12 +174,18 @@ class Case:
                 )
 
     @contextmanager
-    def located(self) -> Iterator[None]:
-        """Show an error of the mechanism at its line of the case file."""
+    def located(self, trajectory: str = "trajectory") -> Iterator[None]:
+        """Show an error of the mechanism at its line of the case file.
+
+        ``trajectory`` is where the one stands that errors below `trajectory` are about.
+        """
         try:
             yield
         except MechanismError as error:
-            raise CaseError((self.file.problem(error.path, error.message),)) from error
+            path = error.path
+            if path.split(".")[0] == "trajectory":
+                path = trajectory + path.removeprefix("trajectory")
+            raise CaseError((self.file.problem(path, error.message),)) from error
 
 
 def load_case(path: str | Path) -> Case:

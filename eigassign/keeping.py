@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from eigassign.case import CaseFile
-from eigassign.study.findings import Findings
+from eigassign.study.findings import ErrorSummary, Findings
 
 RESULTS = Path("results")  # below the current folder
 
@@ -60,14 +60,21 @@ def log_text(findings: Findings) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _distances(error: ErrorSummary, along: str) -> Iterator[str]:
+    for when in ("initial", "predicted", "exact"):
+        row = getattr(error, when)
+        figures = f"max {100 * row.max_relative:.4g} %, rms {100 * row.rms_relative:.4g} %"
+        yield f"distance  {when}{along}: {figures} from the target"
+
+
 def _outcome_lines(findings: Findings) -> Iterator[str]:
     for row in findings.design:
         yield f"design    {row.name} = {row.optimal:.9g} {row.unit} (before: {row.initial:.9g})"
     if findings.error is not None:
-        for when in ("initial", "predicted", "exact"):
-            row = getattr(findings.error, when)
-            figures = f"max {100 * row.max_relative:.4g} %, rms {100 * row.rms_relative:.4g} %"
-            yield f"distance  {when}: {figures} from the target"
+        yield from _distances(findings.error, "")
+    for own in findings.trajectories if len(findings.trajectories) > 1 else ():
+        along = findings.error_along(own.name)
+        yield from _distances(along, f" along {own.name!r}") if along is not None else ()
     if findings.approximation_error is not None:
         within = "within" if findings.within_tolerance else "OVER"
         error = f"{100 * findings.approximation_error:.4g} %"

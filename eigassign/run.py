@@ -113,7 +113,7 @@ def solve_case(case: Case, options: Options = DEFAULT) -> Result:
     require_assignable(file)
     with case.located():
         scene = prepare(case, stages, _cache(options))
-        wanted = target_frequencies(file, scene.path.time_s)
+        wanted = target_frequencies(file, scene.path)
         with stages("initial", "solving the initial design exactly"):
             initial_hz = scene.exact(scene.initial, stages.advance)
         with stages("assignment", "assigning the frequencies"):

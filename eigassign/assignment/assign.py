@@ -66,7 +66,7 @@ class Assignment:
 
 def solve_assignment(
     goals: Sequence[Goal],
-    time_s: ArrayLike,
+    time_weights: ArrayLike,
     y0: ArrayLike,
     y_initial: ArrayLike,
     bounds: Bounds,
@@ -75,9 +75,10 @@ def solve_assignment(
 ) -> Assignment:
     """The design y within its limits that minimises J of eqs. (13)–(14), in relative error.
 
-    ``time_s`` (n_t,) in s; ``y0`` (n_y,) is the point dy counts from, ``y_initial`` (n_y,) the
-    design to improve on; ``names`` of the parameters (y1, y2, … if not given) serve messages and
-    the list of active limits.
+    ``time_weights`` (n_t,) in s are those of the integral over time (`trapezoidal_weights`, of
+    several trajectories one after the other); ``y0`` (n_y,) is the point dy counts from,
+    ``y_initial`` (n_y,) the design to improve on; ``names`` of the parameters (y1, y2, … if not
+    given) serve messages and the list of active limits.
 
     Raises:
         UsageError: shapes that do not fit, values that are not finite, empty ranges.
@@ -85,7 +86,7 @@ def solve_assignment(
         AccuracyError: the KKT residuals of the best answer found exceed 1e-8.
         KeyboardInterrupt: Ctrl-C while the solver runs.
     """
-    program = build_program(goals, time_s, y0, y_initial, bounds, constraints, names)
+    program = build_program(goals, time_weights, y0, y_initial, bounds, constraints, names)
     refuse_impossible(program)
     solution = _solve(program)
     dy = solution.answer.y - program.y0

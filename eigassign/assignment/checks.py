@@ -31,6 +31,15 @@ def finite(what: str, values: ArrayLike, ndim: int) -> Floats:
     return array
 
 
+def positive(what: str, values: ArrayLike) -> Floats:
+    """A frozen copy (n,) of ``values``, at least one, all finite and above 0, or UsageError."""
+    array = finite(what, values, 1)
+    if not array.size or np.any(array <= 0.0):
+        given = f"{array.min()}" if array.size else "none"
+        raise UsageError(f"{what}: {given} given; must be above 0")
+    return array
+
+
 def limit(what: str, values: ArrayLike, ndim: int) -> Floats:
     """A frozen copy of ``values``: infinite means "no limit", NaN is refused."""
     array = shaped(what, values, ndim)

@@ -6,9 +6,11 @@ Along the trajectory the eigenvalue of target i is, to first order in the design
 
 and what is minimised is the weighted mean square of the relative error in λ,
 
-    J(y) = Σ_i w_i ∫ e_i² dt / (Σ_i w_i · ∫ dt)                                [dimensionless]
+    J(y) = Σ_i w_i ∫_i e_i² dt / Σ_i w_i ∫_i dt                                [dimensionless]
 
-by the trapezoidal rule. √J is the rms relative error in λ: near the target, twice that in Hz.
+over the samples on which target i is wanted, by the trapezoidal rule along each trajectory for
+itself, every trajectory by its own weight. √J is the rms relative error in λ: near the target,
+twice that in Hz.
 
 **Against the paper.** Eqs. (13)–(14) weigh the absolute error, R = ∫ l lᵀ dt and
 h = ∫ (l0 − λ_d) l dt. For one target constant in time λ_d is a common factor,
@@ -30,9 +32,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from eigassign.assignment.checks import Floats, finite, frozen, limit, same_length
+from eigassign.assignment.checks import Floats, finite, frozen, limit, positive, same_length
 from eigassign.assignment.scales import Scales, choose_scales
-from eigassign.assignment.targets import lam_from_hz, positive_hz, trapezoidal_weights
+from eigassign.assignment.targets import lam_from_hz, positive_hz
 from eigassign.errors import UsageError
 
 
@@ -63,11 +65,15 @@ class LinearModel:
 
 @dataclass(frozen=True)
 class Goal:
-    """One assigned mode: its model, its wanted frequency (n_t,) in Hz, and its weight (> 0)."""
+    """One assigned mode: its model, its wanted frequency (n_t,) in Hz, and its weight (> 0).
+
+    ``rows`` says which of all samples in time these n_t are, where it is not wanted at all of them.
+    """
 
     model: LinearModel
     target_hz: Floats
     weight: float = 1.0
+    rows: slice = field(default_factory=lambda: slice(None))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "target_hz", positive_hz(self.target_hz))
@@ -166,14 +172,14 @@ def quadratic_form(model: LinearModel, lam_d: ArrayLike, weights: Floats) -> tup
 
 def build_program(
     goals: Sequence[Goal],
-    time_s: ArrayLike,
+    time_weights: ArrayLike,
     y0: ArrayLike,
     y_initial: ArrayLike,
     bounds: Bounds,
     constraints: Sequence[LinearConstraint] = (),
     names: Sequence[str] | None = None,
 ) -> QuadraticProgram:
-    """The program of all goals over one trajectory; arguments as in `solve_assignment`.
+    """The program of all goals over all samples; arguments as in `solve_assignment`.
 
     Raises:
         UsageError: shapes that do not fit each other, values that are not finite.
@@ -181,7 +187,7 @@ def build_program(
     y0, start = finite("expansion point y0", y0, 1), finite("initial design", y_initial, 1)
     names = tuple(f"y{j + 1}" for j in range(y0.size)) if names is None else tuple(names)
     _require_sizes(goals, y0.size, start, bounds, constraints, names)
-    A, b = _relative_rows(goals, trapezoidal_weights(time_s))
+    A, b = _relative_rows(goals, positive("time weights", time_weights))
     start = np.clip(start, bounds.lower, bounds.upper)
     C = np.array([c.coefficients for c in constraints]).reshape(len(constraints), y0.size)
     return QuadraticProgram(
@@ -202,11 +208,12 @@ def build_program(
 
 def _relative_rows(goals: Sequence[Goal], time_weights: Floats) -> tuple[Floats, Floats]:
     """A and b of J: relative error, mean over time, weighted mean over the goals."""
-    total = sum(goal.weight for goal in goals) * time_weights.sum()
+    each = [time_weights[goal.rows] for goal in goals]
+    total = sum(goal.weight * own.sum() for goal, own in zip(goals, each, strict=True))
     rows = []
-    for goal in goals:
-        same_length("target model", goal.model.l0.size, time_weights.size, "samples in time")
-        share = frozen(goal.weight / total * time_weights)
+    for goal, own in zip(goals, each, strict=True):
+        same_length("target model", goal.model.l0.size, own.size, "samples in time")
+        share = frozen(goal.weight / total * own)
         rows.append(error_rows(goal.model.relative_to(goal.lam_d), 1.0, share))
     return np.vstack([A for A, _ in rows]), np.concatenate([b for _, b in rows])
 

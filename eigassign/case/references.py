@@ -100,6 +100,8 @@ def _names(tree: Tree) -> Iterator[Finding]:
         for name in names(tree, *place):
             if not _NAME.fullmatch(name):
                 yield (*place, name), _UNUSABLE
+    if "time" in names(tree, "coordinates"):
+        yield ("coordinates", "time"), "'time' heads a column of its own: name it otherwise"
     if "ground" in names(tree, "mechanism", "links"):
         yield (
             ("mechanism", "links", "ground"),
@@ -118,9 +120,7 @@ def _names_of_trajectories(tree: Tree) -> Iterator[Finding]:
             yield (*path, "name"), _UNUSABLE
         elif name.casefold() in seen:
             same = seen[name.casefold()]
-            hint = (
-                "" if same == name else f" (as {same!r}: they name files, where case may be lost)"
-            )
+            hint = "" if same == name else f": {same!r} (they name files, where case may be lost)"
             yield (*path, "name"), f"a trajectory has this name already{hint}"
         seen.setdefault(name.casefold(), name)
 

@@ -42,13 +42,22 @@ def check(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
     return max(codes)
 
 
+def _trajectories(answer: CheckAnswer) -> list[str]:
+    if len(answer.trajectories) < 2:
+        return [f"  trajectory: {answer.samples} samples in {answer.duration_s:g} s"]
+    return [
+        f"  trajectory {name!r}: {samples} samples in {duration_s:g} s"
+        for name, samples, duration_s in answer.trajectories
+    ]
+
+
 def _described(name: str, answer: CheckAnswer) -> str:
     q, y = (", ".join(names) or "none" for names in (answer.q_names, answer.y_names))
     lines = [
         f"{name}: {answer.title}",
         f"  {answer.n_dof} degrees of freedom, {answer.n_rigid} of them rigid",
         f"  coordinates {q}; design {y}; targets {answer.targets}",
-        f"  trajectory: {answer.samples} samples in {answer.duration_s:g} s",
+        *_trajectories(answer),
     ]
     return "\n".join([*lines, *(f"  {note}" for note in answer.notes)])
 

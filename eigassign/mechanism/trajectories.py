@@ -19,6 +19,7 @@ from eigassign.errors import UsageError
 from eigassign.mechanism.trajectory import Trajectory
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 
 
 class NamedTrajectory(NamedTuple):
@@ -112,8 +113,19 @@ class Trajectories:
         shares = [part.weight * integral(part.trajectory.time_s) for part in self.parts]
         return _stacked([np.asarray(share) for share in shares])
 
-    def chosen(self, samples: Sequence[int] | NDArray[np.intp]) -> Trajectories:
-        """Only some of the samples, given by ascending numbers; without parts that lose them all."""
+    def spread(self, count: int) -> Ints:
+        """Numbers of about ``count`` samples: of each trajectory its share, with both its ends."""
+        n = len(self.time_s)
+        chosen = []
+        for rows in self.rows:
+            own = rows.stop - rows.start
+            share = min(own, max(2, round(count * own / n)))
+            ends = np.linspace(rows.start, rows.stop - 1, share)
+            chosen.append(np.unique(ends.round().astype(np.intp)))
+        return np.concatenate(chosen)
+
+    def chosen(self, samples: Sequence[int] | Ints) -> Trajectories:
+        """Some of the samples only, given by ascending numbers; no part that has none of them."""
         kept = np.asarray(samples, dtype=np.intp)
         parts = []
         for part, rows in zip(self.parts, self.rows, strict=True):
@@ -123,7 +135,7 @@ class Trajectories:
         return Trajectories(tuple(parts))
 
 
-def _thinned(trajectory: Trajectory, rows: NDArray[np.intp]) -> Trajectory:
+def _thinned(trajectory: Trajectory, rows: Ints) -> Trajectory:
     tip = None if trajectory.tip is None else trajectory.tip[rows]
     return Trajectory(trajectory.time_s[rows], trajectory.q[rows], tip, trajectory.notes)
 

@@ -1,7 +1,8 @@
 """Joint samples from a CSV file: a header `time [ms], q1 [deg], q2`, then one line a sample.
 
 Columns may stand in any order; s and rad (m for strokes) are meant where no unit is written.
-Columns with other names are ignored with a note. Blank lines and lines that begin with `#` are
+Columns with other names are ignored with a note, those of the tip that runs write (`tip x [m]`, …)
+without. Blank lines and lines that begin with `#` are
 skipped.
 """
 
@@ -23,7 +24,8 @@ from eigassign.errors import MechanismError, TrajectoryError
 from eigassign.mechanism.tip_chain import Floats
 
 _KEY = "trajectory.file"
-_TIME = "time"
+TIME = "time"
+TIP_COLUMNS = ("tip x", "tip y", "tip z")  # written by runs; passed over without a note
 _KINDS = {"rad": "angle", "m": "length"}
 _HEADER_CELL = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
@@ -68,7 +70,7 @@ def read_samples(file: Path, q_names: Sequence[str], q_units: Sequence[str] = ()
     where = f"{file.name}:{line}"
     names = [_split(cell, where) for cell in header]
     kinds = ["time", *(_KINDS[unit] for unit in q_units or ["rad"] * len(q_names))]
-    wanted = zip((_TIME, *q_names), kinds, strict=True)
+    wanted = zip((TIME, *q_names), kinds, strict=True)
     columns = [_column(name, names, where, DIMENSIONS[kind]) for name, kind in wanted]
     lines, values = [], []
     for k, (number, row) in enumerate(rows):
@@ -171,5 +173,9 @@ def _ignored(
     names: Sequence[tuple[str, str]], columns: Sequence[_Column], file: str
 ) -> tuple[str, ...]:
     used = {column.index for column in columns}
-    extra = [name or "(no name)" for i, (name, _) in enumerate(names) if i not in used]
+    extra = [
+        name or "(no name)"
+        for i, (name, _) in enumerate(names)
+        if i not in used and name not in TIP_COLUMNS
+    ]
     return (f"{file}: ignored the columns {listed(extra)}",) if extra else ()

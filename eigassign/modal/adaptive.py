@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +29,11 @@ class AdaptiveReduction:
     reasons: tuple[str, ...]
 
 
+def row_in_words(k: int) -> str:
+    """What row k of x is called where nothing better is known."""
+    return f"sample {k}"
+
+
 def reduce_adaptively(
     pencil: Pencil,
     x: Floats,
@@ -36,18 +41,20 @@ def reduce_adaptively(
     modes: Sequence[int] = (1,),
     max_size: int = MAX_SIZE,
     half_orders: Sequence[int] = HALF_ORDERS,
+    place: Callable[[int], str] = row_in_words,
 ) -> AdaptiveReduction:
     """The smallest reduced model found whose estimate is ≤ ``accuracy`` at samples x (n, n_x).
 
-    For each half order, expansion points are added where the estimate is largest. Raises
-    AccuracyError, naming the sample, where ``max_size`` vectors do not suffice.
+    For each half order, expansion points are added where the estimate is largest. ``place`` says
+    in words what row k of x is. Raises AccuracyError, naming the sample, where ``max_size``
+    vectors do not suffice.
     """
     best: AdaptiveReduction | None = None
     reasons: list[str] = []
     worst = (np.inf, 0)
     for half_order in half_orders:
         limit = max_size if best is None else best.reduced.size - 1
-        found, lines, left = _greedy(pencil, x, accuracy, modes, half_order, limit)
+        found, lines, left = _greedy(pencil, x, accuracy, modes, half_order, limit, place)
         reasons += lines
         worst = min(worst, left)
         if found is not None:
@@ -55,14 +62,20 @@ def reduce_adaptively(
     if best is None:
         error, k = worst
         raise AccuracyError(
-            f"no reduced model of up to {max_size} vectors reaches {accuracy:.1e}: at sample {k}, "
+            f"no reduced model of up to {max_size} vectors reaches {accuracy:.1e}: at {place(k)}, "
             f"(q, y) = {shown(x[k])}, the estimated error is {error:.1e}"
         )
     return AdaptiveReduction(best.reduced, best.estimate, accuracy, tuple(reasons))
 
 
 def _greedy(
-    pencil: Pencil, x: Floats, accuracy: float, modes: Sequence[int], half_order: int, limit: int
+    pencil: Pencil,
+    x: Floats,
+    accuracy: float,
+    modes: Sequence[int],
+    half_order: int,
+    limit: int,
+    place: Callable[[int], str],
 ) -> tuple[tuple[ReducedModel, Floats] | None, list[str], tuple[float, int]]:
     """Add the worst sample as an expansion point until it fits, or grows beyond ``limit``."""
     points, n_q = [central(x)], pencil.n_q
@@ -75,7 +88,7 @@ def _greedy(
         highest = estimate.max(axis=1)
         k = int(np.argmax(highest))
         best = min(best, (float(highest[k]), k))
-        lines.append(_line(half_order, len(points), reduced.size, float(highest[k]), k))
+        lines.append(_line(half_order, len(points), reduced.size, float(highest[k]), place(k)))
         if reduced.size > limit:
             break
         if highest[k] <= accuracy:
@@ -86,10 +99,10 @@ def _greedy(
     return None, lines, best
 
 
-def _line(half_order: int, points: int, size: int, error: float, sample: int) -> str:
+def _line(half_order: int, points: int, size: int, error: float, sample: str) -> str:
     where = f"{points} point{'s' if points > 1 else ''}"
     what = f"at most {error:.1e}" if np.isfinite(error) else "refused"
-    return f"vectors to order {half_order} at {where} ({size} in all): {what} (sample {sample})"
+    return f"vectors to order {half_order} at {where} ({size} in all): {what} ({sample})"
 
 
 def central(x: Floats) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.pencil import Pencil
-from eigassign.modal.adaptive import AdaptiveReduction, central, reduce_adaptively, shown
+from eigassign.modal.adaptive import (
+    AdaptiveReduction,
+    central,
+    reduce_adaptively,
+    row_in_words,
+    shown,
+)
 from eigassign.modal.clusters import CLUSTER_GAP
 from eigassign.modal.convergence import radius_share
 from eigassign.modal.expansion import Expansion, expand
@@ -65,19 +71,21 @@ def choose_expansion(
     linear_in_y: bool = False,
     orders: Sequence[int] = ORDERS,
     start: Floats | None = None,
+    place: Callable[[int], str] = row_in_words,
 ) -> ExpansionChoice:
     """The expansions with the fewest coefficients whose estimate is ≤ ``accuracy`` at x (n, n_x).
 
     Tried in order of cost: the order p at one point, ``start`` or the most central sample; with
-    neighbouring modes as one cluster; at several points. Judged against one reduced model. Raises
-    AccuracyError, naming the sample, where nothing does.
+    neighbouring modes as one cluster; at several points. Judged against one reduced model.
+    ``place`` says in words what row k of x is. Raises AccuracyError, naming the sample, where
+    nothing does.
     """
-    beside = reduce_adaptively(pencil, x, FINER * accuracy, modes)
+    beside = reduce_adaptively(pencil, x, FINER * accuracy, modes, place=place)
     judge = (
         f"judged beside a reduced model of {beside.reduced.size} vectors, itself right to "
         f"{beside.estimate.max():.1e}"
     )
-    trial = _Trial(pencil, x, accuracy, tuple(modes), linear_in_y, beside, [judge])
+    trial = _Trial(pencil, x, accuracy, tuple(modes), linear_in_y, beside, [judge], place)
     first = x[central(x)] if start is None else start
     best = _cheapest(trial, _single(trial, first, orders))
     if best is None:
@@ -86,7 +94,7 @@ def choose_expansion(
         k = trial.worst_sample
         raise AccuracyError(
             f"no expansion of order up to {max(orders)} at up to {MAX_POINTS} points reaches "
-            f"{accuracy:.1e}: the last left {trial.last:.1e} at sample {k}, (q, y) = {shown(x[k])}"
+            f"{accuracy:.1e}: the last left {trial.last:.1e} at {place(k)}, (q, y) = {shown(x[k])}"
         )
     parts, owner, estimate = best
     return ExpansionChoice(parts, owner, estimate, beside, tuple(trial.reasons))
@@ -106,6 +114,7 @@ class _Trial:
     linear_in_y: bool
     beside: AdaptiveReduction
     reasons: list[str]
+    place: Callable[[int], str]
     last: float = np.inf
     worst_sample: int = 0
 
@@ -135,7 +144,7 @@ class _Trial:
         self.last = float(worst[self.worst_sample])
         error = f"error at most {self.last:.1e}" if np.isfinite(self.last) else "no number"
         reach = f", {share:.2f} of the radius of convergence" if np.isfinite(share) else ""
-        self.reasons.append(f"{what}: {error} (sample {self.worst_sample}{reach})")
+        self.reasons.append(f"{what}: {error} ({self.place(self.worst_sample)}{reach})")
 
 
 def _cheapest(trial: _Trial, candidates: Iterator[tuple[int, _Found]]) -> _Found | None:

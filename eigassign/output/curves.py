@@ -48,16 +48,21 @@ def joints(findings: Findings) -> Sheet:
         for unit in units
     ]
     entries = [Entry(short(n), s) for n, s in zip(findings.q_names, strokes, strict=True)]
-    return chart("Coordinates along the trajectory", _time(findings), bands, entries)
+    return chart(f"Coordinates along {findings.along}", _time(findings), bands, entries)
 
 
 def _time(findings: Findings) -> tuple[str, str, Floats]:
     return ("time", "s", findings.time_s)
 
 
+def _where(findings: Findings) -> str:
+    """Said in a title where there are several trajectories."""
+    return f", {findings.along}" if findings.only is not None else ""
+
+
 def over_time(findings: Findings, study: ModeStudy, comparison: Comparison) -> Sheet:
     """Exact, Taylor and linearised frequency along the trajectory, and both errors."""
-    title = f"Mode {study.mode}: expansion against exact along the trajectory, initial design"
+    title = f"Mode {study.mode}: expansion against exact along {findings.along}, initial design"
     bands = comparison_bands(comparison)
     return chart(title, _time(findings), bands, comparison_entries(study, comparison))
 
@@ -121,7 +126,9 @@ def assignment(findings: Findings, target: TargetStudy) -> Sheet:
         Band("frequency", "Hz", frequency, 2.0),
         Band("off target", "%", errors, 1.35, zero_line=True),
     ]
-    return chart(f"Mode {target.mode}: assigned frequency", _time(findings), bands, entries)
+    return chart(
+        f"Mode {target.mode}: assigned frequency{_where(findings)}", _time(findings), bands, entries
+    )
 
 
 def others(findings: Findings, modes: OtherModes) -> Sheet:
@@ -137,4 +144,6 @@ def others(findings: Findings, modes: OtherModes) -> Sheet:
         Entry("original design", Stroke(ink.BLACK, 1.3, (5.0, 1.8))),
         Entry("optimal design", Stroke(ink.BLACK, 1.8)),
     ]
-    return chart("Next modes before and after, exact", _time(findings), [band], entries)
+    return chart(
+        f"Next modes before and after, exact{_where(findings)}", _time(findings), [band], entries
+    )

@@ -23,6 +23,7 @@ from eigassign.study.findings import (
     OtherModes,
     TargetStudy,
 )
+from eigassign.study.narrowing import along_each
 
 if TYPE_CHECKING:
     from eigassign.output.ink import Sheet
@@ -61,19 +62,23 @@ def plan(findings: Findings) -> tuple[FigurePlan, ...]:
 def _plans(findings: Findings) -> Iterator[FigurePlan]:
     if any(lines for lines in findings.poses.lines):
         yield _mechanism(findings)
-    if findings.q.size:
-        yield _joints(findings)
-    for study in findings.studies:
-        if study.over_time is not None and study.over_time.exact_hz.size:
-            yield _over_time(findings, study, study.over_time)
+    each = along_each(findings)
+    yield from (_joints(one) for one in each if one.q.size)
+    for k, study in enumerate(findings.studies):
+        for one in each:
+            comparison = one.studies[k].over_time
+            if comparison is not None and comparison.exact_hz.size:
+                yield _over_time(one, study, comparison)
         yield from _over(study, study.over_q, study.q0, findings.q_names, "q")
         names = tuple(row.name for row in findings.design)
         yield from _over(study, study.over_design, study.y0, names, "design")
-    for target in findings.targets:
-        if target.target_hz.size:
-            yield _assignment(findings, target)
-    if findings.others is not None and findings.others.initial_hz.size:
-        yield _others(findings, findings.others)
+    for mode in dict.fromkeys(target.mode for target in findings.targets):
+        for one in each:
+            own = (target for target in one.targets if target.mode == mode)
+            yield from (_assignment(one, target) for target in own if target.target_hz.size)
+    for one in each:
+        if one.others is not None and one.others.initial_hz.size:
+            yield _others(one, one.others)
 
 
 def _mechanism(findings: Findings) -> FigurePlan:
@@ -92,6 +97,16 @@ def _mechanism(findings: Findings) -> FigurePlan:
     )
 
 
+def _suffix(findings: Findings) -> str:
+    """What tells the files of several trajectories apart."""
+    return f"_{findings.only}" if findings.only is not None else ""
+
+
+def _of(findings: Findings) -> str:
+    """The same for headings."""
+    return f", {findings.along}" if findings.only is not None else ""
+
+
 def _joints(findings: Findings) -> FigurePlan:
     def draw() -> Sheet:
         from eigassign.output import curves
@@ -100,9 +115,9 @@ def _joints(findings: Findings) -> FigurePlan:
 
     names = ", ".join(findings.q_names)
     return FigurePlan(
-        "coordinates.png",
-        "Coordinates",
-        f"The coordinates {names} along the trajectory of {findings.time_s.size} samples.",
+        f"coordinates{_suffix(findings)}.png",
+        f"Coordinates{_of(findings)}",
+        f"The coordinates {names} along {findings.along} of {findings.time_s.size} samples.",
         f"Curves of {names} over time.",
         draw,
     )
@@ -115,8 +130,8 @@ def _over_time(findings: Findings, study: ModeStudy, comparison: Comparison) -> 
         return curves.over_time(findings, study, comparison)
 
     return FigurePlan(
-        f"approximation_mode_{study.mode}_time.png",
-        f"Mode {study.mode}: expansion along the trajectory",
+        f"approximation_mode_{study.mode}_time{_suffix(findings)}.png",
+        f"Mode {study.mode}: expansion along {findings.along}",
         "Exact, Taylor and linearised frequency at the initial design. " + _worst(comparison),
         f"Frequency of mode {study.mode} over time and the errors of both expansions.",
         draw,
@@ -167,8 +182,8 @@ def _assignment(findings: Findings, target: TargetStudy) -> FigurePlan:
         return curves.assignment(findings, target)
 
     return FigurePlan(
-        f"assignment_mode_{target.mode}.png",
-        f"Mode {target.mode}: original, optimal and target frequency",
+        f"assignment_mode_{target.mode}{_suffix(findings)}.png",
+        f"Mode {target.mode}: original, optimal and target frequency{_of(findings)}",
         f"Worst distance to the target {percent(target.initial.max_relative)} before and "
         f"{percent(target.exact.max_relative)} after, "
         f"where the expansion predicted {percent(target.predicted.max_relative)}.",
@@ -185,8 +200,8 @@ def _others(findings: Findings, others: OtherModes) -> FigurePlan:
 
     modes = ", ".join(map(str, others.modes))
     return FigurePlan(
-        "other_modes.png",
-        "Next modes",
+        f"other_modes{_suffix(findings)}.png",
+        f"Next modes{_of(findings)}",
         f"Exact frequencies of modes {modes}, which were not assigned, before and after.",
         f"Frequencies of modes {modes} over time before and after.",
         draw,

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from eigassign.errors import EigassignError
+from eigassign.output.samples_csv import trajectory_names
 from eigassign.study.findings import (
     Comparison,
     ErrorSummary,
@@ -18,6 +19,7 @@ from eigassign.study.findings import (
     ModeStudy,
     OtherModes,
     TargetStudy,
+    TrajectoryRow,
 )
 
 SCHEMA = 1
@@ -27,6 +29,7 @@ _NESTED = (Mapping, list, tuple, str, np.ndarray)
 def results(findings: Findings) -> dict[str, Any]:
     """Plain values in a fixed order. ``frequencies`` is of the first target, ``error`` of all.
 
+    Of several trajectories all samples stand one after the other, each with its ``trajectory``.
     What the run did not ask for (no target, no trajectory) is null, and so is what an expansion
     cannot say: it predicts no frequency where its eigenvalue comes out negative.
     """
@@ -51,8 +54,10 @@ def results(findings: Findings) -> dict[str, Any]:
         "approximation": [_study(study) for study in findings.studies],
         "trajectory": {
             "time_s": findings.time_s,
+            **_named(findings, slice(None)),
             "coordinates": _coordinates(findings),
         },
+        "trajectories": [_trajectory(findings, row) for row in findings.trajectories],
         "solver": asdict(findings.solver) if findings.solver else None,
         "warnings": findings.warnings,
         "notes": findings.notes,
@@ -74,7 +79,8 @@ def _said(value: Any) -> Any:
 
 def _frequencies(findings: Findings, target: TargetStudy) -> dict[str, Any]:
     return {
-        "time_s": findings.time_s,
+        "time_s": findings.time_s[target.rows],
+        **_named(findings, target.rows),
         "target_hz": target.target_hz,
         "initial_hz": target.initial_hz,
         "predicted_hz": _said(target.predicted_hz),
@@ -82,9 +88,28 @@ def _frequencies(findings: Findings, target: TargetStudy) -> dict[str, Any]:
     }
 
 
+def _named(findings: Findings, rows: slice) -> dict[str, Any]:
+    """Of several trajectories the name of each sample's own."""
+    if len(findings.trajectories) < 2:
+        return {}
+    return {"trajectory": trajectory_names(findings, rows)}
+
+
+def _trajectory(findings: Findings, row: TrajectoryRow) -> dict[str, Any]:
+    error = findings.error_along(row.name)
+    return {
+        "name": row.name,
+        "samples": row.rows.stop - row.rows.start,
+        "duration_s": row.duration_s,
+        "weight": row.weight,
+        "error": _error(error) if error else None,
+    }
+
+
 def _target(findings: Findings, target: TargetStudy) -> dict[str, Any]:
     return {
         "mode": target.mode,
+        **({"trajectory": target.trajectory} if target.trajectory is not None else {}),
         "error": _error(target.error),
         "frequencies": _frequencies(findings, target),
     }

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from eigassign.output.formats import number, percent, residual, seconds
-from eigassign.study.findings import Comparison, Findings, ValidationRow
+from eigassign.study.findings import Comparison, ErrorSummary, Findings, TargetStudy, ValidationRow
 
 
 @dataclass(frozen=True)
@@ -40,16 +40,28 @@ def errors(findings: Findings) -> Table:
     """Distance to the target before, as predicted, and exact, side by side."""
     kinds = ("initial", "predicted", "exact")
     columns = ("target", *(f"{kind} {what}" for what in ("worst", "rms") for kind in kinds))
-    summaries = [(f"mode {target.mode}", target.error) for target in findings.targets]
-    if len(summaries) > 1 and findings.error is not None:
+    summaries = [pair for target in findings.targets for pair in _of_target(target)]
+    if len(findings.targets) > 1 and len(findings.trajectories) > 1:
+        along = ((row.name, findings.error_along(row.name)) for row in findings.trajectories)
+        summaries += [(f"all along {name!r}", error) for name, error in along if error is not None]
+    if len(findings.targets) > 1 and findings.error is not None:
         summaries.append(("all", findings.error))
     rows = []
     for label, summary in summaries:
         errors = (summary.initial, summary.predicted, summary.exact)
         worst = (percent(error.max_relative) for error in errors)
         rows.append((label, *worst, *(percent(error.rms_relative) for error in errors)))
-    caption = "Frequency against its target in Hz, relative to the target, along the trajectory."
+    caption = "Frequency against its target in Hz, relative to the target, along "
+    caption += f"{findings.along}."
     return Table("Distance to the target", columns, tuple(rows), caption)
+
+
+def _of_target(target: TargetStudy) -> Iterator[tuple[str, ErrorSummary]]:
+    """Along each trajectory if there are several, then in all."""
+    if len(target.along) > 1:
+        for one in target.along:
+            yield f"{target.label} along {one.name!r}", one.error
+    yield target.label, target.error
 
 
 def approximation(findings: Findings) -> Table:
@@ -63,7 +75,7 @@ def _approximations(findings: Findings) -> Iterator[tuple[str, ...]]:
     for study in findings.studies:
         places: list[tuple[str, Comparison]] = []
         if study.over_time is not None:
-            places.append(("along the trajectory, initial design", study.over_time))
+            places.append((f"along {findings.along}, initial design", study.over_time))
         for over in (study.over_q, study.over_design):
             if over is not None:
                 places.append((f"over {' and '.join(over.names)}", over.values))

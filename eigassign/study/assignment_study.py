@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,13 +20,23 @@ from eigassign.assignment import (
     solve_assignment,
     trapezoidal_weights,
 )
+from eigassign.assignment.checks import frozen
 from eigassign.case import CaseFile, Target
 from eigassign.errors import AccuracyError, CaseError, UsageError
-from eigassign.study.findings import DesignRow, ErrorRow, SolverRow, TargetStudy
+from eigassign.mechanism.trajectories import Trajectories
+from eigassign.study.findings import (
+    DesignRow,
+    ErrorRow,
+    ErrorSummary,
+    SolverRow,
+    TargetAlong,
+    TargetStudy,
+)
 from eigassign.study.scene import Scene
 from eigassign.study.units import design_units
 
 Floats = NDArray[np.float64]
+_Curves = tuple[Floats, Floats, Floats, Floats]  # wanted, initial, predicted and exact, (n,) in Hz
 
 
 def require_assignable(file: CaseFile) -> None:
@@ -42,16 +55,36 @@ def require_assignable(file: CaseFile) -> None:
         raise CaseError(problems)
 
 
-def target_frequencies(file: CaseFile, time_s: Floats) -> tuple[Floats, ...]:
-    """The wanted frequency (n_t,) in Hz of each target; CaseError where one ends too early."""
-    sampled = []
-    for k, target in enumerate(file.targets):
+@dataclass(frozen=True)
+class Wanted:
+    """What one target asks for: a frequency (n,) in Hz at those ``rows`` of all samples."""
+
+    hz: Floats
+    rows: slice
+
+
+def target_frequencies(file: CaseFile, path: Trajectories) -> tuple[Wanted, ...]:
+    """What each target asks for; CaseError where a profile ends before a trajectory does."""
+    return tuple(_wanted(file, k, target, path) for k, target in enumerate(file.targets))
+
+
+def _wanted(file: CaseFile, k: int, target: Target, path: Trajectories) -> Wanted:
+    hz = []
+    for part in path.parts:
+        if target.trajectory not in (None, part.name):
+            continue
         try:
-            sampled.append(_sampled(target, time_s))
+            hz.append(_sampled(target, part.trajectory.time_s))
         except UsageError as error:
-            path = f"targets[{k}].frequency"
-            raise CaseError((file.problem(path, str(error)),)) from error
-    return tuple(sampled)
+            which = f" (trajectory {part.name!r})" if path.several else ""
+            problem = file.problem(f"targets[{k}].frequency", f"{error}{which}")
+            raise CaseError((problem,)) from error
+    return Wanted(frozen(np.concatenate(hz)), path.rows_of(target.trajectory))
+
+
+def time_weights(path: Trajectories) -> Floats:
+    """ω (n_t,) in s of the integral over every trajectory for itself, by the trapezoidal rule."""
+    return path.weights(trapezoidal_weights)
 
 
 def _sampled(target: Target, time_s: Floats) -> Floats:
@@ -61,7 +94,7 @@ def _sampled(target: Target, time_s: Floats) -> Floats:
     return sample_target(time_s, wanted.frequency, wanted.time)
 
 
-def assign_design(scene: Scene, target_hz: tuple[Floats, ...]) -> Assignment:
+def assign_design(scene: Scene, targets: tuple[Wanted, ...]) -> Assignment:
     """Build and solve the quadratic program of eqs. (13)–(14) on the linearised expansion.
 
     Raises InfeasibleError with the names of the constraints that contradict each other.
@@ -72,15 +105,17 @@ def assign_design(scene: Scene, target_hz: tuple[Floats, ...]) -> Assignment:
     column = scene.expansions.column
     goals = [
         Goal(
-            LinearModel(l0[:, column(target.mode)], slope[:, column(target.mode)]),
-            wanted,
+            LinearModel(l0[wanted.rows, k], slope[wanted.rows, k]),
+            wanted.hz,
             target.weight,
+            wanted.rows,
         )
-        for target, wanted in zip(file.targets, target_hz, strict=True)
+        for target, wanted in zip(file.targets, targets, strict=True)
+        for k in [column(target.mode)]
     ]
     return solve_assignment(
         goals,
-        path.time_s,
+        time_weights(path),
         scene.expansions.linear.y0,
         scene.initial,
         Bounds(*scene.bounds),
@@ -97,7 +132,7 @@ def _require_near(scene: Scene, l0: Floats) -> None:
         problem = scene.file.problem(
             "expansion.q",
             f"too far from the motion: the expansion predicts a negative λ of mode "
-            f"{scene.expansions.modes[column]} at sample {k} (t = {scene.path.time_s[k]:.4g} s); "
+            f"{scene.expansions.modes[column]} at {scene.path.where(k)}; "
             "give a pose of the trajectory, or auto",
         )
         raise AccuracyError(str(problem))
@@ -121,23 +156,58 @@ def _constraints(file: CaseFile) -> list[LinearConstraint]:
 
 def study_targets(
     scene: Scene,
-    target_hz: tuple[Floats, ...],
+    targets: tuple[Wanted, ...],
     assignment: Assignment,
     initial_hz: Floats,
     exact_hz: Floats,
 ) -> tuple[TargetStudy, ...]:
     """Each target before, as predicted, and exactly; ``initial_hz``, ``exact_hz`` (n_t, modes)."""
-    weights = trapezoidal_weights(scene.path.time_s)
+    weights = time_weights(scene.path)
     studies = []
-    for k, (target, wanted) in enumerate(zip(scene.file.targets, target_hz, strict=True)):
-        curves = (
-            initial_hz[:, target.mode - 1],
-            hz_from_lam(assignment.lam[k]),
-            exact_hz[:, target.mode - 1],
-        )
-        errors = (_error(curve, wanted, weights) for curve in curves)
-        studies.append(TargetStudy(target.mode, wanted, *curves, *errors))
+    for k, (target, wanted) in enumerate(zip(scene.file.targets, targets, strict=True)):
+        rows, column = wanted.rows, target.mode - 1
+        predicted = hz_from_lam(assignment.lam[k])
+        hz = (wanted.hz, initial_hz[rows, column], predicted, exact_hz[rows, column])
+        studies.append(_studied(scene.path, target, rows, hz, weights[rows]))
     return tuple(studies)
+
+
+def _studied(
+    path: Trajectories, target: Target, rows: slice, hz: _Curves, weights: Floats
+) -> TargetStudy:
+    """``hz`` and ``weights`` are those at ``rows`` of all samples."""
+    error = _errors(hz, weights)
+    return TargetStudy(
+        target.mode,
+        target_hz=hz[0],
+        initial_hz=hz[1],
+        predicted_hz=hz[2],
+        exact_hz=hz[3],
+        initial=error.initial,
+        predicted=error.predicted,
+        exact=error.exact,
+        trajectory=target.trajectory,
+        rows=rows,
+        weight_s=float(weights.sum()),
+        along=tuple(_along(path, rows, hz, weights)),
+    )
+
+
+def _along(
+    path: Trajectories, wanted: slice, hz: _Curves, weights: Floats
+) -> Iterator[TargetAlong]:
+    """The errors along each trajectory that the target holds on; ``hz`` and ``weights`` its own."""
+    for part, rows in zip(path.parts, path.rows, strict=True):
+        if wanted.start <= rows.start and rows.stop <= wanted.stop:
+            own = slice(rows.start - wanted.start, rows.stop - wanted.start)
+            target, initial, predicted, exact = (curve[own] for curve in hz)
+            error = _errors((target, initial, predicted, exact), weights[own])
+            yield TargetAlong(part.name, own, error)
+
+
+def _errors(hz: _Curves, weights: Floats) -> ErrorSummary:
+    wanted, *curves = hz
+    return ErrorSummary(*(_error(curve, wanted, weights) for curve in curves))
 
 
 def _error(frequency: Floats, wanted: Floats, weights: Floats) -> ErrorRow:

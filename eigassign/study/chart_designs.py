@@ -14,9 +14,9 @@ from eigassign.assignment import (
     Assignment,
     Goal,
     LinearModel,
+    hz_from_lam,
     relative_error,
     solve_assignment,
-    trapezoidal_weights,
 )
 from eigassign.errors import EigassignError
 from eigassign.modal.expansion import expand
@@ -113,12 +113,11 @@ def _run(
 ) -> DesignRun:
     lam = _exact(task, y)
     worst, square = 0.0, 0.0
-    weights = trapezoidal_weights(task.time_s)
-    total = sum(t.weight for t in task.scene.file.targets)
-    for target, hz in zip(task.scene.file.targets, task.wanted_hz, strict=True):
-        off = relative_error(np.sqrt(lam[:, target.mode - 1]) / (2.0 * np.pi), hz, weights)
+    for target, own in zip(task.scene.file.targets, task.wanted, strict=True):
+        hz, weights = hz_from_lam(lam[own.rows, target.mode - 1]), task.weights[own.rows]
+        off = relative_error(hz, own.hz, weights)
         worst = max(worst, off.max_relative)
-        square += target.weight / total * off.rms_relative**2
+        square += target.weight * weights.sum() / task.total_s * off.rms_relative**2
     value = task.objective(lam)
     return DesignRun(
         name, ours, parameters, spent, solves, tuple(y.tolist()), value, worst, square**0.5, 0.0,
@@ -135,8 +134,7 @@ def _one_shot(task: Task, effort: Effort) -> DesignRun:
     def design() -> Assignment:
         linear = expand(*point, order, linear_in_y=True)
         made = Expansions(full, linear, order, order)
-        path = replace(scene.path, time_s=task.time_s, q=task.q)
-        return assign_design(replace(scene, expansions=made, trajectory=path), task.wanted_hz)
+        return assign_design(replace(scene, expansions=made, trajectory=task.path), task.wanted)
 
     found, spent = measure(design, effort.patience)
     parameters: dict[str, object] = {"order": order, "q0": full.q0, "y0": full.y0}
@@ -178,12 +176,12 @@ def _programs(
     while done < rounds and moved >= STILL:
         l0, slope = _linearised(lam, y, width)
         goals = [
-            Goal(LinearModel(l0[:, k], slope[:, k]), hz, target.weight)
-            for target, hz in zip(task.scene.file.targets, task.wanted_hz, strict=True)
+            Goal(LinearModel(l0[own.rows, k], slope[own.rows, k]), own.hz, target.weight, own.rows)
+            for target, own in zip(task.scene.file.targets, task.wanted, strict=True)
             for k in [columns.index(target.mode)]
         ]
         found = solve_assignment(
-            goals, task.time_s, y, np.clip(y, *task.scene.bounds), bounds, constraints, names
+            goals, task.weights, y, np.clip(y, *task.scene.bounds), bounds, constraints, names
         )
         moved = float((np.abs(found.y - y) / np.where(width > 0.0, width, 1.0)).max())
         y, done = found.y, done + 1

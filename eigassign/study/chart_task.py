@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment import (
-    Bounds,
-    LinearConstraint,
-    lam_from_hz,
-    trapezoidal_weights,
-)
-from eigassign.study.assignment_study import target_frequencies
-from eigassign.study.chart_bench import spread_rows
+from eigassign.assignment import Bounds, LinearConstraint, lam_from_hz
+from eigassign.mechanism.trajectories import Trajectories
+from eigassign.study.assignment_study import Wanted, target_frequencies, time_weights
 from eigassign.study.chart_effort import Effort
 from eigassign.study.scene import Scene
 
@@ -26,10 +22,25 @@ class Task:
     """The assignment of one case on (perhaps thinned) samples of its trajectory."""
 
     scene: Scene
-    time_s: Floats
-    q: Floats
-    wanted_hz: tuple[Floats, ...]  # (n_t,) each
+    path: Trajectories  # with these samples only
+    wanted: tuple[Wanted, ...]  # at them
     rows: NDArray[np.intp]
+
+    @property
+    def q(self) -> Floats:
+        """(n_t, n_q)."""
+        return self.path.q
+
+    @cached_property
+    def weights(self) -> Floats:
+        """ω (n_t,) of the integral over time."""
+        return time_weights(self.path)
+
+    @property
+    def total_s(self) -> float:
+        """The time that all targets stand for, each by its weight."""
+        pairs = zip(self.scene.file.targets, self.wanted, strict=True)
+        return float(sum(t.weight * self.weights[own.rows].sum() for t, own in pairs))
 
     @property
     def modes(self) -> tuple[int, ...]:
@@ -44,31 +55,28 @@ class Task:
 
     def objective(self, lam: Floats) -> float:
         """J, the weighted mean square of the relative error in λ; lam (n_t, highest mode)."""
-        weights = trapezoidal_weights(self.time_s)
-        total, value = sum(t.weight for t in self.scene.file.targets) * weights.sum(), 0.0
-        for target, hz in zip(self.scene.file.targets, self.wanted_hz, strict=True):
-            off = lam[:, target.mode - 1] / lam_from_hz(hz) - 1.0
-            value += float(target.weight / total * weights @ off**2)
+        value = 0.0
+        for target, own in zip(self.scene.file.targets, self.wanted, strict=True):
+            off = lam[own.rows, target.mode - 1] / lam_from_hz(own.hz) - 1.0
+            value += float(target.weight / self.total_s * self.weights[own.rows] @ off**2)
         return value
 
     def slope(self, lam: Floats, slopes: Floats) -> Floats:
         """∂J/∂y (n_y,) from ∂λ/∂y (n_t, highest mode, n_y)."""
-        weights = trapezoidal_weights(self.time_s)
-        total = sum(t.weight for t in self.scene.file.targets) * weights.sum()
         value = np.zeros(slopes.shape[2])
-        for target, hz in zip(self.scene.file.targets, self.wanted_hz, strict=True):
-            lam_d, k = lam_from_hz(hz), target.mode - 1
-            off = lam[:, k] / lam_d - 1.0
-            value += 2.0 * target.weight / total * (weights * off / lam_d) @ slopes[:, k]
+        for target, own in zip(self.scene.file.targets, self.wanted, strict=True):
+            lam_d, k = lam_from_hz(own.hz), target.mode - 1
+            push = self.weights[own.rows] * (lam[own.rows, k] / lam_d - 1.0) / lam_d
+            value += 2.0 * target.weight / self.total_s * push @ slopes[own.rows, k]
         return value
 
 
 def task_of(scene: Scene, effort: Effort, solve_s: float) -> Task:
     """All samples, or so few that one exact objective takes about a fortieth of a search."""
-    path, wanted = scene.path, target_frequencies(scene.file, scene.path.time_s)
     affordable = max(5, int(effort.searched_s / 40.0 / solve_s))
-    rows = spread_rows(len(path.time_s), affordable)
-    return Task(scene, path.time_s[rows], path.q[rows], tuple(w[rows] for w in wanted), rows)
+    rows = scene.path.spread(affordable)
+    path = scene.path.chosen(rows)
+    return Task(scene, path, target_frequencies(scene.file, path), rows)
 
 
 def limits_of(scene: Scene) -> tuple[Bounds, list[LinearConstraint], tuple[str, ...]]:

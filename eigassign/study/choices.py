@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
-from eigassign.mechanism.trajectory import Trajectory
+from eigassign.mechanism.trajectories import Trajectories
 from eigassign.modal.expansion_choice import choose_expansion
 from eigassign.modal.mesh_choice import MeshChoice, choose_mesh
 from eigassign.modal.model import Model
@@ -66,7 +67,7 @@ def settle_mesh(
 def choose_order(
     file: CaseFile,
     model: Model,
-    trajectory: Trajectory | None,
+    trajectory: Trajectories | None,
     q0: Floats,
     y0: Floats,
     modes: tuple[int, ...],
@@ -78,17 +79,19 @@ def choose_order(
     x = looked_at(file, model, trajectory, q0, y0)
     start = np.concatenate([q0, y0])
     accuracy = SHARE * asked_accuracy(file)
-    found = choose_expansion(model.pencil, x, accuracy, modes, start=start)
+    found = choose_expansion(
+        model.pencil, x, accuracy, modes, start=start, place=partial(_place, trajectory)
+    )
     points = [part.q0 for part in found.expansions[1:]]
     more = tuple(tuple(float(v) for v in q) for q in points if not np.allclose(q, q0))
     return OrderChoice(found.order, more, found.reasons)
 
 
 def looked_at(
-    file: CaseFile, model: Model, trajectory: Trajectory | None, q0: Floats, y0: Floats
+    file: CaseFile, model: Model, trajectory: Trajectories | None, q0: Floats, y0: Floats
 ) -> Floats:
     """Poses (n, n_x) that the answer must hold at: the trajectory at designs all over the box."""
-    q = q0[None] if trajectory is None else _thinned(trajectory.q)
+    q = q0[None] if trajectory is None else trajectory.q[trajectory.spread(SAMPLES)]
     parameters = file.design.parameters.values()
     lower = np.array([p.min for p in parameters])
     upper = np.array([p.max for p in parameters])
@@ -96,6 +99,9 @@ def looked_at(
     return np.vstack([np.hstack([q, np.broadcast_to(y, (len(q), len(y)))]) for y in designs])
 
 
-def _thinned(q: Floats) -> Floats:
-    keep = np.unique(np.linspace(0, len(q) - 1, min(SAMPLES, len(q))).round().astype(int))
-    return np.asarray(q[keep])
+def _place(trajectory: Trajectories | None, row: int) -> str:
+    """Row of what `looked_at` gives, in words: the sample, whatever the design."""
+    if trajectory is None:
+        return "the expansion point"
+    samples = trajectory.spread(SAMPLES)
+    return trajectory.sample(int(samples[row % len(samples)]))

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
-from eigassign.mechanism.trajectory import Trajectory
+from eigassign.mechanism.trajectories import Trajectories
 from eigassign.modal.model import Model
 from eigassign.study.findings import Poses
 
@@ -15,7 +15,7 @@ POSES = 7  # drawn, first and last sample included
 
 
 def draw_poses(
-    file: CaseFile, model: Model, trajectory: Trajectory, y: Floats, count: int = POSES
+    file: CaseFile, model: Model, trajectory: Trajectories, y: Floats, count: int = POSES
 ) -> Poses:
     """Poses at samples evenly spread over the trajectory's length in q, at design y."""
     chosen = spread_samples(trajectory.q, count)
@@ -48,7 +48,7 @@ def spread_samples(q: Floats, count: int) -> list[int]:
     return sorted({int(np.abs(travelled - distance).argmin()) for distance in wanted})
 
 
-def _tip_path(trajectory: Trajectory, lines: Floats) -> Floats:
+def _tip_path(trajectory: Trajectories, lines: Floats) -> Floats:
     """The path that the case gives, else the one of the last link's end."""
     if trajectory.tip is not None:
         return trajectory.tip

@@ -6,7 +6,7 @@ errors as fractions (0.01 is 1 %) of the frequency in Hz.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -115,8 +115,21 @@ class ErrorSummary:
 
 
 @dataclass(frozen=True)
+class TargetAlong:
+    """The errors of a target along one trajectory; ``rows`` are of the target's own arrays."""
+
+    name: str
+    rows: slice
+    error: ErrorSummary
+
+
+@dataclass(frozen=True)
 class TargetStudy:
-    """One assigned mode along the trajectory (the paper's Figure 4); arrays (n_t,) in Hz."""
+    """One assigned mode along the trajectory (the paper's Figure 4); arrays (n,) in Hz.
+
+    They belong to the ``rows`` of all samples at which the target holds: all of them, unless the
+    case names one ``trajectory``. ``weight_s`` is the time that they stand for, weighted.
+    """
 
     mode: int
     target_hz: Floats
@@ -126,6 +139,16 @@ class TargetStudy:
     initial: ErrorRow
     predicted: ErrorRow
     exact: ErrorRow
+    trajectory: str | None
+    rows: slice
+    weight_s: float
+    along: tuple[TargetAlong, ...]
+
+    @property
+    def label(self) -> str:
+        """The target in words: its mode, and its trajectory where it holds on one only."""
+        along = f" along {self.trajectory!r}" if self.trajectory is not None else ""
+        return f"mode {self.mode}{along}"
 
     @property
     def error(self) -> ErrorSummary:
@@ -159,6 +182,17 @@ class SolverRow:
 
 
 @dataclass(frozen=True)
+class TrajectoryRow:
+    """One trajectory: the ``rows`` of all samples that are its own, and what it counts."""
+
+    name: str
+    rows: slice
+    duration_s: float
+    weight: float
+    tip: Floats | None  # (n, 2 or 3) in m, where the case gives a path of the tip
+
+
+@dataclass(frozen=True)
 class Findings:
     """Everything a run folder shows."""
 
@@ -169,8 +203,9 @@ class Findings:
     version: str
     q_names: tuple[str, ...]
     q_units: tuple[str, ...]
-    time_s: Floats
-    q: Floats  # (n_t, n_q)
+    time_s: Floats  # of each trajectory from its own start
+    q: Floats  # (n_t, n_q), of several trajectories one after the other
+    trajectories: tuple[TrajectoryRow, ...]
     poses: Poses
     studies: tuple[ModeStudy, ...]
     design: tuple[DesignRow, ...]
@@ -181,6 +216,15 @@ class Findings:
     notes: tuple[str, ...]  # what was chosen and why, one line each
     timing_s: Mapping[str, float]
     tolerance: float = 0.02  # the largest approximation error the case accepts, a fraction
+    only: str | None = None  # the one of several trajectories that these are narrowed to
+
+    @property
+    def along(self) -> str:
+        """What the samples belong to, in words."""
+        if self.only is not None:
+            return f"trajectory {self.only!r}"
+        several = len(self.trajectories) > 1
+        return f"{len(self.trajectories)} trajectories" if several else "the trajectory"
 
     @property
     def approximation_error(self) -> float | None:
@@ -200,16 +244,28 @@ class Findings:
         """Over all targets: the largest maximum and the root of the mean square; None without."""
         if not self.targets:
             return None
-        return ErrorSummary(
-            _over_all([target.initial for target in self.targets]),
-            _over_all([target.predicted for target in self.targets]),
-            _over_all([target.exact for target in self.targets]),
+        return over_all([(target.error, target.weight_s) for target in self.targets])
+
+    def error_along(self, name: str) -> ErrorSummary | None:
+        """The same along one trajectory; None where no target holds on it."""
+        along = [one.error for target in self.targets for one in target.along if one.name == name]
+        return over_all([(error, 1.0) for error in along]) if along else None
+
+
+def over_all(errors: Sequence[tuple[ErrorSummary, float]]) -> ErrorSummary:
+    """The largest of the maxima, and of the mean squares their mean by the time they stand for."""
+    weights = np.array([weight for _, weight in errors])
+    return ErrorSummary(
+        *(
+            _combined([getattr(error, kind) for error, _ in errors], weights)
+            for kind in ("initial", "predicted", "exact")
         )
+    )
 
 
-def _over_all(rows: list[ErrorRow]) -> ErrorRow:
-    """All targets are sampled at the same times, so their mean squares average."""
-    mean_square = sum(row.rms_relative**2 for row in rows) / len(rows)
+def _combined(rows: list[ErrorRow], weights: Floats) -> ErrorRow:
+    square = np.array([row.rms_relative**2 for row in rows])
+    mean_square = float(square @ weights / weights.sum())
     return ErrorRow(max(row.max_relative for row in rows), float(np.sqrt(mean_square)))
 
 

@@ -10,10 +10,18 @@ from numpy.typing import NDArray
 
 from eigassign._version import __version__
 from eigassign.assignment import Assignment
+from eigassign.mechanism.trajectories import Trajectories
 from eigassign.study.assignment_study import design_rows, limit_notes, solver_row
 from eigassign.study.crossings import crossing_warnings
 from eigassign.study.drawing import draw_poses, rest_pose
-from eigassign.study.findings import Findings, ModeStudy, OtherModes, Poses, TargetStudy
+from eigassign.study.findings import (
+    Findings,
+    ModeStudy,
+    OtherModes,
+    Poses,
+    TargetStudy,
+    TrajectoryRow,
+)
 from eigassign.study.motion_study import study_motion
 from eigassign.study.scene import Scene
 from eigassign.study.units import coordinate_units
@@ -51,6 +59,7 @@ def gather(
         q_units=coordinate_units(file),
         time_s=np.zeros(0) if trajectory is None else trajectory.time_s,
         q=np.zeros((0, n_q)) if trajectory is None else trajectory.q,
+        trajectories=_trajectories(trajectory),
         poses=_poses(scene),
         studies=studies,
         design=() if assigned is None else design_rows(scene, assigned.assignment.y),
@@ -61,6 +70,17 @@ def gather(
         notes=(*scene.notes, *(limit_notes(assigned.assignment) if assigned else ()), *motion[0]),
         timing_s=dict(timing_s),
         tolerance=file.validation.max_error,
+    )
+
+
+def _trajectories(path: Trajectories | None) -> tuple[TrajectoryRow, ...]:
+    if path is None:
+        return ()
+    return tuple(
+        TrajectoryRow(
+            part.name, rows, float(np.ptp(part.trajectory.time_s)), part.weight, part.trajectory.tip
+        )
+        for part, rows in zip(path.parts, path.rows, strict=True)
     )
 
 
@@ -98,7 +118,7 @@ def _warnings(scene: Scene, assigned: Assigned | None) -> Iterator[str]:
         return
     modes = tuple(sorted({target.mode for target in assigned.targets}))
     for hz, design in ((assigned.initial_hz, "initial"), (assigned.exact_hz, "optimal")):
-        yield from crossing_warnings(hz, modes, scene.path.time_s, design)
+        yield from crossing_warnings(hz, modes, scene.path.where, design)
     yield from _accuracy_warnings(scene, assigned)
     yield from _worsening(scene, assigned)
 
@@ -108,7 +128,7 @@ def _accuracy_warnings(scene: Scene, assigned: Assigned) -> Iterator[str]:
     limit, y = scene.file.validation.max_error, assigned.assignment.y
     off = [t for t in assigned.targets if not t.approximation_error <= limit]
     for target in off:
-        taylor = scene.expansions.taylor_hz(scene.path.q, y)
+        taylor = scene.expansions.taylor_hz(scene.path.q[target.rows], y)
         taylor_hz = taylor[:, scene.expansions.column(target.mode)]
         enough = np.all(np.abs(taylor_hz / target.exact_hz - 1.0) <= limit)
         point = ", ".join(f"{value:.4g}" for value in y)
@@ -118,7 +138,7 @@ def _accuracy_warnings(scene: Scene, assigned: Assigned) -> Iterator[str]:
             else "so is the full expansion: narrow the bounds, expand nearer or to a higher order"
         )
         yield (
-            f"mode {target.mode}: the prediction that the optimum rests on is up to "
+            f"{target.label}: the prediction that the optimum rests on is up to "
             f"{100 * target.approximation_error:.3g} % off the exact frequency, over the "
             f"{100 * limit:g} % of validation.max_error ({advice}); the exact frequencies hold, "
             "but there may be a better design"
@@ -128,8 +148,14 @@ def _accuracy_warnings(scene: Scene, assigned: Assigned) -> Iterator[str]:
 def _worsening(scene: Scene, assigned: Assigned) -> Iterator[str]:
     """Where, in truth, the initial design was nearer to the targets than the optimum is."""
     weighed = list(zip(scene.file.targets, assigned.targets, strict=True))
-    before = sum(file.weight * target.initial.rms_relative**2 for file, target in weighed)
-    after = sum(file.weight * target.exact.rms_relative**2 for file, target in weighed)
+    shares = [file.weight * target.weight_s for file, target in weighed]
+    before, after = (
+        sum(
+            share * getattr(target, when).rms_relative ** 2
+            for share, (_, target) in zip(shares, weighed, strict=True)
+        )
+        for when in ("initial", "exact")
+    )
     if after > before and _is_feasible(scene):
         yield (
             "the initial design is nearer to the targets than this optimum is, when both are "

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.case import CaseFile
 from eigassign.errors import CaseError
-from eigassign.mechanism.trajectory import Trajectory
+from eigassign.mechanism.trajectories import Trajectories
 from eigassign.modal.model import Model
 from eigassign.study.choices import choose_order
 
@@ -34,7 +34,7 @@ class Plan:
 def plan_expansion(
     file: CaseFile,
     model: Model,
-    trajectory: Trajectory | None,
+    trajectory: Trajectories | None,
     order: int | None = None,
     modes: Sequence[int] | None = None,
 ) -> Plan:
@@ -56,7 +56,7 @@ def plan_expansion(
     return Plan(q0, y0, found.order, chosen, said, found.more_q)
 
 
-def _q0(file: CaseFile, model: Model, trajectory: Trajectory | None) -> tuple[Floats, str]:
+def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[Floats, str]:
     n_q, given = len(model.q_names), file.expansion.q
     if given != "auto":
         q0 = np.array(given, dtype=np.float64)
@@ -69,10 +69,9 @@ def _q0(file: CaseFile, model: Model, trajectory: Trajectory | None) -> tuple[Fl
         message = "auto needs a trajectory to be central in, and the case has none: give values"
         raise _wrong(file, "expansion.q", message)
     k = central_sample(trajectory.q @ joint_map(model).T)
-    q0, t = trajectory.q[k], trajectory.time_s[k]
-    point = shown_point(model.q_names, q0)
+    point = shown_point(model.q_names, trajectory.q[k])
     why = "the most central: its farthest other sample is nearer than any other's"
-    return q0, f"expansion point: {point}, sample {k} of the trajectory (t = {t:.4g} s), {why}"
+    return trajectory.q[k], f"expansion point: {point}, {trajectory.where(k)}, {why}"
 
 
 def joint_map(model: Model) -> Floats:
@@ -129,7 +128,7 @@ def _check_modes(file: CaseFile, model: Model, modes: Sequence[int]) -> None:
 
 
 def _outside(
-    file: CaseFile, q0: Floats, y0: Floats, model: Model, trajectory: Trajectory | None
+    file: CaseFile, q0: Floats, y0: Floats, model: Model, trajectory: Trajectories | None
 ) -> list[str]:
     """Notes on an expansion point that lies outside what it is meant to stand for."""
     notes = [

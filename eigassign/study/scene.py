@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.errors import CaseError
-from eigassign.mechanism.trajectory import Trajectory
+from eigassign.mechanism.trajectories import Trajectories
 from eigassign.modal.model import Model
 from eigassign.study.approximation import Expansions
 
@@ -30,13 +30,13 @@ class Scene:
     file: CaseFile
     model: Model
     initial: Floats  # y as the file writes it, (n_y,)
-    trajectory: Trajectory | None
+    trajectory: Trajectories | None
     expansions: Expansions
     notes: tuple[str, ...]  # what was chosen and why
 
     @property
-    def path(self) -> Trajectory:
-        """The trajectory; raises CaseError where the case has none."""
+    def path(self) -> Trajectories:
+        """The trajectory, or several; raises CaseError where the case has none."""
         if self.trajectory is None:
             problem = self.file.problem("trajectory", "is missing, and needed here")
             raise CaseError((problem,))

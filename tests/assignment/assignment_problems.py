@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from eigassign.assignment import Bounds, Goal, LinearModel, hz_from_lam
+from eigassign.assignment import Bounds, Goal, LinearModel, hz_from_lam, trapezoidal_weights
 
 
 @dataclass(frozen=True)
@@ -24,8 +24,12 @@ class Problem:
         return Bounds(self.lower, self.upper)
 
     @property
+    def weights(self):
+        return trapezoidal_weights(self.time_s)
+
+    @property
     def arguments(self):
-        return self.goals, self.time_s, self.y0, self.y_initial, self.bounds
+        return self.goals, self.weights, self.y0, self.y_initial, self.bounds
 
 
 def goal(l0, slope, lam_d, weight=1.0):

@@ -27,7 +27,7 @@ from eigassign.errors import AccuracyError, UsageError
 def small_program(upper=0.1):
     """J = (0.2 − 0.5 y)² on [0, upper], y + 0 ≤ 5."""
     box, free = Bounds(np.zeros(1), np.array([upper])), LinearConstraint("loose", [1.0], upper=5.0)
-    return build_program([goal([1.2e6], [[-5e5]], 1e6)], [0.0], [0.0], [0.0], box, [free])
+    return build_program([goal([1.2e6], [[-5e5]], 1e6)], [1.0], [0.0], [0.0], box, [free])
 
 
 def answer(y, mu, nu=0.0):
@@ -62,7 +62,7 @@ def test_each_residual_is_what_it_is_by_hand(wrong, expected):
 
 def test_a_violated_constraint_is_measured_in_units_of_its_row():
     box, tight = Bounds(np.zeros(1), np.array([0.1])), LinearConstraint("tight", [1.0], upper=0.05)
-    program = build_program([goal([1.2e6], [[-5e5]], 1e6)], [0.0], [0.0], [0.0], box, [tight])
+    program = build_program([goal([1.2e6], [[-5e5]], 1e6)], [1.0], [0.0], [0.0], box, [tight])
     assert judge(program, answer(0.08, 0.16)).primal_residual == pytest.approx(0.03 / 0.1)
 
 
@@ -72,7 +72,7 @@ def test_the_rounding_of_a_sum_of_large_numbers_is_not_held_against_it():
     value = float(share @ (low + 0.3))
     total = LinearConstraint("total", share, value, value)
     model = goal(np.full(3, 1.2e6), -1e5 * np.eye(3), 1e6)
-    result = solve_assignment([model], [0.0, 1.0, 3.0], low, low, Bounds(low, low + 1), [total])
+    result = solve_assignment([model], [0.5, 1.5, 1.0], low, low, Bounds(low, low + 1), [total])
     assert share @ result.dy == pytest.approx(0.3 * share.sum(), abs=1e-6)
 
 
@@ -81,7 +81,7 @@ def test_the_last_bit_of_a_sum_of_large_numbers_is_no_violation_but_a_hundred_ar
     for bits, met in ((1, True), (100, False)):
         value = 1e9 + bits * np.spacing(1e9)
         limit = LinearConstraint("limit", [1.0], lower=value)
-        program = build_program([model], [0.0], [1e9], [1e9], box, [limit])
+        program = build_program([model], [1.0], [1e9], [1e9], box, [limit])
         assert (judge(program, answer(1e9, 0.0)).primal_residual == 0.0) is met
 
 
@@ -221,7 +221,7 @@ def test_an_equality_said_twice_does_no_harm(monkeypatch):
     ]
     model = goal([0.0, -1e6], 1e6 * np.eye(2), 1e6)
     box = Bounds(np.full(2, -9.0), np.full(2, 9.0))
-    found = solve_assignment([model], [0.0, 1.0], [0.0, 0.0], [0.0, 0.0], box, twice)
+    found = solve_assignment([model], [0.5, 0.5], [0.0, 0.0], [0.0, 0.0], box, twice)
     np.testing.assert_allclose(found.y, [1.5, 1.5], rtol=1e-12)
 
 

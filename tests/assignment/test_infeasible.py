@@ -15,7 +15,7 @@ def solve(constraints, lower=(0.0, 0.0), upper=(1.0, 1.0)):
     """Two parameters that change λ by some 10 % a unit."""
     box = Bounds(np.array(lower), np.array(upper))
     model = goal([1.2e6, 1.1e6], [[-1e5, 2e4], [3e4, -1e5]], 1e6)
-    return solve_assignment([model], [0.0, 1.0], [0.0, 0.0], [0.5, 0.5], box, constraints)
+    return solve_assignment([model], [0.5, 0.5], [0.0, 0.0], [0.5, 0.5], box, constraints)
 
 
 def row(name, coefficients, lower=-np.inf, upper=np.inf):
@@ -113,7 +113,7 @@ def test_infeasible_is_said_exactly_when_it_is_so_and_the_named_set_is_smallest(
         constraints.append(row(f"c{k}", rng.normal(size=3), low - 0.5, low + rng.random()))
     box = Bounds(np.zeros(3), np.ones(3))
     constraints = constraints[: 2 + seed % 5]
-    arguments = (problem.goals, problem.time_s, np.zeros(3), 0.5 * np.ones(3), box, constraints)
+    arguments = (problem.goals, problem.weights, np.zeros(3), 0.5 * np.ones(3), box, constraints)
     if possible(constraints):
         solve_assignment(*arguments)
         return

@@ -41,7 +41,7 @@ def test_the_program_of_one_constant_target_is_the_papers_up_to_a_factor():
     R, h = quadratic_form(model, lam_d, trapezoidal_weights(time))
     program = build_program(
         [goal(model.l0, model.l, lam_d, weight=7.0)],
-        time,
+        trapezoidal_weights(time),
         np.zeros(3),
         np.zeros(3),
         Bounds(-np.ones(3), np.ones(3)),
@@ -80,7 +80,7 @@ def test_one_percent_weighs_the_same_in_a_slow_and_in_a_fast_mode():
     slow, fast = goal([1.01e4], np.zeros((1, 0)), 1e4), goal([1.01e12], np.zeros((1, 0)), 1e12)
     nothing = np.zeros(0)
     for g in (slow, fast):
-        program = build_program([g], [0.0], nothing, nothing, Bounds(nothing, nothing))
+        program = build_program([g], [1.0], nothing, nothing, Bounds(nothing, nothing))
         assert program.objective(nothing) == pytest.approx(1e-4, rel=1e-9)
 
 
@@ -153,7 +153,9 @@ def test_data_that_is_not_a_number_or_does_not_fit_is_refused(make, words):
     ("change", "words"),
     [
         ({"goals": []}, "targets: none given"),
-        ({"time_s": [0.0, 1.0, 2.0]}, "2 given, but there are 3 samples"),
+        ({"time_weights": [0.5, 1.0, 0.5]}, "2 given, but there are 3 samples"),
+        ({"time_weights": [0.5, 0.0]}, "time weights: 0.0 given; must be above 0"),
+        ({"time_weights": []}, "time weights: none given"),
         ({"y0": [np.nan]}, "expansion point y0: nan"),
         ({"y0": [0.0, 0.0]}, "2 design parameters"),
         ({"y_initial": [np.inf]}, "initial design: inf"),
@@ -166,7 +168,7 @@ def test_data_that_is_not_a_number_or_does_not_fit_is_refused(make, words):
 def test_parts_that_do_not_fit_each_other_are_refused(change, words):
     whole = {
         "goals": [Goal(model(), np.ones(2))],
-        "time_s": [0.0, 1.0],
+        "time_weights": [0.5, 0.5],
         "y0": [0.0],
         "y_initial": [0.5],
         "bounds": BOX,

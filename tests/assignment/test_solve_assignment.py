@@ -12,6 +12,7 @@ from eigassign.assignment import (
     LinearConstraint,
     build_program,
     solve_assignment,
+    trapezoidal_weights,
 )
 from eigassign.assignment.certificate import ACCEPT
 
@@ -25,7 +26,7 @@ def solve(l0, slope, lower, upper, y_initial=None, constraints=(), y0=None, name
     zero = np.zeros(slope.shape[1])
     return solve_assignment(
         [goal(LAM * np.asarray(l0, dtype=float), LAM * slope, LAM)],
-        np.arange(slope.shape[0]) if time is None else time,
+        trapezoidal_weights(np.arange(slope.shape[0]) if time is None else time),
         zero if y0 is None else y0,
         zero if y_initial is None else y_initial,
         Bounds(np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)),
@@ -234,7 +235,7 @@ def test_the_expansion_point_and_the_start_do_not_change_a_determined_answer(see
     shift = 0.3 * (p.upper - p.lower)
     goals = [goal(g.model.l0 + g.model.l @ shift, g.model.l, g.lam_d, g.weight) for g in p.goals]
     one = solve_assignment(*p.arguments)
-    two = solve_assignment(goals, p.time_s, p.y0 + shift, p.lower, p.bounds)
+    two = solve_assignment(goals, p.weights, p.y0 + shift, p.lower, p.bounds)
     assert np.max(np.abs(two.y - one.y) / (p.upper - p.lower)) <= 1e-8
 
 
@@ -296,7 +297,7 @@ def test_uneven_samples_weigh_by_the_time_they_stand_for():
 def test_goals_share_by_their_weights():
     goals = [goal([LAM], [[-LAM]], LAM, 3.0), goal([2 * LAM], [[-LAM]], LAM, 1.0)]
     one = Bounds(np.zeros(1), np.ones(1))
-    result = solve_assignment(goals, [0.0], [0.0], [0.0], one)
+    result = solve_assignment(goals, [1.0], [0.0], [0.0], one)
     assert result.y[0] == pytest.approx(0.25, abs=1e-12)  # (3 · 0 + 1 · 1) / 4
     np.testing.assert_allclose(result.lam, [[0.75 * LAM], [1.75 * LAM]], rtol=1e-12)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,12 +12,15 @@ from eigassign.study.findings import (
     DesignMap,
     DesignRow,
     ErrorRow,
+    ErrorSummary,
     Findings,
     ModeStudy,
     OtherModes,
     Poses,
     SolverRow,
+    TargetAlong,
     TargetStudy,
+    TrajectoryRow,
 )
 
 Floats = NDArray[np.float64]
@@ -34,12 +39,14 @@ def make_findings(
     prefix: str = "",
     varies: bool = True,
     spatial: bool = False,
+    parts: tuple[int, ...] | None = None,
 ) -> Findings:
     time = np.linspace(0.0, 1.0, n_t) if n_t > 1 else np.zeros(n_t)
     names = tuple(f"{prefix}q{i + 1}" for i in range(n_q))
     q = _joint_motion(time, n_q)
     studies = tuple(_study(i + 1, time, n_y, n_q, scale_hz, prefix, varies) for i in range(1))
-    targets = tuple(_target(i + 1, time, scale_hz) for i in range(n_targets if n_t else 0))
+    parts = (n_t,) if parts is None else parts
+    targets = tuple(_target(i + 1, time, scale_hz, parts) for i in range(n_targets if n_t else 0))
     return Findings(
         title=title,
         reference="Belotti et al., Appl. Sci. 11 (2021) 11558",
@@ -50,6 +57,7 @@ def make_findings(
         q_units=tuple("m" if i % 4 == 3 else "rad" for i in range(n_q)),
         time_s=time,
         q=q,
+        trajectories=_trajectories(time, parts) if n_t else (),
         poses=_poses(time, n_links, scale_m, prefix, spatial),
         studies=studies,
         design=tuple(_design_row(i, prefix) for i in range(n_y)),
@@ -59,6 +67,20 @@ def make_findings(
         warnings=("section 'rod': <area> & inertia look odd",),
         notes=("order 4: asked for", "q1 dropped: no frequency depends on it"),
         timing_s={"model": 0.004, "expansion": 0.0061, "assignment": 0.0123, "exact": 0.05},
+    )
+
+
+def _slices(parts: tuple[int, ...]) -> list[slice]:
+    ends = np.cumsum([0, *parts])
+    return [slice(int(a), int(b)) for a, b in pairwise(ends)]
+
+
+def _trajectories(time: Floats, parts: tuple[int, ...]) -> tuple[TrajectoryRow, ...]:
+    return tuple(
+        TrajectoryRow(
+            f"part{k}" if len(parts) > 1 else "1", rows, float(np.ptp(time[rows])), 1.0, None
+        )
+        for k, rows in enumerate(_slices(parts))
     )
 
 
@@ -135,19 +157,24 @@ def _map(
     return DesignMap(names, (kind[1],) * count, axes, values)
 
 
-def _target(mode: int, time: Floats, scale: float) -> TargetStudy:
+def _target(mode: int, time: Floats, scale: float, parts: tuple[int, ...]) -> TargetStudy:
     wave = np.sin(3.0 * time)
     target = np.full(time.size, 190.0 * scale * mode)
     initial = target * (1.06 - 0.05 * wave)
     exact = target * (1.01 - 0.02 * wave)
     predicted = exact * (1.0 + 1e-3 * wave)
+    curves = (initial, predicted, exact)
+    along = tuple(
+        TargetAlong(
+            f"part{k}" if len(parts) > 1 else "1",
+            rows,
+            ErrorSummary(*(_error(hz[rows] / target[rows] - 1.0) for hz in curves)),
+        )
+        for k, rows in enumerate(_slices(parts))
+    )
+    errors = (_error(hz / target - 1.0) for hz in curves)
     return TargetStudy(
-        mode,
-        target,
-        initial,
-        predicted,
-        exact,
-        *(_error(hz / target - 1.0) for hz in (initial, predicted, exact)),
+        mode, target, *curves, *errors, None, slice(0, time.size), max(1.0, time.size), along
     )
 
 

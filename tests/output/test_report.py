@@ -114,6 +114,11 @@ def test_a_run_leaves_results_report_and_figures(tmp_path):
     write_run(findings, tmp_path)
     names = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.*")}
     expected = {f"figures/{plan.file}" for plan in figures.plan(findings)}
-    assert names == expected | {"results.json", "report.html"}
+    assert names == expected | {
+        "results.json",
+        "report.html",
+        "trajectory.csv",
+        "frequencies.csv",
+    }
     picture = (tmp_path / "figures" / "mechanism.png").read_bytes()
     assert base64.b64encode(picture).decode() in (tmp_path / "report.html").read_text()
