@@ -3,13 +3,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from eigassign.mechanism.trajectories import NamedTrajectory, Trajectories
+from eigassign.mechanism.trajectory import Trajectory
 from eigassign.study.crossings import crossing_warnings
 
 TIME = np.linspace(0.0, 1.0, 11)
 
 
 def warned(hz: np.ndarray, modes: tuple[int, ...]) -> list[str]:
-    return list(crossing_warnings(hz, modes, TIME, "initial"))
+    path = Trajectories((NamedTrajectory("1", Trajectory(TIME, TIME[:, None], None)),))
+    return list(crossing_warnings(hz, modes, path.where, "initial"))
 
 
 def crossing(gap: float) -> np.ndarray:
@@ -21,7 +24,7 @@ def crossing(gap: float) -> np.ndarray:
 def test_modes_that_nearly_meet_are_named_with_sample_and_time() -> None:
     (warning,) = warned(crossing(0.005), (1,))
     assert "modes 1 and 2 come within 0.5 %" in warning
-    assert "sample 6 (t = 0.6 s, 100 Hz) with the initial design" in warning
+    assert "sample 6 (t = 0.6 s), near 100 Hz, with the initial design" in warning
 
 
 @pytest.mark.parametrize("gap", [0.011, 0.5])
