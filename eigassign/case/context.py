@@ -142,8 +142,9 @@ def _trajectory(
     if not isinstance(body, Mapping):
         return body
     kinds, changed = coordinate_quantities(tree), dict(body)
-    for k in {"q", "points", "start"} & set(body):
-        changed[k] = _coordinates(body[k], kinds, (*path, k), findings)
+    for key in ("q", "points", "start"):
+        if key in body:
+            changed[key] = _coordinates(body[key], kinds, (*path, key), findings)
     if isinstance(at(body, "branch"), Mapping):
         changed["branch"] = {
             joint: _coordinates(limits, _range(tree, joint), (*path, "branch", joint), findings)

@@ -62,8 +62,17 @@ def _entry(key: str, value: object, depth: int) -> str:
         inner = "".join(_entry(k, v, depth + 1) for k, v in value.items())
         return f"{pad}{_word(key)}:\n{inner}"
     if isinstance(value, list) and not fits:
-        return f"{pad}{_word(key)}:\n" + "".join(f"{pad}  - {_flow(v)}\n" for v in value)
+        return f"{pad}{_word(key)}:\n" + "".join(_item(v, depth + 1) for v in value)
     return f"{pad}{_word(key)}: {flow}\n"
+
+
+def _item(value: object, depth: int) -> str:
+    """One entry of a block list; of a long mapping the first key stands beside the dash."""
+    pad, flow = "  " * depth, _flow(value)
+    if not isinstance(value, dict) or len(pad) + 2 + len(flow) <= _WIDTH:
+        return f"{pad}- {flow}\n"
+    inner = "".join(_entry(k, v, depth + 1) for k, v in value.items())
+    return f"{pad}- {inner.removeprefix(pad + '  ')}"
 
 
 def _flow(value: object) -> str:

@@ -25,7 +25,8 @@ def misfits(tree: Tree) -> Iterator[Finding]:
         place: KeyPath = ("mechanism", "springs", name)
         yield from _turning(spring, place, space)
         yield from _spring_axes(spring, place, space)
-    yield from _turning(at(tree, "trajectory"), ("trajectory",), space)
+    for path, body in trajectories(tree):
+        yield from _turning(body, path, space)
     for name, coordinate in items(tree, "coordinates"):
         if space == "spatial" and at(coordinate, "angle") == "absolute":
             message = "an absolute angle is for planar mechanisms: in space angles are relative"

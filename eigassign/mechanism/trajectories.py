@@ -100,6 +100,10 @@ class Trajectories:
         """The same with its time."""
         return f"{self.sample(k)} (t = {self.time_s[k]:.4g} s)"
 
+    def name_of(self, k: int) -> str:
+        """The name of the trajectory that sample k of all belongs to."""
+        return self._at(k)[0].name
+
     def _at(self, k: int) -> tuple[NamedTrajectory, slice]:
         pairs = zip(self.parts, self.rows, strict=True)
         return next(pair for pair in pairs if pair[1].start <= k < pair[1].stop)

@@ -73,7 +73,8 @@ def _entries(poses: Poses) -> list[Entry]:
     for at, (text, _) in enumerate(poses.bodies[:_BODY_KEYS]):
         entries.append(Entry(short(text, 22), _body_stroke(at)))
     for at, time in enumerate(poses.time_s):
-        entries.append(Entry(f"at {time:.3g} s", _pose_stroke(at, len(poses.lines))))
+        whose = f"{short(poses.of[at], 12)} " if poses.of else ""
+        entries.append(Entry(f"{whose}at {time:.3g} s", _pose_stroke(at, len(poses.lines))))
     return entries
 
 

@@ -27,7 +27,9 @@ def accuracy_notes(scene: Scene, discretisation: Discretisation) -> list[str]:
     lines = _mesh_lines(discretisation(x, modes), modes)
     few = _spread(q, SAMPLES)
     estimate = scene.expansions.estimate(few, scene.initial).max(axis=0)
+    several = scene.trajectory is not None and scene.trajectory.several
     where = "at the expansion point" if scene.trajectory is None else "along the trajectory"
+    where = "along all trajectories" if several else where
     for mode, error in zip(modes, estimate, strict=True):
         stated = (
             "cannot be vouched for" if not np.isfinite(error) else f"{100 * error:.2g} % at most"

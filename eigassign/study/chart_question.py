@@ -10,9 +10,10 @@ poses that the trajectory never takes.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,9 @@ from numpy.typing import NDArray
 from eigassign.errors import CaseError
 from eigassign.study.plan import joint_map
 from eigassign.study.scene import Scene
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 Floats = NDArray[np.float64]
 SEED = 20211204
@@ -140,18 +144,34 @@ def _place(scene: Scene) -> tuple[Floats | None, Callable[[Floats], Floats]]:
         return (
             s[:, 0] - low
         ) / reach, lambda u: base + (low + np.outer(u, [reach]) - s[0]) * back[None, :]
-    return _distance(s, q)
+    return _distance(s, q, scene.path.rows)
 
 
-def _distance(s: Floats, q: Floats) -> tuple[Floats, Callable[[Floats], Floats]]:
-    """Distance travelled, as a fraction; poses between samples by a cubic spline over it."""
+def _distance(
+    s: Floats, q: Floats, parts: Sequence[slice]
+) -> tuple[Floats, Callable[[Floats], Floats]]:
+    """Distance travelled, as a fraction; poses between samples by a cubic spline over it.
+
+    Each trajectory has a spline of its own; on the way from one to the next the pose is linear.
+    """
     from scipy.interpolate import CubicSpline
 
     travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(s, axis=0), axis=1))])
     place = travelled / travelled[-1]
     apart = np.concatenate([[True], np.diff(place) > 1e-9])
-    spline = CubicSpline(place[apart], q[apart])
-    return place, lambda u: np.asarray(spline(u))
+    apart[[rows.start for rows in parts]] = True
+    kept = [np.flatnonzero(apart[rows]) + rows.start for rows in parts]
+    splines = [CubicSpline(place[own], q[own]) for own in kept if len(own) > 1]
+    return place, lambda u: _pose(u, place, q, splines)
+
+
+def _pose(u: Floats, place: Floats, q: Floats, splines: Sequence[CubicSpline]) -> Floats:
+    """q (n, n_q) at places u (n,): on the spline that holds there, between two on a line."""
+    out = np.column_stack([np.interp(u, place, column) for column in q.T])
+    for spline in splines:
+        inside = (u >= spline.x[0]) & (u <= spline.x[-1])
+        out[inside] = spline(u[inside])
+    return out
 
 
 def build_points(

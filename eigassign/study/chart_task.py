@@ -36,7 +36,7 @@ class Task:
         """ω (n_t,) of the integral over time."""
         return time_weights(self.path)
 
-    @property
+    @cached_property
     def total_s(self) -> float:
         """The time that all targets stand for, each by its weight."""
         pairs = zip(self.scene.file.targets, self.wanted, strict=True)

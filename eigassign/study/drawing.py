@@ -23,6 +23,7 @@ def draw_poses(
     links = model.poses.links
     return Poses(
         time_s=_frozen(trajectory.time_s[chosen]),
+        of=tuple(trajectory.name_of(k) for k in chosen) if trajectory.several else (),
         lines=tuple(tuple(_frozen(line) for line in lines[k]) for k in chosen),
         link_names=links,
         bodies=_bodies(file, links, lines[chosen]),
@@ -49,10 +50,10 @@ def spread_samples(q: Floats, count: int) -> list[int]:
 
 
 def _tip_path(trajectory: Trajectories, lines: Floats) -> Floats:
-    """The path that the case gives, else the one of the last link's end."""
-    if trajectory.tip is not None:
-        return trajectory.tip
-    return _frozen(lines[:, -1, 1])
+    """The path that the case gives, else the one of the last link's end; NaN between two."""
+    path = lines[:, -1, 1] if trajectory.tip is None else trajectory.tip
+    seams = [rows.stop for rows in trajectory.rows[:-1]]
+    return _frozen(np.insert(path, seams, np.nan, axis=0))
 
 
 def _bodies(

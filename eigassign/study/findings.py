@@ -23,7 +23,8 @@ class Poses:
     lines: tuple[tuple[Floats, ...], ...]
     link_names: tuple[str, ...]
     bodies: tuple[tuple[str, Floats], ...]  # name, position per pose (n_poses, 2 or 3)
-    tip_path: Floats | None  # (n_t, 2 or 3)
+    tip_path: Floats | None  # (n, 2 or 3), NaN between the end of a trajectory and the next
+    of: tuple[str, ...] = ()  # of several trajectories the one that each pose belongs to
 
 
 @dataclass(frozen=True)

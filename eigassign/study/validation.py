@@ -4,7 +4,7 @@ Three places are looked at, and all of them count against ``validation.max_error
 they are what an assignment relies on:
 
 trajectory
-    every sample of the trajectory, at the initial design;
+    every sample of the trajectory, or of each of several, at the initial design;
 box of y at q0
     all designs within their bounds at the expansion point: a grid with its corners for up to three
     parameters, corners and seeded random designs beyond;
@@ -77,7 +77,9 @@ def _places(scene: Scene) -> Iterator[tuple[str, Floats]]:
     """Where, and the points x (n, n_x) there."""
     model, random = scene.model, np.random.default_rng(SEED)
     if scene.trajectory is not None:
-        yield TRAJECTORY, model.x(scene.trajectory.q, scene.initial)
+        for part in scene.trajectory.parts:
+            where = f"{TRAJECTORY} {part.name!r}" if scene.trajectory.several else TRAJECTORY
+            yield where, model.x(part.trajectory.q, scene.initial)
     lower, upper = scene.bounds
     if np.any(upper > lower):
         y = box_points(lower, upper, scene.file.validation.samples, random)

@@ -1,0 +1,306 @@
+"""Several trajectories in one case: one design for all, and nothing leaks over a seam."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from run_cases import UNCACHED, case_of, shipped, solved, without, written
+from scipy.optimize import lsq_linear
+
+import eigassign as ea
+from eigassign.answers import check
+from eigassign.errors import CaseError
+from eigassign.output.results_json import results, to_json
+from eigassign.run import Options, Result, optimize, validate
+
+REST = without(shipped(), "trajectory", "targets")
+TARGETS = "targets:\n  - {mode: 1, frequency: 194 Hz}\n"  # that leaves m1 between its bounds
+S = np.linspace(0.0, 1.0, 21)
+PICK = np.column_stack([1.2 + S, 4.95 + 0.6 * S**2])
+BACK = np.column_stack([2.2 - S, 5.55 - 0.7 * S + 0.2 * S**2])
+
+
+def part(q: np.ndarray, duration: float = 1.0, **more: object) -> str:
+    keys = {**more, "q": q.tolist(), "duration": duration}
+    return json.dumps(keys)
+
+
+def several(*parts: str, targets: str = TARGETS) -> str:
+    return REST + targets + "trajectory:\n" + "".join(f"  - {p}\n" for p in parts)
+
+
+def alone(one: str, targets: str = TARGETS) -> str:
+    return REST + targets + f"trajectory: {one}\n"
+
+
+PAIR = several(part(PICK, name="pick"), part(BACK, 0.5, name="return"))
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory: pytest.TempPathFactory) -> Result:
+    return solved(tmp_path_factory.mktemp("pair"), PAIR)
+
+
+@pytest.fixture(scope="module")
+def singles(tmp_path_factory: pytest.TempPathFactory) -> tuple[Result, Result]:
+    folder = tmp_path_factory.mktemp("singles")
+    pick, back = alone(part(PICK)), alone(part(BACK, 0.5))
+    return solved(folder, pick), solved(folder, back)
+
+
+def test_a_list_of_one_is_bit_for_bit_the_mapping(tmp_path: Path) -> None:
+    both = [solved(tmp_path, text) for text in (alone(part(PICK)), several(part(PICK)))]
+    one, two = (json.loads(to_json(result.findings)) for result in both)
+    for key in ("case", "timing_s"):
+        one.pop(key), two.pop(key)
+    assert one == two
+
+
+def test_what_is_known_before_the_design_is_that_of_two_runs(
+    pair: Result, singles: tuple[Result, Result]
+) -> None:
+    for kind in ("target_hz", "initial_hz", "time_s"):
+        stacked = np.concatenate([getattr(single, kind) for single in singles])
+        np.testing.assert_allclose(getattr(pair, kind), stacked, rtol=1e-12)
+    over = [study.over_time for r in (pair, *singles) for study in r.findings.studies]
+    for kind in ("taylor_hz", "linearised_hz"):
+        whole, *each = (getattr(comparison, kind) for comparison in over)
+        np.testing.assert_allclose(whole, np.concatenate(each), rtol=1e-12)
+
+
+def hand_rows(pair: Result, weights: tuple[float, float] = (1.0, 1.0)) -> tuple[np.ndarray, ...]:
+    """The rows of the least squares, written out by hand trajectory by trajectory."""
+    rows, right = [], []
+    for q, duration, weight in ((PICK, 1.0, weights[0]), (BACK, 0.5, weights[1])):
+        l0, slope = (part[:, 0] for part in pair.linearised.linear_in_design(q))
+        step, lam_d = duration / 20, (2 * np.pi * 194) ** 2
+        for k in range(21):
+            root = np.sqrt(weight * step * (0.5 if k in (0, 20) else 1.0)) / lam_d
+            rows.append(root * slope[k])
+            right.append(root * (lam_d - l0[k] + slope[k] @ [0.125, 0.125]))
+    return np.array(rows), np.array(right)
+
+
+def by_hand(pair: Result, weights: tuple[float, float] = (1.0, 1.0)) -> np.ndarray:
+    found = lsq_linear(*hand_rows(pair, weights), (0.0, 0.25), method="bvls", tol=1e-15)
+    return np.asarray(found.x)
+
+
+def test_the_optimum_is_that_of_the_combined_least_squares(
+    pair: Result, singles: tuple[Result, Result]
+) -> None:
+    design = list(pair.design.values())
+    np.testing.assert_allclose(design, by_hand(pair), rtol=1e-9, atol=1e-12)
+    for single in singles:
+        assert abs(design[0] - single.design["m1"]) > 1e-4  # a compromise
+
+
+@pytest.mark.parametrize("weights", [(3.0, 1.0), (0.2, 7.0)])
+def test_each_trajectory_counts_by_its_weight(
+    pair: Result, tmp_path: Path, weights: tuple[float, float]
+) -> None:
+    text = several(part(PICK, weight=weights[0]), part(BACK, 0.5, weight=weights[1]))
+    design = list(solved(tmp_path, text).design.values())
+    np.testing.assert_allclose(design, by_hand(pair, weights), rtol=1e-9, atol=1e-12)
+
+
+def test_a_common_factor_of_all_weights_changes_nothing(pair: Result, tmp_path: Path) -> None:
+    text = several(part(PICK, name="pick", weight=4), part(BACK, 0.5, name="return", weight=4))
+    scaled = solved(tmp_path, text)
+    np.testing.assert_allclose(list(scaled.design.values()), list(pair.design.values()), rtol=1e-10)
+    one, two = (r.findings.error for r in (pair, scaled))
+    assert one is not None
+    assert two is not None
+    assert two.exact.rms_relative == pytest.approx(one.exact.rms_relative, rel=1e-9)
+
+
+def test_a_trajectory_cut_in_two_is_still_the_same_problem(tmp_path: Path) -> None:
+    """The trapezoidal rule over both halves adds up to the one over the whole."""
+    whole = solved(tmp_path, alone(part(PICK)))
+    halves = solved(tmp_path, several(part(PICK[:9], 0.4), part(PICK[8:], 0.6)))
+    np.testing.assert_allclose(
+        list(halves.design.values()), list(whole.design.values()), rtol=1e-9, atol=1e-12
+    )
+    one, two = (r.findings.error for r in (whole, halves))
+    assert one is not None
+    assert two is not None
+    for kind in ("initial", "predicted", "exact"):
+        a, b = getattr(one, kind), getattr(two, kind)
+        assert b.rms_relative == pytest.approx(a.rms_relative, rel=1e-9)
+        assert b.max_relative == pytest.approx(a.max_relative, rel=1e-9)
+
+
+def test_the_errors_of_each_trajectory_are_those_of_its_own_samples(pair: Result) -> None:
+    (target,) = pair.findings.targets
+    off = target.exact_hz / target.target_hz - 1.0
+    for along, rows in zip(target.along, (slice(0, 21), slice(21, 42)), strict=True):
+        assert along.rows == rows
+        assert along.error.exact.max_relative == pytest.approx(np.abs(off[rows]).max(), rel=1e-12)
+        weights = np.ones(21)
+        weights[[0, -1]] = 0.5
+        rms = np.sqrt(weights @ off[rows] ** 2 / 20)
+        assert along.error.exact.rms_relative == pytest.approx(rms, rel=1e-12)
+    squares = [along.error.exact.rms_relative**2 for along in target.along]
+    total = np.sqrt((1.0 * squares[0] + 0.5 * squares[1]) / 1.5)
+    assert target.exact.rms_relative == pytest.approx(total, rel=1e-12)
+
+
+def test_two_targets_of_a_mode_one_a_trajectory_are_as_good_as_one_for_both(
+    pair: Result, tmp_path: Path
+) -> None:
+    targets = TARGETS.replace("Hz}", "Hz, trajectory: pick}")
+    targets += "  - {mode: 1, frequency: 194 Hz, trajectory: return}\n"
+    text = several(part(PICK, name="pick"), part(BACK, 0.5, name="return"), targets=targets)
+    split = solved(tmp_path, text)
+    np.testing.assert_allclose(list(split.design.values()), list(pair.design.values()), rtol=1e-10)
+    one, two = pair.findings.error, split.findings.error
+    assert one is not None
+    assert two is not None
+    assert two.exact.rms_relative == pytest.approx(one.exact.rms_relative, rel=1e-10)
+    assert [t.trajectory for t in split.findings.targets] == ["pick", "return"]
+    np.testing.assert_array_equal(
+        np.concatenate([t.initial_hz for t in split.findings.targets]),
+        pair.findings.targets[0].initial_hz,
+    )
+
+
+def test_a_target_on_one_trajectory_ignores_the_other(
+    singles: tuple[Result, Result], tmp_path: Path
+) -> None:
+    targets = TARGETS.replace("Hz}", "Hz, trajectory: return}")
+    text = several(part(PICK, name="pick"), part(BACK, 0.5, name="return"), targets=targets)
+    result = solved(tmp_path, text)
+    assert result.design == pytest.approx(dict(singles[1].design), rel=1e-9, abs=1e-12)
+    found = results(result.findings)
+    assert found["targets"][0]["trajectory"] == "return"
+    assert len(found["frequencies"]["time_s"]) == 21
+    assert set(found["frequencies"]["trajectory"]) == {"return"}
+    assert [row["error"] is None for row in found["trajectories"]] == [True, False]
+
+
+def test_a_profile_runs_in_the_time_of_each_trajectory(tmp_path: Path) -> None:
+    targets = "targets:\n  - {mode: 1, frequency: {time: [0, 1], frequency: [200, 180]}}\n"
+    result = solved(tmp_path, several(part(PICK), part(BACK, 0.5), targets=targets))
+    pick, back = result.target_hz[:21], result.target_hz[21:]
+    np.testing.assert_allclose(pick, 200 - 20 * S)
+    np.testing.assert_allclose(back, 200 - 10 * S)
+
+
+FAR = BACK - np.array([0.0, 3.9])  # the elbow jumps by far more than half a turn between the two
+
+
+def slow(result: Result) -> list[str]:
+    return [note for note in result.findings.notes if "slow motion" in note]
+
+
+def test_a_jump_between_trajectories_is_neither_fast_nor_a_jump(tmp_path: Path) -> None:
+    # A sum of a slower part and a very quick seam would be noticed at once.
+    near = REST.replace("order: 4", "order: 1")
+    far = solved(
+        tmp_path, near + TARGETS + f"trajectory:\n  - {part(PICK)}\n  - {part(FAR, 0.5)}\n"
+    )
+    each = [
+        solved(tmp_path, near + TARGETS + f"trajectory: {one}\n")
+        for one in (part(PICK), part(FAR, 0.5))
+    ]
+    joined = json.dumps({"q": [*PICK.tolist(), *FAR.tolist()], "duration": 1.5})
+    one_motion = solved(tmp_path, near + TARGETS + f"trajectory: {joined}\n")
+    assert any("jumps by" in note for note in one_motion.findings.notes)
+    assert not any("jumps by" in note for note in far.findings.notes)
+    assert slow(far)[0] in [slow(single)[0] for single in each]
+    assert slow(one_motion) != slow(far)
+    assert not any("not slow" in warning for warning in far.findings.warnings)
+
+
+def test_a_quick_trajectory_among_slow_ones_is_named(tmp_path: Path) -> None:
+    result = solved(tmp_path, several(part(PICK), part(BACK, 0.001, name="dash")))
+    (warning,) = [line for line in result.findings.warnings if "not slow" in line]
+    assert "along trajectory 'dash'" in warning
+
+
+def test_the_expansion_point_is_central_over_all(tmp_path: Path) -> None:
+    auto = several(part(PICK, name="pick"), part(BACK, 0.5, name="return")).replace(
+        "q: [1.817, 5.312] #", "q: auto #"
+    )
+    case = case_of(tmp_path, auto)
+    elbow = np.concatenate([PICK, BACK])[:, 1] - np.concatenate([PICK, BACK])[:, 0]
+    farthest = np.abs(elbow[:, None] - elbow).max(axis=1)
+    k = int(np.argmin(farthest))
+    result = ea.assign(case)
+    np.testing.assert_allclose(result.expansion.q0, case.trajectory.q[k])
+    name = "pick" if k < 21 else "return"
+    assert any(f"sample {k % 21} of trajectory '{name}'" in note for note in result.findings.notes)
+
+
+def test_automatic_orders_look_at_every_trajectory_and_name_its_samples(tmp_path: Path) -> None:
+    text = several(part(PICK, name="pick"), part(BACK, 0.5, name="return"))
+    result = solved(tmp_path, text.replace("order: 4", "order: auto\n  accuracy: 0.5 %"))
+    lines = [note for note in result.findings.notes if note.startswith("order ")]
+    assert any("of trajectory 'return'" in line or "of trajectory 'pick'" in line for line in lines)
+    (study,) = result.findings.studies
+    assert study.over_time is not None
+    assert study.over_time.worst_taylor < 0.005
+
+
+def test_validation_has_a_row_for_each_trajectory(tmp_path: Path) -> None:
+    rows = validate(written(tmp_path, PAIR), UNCACHED).rows
+    assert [row.where for row in rows[:2]] == ["trajectory 'pick'", "trajectory 'return'"]
+    assert [row.points for row in rows[:2]] == [21, 21]
+
+
+def test_check_counts_the_samples_of_each(tmp_path: Path) -> None:
+    answer = check(written(tmp_path, PAIR))
+    assert answer.trajectories == (("pick", 21, 1.0), ("return", 21, 0.5))
+    assert (answer.samples, answer.duration_s) == (42, 1.5)
+
+
+def test_an_error_of_one_trajectory_stands_at_its_own_line(tmp_path: Path) -> None:
+    (tmp_path / "back.csv").write_text("time,q1,q2\n0,1,2\n1,1\n")
+    text = several(part(PICK), "{file: back.csv}")
+    with pytest.raises(CaseError) as caught:
+        _ = case_of(tmp_path, text).trajectory
+    (problem,) = caught.value.problems
+    assert problem.path == "trajectory[1].file"
+    assert problem.line == len(text.splitlines())
+    assert "back.csv:3" in problem.message
+
+
+def test_a_case_gives_its_trajectories_one_by_one_and_stacked(tmp_path: Path) -> None:
+    case = case_of(tmp_path, PAIR)
+    (name, pick, weight), back = case.trajectories
+    assert (name, weight, back.name) == ("pick", 1.0, "return")
+    np.testing.assert_array_equal(np.vstack([pick.q, back.trajectory.q]), case.trajectory.q)
+
+
+def numbers(folder: Path) -> dict[str, object]:
+    found = json.loads((folder / "results.json").read_text())
+    return {k: v for k, v in found.items() if k not in ("case", "timing_s", "notes")}
+
+
+def test_the_run_folder_reruns_from_its_case_and_from_its_csv_files(tmp_path: Path) -> None:
+    first = optimize(written(tmp_path, PAIR), Options(out=tmp_path / "one", use_cache=False))
+    assert first.folder is not None
+    second = Options(out=tmp_path / "two", use_cache=False)
+    optimize(tmp_path / "one" / "case.yaml", second)
+    assert numbers(tmp_path / "two") == numbers(tmp_path / "one")
+    files = [f"{{name: {n}, file: one/trajectory_{n}.csv}}" for n in ("pick", "return")]
+    optimize(
+        written(tmp_path, several(*files), "files.yaml"),
+        Options(out=tmp_path / "three", use_cache=False),
+    )
+    assert numbers(tmp_path / "three") == numbers(tmp_path / "one")
+
+
+def test_figures_and_files_of_each_trajectory_carry_its_name(tmp_path: Path) -> None:
+    optimize(written(tmp_path, PAIR), Options(out=tmp_path / "run", use_cache=False))
+    names = {p.relative_to(tmp_path / "run").as_posix() for p in (tmp_path / "run").rglob("*.*")}
+    for stem in ("coordinates", "assignment_mode_1", "approximation_mode_1_time", "other_modes"):
+        assert {f"figures/{stem}_pick.png", f"figures/{stem}_return.png"} <= names
+        assert f"figures/{stem}.png" not in names
+    assert {"trajectory_pick.csv", "trajectory_return.csv", "frequencies.csv"} <= names
+    page = (tmp_path / "run" / "report.html").read_text()
+    assert "mode 1 along &#39;pick&#39;" in page
+    assert "Coordinates, trajectory &#39;return&#39;" in page
