@@ -175,3 +175,17 @@ def test_parts_that_do_not_fit_each_other_are_refused(change, words):
     }
     with pytest.raises(UsageError, match=words):
         build_program(**(whole | change))
+
+
+def test_goals_on_some_of_the_samples_count_by_the_time_of_those():
+    """J = Σ_i w_i ∫_i e_i² dt / Σ_i w_i ∫_i dt, with the second goal on the last three samples."""
+    rng = np.random.default_rng(8)
+    weights = rng.uniform(0.1, 2.0, 7)
+    whole = goal(1e6 * (1 + rng.random(7)), rng.normal(size=(7, 1)), 1.3e6, weight=0.7)
+    late = goal(1e6 * (1 + rng.random(3)), rng.normal(size=(3, 1)), 1.1e6, weight=2.0)
+    late = Goal(late.model, late.target_hz, late.weight, slice(4, 7))
+    program = build_program([whole, late], weights, [0.0], [0.0], BOX)
+    e1, e2 = (g.model(np.zeros(1)) / g.lam_d - 1.0 for g in (whole, late))
+    above = 0.7 * weights @ e1**2 + 2.0 * weights[4:] @ e2**2
+    below = 0.7 * weights.sum() + 2.0 * weights[4:].sum()
+    assert program.objective(np.zeros(1)) == pytest.approx(above / below, rel=1e-12)

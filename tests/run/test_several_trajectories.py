@@ -304,3 +304,13 @@ def test_figures_and_files_of_each_trajectory_carry_its_name(tmp_path: Path) -> 
     page = (tmp_path / "run" / "report.html").read_text()
     assert "mode 1 along &#39;pick&#39;" in page
     assert "Coordinates, trajectory &#39;return&#39;" in page
+
+
+def test_the_drawn_tip_path_stops_where_a_trajectory_does(pair: Result) -> None:
+    poses = pair.findings.poses
+    assert poses.tip_path is not None
+    gaps = np.flatnonzero(np.isnan(poses.tip_path).any(axis=1))
+    assert gaps.tolist() == [21]
+    assert len(poses.tip_path) == 43
+    assert poses.of[0] == "pick"
+    assert poses.of[-1] == "return"
