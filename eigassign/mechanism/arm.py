@@ -18,23 +18,12 @@ import numpy as np
 from eigassign.errors import MechanismError, SingularityError
 from eigassign.mechanism.course import Course, Target
 from eigassign.mechanism.tip_chain import Bools, Floats, Look, TipChain
+from eigassign.mechanism.tip_seeds import first_guesses
 from eigassign.mechanism.turning import logarithm
 
 _SLACK = 1e-9  # rad: round-off at the end of a branch's range
 _STRUCTURAL = 1e-6  # of L: a smaller singular value everywhere is round-off
-_CLOSED = 1e-9  # of L: gaps of loops that are closed
 _GAP = 100.0  # weight of open loops against a missed point: what is nearest must be closed
-_TURNS_OF_A_SCREW = 500.0  # rad: as far as first guesses go
-
-
-@dataclass(frozen=True)
-class Reduced:
-    """A look with the passive freedoms eliminated: the loops closed to first order, and kept so."""
-
-    J: Floats  # (n, m, n_q): task components per u of the coordinates
-    drift: Floats  # (n, m): what closing the loops adds
-    closing: Floats  # (n, n_p): what closes them
-    following: Floats  # (n, n_p, n_q): how the passive freedoms follow
 
 
 @dataclass(frozen=True)
@@ -110,30 +99,6 @@ def _measured(chain: TipChain, u: Floats, scale: Floats, lever: float) -> Look:
     return Look(seen.point, seen.rotation, J, seen.gap * weight, closure)
 
 
-def reduced(seen: Look, n_q: int) -> Reduced:
-    """Passive freedoms from ∂F/∂p δp = −F and ∂F/∂p ∂p/∂q = −∂F/∂q, least squares if redundant."""
-    J = seen.jacobian
-    n, m, n_z = J.shape
-    if n_z == n_q:
-        none = np.zeros((n, 0))
-        return Reduced(J, np.zeros((n, m)), none, np.zeros((n, 0, n_q)))
-    wanted = -np.concatenate([seen.gap[:, :, None], seen.closure[:, :, :n_q]], axis=2)
-    solved = _solved(seen.closure[:, :, n_q:], wanted)
-    closing, following = solved[:, :, 0], solved[:, :, 1:]
-    J_p = J[:, :, n_q:]
-    drift = np.einsum("nmp,np->nm", J_p, closing)
-    return Reduced(J[:, :, :n_q] + J_p @ following, drift, closing, following)
-
-
-def _solved(A: Floats, B: Floats) -> Floats:
-    if A.shape[1] == A.shape[2]:
-        try:
-            return np.asarray(np.linalg.solve(A, B))
-        except np.linalg.LinAlgError:  # exactly singular somewhere
-            pass
-    return np.asarray(np.linalg.pinv(A, rcond=1e-12) @ B)
-
-
 # --- before solving ---
 
 
@@ -155,7 +120,7 @@ def prepare(
     limits = np.array([_limits(joint, *ends) for joint, ends in branch.items()]).reshape(-1, 2)
     guess = _checked_start(start, chain.n_q)
     near = _near(chain, guess)
-    z, J = _seeds(chain, course, rows, limits, near)
+    z, J = first_guesses(chain, course, rows, limits, near)
     lever = _lever(chain, course, J)
     scale = np.where(chain.of_kind("slide"), lever, 1.0)
     J = _weighted(chain, J, scale, lever)
@@ -209,66 +174,6 @@ def _near(chain: TipChain, guess: Floats | None) -> Floats | None:
         raise MechanismError("trajectory.start", str(error)) from error
 
 
-def _seeds(
-    chain: TipChain, course: Course, rows: tuple[int, ...], limits: Floats, near: Floats | None
-) -> tuple[Floats, Floats]:
-    """States z (n_seeds, n_z) with closed loops, and their J (n_seeds, d + r, n_q), not scaled."""
-    q = _spread(chain, course, rows, limits, near)
-    if near is None:
-        return q, reduced(chain.look(q), chain.n_q).J
-    z = np.hstack([q, np.broadcast_to(near[chain.n_q :], (len(q), len(near) - chain.n_q))])
-    z = _closed(chain, np.vstack([near, z]), course.size)
-    return z, reduced(chain.look(z), chain.n_q).J
-
-
-def _spread(
-    chain: TipChain, course: Course, rows: tuple[int, ...], limits: Floats, near: Floats | None
-) -> Floats:
-    """Evenly spread q (n_seeds, n_q): a Kronecker sequence over all that the branch allows."""
-    matrix, offset = chain.relative_map
-    n_j = chain.n_q
-    middle = matrix @ (np.zeros(n_j) if near is None else near[:n_j]) + offset
-    low, width = _ranges(chain, course, middle)
-    low[list(rows)], width[list(rows)] = limits.T
-    turns = chain.of_kind("turn")[:n_j]
-    width = np.where(turns, np.minimum(width, 2.0 * np.pi), width)
-    count = min(128, 8 * 2**n_j)
-    strides = _harmonious(n_j) ** -np.arange(1.0, n_j + 1.0)
-    fractions = np.mod(0.5 + np.arange(count)[:, None] * strides, 1.0)
-    return np.asarray((low + width * fractions - offset) @ np.linalg.pinv(matrix).T)
-
-
-def _ranges(chain: TipChain, course: Course, middle: Floats) -> tuple[Floats, Floats]:
-    """Low end and width (n_q,) of each joint: a turn, or as far as the path and the tip may be."""
-    n_q = chain.n_q
-    low, width = np.zeros(n_q), np.full(n_q, 2.0 * np.pi)
-    far = chain.kinds[:n_q]
-    if set(far) == {"turn"}:
-        return low, width
-    state = np.zeros((1, len(chain.kinds)))
-    seen = chain.look(state)
-    reach = course.size + float(np.linalg.norm(seen.point))
-    pitch = np.abs(seen.jacobian[0, : seen.point.shape[1], :n_q]).max(axis=0)
-    turns = np.clip(reach / np.maximum(pitch, 1e-12), 2.0 * np.pi, _TURNS_OF_A_SCREW)
-    half = np.where(chain.of_kind("slide")[:n_q], reach, turns)
-    free = ~chain.of_kind("turn")[:n_q]
-    return np.where(free, middle - half, low), np.where(free, 2.0 * half, width)
-
-
-def _closed(chain: TipChain, z: Floats, size: float) -> Floats:
-    """Those of the states whose loops close by moving the passive freedoms alone."""
-    n_q = chain.n_q
-    if len(chain.kinds) == n_q:
-        return z
-    z = z.copy()
-    for _ in range(20):
-        step = reduced(chain.look(z), n_q).closing
-        z[:, n_q:] += np.clip(step, -0.5, 0.5)
-    good = np.abs(chain.look(z).gap).max(axis=1) <= _CLOSED * max(size, 1.0)
-    good[0] = True  # the pose at which the loops are known to close
-    return np.asarray(z[good])
-
-
 def _lever(chain: TipChain, course: Course, J: Floats) -> float:
     """L in m; see the module."""
     d = J.shape[1] - len(chain.turned_by)
@@ -291,11 +196,3 @@ def _check_idle(J: Floats, lever: float, start: Floats | None) -> None:
         numbers = ", ".join(str(i + 1) for i in idle)
         message = f"is needed: the tip does not depend on coordinate {numbers} (counted from 1)"
         raise MechanismError("trajectory.start", message)
-
-
-def _harmonious(n: int) -> float:
-    """The root > 1 of x^(n+1) = x + 1: the golden ratio for n = 1 and its kin above."""
-    x = 1.5
-    for _ in range(60):  # contracts by at least 2 a step
-        x = (1.0 + x) ** (1.0 / (n + 1.0))
-    return float(x)

@@ -60,3 +60,37 @@ class TipChain:
     def of_kind(self, kind: str) -> Bools:
         """Which entries of a state are of this kind, (n_q + n_p,)."""
         return np.array([k == kind for k in self.kinds], dtype=bool)
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """A look with the passive freedoms eliminated: the loops closed to first order, and kept so."""
+
+    J: Floats  # (n, m, n_q): task components per u of the coordinates
+    drift: Floats  # (n, m): what closing the loops adds
+    closing: Floats  # (n, n_p): what closes them
+    following: Floats  # (n, n_p, n_q): how the passive freedoms follow
+
+
+def reduced(seen: Look, n_q: int) -> Reduced:
+    """Passive freedoms from ∂F/∂p δp = −F and ∂F/∂p ∂p/∂q = −∂F/∂q, least squares if redundant."""
+    J = seen.jacobian
+    n, m, n_z = J.shape
+    if n_z == n_q:
+        none = np.zeros((n, 0))
+        return Reduced(J, np.zeros((n, m)), none, np.zeros((n, 0, n_q)))
+    wanted = -np.concatenate([seen.gap[:, :, None], seen.closure[:, :, :n_q]], axis=2)
+    solved = _solved(seen.closure[:, :, n_q:], wanted)
+    closing, following = solved[:, :, 0], solved[:, :, 1:]
+    J_p = J[:, :, n_q:]
+    drift = np.einsum("nmp,np->nm", J_p, closing)
+    return Reduced(J[:, :, :n_q] + J_p @ following, drift, closing, following)
+
+
+def _solved(A: Floats, B: Floats) -> Floats:
+    if A.shape[1] == A.shape[2]:
+        try:
+            return np.asarray(np.linalg.solve(A, B))
+        except np.linalg.LinAlgError:  # exactly singular somewhere
+            pass
+    return np.asarray(np.linalg.pinv(A, rcond=1e-12) @ B)

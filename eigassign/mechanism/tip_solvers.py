@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from eigassign.mechanism.arm import Arm, Reduced, reduced
+from eigassign.mechanism.arm import Arm
 from eigassign.mechanism.course import Target
-from eigassign.mechanism.tip_chain import Bools, Floats, Look
+from eigassign.mechanism.tip_chain import Bools, Floats, Look, Reduced, reduced
 
 ROUND_OFF = 1e-13  # of L: as near to a point as the tip can be computed
 

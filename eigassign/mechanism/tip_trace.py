@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eigassign.mechanism.arm import Arm, Reduced, reduced
+from eigassign.mechanism.arm import Arm
 from eigassign.mechanism.course import Course
-from eigassign.mechanism.tip_chain import Floats, Look
+from eigassign.mechanism.tip_chain import Floats, Look, Reduced, reduced
 from eigassign.mechanism.tip_solvers import (
     handedness,
     least_norm,

@@ -101,9 +101,10 @@ def swing(last: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def test_a_dead_point_is_refused_by_sample_and_configuration() -> None:
+@pytest.mark.parametrize("short_of_it", [0.0, 1e-5])  # deg: too near to be told from it
+def test_a_dead_point_is_refused_by_sample_and_configuration(short_of_it: float) -> None:
     with pytest.raises(CaseError) as error:
-        _ = shipped("four_bar", swing(DEAD), LONG_CRANK).trajectory
+        _ = shipped("four_bar", swing(DEAD - short_of_it), LONG_CRANK).trajectory
     message = str(error.value)
     assert re.search(r"sample (59|60) \(t = ", message)
     assert "the loops are at a dead point" in message
@@ -271,6 +272,16 @@ def test_a_length_that_moves_the_tip_through_a_loop_is_refused(
     case = length_as_design(name, link, {"tip": tip, "waypoints": [[0.1, 0.5], [0.12, 0.5]]})
     with pytest.raises(CaseError, match=r"design\.long\.parameter: moves the tip"):
         _ = case.trajectory
+
+
+def test_a_length_that_only_turns_the_tip_is_refused_where_its_angle_is_asked_for() -> None:
+    crank = [0.12 * np.array([np.cos(a), np.sin(a)]) for a in (1.0, 1.1)]
+    wish = {"tip": "coupler.start", "waypoints": [p.tolist() for p in crank], "start": [1.0]}
+    case = length_as_design("four_bar", "follower", wish | {"angle": 0.3})
+    with pytest.raises(CaseError, match=r"design\.long\.parameter: moves the tip"):
+        _ = case.trajectory
+    with pytest.raises(CaseError, match="m out of reach"):  # a chord of the crank's circle
+        _ = length_as_design("four_bar", "follower", wish).trajectory
 
 
 def test_a_length_that_cannot_move_the_tip_is_allowed() -> None:

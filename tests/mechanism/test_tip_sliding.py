@@ -48,6 +48,11 @@ def test_a_place_outside_its_range_is_named_in_metres() -> None:
     assert "needs joint boom at 7.1 m, outside its range [1, 7] m" in error.value.message
 
 
+def test_a_place_is_not_inside_its_range_for_being_a_full_turn_further() -> None:
+    with pytest.raises(TrajectoryError, match=r"boom at -?8 m, outside its range \[1, 3\] m"):
+        follow(polar_arm(), course([(8.0, 0.0), (8.5, 0.0)], 9), {"boom": (1.0, 3.0)})
+
+
 def test_a_start_in_metres_is_kept() -> None:
     due = course([(2.0, 0.0), (9.0, 0.5)], 9)
     q = follow(polar_arm(), due, start=[2 * np.pi, 9.0]).q

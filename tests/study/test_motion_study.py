@@ -34,6 +34,21 @@ def test_a_motion_in_milliseconds_is_warned_of(
     assert any("not slow" in warning for warning in findings.warnings) is expected
 
 
+def test_the_corners_of_a_trapezoid_are_judged_by_its_acceleration(tmp_path: Path) -> None:
+    """The differences of samples never exceed the law's own rates, however many there are."""
+    text = CASE.read_text(encoding="utf-8").replace("timing: quintic", "timing: trapezoidal")
+    changes = []
+    for samples in (152, 1001):
+        path = tmp_path / f"{samples}.yaml"
+        path.write_text(text.replace("samples: 152", f"samples: {samples}"), encoding="utf-8")
+        case = load_case(path)
+        q, time_s = case.trajectory.q, case.trajectory.time_s
+        rate = np.gradient(q, time_s, axis=0, edge_order=2)
+        push = np.gradient(rate, time_s, axis=0, edge_order=2)
+        changes.append((5 * np.abs(rate).sum(axis=1) ** 2 + np.abs(push).sum(axis=1)).max())
+    assert changes[1] == pytest.approx(changes[0], rel=0.05)
+
+
 def test_the_effect_grows_with_the_square_of_the_speed(tmp_path: Path) -> None:
     from eigassign.mechanism.velocity import velocity_terms
     from eigassign.modal.motion import motion_effect
