@@ -112,6 +112,21 @@ def test_three_links_place_and_turn_the_tip_as_the_law_of_cosines_says(kind, ang
     np.testing.assert_allclose(q.sum(axis=1), last, atol=1e-8)
 
 
+@pytest.mark.parametrize("size", [1e-3, 1e3])
+def test_the_size_of_an_arm_changes_none_of_its_angles(size: float) -> None:
+    wish = {"angle": [0.4, 0.9, 2.4, 2.0]}
+    lengths, points = np.array([0.5, 0.4, 0.15]), np.array(POINTS)
+    one, other = (
+        follow(
+            serial_arm(*(s * lengths), absolute=False, oriented=True),
+            course(s * points, 30, "spline", **wish),
+            start=[0.0, 1.2, 0.0],
+        ).q
+        for s in (1.0, size)
+    )
+    np.testing.assert_allclose(other, one, atol=1e-10)
+
+
 def test_a_fourth_link_is_redundant_and_says_so() -> None:
     arm = serial_arm(0.4, 0.3, 0.2, 0.15, absolute=False, oriented=True)
     due = course(POINTS, 40, "spline", angle=[0.4, 0.9, 2.4, 2.0])
