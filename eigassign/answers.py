@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from eigassign import values
 from eigassign.api import Case, load_case
 from eigassign.errors import CaseError, Problem, UsageError
+from eigassign.mechanism.superelement import weights
+from eigassign.study.accuracy import truncation_lines
 from eigassign.study.assignment_study import target_frequencies
 from eigassign.study.plan import plan_expansion
 
@@ -26,6 +28,7 @@ class ModesAnswer:
     frequencies_hz: list[float]
     q: tuple[tuple[str, float], ...]  # where: name and value, SI
     y: tuple[tuple[str, float], ...]
+    truncation_error: list[float] | None = None  # of reduced links: relative, too high by at most
 
 
 @dataclass(frozen=True)
@@ -65,11 +68,14 @@ def modes(
         at_q = np.asarray(_default_q(case) if q is None else q, dtype=np.float64)
         at_y = np.asarray(case.initial_design if y is None else y, dtype=np.float64)
         hz = model.frequencies(at_q, at_y, count)[0]
+        every = tuple(range(1, count + 1))
+        lost = model.truncation_error(at_q, at_y, every)[0] if model.reduced else None
     return ModesAnswer(
         model.n_rigid,
         [float(value) for value in hz],
         _pairs(model.q_names, at_q),
         _pairs(model.y_names, at_y),
+        None if lost is None else [float(value) for value in lost],
     )
 
 
@@ -97,13 +103,17 @@ def check(path: str | Path) -> CheckAnswer:
     case = load_case(path)
     file, model = case.file, case.model()
     trajectory = case.trajectory if file.trajectory is not None else None
-    notes = () if trajectory is None else trajectory.notes
+    notes = weights(file)
+    notes += () if case.reduction is None else case.reduction.reasons
+    notes += () if trajectory is None else trajectory.notes
     parts = () if trajectory is None else trajectory.parts
     each = tuple((p.name, len(p.trajectory.q), float(np.ptp(p.trajectory.time_s))) for p in parts)
     if trajectory is not None:
         target_frequencies(file, trajectory)
     if trajectory is not None or file.expansion.q != "auto":
-        notes += plan_expansion(file, model, trajectory).notes
+        plan = plan_expansion(file, model, trajectory)
+        q = plan.q0[None] if trajectory is None else trajectory.q
+        notes += (*plan.notes, *truncation_lines(model, plan.modes, q, case.initial_design[None]))
     _require_regular(case, trajectory.q[:1] if trajectory is not None else None)
     return CheckAnswer(
         title=file.title,

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,9 +16,16 @@ from numpy.typing import ArrayLike, NDArray
 from eigassign.case import CaseFile, TipTrajectory, load
 from eigassign.case import Trajectory as TrajectoryKeys
 from eigassign.errors import CaseError, MechanismError
-from eigassign.mechanism.build import build_pencil, with_elements
-from eigassign.mechanism.kinematics import kinematics
-from eigassign.mechanism.parameters import initial_design, parameters
+from eigassign.mechanism.build import (
+    WholeLinks,
+    build_pencil,
+    local_links,
+    whole_links,
+    with_elements,
+    with_reduction,
+)
+from eigassign.mechanism.local_motion import reduced_links
+from eigassign.mechanism.parameters import initial_design
 from eigassign.mechanism.poses import build_poses, design_dependence
 from eigassign.mechanism.tip_motion import tip_chain
 from eigassign.mechanism.trajectories import NamedTrajectory, Trajectories
@@ -46,6 +54,7 @@ __all__ = [
 
 if TYPE_CHECKING:
     from eigassign.modal.mesh_choice import MeshChoice
+    from eigassign.modal.reduction_choice import ReductionChoice
     from eigassign.run import Result
 
 Floats = NDArray[np.float64]
@@ -64,18 +73,42 @@ class Case:
 
     @cached_property
     def _model(self) -> Model:
-        mesh = self.mesh
-        return self._meshed(mesh.elements if mesh is not None else {})
+        return self._assembled(self._reduction, self._whole)
 
-    def _meshed(self, elements: Mapping[str, int]) -> Model:
-        """The model with given numbers of elements for some of the links."""
-        file = with_elements(self.file, elements)
+    @cached_property
+    def _whole(self) -> WholeLinks:
+        """The links of the chosen mesh with all their dofs."""
+        return self._unreduced(with_elements(self.file, self._elements))
+
+    def _unreduced(self, file: CaseFile) -> WholeLinks:
         with self.located():
-            numbers = parameters(file)
-            motion = kinematics(file, numbers)
-            pencil = build_pencil(file, numbers, motion)
+            return whole_links(file)
+
+    def _meshed(
+        self,
+        elements: Mapping[str, int],
+        reduction: Mapping[str, float | None] = MappingProxyType({}),
+    ) -> Model:
+        """The model with given elements for some of the links, and frequencies they reduce to."""
+        return self._assembled(reduction, self._unreduced(with_elements(self.file, elements)))
+
+    def _assembled(self, reduction: Mapping[str, float | None], whole: WholeLinks) -> Model:
+        """The model of given links, reduced."""
+        file, numbers, motion = whole.case, whole.parameters, whole.motion
+        with self.located():
+            local = local_links(with_reduction(file, reduction), numbers, motion, whole.meshes)
+            pencil = build_pencil(file, numbers, motion, local)
             poses = build_poses(file, numbers, motion)
-        return Model(pencil, poses, motion, numbers.coordinates, numbers.design)
+            reduced = reduced_links(numbers, local[0], pencil)
+        return Model(pencil, poses, motion, numbers.coordinates, numbers.design, reduced)
+
+    @property
+    def _elements(self) -> Mapping[str, int]:
+        return {} if self.mesh is None else self.mesh.elements
+
+    @property
+    def _reduction(self) -> Mapping[str, float | None]:
+        return {} if self.reduction is None else self.reduction.frequencies
 
     @cached_property
     def mesh(self) -> MeshChoice | None:
@@ -83,17 +116,36 @@ class Case:
 
         Raises AccuracyError where no mesh meets ``expansion.accuracy``.
         """
-        from eigassign.study.choices import automatic_elements, looked_at, settle_mesh
+        from eigassign.study.choices import automatic_elements, settle_mesh
 
         wanted = automatic_elements(self.file)
         if None not in wanted.values():
             return None
         trial = self._meshed({name: 2 for name, n in wanted.items() if n is None})
+        return settle_mesh(self.file, self._meshed, self._looked_at(trial))
+
+    @cached_property
+    def reduction(self) -> ReductionChoice | None:
+        """The frequencies that links with ``reduce_to: auto`` are reduced to; None without any."""
+        from eigassign.study.choices import automatic_reduction, settle_reduction
+
+        names = automatic_reduction(self.file)
+        if not names:
+            return None
+
+        def build(frequency_hz: float | None) -> Model:
+            return self._assembled(dict.fromkeys(names, frequency_hz), self._whole)
+
+        return settle_reduction(self.file, names, build, self._looked_at)
+
+    def _looked_at(self, trial: Model) -> Floats:
+        """Poses and designs (n, n_x) at which choices are judged."""
+        from eigassign.study.choices import looked_at
+
         path = self._path(trial) if self.file.trajectories else None
         given = self.file.expansion.q
         q0 = np.zeros(len(trial.q_names)) if given == "auto" else np.array(given, dtype=float)
-        x = looked_at(self.file, trial, path, q0, self.initial_design)
-        return settle_mesh(self.file, self._meshed, x)
+        return looked_at(self.file, trial, path, q0, self.initial_design)
 
     @cached_property
     def initial_design(self) -> Floats:
@@ -109,12 +161,16 @@ class Case:
         from eigassign.study.choices import automatic_elements
 
         model = self.model()
-        chosen = {} if self.mesh is None else dict(self.mesh.elements)
+        chosen = self._elements
         elements = {n: chosen.get(n) or k for n, k in automatic_elements(self.file).items()}
         if not elements or model.n_dof > LARGE:
             return None
         fixed = {name: int(n) for name, n in elements.items() if n is not None}
-        return mesh_error(lambda e: model if e == fixed else self._meshed(e), fixed, x, modes)
+
+        def build(elements: Mapping[str, int]) -> Model:
+            return model if elements == fixed else self._meshed(elements, self._reduction)
+
+        return mesh_error(build, fixed, x, modes)
 
     @cached_property
     def trajectory(self) -> Trajectories:

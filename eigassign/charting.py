@@ -17,6 +17,7 @@ from eigassign.keeping import keep
 from eigassign.modal.model import Model
 from eigassign.run import Options, prepare
 from eigassign.stages import Stages
+from eigassign.study.accuracy import truncation_notes
 from eigassign.study.chart_bench import spread_rows
 from eigassign.study.chart_data import Chart, DesignRun, MeshRow
 from eigassign.study.chart_designs import chart_designs
@@ -98,7 +99,13 @@ def _chart(
         advice=compared.advice,
         mesh=mesh,
         designs=designs,
-        notes=(*(a.words for a in compared.advice), *compared.notes, *remarks, *skipped),
+        notes=(
+            *(a.words for a in compared.advice),
+            *compared.notes,
+            *truncation_notes(scene),
+            *remarks,
+            *skipped,
+        ),
         warnings=scene.warnings,
         seconds=seconds,
     )

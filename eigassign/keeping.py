@@ -41,7 +41,7 @@ def keep(file: CaseFile, out: Path | None, force: bool) -> Iterator[Kept]:
     from eigassign.output.run_folder import run_folder
 
     target = RESULTS / file.path.stem if out is None else Path(out)
-    case = {"case_path": file.path, "case_sha256": file.sha256}
+    case = {"case_path": file.path, "case_sha256": file.sha256, "case_files": file.files}
     with run_folder(target, **case, force=force) as hidden:  # type: ignore[arg-type]
         yield Kept(target, hidden, file)
 
@@ -52,6 +52,7 @@ def log_text(findings: Findings) -> str:
         f"eigassign {findings.version}",
         f"case      {findings.case_name}: {findings.title}",
         f"sha256    {findings.case_sha256}",
+        *(f"sha256    {digest} {name}" for name, digest in findings.case_files.items()),
         *(f"note      {note}" for note in findings.notes),
         *(f"warning   {warning}" for warning in findings.warnings),
         *_outcome_lines(findings),

@@ -22,7 +22,7 @@ from eigassign.expansions import expand_plan
 from eigassign.keeping import Kept, keep
 from eigassign.modal.expansion import Expansion
 from eigassign.stages import Stages
-from eigassign.study.accuracy import accuracy_notes
+from eigassign.study.accuracy import accuracy_notes, truncation_notes
 from eigassign.study.approximation import Expansions
 from eigassign.study.assignment_study import (
     assign_design,
@@ -122,7 +122,7 @@ def solve_case(case: Case, options: Options = DEFAULT) -> Result:
             exact_hz = scene.exact(assignment.y, stages.advance)
         with stages("comparison", "comparing the expansion with exact frequencies"):
             studies = study_modes(scene, initial_hz)
-            scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene)))
+            scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene, assignment.y)))
         targets = study_targets(scene, wanted, assignment, initial_hz, exact_hz)
     found = Assigned(assignment, targets, initial_hz, exact_hz)
     findings = gather(scene, studies, found, stages.timing_s)
@@ -147,12 +147,13 @@ def prepare(
         expansions, notes = expand_plan(model, plan, cache)
     moving = () if trajectory is None else trajectory.notes
     mesh = () if case.mesh is None else case.mesh.reasons
-    notes = [*mesh, *moving, *plan.notes, *notes]
+    smaller = () if case.reduction is None else case.reduction.reasons
+    notes = [*mesh, *smaller, *moving, *plan.notes, *notes]
     return Scene(file, model, initial, trajectory, expansions, tuple(notes))
 
 
-def _accuracy(case: Case, scene: Scene) -> list[str]:
-    return accuracy_notes(scene, case.discretisation_error)
+def _accuracy(case: Case, scene: Scene, optimum: Floats | None = None) -> list[str]:
+    return accuracy_notes(scene, case.discretisation_error, optimum)
 
 
 def _result(findings: Findings, expansions: Expansions, assignment: Assignment) -> Result:
@@ -218,7 +219,8 @@ def validate(path: str | Path, options: Options = DEFAULT) -> Validation:
         scene = prepare(case, stages, _cache(options))
         with stages("validation", "comparing both expansions with exact frequencies"):
             rows = validate_expansions(scene)
-    return Validation(rows, scene.notes, scene.warnings, stages.total_s)
+            notes = (*scene.notes, *truncation_notes(scene))
+    return Validation(rows, notes, scene.warnings, stages.total_s)
 
 
 def _outcome(folder: Kept, findings: Findings, watch: Stages) -> Outcome:

@@ -24,8 +24,8 @@ _STEP = re.compile(r"\[(\d+)\]|([^.\[\]]+)")
 class CaseFile:
     """One validated case. Two are equal when their content is, wherever they were read from.
 
-    ``path`` and ``sha256`` identify the file and its bytes; ``warnings`` are plausibility problems
-    that do not keep the case from being run.
+    ``path`` and ``sha256`` identify the file and its bytes, ``files`` the bytes of those that it
+    names; ``warnings`` are plausibility problems that do not keep the case from being run.
     """
 
     title: str
@@ -41,6 +41,7 @@ class CaseFile:
     sha256: str = field(compare=False)
     warnings: tuple[Problem, ...] = field(compare=False)
     marks: Mark = field(compare=False, repr=False)
+    files: Mapping[str, str] = field(compare=False, default_factory=dict)  # SHA-256 by name
 
     def problem(self, key_path: str, message: str) -> Problem:
         """Problem at the line and column of ``key_path`` (``mechanism.links.forearm.length``,

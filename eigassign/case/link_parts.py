@@ -23,6 +23,11 @@ ElementsOrAuto: TypeAlias = Annotated[
     Annotated[Elements, Tag("<number>")] | Annotated[Literal["auto"], Tag("<auto>")],
     Discriminator(word_or_number),
 ]
+ReduceTo: TypeAlias = Annotated[
+    Annotated[float, quantity("frequency", above=0), Tag("<number>")]
+    | Annotated[Literal["auto"], Tag("<auto>")],
+    Discriminator(lambda value: "<auto>" if value == "auto" else "<number>"),
+]
 Nodes: TypeAlias = Annotated[Mapping[str, Vector], Frozen]
 Dof: TypeAlias = Annotated[int, Field(ge=0)]
 
@@ -42,7 +47,8 @@ class BeamLink(Part):
     """A straight flexible link along its local x: length in m, material, section, elements.
 
     `shear`: Timoshenko beam; `roll` (rad) turns the section about the beam's axis. Nodes `start`
-    (the origin of the link's frame) and `end`.
+    (the origin of the link's frame) and `end`. `reduce_to` (Hz, or `auto`): Craig–Bampton with the
+    fixed-interface modes up to that frequency.
     """
 
     type: Literal["beam"] = "beam"
@@ -55,6 +61,7 @@ class BeamLink(Part):
     elements: ElementsOrAuto
     shear: bool = False
     roll: Angle = 0.0
+    reduce_to: ReduceTo | None = None
 
 
 class RigidLink(Part):
@@ -89,11 +96,15 @@ class FrameBeam(Part):
 
 
 class FrameLink(Part):
-    """Beams rigidly joined at nodes (m, in the link's frame): lattice booms, forks, portals."""
+    """Beams rigidly joined at nodes (m, in the link's frame): lattice booms, forks, portals.
+
+    `reduce_to` (Hz, or `auto`): Craig–Bampton; the nodes that nothing uses are interior.
+    """
 
     type: Literal["frame"]
     nodes: Nodes
     beams: Annotated[Mapping[str, FrameBeam], Field(min_length=1), Frozen]
+    reduce_to: ReduceTo | None = None
 
 
 class SuperelementNode(Part):
@@ -109,14 +120,14 @@ class SuperelementNode(Part):
 class SuperelementLink(Part):
     """Stiffness and mass from another program (Matrix Market or NumPy files, SI units).
 
-    `reduce_to` (Hz): Craig–Bampton with the fixed-interface modes up to that frequency.
+    `reduce_to` (Hz, or `auto`): Craig–Bampton with the fixed-interface modes up to that frequency.
     """
 
     type: Literal["superelement"]
     stiffness: str
     mass: str
     nodes: Annotated[Mapping[str, SuperelementNode], Field(min_length=1), Frozen]
-    reduce_to: Annotated[float, quantity("frequency", above=0)] | None = None
+    reduce_to: ReduceTo | None = None
 
 
 LINKS: dict[str, type[Part]] = {

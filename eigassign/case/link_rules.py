@@ -28,6 +28,7 @@ def links(tree: Tree) -> Iterator[Finding]:
             yield from _frame(path, body)
         elif kind == "superelement":
             yield from _superelement(tree, path, body)
+    yield from _ridden(tree)
     yield from _moduli(tree)
     yield from _bare(tree)
 
@@ -170,6 +171,18 @@ def _superelement(tree: Tree, path: KeyPath, body: object) -> Iterator[Finding]:
         if file is not None and not file.lower().endswith((".mtx", ".npy", ".npz")):
             message = "expected a Matrix Market (.mtx) or NumPy (.npy, .npz) file, got "
             yield (*path, key), message + shown(file)
+
+
+def _ridden(tree: Tree) -> Iterator[Finding]:
+    """A link on which a carriage travels bends differently at every place: it stays whole."""
+    for joint, body in items(tree, "mechanism", "joints"):
+        kind, base = text(body, "type"), text(body, "base")
+        if kind not in ("carriage", "nut") or base is None:
+            continue
+        path = ("mechanism", "links", base, "reduce_to")
+        if at(tree, *path) is not None:
+            message = f"{joint!r} travels along this link, so that it cannot be reduced: "
+            yield path, message + "leave reduce_to out"
 
 
 def _moduli(tree: Tree) -> Iterator[Finding]:

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from itertools import islice
 from pathlib import Path
 
+from eigassign.case.attached import attached
 from eigassign.case.casefile import CaseFile
 from eigassign.case.context import in_context
 from eigassign.case.document import Document, validated
@@ -55,7 +56,9 @@ def _case_file(document: Document, source: Source, data: bytes, path: Path) -> C
     content = {name: getattr(document, name) for name in Document.model_fields}
     warnings = _located(implausible(document), source)
     digest = hashlib.sha256(data).hexdigest()
-    return CaseFile(**content, path=path, sha256=digest, warnings=warnings, marks=source.marks)
+    files = attached(document, path.parent)
+    named = {"path": path, "sha256": digest, "files": files}
+    return CaseFile(**content, **named, warnings=warnings, marks=source.marks)  # type: ignore[arg-type]
 
 
 def _located(findings: Iterable[Finding], source: Source) -> tuple[Problem, ...]:

@@ -81,12 +81,15 @@ def modes(case: Path, q: str | None, y: str | None, count: int, as_json: bool, *
     with telling(how):
         answer = solved(case, *point(case, q, y), count)
     hz = list(answer.frequencies_hz)
+    lost = answer.truncation_error
     if as_json:
-        print_json({"rigid_modes": answer.rigid_modes, "frequencies_hz": hz})
+        told = {"rigid_modes": answer.rigid_modes, "frequencies_hz": hz}
+        finite = {} if lost is None else {"truncation_error": lost}
+        print_json({**told, **finite})
     else:
         from eigassign.output.console import print_modes
 
-        print_modes(hz, rigid_modes=answer.rigid_modes)
+        print_modes(hz, rigid_modes=answer.rigid_modes, truncation=lost)
     return 0
 
 

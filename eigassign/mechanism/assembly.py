@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from eigassign.mechanism.mesh import Term
+from eigassign.mechanism.mesh import Reduction, Term
 from eigassign.mechanism.rotations import multiply
 from eigassign.series.expression import Expression, Scalar
 
@@ -38,6 +38,7 @@ class LocalLink:
     twist: Objects  # (n_twist, n_columns)
     own: Ints
     carried: dict[int, list[tuple[int, Scalar]]]
+    reduction: Reduction | None = None
 
 
 @dataclass

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly import Accumulator, LocalLink, add_link, pattern
-from eigassign.mechanism.kinematics import Kinematics, Placement
+from eigassign.mechanism.craig_bampton import as_asked
+from eigassign.mechanism.kinematics import Kinematics, Placement, kinematics
 from eigassign.mechanism.links import link_mesh
 from eigassign.mechanism.mesh import DOFS, LinkMesh
 from eigassign.mechanism.nodes import NodeMotions
 from eigassign.mechanism.parameters import Parameters
+from eigassign.mechanism.parameters import parameters as variables
 from eigassign.mechanism.pencil import Pencil
 from eigassign.series.program import compile_program
 
@@ -24,9 +26,17 @@ Ints = NDArray[np.intp]
 Objects = NDArray[np.object_]
 
 
-def build_pencil(case: CaseFile, parameters: Parameters, motion: Kinematics) -> Pencil:
-    """Assemble K and M of eq. (1) for a mechanism; raises MechanismError naming what is wrong."""
-    links, nodes = local_links(case, parameters, motion)
+LocalLinks: TypeAlias = "tuple[list[LocalLink], NodeMotions]"
+
+
+def build_pencil(
+    case: CaseFile, parameters: Parameters, motion: Kinematics, local: LocalLinks | None = None
+) -> Pencil:
+    """Assemble K and M of eq. (1) for a mechanism; raises MechanismError naming what is wrong.
+
+    ``local`` is what `local_links` gave, where that is known already.
+    """
+    links, nodes = local_links(case, parameters, motion) if local is None else local
     stiffness, mass = Accumulator(), Accumulator()
     for link in links:
         add_link(stiffness, mass, link, nodes.count)
@@ -37,10 +47,19 @@ def build_pencil(case: CaseFile, parameters: Parameters, motion: Kinematics) -> 
 
 def with_elements(case: CaseFile, elements: Mapping[str, int]) -> CaseFile:
     """The case with other numbers of elements for the named beam links."""
-    if not elements:
+    return _with_links(case, "elements", elements)
+
+
+def with_reduction(case: CaseFile, frequencies: Mapping[str, float | None]) -> CaseFile:
+    """The case with other frequencies (Hz) to which links are reduced; None leaves one whole."""
+    return _with_links(case, "reduce_to", frequencies)
+
+
+def _with_links(case: CaseFile, key: str, values: Mapping[str, float | None]) -> CaseFile:
+    if not values:
         return case
     links = {
-        name: link.model_copy(update={"elements": elements[name]}) if name in elements else link
+        name: link.model_copy(update={key: values[name]}) if name in values else link
         for name, link in case.mechanism.links.items()
     }
     same_kind: Any = type(case.mechanism.links)
@@ -48,12 +67,40 @@ def with_elements(case: CaseFile, elements: Mapping[str, int]) -> CaseFile:
     return replace(case, mechanism=mechanism)
 
 
+@dataclass(frozen=True)
+class WholeLinks:
+    """A case with its links before they are reduced, to any frequency."""
+
+    case: CaseFile
+    parameters: Parameters
+    motion: Kinematics
+    meshes: Mapping[str, LinkMesh]
+
+
+def whole_links(case: CaseFile) -> WholeLinks:
+    """Variables, kinematics and the mesh of every link with all its dofs."""
+    numbers = variables(case)
+    motion = kinematics(case, numbers)
+    return WholeLinks(case, numbers, motion, _meshes(case, numbers, motion))
+
+
+def _meshes(case: CaseFile, parameters: Parameters, motion: Kinematics) -> dict[str, LinkMesh]:
+    known = parameters.with_passive(motion.passive)
+    return {p.link: link_mesh(case, known, motion.tree, p.link) for p in motion.placements}
+
+
 def local_links(
-    case: CaseFile, parameters: Parameters, motion: Kinematics
-) -> tuple[list[LocalLink], NodeMotions]:
-    """Every link's matrices in its own frame, and how its nodes hang on the unknowns."""
-    parameters = parameters.with_passive(motion.passive)
-    meshes = {p.link: link_mesh(case, parameters, motion.tree, p.link) for p in motion.placements}
+    case: CaseFile,
+    parameters: Parameters,
+    motion: Kinematics,
+    whole: Mapping[str, LinkMesh] | None = None,
+) -> LocalLinks:
+    """Every link's matrices in its own frame, and how its nodes hang on the unknowns.
+
+    Links are reduced as the case asks; ``whole`` are their meshes where they are known already.
+    """
+    meshes = _meshes(case, parameters, motion) if whole is None else whole
+    meshes = {name: as_asked(case, parameters, name, mesh) for name, mesh in meshes.items()}
     nodes = NodeMotions(motion, meshes, case.mechanism.space)
     nodes.number()
     if motion.tree.n_elastic < len(motion.tree.loops):
@@ -84,6 +131,7 @@ def _local_link(placement: Placement, mesh: LinkMesh, nodes: NodeMotions) -> Loc
         twist=placement.twist[list(DOFS[nodes.space])],
         own=own,
         carried=carried,
+        reduction=mesh.reduction,
     )
 
 

@@ -32,7 +32,7 @@ Ints = NDArray[np.intp]
 
 
 def link_mesh(case: CaseFile, parameters: Parameters, tree: Tree, name: str) -> LinkMesh:
-    """The mesh of one link, its bodies included."""
+    """The mesh of one link with all its dofs, its bodies included."""
     match link_type(case, name):
         case "rigid":
             return _rigid(case, parameters, name)

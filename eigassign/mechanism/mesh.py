@@ -43,6 +43,16 @@ class LinkMesh:
     stiffness: Sequence[Term]
     mass: Sequence[Term]
     rigid: Sequence[Term]
+    reduction: Reduction | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Reduction:
+    """Where a reduced link comes from: motion of ``mesh`` = ``basis`` × reduced local motion."""
+
+    mesh: LinkMesh
+    basis: Floats  # (mesh.n_local, n_reduced)
+    interior: Ints  # local dofs of ``mesh`` that are no unknowns any more
 
 
 @dataclass

@@ -12,6 +12,7 @@ differences of the kinematics along the motion q(t), q̇(t), q̈(t).
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,10 +20,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.case import CaseFile
+from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly import LocalLink
 from eigassign.mechanism.build import local_links
+from eigassign.mechanism.craig_bampton import total
+from eigassign.mechanism.geometry import link_type
 from eigassign.mechanism.kinematics import Kinematics, all_moving
-from eigassign.mechanism.mesh import DOFS
+from eigassign.mechanism.local_motion import motion_matrix, motion_scalars
+from eigassign.mechanism.mesh import DOFS, Term
 from eigassign.mechanism.parameters import Parameters
 from eigassign.series.algebra import Samples
 from eigassign.series.expression import Scalar
@@ -68,6 +73,8 @@ class VelocityTerms:
         C = sparse.csr_array((self.n_dof, self.n_dof))
         K = sparse.csr_array((self.n_dof, self.n_dof))
         for one in self.links:
+            if not whole_mass(one.link):  # a rigid link without mass
+                continue
             c, k = self._link_terms(one, values, rates, h)
             C, K = C + c, K + k
         return sparse.csr_array(C), sparse.csr_array(K)
@@ -80,7 +87,7 @@ class VelocityTerms:
         self, one: _LinkTable, values: list[Floats], rates: list[Floats], h: float
     ) -> tuple[sparse.csr_array, sparse.csr_array]:
         B = [self._motion(one, v) for v in values]
-        m = _sum(one.link.mass, values[2][one.mass])
+        m = total(whole_mass(one.link), values[2][one.mass])
         P = [
             (B[k + 1] - B[k - 1]) * (0.5 / h) + self._spin(one, values[k], rates[k]) @ B[k]
             for k in (1, 2, 3)
@@ -91,26 +98,11 @@ class VelocityTerms:
         return C, (momentum[2] - momentum[0]) * (0.5 / h) - P[1].T @ m @ P[1]
 
     def _motion(self, one: _LinkTable, values: Floats) -> sparse.csr_array:
-        """B (n_local, n_dof): own unknowns, carried nodes, and N T."""
-        link = one.link
-        own = np.flatnonzero(link.own >= 0)
-        rows, columns, data = [own], [link.own[own]], [np.ones(len(own))]
-        pairs = [
-            (slot, unknown) for slot, masters in link.carried.items() for unknown, _ in masters
-        ]
-        if pairs:
-            slots, unknowns = (np.array(p) for p in zip(*pairs, strict=True))
-            rows, columns = [*rows, slots], [*columns, unknowns]
-            data.append(values[one.carries])
-        shape = (len(link.own), self.n_dof)
-        entries = (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns)))
-        B = sparse.csr_array(entries, shape=shape)
-        if link.twist.shape[1]:
-            N = _sum(link.rigid, values[one.rigid])
-            T = values[one.twist].reshape(link.twist.shape)
-            wide = sparse.csr_array((shape[0], self.n_u))
-            B = B + sparse.hstack([wide, sparse.csr_array(N @ T)], format="csr")
-        return B
+        """B (n_local, n_dof) of all local dofs, of a reduced link of those it stands for too."""
+        groups = (values[one.carries], values[one.twist], values[one.rigid])
+        B = motion_matrix(one.link, *groups, self.n_u, self.n_dof)
+        reduction = one.link.reduction
+        return B if reduction is None else sparse.csr_array(reduction.basis @ B)
 
     def _spin(self, one: _LinkTable, values: Floats, rate: Floats) -> sparse.csr_array:
         """ω̃ on the translations and rotations of every node, in the link's axes."""
@@ -118,26 +110,28 @@ class VelocityTerms:
         tilde = np.array([[0.0, -wz, wy], [wz, 0.0, -wx], [-wy, wx, 0.0]])
         kept = list(DOFS[self.space])
         block = np.kron(np.eye(2), tilde)[np.ix_(kept, kept)]
-        n = len(one.link.own) // len(kept)
-        turned = sparse.kron(sparse.eye_array(n), block, format="csr")
-        extra = len(one.link.own) - n * len(kept)
-        return sparse.csr_array(
-            sparse.block_diag([turned, sparse.csr_array((extra, extra))], format="csr")
-            if extra
-            else turned
-        )
+        n = whole_mass(one.link)[0].matrix.shape[0] // len(kept)
+        return sparse.csr_array(sparse.kron(sparse.eye_array(n), block, format="csr"))
 
 
-def _sum(terms: object, values: Floats) -> sparse.csr_array:
-    matrices = [t.matrix * float(v) for t, v in zip(terms, values, strict=True)]  # type: ignore[call-overload]
-    total = matrices[0]
-    for matrix in matrices[1:]:
-        total = total + matrix
-    return sparse.csr_array(total)
+def whole_mass(link: LocalLink) -> Sequence[Term]:
+    """The mass terms of a link with all its dofs."""
+    return link.mass if link.reduction is None else link.reduction.mesh.mass
+
+
+def placeless(case: CaseFile) -> tuple[str, ...]:
+    """Superelements: nobody knows which way their inner dofs point, and so how they turn."""
+    return tuple(n for n in case.mechanism.links if link_type(case, n) == "superelement")
 
 
 def velocity_terms(case: CaseFile, parameters: Parameters, motion: Kinematics) -> VelocityTerms:
-    """Collect what varies along a motion: carried nodes, twists, spins, mass coefficients."""
+    """Collect what varies along a motion: carried nodes, twists, spins, mass coefficients.
+
+    Raises MechanismError for a superelement, whose inner dofs have no directions.
+    """
+    for name in placeless(case):
+        message = "has inner dofs of unknown direction: its velocity terms cannot be formed"
+        raise MechanismError(f"mechanism.links.{name}", message)
     links, nodes = local_links(case, parameters, motion)
     moving = all_moving(case, parameters, motion)
     scalars: list[Scalar] = []
@@ -146,10 +140,8 @@ def velocity_terms(case: CaseFile, parameters: Parameters, motion: Kinematics) -
         spin = moving.placement(placement.link).twist[3:]
         parts = [
             list(spin.ravel()),
-            [carry for masters in link.carried.values() for _, carry in masters],
-            list(link.twist.ravel()),
-            [t.coefficient for t in link.rigid],
-            [t.coefficient for t in link.mass],
+            *motion_scalars(link),
+            [t.coefficient for t in whole_mass(link)],
         ]
         cuts = np.cumsum([len(scalars), *(len(p) for p in parts)]).tolist()
         slices = [slice(a, b) for a, b in itertools.pairwise(cuts)]

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import UsageError
 from eigassign.mechanism.kinematics import Kinematics
+from eigassign.mechanism.local_motion import ReducedLinks
 from eigassign.mechanism.pencil import Pencil
 from eigassign.mechanism.poses import Poses
 from eigassign.modal.exact import eigenvalues, modes
@@ -31,6 +32,7 @@ class Model:
     motion: Kinematics
     q_names: tuple[str, ...]
     y_names: tuple[str, ...]
+    reduced: ReducedLinks | None = None  # the links that Craig-Bampton made smaller
 
     @property
     def n_rigid(self) -> int:
@@ -54,6 +56,18 @@ class Model:
         """Frequencies (n_samples, count) in Hz and mass-normalised modes (…, n_dof, count)."""
         found = modes(self.pencil, self.x(q, y), count)
         return np.sqrt(found.lam) / (2.0 * np.pi), found.phi
+
+    def truncation_error(self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)) -> Floats:
+        """By how much reduced links raise frequencies at most, relative, (n_samples, n_modes).
+
+        Zero without reduced links; infinite where nothing can be vouched for.
+        """
+        x = self.x(q, y)
+        if self.reduced is None:
+            return np.zeros((len(x), len(modes)))
+        from eigassign.modal.truncation import truncation_error
+
+        return truncation_error(self.reduced, x, modes)
 
     def tracked(self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)) -> Tracked:
         """``modes`` of the first sample followed along the samples by their shapes.

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse import linalg
 
+from eigassign.mechanism.definite import factorise
 from eigassign.mechanism.pencil import Pencil
+
+__all__ = ["block", "factorise", "principal"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -38,12 +40,3 @@ def block(pencil: Pencil, data: Floats, rows: Ints) -> Floats:
     out = np.zeros((len(rows), pencil.n_dof))
     out[slot[keep], pencil.columns[keep]] = data[keep]
     return out
-
-
-def factorise(matrix: sparse.csc_array) -> linalg.SuperLU:
-    """LU without pivoting off the diagonal: cheap in fill-in, right for definite matrices.
-
-    For others the caller checks what comes out.
-    """
-    options = {"SymmetricMode": True}
-    return linalg.splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)

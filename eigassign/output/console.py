@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, TextIO
@@ -118,17 +119,29 @@ def print_modes(
     rigid_modes: int,
     q: Sequence[tuple[str, float]] = (),
     y: Sequence[tuple[str, float]] = (),
+    truncation: Sequence[float] | None = None,
     stream: TextIO | None = None,
 ) -> None:
     """Elastic modes in Hz from 1 upwards, where they were evaluated, and the rigid modes left out.
 
-    ``q`` and ``y`` are (name, value) pairs in SI.
+    ``q`` and ``y`` are (name, value) pairs in SI; ``truncation`` is how much reduced links raise
+    each frequency at most, relative.
     """
     where = ", ".join(f"{name} = {number(value)}" for name, value in (*q, *y))
     caption = f"{rigid_modes} rigid-body mode{'s' if rigid_modes != 1 else ''} not counted."
-    rows = [(str(mode), f"{hz:.10g}") for mode, hz in enumerate(frequencies_hz, start=1)]
+    rows: list[tuple[str, ...]] = [
+        (str(mode), f"{hz:.10g}") for mode, hz in enumerate(frequencies_hz, start=1)
+    ]
+    columns: tuple[str, ...] = ("mode", "frequency [Hz]")
+    if truncation is not None:
+        columns = (*columns, "too high by at most")
+        rows = [(*row, _bounded(e)) for row, e in zip(rows, truncation, strict=True)]
     title = f"Modes at {where}" if where else "Modes"
-    print_table(title, ("mode", "frequency [Hz]"), rows, caption=caption, stream=stream)
+    print_table(title, columns, rows, caption=caption, stream=stream)
+
+
+def _bounded(error: float) -> str:
+    return f"{100 * error:.2g} %" if math.isfinite(error) else "cannot be bounded"
 
 
 def print_batch(

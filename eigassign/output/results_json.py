@@ -42,6 +42,7 @@ def results(findings: Findings) -> dict[str, Any]:
             "title": findings.title,
             "reference": findings.reference,
             "sha256": findings.case_sha256,
+            "files": dict(findings.case_files),
         },
         "design": {
             row.name: {k: v for k, v in asdict(row).items() if k != "name"}

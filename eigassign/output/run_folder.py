@@ -19,9 +19,10 @@ import os
 import re
 import shutil
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 
 from eigassign.errors import StorageError
 from eigassign.output.files import sync_path, sync_tree, temporary_name, write_synced
@@ -39,15 +40,26 @@ class RunOf:
 
     case_path: str
     case_sha256: str
+    case_files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of what the case names
 
     def is_same_case(self, other: RunOf) -> bool:
-        """Same file (perhaps edited since), or same content (perhaps moved since)."""
-        return self.case_path == other.case_path or self.case_sha256 == other.case_sha256
+        """Same file (perhaps edited since), or same content (perhaps moved since).
+
+        The content is that of the case file and of every file it names.
+        """
+        if self.case_path == other.case_path:
+            return True
+        return (self.case_sha256, self.case_files) == (other.case_sha256, other.case_files)
 
 
 @contextlib.contextmanager
 def run_folder(
-    target: Path, *, case_path: Path, case_sha256: str, force: bool = False
+    target: Path,
+    *,
+    case_path: Path,
+    case_sha256: str,
+    case_files: Mapping[str, str] = MappingProxyType({}),
+    force: bool = False,
 ) -> Iterator[Path]:
     """Yield an empty hidden folder to fill; on a clean exit it becomes ``target``.
 
@@ -56,7 +68,7 @@ def run_folder(
     (checked on entry already) or cannot be written.
     """
     target = Path(os.path.realpath(target))
-    run = RunOf(_relative(case_path, target), case_sha256)
+    run = RunOf(_relative(case_path, target), case_sha256, dict(case_files))
     with _storage_errors(target):
         require_replaceable(target, run, force=force, case_path=case_path)
         made = _make_parents(target.parent)
@@ -139,9 +151,10 @@ class _Marker:
 def _read_marker(folder: Path) -> _Marker | None:
     try:
         found = json.loads((folder / MARKER).read_bytes())
-        run = RunOf(str(found["case_path"]), str(found["case_sha256"]))
+        named = {str(k): str(v) for k, v in found.get("case_files", {}).items()}
+        run = RunOf(str(found["case_path"]), str(found["case_sha256"]), named)
         return _Marker(run, frozenset(found["files"]))
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
 
 
@@ -193,6 +206,7 @@ def _write_marker(folder: Path, run: RunOf) -> None:
         "eigassign_run": _MARKER_SCHEMA,
         "case_path": run.case_path,
         "case_sha256": run.case_sha256,
+        "case_files": dict(run.case_files),
         "files": sorted(_files(folder) | {MARKER}),
     }
     write_synced(folder / MARKER, (json.dumps(content, indent=2) + "\n").encode())

@@ -10,6 +10,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.errors import AccuracyError
+from eigassign.modal.model import Model
 from eigassign.modal.roundoff import rounding_error
 from eigassign.study.scene import Scene
 
@@ -19,13 +21,19 @@ SAMPLES = 20  # at which the expansion's own estimate is evaluated
 Discretisation = Callable[[Floats, tuple[int, ...]], Floats | None]
 
 
-def accuracy_notes(scene: Scene, discretisation: Discretisation) -> list[str]:
-    """Lines on discretisation error, estimated approximation error and round-off, per mode."""
+def accuracy_notes(
+    scene: Scene, discretisation: Discretisation, optimum: Floats | None = None
+) -> list[str]:
+    """Lines on discretisation, truncation, estimated approximation error and round-off, per mode.
+
+    ``optimum`` (n_y,) is one more design at which the truncation is looked at.
+    """
     modes = scene.expansions.modes
     q = scene.q0[None] if scene.trajectory is None else scene.path.q
     x = scene.model.x(_spread(q, POSES), scene.initial)
     lines = _mesh_lines(discretisation(x, modes), modes)
     few = _spread(q, SAMPLES)
+    lines += truncation_notes(scene, optimum)
     estimate = scene.expansions.estimate(few, scene.initial).max(axis=0)
     several = scene.trajectory is not None and scene.trajectory.several
     where = "at the expansion point" if scene.trajectory is None else "along the trajectory"
@@ -49,6 +57,36 @@ def _mesh_lines(error: Floats | None, modes: tuple[int, ...]) -> list[str]:
     return [
         f"mode {mode}: discretisation error about {100 * worst:.2g} %, from twice as many elements"
         for mode, worst in zip(modes, error.max(axis=0), strict=True)
+    ]
+
+
+def truncation_notes(scene: Scene, optimum: Floats | None = None) -> list[str]:
+    """`truncation_lines` along the trajectory, at the initial design, both bounds, the optimum."""
+    q = scene.q0[None] if scene.trajectory is None else scene.path.q
+    designs = [scene.initial, *scene.bounds, *([] if optimum is None else [optimum])]
+    return truncation_lines(scene.model, scene.expansions.modes, q, np.array(designs))
+
+
+def truncation_lines(model: Model, modes: tuple[int, ...], q: Floats, designs: Floats) -> list[str]:
+    """By how much reduced links raise frequencies at most, at poses q (n, n_q) of every design.
+
+    Raises AccuracyError where that cannot be bounded: the links are reduced too far.
+    """
+    if model.reduced is None:
+        return []
+    few, different = _spread(q, SAMPLES), np.unique(designs, axis=0)
+    error = np.array([model.truncation_error(few, y, modes) for y in different]).max(axis=(0, 1))
+    where = f"{len(few)} poses" + (f" and {len(different)} designs" if len(different) > 1 else "")
+    for mode, worst in zip(modes, error, strict=True):
+        if not np.isfinite(worst):
+            raise AccuracyError(
+                f"mode {mode}: what the reduced links leave out cannot be bounded over {where}: "
+                "raise reduce_to"
+            )
+    return [
+        f"mode {mode}: truncation error of the reduced links at most {100 * worst:.2g} % (too "
+        f"high), over {where}"
+        for mode, worst in zip(modes, error, strict=True)
     ]
 
 

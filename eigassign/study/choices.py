@@ -1,7 +1,8 @@
 """What a case leaves to ``auto``: elements per link, order, expansion points along the trajectory.
 
 The accuracy asked for (``expansion.accuracy``) is shared: half of it for the mesh, half for the
-approximation. Everything is decided from estimates, and the reasons are kept as lines of text.
+approximation; where links are reduced, their truncation error may use half of the mesh's half.
+Everything is decided from estimates, and the reasons are kept as lines of text.
 """
 
 from __future__ import annotations
@@ -14,14 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
+from eigassign.errors import AccuracyError
 from eigassign.mechanism.trajectories import Trajectories
 from eigassign.modal.expansion_choice import choose_expansion
 from eigassign.modal.mesh_choice import MeshChoice, choose_mesh
 from eigassign.modal.model import Model
+from eigassign.modal.reduction_choice import ReductionChoice, choose_reduction, few_of
 
 Floats = NDArray[np.float64]
 ACCURACY = 1e-3  # where the case asks for auto and names none
 SHARE = 0.5
+TRUNCATION = 0.25  # where links are reduced: half of what else the mesh may use
 SAMPLES = 40  # along the trajectory, at each design that is looked at
 
 
@@ -60,8 +64,48 @@ def settle_mesh(
 
     Raises AccuracyError where no mesh will do.
     """
-    accuracy = SHARE * asked_accuracy(file)
+    accuracy = SHARE * asked_accuracy(file) - truncation_share(file)
     return choose_mesh(build, automatic_elements(file), x, accuracy, wanted_modes(file))
+
+
+def automatic_reduction(file: CaseFile) -> tuple[str, ...]:
+    """The links with ``reduce_to: auto``."""
+    return tuple(n for n, f in _reduced_to(file).items() if isinstance(f, str))
+
+
+def _reduced_to(file: CaseFile) -> dict[str, float | str]:
+    wanted = {n: getattr(link, "reduce_to", None) for n, link in file.mechanism.links.items()}
+    return {name: f for name, f in wanted.items() if f is not None}
+
+
+def truncation_share(file: CaseFile) -> float:
+    """The part of the accuracy asked for that reduced links may use; 0 without any."""
+    return TRUNCATION * asked_accuracy(file) if _reduced_to(file) else 0.0
+
+
+def settle_reduction(
+    file: CaseFile,
+    names: tuple[str, ...],
+    build: Callable[[float | None], Model],
+    look: Callable[[Model], Floats],
+) -> ReductionChoice:
+    """The lowest frequency to which links may be reduced at the poses looked at, if it pays."""
+    return choose_reduction(names, build, look, truncation_share(file), wanted_modes(file))
+
+
+def require_little_truncation(file: CaseFile, model: Model, x: Floats) -> None:
+    """Raise AccuracyError where reduced links use more of the accuracy than their share."""
+    share, modes = truncation_share(file), wanted_modes(file)
+    if model.reduced is None:
+        return
+    few, n_q = few_of(x), len(model.q_names)
+    worst = model.truncation_error(few[:, :n_q], few[:, n_q:], modes).max()
+    if worst > share:
+        stated = f"{worst:.1e}" if np.isfinite(worst) else "an error that cannot be bounded"
+        raise AccuracyError(
+            f"the reduced links leave {stated}, of the {asked_accuracy(file):.1e} asked for "
+            f"{share:.1e} is theirs: raise reduce_to, or write reduce_to: auto"
+        )
 
 
 def choose_order(
@@ -77,6 +121,7 @@ def choose_order(
     Raises AccuracyError, naming the pose, where no order and number of points will do.
     """
     x = looked_at(file, model, trajectory, q0, y0)
+    require_little_truncation(file, model, x)
     start = np.concatenate([q0, y0])
     accuracy = SHARE * asked_accuracy(file)
     found = choose_expansion(

@@ -7,7 +7,7 @@ errors as fractions (0.01 is 1 %) of the frequency in Hz.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -216,6 +216,7 @@ class Findings:
     warnings: tuple[str, ...]
     notes: tuple[str, ...]  # what was chosen and why, one line each
     timing_s: Mapping[str, float]
+    case_files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of what the case names
     tolerance: float = 0.02  # the largest approximation error the case accepts, a fraction
     only: str | None = None  # the one of several trajectories that these are narrowed to
 

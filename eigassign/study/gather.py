@@ -54,6 +54,7 @@ def gather(
         reference=file.reference,
         case_name=file.path.stem.encode("utf-8", "replace").decode("utf-8"),
         case_sha256=file.sha256,
+        case_files=file.files,
         version=__version__,
         q_names=scene.model.q_names,
         q_units=coordinate_units(file),

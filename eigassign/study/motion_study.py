@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from eigassign.mechanism.trajectories import NamedTrajectory
 from eigassign.mechanism.trajectory import Trajectory
-from eigassign.mechanism.velocity import velocity_terms
+from eigassign.mechanism.velocity import placeless, velocity_terms
 from eigassign.modal.motion import motion_effect
 from eigassign.study.scene import Scene
 
@@ -42,9 +42,28 @@ def study_motion(scene: Scene, lam: float) -> MotionStudy | None:
     if simple is not None and simple < NEGLIGIBLE * limit:
         note = f"slow motion: the neglected velocity terms change λ by less than about {simple:.1g}"
         return MotionStudy(simple, note, None)
+    if names := placeless(scene.file):
+        return _roughly(simple, names, limit)
     change, name = max((_effect(scene, part), part.name) for part in timed)
     along = f"trajectory {name!r}" if len(parts) > 1 else "the trajectory"
     return _stated(change, limit, along)
+
+
+def _roughly(simple: float | None, names: tuple[str, ...], limit: float) -> MotionStudy:
+    """Superelements: their inner dofs have no directions, so only the simple estimate is left."""
+    why = f"the inner dofs of {', '.join(names)} have no directions"
+    if simple is None:
+        warning = f"what the neglected velocity terms change is not known: {why}"
+        return MotionStudy(np.inf, "", warning)
+    change = 0.5 * simple  # of a frequency
+    text = f"the neglected velocity terms change a frequency by about {100 * change:.2g} %"
+    if change <= limit:
+        return MotionStudy(change, f"speed of the motion: {text}, roughly, for {why}", None)
+    warning = (
+        f"the motion may not be slow: {text}, roughly, for {why}; over the {100 * limit:g} % of "
+        "validation.max_error"
+    )
+    return MotionStudy(change, "", warning)
 
 
 def _simple_estimate(scene: Scene, parts: list[NamedTrajectory], lam: float) -> float | None:

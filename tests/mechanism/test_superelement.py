@@ -222,3 +222,127 @@ def test_an_entry_that_is_not_finite_is_refused(tmp_path: Path) -> None:
     K, M = exported("planar")
     M[0, 0] = np.nan
     refused(tmp_path, part("planar", write(tmp_path, "npy", K, M)), "mass", "finite")
+
+
+@pytest.mark.parametrize("what", ["stiffness", "mass"])
+def test_a_matrix_with_negative_energy_is_refused(tmp_path: Path, what: str) -> None:
+    K, M = exported("planar")
+    pair = (-K, M) if what == "stiffness" else (K, -M)
+    files = write(tmp_path, "npy", *pair)
+    refused(tmp_path, part("planar", files), what, "positive semidefinite")
+
+
+def test_one_negative_mass_among_many_is_refused(tmp_path: Path) -> None:
+    """Positive on the diagonal and in sum, but not between two neighbours."""
+    K, M = exported("planar")
+    M[13, 13] *= 0.2
+    refused(tmp_path, part("planar", write(tmp_path, "npy", K, M)), "mass", "semidefinite")
+
+
+def test_rotations_without_inertia_are_fine(tmp_path: Path) -> None:
+    """Lumped masses, nothing on the rotations; reduced or not."""
+    K, M = exported("planar")
+    lumped = np.zeros(len(M))
+    for at in range(0, len(M), 3):
+        lumped[at : at + 2] = M[at, ::3].sum()
+    files = write(tmp_path, "mtx", K, np.diag(lumped))
+    whole = lam(tmp_path, arm("planar", {"part": part("planar", files)}), 3)
+    small = lam(tmp_path, arm("planar", {"part": part("planar", files, reduce_to=2e4)}), 3)
+    np.testing.assert_allclose(whole, built(beam_arm("planar")).lam([0.4, 0.9], 3), rtol=0.05)
+    np.testing.assert_allclose(small, whole, rtol=1e-5)
+
+
+def test_a_mass_in_another_order_than_the_stiffness_is_refused(tmp_path: Path) -> None:
+    K, M = exported("planar")
+    order = np.argsort(np.arange(len(M)) % 3, kind="stable")  # all u_x, then all u_y, then θ
+    other = M[np.ix_(order, order)]
+    refused(tmp_path, part("planar", write(tmp_path, "npy", K, other)), "mass", "order of the")
+
+
+def test_a_part_with_something_loose_inside_is_refused(tmp_path: Path) -> None:
+    K, M = exported("planar")
+    wide = [np.zeros((len(K) + 3, len(K) + 3)) for _ in range(2)]
+    for A, B in zip(wide, (K, M), strict=True):
+        A[:-3, :-3] = B
+    wide[1][-3:, -3:] = 0.1 * np.eye(3)
+    files = write(tmp_path, "npy", *wide)
+    tree = arm("planar", {"part": part("planar", files)})
+    with pytest.raises(MechanismError, match=r"links\.part: is limp inside"):
+        _ = built(tree, tmp_path / "case.yaml").pencil
+
+
+@pytest.mark.parametrize(
+    ("header", "body", "message"),
+    [
+        ("complex general", "1 1 1 0", "complex entries"),
+        ("pattern general", "1 1", "no values"),
+        ("real skew-symmetric", "2 1 1", "skew-symmetric"),
+        ("real general", "1 9 1", "cannot read"),
+        ("real general", "1 1 one", "cannot read"),
+    ],
+)
+def test_matrix_market_files_of_other_kinds_are_refused(
+    tmp_path: Path, good: Tree, header: str, body: str, message: str
+) -> None:
+    text = f"%%MatrixMarket matrix coordinate {header}\n3 3 1\n{body}\n"
+    (tmp_path / "K.mtx").write_text(text)
+    good["stiffness"] = "K.mtx"
+    refused(tmp_path, good, "stiffness", message)
+
+
+def test_a_matrix_larger_than_any_part_is_refused_unread(tmp_path: Path, good: Tree) -> None:
+    header = "%%MatrixMarket matrix coordinate real symmetric\n"
+    (tmp_path / "K.mtx").write_text(header + "3000000 3000000 1\n1 1 1.0\n")
+    good["stiffness"] = "K.mtx"
+    refused(tmp_path, good, "stiffness", "up to 2000000 are supported")
+
+
+def test_one_triangle_without_its_header_is_explained(tmp_path: Path) -> None:
+    K, M = exported("planar")
+    files = write(tmp_path, "npy", np.triu(K), M)
+    refused(tmp_path, part("planar", files), "stiffness", "one triangle only: say 'symmetric'")
+
+
+def test_integers_dense_and_array_format_are_read(tmp_path: Path) -> None:
+    """K rounded to whole N/m, as `array`, and single precision M."""
+    K, M = exported("planar")
+    header = "%%MatrixMarket matrix array integer symmetric\n27 27\n"
+    lower = [round(K[i, j]) for j in range(27) for i in range(j, 27)]
+    (tmp_path / "K.mtx").write_text(header + "\n".join(map(str, lower)) + "\n")
+    np.save(tmp_path / "M.npy", M.astype(np.float32))
+    found = lam(tmp_path, arm("planar", {"part": part("planar", ("K.mtx", "M.npy"))}), 3)
+    np.testing.assert_allclose(found, built(beam_arm("planar")).lam([0.4, 0.9], 3), rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "array", "message"),
+    [
+        ("K.npy", np.eye(27, dtype=complex), "complex entries"),
+        ("K.npy", np.ones(27), "not a square matrix"),
+        ("K.npy", np.eye(27, dtype=bool), "expected real numbers"),
+        ("K.npy", np.full((27, 27), "x"), "expected real numbers"),
+        ("K.npz", np.eye(27), "cannot read"),
+    ],
+)
+def test_arrays_that_are_no_stiffness_are_refused(
+    tmp_path: Path, good: Tree, name: str, array: np.ndarray, message: str
+) -> None:
+    save: Any = np.save if name.endswith("npy") else np.savez
+    save(tmp_path / name, array)
+    good["stiffness"] = name
+    refused(tmp_path, good, "stiffness", message)
+
+
+@pytest.mark.parametrize("name", ["K.npz", "K.npy", "K.mtx"])
+def test_files_cut_short_are_refused(tmp_path: Path, good: Tree, name: str) -> None:
+    written = write(tmp_path, name[-3:], *exported("planar"))[0]
+    data = (tmp_path / written).read_bytes()
+    (tmp_path / written).write_bytes(data[: len(data) // 2])
+    good["stiffness"] = written
+    refused(tmp_path, good, "stiffness", "cannot read K")
+
+
+def test_a_soft_support_of_a_rotation_is_found_beside_stiff_translations(tmp_path: Path) -> None:
+    K, M = exported("planar")
+    K[2, 2] += 1e-3 * K[2, 2]
+    refused(tmp_path, part("planar", write(tmp_path, "npy", K, M)), "stiffness", "supports")

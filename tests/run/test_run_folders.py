@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import hashlib
 import io
 import json
+import shutil
 from pathlib import Path
 
 import h5py
@@ -189,3 +191,50 @@ design:
   m: {parameter: bodies.tip.mass, min: 0, max: 0.2}
 expansion: {q: [0, 0]}
 """
+
+
+# Files that a case names are part of what it is
+
+
+def superelement_case(folder: Path) -> Path:
+    """A copy of the shipped case with its matrices, found by relative names."""
+    cases = SHIPPED.parent
+    shutil.copytree(cases / "superelement_arm", folder / "superelement_arm")
+    return Path(shutil.copy(cases / "superelement_arm.yaml", folder / "superelement_arm.yaml"))
+
+
+def test_results_name_the_files_of_a_case_and_their_content(tmp_path: Path) -> None:
+    case = superelement_case(tmp_path)
+    optimize(case, in_folder(tmp_path / "run"))
+    named = json.loads((tmp_path / "run" / "results.json").read_text())["case"]["files"]
+    for name in ("superelement_arm/stiffness.mtx", "superelement_arm/mass.mtx"):
+        assert named[name] == hashlib.sha256((tmp_path / name).read_bytes()).hexdigest()
+        assert named[name] in (tmp_path / "run" / "log.txt").read_text()
+
+
+def test_the_resolved_case_finds_its_matrices_and_samples_from_its_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case = superelement_case(tmp_path)
+    samples = "time, q1, q2\n0, 1.8, 5.3\n0.5, 1.85, 5.35\n1, 1.9, 5.5\n"
+    (tmp_path / "samples.csv").write_text(samples)
+    head, rest = case.read_text().split("trajectory:\n")
+    case.write_text(head + "trajectory: {file: samples.csv}\n\ndesign:" + rest.split("design:")[1])
+    first = optimize(case, in_folder(tmp_path / "deep" / "er" / "run")).findings
+    monkeypatch.chdir(tmp_path / "deep")
+    again = solve_case(load_case("er/run/case.yaml"), UNCACHED)
+    assert again.design == {row.name: row.optimal for row in first.design}
+
+
+def test_equal_cases_with_other_matrices_do_not_replace_each_others_runs(tmp_path: Path) -> None:
+    for name in ("one", "same", "other"):
+        (tmp_path / name).mkdir()
+        superelement_case(tmp_path / name)
+    mass = tmp_path / "other" / "superelement_arm" / "mass.mtx"
+    lines = mass.read_text().splitlines()
+    mass.write_text("\n".join([lines[0], "% lighter", *lines[1:]]) + "\n")
+    target = tmp_path / "run"
+    expand_case(tmp_path / "one" / "superelement_arm.yaml", in_folder(target))
+    expand_case(tmp_path / "same" / "superelement_arm.yaml", in_folder(target))
+    with pytest.raises(StorageError, match="holds a run of another case"):
+        expand_case(tmp_path / "other" / "superelement_arm.yaml", in_folder(target))

@@ -1,0 +1,48 @@
+"""Factors of symmetric definite sparse matrices, and whether a matrix is one."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import linalg
+
+Floats = NDArray[np.float64]
+PIVOT = 1e-15  # smallest pivot of a definite matrix, relative to its diagonal entry
+
+
+def factorise(matrix: sparse.csc_array) -> linalg.SuperLU:
+    """LU without pivoting off the diagonal: cheap in fill-in, right for definite matrices.
+
+    For others the caller checks what comes out.
+    """
+    options = {"SymmetricMode": True}
+    return linalg.splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+
+
+def definite_factor(matrix: sparse.csc_array) -> linalg.SuperLU | None:
+    """The factor of a symmetric positive definite matrix; None where it is not definite."""
+    try:
+        factor = factorise(matrix)
+    except RuntimeError:  # a pivot is exactly zero
+        return None
+    diagonal = np.asarray(matrix.diagonal())[np.argsort(factor.perm_c)]
+    pivots = np.asarray(factor.U.diagonal())
+    return factor if (pivots > PIVOT * np.abs(diagonal)).all() else None
+
+
+def is_semidefinite(matrix: sparse.csr_array, tolerance: float) -> bool:
+    """Whether A + tolerance × diag(A) is positive definite on the rows that are not zero.
+
+    Negative eigenvalues within the tolerance, relative to the diagonal, pass for round-off.
+    """
+    diagonal = np.asarray(matrix.diagonal())
+    present = np.flatnonzero(np.asarray(abs(matrix).sum(axis=1)).ravel())
+    if (diagonal[present] <= 0.0).any():
+        return False
+    if not len(present):
+        return True
+    scale = sparse.diags_array(1.0 / np.sqrt(diagonal[present]))
+    scaled = scale @ matrix[present][:, present] @ scale
+    eye = sparse.eye_array(len(present))
+    return definite_factor(sparse.csc_array(scaled + tolerance * eye)) is not None

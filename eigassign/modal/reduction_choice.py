@@ -1,0 +1,87 @@
+"""To which frequency links are reduced, and whether that pays: judged by the truncation error.
+
+Reduced to their interfaces alone, links give frequencies that are too high; twice the highest that
+matters is the first trial, and it is raised until the bound on the truncation error fits. A model
+with fewer than half of the dofs pays: its dense blocks then cost less than the sparse ones of the
+whole mechanism (benchmarks/craig_bampton.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.modal.model import Model
+
+Floats = NDArray[np.float64]
+STATIC = 1e-6  # Hz: below every fixed-interface mode
+FIRST = 2.0  # of the highest frequency that matters
+STEP = 1.5
+ROUNDS = 16
+PAYS = 0.5  # of the dofs that the whole mechanism has
+SAMPLES = 30  # poses and designs at which it is judged
+
+
+@dataclass(frozen=True, eq=False)
+class ReductionChoice:
+    """The frequency in Hz for each link, None where it stays whole, and why."""
+
+    frequencies: Mapping[str, float | None]
+    error: Floats  # (n_modes,): bound on the truncation error, largest over the samples
+    reasons: tuple[str, ...]
+
+
+def choose_reduction(
+    names: Sequence[str],
+    build: Callable[[float | None], Model],
+    look: Callable[[Model], Floats],
+    accuracy: float,
+    modes: Sequence[int],
+) -> ReductionChoice:
+    """The lowest frequency tried that leaves ``accuracy`` at the samples that ``look`` gives.
+
+    The links stay whole where the model keeps more than `PAYS` of its dofs.
+    """
+    whole = build(None)
+    x = few_of(look(whole))
+    reasons: list[str] = []
+    frequency = FIRST * _highest(build(STATIC), x, max(modes))
+    size = 0
+    for _ in range(ROUNDS):
+        model = build(frequency)
+        if model.reduced is None or model.n_dof > PAYS * whole.n_dof:
+            reasons.append(f"reduced to {frequency:.4g} Hz: {model.n_dof} of {whole.n_dof} dofs")
+            break
+        if model.n_dof == size:  # no mode in between
+            frequency *= STEP
+            continue
+        size, n_q = model.n_dof, len(model.q_names)
+        error = model.truncation_error(x[:, :n_q], x[:, n_q:], modes).max(axis=0)
+        reasons.append(_line(frequency, model, whole, error))
+        if error.max() <= accuracy:
+            return ReductionChoice(dict.fromkeys(names, frequency), error, tuple(reasons))
+        frequency *= STEP
+    reasons.append(f"not reduced, it does not pay: {', '.join(names)}")
+    return ReductionChoice(dict.fromkeys(names), np.zeros(len(modes)), tuple(reasons))
+
+
+def few_of(x: Floats) -> Floats:
+    """At most `SAMPLES` of the samples, spread evenly."""
+    keep = np.unique(np.linspace(0, len(x) - 1, min(SAMPLES, len(x))).round().astype(int))
+    return np.asarray(x[keep])
+
+
+def _highest(model: Model, x: Floats, count: int) -> float:
+    """The highest frequency of the lowest ``count`` modes over the samples, Hz."""
+    n_q = len(model.q_names)
+    available = min(count, len(model.pencil.elastic))
+    return float(model.frequencies(x[:, :n_q], x[:, n_q:], available).max())
+
+
+def _line(frequency: float, model: Model, whole: Model, error: Floats) -> str:
+    worst = float(error.max())
+    stated = f"truncation error at most {100 * worst:.2g} %" if np.isfinite(worst) else "no bound"
+    return f"reduced to {frequency:.4g} Hz: {model.n_dof} of {whole.n_dof} dofs, {stated}"

@@ -1,0 +1,132 @@
+"""How far the frequencies of reduced links are from those of the whole ones, without solving these.
+
+In the inverse form let (μ̂_j, z_j), ‖z_j‖_K = 1, be exact modes of the reduced mechanism, put back
+into all dofs. What they leave, ρ_j = M_c z_j − μ̂_j K z_j, vanishes on everything that the reduced
+links can do, so that only the space C left out, K-orthogonal to it, sees it. With G_jk the inner
+products of the ρ in K⁻¹ and β the largest μ within C, the k-th true μ satisfies
+
+    μ̂_k ≤ μ_k ≤ λ_k( diag(μ̂) + G / (μ̂_k − β) )        (where μ̂_k > β)
+
+by eliminating C. No gap between modes enters, so clusters and crossings do no harm. K splits into
+the interiors of the links, each with its interface held, and what the interfaces carry along:
+
+    ρᵀ K⁻¹ ρ = Σ_links ρ_iᵀ K_ii⁻¹ ρ_i + gᵀ S⁻¹ g,   g = Σ_links (Ψ(y) − Ψ_0)ᵀ ρ_i,
+
+the last term being there only where constraint modes change with y. S is taken from the reduced K,
+which is stiffer, and a factor makes up for that.
+All of it is a matter of each link's own matrices: no factor of the whole mechanism is needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from eigassign.errors import AccuracyError
+from eigassign.mechanism.definite import definite_factor
+from eigassign.mechanism.fixed_interface import largest_left_out
+from eigassign.mechanism.local_motion import ReducedLinks
+from eigassign.mechanism.pencil import Pencil
+from eigassign.modal.lowest import lowest_modes
+from eigassign.modal.symmetric import factorise, principal
+
+Floats = NDArray[np.float64]
+BESIDE = 6  # modes above the highest one asked for that may be drawn in
+SAFETY = 4.0  # on the part that the reduced stiffness is used for
+REFUSED = 0.5  # relative error in frequency above which nothing is said
+
+
+@dataclass(frozen=True, eq=False)
+class _Interior:
+    """One link at one design. ρ_i = X a for a = [v; −μ̂ v], v its reduced local motion."""
+
+    gram: Floats  # Xᵀ K_ii⁻¹ X
+    drawn: Floats  # (Ψ(y) − Ψ_0)ᵀ X
+    beta: float  # largest μ among what was left out
+
+
+def truncation_error(parts: ReducedLinks, x: Floats, modes: Sequence[int]) -> Floats:
+    """Relative error in frequency (n_samples, n_modes) that the reduction of links leaves at most.
+
+    Frequencies of reduced links are too high by it. Infinite where it is over `REFUSED`, or a
+    truncated mode may lie below the mode asked for. Cost: one factor of each link's interior for
+    each different y, and one exact solve of the reduced mechanism for each sample.
+    """
+    pencil = parts.pencil
+    out = np.empty((len(x), len(modes)))
+    pick = np.array(modes) - 1
+    designs, which = np.unique(x[:, pencil.n_q :], axis=0, return_inverse=True)
+    for k in range(len(designs)):
+        (samples,) = np.nonzero(which.ravel() == k)
+        values = parts.values(x[samples[0]])
+        interiors = [_interior(parts, link, values) for link in range(len(parts.links))]
+        for s in samples:
+            out[s] = _at(parts, interiors, x[s], max(modes))[pick]
+    return out
+
+
+def _interior(parts: ReducedLinks, k: int, values: Floats) -> _Interior:
+    """The factor of K_ii serves the Gram matrix, the constraint modes and β alike."""
+    reduction = parts.links[k].reduction
+    assert reduction is not None
+    T, i = reduction.basis, reduction.interior
+    b = np.setdiff1d(np.arange(len(T)), i)
+    place = np.abs(T[b]).argmax(axis=1)  # reduced local dof of each interface dof
+    n_b = len(b)
+    K, M = parts.matrices(k, values)
+    K_ii, M_ii = (sparse.csc_array(A[i][:, i]) for A in (K, M))
+    factor = definite_factor(K_ii)
+    if factor is None:
+        raise AccuracyError("a reduced link is limp at a design that was looked at")
+    X = np.hstack([np.asarray(A[i] @ T) for A in (M, K)])
+    solved = factor.solve(X)
+    drawn = np.empty((n_b, X.shape[1]))
+    drawn[place] = -np.asarray(K[b][:, i] @ solved) - T[i][:, place].T @ X
+    return _Interior(X.T @ solved, drawn, largest_left_out(K_ii, M_ii, factor, T[i, n_b:]))
+
+
+def _at(parts: ReducedLinks, interiors: Sequence[_Interior], x: Floats, highest: int) -> Floats:
+    """Bounds (highest,) at one sample."""
+    pencil = parts.pencil
+    theta = pencil.theta(x[None])
+    found = lowest_modes(pencil, theta, highest, BESIDE)
+    mu = 1.0 / found.lam[0]
+    z = found.phi[0] * np.sqrt(mu)
+    values = parts.values(x)
+    gram, pull = np.zeros((len(mu), len(mu))), np.zeros_like(z)
+    for k, one in enumerate(interiors):
+        B = parts.motion(k, values)
+        v = np.asarray(B @ z)
+        a = np.vstack([v, -mu * v])
+        gram += a.T @ one.gram @ a
+        n_b = len(one.drawn)
+        pull += np.asarray(B[:n_b].T @ (one.drawn @ a))
+    gram += SAFETY * _carried(pencil, theta[:, 0], pull)
+    return _bounds(mu, 0.5 * (gram + gram.T), max(one.beta for one in interiors), highest, pencil)
+
+
+def _carried(pencil: Pencil, theta: Floats, pull: Floats) -> Floats:
+    """gᵀ S⁻¹ g."""
+    g = pull[pencil.elastic]
+    if not g.any():
+        return np.zeros((g.shape[1], g.shape[1]))
+    K = principal(pencil, pencil.stiffness @ theta, pencil.elastic)
+    return np.asarray(g.T @ factorise(K).solve(g))
+
+
+def _bounds(mu: Floats, gram: Floats, beta: float, highest: int, pencil: Pencil) -> Floats:
+    """√(μ/μ̂) − 1 at most, for every mode up to ``highest``."""
+    kept = len(mu)
+    if kept < len(pencil.elastic) and kept > highest:  # the last stands for all above it
+        kept, beta = kept - 1, max(beta, float(mu[-1]))
+    error = np.full(highest, np.inf)
+    for k in range(highest):
+        if mu[k] > beta:
+            raised = np.diag(mu[:kept]) + gram[:kept, :kept] / (mu[k] - beta)
+            top = np.linalg.eigvalsh(raised)[::-1][k]
+            error[k] = np.sqrt(max(top / mu[k], 1.0)) - 1.0
+    return np.where(error < REFUSED, error, np.inf)
