@@ -80,7 +80,7 @@ def interface(case: CaseFile, name: str) -> set[str]:
     mechanism: Any = case.mechanism
     if link_type(case, name) != "frame":
         return {"start", "end", *(getattr(mechanism.links[name], "nodes", None) or ())}
-    used = [f"{name}.start", getattr(getattr(case, "trajectory", None), "tip", None) or ""]
+    used = [f"{name}.start"]  # a tip is followed rigidly
     used += [end for joint in mechanism.joints.values() for end in (joint.base, joint.follower)]
     used += [body.at for body in mechanism.bodies.values()]
     used += [end for spring in mechanism.springs.values() for end in spring.between]
