@@ -274,12 +274,18 @@ def reduce(
     y0: ArrayLike,
     modes: Sequence[int] = (1,),
     half_order: int = 2,
+    span: tuple[ArrayLike, ArrayLike] | None = None,
+    accuracy: float = modal_reduced.ACCURACY,
 ) -> ReducedModel:
     """Reduced model on the Taylor vectors at one or several expansion points, with its own error.
 
-    See :func:`eigassign.modal.reduced.reduce`.
+    ``span``, half-widths of q (n_q,) and y (n_y,) about the points, makes it as small as changes
+    no frequency in there by more than ``accuracy`` (relative). See
+    :func:`eigassign.modal.reduced.reduce`.
     """
-    return modal_reduced.reduce(model.pencil, q0, y0, modes, half_order)
+    return modal_reduced.reduce(
+        model.pencil, q0, y0, modes, half_order, span=span, accuracy=accuracy
+    )
 
 
 def assign(case: Case) -> Result:

@@ -181,11 +181,23 @@ def pattern(
     entries: Sequence[tuple[Ints, Ints, Ints, Floats]], n_dof: int, n_theta: int
 ) -> tuple[Ints, Ints, list[sparse.csr_array]]:
     """Common pattern of several matrices and their weights (n_nonzeros, n_theta) on it."""
-    keys = [rows * n_dof + columns for rows, columns, _, _ in entries]
-    unique = np.unique(np.concatenate(keys))
+    keys = np.concatenate([rows * n_dof + columns for rows, columns, _, _ in entries])
+    unique, place = _ranked(keys)
     shape = (len(unique), n_theta)
+    ends = np.cumsum([len(rows) for rows, _, _, _ in entries])[:-1]
     weights = [
-        sparse.csr_array((values, (np.searchsorted(unique, key), theta)), shape=shape)
-        for key, (_, _, theta, values) in zip(keys, entries, strict=True)
+        sparse.csr_array((values, (at, theta)), shape=shape)
+        for at, (_, _, theta, values) in zip(np.split(place, ends), entries, strict=True)
     ]
     return (unique // n_dof).astype(np.intp), (unique % n_dof).astype(np.intp), weights
+
+
+def _ranked(keys: Ints) -> tuple[Ints, Ints]:
+    """The distinct keys, ascending, and the place of each key among them: one sort for both."""
+    order = np.argsort(keys)
+    ascending = keys[order]
+    new = np.ones(len(keys), dtype=bool)
+    new[1:] = ascending[1:] != ascending[:-1]
+    place = np.empty(len(keys), dtype=np.intp)
+    place[order] = np.cumsum(new) - 1
+    return ascending[new], place

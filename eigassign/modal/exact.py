@@ -20,7 +20,7 @@ from eigassign.modal.arguments import whole
 from eigassign.modal.exact_single import solve_single
 from eigassign.modal.sizes import DENSE_LIMIT
 
-__all__ = ["DENSE_LIMIT", "Modes", "condense", "eigenvalues", "modes", "modes_at"]
+__all__ = ["DENSE_LIMIT", "Modes", "condense_blocks", "eigenvalues", "modes", "modes_at"]
 
 Floats = NDArray[np.float64]
 
@@ -102,10 +102,14 @@ def condense(
     M: Floats, elastic: NDArray[np.intp], rigid: NDArray[np.intp]
 ) -> tuple[Floats, Floats]:
     """M_FF⁻¹ M_FE and M_c = M_EE − M_EF M_FF⁻¹ M_FE for a batch of M (n_samples, n, n)."""
-    M_EE = _block(M, elastic, elastic)
-    if not len(rigid):
-        return np.zeros((len(M), 0, len(elastic))), M_EE
     M_FE, M_FF = _block(M, rigid, elastic), _block(M, rigid, rigid)
+    return condense_blocks(_block(M, elastic, elastic), M_FE, M_FF)
+
+
+def condense_blocks(M_EE: Floats, M_FE: Floats, M_FF: Floats) -> tuple[Floats, Floats]:
+    """The same from its blocks."""
+    if not M_FF.size:
+        return M_FE, M_EE
     try:
         np.linalg.cholesky(M_FF)
         coupling = np.linalg.solve(M_FF, M_FE)

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
+from scipy.sparse import linalg
 
 from eigassign.mechanism.pencil import Pencil
-from eigassign.modal.symmetric import factorise
+from eigassign.modal.project import project
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -47,10 +47,13 @@ class JointRows:
     responses: Floats
 
 
-def joint_rows(pencil: Pencil, K0: sparse.csc_array) -> JointRows:
-    """The rows where K_E depends on q; none where they are too many to be worth it."""
+def joint_rows(pencil: Pencil, factor: linalg.SuperLU) -> JointRows:
+    """The rows where K_E depends on q; none where they are too many to be worth it.
+
+    ``factor`` is that of K0.
+    """
     of_joints = np.flatnonzero(pencil.program.dependence[:, : pencil.n_q].any(axis=1)) + 1
-    columns = pencil.stiffness.tocsc()
+    columns = pencil.by_term[0]
     terms = np.array([t for t in of_joints if columns.indptr[t + 1] > columns.indptr[t]], np.intp)
     entries = np.unique(columns[:, terms].tocoo().coords[0]) if len(terms) else terms
     touched = np.union1d(pencil.rows[entries], pencil.columns[entries])
@@ -61,32 +64,40 @@ def joint_rows(pencil: Pencil, K0: sparse.csc_array) -> JointRows:
     units[dofs, np.arange(len(dofs))] = 1.0
     responses = np.zeros((pencil.n_dof, len(dofs)))
     if len(dofs):
-        responses[pencil.elastic] = factorise(K0).solve(units)
+        responses[pencil.elastic] = factor.solve(units)
     return JointRows(dofs, terms, responses)
 
 
-def pose(
-    pencil: Pencil, at: JointRows, theta0: Floats, stiffness_rows: Floats, mass_rows: Floats
-) -> Pose:
-    """Everything the correction needs online; ``theta0`` (n_theta,) are those of K0."""
-    dofs = pencil.elastic[at.dofs]
-    blocks = np.zeros((len(at.terms), len(dofs), len(dofs)))
+def pose(pencil: Pencil, at: JointRows, theta0: Floats, wide: Floats) -> Pose:
+    """Everything the correction needs online.
+
+    ``theta0`` (n_theta,) are those of K0, ``wide`` is [V 0; 0 I_F] (n_dof, k + f).
+    """
+    dofs, k = pencil.elastic[at.dofs], wide.shape[1] - len(pencil.rigid)
+    stiffness, mass = project(pencil, wide, at.responses)
+    k_terms, m_terms = (np.flatnonzero(np.diff(w.indptr)) for w in pencil.by_term)
+    return Pose(
+        terms=at.terms,
+        theta0=theta0[at.terms],
+        stiffness=_joint_blocks(pencil, at.terms, dofs),
+        flexibility=at.responses[dofs],
+        stiffness_rows=stiffness[k_terms, :, :k],
+        mass_rows=mass[m_terms],
+    )
+
+
+def _joint_blocks(pencil: Pencil, terms: Ints, dofs: Ints) -> Floats:
+    """The stiffness terms on rows and columns ``dofs``, (n_terms, j, j)."""
+    blocks = np.zeros((len(terms), len(dofs), len(dofs)))
     position = np.full(pencil.n_dof, -1, dtype=np.intp)
     position[dofs] = np.arange(len(dofs))
-    columns = pencil.stiffness.tocsc()
-    for block, term in zip(blocks, at.terms, strict=True):
+    columns = pencil.by_term[0]
+    for block, term in zip(blocks, terms, strict=True):
         part = slice(columns.indptr[term], columns.indptr[term + 1])
         entries = columns.indices[part]
         rows, cols = position[pencil.rows[entries]], position[pencil.columns[entries]]
         block[rows, cols] = columns.data[part]
-    return Pose(
-        terms=at.terms,
-        theta0=theta0[at.terms],
-        stiffness=blocks,
-        flexibility=at.responses[dofs],
-        stiffness_rows=stiffness_rows,
-        mass_rows=mass_rows,
-    )
+    return blocks
 
 
 def corrected(gram: Floats, here: Pose, theta: Floats, g: Floats) -> Floats:

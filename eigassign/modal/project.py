@@ -25,10 +25,14 @@ class Terms:
     values: Floats
 
 
-def project(pencil: Pencil, basis: Floats) -> tuple[Floats, Floats]:
-    """(n_theta, k, k) projections of the stiffness and the mass terms on ``basis`` (n_dof, k)."""
-    out = np.zeros((2, pencil.n_theta, basis.shape[1], basis.shape[1]))
-    for part in project_terms(pencil, basis.T, basis.T, np.arange(pencil.n_theta)):
+def project(pencil: Pencil, basis: Floats, left: Floats | None = None) -> tuple[Floats, Floats]:
+    """(n_theta, k, k) projections of the stiffness and the mass terms on ``basis`` (n_dof, k).
+
+    With ``left`` (n_dof, j) those on it from the left, (n_theta, j, k).
+    """
+    rows = (basis if left is None else left).T
+    out = np.zeros((2, pencil.n_theta, len(rows), basis.shape[1]))
+    for part in project_terms(pencil, rows, basis.T, np.arange(pencil.n_theta)):
         out[part.matrices, part.terms] = part.values
     return out[0], out[1]
 
@@ -43,7 +47,7 @@ def project_terms(pencil: Pencil, left: Floats, right: Floats, wanted: Ints) -> 
     n = pencil.n_dof
     half = left @ stacks.reshape(n, -1)
     full = half.reshape(-1, n) @ right.T
-    values = full.reshape(len(left), 2, -1, len(right)).transpose(1, 2, 0, 3)
+    values = full.reshape(len(left), 2, pencil.n_theta, len(right)).transpose(1, 2, 0, 3)
     return [Terms(slice(0, 2), slice(None), values)]
 
 

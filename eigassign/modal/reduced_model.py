@@ -7,25 +7,30 @@ radius of convergence. Rigid-body motion is projected out exactly, as in the exa
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.errors import SingularityError, UsageError
-from eigassign.modal.estimate import frequency_error, gone
-from eigassign.modal.exact import condense
-from eigassign.modal.pose import Pose, corrected
-from eigassign.modal.residual import Residual
+from eigassign.errors import UsageError
+from eigassign.modal.error_terms import ErrorTerms
+from eigassign.modal.exact import condense_blocks
+from eigassign.modal.ritz_error import relative_error
+from eigassign.modal.ritz_pairs import ritz_values
 from eigassign.modal.samples import samples
+from eigassign.modal.symmetric_terms import SymmetricTerms, symmetric_terms
 from eigassign.series.algebra import Samples
 from eigassign.series.program import Program
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-CHUNK = 2048  # samples evaluated at once
-SOLVER = 40.0  # round-off of the dense eigensolver, relative to the largest μ, over ε
-ROUNDING = 5.0  # on the round-off of one entry, ε/2 in frequency, through the whole solve
+CHUNK = 2048  # samples evaluated at once, at most
+NUMBERS = 100_000  # of one matrix for each sample: what they need stays in the cache
+LEAST = 16
+Array = TypeVar("Array", Floats, Ints)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,24 +49,27 @@ class ReducedModel:
     stiffness: Floats  # (n_terms, k, k)
     mass_terms: Ints
     mass: Floats  # (n_terms, k + f, k + f)
-    residual: Residual
-    pose: Pose
-    material_terms: Ints  # indices of θ with a stiffness term that no joint coordinate enters
-    material: Floats  # their values at the first expansion point
-    anchors: Floats  # (n_points, c + 1): the largest μ at each point, one more than are represented
-    shapes: Floats  # (n_points, k, c): those c modes in the basis
-    stiffness_rounding: Floats  # Vᵀ d_K V (k, k), round-off weights of `roundoff` at x0
-    mass_rounding: Floats  # (k + f, k + f)
+    certified: ErrorTerms | Callable[[], ErrorTerms]  # as they are, or how to make them
 
     @property
     def size(self) -> int:
         """Number k of basis vectors."""
         return int(self.stiffness.shape[1])
 
+    @cached_property
+    def error_terms(self) -> ErrorTerms:
+        """What the error estimate needs, made when it is first asked for."""
+        return self.certified() if callable(self.certified) else self.certified
+
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
-        """(n_samples, n_modes) in Hz; ``error_estimate`` says how far to trust them."""
+        """(n_samples, n_modes) in Hz; ``error_estimate`` says how far to trust them.
+
+        Raises UsageError outside the domain of a section or length, MechanismError where K̂ is not
+        positive definite.
+        """
         wanted = np.array(self.modes) - 1
-        parts = [self._ritz(self._theta(x), False)[0] for x in self._chunks(q, y)]
+        x = samples(q, y, self.n_q, self.n_y)
+        parts = [ritz_values(*m[:2]) for m in self.matrices(x)]
         mu = np.concatenate(parts)[:, wanted]
         return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(mu)))
 
@@ -71,146 +79,50 @@ class ReducedModel:
         Infinite where it is refused: a neighbouring mode is not represented, so that not even the
         identity of the mode is certain.
         """
-        return np.concatenate([self._estimate(x) for x in self._chunks(q, y)])
-
-    def _chunks(self, q: ArrayLike, y: ArrayLike) -> list[Floats]:
         x = samples(q, y, self.n_q, self.n_y)
-        return [x[i : i + CHUNK] for i in range(0, max(len(x), 1), CHUNK)]
+        largest = self.error_terms.residual.mass[0].size
+        return np.concatenate([relative_error(self, part) for part in chunks(x, largest)])
 
-    def _theta(self, x: Floats) -> Floats:
+    def matrices(self, x: Floats) -> Iterator[tuple[Floats, Floats, Floats]]:
+        """K̂, M̂_c (n, k, k) and the coupling M̂_FF⁻¹ M̂_FE (n, f, k), some samples at a time."""
+        for outer in chunks(x, 1):
+            theta = self.theta(outer)
+            for part in chunks(np.arange(len(outer)), self.mass[0].size):
+                yield self.at(theta[:, part])
+
+    def theta(self, x: Floats) -> Floats:
+        """θ (n_theta, n) at samples x (n, n_x)."""
         z = self.to_program @ x.T + self.shift[:, None]
         theta = np.vstack([np.ones((1, len(x))), self.program.run(Samples(), z)])
         if not np.isfinite(theta).all():
             raise UsageError("q or y is outside the domain of a section or length")
         return theta
 
-    def _matrices(self, theta: Floats) -> tuple[Floats, Floats, Floats]:
-        """K̂, M̂_c (n, k, k) and the coupling M̂_FF⁻¹ M̂_FE (n, f, k)."""
-        k = self.size
-        K = np.tensordot(theta[self.stiffness_terms].T, self.stiffness, axes=1)
-        M = np.tensordot(theta[self.mass_terms].T, self.mass, axes=1)
-        elastic, rigid = np.arange(k), np.arange(k, M.shape[1])
-        coupling, M_c = condense(M, elastic, rigid)
-        return K, M_c, coupling
+    def at(self, theta: Floats) -> tuple[Floats, Floats, Floats]:
+        """K̂, M̂_c (n, k, k) and the coupling (n, f, k) at θ (n_theta, n)."""
+        stiff, heavy = self._terms
+        E, F = slice(0, self.size), slice(self.size, None)
+        K, M = stiff(theta), heavy(theta)
+        blocks = [heavy.block(M, rows, columns) for rows, columns in ((E, E), (F, E), (F, F))]
+        coupling, M_c = condense_blocks(*blocks)
+        return stiff.block(K, E, E), M_c, coupling
 
-    def _ritz(self, theta: Floats, vectors: bool) -> tuple[Floats, Floats, Floats]:
-        """Ritz values μ̂ descending (n, k), vectors z (n, k, k) with zᵀK̂z = 1, and coupling."""
-        K, M_c, coupling = self._matrices(theta)
-        L = np.linalg.cholesky(K)
-        half = np.linalg.solve(L, M_c)
-        A = np.linalg.solve(L, np.swapaxes(half, 1, 2))
-        if not vectors:
-            return np.linalg.eigvalsh(A)[:, ::-1], A[:, :0], coupling
-        mu, v = np.linalg.eigh(A)
-        z = np.linalg.solve(np.swapaxes(L, 1, 2), v)
-        return mu[:, ::-1], z[:, :, ::-1], coupling
+    def uncondensed(self, theta: Floats) -> tuple[Floats, Floats]:
+        """K̂ (n, k, k) and M̂ (n, k + f, k + f)."""
+        stiff, heavy = self._terms
+        every = slice(None)
+        return stiff.block(stiff(theta), every, every), heavy.block(heavy(theta), every, every)
 
-    def _estimate(self, x: Floats) -> Floats:
-        theta = self._theta(x)
-        all_mu, all_z, coupling = self._ritz(theta, True)
-        count = min(self.anchors.shape[1] - 1, all_mu.shape[1])
-        mu, z = all_mu[:, :count], all_z[:, :, :count]
-        wide = np.concatenate([z, -coupling @ z], axis=1)
-        softest, hardest = self._scaling(theta)
-        turned, closes = self._at_first_design(x)
-        gram = self._residual_gram(turned, theta, mu, wide) / softest[:, None, None]
-        error = frequency_error(mu, gram, self._outside(mu, softest), self.anchors)
-        error[~closes] = np.inf
-        error[self._gone(theta, all_mu, all_z, gram)] = np.inf
-        error += self._rounding(theta, mu, wide, hardest)
-        return np.asarray(error[:, np.array(self.modes) - 1])
-
-    def _outside(self, mu: Floats, softest: Floats) -> Floats:
-        """How large μ of the modes without a vector in the basis may have become, (n,).
-
-        Their largest μ at an expansion point, grown as the represented modes did or as the links
-        softened, whichever is more; the expansion point that says least counts.
-        """
-        known = self.anchors[:, : mu.shape[1]]
-        growth = np.max(mu[:, None, :] / known, axis=2)
-        grown = self.anchors[:, -1] * np.maximum(growth, 1.0 / softest[:, None])
-        return np.asarray(grown.min(axis=1))
-
-    def _gone(self, theta: Floats, mu: Floats, z: Floats, gram: Floats) -> NDArray[np.bool_]:
-        """Where a mode may be missing because the basis no longer holds it, (n, c): see `estimate`.
-
-        A shape a of an expansion point keeps its mass in any pose: the shares of the Ritz pairs in
-        it, (aᵀM̂_c z_i)² / (μ̂_i aᵀM̂_c a), say whether it is still among them.
-        """
-        M_c = self._matrices(theta)[1]
-        shares = []
-        for a in self.shapes:
-            moved = M_c @ a
-            weight = (np.swapaxes(moved, 1, 2) @ z) ** 2 / np.maximum(mu, 1e-300)[:, None, :]
-            shares.append(weight / np.einsum("kc,nkc->nc", a, moved)[:, :, None])
-        return gone(mu, gram, np.array(shares), self.anchors)
-
-    def _scaling(self, theta: Floats) -> tuple[Floats, Floats]:
-        """Least and largest stiffness of a link relative to x0, (n,): α ≤ 1 ≤ β.
-
-        α K(q, y0) ≤ K(q, y) ≤ β K(q, y0), so that ‖ρ‖²/α is a bound in K(q, y)⁻¹.
-        """
-        if not len(self.material_terms):
-            return np.ones(theta.shape[1]), np.ones(theta.shape[1])
-        ratio = theta[self.material_terms] / self.material[:, None]
-        return np.clip(ratio.min(axis=0), 1e-300, 1.0), np.maximum(ratio.max(axis=0), 1.0)
-
-    def _rounding(self, theta: Floats, mu: Floats, wide: Floats, hardest: Floats) -> Floats:
-        """Relative round-off in frequency of each pair, (n, c).
-
-        That of an exact solve (`roundoff`), that of K̂ and M̂ themselves (a basis made for one pose
-        strains far more than a mode in another: |z|ᵀ|K̂||z| ≫ zᵀK̂z), and the eigensolver's.
-        """
-        k = self.size
-        z, size = wide[:, :k], np.abs(wide)
-        K = np.abs(np.tensordot(theta[self.stiffness_terms].T, self.stiffness, axes=1))
-        M = np.abs(np.tensordot(theta[self.mass_terms].T, self.mass, axes=1))
-        strain = hardest[:, None] * _forms(self.stiffness_rounding, z) + _forms(K, size[:, :k])
-        inertia = _forms(self.mass_rounding, wide) + _forms(M, size)
-        amplification = strain + (inertia + SOLVER * mu[:, :1]) / mu
-        return np.asarray(ROUNDING * np.finfo(float).eps * amplification)
-
-    def _at_first_design(self, x: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-        """θ(q, y0) (n_theta, n), and where there is one: a loop may not close with other lengths.
-
-        θ(x0) stands where there is none.
-        """
-        turned = x.copy()
-        turned[:, self.n_q :] = self.points[0, self.n_q :]
-        try:
-            return self._theta(turned), np.ones(len(x), dtype=bool)
-        except SingularityError:
-            closes = np.array([self._has_pose(row) for row in turned])
-            turned[~closes] = self.points[0]
-            return self._theta(turned), closes
-
-    def _has_pose(self, x: Floats) -> bool:
-        try:
-            self._theta(x[None])
-        except SingularityError:
-            return False
-        return True
-
-    def _residual_gram(self, turned: Floats, theta: Floats, mu: Floats, wide: Floats) -> Floats:
-        """ρ_iᵀ K_E(q, y0)⁻¹ ρ_j, ρ = M_c z − μ̂ K z, between the leading Ritz pairs, (n, c, c).
-
-        ``theta`` at (q, y), ``turned`` at (q, y0).
-        """
-        r, p, z = self.residual, self.pose, wide[:, : self.size]
-
-        def apply(K_at: Ints, K_terms: Floats, M_at: Ints, M_terms: Floats) -> Floats:
-            K = np.tensordot(theta[K_at].T, K_terms, axes=1)
-            M = np.tensordot(theta[M_at].T, M_terms, axes=1)
-            return np.asarray(M @ wide - (K @ z) * mu[:, None, :])
-
-        rho = apply(r.stiffness_terms, r.stiffness, r.mass_terms, r.mass)
-        gram = np.asarray(np.swapaxes(rho, 1, 2) @ rho)
-        if not len(p.terms):
-            return gram
-        g = apply(self.stiffness_terms, p.stiffness_rows, self.mass_terms, p.mass_rows)
-        return corrected(gram, p, turned, g)
+    @cached_property
+    def _terms(self) -> tuple[SymmetricTerms, SymmetricTerms]:
+        """K̂'s and M̂'s terms."""
+        return (
+            symmetric_terms(self.stiffness_terms, self.stiffness),
+            symmetric_terms(self.mass_terms, self.mass),
+        )
 
 
-def _forms(A: Floats, z: Floats) -> Floats:
-    """z_cᵀ A z_c for every column, (n, c)."""
-    return np.asarray(np.einsum("nic,nic->nc", z, A @ z))
+def chunks(rows: Array, numbers: int) -> Iterator[Array]:
+    """``rows`` in parts, fewer at once the more ``numbers`` each of them needs."""
+    size = min(CHUNK, max(LEAST, NUMBERS // numbers))
+    return (rows[i : i + size] for i in range(0, max(len(rows), 1), size))

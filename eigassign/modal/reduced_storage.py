@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.errors import UsageError
+from eigassign.modal.error_terms import ErrorTerms
 from eigassign.modal.pose import Pose
 from eigassign.modal.reduced_model import ReducedModel
 from eigassign.modal.residual import Residual
@@ -24,15 +25,16 @@ from eigassign.series.implicit import ImplicitFunction
 from eigassign.series.program import Program, Step
 
 Array = NDArray[Any]
-FORMAT = "reduced model 1"  # raise it whenever what the arrays mean changes
-STORED = (ReducedModel, Residual, Pose, Program, Step, ImplicitFunction)
+FORMAT = "reduced model 2"  # raise it whenever what the arrays mean changes
+STORED = (ReducedModel, ErrorTerms, Residual, Pose, Program, Step, ImplicitFunction)
 CLASSES: dict[str, type] = {c.__name__: c for c in STORED}
 
 
 def reduced_arrays(reduced: ReducedModel) -> dict[str, Array]:
     """Everything a reduced model consists of, as int64, float64 and byte arrays."""
     arrays: dict[str, Array] = {}
-    tree = {"format": FORMAT, "model": _taken_apart(reduced, arrays)}
+    complete = replace(reduced, certified=reduced.error_terms)
+    tree = {"format": FORMAT, "model": _taken_apart(complete, arrays)}
     text = np.frombuffer(json.dumps(tree, allow_nan=False).encode(), dtype=np.uint8)
     return {**flatten(arrays), "tree": text}
 

@@ -1,8 +1,10 @@
 """The size of an eigen-residual of the reduced model, without a vector of full length online.
 
 In the inverse form a Ritz pair (μ̂, z) leaves ρ = M_c z − μ̂ K_E z. Over all (q, y) it lies in the
-span of the terms M_j [V, I_F] and K_j V on the elastic rows; with A a basis of that span and
-AᵀK_E(x0)⁻¹A = RᵀR, its norm ‖ρ‖ in K_E(x0)⁻¹ is the length of Σ_j θ_j (R B_j) c: small arrays only.
+span of the terms M_j [V, I_F] and K_j V on the elastic rows; with A a basis of that span, K0 = L Lᵀ
+and L⁻¹A = Q R by orthogonal triangularisation, its norm ‖ρ‖ in K0⁻¹ is the length of
+Σ_j θ_j (R B_j) c: small arrays only. Terms of the residual are large where one link is carried by
+another and cancel in the sum; a Gram matrix AᵀK0⁻¹A would keep half the digits of that only.
 """
 
 from __future__ import annotations
@@ -12,11 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.linalg import solve_triangular
+from scipy.sparse import linalg
 
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.basis import INDEFINITE
-from eigassign.modal.symmetric import factorise
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -42,43 +45,55 @@ class _Block:
     values: Floats
 
 
-def residual_factors(pencil: Pencil, K0: sparse.csc_array, V: Floats, elastic: Ints) -> Residual:
-    """Offline part for the basis V (n_elastic, k) and K_E(x0)."""
-    wide = _with_rigid(pencil, V, elastic)
-    stiff = _blocks(pencil, pencil.stiffness, wide[:, : V.shape[1]], elastic)
-    heavy = _blocks(pencil, pencil.mass, wide, elastic)
-    if len(elastic) <= UNIT_LIMIT:
+def residual_factors(
+    pencil: Pencil, K0: sparse.csc_array, factor: linalg.SuperLU, wide: Floats
+) -> Residual:
+    """Offline part for [V 0; 0 I_F] ``wide`` (n_dof, k + f); ``factor`` is that of K0.
+
+    Raises AccuracyError where K0 is not positive definite.
+    """
+    n, k = len(pencil.elastic), wide.shape[1] - len(pencil.rigid)
+    stiff = _blocks(pencil, pencil.by_term[0], np.ascontiguousarray(wide[:, :k]))
+    heavy = _blocks(pencil, pencil.by_term[1], wide)
+    if n <= UNIT_LIMIT:
         L = _root_of(K0.toarray())
-        return Residual(*_dense(stiff, L, len(elastic)), *_dense(heavy, L, len(elastic)))
-    A, coordinates = _span(stiff + heavy, len(elastic))
-    R = _root(A, factorise(K0).solve(A))
-    parts = [np.array([R @ c for c in coordinates[: len(stiff)]])]
-    parts.append(np.array([R @ c for c in coordinates[len(stiff) :]]))
-    return Residual(_terms(stiff), parts[0], _terms(heavy), parts[1])
+        return Residual(_terms(stiff), _dense(stiff, L), _terms(heavy), _dense(heavy, L))
+    A, coordinates = _span(stiff + heavy, n)
+    R = np.asarray(np.linalg.qr(half_solve(factor, A), mode="r"), dtype=np.float64)
+    parts = [_product(R, c) for c in coordinates]
+    split = len(stiff)
+    return Residual(_terms(stiff), np.array(parts[:split]), _terms(heavy), np.array(parts[split:]))
 
 
-def _with_rigid(pencil: Pencil, V: Floats, elastic: Ints) -> Floats:
-    """[V 0; 0 I_F] on all dofs."""
-    f = len(pencil.rigid)
-    wide = np.zeros((pencil.n_dof, V.shape[1] + f))
-    wide[elastic, : V.shape[1]] = V
-    wide[pencil.rigid, V.shape[1] :] = np.eye(f)
-    return wide
+def half_solve(factor: linalg.SuperLU, A: Floats) -> Floats:
+    """L⁻¹ P A with P K0 Pᵀ = L Lᵀ; raises AccuracyError where K0 is not positive definite."""
+    pivots = factor.U.diagonal()
+    if (factor.perm_r != factor.perm_c).any() or not (pivots > 0.0).all():
+        raise AccuracyError(INDEFINITE)
+    permuted = np.empty_like(A)
+    permuted[factor.perm_r] = A
+    lower = factor.L.tocsr()
+    solved = linalg.spsolve_triangular(lower, permuted, lower=True, unit_diagonal=True)
+    return np.asarray(solved / np.sqrt(pivots)[:, None])
 
 
-def _blocks(
-    pencil: Pencil, weights: sparse.csr_array, basis: Floats, elastic: Ints
-) -> list[_Block]:
+def _product(R: Floats, coordinates: Floats) -> Floats:
+    """R times coordinates most rows of which are zero."""
+    rows = np.flatnonzero(coordinates.any(axis=1))
+    return np.asarray(R[:, rows] @ coordinates[rows])
+
+
+def _blocks(pencil: Pencil, columns: sparse.csc_array, basis: Floats) -> list[_Block]:
     """Every term of one matrix applied to ``basis``, elastic rows only."""
     position = np.full(pencil.n_dof, -1, dtype=np.intp)
-    position[elastic] = np.arange(len(elastic))
-    columns = weights.tocsc()
+    position[pencil.elastic] = np.arange(len(pencil.elastic))
     blocks = []
-    for theta in range(weights.shape[1]):
+    for theta in range(columns.shape[1]):
         at = slice(columns.indptr[theta], columns.indptr[theta + 1])
         entries, data = columns.indices[at], columns.data[at]
-        keep = position[pencil.rows[entries]] >= 0
-        rows, slot = np.unique(position[pencil.rows[entries[keep]]], return_inverse=True)
+        place = position[pencil.rows[entries]]
+        keep = place >= 0
+        rows, slot = np.unique(place[keep], return_inverse=True)
         if len(rows):
             shape = (len(rows), pencil.n_dof)
             term = sparse.csr_array(
@@ -92,14 +107,14 @@ def _terms(blocks: list[_Block]) -> Ints:
     return np.array([b.theta for b in blocks], dtype=np.intp)
 
 
-def _dense(blocks: list[_Block], L: Floats, n: int) -> tuple[Ints, Floats]:
+def _dense(blocks: list[_Block], L: Floats) -> Floats:
     """L⁻¹ times every block, A being the identity."""
-    full = np.zeros((len(blocks), n, blocks[0].values.shape[1]))
+    n = len(L)
+    full = np.zeros((n, len(blocks), blocks[0].values.shape[1]))
     for k, block in enumerate(blocks):
-        full[k, block.rows] = block.values
-    flat = full.transpose(1, 0, 2).reshape(n, -1)
-    solved = np.linalg.solve(L, flat).reshape(n, len(blocks), -1)
-    return _terms(blocks), np.ascontiguousarray(solved.transpose(1, 0, 2))
+        full[block.rows, k] = block.values
+    solved = solve_triangular(L, full.reshape(n, -1), lower=True, check_finite=False)
+    return np.ascontiguousarray(solved.reshape(full.shape).transpose(1, 0, 2))
 
 
 def _span(blocks: list[_Block], n: int) -> tuple[Floats, list[Floats]]:
@@ -160,15 +175,6 @@ def _coordinates(parts: list[tuple[int, Floats]], a: int, k: int) -> Floats:
 
 def _root_of(K: Floats) -> Floats:
     try:
-        return np.asarray(np.linalg.cholesky(K))
+        return np.asarray(np.linalg.cholesky(K), dtype=np.float64)
     except np.linalg.LinAlgError as error:
         raise AccuracyError(INDEFINITE) from error
-
-
-def _root(A: Floats, solved: Floats) -> Floats:
-    """R with RᵀR = AᵀK⁻¹A, directions lost in round-off left out."""
-    gram = A.T @ solved
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    values, vectors = np.linalg.eigh(0.5 * (gram + gram.T) * scale[:, None] * scale)
-    keep = values > 1e-15 * values[-1]
-    return np.asarray((np.sqrt(values[keep])[:, None] * vectors[:, keep].T) / scale)

@@ -16,10 +16,14 @@ from calibration import draw
 from wide_draws import planar_loop, spatial_loop, spatial_tree
 
 from eigassign.errors import AccuracyError, SingularityError
+from eigassign.modal import ritz_error
 from eigassign.modal.estimate import frequency_error, gone
-from eigassign.modal.half_norm import half_solve
 from eigassign.modal.reduced import reduce
+from eigassign.modal.residual import half_solve
+from eigassign.modal.ritz_basis import ritz_basis
+from eigassign.modal.ritz_pairs import ritz_pairs
 from eigassign.modal.roundoff import rounding_error, rounding_weights
+from eigassign.modal.symmetric import factorise
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 
@@ -68,11 +72,12 @@ def test_the_residual_is_measured_in_the_stiffness_of_the_pose_at_hand(seed):
     pencil = model_of(tree).pencil
     reduced = reduce(pencil, q0, [], (1,), 1)
     q = q0 + np.random.default_rng(seed).uniform(-1.0, 1.0, (3, len(q0)))
-    theta = reduced._theta(q)
-    mu, z, coupling = reduced._ritz(theta, True)
-    count = reduced.anchors.shape[1] - 1
+    theta = reduced.theta(q)
+    K, M_c, coupling = reduced.at(theta)
+    mu, z = ritz_pairs(K, M_c)
+    count = reduced.error_terms.anchors.shape[1] - 1
     wide = np.concatenate([z, -coupling @ z], axis=1)[:, :, :count]
-    gram = reduced._residual_gram(theta, theta, mu[:, :count], wide)
+    gram = ritz_error._residual_gram(reduced, theta, theta, mu[:, :count], wide)
     expected = full_gram(pencil, q, q0, mu[:, :count], count)
     # A residual below 1e-10 of μ is round-off and may differ.
     scale = np.maximum(np.sqrt(np.einsum("nii->ni", expected)), 1e-5 * mu[:, :count])
@@ -82,16 +87,8 @@ def test_the_residual_is_measured_in_the_stiffness_of_the_pose_at_hand(seed):
 
 def full_gram(pencil, q, q0, mu, count):
     """ρᵀ K_E(q)⁻¹ ρ with full matrices and an own Ritz step on the same vectors."""
-    import eigassign.modal.reduced as module
-
-    kept = {}
-    original = module.accurate_factors
-    module.accurate_factors = lambda *a: kept.setdefault("V", a[2]) is None or original(*a)
-    try:
-        module.reduce(pencil, q0, [], (1,), 1)
-    finally:
-        module.accurate_factors = original
-    V, E, F = kept["V"], pencil.elastic, pencil.rigid
+    V = ritz_basis(pencil, q0[None], (1,), 1, True, None).V
+    E, F = pencil.elastic, pencil.rigid
     grams = []
     for row in q:
         K, M = (a[0] for a in pencil.matrices(pencil.theta(row[None])))
@@ -142,15 +139,15 @@ def test_pairs_that_coincide_may_move_by_what_both_miss_together(monkeypatch):
 
 
 def test_modes_outside_the_basis_are_taken_to_grow_as_those_inside_or_as_the_softest_link():
-    reduced = reduce(model_of(two_link()).pencil, Q0, Y0, (1,), 1)
-    count = reduced.anchors.shape[1] - 1
-    mu, last = reduced.anchors[:, :count].copy(), reduced.anchors[0, -1]
+    terms = reduce(model_of(two_link()).pencil, Q0, Y0, (1,), 1).error_terms
+    count = terms.anchors.shape[1] - 1
+    mu, last = terms.anchors[:, :count].copy(), terms.anchors[0, -1]
     one, soft = np.ones(1), np.array([0.25])
-    assert reduced._outside(mu, one) == pytest.approx(last)
-    assert reduced._outside(mu, soft) == pytest.approx(4.0 * last)
+    assert ritz_error._outside(terms, mu, one) == pytest.approx(last)
+    assert ritz_error._outside(terms, mu, soft) == pytest.approx(4.0 * last)
     mu[0, -1] *= 3.0
-    assert reduced._outside(mu, one) == pytest.approx(3.0 * last)
-    assert reduced._outside(mu, soft) == pytest.approx(4.0 * last)
+    assert ritz_error._outside(terms, mu, one) == pytest.approx(3.0 * last)
+    assert ritz_error._outside(terms, mu, soft) == pytest.approx(4.0 * last)
 
 
 def test_half_a_solve_measures_in_the_inverse():
@@ -159,7 +156,7 @@ def test_half_a_solve_measures_in_the_inverse():
     K = pencil.sparse(pencil.stiffness @ pencil.theta(x[None])[:, 0])
     K_E = K[pencil.elastic][:, pencil.elastic].tocsc()
     A = np.random.default_rng(3).standard_normal((K_E.shape[0], 4))
-    half = half_solve(K_E, A)
+    half = half_solve(factorise(K_E), A)
     expected = A.T @ np.linalg.solve(K_E.toarray(), A)
     # The condition number of K_E, 1e11, leaves five digits of its inverse.
     np.testing.assert_allclose(half.T @ half, expected, rtol=1e-4, atol=1e-4 * expected.max())
@@ -168,7 +165,7 @@ def test_half_a_solve_measures_in_the_inverse():
 def test_half_a_solve_refuses_what_is_not_definite():
     K = sparse.csc_array(np.diag([1.0, -1.0, 2.0]))
     with pytest.raises(AccuracyError, match="not positive definite"):
-        half_solve(K, np.eye(3))
+        half_solve(factorise(K), np.eye(3))
 
 
 def test_a_mode_is_gone_when_its_shape_and_one_frequency_are_missing():
