@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.series.algebra import Samples, Truncated
-from eigassign.series.lower_set import LowerSet
+from eigassign.series.lower_set import LowerSet, on_faces
 from eigassign.series.program import Program
 
 Floats = NDArray[np.float64]
 STACK_LIMIT = 500_000  # numbers: 4 MB
 TINY_STACK = 20_000
+MANY = 200  # coefficients from which it pays to know which of them are zero
 Ints = NDArray[np.intp]
 
 
@@ -91,14 +92,21 @@ class Pencil:
 
     def theta_series(self, space: LowerSet, x0: Floats, directions: Floats) -> Floats:
         """Coefficients of θ (n_theta, N) about x0 in w, where z = z0 + ``directions`` w."""
-        z = np.zeros((len(self.shift), len(space)))
+        inner, where = self._needed(space, directions)
+        z = np.zeros((len(self.shift), len(inner)))
         z[:, 0] = self.to_program @ x0 + self.shift
-        present = (space.units >= 0).nonzero()[0]
-        z[:, space.units[present]] = directions[:, present]
+        present = (inner.units >= 0).nonzero()[0]
+        z[:, inner.units[present]] = directions[:, present]
         theta = np.zeros((self.n_theta, len(space)))
         theta[0, 0] = 1.0
-        theta[1:] = self.program.run(Truncated(space), z)
+        theta[1:, where] = self.program.run(Truncated(inner), z)
         return theta
+
+    def _needed(self, space: LowerSet, directions: Floats) -> tuple[LowerSet, Ints | slice]:
+        """The members that θ may have coefficients of, and their places; all of a small set."""
+        if len(space) < MANY:
+            return space, slice(None)
+        return on_faces(space, (self.program.faces @ (directions != 0.0)).tobytes())
 
     def matrices(self, theta: Floats) -> tuple[Floats, Floats]:
         """Dense K, M (n_samples, n_dof, n_dof) for θ (n_theta, n_samples)."""

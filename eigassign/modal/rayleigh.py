@@ -127,8 +127,8 @@ def _quadratics(
         factors, varying = theta.T[stored], np.flatnonzero(present.any(axis=1))
         for part in project_terms(pencil, rows[: plan.low * r], rows, varying):
             for i, j in _lower(r):
-                met = _meet(part.values, plan.varying, i, j, r)
-                sums = (factors[:, part.terms] @ met)[:, plan.left, plan.right]
+                met = _weighted(factors[:, part.terms], part.values, plan.varying, i, j, r)
+                sums = met[:, plan.left, plan.right]
                 out[part.matrices, i, j, plan.into] += np.add.reduceat(sums, plan.end, axis=1)
     for i, j in _lower(r):
         out[:, j, i] = out[:, i, j]
@@ -137,6 +137,14 @@ def _quadratics(
 
 def _lower(r: int) -> list[tuple[int, int]]:
     return [(i, j) for i in range(r) for j in range(i + 1)]
+
+
+def _weighted(factors: Floats, projected: Floats, p: _Products, i: int, j: int, r: int) -> Floats:
+    """Σ_t factors (k, t) of what meets in the projections (…, t, l r, k r), fewer of them first."""
+    if len(factors) > projected.shape[1]:
+        return np.asarray(factors @ _meet(projected, p, i, j, r))
+    flat = projected.reshape(*projected.shape[:2], -1)
+    return _meet((factors @ flat).reshape(len(flat), -1, *projected.shape[2:]), p, i, j, r)
 
 
 def _meet(projected: Floats, p: _Products, i: int, j: int, r: int) -> Floats:

@@ -123,6 +123,18 @@ class LowerSet:
         wrong = (self.indices[found] != rows).any(axis=1)
         return np.where(wrong, -1, found)
 
+    def pairs(self, left: Ints, right: Ints) -> tuple[Ints, Ints, Ints]:
+        """Members i of ``left`` and j of ``right`` with γ_i + γ_j = γ_k in the set, by ascending k.
+
+        Both ascending; pairs of one k come by ascending i.
+        """
+        i, j = np.repeat(left, len(right)), np.tile(right, len(left))
+        keys = self._keys[0]
+        k = self._lookup(keys[i] + keys[j])
+        member = np.flatnonzero((self.indices[k] == self.indices[i] + self.indices[j]).all(axis=1))
+        member = member[np.argsort(k[member], kind="stable")]
+        return i[member], j[member], k[member]
+
     def _lookup(self, keys: NDArray[np.uint64]) -> Ints:
         _, ordered, order = self._keys
         at = np.minimum(np.searchsorted(ordered, keys), len(self) - 1)
@@ -156,19 +168,15 @@ def _weights(n: int) -> NDArray[np.uint64]:
 
 
 def _product_table(space: LowerSet) -> ProductTable:
-    keys = space._keys[0]
     starts = space.degree_starts
-    lefts, rights, targets = [], [], []
-    for degree in range(space.order + 1):
-        left = np.arange(starts[degree], starts[degree + 1])
-        right = np.arange(starts[space.order - degree + 1])
-        i, j = (a.ravel() for a in np.meshgrid(left, right, indexing="ij"))
-        k = space._lookup(keys[i] + keys[j])
-        member = (space.indices[k] == space.indices[i] + space.indices[j]).all(axis=1)
-        lefts.append(i[member])
-        rights.append(j[member])
-        targets.append(k[member])
-    left, right, target = (np.concatenate(a).astype(np.intp) for a in (lefts, rights, targets))
+    parts = [
+        space.pairs(
+            np.arange(starts[degree], starts[degree + 1]),
+            np.arange(starts[space.order - degree + 1]),
+        )
+        for degree in range(space.order + 1)
+    ]
+    left, right, target = (np.concatenate(a) for a in zip(*parts, strict=True))
     by_target = np.argsort(target, kind="stable")
     left, right, target = left[by_target], right[by_target], target[by_target]
     first = np.searchsorted(target, np.arange(len(space))).astype(np.intp)
@@ -249,6 +257,22 @@ def weighted_degree(weights: tuple[float, ...], order: float) -> LowerSet:
         rows = np.vstack(grown)
         members.append(rows[rows @ np.array(weights[: i + 1]) <= order + 1e-9])
     return lower_set(members[-1])
+
+
+@lru_cache(maxsize=64)
+def on_faces(space: LowerSet, faces: bytes) -> tuple[LowerSet, Ints]:
+    """The members in the variables of one face (n_faces, n) alone, and their places in the set.
+
+    Series of functions that depend on the variables of one face each have no other coefficients.
+    """
+    allowed = np.frombuffer(faces, dtype=bool).reshape(-1, space.n_variables)
+    inside = ((space.indices > 0).astype(np.int64) @ ~allowed.T == 0).any(axis=1)
+    where = np.flatnonzero(inside | (space.degrees == 0))
+    return (
+        (space, where)
+        if len(where) == len(space)
+        else (LowerSet(_frozen(space.indices[where])), where)
+    )
 
 
 def _simplex(n: int, order: int) -> NDArray[np.int64]:

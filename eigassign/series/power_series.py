@@ -16,38 +16,54 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import UsageError
-from eigassign.series.lower_set import LowerSet, ProductTable, first_of_each
+from eigassign.series.lower_set import LowerSet, first_of_each
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+Used = NDArray[np.bool_]
 CHUNK = 4_000_000  # numbers gathered at once in a product: 32 MB
 SMALL_TABLE = 1_000  # pairs up to which looking for zeros costs more than it saves
+FEW = 0.05  # part of the table up to which looking pairs up is quicker than picking them out
+MOST = 0.5  # part of all pairs of coefficients from which leaving the others out saves nothing
 
 
 def multiply(space: LowerSet, a: Floats, b: Floats) -> Floats:
     """(ab)_γ = Σ_{δ ≤ γ} a_δ b_{γ-δ} for stacks a, b of shape (n, N)."""
     table = space.table
     if len(table.left) > SMALL_TABLE:
-        return _multiply_present(table, a, b)
-    products = a.take(table.left, axis=1)
-    products *= b.take(table.right, axis=1)
-    return np.add.reduceat(products, table.starts, axis=1)
+        used = [np.asarray(stack.any(axis=0)) for stack in (a, b)]
+        if np.count_nonzero(used[0]) * np.count_nonzero(used[1]) < MOST * len(space) ** 2:
+            return _multiply_present(space, a, b, used[0], used[1])
+    return _sums(a, b, table.left, table.right, table.starts)
 
 
-def _multiply_present(table: ProductTable, a: Floats, b: Floats) -> Floats:
+def _multiply_present(space: LowerSet, a: Floats, b: Floats, used_a: Used, used_b: Used) -> Floats:
     """The same, over the pairs of coefficients that any row of a and any row of b has."""
-    used_a, used_b = (np.asarray(stack.any(axis=0)) for stack in (a, b))
-    keep = used_a[table.left] & used_b[table.right]
-    left, right, target = table.left[keep], table.right[keep], table.target[keep]
+    left, right, target = _present(space, used_a, used_b)
     result = np.zeros_like(a)
-    if not len(target):
-        return result
-    first = first_of_each(target)
+    if len(target):
+        first = first_of_each(target)
+        result[:, target[first]] = _sums(a, b, left, right, first)
+    return result
+
+
+def _present(space: LowerSet, used_a: Used, used_b: Used) -> tuple[Ints, Ints, Ints]:
+    """Those pairs, looked up one by one where they are few, or picked from the table."""
+    table, i, j = space.table, np.flatnonzero(used_a), np.flatnonzero(used_b)
+    if len(i) * len(j) < FEW * len(table.left):
+        return space.pairs(i, j)
+    keep = np.flatnonzero(used_a[table.left] & used_b[table.right])
+    return table.left[keep], table.right[keep], table.target[keep]
+
+
+def _sums(a: Floats, b: Floats, left: Ints, right: Ints, first: Ints) -> Floats:
+    """Σ a_left b_right over the pairs from each ``first`` on to the next, some rows at a time."""
     rows = max(1, CHUNK // len(left))
+    result = np.empty((len(a), len(first)))
     for i in range(0, len(a), rows):
         products = a[i : i + rows].take(left, axis=1)
         products *= b[i : i + rows].take(right, axis=1)
-        result[i : i + rows, target[first]] = np.add.reduceat(products, first, axis=1)
+        np.add.reduceat(products, first, axis=1, out=result[i : i + rows])
     return result
 
 

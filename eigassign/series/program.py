@@ -69,6 +69,12 @@ class Program:
         """Whether anything in it solves equations: it may then have no value at all."""
         return any(step.function is not None for step in self.steps)
 
+    def faces(self) -> NDArray[np.bool_]:
+        """(n_faces, n_variables): every atom is a sum of functions of one face's variables each."""
+        from eigassign.series.faces import faces
+
+        return faces(self)
+
     def run(self, algebra: Algebra, variables: Floats) -> Floats:
         """Outputs as rows, from the variables as rows (n_variables, …) of the algebra."""
         values = np.empty((self.n_atoms, variables.shape[1]))

@@ -7,9 +7,11 @@ import pytest
 from chains import A_PAPER, bar, model_of, random_chain, two_link
 from frame_oracle import frame
 
+from eigassign.api import load_case
 from eigassign.errors import CaseError, MechanismError, UsageError
 from eigassign.modal.model import Model
 from eigassign.modal.roundoff import rounding_error
+from eigassign.series.lower_set import total_degree
 
 SEEDS = range(0, 60, 4)
 
@@ -144,6 +146,20 @@ def test_turning_the_whole_mechanism_changes_no_frequency(seed: int) -> None:
 def test_the_coefficient_functions_are_as_few_as_a_planar_elbow_needs() -> None:
     assert model_of(two_link()).pencil.n_theta == 13
     assert model_of(two_link((40, 30))).pencil.n_theta == 13
+
+
+@pytest.mark.parametrize("name", ["two_link", "four_bar", "arm_6r", "ball_screw"])
+def test_coefficients_are_left_out_only_where_they_are_zero(name, monkeypatch) -> None:
+    case = load_case(f"cases/{name}.yaml")
+    pencil, y = case.model().pencil, case.initial_design
+    space = total_degree(pencil.to_program.shape[1], 3)
+    x0 = np.concatenate([case.trajectory.q[3], y])
+
+    def series(many: int) -> np.ndarray:
+        monkeypatch.setattr("eigassign.mechanism.pencil.MANY", many)
+        return pencil.theta_series(space, x0, pencil.to_program)
+
+    np.testing.assert_array_equal(series(0), series(10**9))
 
 
 def test_affine_matrices_are_the_sum_of_their_terms() -> None:

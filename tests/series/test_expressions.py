@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from eigassign.errors import UsageError
 from eigassign.series.algebra import Samples, Truncated
 from eigassign.series.expression import Expression, Recorder, cos, sin
-from eigassign.series.lower_set import total_degree
+from eigassign.series.lower_set import on_faces, total_degree
 from eigassign.series.power_series import PowerSeries
 from eigassign.series.program import compile_program
 from eigassign.series.table import compile_table
@@ -119,6 +119,41 @@ def test_what_a_tree_does_not_depend_on_structurally_does_not_change_it(tree: Tr
         np.broadcast_to(table.evaluate(Samples(), x.T), (1, 1)) for x in (AT[:1], moved)
     )
     np.testing.assert_array_equal(before, after)
+
+
+@given(st.lists(trees, min_size=1, max_size=3))
+def test_series_have_no_coefficients_off_the_faces(several: list[Tree]) -> None:
+    recorder = Recorder()
+    x = [recorder.variable(k) for k in range(N)]
+    found = [value(tree, x, sin, cos) for tree in several]
+    atoms = [atom for f in found if isinstance(f, Expression) for atom in f.terms]
+    program = compile_program(recorder, atoms, N)
+    variables = np.zeros((N, len(SPACE)))
+    variables[:, 0] = 0.3, -0.7, 1.1
+    variables[:, SPACE.units] = np.eye(N)
+    whole = program.run(Truncated(SPACE), variables)
+    inner, where = on_faces(SPACE, program.faces.tobytes())
+    off = np.delete(np.arange(len(SPACE)), where)
+    assert not whole[:, off].any()
+    np.testing.assert_array_equal(
+        program.run(Truncated(inner), variables[:, where]), whole[:, where]
+    )
+
+
+def test_a_sum_has_the_faces_of_its_terms_and_a_function_of_it_has_one() -> None:
+    recorder = Recorder()
+    x, y, z = (recorder.variable(k) for k in range(3))
+
+    def faces(expression: Expression) -> list[list[bool]]:
+        return compile_program(recorder, [*(expression * 1.0).terms], 3).faces.tolist()
+
+    assert faces(sin(x * y + sin(z))) == [[True, True, True]]
+    assert faces(x * (y + sin(z))) == [[True, True, False], [True, False, True]]
+    assert faces(x * x + sin(y) + z) == [
+        [True, False, False],
+        [False, True, False],
+        [False, False, True],
+    ]
 
 
 def test_constants_fold_away_as_they_are_written() -> None:
