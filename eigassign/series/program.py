@@ -69,6 +69,7 @@ class Program:
         """Whether anything in it solves equations: it may then have no value at all."""
         return any(step.function is not None for step in self.steps)
 
+    @cached_property
     def faces(self) -> NDArray[np.bool_]:
         """(n_faces, n_variables): every atom is a sum of functions of one face's variables each."""
         from eigassign.series.faces import faces
