@@ -148,7 +148,7 @@ def test_the_coefficient_functions_are_as_few_as_a_planar_elbow_needs() -> None:
     assert model_of(two_link((40, 30))).pencil.n_theta == 13
 
 
-@pytest.mark.parametrize("name", ["two_link", "four_bar", "arm_6r", "ball_screw"])
+@pytest.mark.parametrize("name", ["two_link", "five_bar", "arm_6r", "ball_screw"])
 def test_coefficients_are_left_out_only_where_they_are_zero(name, monkeypatch) -> None:
     case = load_case(f"cases/{name}.yaml")
     pencil, y = case.model().pencil, case.initial_design
