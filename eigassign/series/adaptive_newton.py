@@ -23,11 +23,12 @@ from eigassign.series.newton import cross, ordered, products, spread_steps
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 POWERS = (1.0, 2.0, -2.0)  # of f that are tried, the quickest to evaluate first
-SAFETY = 4.0  # on the predicted rest
+SAFETY, SAFETY_LINE = 4.0, 2.0  # on the predicted rest, in general and on a single axis
 MISSED = 3.0  # how much worse than at the points held out it may be elsewhere
 CHECKED = 12  # members for each further point that is held out
 TRUSTED = 4  # degrees from which a rate is believed as it is
-STARTS = (3e-3, 1e-4, 1e-5, 1e-6)  # accuracies below each of which one degree more is started with
+STARTS = (5e-3, 5e-4)  # accuracies below each of which one degree more is started with
+STARTS_LINE = (5e-3, 5e-4, 5e-5, 5e-6, 5e-7, 5e-8, 5e-9)  # on a single axis
 FEW = 12  # nodes below which an axis is taken whole
 GROWTH = 3  # times as many members in one round at most
 STEPS = 4  # further members in one round on a single axis at most
@@ -100,7 +101,7 @@ def _start(tops: Ints, whole: NDArray[np.bool_], accuracy: float) -> Ints:
     A whole axis of few nodes is taken at once: so few samples show no rate.
     """
     d = len(tops)
-    degree = 2 + sum(accuracy < each for each in STARTS[: None if d == 1 else 2])
+    degree = 2 + sum(accuracy < each for each in (STARTS_LINE if d == 1 else STARTS))
     reach = np.where(whole & (tops < FEW), tops, np.minimum(degree, tops))
     if d == 1:
         return np.arange(reach[0] + 1)[:, None]
@@ -187,7 +188,8 @@ class _State:
 
 def _tail(rates: Floats) -> float:
     """From the sum over the first missing members to that over all, with the safety."""
-    return SAFETY / (1.0 - float(rates.max(initial=0.0)))
+    safety = SAFETY if len(rates) > 1 else SAFETY_LINE
+    return safety / (1.0 - float(rates.max()))
 
 
 def _wanted(found: Interpolant, tops: Ints, accuracy: float) -> tuple[Ints, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from eigassign.study.chart_timing import Patience, take_turns, timed
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
-BATCH = 4096  # evaluations in one call, where methods are timed
+BATCH = 32768  # evaluations in one call, where methods are timed
 LONG_BATCH_S = 0.05  # a batch that would take longer is timed on the question's own points only
 
 
@@ -118,7 +119,7 @@ def _trial(bench: Bench, method: Method, known: dict[bytes, tuple[Floats, float]
     many = asked.repeated(copies) if copies > 1 else asked
     jobs = (
         _Job(lambda: bench.solved(once), solving / parts),
-        _Job(lambda: method.fit(answers), fitting),
+        _Job(method.one or partial(method.fit, answers), fitting / (parts if method.one else 1)),
         _Job(lambda: evaluator(many), evaluating * copies),
     )
     trained = len(x) + getattr(evaluator, "solves", 0)
@@ -134,7 +135,7 @@ def _point(bench: Bench, trial: _Trial, spent: Sequence[Timing], solve: Timing) 
     elif method.per_design:
         designs, samples = bench.points.designs, len(bench.scene.path.q)
         solves_online = trained / (designs * samples)
-        anew = fitting.times(1.0 / designs)
+        anew = fitting if trial.method.one else fitting.times(1.0 / designs)
         anew = anew.plus(training) if trial.trains else anew
         online, offline, trained = online.plus(anew.times(1.0 / samples)), NOTHING, 0
     gain = break_even(offline.median_s, online.median_s, solve.median_s)

@@ -72,6 +72,7 @@ def fit_methods(
                 {"accuracy": accuracy},
                 partial(_along, scene, points, accuracy, most),
                 per_design=True,
+                one=partial(_one, scene, points, accuracy, most),
                 note="fitted anew for every design: answers the runs along the trajectory only",
             )
     for accuracy in accuracies:
@@ -95,6 +96,12 @@ def fit_methods(
 
 def _method(name: str, family: str, parameters: dict[str, Any], fit: Any, **more: Any) -> Method:
     return Method(name, family, True, parameters, fit, **more)
+
+
+def _one(scene: Scene, points: Points, accuracy: float, most: int) -> Fit:
+    """The fit of the first design of the runs."""
+    y = points.y[points.n_random]
+    return fit(scene.model, scene.path.q, y, scene.expansions.modes, accuracy, most)
 
 
 def _along(scene: Scene, points: Points, accuracy: float, most: int, _: Floats) -> Evaluator:

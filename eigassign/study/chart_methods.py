@@ -33,8 +33,9 @@ class Method:
     """``fit`` makes an evaluator from exact answers (n, n_modes) in Hz at ``train``'s points x.
 
     ``solves`` are exact eigensolves inside ``fit`` itself. With ``per_design`` the training is
-    repeated for every design of the runs along the trajectory, and its cost is an online one.
-    ``most`` limits the evaluation points of slow methods.
+    repeated for every design of the runs along the trajectory, and its cost is an online one; so is
+    that of the fit, timed as ``one`` design's where each has a fit of its own. ``most`` limits the
+    evaluation points of slow methods.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Method:
     per_design: bool = False
     most: int | None = None
     note: str = ""
+    one: Callable[[], object] | None = None
 
 
 def exact_methods(model: Model, modes: Sequence[int], most: int | None) -> Iterator[Method]:
