@@ -151,6 +151,7 @@ def _point(bench: Bench, trial: _Trial, spent: Sequence[Timing], solve: Timing) 
         *_errors(bench, trial.points, trial.hz),
         None if method.exact else gain,
         method.note,
+        method.use,
     )
 
 

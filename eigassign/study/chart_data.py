@@ -69,6 +69,7 @@ class ChartPoint:
     trajectory: Errors | None  # along the trajectory at several designs
     break_even: float | None  # evaluations from which it beats exact solves; None: never
     note: str = ""
+    use: str = ""  # how to ask for it: a line of a case file, or a call
 
     def total_s(self, evaluations: float) -> float:
         """Seconds for set-up and so many evaluations."""

@@ -73,6 +73,7 @@ def fit_methods(
                 partial(_along, scene, points, accuracy, most),
                 per_design=True,
                 one=partial(_one, scene, points, accuracy, most),
+                use=f"ea.fit(model, q, y, accuracy={accuracy:g}).along()",
                 note="fitted anew for every design: answers the runs along the trajectory only",
             )
     for accuracy in accuracies:
@@ -81,6 +82,7 @@ def fit_methods(
             "fit of exact solves",
             {"accuracy": accuracy},
             partial(_over_box, scene, features, accuracy, most),
+            use=f"ea.fit(model, q, ea.Box(lower, upper), accuracy={accuracy:g}).along(designs)",
         )
     for m, count in sources:
         q, y = points_along(scene, count)
@@ -91,6 +93,8 @@ def fit_methods(
                 f"fit of {name}",
                 {"accuracy": accuracy, "half_order": m, "q": q, "y": y},
                 partial(_of_reduced, scene, features, accuracy, m, q, y),
+                use=f"ea.fit(ea.reduce(model, q0, y0, half_order={m}), q, ea.Box(lower, upper), "
+                f"accuracy={accuracy:g})",
             )
 
 

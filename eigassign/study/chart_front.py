@@ -54,13 +54,10 @@ def break_even(offline_s: float, online_s: float, exact_s: float) -> float | Non
 
 
 def cheapest(
-    points: Sequence[ChartPoint], accuracy: float, evaluations: float, floor: float
+    points: Sequence[ChartPoint], accuracy: float, evaluations: float
 ) -> ChartPoint | None:
-    """The quickest method whose worst relative error is at most ``accuracy``.
-
-    ``floor`` (relative) is what no method can be seen to be better than.
-    """
-    good = [p for p in points if p.everywhere.worst_relative <= max(accuracy, floor)]
+    """The quickest method whose worst relative error is at most ``accuracy``."""
+    good = [p for p in points if p.everywhere.worst_relative <= accuracy]
     return min(good, key=lambda p: p.total_s(evaluations), default=None)
 
 
@@ -75,9 +72,15 @@ def most_accurate(
 def advise_accuracy(
     points: Sequence[ChartPoint], accuracy: float, evaluations: float, floor: float
 ) -> Advice:
-    """What to choose for a worst relative error in Hz, in words and as data."""
-    found = cheapest(points, accuracy, evaluations, floor)
+    """What to choose for a worst relative error in Hz, in words and as data.
+
+    Nothing is advised below ``floor`` (relative): no method can be seen to be that accurate.
+    """
     asked = f"for {evaluations:.3g} evaluations, each within {accuracy:.1e} of exact"
+    if accuracy < floor:
+        words = f"{asked}: nothing, for round-off moves even exact solves by {floor:.1e}"
+        return Advice("accuracy", accuracy, None, evaluations, None, {}, None, None, words)
+    found = cheapest(points, accuracy, evaluations)
     return _advice("accuracy", accuracy, None, evaluations, found, asked)
 
 
@@ -102,7 +105,10 @@ def _advice(
         )
     total, worst = found.total_s(evaluations), found.everywhere.worst_relative
     anew = "" if found.random else ", solved anew for every design"
-    words = f"{asked}: {found.method}{anew}, {_time(total)} in all, worst error {worst:.1e}"
+    words = (
+        f"{asked}: {found.method}{anew}, {_time(total)} in all, worst error {worst:.1e}"
+        f"{'; ' + found.use if found.use else ''}"
+    )
     return Advice(
         kind, accuracy, budget_s, evaluations, found.method, found.parameters, worst, total, words
     )

@@ -50,6 +50,7 @@ class Method:
     most: int | None = None
     note: str = ""
     one: Callable[[], object] | None = None
+    use: str = ""  # how to ask for it: a line of a case file, or a call
 
 
 def exact_methods(model: Model, modes: Sequence[int], most: int | None) -> Iterator[Method]:
@@ -109,6 +110,7 @@ def _taylor(scene: Scene, order: int, linear: bool) -> Method:
         {"order": order, "linear_in_y": linear, "q0": point.q0, "y0": point.y0},
         fit,
         solves=1,
+        use=f"in the case file, expansion: {{order: {order}}}",
     )
 
 
@@ -134,6 +136,7 @@ def _reciprocal(scene: Scene, order: int, linear: bool) -> Method:
         {"order": order, "linear_in_y": linear, "q0": point.q0, "y0": point.y0},
         fit,
         solves=1,
+        use=f"ea.expand(model, q0, y0, order={order}{', linear_in_y=True' * linear}).inverse",
     )
 
 
@@ -208,6 +211,7 @@ def _reduced(scene: Scene, m: int, count: int, guard: bool) -> Method:
         {"half_order": m, "guard": guard, "q": q, "y": y},
         fit,
         solves=len(q) * solves_per_point(scene, m, guard),
+        use=f"ea.reduce(model, q0, y0, half_order={m})" if guard else "",
     )
 
 

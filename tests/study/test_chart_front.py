@@ -83,6 +83,12 @@ def test_advice_is_the_cheapest_that_is_good_enough() -> None:
     assert advise_accuracy(POINTS[1:], 1e-9, 1e4, 0.0).method is None
 
 
+def test_nothing_is_advised_below_round_off() -> None:
+    found = advise_accuracy(POINTS, 1e-7, 1e4, 2e-7)
+    assert found.method is None
+    assert "round-off moves even exact solves by 2.0e-07" in found.words
+
+
 def test_advice_for_a_budget_is_the_most_accurate_in_time() -> None:
     assert advise_budget(POINTS, 0.2, 1e4).method == "good"
     assert advise_budget(POINTS, 20.0, 1e4).method == "exact"
