@@ -1,8 +1,9 @@
 """The charts of the paper's arm, a spatial arm of six joints, scenes of 10⁴ and 5 · 10⁴ dof.
 
 What `eigassign chart` writes goes to ``results/chart_<case>/``; here are its fronts and advice as
-Markdown. The last two are charted with less of everything, since exact solves take long there:
-what is left out is said in their notes.
+Markdown. Then the figures of the README and the table of who holds the fronts are made anew.
+The last two are charted with less of everything, since exact solves take long there: what is left
+out is said in their notes.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import chart_cases
+import fronts
 
 from eigassign import charting
 from eigassign.api import load_case
@@ -66,6 +68,8 @@ def main(names: list[str]) -> None:
         parts = [f"# {chart.title}", *(_markdown(table) for table in tables(chart))]
         parts += ["\n".join(f"- {note}" for note in chart.notes)]
         (target / "README.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+    fronts.write_figures()
+    print(fronts.write_shares())
 
 
 def _say(line: str) -> None:
