@@ -21,7 +21,7 @@ GROUPS = (  # families that begin so, how they are called, colour
 PEERS = ("interpolation and surrogates", "#9a9a9a")
 
 
-def share(chart: dict[str, Any]) -> list[dict[str, Any]]:
+def share(case: str, chart: dict[str, Any]) -> list[dict[str, Any]]:
     """One row a front: methods between LOW and HIGH, how many are eigassign's, the others."""
     known = {point["method"]: point for point in chart["points"]}
     rows = []
@@ -34,7 +34,7 @@ def share(chart: dict[str, Any]) -> list[dict[str, Any]]:
         peers = [point["method"] for point in inside if not point["ours"]]
         rows.append(
             {
-                "case": chart["case_name"],
+                "case": case,
                 "front": front["name"],
                 "methods": len(inside),
                 "ours": len(inside) - len(peers),
@@ -46,8 +46,8 @@ def share(chart: dict[str, Any]) -> list[dict[str, Any]]:
 
 def write_shares() -> str:
     """``results/fronts.json`` and ``.md`` of all charts there; the table."""
-    charts = [_read(path) for path in sorted(common.RESULTS.glob("chart_*/chart.json"))]
-    rows = [row for chart in charts for row in share(chart)]
+    paths = sorted(common.RESULTS.glob("chart_*/chart.json"))
+    rows = [row for path in paths for row in share(path.parent.name[6:], _read(path))]
     lines = [
         "# Who holds the fronts",
         "",
