@@ -55,7 +55,7 @@ def element_stiffness(beam: BeamValues, h: Scalar) -> list[ElementTerm]:
         terms += [
             ElementTerm(c, m) for c, m in zip(coefficients, bending_stiffness(plane), strict=True)
         ]
-    return [t for t in terms if not _is_zero(t.coefficient)]
+    return _folded(terms)
 
 
 def element_mass(beam: BeamValues, h: Scalar) -> list[ElementTerm]:
@@ -70,7 +70,18 @@ def element_mass(beam: BeamValues, h: Scalar) -> list[ElementTerm]:
         terms += _translation(beam.mass * scale, phi, h, plane)
         if beam.shear is not None:
             terms += _rotary(rotary * scale, phi, h, plane)
-    return [t for t in terms if not _is_zero(t.coefficient)]
+    return _folded(terms)
+
+
+def _folded(terms: list[ElementTerm]) -> list[ElementTerm]:
+    """The same sum, with all constant coefficients in one matrix: most elements have no others."""
+    varying, total = [], np.zeros((12, 12))
+    for term in terms:
+        if is_constant(term.coefficient):
+            total += term.coefficient * term.matrix
+        else:
+            varying.append(term)
+    return [*varying, ElementTerm(1.0, total)] if total.any() else varying
 
 
 def _phi(beam: BeamValues, EI: Scalar, h: Scalar) -> Scalar:

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, TypeAlias, overload
 from eigassign.errors import UsageError
 
 if TYPE_CHECKING:
+    from typing_extensions import TypeIs
+
     from eigassign.series.implicit import ImplicitFunction
 
 Scalar: TypeAlias = "float | Expression"
@@ -230,6 +232,6 @@ def _rule(
     raise UsageError(f"no derivative of {node[0]}")
 
 
-def is_constant(x: Scalar) -> bool:
+def is_constant(x: Scalar) -> TypeIs[float]:
     """Whether x is a plain number."""
     return not isinstance(x, Expression)
