@@ -84,6 +84,30 @@ def _folded(terms: list[ElementTerm]) -> list[ElementTerm]:
     return [*varying, ElementTerm(1.0, total)] if total.any() else varying
 
 
+def shear_ratios(beam: BeamValues, h: Scalar) -> tuple[Scalar, Scalar]:
+    """Φ of bending in the element's x-y and x-z plane; 0 without shear."""
+    return _phi(beam, beam.EI_z, h), _phi(beam, beam.EI_y, h)
+
+
+def bending_shapes(xi: Floats, phi: Floats) -> Floats:
+    """Deflection per (w1, h θ1, w2, h θ2) at ξ = x/h in an element with shear ratio Φ, (…, 4).
+
+    (1+Φ) w = (1−3ξ²+2ξ³ + Φ(1−ξ)) w1 + (ξ−2ξ²+ξ³ + Φ(ξ−ξ²)/2) h θ1
+            + (3ξ²−2ξ³ + Φξ) w2 + (−ξ²+ξ³ − Φ(ξ−ξ²)/2) h θ2,   θ = dw/dx less the shear angle
+    (Przemieniecki, Theory of Matrix Structural Analysis, §11.7); cubic Hermite for Φ = 0. These are
+    the shapes whose products integrate to the consistent mass.
+    """
+    bubble = 0.5 * phi * (xi - xi**2)
+    second = xi**2 * (3.0 - 2.0 * xi)
+    shapes = (
+        1.0 - second + phi * (1.0 - xi),
+        xi * (1.0 - xi) ** 2 + bubble,
+        second + phi * xi,
+        xi**2 * (xi - 1.0) - bubble,
+    )
+    return np.stack(shapes, axis=-1) / (1.0 + phi)[..., None]
+
+
 def _phi(beam: BeamValues, EI: Scalar, h: Scalar) -> Scalar:
     """Φ = 12EI/(κGA h²)."""
     return 0.0 if beam.shear is None else EI * 12.0 / (beam.shear * h**2.0)

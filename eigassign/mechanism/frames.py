@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
-from eigassign.mechanism.beam import element_mass, element_stiffness
+from eigassign.mechanism.beam import element_mass, element_stiffness, shear_ratios
 from eigassign.mechanism.links import add_bodies, beam_values, rolled
-from eigassign.mechanism.mesh import DOFS, Entries, LinkMesh, node_dofs, rigid_motion
+from eigassign.mechanism.mesh import DOFS, Entries, LinkMesh, Strand, node_dofs, rigid_motion
 from eigassign.mechanism.parameters import Parameters
 from eigassign.mechanism.rotations import vector
+from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]
 
@@ -27,19 +28,23 @@ def frame_mesh(case: CaseFile, parameters: Parameters, name: str) -> LinkMesh:
     at = {key: k for k, key in enumerate(link.nodes)}
     count = len(points) + sum(b.elements - 1 for b in link.beams.values())
     stiffness, mass = Entries((width * count,) * 2), Entries((width * count,) * 2)
+    slots = [node_dofs(width * k, space) for k in range(count)]
+    strands = []
     for beam in link.beams.values():
         a, b = at[beam.from_node], at[beam.to_node]
         inner = list(range(len(points), len(points) + beam.elements - 1))
         ends = [a, *inner, b]
         for k in range(1, beam.elements):
             points.append(points[a] + (points[b] - points[a]) * (k / beam.elements))
-        _add_beam(case, parameters, beam, stiffness, mass, points, ends, space)
-    slots = [node_dofs(width * k, space) for k in range(count)]
+        turn, shear = _add_beam(case, parameters, beam, stiffness, mass, points, ends, space)
+        row = [vector(points[k].tolist()) for k in ends]
+        strands.append(Strand([slots[k] for k in ends], row, turn, [shear] * beam.elements))
     nodes = {key: slots[k] for key, k in at.items()}
     places = {key: vector(points[k].tolist()) for key, k in at.items()}
     add_bodies(case, parameters, name, mass, nodes)
     rigid = rigid_motion([vector(p.tolist()) for p in points], slots, width * count, space)
-    return LinkMesh(width * count, nodes, places, stiffness.terms(), mass.terms(), rigid)
+    terms = stiffness.terms(), mass.terms(), rigid
+    return LinkMesh(width * count, nodes, places, *terms, strands)
 
 
 def _add_beam(
@@ -51,7 +56,8 @@ def _add_beam(
     points: list[Floats],
     ends: list[int],
     space: str,
-) -> None:
+) -> tuple[Floats, tuple[Scalar, Scalar]]:
+    """Add the elements of one beam; its axes, and Φ of each element."""
     along = points[ends[-1]] - points[ends[0]]
     h = float(np.linalg.norm(along)) / (len(ends) - 1)
     values = beam_values(case, parameters, beam, beam.section)
@@ -67,6 +73,7 @@ def _add_beam(
             for a, b in itertools.pairwise(ends):
                 dofs = np.concatenate([node_dofs(width * a, space), node_dofs(width * b, space)])
                 target.add_block(coefficient, dofs, turned)
+    return turn[:3, :3], shear_ratios(values, h)
 
 
 def axes(along: Floats) -> Floats:

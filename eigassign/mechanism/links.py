@@ -10,12 +10,19 @@ from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
-from eigassign.mechanism.beam import BeamValues, ElementTerm, element_mass, element_stiffness
+from eigassign.mechanism.beam import (
+    BeamValues,
+    ElementTerm,
+    element_mass,
+    element_stiffness,
+    shear_ratios,
+)
 from eigassign.mechanism.geometry import length, link_type, station
 from eigassign.mechanism.mesh import (
     DOFS,
     Entries,
     LinkMesh,
+    Strand,
     add_scalars,
     body_block,
     node_dofs,
@@ -78,10 +85,11 @@ def _chain(
     count = sum(n for _, _, n in pieces) + 1
     stiffness, mass = Entries((width * count,) * 2), Entries((width * count,) * 2)
     positions: list[Objects] = [vector([0.0])]
+    shear: list[tuple[Scalar, Scalar]] = []
     for start, span, n in pieces:
         first = len(positions) - 1
         positions += [vector([start + span * (k / n)]) for k in range(1, n + 1)]
-        _segment(case, parameters, name, stiffness, mass, first, (start, span), n, space)
+        shear += _segment(case, parameters, name, stiffness, mass, first, (start, span), n, space)
     slots = [node_dofs(width * k, space) for k in range(count)]
     nodes = {"start": slots[0], "end": slots[-1]}
     places = {"start": positions[0], "end": positions[-1]}
@@ -89,7 +97,9 @@ def _chain(
         nodes[rider], places[rider] = slots[pieces[0][2]], positions[pieces[0][2]]
     add_bodies(case, parameters, name, mass, nodes)
     rigid = _chain_rigid(pieces, space)
-    return LinkMesh(width * count, nodes, places, stiffness.terms(), mass.terms(), rigid)
+    strand = Strand(slots, positions, rolled(_roll(case.mechanism.links[name]))[:3, :3], shear)
+    terms = stiffness.terms(), mass.terms(), rigid
+    return LinkMesh(width * count, nodes, places, *terms, (strand,))
 
 
 def _chain_rigid(pieces: Sequence[tuple[Scalar, Scalar, int]], space: str) -> list[Any]:
@@ -122,18 +132,19 @@ def _segment(
     piece: tuple[Scalar, Scalar],
     n: int,
     space: str,
-) -> None:
-    """n equal elements from node ``first`` on; with a taper each has its own section."""
+) -> list[tuple[Scalar, Scalar]]:
+    """n equal elements from node ``first`` on; with a taper each has its own section. Their Φ."""
     start, span = piece
     link: Any = case.mechanism.links[name]
     h = span * (1.0 / n)
-    turn = rolled(float(getattr(link, "roll", 0.0) or 0.0))
+    turn = rolled(_roll(link))
     if isinstance(link.section, str):
         beam = beam_values(case, parameters, link, link.section)
         _tile(stiffness, element_stiffness(beam, h), turn, first, n, space)
         _tile(mass, element_mass(beam, h), turn, first, n, space)
-        return
+        return [shear_ratios(beam, h)] * n
     total = length(case, parameters, name)
+    shear = []
     for k in range(n):
         share: Scalar = (k + 0.5) / n
         if span is not total:  # a rider splits the beam
@@ -141,6 +152,8 @@ def _segment(
         beam = _tapered(case, parameters, link, share)
         _tile(stiffness, element_stiffness(beam, h), turn, first + k, 1, space)
         _tile(mass, element_mass(beam, h), turn, first + k, 1, space)
+        shear.append(shear_ratios(beam, h))
+    return shear
 
 
 def _tile(
@@ -159,6 +172,10 @@ def _tile(
             shift = width * (first + np.arange(n))[:, None]
             rows, columns = (shift + local[i]).ravel(), (shift + local[j]).ravel()
             entries.add(coefficient, rows, columns, np.tile(turned[i, j], n))
+
+
+def _roll(beam: Any) -> float:
+    return float(getattr(beam, "roll", 0.0) or 0.0)
 
 
 def rolled(angle: float) -> Floats:

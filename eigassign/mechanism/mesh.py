@@ -29,12 +29,21 @@ class Term(NamedTuple):
     matrix: sparse.csr_array
 
 
+class Strand(NamedTuple):
+    """A row of beam elements from node to node, for what lies between the nodes."""
+
+    slots: Sequence[Ints]  # per node its six slots
+    points: Sequence[Objects]  # per node its place, m
+    axes: Floats | None  # rows: x, y, z of the elements in the link's axes; None where no matter
+    shear: Sequence[tuple[Scalar, Scalar]]  # per element Φ of bending in its x-y and x-z plane
+
+
 @dataclass(frozen=True)
 class LinkMesh:
     """One link: ``nodes`` maps a name to the local dofs of that node (None: rigidly attached).
 
     ``rigid`` are the terms ν_b N_b of N, (n_local, n_twist): nodal motion per twist of the origin.
-    ``positions`` are those of the named nodes.
+    ``positions`` are those of the named nodes; ``strands`` are the beams, where it consists of any.
     """
 
     n_local: int
@@ -43,6 +52,7 @@ class LinkMesh:
     stiffness: Sequence[Term]
     mass: Sequence[Term]
     rigid: Sequence[Term]
+    strands: Sequence[Strand] = ()
     reduction: Reduction | None = None
 
 

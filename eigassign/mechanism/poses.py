@@ -52,6 +52,14 @@ class Poses:
         rows = table.evaluate(Samples(), z)
         return np.broadcast_to(rows, (len(rows), z.shape[1])).T
 
+    def values(self, x: Floats, arrays: Sequence[NDArray[np.object_]]) -> list[Floats]:
+        """Numbers (n_samples, *shape) of arrays of this mechanism's scalars, evaluated together."""
+        table = self._compile([scalar for array in arrays for scalar in array.ravel()])
+        rows = self._evaluate(table, x)
+        cuts = np.cumsum([array.size for array in arrays])[:-1]
+        parts = zip(np.split(rows, cuts, axis=1), arrays, strict=True)
+        return [part.reshape(len(rows), *array.shape) for part, array in parts]
+
     @cached_property
     def _ends(self) -> Table:
         """World positions of both ends of every drawn line."""

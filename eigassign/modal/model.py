@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -18,9 +18,19 @@ from eigassign.modal.exact import eigenvalues, modes
 from eigassign.modal.samples import samples
 
 if TYPE_CHECKING:
+    from eigassign.mechanism.shapes import NodeShape, StrandShape
     from eigassign.modal.tracking import Tracked
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ModeShapes:
+    """Exact modes at one pose and design as motions; see `Model.shapes`."""
+
+    frequencies: Floats  # (count,) in Hz
+    strands: tuple[StrandShape, ...]
+    nodes: Mapping[tuple[str, str], NodeShape]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +58,13 @@ class Model:
         """(q, y) as rows (n_samples, n_q + n_y); raises UsageError for a wrong shape."""
         return samples(q, y, len(self.q_names), len(self.y_names))
 
+    def one(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """The same of one sample, (1, n_q + n_y); raises UsageError for several."""
+        x = self.x(q, y)
+        if len(x) != 1:
+            raise UsageError(f"this is for one sample of q and y, not {len(x)}")
+        return x
+
     def frequencies(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> Floats:
         """Exact frequencies of the lowest elastic modes, (n_samples, count) in Hz."""
         return np.sqrt(eigenvalues(self.pencil, self.x(q, y), count)) / (2.0 * np.pi)
@@ -69,6 +86,20 @@ class Model:
 
         return truncation_error(self.reduced, x, modes)
 
+    def shapes(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> ModeShapes:
+        """The lowest elastic modes at one sample as motions of all nodes and beams, for drawing.
+
+        ``.frequencies`` (count,) in Hz; ``.strands``: per beam ``.link``, points ``.places``
+        (n_points, 2 or 3) in m and their displacements ``.motions`` (count, n_points, 2 or 3) in
+        the mass-normalised modes (m per √kg m), rigid motion φ_q included; ``.nodes`` by
+        (link, node). Raises UsageError for several samples.
+        """
+        from eigassign.mechanism.shapes import shapes
+
+        hz, phi = self.modes(q, y, count)
+        found = shapes(self.poses, self.one(q, y), phi[0])
+        return ModeShapes(hz[0], found.strands, found.nodes)
+
     def tracked(self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)) -> Tracked:
         """``modes`` of the first sample followed along the samples by their shapes.
 
@@ -83,8 +114,6 @@ class Model:
 
         Raises UsageError for several samples.
         """
-        x = self.x(q, y)
-        if len(x) != 1:
-            raise UsageError(f"matrices are for one sample of q and y, not {len(x)}")
+        x = self.one(q, y)
         K, M = self.pencil.matrices(self.pencil.theta(x))
         return M[0], K[0]

@@ -1,0 +1,218 @@
+"""Shapes of modes: displacements that carry the modal mass, hang together, and bend as beams do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import eigassign as ea
+from eigassign.case import parse
+from eigassign.errors import UsageError
+from eigassign.mechanism.beam import bending_mass, bending_shapes
+from eigassign.mechanism.build import with_elements
+from eigassign.mechanism.shapes import shapes
+
+CASES = Path(__file__).parents[2] / "cases"
+ALL = sorted(path.stem for path in CASES.glob("*.yaml"))
+SLIDING = {"prismatic", "carriage", "nut", "cylindrical", "screw"}
+
+
+def posed(name: str) -> tuple[ea.Case, Any, Any]:
+    """A shipped case, and q, y at its expansion point with its initial design."""
+    case = ea.load_case(CASES / f"{name}.yaml")
+    return case, np.array(case.file.expansion.q, dtype=float), case.initial_design
+
+
+def every_shape(case: ea.Case, q: Any, y: Any, vectors: Any) -> Any:
+    model = case.model()
+    return shapes(model.poses, model.x(q, y), vectors)
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.3, 4.0])
+@pytest.mark.parametrize(("plane", "dofs"), [("z", [1, 5, 7, 11]), ("y", [2, 4, 8, 10])])
+def test_products_of_the_drawn_shapes_integrate_to_the_consistent_mass(
+    phi: float, plane: str, dofs: list[int]
+) -> None:
+    points, weights = np.polynomial.legendre.leggauss(6)
+    xi, weights = 0.5 * (points + 1.0), 0.5 * weights
+    h = 0.7
+    sign = 1.0 if plane == "z" else -1.0
+    N = bending_shapes(xi, np.full(len(xi), phi)) * [1.0, sign * h, 1.0, sign * h]
+    mass = h * np.einsum("x,xi,xj->ij", weights, N, N)
+    parts = bending_mass(plane)
+    stored = sum(phi**i * h ** (j + 1) * parts[i][j] for i in range(3) for j in range(3))
+    np.testing.assert_allclose(mass, stored[np.ix_(dofs, dofs)] / (1 + phi) ** 2, rtol=1e-13)
+
+
+PLANAR = ["two_link", "four_bar", "five_bar", "six_bar", "luffing_boom", "gantry", "slider_crank"]
+
+
+@pytest.mark.parametrize("name", PLANAR)
+def test_what_is_drawn_carries_the_modal_mass(name: str) -> None:
+    # ∫ ρA |v|² dx over all that is drawn, plus the bodies, is φᵀMφ = 1. Simpson's rule on two
+    # intervals and more an element of these products is right to h⁴ and 1e-4 in the third mode.
+    assert (np.abs(drawn_mass(*posed(name)) - 1.0) < [1e-5, 5e-5, 2e-4]).all()
+
+
+def test_a_beam_soft_in_shear_is_drawn_with_its_shear() -> None:
+    # Φ = 3.2 and 1.8 by a small κ and I, so that the rotary inertia, which is not drawn, is 1e-5.
+    text = (CASES / "two_link.yaml").read_text(encoding="utf-8")
+    for old, new in (
+        ("density: 2690.007033", "density: 2690.007033, poissons_ratio: 0.33"),
+        ("bending_inertia: 3.97e-8", "bending_inertia: 1.6e-11, shear_coefficient: 1e-5"),
+        ("elements: 4", "elements: 4, shear: true"),
+        ("elements: 3", "elements: 3, shear: true"),
+    ):
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    case = ea.Case(parse(text.encode(), CASES / "two_link.yaml"))
+    assert (np.abs(drawn_mass(case, [1.817, 5.312], [0.0, 0.0]) - 1.0) < 1e-4).all()
+
+
+def drawn_mass(case: ea.Case, q: Any, y: Any) -> Any:
+    """∫ ρA |v|² dx over all beams plus m |v|² of bodies and rigid links, in three modes."""
+    mechanism = case.file.mechanism
+    found = case.model().shapes(q, y, 3)
+    total = np.zeros(3)
+    beams = iter(
+        beam
+        for link in case.model().poses.links
+        for data in [mechanism.links[link]]
+        for beam in getattr(data, "beams", {"": data}).values()
+    )
+    for strand, beam in zip(found.strands, beams, strict=False):
+        if hasattr(beam, "material"):
+            total += _line_density(mechanism, beam) * _simpson(strand)
+    for body in mechanism.bodies.values():
+        node = found.nodes[tuple(body.at.split("."))]  # type: ignore[index]
+        total += body.mass * (node.motion[:, :3] ** 2).sum(axis=1)
+    for link, data in mechanism.links.items():
+        if getattr(data, "type", "") == "rigid":
+            total += data.mass * (found.nodes[link, "start"].motion[:, :3] ** 2).sum(axis=1)
+    return total
+
+
+def _line_density(mechanism: Any, beam: Any) -> float:
+    from eigassign.mechanism.sections import section_values
+
+    section = section_values(mechanism.sections[beam.section], lambda _key, value: value)
+    return float(mechanism.materials[beam.material].density * section.area)
+
+
+def _simpson(strand: Any) -> Any:
+    length = np.linalg.norm(strand.places[-1] - strand.places[0])
+    weights = np.ones(len(strand.places))
+    assert len(weights) % 2 == 1
+    weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
+    return (strand.motions**2).sum(axis=2) @ weights * length / (3.0 * (len(weights) - 1))
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "node"),
+    [
+        ("two_link", 0, ("upper_arm", "end")),
+        ("two_link", 1, ("forearm", "end")),
+        ("luffing_boom", 1, ("boom", "head")),
+        ("gantry", 1, ("carriage", "start")),
+        ("superelement_arm", 1, ("forearm", "end")),
+        ("arm_3r", 1, ("upper_arm", "end")),
+    ],
+)
+def test_a_mass_on_a_node_sees_the_node_move_as_drawn(
+    name: str, parameter: int, node: tuple[str, str]
+) -> None:
+    # ∂M/∂m = v vᵀ for any vector, rigid and elastic parts alike, summed over the directions.
+    case, q, y = posed(name)
+    model = case.model()
+    more = y + np.eye(len(y))[parameter]
+    difference = model.matrices(q, more)[0] - model.matrices(q, y)[0]
+    vectors = np.random.default_rng(3).standard_normal((model.n_dof, 5))
+    motion = every_shape(case, q, y, vectors).nodes[node].motion[:, :3]
+    np.testing.assert_allclose(motion @ motion.T, vectors.T @ difference @ vectors, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_rigid_motion_is_that_of_the_rigid_links(name: str) -> None:
+    case, q, y = posed(name)
+    model = case.model()
+    columns = model.motion.columns
+    vectors = np.eye(model.n_dof)[:, model.n_dof - len(columns) :]
+    for (link, node), shape in every_shape(case, q, y, vectors).nodes.items():
+        if node.startswith("@"):
+            continue  # material point of the beam: it does not travel with the carriage
+        exact = model.poses.jacobian(model.x(q, y), link, node)[0][:, columns]
+        np.testing.assert_allclose(shape.motion[:, :3].T, exact, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_both_sides_of_every_joint_stay_together(name: str) -> None:
+    # u_f = u_b + ω_b × r: in all directions where the joint turns, across its axis where it slides.
+    case, q, y = posed(name)
+    model = case.model()
+    nodes = model.shapes(q, y, 3).nodes
+    for edge in (*model.motion.tree.edges, *model.motion.tree.loops):
+        base, follower = nodes.get(edge.base), nodes[edge.follower]
+        gap = follower.motion[:, :3].copy()
+        if base is not None:
+            arm = follower.place - base.place
+            gap -= base.motion[:, :3] + np.cross(base.motion[:, 3:], arm)
+        kind = case.file.mechanism.joints[edge.joint].type
+        # what a sliding joint leaves free is one direction, the same in every mode
+        allowed = 1 if kind in SLIDING else 0
+        assert np.linalg.matrix_rank(gap, tol=1e-9) <= allowed, edge.joint
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_lines_end_at_their_nodes_and_move_with_them(name: str) -> None:
+    case, q, y = posed(name)
+    model = case.model()
+    found = model.shapes(q, y, 2)
+    ends = [(link, pair) for link, pairs in zip(model.poses.links, model.poses.drawn, strict=True)
+            for pair in pairs]  # fmt: skip
+    assert len(ends) == len(found.strands)
+    for (link, pair), strand in zip(ends, found.strands, strict=True):
+        d = strand.places.shape[1]
+        for node, k in zip(pair, (0, -1), strict=True):
+            shape = found.nodes[link, node]
+            np.testing.assert_allclose(strand.places[k], shape.place[:d], atol=1e-12)
+            np.testing.assert_allclose(strand.motions[:, k], shape.motion[:, :d], atol=1e-12)
+
+
+def test_a_coarse_mesh_bends_between_its_nodes_as_a_fine_one_does() -> None:
+    case, q, y = posed("two_link")
+    fine = ea.Case(with_elements(case.file, {"upper_arm": 24, "forearm": 24}))
+    coarse, right = case.model().shapes(q, y, 2), fine.model().shapes(q, y, 2)
+    for strand, other in zip(coarse.strands, right.strands, strict=True):
+        np.testing.assert_allclose(strand.places, other.places, atol=1e-12)
+        size = np.abs(other.motions).max(axis=(1, 2))
+        off = np.abs(strand.motions - other.motions).max(axis=(1, 2)) / size
+        assert (off < [1e-3, 1e-2]).all()
+        every = strand.motions[:, :: 24 // (4 if strand.link == "upper_arm" else 3)]
+        at = np.linspace(0, 1, every.shape[1]), np.linspace(0, 1, 25)
+        chords = np.array([[np.interp(at[1], at[0], m[:, i]) for i in (0, 1)] for m in every])
+        straight = np.abs(chords.transpose(0, 2, 1) - other.motions).max(axis=(1, 2)) / size
+        assert (straight > 4.0 * off).all()
+
+
+def test_a_rigid_link_stays_straight_and_a_superelement_keeps_its_slopes() -> None:
+    case, q, y = posed("arm_6r")
+    found = case.model().shapes(q, y, 1)
+    (hand,) = (s for s in found.strands if s.link == "hand")
+    np.testing.assert_allclose(np.diff(hand.motions[0], n=2, axis=0), 0.0, atol=1e-12)
+    case, q, y = posed("superelement_arm")
+    found, exact = case.model().shapes(q, y, 1), posed("two_link")[0].model().shapes(q, y, 1)
+    whole, parts = found.strands[1].motions[0], exact.strands[1].motions[0]
+    slopes = [np.diff(shape, axis=0)[[0, -1]] * 24 for shape in (whole, parts)]
+    np.testing.assert_allclose(slopes[0], slopes[1], rtol=0.05, atol=0.02)
+
+
+def test_shapes_are_of_one_pose() -> None:
+    case, q, y = posed("two_link")
+    with pytest.raises(UsageError, match="one sample"):
+        case.model().shapes([q, q], y)
+    found = case.model().shapes(q, y, 2)
+    assert found.strands[0].motions.shape == (2, 25, 2)
+    np.testing.assert_allclose(found.frequencies, case.model().frequencies(q, y, 2)[0])
