@@ -13,6 +13,7 @@ from eigassign import values
 from eigassign.api import Case, load_case
 from eigassign.errors import CaseError, Problem, UsageError
 from eigassign.mechanism.superelement import weights
+from eigassign.study import drawing
 from eigassign.study.accuracy import truncation_lines
 from eigassign.study.assignment_study import target_frequencies
 from eigassign.study.plan import plan_expansion
@@ -61,20 +62,60 @@ def modes(
     or counts, and where there is no pose to take.
     """
     case = load_case(path)
+    at_q, at_y = _point(case, q, y)
+    with case.located():
+        model = case.model()
+        hz = model.frequencies(at_q, at_y, count)[0]
+    return _answer(case, at_q, at_y, hz)
+
+
+def draw_modes(
+    path: str | Path,
+    q: Sequence[float] | str | None = None,
+    y: Sequence[float] | str | None = None,
+    count: int = 3,
+    out: Path | None = None,
+    force: bool = False,
+) -> tuple[ModesAnswer, Path]:
+    """`modes`, and a folder with a figure of each: ``out``, or results/<case>_modes.
+
+    Raises what `modes` does, and StorageError where the folder may not be replaced.
+    """
+    from eigassign.keeping import RESULTS, keep
+
+    case = load_case(path)
+    at_q, at_y = _point(case, q, y)
+    target = RESULTS / f"{case.file.path.stem}_modes" if out is None else out
+    with keep(case.file, target, force) as folder:
+        with case.located():
+            pictures = drawing.draw_modes(case.file, case.model(), at_q, at_y, count)
+        from eigassign.output.mode_write import write_modes
+
+        write_modes(pictures, folder.hidden)
+        (folder.hidden / "case.yaml").write_text(case.file.resolved(), encoding="utf-8")
+    return _answer(case, at_q, at_y, np.array(pictures.frequencies_hz)), target
+
+
+def _point(
+    case: Case, q: Sequence[float] | str | None, y: Sequence[float] | str | None
+) -> tuple[Floats, Floats]:
+    """Where modes are asked for, in SI; raises UsageError."""
     q = values.coordinates(case.file, q) if isinstance(q, str) else q
     y = values.design(case.file, y) if isinstance(y, str) else y
     with case.located():
-        model = case.model()
         at_q = np.asarray(_default_q(case) if q is None else q, dtype=np.float64)
-        at_y = np.asarray(case.initial_design if y is None else y, dtype=np.float64)
-        hz = model.frequencies(at_q, at_y, count)[0]
-        every = tuple(range(1, count + 1))
-        lost = model.truncation_error(at_q, at_y, every)[0] if model.reduced else None
+    return at_q, np.asarray(case.initial_design if y is None else y, dtype=np.float64)
+
+
+def _answer(case: Case, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
+    model = case.model()
+    every = tuple(range(1, len(hz) + 1))
+    lost = model.truncation_error(q, y, every)[0] if model.reduced else None
     return ModesAnswer(
         model.n_rigid,
         [float(value) for value in hz],
-        _pairs(model.q_names, at_q),
-        _pairs(model.y_names, at_y),
+        _pairs(model.q_names, q),
+        _pairs(model.y_names, y),
         None if lost is None else [float(value) for value in lost],
     )
 

@@ -39,8 +39,9 @@ cache_dir = click.option(
 caching = several(
     click.option("--no-cache", is_flag=True, help="Neither read nor write the cache."), cache_dir
 )
+force = click.option("--force", is_flag=True, help="Move what is in the way aside, whatever it is.")
 running = several(
     click.option("--out", type=PATH, help="Run folder (default: results/<case>)."),
     caching,
-    click.option("--force", is_flag=True, help="Move what is in the way aside, whatever it is."),
+    force,
 )

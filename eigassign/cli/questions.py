@@ -13,7 +13,7 @@ from eigassign.cli.speech import print_json, telling
 from eigassign.errors import EigassignError
 
 if TYPE_CHECKING:
-    from eigassign.answers import CheckAnswer
+    from eigassign.answers import CheckAnswer, ModesAnswer
 
 
 @click.command()
@@ -67,30 +67,52 @@ def _described(name: str, answer: CheckAnswer) -> str:
 @click.option("--q", metavar="VALUES", help="Pose, as '1.817, 5.312' or '104 deg 304 deg'.")
 @click.option("--y", metavar="VALUES", help="Design, as '0.125 0.125' or '125 g, 0'.")
 @click.option("--count", type=click.IntRange(1), default=4, show_default=True, help="Modes.")
+@click.option("--draw", is_flag=True, help="Draw their shapes, in results/<case>_modes.")
+@click.option("--out", type=options.PATH, help="Draw their shapes, in this folder.")
+@options.force
 @options.json
 @options.common
-def modes(case: Path, q: str | None, y: str | None, count: int, as_json: bool, **how: Any) -> int:
-    """Exact natural frequencies of the elastic modes at one pose and design.
+def modes(
+    case: Path, q: str | None, y: str | None, count: int, as_json: bool, draw: bool, **how: Any
+) -> int:
+    """Exact natural frequencies of the elastic modes at one pose and design, and their shapes.
 
     Without --q at the case's expansion point, or where its trajectory starts; without --y for the
     design written in the file.
     """
-    from eigassign.answers import modes as solved
+    from eigassign import answers
     from eigassign.values import point
 
-    with telling(how):
-        answer = solved(case, *point(case, q, y), count)
-    hz = list(answer.frequencies_hz)
-    lost = answer.truncation_error
+    folder = None
+    with telling(how) as tell:
+        at = point(case, q, y)
+        if draw or how["out"] is not None:
+            answer, folder = answers.draw_modes(case, *at, count, how["out"], how["force"])
+        else:
+            answer = answers.modes(case, *at, count)
+        if as_json and folder is not None:
+            tell.stage(f"{folder} written")
     if as_json:
-        told = {"rigid_modes": answer.rigid_modes, "frequencies_hz": hz}
-        finite = {} if lost is None else {"truncation_error": lost}
-        print_json({**told, **finite})
+        told = {"rigid_modes": answer.rigid_modes, "frequencies_hz": answer.frequencies_hz}
+        lost = answer.truncation_error
+        print_json(told if lost is None else {**told, "truncation_error": lost})
     else:
-        from eigassign.output.console import print_modes
-
-        print_modes(hz, rigid_modes=answer.rigid_modes, truncation=lost)
+        _show_modes(answer, folder)
     return 0
+
+
+def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
+    from eigassign.output.console import print_modes
+
+    print_modes(
+        answer.frequencies_hz,
+        rigid_modes=answer.rigid_modes,
+        q=answer.q,
+        y=answer.y,
+        truncation=answer.truncation_error,
+    )
+    if folder is not None:
+        click.echo(f"{folder} written")
 
 
 @click.command()

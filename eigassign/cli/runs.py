@@ -134,7 +134,7 @@ def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
 @click.option("--budget", "budget_s", type=options.POSITIVE, help="Advise for so many seconds.")
 @click.option("--evaluations", type=options.POSITIVE, help="How many evaluations are wanted.")
 @click.option("--out", type=options.PATH, help="Folder (default: results/<case>_chart).")
-@click.option("--force", is_flag=True, help="Move what is in the way aside, whatever it is.")
+@options.force
 @options.json
 @options.common
 def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:

@@ -41,14 +41,14 @@ def joint_motion(joint: Any, values: Sequence[Scalar]) -> JointMotion:
             a = unit(getattr(joint, "axis", None), Z)
             return JointMotion(rotation(a, values[0]), none, _columns((0 * a, a)))
         case "prismatic":
-            a = unit(joint.axis, X)
+            a = sliding_axis(joint)
             return JointMotion(_eye(), _scaled(a, values[0]), _columns((a, 0 * a)))
         case "cylindrical":
-            a = unit(joint.axis, Z)
+            a = sliding_axis(joint)
             columns = _columns((a, 0 * a), (0 * a, a))
             return JointMotion(rotation(a, values[1]), _scaled(a, values[0]), columns)
         case "screw":
-            a, pitch = unit(joint.axis, Z), joint.lead / (2.0 * math.pi)
+            a, pitch = sliding_axis(joint), joint.lead / (2.0 * math.pi)
             travel = _scaled(a, values[0] * pitch)
             return JointMotion(rotation(a, values[0]), travel, _columns((pitch * a, a)))
         case "carriage":
@@ -90,6 +90,11 @@ def _spherical(values: Sequence[Scalar]) -> JointMotion:
     A[3:, 1] = multiply(z.T, Y)
     A[3:, 2] = Z
     return JointMotion(multiply(x, multiply(y, z)), np.zeros(3, dtype=object), A)
+
+
+def sliding_axis(joint: Any) -> Floats:
+    """Unit vector along which a prismatic, cylindrical or screw joint slides, in its own axes."""
+    return unit(joint.axis, X if joint.type == "prismatic" else Z)
 
 
 def unit(axis: Sequence[float] | None, default: Floats | None) -> Floats:

@@ -66,10 +66,11 @@ class Poses:
         scalars: list[Scalar] = []
         for link, pairs in zip(self.links, self.drawn, strict=True):
             for node in (name for pair in pairs for name in pair):
-                scalars += list(self._world(link, node))
+                scalars += list(self.world(link, node))
         return self._compile(scalars)
 
-    def _world(self, link: str, node: str) -> NDArray[np.object_]:
+    def world(self, link: str, node: str) -> NDArray[np.object_]:
+        """World position of a named node, as scalars (3,)."""
         from eigassign.mechanism.rotations import multiply
 
         p = self.motion.placement(link)
@@ -91,7 +92,7 @@ class Poses:
 
     def position(self, x: Floats, link: str, node: str) -> Floats:
         """World position (n, 3) of a named node, in m."""
-        return self._evaluate(self._compile(list(self._world(link, node))), x)
+        return self._evaluate(self._compile(list(self.world(link, node))), x)
 
     def jacobian(self, x: Floats, link: str, node: str) -> Floats:
         """∂position/∂q (n, 3, n_q)."""
@@ -139,7 +140,7 @@ def _lines(case: CaseFile, motion: Kinematics, link: str) -> tuple[tuple[str, st
 def design_dependence(poses: Poses, tip: str, oriented: bool = False) -> NDArray[np.bool_]:
     """Which design parameters a node's place, and its turning, depend on (n_y,): structural."""
     link, node = split(tip)
-    scalars = list(poses._world(link, node))
+    scalars = list(poses.world(link, node))
     if oriented:
         scalars += list(poses.motion.placement(link).world_rotation.ravel())
     table = poses._compile(scalars)

@@ -74,12 +74,13 @@ def ramp(fraction: float) -> tuple[float, float, float]:
     """Colour for a magnitude between 0 (dark) and 1 (light)."""
     at = min(max(fraction, 0.0), 1.0) * (len(_RAMP) - 1)
     low = min(int(at), len(_RAMP) - 2)
-    dark, light = (np.array(_rgb(_RAMP[low + i])) for i in (0, 1))
+    dark, light = (np.array(rgb(_RAMP[low + i])) for i in (0, 1))
     red, green, blue = dark + (at - low) * (light - dark)
     return float(red), float(green), float(blue)
 
 
-def _rgb(colour: str) -> tuple[float, float, float]:
+def rgb(colour: str) -> tuple[float, float, float]:
+    """``#rrggbb`` as fractions."""
     red, green, blue = (int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
     return red, green, blue
 
@@ -113,7 +114,7 @@ class Sheet:
         self.width, self.height = width, height
         self._renderer = renderer(round(width * DPI), round(height * DPI))
         self._pixels: NDArray[np.uint8] = np.asarray(self._renderer.buffer_rgba())
-        self.area(rectangle((0.0, 0.0, width, height)), _rgb("#ffffff"))
+        self.area(rectangle((0.0, 0.0, width, height)), rgb("#ffffff"))
 
     def line(self, points: Floats, stroke: Stroke, clip: Box | None = None) -> None:
         """A polyline through ``points`` (n, 2); NaN interrupts it; one point is a dot."""
@@ -127,7 +128,7 @@ class Sheet:
         if len(points) > 1:
             self._renderer.draw_path(context, Path(points * DPI), IdentityTransform())
         diameter = stroke.dot or (2.5 + 1.6 * stroke.width if len(points) == 1 else 0.0)
-        fill = _rgb("#ffffff" if stroke.dashes else stroke.colour)
+        fill = rgb("#ffffff" if stroke.dashes else stroke.colour)
         for point in points if diameter else ():
             self.dot((point[0], point[1]), diameter, fill, stroke.colour)
 
@@ -187,7 +188,7 @@ class Sheet:
         x, y = x * DPI, self._renderer.height - y * DPI
         if is_plain(text):
             ink = word(text, points, bold)
-            stamp(self._pixels, ink, round(x), round(y), _rgb(colour), upright=upright)
+            stamp(self._pixels, ink, round(x), round(y), rgb(colour), upright=upright)
         else:
             angle, style = 90.0 if upright else 0.0, font(points, bold)
             self._renderer.draw_text(self._context(colour), x, y, text, style, angle, False)

@@ -1,42 +1,46 @@
-"""The mechanism in a few of the poses that it passes through, as polylines to draw."""
+"""The mechanism as polylines and symbols: in poses that it passes through, and in its modes."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.mechanism.trajectories import Trajectories
-from eigassign.modal.model import Model
-from eigassign.study.findings import Poses
+from eigassign.mechanism.tree import Node
+from eigassign.modal.model import Model, ModeShapes
+from eigassign.study import marks
+from eigassign.study.pictures import ModePictures, Poses
+from eigassign.study.units import coordinate_units, design_units
 
 Floats = NDArray[np.float64]
 POSES = 7  # drawn, first and last sample included
+CROWDED = 12  # lines of a mechanism of which only three poses can be told apart
+AMPLITUDE = 0.1  # a mode's largest displacement, relative to the mechanism's extent
 
 
-def draw_poses(
-    file: CaseFile, model: Model, trajectory: Trajectories, y: Floats, count: int = POSES
-) -> Poses:
+def draw_poses(file: CaseFile, model: Model, trajectory: Trajectories, y: Floats) -> Poses:
     """Poses at samples evenly spread over the trajectory's length in q, at design y."""
-    chosen = spread_samples(trajectory.q, count)
-    lines = model.poses.lines(model.x(trajectory.q, y))[..., :2]  # (n_t, n_links, 2 ends, 2)
-    links = model.poses.links
-    return Poses(
-        time_s=_frozen(trajectory.time_s[chosen]),
-        of=tuple(trajectory.name_of(k) for k in chosen) if trajectory.several else (),
-        lines=tuple(tuple(_frozen(line) for line in lines[k]) for k in chosen),
-        link_names=links,
-        bodies=_bodies(file, links, lines[chosen]),
-        tip_path=_tip_path(trajectory, lines),
-    )
+    crowded = sum(map(len, model.poses.drawn)) > CROWDED
+    chosen = spread_samples(trajectory.q, 3 if crowded else POSES)
+    seams = [rows.stop for rows in trajectory.rows[:-1]]
+    if trajectory.tip is None:
+        tip = _farthest_travelled(file, model, model.x(trajectory.q, y), seams)
+    else:
+        tip = _frozen(np.insert(trajectory.tip, seams, np.nan, axis=0))
+    poses = _posed(file, model, model.x(trajectory.q[chosen], y), trajectory.time_s[chosen], tip)
+    if not trajectory.several:
+        return poses
+    return replace(poses, of=tuple(trajectory.name_of(k) for k in chosen))
 
 
 def rest_pose(file: CaseFile, model: Model, q: Floats, y: Floats) -> Poses:
     """The one pose of a case without a trajectory."""
-    lines = model.poses.lines(model.x(q, y))[..., :2]
-    drawn = (tuple(_frozen(line) for line in lines[0]),)
-    links = model.poses.links
-    return Poses(np.zeros(1), drawn, links, _bodies(file, links, lines), None)
+    return _posed(file, model, model.one(q, y), np.zeros(1), None)
 
 
 def spread_samples(q: Floats, count: int) -> list[int]:
@@ -49,23 +53,146 @@ def spread_samples(q: Floats, count: int) -> list[int]:
     return sorted({int(np.abs(travelled - distance).argmin()) for distance in wanted})
 
 
-def _tip_path(trajectory: Trajectories, lines: Floats) -> Floats:
-    """The path that the case gives, else the one of the last link's end; NaN between two."""
-    path = lines[:, -1, 1] if trajectory.tip is None else trajectory.tip
-    seams = [rows.stop for rows in trajectory.rows[:-1]]
-    return _frozen(np.insert(path, seams, np.nan, axis=0))
+def draw_modes(file: CaseFile, model: Model, q: Floats, y: Floats, count: int) -> ModePictures:
+    """The lowest elastic modes at one pose and design, rigid motion φ_q included.
+
+    Raises what `Model.shapes` raises.
+    """
+    shapes, x = model.shapes(q, y, count), model.one(q, y)
+    n_q = len(model.q_names)
+    scales = AMPLITUDE * _extent(shapes) / _largest(shapes) * _phase(shapes)
+    coordinates = zip(model.q_names, x[0, :n_q], coordinate_units(file), strict=True)
+    design = zip(model.y_names, x[0, n_q:], design_units(file), strict=True)
+    return ModePictures(
+        title=file.title,
+        rigid_modes=model.n_rigid,
+        frequencies_hz=tuple(float(hz) for hz in shapes.frequencies),
+        q=tuple((name, float(value), unit) for name, value, unit in coordinates),
+        y=tuple((name, float(value), unit) for name, value, unit in design),
+        amplitude=AMPLITUDE,
+        rest=_displaced(file, model, x, shapes, np.zeros((1, count))),
+        deformed=_displaced(file, model, x, shapes, np.diag(scales)),
+    )
 
 
-def _bodies(
-    file: CaseFile, links: tuple[str, ...], lines: Floats
-) -> tuple[tuple[str, Floats], ...]:
-    """Name and position per pose (n_poses, 2) of every body."""
-    placed = []
-    for name, body in file.mechanism.bodies.items():
-        link, _, node = body.at.partition(".")
-        end = 1 if node == "end" else 0
-        placed.append((name, _frozen(lines[:, links.index(link), end])))
-    return tuple(placed)
+def _extent(shapes: ModeShapes) -> float:
+    """Diagonal of the box that holds the rigid links, m."""
+    return float(np.linalg.norm(np.ptp(np.concatenate([s.places for s in shapes.strands]), axis=0)))
+
+
+def _largest(shapes: ModeShapes) -> Floats:
+    """The largest displacement in each mode, (count,)."""
+    each = [np.linalg.norm(strand.motions, axis=2).max(axis=1) for strand in shapes.strands]
+    return np.asarray(np.max(each, axis=0))
+
+
+def _phase(shapes: ModeShapes) -> Floats:
+    """±1 (count,): a phase that round-off does not decide where two nodes move equally far.
+
+    The sign of Σ_l v̄_l · (1, 0.7, 0.4) / l over the lines l = 1, 2, … with mean motion v̄_l.
+    """
+    leaning = np.array([1.0, 0.7, 0.4])
+    total = np.sum(
+        [
+            (s.motions.mean(axis=1) @ leaning[: s.motions.shape[2]]) / k
+            for k, s in enumerate(shapes.strands, start=1)
+        ],
+        axis=0,
+    )
+    return np.where(total < 0.0, -1.0, 1.0)
+
+
+def _displaced(
+    file: CaseFile, model: Model, x: Floats, shapes: ModeShapes, factors: Floats
+) -> Poses:
+    """Poses moved by ``factors`` (n_poses, count) of the modes."""
+    d, n = _dimension(file), len(factors)
+
+    def at(node: Node) -> Floats:
+        shape = shapes.nodes[node]
+        return _frozen((shape.place + factors @ shape.motion[:, :3])[:, :d])
+
+    moved = [s.places + np.tensordot(factors, s.motions, axes=1) for s in shapes.strands]
+    axes = model.poses.values(x, marks.joint_axes(file, model.poses))
+    y = x[0, len(model.q_names) :]
+    return Poses(
+        time_s=np.zeros(n),
+        lines=tuple(tuple(_frozen(line[k]) for line in moved) for k in range(n)),
+        **_marks(file, model, y, at, [np.repeat(axis[:, :d], n, axis=0) for axis in axes]),
+    )
+
+
+def _posed(
+    file: CaseFile, model: Model, x: Floats, time_s: Floats, tip_path: Floats | None
+) -> Poses:
+    """Undeformed poses at samples x, all of one design."""
+    poses, d = model.poses, _dimension(file)
+    nodes = _named_nodes(file, model)
+    axes = marks.joint_axes(file, poses)
+    values = poses.values(x, [*(poses.world(*node) for node in nodes), *axes])
+    place = {node: _frozen(value[:, :d]) for node, value in zip(nodes, values, strict=False)}
+    lines = [
+        np.stack([place[link, start], place[link, end]], axis=1)
+        for link, pairs in zip(poses.links, poses.drawn, strict=True)
+        for start, end in pairs
+    ]
+    directions = [_frozen(value[:, :d]) for value in values[len(nodes) :]]
+    return Poses(
+        time_s=_frozen(time_s),
+        lines=tuple(tuple(_frozen(line[k]) for line in lines) for k in range(len(x))),
+        tip_path=tip_path,
+        **_marks(file, model, x[0, len(model.q_names) :], place.__getitem__, directions),
+    )
+
+
+def _marks(
+    file: CaseFile, model: Model, y: Floats, at: marks.At, axes: Sequence[Floats]
+) -> dict[str, Any]:
+    """What poses have besides their lines."""
+    paths = [p.parameter for p in file.design.parameters.values()]
+    design = dict(zip(paths, y.tolist(), strict=True))
+    poses = model.poses
+    return {
+        "link_names": poses.links,
+        "line_links": tuple(
+            link for link, pairs in zip(poses.links, poses.drawn, strict=True) for _ in pairs
+        ),
+        "joints": marks.joints(file, poses.motion.tree, at, axes),
+        "bodies": marks.bodies(file, lambda path, value: float(design.get(path, value)), at),
+        "springs": marks.springs(file, at),
+        "sizes": marks.sizes(file, poses.links, poses.drawn),
+    }
+
+
+def _named_nodes(file: CaseFile, model: Model) -> list[Node]:
+    """Every node that something is drawn at, once."""
+    poses = model.poses
+    drawn = zip(poses.links, poses.drawn, strict=True)
+    nodes = [(link, name) for link, pairs in drawn for pair in pairs for name in pair]
+
+    def ask(node: Node) -> Floats:
+        nodes.append(node)
+        return np.zeros(0)
+
+    axes = [np.zeros(0)] * len(marks.edges(poses.motion.tree))
+    _marks(file, model, np.zeros(len(model.y_names)), ask, axes)
+    return list(dict.fromkeys(nodes))
+
+
+def _farthest_travelled(file: CaseFile, model: Model, x: Floats, seams: Sequence[int]) -> Floats:
+    """The path of the node that travels farthest, where the case names no tip.
+
+    (n, d), NaN between the end of a trajectory and the next, which begins at a row of ``seams``.
+    """
+    nodes = [model.poses.world(*node) for node in _named_nodes(file, model)]
+    paths = np.insert(np.stack(model.poses.values(x, nodes)), list(seams), np.nan, axis=1)
+    way = np.nansum(np.linalg.norm(np.diff(paths, axis=1), axis=2), axis=1)
+    farthest = int(np.argmax(way >= way.max() * (1.0 - 1e-9)))  # the first of those that coincide
+    return _frozen(paths[farthest, :, : _dimension(file)])
+
+
+def _dimension(file: CaseFile) -> int:
+    return 2 if file.mechanism.space == "planar" else 3
 
 
 def _frozen(array: Floats) -> Floats:

@@ -12,19 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.study.pictures import Poses
+
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Poses:
-    """The mechanism drawn: ``lines[pose][link]`` is a polyline (n_points, 2 or 3) in m."""
-
-    time_s: Floats
-    lines: tuple[tuple[Floats, ...], ...]
-    link_names: tuple[str, ...]
-    bodies: tuple[tuple[str, Floats], ...]  # name, position per pose (n_poses, 2 or 3)
-    tip_path: Floats | None  # (n, 2 or 3), NaN between the end of a trajectory and the next
-    of: tuple[str, ...] = ()  # of several trajectories the one that each pose belongs to
 
 
 @dataclass(frozen=True)

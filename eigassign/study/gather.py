@@ -18,11 +18,11 @@ from eigassign.study.findings import (
     Findings,
     ModeStudy,
     OtherModes,
-    Poses,
     TargetStudy,
     TrajectoryRow,
 )
 from eigassign.study.motion_study import study_motion
+from eigassign.study.pictures import Poses
 from eigassign.study.scene import Scene
 from eigassign.study.units import coordinate_units
 

@@ -70,6 +70,45 @@ def test_modes_without_q_and_y_is_at_the_expansion_point_and_the_design_of_the_f
     assert found["frequencies_hz"] == pytest.approx(REFERENCE["0 0"], rel=1e-6)
 
 
+def test_modes_drawn_leave_a_folder_and_print_the_same(capsys: Captured) -> None:
+    plain = json.loads(answer(capsys, "modes", TWO_LINK, "--count", 2, "--json"))
+    assert main(["modes", str(TWO_LINK), "--count", "2", "--json", "--draw"]) == 0
+    out, err = capsys.readouterr()
+    assert err == "results/two_link_modes written\n"
+    assert list(json.loads(out)) == list(plain)
+    hz = json.loads(out)["frequencies_hz"]
+    assert hz == pytest.approx(plain["frequencies_hz"], rel=1e-12)
+    folder = Path("results/two_link_modes")
+    figures = sorted(path.name for path in (folder / "figures").iterdir())
+    assert figures == ["mode_1.png", "mode_2.png"]
+    assert json.loads((folder / "modes.json").read_text())["frequencies_hz"] == hz
+    text = answer(capsys, "modes", TWO_LINK, "--count", 1, "--out", "shapes")
+    assert text.endswith("shapes written\n")
+    assert Path("shapes/figures/mode_1.png").exists()
+
+
+def test_modes_are_not_drawn_over_something_else(capsys: Captured) -> None:
+    Path("mine").mkdir()
+    Path("mine/thesis.txt").touch()
+    assert main(["modes", str(TWO_LINK), "--out", "mine"]) == 3
+    assert "mine is not a run folder" in capsys.readouterr().err.replace(str(Path.cwd()) + "/", "")
+    assert main(["modes", str(TWO_LINK), "--out", "mine", "--force"]) == 0
+    assert Path("mine.1/thesis.txt").exists()
+
+
+def test_modes_say_where_they_were_solved(capsys: Captured) -> None:
+    out = answer(capsys, "modes", TWO_LINK, "--q", "1.8, 5.3", "--y", "125 g, 0")
+    assert out.startswith("Modes at q1 = 1.8, q2 = 5.3, m1 = 0.125, m2 = 0\n")
+
+
+@pytest.mark.parametrize("place", ["-0.1", "0", "1.6", "2.5 m"])
+def test_a_carriage_off_its_beam_is_told_by_name(place: str, capsys: Captured) -> None:
+    gantry = TWO_LINK.with_name("gantry.yaml")
+    assert main(["modes", str(gantry), "--q", place]) == 2
+    says = f"rail stands {float(place.split()[0]):g} m from the start of girder, which is 1.6 m"
+    assert says in capsys.readouterr().err
+
+
 def test_modes_as_text_lists_the_modes_from_one(capsys: Captured) -> None:
     out = answer(capsys, "modes", TWO_LINK, "--count", 2)
     assert re.search(r"^ *1 +202\.21955", out, re.MULTILINE)

@@ -16,12 +16,12 @@ from eigassign.study.findings import (
     Findings,
     ModeStudy,
     OtherModes,
-    Poses,
     SolverRow,
     TargetAlong,
     TargetStudy,
     TrajectoryRow,
 )
+from eigassign.study.pictures import BodyMark, JointMark, Poses, SpringMark
 
 Floats = NDArray[np.float64]
 
@@ -92,16 +92,37 @@ def _joint_motion(time: Floats, n_q: int) -> Floats:
 
 def _poses(time: Floats, n_links: int, scale: float, prefix: str, spatial: bool) -> Poses:
     if time.size == 0 or n_links == 0:
-        return Poses(np.zeros(0), (), (), (), None)
+        return Poses(np.zeros(0), (), ())
     chosen = np.unique(np.linspace(0, time.size - 1, 6).round().astype(int))
     every = [_chain(_joint_motion(time[[k]], n_links)[0], scale, spatial) for k in range(time.size)]
     lines = tuple(every[k] for k in chosen)
-    bodies = tuple(
-        (f"{prefix}{name}", np.array([pose[link][-1] for pose in lines]))
-        for name, link in (("elbow_mass", 0), ("tool_mass", -1))
-    )
+    ends = [
+        np.array([pose[link][end] for pose in lines]) for link, end in ((0, 0), (0, -1), (-1, -1))
+    ]
+    sideways = np.zeros_like(ends[0])
+    sideways[:, 0] = 1.0
     names = tuple(f"{prefix}link_{i + 1}" for i in range(n_links))
-    return Poses(time[chosen], lines, names, bodies, np.array([pose[-1][-1] for pose in every]))
+    return Poses(
+        time_s=time[chosen],
+        lines=lines,
+        link_names=names,
+        line_links=names,
+        bodies=tuple(
+            BodyMark(f"{prefix}{name}", mass, at)
+            for name, mass, at in (("elbow_mass", 0.0, ends[1]), ("tool_mass", 0.25, ends[2]))
+        ),
+        tip_path=np.array([pose[-1][-1] for pose in every]),
+        joints=(
+            JointMark("shoulder", "turning", True, True, ends[0], sideways),
+            JointMark("elbow", "sliding", False, False, ends[1], sideways),
+            JointMark("wrist", "fixed", False, False, ends[2], sideways),
+        ),
+        springs=(
+            SpringMark("gear", True, True, ends[0], ends[0]),
+            SpringMark("stay", False, False, ends[0], ends[2]),
+        ),
+        sizes=((2e-3, 1e-3),) * n_links,
+    )
 
 
 def _chain(angles: Floats, scale: float, spatial: bool) -> tuple[Floats, ...]:

@@ -8,7 +8,6 @@ from scenes import HEAD, SHIPPED, changed, scene_of
 
 from eigassign.case import parse
 from eigassign.study.approximation import COARSE, compare, grid_over
-from eigassign.study.drawing import draw_poses, spread_samples
 from eigassign.study.mode_studies import q_grid, study_modes
 from eigassign.study.units import PROPERTY_UNITS, coordinate_units, design_units
 
@@ -74,35 +73,6 @@ def test_the_expansion_point_is_on_the_map_even_if_the_path_misses_it(tmp_path: 
 def test_without_trajectory_and_design_there_is_nothing_to_map(tmp_path: Path) -> None:
     (study,) = study_modes(scene_of(tmp_path, HEAD + "expansion: {q: [1.8, 5.2]}\n"))
     assert (study.over_time, study.over_design, study.over_q) == (None, None, None)
-
-
-def test_poses_are_the_rigid_links_where_kinematics_puts_them(tmp_path: Path) -> None:
-    scene = scene_of(tmp_path, SHIPPED)
-    poses = draw_poses(scene.file, scene.model, scene.path, scene.initial)
-    k = int(np.flatnonzero(scene.path.time_s == poses.time_s[3])[0])
-    q1, q2 = scene.path.q[k]
-    elbow = 0.6 * np.array([np.cos(q1), np.sin(q1)])
-    tip = elbow + 0.45 * np.array([np.cos(q2), np.sin(q2)])
-    np.testing.assert_allclose(poses.lines[3][0], [[0, 0], elbow], atol=1e-12)
-    np.testing.assert_allclose(poses.lines[3][1], [elbow, tip], atol=1e-12)
-    bodies = dict(poses.bodies)
-    np.testing.assert_allclose(bodies["elbow_mass"][3], elbow, atol=1e-12)
-    np.testing.assert_allclose(bodies["tool_mass"][3], tip, atol=1e-12)
-    assert poses.tip_path is not None
-    np.testing.assert_allclose(poses.tip_path[k], tip, atol=1e-9)
-
-
-def test_a_body_at_the_start_of_a_link_is_drawn_there(tmp_path: Path) -> None:
-    scene = scene_of(tmp_path, changed(("at: forearm.end", "at: forearm.start")))
-    poses = draw_poses(scene.file, scene.model, scene.path, scene.initial)
-    bodies = dict(poses.bodies)
-    np.testing.assert_allclose(bodies["tool_mass"], bodies["elbow_mass"], atol=1e-12)
-
-
-def test_poses_are_spread_over_the_way_and_include_both_ends() -> None:
-    q = np.array([[0.0], [0.0], [0.01], [0.5], [0.99], [1.0], [1.0]])
-    assert spread_samples(q, 3) == [0, 3, 5]
-    assert spread_samples(np.zeros((4, 2)), 3) == [0]
 
 
 def test_every_property_that_can_be_designed_has_a_unit(tmp_path: Path) -> None:

@@ -1,0 +1,31 @@
+"""Draw the first mode of every shipped case for the README: ``python cases/gallery/draw.py``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+import eigassign as ea
+from eigassign.output import ink
+from eigassign.output.lettering import DPI
+from eigassign.output.mode_figures import thumbnail
+from eigassign.output.png import encode
+from eigassign.study.drawing import draw_modes
+
+HERE = Path(__file__).parent
+
+
+def main() -> None:
+    """One PNG a case, beside this file."""
+    for path in sorted(HERE.parent.glob("*.yaml")):
+        case = ea.load_case(path)
+        q = np.array(case.file.expansion.q, dtype=float)
+        pictures = draw_modes(case.file, case.model(), q, case.initial_design, 1)
+        with ink.settings():
+            sheet = thumbnail(pictures)
+        (HERE / f"{path.stem}.png").write_bytes(encode(sheet.pixels(), DPI))
+
+
+if __name__ == "__main__":
+    main()
