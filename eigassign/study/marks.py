@@ -25,8 +25,8 @@ _ALONG = np.array([1.0, 0.0, 0.0])
 
 
 def edges(tree: Tree) -> tuple[Edge, ...]:
-    """All joints, those that close loops last."""
-    return (*tree.edges, *tree.loops)
+    """All joints as the file has them, those that close loops last."""
+    return tuple(edge.written for edge in (*tree.edges, *tree.loops))
 
 
 def joint_axes(file: CaseFile, poses: LinkPoses) -> list[NDArray[np.object_]]:

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scenes import SHIPPED, changed, scene_of
+from scenes import HEAD, SHIPPED, changed, scene_of
 
 import eigassign as ea
+from eigassign.case import parse
 from eigassign.mechanism.trajectory import Trajectory
 from eigassign.study.drawing import AMPLITUDE, draw_modes, draw_poses, rest_pose, spread_samples
 from eigassign.study.pictures import ModePictures
@@ -107,6 +108,19 @@ def test_what_slides_is_drawn_along_its_axis_in_the_world() -> None:
     )
     along = barrel[-1] - barrel[0]
     np.testing.assert_allclose(cylinder.axes[0], along / np.linalg.norm(along), atol=1e-12)
+
+
+def test_a_joint_is_drawn_at_its_follower_as_the_file_has_it() -> None:
+    elbow = "{type: revolute, base: upper_arm.end, follower: forearm.start}"
+    turned = "{type: prismatic, base: forearm.start, follower: upper_arm.end}"
+    text = changed((elbow, turned), (", angle: absolute", ""), text=HEAD)
+    case = ea.Case(parse(text.encode(), "case.yaml"))
+    model, q = case.model(), np.array([0.3, 0.1])
+    assert model.motion.tree.edges[1].turned
+    (mark,) = (j for j in rest_pose(case.file, model, q, np.zeros(0)).joints if j.name == "elbow")
+    place = model.poses.position(model.x(q, []), "upper_arm", "end")
+    np.testing.assert_allclose(mark.places, place[:, :2], atol=1e-12)
+    np.testing.assert_allclose(mark.axes, [[np.cos(0.3), np.sin(0.3)]], atol=1e-12)
 
 
 def test_masses_and_thicknesses_are_those_of_the_design() -> None:
