@@ -10,7 +10,6 @@ from scenes import HEAD, SHIPPED, changed, scene_of
 
 import eigassign as ea
 from eigassign.case import parse
-from eigassign.mechanism.trajectory import Trajectory
 from eigassign.study.drawing import AMPLITUDE, draw_modes, draw_poses, rest_pose, spread_samples
 from eigassign.study.pictures import ModePictures
 
@@ -140,8 +139,22 @@ def test_masses_and_thicknesses_are_those_of_the_design() -> None:
 def test_without_a_tip_the_path_is_that_of_the_point_that_travels_farthest() -> None:
     case = ea.load_case(CASES / "luffing_boom.yaml")
     path = case.trajectory
-    assert isinstance(path, Trajectory)
     poses = draw_poses(case.file, case.model(), path, case.initial_design)
     x = case.model().x(path.q, case.initial_design)
     head = case.model().poses.position(x, "boom", "head")
     np.testing.assert_allclose(poses.tip_path, head[:, :2], atol=1e-12)
+
+
+def test_the_path_without_a_tip_stops_between_two_trajectories() -> None:
+    case = ea.load_case(CASES / "five_bar.yaml")
+    path = case.trajectory
+    assert path.several
+    assert path.tip is None
+    poses = draw_poses(case.file, case.model(), path, case.initial_design)
+    assert poses.tip_path is not None
+    gaps = np.flatnonzero(np.isnan(poses.tip_path).any(axis=1))
+    assert gaps.tolist() == [path.rows[0].stop]
+    x = case.model().x(path.q, case.initial_design)
+    tool = case.model().poses.position(x, "left_arm", "end")[:, :2]
+    drawn = np.delete(poses.tip_path, gaps, axis=0)
+    np.testing.assert_allclose(drawn, tool, atol=1e-12)
