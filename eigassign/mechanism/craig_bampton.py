@@ -223,7 +223,7 @@ def _projected(
         [Term(t.coefficient, project(t.matrix, T)) for t in mesh.stiffness],
         [Term(t.coefficient, project(t.matrix, T)) for t in mesh.mass],
         [coordinates(t) for t in mesh.rigid],
-        reduction,
+        reduction=reduction,
     )
 
 

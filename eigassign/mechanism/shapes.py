@@ -1,11 +1,8 @@
 """How a mechanism moves in given vectors [u; q̇]: its named nodes, and its beams between nodes.
 
-The local motion of a node at X of link l is its part of v = B [u; q̇] of eq. (1):
-
-    (v, ω) = (v_e, ω_e) + (t_v + t_ω × X, t_ω),   t = T_l q̇,
-
-(v_e, ω_e) being the elastic motion that its own unknowns or the joint that carries it give it. It
-is turned into world axes for drawing. Between nodes a beam takes the shapes of its elements.
+The local motion of a link's nodes is v = B [u; q̇] of eq. (1), of a reduced link that of all the
+nodes it stands for. It is turned into world axes for drawing. Between nodes a beam takes the shapes
+of its elements.
 """
 
 from __future__ import annotations
@@ -21,6 +18,7 @@ from eigassign.mechanism.beam import bending_shapes
 from eigassign.mechanism.build import local_links
 from eigassign.mechanism.frames import axes
 from eigassign.mechanism.kinematics import Placement
+from eigassign.mechanism.local_motion import motion_matrix, motion_scalars
 from eigassign.mechanism.mesh import LinkMesh, Strand
 from eigassign.mechanism.poses import Poses
 from eigassign.mechanism.rotations import Objects
@@ -73,7 +71,7 @@ def shapes(poses: Poses, x: Floats, phi: Floats) -> Shapes:
     nodes: dict[tuple[str, str], NodeShape] = {}
     d = 2 if case.mechanism.space == "planar" else 3
     for part in parts:
-        motion = _LinkMotion(part, [next(values)[0] for _ in part.arrays], phi)
+        motion = _LinkMotion(part, [next(values)[0] for _ in part.arrays], phi, numbering.count)
         nodes |= motion.nodes()
         strands += motion.strands(d)
     return Shapes(tuple(strands), nodes)
@@ -85,29 +83,24 @@ class _Symbols:
 
     name: str
     local: LocalLink
-    mesh: LinkMesh
+    mesh: LinkMesh  # with all its nodes
     strands: tuple[Strand, ...]
     arrays: tuple[Objects, ...]
 
 
 def _symbols(local: LocalLink, placement: Placement, mesh: LinkMesh, poses: Poses) -> _Symbols:
+    mesh = mesh if mesh.reduction is None else mesh.reduction.mesh
     strands = tuple(mesh.strands) or _spokes(placement.link, mesh, poses)
-    carried = [carry for masters in local.carried.values() for _, carry in masters]
     arrays = [
         placement.world_rotation,
         placement.world_origin,
-        placement.twist,
-        _objects(carried, 1),
         np.array(list(mesh.positions.values()), dtype=object).reshape(-1, 3),
+        *(np.array(group, dtype=object) for group in motion_scalars(local)),
     ]
     for strand in strands:
-        arrays += [np.array(list(strand.points), dtype=object), _objects(strand.shear, 2)]
+        shear = np.array(strand.shear, dtype=object).reshape(-1, 2)
+        arrays += [np.array(list(strand.points), dtype=object), shear]
     return _Symbols(placement.link, local, mesh, strands, tuple(arrays))
-
-
-def _objects(values: Sequence[object], ndim: int) -> Objects:
-    flat = np.array(values, dtype=object)
-    return flat.reshape(-1) if ndim == 1 else flat.reshape(-1, 2)
 
 
 def _spokes(link: str, mesh: LinkMesh, poses: Poses) -> tuple[Strand, ...]:
@@ -133,23 +126,22 @@ def _slots(mesh: LinkMesh, node: str) -> Ints:
 
 
 class _LinkMotion:
-    """One link in numbers: where it is, and how it moves in its own axes."""
+    """One link in numbers: where it is, and how its nodes move in its own axes."""
 
-    def __init__(self, part: _Symbols, values: Sequence[Floats], phi: Floats) -> None:
+    def __init__(self, part: _Symbols, values: Sequence[Floats], phi: Floats, n_u: int) -> None:
         self.part = part
-        self.rotation, self.origin, twist, carried, self.positions, *strands = values
+        self.rotation, self.origin, self.positions, carries, twist, rigid, *strands = values
         self.lines = list(zip(part.strands, strands[::2], strands[1::2], strict=True))
-        self.rigid = twist @ phi[len(phi) - twist.shape[1] :]  # (6, count)
-        self.elastic = _elastic(part.local, carried, phi)
+        v = motion_matrix(part.local, carries, twist, rigid, n_u, len(phi)) @ phi
+        reduction = part.local.reduction
+        self.local = v if reduction is None else reduction.basis @ v  # (n_local, count)
 
     def at(self, slots: Ints, X: Floats) -> Floats:
         """(6, count): motion of the node with these slots at X, in the link's axes."""
-        motion = np.zeros((6, self.elastic.shape[1]))
-        motion[slots >= 0] = self.elastic[slots[slots >= 0]]
-        if "@origin" in self.part.mesh.nodes:
-            motion[:3] += _cross(motion[3:], X)
-        motion[:3] += self.rigid[:3] + _cross(self.rigid[3:], X)
-        motion[3:] += self.rigid[3:]
+        motion = np.zeros((6, self.local.shape[1]))
+        motion[slots >= 0] = self.local[slots[slots >= 0]]
+        if "@origin" in self.part.mesh.nodes:  # of a rigid link, v + ω × X
+            motion[:3] += np.cross(motion[3:].T, X).T
         return motion
 
     def nodes(self) -> dict[tuple[str, str], NodeShape]:
@@ -177,23 +169,6 @@ class _LinkMotion:
                 )
             )
         return found
-
-
-def _cross(omega: Floats, X: Floats) -> Floats:
-    """ω × X for columns ω (3, count)."""
-    return np.cross(omega.T, X).T
-
-
-def _elastic(local: LocalLink, carried: Floats, phi: Floats) -> Floats:
-    """Elastic motion (n_local, count): own unknowns, and what carried nodes get from others."""
-    motion = np.zeros((len(local.own), phi.shape[1]))
-    own = local.own >= 0
-    motion[own] = phi[local.own[own]]
-    factors = iter(carried)
-    for slot, masters in local.carried.items():
-        for unknown, _ in masters:
-            motion[slot] += next(factors) * phi[unknown]
-    return motion
 
 
 def along(X: Floats, motion: Floats, shear: Floats, turn: Floats | None) -> tuple[Floats, Floats]:
