@@ -186,7 +186,7 @@ def _compile(
     return Pencil(
         n_dof=n_dof,
         n_u=n_u,
-        rigid=_rigid(case, motion, n_u, entries[0]),
+        rigid=n_u + np.array(motion.rigid, dtype=np.intp),
         rows=rows,
         columns=columns,
         stiffness=weights[0],
@@ -196,13 +196,3 @@ def _compile(
         shift=np.concatenate([motion.offset, np.zeros(n_y)]),
         n_q=n_q,
     )
-
-
-def _rigid(
-    case: CaseFile, motion: Kinematics, n_u: int, stiffness: tuple[Ints, Ints, Ints, object]
-) -> Ints:
-    """Columns of q̇ without stiffness: the rigid-body modes. Held and sprung ones are elastic."""
-    drives = [c.drive for c in case.coordinates.values()]
-    free = [n_u + k for k, i in enumerate(motion.columns) if drives[i] == "free"]
-    sprung = set(stiffness[0].tolist()) if getattr(case.mechanism, "springs", None) else set()
-    return np.array([k for k in free if k not in sprung], dtype=np.intp)

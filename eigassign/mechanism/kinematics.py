@@ -84,6 +84,7 @@ class Kinematics:
     tree: Tree
     coordinates: Coordinates
     passive: tuple[Scalar, ...] = ()  # the loops' passive freedoms as functions of (q, y)
+    rigid: tuple[int, ...] = ()  # columns that nothing resists
 
     @property
     def columns(self) -> tuple[int, ...]:
@@ -108,7 +109,14 @@ class Kinematics:
 def kinematics(case: CaseFile, parameters: Parameters) -> Kinematics:
     """ERLS motion of a case; raises MechanismError for what cannot be placed, moved or closed."""
     tree = build_tree(case)
-    return replayed(case, parameters, tree, coordinates(case, tree))
+    motion = replayed(case, parameters, tree, coordinates(case, tree))
+    drives = [c.drive for c in case.coordinates.values()]
+    free = tuple(k for k, i in enumerate(motion.columns) if drives[i] == "free")
+    if free and getattr(case.mechanism, "springs", None):
+        from eigassign.mechanism.rigid_motions import separated
+
+        return separated(case, parameters, motion, free)
+    return replace(motion, rigid=free)
 
 
 def replayed(case: CaseFile, parameters: Parameters, tree: Tree, coords: Coordinates) -> Kinematics:

@@ -8,6 +8,7 @@ with the elastic *and* the rigid motion of its link.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -18,11 +19,11 @@ from eigassign.mechanism.geometry import node_position
 from eigassign.mechanism.kinematics import Kinematics
 from eigassign.mechanism.links import mounted
 from eigassign.mechanism.mesh import DOFS
-from eigassign.mechanism.nodes import NodeMotions, Rows, apply, combined
+from eigassign.mechanism.nodes import NodeMotions, Row, Rows, apply, combined
 from eigassign.mechanism.parameters import Parameters
 from eigassign.mechanism.rotations import Objects, carried, cross, multiply, present
 from eigassign.mechanism.tree import GROUND, Node, split
-from eigassign.series.expression import Scalar
+from eigassign.series.expression import Scalar, is_constant
 
 
 def add_springs(
@@ -32,16 +33,38 @@ def add_springs(
     motion: Kinematics,
     nodes: NodeMotions,
 ) -> None:
-    """Add every spring of the case to K."""
+    """Add every spring of the case to K; rigid motions are those that no spring resists."""
+    rigid = {nodes.count + k for k in motion.rigid}
+    for k, here, there in spring_ends(case, parameters, motion, nodes.rows, nodes.count):
+        full = combined(there, here, -1.0)
+        row = {i: value for i, value in full.items() if i not in rigid and resists(k)}
+        for i, left in row.items():
+            for j, right in row.items():
+                target.add_small(i, j, k * left * right)
+
+
+def resists(stiffness: Scalar) -> bool:
+    """Whether it is more than a plain zero."""
+    return not is_constant(stiffness) or stiffness != 0.0
+
+
+def spring_ends(
+    case: CaseFile,
+    parameters: Parameters,
+    motion: Kinematics,
+    elastic: Callable[[Node], Rows],
+    first: int,
+) -> Iterator[tuple[Scalar, Row, Row]]:
+    """Stiffness and motions of both ends, six rows for every spring, as `_ends` has them.
+
+    ``elastic`` gives a node's rows over u; the q̇ are numbered from ``first`` on.
+    """
     springs: Any = case.mechanism.springs
     for name, spring in springs.items():
         ends = [GROUND if end == "ground" else split(end) for end in spring.between]
-        rows = _relative(case, parameters, motion, nodes, spring, ends)
+        here, there = _ends(case, parameters, motion, elastic, first, spring, ends)
         values = _stiffness(parameters, f"springs.{name}", spring, case.mechanism.space)
-        for row, k in zip(rows, values, strict=True):
-            for i, left in row.items():
-                for j, right in row.items():
-                    target.add_small(i, j, k * left * right)
+        yield from zip(values, here, there, strict=True)
 
 
 def _stiffness(parameters: Parameters, path: str, spring: Any, space: str) -> list[Scalar]:
@@ -60,27 +83,28 @@ def _stiffness(parameters: Parameters, path: str, spring: Any, space: str) -> li
     return out
 
 
-def _relative(
+def _ends(
     case: CaseFile,
     parameters: Parameters,
     motion: Kinematics,
-    nodes: NodeMotions,
+    elastic: Callable[[Node], Rows],
+    first_rate: int,
     spring: Any,
     ends: list[Node],
-) -> Rows:
-    """Motion of the second end minus the first, in the spring's axes, over [u; q̇]."""
+) -> tuple[Rows, Rows]:
+    """Motion of both ends in the spring's axes over [u; q̇], the first carried to the second."""
     link = ends[0][0]
     turn = mounted(getattr(spring, "orientation", None), float(getattr(spring, "angle", 0) or 0))
     R = multiply(motion.placement(link).world_rotation, turn.astype(object))
-    first, second = (_world_rows(case, parameters, motion, nodes, end) for end in ends)
+    first, second = (
+        _world_rows(case, parameters, motion, elastic, first_rate, end) for end in ends
+    )
     none = np.zeros(3, dtype=object)
     if ends[1] != GROUND:
         here, there = (_world_position(case, parameters, motion, end) for end in ends)
         first = apply(carried(np.eye(3).astype(object), there - here), first)
     seen = carried(R, none)
-    return [
-        combined(b, a, -1.0) for a, b in zip(apply(seen, first), apply(seen, second), strict=True)
-    ]
+    return apply(seen, first), apply(seen, second)
 
 
 def _world_position(
@@ -92,7 +116,12 @@ def _world_position(
 
 
 def _world_rows(
-    case: CaseFile, parameters: Parameters, motion: Kinematics, nodes: NodeMotions, end: Node
+    case: CaseFile,
+    parameters: Parameters,
+    motion: Kinematics,
+    elastic: Callable[[Node], Rows],
+    first_rate: int,
+    end: Node,
 ) -> Rows:
     """Full motion of a node in world axes: elastic rows and N T columns."""
     if end == GROUND:
@@ -102,9 +131,9 @@ def _world_rows(
     rigid = np.concatenate(
         [placement.twist[:3] + cross(placement.twist[3:], X), placement.twist[3:]]
     )
-    rows = [dict(row) for row in nodes.rows(end)]
+    rows = [dict(row) for row in elastic(end)]
     for a, k in zip(*np.nonzero(_some(rigid)), strict=True):
-        rows[a][nodes.count + int(k)] = rigid[a, k]
+        rows[a][first_rate + int(k)] = rigid[a, k]
     to_world = carried(placement.world_rotation.T, np.zeros(3, dtype=object))
     return apply(to_world, rows)
 

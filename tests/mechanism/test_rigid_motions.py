@@ -1,0 +1,180 @@
+"""What springs leave free: rigid motions of several coordinates at once, exact or refused."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+from spatial_cases import ALLOY, Built, built, changed
+from spatial_examples import four_bar
+from spatial_oracle import Tree, world
+from spatial_random import add_springs as add_random_springs
+from spatial_random import random_closed, random_open
+from test_rigid_loops import rigid
+
+from eigassign.errors import MechanismError
+from eigassign.modal.exact import eigenvalues
+
+
+def chain(springs: Tree, n: int = 3, **joint: Any) -> Tree:
+    """Revolute links one after the other, all free."""
+    link = {"length": 0.4, "elements": 2, "material": "m", "section": "s"}
+    names = [f"l{k}" for k in range(n)]
+    ends = ["ground", *(f"{name}.end" for name in names[:-1])]
+    return {
+        "mechanism": {
+            "space": "planar",
+            "materials": {"m": ALLOY},
+            "sections": {"s": {"shape": "tube", "outer_diameter": 0.03, "thickness": 0.003}},
+            "links": {name: dict(link) for name in names},
+            "joints": {
+                f"j{k}": {"type": "revolute", "base": ends[k], "follower": f"l{k}.start", **joint}
+                for k in range(n)
+            },
+            "springs": springs,
+        },
+        "coordinates": {f"q{k}": {"joint": f"j{k}"} for k in range(n)},
+    }  # fmt: skip
+
+
+def turning(a: str, b: str, k: float = 400.0) -> Tree:
+    return {"x": {"between": [a, b], "rotational": k}}
+
+
+def agrees(tree: Tree, q: list[float], n_rigid: int) -> None:
+    model, frame = built(tree), world(tree, q)
+    assert len(model.pencil.rigid) == n_rigid
+    frame.n_free = n_rigid
+    np.testing.assert_allclose(model.lam(q, 6), frame.spectrum(6), rtol=1e-8)
+
+
+def pendulums(**spring: Any) -> Tree:
+    """Two links that hang on the ground side by side."""
+    tree = chain({"x": {"between": ["l0.end", "l1.end"], **spring}}, 2)
+    tree["mechanism"]["joints"]["j1"] |= {"base": "ground", "position": [0.3, 0.0]}
+    return tree
+
+
+def test_coupled_pendulums_turn_together() -> None:
+    tree = pendulums(rotational=250.0)
+    agrees(tree, [0.3, -0.5], 1)
+    motion = built(tree).motion
+    assert motion.rigid == (0,)
+    np.testing.assert_array_equal(motion.coordinates.rates, [[1.0, 0.0], [1.0, 1.0]])
+
+
+def test_a_spring_across_two_joints_leaves_their_opposite_motion() -> None:
+    agrees(chain(turning("l0.end", "l2.start")), [0.2, 0.4, -0.9], 2)
+
+
+def test_absolute_angles_have_rigid_motions_of_their_own() -> None:
+    tree = chain(turning("l0.end", "l2.start"))
+    for data in tree["coordinates"].values():
+        data["angle"] = "absolute"
+    agrees(tree, [0.2, 0.6, -0.3], 2)
+
+
+def test_a_spring_across_an_elbow_leaves_the_shoulder_alone() -> None:
+    """Resisted by cancelling terms only: round-off must not hold the shoulder."""
+    springs = {"x": {"between": ["l0.start", "l1.end"], "translational": 5e4}}
+    for drives in (("free", "free"), ("free", "locked"), ("free", {"stiffness": 90.0})):
+        tree = chain(copy.deepcopy(springs), 2)
+        for data, drive in zip(tree["coordinates"].values(), drives, strict=True):
+            data["drive"] = drive
+        agrees(tree, [0.2, 0.7], 1)
+
+
+def test_geared_slides_move_in_the_ratio_of_their_axes() -> None:
+    """Sprung along x only, a slide along x and one at 60° keep x alike: ratio cos 60°."""
+    tree = pendulums(translational=[6e4, 0.0])
+    joints = tree["mechanism"]["joints"]
+    joints["j0"] |= {"type": "prismatic", "axis": [1.0, 0.0]}
+    joints["j1"] |= {"type": "prismatic", "axis": [0.5, float(np.sqrt(0.75))]}
+    agrees(tree, [0.1, 0.2], 1)
+    rates = built(tree).motion.coordinates.rates
+    assert abs(rates[1, 1] / rates[0, 1] if rates[0, 1] else rates[1, 0]) == pytest.approx(2.0)
+
+
+def test_the_stiffness_takes_no_part_in_what_is_rigid() -> None:
+    tree = chain(turning("l0.end", "l2.start", 1e-6))
+    assert len(built(tree).pencil.rigid) == 2
+    tree["mechanism"]["springs"]["y"] = {
+        "between": ["l0.end", "ground"], "translational": 1e9
+    }  # fmt: skip
+    assert len(built(tree).pencil.rigid) == 1
+    assert len(built(changed(tree, "springs.x.rotational", 0.0)).pencil.rigid) == 2
+
+
+def test_a_designed_stiffness_resists_whatever_it_starts_from() -> None:
+    tree = chain(turning("l0.end", "l2.start", 0.0))
+    tree["design"] = {"k": {"parameter": "springs.x.rotational", "min": 0.0, "max": 900.0}}
+    model = built(tree)
+    assert len(model.pencil.rigid) == 2
+    q = [0.2, 0.4, -0.9]
+    lam = eigenvalues(model.pencil, np.array([[*q, 400.0]]), 4)[0]
+    np.testing.assert_allclose(lam, built(chain(turning("l0.end", "l2.start"))).lam(q, 4))
+
+
+def test_a_rigid_motion_that_turns_with_the_pose_is_refused_with_its_coordinates() -> None:
+    tree = chain({"x": {"between": ["l1.end", "ground"], "translational": [0.0, 3e4]}}, 2)
+    with pytest.raises(MechanismError, match="let q0 and q1 move together") as caught:
+        built(tree)
+    assert caught.value.path == "coordinates.q0"
+    tree["coordinates"]["q1"]["drive"] = "locked"
+    agrees(tree, [0.2, 0.4], 0)
+
+
+@pytest.mark.parametrize("links", ["beams", "rigid"])
+def test_a_coupled_five_bar_closes_its_loop_while_it_turns(links: str) -> None:
+    """A spring across the coupler pin of a four-bar holds its one freedom."""
+    tree = four_bar("free")
+    tree = rigid(tree) if links == "rigid" else tree
+    tree["mechanism"]["springs"] = turning("crank.end", "coupler.start", 80.0)
+    model, frame = built(tree), world(tree, [1.0])
+    frame.n_free = 0
+    count = min(4, model.n_elastic)
+    assert len(model.pencil.rigid) == 0
+    np.testing.assert_allclose(model.lam([1.0], count), frame.spectrum(count), rtol=1e-8)
+
+
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+@pytest.mark.parametrize("seed", range(40))
+def test_random_sprung_mechanisms_have_the_spectrum_of_the_plain_frame_or_are_refused(
+    seed: int, space: str
+) -> None:
+    tree, q = sprung(seed, space)
+    model = built_or_refused(tree)
+    if model is not None and model.n_elastic:
+        frame = world(tree, q)
+        frame.n_free = len(model.pencil.rigid)
+        count = min(3, model.n_elastic)
+        np.testing.assert_allclose(model.lam(q, count), frame.spectrum(count), rtol=1e-7)
+
+
+def test_few_random_sprung_mechanisms_are_refused() -> None:
+    trees = [sprung(seed, space)[0] for seed in range(40) for space in ("planar", "spatial")]
+    assert sum(built_or_refused(tree) is None for tree in trees) <= 12
+
+
+def built_or_refused(tree: Tree) -> Built | None:
+    try:
+        return built(tree)
+    except MechanismError as error:
+        if "move together" not in error.message:
+            raise
+        return None
+
+
+def sprung(seed: int, space: str) -> tuple[Tree, np.ndarray]:
+    """A random mechanism with free coordinates and springs."""
+    if seed % 4 == 3:
+        tree, q, _ = random_closed(seed, space, swap=True)
+    else:
+        tree, q = random_open(seed, space, swap=seed % 2 == 0)
+    rng = np.random.default_rng([seed, 7])
+    for data in tree["coordinates"].values():
+        data["drive"] = "free" if rng.random() < 0.7 else data["drive"]
+    add_random_springs(tree, rng)
+    return tree, q
