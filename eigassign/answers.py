@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from eigassign import values
 from eigassign.api import Case, load_case
 from eigassign.errors import CaseError, Problem, UsageError
+from eigassign.mechanism.rails import resting_pose
 from eigassign.mechanism.superelement import weights
 from eigassign.study import drawing
 from eigassign.study.accuracy import truncation_lines
@@ -175,7 +176,7 @@ def _require_regular(case: Case, q: Floats | None) -> None:
     """One exact solve: a mechanism without mass or stiffness is found here, at its line."""
     if q is None:
         given = case.file.expansion.q
-        q = np.array([given if given != "auto" else [0.0] * len(case.file.coordinates)])
+        q = np.array([given if given != "auto" else resting_pose(case.file)])
     with case.located():
         try:
             case.model().frequencies(q, case.initial_design, 1)

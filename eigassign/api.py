@@ -27,6 +27,7 @@ from eigassign.mechanism.build import (
 from eigassign.mechanism.local_motion import reduced_links
 from eigassign.mechanism.parameters import initial_design
 from eigassign.mechanism.poses import build_poses, design_dependence
+from eigassign.mechanism.rails import resting_pose
 from eigassign.mechanism.tip_motion import tip_chain
 from eigassign.mechanism.trajectories import NamedTrajectory, Trajectories
 from eigassign.mechanism.trajectory import Trajectory, build_trajectory
@@ -144,7 +145,7 @@ class Case:
 
         path = self._path(trial) if self.file.trajectories else None
         given = self.file.expansion.q
-        q0 = np.zeros(len(trial.q_names)) if given == "auto" else np.array(given, dtype=float)
+        q0 = resting_pose(self.file) if given == "auto" else np.array(given, dtype=float)
         return looked_at(self.file, trial, path, q0, self.initial_design)
 
     @cached_property
@@ -200,7 +201,7 @@ class Case:
         """One trajectory, which stands at ``path`` of the case file."""
         with self.located(path):
             self._refuse_moving_tip(model, keys)
-            return build_trajectory(
+            followed = build_trajectory(
                 keys,
                 model.q_names,
                 lambda tip, oriented: tip_chain(
@@ -214,6 +215,8 @@ class Case:
                 self.file.path.parent,
                 self.file.coordinate_units,
             )
+            model.require_on_rails(followed.q, self.initial_design)
+            return followed
 
     def _refuse_moving_tip(self, model: Model, keys: TrajectoryKeys) -> None:
         """A tip path moves q(t) where a design parameter moves the tip: refused by name."""

@@ -61,6 +61,14 @@ class TrajectoryError(MechanismError):
         super().__init__(path, message)
 
 
+class TravelError(MechanismError):
+    """A carriage or nut leaves its beam; ``sample`` is the first sample (0-based) where it does."""
+
+    def __init__(self, path: str, message: str, sample: int) -> None:
+        self.sample = sample
+        super().__init__(path, message)
+
+
 class AccuracyError(EigassignError):
     """A number was computed that cannot be vouched for, and is withheld."""
 

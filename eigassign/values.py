@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from eigassign.case import CaseFile, load
+from eigassign.case.feasible import impossible
 from eigassign.case.properties import find
 from eigassign.case.quantity import Quantity, quantity
 from eigassign.case.resolved import plain
@@ -38,7 +39,12 @@ def design(case: CaseFile, text: str | None) -> Numbers:
     tree = {"mechanism": plain(case.mechanism), "coordinates": plain(case.coordinates)}
     properties = {name: find(tree, p.parameter) for name, p in case.design.parameters.items()}
     quantities = [p.quantity if p else Quantity() for p in properties.values()]
-    return _read(text, "--y", list(properties), quantities)
+    values = _read(text, "--y", list(properties), quantities)
+    paths = [p.parameter for p in case.design.parameters.values()]
+    point = {path: (value, value) for path, value in zip(paths, values, strict=True)}
+    for *_, message in impossible(case.mechanism.sections, point):
+        raise UsageError(f"--y: {message.removesuffix('; narrow the bounds')}")
+    return values
 
 
 def _read(

@@ -13,6 +13,7 @@ from eigassign.case.attached import attached
 from eigassign.case.casefile import CaseFile
 from eigassign.case.context import in_context
 from eigassign.case.document import Document, validated
+from eigassign.case.feasible import infeasible
 from eigassign.case.plausibility import implausible
 from eigassign.case.references import inconsistent, too_many
 from eigassign.case.yaml_reader import MAX_BYTES, Finding, Source, read_yaml
@@ -39,6 +40,8 @@ def parse(data: bytes, path: str | Path) -> CaseFile:
     document, schema_findings = validated(tree)
     findings = [*unit_findings, *islice(inconsistent(source.tree), 2 * MOST_PROBLEMS)]
     findings += [f for f in schema_findings if not f[1].endswith("got nothing")]  # said: empty key
+    if document is not None:
+        findings += infeasible(document.mechanism, document.design.parameters)
     problems = _unique([*source.problems, *(source.problem(*f) for f in findings)])
     if problems or document is None:
         raise CaseError(_capped(problems))

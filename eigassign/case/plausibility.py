@@ -32,6 +32,7 @@ def implausible(document: Document) -> Iterator[Finding]:
     """Everything in a valid document that is probably not meant."""
     yield from implausible_parts(document)
     yield from _angles(document)
+    yield from _idle_mountings(document)
     yield from _goals(document)
 
 
@@ -61,6 +62,14 @@ def _along(document: Document, motion: Trajectory, path: KeyPath) -> Iterator[Fi
         for name, interval in motion.branch.items():
             if document.mechanism.joints[name].type == "revolute":
                 yield from _turned(interval, (*path, "branch", name))
+
+
+def _idle_mountings(document: Document) -> Iterator[Finding]:
+    """An absolute angle is counted from the x axis, wherever the joint's own zero is."""
+    for name, coordinate in document.coordinates.items():
+        if coordinate.angle == "absolute" and document.mechanism.joints[coordinate.joint].angle:
+            message = f"has no effect: coordinate {name!r} is absolute, counted from the x axis"
+            yield ("mechanism", "joints", coordinate.joint, "angle"), message
 
 
 def _angular(document: Document, q: Sequence[float]) -> list[float]:

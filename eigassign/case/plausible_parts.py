@@ -34,7 +34,6 @@ def implausible_parts(document: Document) -> Iterator[Finding]:
     yield from _links(document)
     yield from _inertias(document)
     yield from _unused(document)
-    yield from _tube_walls(document)
 
 
 def outside(
@@ -192,18 +191,3 @@ def _beams(document: Document) -> Iterator[BeamLink | FrameBeam]:
             yield link
         elif isinstance(link, FrameLink):
             yield from link.beams.values()
-
-
-def _tube_walls(document: Document) -> Iterator[Finding]:
-    """Bounds within which a tube's wall can vanish or overfill it."""
-    reach = {p.parameter: (p.min, p.max) for p in document.design.parameters.values()}
-    for name, tube in document.mechanism.sections.items():
-        if not isinstance(tube, TubeSection):
-            continue
-        path = f"sections.{name}."
-        outer, _ = reach.get(path + "outer_diameter", (tube.outer_diameter, 0.0))
-        _, inner = reach.get(path + "inner_diameter", (0.0, tube.inner_diameter or 0.0))
-        _, wall = reach.get(path + "thickness", (0.0, tube.thickness or 0.0))
-        if 2 * wall > outer or inner >= outer:
-            message = "within the design bounds this tube's wall can vanish or exceed its radius"
-            yield ("mechanism", "sections", name), message

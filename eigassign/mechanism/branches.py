@@ -141,12 +141,17 @@ def _at(names: Sequence[str], a: Floats) -> str:
 
 def _ambiguous(tree: Tree, names: Sequence[str], a0: Floats, found: Floats) -> str:
     """All branches in words."""
-    lines = [
-        "; ".join(f"{f.joint}: {v:.4g}" for f, v in zip(tree.passive, p, strict=True))
-        for p in found
-    ]
+    lines = ["; ".join(_guesses(tree, p)) for p in found]
     listed = " | ".join(f"({line})" for line in lines)
     return (
         f"the loops close in {len(found)} ways at {_at(names, a0)}: {listed}; choose one with "
         "mechanism.assembly: {at: …, guess: {joint: value, …}} (rad, m)"
     )
+
+
+def _guesses(tree: Tree, p: Floats) -> list[str]:
+    """One solution as the guess that leads to it: a list for a joint with several freedoms."""
+    values: dict[str, list[str]] = {}
+    for freedom, value in zip(tree.passive, p, strict=True):
+        values.setdefault(freedom.joint, []).append(f"{value:.4g}")
+    return [f"{j}: {v[0] if len(v) == 1 else '[' + ', '.join(v) + ']'}" for j, v in values.items()]

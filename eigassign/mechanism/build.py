@@ -20,6 +20,7 @@ from eigassign.mechanism.nodes import NodeMotions
 from eigassign.mechanism.parameters import Parameters
 from eigassign.mechanism.parameters import parameters as variables
 from eigassign.mechanism.pencil import Pencil
+from eigassign.mechanism.rails import rails
 from eigassign.series.program import compile_program
 
 Ints = NDArray[np.intp]
@@ -195,4 +196,5 @@ def _compile(
         to_program=to_program,
         shift=np.concatenate([motion.offset, np.zeros(n_y)]),
         n_q=n_q,
+        rails=rails(case, parameters.with_passive(motion.passive), motion.tree),
     )

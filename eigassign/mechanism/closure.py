@@ -63,7 +63,7 @@ def _bind_passive(
     used = _used_variables(recorder, [*F, *check], n_q + n_y, n_p)
     scalars = [*F, *check, *(entry for row in J for entry in row)]
     program = _reordered(recorder, scalars, used, n_q + n_y, n_p)
-    names = (*parameters.coordinates, *parameters.design)
+    names = (*_joint_names(case, coords), *parameters.design)
     function = ImplicitFunction(
         program,
         n_p,
@@ -79,6 +79,15 @@ def _bind_passive(
     return parameters.with_passive(
         parameters.recorder.implicit(solved, [parameters.recorder.variable(v) for v in used])
     )
+
+
+def _joint_names(case: CaseFile, coords: Coordinates) -> list[str]:
+    """What the joint coordinates s are called: q's names, but where q counts absolute angles."""
+    plain = (coords.relative == np.eye(len(coords.relative))).all(axis=1) & (coords.offset == 0.0)
+    return [
+        name if same else f"{name} relative to the base of {c.joint!r}"
+        for same, (name, c) in zip(plain, case.coordinates.items(), strict=True)
+    ]
 
 
 def _equations(

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.mechanism.rails import Rails
 from eigassign.series.algebra import Samples, Truncated
 from eigassign.series.lower_set import LowerSet, on_faces
 from eigassign.series.program import Program
@@ -44,6 +45,7 @@ class Pencil:
     to_program: Floats  # (n_z, n_x)
     shift: Floats  # (n_z,)
     n_q: int
+    rails: Rails | None = None  # where carriages and nuts may stand
 
     @property
     def n_theta(self) -> int:
@@ -86,8 +88,13 @@ class Pencil:
         return np.eye(len(self.shift))[:, self.active], directions, (directions != 0.0).any(axis=0)
 
     def theta(self, x: Floats) -> Floats:
-        """θ at samples x (n_samples, n_x): shape (n_theta, n_samples)."""
+        """θ at samples x (n_samples, n_x): shape (n_theta, n_samples).
+
+        Raises TravelError where a carriage or nut leaves its beam.
+        """
         z = self.to_program @ np.atleast_2d(x).T + self.shift[:, None]
+        if self.rails is not None:
+            self.rails.require(z, np.atleast_2d(x))
         return np.vstack([np.ones((1, z.shape[1])), self.program.run(Samples(), z)])
 
     def theta_series(self, space: LowerSet, x0: Floats, directions: Floats) -> Floats:
@@ -95,6 +102,8 @@ class Pencil:
         inner, where = self._needed(space, directions)
         z = np.zeros((len(self.shift), len(inner)))
         z[:, 0] = self.to_program @ x0 + self.shift
+        if self.rails is not None:
+            self.rails.require(z[:, :1], x0[None])
         present = (inner.units >= 0).nonzero()[0]
         z[:, inner.units[present]] = directions[:, present]
         theta = np.zeros((self.n_theta, len(space)))

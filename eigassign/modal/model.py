@@ -66,6 +66,11 @@ class Model:
             raise UsageError(f"this is for one sample of q and y, not {len(x)}")
         return x
 
+    def require_on_rails(self, q: ArrayLike, y: ArrayLike) -> None:
+        """Raise TravelError for the first sample where a carriage or nut leaves its beam."""
+        if self.pencil.rails is not None:
+            self.pencil.theta(self.x(q, y))
+
     def frequencies(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> Floats:
         """Exact frequencies of the lowest elastic modes, (n_samples, count) in Hz."""
         x = self.x(q, y)
