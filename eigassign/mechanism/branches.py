@@ -17,6 +17,7 @@ from eigassign.series.implicit import ACCEPT, ImplicitFunction
 
 TRIES = 64  # starting points where no guess is given
 SAME = 1e-6  # rad or m
+RANK = 1e-7  # of the largest singular value of ∂F/∂p: those below do not count
 
 
 def choose_branch(
@@ -38,7 +39,7 @@ def choose_branch(
     found = _solutions(function, a0, starts, _turning(case, tree))
     if not len(found):
         others = _solutions(function, a0, _starts(function.size), _turning(case, tree))
-        message = f"the loops cannot be closed at {_at(function.names, a0)}"
+        message = _unclosable(tree, function, a0)
         if guess is not None and len(others):
             message = "the guess leads to no closed pose: " + _ambiguous(
                 tree, function.names, a0, others
@@ -122,17 +123,36 @@ def _apart(difference: Floats, turning: NDArray[np.bool_]) -> float:
 
 
 def _check_determined(tree: Tree, function: ImplicitFunction, a0: Floats, p0: Floats) -> None:
-    from eigassign.mechanism.closure import rank
-
     J = function.equations(a0[:, None], p0[:, None])[2][0]
-    missing = function.size - rank(J)
+    missing = function.size - int(np.linalg.matrix_rank(J, RANK))
     if missing:
         joints = ", ".join(sorted({f.joint for f in tree.passive}))
+        n = len(tree.freedoms) - len(tree.passive)
         raise MechanismError(
             "coordinates",
-            f"{missing} more coordinate(s) needed: the joints {joints} are not determined by the "
-            f"coordinates, or {_at(function.names, a0)} is a dead point",
+            f"{missing} more coordinate(s) needed: the mechanism has {n + missing} freedom(s) and "
+            f"{n} coordinate(s), which do not determine the joints {joints}; or "
+            f"{_at(function.names, a0)} is a dead point",
         )
+
+
+def _unclosable(tree: Tree, function: ImplicitFunction, a0: Floats) -> str:
+    """Where the loops do not close, and whether there are too many conditions or too little length.
+
+    Conditions beyond the rank of ∂F/∂p at general places are no passive freedom's to meet.
+    """
+    message = f"the loops cannot be closed at {_at(function.names, a0)}"
+    starts = _starts(function.size).T
+    J = function.equations(np.repeat(a0[:, None], starts.shape[1], axis=1), starts)[2]
+    beyond = function.n_equations - int(np.linalg.matrix_rank(J, RANK).max())
+    if not beyond:
+        return f"{message}: links do not reach, or lie beyond a dead point"
+    joints = ", ".join(dict.fromkeys(f.joint for f in tree.passive))
+    return (
+        f"{message}: they pose {function.n_equations} conditions, of which {joints} can meet "
+        f"{function.n_equations - beyond}: {beyond} coordinate(s) too many, or joints with too few "
+        "freedoms for dimensions that do not agree"
+    )
 
 
 def _at(names: Sequence[str], a: Floats) -> str:

@@ -18,13 +18,11 @@ from eigassign.mechanism.branches import choose_branch
 from eigassign.mechanism.coordinates import Coordinates
 from eigassign.mechanism.kinematics import Kinematics, walk
 from eigassign.mechanism.parameters import Parameters
-from eigassign.mechanism.rotations import Floats, Objects, multiply
+from eigassign.mechanism.rotations import Objects, multiply
 from eigassign.mechanism.tree import Tree
 from eigassign.series.expression import Expression, Recorder, Scalar, derivative
 from eigassign.series.implicit import ImplicitFunction
 from eigassign.series.program import Program, compile_program
-
-RANK = 1e-7  # singular values of ∂F/∂p below this (relative) do not count
 
 
 def close_loops(
@@ -172,9 +170,3 @@ def _combined(twist: Objects, P: Objects, n: int) -> Objects:
     if not n or not len(P):
         return twist[:, :n]
     return np.asarray(twist[:, :n] + multiply(twist[:, n:], P))
-
-
-def rank(J: Floats) -> int:
-    """Numerical rank of ∂F/∂p."""
-    s = np.linalg.svd(J, compute_uv=False)
-    return int((s > RANK * max(s[0], 1e-300)).sum()) if len(s) else 0

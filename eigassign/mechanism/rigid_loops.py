@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from eigassign.errors import MechanismError
-from eigassign.mechanism.closure import RANK, passive_motion
+from eigassign.mechanism.branches import RANK
+from eigassign.mechanism.closure import passive_motion
 from eigassign.mechanism.mesh import DOFS
 from eigassign.mechanism.nodes import NodeMotions, Row, combined
 from eigassign.mechanism.parameters import Parameters

@@ -160,6 +160,74 @@ def test_a_loop_that_cannot_be_closed_is_refused_with_its_configuration() -> Non
     assert caught.value.path == "mechanism.assembly"
 
 
+def test_links_that_do_not_reach_are_told_from_too_many_coordinates() -> None:
+    short = changed(four_bar("free"), "links.coupler.length", 0.05)
+    short = changed(short, "links.rocker.length", 0.2)
+    with pytest.raises(MechanismError, match="links do not reach"):
+        built(short)
+    tree = four_bar("free")
+    tree["coordinates"]["extra"] = {"joint": "E"}
+    message = "3 conditions, of which B, D can meet 2: 1 coordinate.* too many"
+    with pytest.raises(MechanismError, match=message):
+        built(tree)
+
+
+def bennett(error: float = 0.0) -> Tree:
+    """Bennett's overconstrained linkage: sides a, b, twists α, β with sin α / a = sin β / b."""
+    a, b, alpha = 0.3, 0.4, 0.5
+    beta = float(np.arcsin(b / a * np.sin(alpha))) + error
+    tree = arm3r("free")
+    m = tree["mechanism"]
+    m["links"] = {n: straight(L, 2) for n, L in (("l1", a), ("l2", b), ("l3", a))}
+    m["links"]["foot"] = {"type": "rigid", "nodes": {}}
+    pin = {"type": "revolute", "axis": [0.0, 0.0, 1.0]}
+    m["joints"] = {
+        "J1": {**pin, "base": "ground", "follower": "l1.start"},
+        "J2": {**pin, "base": "l1.end", "follower": "l2.start", "orientation": [alpha, 0, 0]},
+        "J3": {**pin, "base": "l2.end", "follower": "l3.start", "orientation": [beta, 0, 0]},
+        "J4": {**pin, "base": "l3.end", "follower": "foot.start", "orientation": [alpha, 0, 0]},
+        "root": {"type": "fixed", "base": "ground", "follower": "foot.start",
+                 "position": [-b, 0.0, 0.0], "orientation": [-beta, 0.0, 0.0]},
+    }  # fmt: skip
+    m.pop("bodies")
+    tree["coordinates"] = {"q": {"joint": "J1", "drive": {"stiffness": 500.0}}}
+    second = 2 * np.arctan(np.sin((beta + alpha) / 2) / np.sin((beta - alpha) / 2) / np.tan(0.5))
+    m["assembly"] = {
+        "at": {"q": 1.0}, "guess": {"J2": float(second), "J3": -1.0, "J4": -float(second)}
+    }  # fmt: skip
+    return tree
+
+
+@pytest.mark.parametrize("q", [1.0, 1.4, 0.7])
+def test_bennetts_linkage_works_where_its_dimensions_agree(q: float) -> None:
+    tree = bennett()
+    np.testing.assert_allclose(built(tree).lam([q], 5), world(tree, [q]).spectrum(5), rtol=1e-7)
+
+
+def test_bennetts_linkage_is_refused_where_its_dimensions_do_not_agree() -> None:
+    with pytest.raises(MechanismError, match="6 conditions, of which J2, J3, J4 can meet 3"):
+        built(bennett(1e-4))
+
+
+def test_branches_are_listed_as_the_guesses_that_lead_to_them() -> None:
+    tree = four_bar("free")
+    tree["mechanism"]["space"] = "spatial"
+    tree["mechanism"]["joints"]["D"]["position"] = [0.5, 0.0, 0.0]
+    tree["mechanism"]["joints"]["E"]["type"] = "spherical"
+    del tree["mechanism"]["assembly"]
+    with pytest.raises(MechanismError, match=r"E: \[0, 0, 0\.92\]|E: \[-?0, -?0, 0\.92\]"):
+        built(tree)
+
+
+def test_an_absolute_coordinate_is_named_by_its_joint_where_its_relative_angle_is_shown() -> None:
+    tree = four_bar("free")
+    tree["mechanism"]["joints"]["A"]["angle"] = 0.4
+    tree["coordinates"]["th"]["angle"] = "absolute"
+    tree["mechanism"]["links"]["coupler"]["length"] = 0.02
+    with pytest.raises(MechanismError, match=r"th relative to the base of 'A' = -0\.4"):
+        built(tree)
+
+
 def test_clamped_loops_whose_sides_do_not_meet_are_refused_at_the_joint() -> None:
     tree = gantry("free")
     tree["mechanism"]["joints"]["f4"]["position"] = [1.61, 0.0]
