@@ -46,13 +46,15 @@ def slider() -> Tree:
 def spatial_arm() -> Tree:
     tree = arm3r("free")
     tree["coordinates"]["elbow"]["drive"] = {"stiffness": 5e3}
-    return with_design(
+    tree = with_design(
         tree,
         wall="sections.s.inner_diameter",
         modulus="materials.m.youngs_modulus",
         length="links.up.length",
         drive="coordinates.elbow.drive.stiffness",
     )
+    tree["design"]["wall"]["max"] = 0.039  # below the outer diameter
+    return tree
 
 
 def portal() -> Tree:
