@@ -43,7 +43,7 @@ def separated(
     W, pivots = _unresisted(case, motion, free, _rows(case, parameters, motion, free))
     change = np.eye(len(motion.columns))
     change[np.ix_(free, [free[k] for k in pivots])] = W
-    rigid = tuple(free[k] for k in pivots)
+    rigid = tuple(sorted(free[k] for k in pivots))
     if np.array_equal(change, np.eye(len(change))):
         return replace(motion, rigid=rigid)
     moved = tuple(replace(p, twist=multiply(p.twist, change)) for p in motion.placements)
