@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import itertools
 import math
-import sys
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 from chains import bar, model_of, random_chain, two_link
 from pencils import crossing
+from rungs import derivative, richardson, treat_as_large
 
 from eigassign.api import expand
 from eigassign.errors import UsageError
-from eigassign.modal import coefficients, exact, expansion
+from eigassign.modal import exact, expansion
 from eigassign.modal.expansion import Expansion, clusters
 from eigassign.modal.expansion import expand as expand_pencil
 from eigassign.modal.model import Model
@@ -228,32 +228,6 @@ def test_random_chains_are_expanded_to_their_order(seed: int) -> None:
 # Derivatives
 
 
-def richardson(f: Callable[[float], np.ndarray], h: float) -> np.ndarray:
-    """Even error terms h², h⁴, h⁶ of f(h) taken out."""
-    rows = [f(h / 2**k) for k in range(4)]
-    for k in range(1, 4):
-        rows = [b + (b - a) / (4.0**k - 1.0) for a, b in itertools.pairwise(rows)]
-    return rows[0]
-
-
-def derivative(
-    at: Callable[[np.ndarray], np.ndarray], along: np.ndarray, centre: np.ndarray
-) -> np.ndarray:
-    """∂^γ/γ! of a function from its values, ``along`` the units of γ (none, one or two)."""
-
-    def even(h: float, d: np.ndarray) -> np.ndarray:
-        return at(h * d) + at(-h * d)
-
-    if len(along) == 0:
-        return centre
-    a, b = along[0], along[-1]
-    if len(along) == 1:
-        return richardson(lambda h: (at(h * a) - at(-h * a)) / (2 * h), 1.0)
-    if (a == b).all():
-        return richardson(lambda h: (even(h, a) - 2 * centre) / (2 * h**2), 1.0)
-    return richardson(lambda h: (even(h, a + b) - even(h, a - b)) / (4 * h**2), 1.0)
-
-
 @pytest.mark.parametrize(
     ("make", "q0", "y0", "steps"),
     [
@@ -437,18 +411,6 @@ def test_a_structure_without_variables_has_a_constant_expansion() -> None:
 
 
 # Large pencils
-
-
-def treat_as_large(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every dense limit of the modal package to nothing, wherever it has been imported to."""
-    limited = [
-        module
-        for name, module in list(sys.modules.items())
-        if name.startswith("eigassign.modal.") and hasattr(module, "DENSE_LIMIT")
-    ]
-    assert {exact, coefficients} <= set(limited)
-    for module in limited:
-        monkeypatch.setattr(module, "DENSE_LIMIT", 0)
 
 
 def test_a_large_chain_is_expanded_sparsely_to_the_same_series(

@@ -11,15 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spatial_cases import Built, built, changed
+from rungs import residual, truncation
+from spatial_cases import built, changed
 from spatial_examples import arm3r, four_bar, gantry, slider_crank
 from spatial_oracle import Tree, world
-from spatial_random import random_closed, random_open
 
-from eigassign.modal.exact import eigenvalues, modes
 from eigassign.modal.expansion import Expansion, expand
-from eigassign.modal.recursion import expand_subspace
-from eigassign.series.lower_set import total_degree
 
 
 def with_design(tree: Tree, **paths: str) -> Tree:
@@ -76,17 +73,6 @@ IDS = [case[0].__name__ for case in CASES]
 STEPS = {1: 0.01, 2: 0.03, 3: 0.06, 4: 0.09, 5: 0.12}
 
 
-def truncation(model: Built, e: Expansion, span: np.ndarray, h: float) -> float:
-    """Root mean square error over random directions, both ways, at distance h of ``span``."""
-    rng = np.random.default_rng(5)
-    d = rng.standard_normal((10, len(span)))
-    d = np.vstack([d, -d]) / np.linalg.norm(d, axis=1).max() * span * h
-    x = e.x0 + d
-    q, y = np.split(x, [len(e.q0)], axis=1)
-    exact = eigenvalues(model.pencil, x, 1)
-    return float(np.sqrt(np.mean((e.eigenvalues(q, y) / exact - 1.0) ** 2)))
-
-
 @pytest.mark.parametrize("order", STEPS)
 @pytest.mark.parametrize(("make", "q0", "span"), CASES, ids=IDS)
 def test_the_truncation_error_falls_with_one_power_more_than_the_order(
@@ -94,7 +80,9 @@ def test_the_truncation_error_falls_with_one_power_more_than_the_order(
 ) -> None:
     model = built(make())
     e = expand(model.pencil, q0, model.y, order=order)
-    coarse, fine = (truncation(model, e, np.array(span), STEPS[order] * s) for s in (1.0, 0.5))
+    coarse, fine = (
+        truncation(model.pencil, e, np.array(span), STEPS[order] * s) for s in (1.0, 0.5)
+    )
     assert fine > 1e-13
     assert math.log2(coarse / fine) == pytest.approx(order + 1, abs=0.2)
 
@@ -172,63 +160,9 @@ def _tensor(e: Expansion, n: int) -> np.ndarray:
 def test_the_recursion_leaves_no_residual_at_any_multi_index(
     make: Any, q0: list[float], span: list[float]
 ) -> None:
-    """Σ K_δ X_{γ−δ} = Σ M_δ X_ε Λ_ζ with plain loops; scaled by the box so that all weigh alike."""
     model = built(make())
-    pencil, order = model.pencil, 3
     x0 = np.concatenate([q0, model.y])
-    space = total_degree(len(x0), order)
-    theta = pencil.theta_series(space, x0, pencil.to_program * np.array(span))
-    found = modes(pencil, x0[None], 2)
-    series = expand_subspace(pencil, theta, space, found.lam[0], found.phi[0])
-    K, M = (
-        [pencil.sparse(weights @ theta[:, k]).toarray() for k in range(len(space))]
-        for weights in (pencil.stiffness, pencil.mass)
-    )
-    members = [tuple(row) for row in space.indices.tolist()]
-    place = {row: k for k, row in enumerate(members)}
-    X, L = series.vectors, series.values
-    pairs = [
-        (a, b, place[c])
-        for a, ra in enumerate(members)
-        for b, rb in enumerate(members)
-        if (c := tuple(i + j for i, j in zip(ra, rb, strict=True))) in place
-    ]
-    left, right, product = (np.zeros_like(X) for _ in range(3))
-    size = np.zeros(len(members))
-    for a, b, c in pairs:
-        left[c] += K[a] @ X[b]
-        product[c] += X[a] @ L[b]
-        size[c] = max(size[c], np.abs(K[a] @ X[b]).max())
-    for a, b, c in pairs:
-        right[c] += M[a] @ product[b]
-    residual = np.abs(left - right).max(axis=(1, 2)) / np.maximum(size, 1e-12 * size.max())
-    assert residual.max() < 1e-8, members[int(residual.argmax())]
-
-
-@pytest.mark.parametrize(
-    ("seed", "space"), [(s, "planar") for s in (0, 1, 5)] + [(s, "spatial") for s in (0, 1, 2, 3)]
-)
-def test_random_loops_are_expanded_to_their_order(seed: int, space: str) -> None:
-    tree, q0, _ = random_closed(seed, space)
-    slopes(tree, q0)
-
-
-@pytest.mark.parametrize("space", ["planar", "spatial"])
-@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5, 6, 7, 8])
-def test_random_trees_are_expanded_to_their_order(seed: int, space: str) -> None:
-    slopes(*random_open(seed, space))
-
-
-def slopes(tree: Tree, q0: np.ndarray) -> None:
-    model = built(tree)
-    e = expand(model.pencil, q0, [], order=2)
-    assert len(e.clusters[0].modes) == 1
-    assert model.pencil.active.any()
-    span = np.full(len(q0), 0.3)
-    coarse, fine = (truncation(model, e, span, h) for h in (0.02, 0.01))
-    if coarse < 1e-11:
-        return  # a polynomial of this order already
-    assert math.log2(coarse / fine) == pytest.approx(3.0, abs=0.3)
+    assert residual(model.pencil, x0, np.array(span), 3, (1, 2)).max() < 1e-12
 
 
 def test_a_coordinate_that_turns_the_whole_mechanism_is_dropped() -> None:
