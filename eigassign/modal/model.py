@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.errors import MechanismError, UsageError
+from eigassign.errors import UsageError
 from eigassign.mechanism.kinematics import Kinematics
 from eigassign.mechanism.local_motion import ReducedLinks
 from eigassign.mechanism.pencil import Pencil
@@ -73,15 +72,11 @@ class Model:
 
     def frequencies(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> Floats:
         """Exact frequencies of the lowest elastic modes, (n_samples, count) in Hz."""
-        x = self.x(q, y)
-        with self._explained(x):
-            return np.sqrt(eigenvalues(self.pencil, x, count)) / (2.0 * np.pi)
+        return np.sqrt(eigenvalues(self.pencil, self.x(q, y), count)) / (2.0 * np.pi)
 
     def modes(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> tuple[Floats, Floats]:
         """Frequencies (n_samples, count) in Hz and mass-normalised modes (…, n_dof, count)."""
-        x = self.x(q, y)
-        with self._explained(x):
-            found = modes(self.pencil, x, count)
+        found = modes(self.pencil, self.x(q, y), count)
         return np.sqrt(found.lam) / (2.0 * np.pi), found.phi
 
     def truncation_error(self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)) -> Floats:
@@ -95,19 +90,6 @@ class Model:
         from eigassign.modal.truncation import truncation_error
 
         return truncation_error(self.reduced, x, modes)
-
-    @contextmanager
-    def _explained(self, x: Floats) -> Iterator[None]:
-        """Name what left its beam instead of what that does to the matrices."""
-        try:
-            yield
-        except (MechanismError, UsageError) as error:
-            from eigassign.mechanism.riders import off_track
-
-            reason = off_track(self.poses, x)
-            if reason is not None:
-                raise UsageError(reason) from error
-            raise
 
     def shapes(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> ModeShapes:
         """The lowest elastic modes at one sample as motions of all nodes and beams, for drawing.

@@ -101,14 +101,6 @@ def test_modes_say_where_they_were_solved(capsys: Captured) -> None:
     assert out.startswith("Modes at q1 = 1.8, q2 = 5.3, m1 = 0.125, m2 = 0\n")
 
 
-@pytest.mark.parametrize("place", ["-0.1", "0", "1.6", "2.5 m"])
-def test_a_carriage_off_its_beam_is_told_by_name(place: str, capsys: Captured) -> None:
-    gantry = TWO_LINK.with_name("gantry.yaml")
-    assert main(["modes", str(gantry), "--q", place]) == 2
-    says = f"rail stands {float(place.split()[0]):g} m from the start of girder, which is 1.6 m"
-    assert says in capsys.readouterr().err
-
-
 def test_modes_as_text_lists_the_modes_from_one(capsys: Captured) -> None:
     out = answer(capsys, "modes", TWO_LINK, "--count", 2)
     assert re.search(r"^ *1 +202\.21955", out, re.MULTILINE)
