@@ -23,6 +23,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 SOLVER = 40.0  # round-off of the dense eigensolver, relative to the largest μ, over ε
 ROUNDING = 5.0  # on the round-off of one entry, ε/2 in frequency, through the whole solve
+CLOSURE = 2.0  # on that, where loops close: θ carries the round-off of passive freedoms, J_p⁻¹F
 
 
 def relative_error(reduced: ReducedModel, x: Floats) -> Floats:
@@ -94,7 +95,8 @@ def _rounding(
     strain = hardest[:, None] * _forms(terms.stiffness_rounding, z) + _forms(K, size[:, :k])
     inertia = _forms(terms.mass_rounding, wide) + _forms(M, size)
     amplification = strain + (inertia + SOLVER * mu[:, :1]) / mu
-    return np.asarray(ROUNDING * np.finfo(float).eps * amplification)
+    rounding = ROUNDING * (CLOSURE if reduced.program.is_implicit else 1.0) * np.finfo(float).eps
+    return np.asarray(rounding * amplification)
 
 
 def _at_first_design(reduced: ReducedModel, x: Floats) -> tuple[Floats, NDArray[np.bool_]]:
