@@ -23,10 +23,11 @@ from eigassign.series.newton import cross, ordered, products, spread_steps
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 POWERS = (1.0, 2.0, -2.0)  # of f that are tried, the quickest to evaluate first
-SAFETY, SAFETY_LINE = 4.0, 2.0  # on the predicted rest, in general and on a single axis
+SAFETY = 4.0  # on the predicted rest
 MISSED = 3.0  # how much worse than at the points held out it may be elsewhere
 CHECKED = 12  # members for each further point that is held out
-TRUSTED = 4  # degrees from which a rate is believed as it is
+TRUSTED, TRUSTED_LINE = 4, 6  # degrees from which a rate is believed; the latter on one axis
+LAST = 4  # coefficients looked at on a single axis: several in turn may be small by accident
 STARTS = (5e-3, 5e-4)  # accuracies below each of which one degree more is started with
 STARTS_LINE = (5e-3, 5e-4, 5e-5, 5e-6, 5e-7, 5e-8, 5e-9)  # on a single axis
 FEW = 12  # nodes below which an axis is taken whole
@@ -175,8 +176,11 @@ class _State:
 
         While an axis has shown few coefficients, its rate is not trusted to be small.
         """
-        short = (self.members.max(axis=0) < TRUSTED) & (rates > 0.0)
+        trusted = TRUSTED if len(rates) > 1 else TRUSTED_LINE
+        short = (self.members.max(axis=0) < trusted) & (rates > 0.0)
         cautious = np.where(short, np.maximum(rates, UNKNOWN), rates)
+        if len(rates) == 1 and len(edge.rows):
+            return _next_on_line(sizes, float(cautious[0])) * _tail(cautious)
         return float(edge.predicted(sizes, cautious).sum()) * _tail(cautious)
 
     def missed(self, found: Interpolant, apart: Ints, values: Floats) -> float:
@@ -188,8 +192,13 @@ class _State:
 
 def _tail(rates: Floats) -> float:
     """From the sum over the first missing members to that over all, with the safety."""
-    safety = SAFETY if len(rates) > 1 else SAFETY_LINE
-    return safety / (1.0 - float(rates.max()))
+    return SAFETY / (1.0 - float(rates.max()))
+
+
+def _next_on_line(sizes: Floats, rate: float) -> float:
+    """max_k |c_{N−k}| r^k over the last few k: the first coefficient missing on a single axis."""
+    last = sizes[: -LAST - 1 : -1]
+    return float((last * rate ** np.arange(1, len(last) + 1)).max())
 
 
 def _wanted(found: Interpolant, tops: Ints, accuracy: float) -> tuple[Ints, float]:
