@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,6 @@ from eigassign.study.chart_methods import Evaluator, Method
 from eigassign.study.chart_question import Features, Points
 from eigassign.study.surrogates import (
     Kernel,
-    Surrogate,
     along,
     chebyshev,
     chebyshev_nodes,
@@ -26,7 +25,8 @@ from eigassign.study.surrogates import (
     response_surface,
     spread_points,
 )
-from eigassign.study.surrogates_kriging import fit_kriging
+from eigassign.study.surrogates_kriging import Kriging, fit_kriging, kriging_lines
+from eigassign.study.surrogates_lines import Separable, Trajectory
 
 Floats = NDArray[np.float64]
 MOST_NODES = 20  # of one Chebyshev polynomial along the trajectory
@@ -76,7 +76,7 @@ def trajectory_methods(features: Features, stations: Sequence[int], n_q: int) ->
                 f"stations, {kind}",
                 False,
                 {"stations": k, "interpolation": kind},
-                partial(_per_run, kind, k),
+                partial(_per_run, features, kind, k),
                 partial(_stations, features, station_nodes(kind, k), n_q),
                 per_design=True,
                 note="solved anew for every design: answers the runs along the trajectory only",
@@ -96,23 +96,26 @@ def _stations(features: Features, nodes: Floats, n_q: int, points: Points) -> Fl
     return np.hstack([np.tile(q, (len(y), 1)), np.repeat(y, k, axis=0)])
 
 
-def _per_run(kind: str, k: int, f: Floats) -> Evaluator:
+def _per_run(features: Features, kind: str, k: int, f: Floats) -> Evaluator:
+    """One product for all designs: what stations contribute to each sample is the same for all."""
     by_design = f.reshape(-1, k, f.shape[1])
 
     def evaluate(points: Points) -> Floats:
-        u = points.u.reshape(len(by_design), -1, points.u.shape[1])
-        pairs = zip(by_design, u, strict=True)
-        return np.vstack([_interpolated(kind, own)(at) for own, at in pairs])
+        hz = np.matmul(station_shares(features, kind, k)[points.along], by_design)
+        return np.asarray(hz.reshape(-1, f.shape[1]))
 
     return evaluate
 
 
-def _interpolated(kind: str, f: Floats) -> Surrogate:
-    """Through stations f (k, n_modes) of one design."""
-    if kind == "Chebyshev":
-        line = chebyshev([len(f)], f)
-        return lambda at: line(at[:, :1])
-    return along(equal_nodes(len(f)), f, kind == "cubic")
+@lru_cache(maxsize=64)
+def station_shares(features: Features, kind: str, k: int) -> Floats:
+    """What each station contributes to each sample of the trajectory, (n_t, k)."""
+    assert features.place is not None
+    one = chebyshev(k, 1, np.eye(k)) if kind == "Chebyshev" else None
+    made = one or along(equal_nodes(k), np.eye(k), kind == "cubic")
+    shares: Floats = made(features.place[:, None])
+    shares.setflags(write=False)
+    return shares
 
 
 def grid_methods(features: Features, nodes: Sequence[int]) -> Iterator[Method]:
@@ -127,15 +130,15 @@ def grid_methods(features: Features, nodes: Sequence[int]) -> Iterator[Method]:
                 f"grid, {kind}",
                 False,
                 {"nodes": k, "features": features.names, "interpolation": kind},
-                partial(_on_grid, kind, k, features.d),
+                partial(_on_grid, features, kind, k),
                 partial(_at, features, grid_points(axis, features.d)),
             )
 
 
-def _on_grid(kind: str, k: int, d: int, f: Floats) -> Evaluator:
+def _on_grid(features: Features, kind: str, k: int, f: Floats) -> Evaluator:
     if kind == "Chebyshev":
-        return _on_u(chebyshev([k] * d, f))
-    return _on_u(grid_interpolation(k, d, f, kind == "cubic"))
+        return _by_lines(features, chebyshev(k, features.d, f))
+    return _by_lines(features, grid_interpolation(k, features.d, f, kind == "cubic"))
 
 
 def _at(features: Features, u: Floats, _: Points) -> Floats:
@@ -143,8 +146,22 @@ def _at(features: Features, u: Floats, _: Points) -> Floats:
     return features.x(u)
 
 
-def _on_u(surrogate: Surrogate) -> Evaluator:
-    return lambda points: surrogate(points.u)
+def _by_lines(features: Features, made: Separable) -> Evaluator:
+    """Whole trajectories of many designs at once, as fits answer them; other points one by one."""
+    if features.place is None or features.d == 1:
+        return lambda points: made(points.u)
+    path = Trajectory(made.lines, features.place)
+
+    def evaluate(points: Points) -> Floats:
+        n = points.n_random if points.designs else len(points.u)
+        parts = [made(points.u[:n])] if n else []
+        if points.designs:
+            hz = path(points.u[n :: len(points.along), 1:])
+            whole = len(points.along) == hz.shape[1]
+            parts.append((hz if whole else hz[:, points.along]).reshape(-1, hz.shape[2]))
+        return parts[0] if len(parts) == 1 else np.vstack(parts)
+
+    return evaluate
 
 
 def surrogate_methods(
@@ -153,16 +170,22 @@ def surrogate_methods(
     """Surrogates fitted to the same spread-out exact solves; Kriging for the counts it can bear."""
     for n in counts:
         u = spread_points(n, features.d)
-        yield from (_fitted(features, u, n, *each) for each in _fits(u))
+        yield from (_fitted(features, u, n, *each) for each in _fits(features, u))
         if n in kriging:
             how = {"kernel": "squared exponential", "starts": 2}
-            yield _fitted(features, u, n, "Kriging", how, partial(_kriging, u))
+            yield _fitted(features, u, n, "Kriging", how, partial(_kriging, features, u))
 
 
-def _fits(u: Floats) -> Iterator[tuple[str, dict[str, object], Callable[[Floats], Evaluator]]]:
+def _fits(
+    features: Features, u: Floats
+) -> Iterator[tuple[str, dict[str, object], Callable[[Floats], Evaluator]]]:
     """Family, parameters and fit of the cheap surrogates."""
     for name, degree in (("quadratic", 2), ("cubic", 3)):
-        yield f"response surface, {name}", {"degree": degree}, partial(_surface, u, degree)
+        yield (
+            f"response surface, {name}",
+            {"degree": degree},
+            partial(_surface, features, u, degree),
+        )
     kernels: tuple[Kernel, ...] = ("thin_plate_spline", "quintic")
     for kernel in kernels:
         yield f"RBF, {kernel}".replace("_", " "), {"kernel": kernel}, partial(_rbf, u, kernel)
@@ -181,14 +204,21 @@ def _fitted(
     return Method(name, family, False, parameters, fit, partial(_at, features, u))
 
 
-def _surface(u: Floats, degree: int, f: Floats) -> Evaluator:
-    return _on_u(response_surface(u, f, degree))
+def _surface(features: Features, u: Floats, degree: int, f: Floats) -> Evaluator:
+    return _by_lines(features, response_surface(u, f, degree))
 
 
 def _rbf(u: Floats, kernel: Kernel, f: Floats) -> Evaluator:
-    return _on_u(radial_basis(u, f, kernel))
+    """Point by point: neither kernel is a sum of products."""
+    made = radial_basis(u, f, kernel)
+    return lambda points: made(points.u)
 
 
-def _kriging(u: Floats, f: Floats) -> Evaluator:
+def _kriging(features: Features, u: Floats, f: Floats) -> Evaluator:
     fitted = [fit_kriging(u, column) for column in f.T]
-    return lambda points: np.column_stack([one(points.u) for one in fitted])
+    anywhere = partial(_columns, fitted)
+    return _by_lines(features, Separable(anywhere, kriging_lines(fitted)))
+
+
+def _columns(fitted: Sequence[Kriging], at: Floats) -> Floats:
+    return np.column_stack([one(at) for one in fitted])

@@ -19,6 +19,12 @@ from eigassign.series.evaluation import polynomials
 from eigassign.series.lower_set import total_degree
 from eigassign.series.newton import spread_steps
 from eigassign.series.power_series import monomials
+from eigassign.study.surrogates_lines import (
+    Separable,
+    polynomial_lines,
+    spline_lines,
+    tensor_lines,
+)
 
 Floats = NDArray[np.float64]
 Surrogate = Callable[[Floats], Floats]
@@ -54,14 +60,15 @@ def chebyshev_nodes(k: int) -> Floats:
     return np.asarray(0.5 - 0.5 * np.cos(np.pi * np.arange(k) / (k - 1)))
 
 
-def response_surface(u: Floats, f: Floats, degree: int) -> Surrogate:
+def response_surface(u: Floats, f: Floats, degree: int) -> Separable:
     """Least squares over all monomials up to total ``degree``."""
     space = total_degree(u.shape[1], degree)
     if len(space) > len(u):
         raise UsageError(f"{len(space)} coefficients from {len(u)} training points")
     beta = np.linalg.lstsq(monomials(space, 2.0 * u - 1.0), f, rcond=None)[0]
-    made = polynomials(space, np.asarray(beta.T, dtype=np.float64))
-    return lambda at: made(2.0 * at - 1.0)
+    coefficients = np.asarray(beta.T, dtype=np.float64)
+    made = polynomials(space, coefficients)
+    return Separable(lambda at: made(2.0 * at - 1.0), polynomial_lines(space, coefficients))
 
 
 Kernel = Literal["thin_plate_spline", "quintic"]
@@ -78,7 +85,7 @@ def radial_basis(u: Floats, f: Floats, kernel: Kernel) -> Surrogate:
     return lambda at: np.asarray(interpolant(at))
 
 
-def grid_interpolation(k: int, d: int, f: Floats, cubic: bool) -> Surrogate:
+def grid_interpolation(k: int, d: int, f: Floats, cubic: bool) -> Separable:
     """Linear or cubic-spline interpolation on the grid of `equal_nodes`; f (k^d, n_modes)."""
     values = f.reshape(*([k] * d), f.shape[1])
     if cubic:
@@ -88,10 +95,11 @@ def grid_interpolation(k: int, d: int, f: Floats, cubic: bool) -> Surrogate:
     axes = tuple(equal_nodes(k) for _ in range(d))
     # rounding may put a point an ulp beyond the last node
     interpolant = RegularGridInterpolator(axes, values, bounds_error=False, fill_value=None)
-    return lambda at: np.asarray(interpolant(at))
+    knots = np.concatenate([[0.0], axes[0], [1.0]])
+    return Separable(lambda at: np.asarray(interpolant(at)), spline_lines(knots, 1, values))
 
 
-def _tensor_spline(k: int, d: int, values: Floats) -> Surrogate:
+def _tensor_spline(k: int, d: int, values: Floats) -> Separable:
     """Spline coefficients axis by axis, solved directly: SciPy's own grid solver is iterative."""
     from scipy.interpolate import NdBSpline, make_interp_spline
 
@@ -100,15 +108,18 @@ def _tensor_spline(k: int, d: int, values: Floats) -> Surrogate:
         spline = make_interp_spline(equal_nodes(k), coefficients, k=3, axis=axis)
         knots, coefficients = spline.t, np.moveaxis(spline.c, 0, axis)
     made = NdBSpline((knots,) * d, np.ascontiguousarray(coefficients), 3)
-    return lambda at: np.asarray(made(at))
+    return Separable(lambda at: np.asarray(made(at)), spline_lines(knots, 3, coefficients))
 
 
-def chebyshev(sizes: Sequence[int], f: Floats) -> Surrogate:
-    """The tensor polynomial through f (Π k_i, n_modes) on `chebyshev_nodes` of each axis."""
-    coefficients = _coefficients(sizes, f)
-    return lambda at: np.concatenate(
-        [_tensor_polynomial(coefficients, at[i : i + BLOCK]) for i in range(0, len(at), BLOCK)]
-    )
+def chebyshev(k: int, d: int, f: Floats) -> Separable:
+    """The tensor polynomial through f (k^d, n_modes) on the grid of `chebyshev_nodes`."""
+    coefficients = _coefficients([k] * d, f)
+
+    def anywhere(at: Floats) -> Floats:
+        blocks = (at[i : i + BLOCK] for i in range(0, len(at), BLOCK))
+        return np.concatenate([_tensor_polynomial(coefficients, block) for block in blocks])
+
+    return Separable(anywhere, tensor_lines(lambda u: _polynomials(u, k), coefficients))
 
 
 def _coefficients(sizes: Sequence[int], f: Floats) -> Floats:

@@ -9,14 +9,17 @@ the least that R needs to be factored.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve
 from scipy.optimize import minimize
+from scipy.spatial.distance import cdist
 
 from eigassign.errors import AccuracyError
+from eigassign.study.surrogates_lines import Lines
 
 Floats = NDArray[np.float64]
 NUGGETS = tuple(10.0**k for k in range(-13, -5))
@@ -52,6 +55,26 @@ class Kriging:
         a, b = at / self.lengths, self.u / self.lengths
         squares = np.square(a).sum(1)[:, None] + np.square(b).sum(1) - 2.0 * a @ b.T
         return np.asarray(np.exp(-0.5 * np.maximum(squares, 0.0)))
+
+
+def kriging_lines(fitted: Sequence[Kriging]) -> Lines:
+    """The correlation is a product over the variables, so that the place stands apart."""
+    return Lines(
+        lambda place: np.array([_places(one, place) for one in fitted]),
+        lambda design: np.array([_designs(one, design) for one in fitted]),
+    )
+
+
+def _places(one: Kriging, place: Floats) -> Floats:
+    """Weights times correlations in u_0, and the mean, (n + 1, n_t)."""
+    off = (place - one.u[:, :1]) / one.lengths[0]
+    return np.vstack([one.weights[:, None] * np.exp(-0.5 * off**2), np.full(len(place), one.mean)])
+
+
+def _designs(one: Kriging, design: Floats) -> Floats:
+    """Correlations in the other variables, and 1, (n_designs, n + 1)."""
+    squares = cdist(design / one.lengths[1:], one.u[:, 1:] / one.lengths[1:], "sqeuclidean")
+    return np.hstack([np.exp(-0.5 * squares), np.ones((len(design), 1))])
 
 
 def fit_kriging(u: Floats, f: Floats, starts: int = 2) -> Kriging:

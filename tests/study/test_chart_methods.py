@@ -21,6 +21,7 @@ from eigassign.study.chart_fits import fit_methods
 from eigassign.study.chart_question import Points, build_features, build_points
 from eigassign.study.chart_study import Compared, Wish, compare_methods
 from eigassign.study.scene import Scene
+from eigassign.study.surrogates import along, chebyshev, equal_nodes
 
 
 @pytest.fixture(scope="module")
@@ -118,6 +119,20 @@ def test_several_modes_have_a_column_each(tmp_path: Path) -> None:
     for method in (*_methods(scene), *rivals_too, *rivals.grid_methods(features, [4])):
         x = method.train(points)
         assert method.fit(exact_frequencies(scene, x) if len(x) else x)(points).shape == (20, 2)
+
+
+def test_stations_are_interpolated_for_every_design_alike(scene: Scene, points: Points) -> None:
+    features, runs = build_features(scene), points.runs()
+    f = np.random.default_rng(1).random((points.designs * 5, 2))
+    linear, cubic, polynomial = rivals.trajectory_methods(features, [5], 2)
+    for method, one in (
+        (linear, lambda own: along(equal_nodes(5), own, False)),
+        (cubic, lambda own: along(equal_nodes(5), own, True)),
+        (polynomial, lambda own: chebyshev(5, 1, own)),
+    ):
+        each = zip(f.reshape(-1, 5, 2), np.split(runs.u, points.designs), strict=True)
+        wanted = np.vstack([one(own)(u[:, :1]) for own, u in each])
+        np.testing.assert_allclose(method.fit(f)(runs), wanted, atol=1e-12)
 
 
 def test_errors_count_what_gives_no_number_as_infinitely_wrong() -> None:

@@ -20,7 +20,8 @@ from eigassign.study.surrogates import (
     response_surface,
     spread_points,
 )
-from eigassign.study.surrogates_kriging import _likelihood, fit_kriging
+from eigassign.study.surrogates_kriging import _likelihood, fit_kriging, kriging_lines
+from eigassign.study.surrogates_lines import Separable, Trajectory
 
 Floats = NDArray[np.float64]
 AT = np.random.default_rng(5).random((300, 3))
@@ -49,7 +50,7 @@ def test_a_response_surface_needs_as_many_points_as_coefficients() -> None:
 
 def test_a_chebyshev_polynomial_of_the_right_degree_is_exact() -> None:
     u = grid_points(chebyshev_nodes(4), 3)
-    np.testing.assert_allclose(chebyshev([4, 4, 4], cubic(u))(AT), cubic(AT), atol=1e-13)
+    np.testing.assert_allclose(chebyshev(4, 3, cubic(u))(AT), cubic(AT), atol=1e-13)
 
 
 @pytest.mark.parametrize(("kind", "rate"), [(False, 2.0), (True, 4.0)], ids=["linear", "cubic"])
@@ -125,3 +126,43 @@ def test_training_points_fill_the_box_evenly_and_hold_its_corners() -> None:
 
 def test_chebyshev_nodes_include_both_ends() -> None:
     assert chebyshev_nodes(5)[[0, 2, 4]] == pytest.approx([0.0, 0.5, 1.0])
+
+
+def _kriging(u: Floats) -> Separable:
+    fitted = [fit_kriging(u, column) for column in wavy(u).T]
+    return Separable(lambda at: np.column_stack([g(at) for g in fitted]), kriging_lines(fitted))
+
+
+def wavy(u: Floats) -> Floats:
+    """Two functions that differ in what they need, of any number of variables."""
+    return np.column_stack([np.cos(u @ np.arange(1.0, 1 + u.shape[1])), np.exp(-u[:, 0] * u[:, 1])])
+
+
+def _grid(k: int, d: int, kind: str) -> Separable:
+    if kind == "Chebyshev":
+        return chebyshev(k, d, wavy(grid_points(chebyshev_nodes(k), d)))
+    return grid_interpolation(k, d, wavy(grid_points(equal_nodes(k), d)), kind == "cubic")
+
+
+@pytest.mark.parametrize("d", [2, 3, 4])
+@pytest.mark.parametrize("kind", ["linear", "cubic", "Chebyshev", "surface", "Kriging"])
+def test_whole_trajectories_are_answered_as_single_points_are(kind: str, d: int) -> None:
+    u = spread_points(90, d)
+    made = {
+        "surface": lambda: response_surface(u, wavy(u), 3),
+        "Kriging": lambda: _kriging(u),
+    }.get(kind, lambda: _grid(5, d, kind))()
+    place = np.array([0.0, 0.31, 0.32, 0.9, 1.0])
+    designs = np.vstack([np.zeros(d - 1), np.ones(d - 1), AT[:, :1].repeat(d - 1, 1) ** 2])
+    points = np.column_stack([np.tile(place, len(designs)), designs.repeat(len(place), 0)])
+    found = Trajectory(made.lines, place)(designs)
+    assert found.shape == (len(designs), 5, 2)
+    np.testing.assert_allclose(found.reshape(-1, 2), made(points), atol=1e-9)
+
+
+def test_splines_on_many_nodes_are_multiplied_sparsely_and_the_same() -> None:
+    made = _grid(11, 4, "linear")
+    assert not isinstance(made.lines.second(AT), np.ndarray)
+    found = Trajectory(made.lines, np.array([0.2, 0.7]))(AT)
+    points = np.column_stack([np.tile([0.2, 0.7], len(AT)), AT.repeat(2, 0)])
+    np.testing.assert_allclose(found.reshape(-1, 2), made(points), atol=1e-12)
