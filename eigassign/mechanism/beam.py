@@ -14,7 +14,7 @@ planar mechanism keeps (u_x, u_y, θ_z).
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from eigassign.series.expression import Scalar, is_constant
 
 Floats = NDArray[np.float64]
+Numbers = NDArray[Any]  # real or complex: polynomials do not mind
 
 
 class ElementTerm(NamedTuple):
@@ -89,7 +90,16 @@ def shear_ratios(beam: BeamValues, h: Scalar) -> tuple[Scalar, Scalar]:
     return _phi(beam, beam.EI_z, h), _phi(beam, beam.EI_y, h)
 
 
-def bending_shapes(xi: Floats, phi: Floats) -> Floats:
+def field_inertia(beam: BeamValues) -> tuple[Scalar, ...]:
+    """Per unit of length what the mass matrix gives to u_x, u_y, u_z, θ_x, θ_y, θ_z.
+
+    ρA three times [kg/m], ρI_p, ρI_y, ρI_z [kg m]; without shear the rotary ones are neglected.
+    """
+    rotary = (0.0, 0.0) if beam.shear is None else (beam.rotary_y, beam.rotary_z)
+    return (beam.mass, beam.mass, beam.mass, beam.polar, *rotary)
+
+
+def bending_shapes(xi: Numbers, phi: Numbers) -> Numbers:
     """Deflection per (w1, h θ1, w2, h θ2) at ξ = x/h in an element with shear ratio Φ, (…, 4).
 
     (1+Φ) w = (1−3ξ²+2ξ³ + Φ(1−ξ)) w1 + (ξ−2ξ²+ξ³ + Φ(ξ−ξ²)/2) h θ1
@@ -106,6 +116,23 @@ def bending_shapes(xi: Floats, phi: Floats) -> Floats:
         xi**2 * (xi - 1.0) - bubble,
     )
     return np.stack(shapes, axis=-1) / (1.0 + phi)[..., None]
+
+
+def bending_slopes(xi: Numbers, phi: Numbers) -> Numbers:
+    """h × rotation of the section per (w1, h θ1, w2, h θ2) at ξ, of `bending_shapes`, (…, 4).
+
+    (1+Φ) h θ = −6(ξ−ξ²) w1 + (1−4ξ+3ξ² + Φ(1−ξ)) h θ1
+              + 6(ξ−ξ²) w2 + (−2ξ+3ξ² + Φξ) h θ2 .
+    These are the shapes whose products integrate to the rotary inertia.
+    """
+    bow = 6.0 * xi * (1.0 - xi)
+    slopes = (
+        -bow,
+        (1.0 - xi) * (1.0 - 3.0 * xi + phi),
+        bow,
+        xi * (3.0 * xi - 2.0 + phi),
+    )
+    return np.stack(slopes, axis=-1) / (1.0 + phi)[..., None]
 
 
 def _phi(beam: BeamValues, EI: Scalar, h: Scalar) -> Scalar:

@@ -15,6 +15,7 @@ from eigassign.mechanism.beam import (
     ElementTerm,
     element_mass,
     element_stiffness,
+    field_inertia,
     shear_ratios,
 )
 from eigassign.mechanism.geometry import length, link_type, station
@@ -86,10 +87,13 @@ def _chain(
     stiffness, mass = Entries((width * count,) * 2), Entries((width * count,) * 2)
     positions: list[Objects] = [vector([0.0])]
     shear: list[tuple[Scalar, Scalar]] = []
+    inertia: list[Sequence[Scalar]] = []
     for start, span, n in pieces:
         first = len(positions) - 1
         positions += [vector([start + span * (k / n)]) for k in range(1, n + 1)]
-        shear += _segment(case, parameters, name, stiffness, mass, first, (start, span), n, space)
+        beams = _segment(case, parameters, name, stiffness, mass, first, (start, span), n, space)
+        shear += [shear_ratios(beam, span * (1.0 / n)) for beam in beams]
+        inertia += [field_inertia(beam) for beam in beams]
     slots = [node_dofs(width * k, space) for k in range(count)]
     nodes = {"start": slots[0], "end": slots[-1]}
     places = {"start": positions[0], "end": positions[-1]}
@@ -97,7 +101,8 @@ def _chain(
         nodes[rider], places[rider] = slots[pieces[0][2]], positions[pieces[0][2]]
     add_bodies(case, parameters, name, mass, nodes)
     rigid = _chain_rigid(pieces, space)
-    strand = Strand(slots, positions, rolled(_roll(case.mechanism.links[name]))[:3, :3], shear)
+    turn = rolled(_roll(case.mechanism.links[name]))[:3, :3]
+    strand = Strand(slots, positions, turn, shear, inertia)
     terms = stiffness.terms(), mass.terms(), rigid
     return LinkMesh(width * count, nodes, places, *terms, (strand,))
 
@@ -132,8 +137,8 @@ def _segment(
     piece: tuple[Scalar, Scalar],
     n: int,
     space: str,
-) -> list[tuple[Scalar, Scalar]]:
-    """n equal elements from node ``first`` on; with a taper each has its own section. Their Φ."""
+) -> list[BeamValues]:
+    """n equal elements from node ``first`` on, of these values; a taper gives each its section."""
     start, span = piece
     link: Any = case.mechanism.links[name]
     h = span * (1.0 / n)
@@ -142,9 +147,9 @@ def _segment(
         beam = beam_values(case, parameters, link, link.section)
         _tile(stiffness, element_stiffness(beam, h), turn, first, n, space)
         _tile(mass, element_mass(beam, h), turn, first, n, space)
-        return [shear_ratios(beam, h)] * n
+        return [beam] * n
     total = length(case, parameters, name)
-    shear = []
+    beams = []
     for k in range(n):
         share: Scalar = (k + 0.5) / n
         if span is not total:  # a rider splits the beam
@@ -152,8 +157,8 @@ def _segment(
         beam = _tapered(case, parameters, link, share)
         _tile(stiffness, element_stiffness(beam, h), turn, first + k, 1, space)
         _tile(mass, element_mass(beam, h), turn, first + k, 1, space)
-        shear.append(shear_ratios(beam, h))
-    return shear
+        beams.append(beam)
+    return beams
 
 
 def _tile(

@@ -36,6 +36,7 @@ class Strand(NamedTuple):
     points: Sequence[Objects]  # per node its place, m
     axes: Floats | None  # rows: x, y, z of the elements in the link's axes; None where no matter
     shear: Sequence[tuple[Scalar, Scalar]]  # per element Φ of bending in its x-y and x-z plane
+    inertia: Sequence[Sequence[Scalar]] = ()  # per element of a straight link `field_inertia`
 
 
 @dataclass(frozen=True)

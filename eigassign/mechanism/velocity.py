@@ -1,9 +1,12 @@
 """The velocity terms of eq. (1), which the method neglects: built here so that they can be checked.
 
 With the local motion w = B x of a link whose frame turns at ω(t), the velocity of its nodes in its
-own axes is B ẋ + P x, P = Ḃ + ω̃ B. From the kinetic energy ½ (Bẋ + Px)ᵀ m (Bẋ + Px),
+own axes is B ẋ + P x, P = Ḃ + ω̃ B, and that of its matter N (B ẋ + P x) + Ṅ B x: the shapes N
+change at a place of the link where its mesh moves with a carriage or nut (`convection`). With
+m = ∫ ρ Nᵀ N, G = ∫ ρ Nᵀ Ṅ and H = ∫ ρ Ṅᵀ Ṅ the kinetic energy gives
 
-    M = Bᵀ m B,   C = Ṁ + Bᵀ m P − Pᵀ m B,   K_v = d(Bᵀ m P)/dt − Pᵀ m P .
+    M = Bᵀ m B,   C = Ṁ + Q − Qᵀ,   K_v = Q̇ − R,
+    Q = Bᵀ (m P + G B),   R = Pᵀ m P + Pᵀ G B + Bᵀ Gᵀ P + Bᵀ H B .
 
 C is gyroscopic up to Ṁ; K_v holds the centrifugal and Euler terms. Derivatives in time are central
 differences of the kinematics along the motion q(t), q̇(t), q̈(t).
@@ -23,6 +26,7 @@ from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly import LocalLink
 from eigassign.mechanism.build import local_links
+from eigassign.mechanism.convection import Riding, mesh_scalars, riding
 from eigassign.mechanism.craig_bampton import total
 from eigassign.mechanism.geometry import link_type
 from eigassign.mechanism.kinematics import Kinematics, all_moving
@@ -34,7 +38,7 @@ from eigassign.series.expression import Scalar
 from eigassign.series.table import Table, compile_table
 
 Floats = NDArray[np.float64]
-STEP = 1e-4  # of the time in which the fastest coordinate moves, or would start to, by 1 rad or m
+STEP = 1e-4  # of the time in which the fastest coordinate or spin moves, or would, by 1 rad or m
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +46,13 @@ class _LinkTable:
     """One link with everything about it that varies, in one table of scalars."""
 
     link: LocalLink
+    riding: Riding | None  # its beam where something rides on it
     spin: slice  # rows of ω per q̇, all coordinates moving
     carries: slice
     twist: slice
     rigid: slice
     mass: slice
+    mesh: slice
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +71,7 @@ class VelocityTerms:
         self, q: Floats, y: Floats, rate: Floats, acceleration: Floats
     ) -> tuple[sparse.csr_array, sparse.csr_array]:
         """C [N s/m] and K_v [N/m] (n_dof, n_dof) for q, q̇, q̈ (n_q,) of one instant."""
-        speed = max(*np.abs(rate), *np.sqrt(np.abs(acceleration)), 0.0, 0.0)
-        h = STEP / speed if speed > 0.0 else STEP
+        h = self._step(q, y, rate, acceleration)
         instants = [(k * h) for k in (-2, -1, 0, 1, 2)]
         values = [self._values(q + rate * t + acceleration * (t * t / 2.0), y) for t in instants]
         rates = [rate + acceleration * t for t in instants]
@@ -79,6 +84,14 @@ class VelocityTerms:
             C, K = C + c, K + k
         return sparse.csr_array(C), sparse.csr_array(K)
 
+    def _step(self, q: Floats, y: Floats, rate: Floats, acceleration: Floats) -> float:
+        """Interval of the differences, s: a screw turns much faster than its nut travels."""
+        values = self._values(q, y)
+        spins = [values[one.spin].reshape(3, -1) for one in self.links]
+        moved = np.vstack([np.eye(len(rate)), *spins])
+        speed = max(np.abs(moved @ rate).max(), np.sqrt(np.abs(moved @ acceleration)).max())
+        return STEP / float(speed) if speed > 0.0 else STEP
+
     def _values(self, q: Floats, y: Floats) -> Floats:
         z = np.concatenate([self.relative @ q + self.offset, y])
         return self.table.evaluate(Samples(), z[:, None])[:, 0]
@@ -87,15 +100,28 @@ class VelocityTerms:
         self, one: _LinkTable, values: list[Floats], rates: list[Floats], h: float
     ) -> tuple[sparse.csr_array, sparse.csr_array]:
         B = [self._motion(one, v) for v in values]
-        m = total(whole_mass(one.link), values[2][one.mass])
+        m = [total(whole_mass(one.link), values[k][one.mass]) for k in (1, 2, 3)]
         P = [
             (B[k + 1] - B[k - 1]) * (0.5 / h) + self._spin(one, values[k], rates[k]) @ B[k]
             for k in (1, 2, 3)
         ]
-        momentum = [B[k].T @ m @ P[k - 1] for k in (1, 2, 3)]
-        growth = (B[3].T @ m @ B[3] - B[1].T @ m @ B[1]) * (0.5 / h)
-        C = growth + momentum[1] - momentum[1].T
-        return C, (momentum[2] - momentum[0]) * (0.5 / h) - P[1].T @ m @ P[1]
+        growth = (B[3].T @ m[2] @ B[3] - B[1].T @ m[0] @ B[1]) * (0.5 / h)
+        G, H = zip(
+            *(self._convection(one, values[k - 1 : k + 2], h) for k in (1, 2, 3)), strict=True
+        )
+        Q = [b.T @ (a @ p + g @ b) for a, b, p, g in zip(m, B[1:4], P, G, strict=True)]
+        cross = P[1].T @ G[1] @ B[2]
+        R = P[1].T @ m[1] @ P[1] + cross + cross.T + B[2].T @ H[1] @ B[2]
+        return growth + Q[1] - Q[1].T, (Q[2] - Q[0]) * (0.5 / h) - R
+
+    def _convection(
+        self, one: _LinkTable, values: list[Floats], h: float
+    ) -> tuple[sparse.csr_array, sparse.csr_array]:
+        """G and H at the middle of three instants; 0 where the mesh stays where it is."""
+        if one.riding is None:
+            n = whole_mass(one.link)[0].matrix.shape[0]
+            return sparse.csr_array((n, n)), sparse.csr_array((n, n))
+        return one.riding.at([v[one.mesh] for v in values], h)
 
     def _motion(self, one: _LinkTable, values: Floats) -> sparse.csr_array:
         """B (n_local, n_dof) of all local dofs, of a reduced link of those it stands for too."""
@@ -143,10 +169,12 @@ def velocity_terms(case: CaseFile, parameters: Parameters, motion: Kinematics) -
             *motion_scalars(link),
             [t.coefficient for t in whole_mass(link)],
         ]
+        mesh, rides = nodes.meshes[placement.link], motion.tree.riders(placement.link)
+        parts.append(mesh_scalars(mesh) if rides else [])
         cuts = np.cumsum([len(scalars), *(len(p) for p in parts)]).tolist()
         slices = [slice(a, b) for a, b in itertools.pairwise(cuts)]
         scalars += [s for part in parts for s in part]
-        tables.append(_LinkTable(link, *slices))
+        tables.append(_LinkTable(link, riding(mesh) if rides else None, *slices))
     n = len(parameters.coordinates) + len(parameters.design)
     return VelocityTerms(
         links=tuple(tables),
