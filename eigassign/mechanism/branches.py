@@ -17,6 +17,8 @@ from eigassign.series.implicit import ACCEPT, ImplicitFunction
 
 TRIES = 64  # starting points where no guess is given
 SAME = 1e-6  # rad or m
+CHANGE = 1e-5  # rad or m, for central differences of F
+IMMOBILE = 1e-5  # share of ∂F/∂a beyond what ∂F/∂p can meet; differences leave some 1e-9 of it
 RANK = 1e-7  # of the largest singular value of ∂F/∂p: those below do not count
 
 
@@ -46,6 +48,7 @@ def choose_branch(
             )
         raise MechanismError("mechanism.assembly" if assembly else "mechanism.joints", message)
     _check_determined(tree, function, a0, found[0])
+    _check_movable(case, function, used, a0, found[0])
     if guess is None and len(found) > 1:
         raise MechanismError("mechanism.joints", _ambiguous(tree, function.names, a0, found))
     return a0, found[0]
@@ -134,6 +137,30 @@ def _check_determined(tree: Tree, function: ImplicitFunction, a0: Floats, p0: Fl
             f"{n} coordinate(s), which do not determine the joints {joints}; or "
             f"{_at(function.names, a0)} is a dead point",
         )
+
+
+def _check_movable(
+    case: CaseFile, function: ImplicitFunction, used: Sequence[int], a0: Floats, p0: Floats
+) -> None:
+    """Every argument of p can change: ∂F/∂p ṗ = −∂F/∂a has a solution, rows beyond p's included."""
+    J = function.equations(a0[:, None], p0[:, None])[2][0]
+    steps = np.repeat(a0[:, None], 2 * len(a0), axis=1)
+    steps += CHANGE * np.hstack([np.eye(len(a0)), -np.eye(len(a0))])
+    F = function.equations(steps, np.repeat(p0[:, None], steps.shape[1], axis=1))[0]
+    slope = (F[:, : len(a0)] - F[:, len(a0) :]) / (2.0 * CHANGE)
+    unmet = np.linalg.norm(slope - J @ (np.linalg.pinv(J) @ slope), axis=0)
+    drives = [c.drive for c in case.coordinates.values()]
+    for k, v in enumerate(used):
+        held = v < len(drives) and drives[v] == "locked"  # the only pose it has is then enough
+        if unmet[k] > IMMOBILE * np.linalg.norm(slope[:, k]) and not held:
+            raise MechanismError(
+                "coordinates" if v < len(drives) else "design",
+                f"{function.names[k]} cannot change at {_at(function.names, a0)}: the loops pose "
+                f"{function.n_equations} conditions, of which the {function.size} passive "
+                "freedom(s) can meet none more. It is a structure, or stretched to a dead point: "
+                "give a joint another freedom, lock the coordinate, or choose another pose with "
+                "mechanism.assembly.at",
+            )
 
 
 def _unclosable(tree: Tree, function: ImplicitFunction, a0: Floats) -> str:

@@ -24,7 +24,7 @@ from eigassign.mechanism.rotations import vector
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-STRAIN_FREE = 1e-6  # largest |K N| relative to |K| |N|, row by row, that passes for none
+STRAIN_FREE = 1e-6  # largest |K N|_i relative to √K_ii ‖√K_jj N_j‖ that passes for none
 ALIKE = 1e-3  # relative difference of a part's mass by direction that passes for round-off
 
 
@@ -100,8 +100,9 @@ def _follow(K: sparse.csr_array, N: sparse.csr_array, n_b: int, path: str) -> sp
 
 def _check_rigid(K: sparse.csr_array, rigid: list[Term], path: str) -> None:
     N = np.sum([t.matrix.toarray() for t in rigid], axis=0)  # the nodes are numbers, not variables
-    strained = np.abs(np.asarray(K @ N))
-    if (strained > STRAIN_FREE * np.asarray(abs(K) @ np.abs(N))).any():
+    size = np.sqrt(np.maximum(K.diagonal(), 0.0))  # |K_ij| ≤ √(K_ii K_jj), in any units
+    most = size[:, None] * np.linalg.norm(size[:, None] * N, axis=0)
+    if (np.abs(np.asarray(K @ N)) > STRAIN_FREE * most).any():
         raise MechanismError(
             f"{path}.stiffness",
             "strains under rigid motion: the node positions or dof numbers do not fit the "
