@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spatial_cases import Built, built, changed
+from spatial_cases import ALLOY, Built, built, changed
 from spatial_examples import arm3r, four_bar, gantry, slider_crank, straight
 from spatial_oracle import Tree, world
 
@@ -170,6 +170,35 @@ def test_links_that_do_not_reach_are_told_from_too_many_coordinates() -> None:
     message = "3 conditions, of which B, D can meet 2: 1 coordinate.* too many"
     with pytest.raises(MechanismError, match=message):
         built(tree)
+
+
+def triangle(drive: Any) -> Tree:
+    """Two links pinned to each other and to the ground: a truss."""
+    angle = float(np.arctan2(0.24, 0.32))  # sides 0.4, 0.3, 0.5
+    return {
+        "mechanism": {
+            "space": "planar",
+            "materials": {"m": ALLOY},
+            "sections": {"s": {"shape": "rectangle", "height": 0.02, "width": 0.02}},
+            "links": {"a": straight(0.4, 2), "b": straight(0.3, 2)},
+            "joints": {
+                "A": {"type": "revolute", "base": "ground", "follower": "a.start"},
+                "B": {"type": "revolute", "base": "a.end", "follower": "b.start"},
+                "C": {"type": "revolute", "base": "ground", "follower": "b.end",
+                      "position": [0.5, 0.0]},
+            },
+            "assembly": {"at": {"q": angle}, "guess": {"B": -np.pi / 2, "C": angle - np.pi / 2}},
+        },
+        "coordinates": {"q": {"joint": "A", "drive": drive}},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("drive", ["free", {"stiffness": 100.0}])
+def test_a_structure_is_not_taken_for_a_mechanism(drive: Any) -> None:
+    message = r"q cannot change at q = 0.6435.* structure"
+    with pytest.raises(MechanismError, match=message) as caught:
+        built(triangle(drive))
+    assert caught.value.path == "coordinates"
 
 
 def bennett(error: float = 0.0) -> Tree:

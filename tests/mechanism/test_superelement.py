@@ -139,6 +139,38 @@ def test_the_whole_mass_and_inertia_survive_the_reduction(tmp_path: Path) -> Non
     assert at[0] == pytest.approx(at[1], rel=1e-9)
 
 
+def bent() -> tuple[np.ndarray, np.ndarray]:
+    """Free-free K, M of an L: ELEMENTS along x, then as many along y."""
+    n = 6 * (2 * ELEMENTS + 1)
+    K, M = np.zeros((n, n)), np.zeros((n, n))
+    R = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    for e in range(2 * ELEMENTS):
+        turn = np.kron(np.eye(4), R if e >= ELEMENTS else np.eye(3))
+        at = slice(6 * e, 6 * e + 12)
+        for A, a in zip((K, M), element(ALLOY, section(FLAT), 0.0375, False), strict=True):
+            A[at, at] += turn.T @ a @ turn
+    return (K + K.T) / 2.0, (M + M.T) / 2.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_order_of_a_bent_part_s_dofs_does_not_matter(tmp_path: Path, seed: int) -> None:
+    def eigenvalues(order: np.ndarray) -> np.ndarray:
+        matrices = (A[np.ix_(order, order)] for A in bent())
+        row = np.argsort(order)
+        side = 0.0375 * ELEMENTS
+        nodes = {
+            "start": {"position": [0.0, 0.0, 0.0], "dofs": row[:6].tolist()},
+            "end": {"position": [side, side, 0.0], "dofs": row[-6:].tolist()},
+        }
+        files = write(tmp_path, "npy", *matrices)
+        link = {**part("spatial", files), "nodes": nodes}
+        return lam(tmp_path, arm("spatial", {"part": link}))
+
+    plain = np.arange(6 * (2 * ELEMENTS + 1))
+    mixed = np.random.default_rng(seed).permutation(plain)
+    np.testing.assert_allclose(eigenvalues(mixed), eigenvalues(plain), rtol=1e-8)
+
+
 # Wrong ones
 
 
