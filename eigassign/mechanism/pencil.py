@@ -9,15 +9,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from eigassign.mechanism.rails import Rails
 from eigassign.series.algebra import Samples, Truncated
 from eigassign.series.lower_set import LowerSet, on_faces
 from eigassign.series.program import Program
+
+if TYPE_CHECKING:
+    from eigassign.mechanism.rails import Rails
 
 Floats = NDArray[np.float64]
 STACK_LIMIT = 500_000  # numbers: 4 MB
