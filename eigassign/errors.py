@@ -69,6 +69,19 @@ class TravelError(MechanismError):
         super().__init__(path, message)
 
 
+class MissingMassError(MechanismError):
+    """More modes are asked for than have mass; ``most`` is how many of them can be told."""
+
+    def __init__(self, most: int) -> None:
+        self.most = most
+        modes = f"only {most} modes" if most != 1 else "only 1 mode"
+        super().__init__(
+            "mechanism",
+            f"has {modes} with mass, or with enough of it to be told from round-off: "
+            "give it mass or ask for fewer",
+        )
+
+
 class AccuracyError(EigassignError):
     """A number was computed that cannot be vouched for, and is withheld."""
 

@@ -85,6 +85,15 @@ class Pencil:
         return self.stiffness.tocsc(), self.mass.tocsc()
 
     @cached_property
+    def mass_magnitude(self) -> sparse.csr_array:
+        """|(M_j)_ii| (n_dof, n_theta): with |θ| the size of what adds up to each M_ii."""
+        on = np.flatnonzero(self.rows == self.columns)
+        place = sparse.csr_array(
+            (np.ones(len(on)), (self.rows[on], on)), shape=(self.n_dof, len(self.rows))
+        )
+        return sparse.csr_array(place @ abs(self.mass))
+
+    @cached_property
     def local_directions(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """dz/dw, dw/dx for w the active ones of z, and which of x they depend on."""
         directions = self.to_program[self.active]

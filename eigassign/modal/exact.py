@@ -5,6 +5,7 @@ With E the elastic unknowns (u and held coordinates) and F the free coordinates,
     K_E φ_E = λ M_c φ_E,   M_c = M_EE − M_EF M_FF⁻¹ M_FE,   φ_F = −M_FF⁻¹ M_FE φ_E
 
 solved in the inverse form M_c z = μ K_E z, μ = 1/λ, so that massless unknowns (μ = 0) are harmless.
+What may be round-off instead of a mode with mass is settled by ``massive``, for all solvers alike.
 """
 
 from __future__ import annotations
@@ -14,10 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.errors import AccuracyError, MechanismError, UsageError
+from eigassign.errors import MechanismError, UsageError
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.arguments import whole
 from eigassign.modal.exact_single import solve_single
+from eigassign.modal.massive import doubtful, mass_sizes, solve_massive
 from eigassign.modal.sizes import DENSE_LIMIT
 
 __all__ = ["DENSE_LIMIT", "Modes", "condense_blocks", "eigenvalues", "modes", "modes_at"]
@@ -39,7 +41,8 @@ class Modes:
 def eigenvalues(pencil: Pencil, x: Floats, count: int) -> Floats:
     """λ (n_samples, count) of the lowest elastic modes at x (n_samples, n_x), in rad²/s².
 
-    Raises UsageError for more modes than there are, MechanismError where K_E or M_FF is singular.
+    Raises UsageError for more modes than there are, MissingMassError for more than have mass,
+    MechanismError where K_E or M_FF is singular.
     """
     return _solve(pencil, pencil.theta(x), count, vectors=False).lam
 
@@ -66,36 +69,50 @@ def _solve(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
         from eigassign.modal.exact_sparse import solve_sparse
 
         found = Modes(*solve_sparse(pencil, theta, count, vectors))
-    if not np.isfinite(found.lam).all():
-        raise MechanismError(
-            "mechanism", f"has fewer than {count} modes with mass: give it mass or ask for fewer"
-        )
     return found
 
 
 def _dense(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
     if vectors and theta.shape[1] == 1:
-        mu, phi = solve_single(pencil, theta, count)
-        plain = mu[-1] > 1e-15 * mu[0]
-        return Modes(1.0 / mu[None] if plain else _inverse(mu[None]), phi[None])
+        lam, phi = solve_single(pencil, theta, count)
+        return Modes(lam[None], phi[None])
     K, M = pencil.matrices(theta)
     elastic = pencil.elastic
     K_E = _block(K, elastic, elastic)
     if len(K_E) and not np.ptp(K_E, axis=0).any():  # as for added masses: one factor serves all
         K_E = K_E[:1]
     coupling, M_c = condense(M, elastic, pencil.rigid)
-    L_inverse = np.linalg.inv(_cholesky(K_E))
+    L_inverse = np.asarray(np.linalg.inv(_cholesky(K_E)), dtype=np.float64)
     A = L_inverse @ np.swapaxes(L_inverse @ M_c, 1, 2)  # M_c is symmetric
     A = 0.5 * (A + np.swapaxes(A, 1, 2))
+    noise = _noise(L_inverse, mass_sizes(pencil, theta, coupling))
     if not vectors:
         mu = np.asarray(np.linalg.eigvalsh(A)[:, ::-1][:, :count], dtype=np.float64)
-        return Modes(_inverse(mu), np.zeros((len(mu), 0, count)))
+        return _with_mass(pencil, theta, mu, noise, np.zeros((len(mu), 0, count)))
     mu, v = (a[..., ::-1][..., :count] for a in np.linalg.eigh(A))
     z = np.swapaxes(L_inverse, 1, 2) @ v / np.sqrt(np.maximum(mu, 1e-300))[:, None, :]
     phi = np.empty((len(mu), pencil.n_dof, count))
     phi[:, elastic] = z
     phi[:, pencil.rigid] = -coupling @ z
-    return Modes(_inverse(mu), _signed(phi))
+    return _with_mass(pencil, theta, mu, noise, phi)
+
+
+def _noise(L_inverse: Floats, sizes: Floats) -> Floats:
+    """Σ_i (K_E⁻¹)_ii t_i² (n_samples, 1): zᵀ T² z of no K_E-unit z is more."""
+    flexibility = np.einsum("kij,kij->kj", L_inverse, L_inverse)
+    return np.asarray((flexibility * sizes).sum(axis=1, keepdims=True))
+
+
+def _with_mass(pencil: Pencil, theta: Floats, mu: Floats, noise: Floats, phi: Floats) -> Modes:
+    """Modes of μ (n_samples, count); those samples anew whose μ may be round-off."""
+    n, count = len(pencil.elastic), mu.shape[1]
+    again = np.flatnonzero(doubtful(mu, noise, n).any(axis=1))
+    lam = 1.0 / np.where(mu > 0.0, mu, np.inf)
+    for k in again:
+        lam[k], modes = solve_massive(pencil, theta[:, [k]], count)
+        if phi.size:
+            phi[k] = modes
+    return Modes(lam, _signed(phi) if phi.size else phi)
 
 
 def condense(
@@ -134,15 +151,6 @@ def _cholesky(K: Floats) -> Floats:
         raise MechanismError(
             "mechanism", "the stiffness matrix is not positive definite: a link or drive is limp"
         ) from error
-
-
-def _inverse(mu: Floats) -> Floats:
-    """λ = 1/μ, infinite where no mass moves; a clearly negative μ means an indefinite mass."""
-    scale = np.abs(mu).max(axis=1, keepdims=True)
-    if (mu < -1e-9 * scale).any():
-        raise AccuracyError("the mass matrix is not positive semidefinite")
-    with np.errstate(divide="ignore"):
-        return np.where(mu > 1e-15 * scale, 1.0 / np.maximum(mu, 1e-300), np.inf)
 
 
 def _signed(phi: Floats) -> Floats:

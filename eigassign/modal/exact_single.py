@@ -11,13 +11,14 @@ from scipy.linalg import lapack
 
 from eigassign.errors import AccuracyError, MechanismError
 from eigassign.mechanism.pencil import Pencil
+from eigassign.modal.massive import doubtful, mass_sizes, solve_massive
 
 Floats = NDArray[np.float64]
 ALL_AT_ONCE = 64  # unknowns up to which all eigenpairs cost no more than the wanted ones
 
 
 def solve_single(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
-    """μ = 1/λ (count,), descending, and modes (n_dof, count) with φᵀMφ = 1 for θ (n_theta, 1).
+    """λ (count,), ascending, and modes (n_dof, count) with φᵀMφ = 1 for θ (n_theta, 1).
 
     The entry of largest magnitude of every mode is positive.
     """
@@ -36,12 +37,16 @@ def solve_single(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Flo
     A, _ = lapack.dsygst(M_c.T, C, lower=1, overwrite_a=1)
     mu, v = _largest(A, count)
     z, _ = lapack.dtrtrs(C, v, lower=1, trans=1)
-    z = z / np.sqrt(np.maximum(mu, 1e-300))
-    phi = np.concatenate([z, -coupling @ z])
-    if order is not None:
-        phi[order] = phi.copy()
+    noise = mass_sizes(pencil, theta, coupling[None])[0] @ (z * z)
+    if doubtful(mu, noise, n).any():
+        lam, phi = solve_massive(pencil, theta, count)
+    else:
+        z = z / np.sqrt(mu)
+        lam, phi = 1.0 / mu, np.concatenate([z, -coupling @ z])
+        if order is not None:
+            phi[order] = phi.copy()
     top = phi[np.abs(phi).argmax(axis=0), np.arange(count)]
-    return mu, phi * np.copysign(1.0, top)
+    return lam, phi * np.copysign(1.0, top)
 
 
 def _coupling(M_FF: Floats, M_FE: Floats) -> Floats:

@@ -7,11 +7,13 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import linalg
 
-from eigassign.errors import AccuracyError, MechanismError
+from eigassign.errors import AccuracyError, MechanismError, MissingMassError
 from eigassign.mechanism.pencil import Pencil
+from eigassign.modal.massive import doubtful, mass_sizes, solve_massive
 from eigassign.modal.symmetric import block, factorise, principal
 
 Floats = NDArray[np.float64]
+DENSE_MOST = 4000  # elastic unknowns up to which dense algebra settles what may be round-off
 
 
 def solve_sparse(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> tuple[Floats, Floats]:
@@ -29,12 +31,19 @@ def _one(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
     M_FE = M_F[:, E]
     coupling = _coupling(M_F[:, F], M_FE)
     mu, z = _lanczos(K_E, M_EE, M_FE, coupling, count)
-    phi = np.empty((pencil.n_dof, count))
-    phi[E] = z / np.sqrt(mu)
-    phi[F] = -coupling @ phi[E]
+    noise = mass_sizes(pencil, theta[:, None], coupling[None])[0] @ (z * z)
+    sure = ~doubtful(mu, noise, len(E), margin=1.0)  # dense algebra is dear here
+    if sure.all():
+        lam, phi = 1.0 / mu, np.empty((pencil.n_dof, count))
+        phi[E] = z / np.sqrt(mu)
+        phi[F] = -coupling @ phi[E]
+    elif len(E) <= DENSE_MOST:
+        lam, phi = solve_massive(pencil, theta[:, None], count)
+    else:
+        raise MissingMassError(int(sure.argmin()))
     at = np.abs(phi).argmax(axis=0)
     phi *= np.where(phi[at, np.arange(count)] < 0.0, -1.0, 1.0)
-    return 1.0 / mu, phi
+    return lam, phi
 
 
 def _coupling(M_FF: Floats, M_FE: Floats) -> Floats:

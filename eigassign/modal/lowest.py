@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.errors import MechanismError
+from eigassign.errors import MissingMassError
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.exact import Modes, modes_at
 
@@ -14,10 +14,11 @@ Floats = NDArray[np.float64]
 
 def lowest_modes(pencil: Pencil, theta: Floats, least: int, extra: int) -> Modes:
     """At least the lowest ``least`` modes, and up to ``extra`` more where so many have mass."""
-    most = max(min(least + extra, len(pencil.elastic)), least)
-    for count in range(most, least, -1):
+    count = max(min(least + extra, len(pencil.elastic)), least)
+    while True:
         try:
             return modes_at(pencil, theta, count)
-        except MechanismError:
-            continue
-    return modes_at(pencil, theta, least)
+        except MissingMassError as error:
+            if count == least:
+                raise
+            count = min(max(error.most, least), count - 1)

@@ -109,6 +109,7 @@ class Model:
         """``modes`` of the first sample followed along the samples by their shapes.
 
         ``.frequencies`` (n_samples, n_modes) in Hz, ``.swaps``, ``.encounters`` and ``.notes``.
+        Neighbours must be neighbours: pass each of ``case.trajectories`` by itself.
         """
         from eigassign.modal.tracking import track
 

@@ -68,7 +68,7 @@ def ritz_basis(
     theta0 = pencil.theta(points)
     found = lowest_modes(pencil, theta0, wanted[-1], 2 + PROBES if guard else 1)
     count = _represented(found.lam, wanted[-1]) if guard else wanted[-1]
-    plan = _plan(pencil, wanted, half_order, guard)
+    plan = _plan(found.lam.shape[1], wanted, half_order, guard)
     if given is None:
         columns = [_taylor_vectors(pencil, x, plan) for x in points]
     else:
@@ -88,9 +88,9 @@ def _represented(lam: Floats, highest: int) -> int:
     return int(min(wished, highest + 1 + PROBES, lam.shape[1]))
 
 
-def _plan(pencil: Pencil, wanted: tuple[int, ...], half_order: int, guard: bool) -> Plan:
-    """The wanted modes and, to one order less, guards."""
-    guards = [m for m in range(1, wanted[-1] + 2) if m not in wanted and m <= len(pencil.elastic)]
+def _plan(most: int, wanted: tuple[int, ...], half_order: int, guard: bool) -> Plan:
+    """The wanted modes and, to one order less, guards: of the ``most`` that have mass."""
+    guards = [m for m in range(1, wanted[-1] + 2) if m not in wanted and m <= most]
     if not guard or not guards or half_order < 2:
         return [(wanted, half_order)]
     return [(wanted, half_order), (tuple(guards), half_order - 1)]

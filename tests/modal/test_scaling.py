@@ -221,8 +221,8 @@ def test_one_sample_has_the_modes_of_the_batch(
     model = arm(drives, elements)
     x = model.x(np.tile(Q0, (2, 1)), np.tile(Y0, (2, 1)))
     batch = exact.modes(model.pencil, x, 4)
-    mu, phi = solve_single(model.pencil, model.pencil.theta(x[:1]), 4)
-    np.testing.assert_allclose(1.0 / mu, batch.lam[0], rtol=1e-10)
+    lam, phi = solve_single(model.pencil, model.pencil.theta(x[:1]), 4)
+    np.testing.assert_allclose(lam, batch.lam[0], rtol=1e-10)
     np.testing.assert_allclose(phi, batch.phi[0], atol=1e-7 * np.abs(phi).max())
 
 
