@@ -160,6 +160,13 @@ def _expected(what: str) -> Any:
     return explain
 
 
+def _text(error: Any) -> _Explained:
+    value = error["input"]
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    hint = f': write "{value}", in quotes, if that is its name' if number else ""
+    return (), f"expected text (in quotes if need be), got {shown(value)}{hint}"
+
+
 def _literal(error: Any) -> _Explained:
     expected = error["ctx"]["expected"]
     value = error["input"]
@@ -192,7 +199,7 @@ _EXPLAIN: dict[str, Any] = {
     "bool_type": _expected("true or false"),
     "int_type": _expected("a whole number"),
     "int_from_float": _expected("a whole number"),
-    "string_type": _expected("text (in quotes if need be)"),
+    "string_type": _text,
     "string_too_short": _expected("some text"),
     "string_too_long": lambda e: ((), f"is longer than {e['ctx']['max_length']} characters"),
     "too_short": lambda e: (

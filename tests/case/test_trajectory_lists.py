@@ -78,7 +78,7 @@ WRONG = {
         "needs at least 1 entries",
     ),
     "name with a slash": (("name: pick", "¦name: ../x"), "trajectory[0].name", "not a usable name"),
-    "name that is a number": (("name: pick", "¦name: 7"), "trajectory[0].name", "expected text"),
+    "name that is a number": (("name: pick", "¦name: 7"), "trajectory[0].name", 'write "7"'),
     "the same name": (
         ("weight: 2.5", "¦name: pick"),
         "trajectory[1].name",
