@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+LIMP = (
+    "the stiffness matrix is not positive definite: a link or drive is limp, or at this pose the "
+    "springs resist fewer motions than elsewhere"
+)
+
 
 class EigassignError(Exception):
     """Root of the tree. ``exit_code`` is what the command line returns for it."""

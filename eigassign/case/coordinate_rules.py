@@ -116,11 +116,15 @@ def per_coordinate(tree: Tree) -> Iterator[Finding]:
 def branches(tree: Tree) -> Iterator[Finding]:
     """Ranges of joints that keep a tip path in its branch."""
     ranged = [name for name in moving(tree) if len(freedoms(tree, name) or ()) == 1]
+    driven = [text(body, "joint") for _, body in items(tree, "coordinates")]
     for place, body in trajectories(tree):
         for joint, limits in items(body, "branch"):
             path: KeyPath = (*place, "branch", joint)
             if joint not in ranged:
                 yield path, unknown("joint with one freedom", joint, ranged)
+            elif joint not in driven:
+                known = listed([name for name in ranged if name in driven])
+                yield path, f"no coordinate moves this joint (mechanism.assembly does); use {known}"
             elif _repeats(tree, joint) and _width(limits) > 2 * math.pi:
                 yield path, "wider than one turn (an angle is in rad when bare; or write deg)"
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.mechanism.beam import element_mass, element_stiffness, shear_ratios
-from eigassign.mechanism.links import add_bodies, beam_values, rolled
+from eigassign.mechanism.bodies import add_bodies
+from eigassign.mechanism.links import beam_values, rolled
 from eigassign.mechanism.mesh import DOFS, Entries, LinkMesh, Strand, node_dofs, rigid_motion
 from eigassign.mechanism.parameters import Parameters
 from eigassign.mechanism.rotations import vector

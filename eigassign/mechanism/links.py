@@ -18,19 +18,17 @@ from eigassign.mechanism.beam import (
     field_inertia,
     shear_ratios,
 )
+from eigassign.mechanism.bodies import add_bodies, rigid_link
 from eigassign.mechanism.geometry import length, link_type, station
 from eigassign.mechanism.mesh import (
     DOFS,
     Entries,
     LinkMesh,
     Strand,
-    add_scalars,
-    body_block,
     node_dofs,
-    rigid_motion,
 )
 from eigassign.mechanism.parameters import Parameters
-from eigassign.mechanism.rotations import Objects, euler, rotation, vector
+from eigassign.mechanism.rotations import Objects, rotation, vector
 from eigassign.mechanism.sections import SectionValues, section_values
 from eigassign.mechanism.tree import Tree
 from eigassign.series.expression import Scalar, is_constant
@@ -43,7 +41,7 @@ def link_mesh(case: CaseFile, parameters: Parameters, tree: Tree, name: str) -> 
     """The mesh of one link with all its dofs, its bodies included."""
     match link_type(case, name):
         case "rigid":
-            return _rigid(case, parameters, name)
+            return rigid_link(case, parameters, name)
         case "frame":
             from eigassign.mechanism.frames import frame_mesh
 
@@ -266,64 +264,3 @@ def _tapered(case: CaseFile, parameters: Parameters, link: Any, share: Scalar) -
         return low + (high - low) * share
 
     return _values(case, parameters, link, section_values(a, number))
-
-
-# --- bodies and rigid links ---
-
-
-def add_bodies(
-    case: CaseFile, parameters: Parameters, name: str, mass: Entries, nodes: dict[str, Ints]
-) -> None:
-    """The point masses and rigid bodies fixed to a link's nodes."""
-    for key, body in case.mechanism.bodies.items():
-        link, _, node = body.at.partition(".")
-        if link == name:
-            lever = vector(getattr(body, "offset", None) or (0.0,))
-            add_scalars(mass, nodes[node], _body(case, parameters, f"bodies.{key}", body, lever))
-
-
-def _body(case: CaseFile, parameters: Parameters, path: str, body: Any, lever: Objects) -> Objects:
-    value = parameters.number(f"{path}.mass", body.mass)
-    return body_block(value, _inertia(parameters, path, body.inertia), lever)
-
-
-def _inertia(parameters: Parameters, path: str, given: Any) -> list[Scalar]:
-    """(Ixx, Iyy, Izz, Ixy, Ixz, Iyz): a number is I_zz of a planar body."""
-    if isinstance(given, (tuple, list)):
-        return [*(float(v) for v in given), *([0.0] * (6 - len(given)))]
-    zz = parameters.number(f"{path}.inertia", given)
-    return [0.0, 0.0, zz, 0.0, 0.0, 0.0]
-
-
-def _rigid(case: CaseFile, parameters: Parameters, name: str) -> LinkMesh:
-    """A rigid link: one node at its origin carries its mass, named nodes hang on it rigidly."""
-    space, link = case.mechanism.space, case.mechanism.links[name]
-    width, kept = len(DOFS[space]), node_dofs(0, case.mechanism.space)
-    mass = Entries((width, width))
-    center = vector(getattr(link, "center", None) or (0.0,))
-    add_scalars(mass, kept, _body(case, parameters, f"links.{name}", link, center))
-    places = rigid_nodes(case, parameters, name)
-    for key, body in case.mechanism.bodies.items():
-        owner, _, node = body.at.partition(".")
-        if owner == name:
-            lever = places[node] + vector(getattr(body, "offset", None) or (0.0,))
-            add_scalars(mass, kept, _body(case, parameters, f"bodies.{key}", body, lever))
-    rigid = rigid_motion([vector([0.0])], [kept], width, space)
-    return LinkMesh(width, {"@origin": kept}, places, [], mass.terms(), rigid)
-
-
-def rigid_nodes(case: CaseFile, parameters: Parameters, name: str) -> dict[str, Objects]:
-    """Named nodes of a rigid link in its frame, m."""
-    link = case.mechanism.links[name]
-    places = {"start": vector([0.0])}
-    if getattr(link, "length", None) is not None:
-        places["end"] = vector([length(case, parameters, name)])
-    given = getattr(link, "nodes", None) or {}
-    return places | {key: vector([float(c) for c in X]) for key, X in given.items()}
-
-
-def mounted(orientation: Sequence[float] | None, angle: float) -> Floats:
-    """A constant rotation from spatial angles or a planar one."""
-    if orientation is not None:
-        return euler(orientation)
-    return np.asarray(rotation(np.array([0.0, 0.0, 1.0]), angle), dtype=np.float64)

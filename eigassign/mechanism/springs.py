@@ -15,9 +15,9 @@ import numpy as np
 
 from eigassign.case import CaseFile
 from eigassign.mechanism.assembly import Accumulator
+from eigassign.mechanism.bodies import mounted
 from eigassign.mechanism.geometry import node_position
 from eigassign.mechanism.kinematics import Kinematics
-from eigassign.mechanism.links import mounted
 from eigassign.mechanism.mesh import DOFS
 from eigassign.mechanism.nodes import NodeMotions, Row, Rows, apply, combined
 from eigassign.mechanism.parameters import Parameters

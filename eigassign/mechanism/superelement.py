@@ -14,9 +14,9 @@ from scipy import sparse
 
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
+from eigassign.mechanism.bodies import add_bodies
 from eigassign.mechanism.craig_bampton import held_factor
 from eigassign.mechanism.geometry import link_type
-from eigassign.mechanism.links import add_bodies
 from eigassign.mechanism.matrix_files import read_pair
 from eigassign.mechanism.mesh import DOFS, Entries, LinkMesh, Term, rigid_motion
 from eigassign.mechanism.parameters import Parameters

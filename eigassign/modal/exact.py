@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.errors import MechanismError, UsageError
+from eigassign.errors import LIMP, MechanismError, UsageError
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.arguments import whole
 from eigassign.modal.exact_single import solve_single
@@ -148,9 +148,7 @@ def _cholesky(K: Floats) -> Floats:
     try:
         return np.asarray(np.linalg.cholesky(K), dtype=np.float64)
     except np.linalg.LinAlgError as error:
-        raise MechanismError(
-            "mechanism", "the stiffness matrix is not positive definite: a link or drive is limp"
-        ) from error
+        raise MechanismError("mechanism", LIMP) from error
 
 
 def _signed(phi: Floats) -> Floats:

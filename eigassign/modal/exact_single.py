@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from eigassign.errors import AccuracyError, MechanismError
+from eigassign.errors import LIMP, AccuracyError, MechanismError
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.massive import doubtful, mass_sizes, solve_massive
 
@@ -29,9 +29,7 @@ def solve_single(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Flo
     E, F = slice(n), slice(n, pencil.n_dof)
     C, info = lapack.dpotrf(K[E, E].T, lower=1, overwrite_a=1)
     if info:
-        raise MechanismError(
-            "mechanism", "the stiffness matrix is not positive definite: a link or drive is limp"
-        )
+        raise MechanismError("mechanism", LIMP)
     coupling = _coupling(M[F, F], M[F, E])
     M_c = M[E, E] - M[E, F] @ coupling
     A, _ = lapack.dsygst(M_c.T, C, lower=1, overwrite_a=1)

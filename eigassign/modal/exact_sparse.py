@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import linalg
 
-from eigassign.errors import AccuracyError, MechanismError, MissingMassError
+from eigassign.errors import LIMP, AccuracyError, MechanismError, MissingMassError
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.massive import doubtful, mass_sizes, solve_massive
 from eigassign.modal.symmetric import block, factorise, principal
@@ -66,9 +66,7 @@ def _lanczos(
     try:
         factor = factorise(K_E)
     except RuntimeError as error:
-        raise MechanismError(
-            "mechanism", "the stiffness matrix is singular: a link or drive is limp"
-        ) from error
+        raise MechanismError("mechanism", LIMP) from error
     K_rows, M_rows = K_E.T, M_EE.T  # symmetric: products run faster row by row
     M_c = linalg.LinearOperator((n, n), matvec=lambda v: M_rows @ v - (coupling @ v) @ M_FE)
     inverse = linalg.LinearOperator((n, n), matvec=factor.solve)

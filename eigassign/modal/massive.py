@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack, svd
 
-from eigassign.errors import AccuracyError, MechanismError, MissingMassError
+from eigassign.errors import LIMP, AccuracyError, MechanismError, MissingMassError
 from eigassign.mechanism.pencil import Pencil
 
 Floats = NDArray[np.float64]
@@ -58,9 +58,7 @@ def solve_massive(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Fl
     G = _factor(M_c[0], np.sqrt(mass_sizes(pencil, theta, coupling)[0]))
     C, info = lapack.dpotrf(K[0][np.ix_(E, E)], lower=1)
     if info:
-        raise MechanismError(
-            "mechanism", "the stiffness matrix is not positive definite: a link or drive is limp"
-        )
+        raise MechanismError("mechanism", LIMP)
     U, root, _ = svd(lapack.dtrtrs(C, G, lower=1)[0], full_matrices=False)
     most = int((root > STIFFEST * root.max(initial=0.0)).sum())
     if most < count:

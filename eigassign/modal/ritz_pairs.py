@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.errors import MechanismError
+from eigassign.errors import LIMP, MechanismError
 from eigassign.modal.triangular import triangular_inverse
 
 Floats = NDArray[np.float64]
@@ -28,7 +28,5 @@ def _standard(K: Floats, M_c: Floats) -> tuple[Floats, Floats]:
     try:
         inverse = triangular_inverse(np.asarray(np.linalg.cholesky(K), dtype=np.float64))
     except np.linalg.LinAlgError as error:
-        raise MechanismError(
-            "mechanism", "the stiffness matrix is not positive definite: a link or drive is limp"
-        ) from error
+        raise MechanismError("mechanism", LIMP) from error
     return inverse @ M_c @ np.swapaxes(inverse, 1, 2), inverse

@@ -182,3 +182,14 @@ def test_no_coordinate_is_called_time_for_that_is_a_column() -> None:
     text = edited("q1: {joint: shoulder}", "time: {joint: shoulder}")
     with pytest.raises(CaseError, match="heads a column of its own"):
         read(text)
+
+
+def test_a_branch_of_a_passive_joint_is_refused_and_the_driven_ones_named() -> None:
+    text = Path(__file__).parents[2].joinpath("cases/five_bar.yaml").read_text(encoding="utf-8")
+    head, rest = text.split("trajectory:\n")
+    path = "  tip: left_arm.end\n  waypoints: [[0.1, 0.3], [0.12, 0.3]]\n"
+    path += "  branch: {left_elbow: [0, 1]}\n\n"
+    rest = rest[rest.index("design:") :]
+    with pytest.raises(CaseError, match=r"no coordinate moves this joint .*left_motor") as caught:
+        read(f"{head}trajectory:\n{path}{rest}")
+    assert [p.path for p in caught.value.problems] == ["trajectory.branch.left_elbow"]
