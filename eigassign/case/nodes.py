@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from eigassign.case.link_parts import LINKS
 from eigassign.case.suggest import listed, shown, suggestion, unknown
-from eigassign.case.tree import Tree, at, lacks, names, text
+from eigassign.case.tree import Tree, at, lacks, names
 
 _MOST = 6  # node names spelt out in a message
 
@@ -55,9 +55,3 @@ def _spelt(link: str, nodes: list[str]) -> list[str]:
     if len(nodes) <= _MOST:
         return [repr(f"{link}.{node}") for node in nodes]
     return [f"'{link}.<node>' ({listed(nodes)})"]
-
-
-def base_link(tree: Tree, joint: object) -> str | None:
-    """Link (or "ground") that carries a joint; None where it is not given."""
-    base = text(joint, "base")
-    return base.partition(".")[0] if base is not None else None

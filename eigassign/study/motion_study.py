@@ -92,7 +92,7 @@ def _effect(scene: Scene, part: NamedTrajectory) -> float:
 
 
 def _stated(change: float, limit: float, along: str) -> MotionStudy:
-    text = f"the neglected velocity terms change a frequency by up to {100 * change:.2g} %"
+    text = f"the neglected velocity terms change a frequency by about {100 * change:.2g} %"
     if change <= limit:
         return MotionStudy(change, f"speed of the motion: {text} along {along}", None)
     warning = (
