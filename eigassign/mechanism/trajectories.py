@@ -7,7 +7,7 @@ into the start of the next; what does so goes part by part.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
@@ -141,7 +141,7 @@ class Trajectories:
 
 def _thinned(trajectory: Trajectory, rows: Ints) -> Trajectory:
     tip = None if trajectory.tip is None else trajectory.tip[rows]
-    return Trajectory(trajectory.time_s[rows], trajectory.q[rows], tip, trajectory.notes)
+    return replace(trajectory, time_s=trajectory.time_s[rows], q=trajectory.q[rows], tip=tip)
 
 
 def _stacked(arrays: Sequence[Floats]) -> Floats:

@@ -35,6 +35,7 @@ class Trajectory:
     q: Floats  # (n, n_q) in rad or m
     tip: Floats | None  # (n, 2 or 3) in m
     notes: tuple[str, ...] = ()  # what a reader should know: choices made, columns ignored
+    corners_s: tuple[float, ...] = ()  # times in between at which it is known that q̇ may jump
 
     def __post_init__(self) -> None:
         for array in (self.time_s, self.q, self.tip):
@@ -82,7 +83,10 @@ def _from_tip_path(
     s = np.maximum.accumulate(np.clip(s, 0.0, 1.0))  # round-off at the ends
     course = Course(path, s, spec.duration * tau, attitude)
     followed = follow(chain, course, spec.branch, spec.start)
-    return Trajectory(course.time_s, followed.q, followed.tip, followed.notes)
+    corners = np.interp(course.corners(), course.s, course.time_s)
+    return Trajectory(
+        course.time_s, followed.q, followed.tip, followed.notes, tuple(corners.tolist())
+    )
 
 
 def _check_dimension(chain: TipChain, path: Path) -> None:
@@ -127,7 +131,8 @@ def _from_points(spec: PointTrajectory, q_names: Sequence[str]) -> Trajectory:
         reached, said = _checked_time(spec.times, len(points), "times", "point"), ()
     law = timing_law(spec.timing, spec.acceleration_share)
     motion = point_to_point(points, reached, law, spec.samples)
-    return Trajectory(motion.time_s, motion.q, None, said if len(points) > 2 else ())
+    corners = tuple(reached[1:-1].tolist()) if spec.timing == "linear" else ()  # elsewhere at rest
+    return Trajectory(motion.time_s, motion.q, None, said if len(points) > 2 else (), corners)
 
 
 def _checked_rows(

@@ -72,9 +72,9 @@ class VelocityTerms:
     ) -> tuple[sparse.csr_array, sparse.csr_array]:
         """C [N s/m] and K_v [N/m] (n_dof, n_dof) for q, q̇, q̈ (n_q,) of one instant."""
         h = self._step(q, y, rate, acceleration)
-        instants = [(k * h) for k in (-2, -1, 0, 1, 2)]
-        values = [self._values(q + rate * t + acceleration * (t * t / 2.0), y) for t in instants]
-        rates = [rate + acceleration * t for t in instants]
+        t = h * np.arange(-2.0, 3.0)[:, None]
+        values = list(self._values(q + rate * t + acceleration * (t * t / 2.0), y))
+        rates = list(rate + acceleration * t)
         C = sparse.csr_array((self.n_dof, self.n_dof))
         K = sparse.csr_array((self.n_dof, self.n_dof))
         for one in self.links:
@@ -86,15 +86,16 @@ class VelocityTerms:
 
     def _step(self, q: Floats, y: Floats, rate: Floats, acceleration: Floats) -> float:
         """Interval of the differences, s: a screw turns much faster than its nut travels."""
-        values = self._values(q, y)
+        (values,) = self._values(q[None], y)
         spins = [values[one.spin].reshape(3, -1) for one in self.links]
         moved = np.vstack([np.eye(len(rate)), *spins])
         speed = max(np.abs(moved @ rate).max(), np.sqrt(np.abs(moved @ acceleration)).max())
         return STEP / float(speed) if speed > 0.0 else STEP
 
     def _values(self, q: Floats, y: Floats) -> Floats:
-        z = np.concatenate([self.relative @ q + self.offset, y])
-        return self.table.evaluate(Samples(), z[:, None])[:, 0]
+        """All scalars at each of several poses q (n, n_q)."""
+        z = np.vstack([self.relative @ q.T + self.offset[:, None], np.tile(y[:, None], len(q))])
+        return self.table.evaluate(Samples(), z).T
 
     def _link_terms(
         self, one: _LinkTable, values: list[Floats], rates: list[Floats], h: float

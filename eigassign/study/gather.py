@@ -89,8 +89,7 @@ def _motion(scene: Scene, assigned: Assigned | None) -> tuple[list[str], list[st
     """Notes and warnings on the speed of the motion."""
     if assigned is None:
         return [], []
-    lowest = float(assigned.initial_hz.min())
-    study = study_motion(scene, (2.0 * np.pi * lowest) ** 2)
+    study = study_motion(scene, assigned.initial_hz)
     if study is None:
         return [], []
     return [study.note] if study.note else [], [study.warning] if study.warning else []

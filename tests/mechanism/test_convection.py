@@ -156,7 +156,7 @@ def test_the_fields_integrate_to_the_consistent_mass() -> None:
         model = built(cantilever("spatial", shear, roll=0.4))
         found = terms(model)
         (one,) = (t for t in found.links if t.riding is not None)
-        values = found._values(np.array([0.47]), np.zeros(0))
+        (values,) = found._values(np.array([[0.47]]), np.zeros(0))
         n = ELEMENTS
         x, phi, rho = np.split(values[one.mesh], [n + 1, 3 * n + 1])
         xi, g = np.polynomial.legendre.leggauss(5)
@@ -189,7 +189,7 @@ class Energy:
         self.bodies = list(model.case.mechanism.bodies.values())
 
     def values(self, t: float) -> np.ndarray:
-        return self.terms._values(np.array([self.path(t)]), self.model.y)
+        return self.terms._values(np.array([[self.path(t)]]), self.model.y)[0]
 
     def turns(self, t: float) -> list[np.ndarray]:
         x = self.model.x([self.path(t)])

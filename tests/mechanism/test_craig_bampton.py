@@ -12,6 +12,7 @@ from designed_arm import designed
 from scipy.linalg import eigh
 from spatial_cases import ALLOY, Built, built
 from spatial_oracle import Tree
+from timed_motions import timed
 
 from eigassign.errors import CaseError
 from eigassign.mechanism.build import local_links
@@ -130,7 +131,7 @@ def test_velocity_terms_of_a_reduced_link_are_those_of_its_nodes() -> None:
         s = np.linspace(0.0, 1.0, 11)
         q = np.outer(10 * s**3 - 15 * s**4 + 6 * s**5, [2.0, -3.0])
         terms = velocity_terms(model.case, model.numbers, model.motion)
-        changes.append(motion_effect(model.pencil, terms, s, q, np.zeros(0), (1, 2)).change)
+        changes.append(motion_effect(model.pencil, terms, timed(s, q), np.zeros(0), (1, 2)).change)
     assert np.abs(changes[0]).max() > 1e-5
     np.testing.assert_allclose(changes[1], changes[0], rtol=1e-3, atol=1e-3 * changes[0].max())
 

@@ -10,6 +10,7 @@ from spatial_cases import ALLOY, Built, built
 from spatial_examples import arm3r, four_bar, gantry, slider_crank
 from spatial_oracle import Tree
 from spatial_random import random_closed, random_open
+from timed_motions import timed
 
 from eigassign.mechanism.velocity import VelocityTerms, velocity_terms
 from eigassign.modal.motion import motion_effect
@@ -117,7 +118,7 @@ def test_the_mass_matrix_is_that_of_the_local_motions(make: Any) -> None:
     model = built(make("free"))
     q = np.array([0.6])
     found = terms(model)
-    values = found._values(q, NONE)
+    (values,) = found._values(q[None], NONE)
     total = np.zeros((found.n_dof, found.n_dof))
     from eigassign.mechanism.craig_bampton import total as summed
 
@@ -191,7 +192,8 @@ def test_the_effect_falls_with_the_square_of_the_speed() -> None:
     s = np.linspace(0.0, 1.0, 41)
     q = np.array([0.3, 0.5, -0.9]) + np.outer(10 * s**3 - 15 * s**4 + 6 * s**5, [0.5, 0.4, 0.8])
     found = [
-        motion_effect(model.pencil, terms(model), T * s, q, NONE, (1, 2)).worst for T in (1.0, 2.0)
+        motion_effect(model.pencil, terms(model), timed(T * s, q), NONE, (1, 2)).worst
+        for T in (1.0, 2.0)
     ]
     assert found[0] > 1e-6
     assert found[0] / found[1] == pytest.approx(4.0, rel=0.02)
@@ -200,7 +202,9 @@ def test_the_effect_falls_with_the_square_of_the_speed() -> None:
 def test_a_motion_that_starts_with_a_jerk_is_measured_too() -> None:
     model = built(four_bar("free"))
     t = np.linspace(0.0, 0.5, 7)
-    found = motion_effect(model.pencil, terms(model), t, (0.4 + 2.0 * t**2)[:, None], NONE, (1,))
+    found = motion_effect(
+        model.pencil, terms(model), timed(t, (0.4 + 2.0 * t**2)[:, None]), NONE, (1,)
+    )
     assert np.isfinite(found.change).all()
     assert found.worst < 0.1
 
@@ -208,5 +212,5 @@ def test_a_motion_that_starts_with_a_jerk_is_measured_too() -> None:
 def test_a_still_trajectory_changes_nothing() -> None:
     model = built(arm3r("free"))
     q = np.tile([0.3, 0.5, -0.9], (5, 1))
-    found = motion_effect(model.pencil, terms(model), np.arange(5.0), q, NONE, (1, 2))
+    found = motion_effect(model.pencil, terms(model), timed(np.arange(5.0), q), NONE, (1, 2))
     assert found.worst < 1e-10
