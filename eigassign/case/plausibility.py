@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from eigassign.case.document import Document
 from eigassign.case.freedoms import freedom_of
+from eigassign.case.joined_twice import joined_twice
 from eigassign.case.mechanism_parts import Coordinate, Mechanism
 from eigassign.case.plausible_parts import implausible_parts, outside
 from eigassign.case.study_parts import FrequencyProfile
@@ -33,6 +34,7 @@ def implausible(document: Document) -> Iterator[Finding]:
     yield from implausible_parts(document)
     yield from _angles(document)
     yield from _idle_mountings(document)
+    yield from joined_twice(document.mechanism.joints)
     yield from _goals(document)
 
 

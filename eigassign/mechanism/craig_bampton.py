@@ -22,7 +22,7 @@ from scipy.sparse import linalg
 
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
-from eigassign.mechanism.definite import definite_factor
+from eigassign.mechanism.definite import kept_factor
 from eigassign.mechanism.fixed_interface import fixed_modes
 from eigassign.mechanism.geometry import link_type
 from eigassign.mechanism.mesh import LinkMesh, Reduction, Term
@@ -107,7 +107,7 @@ class _Interior:
 
 def held_factor(K_ii: sparse.csc_array, path: str) -> linalg.SuperLU:
     """The factor of K_ii; raises MechanismError where the part is limp with its interface held."""
-    factor = definite_factor(K_ii)
+    factor = kept_factor(K_ii)
     if factor is None:
         raise MechanismError(
             path,

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
+from dataclasses import dataclass, field
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import linalg
 
 Floats = NDArray[np.float64]
+KEPT = 4  # factors kept: few, for those of large parts are large
 PIVOT = 1e-15  # smallest pivot of a definite matrix, relative to its diagonal entry
 
 
@@ -29,6 +34,30 @@ def definite_factor(matrix: sparse.csc_array) -> linalg.SuperLU | None:
     diagonal = np.asarray(matrix.diagonal())[np.argsort(factor.perm_c)]
     pivots = np.asarray(factor.U.diagonal())
     return factor if (pivots > PIVOT * np.abs(diagonal)).all() else None
+
+
+@dataclass(frozen=True)
+class _Matrix:
+    """A sparse matrix, the same where all its numbers are."""
+
+    digest: bytes
+    matrix: sparse.csc_array = field(compare=False)
+
+
+def kept_factor(matrix: sparse.csc_array) -> linalg.SuperLU | None:
+    """`definite_factor`, once for a matrix that is asked for again and again.
+
+    A part that a design leaves alone has the same stiffness at every design and in every model.
+    """
+    indices = (np.asarray(a, dtype=np.int64) for a in (matrix.indptr, matrix.indices))
+    parts = (*indices, np.asarray(matrix.data, dtype=np.float64))  # the first tells the order n
+    digest = hashlib.sha256(b"".join(hashlib.sha256(a.tobytes()).digest() for a in parts)).digest()
+    return _kept(_Matrix(digest, matrix))
+
+
+@lru_cache(maxsize=KEPT)
+def _kept(asked: _Matrix) -> linalg.SuperLU | None:
+    return definite_factor(asked.matrix)
 
 
 def is_semidefinite(matrix: sparse.csr_array, tolerance: float) -> bool:

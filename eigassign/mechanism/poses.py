@@ -1,7 +1,6 @@
 """Where the rigid links are in the world: for drawing, and for inverse kinematics.
 
-World rotation and origin of every link come from the same kinematics as the pencil; the motion of
-a node per q̇ is v + ω × X of its link's twist with every coordinate free to move.
+World rotation and origin of every link come from the same kinematics as the pencil.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.mechanism.geometry import link_type, node_position
-from eigassign.mechanism.kinematics import Kinematics, all_moving
+from eigassign.mechanism.kinematics import Kinematics
 from eigassign.mechanism.parameters import Parameters
 from eigassign.mechanism.tree import split
 from eigassign.series.algebra import Samples
@@ -93,25 +92,6 @@ class Poses:
     def position(self, x: Floats, link: str, node: str) -> Floats:
         """World position (n, 3) of a named node, in m."""
         return self._evaluate(self._compile(list(self.world(link, node))), x)
-
-    def jacobian(self, x: Floats, link: str, node: str) -> Floats:
-        """∂position/∂q (n, 3, n_q)."""
-        values = self._evaluate(self._compile(self._velocity(link, node)), x)
-        return values.reshape(len(values), 3, -1)
-
-    def _velocity(self, link: str, node: str) -> list[Scalar]:
-        """R_w (v + ω × X) per q̇, row by row."""
-        from eigassign.mechanism.rotations import cross, multiply
-
-        p = self._all_moving.placement(link)
-        X = node_position(self.case, self.parameters, self.motion.tree, (link, node))
-        velocity = p.twist[:3] + cross(p.twist[3:], X)
-        return list(multiply(p.world_rotation, velocity).ravel())
-
-    @cached_property
-    def _all_moving(self) -> Kinematics:
-        """The same motion with every coordinate among the columns."""
-        return all_moving(self.case, self.parameters, self.motion)
 
 
 def build_poses(case: CaseFile, parameters: Parameters, motion: Kinematics) -> Poses:

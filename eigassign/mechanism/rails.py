@@ -7,6 +7,7 @@ round-off: no element may be shorter than L/10⁴ (or a tenth of its share, in f
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +25,7 @@ from eigassign.series.expression import Scalar
 from eigassign.series.table import Table, compile_table
 
 Floats = NDArray[np.float64]
+Label = Callable[[int], str]
 SHORTEST = 1e-4  # of the beam's length
 FINER = 0.1  # of an element's share of it
 
@@ -38,10 +40,11 @@ class Rails:
     table: Table  # station and length of every rider
     names: tuple[str, ...]  # of the coordinates
 
-    def require(self, z: Floats, x: Floats) -> None:
+    def require(self, z: Floats, x: Floats, label: Label = "sample {}".format) -> None:
         """Raise TravelError for the first sample at which a rider leaves its range.
 
-        z (n_z, n_samples), and x (n_samples, n_x) to name the pose by.
+        z (n_z, n_samples), and x (n_samples, n_x) to name the pose by; ``label`` names sample k of
+        several, counted from 0.
         """
         n = z.shape[1]
         values = np.broadcast_to(self.table.evaluate(Samples(), z), (2 * len(self.joints), n))
@@ -51,13 +54,13 @@ class Rails:
         if outside.any():
             k = int(np.flatnonzero(outside.any(axis=0))[0])
             rider = int(np.flatnonzero(outside[:, k])[0])
-            raise self._refusal(rider, k, s[rider, k], (low[rider, k], high[rider, k]), x)
+            raise self._refusal(rider, k, s[rider, k], (low[rider, k], high[rider, k]), x, label)
 
     def _refusal(
-        self, rider: int, k: int, s: float, allowed: tuple[float, float], x: Floats
+        self, rider: int, k: int, s: float, allowed: tuple[float, float], x: Floats, label: Label
     ) -> TravelError:
         pose = ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.names, x[k], strict=False))
-        where = f"in the pose {pose}" + (f" (sample {k + 1})" if len(x) > 1 else "")
+        where = f"in the pose {pose}" + (f" ({label(k)})" if len(x) > 1 else "")
         message = (
             f"stands at {s:.6g} m of {self.links[rider]!r} {where}: it can travel from "
             f"{allowed[0]:.4g} m to {allowed[1]:.6g} m, since the mesh that moves with it needs "

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.errors import AccuracyError
-from eigassign.mechanism.definite import definite_factor
+from eigassign.mechanism.definite import kept_factor
 from eigassign.mechanism.fixed_interface import largest_left_out
 from eigassign.mechanism.local_motion import ReducedLinks
 from eigassign.mechanism.pencil import Pencil
@@ -79,7 +79,7 @@ def _interior(parts: ReducedLinks, k: int, values: Floats) -> _Interior:
     n_b = len(b)
     K, M = parts.matrices(k, values)
     K_ii, M_ii = (sparse.csc_array(A[i][:, i]) for A in (K, M))
-    factor = definite_factor(K_ii)
+    factor = kept_factor(K_ii)
     if factor is None:
         raise AccuracyError("a reduced link is limp at a design that was looked at")
     X = np.hstack([np.asarray(A[i] @ T) for A in (M, K)])

@@ -2,9 +2,8 @@
 
     ∂λ/∂y = φᵀ (∂K/∂y − λ ∂M/∂y) φ,   φᵀ M φ = 1,
 
-with ∂K = Σ_j K_j ∂θ_j: no further eigensolve. The coefficient functions θ are differentiated as
-power series of order 1, or, for many samples at once, by central differences of θ alone, which is
-cheap and accurate to about 1e-10.
+with ∂K = Σ_j K_j ∂θ_j: no further eigensolve. The coefficient functions θ are differentiated by
+central differences of θ alone, which is cheap and accurate to about 1e-10.
 """
 
 from __future__ import annotations
@@ -14,18 +13,9 @@ from numpy.typing import NDArray
 
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.exact import modes_at
-from eigassign.series.lower_set import total_degree
 
 Floats = NDArray[np.float64]
 STEP = 1e-5  # of a central difference, relative to a parameter's range
-
-
-def theta_slopes_by_series(pencil: Pencil, x: Floats) -> Floats:
-    """∂θ/∂y (n_theta, n_y) at one x (n_x,), from θ's power series of order 1."""
-    n_y = len(x) - pencil.n_q
-    space = total_degree(n_y, 1)
-    series = pencil.theta_series(space, x, pencil.to_program[:, pencil.n_q :])
-    return np.asarray(series[:, space.units])
 
 
 def theta_slopes(pencil: Pencil, x: Floats, ranges: Floats) -> Floats:

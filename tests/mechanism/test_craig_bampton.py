@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 from designed_arm import designed
+from scipy import sparse
 from scipy.linalg import eigh
 from spatial_cases import ALLOY, Built, built
 from spatial_oracle import Tree
 from timed_motions import timed
 
 from eigassign.errors import CaseError
+from eigassign.mechanism import definite
 from eigassign.mechanism.build import local_links
 from eigassign.mechanism.craig_bampton import coefficients, total
 from eigassign.mechanism.velocity import velocity_terms
@@ -134,6 +136,30 @@ def test_velocity_terms_of_a_reduced_link_are_those_of_its_nodes() -> None:
         changes.append(motion_effect(model.pencil, terms, timed(s, q), np.zeros(0), (1, 2)).change)
     assert np.abs(changes[0]).max() > 1e-5
     np.testing.assert_allclose(changes[1], changes[0], rtol=1e-3, atol=1e-3 * changes[0].max())
+
+
+def test_a_part_is_factored_once_however_often_it_is_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Equal numbers are one matrix, another number is another."""
+    asked: list[int] = []
+
+    def counted(matrix: sparse.csc_array) -> object:
+        asked.append(matrix.shape[0])
+        return definite.factorise(matrix)
+
+    monkeypatch.setattr(definite, "definite_factor", counted)
+    definite._kept.cache_clear()
+    for _ in range(2):
+        assert built(cantilever(7, reduce_to=100.0)).pencil.n_dof
+    A = sparse.csc_array(np.diag([2.0, 3.0]))
+    first, again = definite.kept_factor(A), definite.kept_factor(A.copy())
+    assert first is again
+    assert asked == [18, 2]
+    other = definite.kept_factor(A * 2.0)
+    assert other is not None
+    np.testing.assert_allclose(other.solve(np.ones(2)), [0.25, 1 / 6])
+    definite._kept.cache_clear()
 
 
 def test_a_link_that_a_carriage_travels_along_stays_whole() -> None:

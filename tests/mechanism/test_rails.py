@@ -42,7 +42,7 @@ def test_a_carriage_near_the_end_keeps_its_digits(mirrored: bool) -> None:
 def test_the_first_sample_that_leaves_the_beam_is_named() -> None:
     model = built(gantry("free"))
     x = np.array([[0.5], [1.2], [1.7], [-1.0]])
-    with pytest.raises(TravelError, match=r"x = 1.7 \(sample 3\)") as caught:
+    with pytest.raises(TravelError, match=r"x = 1.7 \(sample 2\)") as caught:
         eigenvalues(model.pencil, x, 1)
     assert caught.value.sample == 2
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from chains import model_of, two_link
 
-from eigassign.api import expand, reduce
+from eigassign.api import expand, load_case, reduce
 from eigassign.errors import EigassignError, UsageError
 from eigassign.modal.expansion import expand as expand_pencil
 from eigassign.modal.model import Model
 from eigassign.series.lower_set import lower_set
 
+CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 Q0, Y0 = [1.817, 5.312], [0.125, 0.125]
 
 
@@ -48,6 +51,15 @@ def test_modes_that_are_none_are_refused(model, face, modes, words):
     }
     with pytest.raises(UsageError, match=words):
         calls[face]()
+
+
+@pytest.mark.parametrize("face", [expand, reduce])
+def test_a_case_in_place_of_its_model_is_refused_with_the_way_to_the_model(face):
+    case = load_case(CASE)
+    with pytest.raises(UsageError, match=r"not Case: .*case\.model\(\)"):
+        face(case, Q0, Y0)
+    with pytest.raises(UsageError, match="not str"):
+        face("arm", Q0, Y0)
 
 
 def test_modes_may_come_as_an_array_and_in_any_order(model):

@@ -10,12 +10,9 @@ from chart_scenes import TINY
 from scenes import SHIPPED, changed, scene_of
 
 from eigassign.modal.exact import eigenvalues
+from eigassign.series.lower_set import total_degree
 from eigassign.study.chart_designs import chart_designs
-from eigassign.study.chart_gradient import (
-    eigenvalue_slopes,
-    theta_slopes,
-    theta_slopes_by_series,
-)
+from eigassign.study.chart_gradient import eigenvalue_slopes, theta_slopes
 from eigassign.study.chart_search import Limits, SpentError, Watched, by_gradient, by_kriging
 from eigassign.study.chart_task import task_of
 from eigassign.study.scene import Scene
@@ -29,7 +26,8 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 def test_slopes_of_the_coefficient_functions_are_those_of_their_series(scene: Scene) -> None:
     pencil, ranges = scene.model.pencil, np.array([0.25, 0.25])
     x = np.array([1.8, 5.2, 0.1, 0.2])
-    series = theta_slopes_by_series(pencil, x)
+    space = total_degree(2, 1)
+    series = pencil.theta_series(space, x, pencil.to_program[:, 2:])[:, space.units]
     found = theta_slopes(pencil, x[None], ranges)[:, :, 0].T
     np.testing.assert_allclose(found, series, atol=1e-8 * np.abs(series).max())
 
