@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.case import CaseFile, TipTrajectory, load
 from eigassign.case import Trajectory as TrajectoryKeys
-from eigassign.errors import CaseError, MechanismError, UsageError
+from eigassign.errors import CaseError, MechanismError
 from eigassign.mechanism.build import (
     WholeLinks,
     build_pencil,
@@ -35,7 +35,7 @@ from eigassign.modal import expansion as modal_expansion
 from eigassign.modal import reduced as modal_reduced
 from eigassign.modal.expansion import Expansion
 from eigassign.modal.fit import Fit, fit
-from eigassign.modal.model import Model
+from eigassign.modal.model import Model, as_model
 from eigassign.modal.reduced import ReducedModel
 from eigassign.modal.region import Box
 from eigassign.series.lower_set import LowerSet
@@ -267,7 +267,7 @@ def expand(
     See :func:`eigassign.modal.expansion.expand`.
     """
     return modal_expansion.expand(
-        _model(model).pencil, q0, y0, modes, order, linear_in_y, space, vector_order
+        as_model(model).pencil, q0, y0, modes, order, linear_in_y, space, vector_order
     )
 
 
@@ -287,16 +287,8 @@ def reduce(
     :func:`eigassign.modal.reduced.reduce`.
     """
     return modal_reduced.reduce(
-        _model(model).pencil, q0, y0, modes, half_order, span=span, accuracy=accuracy
+        as_model(model).pencil, q0, y0, modes, half_order, span=span, accuracy=accuracy
     )
-
-
-def _model(given: object) -> Model:
-    """The model; UsageError for anything else, such as the case that it comes from."""
-    if isinstance(given, Model):
-        return given
-    how = "it comes from case.model()" if isinstance(given, Case) else "load_case(path).model()"
-    raise UsageError(f"a Model is needed here, not {type(given).__name__}: {how}")
 
 
 def assign(case: Case) -> Result:

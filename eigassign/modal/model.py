@@ -123,3 +123,10 @@ class Model:
         x = self.one(q, y)
         K, M = self.pencil.matrices(self.pencil.theta(x))
         return M[0], K[0]
+
+
+def as_model(given: object) -> Model:
+    """The model itself; UsageError for anything else, such as the case that it comes from."""
+    if isinstance(given, Model):
+        return given
+    raise UsageError(f"a Model is needed, not {type(given).__name__}: case.model() is one")
