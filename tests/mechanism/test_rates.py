@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from eigassign.api import load_case
 from eigassign.case import PointTrajectory
 from eigassign.mechanism.rates import rates
 from eigassign.mechanism.tip_chain import TipChain
 from eigassign.mechanism.trajectory import Trajectory, build_trajectory
+
+CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"
+WAYPOINTS = [[0.30, 0.19], [0.108, 0.2104], [0.02, 0.1845]]
 
 
 def no_arm(node: str, oriented: bool) -> TipChain:
@@ -47,3 +53,22 @@ def test_a_lone_sample_between_two_corners_tells_no_rate() -> None:
     t = np.linspace(0.0, 1.0, 5)
     found = rates(Trajectory(t, t[:, None], None, (), (0.4, 0.6)))
     np.testing.assert_array_equal(found.samples, [0, 1, 3, 4])
+
+
+def test_a_straight_tip_path_says_when_it_turns_its_corners(tmp_path: Path) -> None:
+    """Passed at speed: accelerations stay those of the straight parts, however fine the samples."""
+    text = CASE.read_text(encoding="utf-8").replace("path: spline", "path: straight")
+    largest = []
+    for samples in (152, 608):
+        path = tmp_path / f"{samples}.yaml"
+        path.write_text(text.replace("samples: 152", f"samples: {samples}"), encoding="utf-8")
+        trajectory = load_case(path).trajectories[0].trajectory
+        corners = np.array(trajectory.corners_s)
+        assert len(corners) == 3
+        s = np.interp(corners, trajectory.time_s, np.arange(samples))
+        tips = np.array(
+            [[np.interp(k, np.arange(samples), c) for c in trajectory.tip.T] for k in s]
+        )
+        np.testing.assert_allclose(tips, WAYPOINTS, atol=4e-4)  # cut by the chord of two samples
+        largest.append(np.abs(rates(trajectory).acceleration).max())
+    assert largest[1] == pytest.approx(largest[0], rel=0.1)
