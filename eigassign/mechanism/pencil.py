@@ -85,13 +85,14 @@ class Pencil:
         return self.stiffness.tocsc(), self.mass.tocsc()
 
     @cached_property
-    def mass_magnitude(self) -> sparse.csr_array:
+    def mass_magnitude(self) -> Floats | sparse.csr_array:
         """|(M_j)_ii| (n_dof, n_theta): with |θ| the size of what adds up to each M_ii."""
         on = np.flatnonzero(self.rows == self.columns)
         place = sparse.csr_array(
             (np.ones(len(on)), (self.rows[on], on)), shape=(self.n_dof, len(self.rows))
         )
-        return sparse.csr_array(place @ abs(self.mass))
+        sizes = sparse.csr_array(place @ abs(self.mass))
+        return sizes.toarray() if self.n_dof * self.n_theta <= TINY_STACK else sizes
 
     @cached_property
     def local_directions(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:
@@ -104,10 +105,13 @@ class Pencil:
 
         Raises TravelError where a carriage or nut leaves its beam.
         """
-        z = self.to_program @ np.atleast_2d(x).T + self.shift[:, None]
+        x = np.atleast_2d(x)
+        z = self.to_program @ x.T + self.shift[:, None]
         if self.rails is not None:
-            self.rails.require(z, np.atleast_2d(x))
-        return np.vstack([np.ones((1, z.shape[1])), self.program.run(Samples(), z)])
+            self.rails.require(z, x)
+        theta = np.empty((self.n_theta, len(x)))
+        theta[0], theta[1:] = 1.0, self.program.run(Samples(), z)
+        return theta
 
     def theta_series(self, space: LowerSet, x0: Floats, directions: Floats) -> Floats:
         """Coefficients of θ (n_theta, N) about x0 in w, where z = z0 + ``directions`` w."""
@@ -141,6 +145,24 @@ class Pencil:
         return self._pair((self._both @ theta).reshape(2, -1, theta.shape[1]))
 
     @cached_property
+    def stiffness_terms(self) -> Ints:
+        """Indices j of θ with a stiffness term."""
+        return np.flatnonzero(np.diff(self.by_term[0].indptr))
+
+    def stiffness_matrices(self, theta: Floats) -> Floats:
+        """Dense K (n_samples, n_dof, n_dof) alone."""
+        return self._one(0, self.stiffness, theta)
+
+    def mass_matrices(self, theta: Floats) -> Floats:
+        """Dense M (n_samples, n_dof, n_dof) alone."""
+        return self._one(1, self.mass, theta)
+
+    def _one(self, which: int, weights: sparse.csr_array, theta: Floats) -> Floats:
+        if self._stack is not None:
+            return np.asarray((theta.T @ self._stack[which]).reshape(-1, self.n_dof, self.n_dof))
+        return np.asarray(self._pair((weights @ theta)[None])[0])
+
+    @cached_property
     def _stack(self) -> Floats | None:
         """All K_j and M_j dense, (2, n_theta, n_dof²), where products with zeros cost nothing."""
         if self.n_theta * self.n_dof**2 > TINY_STACK:
@@ -159,10 +181,10 @@ class Pencil:
         return self.rows * self.n_dof + self.columns
 
     def _pair(self, data: Floats) -> Floats:
-        """Dense (2, k, n_dof, n_dof) from the non-zeros of k matrices each, (2, n_nonzeros, k)."""
-        full = np.zeros((2, data.shape[2], self.n_dof * self.n_dof))
+        """Dense (…, k, n_dof, n_dof) from the non-zeros of k matrices each, (…, n_nonzeros, k)."""
+        full = np.zeros((len(data), data.shape[2], self.n_dof * self.n_dof))
         full[:, :, self._flat] = data.transpose(0, 2, 1)
-        return full.reshape(2, -1, self.n_dof, self.n_dof)
+        return full.reshape(len(data), -1, self.n_dof, self.n_dof)
 
     def sparse(self, data: Floats) -> sparse.csc_array:
         """One sparse matrix from its non-zeros (n_nonzeros,) on the common pattern."""

@@ -18,9 +18,11 @@ from numpy.typing import NDArray
 from eigassign.errors import LIMP, MechanismError, UsageError
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.arguments import whole
-from eigassign.modal.exact_single import solve_single
+from eigassign.modal.chunks import NUMBERS, chunks
+from eigassign.modal.exact_single import single_values, solve_single
 from eigassign.modal.massive import doubtful, mass_sizes, solve_massive
 from eigassign.modal.sizes import DENSE_LIMIT
+from eigassign.modal.triangular import triangular_inverse
 
 __all__ = ["DENSE_LIMIT", "Modes", "condense_blocks", "eigenvalues", "modes", "modes_at"]
 
@@ -73,18 +75,31 @@ def _solve(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
 
 
 def _dense(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
-    if vectors and theta.shape[1] == 1:
-        lam, phi = solve_single(pencil, theta, count)
-        return Modes(lam[None], phi[None])
-    K, M = pencil.matrices(theta)
-    elastic = pencil.elastic
-    K_E = _block(K, elastic, elastic)
-    if len(K_E) and not np.ptp(K_E, axis=0).any():  # as for added masses: one factor serves all
-        K_E = K_E[:1]
-    coupling, M_c = condense(M, elastic, pencil.rigid)
-    L_inverse = np.asarray(np.linalg.inv(_cholesky(K_E)), dtype=np.float64)
-    A = L_inverse @ np.swapaxes(L_inverse @ M_c, 1, 2)  # M_c is symmetric
-    A = 0.5 * (A + np.swapaxes(A, 1, 2))
+    if theta.shape[1] == 1:
+        return _single(pencil, theta, count, vectors)
+    columns = np.arange(theta.shape[1])
+    if pencil.n_dof**2 * len(columns) <= NUMBERS:
+        return _batch(pencil, theta, count, vectors)
+    parts = [
+        _batch(pencil, theta[:, at], count, vectors) for at in chunks(columns, pencil.n_dof**2)
+    ]
+    return Modes(np.concatenate([p.lam for p in parts]), np.concatenate([p.phi for p in parts]))
+
+
+def _single(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
+    if not vectors:
+        return Modes(single_values(pencil, theta, count)[None], np.zeros((1, 0, count)))
+    lam, phi = solve_single(pencil, theta, count)
+    return Modes(lam[None], phi[None])
+
+
+def _batch(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
+    """Modes at θ (n_theta, n_samples): as many samples as stay in the processor's cache."""
+    K, M = _elastic_first(pencil, theta)
+    n = len(pencil.elastic)
+    coupling, M_c = condense_blocks(M[:, :n, :n], M[:, n:, :n], M[:, n:, n:])
+    L_inverse = triangular_inverse(_cholesky(K[:, :n, :n]))
+    A = (L_inverse @ M_c) @ np.swapaxes(L_inverse, 1, 2)
     noise = _noise(L_inverse, mass_sizes(pencil, theta, coupling))
     if not vectors:
         mu = np.asarray(np.linalg.eigvalsh(A)[:, ::-1][:, :count], dtype=np.float64)
@@ -92,23 +107,33 @@ def _dense(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
     mu, v = (a[..., ::-1][..., :count] for a in np.linalg.eigh(A))
     z = np.swapaxes(L_inverse, 1, 2) @ v / np.sqrt(np.maximum(mu, 1e-300))[:, None, :]
     phi = np.empty((len(mu), pencil.n_dof, count))
-    phi[:, elastic] = z
+    phi[:, pencil.elastic] = z
     phi[:, pencil.rigid] = -coupling @ z
     return _with_mass(pencil, theta, mu, noise, phi)
 
 
+def _elastic_first(pencil: Pencil, theta: Floats) -> tuple[Floats, Floats]:
+    """K and M with the rigid unknowns last; K once where it is the same at all samples."""
+    order, stiff = pencil.elastic_first, theta[pencil.stiffness_terms]
+    if (stiff == stiff[:, :1]).all():  # as where one pose meets many added masses
+        K, M = pencil.stiffness_matrices(theta[:, :1]), pencil.mass_matrices(theta)
+    else:
+        K, M = pencil.matrices(theta)
+    if order is None:
+        return K, M
+    return _block(K, order, order), _block(M, order, order)
+
+
 def _noise(L_inverse: Floats, sizes: Floats) -> Floats:
     """Σ_i (K_E⁻¹)_ii t_i² (n_samples, 1): zᵀ T² z of no K_E-unit z is more."""
-    flexibility = np.einsum("kij,kij->kj", L_inverse, L_inverse)
-    return np.asarray((flexibility * sizes).sum(axis=1, keepdims=True))
+    return np.asarray(np.einsum("kij,kij,kj->k", L_inverse, L_inverse, sizes)[:, None])
 
 
 def _with_mass(pencil: Pencil, theta: Floats, mu: Floats, noise: Floats, phi: Floats) -> Modes:
     """Modes of μ (n_samples, count); those samples anew whose μ may be round-off."""
-    n, count = len(pencil.elastic), mu.shape[1]
-    again = np.flatnonzero(doubtful(mu, noise, n).any(axis=1))
+    count = mu.shape[1]
     lam = 1.0 / np.where(mu > 0.0, mu, np.inf)
-    for k in again:
+    for k in np.flatnonzero(doubtful(mu, noise, len(pencil.elastic))[:, -1]):  # the least of them
         lam[k], modes = solve_massive(pencil, theta[:, [k]], count)
         if phi.size:
             phi[k] = modes

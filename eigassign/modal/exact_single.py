@@ -22,17 +22,8 @@ def solve_single(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Flo
 
     The entry of largest magnitude of every mode is positive.
     """
-    (K,), (M,) = pencil.matrices(theta)
     order, n = pencil.elastic_first, len(pencil.elastic)
-    if order is not None:
-        K, M = K[order[:, None], order], M[order[:, None], order]
-    E, F = slice(n), slice(n, pencil.n_dof)
-    C, info = lapack.dpotrf(K[E, E].T, lower=1, overwrite_a=1)
-    if info:
-        raise MechanismError("mechanism", LIMP)
-    coupling = _coupling(M[F, F], M[F, E])
-    M_c = M[E, E] - M[E, F] @ coupling
-    A, _ = lapack.dsygst(M_c.T, C, lower=1, overwrite_a=1)
+    A, C, coupling = _standard(pencil, theta)
     mu, v = _largest(A, count)
     z, _ = lapack.dtrtrs(C, v, lower=1, trans=1)
     noise = mass_sizes(pencil, theta, coupling[None])[0] @ (z * z)
@@ -45,6 +36,36 @@ def solve_single(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Flo
             phi[order] = phi.copy()
     top = phi[np.abs(phi).argmax(axis=0), np.arange(count)]
     return lam, phi * np.copysign(1.0, top)
+
+
+def single_values(pencil: Pencil, theta: Floats, count: int) -> Floats:
+    """λ (count,) alone."""
+    A, C, coupling = _standard(pencil, theta)
+    mu, _, info = lapack.dsyevd(A, compute_v=0, lower=1, overwrite_a=1)
+    if info:
+        raise AccuracyError("the exact modes did not converge")
+    mu = mu[::-1][:count]
+    flexibility = (lapack.dtrtri(C, lower=1)[0] ** 2).sum(axis=0)
+    noise = flexibility @ mass_sizes(pencil, theta, coupling[None])[0]
+    if doubtful(mu, noise, len(A))[-1]:
+        return solve_massive(pencil, theta, count)[0]
+    return np.asarray(1.0 / mu)
+
+
+def _standard(pencil: Pencil, theta: Floats) -> tuple[Floats, Floats, Floats]:
+    """A's lower triangle, C and M_FF⁻¹ M_FE."""
+    (K,), (M,) = pencil.matrices(theta)
+    order, n = pencil.elastic_first, len(pencil.elastic)
+    if order is not None:
+        K, M = K[order[:, None], order], M[order[:, None], order]
+    E, F = slice(n), slice(n, pencil.n_dof)
+    C, info = lapack.dpotrf(K[E, E].T, lower=1, overwrite_a=1)
+    if info:
+        raise MechanismError("mechanism", LIMP)
+    coupling = _coupling(M[F, F], M[F, E])
+    M_c = M[E, E] - M[E, F] @ coupling
+    A, _ = lapack.dsygst(M_c.T, C, lower=1, overwrite_a=1)
+    return A, C, coupling
 
 
 def _coupling(M_FF: Floats, M_FE: Floats) -> Floats:

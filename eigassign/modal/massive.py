@@ -32,8 +32,10 @@ INDEFINITE = 1e-9  # of the scaled mass left over by its Cholesky factor that is
 def mass_sizes(pencil: Pencil, theta: Floats, coupling: Floats) -> Floats:
     """t² (n_samples, n_elastic); θ (n_theta, n_samples), W (n_samples, n_rigid, n_elastic)."""
     root = np.sqrt(pencil.mass_magnitude @ np.abs(theta)).T
-    moved = np.abs(np.swapaxes(coupling, 1, 2)) @ root[:, pencil.rigid, None]
-    return np.asarray((root[:, pencil.elastic] + moved[:, :, 0]) ** 2)
+    size = root[:, pencil.elastic]
+    if coupling.size:
+        size += np.einsum("kfi,kf->ki", np.abs(coupling), root[:, pencil.rigid])
+    return np.asarray(size * size)
 
 
 def doubtful(mu: Floats, noise: Floats, n: int, margin: float = MARGIN) -> Flags:

@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import UsageError
+from eigassign.modal.chunks import chunks
 from eigassign.modal.error_terms import ErrorTerms
 from eigassign.modal.exact import condense_blocks
 from eigassign.modal.ritz_error import relative_error
@@ -27,10 +27,6 @@ from eigassign.series.program import Program
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-CHUNK = 2048  # samples evaluated at once, at most
-NUMBERS = 100_000  # of one matrix for each sample: what they need stays in the cache
-LEAST = 16
-Array = TypeVar("Array", Floats, Ints)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,9 +116,3 @@ class ReducedModel:
             symmetric_terms(self.stiffness_terms, self.stiffness),
             symmetric_terms(self.mass_terms, self.mass),
         )
-
-
-def chunks(rows: Array, numbers: int) -> Iterator[Array]:
-    """``rows`` in parts, fewer at once the more ``numbers`` each of them needs."""
-    size = min(CHUNK, max(LEAST, NUMBERS // numbers))
-    return (rows[i : i + size] for i in range(0, max(len(rows), 1), size))

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 LEAF = 16  # order up to which LAPACK's general inverse is quicker than halving
+FEW, LEAF_OF_FEW = 8, 32  # so many matrices, for which calls cost more than arithmetic
 
 
 def triangular_inverse(L: Floats) -> Floats:
@@ -16,7 +17,7 @@ def triangular_inverse(L: Floats) -> Floats:
     ⎣ B C ⎦   = ⎣ −C⁻¹ B A⁻¹  C⁻¹ ⎦
     """
     k = L.shape[1]
-    if k <= LEAF:
+    if k <= (LEAF_OF_FEW if len(L) <= FEW else LEAF):
         return np.asarray(np.linalg.inv(L), dtype=np.float64)
     half = k // 2
     inverse = np.zeros_like(L)

@@ -50,8 +50,7 @@ class Samples:
 
     def linear(self, step: Step, values: Floats) -> Floats:
         """A sum for each form."""
-        assert step.matrix is not None
-        return np.asarray(step.matrix @ values + step.numbers[:, None])
+        return np.asarray(step.weights @ values + step.numbers[:, None])
 
     def product(self, a: Floats, b: Floats) -> Floats:
         """Elementwise."""

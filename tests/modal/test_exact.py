@@ -38,6 +38,27 @@ def test_dense_modes_are_modes() -> None:
     np.testing.assert_allclose(f, model.frequencies(POSES, DESIGN, 6), rtol=1e-12)
 
 
+@pytest.mark.parametrize(
+    "drives", [("free", "free"), ("locked", {"stiffness": 3e3}), ("free", {"stiffness": 3e3})]
+)
+def test_how_many_are_solved_at_once_does_not_show(
+    drives: tuple[object, object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One by one, in parts and all at once; designs at one pose, which share K, and poses."""
+    model = model_of(two_link(drives=drives))
+    for q, y in ((POSES, DESIGN), (POSES[:1], DESIGN)):
+        x = model.x(q, y)
+        alone = np.vstack([model.frequencies(row[:2], row[2:], 6) for row in x])
+        shapes = np.vstack([model.modes(row[:2], row[2:], 6)[1] for row in x])
+        for numbers, at_once in ((exact.NUMBERS, 2048), (1, 2)):
+            monkeypatch.setattr(exact, "NUMBERS", numbers)
+            monkeypatch.setattr("eigassign.modal.chunks.CHUNK", at_once)
+            f, phi = model.modes(q, y, 6)
+            np.testing.assert_allclose(model.frequencies(q, y, 6), alone, rtol=1e-12)
+            np.testing.assert_allclose(f, alone, rtol=1e-12)
+            np.testing.assert_allclose(phi, shapes, atol=1e-9 * np.abs(shapes).max())
+
+
 def test_sparse_modes_are_modes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(exact, "DENSE_LIMIT", 0)
     model = model_of(two_link())

@@ -101,7 +101,7 @@ def test_chunks_do_not_show(seed, monkeypatch):
     reduced = reduce(model.pencil, q0, [], (1,), 2)
     q = q0 + np.random.default_rng(seed).uniform(-0.3, 0.3, (7, len(q0)))
     whole = reduced.frequencies(q, []), reduced.error_estimate(q, [])
-    monkeypatch.setattr("eigassign.modal.reduced_model.CHUNK", 3)
+    monkeypatch.setattr("eigassign.modal.chunks.CHUNK", 3)
     np.testing.assert_allclose(reduced.frequencies(q, []), whole[0], rtol=1e-11)
     np.testing.assert_allclose(reduced.error_estimate(q, []), whole[1], rtol=1e-3, atol=1e-12)
 
