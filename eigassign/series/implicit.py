@@ -6,7 +6,9 @@ reached from a_0 in small steps, and a passage through a singular ∂F/∂p is r
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +22,19 @@ STEP = 0.15  # largest change of an argument in one continuation step (rad or m)
 FARTHEST = 500.0  # rad or m from the known solution: 80 turns
 REFINEMENTS = (1, 4, 16, 64)  # of the steps, where ∂F/∂p changes too much for one
 TOLERANCE = 1e-13  # on Newton's step, relative to 1 (rad or m)
+ON_THE_WAY = 1e-6  # the same where p is only the start of the next step: what is left is its square
 CONVERGED = 1e-8  # last step of a regular solution; at a dead point Newton only creeps
 ACCEPT = 1e-9  # on F and on the check rows afterwards
 SINGULAR = 1e-5  # smallest over largest singular value of ∂F/∂p that is refused
+
+
+class _Reached(NamedTuple):
+    """p (size, n), whether it is regular, ∂F/∂p (n, n_equations, size) and its least σ (n,)."""
+
+    p: Floats
+    regular: NDArray[np.bool_]
+    J: Floats
+    smallest: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,31 +87,39 @@ class ImplicitFunction:
         ok = np.ones(a.shape[1], dtype=bool)
         start, reached = self.a0[:, None], a.copy()
         before = self.equations(start, self.p0[:, None])[2]
+        smallest = np.linalg.svd(before, compute_uv=False)[:, -1]
         for t in np.linspace(0.0, 1.0, steps + 1)[1:]:
             here = start + t * (a - start)
-            p, regular = self.newton(here, p)
-            J = self.equations(here, p)[2]
-            good = regular & _near(before, J)
+            made = self._newton(here, p, TOLERANCE if t == 1.0 else ON_THE_WAY, _solved)
+            good = made.regular & (np.linalg.norm(made.J - before, axis=(1, 2)) < smallest)
             reached = np.where(ok & ~good, here, reached)
             ok &= good
-            before = J
+            p, before, smallest = made.p, made.J, made.smallest
         F, check, _ = self.equations(a, p)
         missed = np.abs(np.concatenate([F, check])).max(axis=0, initial=0.0)
         return p, ok & (missed < ACCEPT), reached
 
     def newton(self, a: Floats, p: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-        """Newton from p at fixed a; whether each sample is regular there."""
+        """Newton from any p at fixed a; whether each sample is regular there."""
+        made = self._newton(a, p, TOLERANCE, _least)
+        return made.p, made.regular
+
+    def _newton(
+        self, a: Floats, p: Floats, tolerance: float, solve: Callable[[Floats, Floats], Floats]
+    ) -> _Reached:
+        """Newton's steps ``solve`` (J, F) until they are below ``tolerance``."""
         for _ in range(12):
             F, _, J = self.equations(a, p)
             if not np.isfinite(J).all():
-                return p, np.zeros(p.shape[1], dtype=bool)
-            step = -(np.linalg.pinv(J) @ F.T[:, :, None])[:, :, 0].T
+                nowhere = np.zeros(len(J))
+                return _Reached(p, nowhere > 0.0, J, nowhere)
+            step = -solve(J, F.T[:, :, None])[:, :, 0].T
             p = p + np.clip(step, -0.5, 0.5)
-            if np.abs(step).max(initial=0.0) < TOLERANCE:
+            if np.abs(step).max(initial=0.0) < tolerance:
                 break
-        s = np.linalg.svd(J, compute_uv=False)
-        converged = np.abs(step).max(axis=0, initial=0.0) < CONVERGED
-        return p, np.asarray(converged & (s[:, -1] > SINGULAR * s[:, 0]))
+        s = np.asarray(np.linalg.svd(J, compute_uv=False), dtype=np.float64)
+        converged = np.abs(step).max(axis=0, initial=0.0) < max(tolerance, CONVERGED)
+        return _Reached(p, converged & (s[:, -1] > SINGULAR * s[:, 0]), J, s[:, -1])
 
     def equations(self, a: Floats, p: Floats) -> tuple[Floats, Floats, Floats]:
         """F (n_equations, n), check (n_checks, n), ∂F/∂p (n, n_equations, size)."""
@@ -130,12 +150,20 @@ class ImplicitFunction:
         return ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.names, a, strict=True))
 
 
-def _near(before: Floats, J: Floats) -> NDArray[np.bool_]:
-    """‖J − J_before‖ < σ_min(J_before), sample by sample."""
-    if not np.isfinite(J).all():
-        return np.zeros(len(J), dtype=bool)
-    smallest = np.linalg.svd(before, compute_uv=False)[:, -1]
-    return np.asarray(np.linalg.norm(J - before, axis=(1, 2)) < smallest)
+def _least(J: Floats, F: Floats) -> Floats:
+    """x of least ‖J x − F‖ and least length, sample by sample, whatever J is."""
+    return np.asarray(np.linalg.pinv(J) @ F)
+
+
+def _solved(J: Floats, F: Floats) -> Floats:
+    """The same from the neighbourhood of a regular J: without its singular values."""
+    turned = np.swapaxes(J, 1, 2)
+    try:
+        if J.shape[1] == J.shape[2]:
+            return np.asarray(np.linalg.solve(J, F))
+        return np.asarray(np.linalg.solve(turned @ J, turned @ F))
+    except np.linalg.LinAlgError:
+        return _least(J, F)
 
 
 def evaluate(function: ImplicitFunction, algebra: Algebra, a: Floats) -> Floats:
