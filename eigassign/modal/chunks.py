@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 CHUNK = 2048  # samples at once, at most
 NUMBERS = 30_000  # of one matrix for each sample at once: some five of them fit the cache
-LEAST = 8
+LEAST = 16
 Array = TypeVar("Array", NDArray[np.float64], NDArray[np.intp])
 
 
