@@ -11,6 +11,7 @@ What may be round-off instead of a mode with mass is settled by ``massive``, for
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,7 @@ from eigassign.modal.triangular import triangular_inverse
 __all__ = ["DENSE_LIMIT", "Modes", "condense_blocks", "eigenvalues", "modes", "modes_at"]
 
 Floats = NDArray[np.float64]
+UPPER: Literal["U"] = "U"  # half of (L⁻¹ M_c) L⁻ᵀ that is read: the other has more round-off
 
 
 @dataclass(frozen=True)
@@ -102,9 +104,9 @@ def _batch(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
     A = (L_inverse @ M_c) @ np.swapaxes(L_inverse, 1, 2)
     noise = _noise(L_inverse, mass_sizes(pencil, theta, coupling))
     if not vectors:
-        mu = np.asarray(np.linalg.eigvalsh(A)[:, ::-1][:, :count], dtype=np.float64)
+        mu = np.asarray(np.linalg.eigvalsh(A, UPPER)[:, ::-1][:, :count], dtype=np.float64)
         return _with_mass(pencil, theta, mu, noise, np.zeros((len(mu), 0, count)))
-    mu, v = (a[..., ::-1][..., :count] for a in np.linalg.eigh(A))
+    mu, v = (a[..., ::-1][..., :count] for a in np.linalg.eigh(A, UPPER))
     z = np.swapaxes(L_inverse, 1, 2) @ v / np.sqrt(np.maximum(mu, 1e-300))[:, None, :]
     phi = np.empty((len(mu), pencil.n_dof, count))
     phi[:, pencil.elastic] = z
