@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from eigassign.series.expression import Expression, Scalar
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Objects = NDArray[np.object_]
+Part = tuple[Scalar, Ints, Ints, Floats]  # coefficient × values at (rows, columns)
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Accumulator:
 
     rows: list[Ints] = field(default_factory=list)
     columns: list[Ints] = field(default_factory=list)
-    atoms: list[Ints] = field(default_factory=list)
+    atoms: list[int] = field(default_factory=list)
     values: list[Floats] = field(default_factory=list)
     small: dict[tuple[int, int], Scalar] = field(default_factory=dict)
 
@@ -55,16 +57,22 @@ class Accumulator:
         """coefficient × values at (rows, columns)."""
         for atom, factor in _parts(coefficient):
             if factor != 0.0 and len(rows):
-                self.rows.append(rows)
-                self.columns.append(columns)
-                self.atoms.append(np.full(len(rows), atom, dtype=np.intp))
-                self.values.append(values * factor)
+                self._append(rows, columns, atom, values * factor if factor != 1.0 else values)
 
     def add_symmetric(self, coefficient: Scalar, rows: Ints, column: int, values: Floats) -> None:
         """One column and its transpose, off the diagonal blocks."""
         columns = np.full(len(rows), column, dtype=np.intp)
-        self.add(coefficient, rows, columns, values)
-        self.add(coefficient, columns, rows, values)
+        for atom, factor in _parts(coefficient):
+            if factor != 0.0 and len(rows):
+                product = values * factor if factor != 1.0 else values
+                self._append(rows, columns, atom, product)
+                self._append(columns, rows, atom, product)
+
+    def _append(self, rows: Ints, columns: Ints, atom: int, values: Floats) -> None:
+        self.rows.append(rows)
+        self.columns.append(columns)
+        self.atoms.append(atom)
+        self.values.append(values)
 
     def add_small(self, row: int, column: int, value: Scalar) -> None:
         """An entry among joint nodes and q̇, where many functions meet: summed before use."""
@@ -74,17 +82,30 @@ class Accumulator:
 
     def finish(self, n_u: int) -> tuple[Ints, Ints, Ints, Floats]:
         """All entries as arrays; q̇-q̇ entries become one atom each."""
-        for (row, column), value in self.small.items():
-            if min(row, column) >= n_u and isinstance(value, Expression):
-                factor, atom = value.single()
-                value = Expression(value.recorder, 0.0, {atom: factor})
-            at = np.array([row], dtype=np.intp), np.array([column], dtype=np.intp)
-            self.add(value, *at, np.ones(1))
-        if not self.rows:
-            none = np.zeros(0, dtype=np.intp)
-            return none, none, none, np.zeros(0)
-        rows, columns, atoms = (np.concatenate(a) for a in (self.rows, self.columns, self.atoms))
-        return rows, columns, atoms, np.concatenate(self.values)
+        small = [
+            (row, column, atom, factor)
+            for (row, column), value in self.small.items()
+            for atom, factor in _parts(_whole(value) if min(row, column) >= n_u else value)
+            if factor != 0.0
+        ]
+        rows, columns, atoms, values = zip(*small, strict=True) if small else ((), (), (), ())
+        lengths = [len(part) for part in self.rows]
+        return (
+            np.concatenate([*self.rows, np.array(rows, dtype=np.intp)]),
+            np.concatenate([*self.columns, np.array(columns, dtype=np.intp)]),
+            np.concatenate(
+                [np.repeat(np.array(self.atoms, np.intp), lengths), np.array(atoms, np.intp)]
+            ),
+            np.concatenate([*self.values, np.array(values, dtype=np.float64)]),
+        )
+
+
+def _whole(value: Scalar) -> Scalar:
+    """A sum as one atom."""
+    if not isinstance(value, Expression):
+        return value
+    factor, atom = value.single()
+    return Expression(value.recorder, 0.0, {atom: factor})
 
 
 def _parts(coefficient: Scalar) -> list[tuple[int, float]]:
@@ -93,47 +114,109 @@ def _parts(coefficient: Scalar) -> list[tuple[int, float]]:
     return [(-1, coefficient.constant), *coefficient.terms.items()]
 
 
-def add_link(stiffness: Accumulator, mass: Accumulator, link: LocalLink, n_u: int) -> None:
-    """Add one link to K and M."""
-    for term in link.stiffness:
-        _add_elastic(stiffness, term, link)
-    for term in link.mass:
-        _add_elastic(mass, term, link)
-        if link.twist.shape[1]:
-            _add_rigid_elastic(mass, term, link, n_u)
-    if link.twist.shape[1]:
-        _add_rigid(mass, link, n_u)
+@dataclass(frozen=True, eq=False)
+class _Own:
+    """What a link brings wherever it hangs: entries of k and m, Qᵀ m N, and Nᵀ m N."""
+
+    link: LocalLink  # any of those that share these
+
+    @cached_property
+    def stiffness(self) -> list[Part]:
+        return [_part(term) for term in self.link.stiffness]
+
+    @cached_property
+    def mass(self) -> list[Part]:
+        return [_part(term) for term in self.link.mass]
+
+    @cached_property
+    def spreads(self) -> list[tuple[Scalar, Floats]]:
+        """ν_b and N_b, dense: three columns, or six, however many nodes."""
+        return [(spread.coefficient, spread.matrix.toarray()) for spread in self.link.rigid]
+
+    @cached_property
+    def momenta(self) -> list[list[Floats]]:
+        """m_i N_b by term i and spread b."""
+        return [
+            [np.asarray(term.matrix @ spread) for _, spread in self.spreads]
+            for term in self.link.mass
+        ]
+
+    @cached_property
+    def inertia(self) -> Objects:
+        """Nᵀ m N: the rigid inertia about the origin of the link's frame, (n_twist, n_twist)."""
+        size = self.link.twist.shape[0]
+        total = np.zeros((size, size), dtype=object)
+        for term, momenta in zip(self.link.mass, self.momenta, strict=True):
+            for (right_factor, _), momentum in zip(self.spreads, momenta, strict=True):
+                for left_factor, left in self.spreads:
+                    constant = left.T @ momentum
+                    coefficient = term.coefficient * left_factor * right_factor
+                    for a, b in zip(*np.nonzero(constant), strict=True):
+                        total[a, b] = total[a, b] + coefficient * float(constant[a, b])
+        return total
 
 
-def _add_elastic(target: Accumulator, term: Term, link: LocalLink) -> None:
-    """The u-u part of Bᵀ a B: own-own constant, own-carried linear in C, carried-carried CᵀaC."""
+def _part(term: Term) -> Part:
     entries = term.matrix.tocoo()
-    i, j, values = entries.coords[0], entries.coords[1], entries.data
-    own = link.own
-    inside = (own[i] >= 0) & (own[j] >= 0)
-    target.add(term.coefficient, own[i[inside]], own[j[inside]], values[inside])
+    i, j = (np.asarray(at, dtype=np.intp) for at in entries.coords)
+    return term.coefficient, i, j, np.asarray(entries.data, dtype=np.float64)
+
+
+def add_links(
+    stiffness: Accumulator, mass: Accumulator, links: Sequence[LocalLink], n_u: int
+) -> None:
+    """Add links to K and M; those that share their matrices are taken apart once."""
+    known: dict[tuple[int, ...], _Own] = {}
+    for link in links:
+        key = (id(link.stiffness), id(link.mass), id(link.rigid))  # all held by ``links``
+        _add_link(stiffness, mass, link, known.setdefault(key, _Own(link)), n_u)
+
+
+def _add_link(
+    stiffness: Accumulator, mass: Accumulator, link: LocalLink, own: _Own, n_u: int
+) -> None:
+    for part in own.stiffness:
+        _add_elastic(stiffness, part, link)
+    for k, part in enumerate(own.mass):
+        _add_elastic(mass, part, link)
+        if link.twist.shape[1]:
+            for (factor, _), momentum in zip(own.spreads, own.momenta[k], strict=True):
+                _add_rigid_elastic(mass, part[0] * factor, momentum, link, n_u)
+    if link.twist.shape[1]:
+        _add_rigid(mass, link, own, n_u)
+
+
+def _add_elastic(target: Accumulator, part: Part, link: LocalLink) -> None:
+    """The u-u part of Bᵀ a B: own-own constant, own-carried linear in C, carried-carried CᵀaC."""
+    coefficient, i, j, values = part
+    rows, columns = link.own[i], link.own[j]
+    mine, its = rows >= 0, columns >= 0
+    inside = mine & its
+    target.add(coefficient, rows[inside], columns[inside], values[inside])
+    (beside,) = np.nonzero(mine & ~its)
     for slave, masters in link.carried.items():
-        beside = (j == slave) & (own[i] >= 0)
+        at = beside[j[beside] == slave]
         for column, carry in masters:
-            target.add_symmetric(term.coefficient * carry, own[i[beside]], column, values[beside])
-    between = (own[i] < 0) & (own[j] < 0)
-    for a, b, value in zip(i[between], j[between], values[between], strict=True):
-        for row, left in link.carried.get(int(a), ()):
-            for column, right in link.carried.get(int(b), ()):
-                target.add_small(row, column, term.coefficient * left * right * float(value))
+            target.add_symmetric(coefficient * carry, rows[at], column, values[at])
+    between = ~(mine | its)
+    for a, b, value in zip(
+        i[between].tolist(), j[between].tolist(), values[between].tolist(), strict=True
+    ):
+        for row, left in link.carried.get(a, ()):
+            for column, right in link.carried.get(b, ()):
+                target.add_small(row, column, coefficient * left * right * value)
 
 
-def _add_rigid_elastic(target: Accumulator, term: Term, link: LocalLink, n_u: int) -> None:
-    """The u-q̇ part: Qᵀ m N T."""
-    for spread in link.rigid:
-        coupling = np.asarray(term.matrix @ spread.matrix.toarray())
-        coefficient = term.coefficient * spread.coefficient
-        for component, row in enumerate(link.twist):
-            column = coupling[:, component]
-            rows = np.flatnonzero((column != 0.0) & (link.own >= 0))
-            for k, rate in enumerate(row):
-                if isinstance(rate, Expression) or rate != 0.0:
-                    _add_twist_column(target, coefficient * rate, link, column, rows, n_u + k)
+def _add_rigid_elastic(
+    target: Accumulator, coefficient: Scalar, momentum: Floats, link: LocalLink, n_u: int
+) -> None:
+    """The u-q̇ part: Qᵀ m N T, one term of it with m_i N_b = ``momentum``."""
+    for component, row in enumerate(link.twist):
+        column = momentum[:, component]
+        rows = np.flatnonzero((column != 0.0) & (link.own >= 0))
+        for k, rate in enumerate(row):
+            if isinstance(rate, Expression) or rate != 0.0:
+                _add_twist_column(target, coefficient * rate, link, column, rows, n_u + k)
 
 
 def _add_twist_column(
@@ -148,10 +231,9 @@ def _add_twist_column(
                 target.add_small(at, row, value)
 
 
-def _add_rigid(target: Accumulator, link: LocalLink, n_u: int) -> None:
+def _add_rigid(target: Accumulator, link: LocalLink, own: _Own, n_u: int) -> None:
     """The q̇-q̇ part: Tᵀ (Nᵀ m N) T."""
-    inertia = rigid_inertia(link)
-    momentum = multiply(inertia, link.twist)
+    momentum = multiply(own.inertia, link.twist)
     block = multiply(link.twist.T, momentum)
     n = block.shape[0]
     for k in range(n):
@@ -159,22 +241,6 @@ def _add_rigid(target: Accumulator, link: LocalLink, n_u: int) -> None:
             target.add_small(n_u + k, n_u + l, block[k, l])
             if k != l:
                 target.add_small(n_u + l, n_u + k, block[k, l])
-
-
-def rigid_inertia(link: LocalLink) -> Objects:
-    """Nᵀ m N: the link's rigid inertia about the origin of its frame, (n_twist, n_twist)."""
-    size = link.twist.shape[0]
-    total = np.zeros((size, size), dtype=object)
-    spreads = [(spread.coefficient, spread.matrix.toarray()) for spread in link.rigid]
-    for term in link.mass:
-        for right_factor, right in spreads:
-            momentum = term.matrix @ right  # dense from here on: three columns, however many nodes
-            for left_factor, left in spreads:
-                constant = left.T @ momentum
-                coefficient = term.coefficient * left_factor * right_factor
-                for a, b in zip(*np.nonzero(constant), strict=True):
-                    total[a, b] = total[a, b] + coefficient * float(constant[a, b])
-    return total
 
 
 def pattern(

@@ -13,7 +13,7 @@ planar mechanism keeps (u_x, u_y, θ_z).
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,14 +26,17 @@ Numbers = NDArray[Any]  # real or complex: polynomials do not mind
 
 
 class ElementTerm(NamedTuple):
-    """coefficient × constant 12 × 12 matrix."""
+    """coefficient × constant 12 × 12 matrix, or one matrix an element (n, 12, 12)."""
 
     coefficient: Scalar
     matrix: Floats
 
 
 class BeamValues(NamedTuple):
-    """Stiffnesses EA [N], EI_z, EI_y, GJ [N m²], shear κGA [N] or None; ρA, ρI_p, ρI_z, ρI_y."""
+    """Stiffnesses EA [N], EI_z, EI_y, GJ [N m²], shear κGA [N] or None; ρA, ρI_p, ρI_z, ρI_y.
+
+    Numbers, expressions, or arrays of numbers (n,): one for each of n elements.
+    """
 
     EA: Scalar
     EI_z: Scalar
@@ -76,10 +79,11 @@ def element_mass(beam: BeamValues, h: Scalar) -> list[ElementTerm]:
 
 def _folded(terms: list[ElementTerm]) -> list[ElementTerm]:
     """The same sum, with all constant coefficients in one matrix: most elements have no others."""
-    varying, total = [], np.zeros((12, 12))
+    varying: list[ElementTerm] = []
+    total = np.zeros((12, 12))
     for term in terms:
         if is_constant(term.coefficient):
-            total += term.coefficient * term.matrix
+            total = total + np.multiply.outer(term.coefficient, term.matrix)
         else:
             varying.append(term)
     return [*varying, ElementTerm(1.0, total)] if total.any() else varying
@@ -88,6 +92,14 @@ def _folded(terms: list[ElementTerm]) -> list[ElementTerm]:
 def shear_ratios(beam: BeamValues, h: Scalar) -> tuple[Scalar, Scalar]:
     """Φ of bending in the element's x-y and x-z plane; 0 without shear."""
     return _phi(beam, beam.EI_z, h), _phi(beam, beam.EI_y, h)
+
+
+def repeated(values: tuple[Scalar, ...], n: int) -> list[tuple[Scalar, ...]]:
+    """Those of n elements, from values of all or arrays of each one's own."""
+    if not any(isinstance(value, np.ndarray) for value in values):
+        return [values] * n
+    each = (np.broadcast_to(np.asarray(value), n).tolist() for value in values)
+    return list(zip(*each, strict=True))
 
 
 def field_inertia(beam: BeamValues) -> tuple[Scalar, ...]:
@@ -168,9 +180,10 @@ def _polynomial(
 
 
 def _is_zero(x: Scalar) -> bool:
-    return is_constant(x) and x == 0.0
+    return isinstance(x, float | int) and x == 0.0
 
 
+@cache
 def _pair(dof: int) -> Floats:
     """[[1, −1], [−1, 1]] on one dof of both nodes."""
     out = np.zeros((12, 12))
@@ -178,6 +191,7 @@ def _pair(dof: int) -> Floats:
     return out
 
 
+@cache
 def _spread(dof: int) -> Floats:
     """Consistent mass of a linear field: [[1/3, 1/6], [1/6, 1/3]]."""
     out = np.zeros((12, 12))

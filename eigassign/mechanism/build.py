@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
-from eigassign.mechanism.assembly import Accumulator, LocalLink, add_link, pattern
+from eigassign.mechanism.assembly import Accumulator, LocalLink, add_links, pattern
 from eigassign.mechanism.craig_bampton import as_asked
 from eigassign.mechanism.kinematics import Kinematics, Placement, kinematics
-from eigassign.mechanism.links import link_mesh
+from eigassign.mechanism.links import copies_of, link_mesh
 from eigassign.mechanism.mesh import DOFS, LinkMesh
 from eigassign.mechanism.nodes import NodeMotions
 from eigassign.mechanism.parameters import Parameters
@@ -39,8 +39,7 @@ def build_pencil(
     """
     links, nodes = local_links(case, parameters, motion) if local is None else local
     stiffness, mass = Accumulator(), Accumulator()
-    for link in links:
-        add_link(stiffness, mass, link, nodes.count)
+    add_links(stiffness, mass, links, nodes.count)
     _add_springs(stiffness, case, parameters, motion, nodes)
     _add_drives(stiffness, case, parameters, motion, nodes.count)
     return _compile(stiffness, mass, case, parameters, motion, nodes.count)
@@ -86,8 +85,15 @@ def whole_links(case: CaseFile) -> WholeLinks:
 
 
 def _meshes(case: CaseFile, parameters: Parameters, motion: Kinematics) -> dict[str, LinkMesh]:
+    """The mesh of every link; copies of a beam share theirs."""
     known = parameters.with_passive(motion.passive)
-    return {p.link: link_mesh(case, known, motion.tree, p.link) for p in motion.placements}
+    copies = copies_of(case, known, motion.tree)
+    made: dict[object, LinkMesh] = {}
+    for name in (p.link for p in motion.placements):
+        key = copies.get(name, name)
+        if key not in made:
+            made[key] = link_mesh(case, known, motion.tree, name)
+    return {p.link: made[copies.get(p.link, p.link)] for p in motion.placements}
 
 
 def local_links(

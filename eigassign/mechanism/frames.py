@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.mechanism.beam import element_mass, element_stiffness, shear_ratios
+from eigassign.mechanism.beam_values import beam_values
 from eigassign.mechanism.bodies import add_bodies
-from eigassign.mechanism.links import beam_values, rolled
+from eigassign.mechanism.links import rolled
 from eigassign.mechanism.mesh import DOFS, Entries, LinkMesh, Strand, node_dofs, rigid_motion
 from eigassign.mechanism.parameters import Parameters
 from eigassign.mechanism.rotations import vector

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -103,7 +104,11 @@ class Kinematics:
 
     def placement(self, link: str) -> Placement:
         """The placement of one link."""
-        return next(p for p in self.placements if p.link == link)
+        return self._by_link[link]
+
+    @cached_property
+    def _by_link(self) -> dict[str, Placement]:
+        return {p.link: p for p in self.placements}
 
 
 def kinematics(case: CaseFile, parameters: Parameters) -> Kinematics:

@@ -16,8 +16,10 @@ from eigassign.mechanism.beam import (
     element_mass,
     element_stiffness,
     field_inertia,
+    repeated,
     shear_ratios,
 )
+from eigassign.mechanism.beam_values import beam_values, is_settled, tapered_values
 from eigassign.mechanism.bodies import add_bodies, rigid_link
 from eigassign.mechanism.geometry import length, link_type, station
 from eigassign.mechanism.mesh import (
@@ -25,11 +27,10 @@ from eigassign.mechanism.mesh import (
     Entries,
     LinkMesh,
     Strand,
-    node_dofs,
+    chain_dofs,
 )
 from eigassign.mechanism.parameters import Parameters
 from eigassign.mechanism.rotations import Objects, rotation, vector
-from eigassign.mechanism.sections import SectionValues, section_values
 from eigassign.mechanism.tree import Tree
 from eigassign.series.expression import Scalar, is_constant
 
@@ -51,6 +52,21 @@ def link_mesh(case: CaseFile, parameters: Parameters, tree: Tree, name: str) -> 
 
             return superelement_mesh(case, parameters, name)
     return _beam(case, parameters, tree, name)
+
+
+def copies_of(case: CaseFile, parameters: Parameters, tree: Tree) -> dict[str, tuple[object, ...]]:
+    """By name of a plain beam all that its mesh depends on, equal for those that are copies.
+
+    Beams with bodies or riders, or of a length that varies, are left out: they have their own.
+    """
+    loaded = {body.at.partition(".")[0] for body in case.mechanism.bodies.values()}
+    found: dict[str, tuple[object, ...]] = {}
+    for name, link in case.mechanism.links.items():
+        plain = link_type(case, name) == "beam" and name not in loaded and not tree.riders(name)
+        if plain and is_constant(length(case, parameters, name)):
+            data = link.model_dump(exclude={"reduce_to"})
+            found[name] = tuple((key, str(value)) for key, value in data.items())
+    return found
 
 
 # --- beams ---
@@ -88,11 +104,12 @@ def _chain(
     inertia: list[Sequence[Scalar]] = []
     for start, span, n in pieces:
         first = len(positions) - 1
-        positions += [vector([start + span * (k / n)]) for k in range(1, n + 1)]
+        positions += _places(start, span, n)
         beams = _segment(case, parameters, name, stiffness, mass, first, (start, span), n, space)
-        shear += [shear_ratios(beam, span * (1.0 / n)) for beam in beams]
-        inertia += [field_inertia(beam) for beam in beams]
-    slots = [node_dofs(width * k, space) for k in range(count)]
+        for beam, number in beams:
+            shear += [(z, y) for z, y in repeated(shear_ratios(beam, span * (1.0 / n)), number)]
+            inertia += repeated(field_inertia(beam), number)
+    slots = list(chain_dofs(count, space))
     nodes = {"start": slots[0], "end": slots[-1]}
     places = {"start": positions[0], "end": positions[-1]}
     if rider is not None:
@@ -103,6 +120,13 @@ def _chain(
     strand = Strand(slots, positions, turn, shear, inertia)
     terms = stiffness.terms(), mass.terms(), rigid
     return LinkMesh(width * count, nodes, places, *terms, (strand,))
+
+
+def _places(start: Scalar, span: Scalar, n: int) -> list[Objects]:
+    """Where the n nodes behind the first one of a piece are."""
+    out = np.full((n, 3), 0.0, dtype=object)
+    out[:, 0] = [start + span * (k / n) for k in range(1, n + 1)]
+    return list(out)
 
 
 def _chain_rigid(pieces: Sequence[tuple[Scalar, Scalar, int]], space: str) -> list[Any]:
@@ -135,46 +159,53 @@ def _segment(
     piece: tuple[Scalar, Scalar],
     n: int,
     space: str,
-) -> list[BeamValues]:
-    """n equal elements from node ``first`` on, of these values; a taper gives each its section."""
-    start, span = piece
+) -> list[tuple[BeamValues, int]]:
+    """n elements of equal length from node ``first`` on; their values, and how many have them.
+
+    A taper gives each element its own section; where these are plain numbers, as arrays over all.
+    """
+    span = piece[1]
     link: Any = case.mechanism.links[name]
     h = span * (1.0 / n)
     turn = rolled(_roll(link))
+
+    def add(beam: BeamValues, first: int, count: int) -> tuple[BeamValues, int]:
+        _tile(stiffness, element_stiffness(beam, h), turn, first, count, space)
+        _tile(mass, element_mass(beam, h), turn, first, count, space)
+        return beam, count
+
     if isinstance(link.section, str):
-        beam = beam_values(case, parameters, link, link.section)
-        _tile(stiffness, element_stiffness(beam, h), turn, first, n, space)
-        _tile(mass, element_mass(beam, h), turn, first, n, space)
-        return [beam] * n
+        return [add(beam_values(case, parameters, link, link.section), first, n)]
+    shares = (np.arange(n) + 0.5) / n
     total = length(case, parameters, name)
-    beams = []
-    for k in range(n):
-        share: Scalar = (k + 0.5) / n
-        if span is not total:  # a rider splits the beam
-            share = (start + span * share) / total
-        beam = _tapered(case, parameters, link, share)
-        _tile(stiffness, element_stiffness(beam, h), turn, first + k, 1, space)
-        _tile(mass, element_mass(beam, h), turn, first + k, 1, space)
-        beams.append(beam)
-    return beams
+    if is_constant(total) and span is total and is_settled(parameters, link):
+        return [add(tapered_values(case, parameters, link, shares), first, n)]
+    varying = _shares(piece, shares.tolist(), total)
+    beams = (tapered_values(case, parameters, link, share) for share in varying)
+    return [add(beam, first + k, 1) for k, beam in enumerate(beams)]
+
+
+def _shares(piece: tuple[Scalar, Scalar], shares: list[float], total: Scalar) -> list[Scalar]:
+    """Shares of the whole length from those of a piece; a rider splits the beam."""
+    start, span = piece
+    return [share if span is total else (start + span * share) / total for share in shares]
 
 
 def _tile(
     entries: Entries, terms: Sequence[ElementTerm], turn: Floats, first: int, n: int, space: str
 ) -> None:
-    """The same element between n pairs of neighbouring nodes, all at once."""
-    width = len(DOFS[space])
-    local = np.concatenate([node_dofs(0, space), node_dofs(width, space)])
-    local[6:][node_dofs(0, space) < 0] = -1
+    """Like elements between n pairs of neighbouring nodes, all at once."""
+    local = chain_dofs(2, space).ravel()
+    shift = len(DOFS[space]) * (first + np.arange(n))[:, None]
     for coefficient, matrix in terms:
         turned = turn.T @ matrix @ turn
-        i, j = np.nonzero(turned)
+        i, j = np.nonzero(turned.any(axis=0) if turned.ndim == 3 else turned)
         keep = (local[i] >= 0) & (local[j] >= 0)
         i, j = i[keep], j[keep]
         if len(i):
-            shift = width * (first + np.arange(n))[:, None]
             rows, columns = (shift + local[i]).ravel(), (shift + local[j]).ravel()
-            entries.add(coefficient, rows, columns, np.tile(turned[i, j], n))
+            values = np.broadcast_to(turned[..., i, j], (n, len(i))).ravel()
+            entries.add(coefficient, rows, columns, values)
 
 
 def _roll(beam: Any) -> float:
@@ -185,82 +216,3 @@ def rolled(angle: float) -> Floats:
     """(12, 12) turn of the section's axes about the beam's."""
     R = np.asarray(rotation(np.array([1.0, 0.0, 0.0]), angle), dtype=np.float64).T
     return np.asarray(np.kron(np.eye(4), R), dtype=np.float64)
-
-
-def beam_values(case: CaseFile, parameters: Parameters, beam: Any, section: str) -> BeamValues:
-    """Stiffness and mass values of a beam of the case with one section."""
-
-    def number(key: str, value: float) -> Scalar:
-        return parameters.number(f"sections.{section}.{key}", value)
-
-    _refuse_square(case, section)
-    return _values(case, parameters, beam, section_values(case.mechanism.sections[section], number))
-
-
-def _refuse_square(case: CaseFile, section: str) -> None:
-    """The torsion constant of a rectangle knows its longer side: a design must not swap them."""
-    data = case.mechanism.sections[section]
-    if data.shape != "rectangle" or case.mechanism.space == "planar":
-        return
-    ranges = {
-        p.parameter: (p.min, p.max) for p in case.design.parameters.values() if hasattr(p, "min")
-    }
-    low_w, high_w = ranges.get(f"sections.{section}.width", (data.width, data.width))
-    low_h, high_h = ranges.get(f"sections.{section}.height", (data.height, data.height))
-    if low_w < high_h and low_h < high_w and (low_w, low_h) != (high_w, high_h):
-        raise MechanismError(
-            f"mechanism.sections.{section}",
-            "the bounds of its design let width and height change places, which the torsion "
-            "constant does not follow: keep one side the longer",
-        )
-
-
-def _values(
-    case: CaseFile, parameters: Parameters, beam: Any, section: SectionValues
-) -> BeamValues:
-    data = case.mechanism.materials[beam.material]
-    path = f"materials.{beam.material}."
-    E = parameters.number(path + "youngs_modulus", data.youngs_modulus)
-    rho = parameters.number(path + "density", data.density)
-    sheared = bool(getattr(beam, "shear", False))
-    G = _shear_modulus(case, parameters, beam, E, sheared)
-    return BeamValues(
-        EA=E * section.area,
-        EI_z=E * section.inertia_z,
-        EI_y=E * section.inertia_y,
-        GJ=G * section.torsion_constant,
-        shear=G * section.area * section.shear_coefficient if sheared else None,
-        mass=rho * section.area,
-        polar=rho * section.polar_inertia,
-        rotary_z=rho * section.inertia_z,
-        rotary_y=rho * section.inertia_y,
-    )
-
-
-def _shear_modulus(
-    case: CaseFile, parameters: Parameters, beam: Any, E: Scalar, sheared: bool
-) -> Scalar:
-    """G = E/(2(1 + ν)), or as given; not needed by planar beams without shear."""
-    data: Any = case.mechanism.materials[beam.material]
-    path = f"materials.{beam.material}."
-    if getattr(data, "shear_modulus", None) is not None:
-        return parameters.number(path + "shear_modulus", data.shear_modulus)
-    if getattr(data, "poissons_ratio", None) is not None:
-        nu = parameters.number(path + "poissons_ratio", data.poissons_ratio)
-        return E / ((nu + 1.0) * 2.0)
-    if case.mechanism.space == "planar" and not sheared:
-        return 0.0
-    message = "needs poissons_ratio or shear_modulus for torsion or shear"
-    raise MechanismError(f"mechanism.materials.{beam.material}", message)
-
-
-def _tapered(case: CaseFile, parameters: Parameters, link: Any, share: Scalar) -> BeamValues:
-    """Values at a share of the length, the sections' dimensions running linearly."""
-    a, b = case.mechanism.sections[link.section.start], case.mechanism.sections[link.section.end]
-
-    def number(key: str, value: float) -> Scalar:
-        low = parameters.number(f"sections.{link.section.start}.{key}", value)
-        high = parameters.number(f"sections.{link.section.end}.{key}", getattr(b, key))
-        return low + (high - low) * share
-
-    return _values(case, parameters, link, section_values(a, number))

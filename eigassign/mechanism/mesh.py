@@ -21,6 +21,11 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 DOFS = {"planar": (0, 1, 5), "spatial": (0, 1, 2, 3, 4, 5)}
 
+_PLACES = {
+    space: np.array([kept.index(dof) if dof in kept else -1 for dof in range(6)])
+    for space, kept in DOFS.items()
+}
+
 
 class Term(NamedTuple):
     """coefficient × constant matrix; one term of an affine local matrix."""
@@ -106,10 +111,13 @@ class Entries:
 
 def node_dofs(first: int, space: str) -> Ints:
     """Six slots of a node's dofs; −1 for those a planar mechanism has not."""
-    slots = np.full(6, -1, dtype=np.intp)
-    kept = DOFS[space]
-    slots[list(kept)] = first + np.arange(len(kept))
-    return slots
+    return np.where(_PLACES[space] >= 0, first + _PLACES[space], -1)
+
+
+def chain_dofs(count: int, space: str) -> Ints:
+    """Those of ``count`` nodes one after the other, (count, 6)."""
+    first = len(DOFS[space]) * np.arange(count)[:, None]
+    return np.where(_PLACES[space] >= 0, first + _PLACES[space], -1)
 
 
 def rigid_motion(

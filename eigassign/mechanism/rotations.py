@@ -57,17 +57,22 @@ def multiply(a: Objects | Floats, b: Objects | Floats) -> Objects:
     """Product of matrices of scalars, skipping plain zeros (most entries of these)."""
     columns = b[:, None] if b.ndim == 1 else b
     out = np.zeros((a.shape[0], columns.shape[1]), dtype=object)
-    some = present(columns)
-    for i, k in zip(*np.nonzero(present(a)), strict=True):
-        for j in np.flatnonzero(some[k]):
-            out[i, j] = out[i, j] + a[i, k] * columns[k, j]
+    others = [[(j, x) for j, x in enumerate(row) if _some(x)] for row in columns.tolist()]
+    for i, row in enumerate(a.tolist()):
+        for left, other in zip(row, others, strict=True):
+            if other and _some(left):
+                for j, right in other:
+                    out[i, j] = out[i, j] + left * right
     return out[:, 0] if b.ndim == 1 else out
 
 
 def present(a: Objects | Floats) -> NDArray[np.bool_]:
     """Which entries are not the plain number zero."""
-    flags = [isinstance(value, Expression) or value != 0.0 for value in a.ravel()]
-    return np.array(flags, dtype=bool).reshape(a.shape)
+    return np.array([_some(value) for value in a.ravel()], dtype=bool).reshape(a.shape)
+
+
+def _some(value: Scalar) -> bool:
+    return isinstance(value, Expression) or value != 0.0
 
 
 def carried(R: Objects | Floats, lever: Objects) -> Objects:

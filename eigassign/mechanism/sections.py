@@ -10,6 +10,8 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from eigassign.series.expression import Scalar, is_constant
 
 Number = Callable[[str, float], Scalar]
@@ -96,7 +98,7 @@ def _bare(section: Any, number: Number, kappa: float) -> SectionValues:
         return default if value is None else number(key, value)
 
     I_z = given("inertia_z", 0.0)
-    if is_constant(I_z) and I_z == 0.0:
+    if is_constant(I_z) and not np.any(I_z):
         I_z = given("bending_inertia", 0.0)
     I_y = given("inertia_y", 0.0)
     J = given("torsion_constant", 0.0)

@@ -64,7 +64,7 @@ def _walk(joints: Sequence[Edge], closing: frozenset[str], rigid: set[str]) -> _
     while step := next(_steps(waiting, placed), None):
         tree.append(step)
         placed.add(step.follower[0])
-        waiting = [e for e in waiting if e.joint != step.joint]
+        del waiting[next(k for k, e in enumerate(waiting) if e.joint == step.joint)]
     used = {edge.joint for edge in tree}
     return _sorted(tree, [e for e in joints if e.joint not in used], rigid)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from eigassign.case import CaseFile
 from eigassign.mechanism.joints import COMPONENTS
@@ -68,8 +69,17 @@ class Tree:
 
     def riders(self, link: str) -> list[str]:
         """The carriages and nuts that travel along a link."""
-        written = (edge.written for edge in (*self.edges, *self.loops))
-        return [e.joint for e in written if e.base == (link, f"@{e.joint}")]
+        return self._riders.get(link, [])
+
+    @cached_property
+    def _riders(self) -> dict[str, list[str]]:
+        """All of them by link: asked for once a link, of which there may be a thousand."""
+        found: dict[str, list[str]] = {}
+        for edge in (*self.edges, *self.loops):
+            link, node = edge.written.base
+            if node == f"@{edge.joint}":
+                found.setdefault(link, []).append(edge.joint)
+        return found
 
 
 def split(node: str) -> Node:
