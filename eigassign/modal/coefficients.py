@@ -7,12 +7,14 @@ coefficients; large ones only what each coefficient touches (``coefficients_spar
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.bordered import Solve, factor_dense
@@ -87,31 +89,46 @@ def _pairs(space: LowerSet, slot: Ints, degree: int, of_delta: int) -> Pairs:
 
 
 @dataclass(frozen=True, eq=False)
-class DenseSeries:
-    """All coefficients that are not zero in two dense stacks; the first is that of w = 0."""
+class DenseTerms:
+    """The coefficients of one matrix that are not zero in one stack; the first is that of w = 0."""
 
     pairs: tuple[tuple[Pairs, ...], ...]
-    stiffness: Floats  # (n_stored, n, n)
-    mass: Floats
+    stack: Floats  # (n_stored, n, n)
+
+    def sums(self, degree: int, X: Floats) -> Iterator[tuple[Ints, Floats]]:
+        """Parts of Σ_{0<δ≤γ} A_δ X_{γ−δ}, |γ| = degree: which γ, and (n_γ, r, n) of them.
+
+        The coefficients are symmetric, so rows multiply from the left.
+        """
+        for p in self.pairs[degree]:
+            count, r, n = X[p.below].shape
+            products = X[p.below].reshape(-1, n) @ self.stack[p.slots]
+            chosen = products.reshape(-1, count, r, n)[p.left, p.right]
+            yield p.target, np.add.reduceat(chosen, p.first, axis=0)
+
+
+@dataclass(frozen=True, eq=False)
+class DenseSeries:
+    """K and M over one set as stacks, each with the coefficients that it has."""
+
+    stiffness: DenseTerms
+    mass: DenseTerms
 
     def convolve(self, degree: int, X: Floats, Y: Floats, out: Floats) -> None:
-        """See :class:`PencilSeries`; the coefficients are symmetric, so rows multiply from left."""
+        """See :class:`PencilSeries`."""
         out[...] = 0.0
-        for p in self.pairs[degree]:
-            count, r, n = Y[p.below].shape
-            x, y = X[p.below].reshape(-1, n), Y[p.below].reshape(-1, n)
-            products = y @ self.mass[p.slots]
-            products -= x @ self.stiffness[p.slots]
-            chosen = products.reshape(-1, count, r, n)[p.left, p.right]
-            out[p.target] += np.add.reduceat(chosen, p.first, axis=0)
+        for target, sums in self.mass.sums(degree, Y):
+            out[target] += sums
+        for target, sums in self.stiffness.sums(degree, X):
+            out[target] -= sums
 
     def mass_times(self, X: Floats) -> Floats:
         """M_0 X for rows X (k, n)."""
-        return np.asarray(X @ self.mass[0])
+        return np.asarray(X @ self.mass.stack[0])
 
     def factor(self, lam: float, border: Floats, phi: Floats) -> Solve:
         """The bordered system of K_0 − λ M_0."""
-        return factor_dense(self.stiffness[0] - lam * self.mass[0], border)
+        return factor_dense(self.stiffness.stack[0] - lam * self.mass.stack[0], border)
 
 
 def pencil_series(pencil: Pencil, theta: Floats, space: LowerSet) -> PencilSeries:
@@ -121,5 +138,16 @@ def pencil_series(pencil: Pencil, theta: Floats, space: LowerSet) -> PencilSerie
 
         return sparse_series(pencil, theta, space)
     stored = np.flatnonzero(theta.any(axis=0))  # θ_0 = 1: position 0 is always there
-    K, M = pencil.matrices(theta[:, stored])
-    return DenseSeries(pairs(space, stored.tobytes()), K, M)
+    both = zip(pencil.matrices(theta[:, stored]), pencil.by_term, strict=True)
+    return DenseSeries(*(_dense(space, theta[:, stored], stored, *each) for each in both))
+
+
+def _dense(
+    space: LowerSet, theta: Floats, stored: Ints, stack: Floats, terms: sparse.csc_array
+) -> DenseTerms:
+    """One matrix without the coefficients that it has not: stiffness hardly varies with q."""
+    varying = np.asarray(theta[np.diff(terms.indptr) > 0].any(axis=0))
+    varying[0] = True
+    if not varying.all():
+        stack, stored = stack[varying], stored[varying]
+    return DenseTerms(pairs(space, stored.tobytes()), stack)

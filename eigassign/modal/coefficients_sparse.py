@@ -7,6 +7,7 @@ coefficient is A = C + E B + Bᵀ Eᵀ: C sparse on the touched elastic unknowns
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ from eigassign.modal.bordered import Solve
 from eigassign.modal.bordered_sparse import factor_sparse
 from eigassign.modal.coefficients import Pairs, pairs
 from eigassign.modal.products import add_product
-from eigassign.series.lower_set import LowerSet
+from eigassign.series.lower_set import LowerSet, first_of_each
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -112,41 +113,45 @@ def sparse_series(pencil: Pencil, theta: Floats, space: LowerSet) -> SparseSerie
 
 def _terms(pencil: Pencil, columns: sparse.csc_array, theta: Floats) -> Terms:
     """All but the first of the stored coefficients, θ (n_theta, n_stored)."""
+    slot, entries, values = _entries(columns, theta)
+    rows, cols = pencil.rows[entries], pencil.columns[entries]
+    inside = (rows < pencil.n_u) & (cols < pencil.n_u)
+    bodies = _bodies(pencil.n_u, slot[inside], rows[inside], cols[inside], values[inside])
+    edge = rows >= pencil.n_u
+    n_q = pencil.n_dof - pencil.n_u
+    keys, at = np.unique(slot[edge] * n_q + rows[edge] - pencil.n_u, return_inverse=True)
+    halved = np.where(cols[edge] < pencil.n_u, 1.0, 0.5) * values[edge]
+    size = len(keys) * pencil.n_dof
+    B = np.bincount(at * pencil.n_dof + cols[edge], halved, size).astype(np.float64)
+    dofs = pencil.n_u + keys % n_q
+    return Terms(bodies, keys // n_q, dofs, B.reshape(-1, pencil.n_dof))
+
+
+def _entries(columns: sparse.csc_array, theta: Floats) -> tuple[Ints, Ints, Floats]:
+    """Which non-zeros of the pattern each coefficient but the first has, and their values.
+
+    Slot by slot, term by term: (n,) slots, places in the pattern, values.
+    """
+    slots, terms = np.nonzero(theta.T[1:])
+    counts = np.diff(columns.indptr)[terms]
+    ends = np.cumsum(counts)
+    shift = columns.indptr[terms] - (ends - counts)
+    at = np.arange(ends[-1] if len(ends) else 0) + np.repeat(shift, counts)
+    values = columns.data[at] * np.repeat(theta[terms, slots + 1], counts)
+    return np.repeat(slots + 1, counts), columns.indices[at].astype(np.intp), values
+
+
+def _bodies(n_u: int, slot: Ints, rows: Ints, columns: Ints, values: Floats) -> dict[int, Body]:
+    """The coefficients on the unknowns that they touch, by their slots (ascending)."""
+    place, touched = np.empty(n_u, dtype=np.intp), np.zeros(n_u, dtype=bool)
+    starts = first_of_each(slot)
     bodies: dict[int, Body] = {}
-    slots: list[int] = []
-    dofs: list[int] = []
-    B: list[Floats] = []
-    for slot in range(1, theta.shape[1]):
-        entries, values = _entries(columns, theta[:, slot])
-        rows, cols = pencil.rows[entries], pencil.columns[entries]
-        inside = (rows < pencil.n_u) & (cols < pencil.n_u)
-        if inside.any():
-            bodies[slot] = _body(rows[inside], cols[inside], values[inside])
-        edge = rows >= pencil.n_u
-        for dof in np.unique(rows[edge]).tolist():
-            row = np.zeros(pencil.n_dof)
-            at = rows == dof
-            np.add.at(row, cols[at], np.where(cols[at] < pencil.n_u, 1.0, 0.5) * values[at])
-            slots.append(slot)
-            dofs.append(dof)
-            B.append(row)
-    rows_of_q = np.array(B).reshape(-1, pencil.n_dof)
-    return Terms(bodies, np.array(slots, np.intp), np.array(dofs, np.intp), rows_of_q)
-
-
-def _entries(columns: sparse.csc_array, theta: Floats) -> tuple[Ints, Floats]:
-    """Which non-zeros of the pattern a coefficient has, term by term, and their values."""
-    found: list[Ints] = [np.zeros(0, dtype=np.intp)]
-    values = [np.zeros(0)]
-    for term in np.flatnonzero(theta):
-        at = slice(columns.indptr[term], columns.indptr[term + 1])
-        found.append(columns.indices[at].astype(np.intp))
-        values.append(columns.data[at] * theta[term])
-    return np.concatenate(found), np.concatenate(values)
-
-
-def _body(rows: Ints, columns: Ints, values: Floats) -> Body:
-    touched, at = np.unique(np.concatenate([rows, columns]), return_inverse=True)
-    shape = (len(touched), len(touched))
-    place = (at[: len(rows)], at[len(rows) :])
-    return touched, sparse.csr_array((values, place), shape=shape)
+    for start, stop in itertools.pairwise([*starts.tolist(), len(slot)]):
+        i, j = rows[start:stop], columns[start:stop]
+        touched[i] = touched[j] = True
+        at = np.flatnonzero(touched)
+        place[at], touched[at] = np.arange(len(at)), False
+        shape = (len(at), len(at))
+        C = sparse.csr_array((values[start:stop], (place[i], place[j])), shape=shape)
+        bodies[int(slot[start])] = (at, C)
+    return bodies

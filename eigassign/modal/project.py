@@ -81,7 +81,8 @@ def _project(
     tall, rows, bounds = _stacked(pencil, terms, there)
     out = np.zeros((1, len(there), W.shape[1], V.shape[1]))
     for i in range(0, len(rows), CHUNK):
-        products, others = tall[i : i + CHUNK] @ W, V[rows[i : i + CHUNK]]
+        part = tall if len(rows) <= CHUNK else tall[i : i + CHUNK]  # slicing costs as much
+        products, others = part @ W, V[rows[i : i + CHUNK]]
         first, last = np.searchsorted(bounds, [i + 1, i + len(others)], side="left") - 1
         for k in range(first, last + 1):
             a, b = max(bounds[k] - i, 0), bounds[k + 1] - i
@@ -94,9 +95,8 @@ def _stacked(
 ) -> tuple[sparse.csr_array, Ints, Ints]:
     """The non-zero rows of the terms below each other, their numbers, and where terms begin."""
     starts = np.concatenate([[0], np.cumsum(np.diff(terms.indptr)[there])])
-    entries = np.concatenate(
-        [np.arange(terms.indptr[t], terms.indptr[t + 1]) for t in there.tolist()] or [starts[:0]]
-    )
+    shift = terms.indptr[there] - starts[:-1]
+    entries = np.arange(starts[-1]) + np.repeat(shift, np.diff(starts))
     row, column = pencil.rows[terms.indices[entries]], pencil.columns[terms.indices[entries]]
     new = np.ones(len(row), dtype=bool)  # entries of one term run row by row
     new[1:] = row[1:] != row[:-1]
