@@ -19,6 +19,7 @@ from eigassign.errors import UsageError
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.arguments import mode_numbers, relative_gap, whole_within
 from eigassign.modal.clusters import CLUSTER_GAP, clusters, whole_clusters
+from eigassign.modal.exact import Modes
 from eigassign.modal.local import Local, local_space, vector_set
 from eigassign.modal.rayleigh import eigenvalue_series
 from eigassign.modal.recursion import expand_subspace
@@ -233,35 +234,48 @@ def expand(
     if vector_order is not None:
         vector_order = whole_within(vector_order, "vector_order", 0, MAX_ORDER)
     cluster_gap = relative_gap(cluster_gap)
-    n_y = pencil.to_program.shape[1] - pencil.n_q
-    x0 = point(q0, y0, pencil.n_q, n_y)
+    x0 = point(q0, y0, pencil.n_q, pencil.to_program.shape[1] - pencil.n_q)
     local = local_space(pencil, order, linear_in_y, space)
+    return _about(pencil, x0, wanted, local, vector_order, cluster_gap)
+
+
+def _about(
+    pencil: Pencil,
+    x0: Floats,
+    wanted: tuple[int, ...],
+    local: Local,
+    vector_order: int | None,
+    cluster_gap: float,
+) -> Expansion:
+    """The expansion about x0: eigenpairs there, eigenvectors to half the order, eigenvalues."""
     theta = pencil.theta_series(local.space, x0, local.to_z)
     found, groups = whole_clusters(pencil, theta[:, :1], wanted, cluster_gap)
-    vector_space, kept = vector_set(local.space, local.n_linear, vector_order)
-    parts, vectors = [], []
-    for group in groups:
-        pick = np.array(group) - 1
-        X = expand_subspace(
-            pencil, theta[:, kept], vector_space, found.lam[0, pick], found.phi[0][:, pick]
-        ).vectors
-        series = eigenvalue_series(pencil, theta, local.space, vector_space, X)
-        parts.append(Cluster(group, _frozen(series)))
-        vectors.append(_frozen(X))
+    half, kept = vector_set(local.space, local.n_linear, vector_order)
+    vectors = tuple(_vectors(pencil, theta[:, kept], half, found, group) for group in groups)
+    series = [eigenvalue_series(pencil, theta, local.space, half, X) for X in vectors]
     return Expansion(
         modes=tuple(m for g in groups for m in g if m in wanted),
-        clusters=tuple(parts),
-        q0=_frozen(x0[: len(x0) - n_y]),
-        y0=_frozen(x0[len(x0) - n_y :]),
+        clusters=tuple(Cluster(g, _frozen(s)) for g, s in zip(groups, series, strict=True)),
+        q0=_frozen(x0[: pencil.n_q]),
+        y0=_frozen(x0[pencil.n_q :]),
         space=local.space,
         directions=_frozen(local.directions),
         n_linear=local.n_linear,
         kept=_frozen(local.kept.astype(np.float64)),
-        vectors=tuple(vectors),
-        vector_space=vector_space,
+        vectors=vectors,
+        vector_space=half,
         notes=_notes(groups, local, pencil),
         pencil=pencil,
     )
+
+
+def _vectors(
+    pencil: Pencil, theta: Floats, space: LowerSet, found: Modes, group: tuple[int, ...]
+) -> Floats:
+    """X (N_H, n_dof, r) of one cluster over ``space``, from θ's coefficients there."""
+    pick = np.array(group) - 1
+    lam0, phi0 = found.lam[0, pick], found.phi[0][:, pick]
+    return _frozen(expand_subspace(pencil, theta, space, lam0, phi0).vectors)
 
 
 def _notes(groups: Sequence[tuple[int, ...]], local: Local, pencil: Pencil) -> tuple[str, ...]:
