@@ -7,28 +7,24 @@ The one seam is ``Executor.submit(run_case, path, options) -> small dict``: any
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
-import os
 import signal
-import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eigassign.errors import StorageError, UsageError
+from eigassign.case_files import folder_names
 from eigassign.failures import judged
-from eigassign.signals import ONE_THREAD, environment, unwind_when_terminated
+from eigassign.workers import cores, process_pool
 
 if TYPE_CHECKING:
     from eigassign.output.tables import CaseOutcome
 
 Row = dict[str, Any]  # what a worker sends back: plain text and numbers only
 MakePool = Callable[[int], contextlib.AbstractContextManager[Executor]]
-_PATIENCE_S = 5.0  # for workers to clean up after an interrupt
 
 
 @dataclass(frozen=True)
@@ -86,88 +82,12 @@ def _failure(error: Exception) -> Row:
     return {"status": "failed" if failure.exit_code == 1 else "error", "message": failure.text}
 
 
-def default_cases() -> list[Path]:
-    """The case files of ./cases itself; UsageError where there is none."""
-    folder = Path("cases")
-    found = sorted(p for p in folder.glob("*.y*ml") if p.suffix in (".yaml", ".yml"))
-    if not found:
-        raise UsageError("cases: no such file or folder, or no case files in it; name some")
-    return found
-
-
-def cases_in(paths: Sequence[Path]) -> list[Path]:
-    """`find_cases`; UsageError where a path does not exist or there is no case at all."""
-    for path in paths:
-        if not path.exists():
-            raise UsageError(f"{path}: no such file or folder")
-    if not (found := find_cases(paths)):
-        raise UsageError(f"no case files (*.yaml, *.yml) in {', '.join(map(str, paths))}")
-    return found
-
-
-def find_cases(paths: Sequence[Path]) -> list[Path]:
-    """Case files named, and all ``*.yaml``, ``*.yml`` in the folders named, each file once.
-
-    Hidden folders and run folders (they hold a resolved case) are passed over. Raises StorageError
-    for a folder that cannot be read.
-    """
-    found = [each for path in paths for each in (_in(path) if path.is_dir() else [path])]
-    first = {os.path.realpath(path): path for path in reversed(found)}
-    return [path for path in found if first.pop(os.path.realpath(path), None)]
-
-
-def _in(folder: Path) -> Iterator[Path]:
-    from eigassign.output.run_folder import MARKER
-
-    for root, folders, files in os.walk(folder, onerror=_unreadable):
-        if MARKER in files:
-            folders.clear()
-            continue
-        folders[:] = sorted(name for name in folders if not name.startswith("."))
-        for name in sorted(files):
-            if name.endswith((".yaml", ".yml")) and not name.startswith("."):
-                yield Path(root, name)
-
-
-def _unreadable(error: OSError) -> None:
-    raise StorageError(f"{error.filename}: cannot be read: {error.strerror}") from error
-
-
 def plan(cases: Sequence[Path], options: CaseOptions) -> list[Job]:
     """Each case with a folder of its own below ``options.out``, whatever order they come in."""
     return [
         Job(str(case), replace(options, out=str(Path(options.out, name))))
         for case, name in zip(cases, folder_names(cases), strict=True)
     ]
-
-
-def folder_names(cases: Sequence[Path]) -> list[str]:
-    """The files' stems; where two would collide, the path that tells them apart joins in."""
-    stems = [case.stem for case in cases]
-    clashing = {
-        s.casefold() for s in stems if [t.casefold() for t in stems].count(s.casefold()) > 1
-    }
-    root = Path(os.path.commonpath([os.path.abspath(case.parent) for case in cases] or ["."]))
-    taken = {"summary.csv", "junit.xml"}
-    names = []
-    for case, stem in zip(cases, stems, strict=True):
-        parts = Path(os.path.abspath(case)).relative_to(root).with_suffix("").parts
-        name = _free("-".join(parts) if stem.casefold() in clashing else stem, taken)
-        taken.add(name.casefold())
-        names.append(name)
-    return names
-
-
-def _free(name: str, taken: set[str]) -> str:
-    candidates = [name, *(f"{name}-{k}" for k in range(2, len(taken) + 3))]
-    return next(each for each in candidates if each.casefold() not in taken)
-
-
-def cores() -> int:
-    """Processor cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def run_and_summarise(
@@ -274,45 +194,3 @@ def _submitted(pool: Executor, job: Job) -> Future[Row]:
         return pool.submit(run_case, job.case, job.options)
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@contextlib.contextmanager
-def process_pool(workers: int) -> Iterator[Executor]:
-    """Fresh processes, each with one BLAS thread; on an error inside they are stopped at once."""
-    others = set(multiprocessing.active_children())
-    with environment(ONE_THREAD):  # before NumPy is imported there
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers, context, _prepare_worker) as pool:
-            try:
-                yield pool
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                _stop(set(multiprocessing.active_children()) - others)
-                raise
-
-
-def _stop(workers: set[Any]) -> None:
-    """Let workers remove their temporary folders, then kill those that take too long."""
-    deadline = time.monotonic() + _PATIENCE_S
-    for worker in workers:
-        worker.terminate()
-    for worker in workers:
-        worker.join(max(0.0, deadline - time.monotonic()))
-        worker.kill()
-
-
-def _prepare_worker() -> None:
-    """SIGTERM unwinds, Ctrl-C is left to the parent, and no worker outlives its parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    unwind_when_terminated()
-    threading.Thread(target=_follow_parent, daemon=True).start()
-
-
-def _follow_parent() -> None:
-    """End this worker after its parent's death: the pool's own loop may swallow the first try."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGTERM)
-        time.sleep(_PATIENCE_S)
-        os.kill(os.getpid(), signal.SIGKILL)

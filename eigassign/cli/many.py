@@ -29,12 +29,13 @@ def batch(paths: tuple[Path, ...], jobs: int | None, **how: Any) -> int:
     junit.xml. A failed case does not stop the others; exit code 1 if any failed.
     """
     from eigassign import batch as many
+    from eigassign.case_files import cases_in
 
     out = how["out"] or Path("results")
     cache_dir = how["cache_dir"] and str(how["cache_dir"])
     each = many.CaseOptions(str(out), cache_dir, not how["no_cache"], how["force"])
     with telling(how) as tell:
-        outcomes = _watched(many.plan(many.cases_in(paths), each), jobs, out, tell)
+        outcomes = _watched(many.plan(cases_in(paths), each), jobs, out, tell)
         bad = sum(outcome.status != "ok" for outcome in outcomes)
         if bad:
             tell.error(f"{bad} of {len(outcomes)} cases failed")

@@ -104,7 +104,7 @@ def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
     Exit code 1 where an expansion is further off than the case's validation.max_error.
     """
     from eigassign import run
-    from eigassign.batch import cases_in, default_cases
+    from eigassign.case_files import cases_in, default_cases
 
     rows: list[ValidationRow] = []
     codes = [0]

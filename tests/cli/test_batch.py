@@ -18,9 +18,11 @@ from commands import python
 from wrong_inputs import GOOD
 
 from eigassign import batch as many
-from eigassign.batch import CaseOptions, Job, Row, find_cases, folder_names, process_pool, run_batch
+from eigassign.batch import CaseOptions, Job, Row, run_batch
+from eigassign.case_files import find_cases, folder_names
 from eigassign.cli import main
 from eigassign.signals import Terminated
+from eigassign.workers import process_pool
 
 STRICT = GOOD.replace("50 %", "1e-9")
 BOUND = "max: 1}\n  constraints: {heavy: {terms: {m: 1}, min: 3}}"
@@ -215,7 +217,7 @@ def test_folders_are_searched_but_not_their_runs_and_nothing_comes_twice() -> No
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 def test_workers_end_when_their_parent_is_killed() -> None:
     code = (
-        "import os, signal\nfrom eigassign.batch import process_pool\n"
+        "import os, signal\nfrom eigassign.workers import process_pool\n"
         "if __name__ == '__main__':\n"
         "    with process_pool(1) as pool:\n"
         "        print(pool.submit(os.getpid).result(), flush=True)\n"
