@@ -92,7 +92,17 @@ def word(text: str, points: float, bold: bool) -> Word:
         part = coverage[:, round(at) : round(at) + ink.shape[1]]
         np.maximum(part, ink, out=part)
         at += advance
-    return Word(coverage, math.ceil(_LEFT_EM * em), math.ceil(_UP_EM * em))
+    return _trimmed(coverage, math.ceil(_LEFT_EM * em), math.ceil(_UP_EM * em))
+
+
+def _trimmed(coverage: NDArray[np.uint8], left: int, above: int) -> Word:
+    """Without the empty rows and columns around the ink: most of a short label's cells."""
+    rows, columns = (np.flatnonzero(coverage.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return Word(coverage[:0, :0], left, above)
+    top, start = int(rows[0]), int(columns[0])
+    ink = coverage[top : int(rows[-1]) + 1, start : int(columns[-1]) + 1]
+    return Word(np.ascontiguousarray(ink), left - start, above - top)
 
 
 def stamp(

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
 from eigassign.output.figures import FigurePlan
 from eigassign.output.formats import percent
@@ -33,6 +34,19 @@ def page(
     images: Mapping[str, bytes],
 ) -> bytes:
     """Any page of ours: what ``f`` is about, then tables, warnings and notes, then figures."""
+    html = _template().render(
+        f=f,
+        error=error,
+        tables=shown,
+        plans=plans,
+        images={name: base64.b64encode(data).decode() for name, data in images.items()},
+    )
+    return (html + "\n").encode("utf-8", "xmlcharrefreplace")
+
+
+@cache
+def _template() -> Template:
+    """The page's template, compiled once a process."""
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES),
         autoescape=True,
@@ -41,11 +55,4 @@ def page(
         lstrip_blocks=True,
     )
     environment.filters["percent"] = percent
-    html = environment.get_template("report.html.j2").render(
-        f=f,
-        error=error,
-        tables=shown,
-        plans=plans,
-        images={name: base64.b64encode(data).decode() for name, data in images.items()},
-    )
-    return (html + "\n").encode("utf-8", "xmlcharrefreplace")
+    return environment.get_template("report.html.j2")
