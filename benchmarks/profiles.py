@@ -17,13 +17,15 @@ import sys
 import tempfile
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
-from sampling import CATEGORIES, IO, LINEAR, Profile
+from sampling import CATEGORIES, Profile, profile
 
 CASES = ("two_link", "arm_6r, 10⁴ dof", "trunk with chains, 10⁵ dof")
 JOBS = ("expand", "reduce", "optimize")
-ENOUGH = 1.0  # s of processor time for a warm profile: a signal comes every few ms
+ENOUGH = 2.0  # s of processor time for a warm profile: a sample comes every few ms
 FINE = 556  # elements a link: three links of six unknowns a node
 
 
@@ -74,40 +76,29 @@ def _library(what: str, path: Path) -> None:
         reduced.frequencies(q, y0), reduced.error_estimate(q, y0)
 
 
-def one(what: str, path: Path) -> list[dict[str, dict[str, float]]]:
+def one(what: str, path: Path) -> list[Profile]:
     """Cold and warm profile of one job in this process."""
-    found = []
     with tempfile.TemporaryDirectory() as folder:
         job = job_of(what, path, Path(folder))
         with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
-            for enough in (0.0, ENOUGH):
-                profile, calls = Profile(), 0
-                while not calls or sum(profile.seconds.values()) < enough:
-                    profile.of(job)
-                    calls += 1
-                parts = {"seconds": profile.seconds, "functions": profile.functions}
-                found.append({k: _each(values, calls) for k, values in parts.items()})
-    return found
+            return [profile(job, enough) for enough in (0.0, ENOUGH)]
 
 
-def _each(values: dict[str, float], calls: int) -> dict[str, float]:
-    return {name: value / calls for name, value in values.items()}
-
-
-def row(what: str, name: str, state: str, found: dict[str, dict[str, float]]) -> common.Row:
-    """Percentages of the whole, and the largest of our functions outside linear algebra and I/O."""
-    seconds, functions = found["seconds"], found["functions"]
-    total = sum(seconds.values())
-    share = {c: f"{100.0 * seconds.get(c, 0.0) / total:.0f} %" for c in CATEGORIES}
-    top = max(functions, key=lambda f: functions[f], default="")
+def row(what: str, name: str, state: str, found: dict[str, Any]) -> common.Row:
+    """Shares of the whole, and the largest of our functions outside linear algebra."""
+    top, share = next(iter(found["functions"].items()), ("", 0.0))
     return {
         "job": what,
         "case": name,
         "state": state,
-        "time": f"{total:.3g} s",
-        **share,
-        "largest outside": f"{top} {100.0 * functions.get(top, 0.0) / total:.0f} %" if top else "",
+        "time": f"{found['seconds']:.3g} s",
+        **{c: percent(found["categories"].get(c, 0.0)) for c in CATEGORIES},
+        "largest function": f"{top} {percent(share)}",
     }
+
+
+def percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"
 
 
 def main() -> None:
@@ -127,8 +118,9 @@ def main() -> None:
         "Where the time goes",
         rows,
         [
-            f"largest outside: the function of ours with most time outside {LINEAR}, {IO} and"
-            " imports; wanted: none over 20 %",
+            "largest function: of ours, with most time outside linear algebra, imports and what"
+            " libraries read, draw or write for us; wanted: none over 20 %",
+            "output: laying out and drawing figures, the report, files, the cache",
             "expand and reduce: from the case file on, with frequencies (and error estimates) along"
             " the trajectory; optimize: the whole command in this process",
         ],
@@ -137,6 +129,6 @@ def main() -> None:
 
 if __name__ == "__main__":
     if len(sys.argv) == 3:
-        print(json.dumps(one(sys.argv[1], Path(sys.argv[2]))))
+        print(json.dumps([asdict(found) for found in one(sys.argv[1], Path(sys.argv[2]))]))
     else:
         main()
