@@ -63,7 +63,7 @@ class Pencil:
     @cached_property
     def elastic(self) -> Ints:
         """The dofs that are not rigid-body coordinates: u and held coordinates."""
-        return np.setdiff1d(np.arange(self.n_dof), self.rigid)
+        return np.delete(np.arange(self.n_dof), self.rigid)
 
     @cached_property
     def term_stacks(self) -> Floats | None:
