@@ -26,8 +26,9 @@ from eigassign.modal.inverse import InverseExpansion
 from eigassign.modal.model import Model
 from eigassign.modal.region import Box, Region, build_region
 from eigassign.modal.roundoff import rounding_error
-from eigassign.series.adaptive_newton import Interpolant, interpolate
+from eigassign.series.adaptive_newton import interpolate
 from eigassign.series.evaluation import Polynomials
+from eigassign.series.interpolant import Interpolant
 from eigassign.series.newton import newton_polynomials
 
 Floats = NDArray[np.float64]

@@ -16,39 +16,30 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dtrtrs
 
 from eigassign.errors import AccuracyError
+from eigassign.series.interpolant import (
+    POWERS,
+    Interpolant,
+    nearly_best,
+    on_line,
+    powers_of,
+    sizes_of,
+    tail,
+)
 from eigassign.series.lower_set import total_degree
 from eigassign.series.margin import UNKNOWN, Margin, keys, margin, rate
 from eigassign.series.newton import cross, ordered, products, spread_steps
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-POWERS = (1.0, 2.0, -2.0)  # of f that are tried, the quickest to evaluate first
-SAFETY = 4.0  # on the predicted rest
 MISSED = 3.0  # how much worse than at the points held out it may be elsewhere
 CHECKED = 12  # members for each further point that is held out
-TRUSTED, TRUSTED_LINE = 4, 6  # degrees from which a rate is believed; the latter on one axis
-LAST = 4  # coefficients looked at on a single axis: several in turn may be small by accident
+TRUSTED = 4  # degree from which a rate is believed
 STARTS = (5e-3, 5e-4)  # accuracies below each of which one degree more is started with
 STARTS_LINE = (5e-3, 5e-4, 5e-5, 5e-6, 5e-7, 5e-8, 5e-9)  # on a single axis
 FEW = 12  # nodes below which an axis is taken whole
 GROWTH = 3  # times as many members in one round at most
 STEPS = 4  # further members in one round on a single axis at most
-NEAR = 2.0  # how much better another power must be than one that is quicker to evaluate
 ROUNDS = 12
-
-
-@dataclass(frozen=True, eq=False)
-class Interpolant:
-    """f^power ≈ Σ_γ c_γ h_γ; ``error`` estimates |δf/f| over the whole box."""
-
-    power: float
-    members: Ints  # (N, d)
-    coefficients: Floats  # (n_outputs, N)
-    sizes: Floats  # (N,): |δf/f| that each member stands for
-    rates: Floats  # (d,); 0 on an axis that nothing depends on
-    error: float
-    rounds: tuple[tuple[int, float], ...] = ()  # members and error after each
-    asked: int = 0  # values, checks included
 
 
 Sample = Callable[[Ints], Floats]
@@ -147,7 +138,7 @@ class _State:
 
     def grown(self, fresh: Ints, values: Floats, asked: int) -> _State:
         """With further members; the coefficients of the others stay as they are."""
-        g = np.hstack([values**p for p in POWERS])
+        g = powers_of(values)
         rest = g if not len(self.c) else g - products(self.tables, fresh, self.members) @ self.c
         own = dtrtrs(products(self.tables, fresh, fresh), rest, lower=1, unitdiag=1)[0]
         return replace(
@@ -159,46 +150,30 @@ class _State:
         )
 
     def best(self) -> Interpolant:
-        """Of the powers the one with the least error; a quicker one if it is nearly as good."""
-        edge, found = margin(self.members, self.limits), []
-        parts = np.split(self.c, len(POWERS), axis=1)
-        least = np.split(self.smallest, len(POWERS))
-        for power, c, smallest in zip(POWERS, parts, least, strict=True):
-            sizes = (np.abs(c) / (abs(power) * smallest)).max(axis=1)
-            rates = np.array([rate(column, sizes) for column in self.members.T])
-            error = self._rest(edge, sizes, rates)
-            found.append(Interpolant(power, self.members, c.T, sizes, rates, error))
-        bound = NEAR * min(one.error for one in found)
-        return next(one for one in found if one.error <= bound)
+        """The power with the least error, or nearly."""
+        if len(self.limits) == 1:
+            return on_line(self.members, self.c, self.smallest, len(self.c) > self.limits[0])
+        edge, sizes = margin(self.members, self.limits), sizes_of(self.c, self.smallest)
+        rates = [np.array([rate(axis, each) for axis in self.members.T]) for each in sizes]
+        errors = [self._rest(edge, *pair) for pair in zip(sizes, rates, strict=True)]
+        k = nearly_best(errors)
+        c = np.split(self.c, len(POWERS), axis=1)[k].T
+        return Interpolant(POWERS[k], self.members, c, sizes[k], rates[k], errors[k])
 
     def _rest(self, edge: Margin, sizes: Floats, rates: Floats) -> float:
         """Estimated Σ |c_γ| over all γ that are missing.
 
         While an axis has shown few coefficients, its rate is not trusted to be small.
         """
-        trusted = TRUSTED if len(rates) > 1 else TRUSTED_LINE
-        short = (self.members.max(axis=0) < trusted) & (rates > 0.0)
+        short = (self.members.max(axis=0) < TRUSTED) & (rates > 0.0)
         cautious = np.where(short, np.maximum(rates, UNKNOWN), rates)
-        if len(rates) == 1 and len(edge.rows):
-            return _next_on_line(sizes, float(cautious[0])) * _tail(cautious)
-        return float(edge.predicted(sizes, cautious).sum()) * _tail(cautious)
+        return float(edge.predicted(sizes, cautious).sum()) * tail(float(cautious.max()))
 
     def missed(self, found: Interpolant, apart: Ints, values: Floats) -> float:
         """|δf/f| at the points held out, with a margin."""
         g = products(self.tables, apart, found.members) @ found.coefficients.T
         off = np.abs(g / values**found.power - 1.0)
         return MISSED * float(off.max(initial=0.0)) / abs(found.power)
-
-
-def _tail(rates: Floats) -> float:
-    """From the sum over the first missing members to that over all, with the safety."""
-    return SAFETY / (1.0 - float(rates.max()))
-
-
-def _next_on_line(sizes: Floats, rate: float) -> float:
-    """max_k |c_{N−k}| r^k over the last few k: the first coefficient missing on a single axis."""
-    last = sizes[: -LAST - 1 : -1]
-    return float((last * rate ** np.arange(1, len(last) + 1)).max())
 
 
 def _wanted(found: Interpolant, tops: Ints, accuracy: float) -> tuple[Ints, float]:
@@ -208,7 +183,7 @@ def _wanted(found: Interpolant, tops: Ints, accuracy: float) -> tuple[Ints, floa
     where every axis is at its end.
     """
     members, sizes, have = found.members, found.sizes, len(found.members)
-    left = 0.5 * accuracy / _tail(found.rates)
+    left = 0.5 * accuracy / tail(float(found.rates.max()))
     most = have + STEPS if len(tops) == 1 else (1 + GROWTH) * have
     while len(members) < most:
         edge = margin(members, tops)

@@ -10,6 +10,7 @@ the second term being for functions that are even or odd.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,7 +76,12 @@ def rate(degrees: Ints, sizes: Floats) -> float:
     """By how much coefficients fall from one degree to the next along an axis; 0 if all vanish."""
     layers = np.zeros(int(degrees.max()) + 1)
     np.maximum.at(layers, degrees, sizes)
-    first, *others = layers.tolist()
+    return decay(layers.tolist())
+
+
+def decay(layers: Sequence[float]) -> float:
+    """The same of the largest coefficient of each degree."""
+    first, others = layers[0], layers[1:]
     if not others or max(others) <= IDLE * first:
         return 0.0
     pairs = [max(pair) for pair in itertools.pairwise(others)] or others

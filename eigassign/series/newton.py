@@ -36,6 +36,11 @@ def interval() -> Floats:
     return nodes
 
 
+def roots(count: int) -> Floats:
+    """The zeros of T_count on [−1, 1], ascending: Π |v − v_i| is least for them."""
+    return np.asarray(-np.cos(np.pi * (np.arange(count) + 0.5) / count))
+
+
 def leja(candidates: Floats, count: int) -> Ints:
     """Places of ``count`` Leja points among distinct candidates; the most central is the first."""
     middle = 0.5 * (candidates.min() + candidates.max())

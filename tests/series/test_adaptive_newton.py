@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from eigassign.errors import AccuracyError
-from eigassign.series.adaptive_newton import Interpolant, interpolate
+from eigassign.series.adaptive_newton import interpolate
+from eigassign.series.interpolant import Interpolant
 from eigassign.series.newton import basis, interval, leja, newton_polynomials
 
 Function = Callable[[np.ndarray], np.ndarray]

@@ -1,0 +1,148 @@
+"""Nodes on an axis v ∈ [−1, 1], and a trajectory as one such axis.
+
+Where a trajectory is straight in joint space, v is the joint coordinate along it; else v is the
+distance travelled there, and its samples alone are candidates for nodes and can be asked for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.series.newton import basis, interval, leja, roots
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+MOST_STATIONS = 48  # nodes along a trajectory
+DENSE = 513  # samples of a trajectory that may be nodes
+STILL = 1e-9  # rad or m: what moves less stands still, what is off by less lies on the path
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """At most ``most`` Leja points among candidates v (K,), with Newton's basis.
+
+    They are ``whole`` if they are all that will be asked for.
+    """
+
+    places: Floats
+    most: int
+    whole: bool = False
+
+    @cached_property
+    def chosen(self) -> Ints:
+        """Which candidates, in the order of the points."""
+        return leja(self.places, self.most)
+
+    @cached_property
+    def v(self) -> Floats:
+        """The points."""
+        return np.asarray(self.places[self.chosen])
+
+    @cached_property
+    def table(self) -> Floats:
+        """Newton's basis at the points."""
+        return basis(self.v, self.v)
+
+    @cached_property
+    def inverse(self) -> Floats:
+        """From values at the points to coefficients."""
+        return np.asarray(np.linalg.inv(self.table))
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """Nodes, and what each adds to the centre of x, (most, n_x)."""
+
+    points: Nodes
+    steps: Floats
+
+    @property
+    def nodes(self) -> Floats:
+        """v of the nodes, in their order."""
+        return self.points.v
+
+    @property
+    def table(self) -> Floats:
+        """Newton's basis at the nodes."""
+        return self.points.table
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A trajectory as one axis: v_0 of its samples; a straight one is linear in x."""
+
+    axis: Axis
+    q: Floats  # the samples (n_t, n_q)
+    place: Floats  # (n_t,) in [−1, 1]
+    row: Floats  # dv_0/dx (n_x,)
+    straight: bool
+
+    @cached_property
+    def table(self) -> Floats:
+        """Newton's basis at the samples, (n_t, most)."""
+        return basis(self.axis.nodes, self.place)
+
+
+def line_of(joints: Floats, q: Floats, n_y: int, count: int | None) -> Line | None:
+    """The axis of samples q (n_t, n_q); None where they stand still in ``joints`` (n_s, n_q).
+
+    With nested nodes, or with the best ``count`` ones.
+    """
+    if not q.shape[1]:
+        return None
+    reach = (q - q[0]) @ joints.T
+    if not reach.size or np.abs(reach).max() <= STILL:
+        return None
+    place, row, straight = _placed(reach, joints)
+    row = np.append(row, np.zeros(n_y))
+    if straight:
+        points = interval_nodes(MOST_STATIONS) if count is None else chosen_nodes(count)
+        far = int(np.abs(place - place[0]).argmax())
+        back = np.linalg.pinv(joints) @ (reach[far] / (place[far] - place[0]))
+        steps = np.outer(points.v - place[0], np.append(back, np.zeros(n_y)))
+        return Line(Axis(points, steps), q, place, row, True)
+    keep = np.unique(place, return_index=True)[1]
+    some = np.unique(np.linspace(0, len(keep) - 1, min(len(keep), DENSE)).round().astype(int))
+    points = _sampled(place[keep[some]], len(keep), count)
+    steps = np.zeros((len(points.chosen), q.shape[1] + n_y))
+    at = np.searchsorted(place[keep], points.v)
+    steps[:, : q.shape[1]] = q[keep[at]] - q[0]
+    return Line(Axis(points, steps), q, place, row, False)
+
+
+def _sampled(places: Floats, of: int, count: int | None) -> Nodes:
+    """Nodes among the ``of`` samples: Leja points, or the ``count`` nearest to the best places."""
+    if count is None or count >= of:
+        most = MOST_STATIONS if count is None else count
+        return Nodes(places, most, of <= most)
+    nearest = np.unique(np.abs(places[:, None] - roots(count)).argmin(axis=0))
+    return Nodes(places[nearest] if len(nearest) == count else places, count)
+
+
+@lru_cache(maxsize=64)
+def interval_nodes(most: int) -> Nodes:
+    """Nested nodes of [−1, 1]."""
+    return Nodes(interval(), most)
+
+
+@lru_cache(maxsize=64)
+def chosen_nodes(count: int) -> Nodes:
+    """The best ``count`` nodes of [−1, 1]."""
+    return Nodes(roots(count), count)
+
+
+def _placed(reach: Floats, S: Floats) -> tuple[Floats, Floats, bool]:
+    """v (n_t,) in [−1, 1], dv/dq, and whether the path s − s_0 (n_t, n_s) is straight."""
+    far = reach[np.argmax(np.square(reach).sum(axis=1))]
+    along = reach @ far / (far @ far)
+    straight = bool(np.abs(reach - np.outer(along, far)).max() <= STILL)
+    if not straight:
+        steps = np.linalg.norm(np.diff(reach, axis=0), axis=1)
+        along = np.concatenate([[0.0], np.cumsum(steps)])
+    low, width = along.min(), np.ptp(along)
+    row = 2.0 / width * (far / (far @ far)) @ S if straight else np.zeros(S.shape[1])
+    return 2.0 * (along - low) / width - 1.0, row, straight
