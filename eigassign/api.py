@@ -13,8 +13,10 @@ from eigassign.case import load
 from eigassign.modal import expansion as modal_expansion
 from eigassign.modal import reduced as modal_reduced
 from eigassign.modal.expansion import Expansion
-from eigassign.modal.fit import Fit, fit
+from eigassign.modal.fit import Fit
+from eigassign.modal.fitting import fit
 from eigassign.modal.model import Model, as_model
+from eigassign.modal.path_fit import PathFit
 from eigassign.modal.reduced import ReducedModel
 from eigassign.modal.region import Box
 from eigassign.series.lower_set import LowerSet
@@ -23,6 +25,7 @@ __all__ = [
     "Box",
     "Case",
     "Fit",
+    "PathFit",
     "assign",
     "expand",
     "fit",

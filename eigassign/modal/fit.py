@@ -2,43 +2,26 @@
 
     f(q, y)^p ≈ Σ_γ c_γ h_γ(v(q, y)),   p ∈ {1, 2, −2}:  f, λ or 1/λ, whichever needs fewest terms
 
-with Newton's basis at Leja points over a lower set of multi-indices that grows where coefficients
-say so (`series.adaptive_newton`). It asks a source for frequencies: the model's exact solves, a
-reduced model, or an expansion.
+in Newton's basis over a lower set of multi-indices. How it is made is in `modal.fitting`.
 """
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.errors import AccuracyError, UsageError
-from eigassign.modal.adaptive import shown
-from eigassign.modal.exact import DENSE_LIMIT, eigenvalues
-from eigassign.modal.expansion import Expansion
-from eigassign.modal.inverse import InverseExpansion
-from eigassign.modal.model import Model
-from eigassign.modal.region import Box, Region, build_region
-from eigassign.modal.roundoff import rounding_error
-from eigassign.series.adaptive_newton import interpolate
+from eigassign.errors import UsageError
+from eigassign.modal.region import Region
 from eigassign.series.evaluation import Polynomials
 from eigassign.series.interpolant import Interpolant
 from eigassign.series.newton import newton_polynomials
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-MOST = 2000  # frequencies asked for in one fit
-LEAST_ACCURACY = 1e-13
-FINE, FINE_LARGE = 1e-8, 1e-6  # accuracies below which round-off is looked at
-SHARE = 0.5  # of the accuracy that the source itself may use
-FEW_AXES = 3  # up to which all corners are looked at
-CLOSE = 1e-2  # relative gap in Hz below which neighbouring modes are named as a cause
 QUANTITIES = {1.0: "f", 2.0: "λ", -2.0: "1/λ"}
 
 
@@ -48,7 +31,7 @@ class Fit:
 
     modes: tuple[int, ...]
     region: Region
-    accuracy: float  # asked for, relative in Hz
+    accuracy: float | None  # asked for, relative in Hz; None where the solves were given
     error_estimate: float  # of frequencies anywhere in the region, relative in Hz
     interpolant: Interpolant
     floor: float  # part of the estimate that is the source's own
@@ -126,132 +109,11 @@ class Fit:
         return newton_polynomials(self.indices, nodes, self.coefficients)
 
     def _hz(self, g: Floats) -> Floats:
+        """f of f^p, in its place."""
         if self.power == 1.0:
             return g
-        root = np.sqrt(g)
-        return root if self.power == 2.0 else 1.0 / root
-
-
-def fit(
-    source: Any,
-    q: ArrayLike | Box,
-    y: ArrayLike | Box,
-    modes: Sequence[int] | None = None,
-    accuracy: float = 1e-4,
-    most: int = MOST,
-) -> Fit:
-    """Fit ``modes`` of ``source`` over a trajectory or a box of q and a design or a box of y.
-
-    ``source`` is a Model (exact solves), a ReducedModel or an Expansion, whose own error estimates
-    count. ``q`` are samples of a trajectory (n_t, n_q), one pose (n_q,) or a `Box`; ``y`` (n_y,) or
-    a `Box`; ``accuracy`` is relative in Hz. Raises AccuracyError where ``most`` frequencies do not
-    suffice, as where modes cross, UsageError for arguments that cannot be meant.
-    """
-    if not LEAST_ACCURACY <= accuracy < 1.0:
-        raise UsageError(f"accuracy {accuracy} is not within {LEAST_ACCURACY} to 1")
-    directions, n_q = _dependence(source)
-    region, wanted = build_region(directions, n_q, q, y), _modes(source, modes)
-    ask = _question(source, wanted)
-    floor = _floor(source, region, wanted, accuracy)
-    try:
-        found = interpolate(
-            lambda members: ask(region.x(members)),
-            [axis.table for axis in region.axes],
-            accuracy - floor,
-            most,
-            [axis.points.whole for axis in region.axes],
-        )
-    except AccuracyError as error:
-        raise AccuracyError(f"{error}{_cause(source, region, wanted)}") from None
-    if not floor and isinstance(source, Model) and found.error < _fine(source):
-        floor = rounding_error(source.pencil, region.centre, wanted[-1])
-    return Fit(wanted, region, accuracy, found.error + floor, found, floor)
-
-
-def _fine(model: Model) -> float:
-    """Accuracy below which the round-off of exact solves is looked at."""
-    return FINE if model.n_dof <= DENSE_LIMIT else FINE_LARGE
-
-
-def _dependence(source: Any) -> tuple[Floats, int]:
-    """Combinations of x on which the source's frequencies depend (n_w, n_x), and n_q."""
-    if isinstance(source, Model):
-        return source.pencil.local_directions[1], source.pencil.n_q
-    if isinstance(source, InverseExpansion):
-        source = source.expansion
-    if isinstance(source, Expansion):
-        return source.directions, len(source.q0)
-    return source.to_program[source.program.dependence.any(axis=0)], source.n_q
-
-
-def _modes(source: Any, modes: Sequence[int] | None) -> tuple[int, ...]:
-    """The modes to fit. Raises UsageError for one that the source does not have."""
-    own = getattr(source, "modes", None) if not isinstance(source, Model) else None
-    wanted = tuple(sorted({int(m) for m in (modes or own or (1,))}))
-    if wanted[0] < 1 or (own is not None and not set(wanted) <= set(own)):
-        raise UsageError(f"modes {wanted} asked for; the source has {own or 'those from 1 on'}")
-    return wanted
-
-
-def _question(source: Any, modes: tuple[int, ...]) -> Callable[[Floats], Floats]:
-    """x (n, n_x) → f (n, n_modes) in Hz. AccuracyError where the source gives no number."""
-    if isinstance(source, Model):
-        pick, pencil = np.array(modes) - 1, source.pencil
-        return lambda x: np.sqrt(eigenvalues(pencil, x, modes[-1])[:, pick]) / (2.0 * np.pi)
-    columns, n_q = [source.modes.index(m) for m in modes], _dependence(source)[1]
-
-    def ask(x: Floats) -> Floats:
-        hz = np.asarray(source.frequencies(x[:, :n_q], x[:, n_q:]))[:, columns]
-        if not np.isfinite(hz).all():
-            k = int(np.argmin(np.isfinite(hz).all(axis=1)))
-            raise AccuracyError(f"the source has no frequency at (q, y) = {shown(x[k])}")
-        return hz
-
-    return ask
-
-
-def _floor(source: Any, region: Region, modes: tuple[int, ...], accuracy: float) -> float:
-    """Relative error in Hz of what the source answers, at the region's ends and centre.
-
-    Of exact solves this is round-off, looked at only where it may matter. Raises AccuracyError
-    where it leaves nothing of the accuracy asked for.
-    """
-    if isinstance(source, Model):
-        if accuracy >= _fine(source):
-            return 0.0
-        floor = rounding_error(source.pencil, region.centre, modes[-1])
-    else:
-        x = region.x(_ends(region))
-        n_q = _dependence(source)[1]
-        columns = [source.modes.index(m) for m in modes]
-        floor = float(source.error_estimate(x[:, :n_q], x[:, n_q:])[:, columns].max())
-    if floor > SHARE * accuracy:
-        what = "round-off" if isinstance(source, Model) else "the source itself"
-        raise AccuracyError(f"{what} may cost {floor:.1e}, which leaves nothing of {accuracy:.1e}")
-    return floor
-
-
-def _ends(region: Region) -> Ints:
-    """Multi-indices of the centre and both ends of each axis: in all combinations, if few."""
-    d = region.d
-    if d <= FEW_AXES:
-        signs = np.array(list(itertools.product((1, 2), repeat=d)))
-    else:
-        signs = 1 + np.vstack([np.zeros((1, d)), np.eye(d), 1 - np.eye(d), np.ones((1, d))])
-    tops = [len(axis.nodes) - 1 for axis in region.axes]
-    return np.asarray(np.minimum(np.vstack([np.zeros((1, d)), signs]), tops), dtype=np.intp)
-
-
-def _cause(source: Any, region: Region, modes: tuple[int, ...]) -> str:
-    """Neighbouring modes that come close, the usual cause, as the end of a message."""
-    if not isinstance(source, Model):
-        return ""
-    count = min(modes[-1] + 1, len(source.pencil.elastic))
-    lam = eigenvalues(source.pencil, region.x(_ends(region)), count)
-    gap = 0.5 * (1.0 - lam[:, :-1] / lam[:, 1:]).min(axis=0)
-    near = [k + 1 for k in np.flatnonzero(gap < CLOSE) if {k + 1, k + 2} & set(modes)]
-    named = ", ".join(f"{k} and {k + 1}" for k in near)
-    return f"; modes {named} come close, and where they meet none is smooth" if near else ""
+        np.sqrt(g, out=g)  # in place: fresh pages cost more than the roots
+        return g if self.power == 2.0 else np.divide(1.0, g, out=g)
 
 
 def _reasons(found: Interpolant, floor: float) -> Iterator[str]:

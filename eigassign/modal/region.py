@@ -22,6 +22,7 @@ Ints = NDArray[np.intp]
 MOST_NODES = 20  # on an axis of a box
 MOST_AXES = 10
 INSIDE = 1e-9  # by how much |v| may exceed 1
+OFF = 10.0 * STILL  # what is farther lies off the path
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ class Region:
     @cached_property
     def joints(self) -> Floats:
         """The joint coordinates that matter, (n_s, n_q)."""
-        return _joints(self.directions, self.n_q)
+        return joints_of(self.directions, self.n_q)
 
     def x(self, members: Ints) -> Floats:
         """(q, y) (n, n_x) at the nodes of multi-indices (n, d)."""
@@ -85,18 +86,46 @@ class Region:
 
     def v(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """(n, d) of samples. Raises UsageError for any outside the region."""
-        x = samples(q, y, self.n_q, len(self.centre) - self.n_q)
+        x = self.samples(q, y)
         v = x @ self.to_v.T + self.offset
         if self.path is not None:
-            self._project(x[:, : self.n_q], v)
+            off = self._project(x[:, : self.n_q], v).max(initial=0.0)
+            if not off <= OFF:
+                raise UsageError(f"q lies off the path that was fitted, by up to {off:.3g}")
         self._inside(v)
         self._kept(x)
         return np.asarray(v)
 
+    def samples(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """x (n, n_x) of q and y. Raises UsageError for wrong shapes."""
+        return samples(q, y, self.n_q, len(self.centre) - self.n_q)
+
+    def on_path(self, x: Floats) -> NDArray[np.bool_]:
+        """Which of x (n, n_x) are on the path, and not beyond its ends."""
+        v = x @ self.to_v.T + self.offset
+        off = self._project(x[:, : self.n_q], v)
+        return np.asarray((off <= OFF) & (np.abs(v[:, 0]) <= 1.0 + INSIDE))
+
     def design(self, y: ArrayLike) -> Floats:
         """v (n_designs, d) of designs y (n_y,) or (n_designs, n_y), on the path's first sample."""
-        first = self.centre[: self.n_q] if self.path is None else self.path[0]
-        return self.v(first, y)
+        to_v, offset, still = self._by_design
+        rows = _designs(y, to_v.shape[1])
+        v = rows @ to_v.T
+        v += offset
+        self._inside(v)
+        if len(still):
+            self._kept(np.hstack([np.tile(self._first, (len(rows), 1)), rows]))
+        return np.asarray(v)
+
+    @property
+    def _first(self) -> Floats:
+        return self.centre[: self.n_q] if self.path is None else self.path[0]
+
+    @cached_property
+    def _by_design(self) -> tuple[Floats, Floats, Ints]:
+        """dv/dy (d, n_y), v at y = 0 on the first sample, and parameters with one value only."""
+        offset = self.offset + self.to_v[:, : self.n_q] @ self._first
+        return self.to_v[:, self.n_q :], offset, self.still[self.still >= self.n_q]
 
     def _inside(self, v: Floats) -> None:
         reach = float(np.abs(v).max())
@@ -118,22 +147,19 @@ class Region:
             moved[: self.n_q] = True
         return np.flatnonzero((self.directions != 0.0).any(axis=0) & ~moved)
 
-    def _project(self, q: Floats, v: Floats) -> None:
-        """Refuse what lies off the path; along a curved one find the samples."""
+    def _project(self, q: Floats, v: Floats) -> Floats:
+        """How far each of q lies off the path (n,); along a curved one v_0 becomes its sample's."""
         assert self.path is not None
         s, known = q @ self.joints.T, self.path @ self.joints.T
         if self.line is None or self.line.straight:
             far = known[np.argmax(np.square(known - known[0]).sum(axis=1))] - known[0]
             t = (s - known[0]) @ far / max(float(far @ far), 1e-300)
-            off = float(np.abs(s - known[0] - t[:, None] * far).max(initial=0.0))
-        else:
-            from scipy.spatial import cKDTree
+            return np.asarray(np.abs(s - known[0] - t[:, None] * far).max(axis=1, initial=0.0))
+        from scipy.spatial import cKDTree
 
-            distance, nearest = cKDTree(known).query(s)
-            v[:, 0] = self.line.place[nearest]
-            off = float(np.max(distance))
-        if not off <= 10.0 * STILL:
-            raise UsageError(f"q lies off the path that was fitted, by up to {off:.3g}")
+        distance, nearest = cKDTree(known).query(s)
+        v[:, 0] = self.line.place[nearest]
+        return np.asarray(distance)
 
 
 def build_region(
@@ -146,7 +172,7 @@ def build_region(
     nothing that matters varies.
     """
     n_y = directions.shape[1] - n_q
-    path = None if isinstance(q, Box) else _samples(q, n_q, n_y)
+    path = None if isinstance(q, Box) else path_samples(q, n_q, n_y)
     axes: list[Axis] = []
     rows: list[Floats] = []
     if path is not None and not isinstance(y, Box):
@@ -167,7 +193,7 @@ def build_region(
     return Region(tuple(axes), centre, tuple(rows), kept, line, directions, n_q)
 
 
-def _samples(q: ArrayLike, n_q: int, n_y: int) -> Floats:
+def path_samples(q: ArrayLike, n_q: int, n_y: int) -> Floats:
     """Of a trajectory, (n_t, n_q). Raises UsageError for wrong shapes."""
     if isinstance(q, np.ndarray) and q.dtype == np.float64 and q.ndim == 2 and q.shape[1] == n_q:
         return q  # whether it is finite is checked with its line, once
@@ -186,10 +212,10 @@ def _known_line(
     q, directions = np.ndarray(shape, buffer=path), np.ndarray(of, buffer=combinations)
     if not np.isfinite(q).all():
         raise UsageError("q must be finite")
-    return line_of(_joints(directions, shape[1]), q, of[1] - shape[1], count)
+    return line_of(joints_of(directions, shape[1]), q, of[1] - shape[1], count)
 
 
-def _joints(directions: Floats, n_q: int) -> Floats:
+def joints_of(directions: Floats, n_q: int) -> Floats:
     """The joint coordinates that matter, (n_s, n_q)."""
     return np.asarray(directions[(directions[:, :n_q] != 0.0).any(axis=1), :n_q])
 
@@ -203,6 +229,13 @@ def _numbers(value: ArrayLike, n: int, name: str) -> Floats:
     if len(numbers) != n or not np.isfinite(numbers).all():
         raise UsageError(f"{name} has {len(numbers)} values, or not finite ones; expected {n}")
     return numbers
+
+
+def _designs(y: ArrayLike, n_y: int) -> Floats:
+    """(n_designs, n_y); those outside, or not finite, are no place of the region."""
+    if isinstance(y, np.ndarray) and y.dtype == np.float64 and y.ndim == 2 and y.shape[1] == n_y:
+        return y
+    return samples([], y, 0, n_y)
 
 
 def _ends(value: ArrayLike | Box, n: int, name: str) -> Floats:

@@ -8,7 +8,7 @@ them one batch of values.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,24 +35,40 @@ MISSED = 3.0  # how much worse than at the points held out it may be elsewhere
 CHECKED = 12  # members for each further point that is held out
 TRUSTED = 4  # degree from which a rate is believed
 STARTS = (5e-3, 5e-4)  # accuracies below each of which one degree more is started with
-STARTS_LINE = (5e-3, 5e-4, 5e-5, 5e-6, 5e-7, 5e-8, 5e-9)  # on a single axis
+STARTS_LINE = (
+    5e-3,
+    5e-3,
+    5e-4,
+    5e-5,
+    5e-6,
+    5e-7,
+    5e-8,
+    5e-9,
+)  # on a single axis: two more at first
 FEW = 12  # nodes below which an axis is taken whole
 GROWTH = 3  # times as many members in one round at most
 STEPS = 4  # further members in one round on a single axis at most
 ROUNDS = 12
 
 
-Sample = Callable[[Ints], Floats]
+Asking = Generator[Ints, Floats, Interpolant]  # members wanted → values (n, n_outputs) sent
 
 
-def interpolate(
-    sample: Sample,
-    tables: Sequence[Floats],
-    accuracy: float,
-    most: int,
-    whole: Sequence[bool] | None = None,
-) -> Interpolant:
-    """The interpolant of f to a relative ``accuracy``; f = ``sample``(members) is (n, n_outputs).
+def interpolate(sample: Callable[[Ints], Floats], run: Asking) -> Interpolant:
+    """What a run ends with that is sent f = ``sample``(members) (n, n_outputs)."""
+    wanted = next(run)
+    while True:
+        try:
+            wanted = run.send(sample(wanted))
+        except StopIteration as end:
+            found: Interpolant = end.value
+            return found
+
+
+def adaptive(
+    tables: Sequence[Floats], accuracy: float, most: int, whole: Sequence[bool] | None = None
+) -> Asking:
+    """The interpolant of f to a relative ``accuracy``; asks for values, round by round.
 
     ``tables`` hold Newton's basis at the nodes of each axis; an axis is ``whole`` if nothing but
     its nodes is ever asked for. Raises AccuracyError where ``most`` values, or the nodes, do not
@@ -60,12 +76,12 @@ def interpolate(
     """
     tops = np.array([len(table) - 1 for table in tables], dtype=np.intp)
     finite = np.array(whole if whole is not None else [False] * len(tops))
-    state = _State.empty(tables, np.where(finite, tops, tops + 1))
+    state = Growing.empty(tables, np.where(finite, tops, tops + 1))
     fresh, expected = _start(tops, finite, accuracy), np.inf
     rounds: list[tuple[int, float]] = []
     while True:
-        apart = _held_out(np.vstack([state.members, fresh]), tops, len(rounds))
-        values = sample(np.vstack([fresh, apart]))
+        apart = held_out(np.vstack([state.members, fresh]), tops, len(rounds))
+        values = yield np.vstack([fresh, apart])
         state = state.grown(fresh, values[: len(fresh)], len(values))
         found = state.best()
         missed = state.missed(found, apart, values[len(fresh) :])
@@ -103,7 +119,7 @@ def _start(tops: Ints, whole: NDArray[np.bool_], accuracy: float) -> Ints:
     return ordered(keep)
 
 
-def _held_out(members: Ints, tops: Ints, rounds: int) -> Ints:
+def held_out(members: Ints, tops: Ints, rounds: int) -> Ints:
     """Points for a check (n, d): corners, one far from all nodes, and others all over the box.
 
     None on a single axis, where every value was a check of the interpolant before it.
@@ -121,7 +137,7 @@ def _held_out(members: Ints, tops: Ints, rounds: int) -> Ints:
 
 
 @dataclass(frozen=True, eq=False)
-class _State:
+class Growing:
     """Members so far, and the coefficients of every power, (N, n_powers · n_outputs)."""
 
     tables: Sequence[Floats]
@@ -132,11 +148,12 @@ class _State:
     asked: int
 
     @staticmethod
-    def empty(tables: Sequence[Floats], limits: Ints) -> _State:
+    def empty(tables: Sequence[Floats], limits: Ints) -> Growing:
+        """Before any value is known."""
         nothing = np.zeros((0, len(limits)), dtype=np.intp)
-        return _State(tables, limits, nothing, np.zeros((0, 1)), np.full(1, np.inf), 0)
+        return Growing(tables, limits, nothing, np.zeros((0, 1)), np.full(1, np.inf), 0)
 
-    def grown(self, fresh: Ints, values: Floats, asked: int) -> _State:
+    def grown(self, fresh: Ints, values: Floats, asked: int) -> Growing:
         """With further members; the coefficients of the others stay as they are."""
         g = powers_of(values)
         rest = g if not len(self.c) else g - products(self.tables, fresh, self.members) @ self.c

@@ -4,14 +4,15 @@ On a single axis the error is told from the coefficients alone: the first that i
 
     |c_N| ≈ max_k |c_{N−k}| r^k ,
 
-over the last few k, for several in turn may be small by accident; r is the factor by which they
-fall from one degree to the next, not trusted to be small while few have been seen.
+over the last few but the constant, for several in turn may be small by accident; r is the factor by
+which they fall from one degree to the next, not trusted to be small while few have been seen.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,8 +54,15 @@ def sizes_of(c: Floats, smallest: Floats) -> Floats:
     δ(f^p) = p f^p δf/f, where f^p is ``smallest`` (n_powers · n_outputs,).
     """
     each = len(smallest) // len(POWERS)
-    sizes = np.abs(c).T / (smallest * np.repeat(np.abs(POWERS), each))[:, None]
+    sizes = np.abs(c.T)
+    sizes /= (smallest * _orders(each))[:, None]
     return sizes if each == 1 else np.asarray(sizes.reshape(len(POWERS), each, -1).max(axis=1))
+
+
+@lru_cache(maxsize=64)
+def _orders(each: int) -> Floats:
+    """|p|, each so many times."""
+    return np.repeat(np.abs(POWERS), each)
 
 
 def nearly_best(errors: Sequence[float]) -> int:
@@ -68,7 +76,7 @@ def tail(rate: float) -> float:
     return SAFETY / (1.0 - rate)
 
 
-def on_line(members: Ints, c: Floats, smallest: Floats, ended: bool) -> Interpolant:
+def on_line(members: Ints, c: Floats, smallest: Floats, ended: bool, asked: int = 0) -> Interpolant:
     """The best power on a single axis; nothing is missing where that ``ended``."""
     sizes = sizes_of(c, smallest)
     layers: list[list[float]] = sizes.tolist()
@@ -76,7 +84,9 @@ def on_line(members: Ints, c: Floats, smallest: Floats, ended: bool) -> Interpol
     errors = [0.0 if ended else _rest(*pair) for pair in zip(layers, rates, strict=True)]
     k = nearly_best(errors)
     own = c.T.reshape(len(POWERS), -1, len(c))[k]
-    return Interpolant(POWERS[k], members, own, sizes[k], np.array(rates[k : k + 1]), errors[k])
+    rate = np.array(rates[k : k + 1])
+    done = ((len(c), errors[k]),)
+    return Interpolant(POWERS[k], members, own, sizes[k], rate, errors[k], done, asked)
 
 
 def _rest(sizes: Sequence[float], rate: float) -> float:
@@ -84,7 +94,7 @@ def _rest(sizes: Sequence[float], rate: float) -> float:
     if 0.0 < rate < UNKNOWN and len(sizes) <= TRUSTED_LINE:
         rate = UNKNOWN
     largest, factor = 0.0, 1.0
-    for size in sizes[: -LAST - 1 : -1]:
+    for size in sizes[: max(0, len(sizes) - LAST - 1) : -1]:  # the constant shows no rate
         factor *= rate
         largest = max(largest, size * factor)
     return largest * tail(rate)

@@ -19,7 +19,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.series.evaluation import Monomials, Polynomials, monomials_of
+from eigassign.series.evaluation import Monomials, Polynomials
 from eigassign.series.lower_set import LowerSet, lower_set
 
 Floats = NDArray[np.float64]
@@ -71,30 +71,33 @@ def products(tables: Sequence[Floats], rows: Ints, columns: Ints) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class NewtonRows(Monomials):
-    """All Π_j Π_{i<γ_j} (v_j − v_ji) of one lower set, as rows."""
+    """All Π_j Π_{i<γ_j} (v_j − v_ji) of one lower set, as rows: axis by axis, then their products.
 
-    shifts: tuple[Floats, ...] = ()
+    ``nodes`` (k_j, 1) of each axis are those that its highest degree needs; ``degrees`` (n, N).
+    """
+
+    nodes: tuple[Floats, ...] = ()
+    degrees: tuple[Ints, ...] = ()
 
     def __call__(self, x: Floats) -> Floats:
         """(N, n_points) at points x (n, n_points), one row a variable."""
-        rows = np.empty((self.size, x.shape[1]))
-        rows[0] = 1.0
-        for (first, last, parents, variables), shift in zip(self.steps, self.shifts, strict=True):
-            factor = x[variables]
-            factor -= shift
-            np.multiply(rows[parents], factor, out=rows[first:last])
-        return rows
+        rows: Floats | None = None
+        for v, nodes, degrees in zip(x, self.nodes, self.degrees, strict=True):
+            table = np.empty((len(nodes) + 1, len(v)))
+            table[0] = 1.0
+            np.subtract(v, nodes, out=table[1:])
+            np.multiply.accumulate(table, axis=0, out=table)
+            chosen = table.take(degrees, axis=0)
+            rows = chosen if rows is None else np.multiply(rows, chosen, out=rows)
+        return np.ones((self.size, x.shape[1])) if rows is None else rows
 
 
 def newton_rows(space: LowerSet, nodes: Sequence[Floats]) -> NewtonRows:
-    """How the basis functions of a set follow from one another."""
-    plain = monomials_of(space)
-    shifts = []
-    for first, last, _, variables in plain.steps:
-        degree = space.indices[np.arange(first, last), variables]
-        shift = [nodes[j][k - 1] for j, k in zip(variables, degree, strict=True)]
-        shifts.append(np.array(shift)[:, None])
-    return NewtonRows(plain.size, plain.n_variables, plain.steps, tuple(shifts))
+    """The basis functions of a set, up to their scale."""
+    degrees = tuple(np.ascontiguousarray(column) for column in space.indices.T)
+    used = zip(nodes, degrees, strict=True)
+    needed = tuple(v[: int(column.max()), None] for v, column in used)
+    return NewtonRows(len(space), space.n_variables, (), needed, degrees)
 
 
 def newton_polynomials(members: Ints, nodes: Sequence[Floats], c: Floats) -> Polynomials:

@@ -1,11 +1,12 @@
 """eigassign's fits as charted methods: along one trajectory at a design, and over trajectory × box.
 
-Their set-up holds every exact solve, the checks and the error estimate.
+To a stated accuracy, or of a given number of exact solves. Their set-up holds every exact solve,
+the checks and the error estimate; what can state none is left out, as what is refused.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -13,7 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.modal.fit import Fit, fit
+from eigassign.modal.fit import Fit
+from eigassign.modal.fitting import fit
+from eigassign.modal.path_fit import PathFit
 from eigassign.modal.region import Box
 from eigassign.study.chart_methods import (
     Evaluator,
@@ -26,13 +29,16 @@ from eigassign.study.chart_question import Features, Points
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
+Made = Fit | PathFit
+ALONG = (3, 4, 5, 6, 7, 9, 11, 13, 17, 25)  # exact solves of a fit along one trajectory
+OVER_BOX = (9, 12, 16, 22, 30, 42, 60, 84, 120, 160, 220, 300, 400, 550)  # over all designs
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
     """Fits that answer points, and how many exact solves they took."""
 
-    fits: tuple[Fit, ...]  # one for all designs, or one for each
+    fits: tuple[Made, ...]  # one for all designs, or one for each
     solves: int
 
     def __call__(self, points: Points) -> Floats:
@@ -64,25 +70,28 @@ def fit_methods(
 
     ``sources`` are half order and expansion points of the reduced models that are fitted.
     """
+    asked: list[dict[str, Any]] = [{"accuracy": accuracy} for accuracy in accuracies]
     if features.place is not None:
-        for accuracy in accuracies:
+        counts: list[dict[str, Any]] = [{"solves": k} for k in ALONG if k * points.designs <= most]
+        for how in (*counts, *asked):
             yield _method(
-                f"fit along {accuracy:.0e}",
-                "fit along one trajectory",
-                {"accuracy": accuracy},
-                partial(_along, scene, points, accuracy, most),
+                f"fit {_named(how)} along",
+                f"fit {_kind(how)} along one trajectory",
+                how,
+                partial(_along, scene, points, {**how, "most": most}),
                 per_design=True,
-                one=partial(_one, scene, points, accuracy, most),
-                use=f"ea.fit(model, q, y, accuracy={accuracy:g}).along()",
+                one=partial(_one, scene, points, {**how, "most": most}),
+                use=f"ea.fit(model, q, y, {_call(how)}).along()",
                 note="fitted anew for every design: answers the runs along the trajectory only",
             )
-    for accuracy in accuracies:
+    over: list[dict[str, Any]] = [{"solves": k} for k in OVER_BOX if k <= most]
+    for how in (*over, *asked):
         yield _method(
-            f"fit {accuracy:.0e}",
-            "fit of exact solves",
-            {"accuracy": accuracy},
-            partial(_over_box, scene, features, accuracy, most),
-            use=f"ea.fit(model, q, ea.Box(lower, upper), accuracy={accuracy:g}).along(designs)",
+            f"fit {_named(how)}",
+            f"fit {_kind(how)}",
+            how,
+            partial(_over_box, scene, features, {**how, "most": most}),
+            use=f"ea.fit(model, q, ea.Box(lower, upper), {_call(how)}).along(designs)",
         )
     for m, count in sources:
         q, y = points_along(scene, count)
@@ -102,17 +111,30 @@ def _method(name: str, family: str, parameters: dict[str, Any], fit: Any, **more
     return Method(name, family, True, parameters, fit, **more)
 
 
-def _one(scene: Scene, points: Points, accuracy: float, most: int) -> Fit:
+def _kind(how: Mapping[str, Any]) -> str:
+    return "of given solves" if "solves" in how else "to an accuracy"
+
+
+def _named(how: Mapping[str, Any]) -> str:
+    return f"of {how['solves']} solves" if "solves" in how else f"{how['accuracy']:.0e}"
+
+
+def _call(how: Mapping[str, Any]) -> str:
+    """As an argument of `ea.fit`."""
+    return ", ".join(f"{name}={value:g}" for name, value in how.items())
+
+
+def _one(scene: Scene, points: Points, how: Mapping[str, Any]) -> Made:
     """The fit of the first design of the runs."""
     y = points.y[points.n_random]
-    return fit(scene.model, scene.path.q, y, scene.expansions.modes, accuracy, most)
+    return fit(scene.model, scene.path, y, scene.expansions.modes, **how)
 
 
-def _along(scene: Scene, points: Points, accuracy: float, most: int, _: Floats) -> Evaluator:
+def _along(scene: Scene, points: Points, how: Mapping[str, Any], _: Floats) -> Evaluator:
     """One fit for each design of the runs."""
     y = points.y[points.n_random :: len(points.along)]
-    modes, q = scene.expansions.modes, scene.path.q
-    fits = tuple(fit(scene.model, q, each, modes, accuracy, most) for each in y)
+    modes, q = scene.expansions.modes, scene.path
+    fits = tuple(fit(scene.model, q, each, modes, **how) for each in y)
     return Fitted(fits, sum(each.solves for each in fits))
 
 
@@ -123,8 +145,8 @@ def _box(features: Features) -> Box:
     return Box(low, np.where(free, features.upper, features.fixed_y))
 
 
-def _over_box(scene: Scene, features: Features, accuracy: float, most: int, _: Floats) -> Evaluator:
-    made = fit(scene.model, scene.path.q, _box(features), scene.expansions.modes, accuracy, most)
+def _over_box(scene: Scene, features: Features, how: Mapping[str, Any], _: Floats) -> Evaluator:
+    made = fit(scene.model, scene.path, _box(features), scene.expansions.modes, **how)
     return Fitted((made,), made.solves)
 
 
@@ -132,5 +154,5 @@ def _of_reduced(
     scene: Scene, features: Features, accuracy: float, m: int, q: Floats, y: Floats, _: Floats
 ) -> Evaluator:
     reduced = reduced_model(scene, m, q, y)
-    made = fit(reduced, scene.path.q, _box(features), scene.expansions.modes, accuracy)
+    made = fit(reduced, scene.path, _box(features), scene.expansions.modes, accuracy)
     return Fitted((made,), len(q) * solves_per_point(scene, m, True))

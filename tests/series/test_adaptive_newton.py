@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from eigassign.errors import AccuracyError
-from eigassign.series.adaptive_newton import interpolate
+from eigassign.series.adaptive_newton import adaptive, interpolate
 from eigassign.series.interpolant import Interpolant
 from eigassign.series.newton import basis, interval, leja, newton_polynomials
 
@@ -29,7 +29,7 @@ def made(f: Function, d: int, accuracy: float, most: int = 3000) -> tuple[Interp
         asked += len(members)
         return f(NODES[members])
 
-    found = interpolate(sample, [basis(NODES, NODES)] * d, accuracy, most)
+    found = interpolate(sample, adaptive([basis(NODES, NODES)] * d, accuracy, most))
     at = np.random.default_rng(0).uniform(-1.0, 1.0, (500, d))
     at[:100] = np.sign(at[:100])
     g = newton_polynomials(found.members, [NODES] * d, found.coefficients)(at)

@@ -10,16 +10,19 @@ import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import eigassign as ea
-from eigassign.errors import AccuracyError
+from eigassign.errors import AccuracyError, UsageError
 from eigassign.modal.model import Model
 from eigassign.modal.roundoff import rounding_error
 
 CASES = (*sorted(Path("cases").glob("*.yaml")), Path("cases/stress/wide_motion.yaml"))
 ACCURACIES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+SOLVES = (3, 4, 5, 6, 7, 9, 12, 17, 25, 40, 64, 120, 250)
+MOST_ON_LINE = 17
 MODES = ((1,), (2,), (1, 2, 3))
 SPAN = 0.1  # rad or m: half-width of a box of q
 POINTS = 120  # random ones in a box, beside its corners
@@ -44,7 +47,7 @@ class Outcome:
 
     name: str
     modes: tuple[int, ...]
-    accuracy: float
+    asked: str
     estimate: float
     error: float
     solves: int
@@ -91,7 +94,9 @@ def _inside(rng: np.random.Generator, low: Floats, high: Floats) -> Floats:
 
 
 def outcomes(
-    paths: Iterable[Path] = CASES, accuracies: Iterable[float] = ACCURACIES
+    paths: Iterable[Path] = CASES,
+    accuracies: Iterable[float] = ACCURACIES,
+    solves: Iterable[int] = SOLVES,
 ) -> Iterator[Outcome]:
     """Every fit that is not refused."""
     for path in paths:
@@ -99,29 +104,37 @@ def outcomes(
             exact = setting.model.frequencies(setting.q, setting.y, max(map(max, MODES)))
             for modes in MODES:
                 for accuracy in accuracies:
-                    found = _outcome(setting, modes, accuracy, exact)
+                    found = _outcome(setting, modes, {"accuracy": accuracy}, exact)
                     if found is None:  # what is refused to 1e-3 is refused to 1e-4
                         break
                     yield found
+                line = not isinstance(setting.over[1], ea.Box)
+                for count in (k for k in solves if k <= MOST_ON_LINE or not line):
+                    found = _outcome(setting, modes, {"solves": count}, exact)
+                    if found is not None:
+                        yield found
 
 
 def _outcome(
-    setting: Setting, modes: tuple[int, ...], accuracy: float, exact: Floats
+    setting: Setting, modes: tuple[int, ...], asked: dict[str, Any], exact: Floats
 ) -> Outcome | None:
     try:
-        fit = ea.fit(setting.model, *setting.over, modes, accuracy, MOST)
+        fit = ea.fit(setting.model, *setting.over, modes, most=MOST, **asked)
         got = fit.frequencies(setting.q, setting.y)
-    except AccuracyError:
+    except (AccuracyError, UsageError):  # too few solves are no usage
         return None
     off = np.abs(got / exact[:, np.array(modes) - 1] - 1.0).max()
     x = np.append(setting.q[0], setting.y[0])
     own = rounding_error(setting.model.pencil, x, modes[-1])  # the exact frequencies' error
     error = max(0.0, float(off) - own)
-    return Outcome(setting.name, modes, accuracy, fit.error_estimate, error, fit.solves)
+    name = " ".join(f"{key} {value:g}" for key, value in asked.items())
+    return Outcome(setting.name, modes, name, fit.error_estimate, error, fit.solves)
 
 
 def summary(found: list[Outcome]) -> str:
     """How many, how often and by how much the estimate is too small, and its usual excess."""
+    if not found:
+        return "no fits"
     over = np.array([each.overshoot for each in found])
     usual = np.median(1.0 / np.maximum(over, 1e-12))
     below = int((over > 1.0).sum())
@@ -132,11 +145,13 @@ def main() -> None:
     found = []
     for each in outcomes(map(Path, sys.argv[1:]) if sys.argv[1:] else CASES):
         found.append(each)
-        line = f"{each.overshoot:9.2e} {each.estimate:.1e} {each.solves:5d} {each.accuracy:.0e}"
+        line = f"{each.overshoot:9.2e} {each.estimate:.1e} {each.solves:5d} {each.asked}"
         sys.stdout.write(f"{line} {each.modes} {each.name}\n")
-    for axes in (" design", " pose", " x box", " box x box"):
-        sys.stdout.write(f"{axes} {summary([one for one in found if axes in one.name])}\n")
-    sys.stdout.write(summary(found) + "\n")
+    for asked in ("accuracy", "solves"):
+        own = [one for one in found if one.asked.startswith(asked)]
+        for axes in (" design", " pose", " x box", " box x box"):
+            sys.stdout.write(f"{asked}{axes} {summary([one for one in own if axes in one.name])}\n")
+        sys.stdout.write(f"{asked} {summary(own)}\n")
 
 
 if __name__ == "__main__":

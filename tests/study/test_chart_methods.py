@@ -14,6 +14,7 @@ from scenes import SHIPPED, scene_of
 from eigassign.errors import CaseError
 from eigassign.modal import exact
 from eigassign.modal.expansion import expand
+from eigassign.modal.fitting import FINE
 from eigassign.study import chart_methods as own
 from eigassign.study import rivals
 from eigassign.study.chart_bench import errors, exact_frequencies
@@ -92,11 +93,14 @@ def test_fits_solve_as_often_as_they_say_and_are_as_accurate_as_asked(
         with monkeypatch.context() as patch:
             spy = Spy(patch)
             made: Any = method.fit(np.zeros((0, 1)))
-            assert spy.solved == made.solves, method.name
+            looked = sum(f.error_estimate < FINE for f in made.fits)  # at round-off, once each
+            assert spy.solved == made.solves + looked, method.name
             asked = points.runs() if method.per_design else points
             found = made(asked)
-            assert spy.solved == made.solves
-        np.testing.assert_allclose(found, hz[-len(found) :], rtol=1e-3)
+            assert spy.solved == made.solves + looked
+        off = float(np.abs(found / hz[-len(found) :] - 1.0).max())
+        assert off <= method.parameters.get("accuracy", max(f.error_estimate for f in made.fits))
+        assert method.parameters.get("solves", 0) * len(made.fits) in (0, made.solves)
 
 
 def test_all_exact_solvers_agree(scene: Scene, points: Points) -> None:
