@@ -70,6 +70,14 @@ def test_several_unknowns_have_their_closed_form() -> None:
     np.testing.assert_allclose(p[1], elbow(a), rtol=1e-12)
 
 
+def test_samples_are_solved_to_round_off_however_loosely_the_way_there_was() -> None:
+    f = implicit(two_links, A0, P0)
+    for distance in np.geomspace(1e-4, 0.1, 60):  # each by itself: where Newton stops varies
+        a = np.array(A0)[:, None] - distance
+        F = f.equations(a, f.samples(a))[0]
+        assert np.abs(F).max() < 2e-15  # sums of terms of size 1
+
+
 @pytest.mark.parametrize("order", range(1, 9))
 def test_the_series_of_a_circle_is_the_binomial_one(order: int) -> None:
     space = total_degree(1, order)
