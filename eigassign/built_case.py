@@ -168,18 +168,21 @@ class Case:
         given = self.file.trajectories
         if not given:
             raise CaseError((self.file.problem("trajectory", "is needed here and missing"),))
-        return Trajectories(
+        found = Trajectories(
             tuple(
                 NamedTrajectory(name, self._followed(model, keys, path), keys.weight)
                 for path, name, keys in given
             )
         )
+        with self.located():
+            model.require_on_rails(found.q, self.initial_design, found.sample)
+        return found
 
     def _followed(self, model: Model, keys: TrajectoryKeys, path: str) -> Trajectory:
         """One trajectory, which stands at ``path`` of the case file."""
         with self.located(path):
             self._refuse_moving_tip(model, keys)
-            followed = build_trajectory(
+            return build_trajectory(
                 keys,
                 model.q_names,
                 lambda tip, oriented: tip_chain(
@@ -193,8 +196,6 @@ class Case:
                 self.file.path.parent,
                 self.file.coordinate_units,
             )
-            model.require_on_rails(followed.q, self.initial_design)
-            return followed
 
     def _refuse_moving_tip(self, model: Model, keys: TrajectoryKeys) -> None:
         """A tip path moves q(t) where a design parameter moves the tip: refused by name."""

@@ -14,6 +14,7 @@ from eigassign.mechanism.kinematics import Kinematics
 from eigassign.mechanism.local_motion import ReducedLinks
 from eigassign.mechanism.pencil import Pencil
 from eigassign.mechanism.poses import Poses
+from eigassign.mechanism.rails import Label
 from eigassign.modal.exact import eigenvalues, modes
 from eigassign.modal.samples import samples
 
@@ -65,10 +66,14 @@ class Model:
             raise UsageError(f"this is for one sample of q and y, not {len(x)}")
         return x
 
-    def require_on_rails(self, q: ArrayLike, y: ArrayLike) -> None:
-        """Raise TravelError for the first sample where a carriage or nut leaves its beam."""
+    def require_on_rails(
+        self, q: ArrayLike, y: ArrayLike, label: Label = "sample {}".format
+    ) -> None:
+        """Raise TravelError for the first sample k, ``label(k)``, where a rider leaves its beam."""
         if self.pencil.rails is not None:
-            self.pencil.theta(self.x(q, y))
+            x = self.x(q, y)
+            z = self.pencil.to_program @ x.T + self.pencil.shift[:, None]
+            self.pencil.rails.require(z, x, label)
 
     def frequencies(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> Floats:
         """Exact frequencies of the lowest elastic modes, (n_samples, count) in Hz."""

@@ -314,3 +314,23 @@ def test_the_drawn_tip_path_stops_where_a_trajectory_does(pair: Result) -> None:
     assert len(poses.tip_path) == 43
     assert poses.of[0] == "pick"
     assert poses.of[-1] == "return"
+
+
+@pytest.mark.parametrize(
+    ("given", "where"),
+    [
+        ("[{name: out, q: [[0.3], [0.5]], duration: 1 s}, "
+         "{name: home, q: [[0.5], [0.9], [1.7]], duration: 1 s}]",
+         "sample 2 of trajectory 'home'"),
+        ("{q: [[0.5], [0.9], [1.7]], duration: 1 s}", "sample 2"),
+    ],
+)  # fmt: skip
+def test_a_carriage_beyond_its_beam_is_refused_with_its_trajectory(
+    tmp_path: Path, given: str, where: str
+) -> None:
+    text = (Path(__file__).parents[2] / "cases" / "gantry.yaml").read_text(encoding="utf-8")
+    start, end = text.index("trajectory:"), text.index("design:")
+    path = tmp_path / "gantry.yaml"
+    path.write_text(f"{text[:start]}trajectory: {given}\n{text[end:]}", encoding="utf-8")
+    with pytest.raises(CaseError, match=rf"joints\.[a-z]+: .*x = 1\.7 \({where}\)"):
+        _ = ea.load_case(path).trajectory
