@@ -27,7 +27,7 @@ from eigassign.modal.region import Box, Region, build_region
 from eigassign.modal.roundoff import rounding_error
 from eigassign.modal.stretches import stretches
 from eigassign.series.adaptive_newton import Asking, adaptive
-from eigassign.series.given_newton import given
+from eigassign.series.given_newton import fewest, given
 from eigassign.series.interpolant import Interpolant
 
 Floats = NDArray[np.float64]
@@ -77,7 +77,10 @@ def fit(
         runs = [_adaptive(*pair, accuracy, most) for pair in zip(regions, floors, strict=True)]
     else:
         count = whole_within(solves, "solves", 1, MOST)
-        counts = [count] if path is None else path.shares(count)
+        counts = [count]
+        if path is not None and len(path.parts) > 1:
+            d = build_region(directions, n_q, parts[0], y).d
+            counts = path.shares(count, fewest(d))
         regions, floors = _best_nodes(source, parts, y, wanted, counts)
         runs = [_given(*pair) for pair in zip(regions, counts, strict=True)]
     made = zip(regions, _driven(source, wanted, regions, runs), floors, strict=True)

@@ -27,7 +27,6 @@ ABRUPT = 8.0
 STRAIGHT = 1e-6  # rad: what turns by less is round-off
 MOST_CORNERS = 12
 SHORTEST = 4  # samples of a stretch
-FEWEST = 3  # solves on a stretch
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,18 +37,18 @@ class Path:
     rows: tuple[slice, ...]
     lengths: tuple[float, ...]
 
-    def shares(self, solves: int) -> list[int]:
-        """How many of ``solves`` each stretch has: as it is long, and 3 at least."""
+    def shares(self, solves: int, least: int) -> list[int]:
+        """How many of ``solves`` each stretch has: as it is long, and ``least`` at least."""
         n = len(self.parts)
         if n == 1:
             return [solves]
-        if solves < FEWEST * n:
+        if solves < least * n:
             raise UsageError(
-                f"{solves} solves for {n} stretches between corners: at least {FEWEST * n} are "
+                f"{solves} solves for {n} stretches between corners: at least {least * n} are "
                 "needed to tell an error"
             )
-        counts, lengths = np.full(n, FEWEST), np.array(self.lengths)
-        for _ in range(solves - FEWEST * n):
+        counts, lengths = np.full(n, least), np.array(self.lengths)
+        for _ in range(solves - least * n):
             counts[np.argmax(lengths / counts)] += 1
         return [int(count) for count in counts]
 

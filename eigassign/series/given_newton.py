@@ -38,15 +38,19 @@ def given(tables: Sequence[Floats], count: int, whole: Sequence[bool]) -> Asking
     error, AccuracyError where they show that it is large.
     """
     d = len(tables)
-    least = 1 + LOOK if d == 1 else 1 + LOOK * d + CHECKS
-    if count < least:
+    if count < fewest(d):
         axes = "axis" if d == 1 else "axes"
-        raise UsageError(f"{count} solves for {d} {axes}: at least {least} are needed")
+        raise UsageError(f"{count} solves for {d} {axes}: at least {fewest(d)} are needed")
     run = _on_line(tables[0], count, whole[0]) if d == 1 else _on_box(tables, count, whole)
     found = yield from run
     if not found.error < WORTHLESS:
         raise AccuracyError(f"{found.asked} values leave an estimated error of {found.error:.1e}")
     return found
+
+
+def fewest(d: int) -> int:
+    """Values on ``d`` axes that tell an error."""
+    return 1 + LOOK if d == 1 else 1 + LOOK * d + CHECKS
 
 
 def _on_line(table: Floats, count: int, whole: bool) -> Asking:

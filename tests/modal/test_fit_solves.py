@@ -135,6 +135,10 @@ def test_given_solves_are_shared_among_the_stretches(
     assert np.abs(fit.along() / model.frequencies(q, y, 1) - 1.0).max() <= fit.error_estimate
     with pytest.raises(UsageError, match="11 solves for 4 stretches between corners: at least 12"):
         ea.fit(model, q, y, solves=11)
+    box = ea.Box(0.9 * y, 1.1 * y)
+    with pytest.raises(UsageError, match="43 solves for 4 stretches between corners: at least 44"):
+        ea.fit(model, q, box, solves=43)
+    assert [part.solves for part in ea.fit(model, q, box, solves=44).parts] == [11] * 4
 
 
 def test_a_corner_within_a_step_leaves_both_its_ends_on_their_lines() -> None:
