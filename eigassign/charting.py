@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -13,13 +14,15 @@ import numpy as np
 from eigassign._version import __version__
 from eigassign.api import Case, load_case
 from eigassign.case import CaseFile
+from eigassign.errors import AccuracyError
 from eigassign.keeping import keep
 from eigassign.modal.model import Model
 from eigassign.run import Options, prepare
 from eigassign.stages import Stages
 from eigassign.study.accuracy import truncation_notes
+from eigassign.study.chart_auto import with_expansion
 from eigassign.study.chart_bench import spread_rows
-from eigassign.study.chart_data import Chart, DesignRun, MeshRow
+from eigassign.study.chart_data import Advice, Chart, DesignRun, MeshRow
 from eigassign.study.chart_designs import chart_designs
 from eigassign.study.chart_effort import QUICK, Effort
 from eigassign.study.chart_mesh import Mesh, mesh_axis
@@ -46,6 +49,7 @@ def chart(
     case = load_case(path)
     with keep(case.file, options.out, options.force) as folder:
         made = chart_case(case, options, QUICK if quick else _THOROUGH, wish or Wish())
+        made = with_lines(made, case.file, folder.path)
         options.progress("writing the chart")
         from eigassign.output.chart_write import write_chart
 
@@ -57,11 +61,13 @@ def chart(
 def chart_case(case: Case, options: Options, effort: Effort, wish: Wish) -> Chart:
     """Time against accuracy of every method on this case; nothing written.
 
-    Raises CaseError where the case has no trajectory, or nothing that changes a frequency.
+    A case that follows a chart is charted as if it did not. Raises CaseError where the case has no
+    trajectory, or nothing that changes a frequency.
     """
     stages = Stages(options.progress)
+    case = Case(with_expansion(case.file, chart=None))
     with case.located():
-        scene = prepare(case, stages, None)
+        scene = _prepared(case, stages)
         _ = scene.path
         with stages("methods", "charting methods"):
             compared = compare_methods(scene, effort, wish, options.progress)
@@ -71,6 +77,37 @@ def chart_case(case: Case, options: Options, effort: Effort, wish: Wish) -> Char
             solve_s = min(p.online.median_s for p in compared.points if p.family == "exact")
             designs, remarks = chart_designs(scene, effort, solve_s, options.progress)
     return _chart(scene, effort, compared, mesh, designs, remarks, stages.total_s)
+
+
+def _prepared(case: Case, stages: Stages) -> Scene:
+    """The scene; of the usual order where ``auto`` refuses, which the chart then says."""
+    try:
+        return prepare(case, stages, None)
+    except AccuracyError:
+        if case.file.expansion.order != "auto":
+            raise
+        return prepare(case, stages, None, order=int(type(case.file.expansion)().order))
+
+
+def with_lines(made: Chart, file: CaseFile, folder: Path) -> Chart:
+    """The chart, kept in ``folder``, with lines that make the case file follow it.
+
+    Only where the advice is for the evaluations that the chart was asked for: by those a case
+    that follows it decides.
+    """
+    kept = os.path.abspath(folder / "chart.json")
+    try:
+        seen = Path(os.path.relpath(kept, os.path.realpath(file.path.parent))).as_posix()
+    except ValueError:  # another drive
+        seen = Path(kept).as_posix()
+
+    def line(advice: Advice) -> str:
+        if advice.followed is None or advice.evaluations != made.asked.evaluations:
+            return ""
+        accuracy = advice.followed_accuracy
+        return file.expansion_line(order="auto", accuracy=accuracy, chart=seen)
+
+    return replace(made, advice=tuple(replace(a, use=line(a)) for a in made.advice))
 
 
 def _chart(
@@ -88,6 +125,7 @@ def _chart(
         title=file.title,
         case_name=file.path.stem,
         case_sha256=file.sha256,
+        subject_sha256=file.subject_sha256,
         reference=file.reference,
         version=__version__,
         quick=effort.brief,

@@ -13,7 +13,7 @@ import scipy
 from numpy.typing import NDArray
 
 from eigassign.errors import UsageError
-from eigassign.modal.expansion import CLUSTER_GAP, Expansion, expand
+from eigassign.modal.expansion import Expansion, expand
 from eigassign.modal.model import Model
 from eigassign.modal.storage import (
     ALGORITHM,
@@ -86,10 +86,10 @@ def _expansions(
 
 
 def _computed(model: Model, plan: Plan, full_order: int) -> Expansions:
-    point = (model.pencil, plan.q0, plan.y0, plan.modes)
+    point, gap = (model.pencil, plan.q0, plan.y0, plan.modes), plan.cluster_gap
     return Expansions(
-        full=expand(*point, full_order, linear_in_y=False),
-        linear=expand(*point, plan.order, linear_in_y=True),
+        full=expand(*point, full_order, linear_in_y=False, cluster_gap=gap),
+        linear=expand(*point, plan.order, linear_in_y=True, cluster_gap=gap),
         order=plan.order,
         full_order=full_order,
     )
@@ -137,7 +137,7 @@ def expansion_key(model: Model, plan: Plan, full_order: int) -> str:
         plan.q0,
         plan.y0,
         list(plan.modes),
-        [full_order, plan.order, CLUSTER_GAP],
+        [full_order, plan.order, plan.cluster_gap],
         [np.__version__, scipy.__version__],
     ]
     return key(parts, algorithm=ALGORITHM)

@@ -107,5 +107,5 @@ def test_the_command_line_imports_only_click_and_light_modules_at_its_top(path: 
         for name in imports(ast.Module(body=[node], type_ignores=[]))
     }
     light = {"click", "cli", "failures", "signals", "_version", "errors", "teller"}
-    standard = {"sys", "__future__", "collections", "contextlib", "pathlib", "typing"}
+    standard = {"sys", "math", "__future__", "collections", "contextlib", "pathlib", "typing"}
     assert {name.split(".")[0] for name in at_top} <= light | standard

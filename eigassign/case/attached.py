@@ -1,4 +1,4 @@
-"""The files that a case names: matrices of superelements, samples of a trajectory."""
+"""The files that a case names: matrices of superelements, samples of a trajectory, a chart."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ def attached(document: Document, folder: Path) -> dict[str, str]:
     """
     paths = [path for _, _, path in named_trajectories(document.trajectory)]
     named: list[object] = [getattr(path, "file", None) for path in paths]
+    named.append(document.expansion.chart)
     for link in document.mechanism.links.values():
         if link.type == "superelement":
             named += [link.stiffness, link.mass]

@@ -76,6 +76,27 @@ class CaseFile:
         names = Document.model_fields
         return to_yaml({name: getattr(self, name) for name in names})
 
+    @property
+    def subject_sha256(self) -> str:
+        """SHA-256 of mechanism, coordinates, trajectory and bounds, whatever is asked of them."""
+        from eigassign.case.subject import subject_sha256
+
+        told = ("mechanism", "coordinates", "trajectory")
+        content = {name: getattr(self, name) for name in told}
+        return subject_sha256(content, self.design, self.files, self.path.parent)
+
+    def expansion_line(self, **changes: object) -> str:
+        """``expansion: {…}`` for a case file: what this one says below that key, and ``changes``.
+
+        Keys at their defaults are left out.
+        """
+        from eigassign.case.resolved import flow
+
+        keys = self.expansion.model_copy(update=changes)
+        fields = type(keys).model_fields
+        said = {n: getattr(keys, n) for n in fields if getattr(keys, n) != fields[n].default}
+        return f"expansion: {flow(said)}"
+
     @staticmethod
     def json_schema() -> dict[str, Any]:
         """JSON Schema (2020-12) of case files, for editors and documentation."""

@@ -75,12 +75,14 @@ def _links(tree: Tree, folder: Path, findings: list[Finding]) -> dict[str, objec
     return changed
 
 
-def found(file: str | None, folder: Path, path: KeyPath, findings: list[Finding]) -> str:
-    """The absolute path of ``file``; a finding if there is no such file."""
+def found(
+    file: str | None, folder: Path, path: KeyPath, findings: list[Finding], hint: str = ""
+) -> str:
+    """The absolute path of ``file``; a finding, with a ``hint``, if there is no such file."""
     absolute = os.path.abspath(folder / (file or ""))
     if not os.path.isfile(absolute):
         named = absolute if absolute.isprintable() else ascii(absolute)
-        findings.append((path, f"no such file: {named}"))
+        findings.append((path, f"no such file: {named}{hint}"))
     return absolute
 
 

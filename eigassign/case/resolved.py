@@ -21,6 +21,11 @@ def to_yaml(content: Mapping[str, object]) -> str:
     return "".join(_entry(key, plain(value), 0) for key, value in content.items())
 
 
+def flow(value: object) -> str:
+    """On one line: ``{order: 4, q: [1.5, 0.0]}``."""
+    return _flow(plain(value))
+
+
 def plain(value: object) -> object:
     """Objects → mappings, lists, numbers and text, in the shape of the file."""
     if isinstance(value, Design):

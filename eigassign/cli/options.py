@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -22,8 +23,25 @@ def several(*options: Callable[[F], F]) -> Callable[[F], F]:
     return decorate
 
 
+class Number(click.FloatRange):
+    """A number of a range: `nan` compares as inside any, and `inf` is no amount of anything."""
+
+    name = "number"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """``value`` as a float, or a usage error at its option."""
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number.", param, ctx)
+        return number
+
+
 PATH = click.Path(path_type=Path)
-POSITIVE = click.FloatRange(0.0, min_open=True)
+POSITIVE = Number(0.0, min_open=True)
+COUNT = Number(1.0)
+ACCURACY = Number(1e-15, 1.0, max_open=True)  # relative; double precision ends at 2e-16
 case = click.argument("case", type=PATH)
 json = click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 common = several(

@@ -130,9 +130,9 @@ def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
 @click.command()
 @options.case
 @click.option("--quick", is_flag=True, help="In seconds: fewer methods, points and repeats.")
-@click.option("--accuracy", type=options.POSITIVE, help="Advise for this worst relative error.")
+@click.option("--accuracy", type=options.ACCURACY, help="Advise for this worst relative error.")
 @click.option("--budget", "budget_s", type=options.POSITIVE, help="Advise for so many seconds.")
-@click.option("--evaluations", type=options.POSITIVE, help="How many evaluations are wanted.")
+@click.option("--evaluations", type=options.COUNT, help="How many evaluations are wanted.")
 @click.option("--out", type=options.PATH, help="Folder (default: results/<case>_chart).")
 @options.force
 @options.json

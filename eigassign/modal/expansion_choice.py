@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,10 +21,10 @@ from eigassign.modal.adaptive import (
 from eigassign.modal.clusters import CLUSTER_GAP
 from eigassign.modal.convergence import radius_share
 from eigassign.modal.expansion import Expansion, expand
+from eigassign.modal.nearest import picked
 from eigassign.modal.taylor_estimate import polynomial_error
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 ORDERS = (2, 3, 4, 5, 6, 8, 10)
 MAX_POINTS = 8
 WIDEST_CLUSTER = 0.7  # relative gap in λ up to which neighbours are tried as one cluster
@@ -31,12 +32,26 @@ FINER = 0.05  # part of the accuracy that the reduced model beside them has to r
 
 
 @dataclass(frozen=True, eq=False)
+class Suggestion:
+    """An expansion worth a try before any other: its order, about ``points`` (k, n_x)."""
+
+    name: str
+    order: int
+    points: Floats
+    cluster_gap: float = CLUSTER_GAP
+
+
+@dataclass(frozen=True, eq=False)
 class ExpansionChoice:
-    """Expansions that together are within ``accuracy`` at every sample, and why these."""
+    """Expansions that together are within ``accuracy`` at every sample, and why these.
+
+    They share y0 and the order; each sample belongs to the one whose q0 is nearest, and modes
+    closer than ``cluster_gap`` (relative in λ) are expanded together.
+    """
 
     expansions: tuple[Expansion, ...]
-    owner: Ints  # (n,): which one is used at each sample
-    estimate: Floats  # (n, n_modes), of that one
+    cluster_gap: float
+    estimate: Floats  # (n, n_modes) at the samples
     beside: AdaptiveReduction
     reasons: tuple[str, ...]
 
@@ -46,21 +61,15 @@ class ExpansionChoice:
         return self.expansions[0].order
 
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
-        """(n, n_modes) in Hz, each sample by the expansion whose own estimate is smallest there."""
-        return self._best(q, y)[0]
+        """(n, n_modes) in Hz, each sample by the nearest expansion."""
+        values = [part.frequencies(q, y) for part in self.expansions]
+        return picked(self.expansions, np.atleast_2d(np.asarray(q, dtype=np.float64)), values)
 
     def error_estimate(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """Relative error of ``frequencies``, (n, n_modes); infinite where refused."""
-        return self._best(q, y)[1]
-
-    def _best(self, q: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
         reduced = self.beside.reduced
         f, e = reduced.frequencies(q, y), reduced.error_estimate(q, y)
-        values = np.array([part.frequencies(q, y) for part in self.expansions])
-        errors = np.array([polynomial_error(value, f, e) for value in values])
-        owner = errors.max(axis=2).argmin(axis=0)
-        each = np.arange(values.shape[1])
-        return values[owner, each], errors[owner, each]
+        return polynomial_error(self.frequencies(q, y), f, e)
 
 
 def choose_expansion(
@@ -72,13 +81,15 @@ def choose_expansion(
     orders: Sequence[int] = ORDERS,
     start: Floats | None = None,
     place: Callable[[int], str] = row_in_words,
+    suggestions: Sequence[Suggestion] = (),
 ) -> ExpansionChoice:
     """The expansions with the fewest coefficients whose estimate is ≤ ``accuracy`` at x (n, n_x).
 
-    Tried in order of cost: the order p at one point, ``start`` or the most central sample; with
-    neighbouring modes as one cluster; at several points. Judged against one reduced model.
-    ``place`` says in words what row k of x is. Raises AccuracyError, naming the sample, where
-    nothing does.
+    The first of ``suggestions`` that does is taken unseen what else there is. Then are tried, in
+    order of cost: the order p at one point, ``start`` or the most central sample; with
+    neighbouring modes as one cluster; at several points of one design. Judged against one reduced
+    model, as they are evaluated. ``place`` says in words what row k of x is. Raises AccuracyError,
+    naming the sample, where nothing does.
     """
     beside = reduce_adaptively(pencil, x, FINER * accuracy, modes, place=place)
     judge = (
@@ -87,7 +98,9 @@ def choose_expansion(
     )
     trial = _Trial(pencil, x, accuracy, tuple(modes), linear_in_y, beside, [judge], place)
     first = x[central(x)] if start is None else start
-    best = _cheapest(trial, _single(trial, first, orders))
+    best = _first(trial, suggestions)
+    if best is None:
+        best = _cheapest(trial, _single(trial, first, orders))
     if best is None:
         best = _cheapest(trial, _several(trial, first, orders))
     if best is None:
@@ -96,11 +109,10 @@ def choose_expansion(
             f"no expansion of order up to {max(orders)} at up to {MAX_POINTS} points reaches "
             f"{accuracy:.1e}: the last left {trial.last:.1e} at {place(k)}, (q, y) = {shown(x[k])}"
         )
-    parts, owner, estimate = best
-    return ExpansionChoice(parts, owner, estimate, beside, tuple(trial.reasons))
+    return ExpansionChoice(*best, beside, tuple(trial.reasons))
 
 
-_Found = tuple[tuple[Expansion, ...], Ints, Floats]
+_Found = tuple[tuple[Expansion, ...], float, Floats]  # with cluster gap and estimate
 
 
 @dataclass
@@ -130,10 +142,17 @@ class _Trial:
             cluster_gap=gap,
         )
 
-    def errors(self, part: Expansion) -> Floats:
+    @cached_property
+    def reduced_hz(self) -> Floats:
+        """(n, n_modes) of the reduced model that all are compared with."""
+        n_q = self.pencil.n_q
+        return self.beside.reduced.frequencies(self.x[:, :n_q], self.x[:, n_q:])
+
+    def errors(self, *parts: Expansion) -> Floats:
+        """(n, n_modes), each sample by the nearest of ``parts``."""
         q, y = self.x[:, : self.pencil.n_q], self.x[:, self.pencil.n_q :]
-        f = self.beside.reduced.frequencies(q, y)
-        return polynomial_error(part.frequencies(q, y), f, self.beside.estimate)
+        values = picked(parts, q, [part.frequencies(q, y) for part in parts])
+        return polynomial_error(values, self.reduced_hz, self.beside.estimate)
 
     def share(self, part: Expansion) -> float:
         q, y = self.x[:, : self.pencil.n_q], self.x[:, self.pencil.n_q :]
@@ -145,6 +164,19 @@ class _Trial:
         error = f"error at most {self.last:.1e}" if np.isfinite(self.last) else "no number"
         reach = f", {share:.2f} of the radius of convergence" if np.isfinite(share) else ""
         self.reasons.append(f"{what}: {error} ({self.place(self.worst_sample)}{reach})")
+
+
+def _first(trial: _Trial, suggestions: Sequence[Suggestion]) -> _Found | None:
+    """The first suggestion within the accuracy."""
+    for each in suggestions:
+        parts = tuple(trial.expand(point, each.order, each.cluster_gap) for point in each.points)
+        errors = trial.errors(*parts)
+        trial.note(each.name, errors.max(axis=1))
+        if errors.max() <= trial.accuracy:
+            return parts, each.cluster_gap, errors
+    if suggestions:
+        trial.reasons.append("the estimate bears none of these out: chosen without them")
+    return None
 
 
 def _cheapest(trial: _Trial, candidates: Iterator[tuple[int, _Found]]) -> _Found | None:
@@ -162,14 +194,13 @@ def _cost(parts: Sequence[Expansion]) -> int:
 
 def _single(trial: _Trial, point: Floats, orders: Sequence[int]) -> Iterator[tuple[int, _Found]]:
     """One expansion point, the modes alone and then with their neighbours."""
-    nobody = np.zeros(len(trial.x), dtype=np.intp)
     for gap in _gaps(trial, point):
         for order in orders:
             part = trial.expand(point, order, gap)
             errors = trial.errors(part)
             share = trial.share(part)
             trial.note(_named(part), errors.max(axis=1), share)
-            yield _cost((part,)), ((part,), nobody, errors)
+            yield _cost((part,)), ((part,), gap, errors)
             if errors.max() <= trial.accuracy or share > 1.5:
                 break
 
@@ -196,17 +227,14 @@ def _gaps(trial: _Trial, point: Floats) -> list[float]:
 
 
 def _several(trial: _Trial, first: Floats, orders: Sequence[int]) -> Iterator[tuple[int, _Found]]:
-    """Points added where the best expansion so far is worst, for every order."""
+    """Points added where they are worst in all, of the first one's design, for every order."""
+    n_q = trial.pencil.n_q
     for order in orders:
         parts = [trial.expand(first, order, CLUSTER_GAP)]
-        errors = [trial.errors(parts[0])]
-        while len(parts) < MAX_POINTS:
-            smallest = np.min([e.max(axis=1) for e in errors], axis=0)
-            parts.append(trial.expand(trial.x[int(np.argmax(smallest))], order, CLUSTER_GAP))
-            errors.append(trial.errors(parts[-1]))
-            owner = np.argmin([e.max(axis=1) for e in errors], axis=0)
-            estimate = np.array(errors)[owner, np.arange(len(trial.x))]
-            if estimate.max() <= trial.accuracy:
-                break
-        trial.note(f"order {order} at {len(parts)} points", estimate.max(axis=1))
-        yield _cost(parts), (tuple(parts), owner, estimate)
+        errors = trial.errors(*parts)
+        while len(parts) < MAX_POINTS and errors.max() > trial.accuracy:
+            worst = trial.x[int(np.argmax(errors.max(axis=1))), :n_q]
+            parts.append(trial.expand(np.concatenate([worst, first[n_q:]]), order, CLUSTER_GAP))
+            errors = trial.errors(*parts)
+        trial.note(f"order {order} at {len(parts)} points", errors.max(axis=1))
+        yield _cost(parts), (tuple(parts), CLUSTER_GAP, errors)

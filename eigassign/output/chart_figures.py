@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 _LEAST_EXCESS = 1e-10  # an objective nearer to the best one is drawn there
 _MARKED = ("filled: eigassign's; hollow: what people do without it; the band: nothing is both "
-           "quicker and more accurate")  # fmt: skip
+           "quicker and more accurate; ringed: taken by `expansion.order: auto`")  # fmt: skip
 
 
 def plan(chart: Chart) -> tuple[FigurePlan, ...]:
@@ -81,17 +81,24 @@ def draw_errors(chart: Chart, front: Front) -> Sheet:
     from eigassign.output.chart_scatter import scatter
 
     floor = chart.asked.floor_hz
+
+    def places(points: Sequence[ChartPoint]) -> Floats:
+        at = [(cost(p, front), max(p.everywhere.worst_hz, floor)) for p in points]
+        return np.array(at).reshape(-1, 2)
+
     known = {p.method: p for p in chart.points}
     best = [known[name] for name in front.methods if _shown(chart, known[name])]
-    places = [(cost(p, front), max(p.everywhere.worst_hz, floor)) for p in best]
+    taken = {a.auto.method for a in chart.advice if a.auto is not None}
+    ringed = [p for p in chart.points if p.method in taken and _shown(chart, p)]
     title = "Time of one evaluation" if front.evaluations is None else front.name.capitalize()
     return scatter(
         f"{title} against worst error",
         ("time", "s"),
         ("worst error", "Hz"),
         ladders(chart, front),
-        np.array(places).reshape(-1, 2),
+        places(best),
         [("disagreement of two exact solvers", floor)],
+        ("taken by order: auto", places(ringed)) if ringed else None,
     )
 
 

@@ -33,6 +33,8 @@ Floats = NDArray[np.float64]
 _FOOT_IN, _TOP_IN, _KEY_IN, _FRAME_IN = 0.5, 0.42, 0.2, 4.2
 _WHITE = (1.0, 1.0, 1.0)
 _LABELS = 9  # at most, on one axis
+_BELOW = 2.0  # room for a level's name below it, as a factor
+_RING_IN = 0.085
 _FRONT = Stroke("#c9dfee", 7.0)
 _COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, BLACK, SKY, GREY)
 _SIDES = {"circle": 0, "square": 4, "triangle": 3, "diamond": -4, "pentagon": 5}
@@ -85,15 +87,20 @@ def scatter(
     ladders: Sequence[Ladder],
     front: Floats | None = None,
     levels: Sequence[tuple[str, float]] = (),
+    ringed: tuple[str, Floats] | None = None,
 ) -> Sheet:
-    """``front`` (n, 2) is drawn as steps; ``levels`` are named heights across the frame."""
-    heights = [ladder.y for ladder in ladders] + [np.array([value]) for _, value in levels]
+    """``front`` (n, 2) is drawn as steps; ``levels`` are named heights across the frame.
+
+    ``ringed``: what the points (n, 2) with a ring around them are.
+    """
+    heights = [ladder.y for ladder in ladders] + [np.array([v, v / _BELOW]) for _, v in levels]
     x_scale, y_scale = decades([ladder.x for ladder in ladders]), decades(heights)
-    key = _KEY_IN * (len(ladders) + 2)
+    key = _KEY_IN * (len(ladders) + (2 if ringed is None else 3))
     tall = max(_FRAME_IN, key)
     sheet = titled_sheet(_TOP_IN + tall + _FOOT_IN, title)
     left = 0.3 + label_width(y_scale)
-    room = 0.5 + max(text_width(ladder.label) for ladder in ladders)
+    labels = [ladder.label for ladder in ladders] + ([] if ringed is None else [ringed[0]])
+    room = 0.5 + max(text_width(label) for label in labels)
     box = (left, _FOOT_IN, sheet.width - left - room - 0.15, tall)
     frame = Frame(box, x_scale, y_scale)
     draw_frame(sheet, frame)
@@ -103,7 +110,10 @@ def scatter(
     styles = _styles(ladders)
     for ladder, look in reversed(list(zip(ladders, styles, strict=True))):
         _draw_ladder(sheet, frame, ladder, look)
-    _draw_key(sheet, ladders, styles, (box[0] + box[2] + 0.15, _FOOT_IN, room, tall))
+    if ringed is not None:
+        for x_at, y_at in frame.place(*ringed[1].T):
+            _draw_ring(sheet, (x_at, y_at))
+    _draw_key(sheet, ladders, styles, ringed, (box[0] + box[2] + 0.15, _FOOT_IN, room, tall))
     sheet.text(box[0] + box[2] / 2.0, 0.14, axis_label(*x), align="center")
     sheet.text(0.14, _FOOT_IN + tall / 2.0, axis_label(*y), upright=True)
     return sheet
@@ -123,7 +133,7 @@ def _draw_levels(sheet: Sheet, frame: Frame, levels: Sequence[tuple[str, float]]
     for name, value in levels:
         at = float(frame.place(np.array([frame.x.low]), np.array([value]))[0, 1])
         sheet.line(np.array([(left, at), (left + width, at)]), Stroke(GREY, 1.0, (3.0, 3.0)))
-        sheet.text(left + 0.06, at + 0.09, short(name, 60), points=8.0)
+        sheet.text(left + 0.06, at - 0.13, short(name, 60), points=8.0)
 
 
 def _draw_front(sheet: Sheet, frame: Frame, front: Floats) -> None:
@@ -161,7 +171,19 @@ def marker(sheet: Sheet, centre: tuple[float, float], look: Style) -> None:
     sheet.area(Path(corners), fill, look.colour)
 
 
-def _draw_key(sheet: Sheet, ladders: Sequence[Ladder], styles: Sequence[Style], box: Box) -> None:
+def _draw_ring(sheet: Sheet, centre: tuple[float, float]) -> None:
+    angles = 2.0 * np.pi * np.arange(41) / 40.0
+    round_it = np.column_stack([np.cos(angles), np.sin(angles)]) * _RING_IN + np.array(centre)
+    sheet.line(round_it, Stroke(BLACK, 1.4))
+
+
+def _draw_key(
+    sheet: Sheet,
+    ladders: Sequence[Ladder],
+    styles: Sequence[Style],
+    ringed: tuple[str, Floats] | None,
+    box: Box,
+) -> None:
     left, bottom, _, height = box
     at, headed = bottom + height - LINE_IN / 2.0, not all(ladder.ours for ladder in ladders)
     for ours, heading in ((True, "eigassign"), (False, "others")):
@@ -175,3 +197,6 @@ def _draw_key(sheet: Sheet, ladders: Sequence[Ladder], styles: Sequence[Style], 
                 marker(sheet, (left + 0.1, at), look)
                 sheet.text(left + 0.25, at, ladder.label)
                 at -= _KEY_IN
+    if ringed is not None:
+        _draw_ring(sheet, (left + 0.1, at))
+        sheet.text(left + 0.25, at, ringed[0])

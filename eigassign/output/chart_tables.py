@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from eigassign.output.summary import Table
-from eigassign.study.chart_data import Chart, ChartPoint, Front, Timing
+from eigassign.study.chart_data import Advice, Chart, ChartPoint, Front, Timing
 
 
 def tables(chart: Chart) -> tuple[Table, ...]:
     """What to choose, the fronts, all methods, the mesh, the designs: those there are."""
-    made = (advice(chart), *(front(chart, f) for f in chart.fronts), methods(chart),
+    fronts = (front(chart, each) for each in chart.fronts)
+    made = (advice(chart), auto(chart), lines(chart), *fronts, methods(chart),
             mesh(chart), designs(chart), machine(chart))  # fmt: skip
     return tuple(table for table in made if table.rows)
 
@@ -36,14 +37,50 @@ def advice(chart: Chart) -> Table:
     """The recommendations."""
     rows = []
     for a in chart.advice:
-        asked = f"{a.accuracy:.0e}" if a.accuracy is not None else f"in {time(a.budget_s or 0.0)}"
         found = ("none", "", "") if a.method is None else (
             a.method, f"{a.worst_relative:.1e}", time(a.total_s or 0.0),
         )  # fmt: skip
-        rows.append((asked, f"{a.evaluations:,.0f}", *found))
+        rows.append((_accuracy(a), f"{a.evaluations:,.0f}", *found))
     columns = ("asked for", "evaluations", "choose", "worst error", "time in all")
     caption = "Accuracy is the worst relative error in Hz; time is set-up and all evaluations."
     return Table("What to choose", columns, tuple(rows), caption)
+
+
+def auto(chart: Chart) -> Table:
+    """What ``auto`` takes, against the recommendation and the quickest expansion."""
+    looked_at = [a for a in chart.advice if a.auto is not None]
+    rows = tuple((_accuracy(a), f"{a.evaluations:,.0f}", *_taken(a)) for a in looked_at)
+    columns = (
+        "asked for", "evaluations", "auto takes", "worst error", "time in all",
+        "against the choice", "following this chart", "time in all",
+    )  # fmt: skip
+    refused = {a.auto.refused: _accuracy(a) for a in looked_at if a.auto and a.auto.refused}
+    caption = (
+        "expansion.order: auto takes the fewest coefficients, by its own error estimate and no "
+        "timing; where it follows this chart, the quickest expansion, if the estimate agrees."
+    )
+    why = [f"{accuracy} is refused: {words}." for words, accuracy in refused.items()]
+    return Table("What auto takes", columns, rows, " ".join([caption, *why]))
+
+
+def _accuracy(a: Advice) -> str:
+    return f"{a.accuracy:.0e}" if a.accuracy is not None else f"in {time(a.budget_s or 0.0)}"
+
+
+def _taken(a: Advice) -> tuple[str, ...]:
+    followed = (a.followed or "none", "" if a.followed_s is None else time(a.followed_s))
+    if a.auto is None or a.auto.total_s is None:
+        return ("refused", "", "", "", *followed)
+    against = f"{a.auto.total_s / a.total_s:.2g} × as long" if a.total_s else ""
+    own = (str(a.auto.method), f"{a.auto.worst_relative:.1e}", time(a.auto.total_s), against)
+    return (*own, *followed)
+
+
+def lines(chart: Chart) -> Table:
+    """Lines of a case file that make ``auto`` follow the chart."""
+    rows = tuple((_accuracy(a), str(a.followed), a.use) for a in chart.advice if a.use)
+    caption = "In the place of what the case file says there; the path is seen from its folder."
+    return Table("To follow this chart", ("asked for", "takes", "in the case file"), rows, caption)
 
 
 def front(chart: Chart, each: Front) -> Table:

@@ -14,8 +14,7 @@ from eigassign.output.chart_tables import tables
 from eigassign.output.figures import FigurePlan
 from eigassign.output.results_json import dumps
 from eigassign.study.chart_data import Chart
-
-SCHEMA = 1
+from eigassign.study.chart_follow import SCHEMA
 
 
 def write_chart(chart: Chart, folder: Path) -> None:

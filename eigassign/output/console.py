@@ -104,7 +104,8 @@ def print_chart(chart: Chart, *, stream: TextIO | None = None) -> None:
     from eigassign.output import chart_tables
 
     fronts = [chart_tables.front(chart, each) for each in chart.fronts]
-    for table in (*fronts, chart_tables.designs(chart), chart_tables.advice(chart)):
+    advice = (chart_tables.advice(chart), chart_tables.auto(chart), chart_tables.lines(chart))
+    for table in (*fronts, chart_tables.designs(chart), *advice):
         if table.rows:
             _print_summary(table, stream)
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from eigassign.modal.expansion import Expansion
 from eigassign.modal.model import Model
+from eigassign.modal.nearest import picked
 from eigassign.study.findings import Comparison, DesignMap
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 # Points along the axes of a map of one and of two variables, both ends included; odd, so that the
 # middle is one of them; fewer where a single exact solve takes milliseconds.
 AXES = {1: 61, 2: 13}
@@ -48,12 +48,6 @@ class Expansions:
         """One for each expansion point, the first being this one."""
         return (self, *self.others)
 
-    def owners(self, q: Floats) -> Ints:
-        """Which point each sample of q (n, n_q) is nearest to, in the variables of the series."""
-        V = self.full.directions[:, : len(self.full.q0)]
-        away = [np.square((q - part.full.q0) @ V.T).sum(axis=1) for part in self.all]
-        return np.asarray(np.argmin(away, axis=0), dtype=np.intp)
-
     def taylor_hz(self, q: Floats, y: Floats) -> Floats:
         """Full expansion at samples, (n, n_modes) in Hz; each by the nearest point."""
         return self._pick(q, [part.full.frequencies(q, y) for part in self.all])
@@ -72,10 +66,7 @@ class Expansions:
         return self._pick(q, [part.full.error_estimate(q, y) for part in self.all])
 
     def _pick(self, q: Floats, values: list[Floats]) -> Floats:
-        if len(values) == 1:
-            return values[0]
-        owner = self.owners(np.atleast_2d(q))
-        return np.asarray(np.array(values)[owner, np.arange(len(owner))])
+        return picked([part.full for part in self.all], np.atleast_2d(q), values)
 
     def column(self, mode: int) -> int:
         """Column of ``mode`` in what the expansions evaluate to."""

@@ -74,12 +74,12 @@ def chart_methods(
 
     First all run once, which gives the answers and warms caches; then they are timed in turns.
     """
-    trials, skipped, family = [], [], ""
+    trials, skipped, told = [], [], set[str]()
     known: dict[bytes, tuple[Floats, float]] = {}
     for method in methods:
-        if method.family != family:
-            family = method.family
-            progress(f"charting {family}")
+        if method.family not in told:
+            told.add(method.family)
+            progress(f"charting {method.family}")
         try:
             trials.append(_trial(bench, method, known))
         except EigassignError as error:

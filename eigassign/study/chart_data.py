@@ -89,8 +89,27 @@ class Front:
 
 
 @dataclass(frozen=True)
+class AutoTakes:
+    """What ``expansion.order: auto`` takes for an accuracy, as charted.
+
+    ``choosing_s`` went before and is no part of ``total_s``; ``refused`` says why there is none.
+    """
+
+    method: str | None
+    worst_relative: float | None
+    total_s: float | None
+    choosing_s: float
+    refused: str
+
+
+@dataclass(frozen=True)
 class Advice:
-    """The cheapest method for an accuracy, or the most accurate for a budget."""
+    """The cheapest method for an accuracy, or the most accurate for a budget.
+
+    ``followed`` is the quickest expansion that a case file can ask for, here within
+    ``followed_accuracy`` of exact: what ``auto`` takes where it follows this chart, by the line
+    ``use`` of the case file.
+    """
 
     asked: str  # "accuracy" | "budget"
     accuracy: float | None  # worst relative error in Hz
@@ -101,6 +120,12 @@ class Advice:
     worst_relative: float | None
     total_s: float | None
     words: str
+    is_below_round_off: bool = False
+    auto: AutoTakes | None = None  # None: not looked at
+    followed: str | None = None
+    followed_s: float | None = None
+    followed_accuracy: float | None = None
+    use: str = ""
 
 
 @dataclass(frozen=True)
@@ -161,6 +186,7 @@ class Asked:
     designs: int
     samples_per_design: int
     trajectory_samples: int
+    evaluations: float  # what was asked for: the samples of one trajectory if nothing else
     seed: int
     typical_hz: float
     floor_hz: float  # disagreement of the two exact solvers: no error below it means anything
@@ -173,6 +199,7 @@ class Chart:
     title: str
     case_name: str
     case_sha256: str
+    subject_sha256: str  # of what the answers depend on; see `CaseFile`
     reference: str | None
     version: str
     quick: bool

@@ -42,6 +42,7 @@ class Effort:
     training: tuple[int, ...] = (27, 64, 125, 343)
     kriging: int = 343  # training points up to which Kriging is fitted
     reference_s: float = 120.0  # for the exact answers
+    choosing_s: float = 20.0  # a choice by auto that takes longer is the last
     training_s: float = 60.0  # for the exact solves of one method's training
     most_dense: int = 2500  # n_dof up to which SciPy's dense solver is tried
     most_dof: int = 40_000  # of the mesh axis
@@ -72,6 +73,7 @@ QUICK = Effort(
     training=(27, 125),
     kriging=125,
     reference_s=3.0,
+    choosing_s=1.0,
     training_s=1.0,
     most_dense=300,
     most_dof=2500,

@@ -79,7 +79,9 @@ def advise_accuracy(
     asked = f"for {evaluations:.3g} evaluations, each within {accuracy:.1e} of exact"
     if accuracy < floor:
         words = f"{asked}: nothing, for round-off moves even exact solves by {floor:.1e}"
-        return Advice("accuracy", accuracy, None, evaluations, None, {}, None, None, words)
+        return Advice(
+            "accuracy", accuracy, None, evaluations, None, {}, None, None, words, True
+        )  # fmt: skip
     found = cheapest(points, accuracy, evaluations)
     return _advice("accuracy", accuracy, None, evaluations, found, asked)
 
@@ -87,7 +89,7 @@ def advise_accuracy(
 def advise_budget(points: Sequence[ChartPoint], budget_s: float, evaluations: float) -> Advice:
     """What to choose for a time, set-up and all evaluations together."""
     found = most_accurate(points, budget_s, evaluations)
-    asked = f"for {evaluations:.3g} evaluations within {_time(budget_s)}"
+    asked = f"for {evaluations:.3g} evaluations within {time_words(budget_s)}"
     return _advice("budget", None, budget_s, evaluations, found, asked)
 
 
@@ -106,7 +108,7 @@ def _advice(
     total, worst = found.total_s(evaluations), found.everywhere.worst_relative
     anew = "" if found.random else ", solved anew for every design"
     words = (
-        f"{asked}: {found.method}{anew}, {_time(total)} in all, worst error {worst:.1e}"
+        f"{asked}: {found.method}{anew}, {time_words(total)} in all, worst error {worst:.1e}"
         f"{'; ' + found.use if found.use else ''}"
     )
     return Advice(
@@ -114,7 +116,8 @@ def _advice(
     )
 
 
-def _time(seconds: float) -> str:
+def time_words(seconds: float) -> str:
+    """Three digits with a unit."""
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
         if seconds >= size:
             return f"{seconds / size:.3g} {unit}"

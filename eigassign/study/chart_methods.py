@@ -10,11 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.modal.clusters import CLUSTER_GAP
 from eigassign.modal.exact import DENSE_LIMIT
 from eigassign.modal.exact_sparse import solve_sparse
 from eigassign.modal.expansion import expand
 from eigassign.modal.model import Model
+from eigassign.modal.nearest import nearest
 from eigassign.modal.reduced import ReducedModel, reduce
+from eigassign.study.chart_follow import FULL, SEVERAL
 from eigassign.study.chart_question import Points
 from eigassign.study.drawing import spread_samples
 from eigassign.study.scene import Scene
@@ -105,7 +108,7 @@ def _taylor(scene: Scene, order: int, linear: bool) -> Method:
 
     return Method(
         f"Taylor {order} {kind}",
-        f"Taylor, {kind}",
+        "Taylor, linearised" if linear else FULL,
         True,
         {"order": order, "linear_in_y": linear, "q0": point.q0, "y0": point.y0},
         fit,
@@ -158,27 +161,26 @@ def piecewise_methods(
             q, y = points_along(scene, count)
             yield Method(
                 f"Taylor {order} at {len(q)} points",
-                "Taylor, several points",
+                SEVERAL,
                 True,
-                {"order": order, "q": q, "y": y},
-                partial(_nearest, scene, q, y, order),
+                {"order": order, "q0": q, "y0": y},
+                partial(nearest_expansion, scene, q, y[0], order, CLUSTER_GAP),
                 solves=len(q),
             )
 
 
-def _nearest(scene: Scene, q: Floats, y: Floats, order: int, _: Floats) -> Evaluator:
-    """The expansion whose point is nearest in the joint coordinates that matter."""
+def nearest_expansion(
+    scene: Scene, q: Floats, y0: Floats, order: int, cluster_gap: float, _: Floats
+) -> Evaluator:
+    """Expansions about q (k, n_q) at the design y0, the nearest one evaluated."""
     pencil, modes = scene.model.pencil, scene.expansions.full.modes
-    made = [expand(pencil, a, b, modes, order) for a, b in zip(q, y, strict=True)]
-    S = pencil.to_program[: pencil.n_q, : pencil.n_q][pencil.active[: pencil.n_q]]
-    centres = q @ S.T
+    made = [expand(pencil, each, y0, modes, order, cluster_gap=cluster_gap) for each in q]
 
     def evaluate(points: Points) -> Floats:
-        s = points.q @ S.T
-        nearest = np.square(s[:, None, :] - centres).sum(axis=2).argmin(axis=1)
-        hz = np.empty((len(s), len(modes)))
-        for k in np.unique(nearest):
-            mine = nearest == k
+        owner = nearest(made, points.q)
+        hz = np.empty((len(owner), len(modes)))
+        for k in np.unique(owner):
+            mine = owner == k
             hz[mine] = made[k].frequencies(points.q[mine], points.y[mine])
         return hz
 

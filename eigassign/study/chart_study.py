@@ -14,6 +14,7 @@ from eigassign.modal.exact import DENSE_LIMIT
 from eigassign.modal.model import Model
 from eigassign.study import chart_methods as own
 from eigassign.study import rivals
+from eigassign.study.chart_auto import Taken, auto_methods, beside_auto, taken_by_auto
 from eigassign.study.chart_bench import (
     Bench,
     chart_methods,
@@ -63,18 +64,22 @@ def compare_methods(
     """Time against error of every method. Raises CaseError where nothing varies."""
     features, effort = build_features(scene), suited(effort, scene.model.n_dof)
     solve_s = _solve_cost(scene)
+    progress("asking what auto takes")
+    taken, told = taken_by_auto(scene, _accuracies(wish), effort.choosing_s)
     points = _affordable_points(scene, features, effort, solve_s)
     progress(f"solving {len(points.x)} points exactly")
     bench = Bench(scene, points, exact_frequencies(scene, points.x), effort.patience)
     floor = _floor(bench)
     charted, skipped = chart_methods(
-        bench, _methods(scene, features, points, effort, solve_s), progress
+        bench, _methods(scene, features, points, effort, solve_s, taken), progress
     )
     charted = with_floor(charted, floor)
-    asked = _asked(bench, features, floor)
+    asked = _asked(bench, features, floor, wish)
     fronts = _fronts(charted, asked, wish)
-    advice = tuple(_advice(charted, asked, wish))
-    notes = (*_size_notes(scene, features, effort, solve_s), *front_notes(charted, fronts))
+    given = _advice(charted, asked, wish)
+    advice = tuple(beside_auto(each, scene, charted, taken) for each in given)
+    left_out = _size_notes(scene, features, effort, solve_s)
+    notes = (*told, *left_out, *front_notes(charted, fronts))
     return Compared(asked, charted, skipped, fronts, advice, notes)
 
 
@@ -90,11 +95,14 @@ def _fronts(charted: Sequence[ChartPoint], asked: Asked, wish: Wish) -> tuple[Fr
 def _advice(charted: Sequence[ChartPoint], asked: Asked, wish: Wish) -> Iterator[Advice]:
     floor, once = asked.floor_hz / asked.typical_hz, float(asked.trajectory_samples)
     counts = (once, MANY * once) if wish.evaluations is None else (wish.evaluations,)
-    accuracies = ACCURACIES if wish.accuracy is None else (wish.accuracy,)
     for n in counts:
-        yield from (advise_accuracy(charted, accuracy, n, floor) for accuracy in accuracies)
+        yield from (advise_accuracy(charted, a, n, floor) for a in _accuracies(wish))
         if wish.budget_s is not None:
             yield advise_budget(charted, wish.budget_s, n)
+
+
+def _accuracies(wish: Wish) -> tuple[float, ...]:
+    return ACCURACIES if wish.accuracy is None else (wish.accuracy,)
 
 
 def _solve_cost(scene: Scene) -> float:
@@ -146,8 +154,9 @@ def _rounded(model: Model) -> Model:
     return replace(model, pencil=rounded)
 
 
-def _asked(bench: Bench, features: Features, floor: float) -> Asked:
+def _asked(bench: Bench, features: Features, floor: float, wish: Wish) -> Asked:
     scene, points = bench.scene, bench.points
+    once = float(len(scene.path.q))
     return Asked(
         modes=scene.expansions.modes,
         n_dof=scene.model.n_dof,
@@ -156,6 +165,7 @@ def _asked(bench: Bench, features: Features, floor: float) -> Asked:
         designs=points.designs,
         samples_per_design=(len(points.x) - points.n_random) // points.designs,
         trajectory_samples=len(scene.path.q),
+        evaluations=once if wish.evaluations is None else wish.evaluations,
         seed=SEED,
         typical_hz=float(np.median(bench.exact_hz)),
         floor_hz=floor,
@@ -163,7 +173,12 @@ def _asked(bench: Bench, features: Features, floor: float) -> Asked:
 
 
 def _methods(
-    scene: Scene, features: Features, points: Points, effort: Effort, solve_s: float
+    scene: Scene,
+    features: Features,
+    points: Points,
+    effort: Effort,
+    solve_s: float,
+    taken: Sequence[Taken],
 ) -> Iterator[Method]:
     model, modes = scene.model, scene.expansions.modes
     most = max(4, int(effort.training_s / solve_s))  # exact solves that a training may take
@@ -172,9 +187,11 @@ def _methods(
     yield from own.exact_methods(model, modes, few)
     if model.n_dof <= min(effort.most_dense, rivals.MOST_DENSE):
         yield rivals.lapack(model, modes, max(1, min(40, int(4e9 / model.n_dof**3))))
-    yield from own.taylor_methods(scene, orders, orders)
+    autos = {t.choice.order for t in taken if t.choice is not None and t.is_plain}
+    yield from own.taylor_methods(scene, sorted({*orders, *autos}), orders)
     yield from own.reciprocal_methods(scene, orders)
     yield from own.piecewise_methods(scene, orders[1:], effort.expansion_points[1:])
+    yield from auto_methods(scene, taken)
     yield from own.reduced_methods(scene, effort.half_orders, effort.expansion_points)
     sources = [each for each in FITTED if each[1] <= max(effort.expansion_points)]
     yield from fit_methods(scene, features, points, effort.accuracies, sources, most)

@@ -1,8 +1,10 @@
 """What a case leaves to ``auto``: elements per link, order, expansion points along the trajectory.
 
-The accuracy asked for (``expansion.accuracy``) is shared: half of it for the mesh, half for the
-approximation; where links are reduced, their truncation error may use half of the mesh's half.
-Everything is decided from estimates, and the reasons are kept as lines of text.
+The accuracy asked for (``expansion.accuracy``) is shared between what is left to decide. A mesh
+left to auto gets half of it, the series the rest. Where the elements are given, nothing can be
+done about the mesh: the series then gets all, against exact solves of this very mesh. Reduced
+links may use a quarter, of the mesh's half if it has one. Everything is decided from estimates, and
+the reasons are kept as lines of text.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from eigassign.case import CaseFile
 from eigassign.errors import AccuracyError
@@ -21,20 +23,23 @@ from eigassign.modal.expansion_choice import choose_expansion
 from eigassign.modal.mesh_choice import MeshChoice, choose_mesh
 from eigassign.modal.model import Model
 from eigassign.modal.reduction_choice import ReductionChoice, choose_reduction, few_of
+from eigassign.study.chart_follow import suggestions
 
 Floats = NDArray[np.float64]
 ACCURACY = 1e-3  # where the case asks for auto and names none
-SHARE = 0.5
-TRUNCATION = 0.25  # where links are reduced: half of what else the mesh may use
+MESH = 0.5  # where a number of elements is left to auto
+TRUNCATION = 0.25  # where links are reduced, of the mesh's share if it has one
 SAMPLES = 40  # along the trajectory, at each design that is looked at
 
 
 @dataclass(frozen=True)
 class OrderChoice:
-    """Order and further expansion points q, with the reasons."""
+    """Order, expansion points q and which modes go together, with the reasons."""
 
     order: int
+    q0: Floats  # (n_q,)
     more_q: tuple[tuple[float, ...], ...]
+    cluster_gap: float  # relative, in λ
     reasons: tuple[str, ...]
 
 
@@ -60,12 +65,22 @@ def automatic_elements(file: CaseFile) -> dict[str, int | None]:
 def settle_mesh(
     file: CaseFile, build: Callable[[Mapping[str, int]], Model], x: Floats
 ) -> MeshChoice:
-    """The fewest elements that leave half the accuracy asked for at the poses x (n, n_x).
+    """The fewest elements that leave the mesh's share of the accuracy at the poses x (n, n_x).
 
     Raises AccuracyError where no mesh will do.
     """
-    accuracy = SHARE * asked_accuracy(file) - truncation_share(file)
+    accuracy = mesh_share(file) - truncation_share(file)
     return choose_mesh(build, automatic_elements(file), x, accuracy, wanted_modes(file))
+
+
+def mesh_share(file: CaseFile) -> float:
+    """The part of the accuracy asked for that the mesh may use; 0 where it is given."""
+    return MESH * asked_accuracy(file) if None in automatic_elements(file).values() else 0.0
+
+
+def series_share(file: CaseFile) -> float:
+    """The part of the accuracy asked for that is left to the series."""
+    return asked_accuracy(file) - max(mesh_share(file), truncation_share(file))
 
 
 def automatic_reduction(file: CaseFile) -> tuple[str, ...]:
@@ -118,30 +133,63 @@ def choose_order(
 ) -> OrderChoice:
     """The lowest order, with further points only where one cannot do, from error estimates.
 
-    Raises AccuracyError, naming the pose, where no order and number of points will do.
+    With ``expansion.chart`` the quickest expansion of that chart comes first, if the estimate
+    bears it out. Raises AccuracyError, naming the pose, where no order and number of points will
+    do, and CaseError where the chart cannot be read.
     """
-    x = looked_at(file, model, trajectory, q0, y0)
+    x = looked_at(file, model, trajectory, q0, y0, corners(len(y0)))
     require_little_truncation(file, model, x)
-    start = np.concatenate([q0, y0])
-    accuracy = SHARE * asked_accuracy(file)
+    accuracy = series_share(file)
+    followed, said = suggestions(file, q0, y0, modes, accuracy)
     found = choose_expansion(
-        model.pencil, x, accuracy, modes, start=start, place=partial(_place, trajectory)
+        model.pencil,
+        x,
+        accuracy,
+        modes,
+        start=np.concatenate([q0, y0]),
+        place=partial(_place, trajectory),
+        suggestions=followed,
     )
-    points = [part.q0 for part in found.expansions[1:]]
-    more = tuple(tuple(float(v) for v in q) for q in points if not np.allclose(q, q0))
-    return OrderChoice(found.order, more, found.reasons)
+    first, *more = (part.q0 for part in found.expansions)
+    others = tuple(tuple(float(v) for v in q) for q in more)
+    return OrderChoice(found.order, first, others, found.cluster_gap, (*said, *found.reasons))
+
+
+ENDS = ((False,), (True,))  # all parameters at their lower bounds, all at their upper ones
 
 
 def looked_at(
-    file: CaseFile, model: Model, trajectory: Trajectories | None, q0: Floats, y0: Floats
+    file: CaseFile,
+    model: Model,
+    trajectory: Trajectories | None,
+    q0: Floats,
+    y0: Floats,
+    at_upper: ArrayLike = ENDS,
 ) -> Floats:
-    """Poses (n, n_x) that the answer must hold at: the trajectory at designs all over the box."""
+    """Poses (n, n_x) that the answer must hold at: the trajectory at designs all over the box.
+
+    These are y0 and corners of the box, one for each row of ``at_upper`` (k, n_y or 1).
+    """
     q = q0[None] if trajectory is None else trajectory.q[trajectory.spread(SAMPLES)]
     parameters = file.design.parameters.values()
     lower = np.array([p.min for p in parameters])
     upper = np.array([p.max for p in parameters])
-    designs = np.unique(np.array([y0, lower, upper]), axis=0) if len(y0) else np.zeros((1, 0))
+    outer = np.where(np.asarray(at_upper, dtype=bool), upper, lower)
+    designs = np.unique(np.vstack([y0, outer]), axis=0) if len(y0) else np.zeros((1, 0))
     return np.vstack([np.hstack([q, np.broadcast_to(y, (len(q), len(y)))]) for y in designs])
+
+
+def corners(n: int) -> NDArray[np.bool_]:
+    """Corners of a box in n parameters, (k, n), True at the upper bound: that is where series err.
+
+    All of up to 16; of more the Walsh functions w_j(r) = parity of r & (1 + j mod 15), r = 0…15,
+    and their complements: 32 corners with all four combinations of almost every two parameters.
+    """
+    if n <= 4:
+        return np.asarray((np.arange(2**n)[:, None] >> np.arange(n)) % 2 == 1)
+    shared = np.arange(16)[:, None] & (1 + np.arange(n) % 15)
+    walsh = np.asarray(np.bitwise_count(shared) % 2 == 1)
+    return np.vstack([walsh, ~walsh])
 
 
 def _place(trajectory: Trajectories | None, row: int) -> str:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from eigassign.case import CaseFile
 from eigassign.errors import CaseError
 from eigassign.mechanism.trajectories import Trajectories
+from eigassign.modal.clusters import CLUSTER_GAP
 from eigassign.modal.model import Model
 from eigassign.study.choices import choose_order
 
@@ -29,6 +30,7 @@ class Plan:
     modes: tuple[int, ...]
     notes: tuple[str, ...]
     more_q: tuple[tuple[float, ...], ...] = ()  # further expansion points along the trajectory
+    cluster_gap: float = CLUSTER_GAP  # modes closer than this (relative in λ) go together
 
 
 def plan_expansion(
@@ -52,8 +54,10 @@ def plan_expansion(
     if isinstance(wanted, int):
         return Plan(q0, y0, wanted, chosen, tuple(note for note in notes if note))
     found = choose_order(file, model, trajectory, q0, y0, chosen)
+    if not np.array_equal(found.q0, q0):
+        notes[0] = f"expansion point: {shown_point(model.q_names, found.q0)}, the chart's first"
     said = tuple(note for note in (*notes, *found.reasons) if note)
-    return Plan(q0, y0, found.order, chosen, said, found.more_q)
+    return Plan(found.q0, y0, found.order, chosen, said, found.more_q, found.cluster_gap)
 
 
 def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[Floats, str]:

@@ -18,6 +18,7 @@ from eigassign.output.chart_write import write_chart
 from eigassign.study.chart_data import (
     Advice,
     Asked,
+    AutoTakes,
     Chart,
     ChartPoint,
     DesignRun,
@@ -52,11 +53,12 @@ CHART = Chart(
     title="An <arm> & more",
     case_name="arm",
     case_sha256="ab" * 32,
+    subject_sha256="cd" * 32,
     reference=None,
     version="1.0",
     quick=True,
     machine=Machine("CPU", 2, "Linux x86_64", {"Python": "3.12"}, "blas 1", "1"),
-    asked=Asked((1,), 23, ("place", "m1"), 30, 2, 9, 152, 7, 200.0, 1e-10),
+    asked=Asked((1,), 23, ("place", "m1"), 30, 2, 9, 152, 152.0, 7, 200.0, 1e-10),
     points=(
         point("exact dense", "exact", True, 1e-4, 0.0),
         point("Taylor 4 full", "Taylor, full", True, 1e-7, 1e-1),
@@ -69,7 +71,39 @@ CHART = Chart(
         Front("online alone", None, ("exact dense", "grid linear 4", "Taylor 4 full")),
     ),
     advice=(
-        Advice("accuracy", 1e-4, None, 152.0, "exact dense", {}, 0.0, 0.0152, "words"),
+        Advice(
+            "accuracy",
+            1e-4,
+            None,
+            152.0,
+            "exact dense",
+            {},
+            0.0,
+            0.0152,
+            "words",
+            False,
+            AutoTakes("Taylor 4 full", 5e-5, 0.00304, 0.4, ""),
+            "Taylor 4 full",
+            0.00304,
+            1e-4,
+            "expansion: {order: auto, accuracy: 0.0001, chart: chart.json}",
+        ),
+        Advice(
+            "accuracy",
+            1e-8,
+            None,
+            152.0,
+            "exact dense",
+            {},
+            0.0,
+            0.0152,
+            "words",
+            False,
+            AutoTakes(None, None, None, 0.4, "no expansion reaches 1.0e-08"),
+            None,
+            None,
+            1e-8,
+        ),
         Advice("budget", None, 1e-9, 152.0, None, {}, None, None, "nothing"),
     ),
     mesh=(
@@ -114,7 +148,7 @@ def test_the_json_holds_every_point_and_no_numbers_that_json_has_not(tmp_path: P
     assert [p["method"] for p in data["points"]] == [p.method for p in CHART.points]
     assert data["points"][3]["everywhere"]["worst_hz"] is None
     assert data["points"][1]["parameters"] == {"order": 4, "q0": [0.0, 0.0]}
-    assert data["schema"] == 1
+    assert data["schema"] == 2
 
 
 def test_the_page_shows_tables_and_figures_and_escapes_titles(tmp_path: Path) -> None:
@@ -131,6 +165,31 @@ def test_fronts_are_listed_from_the_quickest_with_whose_they_are() -> None:
     table = chart_tables.front(CHART, CHART.fronts[1])
     assert [row[0] for row in table.rows] == ["Taylor 4 full", "grid linear 4", "exact dense"]
     assert [row[1] for row in table.rows] == ["yes", "no", "yes"]
+
+
+def test_what_auto_takes_stands_beside_the_choice_and_the_quickest_expansion() -> None:
+    table = chart_tables.auto(CHART)
+    taken, refused = table.rows
+    assert taken == (
+        "1e-04", "152", "Taylor 4 full", "5.0e-05", "3.04 ms", "0.2 × as long", "Taylor 4 full",
+        "3.04 ms",
+    )  # fmt: skip
+    assert refused[2:] == ("refused", "", "", "", "none", "")
+    assert table.caption.endswith("1e-08 is refused: no expansion reaches 1.0e-08.")
+
+
+def test_lines_for_the_case_file_are_shown_where_there_are_any() -> None:
+    (row,) = chart_tables.lines(CHART).rows
+    assert row == (
+        "1e-04", "Taylor 4 full", "expansion: {order: auto, accuracy: 0.0001, chart: chart.json}",
+    )  # fmt: skip
+    assert not chart_tables.lines(replace(CHART, advice=CHART.advice[1:])).rows
+
+
+def test_what_auto_takes_is_ringed() -> None:
+    plan = chart_figures.plan(CHART)[0]
+    bare = chart_figures.plan(replace(CHART, advice=()))[0]
+    assert not np.array_equal(plan.draw().pixels(), bare.draw().pixels())
 
 
 @pytest.mark.parametrize(
