@@ -88,13 +88,14 @@ class CaseFile:
     def expansion_line(self, **changes: object) -> str:
         """``expansion: {…}`` for a case file: what this one says below that key, and ``changes``.
 
-        Keys at their defaults are left out.
+        What nobody asks for is left out.
         """
         from eigassign.case.resolved import flow
 
         keys = self.expansion.model_copy(update=changes)
         fields = type(keys).model_fields
-        said = {n: getattr(keys, n) for n in fields if getattr(keys, n) != fields[n].default}
+        asked = [n for n in fields if n in changes or getattr(keys, n) != fields[n].default]
+        said = {name: getattr(keys, name) for name in asked}
         return f"expansion: {flow(said)}"
 
     @staticmethod

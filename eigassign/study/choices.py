@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from eigassign.case import CaseFile
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.trajectories import Trajectories
-from eigassign.modal.expansion_choice import choose_expansion
+from eigassign.modal.expansion_choice import ExpansionChoice, choose_expansion
 from eigassign.modal.mesh_choice import MeshChoice, choose_mesh
 from eigassign.modal.model import Model
 from eigassign.modal.reduction_choice import ReductionChoice, choose_reduction, few_of
@@ -29,7 +29,8 @@ Floats = NDArray[np.float64]
 ACCURACY = 1e-3  # where the case asks for auto and names none
 MESH = 0.5  # where a number of elements is left to auto
 TRUNCATION = 0.25  # where links are reduced, of the mesh's share if it has one
-SAMPLES = 40  # along the trajectory, at each design that is looked at
+SAMPLES = 40  # along the trajectory, at each design that a mesh is judged at
+FEW, MANY = 200, 1000  # poses and designs that an order is chosen at, and confirmed at
 
 
 @dataclass(frozen=True)
@@ -137,19 +138,24 @@ def choose_order(
     bears it out. Raises AccuracyError, naming the pose, where no order and number of points will
     do, and CaseError where the chart cannot be read.
     """
-    x = looked_at(file, model, trajectory, q0, y0, corners(len(y0)))
+    at_upper = corners(len(y0))
+    few, many = (max(8, rows // (1 + len(at_upper))) for rows in (FEW, MANY))  # samples of each
+    x, every = (looked_at(file, model, trajectory, q0, y0, at_upper, n) for n in (few, many))
     require_little_truncation(file, model, x)
-    accuracy = series_share(file)
+    accuracy, start = series_share(file), np.concatenate([q0, y0])
     followed, said = suggestions(file, q0, y0, modes, accuracy)
-    found = choose_expansion(
-        model.pencil,
-        x,
-        accuracy,
-        modes,
-        start=np.concatenate([q0, y0]),
-        place=partial(_place, trajectory),
-        suggestions=followed,
-    )
+
+    def choice(x: Floats, samples: int) -> ExpansionChoice:
+        place = partial(_place, trajectory, samples)
+        return choose_expansion(
+            model.pencil, x, accuracy, modes, start=start, place=place, suggestions=followed
+        )
+
+    found = choice(x, few)
+    beyond = float(found.error_estimate(every[:, : len(q0)], every[:, len(q0) :]).max())
+    if beyond > accuracy:
+        found = choice(every, many)
+        said += (f"chosen anew at more samples: between {few} the error was {beyond:.1e}",)
     first, *more = (part.q0 for part in found.expansions)
     others = tuple(tuple(float(v) for v in q) for q in more)
     return OrderChoice(found.order, first, others, found.cluster_gap, (*said, *found.reasons))
@@ -165,12 +171,14 @@ def looked_at(
     q0: Floats,
     y0: Floats,
     at_upper: ArrayLike = ENDS,
+    samples: int = SAMPLES,
 ) -> Floats:
     """Poses (n, n_x) that the answer must hold at: the trajectory at designs all over the box.
 
-    These are y0 and corners of the box, one for each row of ``at_upper`` (k, n_y or 1).
+    These are y0 and corners of the box, one for each row of ``at_upper`` (k, n_y or 1), at up to
+    so many ``samples`` each.
     """
-    q = q0[None] if trajectory is None else trajectory.q[trajectory.spread(SAMPLES)]
+    q = q0[None] if trajectory is None else trajectory.q[trajectory.spread(samples)]
     parameters = file.design.parameters.values()
     lower = np.array([p.min for p in parameters])
     upper = np.array([p.max for p in parameters])
@@ -183,18 +191,18 @@ def corners(n: int) -> NDArray[np.bool_]:
     """Corners of a box in n parameters, (k, n), True at the upper bound: that is where series err.
 
     All of up to 16; of more the Walsh functions w_j(r) = parity of r & (1 + j mod 15), r = 0…15,
-    and their complements: 32 corners with all four combinations of almost every two parameters.
+    in which any two of 15 parameters take all four combinations, and all at their upper bounds.
     """
     if n <= 4:
         return np.asarray((np.arange(2**n)[:, None] >> np.arange(n)) % 2 == 1)
     shared = np.arange(16)[:, None] & (1 + np.arange(n) % 15)
     walsh = np.asarray(np.bitwise_count(shared) % 2 == 1)
-    return np.vstack([walsh, ~walsh])
+    return np.vstack([walsh, np.ones((1, n), dtype=bool)])
 
 
-def _place(trajectory: Trajectories | None, row: int) -> str:
+def _place(trajectory: Trajectories | None, count: int, row: int) -> str:
     """Row of what `looked_at` gives, in words: the sample, whatever the design."""
     if trajectory is None:
         return "the expansion point"
-    samples = trajectory.spread(SAMPLES)
+    samples = trajectory.spread(count)
     return trajectory.sample(int(samples[row % len(samples)]))

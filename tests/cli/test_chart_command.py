@@ -32,6 +32,8 @@ def test_a_quick_chart_leaves_a_whole_folder_and_advises(
     assert [p["method"] for p in shown["points"]] == [p["method"] for p in kept["points"]]
     assert {a["evaluations"] for a in kept["advice"]} == {5000.0}
     assert {a["asked"] for a in kept["advice"]} == {"accuracy", "budget"}
+    assert kept["asked"]["evaluations"] == 5000.0
+    assert all("auto" in a for a in kept["advice"])
     names = {p.name for p in out.iterdir()}
     assert names >= {"chart.json", "report.html", "figures", "case.yaml", "run.json"}
     assert len(list((out / "figures").glob("*.png"))) == 6
@@ -49,9 +51,20 @@ def test_a_case_without_a_trajectory_is_refused_and_leaves_nothing(
     assert not (tmp_path / "out").exists()
 
 
-def test_wishes_must_be_positive(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["chart", str(ARM), "--accuracy", "0"]) == 2
-    assert "--accuracy" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("--accuracy", "0"), ("--accuracy", "1e-20"), ("--accuracy", "1"), ("--accuracy", "nan"),
+        ("--budget", "0"), ("--budget", "inf"), ("--budget", "nan"), ("--budget", "-1"),
+        ("--evaluations", "0.5"), ("--evaluations", "nan"), ("--evaluations", "many"),
+    ],
+)  # fmt: skip
+def test_wishes_that_cannot_be_are_refused_by_name(
+    option: str, value: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["chart", str(ARM), option, value, "--out", str(tmp_path / "out")]) == 2
+    assert f"'{option}'" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_folder_of_something_else_is_not_replaced(tmp_path: Path) -> None:

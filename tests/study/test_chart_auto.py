@@ -1,0 +1,140 @@
+"""What auto takes, charted: the very choice of a run, and within what it promised."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chart_scenes import TINY
+from scenes import SHIPPED, scene_of
+
+from eigassign.api import load_case
+from eigassign.run import prepare
+from eigassign.stages import Stages
+from eigassign.study.chart_auto import auto_methods, beside_auto, taken_by_auto
+from eigassign.study.chart_data import Advice
+from eigassign.study.chart_study import Compared, Wish, compare_methods
+from eigassign.study.choices import corners
+from eigassign.study.scene import Scene
+
+CASES = Path(__file__).parents[2] / "cases"
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    return scene_of(tmp_path_factory.mktemp("arm"), SHIPPED)
+
+
+@pytest.fixture(scope="module")
+def compared(scene: Scene) -> Compared:
+    return compare_methods(scene, TINY, Wish(), lambda line: None)
+
+
+def test_it_is_what_a_run_takes(scene: Scene, tmp_path: Path) -> None:
+    (taken,), _ = taken_by_auto(scene, [1e-4], 1e9)
+    order = next(line for line in SHIPPED.splitlines(True) if line.startswith("  order: 4"))
+    text = SHIPPED.replace(order, "  order: auto\n  accuracy: 1e-4\n")
+    assert taken.choice is not None
+    assert scene_of(tmp_path, text).expansions.order == taken.choice.order
+    assert taken.method == f"Taylor {taken.choice.order} full"
+
+
+def test_it_is_charted_and_as_accurate_as_promised(compared: Compared) -> None:
+    known = {p.method: p for p in compared.points}
+    charted = [a for a in compared.advice if a.auto is not None and a.auto.method]
+    assert len(charted) >= 2
+    for advice in charted:
+        assert advice.auto is not None
+        assert advice.accuracy is not None
+        point = known[str(advice.auto.method)]
+        assert point.everywhere.worst_relative <= advice.accuracy
+        assert advice.auto.total_s == point.total_s(advice.evaluations)
+        assert f"`expansion.order: auto` takes {point.method}" in advice.words
+
+
+def test_a_refusal_is_given_in_words(compared: Compared) -> None:
+    tight = [a for a in compared.advice if a.accuracy == 1e-8]
+    assert tight
+    for advice in tight:
+        assert advice.auto is not None
+        assert advice.auto.method is None
+        assert advice.auto.refused.startswith("no expansion of order up to 10")
+        assert f"`expansion.order: auto` refuses: {advice.auto.refused}" in advice.words
+
+
+def test_the_expansion_that_a_case_may_follow_is_the_quickest_within_the_accuracy(
+    compared: Compared,
+) -> None:
+    loose = next(a for a in compared.advice if a.accuracy == 1e-2)
+    able = [
+        p for p in compared.points
+        if p.family == "Taylor, full" and p.everywhere.worst_relative <= 1e-2
+    ]  # fmt: skip
+    best = min(able, key=lambda p: p.total_s(loose.evaluations))
+    assert (loose.followed, loose.followed_s) == (best.method, best.total_s(loose.evaluations))
+
+
+def test_a_budget_names_the_accuracy_that_it_buys(scene: Scene, compared: Compared) -> None:
+    bare = Advice("budget", None, 1e3, 152.0, "any", {}, 0.0, 1.0, "words")
+    found = beside_auto(bare, scene, compared.points, ())
+    full = [p.everywhere.worst_relative for p in compared.points if p.family == "Taylor, full"]
+    assert found.followed_accuracy is not None
+    assert min(full) <= found.followed_accuracy <= 1.1 * min(full)
+    nothing = beside_auto(replace(bare, budget_s=1e-12), scene, compared.points, ())
+    assert nothing.followed is None
+
+
+def test_below_round_off_nothing_is_followed(scene: Scene, compared: Compared) -> None:
+    below = Advice("accuracy", 1e-14, None, 1.0, None, {}, None, None, "words", True)
+    assert beside_auto(below, scene, compared.points, ()) == below
+
+
+def test_a_choice_that_took_long_is_the_last(scene: Scene) -> None:
+    taken, (note,) = taken_by_auto(scene, [1e-3, 1e-2, 1e-6], 0.0)
+    assert [t.accuracy for t in taken] == [1e-2]
+    assert note.startswith("what auto takes is not charted from 1e-03 on")
+
+
+@pytest.mark.parametrize("name", ["five_bar", "arm_3r"])
+def test_it_holds_all_over_the_box_of_several_parameters(name: str) -> None:
+    """Also where some parameters are at their upper bounds and others at their lower ones."""
+    case = load_case(CASES / f"{name}.yaml")
+    scene = prepare(case, Stages(lambda line: None), None)
+    (taken,), _ = taken_by_auto(scene, [1e-4], 1e9)
+    assert taken.choice is not None
+    run = replace(case.file, expansion=case.file.expansion.model_copy(
+        update={"order": "auto", "accuracy": 1e-4}))  # fmt: skip
+    made = prepare(replace(case, file=run), Stages(lambda line: None), None).expansions
+    low, high = scene.bounds
+    y = np.random.default_rng(3).uniform(low, high, (60, len(low)))
+    y = np.vstack([y, np.where(corners(len(low)), high, low)])
+    q = np.repeat(scene.path.q, len(y), axis=0)
+    y = np.tile(y, (len(scene.path.q), 1))
+    exact = scene.model.frequencies(q, y, max(made.modes))[:, np.array(made.modes) - 1]
+    assert np.abs(made.taylor_hz(q, y) / exact - 1.0).max() <= 1e-4
+
+
+def test_choices_at_several_points_are_charted_as_they_are_evaluated(tmp_path: Path) -> None:
+    text = SHIPPED.replace("max: 250 g", "max: 1 g").replace("  y: [0.125, 0.125]", "  y: [0, 0]")
+    scene = scene_of(tmp_path, text)
+    taken, _ = taken_by_auto(scene, [1e-8], 1e9)
+    assert taken[0].choice is not None
+    assert taken[0].choice.more_q
+    (method,) = auto_methods(scene, taken)
+    compared = compare_methods(scene, TINY, Wish(accuracy=1e-8), lambda line: None)
+    (point,) = [p for p in compared.points if p.method == method.name]
+    assert point.everywhere.worst_relative <= 1e-8
+    assert point.parameters["q0"].shape == (1 + len(taken[0].choice.more_q), 2)
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 4, 5, 9, 15])
+def test_corners_show_every_two_parameters_in_all_four_combinations(n: int) -> None:
+    at = corners(n)
+    assert at.shape == (2**n if n <= 4 else 17, n)
+    for i in range(n):
+        for j in range(i):
+            assert len(np.unique(at[:, [i, j]], axis=0)) == 4
+    assert at.all(axis=1).any()
+    assert (~at).all(axis=1).any()
