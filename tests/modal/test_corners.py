@@ -36,6 +36,12 @@ def test_the_sides_of_a_polyline_are_its_parts(sides, n, d, rest):
     assert max(off_line(s[part]) for part in parts) < 1e-12
 
 
+def test_rounding_on_a_straight_side_is_no_corner():
+    s = polyline(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]), 201, rest=False)
+    s = s + 1e-11 * np.random.default_rng(4).normal(size=s.shape)
+    assert len(smooth_parts(s)) == 2
+
+
 def test_arcs_that_meet_at_an_angle_are_parted_where_they_meet():
     a = np.linspace(0.0, 1.0, 60)
     first = np.column_stack([np.sin(a), 1 - np.cos(a)])
