@@ -12,11 +12,12 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.modal.line import STILL
+
 Floats = NDArray[np.float64]
-STILL = 1e-9  # rad or m: what moves less stands still
 LEAST_TURN = 1e-5  # rad: less is no corner
 SHARP = 4.0  # times the turn that the curvature around explains
-LEAST_SAMPLES = 2  # of a part
+LEAST_SAMPLES = 4  # of a part
 MOST_PARTS = 32
 
 

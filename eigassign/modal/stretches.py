@@ -1,16 +1,10 @@
-"""A path as stretches without corners: no polynomial goes round one, nor from path to path.
-
-A corner is where the direction in joint space turns at once: by more than `TURN`, and `ABRUPT`
-times as much as it does from sample to sample elsewhere. Where there are more than `MOST_CORNERS`
-of them the samples are rough as such, and the path is left in one.
-"""
+"""A path as stretches without corners: no polynomial goes round one, nor from path to path."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,15 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import UsageError
 from eigassign.mechanism.trajectories import Trajectories
-from eigassign.modal.line import STILL
+from eigassign.modal.corners import smooth_parts
 from eigassign.modal.region import joints_of, path_samples
 
 Floats = NDArray[np.float64]
-TURN = np.radians(5.0)
-ABRUPT = 8.0
-STRAIGHT = 1e-6  # rad: what turns by less is round-off
-MOST_CORNERS = 12
-SHORTEST = 4  # samples of a stretch
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,28 +73,6 @@ def _known(path: bytes, shape: tuple[int, int], combinations: bytes, of: tuple[i
     if not np.isfinite(q).all():
         raise UsageError("q must be finite")
     s = q @ joints_of(directions, shape[1]).T
-    cuts = [0, *_corners(s), len(q)]
-    rows = tuple(slice(a, b) for a, b in pairwise(cuts))
+    rows = smooth_parts(s)
     lengths = tuple(float(np.linalg.norm(np.diff(s[own], axis=0), axis=1).sum()) for own in rows)
     return Path(tuple(q[own] for own in rows), rows, lengths)
-
-
-def _corners(s: Floats) -> list[int]:
-    """The first sample after each corner of s (n_t, n_s)."""
-    if s.shape[1] < 2:  # on a line: it may go back and forth
-        return []
-    step = np.diff(s, axis=0)
-    size = np.linalg.norm(step, axis=1)
-    moving = np.flatnonzero(size > STILL)
-    if len(moving) < 2 * SHORTEST:
-        return []
-    unit = step[moving] / size[moving, None]
-    turn = 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(np.diff(unit, axis=0), axis=1), 0.0, 1.0))
-    usual = ABRUPT * float(np.median(turn))
-    sharp = np.flatnonzero(turn > max(TURN, usual))
-    # a corner within a step turns at both its ends, at the nearer one by almost all
-    both = np.append(turn, 0.0)[sharp + 1] > max(STRAIGHT, usual)
-    cuts = np.unique(moving[sharp + both] + 1)
-    gaps = np.diff(np.concatenate([[0], cuts, [len(s)]]))
-    kept = cuts[np.minimum(gaps[:-1], gaps[1:]) >= SHORTEST]
-    return [int(cut) for cut in kept] if len(kept) <= MOST_CORNERS else []

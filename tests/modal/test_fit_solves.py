@@ -126,6 +126,21 @@ def test_a_path_with_corners_is_fitted_from_one_to_the_next(
         fit.frequencies(q[0] + 0.01, y)
 
 
+@pytest.mark.parametrize("degrees", [0.3, 4.0])
+def test_a_slight_corner_is_none_to_overlook(degrees: float) -> None:
+    case = ea.load_case("cases/arm_3r.yaml")
+    model, y = case.model(), case.initial_design
+    turn, along = np.radians(degrees), np.linspace(0.0, 1.0, 81)[:, None]
+    first, aside = np.array([0.0, 0.4, 0.2]), np.array([0.0, -0.2, 0.4])
+    second = np.cos(turn) * first + np.sin(turn) * aside
+    bent = np.where(along < 0.503, along * first, 0.503 * first + (along - 0.503) * second)
+    q = case.trajectory.q[3] + bent
+    fit = ea.fit(model, q, y, accuracy=1e-8)  # in one piece 48 solves leave 1e-5 and more
+    assert len(fit.parts) == 2
+    hz = model.frequencies(q, y, 1)
+    assert np.abs(fit.along() / hz - 1.0).max() <= fit.error_estimate <= 1e-8
+
+
 def test_given_solves_are_shared_among_the_stretches(
     cornered: tuple[Model, np.ndarray, np.ndarray],
 ) -> None:
