@@ -195,7 +195,9 @@ def test_a_signal_during_a_run_cleans_up_and_ends_with_its_code(
 ) -> None:
     Path("slow.py").write_text(SLOW)
     args = [sys.executable, "slow.py", command, "good.yaml", "--no-cache"]
-    with subprocess.Popen(args, env=environment(), stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        args, env=environment(), stderr=subprocess.PIPE, text=True, preexec_fn=_heed_signals
+    ) as process:
         _wait_for(tmp_path / "good.ready", process)
         process.send_signal(number)
         _, err = process.communicate(timeout=SECONDS)
@@ -204,6 +206,11 @@ def test_a_signal_during_a_run_cleans_up_and_ends_with_its_code(
     folder = Path("results")
     left = {path.name for path in folder.iterdir()} if folder.exists() else set()
     assert left == ({"summary.csv", "junit.xml"} if command == "batch" else set())
+
+
+def _heed_signals() -> None:
+    """Where the tests run in the background of a shell, children would ignore Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def test_nohup_is_respected(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ must obey the equations of motion in whatever mesh it is written. The other take
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,8 @@ from spatial_cases import ALLOY, Built, built
 from spatial_oracle import Tree
 
 from eigassign.case.loading import parse
+from eigassign.mechanism.build import local_links
 from eigassign.mechanism.convection import fields
-from eigassign.mechanism.craig_bampton import total
 from eigassign.mechanism.kinematics import kinematics
 from eigassign.mechanism.parameters import parameters
 from eigassign.mechanism.velocity import VelocityTerms, velocity_terms
@@ -155,17 +156,17 @@ def test_the_fields_integrate_to_the_consistent_mass() -> None:
     for shear in (False, True):
         model = built(cantilever("spatial", shear, roll=0.4))
         found = terms(model)
-        (one,) = (t for t in found.links if t.riding is not None)
-        (values,) = found._values(np.array([[0.47]]), np.zeros(0))
+        (one,), (values,) = found.stack.riders, found.values(np.array([[0.47]]), np.zeros(0))
         n = ELEMENTS
-        x, phi, rho = np.split(values[one.mesh], [n + 1, 3 * n + 1])
+        x, phi, rho = np.split(values[one.rows], [n + 1, 3 * n + 1])
         xi, g = np.polynomial.legendre.leggauss(5)
         h = np.diff(x)[:, None]
         N = fields(np.tile((1 + xi) / 2, (n, 1)), h, phi.reshape(n, 1, 2))
         matter = h[..., None] * (g / 2)[:, None] * rho.reshape(n, 1, 6)
         blocks = np.einsum("epri,epr,eprj->eij", N, matter, N)
         assembled = one.riding._assembled(blocks).toarray()
-        mass = total(one.link.mass, values[one.mass]).toarray()
+        own = slice(one.first, one.first + len(assembled))
+        mass = found.stack.mass(values)[own, own].toarray()
         np.testing.assert_allclose(unit(mass, assembled), unit(mass, mass), atol=1e-12)
 
 
@@ -185,11 +186,14 @@ class Energy:
         placements = model.motion.placements
         self.names = [p.link for p in placements]
         self.rotations = [p.world_rotation for p in placements]
+        links, _ = local_links(model.case, model.numbers, model.motion)
+        ends = np.cumsum([0, *(len(link.own) for link in links)]).tolist()
+        self.rows = [slice(a, b) for a, b in pairwise(ends)]  # of each link among all
         self.data = model.case.mechanism.links[beam]
         self.bodies = list(model.case.mechanism.bodies.values())
 
     def values(self, t: float) -> np.ndarray:
-        return self.terms._values(np.array([[self.path(t)]]), self.model.y)[0]
+        return self.terms.values(np.array([[self.path(t)]]), self.model.y)[0]
 
     def turns(self, t: float) -> list[np.ndarray]:
         x = self.model.x([self.path(t)])
@@ -202,11 +206,12 @@ class Energy:
 
     def parts(self, t: float, x: np.ndarray) -> list[np.ndarray]:
         """World motions at t of the matter at x of the beam, and of every other link's nodes."""
-        values, turns, out = self.values(t), self.turns(t), []
+        turns, out = self.turns(t), []
+        motion = self.terms.stack.motion(self.values(t)).toarray()
         width = 3 if self.model.case.mechanism.space == "planar" else 6
         kept = [0, 1, 5] if width == 3 else list(range(6))
-        for name, one, R in zip(self.names, self.terms.links, turns, strict=True):
-            B = self.terms._motion(one, values).toarray()
+        for name, own, R in zip(self.names, self.rows, turns, strict=True):
+            B = motion[own]
             nodal = np.zeros((len(B) // width, 6, B.shape[1]))
             nodal[:, kept] = B.reshape(-1, width, B.shape[1])
             whole = np.kron(np.eye(2), R)
@@ -236,20 +241,19 @@ class Energy:
 
     def weights(self, t: float) -> list[np.ndarray]:
         """(6, 6) of every row of `parts`, in the link's axes."""
-        values, out = self.values(t), []
+        mass, out = self.terms.stack.mass(self.values(t)), []
         mesh = self.mesh(t)
         _, g = np.polynomial.legendre.leggauss(5)
         share = (np.diff(mesh)[:, None] * g / 2).ravel()
         kept = [0, 1, 5] if self.model.case.mechanism.space == "planar" else list(range(6))
-        for name, one in zip(self.names, self.terms.links, strict=True):
+        for name, own in zip(self.names, self.rows, strict=True):
             if name == self.beam:
                 area, polar = self.section(mesh)
                 each = np.stack([area, area, area, polar, 0 * area, 0 * area], axis=1)
                 out.append((np.repeat(each, 5, axis=0) * share[:, None])[:, :, None] * np.eye(6))
                 out.append(self.rotor()[None])
             else:
-                m = total(one.link.mass, values[one.mass]).toarray()
-                out.append((m, kept))
+                out.append((mass[own, own].toarray(), kept))
         return out
 
     def section(self, mesh: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -118,13 +118,9 @@ def test_the_mass_matrix_is_that_of_the_local_motions(make: Any) -> None:
     model = built(make("free"))
     q = np.array([0.6])
     found = terms(model)
-    (values,) = found._values(q[None], NONE)
-    total = np.zeros((found.n_dof, found.n_dof))
-    from eigassign.mechanism.craig_bampton import total as summed
-
-    for one in found.links:
-        B = found._motion(one, values)
-        total += (B.T @ summed(one.link.mass, values[one.mass]) @ B).toarray()
+    (z,) = found.values(q[None], NONE)
+    B = found.stack.motion(z)
+    total = (B.T @ found.stack.mass(z) @ B).toarray()
     M = matrices(model, q)[1]
     np.testing.assert_allclose(total, M, atol=1e-12 * np.abs(M).max())
 
