@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,8 @@ from eigassign.mechanism.mesh import DOFS, Term
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+Matrix = Any  # sparse, or dense where that is quicker
+SMALL = 128  # rows and columns up to which it is
 CROSS = ((0, 1, 2, -1.0), (0, 2, 1, 1.0), (1, 0, 2, 1.0), (1, 2, 0, -1.0), (2, 0, 1, -1.0),
          (2, 1, 0, 1.0))  # fmt: skip
 """Entries (i, j) of ω̃: which component of ω, and its sign."""
@@ -36,14 +39,23 @@ class Pattern:
     values: Floats  # (n,) constants
     scalars: Ints  # (n,) which scalar each is multiplied by; the last one for none
     slots: Ints  # (n,) which entry each adds to
-    indices: Ints
-    starts: Ints
+    places: Ints  # row and column of each entry as one number, ascending
     shape: tuple[int, int]
 
-    def at(self, z: Floats) -> sparse.csr_array:
+    def at(self, z: Floats) -> Matrix:
         """The matrix for scalars z."""
-        data = np.bincount(self.slots, self.values * z[self.scalars], len(self.indices))
-        return sparse.csr_array((data, self.indices, self.starts), shape=self.shape)
+        data = np.bincount(self.slots, self.values * z[self.scalars], len(self.places))
+        if max(self.shape) <= SMALL:
+            out = np.zeros(self.shape)
+            out.flat[self.places] = data
+            return out
+        return sparse.csr_array((data, *self._compressed), shape=self.shape)
+
+    @cached_property
+    def _compressed(self) -> tuple[Ints, Ints]:
+        """Columns of the entries, and where each row starts."""
+        rows, width = self.shape
+        return self.places % width, np.searchsorted(self.places, np.arange(rows + 1) * width)
 
 
 @dataclass
@@ -69,8 +81,7 @@ class _Gathered:
             np.concatenate(each) for each in zip(*(self.parts or [empty]), strict=True)
         )
         places, slots = np.unique(rows * shape[1] + columns, return_inverse=True)
-        starts = np.searchsorted(places, np.arange(shape[0] + 1) * shape[1])
-        return Pattern(values, scalars, slots, places % shape[1], starts, shape)
+        return Pattern(values, scalars, slots, places, shape)
 
 
 @dataclass(frozen=True)
@@ -107,16 +118,16 @@ class StackedLinks:
     turns: Pattern  # ω̃ (n_whole, n_whole) of ω
     riders: tuple[Rider, ...]
 
-    def motion(self, z: Floats) -> sparse.csr_array:
+    def motion(self, z: Floats) -> Matrix:
         """B (n_whole, n_dof)."""
         B = self.joined.at(z) + self.spread.at(z) @ self.twist.at(z)
-        return sparse.csr_array(B if self.basis is None else self.basis @ B)
+        return B if self.basis is None else self.basis @ B
 
-    def mass(self, z: Floats) -> sparse.csr_array:
+    def mass(self, z: Floats) -> Matrix:
         """m (n_whole, n_whole)."""
         return self.masses.at(z)
 
-    def spin(self, z: Floats, rate: Floats) -> sparse.csr_array:
+    def spin(self, z: Floats, rate: Floats) -> Matrix:
         """ω̃ on the translations and rotations of every node, in its link's axes."""
         return self.turns.at(self.spins.at(z) @ rate)
 

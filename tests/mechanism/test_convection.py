@@ -166,7 +166,7 @@ def test_the_fields_integrate_to_the_consistent_mass() -> None:
         blocks = np.einsum("epri,epr,eprj->eij", N, matter, N)
         assembled = one.riding._assembled(blocks).toarray()
         own = slice(one.first, one.first + len(assembled))
-        mass = found.stack.mass(values)[own, own].toarray()
+        mass = found.stack.mass(values)[own, own]
         np.testing.assert_allclose(unit(mass, assembled), unit(mass, mass), atol=1e-12)
 
 
@@ -207,7 +207,7 @@ class Energy:
     def parts(self, t: float, x: np.ndarray) -> list[np.ndarray]:
         """World motions at t of the matter at x of the beam, and of every other link's nodes."""
         turns, out = self.turns(t), []
-        motion = self.terms.stack.motion(self.values(t)).toarray()
+        motion = self.terms.stack.motion(self.values(t))
         width = 3 if self.model.case.mechanism.space == "planar" else 6
         kept = [0, 1, 5] if width == 3 else list(range(6))
         for name, own, R in zip(self.names, self.rows, turns, strict=True):
@@ -253,7 +253,7 @@ class Energy:
                 out.append((np.repeat(each, 5, axis=0) * share[:, None])[:, :, None] * np.eye(6))
                 out.append(self.rotor()[None])
             else:
-                out.append((mass[own, own].toarray(), kept))
+                out.append((mass[own, own], kept))
         return out
 
     def section(self, mesh: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

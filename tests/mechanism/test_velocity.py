@@ -120,9 +120,23 @@ def test_the_mass_matrix_is_that_of_the_local_motions(make: Any) -> None:
     found = terms(model)
     (z,) = found.values(q[None], NONE)
     B = found.stack.motion(z)
-    total = (B.T @ found.stack.mass(z) @ B).toarray()
+    total = B.T @ found.stack.mass(z) @ B
     M = matrices(model, q)[1]
     np.testing.assert_allclose(total, M, atol=1e-12 * np.abs(M).max())
+
+
+@pytest.mark.parametrize("make", [arm3r, four_bar, gantry])
+def test_small_and_large_mechanisms_are_treated_alike(
+    make: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Dense matrices up to a size, sparse ones above it: the same numbers."""
+    model = built(make("free"))
+    n = model.pencil.n_q
+    numbers = np.linspace(0.3, 0.6, n), np.linspace(1.0, 2.0, n), np.linspace(-3.0, 2.0, n)
+    dense = at(model, *numbers)
+    monkeypatch.setattr("eigassign.mechanism.stacked.SMALL", 0)
+    for one, other in zip(dense, at(model, *numbers), strict=True):
+        np.testing.assert_allclose(other, one, atol=1e-12 * np.abs(one).max() + 1e-9)
 
 
 def test_a_mechanism_at_rest_has_no_velocity_terms() -> None:
