@@ -9,16 +9,16 @@ With m = Σ μ_i(y) m_i and N = Σ ν_b(y) N_b each product separates into (func
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
+from eigassign.mechanism.accumulator import Accumulator
 from eigassign.mechanism.mesh import Reduction, Term
 from eigassign.mechanism.rotations import multiply
-from eigassign.series.expression import Expression, Scalar
+from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -41,77 +41,6 @@ class LocalLink:
     own: Ints
     carried: dict[int, list[tuple[int, Scalar]]]
     reduction: Reduction | None = None
-
-
-@dataclass
-class Accumulator:
-    """Gathers entries (row, column, atom) → value; atom -1 stands for the constant 1."""
-
-    rows: list[Ints] = field(default_factory=list)
-    columns: list[Ints] = field(default_factory=list)
-    atoms: list[int] = field(default_factory=list)
-    values: list[Floats] = field(default_factory=list)
-    small: dict[tuple[int, int], Scalar] = field(default_factory=dict)
-
-    def add(self, coefficient: Scalar, rows: Ints, columns: Ints, values: Floats) -> None:
-        """coefficient × values at (rows, columns)."""
-        for atom, factor in _parts(coefficient):
-            if factor != 0.0 and len(rows):
-                self._append(rows, columns, atom, values * factor if factor != 1.0 else values)
-
-    def add_symmetric(self, coefficient: Scalar, rows: Ints, column: int, values: Floats) -> None:
-        """One column and its transpose, off the diagonal blocks."""
-        columns = np.full(len(rows), column, dtype=np.intp)
-        for atom, factor in _parts(coefficient):
-            if factor != 0.0 and len(rows):
-                product = values * factor if factor != 1.0 else values
-                self._append(rows, columns, atom, product)
-                self._append(columns, rows, atom, product)
-
-    def _append(self, rows: Ints, columns: Ints, atom: int, values: Floats) -> None:
-        self.rows.append(rows)
-        self.columns.append(columns)
-        self.atoms.append(atom)
-        self.values.append(values)
-
-    def add_small(self, row: int, column: int, value: Scalar) -> None:
-        """An entry among joint nodes and q̇, where many functions meet: summed before use."""
-        if not isinstance(value, Expression) and value == 0.0:
-            return
-        self.small[row, column] = self.small.get((row, column), 0.0) + value
-
-    def finish(self, n_u: int) -> tuple[Ints, Ints, Ints, Floats]:
-        """All entries as arrays; q̇-q̇ entries become one atom each."""
-        small = [
-            (row, column, atom, factor)
-            for (row, column), value in self.small.items()
-            for atom, factor in _parts(_whole(value) if min(row, column) >= n_u else value)
-            if factor != 0.0
-        ]
-        rows, columns, atoms, values = zip(*small, strict=True) if small else ((), (), (), ())
-        lengths = [len(part) for part in self.rows]
-        return (
-            np.concatenate([*self.rows, np.array(rows, dtype=np.intp)]),
-            np.concatenate([*self.columns, np.array(columns, dtype=np.intp)]),
-            np.concatenate(
-                [np.repeat(np.array(self.atoms, np.intp), lengths), np.array(atoms, np.intp)]
-            ),
-            np.concatenate([*self.values, np.array(values, dtype=np.float64)]),
-        )
-
-
-def _whole(value: Scalar) -> Scalar:
-    """A sum as one atom."""
-    if not isinstance(value, Expression):
-        return value
-    factor, atom = value.single()
-    return Expression(value.recorder, 0.0, {atom: factor})
-
-
-def _parts(coefficient: Scalar) -> list[tuple[int, float]]:
-    if not isinstance(coefficient, Expression):
-        return [(-1, float(coefficient))]
-    return [(-1, coefficient.constant), *coefficient.terms.items()]
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,66 +96,129 @@ def add_links(
 ) -> None:
     """Add links to K and M; those that share their matrices are taken apart once."""
     known: dict[tuple[int, ...], _Own] = {}
+    copies: dict[object, list[LocalLink]] = {}
     for link in links:
-        key = (id(link.stiffness), id(link.mass), id(link.rigid))  # all held by ``links``
-        _add_link(stiffness, mass, link, known.setdefault(key, _Own(link)), n_u)
+        copies.setdefault(_kind(link), []).append(link)
+    for alike in copies.values():
+        first = alike[0]
+        own = known.setdefault(_shared(first), _Own(first))
+        _add_copies(stiffness, mass, _Copies(tuple(alike)), own, n_u)
 
 
-def _add_link(
-    stiffness: Accumulator, mass: Accumulator, link: LocalLink, own: _Own, n_u: int
+def _shared(link: LocalLink) -> tuple[int, ...]:
+    """Which matrices a link has; all of them live as long as the links do."""
+    return id(link.stiffness), id(link.mass), id(link.rigid)
+
+
+def _kind(link: LocalLink) -> object:
+    """Equal for links with the same matrices and the same dofs carried, by as many unknowns."""
+    carried = tuple((slave, len(masters)) for slave, masters in link.carried.items())
+    return _shared(link), (link.own >= 0).tobytes(), carried
+
+
+@dataclass(frozen=True, eq=False)
+class _Copies:
+    """k links that differ only in their unknowns and in what carries and moves them."""
+
+    links: tuple[LocalLink, ...]
+
+    @cached_property
+    def own(self) -> Ints:
+        """Unknown of every local dof, or −1, (k, n_local)."""
+        return np.array([link.own for link in self.links])
+
+    @cached_property
+    def slaves(self) -> Ints:
+        """The local dof of each of p carries, (p,): one for every unknown that carries it."""
+        carried = self.links[0].carried.items()
+        return np.array([slave for slave, masters in carried for _ in masters], dtype=np.intp)
+
+    @cached_property
+    def _pairs(self) -> list[list[tuple[int, Scalar]]]:
+        return [
+            [pair for masters in link.carried.values() for pair in masters] for link in self.links
+        ]
+
+    @cached_property
+    def masters(self) -> Ints:
+        """The unknown that carries, (k, p)."""
+        return np.array([[column for column, _ in pairs] for pairs in self._pairs], dtype=np.intp)
+
+    @cached_property
+    def carries(self) -> list[list[Scalar]]:
+        """How it carries, p lists of k."""
+        return [
+            list(of) for of in zip(*([c for _, c in pairs] for pairs in self._pairs), strict=True)
+        ]
+
+
+def _add_copies(
+    stiffness: Accumulator, mass: Accumulator, copies: _Copies, own: _Own, n_u: int
 ) -> None:
+    moving = copies.links[0].twist.shape[1] > 0
     for part in own.stiffness:
-        _add_elastic(stiffness, part, link)
+        _add_elastic(stiffness, part, copies)
     for k, part in enumerate(own.mass):
-        _add_elastic(mass, part, link)
-        if link.twist.shape[1]:
+        _add_elastic(mass, part, copies)
+        if moving:
             for (factor, _), momentum in zip(own.spreads, own.momenta[k], strict=True):
-                _add_rigid_elastic(mass, part[0] * factor, momentum, link, n_u)
-    if link.twist.shape[1]:
-        _add_rigid(mass, link, own, n_u)
+                _add_rigid_elastic(mass, part[0] * factor, momentum, copies, n_u)
+    if moving:
+        for link in copies.links:
+            _add_rigid(mass, link, own, n_u)
 
 
-def _add_elastic(target: Accumulator, part: Part, link: LocalLink) -> None:
+def _add_elastic(target: Accumulator, part: Part, copies: _Copies) -> None:
     """The u-u part of Bᵀ a B: own-own constant, own-carried linear in C, carried-carried CᵀaC."""
     coefficient, i, j, values = part
-    rows, columns = link.own[i], link.own[j]
-    mine, its = rows >= 0, columns >= 0
-    inside = mine & its
-    target.add(coefficient, rows[inside], columns[inside], values[inside])
+    mine, its = copies.own[0][i] >= 0, copies.own[0][j] >= 0
+    rows, columns = (copies.own[:, at[mine & its]] for at in (i, j))
+    target.add([coefficient] * len(rows), rows, columns, values[mine & its])
     (beside,) = np.nonzero(mine & ~its)
-    for slave, masters in link.carried.items():
-        at = beside[j[beside] == slave]
-        for column, carry in masters:
-            target.add_symmetric(coefficient * carry, rows[at], column, values[at])
-    between = ~(mine | its)
-    for a, b, value in zip(
-        i[between].tolist(), j[between].tolist(), values[between].tolist(), strict=True
+    for slave, masters, carries in zip(
+        copies.slaves, copies.masters.T, copies.carries, strict=True
     ):
-        for row, left in link.carried.get(a, ()):
-            for column, right in link.carried.get(b, ()):
-                target.add_small(row, column, coefficient * left * right * value)
+        at = beside[j[beside] == slave]
+        if len(at):
+            factors = [coefficient * carry for carry in carries]
+            target.add_symmetric(factors, copies.own[:, i[at]], masters, values[at])
+    (between,) = np.nonzero(~(mine | its))
+    if len(between):
+        _add_between(target, (coefficient, i[between], j[between], values[between]), copies)
+
+
+def _add_between(target: Accumulator, part: Part, copies: _Copies) -> None:
+    coefficient, i, j, values = part
+    entries = list(zip(i.tolist(), j.tolist(), values.tolist(), strict=True))
+    for link in copies.links:
+        for a, b, value in entries:
+            for row, left in link.carried.get(a, ()):
+                for column, right in link.carried.get(b, ()):
+                    target.add_small(row, column, coefficient * left * right * value)
 
 
 def _add_rigid_elastic(
-    target: Accumulator, coefficient: Scalar, momentum: Floats, link: LocalLink, n_u: int
+    target: Accumulator, coefficient: Scalar, momentum: Floats, copies: _Copies, n_u: int
 ) -> None:
     """The u-q̇ part: Qᵀ m N T, one term of it with m_i N_b = ``momentum``."""
-    for component, row in enumerate(link.twist):
-        column = momentum[:, component]
-        rows = np.flatnonzero((column != 0.0) & (link.own >= 0))
-        for k, rate in enumerate(row):
-            if isinstance(rate, Expression) or rate != 0.0:
-                _add_twist_column(target, coefficient * rate, link, column, rows, n_u + k)
+    for component, column in enumerate(momentum.T):
+        rows = np.flatnonzero((column != 0.0) & (copies.own[0] >= 0))
+        moved = copies.own[:, rows]
+        for k in range(copies.links[0].twist.shape[1]):
+            rates = [coefficient * link.twist[component, k] for link in copies.links]
+            at = np.full(len(rates), n_u + k, dtype=np.intp)
+            target.add_symmetric(rates, moved, at, column[rows])
+            for link, rate in zip(copies.links, rates, strict=True):
+                _add_carried_twist(target, rate, link, column, n_u + k)
 
 
-def _add_twist_column(
-    target: Accumulator, coefficient: Scalar, link: LocalLink, column: Floats, rows: Ints, at: int
+def _add_carried_twist(
+    target: Accumulator, rate: Scalar, link: LocalLink, column: Floats, at: int
 ) -> None:
-    target.add_symmetric(coefficient, link.own[rows], at, column[rows])
     for slave, masters in link.carried.items():
         if column[slave] != 0.0:
             for row, carry in masters:
-                value = coefficient * carry * float(column[slave])
+                value = rate * carry * float(column[slave])
                 target.add_small(row, at, value)
                 target.add_small(at, row, value)
 
@@ -241,29 +233,3 @@ def _add_rigid(target: Accumulator, link: LocalLink, own: _Own, n_u: int) -> Non
             target.add_small(n_u + k, n_u + l, block[k, l])
             if k != l:
                 target.add_small(n_u + l, n_u + k, block[k, l])
-
-
-def pattern(
-    entries: Sequence[tuple[Ints, Ints, Ints, Floats]], n_dof: int, n_theta: int
-) -> tuple[Ints, Ints, list[sparse.csr_array]]:
-    """Common pattern of several matrices and their weights (n_nonzeros, n_theta) on it."""
-    keys = np.concatenate([rows * n_dof + columns for rows, columns, _, _ in entries])
-    unique, place = _ranked(keys)
-    shape = (len(unique), n_theta)
-    ends = np.cumsum([len(rows) for rows, _, _, _ in entries])[:-1]
-    weights = [
-        sparse.csr_array((values, (at, theta)), shape=shape)
-        for at, (_, _, theta, values) in zip(np.split(place, ends), entries, strict=True)
-    ]
-    return (unique // n_dof).astype(np.intp), (unique % n_dof).astype(np.intp), weights
-
-
-def _ranked(keys: Ints) -> tuple[Ints, Ints]:
-    """The distinct keys, ascending, and the place of each key among them: one sort for both."""
-    order = np.argsort(keys)
-    ascending = keys[order]
-    new = np.ones(len(keys), dtype=bool)
-    new[1:] = ascending[1:] != ascending[:-1]
-    place = np.empty(len(keys), dtype=np.intp)
-    place[order] = np.cumsum(new) - 1
-    return ascending[new], place

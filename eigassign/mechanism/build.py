@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
-from eigassign.mechanism.assembly import Accumulator, LocalLink, add_links, pattern
+from eigassign.mechanism.accumulator import Accumulator, pattern
+from eigassign.mechanism.assembly import LocalLink, add_links
 from eigassign.mechanism.craig_bampton import as_asked
 from eigassign.mechanism.kinematics import Kinematics, Placement, kinematics
 from eigassign.mechanism.links import copies_of, link_mesh

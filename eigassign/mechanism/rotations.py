@@ -56,14 +56,22 @@ def cross(a: Objects, b: Objects) -> Objects:
 def multiply(a: Objects | Floats, b: Objects | Floats) -> Objects:
     """Product of matrices of scalars, skipping plain zeros (most entries of these)."""
     columns = b[:, None] if b.ndim == 1 else b
-    out = np.zeros((a.shape[0], columns.shape[1]), dtype=object)
     others = [[(j, x) for j, x in enumerate(row) if _some(x)] for row in columns.tolist()]
-    for i, row in enumerate(a.tolist()):
-        for left, other in zip(row, others, strict=True):
-            if other and _some(left):
-                for j, right in other:
-                    out[i, j] = out[i, j] + left * right
+    rows = [_combined(row, others, columns.shape[1]) for row in a.tolist()]
+    out = np.array(rows, dtype=object).reshape(len(rows), columns.shape[1])
     return out[:, 0] if b.ndim == 1 else out
+
+
+def _combined(
+    factors: list[Scalar], rows: list[list[tuple[int, Scalar]]], size: int
+) -> list[Scalar]:
+    """Σ factor × row over rows of (place, value), plain zeros left out."""
+    total: list[Scalar] = [0] * size
+    for factor, row in zip(factors, rows, strict=True):
+        if row and _some(factor):
+            for j, value in row:
+                total[j] = total[j] + factor * value
+    return total
 
 
 def present(a: Objects | Floats) -> NDArray[np.bool_]:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from eigassign.case import CaseFile
-from eigassign.mechanism.assembly import Accumulator
+from eigassign.mechanism.accumulator import Accumulator
 from eigassign.mechanism.bodies import mounted
 from eigassign.mechanism.geometry import node_position
 from eigassign.mechanism.kinematics import Kinematics

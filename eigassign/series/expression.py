@@ -95,10 +95,16 @@ class Expression:
 
     def __add__(self, other: Scalar) -> Scalar:
         if not isinstance(other, Expression):
-            return self if other == 0.0 else self._build(self.constant + other, self.terms)
+            if other == 0.0:
+                return self
+            return Expression(self.recorder, self.constant + other, self.terms)
         terms = dict(self.terms)
         for atom, value in other.terms.items():
-            terms[atom] = terms.get(atom, 0.0) + value
+            total = terms.get(atom, 0.0) + value
+            if total:
+                terms[atom] = total
+            else:
+                terms.pop(atom, None)
         return self._build(self.constant + other.constant, terms)
 
     __radd__ = __add__
@@ -117,7 +123,7 @@ class Expression:
             factor = float(other)
             if factor == 1.0:
                 return self
-            terms = {atom: value * factor for atom, value in self.terms.items()}
+            terms = {a: product for a, c in self.terms.items() if (product := c * factor)}
             return self._build(self.constant * factor, terms)
         (a, j), (b, k) = self.single(), other.single()
         product = self.recorder._atom(("product", min(j, k), max(j, k)))
@@ -154,8 +160,7 @@ class Expression:
         return self.recorder._atom(("linear", 0.0, ((atom, factor),)))
 
     def _build(self, constant: float, terms: dict[int, float]) -> Scalar:
-        kept = {atom: value for atom, value in terms.items() if value != 0.0}
-        return Expression(self.recorder, constant, kept) if kept else constant
+        return Expression(self.recorder, constant, terms) if terms else constant
 
 
 def _function(name: str, x: Expression) -> Expression:

@@ -108,8 +108,9 @@ def compile_program(recorder: Recorder, outputs: Sequence[int], n_variables: int
     needed = _needed(recorder.nodes, outputs)
     renumbered = {atom: k for k, atom in enumerate(needed)}
     nodes = [_renumber(recorder.nodes[atom], renumbered) for atom in needed]
-    levels = _levels(nodes)
-    depends = _dependence(nodes, n_variables)
+    arguments = [_arguments(node) for node in nodes]
+    levels = _levels(arguments)
+    depends = _dependence(nodes, arguments, n_variables)
     variables = [(k, int(str(node[1]))) for k, node in enumerate(nodes) if node[0] == "variable"]
     final = np.array([renumbered[atom] for atom in outputs], dtype=np.intp)
     return Program(
@@ -165,21 +166,27 @@ def _renumber(node: Node, new: dict[int, int]) -> Node:
     raise UsageError(f"unknown expression {node!r}")
 
 
-def _levels(nodes: Sequence[Node]) -> list[int]:
+def _levels(arguments: Sequence[tuple[int, ...]]) -> list[int]:
     levels: list[int] = []
-    for node in nodes:
-        levels.append(1 + max((levels[a] for a in _arguments(node)), default=-1))
+    for atoms in arguments:
+        levels.append(1 + max([levels[a] for a in atoms], default=-1))
     return levels
 
 
-def _dependence(nodes: Sequence[Node], n_variables: int) -> NDArray[np.bool_]:
-    depends = np.zeros((len(nodes), n_variables), dtype=bool)
-    for k, node in enumerate(nodes):
-        if node[0] == "variable":
-            depends[k, int(str(node[1]))] = True
-        for argument in _arguments(node):
-            depends[k] |= depends[argument]
-    return depends
+def _dependence(
+    nodes: Sequence[Node], arguments: Sequence[tuple[int, ...]], n_variables: int
+) -> NDArray[np.bool_]:
+    """Which variables each atom is made of: sets of few members, each a bit of one number."""
+    depends: list[int] = []
+    for node, atoms in zip(nodes, arguments, strict=True):
+        found = 1 << int(str(node[1])) if node[0] == "variable" else 0
+        for atom in atoms:
+            found |= depends[atom]
+        depends.append(found)
+    size = (n_variables + 7) // 8
+    packed = np.frombuffer(b"".join(d.to_bytes(size, "little") for d in depends), dtype=np.uint8)
+    bits = np.unpackbits(packed.reshape(len(nodes), size), axis=1, bitorder="little")
+    return bits[:, :n_variables].astype(bool)
 
 
 def _schedule(nodes: Sequence[Node], levels: Sequence[int]) -> tuple[Step, ...]:
