@@ -104,7 +104,7 @@ def pattern(
 
 def _ranked(keys: Ints) -> tuple[Ints, Ints]:
     """The distinct keys, ascending, and the place of each key among them: one sort for both."""
-    order = np.argsort(keys)
+    order = np.argsort(keys, kind="stable")  # a few ascending runs: merged
     ascending = keys[order]
     new = np.ones(len(keys), dtype=bool)
     new[1:] = ascending[1:] != ascending[:-1]

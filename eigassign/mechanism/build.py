@@ -14,13 +14,14 @@ from eigassign.errors import MechanismError
 from eigassign.mechanism.accumulator import Accumulator, pattern
 from eigassign.mechanism.assembly import LocalLink, add_links
 from eigassign.mechanism.craig_bampton import as_asked
-from eigassign.mechanism.kinematics import Kinematics, Placement, kinematics
+from eigassign.mechanism.kinematics import Kinematics, kinematics
 from eigassign.mechanism.links import copies_of, link_mesh
 from eigassign.mechanism.mesh import DOFS, LinkMesh
 from eigassign.mechanism.nodes import NodeMotions
 from eigassign.mechanism.parameters import Parameters
 from eigassign.mechanism.parameters import parameters as variables
 from eigassign.mechanism.pencil import Pencil
+from eigassign.mechanism.placement import Placement
 from eigassign.mechanism.rails import rails
 from eigassign.series.program import compile_program
 

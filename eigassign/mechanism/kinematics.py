@@ -11,9 +11,10 @@ p(q, y), and the loops' twists J_p ṗ + J_q q̇ = 0 give ṗ = P q̇.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from eigassign.mechanism.coordinates import Coordinates, coordinates
 from eigassign.mechanism.geometry import node_position
 from eigassign.mechanism.joints import RIDING, JointMotion, joint_motion, turned
 from eigassign.mechanism.parameters import Parameters
+from eigassign.mechanism.placement import Loop, Placement
 from eigassign.mechanism.rotations import (
     Floats,
     Objects,
@@ -30,6 +32,7 @@ from eigassign.mechanism.rotations import (
     cross,
     euler,
     multiply,
+    present,
     rotation,
     vector,
 )
@@ -39,38 +42,6 @@ from eigassign.series.expression import Scalar
 
 PLANAR_TWIST = (0, 1, 5)  # v_x, v_y, ω_z among (v, ω)
 SPATIAL_TWIST = (0, 1, 2, 3, 4, 5)
-
-
-@dataclass(frozen=True)
-class Placement:
-    """How one link hangs on its base, and its motion.
-
-    ``rotation`` turns the link's components into base components; ``lever`` runs from the base node
-    to the joint node of the link (base axes); ``freedoms`` is A (6, k). ``twist`` (6, n_columns) is
-    that of the link's own origin per column, in its own axes.
-    """
-
-    link: str
-    edge: Edge
-    rotation: Objects
-    lever: Objects
-    freedoms: Objects
-    world_rotation: Objects
-    world_origin: Objects
-    twist: Objects
-
-
-@dataclass(frozen=True)
-class Loop:
-    """One loop-closing joint: pose and twist of its follower node, reached along both sides."""
-
-    edge: Edge
-    rotation: Objects  # from the follower's axes to the base link's axes
-    lever: Objects  # from base node to follower node, base axes
-    freedoms: Objects
-    position_gap: Objects  # (3,) world: along the base side minus along the follower side
-    misalignment: Objects  # (3, 3): R_baseᵀ R_follower, the identity when closed
-    twist_gap: Objects  # (6, n_columns): follower's own twist minus the carried and joint twist
 
 
 @dataclass(frozen=True)
@@ -157,26 +128,103 @@ def walk(
     rates: Objects,
 ) -> Kinematics:
     """Place every link for the freedoms' ``values``, moving at ċ = ``rates`` (n_freedoms, n)."""
-    placed: dict[str, Placement] = {}
+    way = _Walk(case, parameters, tree, values, rates)
     for edge in tree.edges:
-        placed[edge.follower[0]] = _place(case, parameters, tree, edge, values, rates, placed)
-    loops = tuple(_loop(case, parameters, tree, e, values, rates, placed) for e in tree.loops)
-    return Kinematics(tuple(placed.values()), loops, tree, coords)
+        way.placed[edge.follower[0]] = way.place(edge)
+    loops = tuple(way.loop(edge) for edge in tree.loops)
+    return Kinematics(tuple(way.placed.values()), loops, tree, coords)
 
 
-def _own_motion(
-    case: CaseFile, tree: Tree, edge: Edge, values: Sequence[Scalar], rates: Objects
-) -> tuple[JointMotion, Objects]:
-    """R, lever and A of a joint as it is walked, mounting and position included; A ċ per column."""
-    joint = case.mechanism.joints[edge.joint]
-    own = tree.of_joint(edge.joint)
-    motion = _mounted(joint, mounting(joint), joint_motion(joint, [values[k] for k in own]))
+@dataclass(frozen=True, eq=False)
+class _Walk:
+    """What is known on the way from the ground to the tips; each joint and each node once."""
+
+    case: CaseFile
+    parameters: Parameters
+    tree: Tree
+    values: Sequence[Scalar]
+    rates: Objects
+    placed: dict[str, Placement] = field(default_factory=dict)
+    _twists: dict[Node, Objects] = field(default_factory=dict)
+    _rigid: dict[object, JointMotion] = field(default_factory=dict)
+
+    def place(self, edge: Edge) -> Placement:
+        """The link that this joint carries."""
+        motion = self._motion(edge)
+        root = self._position(edge.follower)
+        return Placement(
+            link=edge.follower[0],
+            edge=edge,
+            rotation=motion.rotation,
+            lever=motion.translation,
+            freedoms=motion.freedoms,
+            twist=_shifted(self._reached(edge, motion), root * -1.0),
+            base=self.placed.get(edge.base[0]),
+            foot=self._position(edge.base),
+            root=root,
+        )
+
+    def loop(self, edge: Edge) -> Loop:
+        """Both ways to the follower of a joint that closes a loop."""
+        motion = self._motion(edge)
+        R_base, x_base = self._stands(edge.base)
+        R_end, x_end = self._stands(edge.follower)
+        return Loop(
+            edge=edge,
+            rotation=motion.rotation,
+            lever=motion.translation,
+            freedoms=motion.freedoms,
+            position_gap=x_base + multiply(R_base, motion.translation) - x_end,
+            misalignment=multiply(multiply(R_base, motion.rotation).T, R_end),
+            twist_gap=self._twist(edge.follower) - self._reached(edge, motion),
+        )
+
+    def _position(self, node: Node) -> Objects:
+        if node[0] == "ground":
+            return np.zeros(3, dtype=object)
+        return node_position(self.case, self.parameters, self.tree, node)
+
+    def _stands(self, node: Node) -> tuple[Objects, Objects]:
+        """World rotation and world position of a node."""
+        if node[0] == "ground":
+            return np.eye(3).astype(object), np.zeros(3, dtype=object)
+        return self.placed[node[0]].at(self._position(node))
+
+    def _twist(self, node: Node) -> Objects:
+        """Twist (6, n) of a node in its link's axes."""
+        if node not in self._twists:
+            ground = node[0] == "ground"
+            self._twists[node] = (
+                np.zeros((6, self.rates.shape[1]), dtype=object)
+                if ground
+                else _shifted(self.placed[node[0]].twist, self._position(node))
+            )
+        return self._twists[node]
+
+    def _reached(self, edge: Edge, motion: JointMotion) -> Objects:
+        """Twist of the follower's joint node: carried from the base, and the joint's own."""
+        moved = multiply(carried(motion.rotation, motion.translation), self._twist(edge.base))
+        own = self.tree.of_joint(edge.joint)
+        return moved + multiply(motion.freedoms, self.rates[own]) if own else moved
+
+    def _motion(self, edge: Edge) -> JointMotion:
+        """R, lever and A of a joint as it is walked, mounting and position included."""
+        own = self.tree.of_joint(edge.joint)
+        joint = self.case.mechanism.joints[edge.joint]
+        if own:
+            return _walked(joint, edge.turned, [self.values[k] for k in own])
+        keys = ("type", "angle", "orientation", "position")
+        alike = (*(str(getattr(joint, key, None)) for key in keys), edge.turned)
+        if alike not in self._rigid:
+            self._rigid[alike] = _walked(joint, edge.turned, [])
+        return self._rigid[alike]
+
+
+def _walked(joint: Any, backwards: bool, values: Sequence[Scalar]) -> JointMotion:
+    motion = _mounted(joint, mounting(joint), joint_motion(joint, values))
     position = vector(getattr(joint, "position", None) or (0.0, 0.0))
     motion = motion._replace(translation=position + motion.translation)
-    motion = turned(motion) if edge.turned else motion
-    if not own:
-        return motion, np.zeros((6, rates.shape[1]), dtype=object)
-    return motion, multiply(motion.freedoms, rates[own])
+    return turned(motion) if backwards else motion
 
 
 def _mounted(joint: object, mount: Objects, motion: JointMotion) -> JointMotion:
@@ -197,78 +245,8 @@ def mounting(joint: object) -> Objects:
     return rotation(np.array([0.0, 0.0, 1.0]), float(getattr(joint, "angle", 0.0) or 0.0))
 
 
-def _place(
-    case: CaseFile,
-    parameters: Parameters,
-    tree: Tree,
-    edge: Edge,
-    values: Sequence[Scalar],
-    rates: Objects,
-    placed: Mapping[str, Placement],
-) -> Placement:
-    link = edge.follower[0]
-    motion, own = _own_motion(case, tree, edge, values, rates)
-    lever = motion.translation
-    R_base, o_base, twist_base = _base_motion(case, parameters, tree, edge.base, placed, rates)
-    node = node_position(case, parameters, tree, edge.follower)
-    R_world = multiply(R_base, motion.rotation)
-    at_node = multiply(carried(motion.rotation, lever), twist_base) + own
-    return Placement(
-        link=link,
-        edge=edge,
-        rotation=motion.rotation,
-        lever=lever,
-        freedoms=motion.freedoms,
-        world_rotation=R_world,
-        world_origin=o_base + multiply(R_base, lever) - multiply(R_world, node),
-        twist=_shifted(at_node, node * -1.0),
-    )
-
-
-def _base_motion(
-    case: CaseFile,
-    parameters: Parameters,
-    tree: Tree,
-    base: Node,
-    placed: Mapping[str, Placement],
-    rates: Objects,
-) -> tuple[Objects, Objects, Objects]:
-    """World rotation, world position and twist (own axes) of a base node."""
-    if base[0] == "ground":
-        zero = np.zeros((6, rates.shape[1]), dtype=object)
-        return np.eye(3).astype(object), np.zeros(3, dtype=object), zero
-    p = placed[base[0]]
-    X = node_position(case, parameters, tree, base)
-    position = p.world_origin + multiply(p.world_rotation, X)
-    return p.world_rotation, position, _shifted(p.twist, X)
-
-
 def _shifted(twist: Objects, lever: Objects) -> Objects:
     """The twist at another point of the same body: v + ω × lever."""
+    if not present(lever).any():
+        return twist
     return np.concatenate([twist[:3] + cross(twist[3:], lever), twist[3:]])
-
-
-def _loop(
-    case: CaseFile,
-    parameters: Parameters,
-    tree: Tree,
-    edge: Edge,
-    values: Sequence[Scalar],
-    rates: Objects,
-    placed: Mapping[str, Placement],
-) -> Loop:
-    motion, own = _own_motion(case, tree, edge, values, rates)
-    lever = motion.translation
-    R_base, x_base, twist_base = _base_motion(case, parameters, tree, edge.base, placed, rates)
-    R_end, x_end, twist_end = _base_motion(case, parameters, tree, edge.follower, placed, rates)
-    R_joint = multiply(R_base, motion.rotation)
-    reached = multiply(carried(motion.rotation, lever), twist_base) + own
-    return Loop(
-        edge=edge,
-        rotation=motion.rotation,
-        lever=lever,
-        freedoms=motion.freedoms,
-        position_gap=x_base + multiply(R_base, lever) - x_end,
-        misalignment=multiply(R_joint.T, R_end),
-        twist_gap=twist_end - reached,
-    )

@@ -76,7 +76,7 @@ def _combined(
 
 def present(a: Objects | Floats) -> NDArray[np.bool_]:
     """Which entries are not the plain number zero."""
-    return np.array([_some(value) for value in a.ravel()], dtype=bool).reshape(a.shape)
+    return np.array([_some(value) for value in a.ravel().tolist()], dtype=bool).reshape(a.shape)
 
 
 def _some(value: Scalar) -> bool:
@@ -91,5 +91,6 @@ def carried(R: Objects | Floats, lever: Objects) -> Objects:
     out = np.zeros((6, 6), dtype=object)
     out[:3, :3] = R.T
     out[3:, 3:] = R.T
-    out[:3, 3:] = multiply(R.T.astype(object), skew(lever) * -1.0)
+    if present(lever).any():
+        out[:3, 3:] = multiply(R.T.astype(object), skew(lever) * -1.0)
     return out

@@ -17,9 +17,9 @@ from eigassign.mechanism.assembly import LocalLink
 from eigassign.mechanism.beam import bending_shapes
 from eigassign.mechanism.build import local_links
 from eigassign.mechanism.frames import axes
-from eigassign.mechanism.kinematics import Placement
 from eigassign.mechanism.local_motion import motion_matrix, motion_scalars
 from eigassign.mechanism.mesh import LinkMesh, Strand
+from eigassign.mechanism.placement import Placement
 from eigassign.mechanism.poses import Poses
 from eigassign.mechanism.rotations import Objects
 from eigassign.series.expression import Scalar

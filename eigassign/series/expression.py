@@ -123,7 +123,7 @@ class Expression:
             factor = float(other)
             if factor == 1.0:
                 return self
-            terms = {a: product for a, c in self.terms.items() if (product := c * factor)}
+            terms = {a: value for a, c in self.terms.items() if (value := c * factor)}
             return self._build(self.constant * factor, terms)
         (a, j), (b, k) = self.single(), other.single()
         product = self.recorder._atom(("product", min(j, k), max(j, k)))
