@@ -185,9 +185,12 @@ def _compile(
     if not n_dof:
         raise MechanismError("mechanism.links", "nothing can move: every link is rigid and locked")
     entries = [stiffness.finish(n_u), mass.finish(n_u)]
-    atoms = np.unique(np.concatenate([entry[2] for entry in entries]))
-    atoms = atoms[atoms >= 0]
-    theta = [(r, c, np.searchsorted(atoms, a) + (a >= 0), v) for r, c, a, v in entries]
+    used = np.zeros(1 + len(parameters.recorder.nodes), dtype=bool)  # the constant, every atom
+    used[0] = True
+    for entry in entries:
+        used[entry[2] + 1] = True
+    place, atoms = np.cumsum(used) - 1, np.flatnonzero(used)[1:] - 1
+    theta = [(r, c, place[a + 1], v) for r, c, a, v in entries]
     rows, columns, weights = pattern(theta, n_dof, len(atoms) + 1)
     n_y, n_q = len(parameters.design), len(parameters.coordinates)
     to_program = np.eye(n_q + n_y)

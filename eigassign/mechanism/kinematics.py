@@ -28,7 +28,6 @@ from eigassign.mechanism.placement import Loop, Placement
 from eigassign.mechanism.rotations import (
     Floats,
     Objects,
-    carried,
     cross,
     euler,
     multiply,
@@ -203,7 +202,9 @@ class _Walk:
 
     def _reached(self, edge: Edge, motion: JointMotion) -> Objects:
         """Twist of the follower's joint node: carried from the base, and the joint's own."""
-        moved = multiply(carried(motion.rotation, motion.translation), self._twist(edge.base))
+        base = _shifted(self._twist(edge.base), motion.translation)
+        rotated = multiply(motion.rotation.T, np.concatenate([base[:3], base[3:]], axis=1))
+        moved = np.concatenate(np.split(rotated, 2, axis=1))
         own = self.tree.of_joint(edge.joint)
         return moved + multiply(motion.freedoms, self.rates[own]) if own else moved
 

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from eigassign.mechanism.kinematics import Kinematics
 from eigassign.mechanism.mesh import LinkMesh
-from eigassign.mechanism.rotations import Objects, carried, present
+from eigassign.mechanism.rotations import Objects, carried, present, some
 from eigassign.mechanism.tree import GROUND, Edge, Freedom, Node
-from eigassign.series.expression import Expression, Scalar
+from eigassign.series.expression import Scalar
 
 Ints = NDArray[np.intp]
 Row = dict[int, Scalar]
@@ -123,11 +123,11 @@ def combined(row: Row, other: Row, factor: Scalar) -> Row:
 def apply(X: Objects, rows: Rows) -> Rows:
     """A (6, 6) map of rows: Σ_b X_ab row_b."""
     out: Rows = []
-    some = present(X)
-    for a in range(6):
+    for factors in X.tolist():
         total: Row = {}
-        for b in np.flatnonzero(some[a]):
-            for unknown, carry in rows[b].items():
-                total[unknown] = total.get(unknown, 0.0) + carry * X[a, b]
-        out.append({k: v for k, v in total.items() if isinstance(v, Expression) or v != 0.0})
+        for factor, row in zip(factors, rows, strict=True):
+            if row and some(factor):
+                for unknown, carry in row.items():
+                    total[unknown] = total.get(unknown, 0.0) + carry * factor
+        out.append({unknown: value for unknown, value in total.items() if some(value)})
     return out

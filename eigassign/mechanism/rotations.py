@@ -56,7 +56,7 @@ def cross(a: Objects, b: Objects) -> Objects:
 def multiply(a: Objects | Floats, b: Objects | Floats) -> Objects:
     """Product of matrices of scalars, skipping plain zeros (most entries of these)."""
     columns = b[:, None] if b.ndim == 1 else b
-    others = [[(j, x) for j, x in enumerate(row) if _some(x)] for row in columns.tolist()]
+    others = [[(j, x) for j, x in enumerate(row) if some(x)] for row in columns.tolist()]
     rows = [_combined(row, others, columns.shape[1]) for row in a.tolist()]
     out = np.array(rows, dtype=object).reshape(len(rows), columns.shape[1])
     return out[:, 0] if b.ndim == 1 else out
@@ -68,7 +68,7 @@ def _combined(
     """Σ factor × row over rows of (place, value), plain zeros left out."""
     total: list[Scalar] = [0] * size
     for factor, row in zip(factors, rows, strict=True):
-        if row and _some(factor):
+        if row and some(factor):
             for j, value in row:
                 total[j] = total[j] + factor * value
     return total
@@ -76,10 +76,11 @@ def _combined(
 
 def present(a: Objects | Floats) -> NDArray[np.bool_]:
     """Which entries are not the plain number zero."""
-    return np.array([_some(value) for value in a.ravel().tolist()], dtype=bool).reshape(a.shape)
+    return np.array([some(value) for value in a.ravel().tolist()], dtype=bool).reshape(a.shape)
 
 
-def _some(value: Scalar) -> bool:
+def some(value: Scalar) -> bool:
+    """Whether it is not the plain number zero."""
     return isinstance(value, Expression) or value != 0.0
 
 
