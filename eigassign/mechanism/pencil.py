@@ -188,5 +188,12 @@ class Pencil:
 
     def sparse(self, data: Floats) -> sparse.csc_array:
         """One sparse matrix from its non-zeros (n_nonzeros,) on the common pattern."""
+        columns, starts = self._by_row
         shape = (self.n_dof, self.n_dof)
-        return sparse.csc_array((data, (self.rows, self.columns)), shape=shape)
+        return sparse.csr_array((data, columns, starts), shape=shape).tocsc()
+
+    @cached_property
+    def _by_row(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Column of each non-zero, and where rows begin: the pattern runs row by row."""
+        starts = np.searchsorted(self.rows, np.arange(self.n_dof + 1))
+        return self.columns.astype(np.int32), starts.astype(np.int32)

@@ -23,6 +23,7 @@ from eigassign.modal.basis import INDEFINITE
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+Coordinates = tuple[Ints, Floats]  # which columns of A (c,), and how much of them (c, k)
 UNIT_LIMIT = 300  # elastic dofs up to which A is the identity
 
 
@@ -60,7 +61,7 @@ def residual_factors(
         return Residual(_terms(stiff), _dense(stiff, L), _terms(heavy), _dense(heavy, L))
     A, coordinates = _span(stiff + heavy, n)
     R = np.asarray(np.linalg.qr(half_solve(factor, A), mode="r"), dtype=np.float64)
-    parts = [_product(R, c) for c in coordinates]
+    parts = [R[:, at] @ values for at, values in coordinates]
     split = len(stiff)
     return Residual(_terms(stiff), np.array(parts[:split]), _terms(heavy), np.array(parts[split:]))
 
@@ -75,12 +76,6 @@ def half_solve(factor: linalg.SuperLU, A: Floats) -> Floats:
     lower = factor.L.tocsr()
     solved = linalg.spsolve_triangular(lower, permuted, lower=True, unit_diagonal=True)
     return np.asarray(solved / np.sqrt(pivots)[:, None])
-
-
-def _product(R: Floats, coordinates: Floats) -> Floats:
-    """R times coordinates most rows of which are zero."""
-    rows = np.flatnonzero(coordinates.any(axis=1))
-    return np.asarray(R[:, rows] @ coordinates[rows])
 
 
 def _blocks(pencil: Pencil, columns: sparse.csc_array, basis: Floats) -> list[_Block]:
@@ -117,60 +112,49 @@ def _dense(blocks: list[_Block], L: Floats) -> Floats:
     return np.ascontiguousarray(solved.reshape(full.shape).transpose(1, 0, 2))
 
 
-def _span(blocks: list[_Block], n: int) -> tuple[Floats, list[Floats]]:
+def _span(blocks: list[_Block], n: int) -> tuple[Floats, list[Coordinates]]:
     """A (n, a) spanning all blocks, and each block's coordinates in it.
 
     Terms with few rows (joints) share unit vectors; the others bring their own column space.
     """
     narrow = [len(b.rows) <= b.values.shape[1] for b in blocks]
-    units = np.unique(
-        np.concatenate(
-            [b.rows for b, s in zip(blocks, narrow, strict=True) if s]
-            or [np.zeros(0, dtype=np.intp)]
-        )
-    )
-    wide: list[Floats] = []
-    where: dict[bytes, int] = {}
-    raw: list[list[tuple[int, Floats]]] = []
+    shared = np.zeros(n, dtype=bool)
     for block, is_narrow in zip(blocks, narrow, strict=True):
         if is_narrow:
-            at = np.searchsorted(units, block.rows)
-            raw.append([(int(i), row) for i, row in zip(at, block.values, strict=True)])
-        else:
-            raw.append(_columns(block, n, wide, where, len(units)))
+            shared[block.rows] = True
+    units = np.flatnonzero(shared)
+    wide: list[tuple[Ints, Floats]] = []
+    where: dict[bytes, int] = {}
+    coordinates: list[Coordinates] = [
+        (np.searchsorted(units, block.rows), block.values)
+        if is_narrow
+        else _columns(block, wide, where, len(units))
+        for block, is_narrow in zip(blocks, narrow, strict=True)
+    ]
     A = np.zeros((n, len(units) + len(wide)))
     A[units, np.arange(len(units))] = 1.0
-    if wide:
-        A[:, len(units) :] = np.array(wide).T
-    return A, [
-        _coordinates(r, A.shape[1], b.values.shape[1]) for r, b in zip(raw, blocks, strict=True)
-    ]
+    for k, (rows, column) in enumerate(wide):
+        A[rows, len(units) + k] = column
+    return A, coordinates
 
 
 def _columns(
-    block: _Block, n: int, wide: list[Floats], where: dict[bytes, int], offset: int
-) -> list[tuple[int, Floats]]:
+    block: _Block, wide: list[tuple[Ints, Floats]], where: dict[bytes, int], offset: int
+) -> Coordinates:
     """Orthonormal columns of a block, equal ones of other blocks used again."""
     U, s, Vt = np.linalg.svd(block.values, full_matrices=False)
     rank = int((s > 1e-13 * s[0]).sum()) if s[0] > 0.0 else 0
-    found = []
-    for u, size, row in zip(U.T[:rank], s, Vt, strict=False):
-        sign = -1.0 if u[np.abs(u).argmax()] < 0.0 else 1.0
-        key = np.round(sign * u, 9).tobytes() + block.rows.tobytes()
+    U, values = U[:, :rank], s[:rank, None] * Vt[:rank]
+    signs = np.where(U[np.abs(U).argmax(axis=0), np.arange(rank)] < 0.0, -1.0, 1.0)
+    columns, place = np.ascontiguousarray((signs * U).T), block.rows.tobytes()
+    at = []
+    for column, rounded in zip(columns, np.round(columns, 9), strict=True):
+        key = rounded.tobytes() + place
         if key not in where:
             where[key] = len(wide)
-            column = np.zeros(n)
-            column[block.rows] = sign * u
-            wide.append(column)
-        found.append((offset + where[key], sign * size * row))
-    return found
-
-
-def _coordinates(parts: list[tuple[int, Floats]], a: int, k: int) -> Floats:
-    out = np.zeros((a, k))
-    for at, row in parts:
-        out[at] += row
-    return out
+            wide.append((block.rows, column))
+        at.append(offset + where[key])
+    return np.array(at, dtype=np.intp), signs[:, None] * values
 
 
 def _root_of(K: Floats) -> Floats:
