@@ -7,7 +7,7 @@ in Newton's basis over a lower set of multi-indices. How it is made is in `modal
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -32,9 +32,18 @@ class Fit:
     modes: tuple[int, ...]
     region: Region
     accuracy: float | None  # asked for, relative in Hz; None where the solves were given
-    error_estimate: float  # of frequencies anywhere in the region, relative in Hz
     interpolant: Interpolant
-    floor: float  # part of the estimate that is the source's own
+    own_error: Callable[[], float]  # of the source, part of the estimate; found when asked for
+
+    @cached_property
+    def floor(self) -> float:
+        """Part of the estimate that is the source's own."""
+        return self.own_error()
+
+    @property
+    def error_estimate(self) -> float:
+        """Of frequencies anywhere in the region, relative in Hz."""
+        return self.interpolant.error + self.floor
 
     @property
     def indices(self) -> Ints:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,14 +22,15 @@ from eigassign.modal.exact import DENSE_LIMIT, eigenvalues
 from eigassign.modal.expansion import Expansion
 from eigassign.modal.fit import Fit
 from eigassign.modal.inverse import InverseExpansion
-from eigassign.modal.model import Model
+from eigassign.modal.model import Model, as_model
 from eigassign.modal.path_fit import PathFit
+from eigassign.modal.reduced_model import ReducedModel
 from eigassign.modal.region import Box, Region, build_region
 from eigassign.modal.roundoff import rounding_error
 from eigassign.modal.stretches import stretches
-from eigassign.series.adaptive_newton import Asking, adaptive
+from eigassign.series.adaptive_newton import adaptive
 from eigassign.series.given_newton import fewest, given
-from eigassign.series.interpolant import Interpolant
+from eigassign.series.interpolant import Asking, Interpolant
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -74,7 +76,8 @@ def fit(
         accuracy = ACCURACY if accuracy is None else accuracy
         regions = [build_region(directions, n_q, part, y) for part in parts]
         floors = [_floor(source, region, wanted, accuracy) for region in regions]
-        runs = [_adaptive(*pair, accuracy, most) for pair in zip(regions, floors, strict=True)]
+        pairs = zip(regions, floors, strict=True)
+        runs = [adaptive(region.nodes, accuracy - floor, most) for region, floor in pairs]
     else:
         count = whole_within(solves, "solves", 1, MOST)
         counts = [count]
@@ -82,7 +85,7 @@ def fit(
             d = build_region(directions, n_q, parts[0], y).d
             counts = path.shares(count, fewest(d))
         regions, floors = _best_nodes(source, parts, y, wanted, counts)
-        runs = [_given(*pair) for pair in zip(regions, counts, strict=True)]
+        runs = [given(region.nodes, own) for region, own in zip(regions, counts, strict=True)]
     made = zip(regions, _driven(source, wanted, regions, runs), floors, strict=True)
     fits = tuple(_fit(source, wanted, accuracy, *each) for each in made)
     return fits[0] if path is None or len(fits) == 1 else PathFit(fits, path.rows)
@@ -106,16 +109,6 @@ def _best_nodes(
         return regions, [0.0] * len(regions)
     nested = (build_region(directions, n_q, part, y) for part in parts)
     return regions, [_floor(source, region, modes, None) for region in nested]
-
-
-def _adaptive(region: Region, floor: float, accuracy: float, most: int) -> Asking:
-    tables = [axis.table for axis in region.axes]
-    return adaptive(tables, accuracy - floor, most, [axis.points.whole for axis in region.axes])
-
-
-def _given(region: Region, count: int) -> Asking:
-    tables = [axis.table for axis in region.axes]
-    return given(tables, count, [axis.points.whole for axis in region.axes])
 
 
 def _driven(
@@ -155,9 +148,17 @@ def _fit(
     found: Interpolant,
     floor: float,
 ) -> Fit:
-    if not floor and isinstance(source, Model) and found.error < _fine(source):
-        floor = rounding_error(source.pencil, region.centre, modes[-1])
-    return Fit(modes, region, accuracy, found.error + floor, found, floor)
+    own = partial(_own_error, source, region, modes, found.error, floor)
+    return Fit(modes, region, accuracy, found, own)
+
+
+def _own_error(
+    source: Any, region: Region, modes: tuple[int, ...], error: float, floor: float
+) -> float:
+    """The floor, or round-off where that was not looked at and may matter beside the error."""
+    if floor or not isinstance(source, Model) or error >= _fine(source):
+        return floor
+    return rounding_error(source.pencil, region.centre, modes[-1])
 
 
 def _fine(model: Model) -> float:
@@ -173,6 +174,8 @@ def _dependence(source: Any) -> tuple[Floats, int]:
         source = source.expansion
     if isinstance(source, Expansion):
         return source.directions, len(source.q0)
+    if not isinstance(source, ReducedModel):
+        as_model(source)
     return source.to_program[source.program.dependence.any(axis=0)], source.n_q
 
 

@@ -12,45 +12,13 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.series.newton import basis, interval, leja, roots
+from eigassign.series.newton import Nodes, basis, interval, roots
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 MOST_STATIONS = 48  # nodes along a trajectory
 DENSE = 513  # samples of a trajectory that may be nodes
 STILL = 1e-9  # rad or m: what moves less stands still, what is off by less lies on the path
-
-
-@dataclass(frozen=True, eq=False)
-class Nodes:
-    """At most ``most`` Leja points among candidates v (K,), with Newton's basis.
-
-    They are ``whole`` if they are all that will be asked for.
-    """
-
-    places: Floats
-    most: int
-    whole: bool = False
-
-    @cached_property
-    def chosen(self) -> Ints:
-        """Which candidates, in the order of the points."""
-        return leja(self.places, self.most)
-
-    @cached_property
-    def v(self) -> Floats:
-        """The points."""
-        return np.asarray(self.places[self.chosen])
-
-    @cached_property
-    def table(self) -> Floats:
-        """Newton's basis at the points."""
-        return basis(self.v, self.v)
-
-    @cached_property
-    def inverse(self) -> Floats:
-        """From values at the points to coefficients."""
-        return np.asarray(np.linalg.inv(self.table))
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,18 +33,12 @@ class Axis:
         """v of the nodes, in their order."""
         return self.points.v
 
-    @property
-    def table(self) -> Floats:
-        """Newton's basis at the nodes."""
-        return self.points.table
-
 
 @dataclass(frozen=True, eq=False)
 class Line:
     """A trajectory as one axis: v_0 of its samples; a straight one is linear in x."""
 
     axis: Axis
-    q: Floats  # the samples (n_t, n_q)
     place: Floats  # (n_t,) in [−1, 1]
     row: Floats  # dv_0/dx (n_x,)
     straight: bool
@@ -87,11 +49,25 @@ class Line:
         return basis(self.axis.nodes, self.place)
 
 
-def line_of(joints: Floats, q: Floats, n_y: int, count: int | None) -> Line | None:
-    """The axis of samples q (n_t, n_q); None where they stand still in ``joints`` (n_s, n_q).
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Finite samples q (n_t, n_q) of a path, and the joint coordinates that matter (n_s, n_q)."""
 
-    With nested nodes, or with the best ``count`` ones.
-    """
+    q: Floats
+    joints: Floats
+    n_y: int
+
+    def line(self, count: int | None) -> Line | None:
+        """Its axis, made once for all designs, with nested nodes or the best ``count`` ones.
+
+        None where it stands still in the joint coordinates.
+        """
+        return _line(self, count)
+
+
+@lru_cache(maxsize=64)
+def _line(stretch: Stretch, count: int | None) -> Line | None:
+    q, joints, n_y = stretch.q, stretch.joints, stretch.n_y
     if not q.shape[1]:
         return None
     reach = (q - q[0]) @ joints.T
@@ -104,14 +80,14 @@ def line_of(joints: Floats, q: Floats, n_y: int, count: int | None) -> Line | No
         far = int(np.abs(place - place[0]).argmax())
         back = np.linalg.pinv(joints) @ (reach[far] / (place[far] - place[0]))
         steps = np.outer(points.v - place[0], np.append(back, np.zeros(n_y)))
-        return Line(Axis(points, steps), q, place, row, True)
+        return Line(Axis(points, steps), place, row, True)
     keep = np.unique(place, return_index=True)[1]
     some = np.unique(np.linspace(0, len(keep) - 1, min(len(keep), DENSE)).round().astype(int))
     points = _sampled(place[keep[some]], len(keep), count)
     steps = np.zeros((len(points.chosen), q.shape[1] + n_y))
     at = np.searchsorted(place[keep], points.v)
     steps[:, : q.shape[1]] = q[keep[at]] - q[0]
-    return Line(Axis(points, steps), q, place, row, False)
+    return Line(Axis(points, steps), place, row, False)
 
 
 def _sampled(places: Floats, of: int, count: int | None) -> Nodes:

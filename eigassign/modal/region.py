@@ -8,14 +8,15 @@ asked for. Joint coordinates and design parameters that no frequency depends on 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import UsageError
-from eigassign.modal.line import STILL, Axis, Line, chosen_nodes, interval_nodes, line_of
+from eigassign.modal.line import STILL, Axis, Line, Stretch, chosen_nodes, interval_nodes
 from eigassign.modal.samples import samples
+from eigassign.series.newton import Nodes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -59,6 +60,11 @@ class Region:
         """Number of axes."""
         return len(self.axes)
 
+    @property
+    def nodes(self) -> list[Nodes]:
+        """Of each axis."""
+        return [axis.points for axis in self.axes]
+
     @cached_property
     def to_v(self) -> Floats:
         """dv/dx, (d, n_x)."""
@@ -79,9 +85,9 @@ class Region:
 
     def x(self, members: Ints) -> Floats:
         """(q, y) (n, n_x) at the nodes of multi-indices (n, d)."""
-        out = self.axes[0].steps[members[:, 0]] + self.centre
+        out = self.axes[0].steps.take(members[:, 0], axis=0) + self.centre
         for j, axis in enumerate(self.axes[1:], 1):
-            out += axis.steps[members[:, j]]
+            out += axis.steps.take(members[:, j], axis=0)
         return out
 
     def v(self, q: ArrayLike, y: ArrayLike) -> Floats:
@@ -163,56 +169,40 @@ class Region:
 
 
 def build_region(
-    directions: Floats, n_q: int, q: ArrayLike | Box, y: ArrayLike | Box, count: int | None = None
+    directions: Floats, n_q: int, q: Stretch | Box, y: ArrayLike | Box, count: int | None = None
 ) -> Region:
-    """The region of q, samples (n_t, n_q) of a trajectory, one pose or a box, and y likewise.
+    """The region of q, a stretch of a trajectory, one pose or a box, and of y, a design or a box.
 
     ``directions`` (n_w, n_x) are the combinations of x on which anything depends. A single axis has
     the best ``count`` nodes where that is given. Raises UsageError for wrong lengths, and where
     nothing that matters varies.
     """
     n_y = directions.shape[1] - n_q
-    path = None if isinstance(q, Box) else path_samples(q, n_q, n_y)
+    path = None if isinstance(q, Box) else q.q
     axes: list[Axis] = []
     rows: list[Floats] = []
     if path is not None and not isinstance(y, Box):
         centre = np.concatenate([path[0], _numbers(y, n_y, "y")])
     else:
-        both = [_ends(q if path is None else path[0], n_q, "q"), _ends(y, n_y, "y")]
+        both = [_ends(q if isinstance(q, Box) else q.q[0], n_q, "q"), _ends(y, n_y, "y")]
         low, high = np.hstack(both)
         centre = 0.5 * (low + high)
         rows, axes = _box_axes(directions, low, high, n_q, count if path is None else None)
-    line = None if path is None else _line(path, directions, None if axes else count)
+    line = None if isinstance(q, Box) else q.line(None if axes else count)
     if line is not None:
-        path, axes, rows = line.q, [line.axis, *axes], [line.row, *rows]
+        axes, rows = [line.axis, *axes], [line.row, *rows]
     if not axes:
         raise UsageError("nothing to fit: no coordinate or parameter that matters has room")
     if len(axes) > MOST_AXES:
         raise UsageError(f"a fit has at most {MOST_AXES} axes, not {len(axes)}: fix some of them")
-    kept = path if line is not None or path is None else path.copy()
-    return Region(tuple(axes), centre, tuple(rows), kept, line, directions, n_q)
+    return Region(tuple(axes), centre, tuple(rows), path, line, directions, n_q)
 
 
 def path_samples(q: ArrayLike, n_q: int, n_y: int) -> Floats:
     """Of a trajectory, (n_t, n_q). Raises UsageError for wrong shapes."""
     if isinstance(q, np.ndarray) and q.dtype == np.float64 and q.ndim == 2 and q.shape[1] == n_q:
-        return q  # whether it is finite is checked with its line, once
+        return q  # whether it is finite is checked once
     return samples(q, np.zeros(n_y), n_q, n_y)[:, :n_q]
-
-
-def _line(path: Floats, directions: Floats, count: int | None) -> Line | None:
-    """The axis of a trajectory, made once for all designs; None where it stands still."""
-    return _known_line(path.tobytes(), path.shape, directions.tobytes(), directions.shape, count)
-
-
-@lru_cache(maxsize=64)
-def _known_line(
-    path: bytes, shape: tuple[int, int], combinations: bytes, of: tuple[int, int], count: int | None
-) -> Line | None:
-    q, directions = np.ndarray(shape, buffer=path), np.ndarray(of, buffer=combinations)
-    if not np.isfinite(q).all():
-        raise UsageError("q must be finite")
-    return line_of(joints_of(directions, shape[1]), q, of[1] - shape[1], count)
 
 
 def joints_of(directions: Floats, n_q: int) -> Floats:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from eigassign.errors import UsageError
 from eigassign.mechanism.trajectories import Trajectories
 from eigassign.modal.corners import smooth_parts
+from eigassign.modal.line import Stretch
 from eigassign.modal.region import joints_of, path_samples
 
 Floats = NDArray[np.float64]
@@ -20,9 +21,9 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Samples (n, n_q) of each stretch, which of all samples they are, and its length."""
+    """Stretches, which of all samples each has, and its length."""
 
-    parts: tuple[Floats, ...]
+    parts: tuple[Stretch, ...]
     rows: tuple[slice, ...]
     lengths: tuple[float, ...]
 
@@ -72,7 +73,9 @@ def _known(path: bytes, shape: tuple[int, int], combinations: bytes, of: tuple[i
     q, directions = np.ndarray(shape, buffer=path), np.ndarray(of, buffer=combinations)
     if not np.isfinite(q).all():
         raise UsageError("q must be finite")
-    s = q @ joints_of(directions, shape[1]).T
+    joints = joints_of(directions, shape[1])
+    s = q @ joints.T
     rows = smooth_parts(s)
     lengths = tuple(float(np.linalg.norm(np.diff(s[own], axis=0), axis=1).sum()) for own in rows)
-    return Path(tuple(q[own] for own in rows), rows, lengths)
+    parts = tuple(Stretch(q[own], joints, of[1] - shape[1]) for own in rows)
+    return Path(parts, rows, lengths)

@@ -8,26 +8,29 @@ them one batch of values.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dtrtrs
 
-from eigassign.errors import AccuracyError
+from eigassign.series.adding import Adding
 from eigassign.series.interpolant import (
     POWERS,
+    ROUNDS,
+    Asking,
     Interpolant,
     nearly_best,
-    on_line,
     powers_of,
+    refuse,
     sizes_of,
     tail,
 )
+from eigassign.series.line_newton import adaptive_on_line
 from eigassign.series.lower_set import total_degree
-from eigassign.series.margin import UNKNOWN, Margin, keys, margin, rate
-from eigassign.series.newton import cross, ordered, products, spread_steps
+from eigassign.series.margin import UNKNOWN, Border, keys, rates_of, rows_of
+from eigassign.series.newton import Nodes, cross, frozen, ordered, products, spread_steps
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -35,23 +38,8 @@ MISSED = 3.0  # how much worse than at the points held out it may be elsewhere
 CHECKED = 12  # members for each further point that is held out
 TRUSTED = 4  # degree from which a rate is believed
 STARTS = (5e-3, 5e-4)  # accuracies below each of which one degree more is started with
-STARTS_LINE = (
-    5e-3,
-    5e-3,
-    5e-4,
-    5e-5,
-    5e-6,
-    5e-7,
-    5e-8,
-    5e-9,
-)  # on a single axis: two more at first
 FEW = 12  # nodes below which an axis is taken whole
 GROWTH = 3  # times as many members in one round at most
-STEPS = 4  # further members in one round on a single axis at most
-ROUNDS = 12
-
-
-Asking = Generator[Ints, Floats, Interpolant]  # members wanted → values (n, n_outputs) sent
 
 
 def interpolate(sample: Callable[[Ints], Floats], run: Asking) -> Interpolant:
@@ -65,126 +53,118 @@ def interpolate(sample: Callable[[Ints], Floats], run: Asking) -> Interpolant:
             return found
 
 
-def adaptive(
-    tables: Sequence[Floats], accuracy: float, most: int, whole: Sequence[bool] | None = None
-) -> Asking:
+def adaptive(axes: Sequence[Nodes], accuracy: float, most: int) -> Asking:
     """The interpolant of f to a relative ``accuracy``; asks for values, round by round.
 
-    ``tables`` hold Newton's basis at the nodes of each axis; an axis is ``whole`` if nothing but
-    its nodes is ever asked for. Raises AccuracyError where ``most`` values, or the nodes, do not
+    ``axes`` are the nodes of each. Raises AccuracyError where ``most`` values, or the nodes, do not
     suffice.
     """
-    tops = np.array([len(table) - 1 for table in tables], dtype=np.intp)
-    finite = np.array(whole if whole is not None else [False] * len(tops))
-    state = Growing.empty(tables, np.where(finite, tops, tops + 1))
-    fresh, expected = _start(tops, finite, accuracy), np.inf
+    if len(axes) == 1:
+        return adaptive_on_line(axes[0], accuracy, most)
+    return _on_box(axes, accuracy, most)
+
+
+def _on_box(axes: Sequence[Nodes], accuracy: float, most: int) -> Asking:
+    state = Growing(axes)
+    fresh, expected = _start(axes, accuracy), np.inf
+    state.border.grow(keys(fresh).tolist())
     rounds: list[tuple[int, float]] = []
     while True:
-        apart = held_out(np.vstack([state.members, fresh]), tops, len(rounds))
+        apart = held_out(state.border, len(rounds))
         values = yield np.vstack([fresh, apart])
-        state = state.grown(fresh, values[: len(fresh)], len(values))
+        state.take(fresh, values)
         found = state.best()
         missed = state.missed(found, apart, values[len(fresh) :])
         surprise = max(1.0, float(found.sizes[-len(fresh) :].sum()) / expected)
         rounds.append((len(state.members), max(surprise * found.error, missed)))
         if rounds[-1][1] <= accuracy:
-            return replace(found, error=rounds[-1][1], rounds=tuple(rounds), asked=state.asked)
+            return found._replace(error=rounds[-1][1], rounds=tuple(rounds))
         doubt = max(surprise, missed / found.error if found.error else 1.0)
-        fresh, expected = _wanted(found, tops, accuracy / doubt)
-        count = len(state.members) + len(fresh)
+        fresh, expected = _wanted(state.border, found, accuracy / doubt)
+        count = len(state.border.places)
         if not len(fresh) or count > most or len(rounds) == ROUNDS:
-            raise AccuracyError(_refusal(rounds[-1], accuracy, count, most))
+            refuse(rounds[-1], accuracy, count, most)
 
 
-def _refusal(reached: tuple[int, float], accuracy: float, count: int, most: int) -> str:
-    done = f"{reached[0]} values leave an estimated error of {reached[1]:.1e}, not {accuracy:.1e}"
-    return f"{done}, and " + (
-        f"over {most} are not allowed" if count > most else "more do not help"
-    )
-
-
-def _start(tops: Ints, whole: NDArray[np.bool_], accuracy: float) -> Ints:
+def _start(axes: Sequence[Nodes], accuracy: float) -> Ints:
     """All members of degree 2, and the axes alone to what the accuracy will surely need.
 
     A whole axis of few nodes is taken at once: so few samples show no rate.
     """
-    d = len(tops)
-    degree = 2 + sum(accuracy < each for each in (STARTS_LINE if d == 1 else STARTS))
-    reach = np.where(whole & (tops < FEW), tops, np.minimum(degree, tops))
-    if d == 1:
-        return np.arange(reach[0] + 1)[:, None]
-    lines = cross(d, int(reach.max()))
-    plain = total_degree(d, 2).indices
+    tops = tuple(len(each.v) - 1 for each in axes)
+    all_ = tuple(each.whole and len(each.v) <= FEW for each in axes)
+    return _started(tops, all_, 2 + sum(accuracy < each for each in STARTS))
+
+
+@lru_cache(maxsize=64)
+def _started(tops: tuple[int, ...], all_: tuple[bool, ...], degree: int) -> Ints:
+    d, reach = len(tops), np.where(all_, tops, np.minimum(degree, tops))
+    lines, plain = cross(d, int(reach.max())), total_degree(d, 2).indices
     keep = np.vstack([lines[(lines <= reach).all(axis=1)], plain[(plain <= tops).all(axis=1)]])
-    return ordered(keep)
+    return frozen(ordered(keep))
 
 
-def held_out(members: Ints, tops: Ints, rounds: int) -> Ints:
-    """Points for a check (n, d): corners, one far from all nodes, and others all over the box.
-
-    None on a single axis, where every value was a check of the interpolant before it.
-    """
-    d = len(tops)
-    if d == 1:
-        return members[:0]
-    turns = np.arange(d) % 2
-    corners = np.array([np.full(d, 1), np.full(d, 2), 1 + turns, 2 - turns])  # nodes 1, 2: ends
-    far = np.vstack([corners, members.max(axis=0) + 1])
+def held_out(border: Border, rounds: int) -> Ints:
+    """Points for a check (n, d): corners, one far from all nodes, and others all over the box."""
+    tops, members = np.array(border.tops), rows_of(np.array(list(border.places)), len(border.tops))
+    far = np.vstack([_corners(len(tops)), members.max(axis=0) + 1])
     k = np.arange(1, 2 + len(members) // CHECKED)[:, None] + 100 * rounds
-    spread = np.floor((0.5 + k * spread_steps(d)) % 1.0 * (tops + 1)).astype(np.intp)
+    spread = np.floor((0.5 + k * spread_steps(len(tops))) % 1.0 * (tops + 1)).astype(np.intp)
     apart = np.minimum(np.vstack([far, spread]), tops)
-    return np.asarray(apart[~np.isin(keys(apart), keys(members))])
+    return np.asarray(apart[[key not in border.places for key in keys(apart).tolist()]])
 
 
-@dataclass(frozen=True, eq=False)
+@lru_cache(maxsize=16)
+def _corners(d: int) -> Ints:
+    """Some of them, for nodes 1 and 2 are the ends."""
+    turns = np.arange(d) % 2
+    return frozen(np.array([np.full(d, 1), np.full(d, 2), 1 + turns, 2 - turns]))
+
+
 class Growing:
-    """Members so far, and the coefficients of every power, (N, n_powers · n_outputs)."""
+    """Members so far, and the coefficients of every power; ``border`` may be ahead of them."""
 
-    tables: Sequence[Floats]
-    limits: Ints  # degrees beyond which nothing is missing
-    members: Ints
-    c: Floats
-    smallest: Floats  # the least f^p seen, (n_powers · n_outputs,)
-    asked: int
-
-    @staticmethod
-    def empty(tables: Sequence[Floats], limits: Ints) -> Growing:
+    def __init__(self, axes: Sequence[Nodes]) -> None:
         """Before any value is known."""
-        nothing = np.zeros((0, len(limits)), dtype=np.intp)
-        return Growing(tables, limits, nothing, np.zeros((0, 1)), np.full(1, np.inf), 0)
+        self.tables = [each.table for each in axes]
+        tops = [len(each.v) - 1 for each in axes]
+        self.border = Border(tops, [each.whole for each in axes])
+        self.members: Ints = np.zeros((0, len(axes)), dtype=np.intp)
+        self.c: Floats = np.zeros((0, 1))  # (N, n_powers · n_outputs)
+        self.smallest: Floats = np.full(1, np.inf)  # the least f^p seen, (n_powers · n_outputs,)
+        self.asked = 0
 
-    def grown(self, fresh: Ints, values: Floats, asked: int) -> Growing:
-        """With further members; the coefficients of the others stay as they are."""
-        g = powers_of(values)
-        rest = g if not len(self.c) else g - products(self.tables, fresh, self.members) @ self.c
+    def take(self, fresh: Ints, values: Floats) -> None:
+        """Further members, with whose ``values`` those held out come; other c stay as they are."""
+        g = rest = powers_of(values[: len(fresh)])
+        if len(self.c):
+            rest = g - products(self.tables, fresh, self.members) @ self.c
         own = dtrtrs(products(self.tables, fresh, fresh), rest, lower=1, unitdiag=1)[0]
-        return replace(
-            self,
-            members=np.vstack([self.members, fresh]),
-            c=np.vstack([self.c.reshape(-1, g.shape[1]), own]),
-            smallest=np.minimum(self.smallest, g.min(axis=0)),
-            asked=self.asked + asked,
-        )
+        self.members = np.vstack([self.members, fresh])
+        self.c = np.vstack([self.c, own]) if len(self.c) else own
+        self.smallest = np.minimum(self.smallest, g.min(axis=0))
+        self.asked += len(values)
 
     def best(self) -> Interpolant:
-        """The power with the least error, or nearly."""
-        if len(self.limits) == 1:
-            return on_line(self.members, self.c, self.smallest, len(self.c) > self.limits[0])
-        edge, sizes = margin(self.members, self.limits), sizes_of(self.c, self.smallest)
-        rates = [np.array([rate(axis, each) for axis in self.members.T]) for each in sizes]
-        errors = [self._rest(edge, *pair) for pair in zip(sizes, rates, strict=True)]
+        """The power with the least error, or nearly; all of ``border`` must be known."""
+        sizes = sizes_of(self.c, self.smallest)
+        rates = rates_of(self.members, sizes)
+        errors = self._rest(sizes, rates)
         k = nearly_best(errors)
-        c = np.split(self.c, len(POWERS), axis=1)[k].T
-        return Interpolant(POWERS[k], self.members, c, sizes[k], rates[k], errors[k])
+        own = self.c.T.reshape(len(POWERS), -1, len(self.c))[k]
+        power, error = POWERS[k], errors[k]
+        return Interpolant(power, self.members, own, sizes[k], rates[k], error, asked=self.asked)
 
-    def _rest(self, edge: Margin, sizes: Floats, rates: Floats) -> float:
-        """Estimated Σ |c_γ| over all γ that are missing.
+    def _rest(self, sizes: Floats, rates: Floats) -> list[float]:
+        """Estimated Σ |c_γ| over all γ that are missing, of each power.
 
         While an axis has shown few coefficients, its rate is not trusted to be small.
         """
         short = (self.members.max(axis=0) < TRUSTED) & (rates > 0.0)
         cautious = np.where(short, np.maximum(rates, UNKNOWN), rates)
-        return float(edge.predicted(sizes, cautious).sum()) * tail(float(cautious.max()))
+        next_ = self.border.margin().predicted(sizes, cautious).sum(axis=1)
+        both = zip(next_.tolist(), cautious.max(axis=1).tolist(), strict=True)
+        return [each * tail(rate) for each, rate in both]
 
     def missed(self, found: Interpolant, apart: Ints, values: Floats) -> float:
         """|δf/f| at the points held out, with a margin."""
@@ -193,23 +173,21 @@ class Growing:
         return MISSED * float(off.max(initial=0.0)) / abs(found.power)
 
 
-def _wanted(found: Interpolant, tops: Ints, accuracy: float) -> tuple[Ints, float]:
+def _wanted(border: Border, found: Interpolant, accuracy: float) -> tuple[Ints, float]:
     """Members to add, predecessors first, and Σ |c_γ| expected of them.
 
     Of the margin, and of that of what is added, the largest until the rest is small enough; none
     where every axis is at its end.
     """
-    members, sizes, have = found.members, found.sizes, len(found.members)
+    adding, have = Adding(border, found), len(found.members)
     left = 0.5 * accuracy / tail(float(found.rates.max()))
-    most = have + STEPS if len(tops) == 1 else (1 + GROWTH) * have
-    while len(members) < most:
-        edge = margin(members, tops)
-        predicted = edge.predicted(sizes, found.rates)
-        order = np.argsort(predicted)
-        keep = order[int(np.searchsorted(np.cumsum(predicted[order]), left, side="right")) :]
-        if not len(keep) and len(members) == have:
-            keep = order[predicted[order] > 0.0]  # the error is too large for another reason
-        if not len(keep):
+    while len(adding.keys) < GROWTH * have:
+        ranked = adding.ranked()
+        rest = np.cumsum([adding.next[key] for key in reversed(ranked)])
+        keep = ranked[: len(ranked) - int(np.searchsorted(rest, left, side="right"))]
+        if not keep and not adding.keys:  # the error is too large for another reason
+            keep = [key for key in ranked if adding.next[key] > 0.0]
+        if not keep:
             break
-        members, sizes = np.vstack([members, edge.rows[keep]]), np.append(sizes, predicted[keep])
-    return members[have:], float(sizes[have:].sum())
+        adding.take(keep)
+    return adding.rows, adding.expected

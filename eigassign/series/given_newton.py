@@ -8,21 +8,20 @@ are held out for a check.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import lru_cache
 from math import ceil, log
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dtrtrs
 
 from eigassign.errors import AccuracyError, UsageError
-from eigassign.series.adaptive_newton import Asking, Growing, held_out
-from eigassign.series.interpolant import Interpolant, on_line, powers_of
-from eigassign.series.margin import margin
-from eigassign.series.newton import cross
+from eigassign.series.adaptive_newton import Growing, held_out
+from eigassign.series.adding import Adding
+from eigassign.series.interpolant import Asking, Interpolant
+from eigassign.series.line_newton import given_on_line
+from eigassign.series.margin import Border, keys
+from eigassign.series.newton import Nodes, cross, frozen
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 LOOK = 2  # degree on each axis that is looked at first
 CHECKS, CHECKED = 2, 25  # values held out on several axes, and for how many there is one more
@@ -31,18 +30,17 @@ DOUBT = 2.0  # on what the coefficients show on several axes
 WORTHLESS = 0.5  # an estimate that is no estimate
 
 
-def given(tables: Sequence[Floats], count: int, whole: Sequence[bool]) -> Asking:
-    """The interpolant from ``count`` values, fewer if there are no more nodes.
+def given(axes: Sequence[Nodes], count: int) -> Asking:
+    """The interpolant from ``count`` values, fewer if there are no more nodes on the axes.
 
-    ``tables`` and ``whole`` are as for `adaptive`. Raises UsageError for too few values to tell an
-    error, AccuracyError where they show that it is large.
+    Raises UsageError for too few values to tell an error, AccuracyError where they show that it is
+    large.
     """
-    d = len(tables)
+    d = len(axes)
     if count < fewest(d):
-        axes = "axis" if d == 1 else "axes"
-        raise UsageError(f"{count} solves for {d} {axes}: at least {fewest(d)} are needed")
-    run = _on_line(tables[0], count, whole[0]) if d == 1 else _on_box(tables, count, whole)
-    found = yield from run
+        named = "axis" if d == 1 else "axes"
+        raise UsageError(f"{count} solves for {d} {named}: at least {fewest(d)} are needed")
+    found = yield from given_on_line(axes[0], count) if d == 1 else _on_box(axes, count)
     if not found.error < WORTHLESS:
         raise AccuracyError(f"{found.asked} values leave an estimated error of {found.error:.1e}")
     return found
@@ -53,42 +51,29 @@ def fewest(d: int) -> int:
     return 1 + LOOK if d == 1 else 1 + LOOK * d + CHECKS
 
 
-def _on_line(table: Floats, count: int, whole: bool) -> Asking:
-    n = min(count, len(table))
-    members = _degrees(n)
-    values = yield members
-    g = powers_of(values)
-    c = dtrtrs(table[:n, :n], g, lower=1, unitdiag=1)[0]
-    return on_line(members, c, np.minimum.reduce(g), whole and n == len(table), n)
-
-
-@lru_cache(maxsize=64)
-def _degrees(n: int) -> Ints:
-    """0 … n − 1 on a single axis, (n, 1)."""
-    degrees = np.arange(n)[:, None]
-    degrees.setflags(write=False)
-    return degrees
-
-
-def _on_box(tables: Sequence[Floats], count: int, whole: Sequence[bool]) -> Asking:
-    tops = np.array([len(table) - 1 for table in tables], dtype=np.intp)
-    count = min(count, int(np.prod(tops + 1.0)))
-    lines = cross(len(tops), LOOK)
-    fresh, expected = lines[(lines <= tops).all(axis=1)], np.inf
-    state = Growing.empty(tables, np.where(whole, tops, tops + 1))
+def _on_box(axes: Sequence[Nodes], count: int) -> Asking:
+    state = Growing(axes)
+    count = min(count, int(np.prod(np.array(state.border.tops) + 1.0)))
+    fresh, expected = _looks(state.border.tops), np.inf
+    state.border.grow(keys(fresh).tolist())
     for target in _targets(len(fresh), count - CHECKS - count // CHECKED):
-        state = state.grown(fresh, (yield fresh), len(fresh))
-        found = state.best()
-        fresh, expected = _largest(found, tops, target - len(state.members))
-    done = np.vstack([state.members, fresh])
-    apart = held_out(done, tops, 0)[: count - len(done)]
+        state.take(fresh, (yield fresh))
+        fresh, expected = _largest(state.border, state.best(), target - len(state.members))
+    apart = held_out(state.border, 0)[: count - len(state.border.places)]
     values = yield np.vstack([fresh, apart])
-    state = state.grown(fresh, values[: len(fresh)], len(values))
+    state.take(fresh, values)
     found = state.best()
     surprise = max(1.0, float(found.sizes[-len(fresh) :].sum()) / expected)
     missed = state.missed(found, apart, values[len(fresh) :])
     error = max(DOUBT * surprise * found.error, missed)
-    return replace(found, error=error, rounds=((len(done), error),), asked=state.asked)
+    return found._replace(error=error, rounds=((len(state.members), error),))
+
+
+@lru_cache(maxsize=64)
+def _looks(tops: tuple[int, ...]) -> Ints:
+    """The axes alone."""
+    lines = cross(len(tops), LOOK)
+    return frozen(lines[(lines <= tops).all(axis=1)])
 
 
 def _targets(start: int, members: int) -> list[int]:
@@ -98,16 +83,9 @@ def _targets(start: int, members: int) -> list[int]:
     return [round(start * ratio ** (k / batches)) for k in range(1, batches + 1)]
 
 
-def _largest(found: Interpolant, tops: Ints, count: int) -> tuple[Ints, float]:
+def _largest(border: Border, found: Interpolant, count: int) -> tuple[Ints, float]:
     """The ``count`` missing members predicted largest, predecessors first, and their sum."""
-    members, sizes, have = found.members, found.sizes, len(found.members)
-    while len(members) < have + count:
-        edge = margin(members, tops)
-        if not len(edge.rows):
-            break
-        predicted = edge.predicted(sizes, found.rates)
-        room = have + count - len(members)
-        order = np.argsort(-predicted)[: max(1, min(room, len(predicted) // 2))]
-        members = np.vstack([members, edge.rows[order]])
-        sizes = np.append(sizes, predicted[order])
-    return members[have:], float(sizes[have:].sum())
+    adding = Adding(border, found)
+    while len(adding.keys) < count and (ranked := adding.ranked()):
+        adding.take(ranked[: max(1, min(count - len(adding.keys), len(ranked) // 2))])
+    return adding.rows, adding.expected

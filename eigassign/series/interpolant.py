@@ -1,35 +1,25 @@
-"""An interpolant of a positive function in Newton's basis: of f, f² or f⁻², and its error.
-
-On a single axis the error is told from the coefficients alone: the first that is missing is about
-
-    |c_N| ≈ max_k |c_{N−k}| r^k ,
-
-over the last few but the constant, for several in turn may be small by accident; r is the factor by
-which they fall from one degree to the next, not trusted to be small while few have been seen.
-"""
+"""An interpolant of a positive function in Newton's basis: of f, f² or f⁻², and its error."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Generator, Sequence
 from functools import lru_cache
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.series.margin import UNKNOWN, decay
+from eigassign.errors import AccuracyError
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 POWERS = (1.0, 2.0, -2.0)  # of f that are tried, the quickest to evaluate first
 SAFETY = 4.0  # on the predicted rest
-TRUSTED_LINE = 6  # degree from which the rate on a single axis is believed
-LAST = 4  # coefficients looked at on a single axis
 NEAR = 2.0  # how much better another power must be than one that is quicker to evaluate
+ROUNDS = 12  # to an accuracy, at most
 
 
-@dataclass(frozen=True, eq=False)
-class Interpolant:
+class Interpolant(NamedTuple):
     """f^power ≈ Σ_γ c_γ h_γ; ``error`` estimates |δf/f| over the whole box."""
 
     power: float
@@ -40,6 +30,9 @@ class Interpolant:
     error: float
     rounds: tuple[tuple[int, float], ...] = ()  # members and error after each
     asked: int = 0  # values, checks included
+
+
+Asking = Generator[Ints, Floats, Interpolant]  # members wanted → values (n, n_outputs) sent
 
 
 def powers_of(values: Floats) -> Floats:
@@ -76,25 +69,8 @@ def tail(rate: float) -> float:
     return SAFETY / (1.0 - rate)
 
 
-def on_line(members: Ints, c: Floats, smallest: Floats, ended: bool, asked: int = 0) -> Interpolant:
-    """The best power on a single axis; nothing is missing where that ``ended``."""
-    sizes = sizes_of(c, smallest)
-    layers: list[list[float]] = sizes.tolist()
-    rates = [decay(each) for each in layers]
-    errors = [0.0 if ended else _rest(*pair) for pair in zip(layers, rates, strict=True)]
-    k = nearly_best(errors)
-    own = c.T.reshape(len(POWERS), -1, len(c))[k]
-    rate = np.array(rates[k : k + 1])
-    done = ((len(c), errors[k]),)
-    return Interpolant(POWERS[k], members, own, sizes[k], rate, errors[k], done, asked)
-
-
-def _rest(sizes: Sequence[float], rate: float) -> float:
-    """Estimated Σ |c_k| over all k that are missing."""
-    if 0.0 < rate < UNKNOWN and len(sizes) <= TRUSTED_LINE:
-        rate = UNKNOWN
-    largest, factor = 0.0, 1.0
-    for size in sizes[: max(0, len(sizes) - LAST - 1) : -1]:  # the constant shows no rate
-        factor *= rate
-        largest = max(largest, size * factor)
-    return largest * tail(rate)
+def refuse(reached: tuple[int, float], accuracy: float, count: int, most: int) -> NoReturn:
+    """Raise AccuracyError: ``reached`` is how many values leave how large an error."""
+    done = f"{reached[0]} values leave an estimated error of {reached[1]:.1e}, not {accuracy:.1e}"
+    why = f"over {most} are not allowed" if count > most else "more do not help"
+    raise AccuracyError(f"{done}, and {why}")

@@ -9,7 +9,6 @@ the second term being for functions that are even or odd.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -19,6 +18,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 BITS = 6  # of a degree, in the key of a member
+DEGREE = (1 << BITS) - 1
+ANYTHING, NOTHING = -2, -1  # places of what bounds nothing, and of what is zero
 SLOWEST, FASTEST = 0.9, 0.02  # rates that are believed
 UNKNOWN = 0.3  # a rate that two coefficients show is at least this
 IDLE = 1e-13  # relative size of coefficients on an axis that nothing depends on
@@ -29,64 +30,91 @@ def keys(members: Ints) -> Ints:
     return np.asarray(members @ (1 << (BITS * np.arange(members.shape[1]))))
 
 
+def rows_of(keys: Ints, d: int) -> Ints:
+    """The multi-indices (n, d) of keys."""
+    return np.asarray(keys[:, None] >> (BITS * np.arange(d)) & DEGREE)
+
+
 @dataclass(frozen=True, eq=False)
 class Margin:
-    """Missing members (n, d) all of whose predecessors are there, and where these are."""
+    """Where the predecessors of missing members are, all of them being there."""
 
-    rows: Ints
-    one: Ints  # (n, d): place of γ − e_j; N where γ_j = 0
-    two: Ints  # (n, d): place of γ − 2e_j; N + 1 where γ_j < 2
+    one: Ints  # (n, d): place of γ − e_j; `ANYTHING` where γ_j = 0
+    two: Ints  # (n, d): place of γ − 2e_j; `NOTHING` where γ_j < 2
 
     def predicted(self, sizes: Floats, rates: Floats) -> Floats:
-        """|c_γ| (n,) from those of the members (N,)."""
-        known = np.concatenate([sizes, [np.inf, 0.0]])
-        return np.asarray(
-            np.maximum(known[self.one] * np.maximum(rates, 1e-300), known[self.two] * rates**2)
-            .min(axis=1, initial=np.inf)
-        )  # fmt: skip
+        """|c_γ| (k, n) from k times those of the members (k, N) and rates (k, d)."""
+        known = np.empty((len(sizes), sizes.shape[1] + 2))
+        known[:, :-2], known[:, ANYTHING], known[:, NOTHING] = sizes, np.inf, 0.0
+        falling = rates[:, None]
+        both = known[:, self.one] * np.maximum(falling, 1e-300), known[:, self.two] * falling**2
+        return np.asarray(np.maximum(*both).min(axis=2, initial=np.inf))
 
 
-def margin(members: Ints, tops: Ints) -> Margin:
-    """The margin of a lower set (N, d) with γ_j ≤ tops_j."""
-    n, d = members.shape
-    if d == 1:
-        rows = np.array([[n]])[: int(n <= tops[0])]
-        return Margin(rows, rows - 1, np.where(rows > 1, rows - 2, n + 1))
-    base = 1 << (BITS * np.arange(d))
-    mine = keys(members)
-    order = np.argsort(mine)
-    known = mine[order]
-    at, axis = np.nonzero(members < tops)
-    wanted, first = np.unique(mine[at] + base[axis], return_index=True)
-    place = np.minimum(np.searchsorted(known, wanted), n - 1)
-    new = known[place] != wanted
-    wanted, first = wanted[new], first[new]
-    rows = members[at[first]]
-    rows[np.arange(len(rows)), axis[first]] += 1
-    back = wanted[:, None] - np.concatenate([base, 2 * base])
-    place = np.minimum(np.searchsorted(known, back), n - 1)
-    found = np.where(known[place] == back, order[place], -1)
-    one = np.where(rows > 0, found[:, :d], n)
-    two = np.where(rows > 1, found[:, d:], n + 1)
-    keep = (one >= 0).all(axis=1)
-    return Margin(rows[keep], one[keep], two[keep])
+class Border:
+    """A lower set that grows, by the keys of its members, and what is next to them."""
+
+    def __init__(self, tops: Sequence[int], whole: Sequence[bool]) -> None:
+        """Members have γ_j ≤ tops_j; on a ``whole`` axis nothing is missing beyond."""
+        d = len(tops)
+        self.tops = tuple(tops)
+        self.limits = tuple(top + (not all_) for top, all_ in zip(tops, whole, strict=True))
+        self.places: dict[int, int] = {}  # of members
+        # `Margin.one` and `.two` of keys, and of those some of whose predecessors are missing
+        self.next = {0: ([ANYTHING] * d, [NOTHING] * d)}
+        self.later: dict[int, tuple[list[int], list[int]]] = {}
+        self.outside: set[int] = set()  # of what is next, that over a top
+
+    def grow(self, members: Sequence[int]) -> list[int]:
+        """With further members, predecessors first; returns what is new next to them."""
+        fresh = []
+        for key in members:
+            one, _ = self.next.pop(key)
+            place = self.places[key] = len(self.places)
+            idle = one.count(ANYTHING)
+            for j, limit in enumerate(self.limits):
+                degree, after = key >> BITS * j & DEGREE, key + (1 << BITS * j)
+                if degree >= limit:
+                    continue
+                befores = self.later.get(after) or self._unseen(after)
+                befores[0][j], befores[1][j] = place, one[j] if degree else NOTHING
+                if befores[0].count(ANYTHING) == idle - (not degree):  # none is missing
+                    fresh.append(after)
+                    self.next[after] = self.later.pop(after)
+                    if degree == self.tops[j]:
+                        self.outside.add(after)
+        return fresh
+
+    def _unseen(self, key: int) -> tuple[list[int], list[int]]:
+        d = len(self.tops)
+        befores = self.later[key] = ([ANYTHING] * d, [NOTHING] * d)
+        return befores
+
+    def margin(self, keys: Sequence[int] | None = None) -> Margin:
+        """What is next to the members, or those of ``keys`` of it."""
+        chosen = self.next.values() if keys is None else [self.next[key] for key in keys]
+        both = np.array(list(chosen), dtype=np.intp).reshape(-1, 2, len(self.tops))
+        return Margin(both[:, 0], both[:, 1])
 
 
-def rate(degrees: Ints, sizes: Floats) -> float:
-    """By how much coefficients fall from one degree to the next along an axis; 0 if all vanish."""
-    layers = np.zeros(int(degrees.max()) + 1)
-    np.maximum.at(layers, degrees, sizes)
-    return decay(layers.tolist())
+def rates_of(members: Ints, sizes: Floats) -> Floats:
+    """`decay` of several sizes (n, N) of members (N, d) along each axis, (n, d)."""
+    out = []
+    for degrees in members.T:
+        order = np.argsort(degrees, kind="stable")
+        starts = np.searchsorted(degrees[order], np.arange(int(degrees[order[-1]]) + 1))
+        layers = np.maximum.reduceat(sizes[:, order], starts, axis=1)
+        out.append([decay(each) for each in layers.tolist()])
+    return np.array(out).T
 
 
 def decay(layers: Sequence[float]) -> float:
-    """The same of the largest coefficient of each degree."""
+    """By how much the largest coefficient falls from one degree to the next; 0 if all vanish."""
     first, others = layers[0], layers[1:]
     if not others or max(others) <= IDLE * first:
         return 0.0
-    pairs = [max(pair) for pair in itertools.pairwise(others)] or others
-    if len(pairs) == 1:
-        found = max(UNKNOWN, (pairs[0] / min(first, 1.0)) ** 0.5)
-    else:
-        found = (pairs[-1] / pairs[0]) ** (1.0 / (len(pairs) - 1))
+    if len(others) < 3:
+        found = max(UNKNOWN, (max(others) / min(first, 1.0)) ** 0.5)
+    else:  # of pairs, for every other one may vanish
+        found = (max(others[-2:]) / max(*others[:2], 1e-300)) ** (1.0 / (len(others) - 2))
     return float(min(max(found, FASTEST), SLOWEST))

@@ -14,10 +14,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dtrtri
 
 from eigassign.series.evaluation import Monomials, Polynomials
 from eigassign.series.lower_set import LowerSet, lower_set
@@ -59,6 +60,38 @@ def basis(nodes: Floats, v: Floats) -> Floats:
         scale = nodes[k] - nodes[:k]
         table[:, k] = np.prod((v[:, None] - nodes[:k]) / scale, axis=1)
     return table
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """At most ``most`` Leja points among candidates v (K,), with Newton's basis.
+
+    They are ``whole`` if they are all that will be asked for.
+    """
+
+    places: Floats
+    most: int
+    whole: bool = False
+
+    @cached_property
+    def chosen(self) -> Ints:
+        """Which candidates, in the order of the points."""
+        return leja(self.places, self.most)
+
+    @cached_property
+    def v(self) -> Floats:
+        """The points."""
+        return np.asarray(self.places[self.chosen])
+
+    @cached_property
+    def table(self) -> Floats:
+        """Newton's basis at the points."""
+        return basis(self.v, self.v)
+
+    @cached_property
+    def inverse(self) -> Floats:
+        """From values at the points to coefficients; leading blocks are those of fewer points."""
+        return np.asarray(dtrtri(self.table, lower=1, unitdiag=1)[0])
 
 
 def products(tables: Sequence[Floats], rows: Ints, columns: Ints) -> Floats:
@@ -124,12 +157,19 @@ def _scales(members: Ints, nodes: Sequence[Floats]) -> Floats:
     return out
 
 
+@lru_cache(maxsize=16)
 def spread_steps(d: int) -> Floats:
     """α_i = g^-i, g the root of g^(d+1) = g + 1: (k α) mod 1 fills the unit box (Roberts 2018)."""
     g = 2.0
     for _ in range(60):
         g = (1.0 + g) ** (1.0 / (d + 1.0))
     return np.asarray(g ** -np.arange(1.0, d + 1.0))
+
+
+def frozen(members: Ints) -> Ints:
+    """Members that all may share who ask for them again."""
+    members.setflags(write=False)
+    return members
 
 
 def ordered(members: Ints) -> Ints:

@@ -1,7 +1,8 @@
 """eigassign's fits as charted methods: along one trajectory at a design, and over trajectory × box.
 
 To a stated accuracy, or of a given number of exact solves. Their set-up holds every exact solve,
-the checks and the error estimate; what can state none is left out, as what is refused.
+the checks and the error estimate, but for round-off that decides nothing and is looked at when the
+estimate is asked for; what can state none is left out, as what is refused.
 """
 
 from __future__ import annotations

@@ -8,6 +8,7 @@ import pytest
 import eigassign as ea
 from eigassign.errors import AccuracyError, UsageError
 from eigassign.modal.model import Model
+from eigassign.modal.roundoff import rounding_error
 
 BOX = ea.Box([0.0, 0.0], [0.25, 0.25])
 Q0, Y0 = [1.817, 5.312], [0.125, 0.125]
@@ -166,6 +167,21 @@ def test_calls_that_cannot_be_meant_are_refused(arm: tuple[Model, np.ndarray]) -
         ea.Box([1.0], [0.0])
     with pytest.raises(UsageError, match=r"modes \(3,\) asked for"):
         ea.fit(ea.reduce(model, Q0, Y0), q, Y0, (3,))
+
+
+def test_a_case_is_no_source_but_has_one(arm: tuple[Model, np.ndarray]) -> None:
+    _, q = arm
+    with pytest.raises(UsageError, match=r"not Case: case\.model\(\) is one"):
+        ea.fit(ea.load_case("cases/two_link.yaml"), q, Y0)
+
+
+def test_round_off_is_part_of_a_small_estimate(arm: tuple[Model, np.ndarray]) -> None:
+    model, q = arm
+    fit = ea.fit(model, q, Y0, solves=12)
+    assert fit.interpolant.error < 1e-8
+    assert fit.floor == rounding_error(model.pencil, np.append(q[0], Y0), 1)
+    assert fit.error_estimate == fit.interpolant.error + fit.floor
+    assert ea.fit(model, q, Y0, solves=5).floor == 0.0  # it would not matter
 
 
 def test_reasons_say_what_was_chosen(arm: tuple[Model, np.ndarray]) -> None:

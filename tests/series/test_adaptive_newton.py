@@ -10,7 +10,7 @@ import pytest
 from eigassign.errors import AccuracyError
 from eigassign.series.adaptive_newton import adaptive, interpolate
 from eigassign.series.interpolant import Interpolant
-from eigassign.series.newton import basis, interval, leja, newton_polynomials
+from eigassign.series.newton import Nodes, interval, leja, newton_polynomials
 
 Function = Callable[[np.ndarray], np.ndarray]
 NODES = interval()[leja(interval(), 20)]
@@ -29,7 +29,7 @@ def made(f: Function, d: int, accuracy: float, most: int = 3000) -> tuple[Interp
         asked += len(members)
         return f(NODES[members])
 
-    found = interpolate(sample, adaptive([basis(NODES, NODES)] * d, accuracy, most))
+    found = interpolate(sample, adaptive([Nodes(interval(), 20)] * d, accuracy, most))
     at = np.random.default_rng(0).uniform(-1.0, 1.0, (500, d))
     at[:100] = np.sign(at[:100])
     g = newton_polynomials(found.members, [NODES] * d, found.coefficients)(at)

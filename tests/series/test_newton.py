@@ -7,9 +7,11 @@ import itertools
 import numpy as np
 import pytest
 
+from eigassign.series.adding import Adding
+from eigassign.series.interpolant import Interpolant
 from eigassign.series.lower_set import total_degree
-from eigassign.series.margin import margin, rate
-from eigassign.series.newton import basis, interval, leja, newton_polynomials, products
+from eigassign.series.margin import Border, decay, keys, rates_of, rows_of
+from eigassign.series.newton import Nodes, basis, interval, leja, newton_polynomials, products
 
 AXES = tuple(interval()[leja(interval(), k)] for k in (9, 7, 6))
 TABLES = [basis(v, v) for v in AXES]
@@ -53,30 +55,79 @@ def test_a_coefficient_is_the_error_of_the_interpolant_before_it() -> None:
 
 def test_the_margin_is_what_a_search_over_all_indices_finds() -> None:
     members = np.array([g for g in itertools.product(range(4), range(3), range(5)) if sum(g) < 4])
-    inside, tops = {tuple(g) for g in members.tolist()}, np.array([3, 2, 9])
+    inside = {tuple(g) for g in members.tolist()}
     brute = {
         g
-        for g in itertools.product(range(4), range(3), range(10))
+        for g in itertools.product(range(4), range(4), range(10))
         if g not in inside
         and all(tuple(np.array(g) - np.eye(3, dtype=int)[j]) in inside for j in range(3) if g[j])
     }
-    found = margin(members, tops)
-    assert {tuple(g) for g in found.rows.tolist()} == brute
+    assert any(g[1] == 3 for g in brute)
+    border = Border((3, 2, 9), (True, False, True))  # on the second axis one is missing beyond
+    rng = np.random.default_rng(3)
+    for part in np.split(np.array(sorted(inside, key=lambda g: (sum(g), rng.random()))), [1, 7, 9]):
+        border.grow(keys(part).tolist())
+    found = rows_of(np.array(list(border.next)), 3)
+    assert {tuple(g) for g in found.tolist()} == brute
+    outside = rows_of(np.array(list(border.outside)), 3)
+    assert {tuple(g) for g in outside.tolist()} == {g for g in brute if g[1] > 2}
 
 
-@pytest.mark.parametrize("d", [1, 3])
+@pytest.mark.parametrize("d", [2, 3])
 def test_the_margin_of_a_product_of_powers_is_predicted_exactly(d: int) -> None:
-    rates = np.array([0.5, 0.2, 0.1])[:d]
+    rates = np.array([[0.5, 0.2, 0.1], [0.3, 0.7, 0.4]])[:, :d]
     members = total_degree(d, 3).indices
-    sizes = np.prod(rates**members, axis=1)
-    found = margin(members, np.full(d, 9))
-    expected = np.prod(rates**found.rows, axis=1)
-    np.testing.assert_allclose(found.predicted(sizes, rates), expected)
+    sizes = np.prod(rates[:, None] ** members, axis=2)
+    border = Border((9,) * d, (True,) * d)
+    border.grow(keys(members).tolist())
+    rows = rows_of(np.array(list(border.next)), d)
+    expected = np.prod(rates[:, None] ** rows, axis=2)
+    np.testing.assert_allclose(border.margin().predicted(sizes, rates), expected)
+
+
+def test_that_of_an_even_function_too_whose_odd_coefficients_vanish() -> None:
+    rates, members = np.array([[0.5, 0.2]]), total_degree(2, 3).indices
+    even = (members % 2 == 0).all(axis=1)
+    border = Border((9, 9), (True, True))
+    border.grow(keys(members).tolist())
+    rows = rows_of(np.array(list(border.next)), 2)
+    expected = np.where((rows % 2 == 0).all(axis=1), np.prod(rates**rows, axis=1), 0.0)
+    found = border.margin().predicted(
+        np.where(even, np.prod(rates**members, axis=1), 0.0)[None], rates
+    )
+    np.testing.assert_allclose(found[0], expected)
 
 
 def test_rates_are_those_of_the_layers_also_of_even_functions() -> None:
     degrees = np.arange(9)
-    assert rate(degrees, 0.3**degrees) == pytest.approx(0.3)
+    assert decay((0.3**degrees).tolist()) == pytest.approx(0.3)
     even = np.where(degrees % 2, 0.0, 0.3**degrees)
-    assert rate(degrees, even) == pytest.approx(0.3, rel=0.3)
-    assert rate(degrees, np.where(degrees, 1e-16, 1.0)) == 0.0
+    assert decay(even.tolist()) == pytest.approx(0.3, rel=0.3)
+    assert decay(np.where(degrees, 1e-16, 1.0).tolist()) == 0.0
+
+
+def test_rates_along_an_axis_are_those_of_the_largest_of_each_degree() -> None:
+    members = np.random.default_rng(1).permutation(total_degree(2, 5).indices)
+    rates = np.array([[0.5, 0.2], [0.3, 0.7]])
+    sizes = np.prod(rates[:, None] ** members, axis=2)
+    np.testing.assert_allclose(rates_of(members, sizes), rates)
+
+
+def test_what_is_added_is_the_largest_that_is_predicted_and_grows_the_set() -> None:
+    members, rates = total_degree(2, 1).indices, np.array([0.5, 0.1])
+    sizes = np.prod(rates**members, axis=1)
+    border = Border((2, 9), (False, False))
+    border.grow(keys(members).tolist())
+    found = Interpolant(1.0, members, sizes[None], sizes, rates, 1.0)
+    adding = Adding(border, found)
+    for _ in range(3):
+        adding.take(adding.ranked()[:1])
+    assert adding.rows.tolist() == [[2, 0], [1, 1], [2, 1]]  # and none beyond degree 2
+    assert adding.expected == pytest.approx(0.25 + 0.05 + 0.025)
+    assert (border.places[keys(adding.rows)[2]], len(border.places)) == (5, 6)
+
+
+def test_the_inverse_of_fewer_nodes_is_a_part_of_that_of_all() -> None:
+    nodes = Nodes(interval(), 9)
+    part = nodes.inverse[:5, :5] @ nodes.table[:5, :5]
+    np.testing.assert_allclose(part, np.eye(5), atol=1e-14)

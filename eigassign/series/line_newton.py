@@ -1,0 +1,135 @@
+"""Interpolants of a positive function on a single axis: of given values, or to an accuracy.
+
+The inverse of Newton's basis at the nodes is triangular, and its leading blocks are the inverses of
+those of the basis: the coefficients of f, f² and f⁻² at the first n nodes are one product,
+
+    c = (T⁻¹)_nn [f, f², f⁻²] ,
+
+with T⁻¹ made once for the nodes. Every value was a check of the interpolant before it: none is held
+out, and the error is told from the coefficients alone. The first that is missing is about
+
+    |c_N| ≈ max_k |c_{N−k}| r^k ,
+
+over the last few but the constant, for several in turn may be small by accident; r is the factor by
+which they fall from one degree to the next, not trusted to be small while few have been seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.series.interpolant import (
+    POWERS,
+    ROUNDS,
+    Asking,
+    Interpolant,
+    nearly_best,
+    powers_of,
+    refuse,
+    sizes_of,
+    tail,
+)
+from eigassign.series.margin import UNKNOWN, decay
+from eigassign.series.newton import Nodes, frozen
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+TRUSTED = 6  # degree from which the rate is believed
+LAST = 4  # coefficients looked at
+FIRST = 3  # degree started with: one too many costs less than a round more
+STARTS = (5e-3, 5e-3, 5e-3, 5e-6, 5e-7, 5e-8)  # accuracies: one degree more below each
+FEW = 12  # nodes below which all are taken at once: so few samples show no rate
+STEPS = 4  # further members in one round at most
+
+
+def given_on_line(nodes: Nodes, count: int) -> Asking:
+    """The interpolant from ``count`` values, fewer if there are no more nodes."""
+    n = min(count, len(nodes.v))
+    values = yield _degrees(0, n)
+    return on_line(nodes, powers_of(values))
+
+
+def adaptive_on_line(nodes: Nodes, accuracy: float, most: int) -> Asking:
+    """The interpolant to a relative ``accuracy``; asks for values, round by round.
+
+    Raises AccuracyError where ``most`` values, or the nodes, do not suffice.
+    """
+    have, n, expected = 0, _start(nodes, accuracy), np.inf
+    rounds: list[tuple[int, float]] = []
+    values: list[Floats] = []
+    while True:
+        values.append((yield _degrees(have, n)))
+        found = on_line(nodes, powers_of(values[0] if not have else np.concatenate(values)))
+        surprise = max(1.0, sum(found.sizes[have:].tolist()) / expected)
+        rounds.append((n, surprise * found.error))
+        if rounds[-1][1] <= accuracy:
+            return found._replace(error=rounds[-1][1], rounds=tuple(rounds))
+        have, (n, expected) = n, _further(found, len(nodes.v), accuracy / surprise)
+        if n == have or n > most or len(rounds) == ROUNDS:
+            refuse(rounds[-1], accuracy, n, most)
+
+
+@lru_cache(maxsize=256)
+def _degrees(first: int, last: int) -> Ints:
+    """first … last − 1, (n, 1)."""
+    return frozen(np.arange(first, last)[:, None])
+
+
+def _start(nodes: Nodes, accuracy: float) -> int:
+    """Members that the accuracy will most likely need."""
+    n = len(nodes.v)
+    if nodes.whole and n <= FEW:
+        return n
+    return min(1 + FIRST + sum(accuracy < each for each in STARTS), n)
+
+
+def _further(found: Interpolant, nodes: int, accuracy: float) -> tuple[int, float]:
+    """How many members there are to be, and Σ |c_k| expected of the new ones.
+
+    Until the first that is missing is small enough; as many as there are at the last of the nodes.
+    """
+    sizes, rate = found.sizes.tolist(), float(found.rates[0])
+    have, left = len(sizes), 0.5 * accuracy / tail(rate)
+    while len(sizes) < min(have + STEPS, nodes):
+        predicted = max(sizes[-1] * rate, sizes[-2] * rate**2)
+        enough = predicted <= left
+        if enough and (len(sizes) > have or predicted == 0.0):
+            break
+        sizes.append(predicted)
+        if enough:  # the error is too large for another reason
+            break
+    return len(sizes), sum(sizes[have:])
+
+
+def on_line(nodes: Nodes, g: Floats) -> Interpolant:
+    """The best power of values at the first nodes, ``g`` (N, n_powers · n_outputs) of `powers_of`.
+
+    Nothing is missing where no other node will ever be asked for.
+    """
+    n = len(g)
+    c = nodes.inverse[:n, :n] @ g
+    sizes = sizes_of(c, np.minimum.reduce(g))
+    layers: list[list[float]] = sizes.tolist()
+    rates = [decay(each) for each in layers]
+    ended = nodes.whole and n == len(nodes.v)
+    errors = [0.0 if ended else _rest(*pair) for pair in zip(layers, rates, strict=True)]
+    k = nearly_best(errors)
+    each = g.shape[1] // len(POWERS)
+    own, rate = c[:, k * each : (k + 1) * each].T, np.array(rates[k : k + 1])
+    done = ((n, errors[k]),)
+    return Interpolant(POWERS[k], _degrees(0, n), own, sizes[k], rate, errors[k], done, n)
+
+
+def _rest(sizes: Sequence[float], rate: float) -> float:
+    """Estimated Σ |c_k| over all k that are missing."""
+    if 0.0 < rate < UNKNOWN and len(sizes) <= TRUSTED:
+        rate = UNKNOWN
+    largest, factor = 0.0, 1.0
+    for size in sizes[: max(0, len(sizes) - LAST - 1) : -1]:  # the constant shows no rate
+        factor *= rate
+        largest = max(largest, size * factor)
+    return largest * tail(rate)
