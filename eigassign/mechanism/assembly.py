@@ -86,9 +86,9 @@ class _Own:
 
 
 def _part(term: Term) -> Part:
-    entries = term.matrix.tocoo()
-    i, j = (np.asarray(at, dtype=np.intp) for at in entries.coords)
-    return term.coefficient, i, j, np.asarray(entries.data, dtype=np.float64)
+    matrix = term.matrix
+    i = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+    return term.coefficient, i, matrix.indices.astype(np.intp), matrix.data
 
 
 def add_links(

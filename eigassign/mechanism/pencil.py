@@ -88,11 +88,13 @@ class Pencil:
     def mass_magnitude(self) -> Floats | sparse.csr_array:
         """|(M_j)_ii| (n_dof, n_theta): with |θ| the size of what adds up to each M_ii."""
         on = np.flatnonzero(self.rows == self.columns)
-        place = sparse.csr_array(
-            (np.ones(len(on)), (self.rows[on], on)), shape=(self.n_dof, len(self.rows))
-        )
-        sizes = sparse.csr_array(place @ abs(self.mass))
-        return sizes.toarray() if self.n_dof * self.n_theta <= TINY_STACK else sizes
+        sizes = abs(self.mass[on])
+        if self.n_dof * self.n_theta <= TINY_STACK:
+            dense = np.zeros((self.n_dof, self.n_theta))
+            dense[self.rows[on]] = sizes.toarray()
+            return dense
+        place = (np.ones(len(on)), (self.rows[on], np.arange(len(on))))
+        return sparse.csr_array(sparse.csr_array(place, shape=(self.n_dof, len(on))) @ sizes)
 
     @cached_property
     def local_directions(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:

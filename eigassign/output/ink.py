@@ -114,7 +114,7 @@ class Sheet:
         self.width, self.height = width, height
         self._renderer = renderer(round(width * DPI), round(height * DPI))
         self._pixels: NDArray[np.uint8] = np.asarray(self._renderer.buffer_rgba())
-        self.area(rectangle((0.0, 0.0, width, height)), rgb("#ffffff"))
+        self._pixels.fill(255)  # white, and opaque
 
     def line(self, points: Floats, stroke: Stroke, clip: Box | None = None) -> None:
         """A polyline through ``points`` (n, 2); NaN interrupts it; one point is a dot."""

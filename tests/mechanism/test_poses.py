@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 from chains import model_of, two_link
 from frame_oracle import frame
+
+from eigassign.mechanism.placement import Placement
+from eigassign.mechanism.rotations import rotation, vector
+from eigassign.mechanism.tree import GROUND, Edge
 
 
 def test_a_two_link_arm_reaches_where_trigonometry_says() -> None:
@@ -26,3 +32,18 @@ def test_a_designed_length_moves_the_links_it_carries() -> None:
         lines = model.poses.lines(model.x([0.4, 1.7], [length]))[0]
         np.testing.assert_allclose(lines[0, 1, :2], expected.ends["upper"])
         np.testing.assert_allclose(lines[1, 1, :2], expected.ends["fore"])
+
+
+def test_a_chain_may_have_more_links_than_calls_may_nest() -> None:
+    count, length, bend = 2 * sys.getrecursionlimit(), 0.1, 1e-3
+    R = rotation(np.array([0.0, 0.0, 1.0]), bend)
+    none, end = vector([0.0]), vector([length])
+    link: Placement | None = None
+    for _ in range(count):
+        foot = none if link is None else end
+        edge = Edge("", GROUND, ("", "start"))
+        link = Placement("", edge, R, none, np.zeros((6, 0)), np.zeros((6, 0)), link, foot, none)
+    assert link is not None
+    angles = bend * np.arange(1, count)  # of all links that carry another
+    reached = [length * np.cos(angles).sum(), length * np.sin(angles).sum(), 0.0]
+    np.testing.assert_allclose(link.world_origin.astype(float), reached, rtol=1e-10)
