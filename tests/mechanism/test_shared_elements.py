@@ -97,3 +97,25 @@ def test_a_section_shared_by_copies_may_be_a_design() -> None:
     expected = model_of(thick).matrices([[0.3, 0.8]], [])
     for a, b in zip(model.matrices([[0.3, 0.8]], [[0.03]]), expected, strict=True):
         np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-13 * np.abs(b).max())
+
+
+def test_copies_on_different_links_hang_each_on_its_own() -> None:
+    # three like fingers, fixed at their own angle to two links of an arm: assembled together
+    def hand(bodies: Tree) -> Tree:
+        tree = twins({"section": "bar"}, bodies)
+        beam = tree["mechanism"]["links"]["one"]
+        for name, base, angle in (("f", "one", 0.3), ("g", "two", -0.5), ("h", "two", 0.9)):
+            tree["mechanism"]["links"][name] = {**beam, "length": 0.2}
+            tree["mechanism"]["joints"][name] = {
+                "type": "fixed",
+                "base": f"{base}.end",
+                "follower": f"{name}.start",
+                "angle": angle,
+            }
+        return tree
+
+    apart = hand({name: {"at": f"{name}.end", "mass": 0.0} for name in ("f", "g", "h")})
+    x = [0.4, 1.1]
+    both = zip(model_of(hand({})).matrices(x, []), model_of(apart).matrices(x, []), strict=True)
+    for together, alone in both:
+        np.testing.assert_allclose(together, alone, rtol=0.0, atol=1e-14 * np.abs(alone).max())
