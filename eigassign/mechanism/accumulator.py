@@ -35,7 +35,13 @@ class Accumulator:
             for atom, factor in _parts(coefficient)
             if factor != 0.0
         ]
-        if parts and len(values):
+        if len(parts) == 1:
+            ((k, atom, factor),) = parts
+            self.rows.append(rows[k])
+            self.columns.append(columns[k])
+            self.atoms.append(np.full(len(values), atom, dtype=np.intp))
+            self.values.append(values if factor == 1.0 else factor * values)
+        elif parts and len(values):
             which, atoms, factors = (np.array(part) for part in zip(*parts, strict=True))
             self.rows.append(rows[which].ravel())
             self.columns.append(columns[which].ravel())
