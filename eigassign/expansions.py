@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from eigassign.errors import UsageError
 from eigassign.modal.expansion import Expansion, expand
 from eigassign.modal.model import Model
+from eigassign.modal.sizes import MOST_TERMS
 from eigassign.modal.storage import (
     ALGORITHM,
     expansion_arrays,
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from eigassign.output.cache import Cache
 
 _log = logging.getLogger(__name__)
-FULL_LIMIT = 5000  # coefficients up to which the full set is taken to the asked order
 
 
 def expand_plan(model: Model, plan: Plan, cache: Cache | None) -> tuple[Expansions, list[str]]:
@@ -49,7 +49,7 @@ def expand_plan(model: Model, plan: Plan, cache: Cache | None) -> tuple[Expansio
     if full_order < plan.order:
         notes.append(
             f"the full expansion, only there to compare with, stops at order {full_order}: order "
-            f"{plan.order} in so many variables has over {FULL_LIMIT} coefficients"
+            f"{plan.order} in so many variables has over {MOST_TERMS} coefficients"
         )
     if known:
         notes.append("the expansion coefficients come from the cache")
@@ -65,9 +65,9 @@ def _size_note(expansions: Expansions) -> str:
 
 
 def affordable_order(model: Model, order: int) -> int:
-    """The highest order up to ``order`` whose full set has at most `FULL_LIMIT` members; ≥ 1."""
+    """The highest order up to ``order`` whose full set has at most `MOST_TERMS` members; ≥ 1."""
     n = int(model.pencil.active.sum())
-    fitting = [p for p in range(1, order + 1) if comb(n + p, p) <= FULL_LIMIT]
+    fitting = [p for p in range(1, order + 1) if comb(n + p, p) <= MOST_TERMS]
     return fitting[-1] if fitting else 1
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import comb
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +23,7 @@ from eigassign.modal.clusters import CLUSTER_GAP
 from eigassign.modal.convergence import radius_share
 from eigassign.modal.expansion import Expansion, expand
 from eigassign.modal.nearest import picked
+from eigassign.modal.sizes import MOST_TERMS
 from eigassign.modal.taylor_estimate import polynomial_error
 
 Floats = NDArray[np.float64]
@@ -87,9 +89,9 @@ def choose_expansion(
 
     The first of ``suggestions`` that does is taken unseen what else there is. Then are tried, in
     order of cost: the order p at one point, ``start`` or the most central sample; with
-    neighbouring modes as one cluster; at several points of one design. Judged against one reduced
-    model, as they are evaluated. ``place`` says in words what row k of x is. Raises AccuracyError,
-    naming the sample, where nothing does.
+    neighbouring modes as one cluster; at several points of one design; no order of over
+    `MOST_TERMS` terms. Judged against one reduced model, as they are evaluated. ``place`` says in
+    words what row k of x is. Raises AccuracyError, naming the sample, where nothing does.
     """
     beside = reduce_adaptively(pencil, x, FINER * accuracy, modes, place=place)
     judge = (
@@ -98,6 +100,7 @@ def choose_expansion(
     )
     trial = _Trial(pencil, x, accuracy, tuple(modes), linear_in_y, beside, [judge], place)
     first = x[central(x)] if start is None else start
+    orders = [p for p in orders if _terms(pencil, p) <= MOST_TERMS] or orders[:1]
     best = _first(trial, suggestions)
     if best is None:
         best = _cheapest(trial, _single(trial, first, orders))
@@ -129,6 +132,7 @@ class _Trial:
     place: Callable[[int], str]
     last: float = np.inf
     worst_sample: int = 0
+    cheapest: float = np.inf  # coefficients of the best found so far
 
     def expand(self, point: Floats, order: int, gap: float) -> Expansion:
         n_q = self.pencil.n_q
@@ -184,8 +188,13 @@ def _cheapest(trial: _Trial, candidates: Iterator[tuple[int, _Found]]) -> _Found
     best: tuple[int, _Found] | None = None
     for cost, found in candidates:
         if found[2].max() <= trial.accuracy and (best is None or cost < best[0]):
-            best = (cost, found)
+            best, trial.cheapest = (cost, found), cost
     return None if best is None else best[1]
+
+
+def _terms(pencil: Pencil, order: int) -> int:
+    """Coefficients of one series in everything that anything depends on."""
+    return comb(int(pencil.active.sum()) + order, order)
 
 
 def _cost(parts: Sequence[Expansion]) -> int:
@@ -195,8 +204,12 @@ def _cost(parts: Sequence[Expansion]) -> int:
 def _single(trial: _Trial, point: Floats, orders: Sequence[int]) -> Iterator[tuple[int, _Found]]:
     """One expansion point, the modes alone and then with their neighbours."""
     for gap in _gaps(trial, point):
+        costs: list[int] = []  # of the orders so far
         for order in orders:
+            if costs and costs[-1] >= trial.cheapest:
+                break  # the next order costs more still
             part = trial.expand(point, order, gap)
+            costs.append(_cost((part,)))
             errors = trial.errors(part)
             share = trial.share(part)
             trial.note(_named(part), errors.max(axis=1), share)
@@ -231,8 +244,14 @@ def _several(trial: _Trial, first: Floats, orders: Sequence[int]) -> Iterator[tu
     n_q = trial.pencil.n_q
     for order in orders:
         parts = [trial.expand(first, order, CLUSTER_GAP)]
+        if _cost(parts) >= trial.cheapest:
+            break
         errors = trial.errors(*parts)
-        while len(parts) < MAX_POINTS and errors.max() > trial.accuracy:
+        while (
+            len(parts) < MAX_POINTS
+            and errors.max() > trial.accuracy
+            and _cost(parts) < trial.cheapest
+        ):
             worst = trial.x[int(np.argmax(errors.max(axis=1))), :n_q]
             parts.append(trial.expand(np.concatenate([worst, first[n_q:]]), order, CLUSTER_GAP))
             errors = trial.errors(*parts)

@@ -139,3 +139,18 @@ def test_the_radius_of_convergence_is_that_of_a_pole():
     y = np.array([[0.1], [0.3], [0.5]])
     share = radius_share(expansion, [0.0, 1.0], y)[:, 0]
     np.testing.assert_allclose(share, np.abs(y[:, 0] - 0.2) / 0.2, rtol=1e-3)
+
+
+def test_several_points_are_preferred_to_one_series_of_very_many_terms(x, monkeypatch):
+    """Along the paper's trajectory: one point needs a high order, several do with a low one."""
+    model = build({"upper": 2, "fore": 2})
+    x = np.hstack([x[:, :2], np.full((len(x), 2), 0.1)])
+    alone = choose_expansion(model.pencil, x, 1e-5)
+    monkeypatch.setattr("eigassign.modal.expansion_choice.MOST_TERMS", 40)  # order 4 in three
+    several = choose_expansion(model.pencil, x, 1e-5)
+    assert len(alone.expansions) == 1 < len(several.expansions)
+    assert several.order <= 4 < alone.order
+    for chosen in (alone, several):
+        hz = chosen.frequencies(x[:, :2], x[:, 2:])
+        off = np.abs(hz / exact(model, x, (1,)) - 1.0)
+        assert off.max() <= chosen.estimate.max() <= 1e-5
