@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.output.figures import FigurePlan
-from eigassign.study.chart_data import Chart, ChartPoint, DesignRun, Front
+from eigassign.study.chart_data import Chart, ChartPoint, DesignRun, Front, excess_over
 
 if TYPE_CHECKING:
     from eigassign.output.chart_scatter import Ladder
@@ -106,7 +106,8 @@ def ladders(chart: Chart, front: Front) -> list[Ladder]:
     """The points by family, eigassign's first, in the order in which they were charted."""
     from eigassign.output.chart_scatter import Ladder
 
-    able = [p for p in chart.points if _shown(chart, p)]
+    alone = front.evaluations is None  # what is set up anew for every design has no part in that
+    able = [p for p in chart.points if _shown(chart, p) and not (alone and p.at_once > 1)]
     families = dict.fromkeys(p.family for p in sorted(able, key=lambda p: not p.ours))
     made = []
     for family in families:
@@ -186,7 +187,7 @@ def draw_designs(chart: Chart) -> Sheet:
     made = []
     for run in sorted(chart.designs, key=lambda run: not run.ours):
         seconds, values = _steps(run)
-        excess = np.maximum(values / best - 1.0, _LEAST_EXCESS)
+        excess = np.maximum([excess_over(best, value) for value in values], _LEAST_EXCESS)
         made.append(Ladder(run.method, seconds, excess, run.ours))
     x, y = ("time", "s"), ("objective above the best", "relative")
     return scatter("Time to a design against the objective it reaches", x, y, made)

@@ -52,7 +52,7 @@ def auto(chart: Chart) -> Table:
     rows = tuple((_accuracy(a), f"{a.evaluations:,.0f}", *_taken(a)) for a in looked_at)
     columns = (
         "asked for", "evaluations", "auto takes", "worst error", "time in all",
-        "against the choice", "following this chart", "time in all",
+        "against the choice", "choosing took", "following this chart", "time in all",
     )  # fmt: skip
     refused = {a.auto.refused: _accuracy(a) for a in looked_at if a.auto and a.auto.refused}
     caption = (
@@ -70,10 +70,10 @@ def _accuracy(a: Advice) -> str:
 def _taken(a: Advice) -> tuple[str, ...]:
     followed = (a.followed or "none", "" if a.followed_s is None else time(a.followed_s))
     if a.auto is None or a.auto.total_s is None:
-        return ("refused", "", "", "", *followed)
+        return ("refused", "", "", "", "" if a.auto is None else time(a.auto.choosing_s), *followed)
     against = f"{a.auto.total_s / a.total_s:.2g} × as long" if a.total_s else ""
     own = (str(a.auto.method), f"{a.auto.worst_relative:.1e}", time(a.auto.total_s), against)
-    return (*own, *followed)
+    return (*own, time(a.auto.choosing_s), *followed)
 
 
 def lines(chart: Chart) -> Table:

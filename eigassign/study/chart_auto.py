@@ -158,7 +158,8 @@ def _words(advice: Advice) -> Iterator[str]:
     elif auto is not None and auto.total_s is not None:
         yield (
             f"`expansion.order: auto` takes {auto.method}, {time_words(auto.total_s)} in all"
-            f"{_against(advice, auto.method, auto.total_s)}, worst error {auto.worst_relative:.1e}"
+            f"{_against(advice, auto.method, auto.total_s)}, worst error "
+            f"{auto.worst_relative:.1e}, after {time_words(auto.choosing_s)} of choosing"
         )
     if advice.followed_s is not None and (auto is None or advice.followed != auto.method):
         spent = time_words(advice.followed_s)

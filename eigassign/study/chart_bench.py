@@ -152,6 +152,7 @@ def _point(bench: Bench, trial: _Trial, spent: Sequence[Timing], solve: Timing) 
         None if method.exact else gain,
         method.note,
         method.use,
+        len(bench.scene.path.q) if method.per_design else 1,
     )
 
 

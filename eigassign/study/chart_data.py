@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import ceil
 from typing import Any
 
 
@@ -38,6 +39,7 @@ class Timing:
         )
 
 
+NEARLY_NOTHING = 1e-12  # of an objective: a rms relative error of 1e-6
 NOTHING = Timing(0.0, 0.0, 0.0, 0)
 
 
@@ -70,10 +72,12 @@ class ChartPoint:
     break_even: float | None  # evaluations from which it beats exact solves; None: never
     note: str = ""
     use: str = ""  # how to ask for it: a line of a case file, or a call
+    at_once: int = 1  # evaluations that come together: a whole trajectory where set up anew for it
 
     def total_s(self, evaluations: float) -> float:
         """Seconds for set-up and so many evaluations."""
-        return self.offline.median_s + evaluations * self.online.median_s
+        runs = ceil(evaluations / self.at_once)
+        return self.offline.median_s + runs * self.at_once * self.online.median_s
 
 
 @dataclass(frozen=True)
@@ -158,9 +162,14 @@ class DesignRun:
     objective: float
     max_relative: float  # distance to the target in Hz, exact
     rms_relative: float
-    excess: float  # objective over the best one found by any method, relative to that
+    excess: float  # objective over the best one found by any method: see `excess_over`
     trace: tuple[tuple[float, float], ...]
     note: str = ""
+
+
+def excess_over(best: float, objective: float) -> float:
+    """(J − J_best) / J_best; where J_best is next to nothing, relative to `NEARLY_NOTHING`."""
+    return (objective - best) / max(best, NEARLY_NOTHING)
 
 
 @dataclass(frozen=True)

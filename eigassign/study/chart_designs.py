@@ -22,7 +22,7 @@ from eigassign.errors import EigassignError
 from eigassign.modal.expansion import expand
 from eigassign.study.approximation import Expansions
 from eigassign.study.assignment_study import assign_design
-from eigassign.study.chart_data import DesignRun, Timing
+from eigassign.study.chart_data import DesignRun, Timing, excess_over
 from eigassign.study.chart_effort import Effort, suited
 from eigassign.study.chart_gradient import eigenvalue_slopes
 from eigassign.study.chart_methods import points_along, reduced_model, solves_per_point
@@ -61,9 +61,7 @@ def chart_designs(
         except EigassignError as error:
             notes.append(f"no design by {name}: {error}")
     best = min((run.objective for run in runs), default=0.0)
-    return tuple(replace(r, excess=r.objective / best - 1.0 if best else 0.0) for r in runs), tuple(
-        notes
-    )
+    return tuple(replace(r, excess=excess_over(best, r.objective)) for r in runs), tuple(notes)
 
 
 def _ways(

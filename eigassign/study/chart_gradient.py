@@ -3,7 +3,8 @@
     ∂λ/∂y = φᵀ (∂K/∂y − λ ∂M/∂y) φ,   φᵀ M φ = 1,
 
 with ∂K = Σ_j K_j ∂θ_j: no further eigensolve. The coefficient functions θ are differentiated by
-central differences of θ alone, which is cheap and accurate to about 1e-10.
+central differences of θ alone, which is cheap and accurate to about 1e-10; of parameters without
+room the derivatives are left at 0.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ def theta_slopes(pencil: Pencil, x: Floats, ranges: Floats) -> Floats:
     """∂θ/∂y (n_y, n_theta, n) at samples x (n, n_x); ``ranges`` (n_y,) set the steps."""
     slopes = []
     for j, size in enumerate(ranges):
+        if size == 0.0:  # a parameter that is kept
+            slopes.append(np.zeros((pencil.n_theta, len(x))))
+            continue
         step = np.zeros(x.shape[1])
         step[pencil.n_q + j] = STEP * size
         slopes.append((pencil.theta(x + step) - pencil.theta(x - step)) / (2.0 * STEP * size))

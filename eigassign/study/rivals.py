@@ -75,7 +75,7 @@ def trajectory_methods(features: Features, stations: Sequence[int], n_q: int) ->
                 f"stations {kind} {k}",
                 f"stations, {kind}",
                 False,
-                {"stations": k, "interpolation": kind},
+                {"interpolation": kind, "stations": station_nodes(kind, k)},
                 partial(_per_run, features, kind, k),
                 partial(_stations, features, station_nodes(kind, k), n_q),
                 per_design=True,

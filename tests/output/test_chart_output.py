@@ -171,10 +171,10 @@ def test_what_auto_takes_stands_beside_the_choice_and_the_quickest_expansion() -
     table = chart_tables.auto(CHART)
     taken, refused = table.rows
     assert taken == (
-        "1e-04", "152", "Taylor 4 full", "5.0e-05", "3.04 ms", "0.2 × as long", "Taylor 4 full",
-        "3.04 ms",
+        "1e-04", "152", "Taylor 4 full", "5.0e-05", "3.04 ms", "0.2 × as long", "400 ms",
+        "Taylor 4 full", "3.04 ms",
     )  # fmt: skip
-    assert refused[2:] == ("refused", "", "", "", "none", "")
+    assert refused[2:] == ("refused", "", "", "", "400 ms", "none", "")
     assert table.caption.endswith("1e-08 is refused: no expansion reaches 1.0e-08.")
 
 

@@ -44,6 +44,14 @@ def test_eigenvalue_slopes_are_those_of_finite_differences(scene: Scene) -> None
         np.testing.assert_allclose(slopes[:, :, j], off, rtol=1e-5)
 
 
+def test_a_parameter_without_room_has_no_slope_and_spoils_none(scene: Scene) -> None:
+    x = np.array([[1.8, 5.2, 0.1, 0.2]])
+    both = eigenvalue_slopes(scene.model.pencil, x, 1, np.array([0.25, 0.25]))[1]
+    one = eigenvalue_slopes(scene.model.pencil, x, 1, np.array([0.0, 0.25]))[1]
+    assert one[0, 0, 0] == 0.0
+    np.testing.assert_allclose(one[:, :, 1], both[:, :, 1], rtol=1e-12)
+
+
 def test_the_objective_has_the_slope_it_says(scene: Scene) -> None:
     task = task_of(scene, TINY, 1e-4)
     width = task.box[1]

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from eigassign.study.chart_data import NOTHING, ChartPoint, Errors, Timing
+from eigassign.study.chart_data import NOTHING, ChartPoint, Errors, Timing, excess_over
 from eigassign.study.chart_front import (
     advise_accuracy,
     advise_budget,
     break_even,
+    cheapest,
     front,
     front_notes,
     pareto,
@@ -50,6 +53,21 @@ def test_no_front_member_is_beaten_and_every_other_is() -> None:
                 equal = [j for j in kept if cost[j] == cost[k] and error[j] == error[k]]
                 assert beaten or equal
         assert list(error[kept]) == sorted(error[kept])
+
+
+def test_what_is_set_up_for_a_whole_trajectory_is_paid_for_whole() -> None:
+    stations = replace(point("stations", 0.0, 1e-6, 1e-4), at_once=150)
+    assert stations.total_s(1) == stations.total_s(150) == pytest.approx(150e-6)
+    assert stations.total_s(151) == pytest.approx(300e-6)
+    exact = point("exact", 0.0, 4e-5, 0.0)
+    assert cheapest([stations, exact], 1e-2, 1) is exact
+    assert cheapest([stations, exact], 1e-2, 150) is stations
+
+
+def test_an_objective_of_next_to_nothing_is_no_yardstick() -> None:
+    assert excess_over(2.0, 3.0) == 0.5
+    assert excess_over(1e-30, 1e-28) < 1e-15
+    assert excess_over(0.0, 0.0) == 0.0
 
 
 def test_what_gives_no_number_is_on_no_front() -> None:
