@@ -37,7 +37,7 @@ ROUNDS = 12  # programs in a row at most
 STILL = 1e-7  # of the box: a design that moves less has arrived
 MOST_KRIGING = 12  # design parameters up to which Kriging is tried
 FEW = 60  # evaluations of a Kriging search: it is for objectives that cost much
-CHARTED_ONLY = "charted only: optimize solves one program, on the expansion"
+CHARTED_ONLY = "charted only"  # `optimize` solves one program, on the expansion
 PRECISE_STEP = 1e-4  # of central differences of reduced models, relative to the box
 
 
