@@ -8,6 +8,7 @@ many members as solves were given (`series.given_newton`).
 from __future__ import annotations
 
 import itertools
+import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -17,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import AccuracyError, UsageError
 from eigassign.modal.adaptive import shown
-from eigassign.modal.arguments import whole_within
+from eigassign.modal.arguments import mode_numbers, whole_within
 from eigassign.modal.exact import DENSE_LIMIT, eigenvalues
 from eigassign.modal.expansion import Expansion
 from eigassign.modal.fit import Fit
@@ -66,8 +67,7 @@ def fit(
     """
     if solves is not None and accuracy is not None:
         raise UsageError("a fit has an accuracy or a number of solves, not both")
-    if accuracy is not None and not LEAST_ACCURACY <= accuracy < 1.0:
-        raise UsageError(f"accuracy {accuracy} is not within {LEAST_ACCURACY} to 1")
+    _meant(accuracy, most)
     directions, n_q = _dependence(source)
     path = None if isinstance(q, Box) else stretches(q, directions, n_q)
     parts: tuple[Any, ...] = (q,) if path is None else path.parts
@@ -77,7 +77,9 @@ def fit(
         regions = [build_region(directions, n_q, part, y) for part in parts]
         floors = [_floor(source, region, wanted, accuracy) for region in regions]
         pairs = zip(regions, floors, strict=True)
-        runs = [adaptive(region.nodes, accuracy - floor, most) for region, floor in pairs]
+        runs = [
+            adaptive(region.nodes, _left(source, accuracy, floor), most) for region, floor in pairs
+        ]
     else:
         count = whole_within(solves, "solves", 1, MOST)
         counts = [count]
@@ -86,9 +88,30 @@ def fit(
             counts = path.shares(count, fewest(d))
         regions, floors = _best_nodes(source, parts, y, wanted, counts)
         runs = [given(region.nodes, own) for region, own in zip(regions, counts, strict=True)]
-    made = zip(regions, _driven(source, wanted, regions, runs), floors, strict=True)
+    found, seen = _driven(source, wanted, regions, runs)
+    if not isinstance(source, Model):
+        each_ = zip(floors, seen, strict=True)
+        floors = [max(floor, _known_error(source, x, wanted, accuracy)) for floor, x in each_]
+    made = zip(regions, found, floors, strict=True)
     fits = tuple(_fit(source, wanted, accuracy, *each) for each in made)
     return fits[0] if path is None or len(fits) == 1 else PathFit(fits, path.rows)
+
+
+def _meant(accuracy: object, most: object) -> None:
+    """Raise UsageError for an accuracy or a number of solves that cannot be meant."""
+    whole_within(most, "most", 1, sys.maxsize)
+    if accuracy is None:
+        return
+    number = isinstance(accuracy, int | float | np.number) and not isinstance(accuracy, bool)
+    if not number or not LEAST_ACCURACY <= accuracy < 1.0:  # type: ignore[operator]
+        raise UsageError(
+            f"accuracy {accuracy!r} is not a number within {LEAST_ACCURACY} to 1, as 1e-4"
+        )
+
+
+def _left(source: Any, accuracy: float, floor: float) -> float:
+    """What the polynomial may cost; that of another source is only known where it was asked."""
+    return accuracy - (floor if isinstance(source, Model) else SHARE * accuracy)
 
 
 def _best_nodes(
@@ -113,22 +136,27 @@ def _best_nodes(
 
 def _driven(
     source: Any, modes: tuple[int, ...], regions: Sequence[Region], runs: Sequence[Asking]
-) -> list[Interpolant]:
-    """What all runs end with; what they ask for in one round is one batch of frequencies."""
+) -> tuple[list[Interpolant], list[Floats]]:
+    """What all runs end with, and the x (n, n_x) that each asked for.
+
+    What they ask for in one round is one batch of frequencies.
+    """
     ask = _question(source, modes)
     found: dict[int, Interpolant] = {}
+    seen: list[list[Floats]] = [[] for _ in runs]
     hz: dict[int, Floats | None] = dict.fromkeys(range(len(runs)))
     while hz:
         wanted: dict[int, Floats] = {}
         for k, values in hz.items():
             try:
                 wanted[k] = regions[k].x(runs[k].send(values))  # type: ignore[arg-type]
+                seen[k].append(wanted[k])
             except StopIteration as end:
                 found[k] = end.value
             except AccuracyError as error:
                 raise AccuracyError(f"{error}{_cause(source, regions[k], modes)}") from None
         hz = _batch(ask, wanted)
-    return [found[k] for k in range(len(runs))]
+    return [found[k] for k in range(len(runs))], [np.vstack(each) for each in seen]
 
 
 def _batch(ask: Callable[[Floats], Floats], wanted: dict[int, Floats]) -> dict[int, Floats | None]:
@@ -182,9 +210,9 @@ def _dependence(source: Any) -> tuple[Floats, int]:
 def _modes(source: Any, modes: Sequence[int] | None) -> tuple[int, ...]:
     """The modes to fit. Raises UsageError for one that the source does not have."""
     own = getattr(source, "modes", None) if not isinstance(source, Model) else None
-    wanted = tuple(sorted({int(m) for m in (modes or own or (1,))}))
-    if wanted[0] < 1 or (own is not None and not set(wanted) <= set(own)):
-        raise UsageError(f"modes {wanted} asked for; the source has {own or 'those from 1 on'}")
+    wanted = mode_numbers((own or (1,)) if modes is None else modes)
+    if own is not None and not set(wanted) <= set(own):
+        raise UsageError(f"modes {wanted} asked for; the source has {own}")
     return wanted
 
 
@@ -217,14 +245,25 @@ def _floor(source: Any, region: Region, modes: tuple[int, ...], accuracy: float 
             return 0.0
         floor = rounding_error(source.pencil, region.centre, modes[-1])
     else:
-        x = region.x(_ends(region))
-        n_q = _dependence(source)[1]
-        columns = [source.modes.index(m) for m in modes]
-        floor = float(source.error_estimate(x[:, :n_q], x[:, n_q:])[:, columns].max())
-    if accuracy is not None and floor > SHARE * accuracy:
-        what = "round-off" if isinstance(source, Model) else "the source itself"
-        raise AccuracyError(f"{what} may cost {floor:.1e}, which leaves nothing of {accuracy:.1e}")
-    return floor
+        return _known_error(source, region.x(_ends(region)), modes, accuracy)
+    return _borne("round-off", floor, accuracy)
+
+
+def _known_error(source: Any, x: Floats, modes: tuple[int, ...], accuracy: float | None) -> float:
+    """The largest of the source's own error estimates at x (n, n_x); see `_borne`."""
+    n_q = _dependence(source)[1]
+    columns = [source.modes.index(m) for m in modes]
+    estimates = source.error_estimate(x[:, :n_q], x[:, n_q:])[:, columns]
+    return _borne("the source itself", float(estimates.max()), accuracy)
+
+
+def _borne(what: str, error: float, accuracy: float | None) -> float:
+    """The error, unless it is unknown or leaves nothing of an accuracy: then AccuracyError."""
+    if not error < np.inf:
+        raise AccuracyError(f"{what} may cost any amount: it vouches for no number in the region")
+    if accuracy is not None and error > SHARE * accuracy:
+        raise AccuracyError(f"{what} may cost {error:.1e}, which leaves nothing of {accuracy:.1e}")
+    return error
 
 
 def _ends(region: Region) -> Ints:

@@ -6,24 +6,26 @@ distance travelled there, and its samples alone are candidates for nodes and can
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.series.newton import Nodes, basis, interval, roots
+from eigassign.series.newton import Nodes, basis, generic, interval, roots
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 MOST_STATIONS = 48  # nodes along a trajectory
 DENSE = 513  # samples of a trajectory that may be nodes
+SKEW = 0.03  # by which the best nodes are shifted in the middle
+CHECKS = 15  # generic places on an axis where an interpolant may be checked
 STILL = 1e-9  # rad or m: what moves less stands still, what is off by less lies on the path
 
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """Nodes, and what each adds to the centre of x, (most, n_x)."""
+    """Nodes, and what each and each check adds to the centre of x, (n_points, n_x)."""
 
     points: Nodes
     steps: Floats
@@ -79,13 +81,13 @@ def _line(stretch: Stretch, count: int | None) -> Line | None:
         points = interval_nodes(MOST_STATIONS) if count is None else chosen_nodes(count)
         far = int(np.abs(place - place[0]).argmax())
         back = np.linalg.pinv(joints) @ (reach[far] / (place[far] - place[0]))
-        steps = np.outer(points.v - place[0], np.append(back, np.zeros(n_y)))
+        steps = np.outer(points.points - place[0], np.append(back, np.zeros(n_y)))
         return Line(Axis(points, steps), place, row, True)
     keep = np.unique(place, return_index=True)[1]
     some = np.unique(np.linspace(0, len(keep) - 1, min(len(keep), DENSE)).round().astype(int))
     points = _sampled(place[keep[some]], len(keep), count)
-    steps = np.zeros((len(points.chosen), q.shape[1] + n_y))
-    at = np.searchsorted(place[keep], points.v)
+    steps = np.zeros((len(points.points), q.shape[1] + n_y))
+    at = np.searchsorted(place[keep], points.points)
     steps[:, : q.shape[1]] = q[keep[at]] - q[0]
     return Line(Axis(points, steps), place, row, False)
 
@@ -94,21 +96,35 @@ def _sampled(places: Floats, of: int, count: int | None) -> Nodes:
     """Nodes among the ``of`` samples: Leja points, or the ``count`` nearest to the best places."""
     if count is None or count >= of:
         most = MOST_STATIONS if count is None else count
-        return Nodes(places, most, of <= most)
-    nearest = np.unique(np.abs(places[:, None] - roots(count)).argmin(axis=0))
+        nodes = Nodes(places, most, of <= most)
+        return nodes if nodes.whole else replace(nodes, checks=_others(places, nodes.v))
+    nearest = np.unique(np.abs(places[:, None] - _best(count)).argmin(axis=0))
     return Nodes(places[nearest] if len(nearest) == count else places, count)
+
+
+def _others(places: Floats, nodes: Floats) -> tuple[float, ...]:
+    """Of samples that are no nodes those nearest to generic places."""
+    others = np.setdiff1d(places, nodes)
+    nearest = np.abs(others[:, None] - generic(CHECKS)).argmin(axis=0) if len(others) else []
+    return tuple(others[list(dict.fromkeys(nearest))].tolist())
+
+
+def _best(count: int) -> Floats:
+    """The best places, a little askew: at symmetric ones an even f shows only half of itself."""
+    v = roots(count)
+    return np.asarray(v + SKEW * (1.0 - v * v))
 
 
 @lru_cache(maxsize=64)
 def interval_nodes(most: int) -> Nodes:
-    """Nested nodes of [−1, 1]."""
-    return Nodes(interval(), most)
+    """Nested nodes of [−1, 1], and where they are checked."""
+    return Nodes(interval(), most, checks=tuple(generic(CHECKS).tolist()))
 
 
 @lru_cache(maxsize=64)
 def chosen_nodes(count: int) -> Nodes:
-    """The best ``count`` nodes of [−1, 1]."""
-    return Nodes(roots(count), count)
+    """The best ``count`` nodes of [−1, 1], nearly."""
+    return Nodes(_best(count), count)
 
 
 def _placed(reach: Floats, S: Floats) -> tuple[Floats, Floats, bool]:

@@ -257,4 +257,4 @@ def _box_axes(
         rows.append(unit / half[k])
         steps.append(unit * half[k])
     points = chosen_nodes(count) if count and len(rows) == 1 else interval_nodes(MOST_NODES)
-    return rows, [Axis(points, points.v[:, None] * step) for step in steps]
+    return rows, [Axis(points, points.points[:, None] * step) for step in steps]

@@ -70,6 +70,8 @@ def _several(q: Any) -> list[ArrayLike]:
 @lru_cache(maxsize=64)
 def _known(path: bytes, shape: tuple[int, int], combinations: bytes, of: tuple[int, int]) -> Path:
     """Made once for all designs."""
+    if not shape[0]:
+        raise UsageError("a trajectory without samples is no region: give at least one pose")
     q, directions = np.ndarray(shape, buffer=path), np.ndarray(of, buffer=combinations)
     if not np.isfinite(q).all():
         raise UsageError("q must be finite")

@@ -70,7 +70,10 @@ def _on_box(axes: Sequence[Nodes], accuracy: float, most: int) -> Asking:
     state.border.grow(keys(fresh).tolist())
     rounds: list[tuple[int, float]] = []
     while True:
-        apart = held_out(state.border, len(rounds))
+        apart = held_out(state.border, axes, len(rounds))
+        asked = state.asked + len(fresh) + len(apart)
+        if asked > most or not (len(apart) or state.border.complete):
+            refuse(rounds[-1] if rounds else (0, np.inf), accuracy, asked, most)
         values = yield np.vstack([fresh, apart])
         state.take(fresh, values)
         found = state.best()
@@ -81,9 +84,8 @@ def _on_box(axes: Sequence[Nodes], accuracy: float, most: int) -> Asking:
             return found._replace(error=rounds[-1][1], rounds=tuple(rounds))
         doubt = max(surprise, missed / found.error if found.error else 1.0)
         fresh, expected = _wanted(state.border, found, accuracy / doubt)
-        count = len(state.border.places)
-        if not len(fresh) or count > most or len(rounds) == ROUNDS:
-            refuse(rounds[-1], accuracy, count, most)
+        if not len(fresh) or len(rounds) == ROUNDS:
+            refuse(rounds[-1], accuracy, asked, most)
 
 
 def _start(axes: Sequence[Nodes], accuracy: float) -> Ints:
@@ -104,14 +106,20 @@ def _started(tops: tuple[int, ...], all_: tuple[bool, ...], degree: int) -> Ints
     return frozen(ordered(keep))
 
 
-def held_out(border: Border, rounds: int) -> Ints:
-    """Points for a check (n, d): corners, one far from all nodes, and others all over the box."""
+def held_out(border: Border, axes: Sequence[Nodes], rounds: int) -> Ints:
+    """Points for a check (n, d): corners, one far from all nodes, and others all over the box.
+
+    The others are at places that are never nodes, on axes that have such places.
+    """
     tops, members = np.array(border.tops), rows_of(np.array(list(border.places)), len(border.tops))
     far = np.vstack([_corners(len(tops)), members.max(axis=0) + 1])
     k = np.arange(1, 2 + len(members) // CHECKED)[:, None] + 100 * rounds
-    spread = np.floor((0.5 + k * spread_steps(len(tops))) % 1.0 * (tops + 1)).astype(np.intp)
-    apart = np.minimum(np.vstack([far, spread]), tops)
-    return np.asarray(apart[[key not in border.places for key in keys(apart).tolist()]])
+    first = np.array([len(each.v) if each.checks else 0 for each in axes])
+    count = np.array([len(each.points) for each in axes]) - first
+    spread = first + np.floor((0.5 + k * spread_steps(len(tops))) % 1.0 * count).astype(np.intp)
+    apart = np.vstack([np.minimum(far, tops), spread])
+    new = {key: row for row, key in enumerate(keys(apart).tolist()) if key not in border.places}
+    return np.asarray(apart[list(new.values())])
 
 
 @lru_cache(maxsize=16)

@@ -59,7 +59,7 @@ def _on_box(axes: Sequence[Nodes], count: int) -> Asking:
     for target in _targets(len(fresh), count - CHECKS - count // CHECKED):
         state.take(fresh, (yield fresh))
         fresh, expected = _largest(state.border, state.best(), target - len(state.members))
-    apart = held_out(state.border, 0)[: count - len(state.border.places)]
+    apart = held_out(state.border, axes, 0)[: count - len(state.border.places)]
     values = yield np.vstack([fresh, apart])
     state.take(fresh, values)
     found = state.best()

@@ -5,8 +5,9 @@ those of the basis: the coefficients of f, f² and f⁻² at the first n nodes a
 
     c = (T⁻¹)_nn [f, f², f⁻²] ,
 
-with T⁻¹ made once for the nodes. Every value was a check of the interpolant before it: none is held
-out, and the error is told from the coefficients alone. The first that is missing is about
+with T⁻¹ made once for the nodes. Every value was a check of the interpolant before it, but values
+at nodes that lie symmetrically can agree where nothing is constant: to an accuracy one more point,
+at an irrational place, is held out with each round. The first coefficient missing is about
 
     |c_N| ≈ max_k |c_{N−k}| r^k ,
 
@@ -44,6 +45,8 @@ FIRST = 3  # degree started with: one too many costs less than a round more
 STARTS = (5e-3, 5e-3, 5e-3, 5e-6, 5e-7, 5e-8)  # accuracies: one degree more below each
 FEW = 12  # nodes below which all are taken at once: so few samples show no rate
 STEPS = 4  # further members in one round at most
+MISSED = 3.0  # how much worse than at the points held out it may be elsewhere
+LEAST_SHARE = 0.2  # of the largest Π |v − v_i|, that a point held out is believed to have
 
 
 def given_on_line(nodes: Nodes, count: int) -> Asking:
@@ -60,17 +63,69 @@ def adaptive_on_line(nodes: Nodes, accuracy: float, most: int) -> Asking:
     """
     have, n, expected = 0, _start(nodes, accuracy), np.inf
     rounds: list[tuple[int, float]] = []
-    values: list[Floats] = []
+    values, apart = np.empty((0, 0)), Apart(nodes)
     while True:
-        values.append((yield _degrees(have, n)))
-        found = on_line(nodes, powers_of(values[0] if not have else np.concatenate(values)))
-        surprise = max(1.0, sum(found.sizes[have:].tolist()) / expected)
-        rounds.append((n, surprise * found.error))
+        wanted = apart.with_one(have, n)
+        asked = n + len(apart.rows)
+        if asked > most:
+            refuse(rounds[-1] if rounds else (0, np.inf), accuracy, asked, most)
+        fresh = apart.without((yield wanted), n - have)
+        values = np.concatenate([values, fresh]) if have else fresh
+        found = on_line(nodes, powers_of(values))
+        surprise = max(1.0, sum(found.sizes[have:].tolist()) / (expected or np.inf))
+        missed = apart.missed(found)
+        rounds.append((n, max(surprise * found.error, MISSED * missed)))
         if rounds[-1][1] <= accuracy:
-            return found._replace(error=rounds[-1][1], rounds=tuple(rounds))
-        have, (n, expected) = n, _further(found, len(nodes.v), accuracy / surprise)
-        if n == have or n > most or len(rounds) == ROUNDS:
-            refuse(rounds[-1], accuracy, n, most)
+            return found._replace(error=rounds[-1][1], rounds=tuple(rounds), asked=asked)
+        have, (n, expected) = n, _further(found, missed, len(nodes.v), accuracy / surprise)
+        if n == have or len(rounds) == ROUNDS:
+            refuse(rounds[-1], accuracy, asked, most)
+
+
+class Apart:
+    """Points held out, one more with each round: rows of ``nodes.table``, and values there."""
+
+    def __init__(self, nodes: Nodes) -> None:
+        """Before any is chosen."""
+        self.nodes = nodes
+        self.rows: list[int] = []
+        self.values: list[Floats] = []
+
+    def with_one(self, have: int, n: int) -> Ints:
+        """Members ``have`` … n − 1 and the point held out with them, none if nothing is missing."""
+        row = None if self.nodes.whole and n == len(self.nodes.v) else farthest(self.nodes, n)
+        if row is None or row in self.rows:
+            return _degrees(have, n)
+        self.rows.append(row)
+        return _with(have, n, row)
+
+    def without(self, values: Floats, fresh: int) -> Floats:
+        """Those of the members; that of the point held out is kept."""
+        self.values.extend(values[fresh:])
+        return values[:fresh]
+
+    def missed(self, found: Interpolant) -> float:
+        """|δf/f| that the points held out show, where it is largest.
+
+        The error goes as Π_i (v − v_i), of which h_n at a point is the share of the largest.
+        """
+        n = len(found.members)
+        if not self.rows or (self.nodes.whole and n == len(self.nodes.v)):
+            return 0.0
+        table = self.nodes.table[self.rows]
+        g = table[:, :n] @ found.coefficients.T
+        off = np.abs(g / np.array(self.values) ** found.power - 1.0).max(axis=1)
+        if n < table.shape[1]:
+            off /= np.clip(np.abs(table[:, n]), LEAST_SHARE, 1.0)
+        return float(off.max()) / abs(found.power)
+
+
+@lru_cache(maxsize=256)
+def farthest(nodes: Nodes, n: int) -> int | None:
+    """Of the places for checks that farthest from n nodes; of a whole axis these are nodes too."""
+    first = n + STEPS if nodes.whole else len(nodes.v)
+    rows = nodes.table[first:, min(n, len(nodes.v) - 1)]
+    return first + int(np.abs(rows).argmax()) if len(rows) else None
 
 
 @lru_cache(maxsize=256)
@@ -79,23 +134,33 @@ def _degrees(first: int, last: int) -> Ints:
     return frozen(np.arange(first, last)[:, None])
 
 
+@lru_cache(maxsize=256)
+def _with(first: int, last: int, row: int) -> Ints:
+    """first … last − 1 and one more, (n, 1)."""
+    return frozen(np.append(np.arange(first, last), row)[:, None])
+
+
 def _start(nodes: Nodes, accuracy: float) -> int:
     """Members that the accuracy will most likely need."""
     n = len(nodes.v)
     if nodes.whole and n <= FEW:
         return n
-    return min(1 + FIRST + sum(accuracy < each for each in STARTS), n)
+    start = min(1 + FIRST + sum(accuracy < each for each in STARTS), n)
+    return n if nodes.whole and n <= start + STEPS else start
 
 
-def _further(found: Interpolant, nodes: int, accuracy: float) -> tuple[int, float]:
+def _further(found: Interpolant, missed: float, nodes: int, accuracy: float) -> tuple[int, float]:
     """How many members there are to be, and Σ |c_k| expected of the new ones.
 
     Until the first that is missing is small enough; as many as there are at the last of the nodes.
+    What was ``missed`` at points held out is what the first of them is likely to be.
     """
-    sizes, rate = found.sizes.tolist(), float(found.rates[0])
+    sizes, rate = found.sizes.tolist(), float(found.rates[0]) or UNKNOWN
     have, left = len(sizes), 0.5 * accuracy / tail(rate)
     while len(sizes) < min(have + STEPS, nodes):
         predicted = max(sizes[-1] * rate, sizes[-2] * rate**2)
+        if len(sizes) == have:
+            predicted = max(predicted, missed)
         enough = predicted <= left
         if enough and (len(sizes) > have or predicted == 0.0):
             break

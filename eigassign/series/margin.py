@@ -85,6 +85,11 @@ class Border:
                         self.outside.add(after)
         return fresh
 
+    @property
+    def complete(self) -> bool:
+        """Whether nothing is missing: all of whole axes is there."""
+        return not self.next
+
     def _unseen(self, key: int) -> tuple[list[int], list[int]]:
         d = len(self.tops)
         befores = self.later[key] = ([ANYTHING] * d, [NOTHING] * d)

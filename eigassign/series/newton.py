@@ -42,6 +42,11 @@ def roots(count: int) -> Floats:
     return np.asarray(-np.cos(np.pi * (np.arange(count) + 0.5) / count))
 
 
+def generic(count: int) -> Floats:
+    """Places all over [−1, 1] that no symmetry and no period has in common: multiples of √5."""
+    return np.asarray(2.0 * (np.arange(1, count + 1) * 0.5 * (np.sqrt(5.0) - 1.0) % 1.0) - 1.0)
+
+
 def leja(candidates: Floats, count: int) -> Ints:
     """Places of ``count`` Leja points among distinct candidates; the most central is the first."""
     middle = 0.5 * (candidates.min() + candidates.max())
@@ -66,12 +71,14 @@ def basis(nodes: Floats, v: Floats) -> Floats:
 class Nodes:
     """At most ``most`` Leja points among candidates v (K,), with Newton's basis.
 
-    They are ``whole`` if they are all that will be asked for.
+    They are ``whole`` if they are all that will be asked for. ``checks`` are further points, which
+    are never nodes and come after them where points are counted.
     """
 
     places: Floats
     most: int
     whole: bool = False
+    checks: tuple[float, ...] = ()
 
     @cached_property
     def chosen(self) -> Ints:
@@ -84,14 +91,19 @@ class Nodes:
         return np.asarray(self.places[self.chosen])
 
     @cached_property
+    def points(self) -> Floats:
+        """All that can be asked for: the nodes, then the checks."""
+        return np.concatenate([self.v, np.array(self.checks)])
+
+    @cached_property
     def table(self) -> Floats:
-        """Newton's basis at the points."""
-        return basis(self.v, self.v)
+        """Newton's basis at all ``points``, (n_points, n_nodes)."""
+        return basis(self.v, self.points)
 
     @cached_property
     def inverse(self) -> Floats:
         """From values at the points to coefficients; leading blocks are those of fewer points."""
-        return np.asarray(dtrtri(self.table, lower=1, unitdiag=1)[0])
+        return np.asarray(dtrtri(self.table[: len(self.v)], lower=1, unitdiag=1)[0])
 
 
 def products(tables: Sequence[Floats], rows: Ints, columns: Ints) -> Floats:

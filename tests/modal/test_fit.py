@@ -210,3 +210,29 @@ def test_a_cluster_has_no_inverse_series_of_each_mode() -> None:
     assert len(made.clusters[0].modes) > 1
     with pytest.raises(UsageError, match="expanded as a cluster"):
         _ = made.inverse
+
+
+@pytest.mark.parametrize("kind", ["expansion", "inverse"])
+@pytest.mark.parametrize(("asked", "radius"), [({"accuracy": 1e-2}, 0.5), ({"solves": 17}, 0.15)])
+def test_a_source_that_fails_between_the_ends_is_refused(
+    kind: str, asked: dict[str, float], radius: float
+) -> None:
+    case = ea.load_case("cases/arm_3r.yaml")
+    start, t = case.trajectory.q[0], 4.0 * np.pi * np.linspace(0.0, 1.0, 201)
+    expansion = ea.expand(case.model(), start, case.initial_design, order=4)
+    source = {"expansion": expansion, "inverse": expansion.inverse}[kind]
+    twice = start + radius * np.stack([0.0 * t, np.cos(t) - 1.0, np.sin(t)], axis=1)
+    with pytest.raises(AccuracyError, match="vouches for no number"):
+        ea.fit(source, twice, case.initial_design, **asked)  # starts, turns and ends where it holds
+
+
+def test_arguments_of_wrong_kinds_are_refused(arm: tuple[Model, np.ndarray]) -> None:
+    model, q = arm
+    with pytest.raises(UsageError, match="accuracy '1e-3' is not a number"):
+        ea.fit(model, q, Y0, accuracy="1e-3")  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="without samples"):
+        ea.fit(model, np.zeros((0, 2)), Y0)
+    with pytest.raises(UsageError, match="a mode must be a whole number"):
+        ea.fit(model, q, Y0, modes=[1.7])  # type: ignore[list-item]
+    with pytest.raises(UsageError, match="most -1 is not within"):
+        ea.fit(model, q, Y0, most=-1)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from eigassign.errors import AccuracyError
+from eigassign.modal.line import interval_nodes
 from eigassign.series.adaptive_newton import adaptive, interpolate
 from eigassign.series.interpolant import Interpolant
 from eigassign.series.newton import Nodes, interval, leja, newton_polynomials
@@ -77,3 +78,36 @@ def test_a_kink_is_refused() -> None:
 def test_too_few_values_are_refused() -> None:
     with pytest.raises(AccuracyError, match="over 30 are not allowed"):
         made(smooth, 3, 1e-8, 30)
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-6])
+def test_values_that_agree_at_the_first_nodes_are_no_constant(accuracy: float) -> None:
+    nodes = interval_nodes(48)
+    first = nodes.v[: 4 if accuracy > 5e-3 else 7]
+    largest = float(np.abs(np.prod(interval()[:, None] - first, axis=1)).max())
+
+    def f(v: np.ndarray) -> np.ndarray:
+        return 1.0 + 0.3 / largest * np.prod(v.reshape(-1, 1) - first, axis=1, keepdims=True)
+
+    found = interpolate(lambda k: f(nodes.points[k]), adaptive([nodes], accuracy, 300))
+    at = np.linspace(-1.0, 1.0, 301)[:, None]
+    g = newton_polynomials(found.members, [nodes.v], found.coefficients)(at)
+    assert np.abs(g ** (1.0 / found.power) / f(at) - 1.0).max() <= found.error <= accuracy
+    assert found.asked > len(found.members)  # some are held out
+
+
+def test_a_box_is_checked_at_points_that_are_no_nodes() -> None:
+    nodes = interval_nodes(20)
+
+    def f(v: np.ndarray) -> np.ndarray:  # 1 at all nodes of the grid
+        return 1.0 + 2e4 * np.prod(v[:, :1] - nodes.v, axis=1, keepdims=True)
+
+    with pytest.raises(AccuracyError, match="leave an estimated error"):
+        interpolate(lambda k: f(nodes.points[k]), adaptive([nodes] * 2, 1e-3, 3000))
+
+
+def test_checks_count_among_the_most_values() -> None:
+    asked = made(smooth, 3, 1e-6)[2]
+    assert made(smooth, 3, 1e-6, most=asked)[2] == asked
+    with pytest.raises(AccuracyError, match=f"over {asked - 1} are not allowed"):
+        made(smooth, 3, 1e-6, most=asked - 1)
