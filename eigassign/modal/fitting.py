@@ -28,7 +28,7 @@ from eigassign.modal.path_fit import PathFit
 from eigassign.modal.reduced_model import ReducedModel
 from eigassign.modal.region import Box, Region, build_region
 from eigassign.modal.roundoff import rounding_error
-from eigassign.modal.stretches import stretches
+from eigassign.modal.stretches import followed, stretches
 from eigassign.series.adaptive_newton import adaptive
 from eigassign.series.given_newton import fewest, given
 from eigassign.series.interpolant import Asking, Interpolant
@@ -87,6 +87,7 @@ def fit(
             d = build_region(directions, n_q, parts[0], y).d
             counts = path.shares(count, fewest(d))
         regions, floors = _best_nodes(source, parts, y, wanted, counts)
+        followed(regions)
         runs = [given(region.nodes, own) for region, own in zip(regions, counts, strict=True)]
     found, seen = _driven(source, wanted, regions, runs)
     if not isinstance(source, Model):

@@ -44,11 +44,25 @@ class Line:
     place: Floats  # (n_t,) in [−1, 1]
     row: Floats  # dv_0/dx (n_x,)
     straight: bool
+    reach: Floats  # joint coordinates from the first sample on, (n_t, n_s)
 
     @cached_property
     def table(self) -> Floats:
         """Newton's basis at the samples, (n_t, most)."""
         return basis(self.axis.nodes, self.place)
+
+    @cached_property
+    def strays(self) -> float:
+        """By how much of its reach the path itself is missed by its interpolant at all nodes.
+
+        What depends on the path is no better known, whatever few frequencies show.
+        """
+        if self.straight:
+            return 0.0
+        count = len(self.axis.nodes)
+        c = self.axis.points.inverse @ self.reach[np.searchsorted(self.place, self.axis.nodes)]
+        off = np.abs(self.table[:, :count] @ c - self.reach).max()
+        return float(off / np.abs(self.reach).max())
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,14 +96,14 @@ def _line(stretch: Stretch, count: int | None) -> Line | None:
         far = int(np.abs(place - place[0]).argmax())
         back = np.linalg.pinv(joints) @ (reach[far] / (place[far] - place[0]))
         steps = np.outer(points.points - place[0], np.append(back, np.zeros(n_y)))
-        return Line(Axis(points, steps), place, row, True)
+        return Line(Axis(points, steps), place, row, True, reach)
     keep = np.unique(place, return_index=True)[1]
     some = np.unique(np.linspace(0, len(keep) - 1, min(len(keep), DENSE)).round().astype(int))
     points = _sampled(place[keep[some]], len(keep), count)
     steps = np.zeros((len(points.points), q.shape[1] + n_y))
     at = np.searchsorted(place[keep], points.points)
     steps[:, : q.shape[1]] = q[keep[at]] - q[0]
-    return Line(Axis(points, steps), place, row, False)
+    return Line(Axis(points, steps), place, row, False, reach)
 
 
 def _sampled(places: Floats, of: int, count: int | None) -> Nodes:

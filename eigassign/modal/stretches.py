@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.errors import UsageError
+from eigassign.errors import AccuracyError, UsageError
 from eigassign.mechanism.trajectories import Trajectories
 from eigassign.modal.corners import smooth_parts
 from eigassign.modal.line import Stretch
-from eigassign.modal.region import joints_of, path_samples
+from eigassign.modal.region import Region, joints_of, path_samples
 
 Floats = NDArray[np.float64]
+STRAYS = 0.03  # of a path's reach by which its interpolant may miss it
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,3 +82,13 @@ def _known(path: bytes, shape: tuple[int, int], combinations: bytes, of: tuple[i
     lengths = tuple(float(np.linalg.norm(np.diff(s[own], axis=0), axis=1).sum()) for own in rows)
     parts = tuple(Stretch(q[own], joints, of[1] - shape[1]) for own in rows)
     return Path(parts, rows, lengths)
+
+
+def followed(regions: Sequence[Region]) -> None:
+    """Raise AccuracyError where nodes that were given do not even show the path."""
+    for region in regions:
+        if region.d == 1 and region.line is not None and region.line.strays > STRAYS:
+            raise AccuracyError(
+                f"{len(region.axes[0].nodes)} solves do not follow the path: between them it is "
+                f"missed by {region.line.strays:.0%} of its reach; give more"
+            )

@@ -193,6 +193,8 @@ def _rest(sizes: Sequence[float], rate: float) -> float:
     """Estimated Σ |c_k| over all k that are missing."""
     if 0.0 < rate < UNKNOWN and len(sizes) <= TRUSTED:
         rate = UNKNOWN
+    elif len(sizes) > LAST:  # beside a kink the first coefficients fall and the last no longer
+        rate = max(rate, decay([1.0, *sizes[-LAST:]]))
     largest, factor = 0.0, 1.0
     for size in sizes[: max(0, len(sizes) - LAST - 1) : -1]:  # the constant shows no rate
         factor *= rate

@@ -191,3 +191,13 @@ def test_a_smooth_curve_has_no_corners_and_a_rough_one_is_left_whole() -> None:
     assert len(stretches(rough, np.eye(2), 2).parts) == 1
     there_and_back = np.outer([0.0, 1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0, 0.0], [1.0, 2.0])
     assert len(stretches(there_and_back, np.array([[1.0, 1.0]]), 2).parts) == 1
+
+
+def test_solves_that_do_not_follow_the_path_are_refused_whatever_they_show() -> None:
+    case = ea.load_case("cases/arm_3r.yaml")
+    t = 2.0 * np.pi * np.linspace(0.0, 1.0, 201)
+    ring = case.trajectory.q[0] + 0.3 * np.stack([0.0 * t, np.cos(t), np.sin(t)], axis=1)
+    with pytest.raises(AccuracyError, match="4 solves do not follow the path"):
+        ea.fit(case.model(), ring, case.initial_design, solves=4)
+    with pytest.raises(AccuracyError, match="leave an estimated error"):  # followed, but no more
+        ea.fit(case.model(), ring, case.initial_design, solves=13)
