@@ -217,9 +217,9 @@ def test_what_is_no_expansion_is_not_taken_for_one() -> None:
 
 
 def test_a_set_too_large_is_taken_to_a_lower_order_and_said_so(tmp_path: Path) -> None:
-    bodies = "".join(f"    e{i}: {{at: l{i % 3}.end, mass: 0.01}}\n" for i in range(17))
+    bodies = "".join(f"    e{i}: {{at: l{i % 3}.end, mass: 0.01}}\n" for i in range(30))
     designed = "  e{0}: {{parameter: bodies.e{0}.mass, min: 0, max: 20 g}}\n"
-    design = "".join(designed.format(i) for i in range(17))
+    design = "".join(designed.format(i) for i in range(30))
     text = chain(3).replace("coordinates:", bodies + "coordinates:")
     case = case_of(tmp_path, text.replace("trajectory:", design + "trajectory:"))
     expansions, notes = expand_plan(case.model(), plan_of(case), None)
