@@ -14,7 +14,7 @@ from scenes import SHIPPED, scene_of
 from eigassign.errors import CaseError
 from eigassign.modal import exact
 from eigassign.modal.expansion import expand
-from eigassign.modal.fitting import FINE
+from eigassign.modal.fit_source import FINE
 from eigassign.study import chart_methods as own
 from eigassign.study import rivals
 from eigassign.study.chart_bench import errors, exact_frequencies
