@@ -34,6 +34,7 @@ from eigassign.series.newton import Nodes, cross, frozen, ordered, products, spr
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+STATED = 2.0  # on what is stated of several axes, though no more than the accuracy asked for
 MISSED = 3.0  # how much worse than at the points held out it may be elsewhere
 CHECKED = 12  # members for each further point that is held out
 TRUSTED = 4  # degree from which a rate is believed
@@ -81,7 +82,9 @@ def _on_box(axes: Sequence[Nodes], accuracy: float, most: int) -> Asking:
         surprise = max(1.0, float(found.sizes[-len(fresh) :].sum()) / expected)
         rounds.append((len(state.members), max(surprise * found.error, missed)))
         if rounds[-1][1] <= accuracy:
-            return found._replace(error=rounds[-1][1], rounds=tuple(rounds))
+            stated = min(STATED * rounds[-1][1], accuracy)
+            last = (len(state.members), stated)
+            return found._replace(error=stated, rounds=(*rounds[:-1], last))
         doubt = max(surprise, missed / found.error if found.error else 1.0)
         fresh, expected = _wanted(state.border, found, accuracy / doubt)
         if not len(fresh) or len(rounds) == ROUNDS:
