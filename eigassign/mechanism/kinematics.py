@@ -39,9 +39,6 @@ from eigassign.mechanism.spanning import build_tree
 from eigassign.mechanism.tree import Edge, Node, Tree
 from eigassign.series.expression import Scalar
 
-PLANAR_TWIST = (0, 1, 5)  # v_x, v_y, ω_z among (v, ω)
-SPATIAL_TWIST = (0, 1, 2, 3, 4, 5)
-
 
 @dataclass(frozen=True)
 class Kinematics:

@@ -23,7 +23,6 @@ from eigassign.series.expression import Scalar
 from eigassign.series.table import Table, compile_table
 
 Floats = NDArray[np.float64]
-PER_LINK = 12  # rotation (9) and origin (3)
 
 
 @dataclass(frozen=True, eq=False)
