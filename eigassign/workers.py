@@ -34,12 +34,24 @@ def process_pool(workers: int) -> Iterator[Executor]:
             try:
                 yield pool
             except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                _stop(set(multiprocessing.active_children()) - others)
+                _stop(pool, set(multiprocessing.active_children()) - others)
                 raise
 
 
-def _stop(workers: set[Any]) -> None:
+def _stop(pool: Executor, workers: set[Any]) -> None:
+    """Start nothing more, end the workers, and wait until the pool has taken note of their ends.
+
+    The pool's own thread waits for the same processes: until it is done, a worker that it has
+    reaped still counts as alive here.
+    """
+    ending = threading.Thread(target=pool.shutdown, args=(True,), kwargs={"cancel_futures": True})
+    ending.daemon = True
+    ending.start()
+    _end(workers)
+    ending.join(_PATIENCE_S)
+
+
+def _end(workers: set[Any]) -> None:
     """Let workers remove their temporary folders, then kill those that take too long."""
     deadline = time.monotonic() + _PATIENCE_S
     for worker in workers:
@@ -47,6 +59,7 @@ def _stop(workers: set[Any]) -> None:
     for worker in workers:
         worker.join(max(0.0, deadline - time.monotonic()))
         worker.kill()
+        worker.join(_PATIENCE_S)
 
 
 def _prepare_worker() -> None:

@@ -124,7 +124,8 @@ def test_workers_have_one_blas_thread_each_and_no_numpy_from_the_start(
     assert os.environ["OPENBLAS_NUM_THREADS"] == "7"
 
 
-def test_an_interrupt_stops_the_workers_and_is_passed_on() -> None:
+@pytest.mark.parametrize("_again", range(20))  # two threads wait for the same processes
+def test_an_interrupt_stops_the_workers_and_is_passed_on(_again: int) -> None:
     before = set(multiprocessing.active_children())
 
     def interrupted() -> None:
