@@ -27,6 +27,7 @@ SPATIAL = (
     "revolute", "revolute", "prismatic", "cylindrical", "universal", "spherical", "screw",
     "fixed", "carriage", "nut",
 )  # fmt: skip
+WAY = np.linspace(0.125, 1.0, 8)  # from one configuration to the other
 PARTS = {"cylindrical": ["translation", "rotation"], "universal": [1, 2], "spherical": [1, 2, 3]}
 
 
@@ -404,9 +405,9 @@ def _nearby(
     q0 = np.array(list(values.values()))
     near = q0 + rng.uniform(-0.12, 0.12, len(q0))
     try:
-        pose = solve_pose(tree, near)
-        if rides_well(tree, pose) and condition(tree, pose) > 0.02:
-            return tree, q0, near
+        way = [solve_pose(tree, q0 + t * (near - q0)) for t in WAY]
     except ValueError:
         return None
-    return None
+    if rides_well(tree, way[-1]) and min(condition(tree, pose) for pose in way) > 0.02:
+        return tree, q0, near
+    return None  # beyond a dead point there may be a pose again, but no way to it
