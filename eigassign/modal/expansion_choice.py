@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from math import comb
+from math import comb, isfinite, log2
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,15 +19,19 @@ from eigassign.modal.adaptive import (
     shown,
 )
 from eigassign.modal.clusters import CLUSTER_GAP
-from eigassign.modal.convergence import radius_share
-from eigassign.modal.expansion import Expansion, expand
+from eigassign.modal.expansion import Expansion
+from eigassign.modal.expansion_trial import Found, Trial, size
 from eigassign.modal.nearest import picked
 from eigassign.modal.sizes import MOST_TERMS
 from eigassign.modal.taylor_estimate import polynomial_error
 
 Floats = NDArray[np.float64]
-ORDERS = (2, 3, 4, 5, 6, 8, 10)
-MAX_POINTS = 8
+ORDERS = (2, 3, 4, 5, 6, 8, 10, 12, 14, 17, 20)
+MAX_POINTS = 32
+LOOKED_AT = (8, 16)  # numbers of points at which it is asked whether more of them will do
+IN_VAIN = 3  # orders after which neighbours that do not help are no longer tried
+HELPFUL = 0.5  # times the error without them
+HOPE = 3.0  # by how much more points may do better than the last ones promise
 WIDEST_CLUSTER = 0.7  # relative gap in λ up to which neighbours are tried as one cluster
 FINER = 0.05  # part of the accuracy that the reduced model beside them has to reach
 
@@ -84,24 +87,26 @@ def choose_expansion(
     start: Floats | None = None,
     place: Callable[[int], str] = row_in_words,
     suggestions: Sequence[Suggestion] = (),
+    begun: ExpansionChoice | None = None,
 ) -> ExpansionChoice:
     """The expansions with the fewest coefficients whose estimate is ≤ ``accuracy`` at x (n, n_x).
 
-    The first of ``suggestions`` that does is taken unseen what else there is. Then are tried, in
-    order of cost: the order p at one point, ``start`` or the most central sample; with
-    neighbouring modes as one cluster; at several points of one design; no order of over
-    `MOST_TERMS` terms. Judged against one reduced model, as they are evaluated. ``place`` says in
-    words what row k of x is. Raises AccuracyError, naming the sample, where nothing does.
+    The first of ``suggestions`` that does is taken unseen what else there is; so is what was
+    ``begun`` at fewer samples, with further points if need be. Then are tried, in order of cost:
+    the order p at one point, ``start`` or the most central sample; with neighbouring modes as one
+    cluster; at several points of one design; no order of over `MOST_TERMS` terms. Judged against
+    one reduced model, as they are evaluated. ``place`` says in words what row k of x is. Raises
+    AccuracyError, naming the sample, where nothing does.
     """
     beside = reduce_adaptively(pencil, x, FINER * accuracy, modes, place=place)
     judge = (
         f"judged beside a reduced model of {beside.reduced.size} vectors, itself right to "
         f"{beside.estimate.max():.1e}"
     )
-    trial = _Trial(pencil, x, accuracy, tuple(modes), linear_in_y, beside, [judge], place)
+    trial = Trial(pencil, x, accuracy, tuple(modes), linear_in_y, beside, [judge], place)
     first = x[central(x)] if start is None else start
     orders = [p for p in orders if _terms(pencil, p) <= MOST_TERMS] or orders[:1]
-    best = _first(trial, suggestions)
+    best = _first(trial, suggestions) or _continued(trial, begun)
     if best is None:
         best = _cheapest(trial, _single(trial, first, orders))
     if best is None:
@@ -115,66 +120,11 @@ def choose_expansion(
     return ExpansionChoice(*best, beside, tuple(trial.reasons))
 
 
-_Found = tuple[tuple[Expansion, ...], float, Floats]  # with cluster gap and estimate
-
-
-@dataclass
-class _Trial:
-    """What all candidates are judged by, and what was said of them."""
-
-    pencil: Pencil
-    x: Floats
-    accuracy: float
-    modes: tuple[int, ...]
-    linear_in_y: bool
-    beside: AdaptiveReduction
-    reasons: list[str]
-    place: Callable[[int], str]
-    last: float = np.inf
-    worst_sample: int = 0
-    cheapest: float = np.inf  # coefficients of the best found so far
-
-    def expand(self, point: Floats, order: int, gap: float) -> Expansion:
-        n_q = self.pencil.n_q
-        return expand(
-            self.pencil,
-            point[:n_q],
-            point[n_q:],
-            self.modes,
-            order,
-            self.linear_in_y,
-            cluster_gap=gap,
-        )
-
-    @cached_property
-    def reduced_hz(self) -> Floats:
-        """(n, n_modes) of the reduced model that all are compared with."""
-        n_q = self.pencil.n_q
-        return self.beside.reduced.frequencies(self.x[:, :n_q], self.x[:, n_q:])
-
-    def errors(self, *parts: Expansion) -> Floats:
-        """(n, n_modes), each sample by the nearest of ``parts``."""
-        q, y = self.x[:, : self.pencil.n_q], self.x[:, self.pencil.n_q :]
-        values = picked(parts, q, [part.frequencies(q, y) for part in parts])
-        return polynomial_error(values, self.reduced_hz, self.beside.estimate)
-
-    def share(self, part: Expansion) -> float:
-        q, y = self.x[:, : self.pencil.n_q], self.x[:, self.pencil.n_q :]
-        return float(radius_share(part, q, y).max())
-
-    def note(self, what: str, worst: Floats, share: float = np.nan) -> None:
-        self.worst_sample = int(np.argmax(worst))
-        self.last = float(worst[self.worst_sample])
-        error = f"error at most {self.last:.1e}" if np.isfinite(self.last) else "no number"
-        reach = f", {share:.2f} of the radius of convergence" if np.isfinite(share) else ""
-        self.reasons.append(f"{what}: {error} ({self.place(self.worst_sample)}{reach})")
-
-
-def _first(trial: _Trial, suggestions: Sequence[Suggestion]) -> _Found | None:
+def _first(trial: Trial, suggestions: Sequence[Suggestion]) -> Found | None:
     """The first suggestion within the accuracy."""
     for each in suggestions:
         parts = tuple(trial.expand(point, each.order, each.cluster_gap) for point in each.points)
-        errors = trial.errors(*parts)
+        errors = trial.errors(parts, [trial.values(part) for part in parts])
         trial.note(each.name, errors.max(axis=1))
         if errors.max() <= trial.accuracy:
             return parts, each.cluster_gap, errors
@@ -183,9 +133,9 @@ def _first(trial: _Trial, suggestions: Sequence[Suggestion]) -> _Found | None:
     return None
 
 
-def _cheapest(trial: _Trial, candidates: Iterator[tuple[int, _Found]]) -> _Found | None:
+def _cheapest(trial: Trial, candidates: Iterator[tuple[int, Found]]) -> Found | None:
     """Of the candidates within the accuracy the one with the fewest coefficients."""
-    best: tuple[int, _Found] | None = None
+    best: tuple[int, Found] | None = None
     for cost, found in candidates:
         if found[2].max() <= trial.accuracy and (best is None or cost < best[0]):
             best, trial.cheapest = (cost, found), cost
@@ -197,25 +147,25 @@ def _terms(pencil: Pencil, order: int) -> int:
     return comb(int(pencil.active.sum()) + order, order)
 
 
-def _cost(parts: Sequence[Expansion]) -> int:
-    return sum(c.coefficients.size for part in parts for c in part.clusters)
-
-
-def _single(trial: _Trial, point: Floats, orders: Sequence[int]) -> Iterator[tuple[int, _Found]]:
+def _single(trial: Trial, point: Floats, orders: Sequence[int]) -> Iterator[tuple[int, Found]]:
     """One expansion point, the modes alone and then with their neighbours."""
+    alone: dict[int, float] = {}  # the errors by order
     for gap in _gaps(trial, point):
         costs: list[int] = []  # of the orders so far
+        in_vain = 0
         for order in orders:
-            if costs and costs[-1] >= trial.cheapest:
+            if in_vain == IN_VAIN or (costs and costs[-1] >= trial.cheapest):
                 break  # the next order costs more still
             part = trial.expand(point, order, gap)
-            costs.append(_cost((part,)))
-            errors = trial.errors(part)
-            share = trial.share(part)
+            costs.append(size((part,)))
+            errors = trial.errors([part], [trial.values(part)])
+            share = trial.share(part, errors)
             trial.note(_named(part), errors.max(axis=1), share)
-            yield _cost((part,)), ((part,), gap, errors)
+            yield size((part,)), ((part,), gap, errors)
             if errors.max() <= trial.accuracy or share > 1.5:
                 break
+            in_vain += errors.max() > HELPFUL * alone.get(order, np.inf)
+            alone.setdefault(order, float(errors.max()))
 
 
 def _named(part: Expansion) -> str:
@@ -224,7 +174,7 @@ def _named(part: Expansion) -> str:
     return f"order {part.order}{groups}"
 
 
-def _gaps(trial: _Trial, point: Floats) -> list[float]:
+def _gaps(trial: Trial, point: Floats) -> list[float]:
     """Cluster gaps worth a try: the usual one, and those that take in the nearest neighbours."""
     from eigassign.modal.exact import eigenvalues
 
@@ -239,21 +189,48 @@ def _gaps(trial: _Trial, point: Floats) -> list[float]:
     return [CLUSTER_GAP, *wider[:2]]
 
 
-def _several(trial: _Trial, first: Floats, orders: Sequence[int]) -> Iterator[tuple[int, _Found]]:
+def _several(trial: Trial, first: Floats, orders: Sequence[int]) -> Iterator[tuple[int, Found]]:
     """Points added where they are worst in all, of the first one's design, for every order."""
-    n_q = trial.pencil.n_q
     for order in orders:
-        parts = [trial.expand(first, order, CLUSTER_GAP)]
-        if _cost(parts) >= trial.cheapest:
+        part = trial.expand(first, order, CLUSTER_GAP)
+        if size([part]) >= trial.cheapest:
             break
-        errors = trial.errors(*parts)
-        while (
-            len(parts) < MAX_POINTS
-            and errors.max() > trial.accuracy
-            and _cost(parts) < trial.cheapest
-        ):
-            worst = trial.x[int(np.argmax(errors.max(axis=1))), :n_q]
-            parts.append(trial.expand(np.concatenate([worst, first[n_q:]]), order, CLUSTER_GAP))
-            errors = trial.errors(*parts)
-        trial.note(f"order {order} at {len(parts)} points", errors.max(axis=1))
-        yield _cost(parts), (tuple(parts), CLUSTER_GAP, errors)
+        found = _grown(trial, [part], CLUSTER_GAP)
+        yield size(found[0]), found
+
+
+def _continued(trial: Trial, begun: ExpansionChoice | None) -> Found | None:
+    """What met the accuracy at fewer samples, with the points that these need."""
+    if begun is None:
+        return None
+    found = _grown(trial, list(begun.expansions), begun.cluster_gap)
+    return found if found[2].max() <= trial.accuracy else None
+
+
+def _grown(trial: Trial, parts: list[Expansion], gap: float) -> Found:
+    """``parts`` and others like them where they are worst, until they suffice or cost too much."""
+    order, y0 = parts[0].order, parts[0].y0
+    values = [trial.values(part) for part in parts]
+    errors = trial.errors(parts, values)
+    highest = [float(errors.max())] * len(parts)  # with one point, two, …
+    while _go_on(highest, trial.accuracy) and size(parts) < trial.cheapest:
+        worst = trial.x[int(np.argmax(errors.max(axis=1))), : trial.pencil.n_q]
+        parts.append(trial.expand(np.concatenate([worst, y0]), order, gap))
+        values.append(trial.values(parts[-1]))
+        errors = trial.errors(parts, values)
+        highest.append(float(errors.max()))
+    trial.note(f"order {order} at {len(parts)} points", errors.max(axis=1))
+    return tuple(parts), gap, errors
+
+
+def _go_on(highest: Sequence[float], accuracy: float) -> bool:
+    """Whether a point more may help: as the last doubling of their number did, up to the most."""
+    points, error = len(highest), highest[-1]
+    if error <= accuracy or points >= MAX_POINTS:
+        return False
+    if points not in LOOKED_AT:
+        return True
+    before = highest[points // 2 - 1]
+    gain = min(error / before, 1.0) if isfinite(error) else 1.0
+    promised: float = error * gain ** log2(MAX_POINTS / points)
+    return promised <= HOPE * accuracy

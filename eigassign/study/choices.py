@@ -145,16 +145,17 @@ def choose_order(
     accuracy, start = series_share(file), np.concatenate([q0, y0])
     followed, said = suggestions(file, q0, y0, modes, accuracy)
 
-    def choice(x: Floats, samples: int) -> ExpansionChoice:
+    def choice(x: Floats, samples: int, begun: ExpansionChoice | None = None) -> ExpansionChoice:
         place = partial(_place, trajectory, samples)
         return choose_expansion(
-            model.pencil, x, accuracy, modes, start=start, place=place, suggestions=followed
-        )
+            model.pencil, x, accuracy, modes,
+            start=start, place=place, suggestions=followed, begun=begun,
+        )  # fmt: skip
 
     found = choice(x, few)
     beyond = float(found.error_estimate(every[:, : len(q0)], every[:, len(q0) :]).max())
     if beyond > accuracy:
-        found = choice(every, many)
+        found = choice(every, many, found)
         said += (f"chosen anew at more samples: between {few} the error was {beyond:.1e}",)
     first, *more = (part.q0 for part in found.expansions)
     others = tuple(tuple(float(v) for v in q) for q in more)

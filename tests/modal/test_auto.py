@@ -11,7 +11,7 @@ from eigassign.errors import AccuracyError
 from eigassign.modal.adaptive import central, reduce_adaptively
 from eigassign.modal.convergence import radius_share
 from eigassign.modal.expansion import expand
-from eigassign.modal.expansion_choice import choose_expansion
+from eigassign.modal.expansion_choice import MAX_POINTS, _go_on, choose_expansion
 from eigassign.modal.mesh_choice import choose_mesh, mesh_error
 from eigassign.modal.model import Model
 
@@ -83,8 +83,8 @@ def test_a_mesh_that_round_off_forbids_is_refused(x):
 def test_what_only_several_designs_could_reach_is_refused(x):
     """All points share a design, as an assignment needs it: mode 2 leaves 2e-4 over the box."""
     model = build({"upper": 4, "fore": 3})
-    with pytest.raises(AccuracyError, match=r"up to 10 at up to 8 points reaches 5\.0e-05"):
-        choose_expansion(model.pencil, x, 5e-5, (1, 2))
+    with pytest.raises(AccuracyError, match=r"up to 10 at up to 32 points reaches 5\.0e-05"):
+        choose_expansion(model.pencil, x, 5e-5, (1, 2), orders=(6, 10))
 
 
 def test_several_points_do_where_one_does_not(x):
@@ -98,6 +98,52 @@ def test_several_points_do_where_one_does_not(x):
     error = np.abs(f / exact(model, x, (1, 2)) - 1.0)
     assert error.max() <= 1e-4
     assert (chosen.error_estimate(x[:, :2], x[:, 2:]) >= error).all()
+
+
+def test_many_points_do_while_more_of_them_help(x):
+    """An order of 2 to 1e-4 at one design: more than 8 points, which once were the most."""
+    model = build({"upper": 4, "fore": 3})
+    x = np.hstack([x[:, :2], np.full((len(x), 2), 0.125)])
+    chosen = choose_expansion(model.pencil, x, 2e-6, orders=(2,))
+    assert 8 < len(chosen.expansions) <= MAX_POINTS
+    f = chosen.frequencies(x[:, :2], x[:, 2:])
+    assert np.abs(f / exact(model, x, (1,)) - 1.0).max() <= 2e-6
+
+
+def test_what_was_begun_at_fewer_samples_goes_on(x):
+    """The order and the points found there, and some more: nothing else is tried."""
+    model = build({"upper": 4, "fore": 3})
+    x = np.hstack([x[:, :2], np.full((len(x), 2), 0.125)])
+    begun = choose_expansion(model.pencil, x[::8], 1e-5, orders=(3,))
+    chosen = choose_expansion(model.pencil, x, 1e-5, begun=begun)
+    assert chosen.order == 3
+    had = {part.q0.tobytes() for part in begun.expansions}
+    assert had < {part.q0.tobytes() for part in chosen.expansions}
+    assert chosen.estimate.max() <= 1e-5
+    assert len(chosen.reasons) == 2
+
+
+def test_neighbours_that_do_not_help_are_soon_left_alone(x):
+    model = build({"upper": 4, "fore": 3})
+    chosen = choose_expansion(model.pencil, x, 1e-6, (1,), orders=(2, 3, 4, 5, 6, 8, 12, 14))
+    together = [line for line in chosen.reasons if "as one cluster" in line]
+    assert len(together) <= 2 * 3
+
+
+@pytest.mark.parametrize(
+    ("highest", "more"),
+    [
+        ([1.0] * 7, True),  # not yet looked at
+        ([1.0] * 4 + [0.1] * 4, False),  # halved twice more it would be 1e-3
+        ([1.0] * 4 + [0.005] * 4, True),
+        ([np.inf] * 8, False),
+        ([np.inf] * 7 + [0.005], True),
+        ([1e-9], False),
+        ([0.01] * 32, False),
+    ],
+)
+def test_more_points_are_added_while_they_promise_enough(highest, more):
+    assert _go_on(highest, 1e-6) is more
 
 
 def test_an_order_that_cannot_do_it_is_refused_at_the_worst_sample(x):
