@@ -11,6 +11,7 @@ import pytest
 from eigassign.api import load_case
 from eigassign.charting import chart_case, with_lines
 from eigassign.errors import CaseError
+from eigassign.modal import expansion_choice
 from eigassign.output.chart_write import to_json
 from eigassign.run import Options, optimize, solve_case
 from eigassign.study.chart_effort import Effort
@@ -124,11 +125,14 @@ def test_a_case_that_follows_a_chart_is_charted_as_if_it_did_not(
     assert made.subject_sha256 == content["subject_sha256"]
 
 
-def test_a_case_whose_auto_refuses_is_charted_all_the_same(tmp_path: Path) -> None:
+def test_a_case_whose_auto_refuses_is_charted_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(expansion_choice, "MOST_TERMS", 50)
     (tmp_path / "arm.yaml").write_text(replaced("expansion: {order: auto, accuracy: 1e-9}"))
     made = chart_case(load_case(tmp_path / "arm.yaml"), Options(), EFFORT, Wish(accuracy=1e-9))
     assert made.advice[0].auto is not None
-    assert made.advice[0].auto.refused.startswith("no expansion of order up to 10")
+    assert made.advice[0].auto.refused.startswith("no expansion of order up to 4")
 
 
 def test_a_chart_that_is_missing_or_needs_no_following_is_an_error_at_its_key(
