@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 from eigassign.study.chart_timing import Patience
 
-LARGE = 1000  # n_dof from which a quick chart tries less
+LARGE = 1000  # n_dof over which a quick chart tries less, but for what only pays there
 
 
 @dataclass(frozen=True)
@@ -21,6 +21,7 @@ class Effort:
     coefficients: int = 5000  # largest set that is expanded
     half_orders: tuple[int, ...] = (0, 1, 2, 3)
     expansion_points: tuple[int, ...] = (1, 3, 5)
+    fitted: tuple[tuple[int, int], ...] = ((1, 3), (2, 1))  # half order, points of reduced models
     nodes: tuple[int, ...] = (2, 3, 4, 5, 6, 7, 9, 11)
     stations: tuple[int, ...] = (3, 5, 9, 17, 33, 65)
     accuracies: tuple[float, ...] = (
@@ -42,6 +43,7 @@ class Effort:
     training: tuple[int, ...] = (27, 64, 125, 343)
     kriging: int = 343  # training points up to which Kriging is fitted
     reference_s: float = 120.0  # for the exact answers
+    one_by_one: int = 200  # points at which exact solvers are tried that take one at a time
     choosing_s: float = 20.0  # a choice by auto that takes longer is the last
     training_s: float = 60.0  # for the exact solves of one method's training
     most_dense: int = 2500  # n_dof up to which SciPy's dense solver is tried
@@ -53,9 +55,15 @@ class Effort:
 
 
 def suited(effort: Effort, n_dof: int) -> Effort:
-    """The effort for a model of this size: a quick chart of a large one leaves out what is slow."""
-    if not effort.brief or n_dof <= LARGE:
+    """The effort for a model of this size: a quick chart leaves out what is slow for it.
+
+    A fit of a reduced model costs its error estimate at every node: exact solves of small models
+    cost less.
+    """
+    if not effort.brief:
         return effort
+    if n_dof <= LARGE:
+        return replace(effort, fitted=())
     return replace(effort, orders=(1, 2, 3, 4), half_orders=(1, 2), expansion_points=(1,))
 
 
@@ -73,12 +81,13 @@ QUICK = Effort(
     training=(27, 125),
     kriging=125,
     reference_s=3.0,
+    one_by_one=50,
     choosing_s=1.0,
     training_s=1.0,
     most_dense=300,
     most_dof=2500,
     factors=(0.5, 1.0, 2.0, 4.0),
-    patience=Patience(rounds=5, seconds=0.0, long_s=0.06),
+    patience=Patience(rounds=3, seconds=0.0, long_s=0.06),
     objectives=60,
     searched_s=1.0,
 )

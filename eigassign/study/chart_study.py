@@ -32,7 +32,6 @@ from eigassign.study.chart_timing import timed
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
-FITTED = ((1, 3), (2, 1))  # half order and expansion points of the reduced models fitted
 ACCURACIES = (1e-2, 1e-4, 1e-6, 1e-8)
 MANY = 1000.0  # trajectories of the second front: a search over designs
 
@@ -183,7 +182,7 @@ def _methods(
     model, modes = scene.model, scene.expansions.modes
     most = max(4, int(effort.training_s / solve_s))  # exact solves that a training may take
     orders = _orders(scene, effort)
-    few = max(1, min(len(points.x), int(0.2 * effort.reference_s / solve_s), 200))
+    few = max(1, min(len(points.x), int(0.2 * effort.reference_s / solve_s), effort.one_by_one))
     yield from own.exact_methods(model, modes, few)
     if model.n_dof <= min(effort.most_dense, rivals.MOST_DENSE):
         yield rivals.lapack(model, modes, max(1, min(40, int(4e9 / model.n_dof**3))))
@@ -193,7 +192,7 @@ def _methods(
     yield from own.piecewise_methods(scene, orders[1:], effort.expansion_points[1:])
     yield from auto_methods(scene, taken)
     yield from own.reduced_methods(scene, effort.half_orders, effort.expansion_points)
-    sources = [each for each in FITTED if each[1] <= max(effort.expansion_points)]
+    sources = [each for each in effort.fitted if each[1] <= max(effort.expansion_points)]
     yield from fit_methods(scene, features, points, effort.accuracies, sources, most)
     yield from _rivals(scene, features, points, effort, most)
 
