@@ -67,3 +67,21 @@ def test_every_file_that_is_linked_is_there() -> None:
     links = re.findall(r"\]\((?!https?:)([^)#]+)\)", README)
     assert links
     assert all(Path(ROOT, link).exists() for link in links)
+
+
+def test_every_benchmark_is_described_and_its_peers_can_be_installed() -> None:
+    described = (ROOT / "benchmarks" / "README.md").read_text(encoding="utf-8")
+    scripts = {p.name: p.read_text(encoding="utf-8") for p in ROOT.glob("benchmarks/*.py")}
+    run = {name for name, text in scripts.items() if "__main__" in text}
+    assert len(run) >= 10
+    assert {name for name in run if f"`{name}`" not in described} == set()
+    extra = (ROOT / "pyproject.toml").read_text(encoding="utf-8").split("bench = [")[1]
+    peers = {"eastereig": "EasterEig", "openseespy": "openseespy", "exudyn": "exudyn"}
+    peers |= {"smt": "smt", "sklearn": "scikit-learn"}
+    used = {
+        package
+        for name, package in peers.items()
+        if any(re.search(rf"(import|from) {name}\b", text) for text in scripts.values())
+    }
+    assert used == set(peers.values())
+    assert {package for package in used if f'"{package}==' not in extra} == set()
