@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,30 +43,44 @@ def reduce_adaptively(
     max_size: int = MAX_SIZE,
     half_orders: Sequence[int] = HALF_ORDERS,
     place: Callable[[int], str] = row_in_words,
+    tolerable: float | None = None,
 ) -> AdaptiveReduction:
     """The smallest reduced model found whose estimate is ≤ ``accuracy`` at samples x (n, n_x).
 
     For each half order, expansion points are added where the estimate is largest. ``place`` says
-    in words what row k of x is. Raises AccuracyError, naming the sample, where ``max_size``
-    vectors do not suffice.
+    in words what row k of x is. Where nothing meets the accuracy, as where round-off of a fine mesh
+    is larger, the best within ``tolerable``; else raises AccuracyError, naming the sample.
     """
-    best: AdaptiveReduction | None = None
+    best: _Candidate | None = None  # that meets the accuracy
+    closest: _Candidate | None = None
     reasons: list[str] = []
-    worst = (np.inf, 0)
+    reached = (np.inf, 0)
     for half_order in half_orders:
         limit = max_size if best is None else best.reduced.size - 1
-        found, lines, left = _greedy(pencil, x, accuracy, modes, half_order, limit, place)
+        found, lines, least = _greedy(pencil, x, accuracy, modes, half_order, limit, place)
         reasons += lines
-        worst = min(worst, left)
-        if found is not None:
-            best = AdaptiveReduction(*found, accuracy, ())
-    if best is None:
-        error, k = worst
+        reached = min(reached, least)
+        if found is not None and found.error <= accuracy:
+            best = found
+        if found is not None and (closest is None or found.error < closest.error):
+            closest = found
+    bound = accuracy if tolerable is None else tolerable
+    taken = best or closest
+    if taken is None or not taken.error <= bound:
+        error, k = reached
         raise AccuracyError(
-            f"no reduced model of up to {max_size} vectors reaches {accuracy:.1e}: at {place(k)}, "
+            f"no reduced model of up to {max_size} vectors reaches {bound:.1e}: at {place(k)}, "
             f"(q, y) = {shown(x[k])}, the estimated error is {error:.1e}"
         )
-    return AdaptiveReduction(best.reduced, best.estimate, accuracy, tuple(reasons))
+    return AdaptiveReduction(taken.reduced, taken.estimate, accuracy, tuple(reasons))
+
+
+class _Candidate(NamedTuple):
+    """A reduced model with its estimate (n, n_modes), and the largest of that."""
+
+    reduced: ReducedModel
+    estimate: Floats
+    error: float
 
 
 def _greedy(
@@ -76,27 +91,32 @@ def _greedy(
     half_order: int,
     limit: int,
     place: Callable[[int], str],
-) -> tuple[tuple[ReducedModel, Floats] | None, list[str], tuple[float, int]]:
-    """Add the worst sample as an expansion point until it fits, or grows beyond ``limit``."""
+) -> tuple[_Candidate | None, list[str], tuple[float, int]]:
+    """The worst sample added as an expansion point, until it fits or grows beyond ``limit``.
+
+    The best of up to ``limit`` vectors; and the least error, with its sample, of any.
+    """
     points, n_q = [central(x)], pencil.n_q
     lines: list[str] = []
-    best = (np.inf, 0)
+    best: _Candidate | None = None
+    least = (np.inf, 0)
     while len(points) <= MAX_POINTS:
         at = x[points]
         reduced = reduce(pencil, at[:, :n_q], at[:, n_q:], modes, half_order)
         estimate = reduced.error_estimate(x[:, :n_q], x[:, n_q:])
         highest = estimate.max(axis=1)
         k = int(np.argmax(highest))
-        best = min(best, (float(highest[k]), k))
-        lines.append(_line(half_order, len(points), reduced.size, float(highest[k]), place(k)))
+        error = float(highest[k])
+        least = min(least, (error, k))
+        lines.append(_line(half_order, len(points), reduced.size, error, place(k)))
         if reduced.size > limit:
             break
-        if highest[k] <= accuracy:
-            return (reduced, estimate), lines, best
-        if k in points:
+        if best is None or error < best.error:
+            best = _Candidate(reduced, estimate, error)
+        if error <= accuracy or k in points:
             break
         points.append(k)
-    return None, lines, best
+    return best, lines, least
 
 
 def _line(half_order: int, points: int, size: int, error: float, sample: str) -> str:

@@ -33,7 +33,8 @@ IN_VAIN = 3  # orders after which neighbours that do not help are no longer trie
 HELPFUL = 0.5  # times the error without them
 HOPE = 3.0  # by how much more points may do better than the last ones promise
 WIDEST_CLUSTER = 0.7  # relative gap in λ up to which neighbours are tried as one cluster
-FINER = 0.05  # part of the accuracy that the reduced model beside them has to reach
+FINER = 0.05  # part of the accuracy that the reduced model beside them should reach
+TOLERABLE = 0.5  # the same where round-off does not allow that
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +99,9 @@ def choose_expansion(
     one reduced model, as they are evaluated. ``place`` says in words what row k of x is. Raises
     AccuracyError, naming the sample, where nothing does.
     """
-    beside = reduce_adaptively(pencil, x, FINER * accuracy, modes, place=place)
+    beside = reduce_adaptively(
+        pencil, x, FINER * accuracy, modes, place=place, tolerable=TOLERABLE * accuracy
+    )
     judge = (
         f"judged beside a reduced model of {beside.reduced.size} vectors, itself right to "
         f"{beside.estimate.max():.1e}"

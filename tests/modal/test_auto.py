@@ -11,7 +11,7 @@ from eigassign.errors import AccuracyError
 from eigassign.modal.adaptive import central, reduce_adaptively
 from eigassign.modal.convergence import radius_share
 from eigassign.modal.expansion import expand
-from eigassign.modal.expansion_choice import MAX_POINTS, _go_on, choose_expansion
+from eigassign.modal.expansion_choice import FINER, MAX_POINTS, TOLERABLE, _go_on, choose_expansion
 from eigassign.modal.mesh_choice import choose_mesh, mesh_error
 from eigassign.modal.model import Model
 
@@ -161,6 +161,16 @@ def test_the_reduced_model_is_as_small_as_the_accuracy_allows(x, accuracy):
     assert (error <= found.estimate).all()
     assert found.estimate.max() <= accuracy
     assert found.reduced.size <= 15
+
+
+def test_round_off_of_a_fine_mesh_is_no_refusal_while_it_leaves_half_of_the_accuracy(x):
+    model = build({"upper": 100, "fore": 100})
+    x = x[::3]
+    chosen = choose_expansion(model.pencil, x, 1e-5)
+    assert FINER * 1e-5 < chosen.beside.estimate.max() <= TOLERABLE * 1e-5
+    assert chosen.estimate.max() <= 1e-5
+    f = chosen.frequencies(x[:, :2], x[:, 2:])
+    assert np.abs(f / exact(model, x, (1,)) - 1.0).max() <= 1e-5
 
 
 def test_a_reduced_model_that_may_not_grow_is_refused_at_the_worst_sample(x):
