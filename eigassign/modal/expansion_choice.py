@@ -119,6 +119,7 @@ def choose_expansion(
         raise AccuracyError(
             f"no expansion of order up to {max(orders)} at up to {MAX_POINTS} points reaches "
             f"{accuracy:.1e}: the last left {trial.last:.1e} at {place(k)}, (q, y) = {shown(x[k])}"
+            "; ask for less, narrow the bounds of the design, or take ea.reduce or ea.fit"
         )
     return ExpansionChoice(*best, beside, tuple(trial.reasons))
 
