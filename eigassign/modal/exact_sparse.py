@@ -46,6 +46,11 @@ def _one(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
     return lam, phi
 
 
+def _krylov_size(count: int) -> int:
+    """Lanczos vectors before a restart: few modes converge in fewer than ARPACK's own 20."""
+    return min(max(20, 2 * count + 1), 10 + 2 * count)
+
+
 def _coupling(M_FF: Floats, M_FE: Floats) -> Floats:
     if not len(M_FF):
         return M_FE
@@ -72,7 +77,9 @@ def _lanczos(
     inverse = linalg.LinearOperator((n, n), matvec=factor.solve)
     start = np.random.default_rng(0).standard_normal(n)
     try:
-        mu, z = linalg.eigsh(M_c, count, M=K_rows, Minv=inverse, which="LM", v0=start)
+        mu, z = linalg.eigsh(
+            M_c, count, M=K_rows, Minv=inverse, which="LM", v0=start, ncv=_krylov_size(count)
+        )
     except linalg.ArpackNoConvergence as error:
         raise AccuracyError(f"the exact modes did not converge: {error}") from error
     order = np.argsort(-mu)
