@@ -47,3 +47,8 @@ def __getattr__(name: str) -> Any:
 
         return getattr(api, name)
     raise AttributeError(f"module 'eigassign' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """Names for completion: also those of `__getattr__`, which are not loaded yet."""
+    return sorted({*globals(), *__all__})

@@ -82,6 +82,14 @@ class Case:
         return Model(pencil, poses, motion, numbers.coordinates, numbers.design, reduced)
 
     @property
+    def settled(self) -> CaseFile:
+        """The file with the numbers that were chosen in the place of ``auto``, for its links.
+
+        Raises AccuracyError as `mesh` does.
+        """
+        return with_reduction(with_elements(self.file, self._elements), self._reduction)
+
+    @property
     def _elements(self) -> Mapping[str, int]:
         return {} if self.mesh is None else self.mesh.elements
 

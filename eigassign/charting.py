@@ -120,7 +120,6 @@ def _chart(
     seconds: float,
 ) -> Chart:
     file = scene.file
-    skipped = (f"{name} has no answer: {why}" for name, why in compared.skipped)
     return Chart(
         title=file.title,
         case_name=file.path.stem,
@@ -142,11 +141,21 @@ def _chart(
             *compared.notes,
             *truncation_notes(scene),
             *remarks,
-            *skipped,
+            *_unanswered(compared.skipped),
         ),
         warnings=scene.warnings,
         seconds=seconds,
     )
+
+
+def _unanswered(skipped: Sequence[tuple[str, str]]) -> Iterator[str]:
+    """Each reason once, with the methods (name, reason) that it kept from an answer."""
+    methods: dict[str, list[str]] = {}
+    for name, why in skipped:
+        methods.setdefault(why, []).append(name)
+    for why, names in methods.items():
+        verb = "has" if len(names) == 1 else "have"
+        yield f"{', '.join(names)} {verb} no answer: {why}"
 
 
 def _mesh(case: Case, scene: Scene, effort: Effort) -> tuple[MeshRow, ...]:
@@ -162,8 +171,9 @@ def _mesh(case: Case, scene: Scene, effort: Effort) -> tuple[MeshRow, ...]:
 def _meshes(case: Case, factors: Sequence[float]) -> Iterator[Mesh]:
     """The case with so many times the elements; a link keeps at least one."""
     seen: set[tuple[int, ...]] = set()
+    settled = case.settled  # or every mesh would choose its own elements and reduction anew
     for factor in sorted(factors):
-        file, counts = refined(case.file, factor)
+        file, counts = refined(settled, factor)
         if counts and counts not in seen:
             seen.add(counts)
             yield Mesh(factor, sum(counts), partial(_model, file))
@@ -174,7 +184,10 @@ def _model(file: CaseFile) -> Model:
 
 
 def refined(file: CaseFile, factor: float) -> tuple[CaseFile, tuple[int, ...]]:
-    """The same case with ``factor`` times the elements in every beam, and their numbers."""
+    """The same case with ``factor`` times the elements in every beam, and their numbers.
+
+    Every number of elements must be given or settled (`Case.settled`).
+    """
     counts: list[int] = []
 
     def scaled(part: Any) -> Any:

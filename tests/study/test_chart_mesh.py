@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scenes import SHIPPED
+from scenes import SHIPPED, changed
 
 from eigassign.api import Case, load_case
 from eigassign.charting import _meshes, refined
@@ -28,6 +28,40 @@ def test_links_are_refined_together_and_keep_an_element(arm: Case) -> None:
     assert refined(arm.file, 0.5)[1] == (2, 2)
     assert refined(arm.file, 0.01)[1] == (1, 1)
     assert arm.file.mechanism.links["forearm"].elements == 3
+
+
+PORTAL = """    portal:
+      type: frame
+      nodes: {start: [0, 0], top: [0.1, 0.1], end: [0.2, 0]}
+      beams:
+        up: {from: start, to: top, material: aluminium, section: rod, elements: 2}
+        down: {from: top, to: end, material: aluminium, section: rod, elements: 3}
+"""
+
+
+def test_links_left_to_auto_are_refined_from_the_elements_that_were_chosen(tmp_path: Path) -> None:
+    text = changed(
+        ("section: rod, elements: 4}", "section: rod, elements: auto, reduce_to: auto}"),
+        ("section: rod, elements: 3}\n", "section: rod, elements: auto}\n" + PORTAL),
+        ("  bodies:", "    wrist: {type: fixed, base: forearm.end, follower: portal.start}\n"
+         "  bodies:"),
+        ("  order: 4", "  order: 4\n  accuracy: 1 %"),
+    )  # fmt: skip
+    (tmp_path / "auto.yaml").write_text(text)
+    case = load_case(tmp_path / "auto.yaml")
+    assert case.mesh is not None
+    assert case.reduction is not None
+    own = (case.mesh.elements["upper_arm"], case.mesh.elements["forearm"], 2, 3)
+    assert refined(case.settled, 1.0)[1] == own
+    assert refined(case.settled, 2.0)[1] == tuple(2 * n for n in own)
+    (same, finer) = _meshes(case, (1.0, 2.0))
+    assert same.elements == sum(own)
+    x = np.array([[1.817, 5.312, 0.125, 0.125]])
+    hz, hz_finer = (mesh.build().frequencies(x[:, :2], x[:, 2:], 1) for mesh in (same, finer))
+    assert hz == pytest.approx(case.model().frequencies(x[:, :2], x[:, 2:], 1), rel=1e-12)
+    assert 0.0 < abs(hz_finer / hz - 1.0) < 0.01
+    reduced = case.settled.mechanism.links["upper_arm"].reduce_to
+    assert reduced == case.reduction.frequencies["upper_arm"]
 
 
 def test_errors_fall_with_the_fourth_power_and_the_own_mesh_is_that_far_off(arm: Case) -> None:
