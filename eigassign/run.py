@@ -75,7 +75,10 @@ class Options:
 
 @dataclass(frozen=True)
 class Result:
-    """The whole answer, in memory. Frequencies (n_t,) in Hz of the first target's mode."""
+    """The whole answer, in memory. Frequencies (n_t,) in Hz of the first target's mode.
+
+    At all samples, or those of the trajectory that the first target names; `findings` has the rest.
+    """
 
     design: Mapping[str, float]  # the optimum, SI
     time_s: Floats
@@ -160,7 +163,7 @@ def _result(findings: Findings, expansions: Expansions, assignment: Assignment) 
     first = findings.targets[0]
     return Result(
         design={row.name: row.optimal for row in findings.design},
-        time_s=findings.time_s,
+        time_s=findings.time_s[first.rows],
         target_hz=first.target_hz,
         initial_hz=first.initial_hz,
         predicted_hz=first.predicted_hz,

@@ -42,17 +42,17 @@ class ActiveLimit:
 class Assignment:
     """The optimal design and the proof that it is.
 
-    ``y`` and ``dy = y − y0`` (n_y,) in SI units; ``lam`` (n_goals, n_t) in rad²/s², predicted by
-    the linear models. J as in `program`: the mean square relative error in λ. Residuals are
-    recomputed and dimensionless (`certificate`), each at most 1e-8. ``undetermined`` counts the
-    directions of the free parameters that change no target: there the initial design is kept as
-    nearly as the limits allow (`active_set`).
+    ``y`` and ``dy = y − y0`` (n_y,) in SI units; ``lam`` one array for each goal, (its n_t,) in
+    rad²/s², predicted by the linear models. J as in `program`: the mean square relative error in λ.
+    Residuals are recomputed and dimensionless (`certificate`), each at most 1e-8. ``undetermined``
+    counts the directions of the free parameters that change no target: there the initial design is
+    kept as nearly as the limits allow (`active_set`).
     """
 
     names: tuple[str, ...]
     y: Floats
     dy: Floats
-    lam: Floats
+    lam: tuple[Floats, ...]
     status: str
     iterations: int
     primal_residual: float
@@ -94,7 +94,7 @@ def solve_assignment(
         names=program.names,
         y=frozen(solution.answer.y),
         dy=frozen(dy),
-        lam=frozen([goal.model(dy) for goal in goals]),
+        lam=tuple(frozen(goal.model(dy)) for goal in goals),
         status=solution.status,
         iterations=solution.iterations,
         primal_residual=solution.certificate.primal_residual,

@@ -14,6 +14,7 @@ import eigassign as ea
 from eigassign.answers import check
 from eigassign.errors import CaseError
 from eigassign.output.results_json import results, to_json
+from eigassign.output.samples_csv import sample_files
 from eigassign.run import Options, Result, optimize, validate
 
 REST = without(shipped(), "trajectory", "targets")
@@ -165,6 +166,44 @@ def test_two_targets_of_a_mode_one_a_trajectory_are_as_good_as_one_for_both(
         np.concatenate([t.initial_hz for t in split.findings.targets]),
         pair.findings.targets[0].initial_hz,
     )
+
+
+def test_targets_of_trajectories_with_other_numbers_of_samples_are_each_solved_on_its_own(
+    tmp_path: Path,
+) -> None:
+    short = BACK[::4]  # 6 samples beside 21
+    targets = TARGETS.replace("Hz}", "Hz, trajectory: return}")
+    targets += "  - {mode: 2, frequency: 470 Hz, weight: 2, trajectory: pick}\n"
+    text = several(part(PICK, name="pick"), part(short, 0.5, name="return"), targets=targets)
+    text = text.replace("modes: [1]", "modes: [1, 2]")
+    both = solved(tmp_path, text)
+    assert [len(lam) for lam in both.assignment.lam] == [6, 21]
+    assert [len(hz) for hz in (both.time_s, both.target_hz, both.exact_hz)] == [6, 6, 6]
+
+    rows, right = [], []
+    for q, duration, mode, hz, weight in (
+        (short, 0.5, 1, 194, 1.0),
+        (PICK, 1.0, 2, 470, 2.0),
+    ):
+        l0, slope = (p[:, mode - 1] for p in both.linearised.linear_in_design(q))
+        step, lam_d = duration / (len(q) - 1), (2 * np.pi * hz) ** 2
+        share = np.full(len(q), weight * step)
+        share[[0, -1]] /= 2
+        root = np.sqrt(share)[:, None] / lam_d
+        rows.append(root * slope)
+        right.append(root[:, 0] * (lam_d - l0 + slope @ [0.125, 0.125]))
+    found = lsq_linear(np.vstack(rows), np.concatenate(right), (0, 0.25), method="bvls", tol=1e-15)
+    y = np.array(list(both.design.values()))
+    np.testing.assert_allclose(y, found.x, rtol=1e-9, atol=1e-12)
+    model = case_of(tmp_path, text).model()
+    for target, q in zip(both.findings.targets, (short, PICK), strict=True):
+        exact = model.frequencies(q, y, target.mode)[:, -1]
+        np.testing.assert_allclose(target.exact_hz, exact, rtol=1e-12)
+    kept = results(both.findings)
+    assert [len(t["frequencies"]["time_s"]) for t in kept["targets"]] == [6, 21]
+    table = sample_files(both.findings)["frequencies.csv"].decode().splitlines()
+    empty = [[not cell for cell in line.split(",")[4:]] for line in table[1:]]
+    assert empty == [[True] * 4 + [False] * 4] * 21 + [[False] * 4 + [True] * 4] * 6
 
 
 def test_a_target_on_one_trajectory_ignores_the_other(
