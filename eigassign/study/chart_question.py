@@ -120,8 +120,7 @@ def build_features(scene: Scene) -> Features:
     if place is not None:
         names.insert(0, "place along the trajectory")
     if not names:
-        message = "nothing to chart: no coordinate or design parameter changes a frequency"
-        raise CaseError((scene.file.problem("trajectory", message),))
+        raise CaseError((scene.file.problem("trajectory", _nothing(scene)),))
     return Features(
         tuple(names),
         place,
@@ -131,6 +130,18 @@ def build_features(scene: Scene) -> Features:
         upper,
         np.clip(scene.initial, lower, upper),
     )
+
+
+def _nothing(scene: Scene) -> str:
+    """Why there is nothing to chart, and what to do: nothing moves, and nothing has room."""
+    pencil, driven = scene.model.pencil, list(scene.file.coordinates.values())
+    which = np.flatnonzero(pencil.active[: pencil.n_q])
+    joints = ", ".join(dict.fromkeys(driven[k].joint for k in which))  # in the order of q
+    fixed, room = "no design parameter may change", "a design parameter a `max` above its `min`"
+    if not joints:
+        return f"nothing to chart: no coordinate changes a frequency, and {fixed}; give {room}"
+    why = f"along the trajectory nothing moves that a frequency depends on (joints: {joints})"
+    return f"nothing to chart: {why}, and {fixed}; let it move, or give {room}"
 
 
 def _place(scene: Scene) -> tuple[Floats | None, Callable[[Floats], Floats]]:

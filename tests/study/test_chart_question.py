@@ -58,8 +58,31 @@ def test_points_are_the_same_every_time_and_inside_the_box(tmp_path: Path) -> No
     assert len(one.repeated(3).x) == 3 * len(one.x)
 
 
-def test_a_case_where_nothing_varies_is_refused(tmp_path: Path) -> None:
-    still = "trajectory: {q: [[1.8, 5.3], [1.9, 5.4]], duration: 1 s}\n"
-    scene = scene_of(tmp_path, HEAD + still)
-    with pytest.raises(CaseError, match="nothing to chart"):
+ABSOLUTE = "q2: {joint: elbow, angle: absolute}"
+
+
+@pytest.mark.parametrize("head", [HEAD, HEAD.replace(ABSOLUTE, "q2: {joint: elbow}")])
+def test_a_trajectory_that_stands_still_where_it_matters_is_refused_with_the_joint(
+    head: str, tmp_path: Path
+) -> None:
+    second = 5.4 if "absolute" in head else 5.3  # the elbow does not turn
+    still = f"trajectory: {{q: [[1.8, 5.3], [1.9, {second}]], duration: 1 s}}\n"
+    scene = scene_of(tmp_path, head + still)
+    with pytest.raises(
+        CaseError, match=r"nothing moves .* \(joints: elbow\).* let it move, or give"
+    ):
         build_features(scene)
+
+
+def test_a_case_in_which_nothing_can_change_a_frequency_says_so(tmp_path: Path) -> None:
+    text = (
+        "title: Pin\nmechanism:\n  space: planar\n"
+        "  materials: {m: {youngs_modulus: 210 GPa, density: 7850}}\n"
+        "  sections: {s: {shape: circle, diameter: 20 mm}}\n"
+        "  links: {l: {length: 0.8, material: m, section: s, elements: 3}}\n"
+        "  joints: {j: {type: revolute, base: ground, follower: l.start}}\n"
+        "coordinates: {q: {joint: j}}\n"
+        "trajectory: {q: [[0], [1]], duration: 1 s}\n"
+    )
+    with pytest.raises(CaseError, match=r"no coordinate changes a frequency, .*; give a design"):
+        build_features(scene_of(tmp_path, text))
