@@ -130,8 +130,7 @@ def _mesh(chart: Chart) -> FigurePlan:
         "mesh.png",
         "Elements against discretisation error",
         "Worst error of exact frequencies against the limit that the meshes converge to, "
-        f"extrapolated from the two finest ({finest.elements} elements).{here} The dashed line is "
-        "the Taylor expansion's own error at the case's mesh.",
+        f"extrapolated from the two finest ({finest.elements} elements).{here}{_beside(chart)}",
         "Discretisation error in Hz over the number of elements.",
         partial(draw_mesh, chart),
     )
@@ -153,17 +152,33 @@ def draw_mesh(chart: Chart) -> Sheet:
             Ladder("time of an exact solve [s]", counts, solve, True),
         ],
         None,
-        _taylor_level(chart.points),
+        _taylor_level(chart),
     )
 
 
-def _taylor_level(points: Sequence[ChartPoint]) -> list[tuple[str, float]]:
+def _beside(chart: Chart) -> str:
+    """What the caption says of the Taylor expansion's error."""
+    taylor = _taylor(chart.points)
+    if taylor is None:
+        return ""
+    if not _shown(chart, taylor):
+        return (
+            f" {taylor.method} is wrong by over 100 % somewhere at the case's mesh, and not drawn."
+        )
+    return f" The dashed line is the error of {taylor.method} at the case's mesh."
+
+
+def _taylor_level(chart: Chart) -> list[tuple[str, float]]:
+    taylor = _taylor(chart.points)
+    if taylor is None or not _shown(chart, taylor):
+        return []
+    return [(f"error of {taylor.method}", max(taylor.everywhere.worst_hz, chart.asked.floor_hz))]
+
+
+def _taylor(points: Sequence[ChartPoint]) -> ChartPoint | None:
     """The Taylor polynomial of order 4, or the highest below."""
     full = [p for p in points if p.family == "Taylor, full" and p.parameters["order"] <= 4]
-    if not full:
-        return []
-    last = max(full, key=lambda p: int(p.parameters["order"]))
-    return [(f"error of {last.method}", last.everywhere.worst_hz)]
+    return max(full, key=lambda p: int(p.parameters["order"]), default=None)
 
 
 def _designs(chart: Chart) -> FigurePlan:

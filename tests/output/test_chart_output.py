@@ -133,6 +133,27 @@ def test_captions_tell_what_is_not_drawn() -> None:
     assert "0.06 Hz from the limit" in plans["mesh.png"]
 
 
+@pytest.mark.parametrize(
+    ("worst", "words"),
+    [
+        (0.1, "line is the error of Taylor 4 full"),
+        (0.0, "line is the error of Taylor 4 full"),
+        (np.inf, "Taylor 4 full is wrong by over 100 %"),
+        (1e9, "Taylor 4 full is wrong by over 100 %"),
+    ],
+)
+def test_the_mesh_is_drawn_beside_a_taylor_polynomial_that_is_right_somehow(
+    worst: float, words: str
+) -> None:
+    wrong = point("Taylor 4 full", "Taylor, full", True, 1e-7, worst)
+    chart = replace(CHART, points=(CHART.points[0], wrong, *CHART.points[2:]))
+    plan = next(p for p in chart_figures.plan(chart) if p.file == "mesh.png")
+    assert words in plan.caption
+    bare = replace(chart, points=(CHART.points[0], *CHART.points[2:]))
+    drawn = not np.array_equal(plan.draw().pixels(), chart_figures.draw_mesh(bare).pixels())
+    assert drawn == ("dashed" in plan.caption)
+
+
 def test_a_chart_without_meshes_or_designs_has_no_such_figures() -> None:
     bare = replace(CHART, mesh=(), designs=())
     assert {p.file for p in chart_figures.plan(bare)} == {
