@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 from eigassign.errors import EigassignError
 from eigassign.study.chart_data import NOTHING, ChartPoint, Errors, Timing
 from eigassign.study.chart_front import break_even
-from eigassign.study.chart_methods import Method
+from eigassign.study.chart_methods import Evaluator, Method
 from eigassign.study.chart_question import Points
 from eigassign.study.chart_timing import Patience, take_turns, timed
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 BATCH = 32768  # evaluations in one call, where methods are timed
-LONG_BATCH_S = 0.05  # a batch that would take longer is timed on the question's own points only
+LONG_BATCH_S = 0.05  # a batch that would take longer is timed on few of the question's own runs
+TIMED = 3  # runs along the trajectory on which slow methods are timed
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,7 @@ class Bench:
     points: Points
     exact_hz: Floats
     patience: Patience
+    whole: Points  # the designs of the runs at every sample: for times only
 
     def solved(self, x: Floats) -> Floats:
         """Exact answers elsewhere, for training."""
@@ -97,8 +99,7 @@ def chart_methods(
 def _trial(bench: Bench, method: Method, known: dict[bytes, tuple[Floats, float]]) -> _Trial:
     """Train, fit and evaluate once; answers that are ``known`` are not solved for again.
 
-    Evaluations are timed in batches of whole runs along the trajectory, as a search over designs
-    asks for them; a method that was fitted in its own way says how many ``solves`` that took.
+    A method that was fitted in its own way says how many ``solves`` that took.
     """
     points = bench.points.runs() if method.per_design else bench.points
     points = points.head(method.most or len(points.x))
@@ -111,19 +112,32 @@ def _trial(bench: Bench, method: Method, known: dict[bytes, tuple[Floats, float]
     once = x[: len(x) // parts]
     evaluator, fitting = timed(lambda: method.fit(answers))
     hz = evaluator(points)
-    asked = points if method.most or method.per_design else points.runs()
-    evaluating = timed(lambda: evaluator(asked))[1]
-    copies = 1 if method.most or method.per_design else -(-BATCH // len(asked.x))
-    if evaluating * copies > LONG_BATCH_S:
-        copies = 1
-    many = asked.repeated(copies) if copies > 1 else asked
+    many, evaluating = _batch(bench, method, evaluator, points)
     jobs = (
         _Job(lambda: bench.solved(once), solving / parts),
         _Job(method.one or partial(method.fit, answers), fitting / (parts if method.one else 1)),
-        _Job(lambda: evaluator(many), evaluating * copies),
+        _Job(lambda: evaluator(many), evaluating),
     )
     trained = len(x) + getattr(evaluator, "solves", 0)
     return _Trial(method, len(x) > 0, trained, hz, points, jobs, len(many.x))
+
+
+def _batch(
+    bench: Bench, method: Method, evaluator: Evaluator, points: Points
+) -> tuple[Points, float]:
+    """What evaluations are timed on, and about the seconds that takes.
+
+    Whole runs along the trajectory, as a search over designs asks for them, many at once; a slow
+    method answers few, at those of their samples that the question has.
+    """
+    few = points if method.most else points.runs(TIMED)
+    few = bench.whole if method.per_design else few
+    spent = timed(lambda: evaluator(few))[1]
+    copies = -(-BATCH // len(bench.whole.x))
+    longer = spent * copies * len(bench.whole.x) / len(few.x)
+    if method.most or method.per_design or longer > LONG_BATCH_S:
+        return few, spent
+    return bench.whole.repeated(copies), longer
 
 
 def _point(bench: Bench, trial: _Trial, spent: Sequence[Timing], solve: Timing) -> ChartPoint:

@@ -15,7 +15,7 @@ class Effort:
 
     brief: bool = False
     random_points: int = 600
-    designs: int = 5
+    designs: int = 15
     samples_per_design: int = 152
     orders: tuple[int, ...] = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12)
     coefficients: int = 5000  # largest set that is expanded
@@ -70,7 +70,7 @@ def suited(effort: Effort, n_dof: int) -> Effort:
 QUICK = Effort(
     brief=True,
     random_points=150,
-    designs=3,
+    designs=9,
     samples_per_design=152,
     orders=(1, 2, 3, 4, 6, 8),
     coefficients=1000,

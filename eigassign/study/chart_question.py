@@ -106,9 +106,18 @@ class Points:
         x, u = np.tile(self.x, (copies, 1)), np.tile(self.u, (copies, 1))
         return replace(self, x=x, u=u, designs=copies * self.designs)
 
-    def runs(self) -> Points:
-        """The runs along the trajectory only."""
-        return replace(self, x=self.x[self.n_random :], u=self.u[self.n_random :], n_random=0)
+    def runs(self, most: int | None = None) -> Points:
+        """The runs along the trajectory only, ``most`` of them if given."""
+        designs = self.designs if most is None else min(most, self.designs)
+        rows = slice(self.n_random, self.n_random + designs * len(self.along))
+        return replace(self, x=self.x[rows], u=self.u[rows], n_random=0, designs=designs)
+
+    def whole(self, features: Features) -> Points:
+        """The same designs at every sample of the trajectory, to time what answers it at once."""
+        along = np.arange(len(features.q))
+        y = np.repeat(self.y[self.n_random :: len(self.along)], len(along), axis=0)
+        x, u = features.at_samples(np.tile(along, self.designs), y)
+        return replace(self, x=x, u=u, n_random=0, along=along)
 
 
 def build_features(scene: Scene) -> Features:
@@ -188,25 +197,51 @@ def _pose(u: Floats, place: Floats, q: Floats, splines: Sequence[CubicSpline]) -
 def build_points(
     scene: Scene, features: Features, n_random: int, designs: int, per_design: int, seed: int = SEED
 ) -> Points:
-    """Seeded points; the designs are the initial one, the expansion's, then random ones."""
+    """Seeded points, every third of the random ones at a corner of the box of designs.
+
+    The runs are of the initial design, of the expansion's, then of corners and random ones in turn,
+    each design once: of one design only where no parameter has room.
+    """
     random = np.random.default_rng(seed)
     n_t, n_y = len(scene.path.q), len(features.lower)
     samples = random.integers(0, n_t, n_random)
-    y = _box(features, random.random((n_random, n_y)))
+    y = _box(features, random.random((n_random, n_y)), slice(2, None, 3), random)
     runs = _designs(scene, features, designs, random)
+    designs = len(runs)
     along = np.unique(np.linspace(0, n_t - 1, min(per_design, n_t)).round().astype(np.intp))
     samples = np.concatenate([samples, np.tile(along, designs)])
     x, u = features.at_samples(samples, np.vstack([y, np.repeat(runs, len(along), axis=0)]))
     return Points(x, u, n_random, designs, len(scene.model.q_names), along)
 
 
-def _box(features: Features, unit: Floats) -> Floats:
+def _box(features: Features, unit: Floats, at: slice, random: np.random.Generator) -> Floats:
+    """Designs at ``unit`` (n, n_y) in [0, 1], but corners of the box in the rows ``at``."""
+    inside = unit[:, features.free]
+    inside[at] = _corners(len(inside[at]), len(features.free), random)
     y = np.tile(features.fixed_y, (len(unit), 1))
-    y[:, features.free] = features._spread(unit[:, features.free])
+    y[:, features.free] = features._spread(inside)
     return y
+
+
+def _corners(count: int, d: int, random: np.random.Generator) -> Floats:
+    """(count, d) of 0 and 1: all corners in turn where they are few enough, else random ones.
+
+    Every second is opposite to the one before: the errors are largest at such ends.
+    """
+    half = -(-count // 2)
+    if 0 < d and 2**d <= count:
+        number = np.resize(random.permutation(2 ** (d - 1)), half)
+        ends = (number[:, None] >> np.arange(d)) & 1
+    else:
+        ends = random.integers(0, 2, (half, d))
+    both = np.stack([ends, 1 - ends], axis=1).reshape(2 * half, d)
+    return both[:count].astype(np.float64)
 
 
 def _designs(scene: Scene, features: Features, count: int, random: np.random.Generator) -> Floats:
     first = np.vstack([scene.initial, scene.expansions.full.y0])
     inside = np.clip(first, features.lower, features.upper)
-    return np.vstack([inside, _box(features, random.random((count, len(features.lower))))])[:count]
+    unit = random.random((2 * count, len(features.lower)))
+    found = np.vstack([inside, _box(features, unit, slice(0, None, 2), random)])
+    once = np.sort(np.unique(found, axis=0, return_index=True)[1])
+    return np.asarray(found[once[:count]])

@@ -33,6 +33,7 @@ from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 ACCURACIES = (1e-2, 1e-4, 1e-6, 1e-8)
+FEWEST = 3  # designs followed along the trajectory, however dear: two, and a corner of the box
 MANY = 1000.0  # trajectories of the second front: a search over designs
 
 
@@ -67,7 +68,8 @@ def compare_methods(
     taken, told = taken_by_auto(scene, _accuracies(wish), effort.choosing_s)
     points = _affordable_points(scene, features, effort, solve_s)
     progress(f"solving {len(points.x)} points exactly")
-    bench = Bench(scene, points, exact_frequencies(scene, points.x), effort.patience)
+    exact_hz, whole = exact_frequencies(scene, points.x), points.whole(features)
+    bench = Bench(scene, points, exact_hz, effort.patience, whole)
     floor = _floor(bench)
     charted, skipped = chart_methods(
         bench, _methods(scene, features, points, effort, solve_s, taken), progress
@@ -115,7 +117,7 @@ def _solve_cost(scene: Scene) -> float:
 def _affordable_points(scene: Scene, features: Features, effort: Effort, solve_s: float) -> Points:
     along = effort.designs * effort.samples_per_design
     share = min(1.0, effort.reference_s / ((effort.random_points + along) * solve_s))
-    designs = max(2, round(effort.designs * share**0.5))
+    designs = max(min(FEWEST, effort.designs), round(effort.designs * share))
     n_random, per_design = int(effort.random_points * share), int(along * share / designs)
     return build_points(scene, features, max(4, n_random), designs, max(4, per_design))
 
