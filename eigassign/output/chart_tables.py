@@ -60,7 +60,17 @@ def auto(chart: Chart) -> Table:
         "timing; where it follows this chart, the quickest expansion, if the estimate agrees."
     )
     why = [f"{accuracy} is refused: {words}." for words, accuracy in refused.items()]
-    return Table("What auto takes", columns, rows, " ".join([caption, *why]))
+    return Table(
+        "What auto takes", columns, rows, " ".join([caption, *why, *_not_looked_at(chart)])
+    )
+
+
+def _not_looked_at(chart: Chart) -> Iterator[str]:
+    """The accuracies for which auto was not asked any more."""
+    asked = [a for a in chart.advice if a.accuracy is not None and not a.is_below_round_off]
+    left = dict.fromkeys(_accuracy(a) for a in asked if a.auto is None)
+    if left:
+        yield f"Not asked for {', '.join(left)}: choosing had already taken too long."
 
 
 def _accuracy(a: Advice) -> str:

@@ -67,6 +67,7 @@ class _Trial:
     points: Points
     jobs: tuple[_Job, _Job, _Job]  # training, of one design if it is done for each; fit; evaluate
     evaluations: int  # in one call of the last job
+    estimate: float | None  # of its error by the method itself, relative in Hz
 
 
 def chart_methods(
@@ -119,7 +120,8 @@ def _trial(bench: Bench, method: Method, known: dict[bytes, tuple[Floats, float]
         _Job(lambda: evaluator(many), evaluating),
     )
     trained = len(x) + getattr(evaluator, "solves", 0)
-    return _Trial(method, len(x) > 0, trained, hz, points, jobs, len(many.x))
+    estimate = getattr(evaluator, "estimate", None)
+    return _Trial(method, len(x) > 0, trained, hz, points, jobs, len(many.x), estimate)
 
 
 def _batch(
@@ -167,6 +169,7 @@ def _point(bench: Bench, trial: _Trial, spent: Sequence[Timing], solve: Timing) 
         method.note,
         method.use,
         len(bench.scene.path.q) if method.per_design else 1,
+        trial.estimate,
     )
 
 

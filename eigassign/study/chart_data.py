@@ -73,6 +73,7 @@ class ChartPoint:
     note: str = ""
     use: str = ""  # how to ask for it: a line of a case file, or a call
     at_once: int = 1  # evaluations that come together: a whole trajectory where set up anew for it
+    estimate: float | None = None  # of fits: their own worst estimate, relative; None: has none
 
     def total_s(self, evaluations: float) -> float:
         """Seconds for set-up and so many evaluations."""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.modal.fit import Fit
-from eigassign.modal.fitting import fit
+from eigassign.modal.fitting import MOST, fit
 from eigassign.modal.path_fit import PathFit
 from eigassign.modal.region import Box
 from eigassign.study.chart_methods import (
@@ -24,6 +24,7 @@ from eigassign.study.chart_methods import (
     Method,
     points_along,
     reduced_model,
+    said,
     solves_per_point,
 )
 from eigassign.study.chart_question import Features, Points
@@ -53,6 +54,11 @@ class Fitted:
             parts.append(hz.reshape(-1, hz.shape[2]))
         return parts[0] if len(parts) == 1 else np.vstack(parts)
 
+    @property
+    def estimate(self) -> float:
+        """The largest error estimate of all fits, relative in Hz."""
+        return max(each.error_estimate for each in self.fits)
+
     def _runs(self, y: Floats) -> Floats:
         if len(self.fits) == 1:
             return self.fits[0].along(y)
@@ -71,28 +77,27 @@ def fit_methods(
 
     ``sources`` are half order and expansion points of the reduced models that are fitted.
     """
-    asked: list[dict[str, Any]] = [{"accuracy": accuracy} for accuracy in accuracies]
     if features.place is not None:
         counts: list[dict[str, Any]] = [{"solves": k} for k in ALONG if k * points.designs <= most]
-        for how in (*counts, *asked):
+        for how in (*counts, *_to_accuracies(accuracies, min(most, MOST))):
             yield _method(
                 f"fit {_named(how)} along",
                 f"fit {_kind(how)} along one trajectory",
                 how,
-                partial(_along, scene, points, {**how, "most": most}),
+                partial(_along, scene, points, how),
                 per_design=True,
-                one=partial(_one, scene, points, {**how, "most": most}),
-                use=f"ea.fit(model, q, y, {_call(how)}).along()",
+                one=partial(_one, scene, points, how),
+                use=f"ea.fit(model, q, y{said(scene)}, {_call(how)}).along()",
                 note="fitted anew for every design: answers the runs along the trajectory only",
             )
     over: list[dict[str, Any]] = [{"solves": k} for k in OVER_BOX if k <= most]
-    for how in (*over, *asked):
+    for how in (*over, *_to_accuracies(accuracies, most)):
         yield _method(
             f"fit {_named(how)}",
             f"fit {_kind(how)}",
             how,
-            partial(_over_box, scene, features, {**how, "most": most}),
-            use=f"ea.fit(model, q, ea.Box(lower, upper), {_call(how)}).along(designs)",
+            partial(_over_box, scene, features, how),
+            use=f"ea.fit(model, q, ea.Box(lower, upper){said(scene)}, {_call(how)}).along(designs)",
         )
     for m, count in sources:
         q, y = points_along(scene, count)
@@ -103,13 +108,18 @@ def fit_methods(
                 f"fit of {name}",
                 {"accuracy": accuracy, "half_order": m, "q": q, "y": y},
                 partial(_of_reduced, scene, features, accuracy, m, q, y),
-                use=f"ea.fit(ea.reduce(model, q0, y0, half_order={m}), q, ea.Box(lower, upper), "
-                f"accuracy={accuracy:g})",
+                use=f"ea.fit(ea.reduce(model, q0, y0{said(scene)}, half_order={m}), q, "
+                f"ea.Box(lower, upper), accuracy={accuracy:g})",
             )
 
 
 def _method(name: str, family: str, parameters: dict[str, Any], fit: Any, **more: Any) -> Method:
     return Method(name, family, True, parameters, fit, **more)
+
+
+def _to_accuracies(accuracies: Sequence[float], most: int) -> Iterator[dict[str, Any]]:
+    """What is asked of fits, ``most`` frequencies for each."""
+    yield from ({"accuracy": accuracy, "most": most} for accuracy in accuracies)
 
 
 def _kind(how: Mapping[str, Any]) -> str:
@@ -121,8 +131,11 @@ def _named(how: Mapping[str, Any]) -> str:
 
 
 def _call(how: Mapping[str, Any]) -> str:
-    """As an argument of `ea.fit`."""
-    return ", ".join(f"{name}={value:g}" for name, value in how.items())
+    """As arguments of `ea.fit`; ``most`` only where its default might not do."""
+    if "solves" in how:
+        return f"solves={how['solves']}"
+    more = f", most={how['most']}" if how["most"] > MOST else ""
+    return f"accuracy={how['accuracy']:g}{more}"
 
 
 def _one(scene: Scene, points: Points, how: Mapping[str, Any]) -> Made:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from eigassign.study.chart_data import Advice, ChartPoint, Front
 
 Floats = NDArray[np.float64]
+DOUBTED = 100.0  # times an accuracy that an estimate may be where it is advised: most are cautious
 
 
 def pareto(cost: Floats, error: Floats) -> list[int]:
@@ -56,8 +57,17 @@ def break_even(offline_s: float, online_s: float, exact_s: float) -> float | Non
 def cheapest(
     points: Sequence[ChartPoint], accuracy: float, evaluations: float
 ) -> ChartPoint | None:
-    """The quickest method whose worst relative error is at most ``accuracy``."""
-    good = [p for p in points if p.everywhere.worst_relative <= accuracy]
+    """The quickest method whose worst relative error is at most ``accuracy``.
+
+    Without those whose own estimate is over `DOUBTED` times as large: they may know of places that
+    the points of the question miss.
+    """
+    good = [
+        p
+        for p in points
+        if p.everywhere.worst_relative <= accuracy
+        and (p.estimate is None or p.estimate <= DOUBTED * accuracy)
+    ]
     return min(good, key=lambda p: p.total_s(evaluations), default=None)
 
 

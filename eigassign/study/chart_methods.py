@@ -26,6 +26,15 @@ Floats = NDArray[np.float64]
 Evaluator = Callable[[Points], Floats]  # → Hz (n, n_modes)
 
 
+UNGUARDED = "eigassign.modal.reduced.reduce"
+
+
+def said(scene: Scene) -> str:
+    """The charted modes as an argument of `ea.fit`, `ea.expand`, `ea.reduce`, if they need it."""
+    modes = scene.expansions.modes
+    return "" if modes == (1,) else f", modes={modes}"
+
+
 def nowhere(points: Points) -> Floats:
     """Training points of methods that ask for no exact answers."""
     return np.zeros((0, points.x.shape[1]))
@@ -139,7 +148,8 @@ def _reciprocal(scene: Scene, order: int, linear: bool) -> Method:
         {"order": order, "linear_in_y": linear, "q0": point.q0, "y0": point.y0},
         fit,
         solves=1,
-        use=f"ea.expand(model, q0, y0, order={order}{', linear_in_y=True' * linear}).inverse",
+        use=f"ea.expand(model, q0, y0{said(scene)}, order={order}"
+        f"{', linear_in_y=True' * linear}).inverse",
     )
 
 
@@ -166,6 +176,8 @@ def piecewise_methods(
                 {"order": order, "q0": q, "y0": y},
                 partial(nearest_expansion, scene, q, y[0], order, CLUSTER_GAP),
                 solves=len(q),
+                use=f"[ea.expand(model, q, y{said(scene)}, order={order}) for q, y in zip(q0, y0)]"
+                ", at a pose the one whose q is nearest",
             )
 
 
@@ -201,6 +213,8 @@ def reduced_methods(
 def _reduced(scene: Scene, m: int, count: int, guard: bool) -> Method:
     q, y = points_along(scene, count)
     where = f"{len(q)} point{'s' if len(q) > 1 else ''}"
+    source = "model, q0, y0" if guard else "model.pencil, q0, y0"
+    asked = f"({source}{said(scene)}, half_order={m}{'' if guard else ', guard=False'})"
 
     def fit(_: Floats) -> Evaluator:
         made = reduced_model(scene, m, q, y, guard)
@@ -213,7 +227,7 @@ def _reduced(scene: Scene, m: int, count: int, guard: bool) -> Method:
         {"half_order": m, "guard": guard, "q": q, "y": y},
         fit,
         solves=len(q) * solves_per_point(scene, m, guard),
-        use=f"ea.reduce(model, q0, y0, half_order={m})" if guard else "",
+        use=f"ea.reduce{asked}" if guard else f"no argument of ea.reduce: {UNGUARDED}{asked}",
     )
 
 

@@ -229,7 +229,7 @@ def _corners(count: int, d: int, random: np.random.Generator) -> Floats:
     Every second is opposite to the one before: the errors are largest at such ends.
     """
     half = -(-count // 2)
-    if 0 < d and 2**d <= count:
+    if d > 0 and 2**d <= count:
         number = np.resize(random.permutation(2 ** (d - 1)), half)
         ends = (number[:, None] >> np.arange(d)) & 1
     else:

@@ -199,6 +199,16 @@ def test_what_auto_takes_stands_beside_the_choice_and_the_quickest_expansion() -
     assert table.caption.endswith("1e-08 is refused: no expansion reaches 1.0e-08.")
 
 
+def test_accuracies_for_which_auto_is_not_asked_any_more_are_named() -> None:
+    known, other = CHART.advice[:2]
+    below = replace(other, accuracy=1e-12, auto=None, is_below_round_off=True)
+    budget = replace(other, accuracy=None, budget_s=1.0, auto=None)
+    left = (replace(other, auto=None), replace(other, auto=None, evaluations=1e6))
+    said = chart_tables.auto(replace(CHART, advice=(known, *left, below, budget))).caption
+    assert said.endswith("Not asked for 1e-08: choosing had already taken too long.")
+    assert "Not asked" not in chart_tables.auto(replace(CHART, advice=(known, below))).caption
+
+
 def test_lines_for_the_case_file_are_shown_where_there_are_any() -> None:
     (row,) = chart_tables.lines(CHART).rows
     assert row == (

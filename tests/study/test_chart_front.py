@@ -39,6 +39,13 @@ POINTS = [
 ]
 
 
+def test_what_doubts_itself_is_not_advised_however_well_it_did() -> None:
+    quick = replace(point("lucky", 0.0, 1e-7, 1e-6), estimate=1e-3)
+    assert cheapest([*POINTS, quick], 1e-6, 1e4).method == "good"  # type: ignore[union-attr]
+    assert advise_accuracy([*POINTS, quick], 1e-6, 1e4, 0.0).method == "good"
+    assert advise_accuracy([*POINTS, quick], 1e-5, 1e4, 0.0).method == "lucky"
+
+
 def test_no_front_member_is_beaten_and_every_other_is() -> None:
     random = np.random.default_rng(0)
     for _ in range(30):

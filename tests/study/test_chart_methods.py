@@ -11,16 +11,20 @@ import pytest
 from chart_scenes import TINY
 from scenes import SHIPPED, scene_of
 
+import eigassign
+import eigassign as ea
 from eigassign.errors import CaseError
 from eigassign.modal import exact
 from eigassign.modal.expansion import expand
 from eigassign.modal.fit_source import FINE
+from eigassign.modal.nearest import nearest
 from eigassign.study import chart_methods as own
 from eigassign.study import rivals
-from eigassign.study.chart_bench import errors, exact_frequencies
+from eigassign.study.chart_bench import Bench, _batch, errors, exact_frequencies
 from eigassign.study.chart_fits import fit_methods
 from eigassign.study.chart_question import Points, build_features, build_points
 from eigassign.study.chart_study import Compared, Wish, compare_methods
+from eigassign.study.chart_timing import Patience
 from eigassign.study.scene import Scene
 from eigassign.study.surrogates import along, chebyshev, equal_nodes
 
@@ -125,6 +129,69 @@ def test_several_modes_have_a_column_each(tmp_path: Path) -> None:
         assert method.fit(exact_frequencies(scene, x) if len(x) else x)(points).shape == (20, 2)
 
 
+def _asked(use: str, scene: Scene, how: dict[str, Any], y: np.ndarray) -> Any:
+    """What the call gives, with the names that it uses."""
+    features = build_features(scene)
+    q0 = how.get("q0", how.get("q"))
+    y0 = how.get("y0", how.get("y"))
+    known = {
+        "ea": ea, "eigassign": eigassign, "model": scene.model, "q": scene.path.q, "y": y,
+        "lower": features.lower, "upper": features.upper, "designs": y[None], "q0": q0, "y0": y0,
+    }  # fmt: skip
+    return eval(use, known)
+
+
+def test_calls_give_what_was_charted(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, SHIPPED.replace("modes: [1]", "modes: [1, 2]"))
+    points = build_points(scene, build_features(scene), 4, 2, 200)
+    y, whole = points.y[4], slice(4, 4 + len(scene.path.q))
+    fits = fit_methods(scene, build_features(scene), points, [1e-2], [(2, 1)], 150)
+    for method in (*_methods(scene), *fits):
+        few = method.parameters.get("solves", 7) not in (7, 120)
+        if few or method.use.startswith("in the case file"):
+            continue
+        wanted = method.fit(np.zeros((0, 2)))(points.runs() if method.per_design else points)
+        wanted = wanted[: whole.stop - 4] if method.per_design else wanted[whole]
+        call = method.use.removeprefix("no argument of ea.reduce: ").partition(", at a pose")[0]
+        found = _asked(call, scene, dict(method.parameters), y)
+        if isinstance(found, list):
+            owner = nearest(found, scene.path.q)
+            each = np.array([one.frequencies(scene.path.q, y) for one in found])
+            found = each[owner, np.arange(len(owner))]
+        elif not isinstance(found, np.ndarray):
+            found = found.frequencies(scene.path.q, y)
+        np.testing.assert_allclose(found.reshape(wanted.shape), wanted, rtol=1e-9)
+
+
+def test_a_call_allows_as_many_frequencies_as_its_chart_did(scene: Scene, points: Points) -> None:
+    made = {
+        most: list(fit_methods(scene, build_features(scene), points, [1e-3], [], most))
+        for most in (1500, 5000)
+    }
+    over = {most: next(m for m in each if m.name == "fit 1e-03") for most, each in made.items()}
+    assert over[1500].parameters == {"accuracy": 1e-3, "most": 1500}
+    assert "most" not in over[1500].use
+    assert over[5000].use.endswith("accuracy=0.001, most=5000).along(designs)")
+    along = next(m for m in made[5000] if m.name == "fit 1e-03 along")
+    assert along.parameters["most"] == 2000
+
+
+def test_what_is_solved_anew_is_timed_by_whole_trajectories(scene: Scene, points: Points) -> None:
+    features = build_features(scene)
+    hz = exact_frequencies(scene, points.x)
+    bench = Bench(scene, points, hz, Patience(), points.whole(features))
+    for method in (*_fits(scene, points), *own.exact_methods(scene.model, (1,), 4)):
+        evaluator = method.fit(np.zeros((0, 1)))
+        own_points = points.head(method.most or len(points.x))
+        many, _ = _batch(bench, method, evaluator, own_points)
+        if method.most:
+            assert len(many.x) == 4
+        elif method.per_design:
+            assert len(many.x) == 2 * 152
+        elif method.exact:
+            assert len(many.x) == len(points.runs().x)  # slow
+
+
 def test_stations_are_interpolated_for_every_design_alike(scene: Scene, points: Points) -> None:
     features, runs = build_features(scene), points.runs()
     f = np.random.default_rng(1).random((points.designs * 5, 2))
@@ -153,6 +220,7 @@ def test_every_method_of_a_chart_has_numbers_and_a_name_of_its_own(compared: Com
     assert len(set(names)) == len(names)
     assert not compared.skipped
     for p in compared.points:
+        assert (p.estimate is not None) == p.method.startswith("fit "), p.method
         assert np.isfinite(p.everywhere.worst_hz), p.method
         assert p.everywhere.rms_hz <= p.everywhere.worst_hz
         assert p.online.median_s > 0.0

@@ -9,7 +9,9 @@ import pytest
 from scenes import HEAD, SHIPPED, changed, scene_of
 
 from eigassign.errors import CaseError
-from eigassign.study.chart_question import build_features, build_points
+from eigassign.study.chart_effort import QUICK, Effort
+from eigassign.study.chart_question import Points, _corners, build_features, build_points
+from eigassign.study.chart_study import _affordable_points
 from eigassign.study.plan import joint_map
 
 
@@ -56,6 +58,64 @@ def test_points_are_the_same_every_time_and_inside_the_box(tmp_path: Path) -> No
     assert one.runs().designs == 3
     assert one.head(10).designs == 0
     assert len(one.repeated(3).x) == 3 * len(one.x)
+
+
+def at_corners(points: Points, rows: slice) -> int:
+    """Of these points how many have a design at a corner of the box; places do not count."""
+    u = points.u[rows, 1:]
+    return int(((u == 0.0) | (u == 1.0)).all(axis=1).sum())
+
+
+def test_a_third_of_the_points_and_of_the_designs_followed_are_corners(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, SHIPPED)
+    points = build_points(scene, build_features(scene), 60, 9, 11)
+    assert at_corners(points, slice(0, 60)) == 20
+    assert len(np.unique(points.y[2:60:3], axis=0)) == 4
+    runs = points.y[60::11]
+    assert len(np.unique(runs, axis=0)) == points.designs == 9
+    assert at_corners(points, slice(60, None, 11)) == 4
+    few = build_points(scene, build_features(scene), 4, 3, 5)
+    assert at_corners(few, slice(4, None, 5)) >= 1
+
+
+def test_of_many_corners_random_ones_and_their_opposites_are_taken() -> None:
+    found = _corners(7, 40, np.random.default_rng(1))
+    assert found.shape == (7, 40)
+    np.testing.assert_array_equal(found[1::2], 1.0 - found[:-1:2])
+    assert len(np.unique(found, axis=0)) == 7
+    all_three = _corners(16, 3, np.random.default_rng(1))
+    assert len(np.unique(all_three[:8], axis=0)) == len(np.unique(all_three[8:], axis=0)) == 8
+
+
+def test_without_room_for_designs_one_is_followed(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, HEAD + "trajectory: {q: [[1.8, 5.3], [1.9, 5.9]], duration: 1 s}\n")
+    points = build_points(scene, build_features(scene), 5, 9, 7)
+    assert points.designs == 1
+    assert len(points.x) == 5 + len(points.along)
+
+
+def test_as_many_designs_are_followed_as_the_exact_solves_allow(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, SHIPPED)
+    features = build_features(scene)
+    for effort, wanted in ((QUICK, 9), (Effort(), 15)):
+        cheap = _affordable_points(scene, features, effort, 1e-4)
+        assert (cheap.designs, cheap.n_random) == (wanted, effort.random_points)
+        dear = _affordable_points(scene, features, effort, effort.reference_s / 100.0)
+        assert dear.designs == 3
+        assert len(dear.x) <= 100
+
+
+def test_whole_trajectories_are_those_of_the_same_designs(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, SHIPPED)
+    features = build_features(scene)
+    points = build_points(scene, features, 5, 3, 7)
+    whole = points.whole(features)
+    assert len(whole.x) == 3 * 152
+    assert whole.n_random == 0
+    thinned = whole.x.reshape(3, 152, -1)[:, points.along].reshape(21, -1)
+    np.testing.assert_array_equal(thinned, points.runs().x)
+    np.testing.assert_array_equal(points.runs(2).x, points.runs().x[:14])
+    assert points.runs(2).designs == 2
 
 
 ABSOLUTE = "q2: {joint: elbow, angle: absolute}"
