@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.mechanism.pencil import Pencil
-from eigassign.modal.adaptive import AdaptiveReduction
+from eigassign.modal.adaptive import AdaptiveReduction, shown
 from eigassign.modal.convergence import radius_share
 from eigassign.modal.expansion import Expansion, expand
 from eigassign.modal.nearest import picked
@@ -33,9 +33,8 @@ class Trial:
     beside: AdaptiveReduction
     reasons: list[str]
     place: Callable[[int], str]
-    last: float = np.inf
-    worst_sample: int = 0
-    cheapest: float = np.inf  # coefficients of the best found so far
+    least: float = np.inf  # of the largest errors of all candidates
+    least_at: int = 0  # the sample where that is
 
     def expand(self, point: Floats, order: int, gap: float) -> Expansion:
         """About ``point`` (n_x,), modes closer than ``gap`` (relative in λ) together."""
@@ -74,11 +73,20 @@ class Trial:
 
     def note(self, what: str, worst: Floats, share: float = np.nan) -> None:
         """Keep what is said of a candidate of ``worst`` errors (n,)."""
-        self.worst_sample = int(np.argmax(worst))
-        self.last = float(worst[self.worst_sample])
-        error = f"error at most {self.last:.1e}" if np.isfinite(self.last) else "no number"
+        k = int(np.argmax(worst))
+        if worst[k] <= self.least:
+            self.least, self.least_at = float(worst[k]), k
+        error = f"error at most {worst[k]:.1e}" if np.isfinite(worst[k]) else "no number"
         reach = f", {share:.2f} of the radius of convergence" if np.isfinite(share) else ""
-        self.reasons.append(f"{what}: {error} ({self.place(self.worst_sample)}{reach})")
+        self.reasons.append(f"{what}: {error} ({self.place(k)}{reach})")
+
+    @property
+    def nearest(self) -> str:
+        """How near all candidates came, in words."""
+        at = f"at {self.place(self.least_at)}, (q, y) = {shown(self.x[self.least_at])}"
+        if np.isfinite(self.least):
+            return f"the nearest left {self.least:.1e} {at}"
+        return f"none has a number that it vouches for {at}"
 
 
 def size(parts: Sequence[Expansion]) -> int:

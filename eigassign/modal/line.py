@@ -18,6 +18,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 MOST_STATIONS = 48  # nodes along a trajectory
 DENSE = 513  # samples of a trajectory that may be nodes
+MOST_GIVEN = 128  # nodes on an axis where solves are given: with more, round-off grows
 SKEW = 0.03  # by which the best nodes are shifted in the middle
 CHECKS = 15  # generic places on an axis where an interpolant may be checked
 STILL = 1e-9  # rad or m: what moves less stands still, what is off by less lies on the path
@@ -107,11 +108,15 @@ def _line(stretch: Stretch, count: int | None) -> Line | None:
 
 
 def _sampled(places: Floats, of: int, count: int | None) -> Nodes:
-    """Nodes among the ``of`` samples: Leja points, or the ``count`` nearest to the best places."""
+    """Nodes among the ``of`` samples: Leja points, or the ``count`` nearest to the best places.
+
+    Of given counts `MOST_GIVEN` at most, unless they are all samples.
+    """
     if count is None or count >= of:
         most = MOST_STATIONS if count is None else count
         nodes = Nodes(places, most, of <= most)
         return nodes if nodes.whole else replace(nodes, checks=_others(places, nodes.v))
+    count = min(count, MOST_GIVEN)
     nearest = np.unique(np.abs(places[:, None] - _best(count)).argmin(axis=0))
     return Nodes(places[nearest] if len(nearest) == count else places, count)
 
@@ -137,7 +142,8 @@ def interval_nodes(most: int) -> Nodes:
 
 @lru_cache(maxsize=64)
 def chosen_nodes(count: int) -> Nodes:
-    """The best ``count`` nodes of [−1, 1], nearly."""
+    """The best ``count`` nodes of [−1, 1], nearly; `MOST_GIVEN` of them at most."""
+    count = min(count, MOST_GIVEN)
     return Nodes(_best(count), count)
 
 

@@ -11,7 +11,8 @@ from eigassign.errors import AccuracyError
 from eigassign.modal.adaptive import central, reduce_adaptively
 from eigassign.modal.convergence import radius_share
 from eigassign.modal.expansion import expand
-from eigassign.modal.expansion_choice import FINER, MAX_POINTS, TOLERABLE, _go_on, choose_expansion
+from eigassign.modal.expansion_choice import FINER, TOLERABLE, choose_expansion
+from eigassign.modal.expansion_search import MAX_POINTS, go_on
 from eigassign.modal.mesh_choice import choose_mesh, mesh_error
 from eigassign.modal.model import Model
 
@@ -143,7 +144,7 @@ def test_neighbours_that_do_not_help_are_soon_left_alone(x):
     ],
 )
 def test_more_points_are_added_while_they_promise_enough(highest, more):
-    assert _go_on(highest, 1e-6) is more
+    assert go_on(highest, 1e-6) is more
 
 
 def test_an_order_that_cannot_do_it_is_refused_at_the_worst_sample(x):
