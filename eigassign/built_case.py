@@ -127,12 +127,12 @@ class Case:
 
     def _looked_at(self, trial: Model) -> Floats:
         """Poses and designs (n, n_x) at which choices are judged."""
-        from eigassign.study.choices import looked_at
+        from eigassign.study.judged_at import at_corners
 
         path = self._path(trial) if self.file.trajectories else None
         given = self.file.expansion.q
         q0 = resting_pose(self.file) if given == "auto" else np.array(given, dtype=float)
-        return looked_at(self.file, trial, path, q0, self.initial_design)
+        return at_corners(self.file, path, q0, self.initial_design).x
 
     @cached_property
     def initial_design(self) -> Floats:

@@ -11,10 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.errors import AccuracyError
@@ -24,13 +23,15 @@ from eigassign.modal.mesh_choice import MeshChoice, choose_mesh
 from eigassign.modal.model import Model
 from eigassign.modal.reduction_choice import ReductionChoice, choose_reduction, few_of
 from eigassign.study.chart_follow import suggestions
+from eigassign.study.judged_at import JudgedAt, at_corners, at_random, corners
 
 Floats = NDArray[np.float64]
 ACCURACY = 1e-3  # where the case asks for auto and names none
 MESH = 0.5  # where a number of elements is left to auto
 TRUNCATION = 0.25  # where links are reduced, of the mesh's share if it has one
-SAMPLES = 40  # along the trajectory, at each design that a mesh is judged at
 FEW, MANY = 200, 1000  # poses and designs that an order is chosen at, and confirmed at
+RANDOM = 600  # of those that it is confirmed at, beside corners of the box
+ADDED = 60  # of the worst of these that are added where it is not
 
 
 @dataclass(frozen=True)
@@ -140,70 +141,29 @@ def choose_order(
     """
     at_upper = corners(len(y0))
     few, many = (max(8, rows // (1 + len(at_upper))) for rows in (FEW, MANY))  # samples of each
-    x, every = (looked_at(file, model, trajectory, q0, y0, at_upper, n) for n in (few, many))
-    require_little_truncation(file, model, x)
+    seen, every = (at_corners(file, trajectory, q0, y0, at_upper, each) for each in (few, many))
+    require_little_truncation(file, model, seen.x)
+    if len(y0):
+        every = every.with_rows(at_random(file, trajectory, q0, y0, RANDOM), np.arange(RANDOM))
     accuracy, start = series_share(file), np.concatenate([q0, y0])
     followed, said = suggestions(file, q0, y0, modes, accuracy)
 
-    def choice(x: Floats, samples: int, begun: ExpansionChoice | None = None) -> ExpansionChoice:
-        place = partial(_place, trajectory, samples)
+    def choice(seen: JudgedAt, begun: ExpansionChoice | None = None) -> ExpansionChoice:
         return choose_expansion(
-            model.pencil, x, accuracy, modes,
-            start=start, place=place, suggestions=followed, begun=begun,
+            model.pencil, seen.x, accuracy, modes,
+            start=start, place=seen.place, suggestions=followed, begun=begun,
         )  # fmt: skip
 
-    found = choice(x, few)
-    beyond = float(found.error_estimate(every[:, : len(q0)], every[:, len(q0) :]).max())
-    if beyond > accuracy:
-        found = choice(every, many, found)
-        said += (f"chosen anew at more samples: between {few} the error was {beyond:.1e}",)
+    found = choice(seen)
+    for last in (False, False, True):
+        error = found.error_estimate(every.x[:, : len(q0)], every.x[:, len(q0) :]).max(axis=1)
+        beyond = np.flatnonzero(~(error <= accuracy))
+        if not len(beyond):
+            break
+        said += (f"chosen anew at more poses and designs: there the error was {error.max():.1e}",)
+        worst = beyond[np.argsort(-error[beyond], kind="stable")[:ADDED]]
+        seen = seen.with_rows(every, np.arange(len(error)) if last else worst)
+        found = choice(seen, found)
     first, *more = (part.q0 for part in found.expansions)
     others = tuple(tuple(float(v) for v in q) for q in more)
     return OrderChoice(found.order, first, others, found.cluster_gap, (*said, *found.reasons))
-
-
-ENDS = ((False,), (True,))  # all parameters at their lower bounds, all at their upper ones
-
-
-def looked_at(
-    file: CaseFile,
-    model: Model,
-    trajectory: Trajectories | None,
-    q0: Floats,
-    y0: Floats,
-    at_upper: ArrayLike = ENDS,
-    samples: int = SAMPLES,
-) -> Floats:
-    """Poses (n, n_x) that the answer must hold at: the trajectory at designs all over the box.
-
-    These are y0 and corners of the box, one for each row of ``at_upper`` (k, n_y or 1), at up to
-    so many ``samples`` each.
-    """
-    q = q0[None] if trajectory is None else trajectory.q[trajectory.spread(samples)]
-    parameters = file.design.parameters.values()
-    lower = np.array([p.min for p in parameters])
-    upper = np.array([p.max for p in parameters])
-    outer = np.where(np.asarray(at_upper, dtype=bool), upper, lower)
-    designs = np.unique(np.vstack([y0, outer]), axis=0) if len(y0) else np.zeros((1, 0))
-    return np.vstack([np.hstack([q, np.broadcast_to(y, (len(q), len(y)))]) for y in designs])
-
-
-def corners(n: int) -> NDArray[np.bool_]:
-    """Corners of a box in n parameters, (k, n), True at the upper bound: that is where series err.
-
-    All of up to 16; of more the Walsh functions w_j(r) = parity of r & (1 + j mod 15), r = 0…15,
-    in which any two of 15 parameters take all four combinations, and all at their upper bounds.
-    """
-    if n <= 4:
-        return np.asarray((np.arange(2**n)[:, None] >> np.arange(n)) % 2 == 1)
-    shared = np.arange(16)[:, None] & (1 + np.arange(n) % 15)
-    walsh = np.asarray(np.bitwise_count(shared) % 2 == 1)
-    return np.vstack([walsh, np.ones((1, n), dtype=bool)])
-
-
-def _place(trajectory: Trajectories | None, count: int, row: int) -> str:
-    """Row of what `looked_at` gives, in words: the sample, whatever the design."""
-    if trajectory is None:
-        return "the expansion point"
-    samples = trajectory.spread(count)
-    return trajectory.sample(int(samples[row % len(samples)]))

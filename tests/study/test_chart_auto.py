@@ -17,7 +17,7 @@ from eigassign.stages import Stages
 from eigassign.study.chart_auto import auto_methods, beside_auto, taken_by_auto
 from eigassign.study.chart_data import Advice
 from eigassign.study.chart_study import Compared, Wish, compare_methods
-from eigassign.study.choices import corners
+from eigassign.study.judged_at import corners
 from eigassign.study.scene import Scene
 
 CASES = Path(__file__).parents[2] / "cases"
