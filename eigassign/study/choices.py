@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ from eigassign.modal.mesh_choice import MeshChoice, choose_mesh
 from eigassign.modal.model import Model
 from eigassign.modal.reduction_choice import ReductionChoice, choose_reduction, few_of
 from eigassign.study.chart_follow import suggestions
-from eigassign.study.judged_at import JudgedAt, at_corners, at_random, corners
+from eigassign.study.judged_at import JudgedAt, at_corners, at_random, climbed, corners
 
 Floats = NDArray[np.float64]
 ACCURACY = 1e-3  # where the case asks for auto and names none
@@ -43,6 +44,12 @@ class OrderChoice:
     more_q: tuple[tuple[float, ...], ...]
     cluster_gap: float  # relative, in λ
     reasons: tuple[str, ...]
+
+
+def _highest(found: ExpansionChoice, x: Floats) -> Floats:
+    """The largest estimate of all modes at x (n, n_x)."""
+    n_q = len(found.expansions[0].q0)
+    return np.asarray(found.error_estimate(x[:, :n_q], x[:, n_q:]).max(axis=1))
 
 
 def asked_accuracy(file: CaseFile) -> float:
@@ -148,22 +155,40 @@ def choose_order(
     accuracy, start = series_share(file), np.concatenate([q0, y0])
     followed, said = suggestions(file, q0, y0, modes, accuracy)
 
-    def choice(seen: JudgedAt, begun: ExpansionChoice | None = None) -> ExpansionChoice:
+    def choice(seen: JudgedAt, begun: ExpansionChoice | None) -> ExpansionChoice:
         return choose_expansion(
             model.pencil, seen.x, accuracy, modes,
             start=start, place=seen.place, suggestions=followed, begun=begun,
         )  # fmt: skip
 
-    found = choice(seen)
+    found, judged = _confirmed(choice, seen, every, accuracy, file)
+    first, *more = (part.q0 for part in found.expansions)
+    others = tuple(tuple(float(v) for v in q) for q in more)
+    reasons = (*said, *found.reasons, *judged)
+    return OrderChoice(found.order, first, others, found.cluster_gap, reasons)
+
+
+def _confirmed(
+    choice: Callable[[JudgedAt, ExpansionChoice | None], ExpansionChoice],
+    seen: JudgedAt,
+    every: JudgedAt,
+    accuracy: float,
+    file: CaseFile,
+) -> tuple[ExpansionChoice, tuple[str, ...]]:
+    """The choice for ``seen`` that holds for ``every``, and what was found there.
+
+    Where it does not, the worst of these are seen too, and at last all of them.
+    """
+    found = choice(seen, None)
+    said: list[str] = []
     for last in (False, False, True):
-        error = found.error_estimate(every.x[:, : len(q0)], every.x[:, len(q0) :]).max(axis=1)
+        every, error = climbed(every, partial(_highest, found), file)
+        what = f"at {len(error)} poses and designs in all: error at most {error.max():.1e}"
         beyond = np.flatnonzero(~(error <= accuracy))
         if not len(beyond):
-            break
-        said += (f"chosen anew at more poses and designs: there the error was {error.max():.1e}",)
+            return found, (*said, what)
+        said.append(f"{what}, chosen anew")
         worst = beyond[np.argsort(-error[beyond], kind="stable")[:ADDED]]
         seen = seen.with_rows(every, np.arange(len(error)) if last else worst)
         found = choice(seen, found)
-    first, *more = (part.q0 for part in found.expansions)
-    others = tuple(tuple(float(v) for v in q) for q in more)
-    return OrderChoice(found.order, first, others, found.cluster_gap, (*said, *found.reasons))
+    return found, tuple(said)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,7 @@ Ints = NDArray[np.intp]
 ENDS = ((False,), (True,))  # all parameters at their lower bounds, all at their upper ones
 SAMPLES = 40  # along the trajectory, at each design that a mesh is judged at
 SEED = 20211
+CLIMBERS = 8  # poses and designs from which worse designs are looked for
 MASKS = (1, 2, 4, 8, 15, 7, 11, 13, 14, 3, 5, 6, 9, 10, 12)  # of the Walsh functions in 4 bits
 
 
@@ -68,6 +70,32 @@ def at_random(
     share[count // 2 :] = share[count // 2 :] > 0.5
     rows = random.integers(0, 1 if trajectory is None else len(trajectory.q), count)
     return _judged(trajectory, q0, rows, lower + share * (upper - lower))
+
+
+def climbed(
+    seen: JudgedAt, error: Callable[[Floats], Floats], file: CaseFile
+) -> tuple[JudgedAt, Floats]:
+    """``seen`` and its errors (n,), with designs like those of the largest errors but worse.
+
+    From these, parameter after parameter goes to the bound at which the error is larger, if it is.
+    """
+    errors = error(seen.x)
+    top = np.argsort(-errors, kind="stable")[:CLIMBERS]
+    lower, upper = _bounds(file)
+    x, most = seen.x[top], errors[top]
+    for j in range(len(lower)):
+        column = x.shape[1] - len(lower) + j
+        tried = np.repeat(x[None], 2, axis=0)
+        tried[0, :, column], tried[1, :, column] = lower[j], upper[j]
+        higher = error(tried.reshape(-1, x.shape[1])).reshape(2, -1)
+        best = higher.argmax(axis=0)
+        better = higher.max(axis=0) > most
+        x = np.where(better[:, None], tried[best, np.arange(len(x))], x)
+        most = np.maximum(most, higher.max(axis=0))
+    new = replace(
+        seen, x=np.vstack([seen.x, x]), samples=np.append(seen.samples, seen.samples[top])
+    )
+    return new, np.append(errors, most)
 
 
 def _judged(trajectory: Trajectories | None, q0: Floats, rows: Ints, y: Floats) -> JudgedAt:
