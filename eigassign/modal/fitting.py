@@ -28,6 +28,7 @@ from eigassign.modal.fit_source import (
     own_error,
     question,
 )
+from eigassign.modal.line import Stretch
 from eigassign.modal.model import Model
 from eigassign.modal.path_fit import PathFit
 from eigassign.modal.region import Box, Region, build_region
@@ -98,7 +99,8 @@ def _to_accuracy(
 ) -> _Plan:
     """Runs that ask until their estimate meets the accuracy."""
     directions, n_q = dependence(source)
-    regions = [build_region(directions, n_q, part, y) for part in parts]
+    rests = _some_move(parts)
+    regions = [build_region(directions, n_q, part, y, rests=rests) for part in parts]
     floors = [floor_of(source, region, modes, accuracy) for region in regions]
     pairs = zip(regions, floors, strict=True)
     runs = [adaptive(region.nodes, _left(source, accuracy, floor), most) for region, floor in pairs]
@@ -117,12 +119,17 @@ def _by_solves(
     directions, n_q = dependence(source)
     counts = [count]
     if path is not None and len(path.parts) > 1:
-        d = build_region(directions, n_q, parts[0], y).d
+        d = max(build_region(directions, n_q, each, y, rests=True).d for each in parts)
         counts = path.shares(count, fewest(d))
     regions, floors = _best_nodes(source, parts, y, modes, counts)
     followed(regions)
     pairs = zip(regions, counts, strict=True)
     return regions, floors, [given(region.nodes, own) for region, own in pairs]
+
+
+def _some_move(parts: Sequence[Any]) -> bool:
+    """Whether stretches that stand still are part of something that does not."""
+    return any(isinstance(part, Stretch) and part.line(None) is not None for part in parts)
 
 
 def _meant(accuracy: object, most: object) -> None:
@@ -154,11 +161,11 @@ def _best_nodes(
     That is looked at on nested nodes, which hold both ends of every axis.
     """
     directions, n_q = dependence(source)
-    pairs = zip(parts, counts, strict=True)
-    regions = [build_region(directions, n_q, part, y, count) for part, count in pairs]
+    pairs, rests = zip(parts, counts, strict=True), _some_move(parts)
+    regions = [build_region(directions, n_q, part, y, count, rests) for part, count in pairs]
     if isinstance(source, Model):
         return regions, [0.0] * len(regions)
-    nested = (build_region(directions, n_q, part, y) for part in parts)
+    nested = (build_region(directions, n_q, part, y, rests=rests) for part in parts)
     return regions, [floor_of(source, region, modes, None) for region in nested]
 
 

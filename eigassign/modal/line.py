@@ -81,6 +81,13 @@ class Stretch:
         """
         return _line(self, count)
 
+    def rest(self) -> Line:
+        """An axis of a single node, for a stretch that stands still."""
+        n_t, n_x = len(self.q), self.q.shape[1] + self.n_y
+        axis = Axis(Nodes(np.zeros(1), 1, True), np.zeros((1, n_x)))
+        reach = np.zeros((n_t, len(self.joints)))
+        return Line(axis, np.zeros(n_t), np.zeros(n_x), True, reach)
+
 
 @lru_cache(maxsize=64)
 def _line(stretch: Stretch, count: int | None) -> Line | None:

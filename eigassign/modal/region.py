@@ -169,13 +169,18 @@ class Region:
 
 
 def build_region(
-    directions: Floats, n_q: int, q: Stretch | Box, y: ArrayLike | Box, count: int | None = None
+    directions: Floats,
+    n_q: int,
+    q: Stretch | Box,
+    y: ArrayLike | Box,
+    count: int | None = None,
+    rests: bool = False,
 ) -> Region:
     """The region of q, a stretch of a trajectory, one pose or a box, and of y, a design or a box.
 
     ``directions`` (n_w, n_x) are the combinations of x on which anything depends. A single axis has
     the best ``count`` nodes where that is given. Raises UsageError for wrong lengths, and where
-    nothing that matters varies.
+    nothing that matters varies, unless the stretch may be one that ``rests`` while others move.
     """
     n_y = directions.shape[1] - n_q
     path = None if isinstance(q, Box) else q.q
@@ -191,6 +196,9 @@ def build_region(
     line = None if isinstance(q, Box) else q.line(None if axes else count)
     if line is not None:
         axes, rows = [line.axis, *axes], [line.row, *rows]
+    if not axes and rests and not isinstance(q, Box):
+        line = q.rest()
+        axes, rows = [line.axis], [line.row]
     if not axes:
         raise UsageError("nothing to fit: no coordinate or parameter that matters has room")
     if len(axes) > MOST_AXES:

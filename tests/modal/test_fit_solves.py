@@ -212,3 +212,19 @@ def test_more_solves_than_a_polynomial_bears_are_not_asked_for(solves: int) -> N
     assert fit.solves == 128
     error = np.abs(fit.along() / model.frequencies(q, [0.1, 0.1], 1) - 1.0).max()
     assert error <= min(fit.error_estimate, 1e-9)
+
+
+@pytest.mark.parametrize("how", [{"solves": 12}, {"accuracy": 1e-6}])
+def test_a_trajectory_that_rests_among_others_is_a_constant(
+    arm: tuple[Model, np.ndarray], how: dict[str, float]
+) -> None:
+    """The shoulder alone turns in one of them, on which no frequency depends."""
+    model, q = arm
+    spin = np.column_stack([np.linspace(0.0, 1.0, 9), np.full(9, 5.3) + np.linspace(0.0, 1.0, 9)])
+    fit = ea.fit(model, [q, spin], Y0, **how)  # type: ignore[arg-type]
+    hz = np.concatenate([model.frequencies(part, Y0, 1) for part in (q, spin)])
+    assert np.abs(fit.along() / hz - 1.0).max() <= fit.error_estimate
+    np.testing.assert_array_equal(np.ptp(fit.along()[len(q) :]), 0.0)
+    np.testing.assert_array_equal(fit.frequencies(spin[3], Y0)[0], fit.along()[len(q)])
+    with pytest.raises(UsageError, match="nothing to fit"):
+        ea.fit(model, [spin, spin], Y0, **how)  # type: ignore[arg-type]
