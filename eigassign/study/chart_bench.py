@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -19,7 +19,7 @@ from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 BATCH = 32768  # evaluations in one call, where methods are timed
-LONG_BATCH_S = 0.05  # a batch that would take longer is timed on few of the question's own runs
+LONG_BATCH_S = 0.02  # no batch that would take longer is timed, but few of the question's own runs
 TIMED = 3  # runs along the trajectory on which slow methods are timed
 
 
@@ -132,14 +132,23 @@ def _batch(
     Whole runs along the trajectory, as a search over designs asks for them, many at once; a slow
     method answers few, at those of their samples that the question has.
     """
-    few = points if method.most else points.runs(TIMED)
-    few = bench.whole if method.per_design else few
-    spent = timed(lambda: evaluator(few))[1]
-    copies = -(-BATCH // len(bench.whole.x))
-    longer = spent * copies * len(bench.whole.x) / len(few.x)
-    if method.most or method.per_design or longer > LONG_BATCH_S:
-        return few, spent
-    return bench.whole.repeated(copies), longer
+    many = points if method.most else points.runs(TIMED)
+    many = bench.whole if method.per_design else many
+    spent = timed(partial(evaluator, many))[1]
+    for larger in () if method.most or method.per_design else _larger(bench, many):
+        if spent * len(larger.x) > LONG_BATCH_S * len(many.x):
+            break
+        many, spent = larger, timed(partial(evaluator, larger))[1]
+    return many, spent
+
+
+def _larger(bench: Bench, few: Points) -> Iterator[Points]:
+    """4, 16 … times as many, then a whole batch: a short one tells what a call costs by itself."""
+    copies = 4
+    while copies * len(few.x) < BATCH:
+        yield few.repeated(copies)
+        copies *= 4
+    yield bench.whole.repeated(-(-BATCH // len(bench.whole.x)))
 
 
 def _point(bench: Bench, trial: _Trial, spent: Sequence[Timing], solve: Timing) -> ChartPoint:

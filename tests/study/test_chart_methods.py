@@ -18,8 +18,8 @@ from eigassign.modal import exact
 from eigassign.modal.expansion import expand
 from eigassign.modal.fit_source import FINE
 from eigassign.modal.nearest import nearest
+from eigassign.study import chart_bench, rivals
 from eigassign.study import chart_methods as own
-from eigassign.study import rivals
 from eigassign.study.chart_bench import Bench, _batch, errors, exact_frequencies
 from eigassign.study.chart_fits import fit_methods
 from eigassign.study.chart_question import Points, build_features, build_points
@@ -188,8 +188,25 @@ def test_what_is_solved_anew_is_timed_by_whole_trajectories(scene: Scene, points
             assert len(many.x) == 4
         elif method.per_design:
             assert len(many.x) == 2 * 152
-        elif method.exact:
-            assert len(many.x) == len(points.runs().x)  # slow
+
+
+def test_what_a_call_costs_by_itself_does_not_keep_a_method_from_large_batches(
+    scene: Scene, points: Points, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = Bench(scene, points, points.x, Patience(), points.whole(build_features(scene)))
+    (method, *_) = own.taylor_methods(scene, [1], [])
+
+    def asked(each_s: float, call_s: float) -> int:
+        def spent(job: Any) -> tuple[object, float]:
+            found = job()
+            return found, call_s + each_s * len(found)
+
+        monkeypatch.setattr(chart_bench, "timed", spent)
+        return len(_batch(bench, method, lambda points: points.x, points)[0].x)
+
+    assert asked(0.0, 1e-3) >= 32768
+    assert asked(1e-7, 1e-3) >= 32768
+    assert asked(1e-3, 0.0) == len(points.runs().x)
 
 
 def test_stations_are_interpolated_for_every_design_alike(scene: Scene, points: Points) -> None:
