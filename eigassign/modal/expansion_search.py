@@ -25,7 +25,7 @@ from eigassign.modal.sizes import MOST_TERMS
 Floats = NDArray[np.float64]
 MAX_POINTS = 32
 SEVERAL = 3.0  # times the coefficients: what several points cost beside one
-MOST_IN_ALL = 10 * MOST_TERMS  # coefficients of all points together
+MOST_IN_ALL = 10 * MOST_TERMS  # what all points together may cost
 LOOKED_AT = (8, 16)  # numbers of points at which it is asked whether more of them will do
 HOPE = 3.0  # by how much more points may do better than the last ones promise
 COMPARED = 8  # points at which an order must be better than lower ones
@@ -152,7 +152,7 @@ class Points:
 
     @property
     def cost(self) -> float:
-        """Of all with the next point."""
+        """Of all of them with the next point."""
         return SEVERAL * size(self.parts) * (1.0 + 1.0 / len(self.parts))
 
     @property

@@ -58,8 +58,9 @@ def fit(
     ``source`` is a Model (exact solves), a ReducedModel or an Expansion, whose own error estimates
     count. ``q`` are samples of a trajectory (n_t, n_q), one pose (n_q,), a `Box`, or several
     trajectories: ``case.trajectory`` or a list of samples; ``y`` (n_y,) or a `Box`. ``accuracy``
-    is relative in Hz, 1e-4 unless given; or ``solves`` are that many frequencies and no more, and
-    the estimate is what they leave. A trajectory with corners is fitted from one to the next.
+    is relative in Hz, 1e-4 unless given; or ``solves`` are that many frequencies and no more, of
+    one axis 128 at most, and the estimate is what they leave. A trajectory with corners is fitted
+    from one to the next.
 
     Raises AccuracyError where ``most`` frequencies do not suffice, as where modes cross, or where
     those of given ``solves`` show no error; UsageError for arguments that cannot be meant.
