@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from eigassign.case import FileTrajectory, PointTrajectory, SampledTrajectory, TipTrajectory
 from eigassign.errors import MechanismError, TrajectoryError
@@ -20,11 +20,13 @@ from eigassign.mechanism.inverse_kinematics import follow
 from eigassign.mechanism.paths import WAYPOINTS, Path, spline, straight
 from eigassign.mechanism.point_to_point import point_to_point, shared_times
 from eigassign.mechanism.timing import timing_law
-from eigassign.mechanism.tip_chain import Floats, TipChain
+from eigassign.mechanism.tip_chain import TipChain
 from eigassign.mechanism.trajectory_file import read_samples
 
 _BACKWARDS = "time must increase, and goes from {:g} s to {:g} s"
 _PATHS: dict[str, Callable[[ArrayLike], Path]] = {"spline": spline, "straight": straight}
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

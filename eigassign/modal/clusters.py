@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.mechanism.pencil import Pencil
-from eigassign.modal.exact import Modes
+from eigassign.modal.condensation import Modes
 from eigassign.modal.lowest import lowest_modes
 
 Floats = NDArray[np.float64]

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.mechanism.pencil import Pencil
-from eigassign.modal.exact import Modes, eigenvalues
+from eigassign.modal.condensation import Modes
+from eigassign.modal.exact import eigenvalues
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -19,7 +19,7 @@ from eigassign.errors import UsageError
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.arguments import mode_numbers, relative_gap, whole_within
 from eigassign.modal.clusters import CLUSTER_GAP, clusters, whole_clusters
-from eigassign.modal.exact import Modes
+from eigassign.modal.condensation import Modes
 from eigassign.modal.local import Local, local_space, vector_set
 from eigassign.modal.rayleigh import eigenvalue_series
 from eigassign.modal.recursion import expand_subspace

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from eigassign.errors import AccuracyError, UsageError
 from eigassign.modal.adaptive import shown
 from eigassign.modal.arguments import mode_numbers
-from eigassign.modal.exact import DENSE_LIMIT, eigenvalues
+from eigassign.modal.exact import eigenvalues
 from eigassign.modal.expansion import Expansion
 from eigassign.modal.inverse import InverseExpansion
 from eigassign.modal.model import Model, as_model
 from eigassign.modal.reduced_model import ReducedModel
 from eigassign.modal.region import Region
 from eigassign.modal.roundoff import rounding_error
+from eigassign.modal.sizes import DENSE_LIMIT
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from eigassign.errors import MissingMassError
 from eigassign.mechanism.pencil import Pencil
-from eigassign.modal.exact import Modes, modes_at
+from eigassign.modal.condensation import Modes
+from eigassign.modal.exact import modes_at
 
 Floats = NDArray[np.float64]
 

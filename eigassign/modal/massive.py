@@ -20,6 +20,7 @@ from scipy.linalg import lapack, svd
 
 from eigassign.errors import LIMP, AccuracyError, MechanismError, MissingMassError
 from eigassign.mechanism.pencil import Pencil
+from eigassign.modal.condensation import condense
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -52,8 +53,6 @@ def solve_massive(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Fl
 
     Raises MissingMassError where fewer have mass, AccuracyError for an indefinite mass.
     """
-    from eigassign.modal.exact import condense
-
     K, M = pencil.matrices(theta)
     E = pencil.elastic
     coupling, M_c = condense(M, E, pencil.rigid)

@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import UsageError
 from eigassign.modal.chunks import chunks
+from eigassign.modal.condensation import condense_blocks
 from eigassign.modal.error_terms import ErrorTerms
-from eigassign.modal.exact import condense_blocks
 from eigassign.modal.ritz_error import relative_error
 from eigassign.modal.ritz_pairs import ritz_values
 from eigassign.modal.samples import samples

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from eigassign.mechanism.pencil import Pencil
 from eigassign.modal.arguments import mode_numbers
+from eigassign.modal.condensation import Modes
 from eigassign.modal.encounters import Encounter, find_encounters
-from eigassign.modal.exact import Modes
 from eigassign.modal.lowest import lowest_modes
 
 Floats = NDArray[np.float64]

@@ -140,6 +140,12 @@ class ImplicitFunction:
             p = p - inverse @ F
         return p
 
+    def evaluate(self, algebra: Algebra, a: Floats) -> Floats:
+        """p in either algebra."""
+        if isinstance(algebra, Truncated):
+            return self.series(algebra, a)
+        return self.samples(a)
+
     def _failure(self, a: Floats, reached: Floats) -> SingularityError:
         message = f"{self.title} cannot be closed, or is at a dead point, at {self._named(reached)}"
         if not np.array_equal(a, reached):
@@ -164,10 +170,3 @@ def _solved(J: Floats, F: Floats) -> Floats:
         return np.asarray(np.linalg.solve(turned @ J, turned @ F))
     except np.linalg.LinAlgError:
         return _least(J, F)
-
-
-def evaluate(function: ImplicitFunction, algebra: Algebra, a: Floats) -> Floats:
-    """The function in either algebra."""
-    if isinstance(algebra, Truncated):
-        return function.series(algebra, a)
-    return function.samples(a)

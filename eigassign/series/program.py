@@ -18,6 +18,7 @@ from scipy import sparse
 from eigassign.errors import UsageError
 from eigassign.series.algebra import Algebra
 from eigassign.series.expression import Node, Recorder
+from eigassign.series.faces import faces
 
 if TYPE_CHECKING:
     from eigassign.series.implicit import ImplicitFunction
@@ -72,8 +73,6 @@ class Program:
     @cached_property
     def faces(self) -> NDArray[np.bool_]:
         """(n_faces, n_variables): every atom is a sum of functions of one face's variables each."""
-        from eigassign.series.faces import faces
-
         return faces(self)
 
     def run(self, algebra: Algebra, variables: Floats) -> Floats:
@@ -97,9 +96,7 @@ def _take(step: Step, algebra: Algebra, values: Floats) -> Floats:
         right = values.take(step.right, axis=0)
         return algebra.solve(a, right, int(step.numbers[0]))[step.picked]
     if step.function is not None:
-        from eigassign.series.implicit import evaluate
-
-        return evaluate(step.function, algebra, a)[step.picked]
+        return step.function.evaluate(algebra, a)[step.picked]
     return algebra.wave(a, step.right)
 
 

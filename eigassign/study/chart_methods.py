@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.modal.clusters import CLUSTER_GAP
-from eigassign.modal.exact import DENSE_LIMIT
 from eigassign.modal.exact_sparse import solve_sparse
 from eigassign.modal.expansion import expand
 from eigassign.modal.model import Model
 from eigassign.modal.nearest import nearest
 from eigassign.modal.reduced import ReducedModel, reduce
+from eigassign.modal.sizes import DENSE_LIMIT
 from eigassign.study.chart_follow import FULL, SEVERAL
 from eigassign.study.chart_question import Points
 from eigassign.study.drawing import spread_samples

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from eigassign.modal.exact import DENSE_LIMIT
 from eigassign.modal.model import Model
+from eigassign.modal.sizes import DENSE_LIMIT
 from eigassign.study import chart_methods as own
 from eigassign.study import rivals
 from eigassign.study.chart_auto import Taken, auto_methods, beside_auto, taken_by_auto

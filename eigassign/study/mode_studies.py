@@ -8,7 +8,7 @@ from itertools import zip_longest
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.modal.exact import DENSE_LIMIT
+from eigassign.modal.sizes import DENSE_LIMIT
 from eigassign.study.approximation import AXES, COARSE, Grid, compare, grid_over, map_over
 from eigassign.study.findings import Comparison, ModeStudy
 from eigassign.study.plan import joint_map

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from eigassign.modal.exact import condense
+from eigassign.modal.condensation import condense
 from eigassign.modal.model import Model
 from eigassign.study.chart_methods import Evaluator, Method
 from eigassign.study.chart_question import Features, Points

@@ -7,7 +7,7 @@ import pytest
 from chains import bar, model_of, random_chain, two_link
 
 from eigassign.errors import UsageError
-from eigassign.modal import exact
+from eigassign.modal import exact, exact_dense
 from eigassign.modal.model import Model
 from eigassign.modal.roundoff import rounding_error
 
@@ -50,8 +50,8 @@ def test_how_many_are_solved_at_once_does_not_show(
         x = model.x(q, y)
         alone = np.vstack([model.frequencies(row[:2], row[2:], 6) for row in x])
         shapes = np.vstack([model.modes(row[:2], row[2:], 6)[1] for row in x])
-        for numbers, at_once in ((exact.NUMBERS, 2048), (1, 2)):
-            monkeypatch.setattr(exact, "NUMBERS", numbers)
+        for numbers, at_once in ((exact_dense.NUMBERS, 2048), (1, 2)):
+            monkeypatch.setattr(exact_dense, "NUMBERS", numbers)
             monkeypatch.setattr("eigassign.modal.chunks.CHUNK", at_once)
             f, phi = model.modes(q, y, 6)
             np.testing.assert_allclose(model.frequencies(q, y, 6), alone, rtol=1e-12)

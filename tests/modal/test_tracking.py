@@ -15,7 +15,8 @@ from meetings import E_ONE, line, two_bars
 
 from eigassign.api import load_case
 from eigassign.errors import UsageError
-from eigassign.modal.exact import Modes, modes
+from eigassign.modal.condensation import Modes
+from eigassign.modal.exact import modes
 from eigassign.modal.tracking import _carried, overlaps, track
 
 

@@ -13,7 +13,7 @@ from stress import ATLAS, case
 from eigassign.errors import MissingMassError
 from eigassign.mechanism.parameters import initial_design
 from eigassign.modal import exact_sparse
-from eigassign.modal.exact import condense
+from eigassign.modal.condensation import condense
 from eigassign.modal.expansion import expand
 from eigassign.modal.lowest import lowest_modes
 from eigassign.modal.model import Model

@@ -1,0 +1,52 @@
+"""What all exact solvers share: the modes they find, and the condensed mass M_c."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.errors import MechanismError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Eigenvalues λ (n_samples, count) in rad²/s² and modes φ (n_samples, n_dof, count).
+
+    φᵀMφ = I at every sample; the entry of largest magnitude of every mode is positive.
+    """
+
+    lam: Floats
+    phi: Floats
+
+
+def condense(
+    M: Floats, elastic: NDArray[np.intp], rigid: NDArray[np.intp]
+) -> tuple[Floats, Floats]:
+    """M_FF⁻¹ M_FE and M_c = M_EE − M_EF M_FF⁻¹ M_FE for a batch of M (n_samples, n, n)."""
+    M_FE, M_FF = block(M, rigid, elastic), block(M, rigid, rigid)
+    return condense_blocks(block(M, elastic, elastic), M_FE, M_FF)
+
+
+def condense_blocks(M_EE: Floats, M_FE: Floats, M_FF: Floats) -> tuple[Floats, Floats]:
+    """The same from its blocks."""
+    if not M_FF.size:
+        return M_FE, M_EE
+    try:
+        np.linalg.cholesky(M_FF)
+        coupling = np.linalg.solve(M_FF, M_FE)
+    except np.linalg.LinAlgError as error:
+        raise MechanismError(
+            "mechanism", "a free coordinate moves no mass: give the mechanism mass or lock it"
+        ) from error
+    return np.asarray(coupling, dtype=np.float64), M_EE - np.swapaxes(M_FE, 1, 2) @ coupling
+
+
+def block(A: Floats, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Floats:
+    """A[:, rows, columns] of a batch in C order, which fancy indexing would transpose in memory."""
+    flat = (rows[:, None] * A.shape[2] + columns).ravel()
+    taken = A.reshape(len(A), A.shape[1] * A.shape[2]).take(flat, axis=1)
+    return np.asarray(taken.reshape(len(A), len(rows), len(columns)))
