@@ -27,11 +27,11 @@ import arms
 import numpy as np
 
 import eigassign as ea
-from eigassign.modal.coefficients import pencil_series
-from eigassign.modal.exact import modes
-from eigassign.modal.local import local_space, vector_set
-from eigassign.modal.rayleigh import eigenvalue_series
-from eigassign.modal.recursion import expand_subspace
+from eigassign.modal.exact.solver import modes
+from eigassign.modal.taylor.coefficients import pencil_series
+from eigassign.modal.taylor.local_coordinates import local_space, vector_set
+from eigassign.modal.taylor.rayleigh import eigenvalue_series
+from eigassign.modal.taylor.recursion import expand_subspace
 
 DOFS = (1_000, 3_000, 10_000, 30_000)
 LINKS = (2, 4, 6, 9, 12)

@@ -20,14 +20,13 @@ from pathlib import Path
 import chart_cases
 import fronts
 
-from eigassign import charting
 from eigassign.api import load_case
-from eigassign.output.chart_tables import tables
-from eigassign.output.chart_write import write_chart
-from eigassign.output.summary import Table
-from eigassign.run import Options
-from eigassign.study.chart_effort import QUICK, Effort
-from eigassign.study.chart_study import Wish
+from eigassign.chart.effort import QUICK, Effort
+from eigassign.chart.study import Wish
+from eigassign.output.chart_report import tables, write_chart
+from eigassign.output.tables import Table
+from eigassign.pipeline import chart as charting
+from eigassign.pipeline.run import Options
 
 WHOLE = Effort()
 LARGE = replace(

@@ -19,9 +19,9 @@ import eastereig
 import numpy as np
 
 import eigassign as ea
-from eigassign.modal.expansion import Expansion
 from eigassign.modal.model import Model
-from eigassign.series.lower_set import total_degree
+from eigassign.modal.taylor.expansion import Expansion
+from eigassign.series.multi_index import total_degree
 
 ORDER = 4
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])

@@ -16,21 +16,22 @@ import numpy as np
 from literal_procedure import Q0, design
 
 import eigassign as ea
-from eigassign.modal import coefficients, exact, project
+from eigassign.modal.exact import solver
 from eigassign.modal.model import Model
+from eigassign.modal.taylor import coefficients, rayleigh
 
 
 def forced(limit: int, job: Callable[[], object]) -> Callable[[], object]:
     """The job with every limit set to ``limit``."""
 
     def run() -> object:
-        kept = [module.DENSE_LIMIT for module in (coefficients, exact, project)]
-        for module in (coefficients, exact, project):
+        kept = [module.DENSE_LIMIT for module in (coefficients, solver, rayleigh)]
+        for module in (coefficients, solver, rayleigh):
             module.DENSE_LIMIT = limit
         try:
             return job()
         finally:
-            for module, value in zip((coefficients, exact, project), kept, strict=True):
+            for module, value in zip((coefficients, solver, rayleigh), kept, strict=True):
                 module.DENSE_LIMIT = value
 
     return run

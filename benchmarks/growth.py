@@ -6,7 +6,7 @@ own. Beside the whole ``ea.expand`` call stand two floors, measured in the same 
 
 plain   one SuperLU factorisation of the bordered matrix as it is, the best of three orderings, and
         one block solve a degree: what textbook sparse algebra would cost;
-own     one factorisation by block elimination as ``eigassign.modal.bordered_sparse`` does it, and
+own     one factorisation by block elimination as ``eigassign.modal.taylor.sparse`` does it, and
         its solves in blocks that stay in the cache: the least that we know how to do.
 
 An expansion must also find its eigenpair, which takes a factorisation of K of its own before λ is
@@ -32,9 +32,11 @@ from scipy import sparse
 from scipy.sparse import linalg
 
 import eigassign as ea
-from eigassign.mechanism.pencil import Pencil
-from eigassign.modal import bordered_sparse, recursion, symmetric
-from eigassign.modal.exact import modes
+from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.modal.exact import sparse as symmetric
+from eigassign.modal.exact.solver import modes
+from eigassign.modal.taylor import recursion
+from eigassign.modal.taylor import sparse as bordered_sparse
 
 BRANCHES = (3, 10, 33, 103, 326)
 Q0 = np.array([0.3, 0.5, -0.4, 0.6])

@@ -19,10 +19,10 @@ import arms
 import numpy as np
 
 import eigassign as ea
-from eigassign.modal.exact import modes
-from eigassign.modal.expansion import Expansion
+from eigassign.modal.exact.solver import modes
 from eigassign.modal.model import Model
-from eigassign.series.lower_set import LowerSet, total_degree
+from eigassign.modal.taylor.expansion import Expansion
+from eigassign.series.multi_index import LowerSet, total_degree
 
 ORDER = 4
 Index = tuple[int, ...]

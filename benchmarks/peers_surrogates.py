@@ -16,13 +16,12 @@ from collections.abc import Callable
 import numpy as np
 
 import eigassign as ea
-from eigassign.run import prepare
-from eigassign.stages import Stages
-from eigassign.study.chart_bench import exact_frequencies
-from eigassign.study.chart_methods import reciprocal_methods, reduced_methods
-from eigassign.study.chart_question import build_features, build_points
-from eigassign.study.surrogates import spread_points
-from eigassign.study.surrogates_kriging import fit_kriging
+from eigassign.chart.methods import reciprocal_methods, reduced_methods
+from eigassign.chart.question import build_features, build_points
+from eigassign.chart.rivals import fit_kriging, spread_points
+from eigassign.chart.study import exact_frequencies
+from eigassign.pipeline.run import prepare
+from eigassign.pipeline.stages import Stages
 
 Fit = Callable[[], Callable[[np.ndarray], np.ndarray]]
 COUNTS = (27, 64, 125, 343)

@@ -12,7 +12,7 @@ import common  # first: settles the threads
 import numpy as np
 
 import eigassign as ea
-from eigassign.modal import reduced
+from eigassign.modal.reduced import reduce as reduced
 
 SAMPLES = 2_000
 

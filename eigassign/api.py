@@ -8,18 +8,19 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from eigassign.built_case import Case
 from eigassign.case import load
-from eigassign.modal import expansion as modal_expansion
-from eigassign.modal import reduced as modal_reduced
-from eigassign.modal.expansion import Expansion
-from eigassign.modal.fit import Fit
-from eigassign.modal.fitting import fit
+from eigassign.modal.fit.domain import Box
+from eigassign.modal.fit.fit import Fit, PathFit, fit
 from eigassign.modal.model import Model, as_model
-from eigassign.modal.path_fit import PathFit
-from eigassign.modal.reduced import ReducedModel
-from eigassign.modal.region import Box
-from eigassign.series.lower_set import LowerSet
+from eigassign.modal.reduced import reduce as modal_reduced
+from eigassign.modal.reduced.reduce import ReducedModel
+from eigassign.modal.taylor import expansion as modal_expansion
+from eigassign.modal.taylor.expansion import Expansion
+from eigassign.series.multi_index import LowerSet
+from eigassign.study.built_case import Case
+
+if TYPE_CHECKING:
+    from eigassign.pipeline.run import Result
 
 __all__ = [
     "Box",
@@ -34,9 +35,6 @@ __all__ = [
     "reduce",
     "save_reduced",
 ]
-
-if TYPE_CHECKING:
-    from eigassign.run import Result
 
 
 def load_case(path: str | Path) -> Case:
@@ -56,7 +54,7 @@ def expand(
 ) -> Expansion:
     """Taylor expansion of the eigenvalues of ``modes`` about (q0, y0), eqs. (4)-(9).
 
-    See :func:`eigassign.modal.expansion.expand`.
+    See :func:`eigassign.modal.taylor.expansion.expand`.
     """
     return modal_expansion.expand(
         as_model(model).pencil, q0, y0, modes, order, linear_in_y, space, vector_order
@@ -76,7 +74,7 @@ def reduce(
 
     ``span``, half-widths of q (n_q,) and y (n_y,) about the points, makes it as small as changes
     no frequency in there by more than ``accuracy`` (relative). See
-    :func:`eigassign.modal.reduced.reduce`.
+    :func:`eigassign.modal.reduced.reduce.reduce`.
     """
     return modal_reduced.reduce(
         as_model(model).pencil, q0, y0, modes, half_order, span=span, accuracy=accuracy
@@ -85,7 +83,7 @@ def reduce(
 
 def assign(case: Case) -> Result:
     """The whole job of ``eigassign optimize``, without writing anything."""
-    from eigassign.run import solve_case
+    from eigassign.pipeline.run import solve_case
 
     return solve_case(case)
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 import eigassign as ea
-from eigassign.output import ink
-from eigassign.output.lettering import DPI
-from eigassign.output.mode_figures import thumbnail
-from eigassign.output.png import encode
+from eigassign.output.figures import ink
+from eigassign.output.figures.lettering import DPI
+from eigassign.output.figures.modes import thumbnail
+from eigassign.output.figures.png import encode
 from eigassign.study.drawing import draw_modes
 
 HERE = Path(__file__).parent

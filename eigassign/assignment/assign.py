@@ -8,19 +8,27 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.assignment.active_set import polish
-from eigassign.assignment.certificate import ACCEPT, Candidate, Certificate, candidate, judge
 from eigassign.assignment.checks import Floats, finite, frozen
-from eigassign.assignment.conflict import contradiction, feasible_point, refuse_impossible
+from eigassign.assignment.optimality import (
+    ACCEPT,
+    Candidate,
+    Certificate,
+    candidate,
+    contradiction,
+    feasible_point,
+    judge,
+    refuse_impossible,
+)
 from eigassign.assignment.program import (
     Bounds,
     Goal,
     LinearConstraint,
     QuadraticProgram,
+    ScaledProgram,
     build_program,
+    scaled_program,
 )
-from eigassign.assignment.scales import ScaledProgram, scaled_program
-from eigassign.assignment.solve import RawSolution, solve_osqp
+from eigassign.assignment.solver import RawSolution, polish, solve_osqp
 from eigassign.errors import AccuracyError
 
 

@@ -1,7 +1,9 @@
 """YAML case file → validated, frozen, SI-valued objects; every error with file:line:column."""
 
-from eigassign.case.casefile import CaseFile
-from eigassign.case.joint_parts import (
+from eigassign.case.case_file import CaseFile
+from eigassign.case.loading import load, parse
+from eigassign.case.schema.document import json_schema
+from eigassign.case.schema.joints import (
     CarriageJoint,
     CylindricalJoint,
     FixedJoint,
@@ -13,29 +15,25 @@ from eigassign.case.joint_parts import (
     SphericalJoint,
     UniversalJoint,
 )
-from eigassign.case.json_schema import json_schema
-from eigassign.case.link_parts import (
+from eigassign.case.schema.links import (
+    BareSection,
     BeamLink,
+    CircleSection,
     FrameBeam,
     FrameLink,
+    IProfileSection,
     Link,
+    Material,
+    RectangleSection,
     RigidLink,
+    Section,
     SuperelementLink,
     SuperelementNode,
     Taper,
-)
-from eigassign.case.loading import load, parse
-from eigassign.case.mechanism_parts import Assembly, Body, Coordinate, Drive, Mechanism, Spring
-from eigassign.case.section_parts import (
-    BareSection,
-    CircleSection,
-    IProfileSection,
-    Material,
-    RectangleSection,
-    Section,
     TubeSection,
 )
-from eigassign.case.study_parts import (
+from eigassign.case.schema.mechanism import Assembly, Body, Coordinate, Drive, Mechanism, Spring
+from eigassign.case.schema.study import (
     Constraint,
     Design,
     Expansion,
@@ -44,7 +42,7 @@ from eigassign.case.study_parts import (
     Target,
     Validation,
 )
-from eigassign.case.trajectory_parts import (
+from eigassign.case.schema.trajectory import (
     FileTrajectory,
     PointTrajectory,
     SampledTrajectory,

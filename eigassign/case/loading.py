@@ -1,4 +1,7 @@
-"""Path → CaseFile: read, put into SI, check against the schema and itself; or every problem."""
+"""Path → CaseFile: read, put into SI, check against the schema and itself; or every problem.
+
+The files that a case names: matrices of superelements, samples of a trajectory, a chart.
+"""
 
 from __future__ import annotations
 
@@ -9,15 +12,16 @@ from collections.abc import Iterable
 from itertools import islice
 from pathlib import Path
 
-from eigassign.case.attached import attached
-from eigassign.case.casefile import CaseFile
-from eigassign.case.context import in_context
-from eigassign.case.document import Document, validated
-from eigassign.case.feasible import infeasible
-from eigassign.case.plausibility import implausible
-from eigassign.case.references import inconsistent, too_many
-from eigassign.case.yaml_reader import MAX_BYTES, Finding, Source, read_yaml
+from eigassign.case.case_file import CaseFile
+from eigassign.case.reader import MAX_BYTES, Finding, Source, read_yaml
+from eigassign.case.rules.plausibility import implausible, infeasible
+from eigassign.case.rules.references import inconsistent, too_many
+from eigassign.case.rules.values import in_context
+from eigassign.case.schema.document import Document, validated
+from eigassign.case.schema.trajectory import named_trajectories
 from eigassign.errors import CaseError, Problem, StorageError, UsageError
+
+# --- Path → CaseFile: read, put into SI, check against the schema and itself; or every problem
 
 MOST_PROBLEMS = 100  # shown; of each kind of check twice as many are looked at
 
@@ -93,3 +97,40 @@ def _bytes_of(path: Path) -> bytes:
         raise UsageError(f"{path}: no such case file") from None
     except OSError as error:
         raise StorageError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+# --- The files that a case names: matrices of superelements, samples of a trajectory, a chart
+
+CHUNK = 1 << 20
+
+
+def attached(document: Document, folder: Path) -> dict[str, str]:
+    """SHA-256 of each, by its name as seen from the case's folder.
+
+    Raises StorageError for a file that cannot be read.
+    """
+    paths = [path for _, _, path in named_trajectories(document.trajectory)]
+    named: list[object] = [getattr(path, "file", None) for path in paths]
+    named.append(document.expansion.chart)
+    for link in document.mechanism.links.values():
+        if link.type == "superelement":
+            named += [link.stiffness, link.mass]
+    return {_seen_from(folder, str(file)): _digest(str(file)) for file in named if file is not None}
+
+
+def _seen_from(folder: Path, file: str) -> str:
+    try:
+        return Path(os.path.relpath(file, folder)).as_posix()
+    except ValueError:  # another drive
+        return Path(file).as_posix()
+
+
+def _digest(file: str) -> str:
+    digest = hashlib.sha256()
+    try:
+        with open(file, "rb") as stream:
+            while piece := stream.read(CHUNK):
+                digest.update(piece)
+    except OSError as error:
+        raise StorageError(f"{file}: cannot be read: {error.strerror}") from error
+    return digest.hexdigest()

@@ -12,11 +12,11 @@ from contextlib import suppress
 
 import click
 
-from eigassign import failures, signals
+from eigassign import process
 from eigassign._version import __version__
-from eigassign.cli.caches import cache
-from eigassign.cli.many import batch
-from eigassign.cli.questions import check, modes, schema
+from eigassign.cli.batch import batch
+from eigassign.cli.cache import cache
+from eigassign.cli.inspect import check, modes, schema
 from eigassign.cli.runs import chart, expand, optimize, validate
 
 _CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
@@ -25,24 +25,24 @@ _CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 def main(args: Sequence[str] | None = None) -> int:
     """Run the command line on ``args`` (default: those of the process); returns the exit code."""
     if args is None:
-        signals.expect_to_be_brief()
+        process.expect_to_be_brief()
     arguments = sys.argv[1:] if args is None else list(args)
-    signals.prefer_one_thread()
-    signals.mind_closed_streams()
-    signals.never_fail_to_encode()
+    process.prefer_one_thread()
+    process.mind_closed_streams()
+    process.never_fail_to_encode()
     try:
-        with signals.terminable():
+        with process.terminable():
             code = _invoke(arguments)
-            signals.flush_streams()
+            process.flush_streams()
             return code
     except BaseException as error:
         return _reported(error, debug="--debug" in arguments)
 
 
 def _reported(error: BaseException, debug: bool) -> int:
-    code = failures.report(error, debug)
+    code = process.report(error, debug)
     with suppress(OSError):  # the streams are silenced then, and the code is that of the error
-        signals.flush_streams()
+        process.flush_streams()
     return code
 
 

@@ -8,37 +8,36 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from eigassign import failures
-from eigassign.cli import options
-from eigassign.cli.speech import print_json, telling
+from eigassign import process
+from eigassign.cli import arguments
+from eigassign.cli.reporter import Reporter, print_json, reporting
 from eigassign.errors import EigassignError
-from eigassign.teller import Teller
 
 if TYPE_CHECKING:
-    from eigassign.run import Options, Outcome
+    from eigassign.pipeline.run import Options, Outcome
     from eigassign.study.findings import ValidationRow
 
 
 @click.command()
-@options.case
-@options.running
-@options.json
-@options.common
+@arguments.case
+@arguments.running
+@arguments.json
+@arguments.common
 def optimize(case: Path, as_json: bool, **how: Any) -> int:
     """Assign the frequencies: the best design, proved by exact solves, in a run folder."""
-    from eigassign import run
+    from eigassign.pipeline import run
 
     return _finished(run.optimize, case, as_json, how)
 
 
 @click.command()
-@options.case
+@arguments.case
 @click.option("--order", type=click.IntRange(1, 20), help="Order, instead of the case's.")
 @click.option("--linear", is_flag=True, help="Keep the partially linearised set only.")
 @click.option("--mode", "modes", type=click.IntRange(1), multiple=True, help="Mode (repeatable).")
-@options.running
-@options.json
-@options.common
+@arguments.running
+@arguments.json
+@arguments.common
 def expand(
     case: Path, order: int | None, linear: bool, modes: tuple[int, ...], as_json: bool, **how: Any
 ) -> int:
@@ -46,7 +45,7 @@ def expand(
 
     That is results/<case>_expansion unless --out says otherwise.
     """
-    from eigassign import run
+    from eigassign.pipeline import run
 
     def expanded(path: Path, options: Options) -> Outcome:
         return run.expand_case(path, options, order=order, modes=modes or None, linear=linear)
@@ -59,7 +58,7 @@ def _finished(
     work: Callable[[Path, Options], Outcome], case: Path, as_json: bool, how: Mapping[str, Any]
 ) -> int:
     """Run one case into its folder and show what it found; the exit code."""
-    with telling(how) as tell:
+    with reporting(how) as tell:
         outcome = work(case, _options(how, tell))
         tell.warn(outcome.warnings)
         _show(outcome, as_json)
@@ -68,8 +67,8 @@ def _finished(
     return 0 if outcome.within_tolerance else 1
 
 
-def _options(how: Mapping[str, Any], tell: Teller) -> Options:
-    from eigassign.run import Options
+def _options(how: Mapping[str, Any], tell: Reporter) -> Options:
+    from eigassign.pipeline.run import Options
 
     return Options(
         out=how.get("out"),
@@ -93,27 +92,27 @@ def _show(outcome: Outcome, as_json: bool) -> None:
 
 
 @click.command()
-@click.argument("cases", nargs=-1, type=options.PATH)
-@options.caching
-@options.json
-@options.common
+@click.argument("cases", nargs=-1, type=arguments.PATH)
+@arguments.caching
+@arguments.json
+@arguments.common
 def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
     """Compare both expansions with exact frequencies, along the trajectory and over boxes.
 
     CASES are files or folders; the files of ./cases (not of folders below it) when none is named.
     Exit code 1 where an expansion is further off than the case's validation.max_error.
     """
-    from eigassign import run
-    from eigassign.case_files import cases_in, default_cases
+    from eigassign.batch.runner import cases_in, default_cases
+    from eigassign.pipeline import run
 
     rows: list[ValidationRow] = []
     codes = [0]
-    with telling(how) as tell:
+    with reporting(how) as tell:
         for case in cases_in(cases or default_cases()):
             try:
                 answer = run.validate(case, _options(how, tell))
             except EigassignError as error:
-                codes.append(failures.report(error))
+                codes.append(process.report(error))
                 continue
             tell.warn(answer.warnings)
             rows.extend(answer.rows)
@@ -128,15 +127,15 @@ def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
 
 
 @click.command()
-@options.case
+@arguments.case
 @click.option("--quick", is_flag=True, help="In seconds: fewer methods, points and repeats.")
-@click.option("--accuracy", type=options.ACCURACY, help="Advise for this worst relative error.")
-@click.option("--budget", "budget_s", type=options.POSITIVE, help="Advise for so many seconds.")
-@click.option("--evaluations", type=options.COUNT, help="How many evaluations are wanted.")
-@click.option("--out", type=options.PATH, help="Folder (default: results/<case>_chart).")
-@options.force
-@options.json
-@options.common
+@click.option("--accuracy", type=arguments.ACCURACY, help="Advise for this worst relative error.")
+@click.option("--budget", "budget_s", type=arguments.POSITIVE, help="Advise for so many seconds.")
+@click.option("--evaluations", type=arguments.COUNT, help="How many evaluations are wanted.")
+@click.option("--out", type=arguments.PATH, help="Folder (default: results/<case>_chart).")
+@arguments.force
+@arguments.json
+@arguments.common
 def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
     """Chart time against accuracy of every way to the frequencies of this case.
 
@@ -144,12 +143,12 @@ def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
     exact answers on this machine; the mesh; and ways to a design. Leaves figures, chart.json and
     report.html, and says what to choose.
     """
-    from eigassign import charting
-    from eigassign.study.chart_study import Wish
+    from eigassign.chart.study import Wish
+    from eigassign.pipeline import chart as charting
 
     wish = Wish(how["accuracy"], how["budget_s"], how["evaluations"])
     out = how["out"] or Path("results", f"{case.stem}_chart")
-    with telling(how) as tell:
+    with reporting(how) as tell:
         given = _options({**how, "out": out, "cache_dir": None, "no_cache": True}, tell)
         made = charting.chart(case, given, quick, wish)
         tell.warn(made.chart.warnings)

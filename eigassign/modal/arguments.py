@@ -1,14 +1,73 @@
-"""Checks of what callers give by number: modes, orders, counts, gaps."""
+"""Samples of (q, y) as callers give them: one or many, checked and broadcast.
+
+Checks of what callers give by number: modes, orders, counts, gaps.
+
+Samples in parts, so that what is worked out for each of them stays in the processor's cache.
+
+Where dense algebra gives way to sparse: one number for the exact solve and the expansion alike.
+
+Measured by ``benchmarks/dense_or_sparse.py``: dense arrays win below, sparse ones above.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from operator import index
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import UsageError
+
+# --- Samples of (q, y) as callers give them: one or many, checked and broadcast
+
+Floats = NDArray[np.float64]
+
+
+def samples(q: ArrayLike, y: ArrayLike, n_q: int, n_y: int) -> Floats:
+    """x = (q, y) as (n_samples, n_q + n_y); one sample may be given flat and is broadcast."""
+    rows = [_rows(q, n_q, "q"), _rows(y, n_y, "y")]
+    counts = {len(r) for r in rows if len(r) != 1}
+    if len(counts) > 1:
+        raise UsageError(f"{len(rows[0])} samples of q against {len(rows[1])} of y")
+    n = counts.pop() if counts else 1
+    return np.hstack([np.broadcast_to(r, (n, r.shape[1])) for r in rows])
+
+
+def point(q: ArrayLike, y: ArrayLike, n_q: int, n_y: int) -> Floats:
+    """One point x = (q, y) as (n_q + n_y,); raises UsageError for several."""
+    a, b = _numbers(q, "q"), _numbers(y, "y")
+    if a.shape == (n_q,) and b.shape == (n_y,):
+        x = np.concatenate([a, b])
+        if np.isfinite(x).all():
+            return x
+    x = samples(a, b, n_q, n_y)
+    if len(x) != 1:
+        raise UsageError(f"{len(x)} samples of q and y; one point is expected")
+    return np.asarray(x[0])
+
+
+def _numbers(values: ArrayLike, name: str) -> Floats:
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"{name} must be real numbers, every sample with as many") from error
+
+
+def _rows(values: ArrayLike, width: int, name: str) -> Floats:
+    array = _numbers(values, name)
+    if array.ndim > 2 or (array.ndim == 2 and array.shape[1] != width):
+        raise UsageError(f"{name} has shape {array.shape}; expected (n_samples, {width})")
+    if array.ndim < 2 and array.size != width:
+        raise UsageError(f"{name} has {array.size} values; expected {width}")
+    if not np.isfinite(array).all():
+        raise UsageError(f"{name} must be finite")
+    return array.reshape(-1, width) if width else np.zeros((max(1, len(np.atleast_2d(array))), 0))
+
+
+# --- Checks of what callers give by number: modes, orders, counts, gaps
 
 
 def whole(value: object, name: str) -> int:
@@ -48,3 +107,23 @@ def relative_gap(value: object) -> float:
     if isinstance(value, int | float | np.number) and np.isfinite(value) and value >= 0.0:
         return float(value)
     raise UsageError(f"cluster_gap must be a number of at least 0, not {value!r}")
+
+
+# --- Samples in parts, so that what is worked out for each of them stays in the processor's cac
+
+CHUNK = 2048  # samples at once, at most
+NUMBERS = 30_000  # of one matrix for each sample at once: some five of them fit the cache
+LEAST = 16
+Array = TypeVar("Array", NDArray[np.float64], NDArray[np.intp])
+
+
+def chunks(rows: Array, numbers: int) -> Iterator[Array]:
+    """``rows`` in parts, fewer at once the more ``numbers`` each of them needs."""
+    size = min(CHUNK, max(LEAST, NUMBERS // numbers))
+    return (rows[i : i + size] for i in range(0, max(len(rows), 1), size))
+
+
+# --- Where dense algebra gives way to sparse: one number for the exact solve and the expansion
+
+DENSE_LIMIT = 220  # n_dof up to which matrices are kept dense
+MOST_TERMS = 20_000  # of one full series that is made without being asked for by order

@@ -10,17 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import UsageError
-from eigassign.mechanism.kinematics import Kinematics
-from eigassign.mechanism.local_motion import ReducedLinks
-from eigassign.mechanism.pencil import Pencil
-from eigassign.mechanism.poses import Poses
-from eigassign.mechanism.rails import Label
-from eigassign.modal.exact import eigenvalues, modes
-from eigassign.modal.samples import samples
+from eigassign.mechanism.assembly.assembly import ReducedLinks
+from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism.kinematics.forward import Kinematics
+from eigassign.mechanism.kinematics.poses import Poses
+from eigassign.mechanism.kinematics.travel_limits import Label
+from eigassign.modal.arguments import samples
+from eigassign.modal.exact.solver import eigenvalues, modes
 
 if TYPE_CHECKING:
-    from eigassign.mechanism.shapes import NodeShape, StrandShape
-    from eigassign.modal.tracking import Tracked
+    from eigassign.mechanism.assembly.mode_shapes import NodeShape, StrandShape
+    from eigassign.modal.exact.tracking import Tracked
+
 
 Floats = NDArray[np.float64]
 
@@ -104,7 +105,7 @@ class Model:
         the mass-normalised modes (m per √kg m), rigid motion φ_q included; ``.nodes`` by
         (link, node). Raises UsageError for several samples.
         """
-        from eigassign.mechanism.shapes import shapes
+        from eigassign.mechanism.assembly.mode_shapes import shapes
 
         hz, phi = self.modes(q, y, count)
         found = shapes(self.poses, self.one(q, y), phi[0])
@@ -116,7 +117,7 @@ class Model:
         ``.frequencies`` (n_samples, n_modes) in Hz, ``.swaps``, ``.encounters`` and ``.notes``.
         Neighbours must be neighbours: pass each of ``case.trajectories`` by itself.
         """
-        from eigassign.modal.tracking import track
+        from eigassign.modal.exact.tracking import track
 
         return track(self.pencil, self.x(q, y), modes)
 

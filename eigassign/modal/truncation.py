@@ -27,12 +27,12 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.errors import AccuracyError
-from eigassign.mechanism.definite import kept_factor
-from eigassign.mechanism.fixed_interface import largest_left_out
-from eigassign.mechanism.local_motion import ReducedLinks
-from eigassign.mechanism.pencil import Pencil
-from eigassign.modal.lowest import lowest_modes
-from eigassign.modal.symmetric import factorise, principal
+from eigassign.mechanism.assembly.assembly import ReducedLinks
+from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism.elements.craig_bampton import largest_left_out
+from eigassign.mechanism.elements.sparse_factor import kept_factor
+from eigassign.modal.exact.solver import lowest_modes
+from eigassign.modal.exact.sparse import factorise, principal
 
 Floats = NDArray[np.float64]
 BESIDE = 6  # modes above the highest one asked for that may be drawn in

@@ -14,12 +14,13 @@ from rich.console import Console
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from eigassign.output import summary
+from eigassign.output import tables as summary
 from eigassign.output.formats import number, percent
 from eigassign.study.findings import Findings, ValidationRow
 
 if TYPE_CHECKING:
-    from eigassign.study.chart_data import Chart
+    from eigassign.chart.results import Chart
+
 
 _ENDLESS = 100_000  # columns: off a terminal nothing is wrapped or cut
 
@@ -101,11 +102,11 @@ def print_validation(rows: Sequence[ValidationRow], *, stream: TextIO | None = N
 
 def print_chart(chart: Chart, *, stream: TextIO | None = None) -> None:
     """What to choose, the fronts and the ways to a design; the report has the rest."""
-    from eigassign.output import chart_tables
+    from eigassign.output import chart_report
 
-    fronts = [chart_tables.front(chart, each) for each in chart.fronts]
-    advice = (chart_tables.advice(chart), chart_tables.auto(chart), chart_tables.lines(chart))
-    for table in (*fronts, chart_tables.designs(chart), *advice):
+    fronts = [chart_report.front(chart, each) for each in chart.fronts]
+    advice = (chart_report.advice(chart), chart_report.auto(chart), chart_report.lines(chart))
+    for table in (*fronts, chart_report.designs(chart), *advice):
         if table.rows:
             _print_summary(table, stream)
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from eigassign.errors import StorageError, UsageError
-from eigassign.modal.reduced_model import ReducedModel
-from eigassign.modal.reduced_storage import FORMAT, reduced_arrays, reduced_from_arrays
-from eigassign.output.cache_format import DamagedError, key, pack, unpack
-from eigassign.output.files import replace_synced
+from eigassign.modal.reduced.model import ReducedModel
+from eigassign.modal.reduced.storage import FORMAT, reduced_arrays, reduced_from_arrays
+from eigassign.output.cache import DamagedError, key, pack, unpack
+from eigassign.output.run_folder import replace_synced
 
 
 def save_reduced(reduced: ReducedModel, path: str | Path) -> None:

@@ -1,4 +1,7 @@
-"""What a batch leaves for people (summary.csv) and for CI servers (junit.xml)."""
+"""The tables of a run, as text: the console and the report show the same ones.
+
+What a batch leaves for people (summary.csv) and for CI servers (junit.xml).
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,137 @@ import csv
 import io
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from eigassign.output.files import replace_synced
+from eigassign.output.formats import number, percent, residual, seconds
+from eigassign.output.run_folder import replace_synced
+from eigassign.study.findings import Comparison, ErrorSummary, Findings, TargetStudy, ValidationRow
+
+# --- The tables of a run, as text: the console and the report show the same ones
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of finished text; the first column names the row."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    caption: str = ""
+
+
+def tables(findings: Findings) -> tuple[Table, ...]:
+    """Design, distance to the targets, approximation, solver and timing: those there are."""
+    made = (design(findings), errors(findings), approximation(findings), solver(findings))
+    return tuple(table for table in (*made, timing(findings)) if table.rows)
+
+
+def design(findings: Findings) -> Table:
+    """Each design parameter before and after."""
+    columns = ("name", "parameter", "unit", "initial", "optimal", "lower", "upper")
+    rows = tuple(
+        (row.name, row.parameter, row.unit, *map(number, (row.initial, row.optimal)),
+         *map(number, (row.lower, row.upper)))
+        for row in findings.design
+    )  # fmt: skip
+    return Table("Design", columns, rows)
+
+
+def errors(findings: Findings) -> Table:
+    """Distance to the target before, as predicted, and exact, side by side."""
+    kinds = ("initial", "predicted", "exact")
+    columns = ("target", *(f"{kind} {what}" for what in ("worst", "rms") for kind in kinds))
+    summaries = [pair for target in findings.targets for pair in _of_target(target)]
+    if len(findings.targets) > 1 and len(findings.trajectories) > 1:
+        along = ((row.name, findings.error_along(row.name)) for row in findings.trajectories)
+        summaries += [(f"all along {name!r}", error) for name, error in along if error is not None]
+    if len(findings.targets) > 1 and findings.error is not None:
+        summaries.append(("all", findings.error))
+    rows = []
+    for label, summary in summaries:
+        errors = (summary.initial, summary.predicted, summary.exact)
+        worst = (percent(error.max_relative) for error in errors)
+        rows.append((label, *worst, *(percent(error.rms_relative) for error in errors)))
+    caption = "Frequency against its target in Hz, relative to the target, along "
+    caption += f"{findings.along}."
+    return Table("Distance to the target", columns, tuple(rows), caption)
+
+
+def _of_target(target: TargetStudy) -> Iterator[tuple[str, ErrorSummary]]:
+    """Along each trajectory if there are several, then in all."""
+    if len(target.along) > 1:
+        for one in target.along:
+            yield f"{target.label} along {one.name!r}", one.error
+    yield target.label, target.error
+
+
+def approximation(findings: Findings) -> Table:
+    """Worst error of both expansions, along the trajectory and over maps."""
+    columns = ("mode", "where", "order", "Taylor", "linearised in y")
+    caption = "Worst relative error in Hz against exact eigenvalues."
+    return Table("Approximation", columns, tuple(_approximations(findings)), caption)
+
+
+def _approximations(findings: Findings) -> Iterator[tuple[str, ...]]:
+    for study in findings.studies:
+        places: list[tuple[str, Comparison]] = []
+        if study.over_time is not None:
+            places.append((f"along {findings.along}, initial design", study.over_time))
+        for over in (study.over_q, study.over_design):
+            if over is not None:
+                places.append((f"over {' and '.join(over.names)}", over.values))
+        for where, values in places:
+            worst = (percent(values.worst_taylor), percent(values.worst_linearised))
+            yield (f"mode {study.mode}", where, str(study.order), *worst)
+
+
+def solver(findings: Findings) -> Table:
+    """What the solver says, and what its answer is worth by our own residuals."""
+    columns = ("status", "iterations", "primal residual", "dual residual", "gap")
+    found = findings.solver
+    if found is None:
+        return Table("Solver", columns, ())
+    proof = map(residual, (found.primal_residual, found.dual_residual, found.gap))
+    caption = "Residuals recomputed from the data of the scaled program."
+    return Table("Solver", columns, ((found.status, str(found.iterations), *proof),), caption)
+
+
+def timing(findings: Findings) -> Table:
+    """Where the time went."""
+    rows = tuple((stage, seconds(value)) for stage, value in findings.timing_s.items())
+    return Table("Timing", ("stage", "time"), rows)
+
+
+def validation(rows: tuple[ValidationRow, ...]) -> Table:
+    """Both expansions against exact, and whether the full one is within the case's tolerance."""
+    columns = (
+        "case",
+        "mode",
+        "where",
+        "points",
+        "order",
+        "Taylor",
+        "linearised in y",
+        "limit",
+        "verdict",
+    )
+    return Table(
+        "Validation",
+        columns,
+        tuple(
+            (row.case, str(row.mode), row.where, str(row.points), str(row.order),
+             percent(row.worst_taylor), percent(row.worst_linearised), percent(row.limit),
+             "ok" if row.passed else "FAILED")
+            for row in rows
+        ),
+        "Worst relative error in Hz.",
+    )  # fmt: skip
+
+
+# --- What a batch leaves for people (summary.csv) and for CI servers (junit.xml)
 
 Status = Literal["ok", "tolerance", "failed", "error"]
 

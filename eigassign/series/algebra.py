@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import SingularityError
-from eigassign.series.lower_set import LowerSet
+from eigassign.series.multi_index import LowerSet
 from eigassign.series.power_series import compose, multiply, power_taylor, wave_taylor
 
 if TYPE_CHECKING:
-    from eigassign.series.program import Step
+    from eigassign.series.expression import Step
+
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

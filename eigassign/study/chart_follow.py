@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
+from eigassign.chart.results import ChartPoint
 from eigassign.errors import CaseError, StorageError
-from eigassign.modal.clusters import CLUSTER_GAP
-from eigassign.modal.expansion_choice import Suggestion
-from eigassign.study.chart_data import ChartPoint
+from eigassign.modal.adaptive.order import Suggestion
+from eigassign.modal.exact.clusters import CLUSTER_GAP
 
 Floats = NDArray[np.float64]
 SCHEMA = 2  # of chart.json

@@ -2,17 +2,27 @@
 
 Shapes: n_t samples in time, n_q coordinates, n_y design parameters. SI units, frequencies in Hz,
 errors as fractions (0.01 is 1 %) of the frequency in Hz.
+
+The findings of a run along each of its trajectories alone, for what is shown one by one.
+
+The SI unit of every numeric property of a mechanism, by the last key of its path.
+
+What there is to draw of a mechanism, as plain numbers: poses, and modes as deformed poses.
+
+``n`` counts the poses; d is 2 in a plane and 3 in space; lengths in m.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.study.pictures import Poses
+from eigassign.case import CaseFile
+
+# --- What one run found, as plain numbers: the only thing the output layer is given to show
 
 Floats = NDArray[np.float64]
 
@@ -276,3 +286,178 @@ class ValidationRow:
     rms_linearised: float
     limit: float
     passed: bool
+
+
+# --- The findings of a run along each of its trajectories alone, for what is shown one by one
+
+
+def along_each(findings: Findings) -> tuple[Findings, ...]:
+    """One for each trajectory, whose name is its ``only``; itself where there is none or one.
+
+    Poses, maps over q and y, design, solver, warnings and notes stay those of the whole run.
+    """
+    if len(findings.trajectories) < 2:
+        return (findings,)
+    return tuple(_along(findings, row) for row in findings.trajectories)
+
+
+def _along(findings: Findings, row: TrajectoryRow) -> Findings:
+    rows, others = row.rows, findings.others
+    narrow = (_target(target, row.name) for target in findings.targets)
+    return replace(
+        findings,
+        only=row.name,
+        time_s=findings.time_s[rows],
+        q=findings.q[rows],
+        trajectories=(replace(row, rows=slice(0, rows.stop - rows.start)),),
+        studies=tuple(_study(study, rows) for study in findings.studies),
+        targets=tuple(target for target in narrow if target is not None),
+        others=None
+        if others is None
+        else OtherModes(others.modes, others.initial_hz[rows], others.optimal_hz[rows]),
+    )
+
+
+def _study(study: ModeStudy, rows: slice) -> ModeStudy:
+    over = study.over_time
+    if over is None:
+        return study
+    parts = (over.exact_hz, over.taylor_hz, over.linearised_hz)
+    return replace(study, over_time=Comparison(*(part[rows] for part in parts)))
+
+
+def _target(target: TargetStudy, name: str) -> TargetStudy | None:
+    """The target along the trajectory of that name; None where it does not hold there."""
+    along = next((one for one in target.along if one.name == name), None)
+    if along is None:
+        return None
+    rows = along.rows
+    return replace(
+        target,
+        target_hz=target.target_hz[rows],
+        initial_hz=target.initial_hz[rows],
+        predicted_hz=target.predicted_hz[rows],
+        exact_hz=target.exact_hz[rows],
+        initial=along.error.initial,
+        predicted=along.error.predicted,
+        exact=along.error.exact,
+        rows=slice(0, rows.stop - rows.start),
+        along=(replace(along, rows=slice(0, rows.stop - rows.start)),),
+    )
+
+
+# --- The SI unit of every numeric property of a mechanism, by the last key of its path
+
+PROPERTY_UNITS = {
+    "youngs_modulus": "Pa",
+    "density": "kg/m3",
+    "area": "m2",
+    "bending_inertia": "m4",
+    "inertia_y": "m4",
+    "inertia_z": "m4",
+    "torsion_constant": "m4",
+    "polar_inertia": "m4",
+    "shear_modulus": "Pa",
+    "flange_thickness": "m",
+    "web_thickness": "m",
+    "diameter": "m",
+    "outer_diameter": "m",
+    "inner_diameter": "m",
+    "thickness": "m",
+    "width": "m",
+    "height": "m",
+    "length": "m",
+    "mass": "kg",
+    "inertia": "kg m2",
+    "stiffness": "N m/rad",
+    "translational": "N/m",
+    "rotational": "N m/rad",
+}
+
+
+def design_units(file: CaseFile) -> tuple[str, ...]:
+    """SI unit of each design parameter, in the order of y; empty text for one without a unit."""
+    held = dict(zip(file.coordinates, file.coordinate_units, strict=True))
+    return tuple(_unit(p.parameter, held) for p in file.design.parameters.values())
+
+
+def _unit(path: str, coordinates: Mapping[str, str]) -> str:
+    group, name, *_ = path.split(".")
+    if group == "coordinates" and coordinates[name] == "m":
+        return "N/m"
+    return PROPERTY_UNITS.get(path.rpartition(".")[2], "")
+
+
+def coordinate_units(file: CaseFile) -> tuple[str, ...]:
+    """SI unit of each coordinate, in the order of q."""
+    return file.coordinate_units
+
+
+# --- What there is to draw of a mechanism, as plain numbers: poses, and modes as deformed poses
+
+
+@dataclass(frozen=True)
+class JointMark:
+    """One joint: ``kind`` is "turning", "sliding" or "fixed"."""
+
+    name: str
+    kind: str
+    grounded: bool
+    driven: bool  # a coordinate moves it
+    places: Floats  # (n, d)
+    axes: Floats  # (n, d): unit vector along which it slides; along its follower if fixed
+
+
+@dataclass(frozen=True)
+class BodyMark:
+    """One body, or rigid link without extent."""
+
+    name: str
+    mass: float  # kg
+    places: Floats  # (n, d)
+
+
+@dataclass(frozen=True)
+class SpringMark:
+    """One spring, between two places or from one to the ground."""
+
+    name: str
+    grounded: bool
+    turning: bool  # it resists rotation only
+    starts: Floats  # (n, d)
+    ends: Floats  # (n, d): the starts again if grounded
+
+
+@dataclass(frozen=True)
+class Poses:
+    """The mechanism in n poses: ``lines[pose][line]`` is a polyline (n_points, d)."""
+
+    time_s: Floats  # (n,)
+    lines: tuple[tuple[Floats, ...], ...]
+    link_names: tuple[str, ...]
+    line_links: tuple[str, ...] = ()  # per line the link it belongs to
+    bodies: tuple[BodyMark, ...] = ()
+    tip_path: Floats | None = None  # (…, d), NaN between the end of a trajectory and the next
+    of: tuple[str, ...] = ()  # of several trajectories the one that each pose belongs to
+    joints: tuple[JointMark, ...] = ()
+    springs: tuple[SpringMark, ...] = ()
+    # per line: its section's largest radius of gyration at start and end; 0 without a section
+    sizes: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class ModePictures:
+    """Elastic modes at one pose and design: the rigid links at rest, and one deformed pose a mode.
+
+    The largest displacement of each mode is ``amplitude`` times the mechanism's extent at rest;
+    the opposite phase is as far on the other side.
+    """
+
+    title: str
+    rigid_modes: int
+    frequencies_hz: tuple[float, ...]
+    q: tuple[tuple[str, float, str], ...]  # name, value, SI unit
+    y: tuple[tuple[str, float, str], ...]
+    amplitude: float
+    rest: Poses  # one pose
+    deformed: Poses  # a pose a mode

@@ -12,15 +12,14 @@ from assignment_problems import goal, random_problem
 from eigassign.assignment import (
     Bounds,
     LinearConstraint,
-    active_set,
     assign,
     build_program,
     solve_assignment,
+    solver,
 )
-from eigassign.assignment.active_set import Polished, polish
-from eigassign.assignment.certificate import Candidate, Certificate, candidate, judge
-from eigassign.assignment.scales import ScaledProgram, scaled_program
-from eigassign.assignment.solve import SETTINGS, Status, solve_osqp
+from eigassign.assignment.optimality import Candidate, Certificate, candidate, judge
+from eigassign.assignment.program import ScaledProgram, scaled_program
+from eigassign.assignment.solver import SETTINGS, Polished, Status, polish, solve_osqp
 from eigassign.errors import AccuracyError, UsageError
 
 
@@ -207,8 +206,8 @@ def test_an_equality_is_held_whichever_way_it_is_pulled(sign):
         lower=np.array([-1.0, -1.0, 0.0]),
         upper=np.array([1.0, 1.0, 0.0]),
     )
-    state = active_set._first_guess(scaled, np.zeros(2))
-    after = active_set._step(scaled, state, cautious=False)
+    state = solver._first_guess(scaled, np.zeros(2))
+    after = solver._step(scaled, state, cautious=False)
     assert after.done
     np.testing.assert_allclose(after.mu, [0.0, 0.0, -sign])
 

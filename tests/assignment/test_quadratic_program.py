@@ -14,7 +14,7 @@ from eigassign.assignment import (
     quadratic_form,
     trapezoidal_weights,
 )
-from eigassign.assignment.scales import scaled_program
+from eigassign.assignment.program import scaled_program
 from eigassign.errors import UsageError
 
 

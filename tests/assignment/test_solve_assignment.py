@@ -14,7 +14,7 @@ from eigassign.assignment import (
     solve_assignment,
     trapezoidal_weights,
 )
-from eigassign.assignment.certificate import ACCEPT
+from eigassign.assignment.optimality import ACCEPT
 
 LAM = 1.0e6
 INF = np.inf

@@ -10,8 +10,8 @@ from typing import Any
 from small_case import TEXT
 
 from eigassign.case import CaseFile, json_schema
-from eigassign.case.document import Document
-from eigassign.case.yaml_reader import read_yaml
+from eigassign.case.reader import read_yaml
+from eigassign.case.schema.document import Document
 
 SCHEMA = json_schema()
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from small_case import TEXT, edited
 
 from eigassign.case import load, parse
-from eigassign.case.resolved import to_yaml
-from eigassign.case.yaml_reader import read_yaml
+from eigassign.case.case_file import to_yaml
+from eigassign.case.reader import read_yaml
 
 CASES = Path(__file__).parents[2] / "cases"
 MOTION = """\

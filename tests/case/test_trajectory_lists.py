@@ -10,7 +10,7 @@ from small_case import edited, unmarked
 from test_case_schema import SCHEMA, accepts
 
 from eigassign.case import CaseFile, SampledTrajectory, TipTrajectory, parse
-from eigassign.case.yaml_reader import read_yaml
+from eigassign.case.reader import read_yaml
 from eigassign.errors import CaseError
 
 ONE = (

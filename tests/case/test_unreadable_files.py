@@ -10,7 +10,7 @@ import pytest
 from small_case import TEXT, unmarked
 
 from eigassign.case import load, parse
-from eigassign.case.yaml_reader import MAX_BYTES
+from eigassign.case.reader import MAX_BYTES
 from eigassign.errors import CaseError, StorageError, UsageError
 
 

@@ -24,7 +24,7 @@ from eigassign.case import (
     UniversalJoint,
     load,
 )
-from eigassign.case.yaml_reader import read_yaml
+from eigassign.case.reader import read_yaml
 
 
 def test_planar_parts_are_read_in_si(tmp_path: Path) -> None:

@@ -17,12 +17,11 @@ import pytest
 from commands import python
 from wrong_inputs import GOOD
 
-from eigassign import batch as many
-from eigassign.batch import CaseOptions, Job, Row, run_batch
-from eigassign.case_files import find_cases, folder_names
+from eigassign.batch import runner as many
+from eigassign.batch.runner import CaseOptions, Job, Row, find_cases, folder_names, run_batch
+from eigassign.batch.workers import process_pool
 from eigassign.cli import main
-from eigassign.signals import Terminated
-from eigassign.workers import process_pool
+from eigassign.process import Terminated
 
 STRICT = GOOD.replace("50 %", "1e-9")
 BOUND = "max: 1}\n  constraints: {heavy: {terms: {m: 1}, min: 3}}"
@@ -33,16 +32,16 @@ INFEASIBLE = GOOD.replace("max: 1}", BOUND)
 KILLING = """
 import os, signal, sys
 from pathlib import Path
-import eigassign.run
+import eigassign.pipeline.run
 
-solved = eigassign.run.optimize
+solved = eigassign.pipeline.run.optimize
 
 def optimize(path, options):
     if Path(path).stem.startswith("kill"):
         os.kill(os.getpid(), signal.SIGKILL)
     return solved(path, options)
 
-eigassign.run.optimize = optimize
+eigassign.pipeline.run.optimize = optimize
 if __name__ == "__main__":
     from eigassign.cli import main
     sys.exit(main())
@@ -218,7 +217,7 @@ def test_folders_are_searched_but_not_their_runs_and_nothing_comes_twice() -> No
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 def test_workers_end_when_their_parent_is_killed() -> None:
     code = (
-        "import os, signal\nfrom eigassign.workers import process_pool\n"
+        "import os, signal\nfrom eigassign.batch.workers import process_pool\n"
         "if __name__ == '__main__':\n"
         "    with process_pool(1) as pool:\n"
         "        print(pool.submit(os.getpid).result(), flush=True)\n"

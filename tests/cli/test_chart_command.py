@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from eigassign.charting import chart
 from eigassign.cli import main
-from eigassign.run import Options
+from eigassign.pipeline.chart import chart
+from eigassign.pipeline.run import Options
 
 ARM = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 

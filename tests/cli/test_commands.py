@@ -13,9 +13,9 @@ from wrong_inputs import GOOD
 
 from eigassign import __version__
 from eigassign.cli import main
+from eigassign.cli.reporter import dumps
 from eigassign.errors import UsageError
-from eigassign.plain_json import dumps
-from eigassign.values import split
+from eigassign.pipeline.queries import split
 
 # Belotti et al. 2021, recomputed with an independent frame program (same mesh)
 REFERENCE = {

@@ -14,11 +14,10 @@ import pytest
 from commands import SECONDS, TWO_LINK, eigassign_process, environment, python
 from wrong_inputs import GOOD
 
-from eigassign import answers, run
 from eigassign.cli import main
 from eigassign.errors import AccuracyError, EigassignError, InfeasibleError, StorageError
-from eigassign.failures import judged
-from eigassign.signals import Terminated
+from eigassign.pipeline import queries, run
+from eigassign.process import Terminated, judged
 
 ERRORS: list[tuple[BaseException, int, str]] = [
     (InfeasibleError("limits contradict each other", ("a", "b")), 1, "limits contradict"),
@@ -63,10 +62,10 @@ def test_every_error_has_its_exit_code_and_one_line(
 def test_a_bug_is_told_with_its_place_and_with_a_traceback_only_when_asked(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(answers, "load_case", lambda _path: 1 / 0)
+    monkeypatch.setattr(queries, "load_case", lambda _path: 1 / 0)
     assert main(["modes", "good.yaml"]) == 4
     err = capsys.readouterr().err
-    assert "ZeroDivisionError: division by zero (eigassign.answers:" in err
+    assert "ZeroDivisionError: division by zero (eigassign.pipeline.queries:" in err
     assert "Traceback" not in err
     assert main(["modes", "good.yaml", "--debug"]) == 4
     assert "Traceback (most recent call last)" in capsys.readouterr().err
@@ -174,14 +173,14 @@ def test_a_cache_that_cannot_be_written_costs_a_warning_and_no_result(
 SLOW = """
 import sys, time
 from pathlib import Path
-from eigassign.output import write
+from eigassign.output import report
 
 def write_run(findings, folder):
     (folder / "half").touch()
     Path(f"{findings.case_name}.ready").touch()
     time.sleep(600)
 
-write.write_run = write_run  # in worker processes too: they import this file
+report.write_run = write_run  # in worker processes too: they import this file
 if __name__ == "__main__":
     from eigassign.cli import main
     sys.exit(main())
@@ -216,7 +215,7 @@ def _heed_signals() -> None:
 def test_nohup_is_respected(tmp_path: Path) -> None:
     code = (
         "import os, signal, sys; signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
-        "from eigassign.signals import terminable\n"
+        "from eigassign.process import terminable\n"
         "with terminable():\n    os.kill(os.getpid(), signal.SIGHUP)\n"
     )
     assert python("-c", code).returncode == 0

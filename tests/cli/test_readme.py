@@ -10,9 +10,8 @@ import pytest
 from commands import TWO_LINK
 
 from eigassign.case import json_schema, parse
-from eigassign.case.joint_parts import JOINTS
-from eigassign.case.link_parts import LINKS
-from eigassign.case.section_parts import SHAPES
+from eigassign.case.schema.joints import JOINTS
+from eigassign.case.schema.links import LINKS, SHAPES
 from eigassign.cli import cli
 
 ROOT = TWO_LINK.parents[1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from eigassign.mechanism.tip_chain import Look, TipChain
+from eigassign.mechanism.inverse_kinematics.chain import Look, TipChain
 
 NAMES = ("shoulder", "elbow", "wrist", "j4", "j5", "j6")
 

@@ -13,12 +13,12 @@ import numpy as np
 
 from eigassign.case import CaseFile
 from eigassign.case.loading import parse
-from eigassign.mechanism.build import build_pencil
-from eigassign.mechanism.kinematics import Kinematics, kinematics
-from eigassign.mechanism.parameters import Parameters, initial_design, parameters
-from eigassign.mechanism.pencil import Pencil
-from eigassign.mechanism.poses import Poses, build_poses
-from eigassign.modal.exact import eigenvalues
+from eigassign.mechanism.assembly.build import build_pencil
+from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism.kinematics.coordinates import Parameters, initial_design, parameters
+from eigassign.mechanism.kinematics.forward import Kinematics, kinematics
+from eigassign.mechanism.kinematics.poses import Poses, build_poses
+from eigassign.modal.exact.solver import eigenvalues
 
 Tree = dict[str, Any]
 STEEL = {"youngs_modulus": 210e9, "density": 7850.0, "poissons_ratio": 0.3}

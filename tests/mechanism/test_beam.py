@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from frame_oracle import element
 
-from eigassign.mechanism.links import link_mesh
-from eigassign.mechanism.mesh import LinkMesh
-from eigassign.mechanism.parameters import Parameters
-from eigassign.mechanism.tree import Tree
+from eigassign.mechanism.elements.links import link_mesh
+from eigassign.mechanism.elements.mesh import LinkMesh
+from eigassign.mechanism.kinematics.coordinates import Parameters
+from eigassign.mechanism.kinematics.topology import Tree
 from eigassign.series.expression import Recorder
 
 E, A, I, RHO, L = 70e9, 3e-4, 5e-9, 2700.0, 0.8  # noqa: E741

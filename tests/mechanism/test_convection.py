@@ -18,11 +18,10 @@ from spatial_cases import ALLOY, Built, built
 from spatial_oracle import Tree
 
 from eigassign.case.loading import parse
-from eigassign.mechanism.build import local_links
-from eigassign.mechanism.convection import fields
-from eigassign.mechanism.kinematics import kinematics
-from eigassign.mechanism.parameters import parameters
-from eigassign.mechanism.velocity import VelocityTerms, velocity_terms
+from eigassign.mechanism.assembly.build import local_links
+from eigassign.mechanism.assembly.velocity_terms import VelocityTerms, fields, velocity_terms
+from eigassign.mechanism.kinematics.coordinates import parameters
+from eigassign.mechanism.kinematics.forward import kinematics
 
 CASES = Path(__file__).parents[2] / "cases"
 LENGTH, ELEMENTS = 1.2, 7  # 3 elements before the carriage, 4 behind
@@ -370,7 +369,7 @@ def test_a_nut_that_turns_fast_while_it_travels_slowly_is_resolved(
     spin = 2 * np.pi / 0.01 * rate
     at = q, np.zeros(0), np.array([rate]), np.zeros(1)
     fine = found.at(*at)
-    monkeypatch.setattr("eigassign.mechanism.velocity.STEP", 4e-4)
+    monkeypatch.setattr("eigassign.mechanism.assembly.velocity_terms.STEP", 4e-4)
     for power, one, other in zip((1, 2), fine, found.at(*at), strict=True):
         error = unit(M[0], one.toarray() - other.toarray())
         assert np.abs(error).max() < 1e-5 * spin**power

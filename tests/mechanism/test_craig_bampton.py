@@ -16,11 +16,11 @@ from spatial_oracle import Tree
 from timed_motions import timed
 
 from eigassign.errors import CaseError
-from eigassign.mechanism import definite
-from eigassign.mechanism.build import local_links
-from eigassign.mechanism.craig_bampton import coefficients, total
-from eigassign.mechanism.velocity import velocity_terms
-from eigassign.modal.motion import motion_effect
+from eigassign.mechanism.assembly.build import local_links
+from eigassign.mechanism.assembly.velocity_terms import velocity_terms
+from eigassign.mechanism.elements import sparse_factor
+from eigassign.mechanism.elements.craig_bampton import coefficients, total
+from eigassign.modal.slow_motion import motion_effect
 
 THIN = {"area": 5e-4, "bending_inertia": 1e-9}
 
@@ -146,20 +146,20 @@ def test_a_part_is_factored_once_however_often_it_is_asked_for(
 
     def counted(matrix: sparse.csc_array) -> object:
         asked.append(matrix.shape[0])
-        return definite.factorise(matrix)
+        return sparse_factor.factorise(matrix)
 
-    monkeypatch.setattr(definite, "definite_factor", counted)
-    definite._kept.cache_clear()
+    monkeypatch.setattr(sparse_factor, "definite_factor", counted)
+    sparse_factor._kept.cache_clear()
     for _ in range(2):
         assert built(cantilever(7, reduce_to=100.0)).pencil.n_dof
     A = sparse.csc_array(np.diag([2.0, 3.0]))
-    first, again = definite.kept_factor(A), definite.kept_factor(A.copy())
+    first, again = sparse_factor.kept_factor(A), sparse_factor.kept_factor(A.copy())
     assert first is again
     assert asked == [18, 2]
-    other = definite.kept_factor(A * 2.0)
+    other = sparse_factor.kept_factor(A * 2.0)
     assert other is not None
     np.testing.assert_allclose(other.solve(np.ones(2)), [0.25, 1 / 6])
-    definite._kept.cache_clear()
+    sparse_factor._kept.cache_clear()
 
 
 def test_a_link_that_a_carriage_travels_along_stays_whole() -> None:

@@ -9,13 +9,11 @@ import pytest
 from planar_arms import open_look, serial_arm, two_link_angles
 
 from eigassign.errors import MechanismError, TrajectoryError
-from eigassign.mechanism.course import Course
-from eigassign.mechanism.inverse_kinematics import follow
-from eigassign.mechanism.paths import Path, spline, straight
-from eigassign.mechanism.timing import timing_law
-from eigassign.mechanism.tip_chain import TipChain
-from eigassign.mechanism.tip_first import RESIDUAL
-from eigassign.mechanism.tip_trace import Trace, interpolated
+from eigassign.mechanism.inverse_kinematics.chain import TipChain
+from eigassign.mechanism.inverse_kinematics.follow import RESIDUAL, follow
+from eigassign.mechanism.inverse_kinematics.solver import Trace, interpolated
+from eigassign.mechanism.trajectory.path import Course, Path, spline, straight
+from eigassign.mechanism.trajectory.timing import timing_law
 
 TAU = 2.0 * np.pi
 UP, DOWN = {"elbow": (0.0, np.pi)}, {"elbow": (np.pi, TAU)}

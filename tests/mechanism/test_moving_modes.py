@@ -12,12 +12,11 @@ from spatial_examples import four_bar
 from timed_motions import RestToRest, integrated
 
 from eigassign.case.loading import parse
-from eigassign.mechanism.kinematics import kinematics
-from eigassign.mechanism.parameters import parameters
-from eigassign.mechanism.velocity import velocity_terms
-from eigassign.modal.exact import eigenvalues, modes
-from eigassign.modal.motion import change_at
-from eigassign.modal.moving import moving_modes, theta_in_time
+from eigassign.mechanism.assembly.velocity_terms import velocity_terms
+from eigassign.mechanism.kinematics.coordinates import parameters
+from eigassign.mechanism.kinematics.forward import kinematics
+from eigassign.modal.exact.solver import eigenvalues, modes
+from eigassign.modal.slow_motion import change_at, moving_modes, theta_in_time
 
 CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 

@@ -9,9 +9,9 @@ from frame_oracle import frame
 
 from eigassign.api import load_case
 from eigassign.errors import CaseError, MechanismError, UsageError
+from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.model import Model
-from eigassign.modal.roundoff import rounding_error
-from eigassign.series.lower_set import total_degree
+from eigassign.series.multi_index import total_degree
 
 SEEDS = range(0, 60, 4)
 
@@ -156,7 +156,7 @@ def test_coefficients_are_left_out_only_where_they_are_zero(name, monkeypatch) -
     x0 = np.concatenate([case.trajectory.q[3], y])
 
     def series(many: int) -> np.ndarray:
-        monkeypatch.setattr("eigassign.mechanism.pencil.MANY", many)
+        monkeypatch.setattr("eigassign.mechanism.assembly.pencil.MANY", many)
         return pencil.theta_series(space, x0, pencil.to_program)
 
     np.testing.assert_array_equal(series(0), series(10**9))

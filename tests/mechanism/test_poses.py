@@ -8,9 +8,8 @@ import numpy as np
 from chains import model_of, two_link
 from frame_oracle import frame
 
-from eigassign.mechanism.placement import Placement
-from eigassign.mechanism.rotations import rotation, vector
-from eigassign.mechanism.tree import GROUND, Edge
+from eigassign.mechanism.kinematics.rotations import rotation, vector
+from eigassign.mechanism.kinematics.topology import GROUND, Edge, Placement
 
 
 def test_a_two_link_arm_reaches_where_trigonometry_says() -> None:

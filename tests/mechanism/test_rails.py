@@ -10,9 +10,9 @@ from test_joints import ball_screw
 from test_loops import slotted_lever
 
 from eigassign.errors import TravelError
-from eigassign.mechanism.rails import resting_pose
-from eigassign.modal.exact import eigenvalues
-from eigassign.modal.expansion import expand
+from eigassign.mechanism.kinematics.travel_limits import resting_pose
+from eigassign.modal.exact.solver import eigenvalues
+from eigassign.modal.taylor.expansion import expand
 
 FIRST = 6 * 1e-4 * 1.6  # m: six elements of L/10⁴ before the carriage
 

@@ -9,9 +9,8 @@ import pytest
 
 from eigassign.api import load_case
 from eigassign.case import PointTrajectory
-from eigassign.mechanism.rates import rates
-from eigassign.mechanism.tip_chain import TipChain
-from eigassign.mechanism.trajectory import Trajectory, build_trajectory
+from eigassign.mechanism.inverse_kinematics.chain import TipChain
+from eigassign.mechanism.trajectory.trajectory import Trajectory, build_trajectory, rates
 
 CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 WAYPOINTS = [[0.30, 0.19], [0.108, 0.2104], [0.02, 0.1845]]

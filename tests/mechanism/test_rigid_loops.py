@@ -13,8 +13,8 @@ from spatial_random import random_closed
 from test_spatial import agree
 
 from eigassign.errors import MechanismError
-from eigassign.mechanism.rigid_loops import require_consistent
-from eigassign.mechanism.tree import Edge
+from eigassign.mechanism.assembly.rigid_loops import require_consistent
+from eigassign.mechanism.kinematics.topology import Edge
 
 MASS, INERTIA = 1.3, 0.02
 

@@ -15,7 +15,7 @@ from spatial_random import random_closed, random_open
 from test_rigid_loops import rigid
 
 from eigassign.errors import MechanismError
-from eigassign.modal.exact import eigenvalues
+from eigassign.modal.exact.solver import eigenvalues
 
 
 def chain(springs: Tree, n: int = 3, **joint: Any) -> Tree:

@@ -7,7 +7,7 @@ from types import SimpleNamespace as Shape
 import numpy as np
 import pytest
 
-from eigassign.mechanism.sections import section_values
+from eigassign.mechanism.elements.sections import section_values
 
 
 def as_written(key: str, value: float) -> float:
@@ -46,7 +46,7 @@ def test_the_papers_rod_of_30_mm_weighs_what_the_paper_says() -> None:
 
 def test_a_design_that_swaps_the_sides_of_a_rectangle_is_refused() -> None:
     from eigassign.errors import MechanismError
-    from eigassign.mechanism.beam_values import _refuse_square
+    from eigassign.mechanism.elements.beam import _refuse_square
 
     def case(low: float, high: float) -> Shape:
         height = Shape(parameter="sections.s.height", min=low, max=high)

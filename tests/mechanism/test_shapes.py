@@ -13,12 +13,12 @@ from spatial_random import random_closed
 import eigassign as ea
 from eigassign.case import parse
 from eigassign.errors import UsageError
-from eigassign.mechanism.beam import bending_mass, bending_shapes
-from eigassign.mechanism.build import with_elements, with_reduction
-from eigassign.mechanism.geometry import node_position
-from eigassign.mechanism.kinematics import all_moving
-from eigassign.mechanism.rotations import cross, multiply
-from eigassign.mechanism.shapes import shapes
+from eigassign.mechanism.assembly.build import with_elements, with_reduction
+from eigassign.mechanism.assembly.mode_shapes import shapes
+from eigassign.mechanism.elements.beam import bending_mass, bending_shapes
+from eigassign.mechanism.elements.mesh import node_position
+from eigassign.mechanism.kinematics.forward import all_moving
+from eigassign.mechanism.kinematics.rotations import cross, multiply
 
 CASES = Path(__file__).parents[2] / "cases"
 ALL = sorted(path.stem for path in CASES.glob("*.yaml"))
@@ -115,7 +115,7 @@ def drawn_mass(case: ea.Case, q: Any, y: Any) -> Any:
 
 
 def _line_density(mechanism: Any, beam: Any) -> float:
-    from eigassign.mechanism.sections import section_values
+    from eigassign.mechanism.elements.sections import section_values
 
     section = section_values(mechanism.sections[beam.section], lambda _key, value: value)
     return float(mechanism.materials[beam.material].density * section.area)

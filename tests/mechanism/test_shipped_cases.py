@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from eigassign.api import Case, load_case
-from eigassign.mechanism.build import with_elements, with_reduction
+from eigassign.mechanism.assembly.build import with_elements, with_reduction
 
 CASES = Path(__file__).parents[2] / "cases"
 SHIPPED = sorted(path.stem for path in CASES.glob("*.yaml"))

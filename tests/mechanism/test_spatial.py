@@ -16,7 +16,7 @@ from spatial_examples import arm3r, four_bar, gantry, slider_crank
 from spatial_oracle import Tree, World, world
 from spatial_random import nodes, random_closed, random_open
 
-from eigassign.modal.exact import eigenvalues
+from eigassign.modal.exact.solver import eigenvalues
 
 TOLERANCE = 3e-8
 

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from tip_paths import between, course
 
 from eigassign.errors import MechanismError, TrajectoryError
-from eigassign.mechanism.inverse_kinematics import follow
-from eigassign.mechanism.turning import euler_rotation, exponential, logarithm
+from eigassign.mechanism.inverse_kinematics.follow import follow
+from eigassign.mechanism.kinematics.rotations import euler_rotation, exponential, logarithm
 
 POINTS = [(0.6, 0.2), (0.5, 0.5), (0.2, 0.6), (-0.1, 0.5)]
 SPACE = [(*p, 0.1 * k**2) for k, p in enumerate(POINTS)]

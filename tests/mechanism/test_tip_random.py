@@ -13,8 +13,8 @@ from spatial_random import Random, random_closed, random_open
 from test_tip_motion import last_node
 from tip_paths import between, chain_of, course, states, tips
 
-from eigassign.mechanism.inverse_kinematics import follow
-from eigassign.mechanism.tip_chain import reduced
+from eigassign.mechanism.inverse_kinematics.chain import reduced
+from eigassign.mechanism.inverse_kinematics.follow import follow
 
 SIZE = 1e-9  # of the path's size: a tip on its path
 

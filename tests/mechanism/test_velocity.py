@@ -12,8 +12,8 @@ from spatial_oracle import Tree
 from spatial_random import random_closed, random_open
 from timed_motions import timed
 
-from eigassign.mechanism.velocity import VelocityTerms, velocity_terms
-from eigassign.modal.motion import motion_effect
+from eigassign.mechanism.assembly.velocity_terms import VelocityTerms, velocity_terms
+from eigassign.modal.slow_motion import motion_effect
 
 NONE = np.zeros(0)
 
@@ -134,7 +134,7 @@ def test_small_and_large_mechanisms_are_treated_alike(
     n = model.pencil.n_q
     numbers = np.linspace(0.3, 0.6, n), np.linspace(1.0, 2.0, n), np.linspace(-3.0, 2.0, n)
     dense = at(model, *numbers)
-    monkeypatch.setattr("eigassign.mechanism.stacked.SMALL", 0)
+    monkeypatch.setattr("eigassign.mechanism.assembly.velocity_terms.SMALL", 0)
     for one, other in zip(dense, at(model, *numbers), strict=True):
         np.testing.assert_allclose(other, one, atol=1e-12 * np.abs(one).max() + 1e-9)
 

@@ -10,10 +10,9 @@ from numpy.polynomial import chebyshev
 from scipy.interpolate import CubicSpline
 from spatial_cases import Built
 
-from eigassign.mechanism.rates import Rates, rates
-from eigassign.mechanism.trajectory import Trajectory
-from eigassign.mechanism.velocity import velocity_terms
-from eigassign.modal.exact import modes
+from eigassign.mechanism.assembly.velocity_terms import velocity_terms
+from eigassign.mechanism.trajectory.trajectory import Rates, Trajectory, rates
+from eigassign.modal.exact.solver import modes
 
 ROOT = np.sqrt(15.0)
 GAUSS = np.array([0.5 - ROOT / 10, 0.5, 0.5 + ROOT / 10])

@@ -9,11 +9,14 @@ from scipy.spatial.transform import Rotation
 from spatial_cases import Built
 from spatial_oracle import Pose, Tree, solve_pose
 
-from eigassign.mechanism.attitudes import planar_attitude, spatial_attitude
-from eigassign.mechanism.course import Course
-from eigassign.mechanism.paths import spline, straight
-from eigassign.mechanism.tip_chain import TipChain
-from eigassign.mechanism.tip_motion import tip_chain
+from eigassign.mechanism.inverse_kinematics.chain import TipChain, tip_chain
+from eigassign.mechanism.trajectory.path import (
+    Course,
+    planar_attitude,
+    spatial_attitude,
+    spline,
+    straight,
+)
 
 
 def chain_of(model: Built, tip: str, oriented: bool = False) -> TipChain:

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import sparse
 
-from eigassign.mechanism.pencil import Pencil
-from eigassign.series.expression import Recorder, Scalar
-from eigassign.series.program import compile_program
+from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.series.expression import Recorder, Scalar, compile_program
 
 Terms = Sequence[tuple[Scalar, np.ndarray]]
 

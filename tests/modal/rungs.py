@@ -9,12 +9,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from eigassign.mechanism.pencil import Pencil
-from eigassign.modal import coefficients, exact
-from eigassign.modal.exact import eigenvalues, modes
-from eigassign.modal.expansion import Expansion
-from eigassign.modal.recursion import expand_subspace
-from eigassign.series.lower_set import total_degree
+from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.modal.exact import solver
+from eigassign.modal.exact.solver import eigenvalues, modes
+from eigassign.modal.taylor import coefficients
+from eigassign.modal.taylor.expansion import Expansion
+from eigassign.modal.taylor.recursion import expand_subspace
+from eigassign.series.multi_index import total_degree
 
 Floats = np.ndarray
 
@@ -110,6 +111,6 @@ def treat_as_large(monkeypatch: pytest.MonkeyPatch) -> None:
         for name, module in list(sys.modules.items())
         if name.startswith("eigassign.modal.") and hasattr(module, "DENSE_LIMIT")
     ]
-    assert {exact, coefficients} <= set(limited)
+    assert {solver, coefficients} <= set(limited)
     for module in limited:
         monkeypatch.setattr(module, "DENSE_LIMIT", 0)

@@ -10,9 +10,9 @@ from chains import model_of, two_link
 
 from eigassign.api import expand, load_case, reduce
 from eigassign.errors import EigassignError, UsageError
-from eigassign.modal.expansion import expand as expand_pencil
 from eigassign.modal.model import Model
-from eigassign.series.lower_set import lower_set
+from eigassign.modal.taylor.expansion import expand as expand_pencil
+from eigassign.series.multi_index import lower_set
 
 CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 Q0, Y0 = [1.817, 5.312], [0.125, 0.125]

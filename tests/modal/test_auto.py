@@ -8,13 +8,19 @@ from chains import model_of, two_link
 
 from eigassign.api import load_case
 from eigassign.errors import AccuracyError
-from eigassign.modal.adaptive import central, reduce_adaptively
-from eigassign.modal.convergence import radius_share
-from eigassign.modal.expansion import expand
-from eigassign.modal.expansion_choice import FINER, TOLERABLE, choose_expansion
-from eigassign.modal.expansion_search import MAX_POINTS, go_on
-from eigassign.modal.mesh_choice import choose_mesh, mesh_error
+from eigassign.modal.adaptive.mesh import choose_mesh, mesh_error
+from eigassign.modal.adaptive.order import (
+    FINER,
+    MAX_POINTS,
+    TOLERABLE,
+    central,
+    choose_expansion,
+    go_on,
+    reduce_adaptively,
+)
 from eigassign.modal.model import Model
+from eigassign.modal.taylor.convergence import radius_share
+from eigassign.modal.taylor.expansion import expand
 
 FREE = {"upper": None, "fore": None}
 
@@ -203,7 +209,7 @@ def test_several_points_are_preferred_to_one_series_of_very_many_terms(x, monkey
     model = build({"upper": 2, "fore": 2})
     x = np.hstack([x[:, :2], np.full((len(x), 2), 0.1)])
     alone = choose_expansion(model.pencil, x, 1e-5)
-    monkeypatch.setattr("eigassign.modal.expansion_choice.MOST_TERMS", 40)  # order 4 in three
+    monkeypatch.setattr("eigassign.modal.adaptive.order.MOST_TERMS", 40)  # order 4 in three
     several = choose_expansion(model.pencil, x, 1e-5)
     assert len(alone.expansions) == 1 < len(several.expansions)
     assert several.order <= 4 < alone.order

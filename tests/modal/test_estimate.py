@@ -16,14 +16,13 @@ from calibration import draw
 from wide_draws import planar_loop, spatial_loop, spatial_tree
 
 from eigassign.errors import AccuracyError, SingularityError
-from eigassign.modal import ritz_error
-from eigassign.modal.estimate import frequency_error, gone
-from eigassign.modal.reduced import reduce
-from eigassign.modal.residual import half_solve
-from eigassign.modal.ritz_basis import ritz_basis
-from eigassign.modal.ritz_pairs import ritz_pairs
-from eigassign.modal.roundoff import rounding_error, rounding_weights
-from eigassign.modal.symmetric import factorise
+from eigassign.modal.exact.roundoff import rounding_error, rounding_weights
+from eigassign.modal.exact.sparse import factorise
+from eigassign.modal.reduced import error_estimate as ritz_error
+from eigassign.modal.reduced.basis import ritz_basis
+from eigassign.modal.reduced.error_estimate import frequency_error, gone, half_solve
+from eigassign.modal.reduced.reduce import reduce
+from eigassign.modal.reduced.ritz import ritz_pairs
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 
@@ -129,7 +128,7 @@ def test_a_fine_mesh_has_a_larger_round_off_and_states_it():
 
 def test_pairs_that_coincide_may_move_by_what_both_miss_together(monkeypatch):
     """Two equal μ̂ with the same coupling c to one mode move by 2c²/gap, not by c²/gap each."""
-    monkeypatch.setattr("eigassign.modal.estimate.SAFETY", 1.0)
+    monkeypatch.setattr("eigassign.modal.reduced.error_estimate.SAFETY", 1.0)
     c = 1e-3
     H = np.array([[1.0, 0.0, c], [0.0, 1.0, c], [c, c, 0.5]])
     mu, gram = np.ones((1, 2)), np.full((1, 2, 2), c * c)

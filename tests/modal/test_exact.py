@@ -7,9 +7,9 @@ import pytest
 from chains import bar, model_of, random_chain, two_link
 
 from eigassign.errors import UsageError
-from eigassign.modal import exact, exact_dense
+from eigassign.modal.exact import dense, solver
+from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.model import Model
-from eigassign.modal.roundoff import rounding_error
 
 POSES = np.array([[0.3, 1.9], [1.0, 0.2], [-2.0, 0.5]])
 DESIGN = np.array([[0.0, 0.1], [0.2, 0.0], [0.25, 0.25]])
@@ -50,9 +50,9 @@ def test_how_many_are_solved_at_once_does_not_show(
         x = model.x(q, y)
         alone = np.vstack([model.frequencies(row[:2], row[2:], 6) for row in x])
         shapes = np.vstack([model.modes(row[:2], row[2:], 6)[1] for row in x])
-        for numbers, at_once in ((exact_dense.NUMBERS, 2048), (1, 2)):
-            monkeypatch.setattr(exact_dense, "NUMBERS", numbers)
-            monkeypatch.setattr("eigassign.modal.chunks.CHUNK", at_once)
+        for numbers, at_once in ((dense.NUMBERS, 2048), (1, 2)):
+            monkeypatch.setattr(dense, "NUMBERS", numbers)
+            monkeypatch.setattr("eigassign.modal.arguments.CHUNK", at_once)
             f, phi = model.modes(q, y, 6)
             np.testing.assert_allclose(model.frequencies(q, y, 6), alone, rtol=1e-12)
             np.testing.assert_allclose(f, alone, rtol=1e-12)
@@ -60,7 +60,7 @@ def test_how_many_are_solved_at_once_does_not_show(
 
 
 def test_sparse_modes_are_modes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(exact, "DENSE_LIMIT", 0)
+    monkeypatch.setattr(solver, "DENSE_LIMIT", 0)
     model = model_of(two_link())
     f, phi = model.modes(POSES, DESIGN, 6)
     for k in range(3):
@@ -73,7 +73,7 @@ def test_dense_and_sparse_solvers_agree(
 ) -> None:
     model = model_of(two_link((12, 9), drives=drives))
     f, phi = model.modes(POSES, DESIGN, 5)
-    monkeypatch.setattr(exact, "DENSE_LIMIT", 0)
+    monkeypatch.setattr(solver, "DENSE_LIMIT", 0)
     found, vectors = model.modes(POSES, DESIGN, 5)
     np.testing.assert_allclose(found, f, rtol=1e-10)
     np.testing.assert_allclose(vectors, phi, atol=1e-7 * np.abs(phi).max())
@@ -82,9 +82,9 @@ def test_dense_and_sparse_solvers_agree(
 
 def test_a_chain_of_300_unknowns_agrees_in_both_solvers(monkeypatch: pytest.MonkeyPatch) -> None:
     model = model_of(two_link((56, 44)))
-    assert model.n_dof > exact.DENSE_LIMIT
+    assert model.n_dof > solver.DENSE_LIMIT
     f = model.frequencies(POSES[0], DESIGN[0], 4)
-    monkeypatch.setattr(exact, "DENSE_LIMIT", 10_000)
+    monkeypatch.setattr(solver, "DENSE_LIMIT", 10_000)
     # round-off in K itself: 1e-16 × (elements)⁴
     np.testing.assert_allclose(f, model.frequencies(POSES[0], DESIGN[0], 4), rtol=1e-8)
 
@@ -92,7 +92,7 @@ def test_a_chain_of_300_unknowns_agrees_in_both_solvers(monkeypatch: pytest.Monk
 def test_all_modes_of_a_large_model_can_be_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     model = model_of(two_link())
     f = model.frequencies(POSES, DESIGN, 21)
-    monkeypatch.setattr(exact, "DENSE_LIMIT", 0)
+    monkeypatch.setattr(solver, "DENSE_LIMIT", 0)
     np.testing.assert_allclose(model.frequencies(POSES, DESIGN, 21), f, rtol=1e-9)
 
 

@@ -14,14 +14,15 @@ from rungs import derivative, richardson, treat_as_large
 
 from eigassign.api import expand
 from eigassign.errors import UsageError
-from eigassign.modal import exact, expansion
-from eigassign.modal.expansion import Expansion, clusters
-from eigassign.modal.expansion import expand as expand_pencil
+from eigassign.modal.exact import solver
 from eigassign.modal.model import Model
-from eigassign.modal.rayleigh import vector_members
-from eigassign.modal.recursion import expand_subspace
-from eigassign.modal.substitution import substitute
-from eigassign.series.lower_set import (
+from eigassign.modal.taylor import expansion
+from eigassign.modal.taylor.expansion import Expansion, clusters
+from eigassign.modal.taylor.expansion import expand as expand_pencil
+from eigassign.modal.taylor.local_coordinates import substitute
+from eigassign.modal.taylor.rayleigh import vector_members
+from eigassign.modal.taylor.recursion import expand_subspace
+from eigassign.series.multi_index import (
     box,
     lower_set,
     partially_linear,
@@ -62,7 +63,7 @@ QL, YL = np.array([0.4, 1.3, -0.6]), np.array([0.6, 3e-3, 400.0])
 
 
 def exact_lam(model: Model, q: np.ndarray, y: np.ndarray, count: int) -> np.ndarray:
-    return exact.eigenvalues(model.pencil, model.x(q, y), count)
+    return solver.eigenvalues(model.pencil, model.x(q, y), count)
 
 
 # The recursion
@@ -72,7 +73,7 @@ def residuals(pencil, order: int, x0: np.ndarray, modes: int):  # type: ignore[n
     """Σ K_δ X_{γ−δ} − Σ M_δ X_ε Λ_ζ at every γ by plain loops, with the size of its terms."""
     space = total_degree(pencil.to_program.shape[1], order)
     theta = pencil.theta_series(space, x0, pencil.to_program)
-    found = exact.modes(pencil, x0[None], modes)
+    found = solver.modes(pencil, x0[None], modes)
     lam0, phi0 = found.lam[0], found.phi[0]
     series = expand_subspace(pencil, theta, space, lam0, phi0)
     K, M = (
@@ -146,7 +147,7 @@ def test_the_quotient_has_the_eigenvalues_of_the_recursion() -> None:
     model, order = paper(), 5
     found = expand(model, Q0, Y0, (1,), order)
     theta = model.pencil.theta_series(found.space, found.x0, np.eye(4)[:, 1:])
-    vectors = exact.modes(model.pencil, found.x0[None], 1)
+    vectors = solver.modes(model.pencil, found.x0[None], 1)
     series = expand_subspace(model.pencil, theta, found.space, vectors.lam[0], vectors.phi[0])
     agree(found.clusters[0].coefficients[0, 0], series.values[:, 0, 0], 1e-10)
 
@@ -458,7 +459,7 @@ GRID = np.array(list(itertools.product(np.linspace(-0.15, 0.15, 13), (0.0, 0.05)
 @pytest.mark.parametrize("x0", [[0.0, 0.0], [0.004, 0.1]])
 def test_a_cluster_is_right_through_crossings_and_veerings(gap: float, x0: list[float]) -> None:
     pencil, x = crossing(gap), GRID + x0
-    expected = exact.eigenvalues(pencil, x, 2)
+    expected = solver.eigenvalues(pencil, x, 2)
     together = expand_pencil(pencil, x0, [], (1, 2), 12)
     assert [c.modes for c in together.clusters] == [(1, 2)]
     np.testing.assert_allclose(together.eigenvalues(x, []), expected, atol=1e-12)
@@ -467,7 +468,7 @@ def test_a_cluster_is_right_through_crossings_and_veerings(gap: float, x0: list[
 def test_a_single_mode_is_lost_where_its_cluster_is_not() -> None:
     pencil = crossing(1e-2)
     x = GRID + np.array([0.004, 0.1])
-    expected = exact.eigenvalues(pencil, x, 2)
+    expected = solver.eigenvalues(pencil, x, 2)
     alone = expand_pencil(pencil, [0.004, 0.1], [], (1, 2), 8, cluster_gap=0.0)
     assert [c.modes for c in alone.clusters] == [(1,), (2,)]
     assert np.abs(alone.eigenvalues(x, []) - expected).max() > 1.0
@@ -480,7 +481,7 @@ def test_the_error_of_a_cluster_falls_with_one_power_more_than_the_order(order: 
     for h in (0.1, 0.05):
         x = h * np.array([[c, s] for c, s in zip(np.cos(range(9)), np.sin(range(9)), strict=True)])
         errors.append(
-            np.sqrt(np.mean((e.eigenvalues(x, []) - exact.eigenvalues(pencil, x, 2)) ** 2))
+            np.sqrt(np.mean((e.eigenvalues(x, []) - solver.eigenvalues(pencil, x, 2)) ** 2))
         )
     assert math.log2(errors[0] / errors[1]) == pytest.approx(order + 1, abs=0.25)
 
@@ -490,7 +491,7 @@ def test_one_mode_of_a_cluster_can_be_asked_for_but_has_no_series_of_its_own() -
     e = expand_pencil(pencil, [0.0, 0.0], [], (2,), 8)
     assert e.modes == (2,)
     assert e.eigenvalues(x, []).shape == (26, 1)
-    expected = exact.eigenvalues(pencil, x, 2)[:, 1:]
+    expected = solver.eigenvalues(pencil, x, 2)[:, 1:]
     np.testing.assert_allclose(e.eigenvalues(x, []), expected, atol=1e-8)
     with pytest.raises(UsageError, match="cluster"):
         _ = e.coefficients

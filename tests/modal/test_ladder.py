@@ -17,12 +17,12 @@ from rungs import derivative, residual, slope, treat_as_large
 from spatial_oracle import world
 
 from eigassign.api import Case, expand, load_case, reduce
-from eigassign.case.resolved import plain
-from eigassign.mechanism.pencil import Pencil
-from eigassign.modal.exact import eigenvalues
-from eigassign.modal.expansion import Expansion
+from eigassign.case.case_file import plain
+from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.modal.exact.roundoff import rounding_error
+from eigassign.modal.exact.solver import eigenvalues
 from eigassign.modal.model import Model
-from eigassign.modal.roundoff import rounding_error
+from eigassign.modal.taylor.expansion import Expansion
 
 SHIPPED = sorted((Path(__file__).parents[2] / "cases").glob("*.yaml"))
 every_case = pytest.mark.parametrize("path", SHIPPED, ids=lambda p: p.stem)

@@ -15,8 +15,8 @@ from calibration import Drawn, draw
 from wide_draws import FAMILIES
 
 from eigassign.errors import EigassignError
-from eigassign.modal.expansion import Expansion, expand
-from eigassign.modal.roundoff import rounding_error
+from eigassign.modal.exact.roundoff import rounding_error
+from eigassign.modal.taylor.expansion import Expansion, expand
 
 EVERY = {"planar trees": draw, **FAMILIES}
 SPAN = 0.2  # rad or m, and of the design parameters' middle values

@@ -8,7 +8,7 @@ from chains import model_of, random_chain, two_link
 
 from eigassign.api import load_case
 from eigassign.errors import UsageError
-from eigassign.modal.reduced import reduce
+from eigassign.modal.reduced.reduce import reduce
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 ELBOW = np.pi / 3.0
@@ -101,7 +101,7 @@ def test_chunks_do_not_show(seed, monkeypatch):
     reduced = reduce(model.pencil, q0, [], (1,), 2)
     q = q0 + np.random.default_rng(seed).uniform(-0.3, 0.3, (7, len(q0)))
     whole = reduced.frequencies(q, []), reduced.error_estimate(q, [])
-    monkeypatch.setattr("eigassign.modal.chunks.CHUNK", 3)
+    monkeypatch.setattr("eigassign.modal.arguments.CHUNK", 3)
     np.testing.assert_allclose(reduced.frequencies(q, []), whole[0], rtol=1e-11)
     np.testing.assert_allclose(reduced.error_estimate(q, []), whole[1], rtol=1e-3, atol=1e-12)
 

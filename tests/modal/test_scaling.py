@@ -13,26 +13,22 @@ from chains import model_of, two_link
 from pencils import crossing
 
 from eigassign.errors import AccuracyError
-from eigassign.mechanism import pencil as pencil_module
-from eigassign.mechanism.pencil import Pencil
-from eigassign.modal import (
-    bordered_sparse,
-    coefficients,
-    exact,
-    project,
-    residual,
-    symmetric,
-)
-from eigassign.modal.bordered import factor_dense
-from eigassign.modal.exact_single import solve_single
-from eigassign.modal.expansion import Expansion, expand
+from eigassign.mechanism.assembly import pencil as pencil_module
+from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.modal.exact import solver
+from eigassign.modal.exact import sparse as symmetric
+from eigassign.modal.exact.dense import solve_single
 from eigassign.modal.model import Model
-from eigassign.modal.products import add_product
-from eigassign.modal.ritz_basis import ritz_basis
+from eigassign.modal.reduced import error_estimate
+from eigassign.modal.reduced.basis import ritz_basis
+from eigassign.modal.taylor import coefficients, rayleigh
+from eigassign.modal.taylor import sparse as bordered_sparse
+from eigassign.modal.taylor.bordered import add_product, factor_dense
+from eigassign.modal.taylor.expansion import Expansion, expand
 
 HELD = {"stiffness": 2e3}
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
-MODULES = (coefficients, exact, project)
+MODULES = (coefficients, solver, rayleigh)
 
 
 def arm(drives: tuple[Any, Any] = ("free", "free"), elements: tuple[int, int] = (9, 7)) -> Model:
@@ -106,7 +102,7 @@ def test_no_array_of_unknowns_times_coefficients_is_ever_stored(
 def mode_system(pencil: Pencil, x0: np.ndarray, mode: int) -> tuple[np.ndarray, ...]:
     """Non-zeros of K0 − λM0, the border M0 φ0 and φ0 as rows."""
     theta = pencil.theta(x0[None])
-    found = exact.modes(pencil, x0[None], mode)
+    found = solver.modes(pencil, x0[None], mode)
     lam, phi = found.lam[0, -1], found.phi[0][:, -1]
     data = (pencil.stiffness - lam * pencil.mass) @ theta[:, 0]
     border = pencil.sparse(pencil.mass @ theta[:, 0]) @ phi
@@ -156,7 +152,7 @@ def test_a_double_mode_with_half_its_border_is_refused() -> None:
     pencil = crossing(0.0)
     x0 = np.zeros(2)
     theta = pencil.theta(x0[None])
-    found = exact.modes(pencil, x0[None], 2)
+    found = solver.modes(pencil, x0[None], 2)
     assert found.lam[0, 1] == pytest.approx(found.lam[0, 0], rel=1e-12)
     data = (pencil.stiffness - found.lam[0, 0] * pencil.mass) @ theta[:, 0]
     M = pencil.sparse(pencil.mass @ theta[:, 0])
@@ -176,10 +172,10 @@ def test_terms_are_projected_alike_from_stacks_and_from_their_rows(
     drives: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     V = np.random.default_rng(2).standard_normal((arm(drives).n_dof, 4))
-    full = project.project(arm(drives).pencil, V)
-    thin = sparsely(monkeypatch, lambda: project.project(arm(drives).pencil, V))
-    monkeypatch.setattr(project, "CHUNK", 7)  # terms cut into pieces
-    cut = sparsely(monkeypatch, lambda: project.project(arm(drives).pencil, V))
+    full = rayleigh.project(arm(drives).pencil, V)
+    thin = sparsely(monkeypatch, lambda: rayleigh.project(arm(drives).pencil, V))
+    monkeypatch.setattr(rayleigh, "CHUNK", 7)  # terms cut into pieces
+    cut = sparsely(monkeypatch, lambda: rayleigh.project(arm(drives).pencil, V))
     for a, b, c in zip(full, thin, cut, strict=True):
         np.testing.assert_allclose(b, a, atol=1e-12 * np.abs(a).max())
         np.testing.assert_allclose(c, a, atol=1e-12 * np.abs(a).max())
@@ -220,7 +216,7 @@ def test_one_sample_has_the_modes_of_the_batch(
 ) -> None:
     model = arm(drives, elements)
     x = model.x(np.tile(Q0, (2, 1)), np.tile(Y0, (2, 1)))
-    batch = exact.modes(model.pencil, x, 4)
+    batch = solver.modes(model.pencil, x, 4)
     lam, phi = solve_single(model.pencil, model.pencil.theta(x[:1]), 4)
     np.testing.assert_allclose(lam, batch.lam[0], rtol=1e-10)
     np.testing.assert_allclose(phi, batch.phi[0], atol=1e-7 * np.abs(phi).max())
@@ -242,9 +238,9 @@ def test_residuals_have_the_same_size_from_unit_and_from_chosen_vectors(
     pencil = arm(drives).pencil
     basis = ritz_basis(pencil, np.concatenate([Q0, Y0])[None], (1,), 2, True, None)
     given = pencil, basis.K0, symmetric.factorise(basis.K0), basis.wide
-    right = residual.residual_factors(*given)
-    monkeypatch.setattr(residual, "UNIT_LIMIT", 0)
-    found = residual.residual_factors(*given)
+    right = error_estimate.residual_factors(*given)
+    monkeypatch.setattr(error_estimate, "UNIT_LIMIT", 0)
+    found = error_estimate.residual_factors(*given)
     np.testing.assert_array_equal(found.stiffness_terms, right.stiffness_terms)
     np.testing.assert_array_equal(found.mass_terms, right.mass_terms)
     rng = np.random.default_rng(5)

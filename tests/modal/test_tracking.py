@@ -15,9 +15,9 @@ from meetings import E_ONE, line, two_bars
 
 from eigassign.api import load_case
 from eigassign.errors import UsageError
-from eigassign.modal.condensation import Modes
-from eigassign.modal.exact import modes
-from eigassign.modal.tracking import _carried, overlaps, track
+from eigassign.modal.exact.condensation import Modes
+from eigassign.modal.exact.solver import modes
+from eigassign.modal.exact.tracking import _carried, overlaps, track
 
 
 @pytest.mark.parametrize("count", [10, 11, 41])

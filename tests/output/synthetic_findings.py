@@ -8,20 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.study.findings import (
+    BodyMark,
     Comparison,
     DesignMap,
     DesignRow,
     ErrorRow,
     ErrorSummary,
     Findings,
+    JointMark,
     ModeStudy,
     OtherModes,
+    Poses,
     SolverRow,
+    SpringMark,
     TargetAlong,
     TargetStudy,
     TrajectoryRow,
 )
-from eigassign.study.pictures import BodyMark, JointMark, Poses, SpringMark
 
 Floats = NDArray[np.float64]
 

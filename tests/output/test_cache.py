@@ -14,8 +14,7 @@ import pytest
 
 from eigassign.errors import StorageError, UsageError
 from eigassign.output import cache as module
-from eigassign.output.cache import Cache, default_directory, key
-from eigassign.output.cache_format import HEADER_BYTES, pack, unpack
+from eigassign.output.cache import HEADER_BYTES, Cache, default_directory, key, pack, unpack
 
 ARRAYS = {
     "coefficients": np.array([1.0, -0.0, 5e-324, np.nan, np.inf, 1.7e308]).reshape(2, 3),
@@ -115,7 +114,7 @@ def resealed(path: Path, change) -> bytes:
 
     import h5py
 
-    from eigassign.output.cache_format import _header
+    from eigassign.output.cache import _header
 
     buffer = io.BytesIO(path.read_bytes())
     with h5py.File(buffer, "r+") as file:
@@ -125,7 +124,7 @@ def resealed(path: Path, change) -> bytes:
 
 
 def not_hdf5(path: Path) -> bytes:
-    from eigassign.output.cache_format import _header
+    from eigassign.output.cache import _header
 
     return _header(KEY, b"rubbish") + b"rubbish"
 
@@ -210,7 +209,7 @@ def test_equal_numbers_have_one_key_whatever_their_memory_looks_like():
 def test_the_algorithm_version_and_the_schema_change_the_key(monkeypatch):
     before = key((1,), algorithm="1")
     assert key((1,), algorithm="2") != before
-    monkeypatch.setattr("eigassign.output.cache_format.SCHEMA", 2)
+    monkeypatch.setattr("eigassign.output.cache.SCHEMA", 2)
     assert key((1,), algorithm="1") != before
 
 

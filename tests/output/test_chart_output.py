@@ -12,10 +12,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "study"))
 
-from eigassign.output import chart_figures, chart_tables, figures
-from eigassign.output.chart_scatter import Ladder, decades, scatter
-from eigassign.output.chart_write import write_chart
-from eigassign.study.chart_data import (
+from eigassign.chart.results import (
     Advice,
     Asked,
     AutoTakes,
@@ -28,6 +25,11 @@ from eigassign.study.chart_data import (
     MeshRow,
     Timing,
 )
+from eigassign.output import chart_report
+from eigassign.output.chart_report import write_chart
+from eigassign.output.figures import front as chart_figures
+from eigassign.output.figures import plan as figures
+from eigassign.output.figures.front import Ladder, decades, scatter
 
 
 def timing(seconds: float, repeats: int = 5) -> Timing:
@@ -160,7 +162,7 @@ def test_a_chart_without_meshes_or_designs_has_no_such_figures() -> None:
         "cost_one_trajectory.png",
         "online_alone.png",
     }
-    assert "Designs" not in [table.title for table in chart_tables.tables(bare)]
+    assert "Designs" not in [table.title for table in chart_report.tables(bare)]
 
 
 def test_the_json_holds_every_point_and_no_numbers_that_json_has_not(tmp_path: Path) -> None:
@@ -183,13 +185,13 @@ def test_the_page_shows_tables_and_figures_and_escapes_titles(tmp_path: Path) ->
 
 
 def test_fronts_are_listed_from_the_quickest_with_whose_they_are() -> None:
-    table = chart_tables.front(CHART, CHART.fronts[1])
+    table = chart_report.front(CHART, CHART.fronts[1])
     assert [row[0] for row in table.rows] == ["Taylor 4 full", "grid linear 4", "exact dense"]
     assert [row[1] for row in table.rows] == ["yes", "no", "yes"]
 
 
 def test_what_auto_takes_stands_beside_the_choice_and_the_quickest_expansion() -> None:
-    table = chart_tables.auto(CHART)
+    table = chart_report.auto(CHART)
     taken, refused = table.rows
     assert taken == (
         "1e-04", "152", "Taylor 4 full", "5.0e-05", "3.04 ms", "0.2 × as long", "400 ms",
@@ -204,17 +206,17 @@ def test_accuracies_for_which_auto_is_not_asked_any_more_are_named() -> None:
     below = replace(other, accuracy=1e-12, auto=None, is_below_round_off=True)
     budget = replace(other, accuracy=None, budget_s=1.0, auto=None)
     left = (replace(other, auto=None), replace(other, auto=None, evaluations=1e6))
-    said = chart_tables.auto(replace(CHART, advice=(known, *left, below, budget))).caption
+    said = chart_report.auto(replace(CHART, advice=(known, *left, below, budget))).caption
     assert said.endswith("Not asked for 1e-08: choosing had already taken too long.")
-    assert "Not asked" not in chart_tables.auto(replace(CHART, advice=(known, below))).caption
+    assert "Not asked" not in chart_report.auto(replace(CHART, advice=(known, below))).caption
 
 
 def test_lines_for_the_case_file_are_shown_where_there_are_any() -> None:
-    (row,) = chart_tables.lines(CHART).rows
+    (row,) = chart_report.lines(CHART).rows
     assert row == (
         "1e-04", "Taylor 4 full", "expansion: {order: auto, accuracy: 0.0001, chart: chart.json}",
     )  # fmt: skip
-    assert not chart_tables.lines(replace(CHART, advice=CHART.advice[1:])).rows
+    assert not chart_report.lines(replace(CHART, advice=CHART.advice[1:])).rows
 
 
 def test_what_auto_takes_is_ringed() -> None:
@@ -228,12 +230,12 @@ def test_what_auto_takes_is_ringed() -> None:
     [(2.5, "2.5 s"), (2.5e-3, "2.5 ms"), (2.5e-6, "2.5 µs"), (2e-8, "20 ns"), (0, "0")],
 )
 def test_times_are_written_with_a_fitting_unit(seconds: float, text: str) -> None:
-    assert chart_tables.time(seconds) == text
+    assert chart_report.time(seconds) == text
 
 
 def test_a_time_measured_once_says_so() -> None:
-    assert chart_tables.spread(timing(2.0, 0)) == "2 s (once)"
-    assert chart_tables.spread(timing(2.0)) == "2 s (1.8 s–2.2 s)"
+    assert chart_report.spread(timing(2.0, 0)) == "2 s (once)"
+    assert chart_report.spread(timing(2.0)) == "2 s (1.8 s–2.2 s)"
 
 
 def test_decades_hold_all_values_and_label_few() -> None:

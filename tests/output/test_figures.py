@@ -12,11 +12,12 @@ import pytest
 from PIL import Image
 from synthetic_findings import make_findings
 
-from eigassign.output import figures, png, ticks
-from eigassign.output.chart import spread
-from eigassign.output.frame import Entry, key_rows
-from eigassign.output.ink import Sheet, Stroke, series_stroke, settings, short
-from eigassign.output.lettering import DPI, text_width
+from eigassign.output.figures import plan as figures
+from eigassign.output.figures import png, ticks
+from eigassign.output.figures.curves import spread
+from eigassign.output.figures.frame import Entry, key_rows
+from eigassign.output.figures.ink import Sheet, Stroke, series_stroke, settings, short
+from eigassign.output.figures.lettering import DPI, text_width
 from eigassign.study.findings import Findings
 
 LONG = "ein_sehr_langer_Name_für_$x_1^2$_中_\x1b[31m_"

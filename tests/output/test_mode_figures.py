@@ -12,14 +12,20 @@ from PIL import Image
 from synthetic_findings import make_findings
 
 import eigassign as ea
-from eigassign.output import figures, ink
-from eigassign.output.lettering import DPI
-from eigassign.output.mode_figures import plan_modes, thumbnail
-from eigassign.output.mode_write import write_modes
-from eigassign.output.symbols import diameters, line_widths
-from eigassign.output.view import extent, length_label, round_length, view_of
+from eigassign.output.figures import ink, plan
+from eigassign.output.figures.lettering import DPI
+from eigassign.output.figures.mechanism import (
+    diameters,
+    extent,
+    length_label,
+    line_widths,
+    round_length,
+    view_of,
+)
+from eigassign.output.figures.modes import plan_modes, thumbnail
+from eigassign.output.report import write_modes
 from eigassign.study.drawing import draw_modes
-from eigassign.study.pictures import BodyMark, ModePictures, Poses
+from eigassign.study.findings import BodyMark, ModePictures, Poses
 
 CASES = Path(__file__).parents[2] / "cases"
 GALLERY = CASES / "gallery"
@@ -45,7 +51,7 @@ def shows(image: np.ndarray, colour: str) -> int:
 @pytest.mark.parametrize("name", ALL)
 def test_every_shipped_mechanism_has_figures_with_rest_mode_and_a_white_margin(name: str) -> None:
     found = pictures(name)
-    files = figures.render(plan_modes(found))
+    files = plan.render(plan_modes(found))
     assert list(files) == ["mode_1.png", "mode_2.png"]
     for data in files.values():
         image = pixels(data)
@@ -55,11 +61,11 @@ def test_every_shipped_mechanism_has_figures_with_rest_mode_and_a_white_margin(n
         edge = [ink_there[:3], ink_there[-2:], ink_there[:, :3].T, ink_there[:, -3:].T]
         assert not any(side.any() for side in edge)
     assert files["mode_1.png"] != files["mode_2.png"]
-    assert figures.render(plan_modes(pictures(name))) == files
+    assert plan.render(plan_modes(pictures(name))) == files
 
 
 def test_a_mode_that_bends_shows_the_grey_links_beside_it() -> None:
-    (first, _) = figures.render(plan_modes(pictures("four_bar"))).values()
+    (first, _) = plan.render(plan_modes(pictures("four_bar"))).values()
     assert shows(pixels(first), "#c4c4c4") > 500
     assert shows(pixels(first), ink.SKY) > 100
 

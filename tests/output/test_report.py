@@ -9,8 +9,9 @@ from html.parser import HTMLParser
 import pytest
 from synthetic_findings import make_findings
 
-from eigassign.output import figures, report
-from eigassign.output.write import write_run
+from eigassign.output import report
+from eigassign.output.figures import plan as figures
+from eigassign.output.report import write_run
 
 VOID = {"meta", "img", "br"}
 EVIL = '"><script>alert(1)</script>&amp;\x27 {{ 7*7 }}'

@@ -14,7 +14,7 @@ import pytest
 
 from eigassign.errors import StorageError
 from eigassign.output import run_folder as module
-from eigassign.output import swap
+from eigassign.output import run_folder as swap
 from eigassign.output.run_folder import MARKER, run_folder
 
 

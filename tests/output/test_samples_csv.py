@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from synthetic_findings import make_findings
 
-from eigassign.mechanism.trajectory_file import read_samples
-from eigassign.output.samples_csv import sample_files
+from eigassign.mechanism.trajectory.csv import read_samples
+from eigassign.output.results_json import sample_files
 from eigassign.study.findings import Comparison, Findings
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from eigassign.api import load_case
 from eigassign.errors import AccuracyError
-from eigassign.run import solve_case
+from eigassign.pipeline.run import solve_case
 
 CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 

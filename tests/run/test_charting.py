@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from eigassign.charting import _unanswered
+from eigassign.pipeline.chart import _unanswered
 
 
 def test_a_reason_that_many_methods_share_is_said_once_with_their_names() -> None:

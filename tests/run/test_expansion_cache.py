@@ -11,9 +11,8 @@ from run_cases import TARGET, automatic, case_of, chain, shipped
 
 from eigassign.api import Case
 from eigassign.errors import UsageError
-from eigassign.expansions import affordable_order, expand_plan, expansion_key
-from eigassign.modal.expansion import Expansion
-from eigassign.modal.storage import (
+from eigassign.modal.taylor.expansion import Expansion
+from eigassign.modal.taylor.storage import (
     expansion_arrays,
     expansion_from_arrays,
     flatten,
@@ -21,8 +20,9 @@ from eigassign.modal.storage import (
     unflatten,
 )
 from eigassign.output.cache import Cache
-from eigassign.run import Options, solve_case
-from eigassign.study.plan import Plan, plan_expansion
+from eigassign.pipeline.expansions import affordable_order, expand_plan, expansion_key
+from eigassign.pipeline.run import Options, solve_case
+from eigassign.study.planning import Plan, plan_expansion
 
 
 def plan_of(case: Case) -> Plan:

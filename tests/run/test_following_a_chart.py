@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 
 from eigassign.api import load_case
-from eigassign.charting import chart_case, with_lines
+from eigassign.chart.effort import Effort
+from eigassign.chart.study import Wish
+from eigassign.chart.timing import Patience
 from eigassign.errors import CaseError
-from eigassign.modal import expansion_choice
-from eigassign.output.chart_write import to_json
-from eigassign.run import Options, optimize, solve_case
-from eigassign.study.chart_effort import Effort
-from eigassign.study.chart_study import Wish
-from eigassign.study.chart_timing import Patience
+from eigassign.modal.adaptive import order as expansion_choice
+from eigassign.output.chart_report import to_json
+from eigassign.pipeline.chart import chart_case, with_lines
+from eigassign.pipeline.run import Options, optimize, solve_case
 
 SHIPPED = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
 EFFORT = Effort(

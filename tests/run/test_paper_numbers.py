@@ -12,7 +12,7 @@ import pytest
 from run_cases import SHIPPED, UNCACHED
 
 import eigassign as ea
-from eigassign.run import Result, modes, validate
+from eigassign.pipeline.run import Result, modes, validate
 from eigassign.study.findings import ValidationRow
 
 

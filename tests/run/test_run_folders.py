@@ -13,7 +13,7 @@ from run_cases import SHIPPED, UNCACHED, chain, shipped, without, written
 
 from eigassign.api import load_case
 from eigassign.errors import InfeasibleError, StorageError
-from eigassign.run import Options, Outcome, expand_case, optimize, solve_case
+from eigassign.pipeline.run import Options, Outcome, expand_case, optimize, solve_case
 
 
 def in_folder(path: Path) -> Options:

@@ -11,11 +11,10 @@ from run_cases import UNCACHED, case_of, shipped, solved, without, written
 from scipy.optimize import lsq_linear
 
 import eigassign as ea
-from eigassign.answers import check
 from eigassign.errors import CaseError
-from eigassign.output.results_json import results, to_json
-from eigassign.output.samples_csv import sample_files
-from eigassign.run import Options, Result, optimize, validate
+from eigassign.output.results_json import results, sample_files, to_json
+from eigassign.pipeline.queries import check
+from eigassign.pipeline.run import Options, Result, optimize, validate
 
 REST = without(shipped(), "trajectory", "targets")
 TARGETS = "targets:\n  - {mode: 1, frequency: 194 Hz}\n"  # that leaves m1 between its bounds

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from eigassign.errors import AccuracyError
-from eigassign.modal.line import interval_nodes
-from eigassign.series.adaptive_newton import adaptive, interpolate
-from eigassign.series.interpolant import Interpolant
-from eigassign.series.newton import Nodes, interval, leja, newton_polynomials
+from eigassign.interpolation.adaptive import adaptive, interpolate
+from eigassign.interpolation.newton import Interpolant, Nodes, interval, leja, newton_polynomials
+from eigassign.modal.fit.domain import interval_nodes
 
 Function = Callable[[np.ndarray], np.ndarray]
 NODES = interval()[leja(interval(), 20)]

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from eigassign.series.evaluation import BLOCK, monomials_of, polynomials
-from eigassign.series.lower_set import LowerSet, box, partially_linear, total_degree
-from eigassign.series.power_series import monomials
+from eigassign.series.multi_index import LowerSet, box, partially_linear, total_degree
+from eigassign.series.power_series import BLOCK, monomials, monomials_of, polynomials
 
 SETS = [
     total_degree(1, 5),

@@ -13,11 +13,16 @@ from hypothesis import strategies as st
 
 from eigassign.errors import UsageError
 from eigassign.series.algebra import Samples, Truncated
-from eigassign.series.expression import Expression, Recorder, cos, sin
-from eigassign.series.lower_set import on_faces, total_degree
+from eigassign.series.expression import (
+    Expression,
+    Recorder,
+    compile_program,
+    compile_table,
+    cos,
+    sin,
+)
+from eigassign.series.multi_index import on_faces, total_degree
 from eigassign.series.power_series import PowerSeries
-from eigassign.series.program import compile_program
-from eigassign.series.table import compile_table
 
 N = 3
 SPACE = total_degree(N, 4)

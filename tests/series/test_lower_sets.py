@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from eigassign.errors import UsageError
-from eigassign.series.lower_set import (
+from eigassign.series.multi_index import (
     LowerSet,
     box,
     lower_set,

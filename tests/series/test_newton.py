@@ -7,11 +7,18 @@ import itertools
 import numpy as np
 import pytest
 
-from eigassign.series.adding import Adding
-from eigassign.series.interpolant import Interpolant
-from eigassign.series.lower_set import total_degree
-from eigassign.series.margin import Border, decay, keys, rates_of, rows_of
-from eigassign.series.newton import Nodes, basis, interval, leja, newton_polynomials, products
+from eigassign.interpolation.adaptive import Adding
+from eigassign.interpolation.margin import Border, decay, keys, rates_of, rows_of
+from eigassign.interpolation.newton import (
+    Interpolant,
+    Nodes,
+    basis,
+    interval,
+    leja,
+    newton_polynomials,
+    products,
+)
+from eigassign.series.multi_index import total_degree
 
 AXES = tuple(interval()[leja(interval(), k)] for k in (9, 7, 6))
 TABLES = [basis(v, v) for v in AXES]

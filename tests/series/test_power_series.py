@@ -10,7 +10,7 @@ import pytest
 
 from eigassign.errors import UsageError
 from eigassign.series import power_series
-from eigassign.series.lower_set import (
+from eigassign.series.multi_index import (
     LowerSet,
     box,
     lower_set,

@@ -6,7 +6,7 @@ import numpy as np
 from stress import answered, judged
 
 from eigassign.api import load_case
-from eigassign.modal.reduced import reduce
+from eigassign.modal.reduced.reduce import reduce
 
 Q0, Y0 = [1.817, 5.312], [0.125, 0.125]
 

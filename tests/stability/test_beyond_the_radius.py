@@ -7,10 +7,9 @@ import pytest
 from stress import answered, case, judged
 
 from eigassign.errors import AccuracyError
-from eigassign.modal.adaptive import reduce_adaptively
-from eigassign.modal.convergence import radius_share
-from eigassign.modal.expansion import expand
-from eigassign.modal.expansion_choice import choose_expansion
+from eigassign.modal.adaptive.order import choose_expansion, reduce_adaptively
+from eigassign.modal.taylor.convergence import radius_share
+from eigassign.modal.taylor.expansion import expand
 
 ELBOW = np.deg2rad(np.linspace(20.0, 170.0, 61))
 Q = np.column_stack([np.zeros(61), ELBOW])

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from eigassign.study.chart_effort import Effort
-from eigassign.study.chart_timing import Patience
+from eigassign.chart.effort import Effort
+from eigassign.chart.timing import Patience
 
 TINY = Effort(
     random_points=30,

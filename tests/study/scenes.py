@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from eigassign.api import load_case
-from eigassign.run import prepare
-from eigassign.stages import Stages
+from eigassign.pipeline.run import prepare
+from eigassign.pipeline.stages import Stages
 from eigassign.study.scene import Scene
 
 SHIPPED = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()

@@ -11,13 +11,13 @@ from chart_scenes import TINY
 from scenes import SHIPPED, scene_of
 
 from eigassign.api import load_case
-from eigassign.modal import expansion_choice
-from eigassign.run import prepare
-from eigassign.stages import Stages
-from eigassign.study.chart_auto import auto_methods, beside_auto, taken_by_auto
-from eigassign.study.chart_data import Advice
-from eigassign.study.chart_study import Compared, Wish, compare_methods
-from eigassign.study.judged_at import corners
+from eigassign.chart.methods import auto_methods, beside_auto, taken_by_auto
+from eigassign.chart.results import Advice
+from eigassign.chart.study import Compared, Wish, compare_methods
+from eigassign.modal.adaptive import order as expansion_choice
+from eigassign.pipeline.run import prepare
+from eigassign.pipeline.stages import Stages
+from eigassign.study.planning import corners
 from eigassign.study.scene import Scene
 
 CASES = Path(__file__).parents[2] / "cases"

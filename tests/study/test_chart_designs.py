@@ -9,12 +9,10 @@ import pytest
 from chart_scenes import TINY
 from scenes import SHIPPED, changed, scene_of
 
-from eigassign.modal.exact import eigenvalues
-from eigassign.series.lower_set import total_degree
-from eigassign.study.chart_designs import chart_designs
-from eigassign.study.chart_gradient import eigenvalue_slopes, theta_slopes
-from eigassign.study.chart_search import Limits, SpentError, Watched, by_gradient, by_kriging
-from eigassign.study.chart_task import task_of
+from eigassign.chart.designs import chart_designs, eigenvalue_slopes, task_of, theta_slopes
+from eigassign.chart.search import Limits, SpentError, Watched, by_gradient, by_kriging
+from eigassign.modal.exact.solver import eigenvalues
+from eigassign.series.multi_index import total_degree
 from eigassign.study.scene import Scene
 
 

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from eigassign.study.chart_data import NOTHING, ChartPoint, Errors, Timing, excess_over
-from eigassign.study.chart_front import (
+from eigassign.chart.front import (
     advise_accuracy,
     advise_budget,
     break_even,
@@ -17,6 +16,7 @@ from eigassign.study.chart_front import (
     front_notes,
     pareto,
 )
+from eigassign.chart.results import NOTHING, ChartPoint, Errors, Timing, excess_over
 
 
 def timing(seconds: float) -> Timing:

@@ -9,9 +9,9 @@ import pytest
 from scenes import SHIPPED, changed
 
 from eigassign.api import Case, load_case
-from eigassign.charting import _meshes, refined
-from eigassign.study.chart_mesh import mesh_axis
-from eigassign.study.chart_timing import Patience
+from eigassign.chart.mesh import mesh_axis
+from eigassign.chart.timing import Patience
+from eigassign.pipeline.chart import _meshes, refined
 
 ONCE = Patience(rounds=1, seconds=0.0)
 

@@ -13,20 +13,27 @@ from scenes import SHIPPED, scene_of
 
 import eigassign
 import eigassign as ea
+from eigassign.chart import methods as own
+from eigassign.chart import rivals
+from eigassign.chart import study as chart_bench
+from eigassign.chart.methods import fit_methods
+from eigassign.chart.question import Points, build_features, build_points
+from eigassign.chart.rivals import along, chebyshev, equal_nodes
+from eigassign.chart.study import (
+    Bench,
+    Compared,
+    Wish,
+    _batch,
+    compare_methods,
+    errors,
+    exact_frequencies,
+)
+from eigassign.chart.timing import Patience
 from eigassign.errors import CaseError
-from eigassign.modal import exact
-from eigassign.modal.expansion import expand
-from eigassign.modal.fit_source import FINE
-from eigassign.modal.nearest import nearest
-from eigassign.study import chart_bench, rivals
-from eigassign.study import chart_methods as own
-from eigassign.study.chart_bench import Bench, _batch, errors, exact_frequencies
-from eigassign.study.chart_fits import fit_methods
-from eigassign.study.chart_question import Points, build_features, build_points
-from eigassign.study.chart_study import Compared, Wish, compare_methods
-from eigassign.study.chart_timing import Patience
+from eigassign.modal.exact import solver
+from eigassign.modal.fit.fit import FINE
+from eigassign.modal.taylor.expansion import expand, nearest
 from eigassign.study.scene import Scene
-from eigassign.study.surrogates import along, chebyshev, equal_nodes
 
 
 @pytest.fixture(scope="module")
@@ -49,13 +56,13 @@ class Spy:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.solved = 0
-        solve = exact._solve
+        solve = solver._solve
 
         def counted(pencil, theta, count, vectors):  # type: ignore[no-untyped-def]
             self.solved += theta.shape[1]
             return solve(pencil, theta, count, vectors)
 
-        monkeypatch.setattr(exact, "_solve", counted)
+        monkeypatch.setattr(solver, "_solve", counted)
 
 
 def _methods(scene: Scene) -> Iterator[own.Method]:

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scenes import HEAD, SHIPPED, changed, scene_of
 
+from eigassign.chart.effort import QUICK, Effort
+from eigassign.chart.question import Points, _corners, build_features, build_points
+from eigassign.chart.study import _affordable_points
 from eigassign.errors import CaseError
-from eigassign.study.chart_effort import QUICK, Effort
-from eigassign.study.chart_question import Points, _corners, build_features, build_points
-from eigassign.study.chart_study import _affordable_points
-from eigassign.study.plan import joint_map
+from eigassign.study.planning import joint_map
 
 
 def test_features_lead_back_to_poses_with_the_same_frequencies(tmp_path: Path) -> None:

@@ -9,9 +9,9 @@ import pytest
 from chart_scenes import TINY
 from scenes import scene_of
 
-from eigassign.study.assignment_study import assign_design, target_frequencies
-from eigassign.study.chart_question import build_features
-from eigassign.study.chart_task import task_of
+from eigassign.chart.designs import task_of
+from eigassign.chart.question import build_features
+from eigassign.study.assignment import assign_design, target_frequencies
 from eigassign.study.scene import Scene
 
 CASES = Path(__file__).parents[2] / "cases"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from eigassign.study.chart_timing import Patience, _processor, machine, measure, take_turns
+from eigassign.chart.timing import Patience, _processor, machine, measure, take_turns
 
 
 class FakeClock:

@@ -3,9 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from eigassign.mechanism.trajectories import NamedTrajectory, Trajectories
-from eigassign.mechanism.trajectory import Trajectory
-from eigassign.study.crossings import crossing_warnings
+from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectories, Trajectory
+from eigassign.study.assignment import crossing_warnings
 
 TIME = np.linspace(0.0, 1.0, 11)
 

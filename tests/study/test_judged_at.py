@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import SHIPPED, scene_of
 
-from eigassign.study.judged_at import at_corners, at_random, climbed, corners
+from eigassign.study.planning import at_corners, at_random, climbed, corners
 from eigassign.study.scene import Scene
 
 

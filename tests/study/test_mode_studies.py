@@ -7,9 +7,9 @@ import pytest
 from scenes import HEAD, SHIPPED, changed, scene_of
 
 from eigassign.case import parse
-from eigassign.study.approximation import COARSE, compare, grid_over
-from eigassign.study.mode_studies import q_grid, study_modes
-from eigassign.study.units import PROPERTY_UNITS, coordinate_units, design_units
+from eigassign.study.comparison import q_grid, study_modes
+from eigassign.study.findings import PROPERTY_UNITS, coordinate_units, design_units
+from eigassign.study.scene import COARSE, compare, grid_over
 
 
 def test_a_map_holds_at_each_point_what_a_solve_there_gives(tmp_path: Path) -> None:
@@ -76,10 +76,9 @@ def test_without_trajectory_and_design_there_is_nothing_to_map(tmp_path: Path) -
 
 
 def test_every_property_that_can_be_designed_has_a_unit(tmp_path: Path) -> None:
-    from eigassign.case.link_parts import LINKS
-    from eigassign.case.mechanism_parts import Body, Spring
-    from eigassign.case.properties import _quantities
-    from eigassign.case.section_parts import SHAPES, Material
+    from eigassign.case.rules.values import _quantities
+    from eigassign.case.schema.links import LINKS, SHAPES, Material
+    from eigassign.case.schema.mechanism import Body, Spring
 
     models = [Material, Body, Spring, *LINKS.values(), *SHAPES.values()]
     quantities = {name: q for model in models for name, q in _quantities(model).items()}

@@ -10,7 +10,7 @@ from scenes import HEAD, SHIPPED, automatic, changed, scene_of
 
 from eigassign.api import load_case
 from eigassign.errors import CaseError
-from eigassign.study.plan import Plan, central_sample, joint_map, plan_expansion, shown_point
+from eigassign.study.planning import Plan, central_sample, joint_map, plan_expansion, shown_point
 
 
 def plan_of(folder: Path, text: str, **override: object) -> Plan:

@@ -8,7 +8,7 @@ import pytest
 from scenes import SHIPPED
 
 from eigassign.api import load_case
-from eigassign.study.choices import mesh_share, series_share, truncation_share
+from eigassign.study.planning import mesh_share, series_share, truncation_share
 
 
 @pytest.mark.parametrize(

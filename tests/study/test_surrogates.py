@@ -8,20 +8,23 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from eigassign.errors import UsageError
-from eigassign.study.surrogates import (
+from eigassign.chart.rivals import (
+    Separable,
+    Trajectory,
+    _likelihood,
     along,
     chebyshev,
     chebyshev_nodes,
     equal_nodes,
+    fit_kriging,
     grid_interpolation,
     grid_points,
+    kriging_lines,
     radial_basis,
     response_surface,
     spread_points,
 )
-from eigassign.study.surrogates_kriging import _likelihood, fit_kriging, kriging_lines
-from eigassign.study.surrogates_lines import Separable, Trajectory
+from eigassign.errors import UsageError
 
 Floats = NDArray[np.float64]
 AT = np.random.default_rng(5).random((300, 3))

@@ -7,7 +7,7 @@ import pytest
 from scenes import HEAD, SHIPPED, automatic, changed, scene_of
 
 from eigassign.errors import CaseError
-from eigassign.study.validation import (
+from eigassign.study.comparison import (
     DESIGN_BOX,
     RANDOM_BOX,
     TRAJECTORY,

@@ -1,0 +1,274 @@
+"""Many cases in parallel processes: one run folder each, and nothing lost to a case that fails.
+
+The one seam is ``Executor.submit(run_case, path, options) -> small dict``: any
+``concurrent.futures`` executor will do, here or on a cluster. Workers write their own folders.
+
+Which case files are meant by files and folders, and a name for the run of each.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from eigassign.batch.workers import cores, process_pool
+from eigassign.errors import StorageError, UsageError
+from eigassign.process import judged
+
+if TYPE_CHECKING:
+    from eigassign.output.tables import CaseOutcome
+
+
+# --- Many cases in parallel processes: one run folder each, and nothing lost to a case that fai
+
+Row = dict[str, Any]  # what a worker sends back: plain text and numbers only
+MakePool = Callable[[int], contextlib.AbstractContextManager[Executor]]
+
+
+@dataclass(frozen=True)
+class CaseOptions:
+    """How one case is run; everything in it can be sent to another process."""
+
+    out: str
+    cache_dir: str | None = None
+    use_cache: bool = True
+    force: bool = False
+
+
+@dataclass(frozen=True)
+class Job:
+    """One case file and where its run goes."""
+
+    case: str
+    options: CaseOptions
+
+
+def run_case(path: str, options: CaseOptions) -> Row:
+    """Run one case into its folder: the fields of a CaseOutcome. Never raises an Exception."""
+    start = time.perf_counter()
+    try:
+        row = _optimised(path, options)
+    except Exception as error:
+        row = _failure(error)
+    return _row(path, options, **row, seconds=time.perf_counter() - start)
+
+
+def _row(path: str, options: CaseOptions, **fields: object) -> Row:
+    return {"name": Path(options.out).name, "path": path, "seconds": 0.0, **fields}
+
+
+def _optimised(path: str, options: CaseOptions) -> Row:
+    from eigassign.pipeline.run import Options, optimize
+
+    cache_dir = Path(options.cache_dir) if options.cache_dir else None
+    how = Options(Path(options.out), cache_dir, options.use_cache, options.force)
+    outcome = optimize(Path(path), how)
+    error = outcome.findings.error
+    return {
+        "status": "ok" if outcome.within_tolerance else "tolerance",
+        "message": "" if outcome.within_tolerance else "the expansion is over the asked tolerance",
+        "run_folder": str(outcome.folder),
+        "initial_max_relative": error and error.initial.max_relative,
+        "predicted_max_relative": error and error.predicted.max_relative,
+        "exact_max_relative": error and error.exact.max_relative,
+        "design": tuple((row.name, row.optimal) for row in outcome.findings.design),
+    }
+
+
+def _failure(error: Exception) -> Row:
+    failure = judged(error)
+    return {"status": "failed" if failure.exit_code == 1 else "error", "message": failure.text}
+
+
+def plan(cases: Sequence[Path], options: CaseOptions) -> list[Job]:
+    """Each case with a folder of its own below ``options.out``, whatever order they come in."""
+    return [
+        Job(str(case), replace(options, out=str(Path(options.out, name))))
+        for case, name in zip(cases, folder_names(cases), strict=True)
+    ]
+
+
+def run_and_summarise(
+    jobs: Sequence[Job], workers: int | None, out: Path, on_row: Callable[[Row], None]
+) -> list[CaseOutcome]:
+    """Run the jobs and write summary.csv and junit.xml; after an interrupt, of what there is."""
+    from eigassign.output.tables import CaseOutcome, write_junit, write_summary
+
+    done: dict[str, Row] = {}
+
+    def keep(row: Row) -> None:
+        done[row["path"]] = row
+        on_row(row)
+
+    out.mkdir(parents=True, exist_ok=True)
+    try:
+        run_batch(jobs, workers or cores(), keep)
+    finally:
+        rows = [done.get(job.case) or not_run(job) for job in jobs]
+        outcomes = [CaseOutcome(**row) for row in rows]
+        write_summary(out / "summary.csv", outcomes)
+        write_junit(out / "junit.xml", outcomes)
+    return outcomes
+
+
+def run_batch(
+    jobs: Sequence[Job],
+    workers: int,
+    on_row: Callable[[Row], None] = lambda _row: None,
+    executor: MakePool | None = None,
+) -> dict[str, Row]:
+    """Run every job; a row per case, in the order the jobs were given.
+
+    ``on_row`` hears of each as it comes in. When a worker dies, the pool is rebuilt and the cases
+    that were running are run again, each alone in its own pool, which tells the culprit.
+    """
+    rows: dict[str, Row] = {}
+    make = executor or process_pool
+
+    def keep(row: Row) -> None:
+        rows[row["path"]] = row
+        on_row(row)
+
+    waiting = list(jobs)
+    while waiting:
+        for suspect in _until_broken(waiting, workers, make, keep):
+            if _until_broken([suspect], 1, make, keep):
+                keep(_killed(suspect))
+        waiting = [job for job in waiting if job.case not in rows]
+    return {job.case: rows[job.case] for job in jobs}
+
+
+def _until_broken(
+    jobs: Sequence[Job], workers: int, make: MakePool, keep: Callable[[Row], None]
+) -> list[Job]:
+    """Run jobs, at most ``workers`` in flight; the jobs in flight when the pool broke, if it did.
+
+    So few, because a broken pool does not say which of them was the cause.
+    """
+    waiting, running = list(jobs), dict[Future[Row], Job]()
+    with make(min(workers, len(jobs))) as pool:
+        try:
+            while waiting or running:
+                while waiting and len(running) < workers:
+                    running[_submitted(pool, waiting[0])] = waiting[0]
+                    del waiting[0]
+                wait(running, return_when=FIRST_COMPLETED)
+                _collect(running, keep)
+        except BrokenProcessPool:
+            return list(running.values()) or waiting[:1]
+    return []
+
+
+def _collect(running: dict[Future[Row], Job], keep: Callable[[Row], None]) -> None:
+    """Take out what is done; raises BrokenProcessPool once all other results are kept."""
+    broken: BrokenProcessPool | None = None
+    for future in [future for future in running if future.done()]:
+        error = future.exception()
+        if isinstance(error, BrokenProcessPool):
+            broken = error
+            continue
+        job = running.pop(future)
+        keep(_killed(job) if error else future.result())
+    if broken:
+        raise broken
+
+
+def _killed(job: Job) -> Row:
+    message = "the process that ran it was killed, perhaps for want of memory"
+    return _row(job.case, job.options, status="error", message=message)
+
+
+def not_run(job: Job) -> Row:
+    """Row of a case that an interrupt came before."""
+    return _row(job.case, job.options, status="error", message="not run: interrupted before")
+
+
+def _submitted(pool: Executor, job: Job) -> Future[Row]:
+    """Submit with SIGINT blocked: processes started here inherit that, Ctrl-C is the parent's."""
+    if not hasattr(signal, "pthread_sigmask"):
+        return pool.submit(run_case, job.case, job.options)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        return pool.submit(run_case, job.case, job.options)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+# --- Which case files are meant by files and folders, and a name for the run of each
+
+
+def default_cases() -> list[Path]:
+    """The case files of ./cases itself; UsageError where there is none."""
+    folder = Path("cases")
+    found = sorted(p for p in folder.glob("*.y*ml") if p.suffix in (".yaml", ".yml"))
+    if not found:
+        raise UsageError("cases: no such file or folder, or no case files in it; name some")
+    return found
+
+
+def cases_in(paths: Sequence[Path]) -> list[Path]:
+    """`find_cases`; UsageError where a path does not exist or there is no case at all."""
+    for path in paths:
+        if not path.exists():
+            raise UsageError(f"{path}: no such file or folder")
+    if not (found := find_cases(paths)):
+        raise UsageError(f"no case files (*.yaml, *.yml) in {', '.join(map(str, paths))}")
+    return found
+
+
+def find_cases(paths: Sequence[Path]) -> list[Path]:
+    """Case files named, and all ``*.yaml``, ``*.yml`` in the folders named, each file once.
+
+    Hidden folders and run folders (they hold a resolved case) are passed over. Raises StorageError
+    for a folder that cannot be read.
+    """
+    found = [each for path in paths for each in (_in(path) if path.is_dir() else [path])]
+    first = {os.path.realpath(path): path for path in reversed(found)}
+    return [path for path in found if first.pop(os.path.realpath(path), None)]
+
+
+def _in(folder: Path) -> Iterator[Path]:
+    from eigassign.output.run_folder import MARKER
+
+    for root, folders, files in os.walk(folder, onerror=_unreadable):
+        if MARKER in files:
+            folders.clear()
+            continue
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        for name in sorted(files):
+            if name.endswith((".yaml", ".yml")) and not name.startswith("."):
+                yield Path(root, name)
+
+
+def _unreadable(error: OSError) -> None:
+    raise StorageError(f"{error.filename}: cannot be read: {error.strerror}") from error
+
+
+def folder_names(cases: Sequence[Path]) -> list[str]:
+    """The files' stems; where two would collide, the path that tells them apart joins in."""
+    stems = [case.stem for case in cases]
+    clashing = {
+        s.casefold() for s in stems if [t.casefold() for t in stems].count(s.casefold()) > 1
+    }
+    root = Path(os.path.commonpath([os.path.abspath(case.parent) for case in cases] or ["."]))
+    taken = {"summary.csv", "junit.xml"}
+    names = []
+    for case, stem in zip(cases, stems, strict=True):
+        parts = Path(os.path.abspath(case)).relative_to(root).with_suffix("").parts
+        name = _free("-".join(parts) if stem.casefold() in clashing else stem, taken)
+        taken.add(name.casefold())
+        names.append(name)
+    return names
+
+
+def _free(name: str, taken: set[str]) -> str:
+    candidates = [name, *(f"{name}-{k}" for k in range(2, len(taken) + 3))]
+    return next(each for each in candidates if each.casefold() not in taken)

@@ -1,0 +1,308 @@
+"""Bytes → plain data with the line and column of every key; hostile files are refused.
+
+The tree is built straight from the parser's events, so depth is bounded before anything recurses
+(libyaml's own composer overflows the C stack on deep nesting). Mappings become dicts, sequences
+tuples; numbers, booleans and nulls follow the YAML 1.2 core schema (`1e3` is a number, `no`, `on`
+and `12:30` are text, `012` is twelve).
+
+Looking into a file's plain data before anything about it is known to be right.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import yaml
+
+from eigassign.case.suggestions import shown
+from eigassign.errors import CaseError, Problem
+
+# --- Bytes → plain data with the line and column of every key; hostile files are refused
+
+MAX_BYTES = 10_000_000
+MAX_DEPTH = 50
+KeyPath = tuple[str | int, ...]
+Finding = tuple[KeyPath, str]  # where, and what is wrong there
+
+_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_INT = re.compile(r"[-+]?[0-9]+")
+_BASED = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
+_FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+_SPECIAL = re.compile(r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
+_WORDS: dict[str, bool | None] = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+}
+_UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\ufeff\ufffe\uffff]")
+
+
+class Mark(NamedTuple):
+    """Position of one node (1-based; a mapping's value is found at its key) and of its children."""
+
+    line: int
+    column: int
+    children: Mapping[str | int, Mark] | None = None
+
+    def find(self, path: KeyPath) -> Mark:
+        """Mark of the deepest existing node on ``path``."""
+        mark = self
+        for key in path:
+            if mark.children is None or key not in mark.children:
+                break
+            mark = mark.children[key]
+        return mark
+
+
+@dataclass(frozen=True)
+class Source:
+    """One file as plain data, its marks, and the problems that did not keep it from being read."""
+
+    file: str
+    tree: Mapping[str, object]
+    marks: Mark
+    problems: tuple[Problem, ...] = ()
+
+    def problem(self, path: KeyPath, message: str) -> Problem:
+        """Problem at the line and column of ``path``, or of the nearest key that exists."""
+        mark = self.marks.find(path)
+        return Problem(self.file, mark.line, mark.column, dotted(path), message)
+
+
+def dotted(path: KeyPath) -> str:
+    """``("targets", 0, "mode")`` → ``"targets[0].mode"``."""
+    text = "".join(f"[{p}]" if isinstance(p, int) else f".{_printable(p)}" for p in path)
+    return text.removeprefix(".")
+
+
+def _printable(key: str) -> str:
+    return key if key.isprintable() and len(key) <= 80 else shown(key)
+
+
+def resolve(text: str) -> object:
+    """Value of a plain (unquoted) scalar under the YAML 1.2 core schema."""
+    if text in _WORDS:
+        return _WORDS[text]
+    if _INT.fullmatch(text):
+        return int(text) if len(text) < 400 else float(text)
+    if _FLOAT.fullmatch(text):
+        return float(text)
+    if _BASED.fullmatch(text):
+        return int(text, 0) if len(text) < 400 else float("inf")
+    if _SPECIAL.fullmatch(text):
+        return float(text.replace(".", "").lower())
+    return text
+
+
+def read_yaml(data: bytes, file: str) -> Source:
+    """Parse one YAML document whose root is a mapping. Raises CaseError on anything unreadable."""
+    text = _decoded(data, file)
+    builder = _Builder(file)
+    try:
+        tree, marks = builder.document(yaml.parse(text, Loader=_LOADER))
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
+        raise CaseError((_syntax_problem(error, text, file),)) from None
+    if builder.fatal:
+        raise CaseError(tuple(builder.fatal))
+    if not isinstance(tree, dict):
+        what = "the file is empty" if tree is None else f"the file holds {shown(tree)}"
+        message = f"{what}: expected keys such as title, mechanism, coordinates"
+        raise CaseError((Problem(file, 1, 1, "", message),))
+    return Source(file, tree, marks, tuple(builder.problems))
+
+
+def _decoded(data: bytes, file: str) -> str:
+    if len(data) > MAX_BYTES:
+        message = f"larger than {MAX_BYTES // 10**6} MB: put long trajectories into a CSV file"
+        raise CaseError((Problem(file, 1, 1, "", message),))
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line, column = _position(data[: error.start].decode("utf-8", "replace"))
+        message = f"not UTF-8 text (byte 0x{data[error.start]:02x}): save the file as UTF-8"
+        raise CaseError((Problem(file, line, column, "", message),)) from None
+    bad = _UNPRINTABLE.search(text)
+    if bad:
+        line, column = _position(text[: bad.start()])
+        message = f"control character U+{ord(bad.group()):04X}: is this a text file?"
+        raise CaseError((Problem(file, line, column, "", message),))
+    return text
+
+
+def _position(before: str) -> tuple[int, int]:
+    return before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
+
+
+def _syntax_problem(error: Exception, text: str, file: str) -> Problem:
+    mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
+    line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+    parts = (getattr(error, "context", None), getattr(error, "problem", None))
+    reason = ", ".join(p for p in parts if p) or "the file cannot be read"
+    return Problem(file, line, column, "", f"not valid YAML: {reason}{_hint(reason, text, line)}")
+
+
+def _hint(reason: str, text: str, line: int) -> str:
+    lines = text.splitlines()
+    nearby = lines[max(line - 2, 0) : line]
+    if any("\t" in row[: len(row) - len(row.lstrip())] for row in nearby) or r"\t" in reason:
+        return "; a tab cannot indent YAML: use spaces"
+    if "mapping values are not allowed" in reason:
+        return "; check the indentation, and quote text that contains ': '"
+    if "could not find expected ':'" in reason:
+        return "; a key needs ': ' behind it"
+    return "; check brackets, quotes and indentation"
+
+
+class _Builder:
+    """Builds the tree from parser events; gathers what can be reported together."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self.fatal: list[Problem] = []  # the data are not what the author meant: stop after reading
+        self.problems: list[Problem] = []
+
+    def document(self, events: Iterator[Any]) -> tuple[object, Mark]:
+        """Root node of the only document; None for an empty file."""
+        tree: object = None
+        marks = Mark(1, 1)
+        documents = 0
+        for event in events:
+            if isinstance(event, yaml.DocumentStartEvent):
+                documents += 1
+                if documents > 1:
+                    self._refuse(event, (), "a second document starts here: one case per file")
+                    return tree, marks
+            elif isinstance(event, yaml.NodeEvent):
+                tree, marks = self.node(event, events, (), Mark(1, 1))
+        return tree, marks
+
+    def node(self, event: Any, events: Iterator[Any], path: KeyPath, at: Mark) -> tuple[Any, Mark]:
+        """One node, found at ``at``; ``event`` is its first event."""
+        if len(path) > MAX_DEPTH:
+            message = f"nested more than {MAX_DEPTH} levels deep"
+            raise CaseError((Problem(self.file, at.line, at.column, "", message),))
+        if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
+            self._refuse(
+                event, path, "anchors (&) and aliases (*) are refused: write the value out"
+            )
+        if getattr(event, "tag", None) is not None:
+            self._refuse(event, path, "tags (!) are refused: write the plain value")
+        if isinstance(event, yaml.MappingStartEvent):
+            return self._mapping(events, path, at)
+        if isinstance(event, yaml.SequenceStartEvent):
+            return self._sequence(events, path, at)
+        if isinstance(event, yaml.AliasEvent):
+            return None, at
+        return (event.value if event.style else resolve(event.value)), at
+
+    def _sequence(self, events: Iterator[Any], path: KeyPath, at: Mark) -> tuple[Any, Mark]:
+        values: list[object] = []
+        marks: dict[str | int, Mark] = {}
+        for event in events:
+            if isinstance(event, yaml.SequenceEndEvent):
+                break
+            i = len(values)
+            value, marks[i] = self.node(event, events, (*path, i), _mark(event))
+            values.append(value)
+        return tuple(values), Mark(at.line, at.column, marks)
+
+    def _mapping(self, events: Iterator[Any], path: KeyPath, at: Mark) -> tuple[Any, Mark]:
+        values: dict[str, object] = {}
+        marks: dict[str | int, Mark] = {}
+        for event in events:
+            if isinstance(event, yaml.MappingEndEvent):
+                break
+            place = _mark(event)
+            key, _ = self.node(event, events, (*path, "?"), place)
+            usable = self._usable(key, values, marks, path, place)
+            value, mark = self.node(next(events), events, (*path, str(key)[:80]), place)
+            if usable:
+                values[key], marks[key] = value, mark
+        return values, Mark(at.line, at.column, marks)
+
+    def _usable(
+        self, key: object, seen: dict[str, object], marks: dict[Any, Mark], path: KeyPath, at: Mark
+    ) -> bool:
+        if not isinstance(key, str):
+            number = isinstance(key, (int, float)) and not isinstance(key, bool)
+            comma = " (decimals take a point, not a comma)" if number else ""
+            message = f"keys must be text, got {shown(key)}: put it in quotes{comma}"
+        elif key in seen:
+            message = f"{shown(key)} is given twice; first in line {marks[key].line}"
+        else:
+            return True
+        where = dotted((*path, key) if isinstance(key, str) else path)
+        self.problems.append(Problem(self.file, at.line, at.column, where, message))
+        return False
+
+    def _refuse(self, event: Any, path: KeyPath, message: str) -> None:
+        mark = _mark(event)
+        self.fatal.append(Problem(self.file, mark.line, mark.column, dotted(path), message))
+
+
+def _mark(event: Any) -> Mark:
+    return Mark(event.start_mark.line + 1, event.start_mark.column + 1)
+
+
+# --- Looking into a file's plain data before anything about it is known to be right
+
+Tree = Mapping[str, object]
+
+
+def at(node: object, *keys: str) -> object:
+    """Value below ``keys``, or None where there is no such key."""
+    for key in keys:
+        node = node.get(key) if isinstance(node, Mapping) else None
+    return node
+
+
+def items(node: object, *keys: str) -> list[tuple[str, object]]:
+    """Entries of the mapping below ``keys``; none if it is not a mapping."""
+    inner = at(node, *keys)
+    return list(inner.items()) if isinstance(inner, Mapping) else []
+
+
+def names(node: object, *keys: str) -> list[str]:
+    """Keys of the mapping below ``keys``."""
+    return [name for name, _ in items(node, *keys)]
+
+
+def lacks(node: object, keys: tuple[str, ...], name: str) -> bool:
+    """Whether the mapping below ``keys`` has no ``name``; False where it is missing or no mapping
+    (one error is enough)."""
+    inner = at(node, *keys)
+    return isinstance(inner, Mapping) and name not in inner
+
+
+def entries(node: object, *keys: str) -> tuple[object, ...]:
+    """Items of the list below ``keys``; none if it is not a list."""
+    inner = at(node, *keys)
+    return inner if isinstance(inner, tuple) else ()
+
+
+def text(node: object, *keys: str) -> str | None:
+    """Text below ``keys``, or None."""
+    inner = at(node, *keys)
+    return inner if isinstance(inner, str) else None
+
+
+def trajectories(tree: object) -> list[tuple[tuple[str | int, ...], object]]:
+    """Key path and content of each trajectory: the one below `trajectory`, or those of the list."""
+    given = at(tree, "trajectory")
+    if isinstance(given, tuple):
+        return [(("trajectory", k), body) for k, body in enumerate(given)]
+    return [] if given is None else [(("trajectory",), given)]
+
+
+def trajectory_names(tree: object) -> list[str]:
+    """What each trajectory is called: its name, or its place counted from 1."""
+    bodies = [body for _, body in trajectories(tree)]
+    return [text(body, "name") or str(k) for k, body in enumerate(bodies, start=1)]
+
+
+def parameters(tree: object) -> list[tuple[str, object]]:
+    """Design parameters as the file has them: what stands under `design` but the constraints."""
+    return [(name, body) for name, body in items(tree, "design") if name != "constraints"]

@@ -1,0 +1,63 @@
+"""The expansions kept from earlier runs: `cache`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from eigassign.cli import arguments
+from eigassign.errors import UsageError
+
+if TYPE_CHECKING:
+    from eigassign.output.cache import Cache
+
+
+@click.group()
+def cache() -> None:
+    """The expansions kept from earlier runs."""
+
+
+@cache.command("path")
+@arguments.cache_dir
+def cache_path(cache_dir: Path | None) -> int:
+    """Print the cache folder."""
+    click.echo(str(_cache(cache_dir).directory))
+    return 0
+
+
+@cache.command("clear")
+@arguments.cache_dir
+def cache_clear(cache_dir: Path | None) -> int:
+    """Delete everything that is in the cache."""
+    count = _cache(cache_dir).clear()
+    click.echo(f"{count} file{'' if count == 1 else 's'} deleted")
+    return 0
+
+
+@cache.command("list")
+@arguments.cache_dir
+def cache_list(cache_dir: Path | None) -> int:
+    """List what is in the cache, oldest first."""
+    from eigassign.output.console import print_table
+
+    rows = [
+        (
+            entry.key[:12],
+            f"{entry.size_bytes / 1000:.1f}",
+            "; ".join(f"{k} {v}" for k, v in entry.meta.items()) if entry.intact else "damaged",
+        )
+        for entry in _cache(cache_dir).entries()
+    ]
+    print_table("", ("key", "kB", "what"), rows)
+    return 0
+
+
+def _cache(directory: Path | None) -> Cache:
+    from eigassign.output.cache import Cache, default_directory
+
+    found = default_directory() if directory is None else directory
+    if found is None:
+        raise UsageError("there is no home folder to keep a cache in: use --cache-dir")
+    return Cache(found)

@@ -1,0 +1,125 @@
+"""Quick questions about a case: `check`, `modes`, `schema`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from eigassign import process
+from eigassign.cli import arguments
+from eigassign.cli.reporter import print_json, reporting
+from eigassign.errors import EigassignError
+
+if TYPE_CHECKING:
+    from eigassign.pipeline.queries import CheckAnswer, ModesAnswer
+
+
+@click.command()
+@click.argument("cases", nargs=-1, required=True, type=arguments.PATH)
+@arguments.json
+@arguments.common
+def check(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
+    """Check case files: every problem with its line, and what is implausible."""
+    from eigassign.pipeline.queries import check as checked
+
+    codes, answers = [0], dict[str, Any]()
+    with reporting(how) as tell:
+        for case in cases:
+            try:
+                answers[str(case)] = answer = checked(case)
+                tell.warn(answer.warnings)
+            except EigassignError as error:
+                codes.append(process.report(error))
+                if as_json:
+                    answers[str(case)] = {"problems": process.problems(error)}
+    if as_json:
+        print_json(answers)
+    else:
+        for name, answer in answers.items():
+            click.echo(_described(name, answer))
+    return max(codes)
+
+
+def _trajectories(answer: CheckAnswer) -> list[str]:
+    if len(answer.trajectories) < 2:
+        return [f"  trajectory: {answer.samples} samples in {answer.duration_s:g} s"]
+    return [
+        f"  trajectory {name!r}: {samples} samples in {duration_s:g} s"
+        for name, samples, duration_s in answer.trajectories
+    ]
+
+
+def _described(name: str, answer: CheckAnswer) -> str:
+    q, y = (", ".join(names) or "none" for names in (answer.q_names, answer.y_names))
+    lines = [
+        f"{name}: {answer.title}",
+        f"  {answer.n_dof} degrees of freedom, {answer.n_rigid} of them rigid",
+        f"  coordinates {q}; design {y}; targets {answer.targets}",
+        *_trajectories(answer),
+    ]
+    return "\n".join([*lines, *(f"  {note}" for note in answer.notes)])
+
+
+@click.command()
+@arguments.case
+@click.option("--q", metavar="VALUES", help="Pose, as '1.817, 5.312' or '104 deg 304 deg'.")
+@click.option("--y", metavar="VALUES", help="Design, as '0.125 0.125' or '125 g, 0'.")
+@click.option("--count", type=click.IntRange(1), default=4, show_default=True, help="Modes.")
+@click.option("--draw", is_flag=True, help="Draw their shapes, in results/<case>_modes.")
+@click.option("--out", type=arguments.PATH, help="Draw their shapes, in this folder.")
+@arguments.force
+@arguments.json
+@arguments.common
+def modes(
+    case: Path, q: str | None, y: str | None, count: int, as_json: bool, draw: bool, **how: Any
+) -> int:
+    """Exact natural frequencies of the elastic modes at one pose and design, and their shapes.
+
+    Without --q at the case's expansion point, or where its trajectory starts; without --y for the
+    design written in the file.
+    """
+    from eigassign.pipeline import queries
+    from eigassign.pipeline.queries import point
+
+    folder = None
+    with reporting(how) as tell:
+        at = point(case, q, y)
+        if draw or how["out"] is not None:
+            answer, folder = queries.draw_modes(case, *at, count, how["out"], how["force"])
+        else:
+            answer = queries.modes(case, *at, count)
+        if as_json and folder is not None:
+            tell.stage(f"{folder} written")
+    if as_json:
+        told = {"rigid_modes": answer.rigid_modes, "frequencies_hz": answer.frequencies_hz}
+        lost = answer.truncation_error
+        print_json(told if lost is None else {**told, "truncation_error": lost})
+    else:
+        _show_modes(answer, folder)
+    return 0
+
+
+def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
+    from eigassign.output.console import print_modes
+
+    print_modes(
+        answer.frequencies_hz,
+        rigid_modes=answer.rigid_modes,
+        q=answer.q,
+        y=answer.y,
+        truncation=answer.truncation_error,
+    )
+    if folder is not None:
+        click.echo(f"{folder} written")
+
+
+@click.command()
+def schema() -> int:
+    """Print the JSON Schema of case files, for editors."""
+
+    from eigassign.case import json_schema
+
+    print_json(json_schema(), indent=2)
+    return 0

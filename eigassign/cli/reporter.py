@@ -1,0 +1,116 @@
+"""What every command shares: how it speaks on stderr, and JSON on stdout.
+
+What a command says on stderr while it works: stages, warnings, the log.
+
+Answers of any kind as one line of JSON: ASCII, so that every terminal can carry it.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import logging
+import math
+import re
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+import click
+
+from eigassign.errors import Problem
+from eigassign.process import say
+
+# --- What every command shares: how it speaks on stderr, and JSON on stdout
+
+
+def reporting(how: Mapping[str, Any]) -> AbstractContextManager[Reporter]:
+    """A teller as loud as ``--quiet`` and ``-v`` say."""
+    return _reporting_at(how["verbose"], how["quiet"])
+
+
+def print_json(value: object, indent: int | None = None) -> None:
+    """``value`` on stdout, as JSON."""
+
+    click.echo(dumps(value, indent))
+
+
+# --- What a command says on stderr while it works: stages, warnings, the log
+
+_PLACE = re.compile(r"(.+?:\d+:\d+: )(.+)", re.DOTALL)  # of a problem that is text already
+
+
+@dataclass(frozen=True)
+class Reporter:
+    """Writes to stderr. ``level`` 0: errors only; 1: warnings and stages; 2, 3: more of the log."""
+
+    level: int = 1
+
+    def stage(self, line: str) -> None:
+        """Progress of long work."""
+        if self.level > 0:
+            say([line])
+
+    def warn(self, warnings: Iterable[Problem | str]) -> None:
+        """``file:line:column: warning: path: message``, or without a place."""
+        for warning in dict.fromkeys(map(str, warnings)) if self.level > 0 else ():
+            located = _PLACE.fullmatch(warning)
+            place, message = located.groups() if located else ("", warning)
+            say([f"{place}warning: {message}"])
+
+    def error(self, line: str) -> None:
+        """Why the exit code will not be 0."""
+        say([f"eigassign: {line}"])
+
+    def stream(self) -> TextIO:
+        """Where progress bars may go: stderr, or nowhere."""
+        return sys.stderr if self.level > 0 and sys.stderr is not None else io.StringIO()
+
+
+@contextmanager
+def _reporting_at(verbose: int, quiet: bool) -> Iterator[Reporter]:
+    """A teller, with the log of this package on stderr meanwhile."""
+    level = 0 if quiet else 1 + verbose
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(_Formatter())
+    ours = logging.getLogger("eigassign")
+    before = ours.level
+    ours.addHandler(handler)
+    ours.setLevel((logging.ERROR, logging.WARNING, logging.INFO, logging.DEBUG)[min(level, 3)])
+    try:
+        yield Reporter(level)
+    finally:
+        ours.removeHandler(handler)
+        ours.setLevel(before)
+
+
+class _Formatter(logging.Formatter):
+    """``warning: text``, as all else on stderr."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return f"{record.levelname.lower()}: {super().format(record)}"
+
+
+# --- Answers of any kind as one line of JSON: ASCII, so that every terminal can carry it
+
+
+def dumps(value: object, indent: int | None = None) -> str:
+    """JSON of dataclasses, mappings, sequences and arrays; a number that is not finite is null."""
+    return json.dumps(_plain(value), indent=indent, allow_nan=False)
+
+
+def _plain(value: object) -> object:
+    if hasattr(value, "tolist"):  # NumPy's arrays and scalars, without importing NumPy
+        value = value.tolist()
+    if is_dataclass(value):
+        value = {field.name: getattr(value, field.name) for field in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, Path):
+        return str(value)
+    return None if isinstance(value, float) and not math.isfinite(value) else value

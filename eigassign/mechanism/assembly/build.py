@@ -1,0 +1,210 @@
+"""From a case to its affine pencil: unknowns, links, springs, drives, coefficient functions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.case import CaseFile
+from eigassign.errors import MechanismError
+from eigassign.mechanism.assembly.assembly import Accumulator, LocalLink, add_links, pattern
+from eigassign.mechanism.assembly.node_motion import NodeMotions
+from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism.elements.craig_bampton import as_asked
+from eigassign.mechanism.elements.links import copies_of, link_mesh
+from eigassign.mechanism.elements.mesh import DOFS, LinkMesh
+from eigassign.mechanism.kinematics.coordinates import Parameters
+from eigassign.mechanism.kinematics.coordinates import parameters as variables
+from eigassign.mechanism.kinematics.forward import Kinematics, kinematics
+from eigassign.mechanism.kinematics.topology import Placement
+from eigassign.mechanism.kinematics.travel_limits import rails
+from eigassign.series.expression import compile_program
+
+Ints = NDArray[np.intp]
+Objects = NDArray[np.object_]
+
+
+LocalLinks: TypeAlias = "tuple[list[LocalLink], NodeMotions]"
+
+
+def build_pencil(
+    case: CaseFile, parameters: Parameters, motion: Kinematics, local: LocalLinks | None = None
+) -> Pencil:
+    """Assemble K and M of eq. (1) for a mechanism; raises MechanismError naming what is wrong.
+
+    ``local`` is what `local_links` gave, where that is known already.
+    """
+    links, nodes = local_links(case, parameters, motion) if local is None else local
+    stiffness, mass = Accumulator(), Accumulator()
+    add_links(stiffness, mass, links, nodes.count)
+    _add_springs(stiffness, case, parameters, motion, nodes)
+    _add_drives(stiffness, case, parameters, motion, nodes.count)
+    return _compile(stiffness, mass, case, parameters, motion, nodes.count)
+
+
+def with_elements(case: CaseFile, elements: Mapping[str, int]) -> CaseFile:
+    """The case with other numbers of elements for the named beam links."""
+    return _with_links(case, "elements", elements)
+
+
+def with_reduction(case: CaseFile, frequencies: Mapping[str, float | None]) -> CaseFile:
+    """The case with other frequencies (Hz) to which links are reduced; None leaves one whole."""
+    return _with_links(case, "reduce_to", frequencies)
+
+
+def _with_links(case: CaseFile, key: str, values: Mapping[str, float | None]) -> CaseFile:
+    if not values:
+        return case
+    links = {
+        name: link.model_copy(update={key: values[name]}) if name in values else link
+        for name, link in case.mechanism.links.items()
+    }
+    same_kind: Any = type(case.mechanism.links)
+    mechanism = case.mechanism.model_copy(update={"links": same_kind(links)})
+    return replace(case, mechanism=mechanism)
+
+
+@dataclass(frozen=True)
+class WholeLinks:
+    """A case with its links before they are reduced, to any frequency."""
+
+    case: CaseFile
+    parameters: Parameters
+    motion: Kinematics
+    meshes: Mapping[str, LinkMesh]
+
+
+def whole_links(case: CaseFile) -> WholeLinks:
+    """Variables, kinematics and the mesh of every link with all its dofs."""
+    numbers = variables(case)
+    motion = kinematics(case, numbers)
+    return WholeLinks(case, numbers, motion, _meshes(case, numbers, motion))
+
+
+def _meshes(case: CaseFile, parameters: Parameters, motion: Kinematics) -> dict[str, LinkMesh]:
+    """The mesh of every link; copies of a beam share theirs."""
+    known = parameters.with_passive(motion.passive)
+    copies = copies_of(case, known, motion.tree)
+    made: dict[object, LinkMesh] = {}
+    for name in (p.link for p in motion.placements):
+        key = copies.get(name, name)
+        if key not in made:
+            made[key] = link_mesh(case, known, motion.tree, name)
+    return {p.link: made[copies.get(p.link, p.link)] for p in motion.placements}
+
+
+def local_links(
+    case: CaseFile,
+    parameters: Parameters,
+    motion: Kinematics,
+    whole: Mapping[str, LinkMesh] | None = None,
+) -> LocalLinks:
+    """Every link's matrices in its own frame, and how its nodes hang on the unknowns.
+
+    Links are reduced as the case asks; ``whole`` are their meshes where they are known already.
+    """
+    meshes = _meshes(case, parameters, motion) if whole is None else whole
+    meshes = {name: as_asked(case, parameters, name, mesh) for name, mesh in meshes.items()}
+    nodes = NodeMotions(motion, meshes, case.mechanism.space)
+    nodes.number()
+    if motion.tree.n_elastic < len(motion.tree.loops):
+        from eigassign.mechanism.assembly.rigid_loops import close_rigid_loops
+        from eigassign.mechanism.kinematics.loop_closure import reference
+
+        close_rigid_loops(nodes, parameters, reference(case, parameters))
+    else:
+        nodes.number_passive(motion.tree.passive)
+    return [_local_link(p, meshes[p.link], nodes) for p in motion.placements], nodes
+
+
+def _local_link(placement: Placement, mesh: LinkMesh, nodes: NodeMotions) -> LocalLink:
+    """The link's matrices with its own unknowns and the motion of its carried nodes."""
+    own = nodes.own[placement.link]
+    carried = {}
+    for name, slots in mesh.nodes.items():
+        present = slots[slots >= 0]
+        if (own[present] < 0).any():
+            rows = nodes.rows((placement.link, name))
+            for component, slot in enumerate(slots):
+                if slot >= 0:
+                    carried[int(slot)] = list(rows[component].items())
+    return LocalLink(
+        stiffness=mesh.stiffness,
+        mass=mesh.mass,
+        rigid=mesh.rigid,
+        twist=placement.twist[list(DOFS[nodes.space])],
+        own=own,
+        carried=carried,
+        reduction=mesh.reduction,
+    )
+
+
+def _add_springs(
+    target: Accumulator,
+    case: CaseFile,
+    parameters: Parameters,
+    motion: Kinematics,
+    nodes: NodeMotions,
+) -> None:
+    if getattr(case.mechanism, "springs", None):
+        from eigassign.mechanism.assembly.springs import add_springs
+
+        add_springs(target, case, parameters, motion, nodes)
+
+
+def _add_drives(
+    target: Accumulator,
+    case: CaseFile,
+    parameters: Parameters,
+    motion: Kinematics,
+    n_u: int,
+) -> None:
+    """Drive stiffness k on the deflection of its joint, which is that coordinate's unknown."""
+    for column, i in enumerate(motion.columns):
+        name, coordinate = tuple(case.coordinates.items())[i]
+        if not isinstance(coordinate.drive, str):
+            path = f"coordinates.{name}.drive.stiffness"
+            stiffness = parameters.number(path, coordinate.drive.stiffness)
+            target.add_small(n_u + column, n_u + column, stiffness)
+
+
+def _compile(
+    stiffness: Accumulator,
+    mass: Accumulator,
+    case: CaseFile,
+    parameters: Parameters,
+    motion: Kinematics,
+    n_u: int,
+) -> Pencil:
+    n_dof = n_u + len(motion.columns)
+    if not n_dof:
+        raise MechanismError("mechanism.links", "nothing can move: every link is rigid and locked")
+    entries = [stiffness.finish(n_u), mass.finish(n_u)]
+    used = np.zeros(1 + len(parameters.recorder.nodes), dtype=bool)  # the constant, every atom
+    used[0] = True
+    for entry in entries:
+        used[entry[2] + 1] = True
+    place, atoms = np.cumsum(used) - 1, np.flatnonzero(used)[1:] - 1
+    theta = [(r, c, place[a + 1], v) for r, c, a, v in entries]
+    rows, columns, weights = pattern(theta, n_dof, len(atoms) + 1)
+    n_y, n_q = len(parameters.design), len(parameters.coordinates)
+    to_program = np.eye(n_q + n_y)
+    to_program[:n_q, :n_q] = motion.relative
+    return Pencil(
+        n_dof=n_dof,
+        n_u=n_u,
+        rigid=n_u + np.array(motion.rigid, dtype=np.intp),
+        rows=rows,
+        columns=columns,
+        stiffness=weights[0],
+        mass=weights[1],
+        program=compile_program(parameters.recorder, atoms.tolist(), n_q + n_y),
+        to_program=to_program,
+        shift=np.concatenate([motion.offset, np.zeros(n_y)]),
+        n_q=n_q,
+        rails=rails(case, parameters.with_passive(motion.passive), motion.tree),
+    )

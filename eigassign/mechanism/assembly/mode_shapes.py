@@ -1,0 +1,222 @@
+"""How a mechanism moves in given vectors [u; q̇]: its named nodes, and its beams between nodes.
+
+The local motion of a link's nodes is v = B [u; q̇] of eq. (1), of a reduced link that of all the
+nodes it stands for. It is turned into world axes for drawing. Between nodes a beam takes the shapes
+of its elements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.mechanism.assembly.assembly import LocalLink, motion_matrix, motion_scalars
+from eigassign.mechanism.assembly.build import local_links
+from eigassign.mechanism.elements.beam import bending_shapes
+from eigassign.mechanism.elements.links import axes
+from eigassign.mechanism.elements.mesh import LinkMesh, Strand
+from eigassign.mechanism.kinematics.poses import Poses
+from eigassign.mechanism.kinematics.rotations import Objects
+from eigassign.mechanism.kinematics.topology import Placement
+from eigassign.series.expression import Scalar
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+POINTS = 24  # intervals drawn of a beam, at least; an element has one or more
+
+
+@dataclass(frozen=True)
+class NodeShape:
+    """One node: ``place`` (3,) m, ``motion`` (count, 6): v and ω in world axes per vector."""
+
+    place: Floats
+    motion: Floats
+
+
+@dataclass(frozen=True)
+class StrandShape:
+    """One beam, or one straight connection of a link without beams: points along it.
+
+    ``places`` (n_points, d) in m where the equivalent rigid link has them, ``motions``
+    (count, n_points, d) their displacements per vector, in world axes; d is 2 in a plane, else 3.
+    """
+
+    link: str
+    places: Floats
+    motions: Floats
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """The motion of a mechanism in ``count`` vectors, at one pose and design."""
+
+    strands: tuple[StrandShape, ...]
+    nodes: Mapping[tuple[str, str], NodeShape]  # by (link, node)
+
+
+def shapes(poses: Poses, x: Floats, phi: Floats) -> Shapes:
+    """The motion of all nodes and beams in the vectors ``phi`` (n_dof, count) at one sample x."""
+    case = poses.case
+    links, numbering = local_links(case, poses.parameters, poses.motion)
+    parts = [
+        _symbols(link, placement, numbering.meshes[placement.link], poses)
+        for link, placement in zip(links, poses.motion.placements, strict=True)
+    ]
+    values = iter(poses.values(x, [array for part in parts for array in part.arrays]))
+    strands: list[StrandShape] = []
+    nodes: dict[tuple[str, str], NodeShape] = {}
+    d = 2 if case.mechanism.space == "planar" else 3
+    for part in parts:
+        motion = _LinkMotion(part, [next(values)[0] for _ in part.arrays], phi, numbering.count)
+        nodes |= motion.nodes()
+        strands += motion.strands(d)
+    return Shapes(tuple(strands), nodes)
+
+
+@dataclass(frozen=True)
+class _Symbols:
+    """What of one link has to be evaluated at x, as arrays of scalars in a fixed order."""
+
+    name: str
+    local: LocalLink
+    mesh: LinkMesh  # with all its nodes
+    strands: tuple[Strand, ...]
+    arrays: tuple[Objects, ...]
+
+
+def _symbols(local: LocalLink, placement: Placement, mesh: LinkMesh, poses: Poses) -> _Symbols:
+    mesh = mesh if mesh.reduction is None else mesh.reduction.mesh
+    strands = tuple(mesh.strands) or _spokes(placement.link, mesh, poses)
+    arrays = [
+        placement.world_rotation,
+        placement.world_origin,
+        np.array(list(mesh.positions.values()), dtype=object).reshape(-1, 3),
+        *(np.array(group, dtype=object) for group in motion_scalars(local)),
+    ]
+    for strand in strands:
+        shear = np.array(strand.shear, dtype=object).reshape(-1, 2)
+        arrays += [np.array(list(strand.points), dtype=object), shear]
+    return _Symbols(placement.link, local, mesh, strands, tuple(arrays))
+
+
+def _spokes(link: str, mesh: LinkMesh, poses: Poses) -> tuple[Strand, ...]:
+    """The connections drawn of a rigid link or a superelement, each as one element.
+
+    That is straight for a rigid link; between the nodes of a superelement, of which nothing else
+    is known, it has the nodes' displacements and slopes.
+    """
+    none: tuple[Scalar, Scalar] = (0.0, 0.0)
+    return tuple(
+        Strand(
+            [_slots(mesh, name) for name in pair],
+            [mesh.positions[name] for name in pair],
+            None,
+            [none],
+        )
+        for pair in poses.drawn[poses.links.index(link)]
+    )
+
+
+def _slots(mesh: LinkMesh, node: str) -> Ints:
+    return mesh.nodes["@origin" if "@origin" in mesh.nodes else node]
+
+
+class _LinkMotion:
+    """One link in numbers: where it is, and how its nodes move in its own axes."""
+
+    def __init__(self, part: _Symbols, values: Sequence[Floats], phi: Floats, n_u: int) -> None:
+        self.part = part
+        self.rotation, self.origin, self.positions, carries, twist, rigid, *strands = values
+        self.lines = list(zip(part.strands, strands[::2], strands[1::2], strict=True))
+        v = motion_matrix(part.local, carries, twist, rigid, n_u, len(phi)) @ phi
+        reduction = part.local.reduction
+        self.local = v if reduction is None else reduction.basis @ v  # (n_local, count)
+
+    def at(self, slots: Ints, X: Floats) -> Floats:
+        """(6, count): motion of the node with these slots at X, in the link's axes."""
+        motion = np.zeros((6, self.local.shape[1]))
+        motion[slots >= 0] = self.local[slots[slots >= 0]]
+        if "@origin" in self.part.mesh.nodes:  # of a rigid link, v + ω × X
+            motion[:3] += np.cross(motion[3:].T, X).T
+        return motion
+
+    def nodes(self) -> dict[tuple[str, str], NodeShape]:
+        """All named nodes."""
+        found = {}
+        for name, X in zip(self.part.mesh.positions, self.positions, strict=True):
+            motion = self.at(_slots(self.part.mesh, name), X)
+            world = np.concatenate([self.rotation @ motion[:3], self.rotation @ motion[3:]])
+            found[self.part.name, name] = NodeShape(self.origin + self.rotation @ X, world.T)
+        return found
+
+    def strands(self, d: int) -> list[StrandShape]:
+        """All lines, as points in world axes."""
+        found = []
+        for strand, X, shear in self.lines:
+            at_nodes = np.stack(
+                [self.at(s, place) for s, place in zip(strand.slots, X, strict=True)]
+            )
+            places, motions = along(X, at_nodes, shear, strand.axes)
+            found.append(
+                StrandShape(
+                    self.part.name,
+                    (self.origin + places @ self.rotation.T)[:, :d],
+                    (motions @ self.rotation.T)[..., :d],
+                )
+            )
+        return found
+
+
+def along(X: Floats, motion: Floats, shear: Floats, turn: Floats | None) -> tuple[Floats, Floats]:
+    """Places (n_points, 3) and displacements (count, n_points, 3) along a row of beam elements.
+
+    ``X`` (n + 1, 3) are its nodes, ``motion`` (n + 1, 6, count) their motion, ``shear`` (n, 2) the
+    elements' Φ; ``turn`` has the elements' axes as rows, in the axes of all these.
+    """
+    step = np.diff(X, axis=0)
+    h = np.linalg.norm(step, axis=1)
+    if not h.all():  # a spoke of no length
+        return X, motion[:, :3].transpose(2, 0, 1)
+    turn = axes(step[0]) if turn is None else turn
+    n, count = len(h), max(1, -(-POINTS // len(h)))
+    xi = np.arange(count) / count
+    local = np.concatenate([turn @ motion[:, :3], turn @ motion[:, 3:]], axis=1)
+    inner = _between(local, h, shear, xi) @ turn  # (count, n, n_xi, 3)
+    places = X[:-1, None] + xi[:, None] * step[:, None]
+    ends = motion[-1, :3].T[:, None]
+    flat = inner.reshape(len(inner), n * len(xi), 3)
+    return np.concatenate([places.reshape(-1, 3), X[-1:]]), np.concatenate([flat, ends], axis=1)
+
+
+def _between(local: Floats, h: Floats, shear: Floats, xi: Floats) -> Floats:
+    """Displacements (count, n, n_xi, 3) at ξ of each element, in the elements' axes."""
+    first, second = local[:-1], local[1:]
+    axial = np.einsum(
+        "xj,jnc->cnx", np.stack([1.0 - xi, xi], 1), np.stack([first, second])[:, :, 0]
+    )
+    bent = [
+        _bent(first, second, h, shear[:, k], xi, (w, slope, sign))
+        for k, (w, slope, sign) in enumerate(((1, 5, 1.0), (2, 4, -1.0)))
+    ]  # θ_z = dv/dx, θ_y = −dw/dx
+    return np.stack([axial, *bent], axis=-1)
+
+
+def _bent(
+    first: Floats,
+    second: Floats,
+    h: Floats,
+    phi: Floats,
+    xi: Floats,
+    plane: tuple[int, int, float],
+) -> Floats:
+    """Deflection (count, n, n_xi) in one plane of bending."""
+    w, slope, sign = plane
+    turned = sign * h[:, None]
+    dofs = np.stack(
+        [first[:, w], turned * first[:, slope], second[:, w], turned * second[:, slope]]
+    )
+    N = bending_shapes(xi[None, :], phi[:, None])  # (n, n_xi, 4)
+    return np.asarray(np.einsum("nxj,jnc->cnx", N, dofs))

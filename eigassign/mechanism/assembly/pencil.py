@@ -1,0 +1,202 @@
+"""The affine pencil: K = Σ θ_j(q, y) K_j and M = Σ θ_j(q, y) M_j with constant sparse K_j, M_j.
+
+The non-zeros of K and M on one common pattern are linear in θ: ``data = weights @ θ`` with θ_0 = 1.
+θ is a compiled program, evaluated on samples or on truncated power series; nothing else differs
+between exact, Taylor and reduced evaluation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from eigassign.series.algebra import Samples, Truncated
+from eigassign.series.expression import Program
+from eigassign.series.multi_index import LowerSet, on_faces
+
+if TYPE_CHECKING:
+    from eigassign.mechanism.kinematics.travel_limits import Rails
+
+
+Floats = NDArray[np.float64]
+STACK_LIMIT = 500_000  # numbers: 4 MB
+TINY_STACK = 20_000
+MANY = 200  # coefficients from which it pays to know which of them are zero
+Ints = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Pencil:
+    """K and M of eq. (1) in the unknowns [u; q̇], order n_dof = n_u + n_columns.
+
+    x = (q, y) are the case's variables, z = ``to_program`` x + ``shift`` those of the program
+    (relative joint coordinates and design parameters).
+    """
+
+    n_dof: int
+    n_u: int
+    rigid: Ints  # dofs of the free coordinates: the rigid-body modes
+    rows: Ints
+    columns: Ints
+    stiffness: sparse.csr_array  # (n_nonzeros, 1 + n_theta)
+    mass: sparse.csr_array
+    program: Program
+    to_program: Floats  # (n_z, n_x)
+    shift: Floats  # (n_z,)
+    n_q: int
+    rails: Rails | None = None  # where carriages and nuts may stand
+
+    @property
+    def n_theta(self) -> int:
+        """Number of coefficient functions, θ_0 = 1 included."""
+        return int(self.stiffness.shape[1])
+
+    @cached_property
+    def active(self) -> NDArray[np.bool_]:
+        """Which variables z anything depends on: the others are dropped from every expansion."""
+        return np.asarray(self.program.dependence.any(axis=0))
+
+    @cached_property
+    def elastic(self) -> Ints:
+        """The dofs that are not rigid-body coordinates: u and held coordinates."""
+        return np.delete(np.arange(self.n_dof), self.rigid)
+
+    @cached_property
+    def term_stacks(self) -> Floats | None:
+        """All K_j and M_j dense, as (row, 2, n_theta, column), where that is small."""
+        if self.n_theta * self.n_dof**2 > STACK_LIMIT:
+            return None
+        dense = self._pair(np.stack([self.stiffness.toarray(), self.mass.toarray()]))
+        return np.ascontiguousarray(dense.transpose(2, 0, 1, 3))
+
+    @cached_property
+    def elastic_first(self) -> Ints | None:
+        """All dofs, the rigid ones last; None where they are in this order anyway."""
+        order = np.concatenate([self.elastic, self.rigid])
+        return None if (order == np.arange(self.n_dof)).all() else order
+
+    @cached_property
+    def by_term(self) -> tuple[sparse.csc_array, sparse.csc_array]:
+        """The weights of K and of M term by term."""
+        return self.stiffness.tocsc(), self.mass.tocsc()
+
+    @cached_property
+    def mass_magnitude(self) -> Floats | sparse.csr_array:
+        """|(M_j)_ii| (n_dof, n_theta): with |θ| the size of what adds up to each M_ii."""
+        on = np.flatnonzero(self.rows == self.columns)
+        sizes = abs(self.mass[on])
+        if self.n_dof * self.n_theta <= TINY_STACK:
+            dense = np.zeros((self.n_dof, self.n_theta))
+            dense[self.rows[on]] = sizes.toarray()
+            return dense
+        place = (np.ones(len(on)), (self.rows[on], np.arange(len(on))))
+        return sparse.csr_array(sparse.csr_array(place, shape=(self.n_dof, len(on))) @ sizes)
+
+    @cached_property
+    def local_directions(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+        """dz/dw, dw/dx for w the active ones of z, and which of x they depend on."""
+        directions = self.to_program[self.active]
+        return np.eye(len(self.shift))[:, self.active], directions, (directions != 0.0).any(axis=0)
+
+    def theta(self, x: Floats) -> Floats:
+        """θ at samples x (n_samples, n_x): shape (n_theta, n_samples).
+
+        Raises TravelError where a carriage or nut leaves its beam.
+        """
+        x = np.atleast_2d(x)
+        z = self.to_program @ x.T + self.shift[:, None]
+        if self.rails is not None:
+            self.rails.require(z, x)
+        theta = np.empty((self.n_theta, len(x)))
+        theta[0], theta[1:] = 1.0, self.program.run(Samples(), z)
+        return theta
+
+    def theta_series(self, space: LowerSet, x0: Floats, directions: Floats) -> Floats:
+        """Coefficients of θ (n_theta, N) about x0 in w, where z = z0 + ``directions`` w."""
+        inner, where = self._needed(space, directions)
+        z = np.zeros((len(self.shift), len(inner)))
+        z[:, 0] = self.to_program @ x0 + self.shift
+        if self.rails is not None:
+            self.rails.require(z[:, :1], x0[None])
+        present = (inner.units >= 0).nonzero()[0]
+        z[:, inner.units[present]] = directions[:, present]
+        theta = np.zeros((self.n_theta, len(space)))
+        theta[0, 0] = 1.0
+        theta[1:, where] = self.program.run(Truncated(inner), z)
+        return theta
+
+    def _needed(self, space: LowerSet, directions: Floats) -> tuple[LowerSet, Ints | slice]:
+        """The members that θ may have coefficients of, and their places; all of a small set."""
+        if len(space) < MANY:
+            return space, slice(None)
+        return on_faces(space, (self.program.faces @ (directions != 0.0)).tobytes())
+
+    def matrices(self, theta: Floats) -> tuple[Floats, Floats]:
+        """Dense K, M (n_samples, n_dof, n_dof) for θ (n_theta, n_samples)."""
+        K, M = self.both_matrices(theta)
+        return K, M
+
+    def both_matrices(self, theta: Floats) -> Floats:
+        """The same as one array (2, n_samples, n_dof, n_dof)."""
+        if self._stack is not None:
+            return np.asarray((theta.T @ self._stack).reshape(2, -1, self.n_dof, self.n_dof))
+        return self._pair((self._both @ theta).reshape(2, -1, theta.shape[1]))
+
+    @cached_property
+    def stiffness_terms(self) -> Ints:
+        """Indices j of θ with a stiffness term."""
+        return np.flatnonzero(np.diff(self.by_term[0].indptr))
+
+    def stiffness_matrices(self, theta: Floats) -> Floats:
+        """Dense K (n_samples, n_dof, n_dof) alone."""
+        return self._one(0, self.stiffness, theta)
+
+    def mass_matrices(self, theta: Floats) -> Floats:
+        """Dense M (n_samples, n_dof, n_dof) alone."""
+        return self._one(1, self.mass, theta)
+
+    def _one(self, which: int, weights: sparse.csr_array, theta: Floats) -> Floats:
+        if self._stack is not None:
+            return np.asarray((theta.T @ self._stack[which]).reshape(-1, self.n_dof, self.n_dof))
+        return np.asarray(self._pair((weights @ theta)[None])[0])
+
+    @cached_property
+    def _stack(self) -> Floats | None:
+        """All K_j and M_j dense, (2, n_theta, n_dof²), where products with zeros cost nothing."""
+        if self.n_theta * self.n_dof**2 > TINY_STACK:
+            return None
+        dense = self._pair(np.stack([self.stiffness.toarray(), self.mass.toarray()]))
+        return dense.reshape(2, self.n_theta, -1)
+
+    @cached_property
+    def _both(self) -> sparse.csr_array:
+        """Weights of K above those of M: one product for both."""
+        return sparse.csr_array(sparse.vstack([self.stiffness, self.mass]))
+
+    @cached_property
+    def _flat(self) -> Ints:
+        """Place of each non-zero in a dense matrix read row by row."""
+        return self.rows * self.n_dof + self.columns
+
+    def _pair(self, data: Floats) -> Floats:
+        """Dense (…, k, n_dof, n_dof) from the non-zeros of k matrices each, (…, n_nonzeros, k)."""
+        full = np.zeros((len(data), data.shape[2], self.n_dof * self.n_dof))
+        full[:, :, self._flat] = data.transpose(0, 2, 1)
+        return full.reshape(len(data), -1, self.n_dof, self.n_dof)
+
+    def sparse(self, data: Floats) -> sparse.csc_array:
+        """One sparse matrix from its non-zeros (n_nonzeros,) on the common pattern."""
+        columns, starts = self._by_row
+        shape = (self.n_dof, self.n_dof)
+        return sparse.csr_array((data, columns, starts), shape=shape).tocsc()
+
+    @cached_property
+    def _by_row(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Column of each non-zero, and where rows begin: the pattern runs row by row."""
+        starts = np.searchsorted(self.rows, np.arange(self.n_dof + 1))
+        return self.columns.astype(np.int32), starts.astype(np.int32)

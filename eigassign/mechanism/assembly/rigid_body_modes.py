@@ -1,0 +1,138 @@
+"""Rigid-body motions that springs leave: combinations of free coordinates that no spring resists.
+
+A spring's rows r(q, y) over the rates of the free coordinates are its ends' relative motion while
+nothing deforms. Motions W with r W = 0 at every q and y strain nothing, whatever the stiffnesses.
+The columns of eq. (1) are changed to them: in the column of one coordinate of each the others move
+along, so that rigid motions are columns again and are projected out exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.case import CaseFile
+from eigassign.errors import MechanismError, SingularityError
+from eigassign.mechanism.assembly.node_motion import Rows
+from eigassign.mechanism.assembly.springs import resists, spring_ends
+from eigassign.mechanism.kinematics.coordinates import Parameters
+from eigassign.mechanism.kinematics.forward import Kinematics
+from eigassign.mechanism.kinematics.loop_closure import reference
+from eigassign.mechanism.kinematics.rotations import multiply
+from eigassign.mechanism.kinematics.topology import Node
+from eigassign.series.algebra import Samples
+from eigassign.series.expression import Table, compile_table
+
+Floats = NDArray[np.float64]
+POSES = 6
+REACH = (0.4, 0.1, 0.02)  # rad or m about the reference, smaller where a loop cannot follow
+RESISTED = 1e-9  # relative motion of a spring's ends, scaled to 1, that is not round-off
+ROUND_OFF = 1e-12  # of an entry of W, whose largest is about 1, and of m or rad per rad or m
+
+
+def separated(
+    case: CaseFile, parameters: Parameters, motion: Kinematics, free: Sequence[int]
+) -> Kinematics:
+    """The motion with its rigid motions as columns ``rigid``.
+
+    Raises MechanismError where springs leave a motion whose direction changes with the pose.
+    """
+    W, pivots = _unresisted(case, motion, free, _rows(case, parameters, motion, free))
+    change = np.eye(len(motion.columns))
+    change[np.ix_(free, [free[k] for k in pivots])] = W
+    rigid = tuple(sorted(free[k] for k in pivots))
+    if np.array_equal(change, np.eye(len(change))):
+        return replace(motion, rigid=rigid)
+    moved = tuple(replace(p, twist=multiply(p.twist, change)) for p in motion.placements)
+    rates = replace(motion.coordinates, rates=motion.coordinates.rates @ change)
+    return replace(motion, placements=moved, coordinates=rates, rigid=rigid)
+
+
+def _rows(
+    case: CaseFile, parameters: Parameters, motion: Kinematics, free: Sequence[int]
+) -> Floats:
+    """r (n_rows, n_poses, n_free) over the free columns; zero where it is but round-off."""
+
+    def stiff(_: Node) -> Rows:
+        return [{} for _ in range(6)]
+
+    known = parameters.with_passive(motion.passive)
+    springs = list(spring_ends(case, known, motion, stiff, 0))
+    entries = [row.get(k, 0.0) for _, *pair in springs for row in pair for k in free]
+    z = reference(case, parameters)
+    table = compile_table(parameters.recorder, entries, len(z))
+    values = _at_poses(table, z, _reach(case, parameters))
+    ends = values.reshape(-1, 3, 2, len(free), values.shape[1])  # three axes of v or ω together
+    size = np.abs(ends).max(axis=(1, 2, 3, 4), initial=0.0)[:, None, None, None]
+    apart = ends[:, :, 1] - ends[:, :, 0]
+    noise = np.abs(apart).max(axis=3, keepdims=True) <= np.maximum(RESISTED * size, ROUND_OFF)
+    rows = np.where(noise, 0.0, apart).reshape(len(springs), len(free), -1).swapaxes(1, 2)
+    return np.asarray(rows[[resists(k) for k, *_ in springs]])
+
+
+def _reach(case: CaseFile, parameters: Parameters) -> Floats:
+    """How far each of z = (s, y) varies: 1 rad or m, half the range of a design parameter."""
+    ranges = [0.5 * (p.max - p.min) for p in case.design.parameters.values()]
+    return np.concatenate([np.ones(len(parameters.coordinates)), ranges])
+
+
+def _at_poses(table: Table, z: Floats, span: Floats) -> Floats:
+    """Values (n, n_poses) at the reference and at random places about it."""
+    rng = np.random.default_rng(0)
+    directions = rng.uniform(-1.0, 1.0, (len(z), POSES)) * span[:, None]
+    for reach in REACH:
+        try:
+            return table.evaluate(Samples(), z[:, None] + reach * directions)
+        except SingularityError:
+            continue
+    return np.repeat(table.evaluate(Samples(), z[:, None]), 2, axis=1)
+
+
+def _unresisted(
+    case: CaseFile, motion: Kinematics, free: Sequence[int], rows: Floats
+) -> tuple[Floats, list[int]]:
+    """W (n_free, n_rigid), and the coordinate of each column where it is 1 and the others are 0."""
+    units = np.abs(rows).max(axis=(0, 1), initial=0.0)
+    units[units == 0.0] = 1.0
+    scaled = rows / units  # rad against m
+    scaled = scaled / np.maximum(np.abs(scaled).max(axis=(1, 2), keepdims=True), 1e-300)
+    always = _null_space(scaled.reshape(-1, len(free)))
+    least = min((_null_space(A) for A in scaled.swapaxes(0, 1)), key=lambda W: W.shape[1])
+    if least.shape[1] > always.shape[1]:
+        _refuse(case, motion, free, least - always @ (always.T @ least))
+    return _echelon(always / units[:, None])
+
+
+def _null_space(A: Floats) -> Floats:
+    _, s, V = np.linalg.svd(A)
+    return np.asarray(V[int((s > RESISTED).sum()) :].T)
+
+
+def _echelon(W: Floats) -> tuple[Floats, list[int]]:
+    """The same space with the identity on pivot rows; round-off beside whole numbers removed."""
+    W = W / np.abs(W).max(axis=0, initial=0.0)
+    pivots = []
+    for column in range(W.shape[1]):
+        size = np.abs(W[:, column])
+        pivots.append(int(np.flatnonzero(size > 0.5 * size.max())[0]))
+        W[:, column] /= W[pivots[-1], column]
+        others = np.arange(W.shape[1]) != column
+        W[:, others] -= np.outer(W[:, column], W[pivots[-1], others])
+    whole = np.round(W)
+    return np.where(np.abs(W - whole) < ROUND_OFF, whole, W), pivots
+
+
+def _refuse(case: CaseFile, motion: Kinematics, free: Sequence[int], left: Floats) -> None:
+    names = tuple(case.coordinates)
+    moving = np.abs(left).max(axis=1) > RESISTED
+    joint = [names[motion.columns[k]] for k, moves in zip(free, moving, strict=True) if moves]
+    listed = " and ".join([", ".join(joint[:-1]), joint[-1]] if len(joint) > 1 else joint)
+    raise MechanismError(
+        f"coordinates.{joint[0]}",
+        f"the springs let {listed} move together, in a ratio that changes with the pose, so that "
+        "this rigid motion is no coordinate: hold or lock one of them, or spring it to the ground "
+        "in another direction as well",
+    )

@@ -1,0 +1,85 @@
+"""Rigid links, and the point masses and rigid bodies fixed to the nodes of any link."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.case import CaseFile
+from eigassign.mechanism.elements.mesh import (
+    DOFS,
+    Entries,
+    LinkMesh,
+    add_scalars,
+    body_block,
+    length,
+    node_dofs,
+    rigid_motion,
+)
+from eigassign.mechanism.kinematics.coordinates import Parameters
+from eigassign.mechanism.kinematics.rotations import Objects, euler, rotation, vector
+from eigassign.series.expression import Scalar
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+
+def add_bodies(
+    case: CaseFile, parameters: Parameters, name: str, mass: Entries, nodes: dict[str, Ints]
+) -> None:
+    """The point masses and rigid bodies fixed to a link's nodes."""
+    for key, body in case.mechanism.bodies.items():
+        link, _, node = body.at.partition(".")
+        if link == name:
+            lever = vector(getattr(body, "offset", None) or (0.0,))
+            add_scalars(mass, nodes[node], _body(case, parameters, f"bodies.{key}", body, lever))
+
+
+def _body(case: CaseFile, parameters: Parameters, path: str, body: Any, lever: Objects) -> Objects:
+    value = parameters.number(f"{path}.mass", body.mass)
+    return body_block(value, _inertia(parameters, path, body.inertia), lever)
+
+
+def _inertia(parameters: Parameters, path: str, given: Any) -> list[Scalar]:
+    """(Ixx, Iyy, Izz, Ixy, Ixz, Iyz): a number is I_zz of a planar body."""
+    if isinstance(given, (tuple, list)):
+        return [*(float(v) for v in given), *([0.0] * (6 - len(given)))]
+    zz = parameters.number(f"{path}.inertia", given)
+    return [0.0, 0.0, zz, 0.0, 0.0, 0.0]
+
+
+def rigid_link(case: CaseFile, parameters: Parameters, name: str) -> LinkMesh:
+    """A rigid link: one node at its origin carries its mass, named nodes hang on it rigidly."""
+    space, link = case.mechanism.space, case.mechanism.links[name]
+    width, kept = len(DOFS[space]), node_dofs(0, case.mechanism.space)
+    mass = Entries((width, width))
+    center = vector(getattr(link, "center", None) or (0.0,))
+    add_scalars(mass, kept, _body(case, parameters, f"links.{name}", link, center))
+    places = rigid_nodes(case, parameters, name)
+    for key, body in case.mechanism.bodies.items():
+        owner, _, node = body.at.partition(".")
+        if owner == name:
+            lever = places[node] + vector(getattr(body, "offset", None) or (0.0,))
+            add_scalars(mass, kept, _body(case, parameters, f"bodies.{key}", body, lever))
+    rigid = rigid_motion([vector([0.0])], [kept], width, space)
+    return LinkMesh(width, {"@origin": kept}, places, [], mass.terms(), rigid)
+
+
+def rigid_nodes(case: CaseFile, parameters: Parameters, name: str) -> dict[str, Objects]:
+    """Named nodes of a rigid link in its frame, m."""
+    link = case.mechanism.links[name]
+    places = {"start": vector([0.0])}
+    if getattr(link, "length", None) is not None:
+        places["end"] = vector([length(case, parameters, name)])
+    given = getattr(link, "nodes", None) or {}
+    return places | {key: vector([float(c) for c in X]) for key, X in given.items()}
+
+
+def mounted(orientation: Sequence[float] | None, angle: float) -> Floats:
+    """A constant rotation from spatial angles or a planar one."""
+    if orientation is not None:
+        return euler(orientation)
+    return np.asarray(rotation(np.array([0.0, 0.0, 1.0]), angle), dtype=np.float64)

@@ -1,0 +1,314 @@
+"""Craig-Bampton reduction of a link: few fixed-interface modes instead of its interior dofs.
+
+Craig and Bampton (AIAA J. 6 (1968) 1313): with the interface b and the interior i of a link,
+
+    u_i = Ψ u_b + W η,   Ψ = −K_ii⁻¹ K_ib,   W ⊇ Φ,   K_ii Φ = M_ii Φ Λ,  λ ≤ (2π f)² .
+
+Links stay affine in y: the basis is constant, taken in the middle of the design's bounds, and every
+constant matrix of the link is projected on it. Where the link itself changes with y, W also holds
+what Ψ and Φ become at both ends of the bounds, and the part of N(y) that Ψ does not carry, so that
+rigid-body motion is in the span at every y. What is left out is estimated in modal/truncation.py.
+
+Modes of a part whose interface is held: K_ii φ = λ M_ii φ, solved as M_ii φ = μ K_ii φ.
+
+In this inverse form massless dofs (μ = 0, as of rotations without inertia) do no harm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.linalg import eigh
+from scipy.sparse import linalg
+
+from eigassign.case import CaseFile
+from eigassign.errors import AccuracyError, MechanismError
+from eigassign.mechanism.elements.mesh import LinkMesh, Reduction, Term, link_type
+from eigassign.mechanism.elements.sparse_factor import kept_factor
+from eigassign.mechanism.kinematics.coordinates import Parameters
+from eigassign.series.algebra import Samples
+from eigassign.series.expression import compile_table
+
+# --- Craig-Bampton reduction of a link: few fixed-interface modes instead of its interior dofs
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+EXACT = 1e-10  # part of a rigid motion, relative, that may be lost to round-off
+ROUND_OFF = 1e-14  # of the squares of lengths
+CLEAN = 1e-15  # entries this small beside their diagonal are zeros
+NEW = 1e-4  # part of a vector of another design, relative, that is worth a dof of its own
+
+
+def as_asked(case: CaseFile, parameters: Parameters, name: str, mesh: LinkMesh) -> LinkMesh:
+    """A link's mesh, reduced where it says to what frequency.
+
+    A ``reduce_to: auto`` that nobody settled leaves the link whole.
+    """
+    frequency = getattr(case.mechanism.links[name], "reduce_to", None)
+    if not isinstance(frequency, float):
+        return mesh
+    return reduce_mesh(case, parameters, name, mesh, frequency)
+
+
+def reduce_mesh(
+    case: CaseFile, parameters: Parameters, name: str, mesh: LinkMesh, frequency_hz: float
+) -> LinkMesh:
+    """The link with its interior replaced by what moves below ``frequency_hz``.
+
+    The mesh as it is where that would not make it smaller. Raises MechanismError where the
+    stiffness is singular with the interface held.
+    """
+    path = f"mechanism.links.{name}"
+    nodes = {key: mesh.nodes[key] for key in mesh.nodes if key in interface(case, name)}
+    b = np.concatenate([slots[slots >= 0] for slots in nodes.values()])
+    i = np.setdiff1d(np.arange(mesh.n_local), b)
+    if not len(i):
+        return mesh
+    lam = (2.0 * np.pi * frequency_hz) ** 2
+    parts = [_Interior(K, M, b, i, path) for K, M in _matrices(case, parameters, mesh)]
+    Psi = _static(parts[0], _at_centre(case, parameters, mesh), b, i)
+    W = _span(parts, Psi, mesh.rigid, b, i, lam)
+    if W.shape[1] >= len(i):
+        return mesh
+    T = np.zeros((mesh.n_local, len(b) + W.shape[1]))
+    T[b, np.arange(len(b))] = 1.0
+    T[i, : len(b)], T[i, len(b) :] = Psi, W
+    return _projected(mesh, nodes, Reduction(mesh, T, i), b, parts[0].K_ii)
+
+
+def interface(case: CaseFile, name: str) -> set[str]:
+    """Nodes of a link that stay: of a beam both ends, of others those that something uses."""
+    mechanism: Any = case.mechanism
+    if link_type(case, name) != "frame":
+        return {"start", "end", *(getattr(mechanism.links[name], "nodes", None) or ())}
+    used = [f"{name}.start"]  # a tip is followed rigidly
+    used += [end for joint in mechanism.joints.values() for end in (joint.base, joint.follower)]
+    used += [body.at for body in mechanism.bodies.values()]
+    used += [end for spring in mechanism.springs.values() for end in spring.between]
+    pairs = [str(end).partition(".") for end in used]
+    return {node for link, _, node in pairs if link == name}
+
+
+class _Interior:
+    """The blocks of K and M of one design, and the factor of K_ii."""
+
+    def __init__(
+        self, K: sparse.csr_array, M: sparse.csr_array, b: Ints, i: Ints, path: str
+    ) -> None:
+        self.K_ii = sparse.csc_array(K[i][:, i])
+        self.K_ib = np.asarray(K[i][:, b].todense())
+        self.M_ii = sparse.csc_array(M[i][:, i])
+        self.factor = held_factor(self.K_ii, path)
+        self.Psi = np.asarray(-self.factor.solve(self.K_ib))
+
+    def modes(self, lam: float) -> Floats:
+        """Φ up to λ, of unit stiffness."""
+        return fixed_modes(self.K_ii, self.M_ii, self.factor, lam)
+
+
+def held_factor(K_ii: sparse.csc_array, path: str) -> linalg.SuperLU:
+    """The factor of K_ii; raises MechanismError where the part is limp with its interface held."""
+    factor = kept_factor(K_ii)
+    if factor is None:
+        raise MechanismError(
+            path,
+            "is limp inside: with its interface nodes held its stiffness is not positive "
+            "definite, so something in it is not attached; fix the part or add interface nodes",
+        )
+    return factor
+
+
+def _matrices(
+    case: CaseFile, parameters: Parameters, mesh: LinkMesh
+) -> list[tuple[sparse.csr_array, sparse.csr_array]]:
+    """K and M in the middle of the bounds, then at both ends where they differ there."""
+    terms = [*mesh.stiffness, *mesh.mass]
+    values = coefficients(parameters, terms, _designs(case))
+    different = [0, *(k for k in (1, 2) if not np.array_equal(values[:, k], values[:, 0]))]
+    n = len(mesh.stiffness)
+    return [
+        (total(mesh.stiffness, values[:n, k]), total(mesh.mass, values[n:, k])) for k in different
+    ]
+
+
+def _designs(case: CaseFile) -> Floats:
+    """The middle, the lower and the upper bounds of y, (3, n_y)."""
+    bounds = np.array([[p.min, p.max] for p in case.design.parameters.values()], dtype=np.float64)
+    low, high = bounds.reshape(-1, 2).T
+    return np.array([0.5 * (low + high), low, high])
+
+
+def coefficients(parameters: Parameters, terms: Sequence[Term], y: Floats) -> Floats:
+    """The coefficients of a link's terms at designs y (n, n_y), (n_terms, n)."""
+    n_q = len(parameters.coordinates)
+    table = compile_table(parameters.recorder, [t.coefficient for t in terms], n_q + y.shape[1])
+    z = np.vstack([np.zeros((n_q, len(y))), y.T])
+    return np.asarray(np.broadcast_to(table.evaluate(Samples(), z), (len(terms), len(y))))
+
+
+def total(terms: Sequence[Term], values: Floats) -> sparse.csr_array:
+    """Σ value × matrix."""
+    out = terms[0].matrix * float(values[0])
+    for term, value in zip(terms[1:], values[1:], strict=True):
+        out = out + term.matrix * float(value)
+    return sparse.csr_array(out)
+
+
+def _at_centre(case: CaseFile, parameters: Parameters, mesh: LinkMesh) -> Floats:
+    """N in the middle of the bounds, (n_local, n_twist)."""
+    values = coefficients(parameters, mesh.rigid, _designs(case)[:1])[:, 0]
+    return total(mesh.rigid, values).toarray()
+
+
+def _static(part: _Interior, N: Floats, b: Ints, i: Ints) -> Floats:
+    """Ψ, with round-off mended so that Ψ N_b = N_i to the last digit."""
+    return np.asarray(part.Psi + (N[i] - part.Psi @ N[b]) @ np.linalg.pinv(N[b]))
+
+
+def _span(
+    parts: Sequence[_Interior], Psi: Floats, rigid: Sequence[Term], b: Ints, i: Ints, lam: float
+) -> Floats:
+    """W (n_i, k), K_ii-orthonormal: rigid remainders, fixed-interface modes, other designs."""
+    K = parts[0].K_ii
+    W = np.zeros((len(i), 0))
+    for term in rigid:
+        N = term.matrix.toarray()
+        W = _extended(W, K, N[i] - Psi @ N[b], _norms(K, N[i]), EXACT)
+    Phi = parts[0].modes(lam)
+    W = _extended(W, K, Phi, np.ones(Phi.shape[1]), EXACT)
+    for part in parts[1:]:
+        W = _extended(W, K, part.Psi - Psi, _norms(K, Psi), NEW)
+        Phi = part.modes(lam)
+        W = _extended(W, K, Phi, _norms(K, Phi), NEW)
+    return W
+
+
+def _norms(K: sparse.csc_array, vectors: Floats) -> Floats:
+    squares = (vectors * np.asarray(K @ vectors)).sum(axis=0)
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+
+
+def _extended(
+    W: Floats, K: sparse.csc_array, vectors: Floats, size: Floats, least: float
+) -> Floats:
+    """W with the K-orthonormal directions that ``vectors`` add to it, relative to ``size``."""
+    new = vectors[:, size > 0.0] / size[size > 0.0]
+    for _ in range(2):
+        new = new - W @ (W.T @ np.asarray(K @ new))
+    values, turns = np.linalg.eigh(new.T @ np.asarray(K @ new))
+    keep = values > max(least**2, ROUND_OFF * values.max(initial=0.0))
+    return np.hstack([W, new @ (turns[:, keep] / np.sqrt(values[keep]))])
+
+
+def _projected(
+    mesh: LinkMesh, kept: dict[str, Ints], reduction: Reduction, b: Ints, K_ii: sparse.csc_array
+) -> LinkMesh:
+    """Interface dofs first, node by node; then the coordinates of W."""
+    T, i = reduction.basis, reduction.interior
+    place = np.full(mesh.n_local, -1, dtype=np.intp)
+    place[b] = np.arange(len(b))
+    nodes = {key: np.where(slots >= 0, place[slots], -1) for key, slots in kept.items()}
+    W = T[i, len(b) :]
+    KW = np.asarray(K_ii @ W)
+
+    def coordinates(term: Term) -> Term:
+        N = term.matrix.toarray()
+        eta = np.linalg.solve(W.T @ KW, KW.T @ (N[i] - T[i, : len(b)] @ N[b]))
+        eta[np.abs(eta) <= EXACT * _norms(K_ii, N[i])] = 0.0
+        return Term(term.coefficient, sparse.csr_array(np.vstack([N[b], eta])))
+
+    return LinkMesh(
+        T.shape[1],
+        nodes,
+        {key: mesh.positions[key] for key in kept},
+        [Term(t.coefficient, project(t.matrix, T)) for t in mesh.stiffness],
+        [Term(t.coefficient, project(t.matrix, T)) for t in mesh.mass],
+        [coordinates(t) for t in mesh.rigid],
+        reduction=reduction,
+    )
+
+
+def project(A: sparse.csr_array, T: Floats) -> sparse.csr_array:
+    """Tᵀ A T, symmetric, without zeros that are only round-off."""
+    out = T.T @ np.asarray(A @ T)
+    out = 0.5 * (out + out.T)
+    scale = np.sqrt(np.abs(np.diag(out)))
+    out[np.abs(out) < CLEAN * np.outer(scale, scale)] = 0.0
+    return sparse.csr_array(out)
+
+
+# --- Modes of a part whose interface is held: K_ii φ = λ M_ii φ, solved as M_ii φ = μ K_ii φ
+
+DENSE = 400  # interior dofs up to which all eigenvalues are computed
+FIRST = 16  # modes that Lanczos is asked for first
+LOOSE = 1e-3  # relative accuracy of the largest μ left out
+
+
+def fixed_modes(
+    K: sparse.csc_array, M: sparse.csc_array, factor: linalg.SuperLU, lam: float
+) -> Floats:
+    """All modes (n, k) with λ ≤ ``lam``, φᵀ K φ = I; ``factor`` is that of K."""
+    n, least = K.shape[0], 1.0 / lam
+    count = FIRST
+    while n > DENSE and count < n // 2:
+        mu, phi = _lanczos(K, _mass(M), factor, count, 0.0)
+        if mu[-1] < least:
+            return np.asarray(phi[:, mu >= least])
+        count *= 2
+    mu, phi = eigh(M.toarray(), K.toarray())
+    return np.asarray(phi[:, ::-1][:, mu[::-1] >= least])
+
+
+def largest_left_out(
+    K: sparse.csc_array, M: sparse.csc_array, factor: linalg.SuperLU, W: Floats
+) -> float:
+    """The largest μ = wᵀMw / wᵀKw over all w with WᵀK w = 0; an upper bound within `LOOSE`.
+
+    By deflation: M' = Pᵀ M P with P = I − W (WᵀKW)⁻¹ WᵀK has μ = 0 on the span of W.
+    """
+    n = K.shape[0]
+    if W.shape[1] >= n:
+        return 0.0
+    KW = np.asarray(K @ W)
+    kept = np.linalg.solve(W.T @ KW, KW.T) if W.shape[1] else np.zeros((0, n))
+
+    def deflated(v: Floats) -> Floats:
+        heavy = M @ (v - W @ (kept @ v))
+        return np.asarray(heavy - kept.T @ (W.T @ heavy))
+
+    if n <= DENSE:
+        mu = eigh(deflated(np.eye(n)), K.toarray(), eigvals_only=True)
+        return float(mu[-1])
+    mass = linalg.LinearOperator((n, n), matvec=deflated, dtype=np.float64)
+    mu, _ = _lanczos(K, mass, factor, 1, LOOSE)
+    return float(mu[0]) * (1.0 + LOOSE)
+
+
+def _mass(M: sparse.csc_array) -> linalg.LinearOperator:
+    rows = M.T  # symmetric: products run faster row by row
+    return linalg.LinearOperator(M.shape, matvec=lambda v: rows @ v, dtype=np.float64)
+
+
+def _lanczos(
+    K: sparse.csc_array,
+    mass: linalg.LinearOperator,
+    factor: linalg.SuperLU,
+    count: int,
+    tolerance: float,
+) -> tuple[Floats, Floats]:
+    """The largest μ, descending, and their vectors of unit K-norm."""
+    n = K.shape[0]
+    inverse = linalg.LinearOperator((n, n), matvec=factor.solve, dtype=np.float64)
+    start = np.random.default_rng(0).standard_normal(n)
+    try:
+        mu, phi = linalg.eigsh(
+            mass, count, M=K.T, Minv=inverse, which="LA", v0=start, tol=tolerance
+        )
+    except linalg.ArpackNoConvergence as error:
+        raise AccuracyError(f"the fixed-interface modes did not converge: {error}") from error
+    order = np.argsort(-mu)
+    return np.asarray(mu[order]), np.asarray(phi[:, order])

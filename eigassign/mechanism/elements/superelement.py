@@ -1,0 +1,219 @@
+"""A link from another finite-element program: K, M and its interface nodes.
+
+The rigid motion of the interior follows from the interface, N_i = −K_ii⁻¹ K_ib N_b, for K N = 0.
+
+K and M of a part from files of another program: read, and refused where they cannot be one.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from eigassign.case import CaseFile
+from eigassign.errors import MechanismError
+from eigassign.mechanism.elements.bodies import add_bodies
+from eigassign.mechanism.elements.craig_bampton import held_factor
+from eigassign.mechanism.elements.mesh import DOFS, Entries, LinkMesh, Term, link_type, rigid_motion
+from eigassign.mechanism.elements.sparse_factor import is_semidefinite
+from eigassign.mechanism.kinematics.coordinates import Parameters
+from eigassign.mechanism.kinematics.rotations import vector
+
+# --- A link from another finite-element program: K, M and its interface nodes
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+STRAIN_FREE = 1e-6  # largest |K N|_i relative to √K_ii ‖√K_jj N_j‖ that passes for none
+ALIKE = 1e-3  # relative difference of a part's mass by direction that passes for round-off
+
+
+def superelement_mesh(case: CaseFile, parameters: Parameters, name: str) -> LinkMesh:
+    """The mesh of a superelement; raises MechanismError for matrices that cannot be one."""
+    link: Any = case.mechanism.links[name]
+    path = f"mechanism.links.{name}"
+    folder = Path(getattr(case, "path", ".")).parent
+    K, M = read_pair(folder / link.stiffness, folder / link.mass, path)
+    boundary = _boundary(link, K.shape[0], path)
+    K, M = _interface_first(K, M, boundary)
+    return _mesh(case, parameters, name, K, M, len(boundary), path)
+
+
+def weights(case: CaseFile) -> tuple[str, ...]:
+    """Mass and centre of mass of every superelement, in words: wrong units show here."""
+    from eigassign.mechanism.kinematics.coordinates import parameters
+
+    return tuple(
+        _weight(name, superelement_mesh(case, parameters(case), name), case.mechanism.space)
+        for name in case.mechanism.links
+        if link_type(case, name) == "superelement"
+    )
+
+
+def _weight(name: str, mesh: LinkMesh, space: str) -> str:
+    """From NᵀMN = [[m 1, −m[c]×], …]: the mass, and where its centre c is."""
+    N = np.sum([t.matrix.toarray() for t in mesh.rigid], axis=0)
+    J = N.T @ (mesh.mass[0].matrix @ N)
+    m = J[0, 0]
+    places = (J[1, 2], -J[0, 2]) if space == "planar" else (J[1, 5], J[2, 3], J[0, 4])
+    centre = ", ".join(f"{c / m + 0.0:.4g}" for c in places) if m > 0.0 else "nowhere"
+    return f"superelement {name}: {mesh.n_local} dofs, {m:.4g} kg, centre of mass at ({centre}) m"
+
+
+def _mesh(
+    case: CaseFile,
+    parameters: Parameters,
+    name: str,
+    K: sparse.csr_array,
+    M: sparse.csr_array,
+    n_b: int,
+    path: str,
+) -> LinkMesh:
+    """Interface dofs first, node by node; then the interior or modal ones."""
+    space, n = case.mechanism.space, K.shape[0]
+    link: Any = case.mechanism.links[name]
+    width, kept = len(DOFS[space]), list(DOFS[space])
+    nodes, places = {}, {}
+    for k, (key, node) in enumerate(link.nodes.items()):
+        slots = np.full(6, -1, dtype=np.intp)
+        slots[kept] = width * k + np.arange(width)
+        nodes[key], places[key] = slots, vector([float(c) for c in node.position])
+    at_interface = rigid_motion(list(places.values()), list(nodes.values()), n, space)
+    rigid = [Term(t.coefficient, _follow(K, t.matrix, n_b, path)) for t in at_interface]
+    _check_rigid(K, rigid, path)
+    _check_mass(M, rigid, space, path)
+    mass = Entries((n, n))
+    add_bodies(case, parameters, name, mass, nodes)
+    return LinkMesh(n, nodes, places, [Term(1.0, K)], [Term(1.0, M), *mass.terms()], rigid)
+
+
+def _follow(K: sparse.csr_array, N: sparse.csr_array, n_b: int, path: str) -> sparse.csr_array:
+    """Rigid motion of the interior from that of the interface: N_i = −K_ii⁻¹ K_ib N_b."""
+    if n_b == K.shape[0]:
+        return N
+    dense = np.asarray(N.todense())
+    right = -(K[n_b:][:, :n_b] @ dense[:n_b])
+    dense[n_b:] = held_factor(K[n_b:][:, n_b:].tocsc(), path).solve(np.asarray(right))
+    dense[np.abs(dense) < 1e-12 * max(1.0, np.abs(dense).max())] = 0.0
+    return sparse.csr_array(dense)
+
+
+def _check_rigid(K: sparse.csr_array, rigid: list[Term], path: str) -> None:
+    N = np.sum([t.matrix.toarray() for t in rigid], axis=0)  # the nodes are numbers, not variables
+    size = np.sqrt(np.maximum(K.diagonal(), 0.0))  # |K_ij| ≤ √(K_ii K_jj), in any units
+    most = size[:, None] * np.linalg.norm(size[:, None] * N, axis=0)
+    if (np.abs(np.asarray(K @ N)) > STRAIN_FREE * most).any():
+        raise MechanismError(
+            f"{path}.stiffness",
+            "strains under rigid motion: the node positions or dof numbers do not fit the "
+            "matrix, or the part is supported (its own supports must be released)",
+        )
+
+
+def _interface_first(
+    K: sparse.csr_array, M: sparse.csr_array, boundary: Ints
+) -> tuple[sparse.csr_array, sparse.csr_array]:
+    interior = np.setdiff1d(np.arange(K.shape[0]), boundary)
+    order = np.concatenate([boundary, interior])
+    return K[order][:, order].tocsr(), M[order][:, order].tocsr()
+
+
+def _check_mass(M: sparse.csr_array, rigid: list[Term], space: str, path: str) -> None:
+    """A rigid translation moves the same mass in every direction."""
+    N = np.sum([t.matrix.toarray() for t in rigid], axis=0)
+    moving = DOFS[space].index(5) if space == "planar" else 3
+    masses = np.einsum("ij,ij->j", N[:, :moving], np.asarray(M @ N[:, :moving]))
+    if np.ptp(masses) > ALIKE * masses.max():
+        shown = ", ".join(f"{m:.4g}" for m in masses)
+        raise MechanismError(
+            f"{path}.mass",
+            f"gives the whole part another mass in each direction ({shown} kg): are its rows in "
+            "the order of the stiffness, in the same units?",
+        )
+
+
+def _boundary(link: Any, n: int, path: str) -> Ints:
+    dofs = [int(d) for node in link.nodes.values() for d in node.dofs]
+    if len(set(dofs)) != len(dofs) or min(dofs) < 0 or max(dofs) >= n:
+        message = f"dof numbers must be different and within 0 to {n - 1}"
+        raise MechanismError(f"{path}.nodes", message)
+    return np.array(dofs, dtype=np.intp)
+
+
+# --- K and M of a part from files of another program: read, and refused where they cannot be one
+
+SYMMETRY = 1e-8  # relative asymmetry of K or M that is taken for round-off
+ROUNDED = 1e-6  # of the diagonal: files of six digits make eigenvalues that small negative
+MOST = 2_000_000  # dofs
+
+
+def read_pair(stiffness: Path, mass: Path, path: str) -> tuple[sparse.csr_array, sparse.csr_array]:
+    """Symmetric positive semidefinite K and M of one size; raises MechanismError naming the key."""
+    K = _checked(read_matrix(stiffness, f"{path}.stiffness"), f"{path}.stiffness", stiffness.name)
+    M = _checked(read_matrix(mass, f"{path}.mass"), f"{path}.mass", mass.name)
+    if K.shape != M.shape:
+        raise MechanismError(f"{path}.mass", f"is {M.shape}, the stiffness is {K.shape}")
+    return K, M
+
+
+def read_matrix(file: Path, key: str) -> sparse.csr_array:
+    """A real square matrix from Matrix Market (.mtx) or NumPy (.npy, .npz of scipy.sparse)."""
+    try:
+        matrix = _read(file, key)
+    except (OSError, ValueError, TypeError, KeyError, EOFError, OverflowError) as error:
+        raise MechanismError(key, f"cannot read {file.name}: {error}") from error
+    except (zipfile.BadZipFile, MemoryError) as error:
+        raise MechanismError(key, f"cannot read {file.name}: {error or 'too large'}") from error
+    if matrix.dtype.kind == "c":
+        message = "has complex entries: damping is not modelled, export the real stiffness and mass"
+        raise MechanismError(key, f"{file.name} {message}")
+    if matrix.dtype.kind not in "fiu":
+        raise MechanismError(key, f"{file.name} holds {matrix.dtype}, expected real numbers")
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
+        raise MechanismError(key, f"{file.name} is not a square matrix: {matrix.shape}")
+    out = sparse.csr_array(matrix, dtype=np.float64)
+    if not np.isfinite(out.data).all():
+        raise MechanismError(key, f"{file.name} has entries that are not finite")
+    return out
+
+
+def _read(file: Path, key: str) -> Any:
+    """Whatever the file holds, as an array, dense or sparse."""
+    suffix = file.suffix.lower()
+    if suffix in (".npy", ".npz"):
+        with open(file, "rb") as stream:
+            if suffix == ".npz":
+                return sparse.load_npz(stream)
+            return np.load(stream, allow_pickle=False)
+    from scipy.io import mminfo, mmread
+
+    rows, columns, _, _, field, symmetry = mminfo(file)
+    if field == "pattern":
+        raise MechanismError(key, f"{file.name} is a pattern: it has places but no values")
+    if symmetry == "skew-symmetric":
+        raise MechanismError(key, f"{file.name} is skew-symmetric, expected a symmetric matrix")
+    if max(rows, columns) > MOST:
+        raise MechanismError(key, f"{file.name} has {rows} rows; up to {MOST} are supported")
+    return mmread(file)
+
+
+def _checked(A: sparse.csr_array, key: str, name: str) -> sparse.csr_array:
+    lost = abs(A - A.T).max() if A.nnz else 0.0
+    if lost > SYMMETRY * abs(A).max():
+        only = sparse.tril(A, -1).nnz == 0 or sparse.triu(A, 1).nnz == 0
+        hint = (
+            f"{name} holds one triangle only: say 'symmetric' in its header, or write both"
+            if only
+            else f"entries differ by {lost:.3g}"
+        )
+        raise MechanismError(key, f"is not symmetric: {hint}")
+    A = sparse.csr_array(0.5 * (A + A.T))
+    if not is_semidefinite(A, ROUNDED):
+        raise MechanismError(
+            key, "is not positive semidefinite: some motion would have negative energy"
+        )
+    return A

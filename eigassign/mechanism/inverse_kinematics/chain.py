@@ -1,0 +1,261 @@
+"""The tip of a mechanism as a function of its state: what inverse kinematics asks of a chain.
+
+A state z = (q, p) holds the coordinates and, where loops are closed, the passive freedoms. Shapes:
+n states, n_q coordinates, n_p passive freedoms, n_e closure equations, d = 2 or 3 components of the
+tip's position, r = 1 or 3 of its turning.
+
+The chain of a tip, built from the kinematics of its case.
+
+The links are placed anew with every freedom of every joint as a variable, the passive ones too: so
+inverse kinematics closes the loops and reaches the point together, and knows of no branch but the
+one it follows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.case import CaseFile
+from eigassign.mechanism.elements.mesh import node_position
+from eigassign.mechanism.kinematics.coordinates import Parameters
+from eigassign.mechanism.kinematics.forward import Kinematics, walk
+from eigassign.mechanism.kinematics.joints import COMPONENTS
+from eigassign.mechanism.kinematics.loop_closure import closure_rows, reference_coordinates
+from eigassign.mechanism.kinematics.rotations import Objects, cross, multiply
+from eigassign.mechanism.kinematics.topology import Tree, split
+from eigassign.series.algebra import Samples
+from eigassign.series.expression import Recorder, compile_table, derivative
+
+# --- The tip of a mechanism as a function of its state: what inverse kinematics asks of a chain
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+
+class Look(NamedTuple):
+    """The tip at n states, and how far the loops are from closed there."""
+
+    point: Floats  # (n, d) m
+    rotation: Floats | None  # (n, 3, 3) to the world; None where it was not asked for
+    jacobian: Floats  # (n, d or d + r, n_q + n_p): m and rad per unit of z
+    gap: Floats  # F (n, n_e), in m and, for turning, sines
+    closure: Floats  # ∂F/∂z (n, n_e, n_q + n_p)
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """How the loops of a chain are put together."""
+
+    reference: Floats  # q (n_q,) at which the assembly is chosen
+    passive: Callable[[Floats], Floats]  # q (n, n_q) -> p (n, n_p); raises SingularityError
+    turning: Bools  # (n_e,) which closure equations are sines of angles
+
+
+@dataclass(frozen=True)
+class TipChain:
+    """One node (the tip) of a mechanism, seen from the ground.
+
+    ``kinds`` of the coordinates, then of the passive freedoms: "turn" (rad, a full turn leads
+    back), "screw" (rad, it does not) or "slide" (m).
+    """
+
+    look: Callable[[Floats], Look]  # z (n, n_q + n_p)
+    joints: tuple[str, ...]  # of the coordinates, in their order
+    relative_map: tuple[Floats, Floats]  # A (n_q, n_q), b (n_q,): joint coordinates A q + b
+    kinds: tuple[str, ...]
+    turned_by: tuple[int, ...] = ()  # the components of a rotation vector that a tip can have
+    assembly: Assembly | None = None
+
+    @property
+    def n_q(self) -> int:
+        """How many coordinates there are."""
+        return len(self.joints)
+
+    def of_kind(self, kind: str) -> Bools:
+        """Which entries of a state are of this kind, (n_q + n_p,)."""
+        return np.array([k == kind for k in self.kinds], dtype=bool)
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """A look with the passive freedoms eliminated: the loops closed to first order, and kept so."""
+
+    J: Floats  # (n, m, n_q): task components per u of the coordinates
+    drift: Floats  # (n, m): what closing the loops adds
+    closing: Floats  # (n, n_p): what closes them
+    following: Floats  # (n, n_p, n_q): how the passive freedoms follow
+
+
+def reduced(seen: Look, n_q: int) -> Reduced:
+    """Passive freedoms from ∂F/∂p δp = −F and ∂F/∂p ∂p/∂q = −∂F/∂q, least squares if redundant."""
+    J = seen.jacobian
+    n, m, n_z = J.shape
+    if n_z == n_q:
+        none = np.zeros((n, 0))
+        return Reduced(J, np.zeros((n, m)), none, np.zeros((n, 0, n_q)))
+    wanted = -np.concatenate([seen.gap[:, :, None], seen.closure[:, :, :n_q]], axis=2)
+    solved = _solved(seen.closure[:, :, n_q:], wanted)
+    closing, following = solved[:, :, 0], solved[:, :, 1:]
+    J_p = J[:, :, n_q:]
+    drift = np.einsum("nmp,np->nm", J_p, closing)
+    return Reduced(J[:, :, :n_q] + J_p @ following, drift, closing, following)
+
+
+def _solved(A: Floats, B: Floats) -> Floats:
+    if A.shape[1] == A.shape[2]:
+        try:
+            return np.asarray(np.linalg.solve(A, B))
+        except np.linalg.LinAlgError:  # exactly singular somewhere
+            pass
+    return np.asarray(np.linalg.pinv(A, rcond=1e-12) @ B)
+
+
+# --- The chain of a tip, built from the kinematics of its case
+
+ADVANCING = ("screw", "nut")  # a full turn of theirs moves something on
+
+
+@dataclass(frozen=True)
+class _Unbound:
+    """A mechanism whose loops are open: closure is an equation to be met, not a fact."""
+
+    parameters: Parameters
+    motion: Kinematics
+
+
+def tip_chain(
+    case: CaseFile,
+    parameters: Parameters,
+    motion: Kinematics,
+    tip: str,
+    y: Floats,
+    oriented: bool = False,
+) -> TipChain:
+    """The chain that carries the node ``tip`` ("link.node") at design y, turned if oriented."""
+    planar = case.mechanism.space == "planar"
+    free = _unbound(case, parameters, motion)
+    points, turns = (2, (2,)) if planar else (3, (0, 1, 2))
+    names = tuple(c.joint for c in case.coordinates.values())
+    return TipChain(
+        look=_looking(case, free, motion, tip, y, points, turns if oriented else ()),
+        joints=names,
+        relative_map=(motion.relative, motion.offset),
+        kinds=_kinds(case, motion.tree),
+        turned_by=turns if oriented else (),
+        assembly=_assembly(case, parameters, motion, y),
+    )
+
+
+def _unbound(case: CaseFile, parameters: Parameters, motion: Kinematics) -> _Unbound:
+    """The mechanism with its passive freedoms as variables, and every freedom moving by itself."""
+    recorder, tree = Recorder(), motion.tree
+    variables = parameters.rerecorded(recorder, len(tree.passive))
+    n = len(tree.freedoms)
+    values = [variables.freedom(k) for k in range(n)]
+    walked = walk(case, variables, tree, motion.coordinates, values, np.eye(n, dtype=object))
+    return _Unbound(variables, walked)
+
+
+def _tip_scalars(case: CaseFile, free: _Unbound, tip: str) -> tuple[Objects, ...]:
+    """World place (3,), rotation (3, 3), and velocity and spin (3, n_freedoms)."""
+    link, node = split(tip)
+    placed = free.motion.placement(link)
+    X = node_position(case, free.parameters, free.motion.tree, (link, node))
+    R = placed.world_rotation
+    place = placed.world_origin + multiply(R, X)
+    velocity = multiply(R, placed.twist[:3] + cross(placed.twist[3:], X))
+    spin = multiply(R, placed.twist[3:])
+    return np.asarray(place), R, velocity, spin
+
+
+def _looking(
+    case: CaseFile,
+    free: _Unbound,
+    motion: Kinematics,
+    tip: str,
+    y: Floats,
+    d: int,
+    turns: tuple[int, ...],
+) -> Callable[[Floats], Look]:
+    """The chain's look: one table of scalars, evaluated for all states together."""
+    A, b = motion.relative, motion.offset
+    place, rotation, velocity, spin = _tip_scalars(case, free, tip)
+    J = _per_coordinate(np.concatenate([velocity[:d], spin[list(turns)]]), A)
+    F, dF = _closure(case, free, A)
+    turned = rotation.ravel() if turns else rotation[:0].ravel()
+    parts = [place[:d], turned, J.ravel(), F, dF.ravel()]
+    n_q, n_z, n_y = len(b), len(free.motion.tree.freedoms), len(y)
+    table = compile_table(free.parameters.recorder, list(np.concatenate(parts)), n_z + n_y)
+    weights, constants = table.weights.toarray(), table.constants[:, None]  # small: dense is quick
+    i, j, k, m = np.cumsum([len(part) for part in parts])[:-1].tolist()
+
+    def look(z: Floats) -> Look:
+        n = len(z)
+        variables = np.empty((n_z + n_y, n))
+        variables[:n_q] = (z[:, :n_q] @ A.T + b).T
+        variables[n_q : n_q + n_y] = y[:, None]
+        variables[n_q + n_y :] = z[:, n_q:].T
+        v = weights @ table.program.run(Samples(), variables) + constants
+        R = v[i:j].T.reshape(n, 3, 3) if turns else None
+        closure = v[m:].T.reshape(n, len(F), n_z)
+        return Look(v[:i].T, R, v[j:k].T.reshape(n, d + len(turns), n_z), v[k:m].T, closure)
+
+    return look
+
+
+def _per_coordinate(rates: Objects, A: Floats) -> Objects:
+    """Derivatives by (s, p) as derivatives by (q, p), s = A q + b."""
+    n_q = len(A)
+    if np.array_equal(A, np.eye(n_q)):
+        return rates
+    return np.concatenate([multiply(rates[:, :n_q], A), rates[:, n_q:]], axis=1)
+
+
+def _closure(case: CaseFile, free: _Unbound, A: Floats) -> tuple[Objects, Objects]:
+    """F (n_e,) and ∂F/∂(q, p) (n_e, n_z) of loops that passive freedoms close."""
+    tree = free.motion.tree
+    n_z = len(tree.freedoms)
+    if not tree.passive:
+        return np.zeros(0, dtype=object), np.zeros((0, n_z), dtype=object)
+    F, _ = closure_rows(free.motion, case.mechanism.space == "planar")
+    n_q, n_y = len(free.parameters.coordinates), len(free.parameters.design)
+    variables = [*range(n_q), *range(n_q + n_y, n_z + n_y)]
+    dF = np.array([[derivative(f, k) for k in variables] for f in F], dtype=object)
+    return np.array(F, dtype=object), _per_coordinate(dF, A)
+
+
+def _kinds(case: CaseFile, tree: Tree) -> tuple[str, ...]:
+    """What each freedom is; where a loop is closed over a screw, no turn leads back."""
+    types = [case.mechanism.joints[f.joint].type for f in tree.freedoms]
+    advancing = any(j.type in ADVANCING for j in case.mechanism.joints.values())
+    kinds = []
+    for freedom, kind in zip(tree.freedoms, types, strict=True):
+        slides = COMPONENTS[kind][freedom.component] == "translation"
+        turn = "screw" if kind == "screw" or (tree.loops and advancing) else "turn"
+        kinds.append("slide" if slides else turn)
+    return tuple(kinds)
+
+
+def _assembly(
+    case: CaseFile, parameters: Parameters, motion: Kinematics, y: Floats
+) -> Assembly | None:
+    """The branch of the model itself: where it was chosen, and its passive freedoms."""
+    if not motion.passive:
+        return None
+    n = len(motion.offset) + len(y)
+    table = compile_table(parameters.recorder, motion.passive, n)
+
+    def passive(q: Floats) -> Floats:
+        s = q @ motion.relative.T + motion.offset
+        z = np.hstack([s, np.broadcast_to(y, (len(q), len(y)))]).T
+        values = table.evaluate(Samples(), z)
+        return np.broadcast_to(values, (len(values), len(q))).T
+
+    gaps, sines = (2, 1) if case.mechanism.space == "planar" else (3, 3)
+    turning = np.array(([False] * gaps + [True] * sines) * len(motion.tree.loops), dtype=bool)
+    return Assembly(reference_coordinates(case), passive, turning)

@@ -1,0 +1,276 @@
+"""Numerical inverse kinematics of any chain: the coordinates q along a path of its tip.
+
+The first sample is solved from many seeds at once. From there the path is traced, position and
+orientation, coordinates and the passive freedoms of loops together; Hermite interpolation of that
+trace seeds one Newton iteration over all samples.
+
+Shapes: n samples, n_q coordinates.
+
+The first sample of a tip path: every way to reach it, the preferred one first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from eigassign.errors import SingularityError, TrajectoryError
+from eigassign.mechanism.inverse_kinematics.chain import Bools, Floats, TipChain
+from eigassign.mechanism.inverse_kinematics.failures import (
+    blocked,
+    lost_assembly,
+    other_assembly,
+    out_of_reach,
+    outside,
+)
+from eigassign.mechanism.inverse_kinematics.solver import (
+    DEAD,
+    ROUND_OFF,
+    Trace,
+    crossed,
+    interpolated,
+    levenberg,
+    loop_regularity,
+    newton,
+    trace,
+)
+from eigassign.mechanism.inverse_kinematics.state import Arm, prepare
+from eigassign.mechanism.trajectory.path import Course, Target
+
+# --- Numerical inverse kinematics of any chain: the coordinates q along a path of its tip
+
+_TURNS = (0.2, 0.02)  # rad: largest step of the trace, and of a second try where that was too bold
+_REDUNDANT = (0.05, 0.01)  # the same where the least motion is wanted, which large steps miss
+_DOUBLE_ROOT = 1e-6  # of L: as near as a dead point can be come to, where two assemblies meet
+_ATTEMPTS = 8  # first solutions that are followed before giving up
+
+
+@dataclass(frozen=True)
+class Followed:
+    """The coordinates q (n, n_q) in rad or m along a course, and the tip (n, 2 or 3) there."""
+
+    q: Floats
+    tip: Floats
+    notes: tuple[str, ...]
+
+
+def follow(
+    chain: TipChain,
+    course: Course,
+    branch: Mapping[str, tuple[float, float]] | None = None,
+    start: Sequence[float] | Floats | None = None,
+) -> Followed:
+    """Coordinates q(t_k), continuous in k, with position(q(t_k)) = path(s_k), turned as asked for.
+
+    ``branch`` keeps the relative angle of a joint in [low, high] modulo 2π (rad), or its place (m).
+    The first sample is the solution nearest to ``start`` (angles modulo 2π, and within π of it);
+    without one, nearest to where the loops were put together, else bent least, with angles in
+    [0, 2π). Chains with more coordinates than the tip fixes take the steps of least norm,
+    dq = J⁺ dp, a slide of L (see `arm`) counting as 1 rad. The tip is on its path to RESIDUAL times
+    L in m, and RESIDUAL in rad; loops stay in the assembly of the model.
+
+    Raises TrajectoryError naming the first sample that is out of reach, outside the branch, or
+    behind a stretched, folded or dead configuration; MechanismError if branch or start make no
+    sense.
+    """
+    arm = prepare(chain, course, branch or {}, start)
+    candidates = first_solutions(arm, course)
+    failures = []
+    for candidate in candidates[:_ATTEMPTS]:
+        u0 = assembled(arm, course.target(course.s[:1]), candidate)
+        if u0 is None:
+            continue
+        try:
+            u = _along(arm, course, u0)
+        except TrajectoryError as error:
+            failures.append(error)
+            continue
+        q = np.ascontiguousarray((u * arm.scale)[:, : arm.n_q])
+        q.setflags(write=False)
+        return Followed(q, arm.look(u).point, _notes(arm, candidates))
+    if not failures:
+        raise other_assembly(arm, course)
+    raise max(failures, key=lambda error: error.sample)
+
+
+def _along(arm: Arm, course: Course, u0: Floats) -> Floats:
+    """All samples (n, n_z) of the solution that begins with u0; TrajectoryError where it ends."""
+    target = course.target(course.s)
+    for turn in _TURNS if arm.rank == arm.n_q else _REDUNDANT:
+        path = trace(arm, course, u0, turn)
+        n = int(np.searchsorted(course.s, path.s[-1], side="right"))
+        seeds = interpolated(path, course.s[:n])
+        u, seen, motion, settled = newton(arm, seeds, _first(target, n), ROUND_OFF)
+        strayed = ~settled | (np.abs(u - seeds).max(axis=1) > turn)
+        strayed |= crossed(arm, seen, motion, path.sense)
+        if not strayed.any():
+            break
+    n = int(np.argmax(strayed)) if strayed.any() else n
+    _check(arm, course, u[:n], _first(target, n))
+    if n < len(course.s):
+        raise _blocked(arm, course, n, path)
+    return _assembled(arm, course, u, target)
+
+
+def _first(target: Target, n: int) -> Target:
+    return Target(target.point[:n], None if target.rotation is None else target.rotation[:n])
+
+
+def _check(arm: Arm, course: Course, u: Floats, target: Target) -> None:
+    """Raises TrajectoryError for the first of the samples u that leaves its branch or its point."""
+    off_path = _off(arm, u, target, RESIDUAL)
+    off_branch = ~arm.inside(u).all(axis=1)
+    if (off_path | off_branch).any():
+        k = int(np.argmax(off_path | off_branch))
+        why = out_of_reach if off_path[k] else outside
+        raise why(arm, course, k, u[k])
+
+
+def _off(arm: Arm, u: Floats, target: Target, tolerance: float) -> Bools:
+    """Whether tips are off their points or their orientations, (n,)."""
+    distance, turn = arm.misses(arm.error(arm.look(u), target))
+    return np.asarray((distance > tolerance * arm.lever) | (turn > tolerance))
+
+
+def _assembled(arm: Arm, course: Course, u: Floats, target: Target) -> Floats:
+    """The same with the passive freedoms as the model has them; TrajectoryError if others."""
+    assembly = arm.chain.assembly
+    if assembly is None:
+        return u
+    q = (u * arm.scale)[:, : arm.n_q]
+    try:
+        p = assembly.passive(q)
+    except SingularityError:
+        raise _first_lost(arm, course, u) from None
+    own = np.hstack([q, p]) / arm.scale
+    other = _off(arm, own, target, 100.0 * RESIDUAL)
+    if other.any():
+        k = int(np.argmax(other))
+        why = "the model, coming straight from its reference, has its loops put together otherwise"
+        raise lost_assembly(arm, course, k, u[k], f"{why}; choose mechanism.assembly.at nearer")
+    return own
+
+
+def _first_lost(arm: Arm, course: Course, u: Floats) -> TrajectoryError:
+    """The first sample whose loops the model cannot close."""
+    assembly = arm.chain.assembly
+    assert assembly is not None
+    for k, q in enumerate((u * arm.scale)[:, : arm.n_q]):
+        try:
+            assembly.passive(q[None])
+        except SingularityError as error:
+            return lost_assembly(arm, course, k, u[k], str(error))
+    return lost_assembly(arm, course, 0, u[0], "its loops cannot be closed together with the rest")
+
+
+def _blocked(arm: Arm, course: Course, k: int, path: Trace) -> TrajectoryError:
+    """Why the solution could not be continued from the end of the trace to sample k."""
+    last = path.u[-1]
+    u, miss = levenberg(arm, np.vstack([last, arm.seeds]), course.target(course.s[[k]]), 115)
+    best = int(np.argmin(miss))
+    dead = bool(loop_regularity(arm, arm.look(last[None]))[0] < 10.0 * DEAD)
+    if miss[best] > (_DOUBLE_ROOT if dead else RESIDUAL) * arm.lever:
+        return out_of_reach(arm, course, k, u[best])
+    return blocked(arm, course, k, float(path.s[-1]), last, dead)
+
+
+def _notes(arm: Arm, candidates: Sequence[Floats]) -> tuple[str, ...]:
+    """What was chosen where the case leaves a choice."""
+    if arm.rank < arm.n_q:
+        slides = arm.chain.of_kind("slide")[: arm.n_q].any()
+        measure = f" (a slide of {arm.lever:.3g} m counting as 1 rad)" if slides else ""
+        return (
+            f"the tip fixes {arm.rank} of {arm.n_q} coordinates: of the many solutions, the one "
+            f"that moves the joints least from sample to sample is taken{measure}",
+        )
+    if len(candidates) == 1 or arm.guessed:
+        return ()
+    if arm.chain.assembly is not None:
+        said = "nearest to where the loops are put together"
+        return (f"the first sample is the solution {said}; name a branch or a start for another",)
+    return (
+        f"the first sample can be reached in {len(candidates)} ways; "
+        "name a branch or a start to choose another",
+    )
+
+
+# --- The first sample of a tip path: every way to reach it, the preferred one first
+
+RESIDUAL = 1e-10  # largest miss of a sample: of L in m, and in rad
+_SAME = 1e-4  # rad, or of L: solutions nearer than this are one solution
+_FULL_TURN_SLACK = 1e-9  # rad below 2π, taken for round-off below 0
+
+
+def first_solutions(arm: Arm, course: Course) -> list[Floats]:
+    """Solutions u (n_q + n_p,) of the first sample within the branch, whatever the assembly.
+
+    The nearest to the start comes first, else the least bent. Raises TrajectoryError where there
+    is none.
+    """
+    target = course.target(course.s[:1])
+    u = arm.seeds
+    for iterations in (8, 20, 100):  # the last for targets at the end of the reach
+        u, miss = levenberg(arm, u, target, iterations)
+        reached = miss <= RESIDUAL * arm.lever
+        wanted = reached & arm.inside(u).all(axis=1)
+        if wanted.any():
+            return _distinct(arm, u[wanted])
+    if reached.any():
+        raise outside(arm, course, 0, u[np.argmax(reached)])
+    raise out_of_reach(arm, course, 0, u[np.argmin(miss)])
+
+
+def _distinct(arm: Arm, u: Floats) -> list[Floats]:
+    """Distinct solutions: nearest to the start first, else least bent, else bent anticlockwise."""
+
+    def preference(candidate: Floats) -> tuple[float, ...]:
+        if arm.start is not None:
+            return (float(np.linalg.norm((candidate - arm.start)[: arm.n_q])),)
+        turns = arm.chain.of_kind("turn")[: arm.n_q]
+        bend = _wrapped(arm.joint_coordinates(candidate[None])[0])[turns][1:].round(6)
+        return (round(float(bend @ bend), 6), *(-bend))
+
+    turns = arm.chain.of_kind("turn")
+    distinct: list[Floats] = []
+    for candidate in sorted(_normalised(arm, u, turns), key=preference):
+        if all(_apart(candidate - other, turns) > _SAME for other in distinct):
+            distinct.append(candidate)
+    return distinct
+
+
+def _apart(difference: Floats, turns: Bools) -> float:
+    return float(np.abs(np.where(turns, _wrapped(difference), difference)).max())
+
+
+def _wrapped(angle: Floats) -> Floats:
+    """The same angle in [−π, π)."""
+    return np.asarray(np.mod(angle + np.pi, 2.0 * np.pi) - np.pi)
+
+
+def _normalised(arm: Arm, u: Floats, turns: Bools) -> Floats:
+    """The same pose within π of the start, else in [0, 2π), where round-off below 0 stays 0."""
+    if arm.start is not None:
+        return np.where(turns, arm.start + _wrapped(u - arm.start), u)
+    turned = np.mod(u, 2.0 * np.pi)
+    turned = np.where(turned >= 2.0 * np.pi - _FULL_TURN_SLACK, turned - 2.0 * np.pi, turned)
+    return np.where(turns, turned, u)
+
+
+def assembled(arm: Arm, target: Target, u: Floats) -> Floats | None:
+    """The same solution if the model itself has the loops in that assembly, coming from its
+    reference; else None.
+    """
+    assembly = arm.chain.assembly
+    if assembly is None:
+        return u
+    q = (u * arm.scale)[: arm.n_q]
+    try:
+        p = assembly.passive(q[None])[0]
+    except SingularityError:
+        return None
+    own = np.concatenate([q, p]) / arm.scale
+    distance, turn = arm.misses(arm.error(arm.look(own[None]), target))
+    met = distance[0] <= 10.0 * RESIDUAL * arm.lever and turn[0] <= 10.0 * RESIDUAL
+    return own if met else None

@@ -1,0 +1,234 @@
+"""Bringing the tip to given points: Levenberg–Marquardt from far away, Newton nearby.
+
+Shapes: n states u (n, n_q + n_p) of an `Arm`, m task components.
+
+A solution traced along a tip path, in steps of a bounded size, whatever the samples are.
+
+Predictor and Newton corrector; Hermite interpolation of the trace seeds the samples.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from eigassign.mechanism.inverse_kinematics.chain import Bools, Floats, Look, Reduced, reduced
+from eigassign.mechanism.inverse_kinematics.state import Arm
+from eigassign.mechanism.trajectory.path import Course, Target
+
+# --- Bringing the tip to given points: Levenberg–Marquardt from far away, Newton nearby
+
+ROUND_OFF = 1e-13  # of L: as near to a point as the tip can be computed
+
+
+def levenberg(arm: Arm, u: Floats, target: Target, iterations: int) -> tuple[Floats, Floats]:
+    """Least |(target − tip, −F)| from many u at once; returns u and that length (n,) in m.
+
+    δ = (JᵀJ + μ L² I)⁻¹ Jᵀ e, μ falling while it helps and rising where it does not. Loops are
+    open on the way and closed at the end.
+    """
+    error, J = _residual(arm, u, target)
+    miss = np.linalg.norm(error, axis=1)
+    mu = np.full(len(u), 1e-2 * arm.lever**2)
+    for _ in range(iterations):
+        if (miss <= ROUND_OFF * arm.lever).all():
+            break
+        Jt = np.swapaxes(J, 1, 2)
+        H = Jt @ J + mu[:, None, None] * np.eye(u.shape[1])
+        trial = u + np.linalg.solve(H, Jt @ error[:, :, None])[:, :, 0]
+        trial_error, trial_J = _residual(arm, trial, target)
+        trial_miss = np.linalg.norm(trial_error, axis=1)
+        better = trial_miss < miss
+        u = np.where(better[:, None], trial, u)
+        error = np.where(better[:, None], trial_error, error)
+        J = np.where(better[:, None, None], trial_J, J)
+        miss = np.where(better, trial_miss, miss)
+        mu = np.clip(mu * np.where(better, 0.2, 4.0), 1e-15 * arm.lever**2, arm.lever**2)
+    return u, miss
+
+
+def _residual(arm: Arm, u: Floats, target: Target) -> tuple[Floats, Floats]:
+    """The error and the open gaps together, and their derivative."""
+    seen = arm.look(u)
+    error = arm.error(seen, target)
+    if arm.chain.assembly is None:
+        return error, seen.jacobian
+    return np.hstack([error, -seen.gap]), np.concatenate([seen.jacobian, seen.closure], axis=1)
+
+
+def newton(
+    arm: Arm, u: Floats, target: Target, tolerance: float
+) -> tuple[Floats, Look, Reduced, Bools]:
+    """Newton for tip(u) = target with closed loops; returns u, what is seen there, who settled.
+
+    A chain that cannot fill the space (rank < m) settles, more slowly, on the nearest point.
+    """
+    for _ in range(8 if arm.rank == target.point.shape[1] + len(arm.chain.turned_by) else 40):
+        seen = arm.look(u)
+        motion = reduced(seen, arm.n_q)
+        error = arm.error(seen, target) - motion.drift
+        settled = _settled(arm, error, motion, tolerance)
+        if settled.all():
+            break
+        step = least_norm(motion.J, error, arm.rank)
+        passive = motion.closing + np.einsum("npq,nq->np", motion.following, step)
+        step = np.hstack([step, passive])
+        settled |= np.abs(step).max(axis=1) <= tolerance
+        if settled.all():
+            break
+        u = u + np.clip(step, -1.0, 1.0)
+    return u, seen, motion, settled
+
+
+def _settled(arm: Arm, error: Floats, motion: Reduced, tolerance: float) -> Bools:
+    """Whether distance, turn and loops are each within the tolerance."""
+    distance, turn = arm.misses(error)
+    open_by = np.abs(motion.closing).max(axis=1, initial=0.0)
+    return np.asarray(
+        (distance <= tolerance * arm.lever) & (turn <= tolerance) & (open_by <= tolerance)
+    )
+
+
+def least_norm(J: Floats, error: Floats, rank: int) -> Floats:
+    """J⁺ e (n, n_q) for J (n, m, n_q) and e (n, m): least error first, least norm second."""
+    m, n_q = J.shape[1:]
+    Jt, e = np.swapaxes(J, 1, 2), error[:, :, None]
+    try:
+        if rank == m == n_q:
+            step = np.linalg.solve(J, e)
+        elif rank == m:
+            step = Jt @ np.linalg.solve(J @ Jt, e)
+        elif rank == n_q:
+            step = np.linalg.solve(Jt @ J, Jt @ e)
+        else:
+            step = np.linalg.pinv(J, rcond=1e-9) @ e
+    except np.linalg.LinAlgError:  # exactly singular somewhere
+        step = np.linalg.pinv(J, rcond=1e-9) @ e
+    return np.asarray(step[:, :, 0])
+
+
+def handedness(arm: Arm, seen: Look, motion: Reduced) -> Floats:
+    """The signs of det J and det ∂F/∂p, (n, 2): they flip where the solution changes branch.
+
+    0 for what is not square.
+    """
+    m, n_q = motion.J.shape[1:]
+    F_p = seen.closure[:, :, n_q:]
+    signs = np.zeros((len(motion.J), 2))
+    if arm.rank == m == n_q:
+        signs[:, 0] = np.sign(np.linalg.det(motion.J))
+    if F_p.shape[2] and F_p.shape[1] == F_p.shape[2]:
+        signs[:, 1] = np.sign(np.linalg.det(F_p))
+    return signs
+
+
+def regularity(arm: Arm, motion: Reduced) -> Floats:
+    """The smallest singular value of J (n,) over L: 0 in a singular pose."""
+    return np.asarray(np.linalg.svd(motion.J, compute_uv=False)[:, arm.rank - 1] / arm.lever)
+
+
+def loop_regularity(arm: Arm, seen: Look) -> Floats:
+    """Smallest over largest singular value of ∂F/∂p (n,): 0 at a dead point; 1 without loops."""
+    F_p = seen.closure[:, :, arm.n_q :]
+    if not F_p.shape[2]:
+        return np.ones(len(F_p))
+    s = np.linalg.svd(F_p, compute_uv=False)
+    return np.asarray(s[:, -1] / s[:, 0])
+
+
+# --- A solution traced along a tip path, in steps of a bounded size, whatever the samples are
+
+_TRACE = 1e-7  # miss of the trace, relative to L, which only seeds the samples
+_SINGULAR = 1e-3  # of L: a smaller singular value of J is a chain stretched or folded;
+# angles are known there to the root of the distance, 3e-4, so that _TRACE can tell it
+DEAD = 1e-3  # smallest over largest singular value of ∂F/∂p: as near a dead point, for that reason
+_STRAY = 0.5  # of a trace's largest step: a corrector that moves further has left the branch
+_MAX_ADVANCE = 0.125  # of the path, a trace step
+_MIN_ADVANCE = 1e-8  # below, the joints turn faster and faster without advancing
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A solution u (1, n_z) at path parameter s, with du/ds."""
+
+    s: float
+    u: Floats
+    slope: Floats
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Solutions at path parameters s_i (m,) with their slopes du/ds, up to where it got."""
+
+    s: Floats
+    u: Floats  # (m, n_z)
+    slope: Floats  # (m, n_z)
+    sense: Floats  # (2,) signs of det J and det ∂F/∂p all along
+
+
+def trace(arm: Arm, course: Course, u0: Floats, turn: float) -> Trace:
+    """du/ds = J⁺ dp/ds from u0 in steps of about ``turn``, corrected back onto the path.
+
+    It steps onto every corner of the path, lest it cuts one that is out of reach.
+    """
+    stops = np.append(course.corners(), course.s[-1])
+    seen = arm.look(u0[None])
+    motion = reduced(seen, arm.n_q)
+    sense = handedness(arm, seen, motion)[0]
+    here = _pose(arm, course, float(course.s[0]), u0[None], motion)
+    poses, advance, bend = [here], _MAX_ADVANCE, np.zeros_like(here.u)
+    while here.s < stops[-1] and advance >= _MIN_ADVANCE:
+        fastest = float(np.abs(here.slope[:, : arm.n_q]).max())
+        advance = min(advance, turn / max(fastest, turn))
+        stop = float(stops[np.searchsorted(stops, here.s, side="right")])
+        there = _step(arm, course, here, min(here.s + advance, stop), bend, sense, turn)
+        if there is None:
+            advance = 0.5 * min(advance, stop - here.s)
+            continue
+        bend = 0.5 * (there.slope - here.slope) / (there.s - here.s) * (there.s < stop)
+        poses.append(there)
+        here, advance = there, min(2.0 * advance, _MAX_ADVANCE)
+    u, slopes = np.vstack([p.u for p in poses]), np.vstack([p.slope for p in poses])
+    return Trace(np.array([p.s for p in poses]), u, slopes, sense)
+
+
+def _step(
+    arm: Arm, course: Course, here: Pose, s: float, bend: Floats, sense: Floats, turn: float
+) -> Pose | None:
+    """The pose at s ahead: a quadratic guess, corrected; None if that is not the same branch."""
+    guess = here.u + (s - here.s) * (here.slope + (s - here.s) * bend)
+    u, seen, motion, settled = newton(arm, guess, course.target(np.array([s])), _TRACE)
+    strayed = not settled[0] or np.abs(u - guess).max() > _STRAY * turn
+    if strayed or crossed(arm, seen, motion, sense)[0] or _singular(arm, seen, motion):
+        return None
+    return _pose(arm, course, s, u, motion)
+
+
+def crossed(arm: Arm, seen: Look, motion: Reduced, sense: Floats) -> Floats:
+    """Whether a branch other than that of ``sense`` has been met, (n,)."""
+    return np.asarray((handedness(arm, seen, motion) * sense < 0.0).any(axis=1))
+
+
+def _singular(arm: Arm, seen: Look, motion: Reduced) -> bool:
+    stretched = regularity(arm, motion)[0] < _SINGULAR
+    return bool(stretched or loop_regularity(arm, seen)[0] < DEAD)
+
+
+def _pose(arm: Arm, course: Course, s: float, u: Floats, motion: Reduced) -> Pose:
+    velocity, spin = course.rates(s)
+    spin = arm.lever * spin[:, list(arm.chain.turned_by)]
+    slope = least_norm(motion.J, np.hstack([velocity, spin]), arm.rank)
+    passive = np.einsum("npq,nq->np", motion.following, slope)
+    return Pose(s, u, np.hstack([slope, passive]))
+
+
+def interpolated(path: Trace, s: Floats) -> Floats:
+    """Cubic Hermite interpolation of a trace at parameters s (n,) within it."""
+    i = np.clip(np.searchsorted(path.s, s, side="right") - 1, 0, max(len(path.s) - 2, 0))
+    j = np.minimum(i + 1, len(path.s) - 1)
+    h = np.where(j > i, path.s[j] - path.s[i], 1.0)[:, None]
+    t = (s - path.s[i])[:, None] / h
+    rise = path.u[j] - path.u[i]
+    left, right = h * path.slope[i] - rise, rise - h * path.slope[j]
+    return np.asarray(path.u[i] + t * rise + t * (1.0 - t) * ((1.0 - t) * left + t * right))

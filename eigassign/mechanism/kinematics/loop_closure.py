@@ -1,0 +1,373 @@
+"""Closed loops: passive freedoms as implicit functions of the coordinates, and their rates.
+
+For every loop the two ways round must meet: three equations for the position and three for the
+orientation (planar: two and one). With passive freedoms p they define p(q, y) on the branch chosen;
+differentiated, J_p ṗ = −J_q q̇ gives the motion of the rigid links.
+
+The assembly branch of a mechanism with loops: from the user's guess, or found and asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.case import CaseFile
+from eigassign.errors import MechanismError
+from eigassign.mechanism.kinematics.coordinates import Coordinates, Parameters, initial_design
+from eigassign.mechanism.kinematics.forward import Kinematics, walk
+from eigassign.mechanism.kinematics.joints import COMPONENTS
+from eigassign.mechanism.kinematics.rotations import Floats, Objects, multiply
+from eigassign.mechanism.kinematics.topology import Tree
+from eigassign.series.expression import (
+    Expression,
+    Program,
+    Recorder,
+    Scalar,
+    compile_program,
+    derivative,
+)
+from eigassign.series.implicit import ACCEPT, ImplicitFunction
+
+# --- Closed loops: passive freedoms as implicit functions of the coordinates, and their rates
+
+
+def close_loops(
+    case: CaseFile, parameters: Parameters, tree: Tree, coords: Coordinates
+) -> Kinematics:
+    """ERLS motion of a mechanism with loops.
+
+    Raises MechanismError when a loop cannot be closed, the branch is ambiguous, or the mechanism
+    has more freedoms than coordinates.
+    """
+    planar = case.mechanism.space == "planar"
+    bound = _bind_passive(case, parameters, tree, coords, planar)
+    values = [bound.freedom(k) for k in range(len(tree.freedoms))]
+    unit = np.eye(len(tree.freedoms), dtype=object)[:, len(coords.relative) :]
+    rates = np.concatenate([coords.rates.astype(object), unit], axis=1)
+    free = replace(walk(case, bound, tree, coords, values, rates), passive=bound.passive)
+    n = len(coords.columns)
+    if not n:
+        return _narrowed(free, np.zeros((0, 0), dtype=object))
+    P = _passive_rates(bound.recorder, free, n, planar)
+    return _narrowed(free, P)
+
+
+def _bind_passive(
+    case: CaseFile, parameters: Parameters, tree: Tree, coords: Coordinates, planar: bool
+) -> Parameters:
+    """The parameters with each passive freedom as a component of the implicit function."""
+    if not tree.passive:
+        _check_rigid_loops(case, parameters, tree, coords, planar)
+        return parameters
+    recorder = Recorder()
+    n_q, n_y, n_p = len(coords.relative), len(parameters.design), len(tree.passive)
+    trial = parameters.rerecorded(recorder, n_p)
+    F, check = _equations(case, trial, tree, coords, planar)
+    J = [[derivative(f, n_q + n_y + k) for k in range(n_p)] for f in F]
+    used = _used_variables(recorder, [*F, *check], n_q + n_y, n_p)
+    scalars = [*F, *check, *(entry for row in J for entry in row)]
+    program = _reordered(recorder, scalars, used, n_q + n_y, n_p)
+    names = (*_joint_names(case, coords), *parameters.design)
+    function = ImplicitFunction(
+        program,
+        n_p,
+        len(F),
+        len(check),
+        np.zeros(len(used)),
+        np.zeros(n_p),
+        tuple(names[v] for v in used),
+        "the mechanism",
+    )
+    a0, p0 = choose_branch(case, tree, function, used, parameters)
+    solved = replace(function, a0=a0, p0=p0)
+    return parameters.with_passive(
+        parameters.recorder.implicit(solved, [parameters.recorder.variable(v) for v in used])
+    )
+
+
+def _joint_names(case: CaseFile, coords: Coordinates) -> list[str]:
+    """What the joint coordinates s are called: q's names, but where q counts absolute angles."""
+    plain = (coords.relative == np.eye(len(coords.relative))).all(axis=1) & (coords.offset == 0.0)
+    return [
+        name if same else f"{name} relative to the base of {c.joint!r}"
+        for same, (name, c) in zip(plain, case.coordinates.items(), strict=True)
+    ]
+
+
+def _equations(
+    case: CaseFile, parameters: Parameters, tree: Tree, coords: Coordinates, planar: bool
+) -> tuple[list[Scalar], list[Scalar]]:
+    """Closure rows F and check rows of all loops, on passive freedoms as plain variables."""
+    values = [parameters.freedom(k) for k in range(len(tree.freedoms))]
+    still = np.zeros((len(tree.freedoms), 0), dtype=object)
+    motion = walk(case, parameters, tree, coords, values, still)
+    return closure_rows(motion, planar)
+
+
+def closure_rows(motion: Kinematics, planar: bool) -> tuple[list[Scalar], list[Scalar]]:
+    """F = 0 of all loops, per loop the gap in m and the sines of the turns, and the check rows."""
+    F: list[Scalar] = []
+    check: list[Scalar] = []
+    for loop in motion.loops:
+        D = loop.misalignment
+        turn = [(D[2, 1] - D[1, 2]) * 0.5, (D[0, 2] - D[2, 0]) * 0.5, (D[1, 0] - D[0, 1]) * 0.5]
+        F += [*loop.position_gap[:2], turn[2]] if planar else [*loop.position_gap, *turn]
+        check.append(D[0, 0] + D[1, 1] + D[2, 2] - 3.0)  # sine rows alone admit a half turn
+    return F, check
+
+
+def _check_rigid_loops(
+    case: CaseFile, parameters: Parameters, tree: Tree, coords: Coordinates, planar: bool
+) -> None:
+    """Loops without passive freedoms must close as they are drawn."""
+    F, check = _equations(case, parameters, tree, coords, planar)
+    for k, value in enumerate([*F, *check]):
+        if isinstance(value, Expression) or abs(value) > 1e-9:
+            loop = tree.loops[min(k // (3 if planar else 6), len(tree.loops) - 1)]
+            raise MechanismError(
+                f"mechanism.joints.{loop.joint}", "closes a loop whose two sides do not meet"
+            )
+
+
+def _used_variables(recorder: Recorder, scalars: Sequence[Scalar], n: int, n_p: int) -> list[int]:
+    """Which of the first n variables the closure depends on; n_p passive ones follow them."""
+    atoms = sorted({a for s in scalars if isinstance(s, Expression) for a in s.terms})
+    depends = compile_program(recorder, atoms, n + n_p).dependence
+    return [v for v in range(n) if depends[:, v].any()]
+
+
+def _reordered(
+    recorder: Recorder, scalars: Sequence[Scalar], used: list[int], n: int, n_p: int
+) -> Program:
+    """Compile over (used variables, passive freedoms) numbered from 0."""
+    program = compile_program(recorder, [recorder.atom(s) for s in scalars], n + n_p)
+    order = {v: k for k, v in enumerate([*used, *range(n, n + n_p)])}
+    renamed = np.array([order[int(v)] for v in program.input_variables], dtype=np.intp)
+    return replace(program, input_variables=renamed, n_variables=len(order))
+
+
+def _passive_rates(recorder: Recorder, motion: Kinematics, n: int, planar: bool) -> Objects:
+    """P (n_passive, n) of ṗ = P q̇ from the loops' twist gaps; least squares where redundant."""
+    keep = [0, 1, 5] if planar else list(range(6))
+    gaps = np.concatenate([loop.twist_gap[keep] for loop in motion.loops])
+    J_q, J_p = gaps[:, :n], gaps[:, n:]
+    return passive_motion(recorder, J_p, J_q)
+
+
+def passive_motion(recorder: Recorder, J: Objects, right: Objects) -> Objects:
+    """X of J X + ``right`` = 0, by normal equations where rows are redundant."""
+    if not J.shape[1] or not right.shape[1]:
+        return np.zeros((J.shape[1], right.shape[1]), dtype=object)
+    A, B = J, right * -1.0
+    if len(J) != J.shape[1]:
+        A, B = multiply(J.T, J), multiply(J.T, B)
+    solved = recorder.solve(A.tolist(), B.tolist())
+    return np.array(solved, dtype=object).reshape(B.shape)
+
+
+def _narrowed(motion: Kinematics, P: Objects) -> Kinematics:
+    """Twists over q̇ alone: T = T_q + T_p P."""
+    n = P.shape[1]
+    placements = tuple(replace(p, twist=_combined(p.twist, P, n)) for p in motion.placements)
+    return replace(motion, placements=placements)
+
+
+def _combined(twist: Objects, P: Objects, n: int) -> Objects:
+    if not n or not len(P):
+        return twist[:, :n]
+    return np.asarray(twist[:, :n] + multiply(twist[:, n:], P))
+
+
+# --- The assembly branch of a mechanism with loops: from the user's guess, or found and asked f
+
+TRIES = 64  # starting points where no guess is given
+SAME = 1e-6  # rad or m
+CHANGE = 1e-5  # rad or m, for central differences of F
+IMMOBILE = 1e-5  # share of ∂F/∂a beyond what ∂F/∂p can meet; differences leave some 1e-9 of it
+RANK = 1e-7  # of the largest singular value of ∂F/∂p: those below do not count
+
+
+def choose_branch(
+    case: CaseFile,
+    tree: Tree,
+    function: ImplicitFunction,
+    used: Sequence[int],
+    parameters: Parameters,
+) -> tuple[Floats, Floats]:
+    """A solution (a_0, p_0) of the closure at the reference configuration.
+
+    Raises MechanismError when there is none, when the passive freedoms are not determined, or when
+    several branches exist and the case gives no guess; the branches are then listed.
+    """
+    assembly = getattr(case.mechanism, "assembly", None)
+    a0 = reference(case, parameters)[list(used)]
+    guess = _guess(tree, assembly)
+    starts = guess[None] if guess is not None else _starts(function.size)
+    found = _solutions(function, a0, starts, _turning(case, tree))
+    if not len(found):
+        others = _solutions(function, a0, _starts(function.size), _turning(case, tree))
+        message = _unclosable(tree, function, a0)
+        if guess is not None and len(others):
+            message = "the guess leads to no closed pose: " + _ambiguous(
+                tree, function.names, a0, others
+            )
+        raise MechanismError("mechanism.assembly" if assembly else "mechanism.joints", message)
+    _check_determined(tree, function, a0, found[0])
+    _check_movable(case, function, used, a0, found[0])
+    if guess is None and len(found) > 1:
+        raise MechanismError("mechanism.joints", _ambiguous(tree, function.names, a0, found))
+    return a0, found[0]
+
+
+def reference(case: CaseFile, parameters: Parameters) -> Floats:
+    """z = (s, y) where the branch is chosen, y as written."""
+    s = parameters.relative @ reference_coordinates(case) + parameters.offset
+    return np.concatenate([s, initial_design(case)])
+
+
+def reference_coordinates(case: CaseFile) -> Floats:
+    """q (n_q,) at which the assembly is chosen: ``assembly.at``, the expansion's q, or zero."""
+    q = np.zeros(len(case.coordinates))
+    given = getattr(case.expansion, "q", "auto")
+    if not isinstance(given, str):
+        q[:] = given
+    at = getattr(getattr(case.mechanism, "assembly", None), "at", None) or {}
+    for name, value in at.items():
+        q[list(case.coordinates).index(name)] = value
+    return q
+
+
+def _guess(tree: Tree, assembly: object) -> Floats | None:
+    given = dict(getattr(assembly, "guess", None) or {})
+    if not given:
+        return None
+    out = np.zeros(len(tree.passive))
+    for k, freedom in enumerate(tree.passive):
+        value = given.get(freedom.joint, 0.0)
+        out[k] = value[freedom.component] if isinstance(value, (tuple, list)) else value
+    return out
+
+
+def _starts(n: int) -> Floats:
+    """Evenly spread starting points (Kronecker sequence) over a turn or a metre each way."""
+    root = 2.0
+    for _ in range(60):
+        root = (1.0 + root) ** (1.0 / (n + 1.0))
+    steps = root ** -np.arange(1.0, n + 1.0)
+    fractions = np.mod(0.5 + np.arange(TRIES)[:, None] * steps, 1.0)
+    return np.asarray(np.pi * (2.0 * fractions - 1.0))
+
+
+def _turning(case: CaseFile, tree: Tree) -> NDArray[np.bool_]:
+    """Which passive freedoms are angles, the same after a full turn."""
+    kinds = [COMPONENTS[case.mechanism.joints[f.joint].type][f.component] for f in tree.passive]
+    return np.array([kind != "translation" for kind in kinds], dtype=bool)
+
+
+def _solutions(
+    function: ImplicitFunction, a0: Floats, starts: Floats, turning: NDArray[np.bool_]
+) -> Floats:
+    """Distinct solutions from many starting points, the nearest to the first start first."""
+    n = len(starts)
+    a = np.repeat(a0[:, None], n, axis=1)
+    p = starts.T
+    for _ in range(6):
+        p, _ = function.newton(a, p)
+    F, check, _ = function.equations(a, p)
+    good = np.abs(np.concatenate([F, check])).max(axis=0) < ACCEPT
+    distinct: list[Floats] = []
+    for candidate in p.T[good]:
+        turned = np.mod(candidate + np.pi, 2.0 * np.pi) - np.pi
+        near = np.where(turning & (n > 1), turned, candidate)
+        if all(_apart(near - d, turning) > SAME for d in distinct):
+            distinct.append(near)
+    return np.array(distinct).reshape(-1, function.size)
+
+
+def _apart(difference: Floats, turning: NDArray[np.bool_]) -> float:
+    """Largest difference of two solutions, rad or m, full turns not counted."""
+    turned = 2.0 * np.sin(difference / 2.0)
+    return float(np.abs(np.where(turning, turned, difference)).max())
+
+
+def _check_determined(tree: Tree, function: ImplicitFunction, a0: Floats, p0: Floats) -> None:
+    J = function.equations(a0[:, None], p0[:, None])[2][0]
+    missing = function.size - int(np.linalg.matrix_rank(J, RANK))
+    if missing:
+        joints = ", ".join(sorted({f.joint for f in tree.passive}))
+        n = len(tree.freedoms) - len(tree.passive)
+        raise MechanismError(
+            "coordinates",
+            f"{missing} more coordinate(s) needed: the mechanism has {n + missing} freedom(s) and "
+            f"{n} coordinate(s), which do not determine the joints {joints}; or "
+            f"{_at(function.names, a0)} is a dead point",
+        )
+
+
+def _check_movable(
+    case: CaseFile, function: ImplicitFunction, used: Sequence[int], a0: Floats, p0: Floats
+) -> None:
+    """Every argument of p can change: ∂F/∂p ṗ = −∂F/∂a has a solution, rows beyond p's included."""
+    J = function.equations(a0[:, None], p0[:, None])[2][0]
+    steps = np.repeat(a0[:, None], 2 * len(a0), axis=1)
+    steps += CHANGE * np.hstack([np.eye(len(a0)), -np.eye(len(a0))])
+    F = function.equations(steps, np.repeat(p0[:, None], steps.shape[1], axis=1))[0]
+    slope = (F[:, : len(a0)] - F[:, len(a0) :]) / (2.0 * CHANGE)
+    unmet = np.linalg.norm(slope - J @ (np.linalg.pinv(J) @ slope), axis=0)
+    drives = [c.drive for c in case.coordinates.values()]
+    for k, v in enumerate(used):
+        held = v < len(drives) and drives[v] == "locked"  # the only pose it has is then enough
+        if unmet[k] > IMMOBILE * np.linalg.norm(slope[:, k]) and not held:
+            raise MechanismError(
+                "coordinates" if v < len(drives) else "design",
+                f"{function.names[k]} cannot change at {_at(function.names, a0)}: the loops pose "
+                f"{function.n_equations} conditions, of which the {function.size} passive "
+                "freedom(s) can meet none more. It is a structure, or stretched to a dead point: "
+                "give a joint another freedom, lock the coordinate, or choose another pose with "
+                "mechanism.assembly.at",
+            )
+
+
+def _unclosable(tree: Tree, function: ImplicitFunction, a0: Floats) -> str:
+    """Where the loops do not close, and whether there are too many conditions or too little length.
+
+    Conditions beyond the rank of ∂F/∂p at general places are no passive freedom's to meet.
+    """
+    message = f"the loops cannot be closed at {_at(function.names, a0)}"
+    starts = _starts(function.size).T
+    J = function.equations(np.repeat(a0[:, None], starts.shape[1], axis=1), starts)[2]
+    beyond = function.n_equations - int(np.linalg.matrix_rank(J, RANK).max())
+    if not beyond:
+        return f"{message}: links do not reach, or lie beyond a dead point"
+    joints = ", ".join(dict.fromkeys(f.joint for f in tree.passive))
+    return (
+        f"{message}: they pose {function.n_equations} conditions, of which {joints} can meet "
+        f"{function.n_equations - beyond}: {beyond} coordinate(s) too many, or joints with too few "
+        "freedoms for dimensions that do not agree"
+    )
+
+
+def _at(names: Sequence[str], a: Floats) -> str:
+    return ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, a, strict=True)) or "its only pose"
+
+
+def _ambiguous(tree: Tree, names: Sequence[str], a0: Floats, found: Floats) -> str:
+    """All branches in words."""
+    lines = ["; ".join(_guesses(tree, p)) for p in found]
+    listed = " | ".join(f"({line})" for line in lines)
+    return (
+        f"the loops close in {len(found)} ways at {_at(names, a0)}: {listed}; choose one with "
+        "mechanism.assembly: {at: …, guess: {joint: value, …}} (rad, m)"
+    )
+
+
+def _guesses(tree: Tree, p: Floats) -> list[str]:
+    """One solution as the guess that leads to it: a list for a joint with several freedoms."""
+    values: dict[str, list[str]] = {}
+    for freedom, value in zip(tree.passive, p, strict=True):
+        values.setdefault(freedom.joint, []).append(f"{value:.4g}")
+    return [f"{j}: {v[0] if len(v) == 1 else '[' + ', '.join(v) + ']'}" for j, v in values.items()]

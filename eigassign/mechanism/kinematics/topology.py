@@ -1,0 +1,311 @@
+"""The graph of links and joints as it is walked: tree edges, loop edges, freedoms.
+
+A spanning tree of links from the ground; the joints left over close loops.
+
+Each loop is closed, where it can be, at a node that deforms: that node's motion then follows from
+the rest. So a loop is closed at another of its joints where the first choice ends between rigid
+links or at nodes that are carried already.
+
+How links hang on one another, and the joints that close loops: what walking the tree found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from eigassign.case import CaseFile
+from eigassign.errors import MechanismError
+from eigassign.mechanism.kinematics.joints import COMPONENTS, RIDING
+from eigassign.mechanism.kinematics.rotations import Objects, multiply
+
+# --- The graph of links and joints as it is walked: tree edges, loop edges, freedoms
+
+Node = tuple[str, str]  # (link, node); the ground is ("ground", "")
+GROUND: Node = ("ground", "")
+
+
+@dataclass(frozen=True)
+class Edge:
+    """One joint as it is walked: ``follower`` hangs on ``base``.
+
+    ``turned`` where the file names the two the other way round: the joint is then walked against
+    its own direction, its freedoms keep their meaning.
+    """
+
+    joint: str
+    base: Node
+    follower: Node
+    turned: bool = False
+
+    def reversed(self) -> Edge:
+        """The same joint walked the other way."""
+        return Edge(self.joint, self.follower, self.base, not self.turned)
+
+    @property
+    def written(self) -> Edge:
+        """The same joint as the file has it."""
+        return self.reversed() if self.turned else self
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """One freedom of one joint: driven by coordinate number ``coordinate``, or passive (None)."""
+
+    joint: str
+    component: int
+    coordinate: int | None
+
+
+@dataclass(frozen=True)
+class Tree:
+    """Tree edges in an order where every base is placed first; loop edges; freedoms.
+
+    The first ``n_elastic`` loops end in a node that deforms and carries nothing else: it follows.
+    The others close between nodes that are rigid, or carried themselves.
+    """
+
+    edges: tuple[Edge, ...]
+    loops: tuple[Edge, ...]
+    n_elastic: int
+    freedoms: tuple[Freedom, ...]  # the coordinates in their order, then the passive ones
+
+    @property
+    def passive(self) -> tuple[Freedom, ...]:
+        """The freedoms without a coordinate."""
+        return tuple(f for f in self.freedoms if f.coordinate is None)
+
+    def of_joint(self, joint: str) -> list[int]:
+        """Positions among the freedoms of one joint's own, by component."""
+        own = [(f.component, k) for k, f in enumerate(self.freedoms) if f.joint == joint]
+        return [k for _, k in sorted(own)]
+
+    def riders(self, link: str) -> list[str]:
+        """The carriages and nuts that travel along a link."""
+        return self._riders.get(link, [])
+
+    @cached_property
+    def _riders(self) -> dict[str, list[str]]:
+        """All of them by link: asked for once a link, of which there may be a thousand."""
+        found: dict[str, list[str]] = {}
+        for edge in (*self.edges, *self.loops):
+            link, node = edge.written.base
+            if node == f"@{edge.joint}":
+                found.setdefault(link, []).append(edge.joint)
+        return found
+
+
+def split(node: str) -> Node:
+    """ "link.node" → (link, node)."""
+    link, _, name = node.partition(".")
+    return link, name
+
+
+def freedoms(case: CaseFile) -> tuple[Freedom, ...]:
+    """The driven freedoms in the order of the coordinates, then the passive ones."""
+    driven = [
+        Freedom(c.joint, component_index(case, c), i)
+        for i, c in enumerate(case.coordinates.values())
+    ]
+    taken = {(f.joint, f.component) for f in driven}
+    passive = [
+        Freedom(name, k, None)
+        for name, joint in case.mechanism.joints.items()
+        for k in range(len(COMPONENTS[joint.type]))
+        if (name, k) not in taken
+    ]
+    return tuple(driven + passive)
+
+
+def component_index(case: CaseFile, coordinate: object) -> int:
+    """Which freedom of its joint a coordinate drives, from 0."""
+    names = COMPONENTS[case.mechanism.joints[coordinate.joint].type]  # type: ignore[attr-defined]
+    component = getattr(coordinate, "component", None)
+    return 0 if component is None else names.index(str(component))
+
+
+# --- A spanning tree of links from the ground; the joints left over close loops
+
+
+class _Walk(NamedTuple):
+    """Tree edges, and the other joints sorted: ending in a free node that deforms, or not."""
+
+    edges: list[Edge]
+    elastic: list[Edge]
+    rigid: list[Edge]
+
+
+def build_tree(case: CaseFile) -> Tree:
+    """From the ground, joints in the order of the file, each from base to follower if possible.
+
+    Raises MechanismError for a link that no joint connects to the ground.
+    """
+    joints = [_edge(case, joint) for joint in case.mechanism.joints]
+    rigid = {n for n, link in case.mechanism.links.items() if getattr(link, "type", "") == "rigid"}
+    walk = _walk(joints, frozenset(), rigid)
+    _require_connected(case, walk.edges)
+    while better := _better(joints, walk, rigid):
+        walk = better
+    loops = (*walk.elastic, *walk.rigid)
+    return Tree(tuple(walk.edges), loops, len(walk.elastic), freedoms(case))
+
+
+def _edge(case: CaseFile, name: str) -> Edge:
+    joint = case.mechanism.joints[name]
+    base = GROUND
+    if joint.type in RIDING:
+        base = (joint.base, f"@{name}")
+    elif joint.base != "ground":
+        base = split(joint.base)
+    return Edge(name, base, split(joint.follower))
+
+
+def _require_connected(case: CaseFile, edges: Sequence[Edge]) -> None:
+    placed = {edge.follower[0] for edge in edges}
+    for link in case.mechanism.links:
+        if link not in placed:
+            message = "is not connected to the ground by joints"
+            raise MechanismError(f"mechanism.links.{link}", message)
+
+
+def _walk(joints: Sequence[Edge], closing: frozenset[str], rigid: set[str]) -> _Walk:
+    """Hang link after link, keeping the joints ``closing`` for loops."""
+    placed, tree = {"ground"}, list[Edge]()
+    waiting = [e for e in joints if e.joint not in closing]
+    while step := next(_steps(waiting, placed), None):
+        tree.append(step)
+        placed.add(step.follower[0])
+        del waiting[next(k for k, e in enumerate(waiting) if e.joint == step.joint)]
+    used = {edge.joint for edge in tree}
+    return _sorted(tree, [e for e in joints if e.joint not in used], rigid)
+
+
+def _steps(waiting: Sequence[Edge], placed: set[str]) -> Iterator[Edge]:
+    """Joints that reach a new link: as the file has them first, then against their direction."""
+    for edges in (waiting, (e.reversed() for e in waiting)):
+        yield from (e for e in edges if e.base[0] in placed and e.follower[0] not in placed)
+
+
+def _sorted(tree: list[Edge], loops: Sequence[Edge], rigid: set[str]) -> _Walk:
+    """Loop edges towards a node of their own that deforms, and those that have none."""
+    carriers = {edge.follower: edge.base for edge in tree}
+    roots = {edge.follower[0]: edge.follower for edge in tree}
+    walk = _Walk(tree, [], [])
+    for edge in loops:
+        ends = (e for e in (edge, edge.reversed()) if e.follower[0] not in {"ground", *rigid})
+        closed = next((e for e in ends if _free(e, carriers, roots, rigid)), None)
+        if closed is None:
+            walk.rigid.append(edge)
+        else:
+            walk.elastic.append(closed)
+            carriers[closed.follower] = closed.base
+    return walk
+
+
+def _free(edge: Edge, carriers: dict[Node, Node], roots: dict[str, Node], rigid: set[str]) -> bool:
+    """Whether nothing carries the follower node yet, and it does not carry the base node itself."""
+    node = edge.base
+    while node != edge.follower:
+        if node in carriers:
+            node = carriers[node]
+        elif node[0] in rigid:
+            node = roots[node[0]]
+        else:
+            return edge.follower not in carriers
+    return False
+
+
+def _better(joints: Sequence[Edge], walk: _Walk, rigid: set[str]) -> _Walk | None:
+    """The walk with one more loop closed at a node that deforms, by exchanging two joints."""
+    closing = frozenset(e.joint for e in (*walk.elastic, *walk.rigid))
+    for edge in walk.rigid:
+        for other in _round(walk.edges, edge):
+            trial = _walk(joints, closing - {edge.joint} | {other}, rigid)
+            if len(trial.rigid) < len(walk.rigid):
+                return trial
+    return None
+
+
+def _round(edges: Sequence[Edge], closing: Edge) -> list[str]:
+    """The tree joints of the loop that a joint closes."""
+    holder = {edge.follower[0]: edge for edge in edges}
+    sides = []
+    for link in (closing.base[0], closing.follower[0]):
+        path = []
+        while link in holder:
+            path.append(holder[link].joint)
+            link = holder[link].base[0]
+        sides.append(path)
+    return [j for j in (*sides[0], *sides[1]) if (j in sides[0]) != (j in sides[1])]
+
+
+# --- How links hang on one another, and the joints that close loops: what walking the tree found
+
+
+@dataclass(frozen=True)
+class Placement:
+    """How one link hangs on its base, and its motion.
+
+    ``rotation`` turns the link's components into base components; ``lever`` runs from the base node
+    to the joint node of the link (base axes); ``freedoms`` is A (6, k). ``twist`` (6, n_columns) is
+    that of the link's own origin per column, in its own axes. ``foot`` and ``root`` are the base
+    node and the joint node, each in its own link's frame.
+    """
+
+    link: str
+    edge: Edge
+    rotation: Objects
+    lever: Objects
+    freedoms: Objects
+    twist: Objects
+    base: Placement | None = field(repr=False)  # of the base link; None for the ground
+    foot: Objects
+    root: Objects
+
+    @property
+    def world_rotation(self) -> Objects:
+        """From the link's axes to those of the world, (3, 3)."""
+        return self._world[0]
+
+    @property
+    def world_origin(self) -> Objects:
+        """The link's origin in the world, m (3,)."""
+        return self._world[1]
+
+    @cached_property
+    def _world(self) -> tuple[Objects, Objects]:
+        """Asked for where something is drawn, reached or closed; links of a model mostly are not.
+
+        The bases come first, one by one: a chain may be longer than Python lets calls nest.
+        """
+        waiting = [self]
+        while waiting[-1].base is not None and "_world" not in waiting[-1].base.__dict__:
+            waiting.append(waiting[-1].base)
+        for base in reversed(waiting[1:]):
+            base._world  # noqa: B018
+        R, foot = (
+            (np.eye(3).astype(object), self.foot) if self.base is None else self.base.at(self.foot)
+        )
+        rotation = multiply(R, self.rotation)
+        return rotation, foot + multiply(R, self.lever) - multiply(rotation, self.root)
+
+    def at(self, X: Objects) -> tuple[Objects, Objects]:
+        """World rotation, and world position of the point X of the link."""
+        return self.world_rotation, self.world_origin + multiply(self.world_rotation, X)
+
+
+@dataclass(frozen=True)
+class Loop:
+    """One loop-closing joint: pose and twist of its follower node, reached along both sides."""
+
+    edge: Edge
+    rotation: Objects  # from the follower's axes to the base link's axes
+    lever: Objects  # from base node to follower node, base axes
+    freedoms: Objects
+    position_gap: Objects  # (3,) world: along the base side minus along the follower side
+    misalignment: Objects  # (3, 3): R_baseᵀ R_follower, the identity when closed
+    twist_gap: Objects  # (6, n_columns): follower's own twist minus the carried and joint twist

@@ -1,0 +1,326 @@
+"""Paths of the tip through waypoints in the plane or in space, as piecewise cubics.
+
+Both kinds are parameterised by the cumulative chord length, scaled to 0 ≤ s ≤ 1. For the polyline
+that is the arc length.
+
+How the tip's link is turned along its path: one orientation that is kept, or one per waypoint.
+
+Between waypoints the orientation follows the same parameter s as the position. On a straight path
+the link turns at a constant rate about a fixed axis from each waypoint to the next; on a spline its
+angle is the same cubic spline (planar), or its angular acceleration is continuous (spatial, SciPy's
+RotationSpline).
+
+When the tip has to be where, and turned how: a path, an attitude and a timing law together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from eigassign.errors import MechanismError, UsageError
+from eigassign.mechanism.kinematics.rotations import euler_rotation, exponential, logarithm
+
+# --- Paths of the tip through waypoints in the plane or in space, as piecewise cubics
+
+Floats = NDArray[np.float64]
+
+WAYPOINTS = "trajectory.waypoints"  # key path in the case file
+_COINCIDENT = 1e-12  # of the chord length: round-off of coordinates, no distance anybody means
+_SMOOTH = 1e-9  # of the slope: a change of direction nobody sees
+_ROUND_OFF = 1e-12  # how far outside [0, 1] a parameter is still taken for its end
+
+
+@dataclass(frozen=True)
+class Path:
+    """p(s) = Σ_k c_k (s − s_i)^k on s_i ≤ s ≤ s_{i+1}, for m waypoints in d = 2 or 3 dimensions."""
+
+    knots: Floats  # (m,) s at the waypoints, from 0 to 1
+    coefficients: Floats  # (4, m - 1, d) in m, ascending powers
+    chord_length: float = 0.0  # m, over all waypoints
+
+    def point(self, s: ArrayLike) -> Floats:
+        """Points on the path in m, (n, d) for s of shape (n,); UsageError outside [0, 1]."""
+        i, t = self._locate(s)
+        c0, c1, c2, c3 = self.coefficients
+        return np.asarray(c0[i] + t * (c1[i] + t * (c2[i] + t * c3[i])))
+
+    def derivative(self, s: ArrayLike) -> Floats:
+        """dp/ds in m, (n, d), from the right at a corner; UsageError outside [0, 1]."""
+        i, t = self._locate(s)
+        _, c1, c2, c3 = self.coefficients
+        return np.asarray(c1[i] + t * (2.0 * c2[i] + t * 3.0 * c3[i]))
+
+    def corners(self) -> Floats:
+        """Parameters s strictly inside (0, 1) at which dp/ds jumps, by more than round-off."""
+        _, c1, c2, c3 = self.coefficients
+        h = np.diff(self.knots)[:, None]
+        jump = c1[1:] - (c1 + 2.0 * h * c2 + 3.0 * h**2 * c3)[:-1]
+        sharp = np.abs(jump).max(axis=1) > _SMOOTH * np.abs(c1).max()
+        return np.asarray(self.knots[1:-1][sharp])
+
+    def _locate(self, s: ArrayLike) -> tuple[NDArray[np.intp], Floats]:
+        """Piece i and s − s_i (as a column) of each parameter; a path never extrapolates."""
+        asked = np.atleast_1d(np.asarray(s, dtype=np.float64))
+        if not np.all((asked >= -_ROUND_OFF) & (asked <= 1.0 + _ROUND_OFF)):
+            raise UsageError("a path is defined for 0 <= s <= 1 only")
+        inside = np.clip(asked, 0.0, 1.0)
+        piece = np.searchsorted(self.knots, inside, side="right") - 1
+        piece = np.minimum(piece, len(self.knots) - 2)  # the end belongs to the last piece
+        return piece, (inside - self.knots[piece])[:, None]
+
+
+def straight(waypoints: ArrayLike) -> Path:
+    """Polyline through the waypoints (m, d), in m, parameterised by arc length.
+
+    Raises MechanismError if there are fewer than two waypoints, if they are not finite, not (m, 2)
+    or (m, 3), or if two consecutive ones coincide.
+    """
+    points, knots, length = _measure(waypoints)
+    return replace(polyline(knots, points), chord_length=length)
+
+
+def polyline(knots: Floats, values: Floats) -> Path:
+    """The piecewise linear curve with ``values`` (m, d) at ``knots`` (m,)."""
+    chords = np.diff(values, axis=0) / np.diff(knots)[:, None]
+    zero = np.zeros_like(chords)
+    return _path(knots, np.stack([values[:-1], chords, zero, zero]))
+
+
+def spline(waypoints: ArrayLike) -> Path:
+    """Cubic spline through the waypoints (m, d), in m, parameterised by cumulative chord length.
+
+    Twice continuously differentiable, with not-a-knot ends (the third derivative is continuous at
+    the second and at the last but one waypoint); the parabola through three waypoints, the line
+    through two. Raises the same errors as `straight`.
+    """
+    points, knots, length = _measure(waypoints)
+    return replace(smooth(knots, points), chord_length=length)
+
+
+def smooth(knots: Floats, values: Floats) -> Path:
+    """The not-a-knot cubic spline with ``values`` (m, d) at ``knots`` (m,)."""
+    slopes = _slopes(knots, values)
+    step = np.diff(knots)[:, None]
+    chords = np.diff(values, axis=0) / step
+    quadratic = (3.0 * chords - 2.0 * slopes[:-1] - slopes[1:]) / step
+    cubic = (slopes[:-1] + slopes[1:] - 2.0 * chords) / step**2
+    return _path(knots, np.stack([values[:-1], slopes[:-1], quadratic, cubic]))
+
+
+def _path(knots: Floats, coefficients: Floats) -> Path:
+    knots.setflags(write=False)
+    coefficients.setflags(write=False)
+    return Path(knots, coefficients)
+
+
+def _measure(waypoints: ArrayLike) -> tuple[Floats, Floats, float]:
+    """Checked points (m, d), knots s (m,) and the chord length in m."""
+    points = _checked(waypoints)
+    chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    length = float(chords.sum())
+    for i in np.flatnonzero(chords <= _COINCIDENT * length):
+        message = f"the same point as the one before it, {points[i].tolist()}; drop one of them"
+        raise MechanismError(f"{WAYPOINTS}[{i + 1}]", message)
+    knots = np.concatenate([[0.0], np.cumsum(chords)]) / length
+    knots[-1] = 1.0
+    return points, knots, length
+
+
+def _checked(waypoints: ArrayLike) -> Floats:
+    try:
+        points = np.array(waypoints, dtype=np.float64)
+    except ValueError:
+        points = np.empty(0)
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise MechanismError(WAYPOINTS, "must be a list of points, each [x, y] or each [x, y, z]")
+    if len(points) < 2:
+        raise MechanismError(WAYPOINTS, "a path needs at least two waypoints")
+    for i in np.flatnonzero(~np.isfinite(points).all(axis=1)):
+        raise MechanismError(f"{WAYPOINTS}[{i}]", f"{points[i].tolist()} is not finite")
+    return points
+
+
+def _slopes(knots: Floats, points: Floats) -> Floats:
+    """dp/ds at the waypoints (m, d) of the not-a-knot spline (de Boor 1978, chapter IV).
+
+    Inside, continuity of p'' with steps h_i and chord slopes δ_i:
+    h_i p'_{i-1} + 2 (h_{i-1} + h_i) p'_i + h_{i-1} p'_{i+1} = 3 (h_i δ_{i-1} + h_{i-1} δ_i).
+    """
+    h = np.diff(knots)
+    chords = np.diff(points, axis=0) / h[:, None]
+    if len(h) == 1:
+        return np.repeat(chords, 2, axis=0)
+    if len(h) == 2:
+        return _parabola_slopes(h, chords)
+    below, on, above = np.zeros((3, len(knots)))  # row i: below[i], on[i], above[i]
+    rhs = np.empty_like(points)
+    below[1:-1], on[1:-1], above[1:-1] = h[1:], 2.0 * (h[:-1] + h[1:]), h[:-1]
+    rhs[1:-1] = 3.0 * (h[1:, None] * chords[:-1] + h[:-1, None] * chords[1:])
+    on[0], above[0], rhs[0] = _end_row(h[0], h[1], chords[0], chords[1])
+    on[-1], below[-1], rhs[-1] = _end_row(h[-1], h[-2], chords[-1], chords[-2])
+    return _tridiagonal(below, on, above, rhs)
+
+
+def _tridiagonal(below: Floats, on: Floats, above: Floats, rhs: Floats) -> Floats:
+    """Solution (m, d) by elimination without exchanges, stable for these rows (de Boor's CUBSPL).
+
+    Not scipy.linalg: importing that would take longer than all the rest of a trajectory.
+    """
+    pivot, x = on.copy(), rhs.copy()
+    for i in range(1, len(x)):
+        factor = below[i] / pivot[i - 1]
+        pivot[i] -= factor * above[i - 1]
+        x[i] -= factor * x[i - 1]
+    x[-1] /= pivot[-1]
+    for i in range(len(x) - 2, -1, -1):
+        x[i] = (x[i] - above[i] * x[i + 1]) / pivot[i]
+    return x
+
+
+def _end_row(h0: float, h1: float, end: Floats, inner: Floats) -> tuple[float, float, Floats]:
+    """Not-a-knot: h1 p'_0 + (h0 + h1) p'_1 = ((3 h0 + 2 h1) h1 δ_0 + h0² δ_1) / (h0 + h1)."""
+    both = h0 + h1
+    return h1, both, ((h0 + 2.0 * both) * h1 * end + h0**2 * inner) / both
+
+
+def _parabola_slopes(h: Floats, chords: Floats) -> Floats:
+    """dp/ds of the parabola through three points: the chord slopes are its slopes midway."""
+    bend = (chords[1] - chords[0]) / h.sum()  # half its second derivative
+    return np.stack([chords[0] - h[0] * bend, chords[0] + h[0] * bend, chords[1] + h[1] * bend])
+
+
+# --- How the tip's link is turned along its path: one orientation that is kept, or one per wayp
+
+_SAME_TURN = 1e-9  # rad: two orientations that do not differ
+_AMBIGUOUS = 1e-6  # rad from half a turn: which way round cannot be told
+
+
+@dataclass(frozen=True)
+class Attitude:
+    """The rotation of the tip's link to the world, R(s) on 0 ≤ s ≤ 1."""
+
+    key: str  # of the case file: angle or orientation
+    rotation: Callable[[Floats], Floats]  # s (n,) -> (n, 3, 3)
+    rate: Callable[[Floats], Floats]  # s (n,) -> ω in the world, rad per unit of s, (n, 3)
+    corners: Floats  # s at which the rate jumps
+
+
+def planar_attitude(path: Path, angle: ArrayLike, kind: str) -> Attitude:
+    """Angle θ(s) in rad, from one value that is kept or one per waypoint, full turns counted."""
+    knots = path.knots
+    values = np.broadcast_to(np.asarray(angle, dtype=np.float64), knots.shape)[:, None]
+    if not np.isfinite(values).all():
+        raise MechanismError("trajectory.angle", "is not finite")
+    course = smooth(knots, values) if kind == "spline" else polyline(knots, values)
+    axis = np.array([0.0, 0.0, 1.0])
+    return Attitude(
+        "angle",
+        lambda s: exponential(course.point(s) * axis),
+        lambda s: course.derivative(s) * axis,
+        course.corners(),
+    )
+
+
+def spatial_attitude(path: Path, orientation: ArrayLike, kind: str) -> Attitude:
+    """Rotation from one triple (rx, ry, rz) that is kept or one per waypoint, R = Rz Ry Rx.
+
+    From one waypoint to the next it turns the shorter way. Raises MechanismError where that is half
+    a turn, so that there is no shorter way.
+    """
+    knots = path.knots
+    angles = np.broadcast_to(np.asarray(orientation, dtype=np.float64), (len(knots), 3))
+    if not np.isfinite(angles).all():
+        raise MechanismError("trajectory.orientation", "is not finite")
+    R = euler_rotation(angles)
+    steps = logarithm(R[1:] @ np.swapaxes(R[:-1], 1, 2))
+    size = np.linalg.norm(steps, axis=1)
+    for k in np.flatnonzero(size > np.pi - _AMBIGUOUS):
+        message = "half a turn from the one before it: say which way by a waypoint in between"
+        raise MechanismError(f"trajectory.orientation[{k + 1}]", message)
+    if kind == "spline" and len(knots) > 2 and size.max() > _SAME_TURN:
+        return _splined(knots, R)
+    return _slerped(knots, R, steps / np.diff(knots)[:, None])
+
+
+def _slerped(knots: Floats, R: Floats, rates: Floats) -> Attitude:
+    """R(s) = exp(ω_i (s − s_i)) R_i."""
+
+    def piece(s: Floats) -> tuple[np.ndarray, Floats]:
+        s = np.atleast_1d(s)
+        i = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(knots) - 2)
+        return i, (s - knots[i])[:, None]
+
+    def rotation(s: Floats) -> Floats:
+        i, t = piece(s)
+        return np.asarray(exponential(t * rates[i]) @ R[i])
+
+    jumps = np.abs(np.diff(rates, axis=0)).max(axis=1)
+    sharp = jumps > _SMOOTH * max(float(np.abs(rates).max()), 1.0)
+    return Attitude("orientation", rotation, lambda s: rates[piece(s)[0]], knots[1:-1][sharp])
+
+
+def _splined(knots: Floats, R: Floats) -> Attitude:
+    from scipy.spatial.transform import Rotation, RotationSpline
+
+    spline = RotationSpline(knots, Rotation.from_matrix(R))
+
+    def rotation(s: Floats) -> Floats:
+        return np.asarray(spline(np.atleast_1d(s)).as_matrix())
+
+    def rate(s: Floats) -> Floats:
+        own = spline(np.atleast_1d(s), 1)  # in the axes of the turned link
+        return np.asarray(np.einsum("nij,nj->ni", rotation(s), own))
+
+    return Attitude("orientation", rotation, rate, np.zeros(0))
+
+
+# --- When the tip has to be where, and turned how: a path, an attitude and a timing law together
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where n tips should be: ``point`` (n, d) in m, and ``rotation`` (n, 3, 3) where asked for."""
+
+    point: Floats
+    rotation: Floats | None = None
+
+
+@dataclass(frozen=True)
+class Course:
+    """Sample k is due at path parameter ``s[k]`` and time ``time_s[k]``."""
+
+    path: Path
+    s: Floats  # (n,) not decreasing, from 0 to 1
+    time_s: Floats  # (n,)
+    attitude: Attitude | None = None
+
+    def target(self, s: Floats) -> Target:
+        """Where the tip should be at parameters s (n,)."""
+        rotation = None if self.attitude is None else self.attitude.rotation(np.atleast_1d(s))
+        return Target(self.path.point(s), rotation)
+
+    def rates(self, s: float) -> tuple[Floats, Floats]:
+        """dp/ds (1, d) in m and ω (1, 3) in rad, per unit of s, from the right at a corner."""
+        at = np.array([s])
+        spin = np.zeros((1, 3)) if self.attitude is None else self.attitude.rate(at)
+        return self.path.derivative(at), spin
+
+    def corners(self) -> Floats:
+        """Parameters inside (0, 1) at which either rate jumps."""
+        turns = np.zeros(0) if self.attitude is None else self.attitude.corners
+        return np.union1d(self.path.corners(), turns)
+
+    @property
+    def size(self) -> float:
+        """m: how far from the origin, or how long, the path is."""
+        points = self.path.point(self.path.knots)
+        return max(self.path.chord_length, float(np.linalg.norm(points, axis=1).max()))
+
+    def label(self, k: int) -> str:
+        """Sample, time and point in words."""
+        point = ", ".join(f"{x:.6g}" for x in self.path.point(self.s[k])[0])
+        return f"sample {k} (t = {self.time_s[k]:.6g} s, point ({point}) m)"

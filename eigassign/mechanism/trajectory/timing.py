@@ -1,0 +1,146 @@
+"""Timing laws: how far along its path (s, 0 to 1) the tip is at the relative time τ = t / T.
+
+Point to point: q(t) between joint coordinates, each segment by the same timing law.
+
+Shapes: m points, n samples in time, n_q coordinates. SI units, angles in rad.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from eigassign.errors import MechanismError, UsageError
+
+# --- Timing laws: how far along its path (s, 0 to 1) the tip is at the relative time τ = t / T
+
+Floats = NDArray[np.float64]
+SHARE = 1.0 / 3.0  # of the time in which a trapezoidal motion accelerates, and as much it brakes
+
+
+@dataclass(frozen=True)
+class TimingLaw:
+    """Polynomials s(τ) = Σ c_k (τ − τ_i)^k on τ_i ≤ τ ≤ τ_{i+1}, from s(0) = 0 to s(1) = 1.
+
+    Defined on 0 ≤ τ ≤ 1 only; ``ends`` are the τ_{i+1} of all pieces but the last.
+    """
+
+    name: str
+    pieces: tuple[tuple[float, ...], ...]  # c_0, c_1, ... of each
+    ends: tuple[float, ...] = ()
+
+    def position(self, tau: ArrayLike) -> Floats:
+        """s(τ), dimensionless, same shape as ``tau``; UsageError outside [0, 1]."""
+        return self._evaluate(self.pieces, tau)
+
+    def velocity(self, tau: ArrayLike) -> Floats:
+        """ds/dτ, dimensionless (divide by the duration for 1/s); UsageError outside [0, 1]."""
+        return self._evaluate(tuple(map(_derivative, self.pieces)), tau)
+
+    def acceleration(self, tau: ArrayLike) -> Floats:
+        """d²s/dτ² (divide by the duration squared for 1/s²), from the right where it jumps."""
+        return self._evaluate(tuple(_derivative(_derivative(p)) for p in self.pieces), tau)
+
+    def _evaluate(self, pieces: tuple[tuple[float, ...], ...], tau: ArrayLike) -> Floats:
+        relative_time = np.asarray(tau, dtype=np.float64)
+        if not np.all((relative_time >= 0.0) & (relative_time <= 1.0)):
+            raise UsageError(f"the {self.name} timing law is defined for 0 <= tau <= 1 only")
+        value = _horner(pieces[0], relative_time)
+        for start, piece in zip(self.ends, pieces[1:], strict=True):
+            value = np.where(relative_time >= start, _horner(piece, relative_time - start), value)
+        return value
+
+
+def _horner(coefficients: tuple[float, ...], t: Floats) -> Floats:
+    value = np.zeros_like(t)
+    for coefficient in reversed(coefficients):
+        value = value * t + coefficient
+    return value
+
+
+def _derivative(coefficients: tuple[float, ...]) -> tuple[float, ...]:
+    """d/dτ Σ c_k τ^k = Σ k c_k τ^(k-1)."""
+    return tuple(k * c for k, c in enumerate(coefficients))[1:]
+
+
+POLYNOMIALS: Mapping[str, TimingLaw] = MappingProxyType(
+    {
+        "linear": TimingLaw("linear", ((0.0, 1.0),)),
+        "cubic": TimingLaw("cubic", ((0.0, 0.0, 3.0, -2.0),)),
+        "quintic": TimingLaw("quintic", ((0.0, 0.0, 0.0, 10.0, -15.0, 6.0),)),
+    }
+)
+
+
+def trapezoidal(share: float) -> TimingLaw:
+    """Constant acceleration for the ``share`` a of the time, constant velocity, and braking for a.
+
+    s = v τ²/(2a), then v (τ − a/2), then 1 − v (1 − τ)²/(2a), at the peak velocity v = 1/(1 − a).
+    UsageError unless 0 < a ≤ 1/2.
+    """
+    if not 0.0 < share <= 0.5:
+        raise UsageError(f"the share of time spent accelerating must be in (0, 0.5], got {share:g}")
+    v, a = 1.0 / (1.0 - share), share
+    ramp = 0.5 * v * a  # covered while accelerating, and while braking
+    pieces = ((0.0, 0.0, 0.5 * v / a), (ramp, v), (1.0 - ramp, v, -0.5 * v / a))
+    return TimingLaw("trapezoidal", pieces, (a, 1.0 - a))
+
+
+def timing_law(name: str, acceleration_share: float = SHARE) -> TimingLaw:
+    """The law called ``name``: linear s = τ, cubic 3τ² − 2τ³, quintic 10τ³ − 15τ⁴ + 6τ⁵, or
+    trapezoidal with the share of its time that it accelerates.
+
+    All but linear start and stop at rest, quintic also without acceleration. UsageError for other
+    names.
+    """
+    if name == "trapezoidal":
+        return trapezoidal(acceleration_share)
+    if name not in POLYNOMIALS:
+        known = ", ".join((*POLYNOMIALS, "trapezoidal"))
+        raise UsageError(f"unknown timing law {name!r}; there are {known}")
+    return POLYNOMIALS[name]
+
+
+# --- Point to point: q(t) between joint coordinates, each segment by the same timing law
+
+
+@dataclass(frozen=True)
+class Motion:
+    """q(t) at n equal steps of time, and when each point is reached."""
+
+    time_s: Floats  # (n,)
+    q: Floats  # (n, n_q)
+    reached_s: Floats  # (m,)
+
+
+def shared_times(points: Floats, duration: float) -> Floats:
+    """When each point (m, n_q) is reached, (m,) in s from 0 to ``duration``.
+
+    The time of a segment is in proportion to the largest move of a coordinate, each relative to the
+    range R_i which that coordinate has over all points: T_k ∝ max_i |q_{k+1,i} − q_{k,i}| / R_i. So
+    radians and metres need no common measure. Raises MechanismError for a point that equals the one
+    before it.
+    """
+    extent = np.ptp(points, axis=0)
+    moves = np.abs(np.diff(points, axis=0)) / np.where(extent > 0.0, extent, 1.0)
+    share = moves.max(axis=1)
+    for k in np.flatnonzero(share == 0.0):
+        message = "the same point as the one before it: give times instead of duration to wait"
+        raise MechanismError(f"trajectory.points[{k + 1}]", message)
+    reached = np.asarray(np.concatenate([[0.0], np.cumsum(share)]) * (duration / share.sum()))
+    reached[-1] = duration
+    return reached
+
+
+def point_to_point(points: Floats, reached_s: Floats, law: TimingLaw, n: int) -> Motion:
+    """q(t) = q_k + s((t − t_k)/(t_{k+1} − t_k)) (q_{k+1} − q_k) at n equal steps of time."""
+    time_s = np.linspace(reached_s[0], reached_s[-1], n)
+    k = np.clip(np.searchsorted(reached_s, time_s, side="right") - 1, 0, len(points) - 2)
+    tau = (time_s - reached_s[k]) / (reached_s[k + 1] - reached_s[k])
+    s = law.position(np.clip(tau, 0.0, 1.0))[:, None]
+    # this form gives both ends exactly
+    return Motion(time_s, (1.0 - s) * points[k] + s * points[k + 1], reached_s)

@@ -1,0 +1,378 @@
+"""The trajectory q(t) of a case: joint samples, a CSV file of them, or a path of the tip.
+
+Shapes: n samples in time, n_q coordinates. SI units, angles in rad.
+
+One or several trajectories studied together: their samples stacked, never joined.
+
+Nothing that is differentiated, integrated or drawn over time may run from the end of one trajectory
+into the start of the next; what does so goes part by part.
+
+How fast a sampled motion is: q̇ and q̈ at its samples, never across a corner.
+
+Where the velocity jumps (straight tip paths, points joined by linear timing) there is a blow and no
+acceleration that samples could tell: each smooth part is differentiated by itself.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path as FilePath
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from eigassign.case import FileTrajectory, PointTrajectory, SampledTrajectory, TipTrajectory
+from eigassign.errors import MechanismError, TrajectoryError, UsageError
+from eigassign.mechanism.inverse_kinematics.chain import TipChain
+from eigassign.mechanism.inverse_kinematics.follow import follow
+from eigassign.mechanism.trajectory.csv import read_samples
+from eigassign.mechanism.trajectory.path import (
+    WAYPOINTS,
+    Course,
+    Path,
+    planar_attitude,
+    spatial_attitude,
+    spline,
+    straight,
+)
+from eigassign.mechanism.trajectory.timing import point_to_point, shared_times, timing_law
+
+# --- The trajectory q(t) of a case: joint samples, a CSV file of them, or a path of the tip
+
+_BACKWARDS = "time must increase, and goes from {:g} s to {:g} s"
+_PATHS: dict[str, Callable[[ArrayLike], Path]] = {"spline": spline, "straight": straight}
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Where the mechanism is when. ``tip`` is None unless the case gives a path of the tip."""
+
+    time_s: Floats  # (n,) strictly increasing, n >= 2
+    q: Floats  # (n, n_q) in rad or m
+    tip: Floats | None  # (n, 2 or 3) in m
+    notes: tuple[str, ...] = ()  # what a reader should know: choices made, columns ignored
+    corners_s: tuple[float, ...] = ()  # times in between at which it is known that q̇ may jump
+
+    def __post_init__(self) -> None:
+        for array in (self.time_s, self.q, self.tip):
+            if array is not None:
+                array.setflags(write=False)
+
+
+def build_trajectory(
+    spec: SampledTrajectory | FileTrajectory | PointTrajectory | TipTrajectory,
+    q_names: Sequence[str],
+    tip_chain: Callable[[str, bool], TipChain],
+    folder: FilePath = FilePath(),
+    q_units: Sequence[str] = (),
+) -> Trajectory:
+    """The trajectory that a case asks for, in the coordinates ``q_names``.
+
+    ``tip_chain(node, oriented)`` gives the chain of a tip path's node, its turning looked at if
+    oriented, and is called for nothing else;
+    ``folder`` is what the name of a CSV file is relative to; ``q_units`` are "rad" or "m" for each
+    coordinate, all rad if empty. Raises MechanismError for what is
+    wrong as a whole, TrajectoryError for what is wrong with one sample.
+    """
+    if isinstance(spec, TipTrajectory):
+        return _from_tip_path(spec, q_names, tip_chain)
+    if isinstance(spec, FileTrajectory):
+        return _from_file(spec, q_names, q_units, folder)
+    if isinstance(spec, PointTrajectory):
+        return _from_points(spec, q_names)
+    return _from_samples(spec, q_names, q_units)
+
+
+def _from_tip_path(
+    spec: TipTrajectory, q_names: Sequence[str], tip_chain: Callable[[str, bool], TipChain]
+) -> Trajectory:
+    """q(t) with tip(q(t)) = p(s(t/T)), turned as asked for, at equal steps in time."""
+    path, attitude = _PATHS[spec.path](spec.waypoints), None
+    if spec.angle is not None:
+        attitude = planar_attitude(path, spec.angle, spec.path)
+    elif spec.orientation is not None:
+        attitude = spatial_attitude(path, spec.orientation, spec.path)
+    chain = tip_chain(spec.tip, attitude is not None)
+    _check_dimension(chain, path)
+    tau = np.linspace(0.0, 1.0, spec.samples)
+    s = timing_law(spec.timing, spec.acceleration_share).position(tau)
+    s = np.maximum.accumulate(np.clip(s, 0.0, 1.0))  # round-off at the ends
+    course = Course(path, s, spec.duration * tau, attitude)
+    followed = follow(chain, course, spec.branch, spec.start)
+    corners = np.interp(course.corners(), course.s, course.time_s)
+    return Trajectory(
+        course.time_s, followed.q, followed.tip, followed.notes, tuple(corners.tolist())
+    )
+
+
+def _check_dimension(chain: TipChain, path: Path) -> None:
+    d = chain.look(np.zeros((1, len(chain.kinds)))).point.shape[1]
+    if path.coefficients.shape[2] != d:
+        raise MechanismError(WAYPOINTS, f"the tip moves in {d} dimensions: give {d} coordinates")
+
+
+def _from_file(
+    spec: FileTrajectory, q_names: Sequence[str], q_units: Sequence[str], folder: FilePath
+) -> Trajectory:
+    table = read_samples(folder / spec.file, q_names, q_units)
+    for k in _not_later(table.time_s):
+        message = f"{table.where(k)}: {_BACKWARDS.format(*table.time_s[k - 1 : k + 1])}"
+        raise TrajectoryError("trajectory.file", message, k)
+    notes = (*table.notes, *_jumps(table.q, q_names, q_units))
+    return Trajectory(table.time_s, table.q, None, notes)
+
+
+def _from_samples(
+    spec: SampledTrajectory, q_names: Sequence[str], q_units: Sequence[str]
+) -> Trajectory:
+    """Samples given in the case: times as given, or at equal steps over the duration from 0."""
+    q = _checked_rows(spec.q, q_names, "q", "sample")
+    if spec.time is None:
+        time_s = np.linspace(0.0, spec.duration or 1.0, len(q))
+    else:
+        time_s = _checked_time(spec.time, len(q), "time", "sample")
+    return Trajectory(time_s, q, None, _jumps(q, q_names, q_units))
+
+
+def _from_points(spec: PointTrajectory, q_names: Sequence[str]) -> Trajectory:
+    """Point to point, in equal steps of time."""
+    points = _checked_rows(spec.points, q_names, "points", "point")
+    if spec.times is None:
+        reached = shared_times(points, spec.duration or 1.0)
+        said: tuple[str, ...] = (
+            f"the points are reached at {', '.join(f'{t:.6g}' for t in reached)} s: time shared in "
+            "proportion to the largest move of a coordinate relative to its range",
+        )
+    else:
+        reached, said = _checked_time(spec.times, len(points), "times", "point"), ()
+    law = timing_law(spec.timing, spec.acceleration_share)
+    motion = point_to_point(points, reached, law, spec.samples)
+    corners = tuple(reached[1:-1].tolist()) if spec.timing == "linear" else ()  # elsewhere at rest
+    return Trajectory(motion.time_s, motion.q, None, said if len(points) > 2 else (), corners)
+
+
+def _checked_rows(
+    rows: Sequence[Sequence[float]], q_names: Sequence[str], key: str, what: str
+) -> Floats:
+    """Rows of finite coordinates (n, n_q), at least two."""
+    for k, row in enumerate(rows):
+        path = f"trajectory.{key}[{k}]"
+        if len(row) != len(q_names):
+            message = f"{what} {k} has {len(row)} values for the coordinates {', '.join(q_names)}"
+            raise TrajectoryError(path, message, k)
+        if not np.isfinite(row).all():
+            raise TrajectoryError(path, f"{what} {k} is not finite", k)
+    if len(rows) < 2:
+        raise MechanismError(f"trajectory.{key}", f"a trajectory needs at least two {what}s")
+    return np.array(rows, dtype=np.float64)
+
+
+def _checked_time(time: Sequence[float], n: int, key: str, what: str) -> Floats:
+    time_s = np.array(time, dtype=np.float64)
+    if len(time_s) != n:
+        raise MechanismError(f"trajectory.{key}", f"{len(time_s)} times for {n} {what}s")
+    for k in _not_later(time_s):
+        message = f"{what} {k}: {_BACKWARDS.format(*time_s[k - 1 : k + 1])}"
+        raise TrajectoryError(f"trajectory.{key}[{k}]", message, k)
+    return time_s
+
+
+def _not_later(time_s: Floats) -> list[int]:
+    """Samples that do not come after the one before them (NaN comes after nothing)."""
+    return [int(k) + 1 for k in np.flatnonzero(~(np.diff(time_s) > 0.0))]
+
+
+def _jumps(q: Floats, q_names: Sequence[str], q_units: Sequence[str]) -> tuple[str, ...]:
+    """A note for each angle that moves by more than half a turn from sample to sample."""
+    steps = np.abs(np.diff(q, axis=0))
+    return tuple(
+        f"{name} jumps by {steps[k, i]:.3g} rad from sample {k} to {k + 1}; is it cut at 360 deg?"
+        for i, (name, unit) in enumerate(
+            zip(q_names, q_units or ["rad"] * len(q_names), strict=True)
+        )
+        if unit == "rad" and steps[k := int(np.argmax(steps[:, i])), i] > np.pi
+    )
+
+
+# --- One or several trajectories studied together: their samples stacked, never joined
+
+Ints = NDArray[np.intp]
+
+
+class NamedTrajectory(NamedTuple):
+    """One of several trajectories; ``weight`` is what each of its seconds counts beside others."""
+
+    name: str
+    trajectory: Trajectory
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """At least one trajectory; n samples in all, those of the first one first.
+
+    The time of each begins where its own does, so ``time_s`` need not increase from one to the
+    next; ``rows`` says which samples are whose.
+    """
+
+    parts: tuple[NamedTrajectory, ...]
+
+    def __post_init__(self) -> None:
+        if not self.parts:
+            raise UsageError("trajectories: none given")
+
+    @cached_property
+    def time_s(self) -> Floats:
+        """(n,) in s."""
+        return _stacked([part.trajectory.time_s for part in self.parts])
+
+    @cached_property
+    def q(self) -> Floats:
+        """(n, n_q) in rad or m."""
+        return _stacked([part.trajectory.q for part in self.parts])
+
+    @cached_property
+    def tip(self) -> Floats | None:
+        """(n, 2 or 3) in m; None unless every trajectory is a path of the tip."""
+        tips = [part.trajectory.tip for part in self.parts]
+        given = [tip for tip in tips if tip is not None]
+        return _stacked(given) if len(given) == len(tips) else None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Those of every trajectory, with its name where there are several."""
+        return tuple(
+            f"trajectory {part.name!r}: {note}" if self.several else note
+            for part in self.parts
+            for note in part.trajectory.notes
+        )
+
+    @property
+    def several(self) -> bool:
+        """Whether there is more than one, so that a sample needs more than its number."""
+        return len(self.parts) > 1
+
+    @cached_property
+    def rows(self) -> tuple[slice, ...]:
+        """Which samples belong to each trajectory."""
+        ends = np.cumsum([0, *(len(part.trajectory.time_s) for part in self.parts)])
+        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+
+    def rows_of(self, name: str | None) -> slice:
+        """The samples of the trajectory of that name, or all; UsageError for an unknown one."""
+        if name is None:
+            return slice(0, len(self.time_s))
+        for part, rows in zip(self.parts, self.rows, strict=True):
+            if part.name == name:
+                return rows
+        raise UsageError(f"trajectory: there is none called {name!r}")
+
+    def sample(self, k: int) -> str:
+        """Sample k of all, in words: its place in its own trajectory, counted from 0."""
+        part, rows = self._at(k)
+        own = k - rows.start
+        return f"sample {own} of trajectory {part.name!r}" if self.several else f"sample {own}"
+
+    def where(self, k: int) -> str:
+        """The same with its time."""
+        return f"{self.sample(k)} (t = {self.time_s[k]:.4g} s)"
+
+    def name_of(self, k: int) -> str:
+        """The name of the trajectory that sample k of all belongs to."""
+        return self._at(k)[0].name
+
+    def _at(self, k: int) -> tuple[NamedTrajectory, slice]:
+        pairs = zip(self.parts, self.rows, strict=True)
+        return next(pair for pair in pairs if pair[1].start <= k < pair[1].stop)
+
+    def weights(self, integral: Callable[[Floats], Floats]) -> Floats:
+        """ω (n,) with ``ω @ g`` ≈ Σ weight · ∫ g dt over every trajectory for itself.
+
+        ``integral`` gives the weights of one trajectory from its times, such as the trapezoidal
+        rule's.
+        """
+        shares = [part.weight * integral(part.trajectory.time_s) for part in self.parts]
+        return _stacked([np.asarray(share) for share in shares])
+
+    def spread(self, count: int) -> Ints:
+        """Numbers of about ``count`` samples: of each trajectory its share, with both its ends."""
+        n = len(self.time_s)
+        chosen = []
+        for rows in self.rows:
+            own = rows.stop - rows.start
+            share = min(own, max(2, round(count * own / n)))
+            ends = np.linspace(rows.start, rows.stop - 1, share)
+            chosen.append(np.unique(ends.round().astype(np.intp)))
+        return np.concatenate(chosen)
+
+    def chosen(self, samples: Sequence[int] | Ints) -> Trajectories:
+        """Some of the samples only, given by ascending numbers; no part that has none of them."""
+        kept = np.asarray(samples, dtype=np.intp)
+        parts = []
+        for part, rows in zip(self.parts, self.rows, strict=True):
+            own = kept[(kept >= rows.start) & (kept < rows.stop)] - rows.start
+            if len(own):
+                parts.append(part._replace(trajectory=_thinned(part.trajectory, own)))
+        return Trajectories(tuple(parts))
+
+
+def _thinned(trajectory: Trajectory, rows: Ints) -> Trajectory:
+    tip = None if trajectory.tip is None else trajectory.tip[rows]
+    return replace(trajectory, time_s=trajectory.time_s[rows], q=trajectory.q[rows], tip=tip)
+
+
+def _stacked(arrays: Sequence[Floats]) -> Floats:
+    stacked = arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
+    stacked.setflags(write=False)
+    return stacked
+
+
+# --- How fast a sampled motion is: q̇ and q̈ at its samples, never across a corner
+
+SAME = 1e-9  # of the duration: a sample this near to a corner is on it, and ends both parts
+
+
+@dataclass(frozen=True, eq=False)
+class Rates:
+    """q, q̇ and q̈ (m, n_q) at ``samples`` (m,); a sample on a corner stands there for both sides."""
+
+    samples: NDArray[np.intp]
+    q: Floats
+    rate: Floats
+    acceleration: Floats
+
+
+def rates(trajectory: Trajectory) -> Rates:
+    """By differences within each smooth part; of a part with one sample nothing is known."""
+    parts = [part for part in _smooth_parts(trajectory) if len(part) > 1]
+    samples = np.concatenate([np.zeros(0, dtype=np.intp), *parts])
+    q, time_s = trajectory.q, trajectory.time_s
+    found = [_differences(time_s[part], q[part]) for part in parts]
+    nothing = np.zeros((0, q.shape[1]))
+    rate, acceleration = (np.concatenate([nothing, *(f[k] for f in found)]) for k in (0, 1))
+    return Rates(samples, q[samples], rate, acceleration)
+
+
+def _smooth_parts(trajectory: Trajectory) -> list[NDArray[np.intp]]:
+    """The samples from each corner to the next."""
+    time_s = trajectory.time_s
+    near = SAME * float(np.ptp(time_s))
+    cuts = [time_s[0], *trajectory.corners_s, time_s[-1]]
+    return [
+        np.flatnonzero((time_s >= a - near) & (time_s <= b + near))
+        for a, b in itertools.pairwise(cuts)
+    ]
+
+
+def _differences(time_s: Floats, q: Floats) -> tuple[Floats, Floats]:
+    """Of second order; of two samples their difference, and no acceleration."""
+    order: Literal[1, 2] = 2 if len(time_s) > 2 else 1
+    rate = np.gradient(q, time_s, axis=0, edge_order=order)
+    return rate, np.gradient(rate, time_s, axis=0, edge_order=order)

@@ -1,0 +1,156 @@
+"""Elements per link: as few as the accuracy needs, judged by what twice as many would change.
+
+Halving the elements of a link changes a frequency by Δ; with an error that falls at least as h²
+(axial; bending falls as h⁴) what is left is at most 4/3 |Δ| (Richardson).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.errors import AccuracyError
+from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.modal.exact.roundoff import rounding_error
+from eigassign.modal.exact.solver import eigenvalues
+
+Floats = NDArray[np.float64]
+START = 2
+MAX_ELEMENTS = 256
+ROUNDS = 8
+POSES = 9  # samples at which meshes are compared
+
+
+class HasPencil(Protocol):
+    """What a mesh is judged on."""
+
+    @property
+    def pencil(self) -> Pencil:
+        """The affine pencil."""
+
+
+Build = Callable[[Mapping[str, int]], HasPencil]
+
+
+@dataclass(frozen=True, eq=False)
+class MeshChoice:
+    """Elements per link, the discretisation error that they leave, and why these."""
+
+    elements: Mapping[str, int]
+    error: Floats  # (n_modes,): estimated relative error in frequency, largest over the samples
+    reasons: tuple[str, ...]
+
+
+def mesh_error(
+    build: Build, elements: Mapping[str, int], x: Floats, modes: Sequence[int]
+) -> Floats:
+    """Estimated discretisation error (n_samples, n_modes), relative in frequency."""
+    doubled = {name: 2 * n for name, n in elements.items()}
+    return 4.0 / 3.0 * _moved(_frequencies(build, elements, x, modes), build, doubled, x, modes)
+
+
+def choose_mesh(
+    build: Build,
+    elements: Mapping[str, int | None],
+    x: Floats,
+    accuracy: float,
+    modes: Sequence[int] = (1,),
+) -> MeshChoice:
+    """Elements for the links that have None, the others kept; error ≤ ``accuracy`` at x (n, n_x).
+
+    Raises AccuracyError where `MAX_ELEMENTS` do not suffice or round-off is in the way.
+    """
+    free = [name for name, n in elements.items() if n is None]
+    now = {name: START if n is None else n for name, n in elements.items()}
+    x = _spread(x)
+    reasons: list[str] = []
+    for _ in range(ROUNDS):
+        f = _frequencies(build, now, x, modes)
+        moved = _moved(f, build, {n: 2 * k for n, k in now.items()}, x, modes)
+        reasons.append(_line(now, moved, modes))
+        if 4.0 / 3.0 * moved.max() <= accuracy:
+            return MeshChoice(dict(now), 4.0 / 3.0 * moved.max(axis=0), tuple(reasons))
+        if not free:
+            break
+        now = _refined(build, now, free, f, x, modes, accuracy)
+        _check_rounding(build, now, x, modes, accuracy)
+    raise AccuracyError(
+        f"the mesh leaves {4.0 / 3.0 * moved.max():.1e} where {accuracy:.1e} is asked for: "
+        f"{reasons[-1]}"
+    )
+
+
+def _refined(
+    build: Build,
+    now: Mapping[str, int],
+    free: Sequence[str],
+    f: Floats,
+    x: Floats,
+    modes: Sequence[int],
+    accuracy: float,
+) -> dict[str, int]:
+    """More elements where doubling them alone matters, as many as the fourth-order law predicts."""
+    share = accuracy / len(free)
+    after = dict(now)
+    for name in free:
+        alone = {**now, name: 2 * now[name]}
+        effect = 4.0 / 3.0 * float(_moved(f, build, alone, x, modes).max())
+        if effect > share:
+            wished = int(np.ceil(now[name] * (effect / share) ** 0.25))
+            after[name] = min(max(wished, now[name] + 1), MAX_ELEMENTS)
+    if after == dict(now):
+        after = {name: n + (name in free) for name, n in now.items()}
+    return after
+
+
+def _check_rounding(
+    build: Build, now: Mapping[str, int], x: Floats, modes: Sequence[int], accuracy: float
+) -> None:
+    lost = rounding_error(build(now).pencil, x[0], max(modes))
+    if lost > accuracy:
+        raise AccuracyError(
+            f"with {_shown(now)} elements round-off is {lost:.1e}, above the {accuracy:.1e} "
+            "that is asked for: a finer mesh makes it worse"
+        )
+
+
+def _frequencies(
+    build: Build, elements: Mapping[str, int], x: Floats, modes: Sequence[int]
+) -> Floats:
+    pencil = build(elements).pencil
+    pick = np.array(modes) - 1
+    return np.asarray(np.sqrt(eigenvalues(pencil, x, max(modes))[:, pick]) / (2.0 * np.pi))
+
+
+def _moved(
+    f: Floats, build: Build, elements: Mapping[str, int], x: Floats, modes: Sequence[int]
+) -> Floats:
+    finer = _frequencies(build, elements, x, modes)
+    return np.asarray(np.abs(f / finer - 1.0))
+
+
+def _spread(x: Floats) -> Floats:
+    """At most `POSES` samples, the first and the last among them."""
+    keep = np.unique(np.linspace(0, len(x) - 1, min(POSES, len(x))).round().astype(int))
+    return np.asarray(x[keep])
+
+
+def _shown(elements: Mapping[str, int]) -> str:
+    counts = set(elements.values())
+    if len(counts) == 1:
+        return str(counts.pop())
+    return ", ".join(f"{name} {n}" for name, n in elements.items())
+
+
+def _line(elements: Mapping[str, int], moved: Floats, modes: Sequence[int]) -> str:
+    each = ", ".join(
+        f"mode {mode} moves {change:.2g} %"
+        for mode, change in zip(modes, 100.0 * moved.max(axis=0), strict=True)
+    )
+    counts = set(elements.values())
+    twice = f"with {2 * counts.pop()}" if len(counts) == 1 else "with twice as many"
+    return f"{_shown(elements)} elements: {each} {twice}"

@@ -1,0 +1,74 @@
+"""Exact elastic modes of the affine pencil, the rigid-body modes projected out exactly.
+
+With E the elastic unknowns (u and held coordinates) and F the free coordinates, K = diag(K_E, 0):
+
+    K_E φ_E = λ M_c φ_E,   M_c = M_EE − M_EF M_FF⁻¹ M_FE,   φ_F = −M_FF⁻¹ M_FE φ_E
+
+solved in the inverse form M_c z = μ K_E z, μ = 1/λ, so that massless unknowns (μ = 0) are harmless.
+What may be round-off instead of a mode with mass is settled by ``massive``, for all solvers alike.
+
+The lowest modes and some more, where the mechanism has so many with mass.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.errors import MissingMassError, UsageError
+from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.modal.arguments import DENSE_LIMIT, whole
+from eigassign.modal.exact.condensation import Modes
+from eigassign.modal.exact.dense import solve_dense
+from eigassign.modal.exact.sparse import solve_sparse
+
+# --- Exact elastic modes of the affine pencil, the rigid-body modes projected out exactly
+
+Floats = NDArray[np.float64]
+
+
+def eigenvalues(pencil: Pencil, x: Floats, count: int) -> Floats:
+    """λ (n_samples, count) of the lowest elastic modes at x (n_samples, n_x), in rad²/s².
+
+    Raises UsageError for more modes than there are, MissingMassError for more than have mass,
+    MechanismError where K_E or M_FF is singular.
+    """
+    return _solve(pencil, pencil.theta(x), count, vectors=False).lam
+
+
+def modes(pencil: Pencil, x: Floats, count: int) -> Modes:
+    """Eigenvalues and mass-normalised modes of the lowest elastic modes."""
+    return _solve(pencil, pencil.theta(x), count, vectors=True)
+
+
+def modes_at(pencil: Pencil, theta: Floats, count: int) -> Modes:
+    """The same where θ (n_theta, n_samples) is known already."""
+    return _solve(pencil, theta, count, vectors=True)
+
+
+def _solve(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
+    elastic, count = len(pencil.elastic), whole(count, "count")
+    if not 1 <= count <= elastic:
+        raise UsageError(f"{count} modes asked for; the model has 1 to {elastic} elastic ones")
+    if not np.isfinite(theta).all():
+        raise UsageError("q or y is not finite, or outside the domain of a section or length")
+    if pencil.n_dof <= DENSE_LIMIT or 2 * count > elastic:  # Lanczos is for few modes of many
+        found = solve_dense(pencil, theta, count, vectors)
+    else:
+        found = Modes(*solve_sparse(pencil, theta, count, vectors))
+    return found
+
+
+# --- The lowest modes and some more, where the mechanism has so many with mass
+
+
+def lowest_modes(pencil: Pencil, theta: Floats, least: int, extra: int) -> Modes:
+    """At least the lowest ``least`` modes, and up to ``extra`` more where so many have mass."""
+    count = max(min(least + extra, len(pencil.elastic)), least)
+    while True:
+        try:
+            return modes_at(pencil, theta, count)
+        except MissingMassError as error:
+            if count == least:
+                raise
+            count = min(max(error.most, least), count - 1)

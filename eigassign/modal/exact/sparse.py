@@ -1,0 +1,126 @@
+"""Exact elastic modes of a large pencil: Lanczos on M_c z = μ K_E z with K_E factored sparsely.
+
+Symmetric sparse matrices from the non-zeros of the pencil, without sorting or duplicates.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import linalg
+
+from eigassign.errors import LIMP, AccuracyError, MechanismError, MissingMassError
+from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism.elements.sparse_factor import factorise
+from eigassign.modal.exact.massless import doubtful, mass_sizes, solve_massive
+
+__all__ = ["block", "factorise", "principal"]
+
+
+# --- Exact elastic modes of a large pencil: Lanczos on M_c z = μ K_E z with K_E factored sparse
+
+Floats = NDArray[np.float64]
+DENSE_MOST = 4000  # elastic unknowns up to which dense algebra settles what may be round-off
+
+
+def solve_sparse(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> tuple[Floats, Floats]:
+    """λ (n_samples, count) and, where asked for, φ (n_samples, n_dof, count)."""
+    solved = [_one(pencil, theta[:, k], count) for k in range(theta.shape[1])]
+    lam = np.array([s[0] for s in solved])
+    return lam, np.array([s[1] for s in solved]) if vectors else np.zeros((len(lam), 0, count))
+
+
+def _one(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
+    E, F = pencil.elastic, pencil.rigid
+    K_E = principal(pencil, pencil.stiffness @ theta, E)
+    mass = pencil.mass @ theta
+    M_EE, M_F = principal(pencil, mass, E), block(pencil, mass, F)
+    M_FE = M_F[:, E]
+    coupling = _coupling(M_F[:, F], M_FE)
+    mu, z = _lanczos(K_E, M_EE, M_FE, coupling, count)
+    noise = mass_sizes(pencil, theta[:, None], coupling[None])[0] @ (z * z)
+    sure = ~doubtful(mu, noise, len(E), margin=1.0)  # dense algebra is dear here
+    if sure.all():
+        lam, phi = 1.0 / mu, np.empty((pencil.n_dof, count))
+        phi[E] = z / np.sqrt(mu)
+        phi[F] = -coupling @ phi[E]
+    elif len(E) <= DENSE_MOST:
+        lam, phi = solve_massive(pencil, theta[:, None], count)
+    else:
+        raise MissingMassError(int(sure.argmin()))
+    at = np.abs(phi).argmax(axis=0)
+    phi *= np.where(phi[at, np.arange(count)] < 0.0, -1.0, 1.0)
+    return lam, phi
+
+
+def _krylov_size(count: int) -> int:
+    """Lanczos vectors before a restart: few modes converge in fewer than ARPACK's own 20."""
+    return min(max(20, 2 * count + 1), 10 + 2 * count)
+
+
+def _coupling(M_FF: Floats, M_FE: Floats) -> Floats:
+    if not len(M_FF):
+        return M_FE
+    try:
+        np.linalg.cholesky(M_FF)
+    except np.linalg.LinAlgError as error:
+        raise MechanismError(
+            "mechanism", "a free coordinate moves no mass: give the mechanism mass or lock it"
+        ) from error
+    return np.asarray(np.linalg.solve(M_FF, M_FE))
+
+
+def _lanczos(
+    K_E: sparse.csc_array, M_EE: sparse.csc_array, M_FE: Floats, coupling: Floats, count: int
+) -> tuple[Floats, Floats]:
+    """Largest μ of M_c z = μ K_E z, descending, z with unit K_E-norm."""
+    n = K_E.shape[0]
+    try:
+        factor = factorise(K_E)
+    except RuntimeError as error:
+        raise MechanismError("mechanism", LIMP) from error
+    K_rows, M_rows = K_E.T, M_EE.T  # symmetric: products run faster row by row
+    M_c = linalg.LinearOperator((n, n), matvec=lambda v: M_rows @ v - (coupling @ v) @ M_FE)
+    inverse = linalg.LinearOperator((n, n), matvec=factor.solve)
+    start = np.random.default_rng(0).standard_normal(n)
+    try:
+        mu, z = linalg.eigsh(
+            M_c, count, M=K_rows, Minv=inverse, which="LM", v0=start, ncv=_krylov_size(count)
+        )
+    except linalg.ArpackNoConvergence as error:
+        raise AccuracyError(f"the exact modes did not converge: {error}") from error
+    order = np.argsort(-mu)
+    return mu[order], z[:, order]
+
+
+# --- Symmetric sparse matrices from the non-zeros of the pencil, without sorting or duplicates
+
+Ints = NDArray[np.intp]
+
+
+def principal(pencil: Pencil, data: Floats, dofs: Ints) -> sparse.csc_array:
+    """The rows and columns ``dofs`` (ascending) of a symmetric matrix from its non-zeros.
+
+    The pencil's pattern runs row by row; read column by column it is the same symmetric matrix.
+    Entries that happen to be zero are left out: they would only cause fill-in.
+    """
+    position = np.full(pencil.n_dof, -1, dtype=np.int32)
+    position[dofs] = np.arange(len(dofs), dtype=np.int32)
+    rows, columns = position[pencil.rows], position[pencil.columns]
+    keep = (rows >= 0) & (columns >= 0) & (data != 0.0)
+    counts = np.bincount(rows[keep], minlength=len(dofs))
+    starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    shape = (len(dofs), len(dofs))
+    return sparse.csc_array((data[keep], columns[keep], starts), shape=shape)
+
+
+def block(pencil: Pencil, data: Floats, rows: Ints) -> Floats:
+    """The rows ``rows`` of a matrix, dense: (len(rows), n_dof)."""
+    position = np.full(pencil.n_dof, -1, dtype=np.intp)
+    position[rows] = np.arange(len(rows))
+    slot = position[pencil.rows]
+    keep = slot >= 0
+    out = np.zeros((len(rows), pencil.n_dof))
+    out[slot[keep], pencil.columns[keep]] = data[keep]
+    return out

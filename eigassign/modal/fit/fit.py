@@ -1,0 +1,514 @@
+"""A polynomial in place of an eigensolve, to a stated accuracy over a stated region.
+
+    f(q, y)^p ≈ Σ_γ c_γ h_γ(v(q, y)),   p ∈ {1, 2, −2}:  f, λ or 1/λ, whichever needs fewest terms
+
+in Newton's basis over a lower set of multi-indices. How it is made is in `modal.fitting`.
+
+Fits made: to a stated accuracy, or of a given number of solves; all stretches of a path at once.
+
+A source is asked for frequencies: the model's exact solves, a reduced model, or an expansion. The
+polynomial of a region grows where its coefficients say so (`series.adaptive_newton`), or has as
+many members as solves were given (`series.given_newton`).
+
+What a fit asks: exact solves of a model, a reduced model or an expansion, with its own error.
+
+Fits of several stretches of a path, one after the other, that answer as one.
+"""
+
+from __future__ import annotations
+
+import itertools
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from eigassign.errors import AccuracyError, UsageError
+from eigassign.interpolation.adaptive import adaptive
+from eigassign.interpolation.given import fewest, given
+from eigassign.interpolation.newton import Asking, Interpolant, newton_polynomials
+from eigassign.modal.adaptive.order import shown
+from eigassign.modal.arguments import DENSE_LIMIT, mode_numbers, whole_within
+from eigassign.modal.exact.roundoff import rounding_error
+from eigassign.modal.exact.solver import eigenvalues
+from eigassign.modal.fit.domain import Box, Path, Region, Stretch, build_region, followed, stretches
+from eigassign.modal.model import Model, as_model
+from eigassign.modal.reduced.model import ReducedModel
+from eigassign.modal.taylor.expansion import Expansion, InverseExpansion
+from eigassign.series.power_series import Polynomials
+
+# --- A polynomial in place of an eigensolve, to a stated accuracy over a stated region
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+QUANTITIES = {1.0: "f", 2.0: "λ", -2.0: "1/λ"}
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Frequencies of ``modes`` over ``region`` from one polynomial each; immutable."""
+
+    modes: tuple[int, ...]
+    region: Region
+    accuracy: float | None  # asked for, relative in Hz; None where the solves were given
+    interpolant: Interpolant
+    own_error: Callable[[], float]  # of the source, part of the estimate; found when asked for
+
+    @cached_property
+    def floor(self) -> float:
+        """Part of the estimate that is the source's own."""
+        return self.own_error()
+
+    @property
+    def error_estimate(self) -> float:
+        """Of frequencies anywhere in the region, relative in Hz."""
+        return self.interpolant.error + self.floor
+
+    @property
+    def indices(self) -> Ints:
+        """Multi-indices (N, d) of the terms."""
+        return self.interpolant.members
+
+    @property
+    def coefficients(self) -> Floats:
+        """(n_modes, N), of Hz^power, in Newton's basis."""
+        return self.interpolant.coefficients
+
+    @property
+    def power(self) -> float:
+        """The power of f that is a polynomial."""
+        return self.interpolant.power
+
+    @property
+    def solves(self) -> int:
+        """Poses at which the source was asked, checks included."""
+        return self.interpolant.asked
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """What was chosen and why, as lines of text."""
+        return tuple(_reasons(self.interpolant, self.floor))
+
+    @property
+    def quantity(self) -> str:
+        """What is a polynomial: "f", "λ" or "1/λ"."""
+        return QUANTITIES[self.power]
+
+    def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """(n, n_modes) in Hz. Raises UsageError outside the region."""
+        return self._hz(self._ready(self.region.v(q, y)))
+
+    def along(self, y: ArrayLike | None = None) -> Floats:
+        """At every sample of the trajectory: (n_t, n_modes) in Hz for one design y (n_y,).
+
+        (n_designs, n_t, n_modes) for many (n_designs, n_y); without y at that of the fit. Raises
+        UsageError for a fit over a box of q, for y outside the region, or missing.
+        """
+        path, line = self.region.path, self.region.line
+        if path is None:
+            raise UsageError("the fit is over a box of q: it has no trajectory to go along")
+        if y is None and line is not None and self.region.d == 1:
+            return self._hz(line.table[:, : len(self.indices)] @ self.coefficients.T)
+        if y is None:
+            raise UsageError("the fit is over a box of y: along which design?")
+        v = self.region.design(y)
+        hz = self._hz(self._on_path(v, len(path)))
+        return hz[0] if np.ndim(y) == 1 else hz
+
+    def _on_path(self, v: Floats, n_t: int) -> Floats:
+        """f^p (n_designs, n_t, n_modes): one product of matrices for all designs."""
+        if self.region.line is None:
+            return np.repeat(self._ready(v)[:, None], n_t, axis=1)
+        right = self._ready.second(np.ascontiguousarray(v[:, 1:].T))
+        g = np.empty((len(v), n_t, len(self.modes)))
+        for k, table in enumerate(self._samples):
+            np.matmul(right.T, table, out=g[:, :, k])
+        return g
+
+    @cached_property
+    def _samples(self) -> Floats:
+        """The polynomials of y at each sample of the trajectory, (n_modes, N_second, n_t)."""
+        assert self.region.line is not None
+        return self._ready.table @ self._ready.first(self.region.line.place[None])
+
+    @cached_property
+    def _ready(self) -> Polynomials:
+        nodes = [axis.nodes for axis in self.region.axes]
+        return newton_polynomials(self.indices, nodes, self.coefficients)
+
+    def _hz(self, g: Floats) -> Floats:
+        """f of f^p, in its place."""
+        if self.power == 1.0:
+            return g
+        np.sqrt(g, out=g)  # in place: fresh pages cost more than the roots
+        return g if self.power == 2.0 else np.divide(1.0, g, out=g)
+
+
+def _reasons(found: Interpolant, floor: float) -> Iterator[str]:
+    yield f"{QUANTITIES[found.power]} is the polynomial: its coefficients fall fastest"
+    for count, error in found.rounds:
+        yield f"{count} terms: error at most {error:.1e}"
+    degrees = found.members.max(axis=0)
+    idle = sum(rate == 0.0 for rate in found.rates)
+    yield f"degrees {' x '.join(map(str, degrees))}" + (f", {idle} idle" if idle else "")
+    if floor:
+        yield f"the source itself may be off by {floor:.1e}"
+
+
+# --- Fits made: to a stated accuracy, or of a given number of solves; all stretches of a path a
+
+ACCURACY = 1e-4  # where neither accuracy nor solves are given
+MOST = 2000  # frequencies asked for in one fit
+LEAST_ACCURACY = 1e-13
+
+
+def fit(
+    source: Any,
+    q: Any,
+    y: ArrayLike | Box,
+    modes: Sequence[int] | None = None,
+    accuracy: float | None = None,
+    most: int = MOST,
+    solves: int | None = None,
+) -> Fit | PathFit:
+    """Fit ``modes`` of ``source`` over a trajectory or a box of q and a design or a box of y.
+
+    ``source`` is a Model (exact solves), a ReducedModel or an Expansion, whose own error estimates
+    count. ``q`` are samples of a trajectory (n_t, n_q), one pose (n_q,), a `Box`, or several
+    trajectories: ``case.trajectory`` or a list of samples; ``y`` (n_y,) or a `Box`. ``accuracy``
+    is relative in Hz, 1e-4 unless given; or ``solves`` are that many frequencies and no more, of
+    one axis 128 at most, and the estimate is what they leave. A trajectory with corners is fitted
+    from one to the next.
+
+    Raises AccuracyError where ``most`` frequencies do not suffice, as where modes cross, or where
+    those of given ``solves`` show no error; UsageError for arguments that cannot be meant.
+    """
+    if solves is not None and accuracy is not None:
+        raise UsageError("a fit has an accuracy or a number of solves, not both")
+    _meant(accuracy, most)
+    directions, n_q = dependence(source)
+    path = None if isinstance(q, Box) else stretches(q, directions, n_q)
+    parts: tuple[Any, ...] = (q,) if path is None else path.parts
+    wanted = modes_of(source, modes)
+    if solves is None:
+        accuracy = ACCURACY if accuracy is None else accuracy
+        regions, floors, runs = _to_accuracy(source, parts, y, wanted, accuracy, most)
+    else:
+        count = whole_within(solves, "solves", 1, MOST)
+        regions, floors, runs = _by_solves(source, path, parts, y, wanted, count)
+    found, seen = _driven(source, wanted, regions, runs)
+    if not isinstance(source, Model):
+        each_ = zip(floors, seen, strict=True)
+        floors = [max(floor, known_error(source, x, wanted, accuracy)) for floor, x in each_]
+    made = zip(regions, found, floors, strict=True)
+    fits = tuple(_fit(source, wanted, accuracy, *each) for each in made)
+    return fits[0] if path is None or len(fits) == 1 else PathFit(fits, path.rows)
+
+
+_Plan = tuple[list[Region], list[float], list[Asking]]  # of each part: with the source's own error
+
+
+def _to_accuracy(
+    source: Any,
+    parts: Sequence[Any],
+    y: ArrayLike | Box,
+    modes: tuple[int, ...],
+    accuracy: float,
+    most: int,
+) -> _Plan:
+    """Runs that ask until their estimate meets the accuracy."""
+    directions, n_q = dependence(source)
+    rests = _some_move(parts)
+    regions = [build_region(directions, n_q, part, y, rests=rests) for part in parts]
+    floors = [floor_of(source, region, modes, accuracy) for region in regions]
+    pairs = zip(regions, floors, strict=True)
+    runs = [adaptive(region.nodes, _left(source, accuracy, floor), most) for region, floor in pairs]
+    return regions, floors, runs
+
+
+def _by_solves(
+    source: Any,
+    path: Path | None,
+    parts: Sequence[Any],
+    y: ArrayLike | Box,
+    modes: tuple[int, ...],
+    count: int,
+) -> _Plan:
+    """Runs that ask for ``count`` frequencies in all."""
+    directions, n_q = dependence(source)
+    counts = [count]
+    if path is not None and len(path.parts) > 1:
+        d = max(build_region(directions, n_q, each, y, rests=True).d for each in parts)
+        counts = path.shares(count, fewest(d))
+    regions, floors = _best_nodes(source, parts, y, modes, counts)
+    followed(regions)
+    pairs = zip(regions, counts, strict=True)
+    return regions, floors, [given(region.nodes, own) for region, own in pairs]
+
+
+def _some_move(parts: Sequence[Any]) -> bool:
+    """Whether stretches that stand still are part of something that does not."""
+    return any(isinstance(part, Stretch) and part.line(None) is not None for part in parts)
+
+
+def _meant(accuracy: object, most: object) -> None:
+    """Raise UsageError for an accuracy or a number of solves that cannot be meant."""
+    whole_within(most, "most", 1, sys.maxsize)
+    if accuracy is None:
+        return
+    number = isinstance(accuracy, int | float | np.number) and not isinstance(accuracy, bool)
+    if not number or not LEAST_ACCURACY <= accuracy < 1.0:  # type: ignore[operator]
+        raise UsageError(
+            f"accuracy {accuracy!r} is not a number within {LEAST_ACCURACY} to 1, as 1e-4"
+        )
+
+
+def _left(source: Any, accuracy: float, floor: float) -> float:
+    """What the polynomial may cost; that of another source is only known where it was asked."""
+    return accuracy - (floor if isinstance(source, Model) else SHARE * accuracy)
+
+
+def _best_nodes(
+    source: Any,
+    parts: Sequence[Any],
+    y: ArrayLike | Box,
+    modes: tuple[int, ...],
+    counts: Sequence[int],
+) -> tuple[list[Region], list[float]]:
+    """Regions with the best nodes for the counts, and the source's own error in each.
+
+    That is looked at on nested nodes, which hold both ends of every axis.
+    """
+    directions, n_q = dependence(source)
+    pairs, rests = zip(parts, counts, strict=True), _some_move(parts)
+    regions = [build_region(directions, n_q, part, y, count, rests) for part, count in pairs]
+    if isinstance(source, Model):
+        return regions, [0.0] * len(regions)
+    nested = (build_region(directions, n_q, part, y, rests=rests) for part in parts)
+    return regions, [floor_of(source, region, modes, None) for region in nested]
+
+
+def _driven(
+    source: Any, modes: tuple[int, ...], regions: Sequence[Region], runs: Sequence[Asking]
+) -> tuple[list[Interpolant], list[Floats]]:
+    """What all runs end with, and the x (n, n_x) that each asked for.
+
+    What they ask for in one round is one batch of frequencies.
+    """
+    ask = question(source, modes)
+    found: dict[int, Interpolant] = {}
+    seen: list[list[Floats]] = [[] for _ in runs]
+    hz: dict[int, Floats | None] = dict.fromkeys(range(len(runs)))
+    while hz:
+        wanted: dict[int, Floats] = {}
+        for k, values in hz.items():
+            try:
+                wanted[k] = regions[k].x(runs[k].send(values))  # type: ignore[arg-type]
+                seen[k].append(wanted[k])
+            except StopIteration as end:
+                found[k] = end.value
+            except AccuracyError as error:
+                raise AccuracyError(f"{error}{cause(source, regions[k], modes)}") from None
+        hz = _batch(ask, wanted)
+    return [found[k] for k in range(len(runs))], [np.vstack(each) for each in seen]
+
+
+def _batch(ask: Callable[[Floats], Floats], wanted: dict[int, Floats]) -> dict[int, Floats | None]:
+    """Frequencies at x (n, n_x) for each, asked for at once."""
+    if len(wanted) < 2:
+        return {k: ask(x) for k, x in wanted.items()}
+    hz = ask(np.vstack(list(wanted.values())))
+    ends = np.cumsum([len(x) for x in wanted.values()])[:-1]
+    return dict(zip(wanted, np.split(hz, ends), strict=True))
+
+
+def _fit(
+    source: Any,
+    modes: tuple[int, ...],
+    accuracy: float | None,
+    region: Region,
+    found: Interpolant,
+    floor: float,
+) -> Fit:
+    own = partial(own_error, source, region, modes, found.error, floor)
+    return Fit(modes, region, accuracy, found, own)
+
+
+# --- What a fit asks: exact solves of a model, a reduced model or an expansion, with its own er
+
+HZ = 0.5 / np.pi  # in a rad/s
+FINE, FINE_LARGE = 1e-8, 1e-6  # accuracies below which round-off is looked at
+SHARE = 0.5  # of the accuracy that the source itself may use
+FEW_AXES = 3  # up to which all corners are looked at
+CLOSE = 1e-2  # relative gap in Hz below which neighbouring modes are named as a cause
+
+
+def own_error(
+    source: Any, region: Region, modes: tuple[int, ...], error: float, floor: float
+) -> float:
+    """The floor, or round-off where that was not looked at and may matter beside the error."""
+    if floor or not isinstance(source, Model) or error >= fine(source):
+        return floor
+    return rounding_error(source.pencil, region.centre, modes[-1])
+
+
+def fine(model: Model) -> float:
+    """Accuracy below which the round-off of exact solves is looked at."""
+    return FINE if model.n_dof <= DENSE_LIMIT else FINE_LARGE
+
+
+def dependence(source: Any) -> tuple[Floats, int]:
+    """Combinations of x on which the source's frequencies depend (n_w, n_x), and n_q."""
+    if isinstance(source, Model):
+        return source.pencil.local_directions[1], source.pencil.n_q
+    if isinstance(source, InverseExpansion):
+        source = source.expansion
+    if isinstance(source, Expansion):
+        return source.directions, len(source.q0)
+    if not isinstance(source, ReducedModel):
+        as_model(source)
+    return source.to_program[source.program.dependence.any(axis=0)], source.n_q
+
+
+def modes_of(source: Any, modes: Sequence[int] | None) -> tuple[int, ...]:
+    """The modes to fit. Raises UsageError for one that the source does not have."""
+    own = getattr(source, "modes", None) if not isinstance(source, Model) else None
+    wanted = mode_numbers((own or (1,)) if modes is None else modes)
+    if own is not None and not set(wanted) <= set(own):
+        raise UsageError(f"modes {wanted} asked for; the source has {own}")
+    return wanted
+
+
+def question(source: Any, modes: tuple[int, ...]) -> Callable[[Floats], Floats]:
+    """x (n, n_x) → f (n, n_modes) in Hz. AccuracyError where the source gives no number."""
+    if isinstance(source, Model):
+        pencil = source.pencil
+        own: Any = slice(None) if modes[-1] == len(modes) else [m - 1 for m in modes]
+        return lambda x: np.sqrt(eigenvalues(pencil, x, modes[-1])[:, own]) * HZ
+    columns, n_q = [source.modes.index(m) for m in modes], dependence(source)[1]
+
+    def ask(x: Floats) -> Floats:
+        hz = np.asarray(source.frequencies(x[:, :n_q], x[:, n_q:]))[:, columns]
+        if not np.isfinite(hz).all():
+            k = int(np.argmin(np.isfinite(hz).all(axis=1)))
+            raise AccuracyError(f"the source has no frequency at (q, y) = {shown(x[k])}")
+        return hz
+
+    return ask
+
+
+def floor_of(source: Any, region: Region, modes: tuple[int, ...], accuracy: float | None) -> float:
+    """Relative error in Hz of what the source answers, at the region's ends and centre.
+
+    Of exact solves this is round-off, looked at only where it may matter. Raises AccuracyError
+    where it leaves nothing of the accuracy asked for.
+    """
+    if isinstance(source, Model):
+        if accuracy is None or accuracy >= fine(source):
+            return 0.0
+        floor = rounding_error(source.pencil, region.centre, modes[-1])
+    else:
+        return known_error(source, region.x(_ends(region)), modes, accuracy)
+    return _borne("round-off", floor, accuracy)
+
+
+def known_error(source: Any, x: Floats, modes: tuple[int, ...], accuracy: float | None) -> float:
+    """The largest of the source's own error estimates at x (n, n_x); see `_borne`."""
+    n_q = dependence(source)[1]
+    columns = [source.modes.index(m) for m in modes]
+    estimates = source.error_estimate(x[:, :n_q], x[:, n_q:])[:, columns]
+    return _borne("the source itself", float(estimates.max()), accuracy)
+
+
+def _borne(what: str, error: float, accuracy: float | None) -> float:
+    """The error, unless it is unknown or leaves nothing of an accuracy: then AccuracyError."""
+    if not error < np.inf:
+        raise AccuracyError(f"{what} may cost any amount: it vouches for no number in the region")
+    if accuracy is not None and error > SHARE * accuracy:
+        raise AccuracyError(f"{what} may cost {error:.1e}, which leaves nothing of {accuracy:.1e}")
+    return error
+
+
+def _ends(region: Region) -> Ints:
+    """Multi-indices of the centre and both ends of each axis: in all combinations, if few."""
+    d = region.d
+    if d <= FEW_AXES:
+        signs = np.array(list(itertools.product((1, 2), repeat=d)))
+    else:
+        signs = 1 + np.vstack([np.zeros((1, d)), np.eye(d), 1 - np.eye(d), np.ones((1, d))])
+    tops = [len(axis.nodes) - 1 for axis in region.axes]
+    return np.asarray(np.minimum(np.vstack([np.zeros((1, d)), signs]), tops), dtype=np.intp)
+
+
+def cause(source: Any, region: Region, modes: tuple[int, ...]) -> str:
+    """Neighbouring modes that come close, the usual cause, as the end of a message."""
+    if not isinstance(source, Model):
+        return ""
+    count = min(modes[-1] + 1, len(source.pencil.elastic))
+    lam = eigenvalues(source.pencil, region.x(_ends(region)), count)
+    gap = 0.5 * (1.0 - lam[:, :-1] / lam[:, 1:]).min(axis=0)
+    near = [k + 1 for k in np.flatnonzero(gap < CLOSE) if {k + 1, k + 2} & set(modes)]
+    named = ", ".join(f"{k} and {k + 1}" for k in near)
+    return f"; modes {named} come close, and where they meet none is smooth" if near else ""
+
+
+# --- Fits of several stretches of a path, one after the other, that answer as one
+
+
+@dataclass(frozen=True, eq=False)
+class PathFit:
+    """One `Fit` for each stretch between corners, or for each of several trajectories."""
+
+    parts: tuple[Fit, ...]
+    rows: tuple[slice, ...]  # which of all samples are whose
+
+    @property
+    def modes(self) -> tuple[int, ...]:
+        """The modes fitted."""
+        return self.parts[0].modes
+
+    @property
+    def accuracy(self) -> float | None:
+        """Asked for, relative in Hz; None where the solves were given."""
+        return self.parts[0].accuracy
+
+    @property
+    def error_estimate(self) -> float:
+        """Of frequencies anywhere in the region, relative in Hz: the largest of all parts."""
+        return max(part.error_estimate for part in self.parts)
+
+    @property
+    def solves(self) -> int:
+        """Poses at which the source was asked, checks included."""
+        return sum(part.solves for part in self.parts)
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """What was chosen and why, as lines of text, for each part."""
+        return tuple(
+            f"samples {rows.start} to {rows.stop - 1}: {line}"
+            for part, rows in zip(self.parts, self.rows, strict=True)
+            for line in part.reasons
+        )
+
+    def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """(n, n_modes) in Hz. Raises UsageError outside the region."""
+        x = self.parts[0].region.samples(q, y)
+        hz, left = np.empty((len(x), len(self.modes))), np.ones(len(x), dtype=np.bool_)
+        for part in self.parts:
+            mine = left & part.region.on_path(x)
+            if mine.any():
+                n_q = part.region.n_q
+                hz[mine] = part.frequencies(x[mine, :n_q], x[mine, n_q:])
+                left &= ~mine
+        if left.any():
+            raise UsageError(f"q lies off the path that was fitted: sample {int(left.argmax())}")
+        return hz
+
+    def along(self, y: ArrayLike | None = None) -> Floats:
+        """As `Fit.along`, at the samples of all parts in their order."""
+        return np.concatenate([part.along(y) for part in self.parts], axis=-2)

@@ -1,0 +1,153 @@
+"""Power-series coefficients K_γ, M_γ of the pencil, and what the recursion asks of them.
+
+Vectors stand in rows: X (N, r, n) holds r vectors of length n for every multi-index, contiguous, so
+that products and solves run over memory in order. Small pencils keep one dense stack of all
+coefficients; large ones only what each coefficient touches (``coefficients_sparse``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.modal.arguments import DENSE_LIMIT
+from eigassign.modal.taylor.bordered import Solve, factor_dense
+from eigassign.series.multi_index import LowerSet, first_of_each
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+
+class PencilSeries(Protocol):
+    """K(w) = Σ_γ K_γ w^γ and M(w) likewise, over one lower set."""
+
+    def convolve(self, degree: int, X: Floats, Y: Floats, out: Floats) -> None:
+        """out_γ = Σ_{0<δ≤γ} M_δ Y_{γ−δ} − K_δ X_{γ−δ} for |γ| = degree; out (N_degree, r, n)."""
+
+    def mass_times(self, X: Floats) -> Floats:
+        """M_0 X for rows X (k, n)."""
+
+    def factor(self, lam: float, border: Floats, phi: Floats) -> Solve:
+        """The bordered system of K_0 − λ M_0, ``border`` M_0 Φ_0 and Φ_0 as rows (r, n)."""
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Products A_δ X_β of all β + δ = γ with |γ| and |δ| fixed, sorted by γ.
+
+    The δ are among the ``slots`` of what is stored and the β among ``below``; ``left``, ``right``
+    count from the first of these, ``into`` from the first γ of that degree. ``first`` is the first
+    pair of each γ that there is, and ``target`` that γ.
+    """
+
+    slots: slice
+    below: slice
+    left: Ints
+    right: Ints
+    into: Ints
+    first: Ints
+    target: Ints
+
+
+@lru_cache(maxsize=64)
+def pairs(space: LowerSet, stored: bytes) -> tuple[tuple[Pairs, ...], ...]:
+    """For every degree the pairs with δ among the ``stored`` positions, by ascending |δ|."""
+    present = np.frombuffer(stored, dtype=np.intp)
+    slot = np.full(len(space), -1, dtype=np.intp)
+    slot[present] = np.arange(len(present))
+    degrees = range(space.order + 1)
+    return tuple(
+        tuple(p for e in range(1, d + 1) if len((p := _pairs(space, slot, d, e)).left))
+        for d in degrees
+    )
+
+
+def _pairs(space: LowerSet, slot: Ints, degree: int, of_delta: int) -> Pairs:
+    table, starts = space.by_degree[degree], space.degree_starts
+    keep = (slot[table.left] >= 0) & (space.degrees[table.left] == of_delta)
+    stored = slot[table.left[keep]]
+    target = table.target[keep]
+    first = first_of_each(target)
+    low = int(stored.min(initial=len(space)))
+    below = slice(int(starts[degree - of_delta]), int(starts[degree - of_delta + 1]))
+    return Pairs(
+        slice(low, int(stored.max(initial=-1)) + 1),
+        below,
+        stored - low,
+        table.right[keep] - below.start,
+        target,
+        first,
+        target[first],
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class DenseTerms:
+    """The coefficients of one matrix that are not zero in one stack; the first is that of w = 0."""
+
+    pairs: tuple[tuple[Pairs, ...], ...]
+    stack: Floats  # (n_stored, n, n)
+
+    def sums(self, degree: int, X: Floats) -> Iterator[tuple[Ints, Floats]]:
+        """Parts of Σ_{0<δ≤γ} A_δ X_{γ−δ}, |γ| = degree: which γ, and (n_γ, r, n) of them.
+
+        The coefficients are symmetric, so rows multiply from the left.
+        """
+        for p in self.pairs[degree]:
+            count, r, n = X[p.below].shape
+            products = X[p.below].reshape(-1, n) @ self.stack[p.slots]
+            chosen = products.reshape(-1, count, r, n)[p.left, p.right]
+            yield p.target, np.add.reduceat(chosen, p.first, axis=0)
+
+
+@dataclass(frozen=True, eq=False)
+class DenseSeries:
+    """K and M over one set as stacks, each with the coefficients that it has."""
+
+    stiffness: DenseTerms
+    mass: DenseTerms
+
+    def convolve(self, degree: int, X: Floats, Y: Floats, out: Floats) -> None:
+        """See :class:`PencilSeries`."""
+        out[...] = 0.0
+        for target, sums in self.mass.sums(degree, Y):
+            out[target] += sums
+        for target, sums in self.stiffness.sums(degree, X):
+            out[target] -= sums
+
+    def mass_times(self, X: Floats) -> Floats:
+        """M_0 X for rows X (k, n)."""
+        return np.asarray(X @ self.mass.stack[0])
+
+    def factor(self, lam: float, border: Floats, phi: Floats) -> Solve:
+        """The bordered system of K_0 − λ M_0."""
+        return factor_dense(self.stiffness.stack[0] - lam * self.mass.stack[0], border)
+
+
+def pencil_series(pencil: Pencil, theta: Floats, space: LowerSet) -> PencilSeries:
+    """The pencil's coefficients over ``space`` from θ's own (n_theta, N)."""
+    if pencil.n_dof > DENSE_LIMIT:
+        from eigassign.modal.taylor.sparse import sparse_series
+
+        return sparse_series(pencil, theta, space)
+    stored = np.flatnonzero(theta.any(axis=0))  # θ_0 = 1: position 0 is always there
+    both = zip(pencil.matrices(theta[:, stored]), pencil.by_term, strict=True)
+    return DenseSeries(*(_dense(space, theta[:, stored], stored, *each) for each in both))
+
+
+def _dense(
+    space: LowerSet, theta: Floats, stored: Ints, stack: Floats, terms: sparse.csc_array
+) -> DenseTerms:
+    """One matrix without the coefficients that it has not: stiffness hardly varies with q."""
+    varying = np.asarray(theta[np.diff(terms.indptr) > 0].any(axis=0))
+    varying[0] = True
+    if not varying.all():
+        stack, stored = stack[varying], stored[varying]
+    return DenseTerms(pairs(space, stored.tobytes()), stack)

@@ -1,0 +1,374 @@
+"""The multivariate Taylor expansion of eigenvalues about x0 = (q0, y0) (eqs. (4)-(9)).
+
+The expansion is carried out in local variables w: the relative joint coordinates and design
+parameters on which anything depends, with w = V (x − x0). A coordinate that nothing depends on is
+dropped by construction; coefficients over (q, y) follow by substituting V (x − x0).
+
+The series of 1/λ: the same coefficients as λ's, summed in another way.
+
+Frequencies that fall with added mass have λ = a / (b + m) in the simplest case: 1/λ is linear in m,
+while λ's own series ends at m = −b. The reciprocal of a truncated series is exact order by order.
+
+Several expansions about points along a trajectory: each pose belongs to the nearest of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from eigassign.errors import UsageError
+from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.modal.arguments import mode_numbers, point, relative_gap, samples, whole_within
+from eigassign.modal.exact.clusters import CLUSTER_GAP, clusters, whole_clusters
+from eigassign.modal.exact.condensation import Modes
+from eigassign.modal.taylor.local_coordinates import Local, local_space, substitute, vector_set
+from eigassign.modal.taylor.rayleigh import eigenvalue_series
+from eigassign.modal.taylor.recursion import expand_subspace
+from eigassign.series.multi_index import LowerSet
+from eigassign.series.power_series import Polynomials, PowerSeries, monomials, polynomials
+
+if TYPE_CHECKING:
+    from eigassign.modal.reduced.model import ReducedModel
+
+__all__ = ["CLUSTER_GAP", "Cluster", "Expansion", "MAX_ORDER", "clusters", "expand"]
+
+
+# --- The multivariate Taylor expansion of eigenvalues about x0 = (q0, y0) (eqs. (4)-(9))
+
+Floats = NDArray[np.float64]
+MAX_ORDER = 20
+MANY = 1000  # samples from which preparing the polynomials pays
+
+
+@dataclass(frozen=True, eq=False)
+class Cluster:
+    """Λ(w) (r, r, N) of the neighbouring ``modes``; r = 1 is a single eigenvalue."""
+
+    modes: tuple[int, ...]
+    coefficients: Floats  # rad²/s² over units of w
+
+
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """Taylor expansion of the eigenvalues of ``modes`` about (q0, y0); immutable."""
+
+    modes: tuple[int, ...]
+    clusters: tuple[Cluster, ...]
+    q0: Floats
+    y0: Floats
+    space: LowerSet  # over w
+    directions: Floats  # V (n_w, n_x): w = V (x − x0)
+    n_linear: int  # the last n_linear of w enter at most linearly, 0 for a full expansion
+    kept: Floats  # (n_x,): 1 where the variable matters
+    vectors: tuple[Floats, ...]  # per cluster, (N_H, n_dof, r)
+    vector_space: LowerSet
+    notes: tuple[str, ...]
+    pencil: Pencil | None = None  # what was expanded; not stored, needed by ``error_estimate``
+
+    def eigenvalues(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """λ (n_samples, n_modes) in rad²/s²; q (n_samples, n_q) or (n_q,), y likewise."""
+        w = (samples(q, y, len(self.q0), len(self.y0)) - self.x0) @ self.directions.T
+        if len(w) < MANY:
+            powers = monomials(self.space, w)
+            return np.hstack([_evaluate(c, powers, self.modes) for c in self.clusters])
+        return np.hstack(
+            [
+                _eigenvalues(c, made(w).reshape(len(w), *c.coefficients.shape[:2]), self.modes)
+                for c, made in zip(self.clusters, self._prepared, strict=True)
+            ]
+        )
+
+    @cached_property
+    def _prepared(self) -> tuple[Polynomials, ...]:
+        """The entries of every cluster's matrix, made ready for many samples."""
+        n = len(self.space)
+        return tuple(polynomials(self.space, c.coefficients.reshape(-1, n)) for c in self.clusters)
+
+    def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """f = √λ/2π in Hz, (n_samples, n_modes); NaN where the polynomial is negative."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.sqrt(self.eigenvalues(q, y)) / (2.0 * np.pi))
+
+    def error_estimate(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """Estimate of the relative error of ``frequencies``, (n_samples, n_modes); no exact solve.
+
+        Measured against a reduced model on the same Taylor vectors, made at the first call.
+        Infinite where λ < 0, or where not even the reduced model vouches for the mode.
+        """
+        from eigassign.modal.taylor.convergence import polynomial_error
+
+        f = self.frequencies(q, y)
+        beside = self.reduced
+        return polynomial_error(f, beside.frequencies(q, y), beside.error_estimate(q, y))
+
+    @cached_property
+    def reduced(self) -> ReducedModel:
+        """The reduced model on these Taylor vectors; UsageError without the pencil."""
+        from eigassign.modal.taylor.convergence import companion
+
+        return companion(self.pencil, self.q0, self.y0, self.modes, self.vector_space, self.vectors)
+
+    @cached_property
+    def inverse(self) -> InverseExpansion:
+        """The expansion of 1/λ with the same coefficients; UsageError for clusters."""
+
+        return inverse(self)
+
+    def linear_in_design(self, q: ArrayLike) -> tuple[Floats, Floats]:
+        """l_0 (n_samples, n_modes) and l (n_samples, n_modes, n_y) of eq. (9) at samples of q.
+
+        λ ≈ l_0(q) + Σ_j l_j(q) (y_j − y0_j), rad²/s² over units of y: the terms |β| ≤ 1.
+        """
+        w = (samples(q, self.y0, len(self.q0), len(self.y0)) - self.x0) @ self.directions.T
+        return _linear_part(self, monomials(self.space, w), w)
+
+    @property
+    def x0(self) -> Floats:
+        """(q0, y0)."""
+        return np.concatenate([self.q0, self.y0])
+
+    @property
+    def order(self) -> int:
+        """Total degree p of the expansion."""
+        return self.space.order
+
+    @property
+    def indices(self) -> NDArray[np.int64]:
+        """Multi-indices γ (n_coefficients, n_q + n_y) over (q, y)."""
+        return self._over_x[0].indices
+
+    @property
+    def coefficients(self) -> Floats:
+        """λ_γ = ∂^γ λ(x0)/γ! (n_modes, n_coefficients), rad²/s² over units of x.
+
+        Raises UsageError for clusters of several modes: a single eigenvalue has no series there;
+        ``clusters`` has the series of the small matrix whose eigenvalues they are.
+        """
+        together = [c.modes for c in self.clusters if len(c.modes) > 1]
+        if together:
+            raise UsageError(f"modes {together[0]} are expanded as a cluster: see .clusters")
+        return self._over_x[1]
+
+    @cached_property
+    def _over_x(self) -> tuple[LowerSet, Floats]:
+        singles = [c.coefficients[0, 0] for c in self.clusters if len(c.modes) == 1]
+        stacked = np.array(singles).reshape(-1, len(self.space))
+        x_space, values = substitute(
+            self.space, stacked, self.directions, len(self.q0), self.n_linear
+        )
+        values.setflags(write=False)
+        return x_space, values
+
+
+def _evaluate(cluster: Cluster, powers: Floats, wanted: tuple[int, ...]) -> Floats:
+    matrices = np.tensordot(powers, cluster.coefficients, axes=(1, 2))
+    return _eigenvalues(cluster, matrices, wanted)
+
+
+def _eigenvalues(cluster: Cluster, matrices: Floats, wanted: tuple[int, ...]) -> Floats:
+    """Of the small matrices (n, r, r), those of the wanted modes."""
+    if len(cluster.modes) == 1:
+        return matrices[:, 0]
+    columns = [k for k, mode in enumerate(cluster.modes) if mode in wanted]
+    return np.asarray(np.linalg.eigvalsh(matrices)[:, columns])
+
+
+def _linear_part(expansion: Expansion, powers: Floats, w: Floats) -> tuple[Floats, Floats]:
+    """Value and ∂/∂y at y = y0 of every mode, from the members with |β| = 0 and 1."""
+    space, n_q, n_y = expansion.space, len(expansion.q0), len(expansion.y0)
+    l0 = np.hstack([_evaluate(c, powers, expansion.modes) for c in expansion.clusters])
+    slopes = np.zeros((len(w), l0.shape[1], n_y))
+    for j in range(n_y):
+        (local,) = np.nonzero(expansion.directions[:, n_q + j])
+        if len(local):
+            derivative = _derivative_powers(space, powers, int(local[0]))
+            slopes[:, :, j] = np.hstack(
+                [_slope(c, powers, derivative, expansion.modes) for c in expansion.clusters]
+            )
+    return l0, slopes
+
+
+def _derivative_powers(space: LowerSet, powers: Floats, variable: int) -> Floats:
+    """∂ w^γ/∂w_j where w_j = 0: the powers of the other variables for γ_j = 1, else 0."""
+    out = np.zeros_like(powers)
+    once = np.flatnonzero(space.indices[:, variable] == 1)
+    lower = space.indices[once].copy()
+    lower[:, variable] = 0
+    out[:, once] = powers[:, space.find(lower)]
+    return out
+
+
+def _slope(cluster: Cluster, powers: Floats, derivative: Floats, wanted: tuple[int, ...]) -> Floats:
+    """∂λ/∂y_j; in a cluster vᵀ (∂Λ/∂y_j) v with the eigenvectors v of Λ."""
+    if len(cluster.modes) == 1:
+        return np.asarray((derivative @ cluster.coefficients[0, 0])[:, None])
+    columns = [k for k, mode in enumerate(cluster.modes) if mode in wanted]
+    value, slope = (
+        np.tensordot(p, cluster.coefficients, axes=(1, 2)) for p in (powers, derivative)
+    )
+    v = np.linalg.eigh(value)[1]
+    return np.asarray(np.einsum("nik,nij,njk->nk", v, slope, v)[:, columns])
+
+
+def expand(
+    pencil: Pencil,
+    q0: ArrayLike,
+    y0: ArrayLike,
+    modes: Sequence[int] = (1,),
+    order: int = 4,
+    linear_in_y: bool = False,
+    space: LowerSet | None = None,
+    vector_order: int | None = None,
+    cluster_gap: float = CLUSTER_GAP,
+) -> Expansion:
+    """Expand the eigenvalues of ``modes`` (1 is the lowest elastic one) to total ``order``.
+
+    ``linear_in_y`` keeps |β| ≤ 1, the terms of eqs. (7)-(9). ``space`` is any other lower set over
+    (q, y). Eigenvectors are expanded to half the order, which suffices (2m + 1), or to
+    ``vector_order``. Modes closer than ``cluster_gap`` (relative in λ) are expanded together.
+    Raises UsageError for impossible arguments.
+    """
+    wanted = mode_numbers(modes)
+    order = whole_within(order, "order", 1, MAX_ORDER)
+    if vector_order is not None:
+        vector_order = whole_within(vector_order, "vector_order", 0, MAX_ORDER)
+    cluster_gap = relative_gap(cluster_gap)
+    x0 = point(q0, y0, pencil.n_q, pencil.to_program.shape[1] - pencil.n_q)
+    local = local_space(pencil, order, linear_in_y, space)
+    return _about(pencil, x0, wanted, local, vector_order, cluster_gap)
+
+
+def _about(
+    pencil: Pencil,
+    x0: Floats,
+    wanted: tuple[int, ...],
+    local: Local,
+    vector_order: int | None,
+    cluster_gap: float,
+) -> Expansion:
+    """The expansion about x0: eigenpairs there, eigenvectors to half the order, eigenvalues."""
+    theta = pencil.theta_series(local.space, x0, local.to_z)
+    found, groups = whole_clusters(pencil, theta[:, :1], wanted, cluster_gap)
+    half, kept = vector_set(local.space, local.n_linear, vector_order)
+    vectors = tuple(_vectors(pencil, theta[:, kept], half, found, group) for group in groups)
+    series = [eigenvalue_series(pencil, theta, local.space, half, X) for X in vectors]
+    return Expansion(
+        modes=tuple(m for g in groups for m in g if m in wanted),
+        clusters=tuple(Cluster(g, _frozen(s)) for g, s in zip(groups, series, strict=True)),
+        q0=_frozen(x0[: pencil.n_q]),
+        y0=_frozen(x0[pencil.n_q :]),
+        space=local.space,
+        directions=_frozen(local.directions),
+        n_linear=local.n_linear,
+        kept=_frozen(local.kept.astype(np.float64)),
+        vectors=vectors,
+        vector_space=half,
+        notes=_notes(groups, local, pencil),
+        pencil=pencil,
+    )
+
+
+def _vectors(
+    pencil: Pencil, theta: Floats, space: LowerSet, found: Modes, group: tuple[int, ...]
+) -> Floats:
+    """X (N_H, n_dof, r) of one cluster over ``space``, from θ's coefficients there."""
+    pick = np.array(group) - 1
+    lam0, phi0 = found.lam[0, pick], found.phi[0][:, pick]
+    return _frozen(expand_subspace(pencil, theta, space, lam0, phi0).vectors)
+
+
+def _notes(groups: Sequence[tuple[int, ...]], local: Local, pencil: Pencil) -> tuple[str, ...]:
+    lines = [
+        f"modes {g[0]}-{g[-1]} lie close together and are expanded as one cluster"
+        for g in groups
+        if len(g) > 1
+    ]
+    idle = len(pencil.active) - np.count_nonzero(pencil.active)
+    if idle:
+        lines.append(f"{idle} variable(s) on which no frequency depends are dropped")
+    return tuple(lines)
+
+
+def _frozen(a: Floats) -> Floats:
+    a = np.ascontiguousarray(a)
+    a.setflags(write=False)
+    return a
+
+
+# --- The series of 1/λ: the same coefficients as λ's, summed in another way
+
+
+@dataclass(frozen=True, eq=False)
+class InverseExpansion:
+    """Taylor expansion of 1/λ about the point of ``expansion``, over the same set; immutable."""
+
+    expansion: Expansion
+    coefficients: Floats  # (n_modes, N) over w, s² over units of w
+
+    @property
+    def modes(self) -> tuple[int, ...]:
+        """The modes expanded, in the order of the columns."""
+        return self.expansion.modes
+
+    @cached_property
+    def _prepared(self) -> Polynomials:
+        return polynomials(self.expansion.space, self.coefficients)
+
+    def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """f = 1/(2π √μ) in Hz, μ the polynomial, (n_samples, n_modes); NaN where μ < 0."""
+        of = self.expansion
+        w = (samples(q, y, len(of.q0), len(of.y0)) - of.x0) @ of.directions.T
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(0.5 / np.pi / np.sqrt(self._prepared(w)))
+
+    def error_estimate(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """Estimate of the relative error of ``frequencies``, (n_samples, n_modes); no exact solve.
+
+        As for the expansion of λ: beside the reduced model on the same Taylor vectors.
+        """
+        from eigassign.modal.taylor.convergence import polynomial_error
+
+        beside = self.expansion.reduced
+        f = self.frequencies(q, y)
+        return polynomial_error(f, beside.frequencies(q, y), beside.error_estimate(q, y))
+
+
+def inverse(expansion: Expansion) -> InverseExpansion:
+    """1/λ of every mode; UsageError for clusters, whose eigenvalues have no series of their own."""
+    together = [c.modes for c in expansion.clusters if len(c.modes) > 1]
+    if together:
+        raise UsageError(f"modes {together[0]} are expanded as a cluster: 1/λ has no series each")
+    series = [
+        (1.0 / PowerSeries(expansion.space, cluster.coefficients[0, 0])).coefficients
+        for cluster in expansion.clusters
+    ]
+    coefficients = np.array(series)
+    coefficients.setflags(write=False)
+    return InverseExpansion(expansion, coefficients)
+
+
+# --- Several expansions about points along a trajectory: each pose belongs to the nearest of th
+
+
+def nearest(parts: Sequence[Expansion], q: Floats) -> NDArray[np.intp]:
+    """Which of ``parts`` each of q (n, n_q) is nearest to, in the variables of the series.
+
+    Distances are |V (q − q0_k)|, so that coordinates on which nothing depends do not count.
+    """
+    V = parts[0].directions[:, : len(parts[0].q0)]
+    away = [np.square((q - part.q0) @ V.T).sum(axis=1) for part in parts]
+    return np.asarray(np.argmin(away, axis=0), dtype=np.intp)
+
+
+def picked(parts: Sequence[Expansion], q: Floats, values: Sequence[Floats]) -> Floats:
+    """Of ``values``, one array (n, …) for each of ``parts``, the nearest one's at each sample."""
+    if len(values) == 1:
+        return values[0]
+    owner = nearest(parts, q)
+    return np.asarray(np.array(values)[owner, np.arange(len(owner))])

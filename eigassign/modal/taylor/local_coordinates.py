@@ -1,0 +1,134 @@
+"""The set of multi-indices an expansion is carried out over, in local variables w = V (x − x0).
+
+w are the relative joint coordinates and design parameters on which anything depends, or, for a set
+that was given over x, those of x.
+
+From a series in local variables w to one in x, by w = V (x − x0).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.errors import UsageError
+from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.modal.taylor.rayleigh import vector_members
+from eigassign.series.multi_index import LowerSet, lower_set, partially_linear, total_degree
+from eigassign.series.power_series import multiply
+
+# --- The set of multi-indices an expansion is carried out over, in local variables w = V (x − x
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Local:
+    """The set over w, dz/dw and dw/dx."""
+
+    space: LowerSet
+    to_z: Floats
+    directions: Floats
+    n_linear: int
+    kept: NDArray[np.bool_]
+
+
+def local_space(pencil: Pencil, order: int, linear_in_y: bool, space: LowerSet | None) -> Local:
+    """The set over w that was asked for; raises UsageError for one of the wrong width."""
+    if space is not None:
+        if not isinstance(space, LowerSet):
+            raise UsageError(f"space must be a lower set, not {type(space).__name__}")
+        return _given_space(pencil, space)
+    to_z, directions, kept = pencil.local_directions
+    n_a = int(np.count_nonzero(pencil.active[: pencil.n_q]))
+    n_b = to_z.shape[1] - n_a
+    chosen = partially_linear(n_a, n_b, order) if linear_in_y else total_degree(n_a + n_b, order)
+    return Local(chosen, to_z, directions, n_b if linear_in_y else 0, kept)
+
+
+def _given_space(pencil: Pencil, space: LowerSet) -> Local:
+    """A set over x as it was given, the variables that do not matter taken out."""
+    n_x = pencil.to_program.shape[1]
+    if space.n_variables != n_x:
+        raise UsageError(f"the set has {space.n_variables} variables, the model {n_x}")
+    kept = (pencil.to_program[pencil.active] != 0.0).any(axis=0)
+    selection = np.eye(n_x)[kept]
+    return Local(_over(space, kept.tobytes()), pencil.to_program[:, kept], selection, 0, kept)
+
+
+@lru_cache(maxsize=64)
+def _over(space: LowerSet, kept: bytes) -> LowerSet:
+    """The members without the variables that are not kept, over those that are."""
+    columns = np.frombuffer(kept, dtype=bool)
+    inside = (space.indices[:, ~columns] == 0).all(axis=1)
+    return lower_set(space.indices[inside][:, columns])
+
+
+@lru_cache(maxsize=64)
+def vector_set(
+    space: LowerSet, n_linear: int, vector_order: int | None
+) -> tuple[LowerSet, NDArray[np.intp]]:
+    """The set of eigenvector coefficients and its positions in the set of eigenvalues."""
+    linear = np.arange(space.n_variables) >= space.n_variables - n_linear
+    if vector_order is None:
+        members = vector_members(space, linear)
+    else:
+        members = np.asarray(space.degrees <= vector_order)
+    half = space.restrict(members)
+    return half, space.find(half.indices)
+
+
+# --- From a series in local variables w to one in x, by w = V (x − x0)
+
+
+def substitute(
+    space: LowerSet, coefficients: Floats, directions: Floats, n_q: int, n_linear: int
+) -> tuple[LowerSet, Floats]:
+    """The set over x and coefficients (k, N_x) of Σ c_γ (V (x − x0))^γ, c (k, N)."""
+    selection = (np.count_nonzero(directions, axis=1) == 1).all()
+    if selection and (directions.max(axis=1, initial=0.0) == 1.0).all():
+        return _embed(space, coefficients, directions)
+    used = np.flatnonzero((directions != 0.0).any(axis=0))
+    n_y = int((used >= n_q).sum())
+    n_a = len(used) - n_y
+    inner = (
+        partially_linear(n_a, n_y, space.order)
+        if n_linear
+        else total_degree(len(used), space.order)
+    )
+    values = coefficients @ _monomial_series(space, inner, directions[:, used])
+    wide = np.zeros((len(inner), directions.shape[1]), dtype=np.int64)
+    wide[:, used] = inner.indices
+    return _sorted(wide, values)
+
+
+def _embed(space: LowerSet, coefficients: Floats, directions: Floats) -> tuple[LowerSet, Floats]:
+    """Every w is one of x: indices are only spread over the columns."""
+    wide = space.indices @ (directions != 0.0).astype(np.int64)
+    return _sorted(wide, coefficients)
+
+
+def _sorted(wide: NDArray[np.int64], values: Floats) -> tuple[LowerSet, Floats]:
+    target = lower_set(wide)
+    ordered = np.empty_like(values)
+    ordered[:, target.find(wide)] = values
+    return target, ordered
+
+
+def _monomial_series(space: LowerSet, inner: LowerSet, directions: Floats) -> Floats:
+    """Rows: the series in x of w^γ for every γ, each a parent's times one linear form."""
+    linear = np.zeros((space.n_variables, len(inner)))
+    units = inner.find(np.eye(inner.n_variables, dtype=np.int64))
+    linear[:, units[units >= 0]] = directions[:, units >= 0]
+    rows = np.zeros((len(space), len(inner)))
+    rows[0, 0] = 1.0
+    for degree in range(1, space.order + 1):
+        here = np.arange(space.degree_starts[degree], space.degree_starts[degree + 1])
+        first = (space.indices[here] > 0).argmax(axis=1)
+        parents = space.indices[here].copy()
+        parents[np.arange(len(here)), first] -= 1
+        rows[here] = multiply(inner, rows[space.find(parents)], linear[first])
+    return rows

@@ -1,0 +1,154 @@
+"""Expansions that were computed before: taken from the cache, bit for bit, or made and kept."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from dataclasses import replace
+from math import comb
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from eigassign.errors import UsageError
+from eigassign.modal.arguments import MOST_TERMS
+from eigassign.modal.model import Model
+from eigassign.modal.taylor.expansion import Expansion, expand
+from eigassign.modal.taylor.storage import (
+    ALGORITHM,
+    expansion_arrays,
+    expansion_from_arrays,
+    flatten,
+    pencil_parts,
+    unflatten,
+)
+from eigassign.study.planning import Plan
+from eigassign.study.scene import Expansions
+
+if TYPE_CHECKING:
+    from eigassign.output.cache import Cache
+
+
+_log = logging.getLogger(__name__)
+
+
+def expand_plan(model: Model, plan: Plan, cache: Cache | None) -> tuple[Expansions, list[str]]:
+    """Both expansions of a plan, and notes on how they came about.
+
+    The linearised one is what the optimum rests on and is always of the plan's order; the full one
+    is there to compare with, and of a lower order where its set would be too large.
+    """
+    full_order = affordable_order(model, plan.order)
+    expansions, known = _expansions(model, plan, full_order, cache)
+    further = [replace(plan, q0=np.array(q), more_q=()) for q in plan.more_q]
+    others = [_expansions(model, at, full_order, cache)[0] for at in further]
+    expansions = replace(expansions, others=tuple(others))
+    full, linear = expansions.full, expansions.linear
+    notes = [_size_note(expansions), *dict.fromkeys(full.notes + linear.notes)]
+    if full_order < plan.order:
+        notes.append(
+            f"the full expansion, only there to compare with, stops at order {full_order}: order "
+            f"{plan.order} in so many variables has over {MOST_TERMS} coefficients"
+        )
+    if known:
+        notes.append("the expansion coefficients come from the cache")
+    return expansions, notes
+
+
+def _size_note(expansions: Expansions) -> str:
+    full, linear = expansions.full.space, expansions.linear.space
+    return (
+        f"order {expansions.order} in {full.n_variables} variables: {len(linear)} coefficients "
+        f"partially linearised, {len(full)} in full"
+    )
+
+
+def affordable_order(model: Model, order: int) -> int:
+    """The highest order up to ``order`` whose full set has at most `MOST_TERMS` members; ≥ 1."""
+    n = int(model.pencil.active.sum())
+    fitting = [p for p in range(1, order + 1) if comb(n + p, p) <= MOST_TERMS]
+    return fitting[-1] if fitting else 1
+
+
+def _expansions(
+    model: Model, plan: Plan, full_order: int, cache: Cache | None
+) -> tuple[Expansions, bool]:
+    """Both expansions, and whether they were known."""
+    if cache is None:
+        return _computed(model, plan, full_order), False
+    entry = expansion_key(model, plan, full_order)
+    if (found := _stored(cache, entry, model, plan, full_order)) is not None:
+        return found, True
+    fresh = _computed(model, plan, full_order)
+    cache.store(entry, flatten(_named(fresh)), _meta(plan))
+    return fresh, False
+
+
+def _computed(model: Model, plan: Plan, full_order: int) -> Expansions:
+    point, gap = (model.pencil, plan.q0, plan.y0, plan.modes), plan.cluster_gap
+    return Expansions(
+        full=expand(*point, full_order, linear_in_y=False, cluster_gap=gap),
+        linear=expand(*point, plan.order, linear_in_y=True, cluster_gap=gap),
+        order=plan.order,
+        full_order=full_order,
+    )
+
+
+def _named(expansions: Expansions) -> dict[str, NDArray[Any]]:
+    parts = {"full": expansions.full, "linear": expansions.linear}
+    return {
+        f"{part}.{name}": array
+        for part, expansion in parts.items()
+        for name, array in expansion_arrays(expansion).items()
+    }
+
+
+def _stored(
+    cache: Cache, entry: str, model: Model, plan: Plan, full_order: int
+) -> Expansions | None:
+    arrays = cache.load(entry)
+    if arrays is None:
+        return None
+    try:
+        named = unflatten(arrays)
+        full, linear = (replace(_part(named, p), pencil=model.pencil) for p in ("full", "linear"))
+        return Expansions(full, linear, plan.order, full_order)
+    except UsageError as error:
+        _log.warning("cache entry %s cannot be used (%s); computed anew", entry[:12], error)
+        return None
+
+
+def _part(named: Mapping[str, NDArray[Any]], part: str) -> Expansion:
+    own = {n.removeprefix(f"{part}."): a for n, a in named.items() if n.startswith(f"{part}.")}
+    return expansion_from_arrays(own)
+
+
+def expansion_key(model: Model, plan: Plan, full_order: int) -> str:
+    """SHA-256 over all that the numbers of both expansions follow from.
+
+    The pencil's arrays, the point, the modes, the sets, and the versions of this algorithm and of
+    the libraries that do its arithmetic: where any of them differs, so may the last bit.
+    """
+    from eigassign.output.cache import key
+
+    parts: list[Any] = [
+        pencil_parts(model.pencil),
+        plan.q0,
+        plan.y0,
+        list(plan.modes),
+        [full_order, plan.order, plan.cluster_gap],
+        [np.__version__, scipy.__version__],
+    ]
+    return key(parts, algorithm=ALGORITHM)
+
+
+def _meta(plan: Plan) -> dict[str, str]:
+    """For people who list the cache."""
+    return {
+        "what": f"expansion of order {plan.order}",
+        "modes": ", ".join(map(str, plan.modes)),
+        "q0": ", ".join(f"{value:.6g}" for value in plan.q0),
+        "y0": ", ".join(f"{value:.6g}" for value in plan.y0),
+    }

@@ -1,0 +1,260 @@
+"""Quick questions about a case: is it right, and what are its frequencies at one point.
+
+``--q`` and ``--y`` of the command line: text → SI numbers of the case's dimensions.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.api import Case, load_case
+from eigassign.case import CaseFile, load
+from eigassign.case.case_file import plain
+from eigassign.case.rules.plausibility import impossible
+from eigassign.case.rules.values import find
+from eigassign.case.units import Quantity, QuantityError, quantity
+from eigassign.errors import CaseError, Problem, UsageError
+from eigassign.mechanism.elements.superelement import weights
+from eigassign.mechanism.kinematics.travel_limits import resting_pose
+from eigassign.study import drawing
+from eigassign.study.accuracy import truncation_lines
+from eigassign.study.assignment import target_frequencies
+from eigassign.study.planning import plan_expansion
+
+# --- Quick questions about a case: is it right, and what are its frequencies at one point
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ModesAnswer:
+    """Exact frequencies (Hz) of the lowest elastic modes; rigid-body modes are only counted."""
+
+    rigid_modes: int
+    frequencies_hz: list[float]
+    q: tuple[tuple[str, float], ...]  # where: name and value, SI
+    y: tuple[tuple[str, float], ...]
+    truncation_error: list[float] | None = None  # of reduced links: relative, too high by at most
+
+
+@dataclass(frozen=True)
+class CheckAnswer:
+    """What a case amounts to; ``warnings`` are plausibility problems that do not stop a run."""
+
+    title: str
+    n_dof: int
+    n_rigid: int
+    q_names: tuple[str, ...]
+    y_names: tuple[str, ...]
+    samples: int  # of all trajectories, 0 without one
+    duration_s: float
+    trajectories: tuple[tuple[str, int, float], ...]  # of each its name, samples and duration
+    targets: int
+    notes: tuple[str, ...]
+    warnings: tuple[Problem, ...]
+
+
+def modes(
+    path: str | Path,
+    q: Sequence[float] | str | None = None,
+    y: Sequence[float] | str | None = None,
+    count: int = 3,
+) -> ModesAnswer:
+    """Exact modes of the case at q (rad) and y (SI units), given as numbers or as text with units.
+
+    Without ``q`` at the expansion point that the case gives, else where its trajectory starts;
+    without ``y`` with the design as it is written in the file. Raises UsageError for wrong lengths
+    or counts, and where there is no pose to take.
+    """
+    case = load_case(path)
+    at_q, at_y = _point(case, q, y)
+    with case.located():
+        model = case.model()
+        hz = model.frequencies(at_q, at_y, count)[0]
+    return _answer(case, at_q, at_y, hz)
+
+
+def draw_modes(
+    path: str | Path,
+    q: Sequence[float] | str | None = None,
+    y: Sequence[float] | str | None = None,
+    count: int = 3,
+    out: Path | None = None,
+    force: bool = False,
+) -> tuple[ModesAnswer, Path]:
+    """`modes`, and a folder with a figure of each: ``out``, or results/<case>_modes.
+
+    Raises what `modes` does, and StorageError where the folder may not be replaced.
+    """
+    from eigassign.pipeline.run_files import RESULTS, keep
+
+    case = load_case(path)
+    at_q, at_y = _point(case, q, y)
+    target = RESULTS / f"{case.file.path.stem}_modes" if out is None else out
+    with keep(case.file, target, force) as folder:
+        with case.located():
+            pictures = drawing.draw_modes(case.file, case.model(), at_q, at_y, count)
+        from eigassign.output.report import write_modes
+
+        write_modes(pictures, folder.hidden)
+        (folder.hidden / "case.yaml").write_text(case.file.resolved(), encoding="utf-8")
+    return _answer(case, at_q, at_y, np.array(pictures.frequencies_hz)), target
+
+
+def _point(
+    case: Case, q: Sequence[float] | str | None, y: Sequence[float] | str | None
+) -> tuple[Floats, Floats]:
+    """Where modes are asked for, in SI; raises UsageError."""
+    q = coordinates(case.file, q) if isinstance(q, str) else q
+    y = design(case.file, y) if isinstance(y, str) else y
+    with case.located():
+        at_q = np.asarray(_default_q(case) if q is None else q, dtype=np.float64)
+    return at_q, np.asarray(case.initial_design if y is None else y, dtype=np.float64)
+
+
+def _answer(case: Case, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
+    model = case.model()
+    every = tuple(range(1, len(hz) + 1))
+    lost = model.truncation_error(q, y, every)[0] if model.reduced else None
+    return ModesAnswer(
+        model.n_rigid,
+        [float(value) for value in hz],
+        _pairs(model.q_names, q),
+        _pairs(model.y_names, y),
+        None if lost is None else [float(value) for value in lost],
+    )
+
+
+def _pairs(names: Sequence[str], numbers: Floats) -> tuple[tuple[str, float], ...]:
+    return tuple((name, float(number)) for name, number in zip(names, numbers, strict=True))
+
+
+def _default_q(case: Case) -> Sequence[float]:
+    file = case.file
+    if file.expansion.q != "auto":
+        return [float(value) for value in file.expansion.q]
+    if file.trajectory is not None:
+        return [float(value) for value in case.trajectory.q[0]]
+    if file.coordinates:
+        names = ", ".join(file.coordinates)
+        raise UsageError(f"q: give a value for {names}; the case has no expansion point to take")
+    return []
+
+
+def check(path: str | Path) -> CheckAnswer:
+    """Validate the file, build its model, follow its trajectory, and settle its expansion point.
+
+    Raises CaseError with every problem found by the first of these steps that finds any.
+    """
+    case = load_case(path)
+    file, model = case.file, case.model()
+    trajectory = case.trajectory if file.trajectory is not None else None
+    notes = weights(file)
+    notes += () if case.reduction is None else case.reduction.reasons
+    notes += () if trajectory is None else trajectory.notes
+    parts = () if trajectory is None else trajectory.parts
+    each = tuple((p.name, len(p.trajectory.q), float(np.ptp(p.trajectory.time_s))) for p in parts)
+    if trajectory is not None:
+        target_frequencies(file, trajectory)
+    if trajectory is not None or file.expansion.q != "auto":
+        plan = plan_expansion(file, model, trajectory)
+        q = plan.q0[None] if trajectory is None else trajectory.q
+        notes += (*plan.notes, *truncation_lines(model, plan.modes, q, case.initial_design[None]))
+    _require_regular(case, trajectory.q[:1] if trajectory is not None else None)
+    return CheckAnswer(
+        title=file.title,
+        n_dof=model.n_dof,
+        n_rigid=model.n_rigid,
+        q_names=model.q_names,
+        y_names=model.y_names,
+        samples=sum(samples for _, samples, _ in each),
+        duration_s=float(sum(duration for *_, duration in each)),
+        trajectories=each,
+        targets=len(file.targets),
+        notes=tuple(notes),
+        warnings=file.warnings,
+    )
+
+
+def _require_regular(case: Case, q: Floats | None) -> None:
+    """One exact solve: a mechanism without mass or stiffness is found here, at its line."""
+    if q is None:
+        given = case.file.expansion.q
+        q = np.array([given if given != "auto" else resting_pose(case.file)])
+    with case.located():
+        try:
+            case.model().frequencies(q, case.initial_design, 1)
+        except UsageError as error:
+            raise CaseError((case.file.problem("mechanism", str(error)),)) from error
+
+
+# --- ``--q`` and ``--y`` of the command line: text → SI numbers of the case's dimensions
+
+Numbers = list[float] | None
+
+
+def point(case: Path, q: str | None, y: str | None) -> tuple[Numbers, Numbers]:
+    """--q and --y in the units of the case; None where not given. Raises UsageError."""
+    if q is None and y is None:
+        return None, None
+    file = load(case)
+    return coordinates(file, q), design(file, y)
+
+
+def coordinates(case: CaseFile, text: str | None) -> Numbers:
+    """q in rad or m, one value per coordinate of the case; raises UsageError."""
+    kinds = {"rad": quantity("angle"), "m": quantity("length")}
+    quantities = [kinds[unit] for unit in case.coordinate_units]
+    return None if text is None else _read(text, "--q", list(case.coordinates), quantities)
+
+
+def design(case: CaseFile, text: str | None) -> Numbers:
+    """y in SI units, one value per design parameter of the case; raises UsageError."""
+    if text is None:
+        return None
+    tree = {"mechanism": plain(case.mechanism), "coordinates": plain(case.coordinates)}
+    properties = {name: find(tree, p.parameter) for name, p in case.design.parameters.items()}
+    quantities = [p.quantity if p else Quantity() for p in properties.values()]
+    values = _read(text, "--y", list(properties), quantities)
+    paths = [p.parameter for p in case.design.parameters.values()]
+    point = {path: (value, value) for path, value in zip(paths, values, strict=True)}
+    for *_, message in impossible(case.mechanism.sections, point):
+        raise UsageError(f"--y: {message.removesuffix('; narrow the bounds')}")
+    return values
+
+
+def _read(
+    text: str, option: str, names: Sequence[str], quantities: Sequence[Quantity]
+) -> list[float]:
+    parts = split(text)
+    if len(parts) != len(names):
+        wanted = f"{len(names)} ({', '.join(names)})" if names else "none"
+        raise UsageError(f"{option}: expected {wanted} values, got {len(parts)} in {text!r}")
+    values = []
+    for name, part, each in zip(names, parts, quantities, strict=True):
+        try:
+            values.append(each.read(part))
+        except QuantityError as error:
+            raise UsageError(f"{option}: {name}: {error}") from None
+    return values
+
+
+def split(text: str) -> list[str]:
+    """``"104 deg, 5.3"`` → ``["104 deg", "5.3"]``; spaces, commas or semicolons in between.
+
+    A word behind a space that does not begin like a number is the unit of the number before it.
+    """
+    values: list[str] = []
+    for part in re.split("[,;]", text):
+        for k, word in enumerate(part.split()):
+            if k and word[0] not in "+-.0123456789":
+                values[-1] += f" {word}"
+            else:
+                values.append(word)
+    return values

@@ -1,0 +1,240 @@
+"""One case from its file to its run folder: the paper's flowchart, and what else may be asked.
+
+``solve_case`` computes and writes nothing; ``optimize``, ``expand_case`` and ``validate`` are what
+the commands of the same names do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.api import Case, load_case
+from eigassign.assignment import Assignment
+from eigassign.modal.taylor.expansion import Expansion
+from eigassign.pipeline.coefficient_files import coefficient_files
+from eigassign.pipeline.expansions import expand_plan
+from eigassign.pipeline.queries import CheckAnswer, ModesAnswer, check, modes
+from eigassign.pipeline.run_files import Kept, keep
+from eigassign.pipeline.stages import Stages
+from eigassign.study.accuracy import accuracy_notes, truncation_notes
+from eigassign.study.assignment import (
+    assign_design,
+    require_assignable,
+    study_targets,
+    target_frequencies,
+)
+from eigassign.study.collect import Assigned, gather
+from eigassign.study.comparison import Validation, study_modes, validate_expansions
+from eigassign.study.findings import Findings
+from eigassign.study.planning import plan_expansion
+from eigassign.study.scene import Expansions, Scene
+
+if TYPE_CHECKING:
+    from eigassign.output.cache import Cache
+
+__all__ = [
+    "CheckAnswer",
+    "ModesAnswer",
+    "Options",
+    "Outcome",
+    "Result",
+    "Validation",
+    "check",
+    "expand_case",
+    "modes",
+    "optimize",
+    "solve_case",
+    "validate",
+]
+
+
+Floats = NDArray[np.float64]
+
+
+def _silent(line: str) -> None:
+    """Progress that nobody watches."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a case is run, never what: nothing in it changes a number."""
+
+    out: Path | None = None  # the run folder; results/<stem of the case file> if None
+    cache_dir: Path | None = None  # the user's cache folder if None
+    use_cache: bool = True
+    force: bool = False  # a folder that another case wrote is moved aside
+    progress: Callable[[str], None] = field(default=_silent)  # told one line as each stage begins
+
+
+@dataclass(frozen=True)
+class Result:
+    """The whole answer, in memory. Frequencies (n_t,) in Hz of the first target's mode.
+
+    At all samples, or those of the trajectory that the first target names; `findings` has the rest.
+    """
+
+    design: Mapping[str, float]  # the optimum, SI
+    time_s: Floats
+    target_hz: Floats
+    initial_hz: Floats
+    predicted_hz: Floats
+    exact_hz: Floats
+    findings: Findings
+    expansion: Expansion  # full
+    linearised: Expansion
+    assignment: Assignment
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A finished run: where it is and what it found."""
+
+    folder: Path | None
+    findings: Findings
+    within_tolerance: bool
+    seconds: float
+    warnings: tuple[str, ...]
+
+
+DEFAULT = Options()
+
+
+def solve_case(case: Case, options: Options = DEFAULT) -> Result:
+    """The paper's flowchart: case → model → trajectory → expansion → assignment → verification.
+
+    Raises CaseError for what the case lacks, InfeasibleError for limits that contradict each
+    other, AccuracyError for numbers that cannot be vouched for.
+    """
+    file, stages = case.file, Stages(options.progress)
+    require_assignable(file)
+    with case.located():
+        scene = prepare(case, stages, _cache(options))
+        wanted = target_frequencies(file, scene.path)
+        with stages("initial", "solving the initial design exactly"):
+            initial_hz = scene.exact(scene.initial, stages.advance)
+        with stages("assignment", "assigning the frequencies"):
+            assignment = assign_design(scene, wanted)
+        with stages("verification", "solving the optimal design exactly"):
+            exact_hz = scene.exact(assignment.y, stages.advance)
+        with stages("comparison", "comparing the expansion with exact frequencies"):
+            studies = study_modes(scene, initial_hz)
+            scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene, assignment.y)))
+        targets = study_targets(scene, wanted, assignment, initial_hz, exact_hz)
+    found = Assigned(assignment, targets, initial_hz, exact_hz)
+    findings = gather(scene, studies, found, stages.timing_s)
+    return _result(findings, scene.expansions, assignment)
+
+
+def prepare(
+    case: Case,
+    stages: Stages,
+    cache: Cache | None,
+    order: int | None = None,
+    modes: Sequence[int] | None = None,
+) -> Scene:
+    """Case → model → trajectory (if it has one) → expansions about the planned point."""
+    file = case.file
+    with stages("model", "assembling K and M"):
+        model, initial = case.model(), case.initial_design
+    with stages("trajectory", "following the trajectory"):
+        trajectory = None if file.trajectory is None else case.trajectory
+    with stages("expansion", "expanding the eigenvalues"):
+        plan = plan_expansion(file, model, trajectory, order, modes)
+        expansions, notes = expand_plan(model, plan, cache)
+    moving = () if trajectory is None else trajectory.notes
+    mesh = () if case.mesh is None else case.mesh.reasons
+    smaller = () if case.reduction is None else case.reduction.reasons
+    notes = [*mesh, *smaller, *moving, *plan.notes, *notes]
+    return Scene(file, model, initial, trajectory, expansions, tuple(notes))
+
+
+def _accuracy(case: Case, scene: Scene, optimum: Floats | None = None) -> list[str]:
+    return accuracy_notes(scene, case.discretisation_error, optimum)
+
+
+def _result(findings: Findings, expansions: Expansions, assignment: Assignment) -> Result:
+    first = findings.targets[0]
+    return Result(
+        design={row.name: row.optimal for row in findings.design},
+        time_s=findings.time_s[first.rows],
+        target_hz=first.target_hz,
+        initial_hz=first.initial_hz,
+        predicted_hz=first.predicted_hz,
+        exact_hz=first.exact_hz,
+        findings=findings,
+        expansion=expansions.full,
+        linearised=expansions.linear,
+        assignment=assignment,
+    )
+
+
+def optimize(path: str | Path, options: Options = DEFAULT) -> Outcome:
+    """`solve_case`, and its run folder: results.json, report.html, figures, case.yaml, log.txt.
+
+    Raises StorageError before anything is computed where the folder may not be replaced.
+    """
+    watch = Stages(options.progress)
+    case = load_case(path)
+    with keep(case.file, options.out, options.force) as folder:
+        findings = solve_case(case, options).findings
+        options.progress("writing the report")
+        folder.write(findings)
+    return _outcome(folder, findings, watch)
+
+
+def expand_case(
+    path: str | Path,
+    options: Options = DEFAULT,
+    order: int | None = None,
+    modes: Sequence[int] | None = None,
+    linear: bool = False,
+) -> Outcome:
+    """Expansion coefficients of a case and how good they are, in a run folder.
+
+    ``order`` and ``modes`` override the case's; ``linear`` keeps the full set's coefficients out
+    of the files. The case needs neither design nor targets, and no trajectory if it gives q.
+    """
+    watch = Stages(options.progress)
+    case = load_case(path)
+    with keep(case.file, options.out, options.force) as folder, case.located():
+        scene = prepare(case, watch, _cache(options), order, modes)
+        with watch("comparison", "comparing the expansion with exact frequencies"):
+            studies = study_modes(scene)
+            scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene)))
+        findings = gather(scene, studies, None, watch.timing_s)
+        options.progress("writing the report")
+        folder.write(findings, coefficient_files(scene, linear))
+    return _outcome(folder, findings, watch)
+
+
+def validate(path: str | Path, options: Options = DEFAULT) -> Validation:
+    """Both expansions of a case against exact; see `eigassign.study.comparison` for where."""
+    stages = Stages(options.progress)
+    case = load_case(path)
+    with case.located():
+        scene = prepare(case, stages, _cache(options))
+        with stages("validation", "comparing both expansions with exact frequencies"):
+            rows = validate_expansions(scene)
+            notes = (*scene.notes, *truncation_notes(scene))
+    return Validation(rows, notes, scene.warnings, stages.total_s)
+
+
+def _outcome(folder: Kept, findings: Findings, watch: Stages) -> Outcome:
+    return Outcome(
+        folder.path, findings, findings.within_tolerance, watch.total_s, findings.warnings
+    )
+
+
+def _cache(options: Options) -> Cache | None:
+    if not options.use_cache:
+        return None
+    from eigassign.output.cache import Cache, default_directory
+
+    directory = options.cache_dir if options.cache_dir is not None else default_directory()
+    return None if directory is None else Cache(directory)

@@ -1,0 +1,82 @@
+"""What a run leaves behind: its folder, whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from eigassign.case import CaseFile
+from eigassign.study.findings import ErrorSummary, Findings
+
+RESULTS = Path("results")  # below the current folder
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A run folder being filled; it appears at ``path`` when the run has succeeded."""
+
+    path: Path
+    hidden: Path
+    file: CaseFile
+
+    def write(self, findings: Findings, extra: Mapping[str, bytes] | None = None) -> None:
+        """Results, report and figures; the resolved case; the log; ``extra`` files by name."""
+        from eigassign.output.report import write_run
+
+        write_run(findings, self.hidden)
+        texts = {"case.yaml": self.file.resolved(), "log.txt": log_text(findings)}
+        encoded = {name: text.encode() for name, text in texts.items()}
+        for name, data in {**encoded, **(extra or {})}.items():
+            (self.hidden / name).write_bytes(data)
+
+
+@contextmanager
+def keep(file: CaseFile, out: Path | None, force: bool) -> Iterator[Kept]:
+    """Yield the folder to fill: ``out``, or results/<stem of the case file>.
+
+    Raises StorageError on entry already where the folder may not be replaced.
+    """
+    from eigassign.output.run_folder import run_folder
+
+    target = RESULTS / file.path.stem if out is None else Path(out)
+    case = {"case_path": file.path, "case_sha256": file.sha256, "case_files": file.files}
+    with run_folder(target, **case, force=force) as hidden:  # type: ignore[arg-type]
+        yield Kept(target, hidden, file)
+
+
+def log_text(findings: Findings) -> str:
+    """What was run, chosen, warned of and how long it took, one line each."""
+    lines = [
+        f"eigassign {findings.version}",
+        f"case      {findings.case_name}: {findings.title}",
+        f"sha256    {findings.case_sha256}",
+        *(f"sha256    {digest} {name}" for name, digest in findings.case_files.items()),
+        *(f"note      {note}" for note in findings.notes),
+        *(f"warning   {warning}" for warning in findings.warnings),
+        *_outcome_lines(findings),
+        *(f"time      {stage}: {1e3 * spent:.2f} ms" for stage, spent in findings.timing_s.items()),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _distances(error: ErrorSummary, along: str) -> Iterator[str]:
+    for when in ("initial", "predicted", "exact"):
+        row = getattr(error, when)
+        figures = f"max {100 * row.max_relative:.4g} %, rms {100 * row.rms_relative:.4g} %"
+        yield f"distance  {when}{along}: {figures} from the target"
+
+
+def _outcome_lines(findings: Findings) -> Iterator[str]:
+    for row in findings.design:
+        yield f"design    {row.name} = {row.optimal:.9g} {row.unit} (before: {row.initial:.9g})"
+    if findings.error is not None:
+        yield from _distances(findings.error, "")
+    for own in findings.trajectories if len(findings.trajectories) > 1 else ():
+        along = findings.error_along(own.name)
+        yield from _distances(along, f" along {own.name!r}") if along is not None else ()
+    if findings.approximation_error is not None:
+        within = "within" if findings.within_tolerance else "OVER"
+        error = f"{100 * findings.approximation_error:.4g} %"
+        yield f"accuracy  predicted against exact: {error}, {within} {100 * findings.tolerance:g} %"

@@ -1,0 +1,274 @@
+"""Errors as people read them on stderr, and the exit code of each.
+
+The process around a command: signals, streams, threads of the linear algebra, collections.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import errno
+import gc
+import io
+import os
+import signal
+import sys
+import threading
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from types import FrameType
+from typing import Any, TextIO
+
+from eigassign.errors import CaseError, EigassignError, Problem, StorageError
+
+# --- Errors as people read them on stderr, and the exit code of each
+
+BUG, STORAGE, INTERRUPTED = EigassignError.exit_code, StorageError.exit_code, 130
+_SNIPPETS = 3  # problems shown with their line of the file
+_WIDEST = 120
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What an error amounts to: exit code, one line, and what there is to list before it."""
+
+    exit_code: int
+    summary: str
+    problems: tuple[Problem, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """The problems if there are any, else the line."""
+        return "\n".join(map(str, self.problems)) or self.summary
+
+
+def judged(error: BaseException) -> Failure:
+    """Exit code and message of any error; a closed pipe has no message."""
+    match error:
+        case KeyboardInterrupt():
+            return Failure(INTERRUPTED, "interrupted")
+        case Terminated():
+            return Failure(error.exit_code, str(error))
+        case CaseError():
+            return Failure(error.exit_code, counted(error.problems), error.problems)
+        case EigassignError() if error.exit_code != BUG:
+            return Failure(error.exit_code, f"error: {error}")
+        case BrokenPipeError():
+            return Failure(STORAGE, "")
+        case OSError():
+            return Failure(STORAGE, f"error: {_os_error(error)}")
+        case MemoryError():
+            return Failure(STORAGE, "error: out of memory")
+        case _:
+            return Failure(BUG, _internal(error))
+
+
+def report(error: BaseException, debug: bool = False) -> int:
+    """Say on stderr what went wrong; returns the exit code."""
+    failure = judged(error)
+    if debug and failure.summary:
+        import traceback
+
+        traceback.print_exception(error)
+    say(problem_lines(failure.problems))
+    say([f"eigassign: {failure.summary}"] if failure.summary else [])
+    return failure.exit_code
+
+
+def say(lines: Iterable[str]) -> None:
+    """Write lines to stderr; if that is closed the exit code must do."""
+    with suppress(OSError, AttributeError, ValueError):
+        for line in lines:
+            sys.stderr.write(f"{line}\n")
+
+
+def problem_lines(problems: Sequence[Problem]) -> list[str]:
+    """``file:line:column: path: message`` for each, the first few with their line of the file."""
+    lines = []
+    for k, problem in enumerate(problems):
+        lines.append(str(problem))
+        lines.extend(_snippet(problem) if k < _SNIPPETS else ())
+    return lines
+
+
+def _snippet(problem: Problem) -> Iterator[str]:
+    """The line and a caret below its column, where that can be shown faithfully."""
+    line = _line(problem).replace("\t", " ")
+    if line.strip() and line.isprintable() and len(line) <= _WIDEST >= problem.column:
+        yield f"{problem.line:>6} | {line}"
+        yield f"{'':>6} | {'^':>{problem.column}}"
+
+
+def _line(problem: Problem) -> str:
+    try:
+        with open(problem.file, encoding="utf-8") as file:
+            return next((t.rstrip("\r\n") for k, t in enumerate(file, 1) if k == problem.line), "")
+    except (OSError, ValueError):
+        return ""
+
+
+def counted(problems: Sequence[Problem]) -> str:
+    """``3 problems in case.yaml``."""
+    files = Counter(problem.file for problem in problems)
+    return "; ".join(f"{n} problem{'s' if n > 1 else ''} in {file}" for file, n in files.items())
+
+
+def _os_error(error: OSError) -> str:
+    reason = error.strerror or str(error) or type(error).__name__
+    return f"{error.filename}: {reason}" if error.filename else reason
+
+
+def _internal(error: BaseException) -> str:
+    """One line for an error that nobody expected, with the last place in our own code."""
+    trace, place = error.__traceback__, ""
+    while trace is not None:
+        name = trace.tb_frame.f_globals.get("__name__", "?")
+        place = f" ({name}:{trace.tb_lineno})" if name.startswith("eigassign") else place
+        trace = trace.tb_next
+    what = ": ".join(filter(None, [type(error).__name__, " ".join(str(error).split())]))
+    return (
+        f"internal error: {what}{place}. This is a bug of eigassign: please report it with the "
+        "case file (--debug shows the traceback)"
+    )
+
+
+def problems(error: BaseException) -> list[Problem]:
+    """What is wrong, for programs: the problems with their lines, or the message without a line."""
+    failure = judged(error)
+    return list(failure.problems) or [Problem("", 0, 0, "", str(error))]
+
+
+# --- The process around a command: signals, streams, threads of the linear algebra, collections
+
+_THREADS = ("OPENBLAS", "OMP", "MKL", "BLIS", "VECLIB_MAXIMUM", "NUMEXPR")
+ONE_THREAD: Mapping[str, str] = {f"{library}_NUM_THREADS": "1" for library in _THREADS}
+_ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
+
+
+class Terminated(BaseException):
+    """The process was told to end: unwinds like KeyboardInterrupt, so that cleanup happens."""
+
+    def __init__(self, number: int) -> None:
+        self.exit_code = 128 + number
+        super().__init__(number)
+
+    def __str__(self) -> str:
+        return f"ended by {signal.Signals(self.exit_code - 128).name}"
+
+
+@contextlib.contextmanager
+def terminable() -> Iterator[None]:
+    """SIGTERM and SIGHUP raise Terminated inside; as before afterwards."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = unwind_when_terminated()
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def unwind_when_terminated() -> dict[signal.Signals, Any]:
+    """From now on SIGTERM and SIGHUP raise Terminated once; returns the handlers replaced.
+
+    A signal that somebody handles or ignores already (nohup) is left alone.
+    """
+    before = {number: signal.getsignal(number) for number in _ENDING}
+    before = {number: handler for number, handler in before.items() if handler == signal.SIG_DFL}
+    for number in before:
+        signal.signal(number, _terminate)
+    return before
+
+
+def _terminate(number: int, _frame: FrameType | None) -> None:
+    for each in _ENDING:
+        signal.signal(each, signal.SIG_IGN)  # the cleanup is not to be disturbed
+    raise Terminated(number)
+
+
+def prefer_one_thread() -> None:
+    """One BLAS thread unless the user chose: small dense algebra is slower on more.
+
+    Only has an effect before NumPy is imported.
+    """
+    for name, value in ONE_THREAD.items():
+        os.environ.setdefault(name, value)
+
+
+def expect_to_be_brief() -> None:
+    """Spare a process its walks over all that it imported: fewer while it runs, none at its end.
+
+    Worth a fifth of a short run. Memory is freed by reference counts as ever.
+    """
+    gc.set_threshold(50_000, 10, 10)
+    atexit.register(gc.freeze)
+
+
+@contextlib.contextmanager
+def environment(changes: Mapping[str, str]) -> Iterator[None]:
+    """Environment variables for the processes started inside."""
+    before = {name: os.environ.get(name) for name in changes}
+    os.environ.update(changes)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+class _ClosedOutput(io.TextIOBase):
+    """Stands for a stdout that was closed before the process began: an answer would be lost."""
+
+    def write(self, _text: str) -> int:
+        raise OSError(errno.EBADF, "standard output is closed")
+
+
+def mind_closed_streams() -> None:
+    """Let writing to a closed stdout fail, and no file opened later take its descriptor.
+
+    Python leaves ``sys.stdout`` None then, and what is printed vanishes without an error.
+    """
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(descriptor)
+    if sys.stdout is None:
+        sys.stdout = _ClosedOutput()
+
+
+def never_fail_to_encode() -> None:
+    """Write ``?`` for what the terminal's character set lacks, instead of failing."""
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(AttributeError, ValueError):
+            stream.reconfigure(errors="replace")  # type: ignore[union-attr]
+
+
+def flush_streams() -> None:
+    """Write out what is buffered now, where an error can still be reported.
+
+    Raises OSError (BrokenPipeError if the reader went away); the stream is then silenced, so that
+    the interpreter does not complain again on its way out.
+    """
+    failure: OSError | None = None
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            if stream is not None and not stream.closed:
+                stream.flush()
+        except OSError as error:
+            _silence(stream)
+            failure = failure or error
+    if failure is not None:
+        raise failure
+
+
+def _silence(stream: TextIO) -> None:
+    with contextlib.suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)

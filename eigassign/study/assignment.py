@@ -1,0 +1,288 @@
+"""From a case's targets and bounds to the optimal design, and what it does to the frequencies.
+
+Where the number of a mode may not be believed: neighbouring frequencies that nearly meet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.assignment import (
+    Assignment,
+    Bounds,
+    Goal,
+    LinearConstraint,
+    LinearModel,
+    hz_from_lam,
+    relative_error,
+    sample_target,
+    solve_assignment,
+    trapezoidal_weights,
+)
+from eigassign.assignment.checks import frozen
+from eigassign.case import CaseFile, Target
+from eigassign.errors import AccuracyError, CaseError, UsageError
+from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.study.findings import (
+    DesignRow,
+    ErrorRow,
+    ErrorSummary,
+    SolverRow,
+    TargetAlong,
+    TargetStudy,
+    design_units,
+)
+from eigassign.study.scene import Scene
+
+# --- From a case's targets and bounds to the optimal design, and what it does to the frequencies
+
+Floats = NDArray[np.float64]
+_Curves = tuple[Floats, Floats, Floats, Floats]  # wanted, initial, predicted and exact, (n,) in Hz
+
+
+def require_assignable(file: CaseFile) -> None:
+    """Raise CaseError naming every key that an assignment needs and the case lacks."""
+    needs = {
+        "trajectory": (file.trajectory is not None, "along which the frequencies are assigned"),
+        "design": (bool(file.design.parameters), "at least one parameter that may change"),
+        "targets": (bool(file.targets), "at least one wanted frequency"),
+    }
+    problems = tuple(
+        file.problem(key, f"is missing, and optimize needs it: {why}")
+        for key, (given, why) in needs.items()
+        if not given
+    )
+    if problems:
+        raise CaseError(problems)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What one target asks for: a frequency (n,) in Hz at those ``rows`` of all samples."""
+
+    hz: Floats
+    rows: slice
+
+
+def target_frequencies(file: CaseFile, path: Trajectories) -> tuple[Wanted, ...]:
+    """What each target asks for; CaseError where a profile ends before a trajectory does."""
+    return tuple(_wanted(file, k, target, path) for k, target in enumerate(file.targets))
+
+
+def _wanted(file: CaseFile, k: int, target: Target, path: Trajectories) -> Wanted:
+    hz = []
+    for part in path.parts:
+        if target.trajectory not in (None, part.name):
+            continue
+        try:
+            hz.append(_sampled(target, part.trajectory.time_s))
+        except UsageError as error:
+            which = f" (trajectory {part.name!r})" if path.several else ""
+            problem = file.problem(f"targets[{k}].frequency", f"{error}{which}")
+            raise CaseError((problem,)) from error
+    return Wanted(frozen(np.concatenate(hz)), path.rows_of(target.trajectory))
+
+
+def time_weights(path: Trajectories) -> Floats:
+    """ω (n_t,) in s of the integral over every trajectory for itself, by the trapezoidal rule."""
+    return path.weights(trapezoidal_weights)
+
+
+def _sampled(target: Target, time_s: Floats) -> Floats:
+    wanted = target.frequency
+    if isinstance(wanted, float | int):
+        return sample_target(time_s, float(wanted))
+    return sample_target(time_s, wanted.frequency, wanted.time)
+
+
+def assign_design(scene: Scene, targets: tuple[Wanted, ...]) -> Assignment:
+    """Build and solve the quadratic program of eqs. (13)–(14) on the linearised expansion.
+
+    Raises InfeasibleError with the names of the constraints that contradict each other.
+    """
+    file, path = scene.file, scene.path
+    l0, slope = scene.expansions.linear_in_design(path.q)
+    _require_near(scene, l0)
+    column = scene.expansions.column
+    goals = [
+        Goal(
+            LinearModel(l0[wanted.rows, k], slope[wanted.rows, k]),
+            wanted.hz,
+            target.weight,
+            wanted.rows,
+        )
+        for target, wanted in zip(file.targets, targets, strict=True)
+        for k in [column(target.mode)]
+    ]
+    return solve_assignment(
+        goals,
+        time_weights(path),
+        scene.expansions.linear.y0,
+        scene.initial,
+        Bounds(*scene.bounds),
+        _constraints(file),
+        _names(file),
+    )
+
+
+def _require_near(scene: Scene, l0: Floats) -> None:
+    """Raise AccuracyError where the expansion is so far from a pose that it predicts λ ≤ 0."""
+    bad = np.argwhere(~(l0 > 0.0))
+    if len(bad):
+        k, column = (int(i) for i in bad[0])
+        problem = scene.file.problem(
+            "expansion.q",
+            f"too far from the motion: the expansion predicts a negative λ of mode "
+            f"{scene.expansions.modes[column]} at {scene.path.where(k)}; "
+            "give a pose of the trajectory, or auto",
+        )
+        raise AccuracyError(str(problem))
+
+
+def _names(file: CaseFile) -> tuple[str, ...]:
+    return tuple(file.design.parameters)
+
+
+def _constraints(file: CaseFile) -> list[LinearConstraint]:
+    return [
+        LinearConstraint(
+            name,
+            np.array([constraint.terms.get(parameter, 0.0) for parameter in _names(file)]),
+            -np.inf if constraint.min is None else constraint.min,
+            np.inf if constraint.max is None else constraint.max,
+        )
+        for name, constraint in file.design.constraints.items()
+    ]
+
+
+def study_targets(
+    scene: Scene,
+    targets: tuple[Wanted, ...],
+    assignment: Assignment,
+    initial_hz: Floats,
+    exact_hz: Floats,
+) -> tuple[TargetStudy, ...]:
+    """Each target before, as predicted, and exactly; ``initial_hz``, ``exact_hz`` (n_t, modes)."""
+    weights = time_weights(scene.path)
+    studies = []
+    for k, (target, wanted) in enumerate(zip(scene.file.targets, targets, strict=True)):
+        rows, column = wanted.rows, target.mode - 1
+        predicted = hz_from_lam(assignment.lam[k])
+        hz = (wanted.hz, initial_hz[rows, column], predicted, exact_hz[rows, column])
+        studies.append(_studied(scene.path, target, rows, hz, weights[rows]))
+    return tuple(studies)
+
+
+def _studied(
+    path: Trajectories, target: Target, rows: slice, hz: _Curves, weights: Floats
+) -> TargetStudy:
+    """``hz`` and ``weights`` are those at ``rows`` of all samples."""
+    error = _errors(hz, weights)
+    return TargetStudy(
+        target.mode,
+        target_hz=hz[0],
+        initial_hz=hz[1],
+        predicted_hz=hz[2],
+        exact_hz=hz[3],
+        initial=error.initial,
+        predicted=error.predicted,
+        exact=error.exact,
+        trajectory=target.trajectory,
+        rows=rows,
+        weight_s=float(weights.sum()),
+        along=tuple(_along(path, rows, hz, weights)),
+    )
+
+
+def _along(
+    path: Trajectories, wanted: slice, hz: _Curves, weights: Floats
+) -> Iterator[TargetAlong]:
+    """The errors along each trajectory that the target holds on; ``hz`` and ``weights`` its own."""
+    for part, rows in zip(path.parts, path.rows, strict=True):
+        if wanted.start <= rows.start and rows.stop <= wanted.stop:
+            own = slice(rows.start - wanted.start, rows.stop - wanted.start)
+            target, initial, predicted, exact = (curve[own] for curve in hz)
+            error = _errors((target, initial, predicted, exact), weights[own])
+            yield TargetAlong(part.name, own, error)
+
+
+def _errors(hz: _Curves, weights: Floats) -> ErrorSummary:
+    wanted, *curves = hz
+    return ErrorSummary(*(_error(curve, wanted, weights) for curve in curves))
+
+
+def _error(frequency: Floats, wanted: Floats, weights: Floats) -> ErrorRow:
+    error = relative_error(frequency, wanted, weights)
+    return ErrorRow(error.max_relative, error.rms_relative)
+
+
+def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:
+    """One row for each design parameter, in the order of the file."""
+    parameters, units, initial = (
+        scene.file.design.parameters,
+        design_units(scene.file),
+        scene.initial,
+    )
+    return tuple(
+        DesignRow(name, p.parameter, units[k], float(initial[k]), float(optimal[k]), p.min, p.max)
+        for k, (name, p) in enumerate(parameters.items())
+    )
+
+
+def solver_row(assignment: Assignment) -> SolverRow:
+    """What the solver reached, as plain numbers."""
+    return SolverRow(
+        assignment.status,
+        assignment.iterations,
+        assignment.primal_residual,
+        assignment.dual_residual,
+        assignment.gap,
+    )
+
+
+def limit_notes(assignment: Assignment) -> list[str]:
+    """What holds the optimum back, and what no frequency depends on."""
+    grouped: dict[str, list[str]] = {}
+    for limit in assignment.active:
+        grouped.setdefault(f"{limit.side} {limit.kind}", []).append(limit.name)
+    notes = [f"on its {side} of {', '.join(names)}" for side, names in grouped.items()]
+    notes = [f"the optimum lies {note}" for note in notes]
+    if assignment.undetermined:
+        notes.append(
+            f"{assignment.undetermined} direction(s) of the design change no target: there the "
+            "initial design is kept as nearly as the limits allow"
+        )
+    return notes
+
+
+# --- Where the number of a mode may not be believed: neighbouring frequencies that nearly meet
+
+NEAR = 0.01  # relative gap in Hz below which two modes may swap numbers between samples
+
+
+def crossing_warnings(
+    hz: Floats, modes: tuple[int, ...], where: Callable[[int], str], design: str
+) -> Iterator[str]:
+    """A warning for each of ``modes`` whose neighbour comes within 1 % along the trajectory.
+
+    ``hz`` (n_t, at least the highest mode) are exact frequencies at the design named ``design``;
+    ``where`` says in words which sample k is.
+    Modes are numbered by size at every sample: where two curves cross, their numbers swap.
+    """
+    pairs = {(low, low + 1) for mode in modes for low in (mode - 1, mode) if low >= 1}
+    for low, high in sorted(pairs):
+        if high > hz.shape[1]:
+            continue
+        gap = hz[:, high - 1] / hz[:, low - 1] - 1.0
+        k = int(np.argmin(gap))
+        if gap[k] < NEAR:
+            yield (
+                f"modes {low} and {high} come within {100 * gap[k]:.2g} % of each other at "
+                f"{where(k)}, near {hz[k, low - 1]:.6g} Hz, with the {design} design; "
+                "modes are numbered by size, so if they cross there the curve of a mode changes "
+                "from one motion to the other"
+            )

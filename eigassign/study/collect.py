@@ -1,0 +1,175 @@
+"""Everything that a run found, put together for the output layer to show."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign._version import __version__
+from eigassign.assignment import Assignment
+from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.study.accuracy import study_motion
+from eigassign.study.assignment import crossing_warnings, design_rows, limit_notes, solver_row
+from eigassign.study.drawing import draw_poses, rest_pose
+from eigassign.study.findings import (
+    Findings,
+    ModeStudy,
+    OtherModes,
+    Poses,
+    TargetStudy,
+    TrajectoryRow,
+    coordinate_units,
+)
+from eigassign.study.scene import Scene
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Assigned:
+    """An assignment with its proof: exact frequencies (n_t, shown modes) before and after."""
+
+    assignment: Assignment
+    targets: tuple[TargetStudy, ...]
+    initial_hz: Floats
+    exact_hz: Floats
+
+
+def gather(
+    scene: Scene,
+    studies: tuple[ModeStudy, ...],
+    assigned: Assigned | None,
+    timing_s: Mapping[str, float],
+) -> Findings:
+    """The findings of a run; without ``assigned`` those of an expansion only."""
+    file, trajectory = scene.file, scene.trajectory
+    motion = _motion(scene, assigned)
+    n_q = len(scene.model.q_names)
+    return Findings(
+        title=file.title,
+        reference=file.reference,
+        case_name=file.path.stem.encode("utf-8", "replace").decode("utf-8"),
+        case_sha256=file.sha256,
+        case_files=file.files,
+        version=__version__,
+        q_names=scene.model.q_names,
+        q_units=coordinate_units(file),
+        time_s=np.zeros(0) if trajectory is None else trajectory.time_s,
+        q=np.zeros((0, n_q)) if trajectory is None else trajectory.q,
+        trajectories=_trajectories(trajectory),
+        poses=_poses(scene),
+        studies=studies,
+        design=() if assigned is None else design_rows(scene, assigned.assignment.y),
+        targets=() if assigned is None else assigned.targets,
+        others=None if assigned is None else _others(scene, assigned),
+        solver=None if assigned is None else solver_row(assigned.assignment),
+        warnings=(*scene.warnings, *_warnings(scene, assigned), *motion[1]),
+        notes=(*scene.notes, *(limit_notes(assigned.assignment) if assigned else ()), *motion[0]),
+        timing_s=dict(timing_s),
+        tolerance=file.validation.max_error,
+    )
+
+
+def _trajectories(path: Trajectories | None) -> tuple[TrajectoryRow, ...]:
+    if path is None:
+        return ()
+    return tuple(
+        TrajectoryRow(
+            part.name, rows, float(np.ptp(part.trajectory.time_s)), part.weight, part.trajectory.tip
+        )
+        for part, rows in zip(path.parts, path.rows, strict=True)
+    )
+
+
+def _motion(scene: Scene, assigned: Assigned | None) -> tuple[list[str], list[str]]:
+    """Notes and warnings on the speed of the motion."""
+    if assigned is None:
+        return [], []
+    study = study_motion(scene, assigned.initial_hz)
+    if study is None:
+        return [], []
+    return [study.note] if study.note else [], [study.warning] if study.warning else []
+
+
+def _poses(scene: Scene) -> Poses:
+    if scene.trajectory is None:
+        return rest_pose(scene.file, scene.model, scene.q0, scene.initial)
+    return draw_poses(scene.file, scene.model, scene.trajectory, scene.initial)
+
+
+def _others(scene: Scene, assigned: Assigned) -> OtherModes | None:
+    """Up to three modes above the lowest assigned one that have no target themselves."""
+    targets = {target.mode for target in assigned.targets}
+    rest = [m for m in scene.shown_modes if m > min(targets) and m not in targets][:3]
+    if not rest:
+        return None
+    columns = [mode - 1 for mode in rest]
+    before, after = assigned.initial_hz[:, columns], assigned.exact_hz[:, columns]
+    return OtherModes(tuple(rest), before, after)
+
+
+def _warnings(scene: Scene, assigned: Assigned | None) -> Iterator[str]:
+    """What keeps the numbers from meaning what they seem to."""
+    if assigned is None:
+        return
+    modes = tuple(sorted({target.mode for target in assigned.targets}))
+    for hz, design in ((assigned.initial_hz, "initial"), (assigned.exact_hz, "optimal")):
+        yield from crossing_warnings(hz, modes, scene.path.where, design)
+    yield from _accuracy_warnings(scene, assigned)
+    yield from _worsening(scene, assigned)
+
+
+def _accuracy_warnings(scene: Scene, assigned: Assigned) -> Iterator[str]:
+    """For each target whose predicted frequency is farther off than the case accepts."""
+    limit, y = scene.file.validation.max_error, assigned.assignment.y
+    off = [t for t in assigned.targets if not t.approximation_error <= limit]
+    for target in off:
+        taylor = scene.expansions.taylor_hz(scene.path.q[target.rows], y)
+        taylor_hz = taylor[:, scene.expansions.column(target.mode)]
+        enough = np.all(np.abs(taylor_hz / target.exact_hz - 1.0) <= limit)
+        point = ", ".join(f"{value:.4g}" for value in y)
+        advice = (
+            f"λ is not linear enough in the design: try expansion.y: [{point}], or narrower bounds"
+            if enough
+            else "so is the full expansion: narrow the bounds, expand nearer or to a higher order"
+        )
+        yield (
+            f"{target.label}: the prediction that the optimum rests on is up to "
+            f"{100 * target.approximation_error:.3g} % off the exact frequency, over the "
+            f"{100 * limit:g} % of validation.max_error ({advice}); the exact frequencies hold, "
+            "but there may be a better design"
+        )
+
+
+def _worsening(scene: Scene, assigned: Assigned) -> Iterator[str]:
+    """Where, in truth, the initial design was nearer to the targets than the optimum is."""
+    weighed = list(zip(scene.file.targets, assigned.targets, strict=True))
+    shares = [file.weight * target.weight_s for file, target in weighed]
+    before, after = (
+        sum(
+            share * getattr(target, when).rms_relative ** 2
+            for share, (_, target) in zip(shares, weighed, strict=True)
+        )
+        for when in ("initial", "exact")
+    )
+    if after > before and _is_feasible(scene):
+        yield (
+            "the initial design is nearer to the targets than this optimum is, when both are "
+            "solved exactly: the expansion misleads here; do not use this design"
+        )
+
+
+def _is_feasible(scene: Scene) -> bool:
+    """Whether the initial design meets the constraints (its bounds it always does)."""
+    names = scene.model.y_names
+    initial = dict(zip(names, scene.initial, strict=True))
+    for constraint in scene.file.design.constraints.values():
+        total = sum(factor * initial[name] for name, factor in constraint.terms.items())
+        low = -np.inf if constraint.min is None else constraint.min
+        high = np.inf if constraint.max is None else constraint.max
+        if not low <= total <= high:
+            return False
+    return True

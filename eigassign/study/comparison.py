@@ -1,0 +1,227 @@
+"""The expansions of a run compared with exact frequencies, over time, over y and over q.
+
+Is the expansion of a case good enough: full Taylor and linearised against exact.
+
+Three places are looked at, and all of them count against ``validation.max_error``, since together
+they are what an assignment relies on:
+
+trajectory
+    every sample of the trajectory, or of each of several, at the initial design;
+box of y at q0
+    all designs within their bounds at the expansion point: a grid with its corners for up to three
+    parameters, corners and seeded random designs beyond;
+box of q and y
+    seeded random points (``validation.samples`` of them). In q the box is what the joint angles
+    travel along the trajectory. It is spanned in the joints' *relative* angles, on which the
+    frequencies depend: the box of the absolute angles would also hold poses far from any that the
+    mechanism takes. With ``validation.q_span`` it is instead q0 ± the span in the coordinates of
+    the case, whatever poses that gives. In y it is the bounds.
+
+Errors are in frequency (Hz), relative; a point where a polynomial gives λ < 0 counts as infinitely
+wrong. Where the full set was too large for the order asked for, only the linearised error counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import product, zip_longest
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.case import CaseFile
+from eigassign.errors import CaseError
+from eigassign.modal.arguments import DENSE_LIMIT
+from eigassign.study.findings import (
+    Comparison,
+    ModeStudy,
+    ValidationRow,
+    coordinate_units,
+    design_units,
+)
+from eigassign.study.planning import joint_map
+from eigassign.study.scene import AXES, COARSE, Grid, Scene, compare, grid_over, map_over
+
+# --- The expansions of a run compared with exact frequencies, over time, over y and over q
+
+Floats = NDArray[np.float64]
+
+
+def study_modes(scene: Scene, initial_hz: Floats | None = None) -> tuple[ModeStudy, ...]:
+    """One study for each expanded mode; ``initial_hz`` (n_t, modes) exact on the trajectory."""
+    model, expansions = scene.model, scene.expansions
+    over_time: tuple[Comparison, ...] = ()
+    if scene.trajectory is not None:
+        x = model.x(scene.trajectory.q, scene.initial)
+        over_time = compare(model, expansions, x, initial_hz)
+    over_design = map_over(model, expansions, design_grid(scene))
+    over_q = map_over(model, expansions, q_grid(scene))
+    x0 = (expansions.full.q0, expansions.full.y0)
+    parts = zip_longest(expansions.modes, over_time, over_design, over_q)
+    return tuple(ModeStudy(m, expansions.order, *x0, time, y, q) for m, time, y, q in parts)
+
+
+def _counts(scene: Scene) -> Mapping[int, int]:
+    return AXES if scene.model.n_dof <= DENSE_LIMIT else COARSE
+
+
+def design_grid(scene: Scene) -> Grid | None:
+    """Over the bounds of the first two design parameters, at q0."""
+    names, n_q, (lower, upper) = scene.model.y_names, len(scene.q0), scene.bounds
+    return grid_over(
+        range(n_q, n_q + len(names)),
+        names,
+        design_units(scene.file),
+        lower,
+        upper,
+        scene.expansions.full.x0,
+        _counts(scene),
+    )
+
+
+def q_grid(scene: Scene) -> Grid | None:
+    """Over the range that the joint angles travel, at y0, for the first two that matter.
+
+    A joint angle s_i = Σ_k S_ik q_k on which frequencies depend is moved by the last coordinate in
+    its row of S, the others staying at q0; so an arm turning as a whole is not mapped.
+    """
+    S, q0 = joint_map(scene.model), scene.q0
+    if scene.trajectory is None or not len(S):
+        return None
+    travelled, s0 = scene.trajectory.q @ S.T, S @ q0
+    moved = [int(np.flatnonzero(row)[-1]) for row in S]
+    ends = np.array([travelled.min(axis=0), travelled.max(axis=0)]) - s0
+    ends = np.array([np.minimum(ends[0], 0.0), np.maximum(ends[1], 0.0)])  # q0 is always inside
+    lower, upper = np.sort(ends / S[range(len(S)), moved], axis=0) + q0[moved]
+    names, units = scene.model.q_names, coordinate_units(scene.file)
+    return grid_over(
+        moved,
+        [names[k] for k in moved],
+        [units[k] for k in moved],
+        lower,
+        upper,
+        scene.expansions.full.x0,
+        _counts(scene),
+    )
+
+
+# --- Is the expansion of a case good enough: full Taylor and linearised against exact
+
+TRAJECTORY, DESIGN_BOX, RANDOM_BOX = "trajectory", "box of y at q0", "box of q and y"
+SEED = 20211204  # any: the same points every time
+_GRID = {1: 61, 2: 13, 3: 7}  # points along each axis by the number of parameters
+_CORNERS = 256  # at most, of a box with many parameters
+
+
+@dataclass(frozen=True)
+class Validation:
+    """The rows of one case, and what else a reader should know."""
+
+    rows: tuple[ValidationRow, ...]
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+    seconds: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether every row is within the case's tolerance."""
+        return all(row.passed for row in self.rows)
+
+
+def validate_expansions(scene: Scene) -> tuple[ValidationRow, ...]:
+    """One row for each place and expanded mode.
+
+    Raises CaseError where there is nothing to look at: no trajectory, no design, no ``q_span``.
+    """
+    rows = [
+        _row(scene, k, where, comparison)
+        for where, x in _places(scene)
+        for k, comparison in enumerate(compare(scene.model, scene.expansions, x))
+    ]
+    if not rows:
+        message = "nothing to validate: give a trajectory, a design, or validation.q_span"
+        raise CaseError((scene.file.problem("validation", message),))
+    return tuple(rows)
+
+
+def _places(scene: Scene) -> Iterator[tuple[str, Floats]]:
+    """Where, and the points x (n, n_x) there."""
+    model, random = scene.model, np.random.default_rng(SEED)
+    if scene.trajectory is not None:
+        for part in scene.trajectory.parts:
+            where = f"{TRAJECTORY} {part.name!r}" if scene.trajectory.several else TRAJECTORY
+            yield where, model.x(part.trajectory.q, scene.initial)
+    lower, upper = scene.bounds
+    if np.any(upper > lower):
+        y = box_points(lower, upper, scene.file.validation.samples, random)
+        yield DESIGN_BOX, model.x(scene.q0, y)
+    q = random_q(scene, random)
+    if q is not None:
+        yield RANDOM_BOX, model.x(q, random.uniform(lower, upper, (len(q), len(lower))))
+
+
+def box_points(lower: Floats, upper: Floats, samples: int, random: np.random.Generator) -> Floats:
+    """Points (n, d) of a box that include its corners: a grid, or from four axes on at random."""
+    d = len(lower)
+    if d in _GRID:
+        unit = np.array(list(product(np.linspace(0.0, 1.0, _GRID[d]), repeat=d)))
+    else:
+        unit = np.vstack([_corners(d, random), random.random((samples, d))])
+    return np.asarray((1.0 - unit) * lower + unit * upper)
+
+
+def _corners(d: int, random: np.random.Generator) -> Floats:
+    """All corners of the unit box if they are few, else a random choice of them."""
+    if 2**d <= _CORNERS:
+        return np.array(list(product((0.0, 1.0), repeat=d)))
+    chosen = random.integers(0, 2, (_CORNERS, d)).astype(np.float64)
+    chosen[:2] = [[0.0], [1.0]]
+    return chosen
+
+
+def random_q(scene: Scene, random: np.random.Generator) -> Floats | None:
+    """Random poses (n, n_q) of the box in q; None if the box is a point or unknown."""
+    n, q0 = scene.file.validation.samples, scene.q0
+    if scene.file.validation.q_span is not None:
+        span = _spans(scene.file, len(q0))
+        return q0 + random.uniform(-1.0, 1.0, (n, len(q0))) * span if span.any() else None
+    S = joint_map(scene.model)
+    if scene.trajectory is None or not len(S):
+        return None
+    travelled = scene.trajectory.q @ S.T
+    s = random.uniform(travelled.min(axis=0), travelled.max(axis=0), (n, len(S)))
+    return np.asarray(q0 + (s - S @ q0) @ np.linalg.pinv(S).T)
+
+
+def _spans(file: CaseFile, n_q: int) -> Floats:
+    """Half-widths (n_q,) of the box in q."""
+    span = np.atleast_1d(np.array(file.validation.q_span, dtype=np.float64))
+    if len(span) not in (1, n_q):
+        message = f"{len(span)} values for {n_q} coordinates; give one, or one for each"
+        raise CaseError((file.problem("validation.q_span", message),))
+    return np.broadcast_to(span, (n_q,))
+
+
+def _row(scene: Scene, k: int, where: str, values: Comparison) -> ValidationRow:
+    expansions, limit = scene.expansions, scene.file.validation.max_error
+    counts = expansions.full_order == expansions.order
+    counted = [values.worst_linearised, *([values.worst_taylor] if counts else [])]
+    return ValidationRow(
+        case=scene.file.path.stem,
+        mode=expansions.modes[k],
+        order=expansions.order,
+        where=where,
+        points=values.exact_hz.size,
+        worst_taylor=values.worst_taylor,
+        worst_linearised=values.worst_linearised,
+        rms_taylor=_rms(values.taylor_error),
+        rms_linearised=_rms(values.linearised_error),
+        limit=limit,
+        passed=max(counted) <= limit,
+    )
+
+
+def _rms(errors: Floats) -> float:
+    rms = float(np.sqrt(np.mean(np.square(errors))))
+    return rms if rms == rms else float("inf")
