@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -27,11 +28,41 @@ OWNERS = {
 EVERYWHERE = {"numpy", "scipy"}
 PRINTING = {"cli.cache", "cli.inspect", "cli.runs", "cli.reporter", "output.console"}
 MODULES = sorted(ROOT.rglob("*.py"))
+PACKAGES = sorted(path.parent for path in ROOT.rglob("__init__.py"))
+PENDING = {
+    "",
+    "assignment",
+    "batch",
+    "case",
+    "case.rules",
+    "case.schema",
+    "chart",
+    "cli",
+    "interpolation",
+    "mechanism",
+    "mechanism.assembly",
+    "mechanism.elements",
+    "mechanism.inverse_kinematics",
+    "mechanism.kinematics",
+    "mechanism.trajectory",
+    "modal",
+    "modal.adaptive",
+    "modal.exact",
+    "modal.fit",
+    "modal.reduced",
+    "modal.taylor",
+    "output",
+    "output.figures",
+    "pipeline",
+    "series",
+    "study",
+}
 
 
 def name_of(path: Path) -> str:
-    """``modal/exact.py`` → ``modal.exact``."""
-    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+    """``modal/exact.py`` → ``modal.exact``; of the package itself the empty text."""
+    name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    return name.removesuffix("__init__").removesuffix(".")
 
 
 def parsed(path: Path) -> ast.Module:
@@ -66,6 +97,31 @@ def test_a_package_imports_only_from_its_left(path: Path) -> None:
     elif package in LEFT_TO_RIGHT and name_of(path) != "study.chart_follow":  # to be deleted
         left = LEFT_TO_RIGHT[: LEFT_TO_RIGHT.index(package) + 1]
         assert used <= {*left, "series", "interpolation", *BELOW_ALL}
+
+
+def reading_order(package: Path) -> list[str]:
+    """Names listed in a package's docstring: four spaces, name, two spaces or more, what it is."""
+    text = ast.get_docstring(parsed(package / "__init__.py")) or ""
+    return re.findall(r"^    (\w+)  +\S", text, re.MULTILINE)
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda p: name_of(p / "__init__.py") or "top")
+def test_modules_import_only_from_those_above_them_in_the_reading_order(package: Path) -> None:
+    prefix = name_of(package / "__init__.py")
+    if prefix in PENDING:
+        pytest.skip("not in order yet")
+    order = reading_order(package)
+    inside = {p.stem for p in package.glob("*.py")} | {
+        p.parent.name for p in package.glob("*/*.py")
+    }
+    assert set(order) == inside - {"__init__"}
+    for k, name in enumerate(order):
+        own = package / name if (package / name).is_dir() else package / f"{name}.py"
+        for path in sorted(own.rglob("*.py")) if own.is_dir() else [own]:
+            for used in imports(parsed(path)):
+                full = f"eigassign.{prefix}." if prefix else "eigassign."
+                part = used.removeprefix(full).split(".")[0] if used.startswith(full) else name
+                assert part not in order[k + 1 :], f"{name_of(path)} imports {used}"
 
 
 @pytest.mark.parametrize("path", MODULES, ids=name_of)
