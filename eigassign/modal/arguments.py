@@ -109,6 +109,11 @@ def relative_gap(value: object) -> float:
     raise UsageError(f"cluster_gap must be a number of at least 0, not {value!r}")
 
 
+def shown_numbers(x: Floats) -> str:
+    """Numbers for a message: "(1.817, 5.312)"."""
+    return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"
+
+
 # --- Samples in parts, so that what is worked out for each of them stays in the processor's cac
 
 CHUNK = 2048  # samples at once, at most

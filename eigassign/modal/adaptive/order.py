@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.arguments import MOST_TERMS
+from eigassign.modal.arguments import MOST_TERMS, shown_numbers
 from eigassign.modal.exact.clusters import CLUSTER_GAP
 from eigassign.modal.exact.solver import eigenvalues
 from eigassign.modal.reduced.model import ReducedModel
@@ -282,7 +282,7 @@ class Trial:
     @property
     def nearest(self) -> str:
         """How near all candidates came, in words."""
-        at = f"at {self.place(self.least_at)}, (q, y) = {shown(self.x[self.least_at])}"
+        at = f"at {self.place(self.least_at)}, (q, y) = {shown_numbers(self.x[self.least_at])}"
         if np.isfinite(self.least):
             return f"the nearest left {self.least:.1e} {at}"
         return f"none has a number that it vouches for {at}"
@@ -350,7 +350,7 @@ def reduce_adaptively(
         error, k = reached
         raise AccuracyError(
             f"no reduced model of up to {max_size} vectors reaches {bound:.1e}: at {place(k)}, "
-            f"(q, y) = {shown(x[k])}, the estimated error is {error:.1e}"
+            f"(q, y) = {shown_numbers(x[k])}, the estimated error is {error:.1e}"
         )
     return AdaptiveReduction(taken.reduced, taken.estimate, accuracy, tuple(reasons))
 
@@ -410,11 +410,6 @@ def central(x: Floats) -> int:
     low, high = x.min(axis=0), x.max(axis=0)
     width = np.where(high > low, high - low, 1.0)
     return int(np.argmin((((x - 0.5 * (low + high)) / width) ** 2).sum(axis=1)))
-
-
-def shown(x: Floats) -> str:
-    """Numbers for a message."""
-    return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"
 
 
 # --- Order, clusters and expansion points of polynomials: the cheapest that meets an accuracy

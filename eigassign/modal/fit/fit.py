@@ -31,8 +31,7 @@ from eigassign.errors import AccuracyError, UsageError
 from eigassign.interpolation.adaptive import adaptive
 from eigassign.interpolation.given import fewest, given
 from eigassign.interpolation.newton import Asking, Interpolant, newton_polynomials
-from eigassign.modal.adaptive.order import shown
-from eigassign.modal.arguments import DENSE_LIMIT, mode_numbers, whole_within
+from eigassign.modal.arguments import DENSE_LIMIT, mode_numbers, shown_numbers, whole_within
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.exact.solver import eigenvalues
 from eigassign.modal.fit.domain import Box, Path, Region, Stretch, build_region, followed, stretches
@@ -395,7 +394,7 @@ def question(source: Any, modes: tuple[int, ...]) -> Callable[[Floats], Floats]:
         hz = np.asarray(source.frequencies(x[:, :n_q], x[:, n_q:]))[:, columns]
         if not np.isfinite(hz).all():
             k = int(np.argmin(np.isfinite(hz).all(axis=1)))
-            raise AccuracyError(f"the source has no frequency at (q, y) = {shown(x[k])}")
+            raise AccuracyError(f"the source has no frequency at (q, y) = {shown_numbers(x[k])}")
         return hz
 
     return ask
