@@ -51,7 +51,6 @@ PENDING = {
     "output",
     "output.figures",
     "pipeline",
-    "series",
     "study",
 }
 

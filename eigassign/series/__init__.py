@@ -1,1 +1,11 @@
-"""Truncated power series over any lower set of multi-indices; knows no mechanics."""
+"""Truncated power series over any lower set of multi-indices; knows no mechanics.
+
+In reading order:
+
+    multi_index   lower sets of multi-indices, and the table of products of two series over one
+    power_series  arithmetic of series Σ a_γ x^γ, and polynomials at many points
+    algebra       what a formula is evaluated on: samples, or truncated series
+    expression    formulas as they are written: sums of recorded atoms
+    compiler      recorded atoms as a straight-line program, run in either algebra
+    implicit      solutions p(a) of F(p, a) = 0, by continuation and by Newton's method on series
+"""

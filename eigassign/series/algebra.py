@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from eigassign.errors import SingularityError
 from eigassign.series.multi_index import LowerSet
 from eigassign.series.power_series import compose, multiply, power_taylor, wave_taylor
 
-if TYPE_CHECKING:
-    from eigassign.series.expression import Step
-
-
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+Weights = sparse.csr_array | NDArray[np.float64]
 
 
 class Algebra(Protocol):
@@ -26,8 +24,8 @@ class Algebra(Protocol):
     def constant(self, values: Floats) -> Floats:
         """Numbers (n,) as rows (n, …)."""
 
-    def linear(self, step: Step, values: Floats) -> Floats:
-        """Linear forms of rows."""
+    def linear(self, weights: Weights, constants: Floats, values: Floats) -> Floats:
+        """Linear forms of rows: constants (k,) + weights (k, n) × values."""
 
     def product(self, a: Floats, b: Floats) -> Floats:
         """Row by row product."""
@@ -42,6 +40,17 @@ class Algebra(Protocol):
         """X as rows (n m, …) of A X = B, entries as rows (n², …) and (n m, …)."""
 
 
+class Function(Protocol):
+    """A vector function that is no formula, such as the solution of equations, in any algebra."""
+
+    @property
+    def size(self) -> int:
+        """Number of components."""
+
+    def evaluate(self, algebra: Algebra, a: Floats) -> Floats:
+        """Components as rows (size, …) from the arguments as rows (n_arguments, …)."""
+
+
 class Samples:
     """Ordinary numbers, many samples at once."""
 
@@ -49,9 +58,9 @@ class Samples:
         """(n,) → (n, 1), broadcast over samples."""
         return values[:, None]
 
-    def linear(self, step: Step, values: Floats) -> Floats:
+    def linear(self, weights: Weights, constants: Floats, values: Floats) -> Floats:
         """A sum for each form."""
-        return np.asarray(step.weights @ values + step.numbers[:, None])
+        return np.asarray(weights @ values + constants[:, None])
 
     def product(self, a: Floats, b: Floats) -> Floats:
         """Elementwise."""
@@ -89,10 +98,10 @@ class Truncated:
         rows[:, 0] = values
         return rows
 
-    def linear(self, step: Step, values: Floats) -> Floats:
+    def linear(self, weights: Weights, constants: Floats, values: Floats) -> Floats:
         """The sum of each coefficient; numbers enter the constant terms."""
-        rows = np.asarray(step.weights @ values)
-        rows[:, 0] += step.numbers
+        rows = np.asarray(weights @ values)
+        rows[:, 0] += constants
         return rows
 
     def product(self, a: Floats, b: Floats) -> Floats:

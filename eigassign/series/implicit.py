@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from eigassign.errors import SingularityError
 from eigassign.series.algebra import Algebra, Samples, Truncated
-from eigassign.series.expression import Program
+from eigassign.series.compiler import Program
 
 Floats = NDArray[np.float64]
 STEP = 0.15  # largest change of an argument in one continuation step (rad or m)

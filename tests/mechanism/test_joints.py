@@ -17,7 +17,7 @@ from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics.forward import Kinematics, all_moving
 from eigassign.mechanism.kinematics.joints import COMPONENTS, JointMotion, joint_motion, turned
 from eigassign.series.algebra import Samples
-from eigassign.series.expression import compile_table
+from eigassign.series.compiler import compile_table
 
 H = 1e-5  # central differences: error about H² = 1e-10 times third derivatives of order 1
 JOINTS = [

@@ -8,7 +8,8 @@ import numpy as np
 from scipy import sparse
 
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.series.expression import Recorder, Scalar, compile_program
+from eigassign.series.compiler import compile_program
+from eigassign.series.expression import Recorder, Scalar
 
 Terms = Sequence[tuple[Scalar, np.ndarray]]
 

@@ -13,14 +13,8 @@ from hypothesis import strategies as st
 
 from eigassign.errors import UsageError
 from eigassign.series.algebra import Samples, Truncated
-from eigassign.series.expression import (
-    Expression,
-    Recorder,
-    compile_program,
-    compile_table,
-    cos,
-    sin,
-)
+from eigassign.series.compiler import compile_program, compile_table
+from eigassign.series.expression import Expression, Recorder, cos, sin
 from eigassign.series.multi_index import on_faces, total_degree
 from eigassign.series.power_series import PowerSeries
 

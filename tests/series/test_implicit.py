@@ -9,15 +9,8 @@ import pytest
 
 from eigassign.errors import SingularityError
 from eigassign.series.algebra import Samples, Truncated
-from eigassign.series.expression import (
-    Expression,
-    Recorder,
-    Scalar,
-    compile_program,
-    cos,
-    derivative,
-    sin,
-)
+from eigassign.series.compiler import compile_program
+from eigassign.series.expression import Expression, Recorder, Scalar, cos, derivative, sin
 from eigassign.series.implicit import ImplicitFunction
 from eigassign.series.multi_index import total_degree
 

@@ -27,7 +27,8 @@ from eigassign.mechanism.elements.mesh import Reduction, Term
 from eigassign.mechanism.kinematics.coordinates import Parameters
 from eigassign.mechanism.kinematics.rotations import multiply
 from eigassign.series.algebra import Samples
-from eigassign.series.expression import Expression, Scalar, Table, compile_table
+from eigassign.series.compiler import Table, compile_table
+from eigassign.series.expression import Expression, Scalar
 
 # --- Assembly of the affine pencil: M = Bᵀ m B, K = Bᵀ k B of eq. (1), factored link by link
 

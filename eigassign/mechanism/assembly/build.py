@@ -22,7 +22,7 @@ from eigassign.mechanism.kinematics.coordinates import parameters as variables
 from eigassign.mechanism.kinematics.forward import Kinematics, kinematics
 from eigassign.mechanism.kinematics.topology import Placement
 from eigassign.mechanism.kinematics.travel_limits import rails
-from eigassign.series.expression import compile_program
+from eigassign.series.compiler import compile_program
 
 Ints = NDArray[np.intp]
 Objects = NDArray[np.object_]

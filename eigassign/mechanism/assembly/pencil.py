@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.series.algebra import Samples, Truncated
-from eigassign.series.expression import Program
+from eigassign.series.compiler import Program
 from eigassign.series.multi_index import LowerSet, on_faces
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ from eigassign.mechanism.kinematics.loop_closure import reference
 from eigassign.mechanism.kinematics.rotations import multiply
 from eigassign.mechanism.kinematics.topology import Node
 from eigassign.series.algebra import Samples
-from eigassign.series.expression import Table, compile_table
+from eigassign.series.compiler import Table, compile_table
 
 Floats = NDArray[np.float64]
 POSES = 6

@@ -26,7 +26,7 @@ from eigassign.mechanism.kinematics.loop_closure import RANK, passive_motion
 from eigassign.mechanism.kinematics.rotations import Objects
 from eigassign.mechanism.kinematics.topology import Edge
 from eigassign.series.algebra import Samples
-from eigassign.series.expression import compile_table
+from eigassign.series.compiler import compile_table
 
 Floats = NDArray[np.float64]
 CONSISTENT = 1e-8  # of the largest entry: round-off of the closure, of its solution and of a turn

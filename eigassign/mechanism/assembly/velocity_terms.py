@@ -56,7 +56,8 @@ from eigassign.mechanism.elements.mesh import DOFS, LinkMesh, Term, link_type
 from eigassign.mechanism.kinematics.coordinates import Parameters
 from eigassign.mechanism.kinematics.forward import Kinematics, all_moving
 from eigassign.series.algebra import Samples
-from eigassign.series.expression import Scalar, Table, compile_table
+from eigassign.series.compiler import Table, compile_table
+from eigassign.series.expression import Scalar
 
 # --- The velocity terms of eq. (1), which the method neglects: built here so that they can be c
 

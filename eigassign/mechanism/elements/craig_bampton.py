@@ -31,7 +31,7 @@ from eigassign.mechanism.elements.mesh import LinkMesh, Reduction, Term, link_ty
 from eigassign.mechanism.elements.sparse_factor import kept_factor
 from eigassign.mechanism.kinematics.coordinates import Parameters
 from eigassign.series.algebra import Samples
-from eigassign.series.expression import compile_table
+from eigassign.series.compiler import compile_table
 
 # --- Craig-Bampton reduction of a link: few fixed-interface modes instead of its interior dofs
 

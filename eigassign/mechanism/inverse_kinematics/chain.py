@@ -29,7 +29,8 @@ from eigassign.mechanism.kinematics.loop_closure import closure_rows, reference_
 from eigassign.mechanism.kinematics.rotations import Objects, cross, multiply
 from eigassign.mechanism.kinematics.topology import Tree, split
 from eigassign.series.algebra import Samples
-from eigassign.series.expression import Recorder, compile_table, derivative
+from eigassign.series.compiler import compile_table
+from eigassign.series.expression import Recorder, derivative
 
 # --- The tip of a mechanism as a function of its state: what inverse kinematics asks of a chain
 

@@ -22,14 +22,8 @@ from eigassign.mechanism.kinematics.forward import Kinematics, walk
 from eigassign.mechanism.kinematics.joints import COMPONENTS
 from eigassign.mechanism.kinematics.rotations import Floats, Objects, multiply
 from eigassign.mechanism.kinematics.topology import Tree
-from eigassign.series.expression import (
-    Expression,
-    Program,
-    Recorder,
-    Scalar,
-    compile_program,
-    derivative,
-)
+from eigassign.series.compiler import Program, compile_program
+from eigassign.series.expression import Expression, Recorder, Scalar, derivative
 from eigassign.series.implicit import ACCEPT, ImplicitFunction
 
 # --- Closed loops: passive freedoms as implicit functions of the coordinates, and their rates

@@ -19,7 +19,8 @@ from eigassign.mechanism.kinematics.coordinates import Parameters
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.topology import split
 from eigassign.series.algebra import Samples
-from eigassign.series.expression import Scalar, Table, compile_table
+from eigassign.series.compiler import Table, compile_table
+from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]
 

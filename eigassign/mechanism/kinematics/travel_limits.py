@@ -21,7 +21,8 @@ from eigassign.mechanism.kinematics.coordinates import Parameters
 from eigassign.mechanism.kinematics.joints import RIDING
 from eigassign.mechanism.kinematics.topology import Tree
 from eigassign.series.algebra import Samples
-from eigassign.series.expression import Scalar, Table, compile_table
+from eigassign.series.compiler import Table, compile_table
+from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]
 Label = Callable[[int], str]

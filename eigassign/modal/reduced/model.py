@@ -20,7 +20,7 @@ from eigassign.modal.exact.condensation import condense_blocks
 from eigassign.modal.reduced.error_estimate import ErrorTerms, relative_error
 from eigassign.modal.reduced.ritz import SymmetricTerms, ritz_values, symmetric_terms
 from eigassign.series.algebra import Samples
-from eigassign.series.expression import Program
+from eigassign.series.compiler import Program
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

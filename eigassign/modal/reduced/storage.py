@@ -19,7 +19,7 @@ from eigassign.errors import UsageError
 from eigassign.modal.reduced.error_estimate import ErrorTerms, Pose, Residual
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.taylor.storage import flatten, unflatten
-from eigassign.series.expression import Program, Step
+from eigassign.series.compiler import Program, Step
 from eigassign.series.implicit import ImplicitFunction
 
 Array = NDArray[Any]

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.taylor.expansion import Cluster, Expansion
-from eigassign.series.expression import Program, Step
+from eigassign.series.algebra import Function
+from eigassign.series.compiler import Program, Step
 from eigassign.series.implicit import ImplicitFunction
 from eigassign.series.multi_index import LowerSet
 
@@ -178,7 +179,9 @@ def _step(step: Step) -> list[Any]:
     return [step.kind, step.targets, step.left, step.right, step.numbers, matrix, *solved]
 
 
-def _implicit(function: ImplicitFunction) -> list[Any]:
+def _implicit(function: Function) -> list[Any]:
+    if not isinstance(function, ImplicitFunction):
+        raise UsageError(f"a {type(function).__name__} has no parts to compare by")
     counts = [function.size, function.n_equations, function.n_checks]
     return [_program(function.program), *counts, function.a0, function.p0]
 
