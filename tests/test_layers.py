@@ -90,7 +90,7 @@ def test_a_package_imports_only_from_its_left(path: Path) -> None:
     used = {part for name in imports(parsed(path)) if (part := ours(name)) is not None}
     if package in ("series", "interpolation"):
         assert used <= {"series", "interpolation", *BELOW_ALL}
-    elif package in LEFT_TO_RIGHT and name_of(path) != "study.chart_follow":  # to be deleted
+    elif package in LEFT_TO_RIGHT:
         left = LEFT_TO_RIGHT[: LEFT_TO_RIGHT.index(package) + 1]
         assert used <= {*left, "series", "interpolation", *BELOW_ALL}
 

@@ -1,14 +1,10 @@
 """The case file as the rest of the program sees it: frozen, SI-valued, aware of its lines.
 
 A case's content → canonical YAML 1.2 text that reads back equal.
-
-What a chart is about: the content of a case without what only says how it is to be solved.
 """
 
 from __future__ import annotations
 
-import hashlib
-import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -84,26 +80,6 @@ class CaseFile:
         names = Document.model_fields
         return to_yaml({name: getattr(self, name) for name in names})
 
-    @property
-    def subject_sha256(self) -> str:
-        """SHA-256 of mechanism, coordinates, trajectory and bounds, whatever is asked of them."""
-
-        told = ("mechanism", "coordinates", "trajectory")
-        content = {name: getattr(self, name) for name in told}
-        return subject_sha256(content, self.design, self.files, self.path.parent)
-
-    def expansion_line(self, **changes: object) -> str:
-        """``expansion: {…}`` for a case file: what this one says below that key, and ``changes``.
-
-        What nobody asks for is left out.
-        """
-
-        keys = self.expansion.model_copy(update=changes)
-        fields = type(keys).model_fields
-        asked = [n for n in fields if n in changes or getattr(keys, n) != fields[n].default]
-        said = {name: getattr(keys, name) for name in asked}
-        return f"expansion: {flow(said)}"
-
     @staticmethod
     def json_schema() -> dict[str, Any]:
         """JSON Schema (2020-12) of case files, for editors and documentation."""
@@ -126,11 +102,6 @@ _WIDTH = 90
 def to_yaml(content: Mapping[str, object]) -> str:
     """Block style for what is long, flow style for what fits on a line; None is left out."""
     return "".join(_entry(key, plain(value), 0) for key, value in content.items())
-
-
-def flow(value: object) -> str:
-    """On one line: ``{order: 4, q: [1.5, 0.0]}``."""
-    return _flow(plain(value))
 
 
 def plain(value: object) -> object:
@@ -208,29 +179,3 @@ def _escaped(c: str) -> str:
     if c.isprintable():
         return c
     return f"\\U{ord(c):08x}"
-
-
-# --- What a chart is about: the content of a case without what only says how it is to be solved
-
-
-def subject_sha256(
-    content: Mapping[str, object], design: Design, files: Mapping[str, str], folder: Path
-) -> str:
-    """SHA-256 of mechanism, coordinates and trajectory (``content``) and of the design's bounds.
-
-    ``files`` (SHA-256 by name as seen from ``folder``) stand for what the case names, so that two
-    cases are the same wherever they lie and however they are written.
-    """
-    digests = {os.path.abspath(folder / name): digest for name, digest in files.items()}
-    told = {**content, "design": design.parameters}
-    bare = {key: _without_paths(plain(value), digests) for key, value in told.items()}
-    return hashlib.sha256(to_yaml(bare).encode()).hexdigest()
-
-
-def _without_paths(value: object, digests: Mapping[str, str]) -> object:
-    """``value`` with the content of a file in the place of its path."""
-    if isinstance(value, dict):
-        return {key: _without_paths(inner, digests) for key, inner in value.items()}
-    if isinstance(value, list):
-        return [_without_paths(inner, digests) for inner in value]
-    return digests.get(value, value) if isinstance(value, str) else value

@@ -1,6 +1,6 @@
 """Path → CaseFile: read, put into SI, check against the schema and itself; or every problem.
 
-The files that a case names: matrices of superelements, samples of a trajectory, a chart.
+The files that a case names: matrices of superelements, samples of a trajectory.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def _bytes_of(path: Path) -> bytes:
         raise StorageError(f"{path}: cannot be read: {error.strerror}") from error
 
 
-# --- The files that a case names: matrices of superelements, samples of a trajectory, a chart
+# --- The files that a case names: matrices of superelements, samples of a trajectory
 
 CHUNK = 1 << 20
 
@@ -111,7 +111,6 @@ def attached(document: Document, folder: Path) -> dict[str, str]:
     """
     paths = [path for _, _, path in named_trajectories(document.trajectory)]
     named: list[object] = [getattr(path, "file", None) for path in paths]
-    named.append(document.expansion.chart)
     for link in document.mechanism.links.values():
         if link.type == "superelement":
             named += [link.stiffness, link.mass]

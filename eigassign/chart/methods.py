@@ -14,13 +14,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import ceil, floor, log10
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile
 from eigassign.chart.front import time_words
 from eigassign.chart.question import Features, Points
 from eigassign.chart.results import Advice, AutoTakes, ChartPoint
@@ -34,16 +32,8 @@ from eigassign.modal.fit.fit import MOST, Fit, PathFit, fit
 from eigassign.modal.model import Model
 from eigassign.modal.reduced.reduce import ReducedModel, reduce
 from eigassign.modal.taylor.expansion import expand, nearest
-from eigassign.study.chart_follow import (
-    CLUSTERED,
-    FULL,
-    SEVERAL,
-    charted_expansions,
-    fitting,
-    within,
-)
 from eigassign.study.drawing import spread_samples
-from eigassign.study.planning import OrderChoice, asked_accuracy, choose_order, series_share
+from eigassign.study.planning import OrderChoice, choose_order
 from eigassign.study.scene import Scene
 
 # --- What a charted method is, and eigassign's own: exact, Taylor, 1/λ, reduced models
@@ -52,6 +42,7 @@ Floats = NDArray[np.float64]
 Evaluator = Callable[[Points], Floats]  # → Hz (n, n_modes)
 
 
+FULL, SEVERAL, CLUSTERED = "Taylor, full", "Taylor, several points", "Taylor, wider cluster"
 UNGUARDED = "eigassign.modal.reduced.reduce.reduce"
 
 
@@ -463,7 +454,8 @@ def taken_by_auto(
 
 def _choice(scene: Scene, accuracy: float) -> tuple[OrderChoice | None, str]:
     full = scene.expansions.full
-    file = with_expansion(scene.file, accuracy=accuracy, chart=None)
+    expansion = scene.file.expansion.model_copy(update={"accuracy": accuracy})
+    file = replace(scene.file, expansion=expansion)
     try:
         made = choose_order(
             file, scene.model, scene.trajectory, full.q0, full.y0, scene.expansions.modes
@@ -471,11 +463,6 @@ def _choice(scene: Scene, accuracy: float) -> tuple[OrderChoice | None, str]:
     except AccuracyError as error:
         return None, str(error)
     return made, ""
-
-
-def with_expansion(file: CaseFile, **changes: object) -> CaseFile:
-    """The case with other keys below ``expansion``."""
-    return replace(file, expansion=file.expansion.model_copy(update=changes))
 
 
 def auto_methods(scene: Scene, taken: Sequence[Taken]) -> Iterator[Method]:
@@ -501,36 +488,13 @@ def auto_methods(scene: Scene, taken: Sequence[Taken]) -> Iterator[Method]:
         )
 
 
-def beside_auto(
-    advice: Advice, scene: Scene, points: Sequence[ChartPoint], taken: Sequence[Taken]
-) -> Advice:
-    """The advice with what ``auto`` takes, by itself and where it follows this chart."""
-    full, share = scene.expansions.full, series_share(scene.file) / asked_accuracy(scene.file)
-    able = fitting(charted_expansions(points), scene.file, full.q0, full.y0)
-    accuracy, n = advice.accuracy, advice.evaluations
-    if accuracy is None:
-        affordable = [e for e in able if e.total_s(n) <= (advice.budget_s or 0.0)]
-        least = min((e.worst_relative for e in affordable), default=np.inf)
-        accuracy = _rounded_up(least / share) if np.isfinite(least) else None
-    if accuracy is None or advice.is_below_round_off:
-        return advice
-    quickest = next(iter(within(able, share * accuracy, n)), None)
-    known = {p.method: p for p in points}
+def beside_auto(advice: Advice, points: Sequence[ChartPoint], taken: Sequence[Taken]) -> Advice:
+    """The advice with what ``auto`` takes for the same accuracy."""
     own = next((t for t in taken if t.accuracy == advice.accuracy), None)
-    advice = replace(
-        advice,
-        auto=None if own is None else _takes(own, known, n),
-        followed=None if quickest is None else quickest.method,
-        followed_s=None if quickest is None else quickest.total_s(n),
-        followed_accuracy=accuracy,
-    )
-    return replace(advice, words="; ".join([advice.words, *_words(advice)]))
-
-
-def _rounded_up(value: float) -> float:
-    """To two digits."""
-    size = 10.0 ** (floor(log10(value)) - 1)
-    return float(f"{ceil(value / size) * size:.1e}")
+    if own is None or advice.is_below_round_off:
+        return advice
+    auto = _takes(own, {p.method: p for p in points}, advice.evaluations)
+    return replace(advice, auto=auto, words=f"{advice.words}; {_words(advice, auto)}")
 
 
 def _takes(own: Taken, known: dict[str, ChartPoint], evaluations: float) -> AutoTakes:
@@ -542,27 +506,14 @@ def _takes(own: Taken, known: dict[str, ChartPoint], evaluations: float) -> Auto
     return AutoTakes(point.method, worst, total, own.seconds, "")
 
 
-def _words(advice: Advice) -> Iterator[str]:
-    auto = advice.auto
-    if auto is not None and auto.total_s is None:
-        yield f"`expansion.order: auto` refuses: {auto.refused}"
-    elif auto is not None and auto.total_s is not None:
-        yield (
-            f"`expansion.order: auto` takes {auto.method}, {time_words(auto.total_s)} in all"
-            f"{_against(advice, auto.method, auto.total_s)}, worst error "
-            f"{auto.worst_relative:.1e}, after {time_words(auto.choosing_s)} of choosing"
-        )
-    if advice.followed_s is not None and (auto is None or advice.followed != auto.method):
-        spent = time_words(advice.followed_s)
-        yield f"following this chart it takes {advice.followed}, {spent} in all"
-
-
-def _against(advice: Advice, method: str | None, total_s: float) -> str:
-    """How many times as long as the choice, and as the quickest expansion."""
-    others = {advice.method: advice.total_s, advice.followed: advice.followed_s}
-    times = [
-        f"{total_s / spent:.2g} times as long as {name}"
-        for name, spent in others.items()
-        if name != method and spent
-    ]
-    return f", {' and '.join(times)}" if times else ""
+def _words(advice: Advice, auto: AutoTakes) -> str:
+    if auto.total_s is None:
+        return f"`expansion.order: auto` refuses: {auto.refused}"
+    against = ""
+    if advice.total_s and advice.method != auto.method:
+        times = auto.total_s / advice.total_s
+        against = f", {times:.2g} times as long as {advice.method}"
+    return (
+        f"`expansion.order: auto` takes {auto.method}, {time_words(auto.total_s)} in all{against}, "
+        f"worst error {auto.worst_relative:.1e}, after {time_words(auto.choosing_s)} of choosing"
+    )

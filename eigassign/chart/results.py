@@ -39,6 +39,7 @@ class Timing:
         )
 
 
+SCHEMA = 3  # of chart.json
 NEARLY_NOTHING = 1e-12  # of an objective: a rms relative error of 1e-6
 NOTHING = Timing(0.0, 0.0, 0.0, 0)
 
@@ -109,12 +110,7 @@ class AutoTakes:
 
 @dataclass(frozen=True)
 class Advice:
-    """The cheapest method for an accuracy, or the most accurate for a budget.
-
-    ``followed`` is the quickest expansion that a case file can ask for, here within
-    ``followed_accuracy`` of exact: what ``auto`` takes where it follows this chart, by the line
-    ``use`` of the case file.
-    """
+    """The cheapest method for an accuracy, or the most accurate for a budget."""
 
     asked: str  # "accuracy" | "budget"
     accuracy: float | None  # worst relative error in Hz
@@ -127,10 +123,6 @@ class Advice:
     words: str
     is_below_round_off: bool = False
     auto: AutoTakes | None = None  # None: not looked at
-    followed: str | None = None
-    followed_s: float | None = None
-    followed_accuracy: float | None = None
-    use: str = ""
 
 
 @dataclass(frozen=True)
@@ -209,7 +201,6 @@ class Chart:
     title: str
     case_name: str
     case_sha256: str
-    subject_sha256: str  # of what the answers depend on; see `CaseFile`
     reference: str | None
     version: str
     quick: bool

@@ -84,7 +84,7 @@ def compare_methods(
     asked = _asked(bench, features, floor, wish)
     fronts = _fronts(charted, asked, wish)
     given = _advice(charted, asked, wish)
-    advice = tuple(beside_auto(each, scene, charted, taken) for each in given)
+    advice = tuple(beside_auto(each, charted, taken) for each in given)
     left_out = _size_notes(scene, features, effort, solve_s)
     notes = (*told, *left_out, *front_notes(charted, fronts))
     return Compared(asked, charted, skipped, fronts, advice, notes)

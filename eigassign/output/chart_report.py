@@ -11,14 +11,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from eigassign.chart.results import Advice, Chart, ChartPoint, Front, Timing
+from eigassign.chart.results import SCHEMA, Advice, Chart, ChartPoint, Front, Timing
 from eigassign.output import report
 from eigassign.output.figures import plan as figures
 from eigassign.output.figures.front import plan
 from eigassign.output.figures.plan import FigurePlan
 from eigassign.output.results_json import dumps
 from eigassign.output.tables import Table
-from eigassign.study.chart_follow import SCHEMA
 
 # --- The tables of a chart, as text: for the console, the report and Markdown
 
@@ -26,7 +25,7 @@ from eigassign.study.chart_follow import SCHEMA
 def tables(chart: Chart) -> tuple[Table, ...]:
     """What to choose, the fronts, all methods, the mesh, the designs: those there are."""
     fronts = (front(chart, each) for each in chart.fronts)
-    made = (advice(chart), auto(chart), lines(chart), *fronts, methods(chart),
+    made = (advice(chart), auto(chart), *fronts, methods(chart),
             mesh(chart), designs(chart), machine(chart))  # fmt: skip
     return tuple(table for table in made if table.rows)
 
@@ -62,17 +61,17 @@ def advice(chart: Chart) -> Table:
 
 
 def auto(chart: Chart) -> Table:
-    """What ``auto`` takes, against the recommendation and the quickest expansion."""
+    """What ``auto`` takes, against the recommendation."""
     looked_at = [a for a in chart.advice if a.auto is not None]
     rows = tuple((_accuracy(a), f"{a.evaluations:,.0f}", *_taken(a)) for a in looked_at)
     columns = (
         "asked for", "evaluations", "auto takes", "worst error", "time in all",
-        "against the choice", "choosing took", "following this chart", "time in all",
+        "against the choice", "choosing took",
     )  # fmt: skip
     refused = {a.auto.refused: _accuracy(a) for a in looked_at if a.auto and a.auto.refused}
     caption = (
         "expansion.order: auto takes the fewest coefficients, by its own error estimate and no "
-        "timing; where it follows this chart, the quickest expansion, if the estimate agrees."
+        "timing."
     )
     why = [f"{accuracy} is refused: {words}." for words, accuracy in refused.items()]
     return Table(
@@ -93,19 +92,11 @@ def _accuracy(a: Advice) -> str:
 
 
 def _taken(a: Advice) -> tuple[str, ...]:
-    followed = (a.followed or "none", "" if a.followed_s is None else time(a.followed_s))
     if a.auto is None or a.auto.total_s is None:
-        return ("refused", "", "", "", "" if a.auto is None else time(a.auto.choosing_s), *followed)
+        return ("refused", "", "", "", "" if a.auto is None else time(a.auto.choosing_s))
     against = f"{a.auto.total_s / a.total_s:.2g} × as long" if a.total_s else ""
     own = (str(a.auto.method), f"{a.auto.worst_relative:.1e}", time(a.auto.total_s), against)
-    return (*own, time(a.auto.choosing_s), *followed)
-
-
-def lines(chart: Chart) -> Table:
-    """Lines of a case file that make ``auto`` follow the chart."""
-    rows = tuple((_accuracy(a), str(a.followed), a.use) for a in chart.advice if a.use)
-    caption = "In the place of what the case file says there; the path is seen from its folder."
-    return Table("To follow this chart", ("asked for", "takes", "in the case file"), rows, caption)
+    return (*own, time(a.auto.choosing_s))
 
 
 def front(chart: Chart, each: Front) -> Table:

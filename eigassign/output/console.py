@@ -105,7 +105,7 @@ def print_chart(chart: Chart, *, stream: TextIO | None = None) -> None:
     from eigassign.output import chart_report
 
     fronts = [chart_report.front(chart, each) for each in chart.fronts]
-    advice = (chart_report.advice(chart), chart_report.auto(chart), chart_report.lines(chart))
+    advice = (chart_report.advice(chart), chart_report.auto(chart))
     for table in (*fronts, chart_report.designs(chart), *advice):
         if table.rows:
             _print_summary(table, stream)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,8 +16,7 @@ from eigassign.case import CaseFile
 from eigassign.chart.designs import chart_designs
 from eigassign.chart.effort import QUICK, Effort
 from eigassign.chart.mesh import Mesh, mesh_axis
-from eigassign.chart.methods import with_expansion
-from eigassign.chart.results import Advice, Chart, DesignRun, MeshRow
+from eigassign.chart.results import Chart, DesignRun, MeshRow
 from eigassign.chart.study import Compared, Wish, compare_methods, spread_rows
 from eigassign.chart.timing import machine
 from eigassign.errors import AccuracyError
@@ -48,7 +46,6 @@ def chart(
     case = load_case(path)
     with keep(case.file, options.out, options.force) as folder:
         made = chart_case(case, options, QUICK if quick else _THOROUGH, wish or Wish())
-        made = with_lines(made, case.file, folder.path)
         options.progress("writing the chart")
         from eigassign.output.chart_report import write_chart
 
@@ -60,11 +57,9 @@ def chart(
 def chart_case(case: Case, options: Options, effort: Effort, wish: Wish) -> Chart:
     """Time against accuracy of every method on this case; nothing written.
 
-    A case that follows a chart is charted as if it did not. Raises CaseError where the case has no
-    trajectory, or nothing that changes a frequency.
+    Raises CaseError where the case has no trajectory, or nothing that changes a frequency.
     """
     stages = Stages(options.progress)
-    case = Case(with_expansion(case.file, chart=None))
     with case.located():
         scene = _prepared(case, stages)
         _ = scene.path
@@ -88,27 +83,6 @@ def _prepared(case: Case, stages: Stages) -> Scene:
         return prepare(case, stages, None, order=int(type(case.file.expansion)().order))
 
 
-def with_lines(made: Chart, file: CaseFile, folder: Path) -> Chart:
-    """The chart, kept in ``folder``, with lines that make the case file follow it.
-
-    Only where the advice is for the evaluations that the chart was asked for: by those a case
-    that follows it decides.
-    """
-    kept = os.path.abspath(folder / "chart.json")
-    try:
-        seen = Path(os.path.relpath(kept, os.path.realpath(file.path.parent))).as_posix()
-    except ValueError:  # another drive
-        seen = Path(kept).as_posix()
-
-    def line(advice: Advice) -> str:
-        if advice.followed is None or advice.evaluations != made.asked.evaluations:
-            return ""
-        accuracy = advice.followed_accuracy
-        return file.expansion_line(order="auto", accuracy=accuracy, chart=seen)
-
-    return replace(made, advice=tuple(replace(a, use=line(a)) for a in made.advice))
-
-
 def _chart(
     scene: Scene,
     effort: Effort,
@@ -123,7 +97,6 @@ def _chart(
         title=file.title,
         case_name=file.path.stem,
         case_sha256=file.sha256,
-        subject_sha256=file.subject_sha256,
         reference=file.reference,
         version=__version__,
         quick=effort.brief,

@@ -28,7 +28,6 @@ from eigassign.modal.adaptive.order import ExpansionChoice, choose_expansion
 from eigassign.modal.adaptive.reduction import ReductionChoice, choose_reduction, few_of
 from eigassign.modal.exact.clusters import CLUSTER_GAP
 from eigassign.modal.model import Model
-from eigassign.study.chart_follow import suggestions
 
 # --- What is expanded, about which point and why: the case's wishes with every "auto" settled
 
@@ -293,9 +292,7 @@ def choose_order(
 ) -> OrderChoice:
     """The lowest order, with further points only where one cannot do, from error estimates.
 
-    With ``expansion.chart`` the quickest expansion of that chart comes first, if the estimate
-    bears it out. Raises AccuracyError, naming the pose, where no order and number of points will
-    do, and CaseError where the chart cannot be read.
+    Raises AccuracyError, naming the pose, where no order and number of points will do.
     """
     at_upper = corners(len(y0))
     few, many = (max(8, rows // (1 + len(at_upper))) for rows in (FEW, MANY))  # samples of each
@@ -304,18 +301,22 @@ def choose_order(
     if len(y0):
         every = every.with_rows(at_random(file, trajectory, q0, y0, RANDOM), np.arange(RANDOM))
     accuracy, start = series_share(file), np.concatenate([q0, y0])
-    followed, said = suggestions(file, q0, y0, modes, accuracy)
 
     def choice(seen: JudgedAt, begun: ExpansionChoice | None) -> ExpansionChoice:
         return choose_expansion(
-            model.pencil, seen.x, accuracy, modes,
-            start=start, place=seen.place, suggestions=followed, begun=begun,
-        )  # fmt: skip
+            model.pencil,
+            seen.x,
+            accuracy,
+            modes,
+            start=start,
+            place=seen.place,
+            begun=begun,
+        )
 
     found, judged = _confirmed(choice, seen, every, accuracy, file)
     first, *more = (part.q0 for part in found.expansions)
     others = tuple(tuple(float(v) for v in q) for q in more)
-    reasons = (*said, *found.reasons, *judged)
+    reasons = (*found.reasons, *judged)
     return OrderChoice(found.order, first, others, found.cluster_gap, reasons)
 
 

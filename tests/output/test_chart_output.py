@@ -55,7 +55,6 @@ CHART = Chart(
     title="An <arm> & more",
     case_name="arm",
     case_sha256="ab" * 32,
-    subject_sha256="cd" * 32,
     reference=None,
     version="1.0",
     quick=True,
@@ -85,10 +84,6 @@ CHART = Chart(
             "words",
             False,
             AutoTakes("Taylor 4 full", 5e-5, 0.00304, 0.4, ""),
-            "Taylor 4 full",
-            0.00304,
-            1e-4,
-            "expansion: {order: auto, accuracy: 0.0001, chart: chart.json}",
         ),
         Advice(
             "accuracy",
@@ -102,9 +97,6 @@ CHART = Chart(
             "words",
             False,
             AutoTakes(None, None, None, 0.4, "no expansion reaches 1.0e-08"),
-            None,
-            None,
-            1e-8,
         ),
         Advice("budget", None, 1e-9, 152.0, None, {}, None, None, "nothing"),
     ),
@@ -171,7 +163,7 @@ def test_the_json_holds_every_point_and_no_numbers_that_json_has_not(tmp_path: P
     assert [p["method"] for p in data["points"]] == [p.method for p in CHART.points]
     assert data["points"][3]["everywhere"]["worst_hz"] is None
     assert data["points"][1]["parameters"] == {"order": 4, "q0": [0.0, 0.0]}
-    assert data["schema"] == 2
+    assert data["schema"] == 3
 
 
 def test_the_page_shows_tables_and_figures_and_escapes_titles(tmp_path: Path) -> None:

@@ -66,31 +66,10 @@ def test_a_refusal_is_given_in_words(scene: Scene, monkeypatch: pytest.MonkeyPat
         assert f"`expansion.order: auto` refuses: {advice.auto.refused}" in advice.words
 
 
-def test_the_expansion_that_a_case_may_follow_is_the_quickest_within_the_accuracy(
-    compared: Compared,
-) -> None:
-    loose = next(a for a in compared.advice if a.accuracy == 1e-2)
-    able = [
-        p for p in compared.points
-        if p.family == "Taylor, full" and p.everywhere.worst_relative <= 1e-2
-    ]  # fmt: skip
-    best = min(able, key=lambda p: p.total_s(loose.evaluations))
-    assert (loose.followed, loose.followed_s) == (best.method, best.total_s(loose.evaluations))
-
-
-def test_a_budget_names_the_accuracy_that_it_buys(scene: Scene, compared: Compared) -> None:
-    bare = Advice("budget", None, 1e3, 152.0, "any", {}, 0.0, 1.0, "words")
-    found = beside_auto(bare, scene, compared.points, ())
-    full = [p.everywhere.worst_relative for p in compared.points if p.family == "Taylor, full"]
-    assert found.followed_accuracy is not None
-    assert min(full) <= found.followed_accuracy <= 1.1 * min(full)
-    nothing = beside_auto(replace(bare, budget_s=1e-12), scene, compared.points, ())
-    assert nothing.followed is None
-
-
-def test_below_round_off_nothing_is_followed(scene: Scene, compared: Compared) -> None:
-    below = Advice("accuracy", 1e-14, None, 1.0, None, {}, None, None, "words", True)
-    assert beside_auto(below, scene, compared.points, ()) == below
+def test_below_round_off_nothing_is_said_of_it(scene: Scene, compared: Compared) -> None:
+    taken, _ = taken_by_auto(scene, [1e-2], 1e9)
+    below = Advice("accuracy", 1e-2, None, 1.0, None, {}, None, None, "words", True)
+    assert beside_auto(below, compared.points, taken) == below
 
 
 def test_a_choice_that_took_long_is_the_last(scene: Scene) -> None:

@@ -44,7 +44,7 @@ def in_context(tree: Tree, folder: Path) -> tuple[Tree, list[Finding]]:
     changed: dict[str, object] = dict(tree)
     if isinstance(at(tree, "design"), Mapping):
         changed["design"] = _design(tree, properties, findings)
-    _convert(changed, "expansion", _expansion(tree, properties, folder, findings))
+    _convert(changed, "expansion", _expansion(tree, properties, findings))
     if "trajectory" in tree:
         changed["trajectory"] = _trajectories(tree, folder, findings)
     _convert(changed, "validation", {"q_span": _span(tree, findings)})
@@ -131,7 +131,7 @@ def _outside(prop: Property, body: object, name: str, path: object) -> Iterable[
 
 
 def _expansion(
-    tree: Tree, properties: Mapping[str, Property | None], folder: Path, findings: list[Finding]
+    tree: Tree, properties: Mapping[str, Property | None], findings: list[Finding]
 ) -> dict[str, object]:
     q, y = at(tree, "expansion", "q"), at(tree, "expansion", "y")
     if isinstance(y, tuple):
@@ -139,12 +139,7 @@ def _expansion(
         each = [*known, *[ANY] * len(y)]
         y = tuple(si(v, each[k], ("expansion", "y", k), findings) for k, v in enumerate(y))
     kinds = coordinate_quantities(tree)
-    changed = {"q": _coordinates(q, kinds, ("expansion", "q"), findings), "y": y}
-    chart, path = text(tree, "expansion", "chart"), ("expansion", "chart")
-    if chart is None:
-        return changed
-    hint = "; `eigassign chart`, on the case without this key, makes it"
-    return {**changed, "chart": found(chart, folder, path, findings, hint)}
+    return {"q": _coordinates(q, kinds, ("expansion", "q"), findings), "y": y}
 
 
 def _span(tree: Tree, findings: list[Finding]) -> object:

@@ -67,7 +67,6 @@ class Expansion(Part):
     """Order of the power series, its point (q, y), and the modes expanded; or `auto`.
 
     `accuracy` (relative error in Hz) is what an `auto` order, and `auto` elements, have to meet.
-    `chart` is the chart.json of this case whose quickest expansion an `auto` order takes.
     """
 
     order: Annotated[
@@ -76,16 +75,9 @@ class Expansion(Part):
         Discriminator(word_or_number),
     ] = 4
     accuracy: Annotated[float, quantity("fraction", above=0)] = 1e-3
-    chart: str | None = None
     q: Annotated[_Auto | Annotated[Coordinates, Tag("<list>")], _WORD_OR_LIST] = "auto"
     y: Annotated[_Auto | Annotated[Parameters, Tag("<list>")], _WORD_OR_LIST] = "auto"
     modes: Annotated[_Auto | Annotated[Modes, Tag("<list>")], _WORD_OR_LIST] = "auto"
-
-    @model_validator(mode="after")
-    def _follows_what_is_open(self) -> Expansion:
-        if self.chart is not None and self.order != "auto":
-            raise wrong(f"says what order: auto takes, but order is {self.order}", "chart")
-        return self
 
 
 class FrequencyProfile(Part):

@@ -420,16 +420,6 @@ TOLERABLE = 0.5  # the same where round-off does not allow that
 
 
 @dataclass(frozen=True, eq=False)
-class Suggestion:
-    """An expansion worth a try before any other: its order, about ``points`` (k, n_x)."""
-
-    name: str
-    order: int
-    points: Floats
-    cluster_gap: float = CLUSTER_GAP
-
-
-@dataclass(frozen=True, eq=False)
 class ExpansionChoice:
     """Expansions that together are within ``accuracy`` at every sample, and why these.
 
@@ -469,17 +459,15 @@ def choose_expansion(
     orders: Sequence[int] = ORDERS,
     start: Floats | None = None,
     place: Callable[[int], str] = row_in_words,
-    suggestions: Sequence[Suggestion] = (),
     begun: ExpansionChoice | None = None,
 ) -> ExpansionChoice:
     """The expansions with the fewest coefficients whose estimate is ≤ ``accuracy`` at x (n, n_x).
 
-    The first of ``suggestions`` that does is taken unseen what else there is; so is what was
-    ``begun`` at fewer samples, with further points if need be. Else the search of
-    `expansion_search`: orders at one point, ``start`` or the most central sample, with neighbouring
-    modes as one cluster, and at several points of one design; no order of over `MOST_TERMS` terms.
-    Judged against one reduced model, as they are evaluated. ``place`` says in words what row k of x
-    is. Raises AccuracyError, naming the sample, where nothing does.
+    What was ``begun`` at fewer samples is taken, with further points if need be. Else the search:
+    orders at one point, ``start`` or the most central sample, with neighbouring modes as one
+    cluster, and at several points of one design; no order of over `MOST_TERMS` terms. Judged
+    against one reduced model, as they are evaluated. ``place`` says in words what row k of x is.
+    Raises AccuracyError, naming the sample, where nothing does.
     """
     beside = reduce_adaptively(
         pencil, x, FINER * accuracy, modes, place=place, tolerable=TOLERABLE * accuracy
@@ -491,8 +479,7 @@ def choose_expansion(
     trial = Trial(pencil, x, accuracy, tuple(modes), linear_in_y, beside, [judge], place)
     first = x[central(x)] if start is None else start
     orders = [p for p in orders if terms(pencil, p) <= MOST_TERMS] or orders[:1]
-    best = _first(trial, suggestions) or _continued(trial, begun)
-    best = best or cheapest(trial, first, orders)
+    best = _continued(trial, begun) or cheapest(trial, first, orders)
     if best is None:
         raise AccuracyError(
             f"no expansion of order up to {max(orders)} at up to {MAX_POINTS} points reaches "
@@ -500,19 +487,6 @@ def choose_expansion(
             "take ea.reduce or ea.fit"
         )
     return ExpansionChoice(*best, beside, tuple(trial.reasons))
-
-
-def _first(trial: Trial, suggestions: Sequence[Suggestion]) -> Found | None:
-    """The first suggestion within the accuracy."""
-    for each in suggestions:
-        parts = tuple(trial.expand(point, each.order, each.cluster_gap) for point in each.points)
-        errors = trial.errors(parts, [trial.values(part) for part in parts])
-        trial.note(each.name, errors.max(axis=1))
-        if errors.max() <= trial.accuracy:
-            return parts, each.cluster_gap, errors
-    if suggestions:
-        trial.reasons.append("the estimate bears none of these out: chosen without them")
-    return None
 
 
 def _continued(trial: Trial, begun: ExpansionChoice | None) -> Found | None:
