@@ -182,14 +182,13 @@ def test_fronts_are_listed_from_the_quickest_with_whose_they_are() -> None:
     assert [row[1] for row in table.rows] == ["yes", "no", "yes"]
 
 
-def test_what_auto_takes_stands_beside_the_choice_and_the_quickest_expansion() -> None:
+def test_what_auto_takes_stands_beside_the_choice() -> None:
     table = chart_report.auto(CHART)
     taken, refused = table.rows
     assert taken == (
         "1e-04", "152", "Taylor 4 full", "5.0e-05", "3.04 ms", "0.2 × as long", "400 ms",
-        "Taylor 4 full", "3.04 ms",
     )  # fmt: skip
-    assert refused[2:] == ("refused", "", "", "", "400 ms", "none", "")
+    assert refused[2:] == ("refused", "", "", "", "400 ms")
     assert table.caption.endswith("1e-08 is refused: no expansion reaches 1.0e-08.")
 
 
@@ -201,14 +200,6 @@ def test_accuracies_for_which_auto_is_not_asked_any_more_are_named() -> None:
     said = chart_report.auto(replace(CHART, advice=(known, *left, below, budget))).caption
     assert said.endswith("Not asked for 1e-08: choosing had already taken too long.")
     assert "Not asked" not in chart_report.auto(replace(CHART, advice=(known, below))).caption
-
-
-def test_lines_for_the_case_file_are_shown_where_there_are_any() -> None:
-    (row,) = chart_report.lines(CHART).rows
-    assert row == (
-        "1e-04", "Taylor 4 full", "expansion: {order: auto, accuracy: 0.0001, chart: chart.json}",
-    )  # fmt: skip
-    assert not chart_report.lines(replace(CHART, advice=CHART.advice[1:])).rows
 
 
 def test_what_auto_takes_is_ringed() -> None:
