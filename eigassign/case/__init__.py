@@ -1,4 +1,15 @@
-"""YAML case file → validated, frozen, SI-valued objects; every error with file:line:column."""
+"""YAML case file → validated, frozen, SI-valued objects; every error with file:line:column.
+
+In reading order, each importing only from those above it:
+
+    suggestions  wording of error messages: what was found, what was probably meant
+    reader       bytes → plain data (a tree) with the line and column of every key
+    units        quantities with units, dimension-checked, and the base of all models
+    schema       what each key may hold: one pydantic model for each part of a case file
+    rules        what keys must have in common, over the plain data; what looks like a slip
+    case_file    the validated case, its canonical YAML text and its hash
+    loading      path → CaseFile, or all problems of the file at once
+"""
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.loading import load, parse

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from eigassign.case.reader import KeyPath, Mark, dotted, resolve
-from eigassign.case.schema.document import Document
+from eigassign.case.schema.document import Document, json_schema
 from eigassign.case.schema.joints import JointBase, freedom_of
 from eigassign.case.schema.mechanism import Coordinate, Mechanism, Spring
 from eigassign.case.schema.study import Design, Expansion, Target, Validation
@@ -83,8 +83,6 @@ class CaseFile:
     @staticmethod
     def json_schema() -> dict[str, Any]:
         """JSON Schema (2020-12) of case files, for editors and documentation."""
-        from eigassign.case.schema.document import json_schema
-
         return json_schema()
 
 

@@ -1,1 +1,12 @@
-"""schema."""
+"""What each key of a case file may hold: one pydantic model for each part.
+
+In reading order, each importing only from those above it:
+
+    vectors     points, directions, angles, inertia tensors
+    links       the keys `materials`, `sections` and `links` of a mechanism
+    joints      the key `joints`, and what each type of joint lets move
+    mechanism   bodies, springs, drives, coordinates, and the mechanism as a whole
+    trajectory  the key `trajectory`
+    study       the keys `design`, `expansion`, `targets` and `validation`
+    document    the whole case file, its errors as readable findings, its JSON Schema
+"""
