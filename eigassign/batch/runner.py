@@ -71,7 +71,7 @@ def _optimised(path: str, options: CaseOptions) -> Row:
     cache_dir = Path(options.cache_dir) if options.cache_dir else None
     how = Options(Path(options.out), cache_dir, options.use_cache, options.force)
     outcome = optimize(Path(path), how)
-    error = outcome.findings.error
+    error = outcome.results.error
     return {
         "status": "ok" if outcome.within_tolerance else "tolerance",
         "message": "" if outcome.within_tolerance else "the expansion is over the asked tolerance",
@@ -79,7 +79,7 @@ def _optimised(path: str, options: CaseOptions) -> Row:
         "initial_max_relative": error and error.initial.max_relative,
         "predicted_max_relative": error and error.predicted.max_relative,
         "exact_max_relative": error and error.exact.max_relative,
-        "design": tuple((row.name, row.optimal) for row in outcome.findings.design),
+        "design": tuple((row.name, row.optimal) for row in outcome.results.design),
     }
 
 

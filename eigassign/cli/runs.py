@@ -15,7 +15,7 @@ from eigassign.errors import EigassignError
 
 if TYPE_CHECKING:
     from eigassign.pipeline.run import Options, Outcome
-    from eigassign.study.findings import ValidationRow
+    from eigassign.study.results import ValidationRow
 
 
 @click.command()
@@ -81,13 +81,13 @@ def _options(how: Mapping[str, Any], tell: Reporter) -> Options:
 
 def _show(outcome: Outcome, as_json: bool) -> None:
     if as_json:
-        from eigassign.output.results_json import results
+        from eigassign.output.results_json import results_document
 
-        print_json({"run_folder": str(outcome.folder), **results(outcome.findings)})
+        print_json({"run_folder": str(outcome.folder), **results_document(outcome.results)})
     else:
         from eigassign.output.console import print_assignment
 
-        print_assignment(outcome.findings)
+        print_assignment(outcome.results)
         click.echo(f"{outcome.folder} written in {outcome.seconds:.2f} s")
 
 

@@ -16,7 +16,7 @@ from rich.text import Text
 
 from eigassign.output import tables as summary
 from eigassign.output.formats import number, percent
-from eigassign.study.findings import Findings, ValidationRow
+from eigassign.study.results import RunResults, ValidationRow
 
 if TYPE_CHECKING:
     from eigassign.chart.results import Chart
@@ -88,9 +88,9 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def print_assignment(findings: Findings, *, stream: TextIO | None = None) -> None:
+def print_assignment(results: RunResults, *, stream: TextIO | None = None) -> None:
     """Design, distances to the targets, approximation errors and the solver's certificate."""
-    for table in summary.tables(findings):
+    for table in summary.tables(results):
         if table.title != "Timing":
             _print_summary(table, stream)
 

@@ -24,7 +24,7 @@ from eigassign.output.figures import plan as figures
 from eigassign.output.figures.plan import FigurePlan
 from eigassign.output.formats import percent
 from eigassign.output.tables import Table, tables
-from eigassign.study.findings import ErrorSummary, Findings, ModePictures
+from eigassign.study.results import ErrorSummary, ModePictures, RunResults
 
 if TYPE_CHECKING:
     from eigassign.chart.results import Chart
@@ -35,13 +35,13 @@ if TYPE_CHECKING:
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
-def to_html(findings: Findings, plans: Sequence[FigurePlan], images: Mapping[str, bytes]) -> bytes:
+def to_html(results: RunResults, plans: Sequence[FigurePlan], images: Mapping[str, bytes]) -> bytes:
     """The report as UTF-8; ``images`` holds the PNG file of every plan by its file name."""
-    return page(findings, findings.error, tables(findings), plans, images)
+    return page(results, results.error, tables(results), plans, images)
 
 
 def page(
-    f: Findings | Chart,
+    f: RunResults | Chart,
     error: ErrorSummary | None,
     shown: Sequence[Table],
     plans: Sequence[FigurePlan],
@@ -75,21 +75,21 @@ def _template() -> Template:
 # --- Everything a run shows, written into a folder
 
 
-def write_run(findings: Findings, folder: Path) -> None:
+def write_run(results: RunResults, folder: Path) -> None:
     """results.json, report.html, CSV files and figures/*.png in ``folder``.
 
     It must exist and be empty. Wrap it in :func:`eigassign.output.run_folder.run_folder` to have
     them whole or not at all.
     """
-    (folder / "results.json").write_bytes(results_json.to_json(findings))
-    for name, data in samples_csv.sample_files(findings).items():
+    (folder / "results.json").write_bytes(results_json.to_json(results))
+    for name, data in samples_csv.sample_files(results).items():
         (folder / name).write_bytes(data)
-    plans = figures.plan(findings)
+    plans = figures.plan(results)
     images = figures.render(plans) if plans else {}
     (folder / "figures").mkdir()
     for name, data in images.items():
         (folder / "figures" / name).write_bytes(data)
-    (folder / "report.html").write_bytes(to_html(findings, plans, images))
+    (folder / "report.html").write_bytes(to_html(results, plans, images))
 
 
 # --- What `eigassign modes --draw` leaves: figures, and the shapes as numbers

@@ -1,4 +1,4 @@
-"""results.json: what a run found, for programs. Same findings, same bytes.
+"""results.json: what a run found, for programs. Same results, same bytes.
 
 trajectory.csv, as `trajectory: {file: …}` reads it, and frequencies.csv: every sample of a run.
 
@@ -21,59 +21,59 @@ from numpy.typing import NDArray
 
 from eigassign.errors import EigassignError
 from eigassign.mechanism.trajectory.csv import TIME, TIP_COLUMNS
-from eigassign.study.findings import (
+from eigassign.study.results import (
     Comparison,
     ErrorSummary,
-    Findings,
     ModeStudy,
     OtherModes,
+    RunResults,
     TargetStudy,
     TrajectoryRow,
 )
 
-# --- results.json: what a run found, for programs. Same findings, same bytes
+# --- results.json: what a run found, for programs. Same results, same bytes
 
 SCHEMA = 1
 _NESTED = (Mapping, list, tuple, str, np.ndarray)
 
 
-def results(findings: Findings) -> dict[str, Any]:
+def results_document(results: RunResults) -> dict[str, Any]:
     """Plain values in a fixed order. ``frequencies`` is of the first target, ``error`` of all.
 
     Of several trajectories all samples stand one after the other, each with its ``trajectory``.
     What the run did not ask for (no target, no trajectory) is null, and so is what an expansion
     cannot say: it predicts no frequency where its eigenvalue comes out negative.
     """
-    first = findings.targets[0] if findings.targets else None
+    first = results.targets[0] if results.targets else None
     return {
         "schema": SCHEMA,
-        "eigassign_version": findings.version,
+        "eigassign_version": results.version,
         "case": {
-            "name": findings.case_name,
-            "title": findings.title,
-            "reference": findings.reference,
-            "sha256": findings.case_sha256,
-            "files": dict(findings.case_files),
+            "name": results.case_name,
+            "title": results.title,
+            "reference": results.reference,
+            "sha256": results.case_sha256,
+            "files": dict(results.case_files),
         },
         "design": {
             row.name: {k: v for k, v in asdict(row).items() if k != "name"}
-            for row in findings.design
+            for row in results.design
         },
-        "error": _error(findings.error) if findings.error else None,
-        "frequencies": _frequencies(findings, first) if first else None,
-        "targets": [_target(findings, target) for target in findings.targets],
-        "other_modes": _other_modes(findings.others),
-        "approximation": [_study(study) for study in findings.studies],
+        "error": _error(results.error) if results.error else None,
+        "frequencies": _frequencies(results, first) if first else None,
+        "targets": [_target(results, target) for target in results.targets],
+        "other_modes": _other_modes(results.others),
+        "approximation": [_study(study) for study in results.studies],
         "trajectory": {
-            "time_s": findings.time_s,
-            **_named(findings, slice(None)),
-            "coordinates": _coordinates(findings),
+            "time_s": results.time_s,
+            **_named(results, slice(None)),
+            "coordinates": _coordinates(results),
         },
-        "trajectories": [_trajectory(findings, row) for row in findings.trajectories],
-        "solver": asdict(findings.solver) if findings.solver else None,
-        "warnings": findings.warnings,
-        "notes": findings.notes,
-        "timing_s": dict(findings.timing_s),
+        "trajectories": [_trajectory(results, row) for row in results.trajectories],
+        "solver": asdict(results.solver) if results.solver else None,
+        "warnings": results.warnings,
+        "notes": results.notes,
+        "timing_s": dict(results.timing_s),
     }
 
 
@@ -89,10 +89,10 @@ def _said(value: Any) -> Any:
     return value if math.isfinite(value) else None
 
 
-def _frequencies(findings: Findings, target: TargetStudy) -> dict[str, Any]:
+def _frequencies(results: RunResults, target: TargetStudy) -> dict[str, Any]:
     return {
-        "time_s": findings.time_s[target.rows],
-        **_named(findings, target.rows),
+        "time_s": results.time_s[target.rows],
+        **_named(results, target.rows),
         "target_hz": target.target_hz,
         "initial_hz": target.initial_hz,
         "predicted_hz": _said(target.predicted_hz),
@@ -100,15 +100,15 @@ def _frequencies(findings: Findings, target: TargetStudy) -> dict[str, Any]:
     }
 
 
-def _named(findings: Findings, rows: slice) -> dict[str, Any]:
+def _named(results: RunResults, rows: slice) -> dict[str, Any]:
     """Of several trajectories the name of each sample's own."""
-    if len(findings.trajectories) < 2:
+    if len(results.trajectories) < 2:
         return {}
-    return {"trajectory": trajectory_names(findings, rows)}
+    return {"trajectory": trajectory_names(results, rows)}
 
 
-def _trajectory(findings: Findings, row: TrajectoryRow) -> dict[str, Any]:
-    error = findings.error_along(row.name)
+def _trajectory(results: RunResults, row: TrajectoryRow) -> dict[str, Any]:
+    error = results.error_along(row.name)
     return {
         "name": row.name,
         "samples": row.rows.stop - row.rows.start,
@@ -118,12 +118,12 @@ def _trajectory(findings: Findings, row: TrajectoryRow) -> dict[str, Any]:
     }
 
 
-def _target(findings: Findings, target: TargetStudy) -> dict[str, Any]:
+def _target(results: RunResults, target: TargetStudy) -> dict[str, Any]:
     return {
         "mode": target.mode,
         **({"trajectory": target.trajectory} if target.trajectory is not None else {}),
         "error": _error(target.error),
-        "frequencies": _frequencies(findings, target),
+        "frequencies": _frequencies(results, target),
     }
 
 
@@ -157,19 +157,19 @@ def _worst(comparison: Comparison | None) -> dict[str, float | None] | None:
     return {"taylor": _said(taylor), "linearised": _said(linearised)}
 
 
-def _coordinates(findings: Findings) -> dict[str, Any]:
+def _coordinates(results: RunResults) -> dict[str, Any]:
     return {
-        name: {"unit": unit, "values": findings.q[:, i]}
-        for i, (name, unit) in enumerate(zip(findings.q_names, findings.q_units, strict=True))
+        name: {"unit": unit, "values": results.q[:, i]}
+        for i, (name, unit) in enumerate(zip(results.q_names, results.q_units, strict=True))
     }
 
 
-def to_json(findings: Findings) -> bytes:
+def to_json(results: RunResults) -> bytes:
     """results.json as UTF-8 with a newline at its end; numbers as ``repr`` writes them.
 
     Raises EigassignError, naming the field, for a number that is not finite.
     """
-    return (dumps(results(findings)) + "\n").encode()
+    return (dumps(results_document(results)) + "\n").encode()
 
 
 def dumps(value: Any) -> str:
@@ -211,21 +211,21 @@ Floats = NDArray[np.float64]
 Column = tuple[str, Sequence[object]]  # heading, one entry a sample
 
 
-def sample_files(findings: Findings) -> dict[str, bytes]:
+def sample_files(results: RunResults) -> dict[str, bytes]:
     """The CSV files of a run by name; none without a trajectory."""
-    if not findings.trajectories:
+    if not results.trajectories:
         return {}
-    several = len(findings.trajectories) > 1
+    several = len(results.trajectories) > 1
     files = {
-        f"trajectory_{row.name}.csv" if several else "trajectory.csv": trajectory_csv(findings, row)
-        for row in findings.trajectories
+        f"trajectory_{row.name}.csv" if several else "trajectory.csv": trajectory_csv(results, row)
+        for row in results.trajectories
     }
-    return {**files, "frequencies.csv": frequencies_csv(findings)}
+    return {**files, "frequencies.csv": frequencies_csv(results)}
 
 
-def trajectory_csv(findings: Findings, row: TrajectoryRow) -> bytes:
+def trajectory_csv(results: RunResults, row: TrajectoryRow) -> bytes:
     """Time, coordinates and, where the case gives its path, the tip of one trajectory; SI."""
-    columns = [*_motion(findings, row.rows)]
+    columns = [*_motion(results, row.rows)]
     if row.tip is not None:
         names = TIP_COLUMNS[: row.tip.shape[1]]
         places = zip(names, row.tip.T, strict=True)
@@ -233,41 +233,39 @@ def trajectory_csv(findings: Findings, row: TrajectoryRow) -> bytes:
     return _number_text(columns)
 
 
-def frequencies_csv(findings: Findings) -> bytes:
+def frequencies_csv(results: RunResults) -> bytes:
     """Every sample with its frequencies in Hz: of targets, or without any of the expanded modes.
 
     Of several trajectories one below the other, the first column naming them.
     """
-    everything = slice(0, findings.time_s.size)
+    everything = slice(0, results.time_s.size)
     columns: list[Column] = []
-    if len(findings.trajectories) > 1:
-        columns.append(("trajectory", trajectory_names(findings)))
-    columns += _motion(findings, everything)
+    if len(results.trajectories) > 1:
+        columns.append(("trajectory", trajectory_names(results)))
+    columns += _motion(results, everything)
     return _number_text(
-        [*columns, *(_assigned(findings) if findings.targets else _expanded(findings))]
+        [*columns, *(_assigned(results) if results.targets else _expanded(results))]
     )
 
 
-def trajectory_names(findings: Findings, rows: slice = slice(None)) -> list[str]:
+def trajectory_names(results: RunResults, rows: slice = slice(None)) -> list[str]:
     """Which trajectory each sample belongs to."""
-    names = [
-        row.name for row in findings.trajectories for _ in range(row.rows.start, row.rows.stop)
-    ]
+    names = [row.name for row in results.trajectories for _ in range(row.rows.start, row.rows.stop)]
     return names[rows]
 
 
-def _motion(findings: Findings, rows: slice) -> Iterator[Column]:
-    yield f"{TIME} [s]", findings.time_s[rows].tolist()
-    for i, (name, unit) in enumerate(zip(findings.q_names, findings.q_units, strict=True)):
-        yield f"{name} [{unit}]", findings.q[rows, i].tolist()
+def _motion(results: RunResults, rows: slice) -> Iterator[Column]:
+    yield f"{TIME} [s]", results.time_s[rows].tolist()
+    for i, (name, unit) in enumerate(zip(results.q_names, results.q_units, strict=True)):
+        yield f"{name} [{unit}]", results.q[rows, i].tolist()
 
 
-def _assigned(findings: Findings) -> Iterator[Column]:
+def _assigned(results: RunResults) -> Iterator[Column]:
     """One group of columns a mode, whichever trajectories its targets hold on."""
-    for mode in dict.fromkeys(target.mode for target in findings.targets):
-        own = [target for target in findings.targets if target.mode == mode]
+    for mode in dict.fromkeys(target.mode for target in results.targets):
+        own = [target for target in results.targets if target.mode == mode]
         for kind in ("target", "initial", "predicted", "exact"):
-            yield f"mode {mode} {kind} [Hz]", _scattered(own, kind, findings.time_s.size)
+            yield f"mode {mode} {kind} [Hz]", _scattered(own, kind, results.time_s.size)
 
 
 def _scattered(targets: Sequence[TargetStudy], kind: str, n: int) -> list[float]:
@@ -277,9 +275,9 @@ def _scattered(targets: Sequence[TargetStudy], kind: str, n: int) -> list[float]
     return [float(value) for value in values]
 
 
-def _expanded(findings: Findings) -> Iterator[Column]:
+def _expanded(results: RunResults) -> Iterator[Column]:
     """At the initial design, with what both expansions make of it."""
-    for study in findings.studies:
+    for study in results.studies:
         if study.over_time is not None:
             for kind in ("exact", "taylor", "linearised"):
                 hz = getattr(study.over_time, f"{kind}_hz")

@@ -16,7 +16,7 @@ from typing import Literal
 
 from eigassign.output.formats import number, percent, residual, seconds
 from eigassign.output.run_folder import replace_synced
-from eigassign.study.findings import Comparison, ErrorSummary, Findings, TargetStudy, ValidationRow
+from eigassign.study.results import Comparison, ErrorSummary, RunResults, TargetStudy, ValidationRow
 
 # --- The tables of a run, as text: the console and the report show the same ones
 
@@ -31,40 +31,40 @@ class Table:
     caption: str = ""
 
 
-def tables(findings: Findings) -> tuple[Table, ...]:
+def tables(results: RunResults) -> tuple[Table, ...]:
     """Design, distance to the targets, approximation, solver and timing: those there are."""
-    made = (design(findings), errors(findings), approximation(findings), solver(findings))
-    return tuple(table for table in (*made, timing(findings)) if table.rows)
+    made = (design(results), errors(results), approximation(results), solver(results))
+    return tuple(table for table in (*made, timing(results)) if table.rows)
 
 
-def design(findings: Findings) -> Table:
+def design(results: RunResults) -> Table:
     """Each design parameter before and after."""
     columns = ("name", "parameter", "unit", "initial", "optimal", "lower", "upper")
     rows = tuple(
         (row.name, row.parameter, row.unit, *map(number, (row.initial, row.optimal)),
          *map(number, (row.lower, row.upper)))
-        for row in findings.design
+        for row in results.design
     )  # fmt: skip
     return Table("Design", columns, rows)
 
 
-def errors(findings: Findings) -> Table:
+def errors(results: RunResults) -> Table:
     """Distance to the target before, as predicted, and exact, side by side."""
     kinds = ("initial", "predicted", "exact")
     columns = ("target", *(f"{kind} {what}" for what in ("worst", "rms") for kind in kinds))
-    summaries = [pair for target in findings.targets for pair in _of_target(target)]
-    if len(findings.targets) > 1 and len(findings.trajectories) > 1:
-        along = ((row.name, findings.error_along(row.name)) for row in findings.trajectories)
+    summaries = [pair for target in results.targets for pair in _of_target(target)]
+    if len(results.targets) > 1 and len(results.trajectories) > 1:
+        along = ((row.name, results.error_along(row.name)) for row in results.trajectories)
         summaries += [(f"all along {name!r}", error) for name, error in along if error is not None]
-    if len(findings.targets) > 1 and findings.error is not None:
-        summaries.append(("all", findings.error))
+    if len(results.targets) > 1 and results.error is not None:
+        summaries.append(("all", results.error))
     rows = []
     for label, summary in summaries:
         errors = (summary.initial, summary.predicted, summary.exact)
         worst = (percent(error.max_relative) for error in errors)
         rows.append((label, *worst, *(percent(error.rms_relative) for error in errors)))
     caption = "Frequency against its target in Hz, relative to the target, along "
-    caption += f"{findings.along}."
+    caption += f"{results.along}."
     return Table("Distance to the target", columns, tuple(rows), caption)
 
 
@@ -76,18 +76,18 @@ def _of_target(target: TargetStudy) -> Iterator[tuple[str, ErrorSummary]]:
     yield target.label, target.error
 
 
-def approximation(findings: Findings) -> Table:
+def approximation(results: RunResults) -> Table:
     """Worst error of both expansions, along the trajectory and over maps."""
     columns = ("mode", "where", "order", "Taylor", "linearised in y")
     caption = "Worst relative error in Hz against exact eigenvalues."
-    return Table("Approximation", columns, tuple(_approximations(findings)), caption)
+    return Table("Approximation", columns, tuple(_approximations(results)), caption)
 
 
-def _approximations(findings: Findings) -> Iterator[tuple[str, ...]]:
-    for study in findings.studies:
+def _approximations(results: RunResults) -> Iterator[tuple[str, ...]]:
+    for study in results.studies:
         places: list[tuple[str, Comparison]] = []
         if study.over_time is not None:
-            places.append((f"along {findings.along}, initial design", study.over_time))
+            places.append((f"along {results.along}, initial design", study.over_time))
         for over in (study.over_q, study.over_design):
             if over is not None:
                 places.append((f"over {' and '.join(over.names)}", over.values))
@@ -96,10 +96,10 @@ def _approximations(findings: Findings) -> Iterator[tuple[str, ...]]:
             yield (f"mode {study.mode}", where, str(study.order), *worst)
 
 
-def solver(findings: Findings) -> Table:
+def solver(results: RunResults) -> Table:
     """What the solver says, and what its answer is worth by our own residuals."""
     columns = ("status", "iterations", "primal residual", "dual residual", "gap")
-    found = findings.solver
+    found = results.solver
     if found is None:
         return Table("Solver", columns, ())
     proof = map(residual, (found.primal_residual, found.dual_residual, found.gap))
@@ -107,9 +107,9 @@ def solver(findings: Findings) -> Table:
     return Table("Solver", columns, ((found.status, str(found.iterations), *proof),), caption)
 
 
-def timing(findings: Findings) -> Table:
+def timing(results: RunResults) -> Table:
     """Where the time went."""
-    rows = tuple((stage, seconds(value)) for stage, value in findings.timing_s.items())
+    rows = tuple((stage, seconds(value)) for stage, value in results.timing_s.items())
     return Table("Timing", ("stage", "time"), rows)
 
 

@@ -31,8 +31,8 @@ from eigassign.study.assignment import (
 )
 from eigassign.study.collect import Assigned, gather
 from eigassign.study.comparison import Validation, study_modes, validate_expansions
-from eigassign.study.findings import Findings
 from eigassign.study.planning import plan_expansion
+from eigassign.study.results import RunResults
 from eigassign.study.scene import Expansions, Scene
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class Options:
 class Result:
     """The whole answer, in memory. Frequencies (n_t,) in Hz of the first target's mode.
 
-    At all samples, or those of the trajectory that the first target names; `findings` has the rest.
+    At all samples, or those of the trajectory that the first target names; `results` has the rest.
     """
 
     design: Mapping[str, float]  # the optimum, SI
@@ -85,7 +85,7 @@ class Result:
     initial_hz: Floats
     predicted_hz: Floats
     exact_hz: Floats
-    findings: Findings
+    results: RunResults
     expansion: Expansion  # full
     linearised: Expansion
     assignment: Assignment
@@ -96,7 +96,7 @@ class Outcome:
     """A finished run: where it is and what it found."""
 
     folder: Path | None
-    findings: Findings
+    results: RunResults
     within_tolerance: bool
     seconds: float
     warnings: tuple[str, ...]
@@ -127,8 +127,8 @@ def solve_case(case: Case, options: Options = DEFAULT) -> Result:
             scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene, assignment.y)))
         targets = study_targets(scene, wanted, assignment, initial_hz, exact_hz)
     found = Assigned(assignment, targets, initial_hz, exact_hz)
-    findings = gather(scene, studies, found, stages.timing_s)
-    return _result(findings, scene.expansions, assignment)
+    results = gather(scene, studies, found, stages.timing_s)
+    return _result(results, scene.expansions, assignment)
 
 
 def prepare(
@@ -158,16 +158,16 @@ def _accuracy(case: Case, scene: Scene, optimum: Floats | None = None) -> list[s
     return accuracy_notes(scene, case.discretisation_error, optimum)
 
 
-def _result(findings: Findings, expansions: Expansions, assignment: Assignment) -> Result:
-    first = findings.targets[0]
+def _result(results: RunResults, expansions: Expansions, assignment: Assignment) -> Result:
+    first = results.targets[0]
     return Result(
-        design={row.name: row.optimal for row in findings.design},
-        time_s=findings.time_s[first.rows],
+        design={row.name: row.optimal for row in results.design},
+        time_s=results.time_s[first.rows],
         target_hz=first.target_hz,
         initial_hz=first.initial_hz,
         predicted_hz=first.predicted_hz,
         exact_hz=first.exact_hz,
-        findings=findings,
+        results=results,
         expansion=expansions.full,
         linearised=expansions.linear,
         assignment=assignment,
@@ -182,10 +182,10 @@ def optimize(path: str | Path, options: Options = DEFAULT) -> Outcome:
     watch = Stages(options.progress)
     case = load_case(path)
     with keep(case.file, options.out, options.force) as folder:
-        findings = solve_case(case, options).findings
+        results = solve_case(case, options).results
         options.progress("writing the report")
-        folder.write(findings)
-    return _outcome(folder, findings, watch)
+        folder.write(results)
+    return _outcome(folder, results, watch)
 
 
 def expand_case(
@@ -207,10 +207,10 @@ def expand_case(
         with watch("comparison", "comparing the expansion with exact frequencies"):
             studies = study_modes(scene)
             scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene)))
-        findings = gather(scene, studies, None, watch.timing_s)
+        results = gather(scene, studies, None, watch.timing_s)
         options.progress("writing the report")
-        folder.write(findings, coefficient_files(scene, linear))
-    return _outcome(folder, findings, watch)
+        folder.write(results, coefficient_files(scene, linear))
+    return _outcome(folder, results, watch)
 
 
 def validate(path: str | Path, options: Options = DEFAULT) -> Validation:
@@ -225,10 +225,8 @@ def validate(path: str | Path, options: Options = DEFAULT) -> Validation:
     return Validation(rows, notes, scene.warnings, stages.total_s)
 
 
-def _outcome(folder: Kept, findings: Findings, watch: Stages) -> Outcome:
-    return Outcome(
-        folder.path, findings, findings.within_tolerance, watch.total_s, findings.warnings
-    )
+def _outcome(folder: Kept, results: RunResults, watch: Stages) -> Outcome:
+    return Outcome(folder.path, results, results.within_tolerance, watch.total_s, results.warnings)
 
 
 def _cache(options: Options) -> Cache | None:

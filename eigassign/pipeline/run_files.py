@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from eigassign.case import CaseFile
-from eigassign.study.findings import ErrorSummary, Findings
+from eigassign.study.results import ErrorSummary, RunResults
 
 RESULTS = Path("results")  # below the current folder
 
@@ -21,12 +21,12 @@ class Kept:
     hidden: Path
     file: CaseFile
 
-    def write(self, findings: Findings, extra: Mapping[str, bytes] | None = None) -> None:
+    def write(self, results: RunResults, extra: Mapping[str, bytes] | None = None) -> None:
         """Results, report and figures; the resolved case; the log; ``extra`` files by name."""
         from eigassign.output.report import write_run
 
-        write_run(findings, self.hidden)
-        texts = {"case.yaml": self.file.resolved(), "log.txt": log_text(findings)}
+        write_run(results, self.hidden)
+        texts = {"case.yaml": self.file.resolved(), "log.txt": log_text(results)}
         encoded = {name: text.encode() for name, text in texts.items()}
         for name, data in {**encoded, **(extra or {})}.items():
             (self.hidden / name).write_bytes(data)
@@ -46,17 +46,17 @@ def keep(file: CaseFile, out: Path | None, force: bool) -> Iterator[Kept]:
         yield Kept(target, hidden, file)
 
 
-def log_text(findings: Findings) -> str:
+def log_text(results: RunResults) -> str:
     """What was run, chosen, warned of and how long it took, one line each."""
     lines = [
-        f"eigassign {findings.version}",
-        f"case      {findings.case_name}: {findings.title}",
-        f"sha256    {findings.case_sha256}",
-        *(f"sha256    {digest} {name}" for name, digest in findings.case_files.items()),
-        *(f"note      {note}" for note in findings.notes),
-        *(f"warning   {warning}" for warning in findings.warnings),
-        *_outcome_lines(findings),
-        *(f"time      {stage}: {1e3 * spent:.2f} ms" for stage, spent in findings.timing_s.items()),
+        f"eigassign {results.version}",
+        f"case      {results.case_name}: {results.title}",
+        f"sha256    {results.case_sha256}",
+        *(f"sha256    {digest} {name}" for name, digest in results.case_files.items()),
+        *(f"note      {note}" for note in results.notes),
+        *(f"warning   {warning}" for warning in results.warnings),
+        *_outcome_lines(results),
+        *(f"time      {stage}: {1e3 * spent:.2f} ms" for stage, spent in results.timing_s.items()),
     ]
     return "\n".join(lines) + "\n"
 
@@ -68,15 +68,15 @@ def _distances(error: ErrorSummary, along: str) -> Iterator[str]:
         yield f"distance  {when}{along}: {figures} from the target"
 
 
-def _outcome_lines(findings: Findings) -> Iterator[str]:
-    for row in findings.design:
+def _outcome_lines(results: RunResults) -> Iterator[str]:
+    for row in results.design:
         yield f"design    {row.name} = {row.optimal:.9g} {row.unit} (before: {row.initial:.9g})"
-    if findings.error is not None:
-        yield from _distances(findings.error, "")
-    for own in findings.trajectories if len(findings.trajectories) > 1 else ():
-        along = findings.error_along(own.name)
+    if results.error is not None:
+        yield from _distances(results.error, "")
+    for own in results.trajectories if len(results.trajectories) > 1 else ():
+        along = results.error_along(own.name)
         yield from _distances(along, f" along {own.name!r}") if along is not None else ()
-    if findings.approximation_error is not None:
-        within = "within" if findings.within_tolerance else "OVER"
-        error = f"{100 * findings.approximation_error:.4g} %"
-        yield f"accuracy  predicted against exact: {error}, {within} {100 * findings.tolerance:g} %"
+    if results.approximation_error is not None:
+        within = "within" if results.within_tolerance else "OVER"
+        error = f"{100 * results.approximation_error:.4g} %"
+        yield f"accuracy  predicted against exact: {error}, {within} {100 * results.tolerance:g} %"

@@ -27,7 +27,7 @@ from eigassign.assignment.checks import frozen
 from eigassign.case import CaseFile, Target
 from eigassign.errors import AccuracyError, CaseError, UsageError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.study.findings import (
+from eigassign.study.results import (
     DesignRow,
     ErrorRow,
     ErrorSummary,

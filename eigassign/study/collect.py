@@ -14,11 +14,11 @@ from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.accuracy import study_motion
 from eigassign.study.assignment import crossing_warnings, design_rows, limit_notes, solver_row
 from eigassign.study.drawing import draw_poses, rest_pose
-from eigassign.study.findings import (
-    Findings,
+from eigassign.study.results import (
+    DrawnPoses,
     ModeStudy,
     OtherModes,
-    Poses,
+    RunResults,
     TargetStudy,
     TrajectoryRow,
     coordinate_units,
@@ -43,12 +43,12 @@ def gather(
     studies: tuple[ModeStudy, ...],
     assigned: Assigned | None,
     timing_s: Mapping[str, float],
-) -> Findings:
-    """The findings of a run; without ``assigned`` those of an expansion only."""
+) -> RunResults:
+    """The results of a run; without ``assigned`` those of an expansion only."""
     file, trajectory = scene.file, scene.trajectory
     motion = _motion(scene, assigned)
     n_q = len(scene.model.q_names)
-    return Findings(
+    return RunResults(
         title=file.title,
         reference=file.reference,
         case_name=file.path.stem.encode("utf-8", "replace").decode("utf-8"),
@@ -94,7 +94,7 @@ def _motion(scene: Scene, assigned: Assigned | None) -> tuple[list[str], list[st
     return [study.note] if study.note else [], [study.warning] if study.warning else []
 
 
-def _poses(scene: Scene) -> Poses:
+def _poses(scene: Scene) -> DrawnPoses:
     if scene.trajectory is None:
         return rest_pose(scene.file, scene.model, scene.q0, scene.initial)
     return draw_poses(scene.file, scene.model, scene.trajectory, scene.initial)

@@ -33,14 +33,14 @@ from numpy.typing import NDArray
 from eigassign.case import CaseFile
 from eigassign.errors import CaseError
 from eigassign.modal.arguments import DENSE_LIMIT
-from eigassign.study.findings import (
+from eigassign.study.planning import joint_map
+from eigassign.study.results import (
     Comparison,
     ModeStudy,
     ValidationRow,
     coordinate_units,
     design_units,
 )
-from eigassign.study.planning import joint_map
 from eigassign.study.scene import AXES, COARSE, Grid, Scene, compare, grid_over, map_over
 
 # --- The expansions of a run compared with exact frequencies, over time, over y and over q

@@ -17,17 +17,17 @@ from eigassign.mechanism.elements.mesh import link_type
 from eigassign.mechanism.elements.sections import section_values
 from eigassign.mechanism.kinematics.forward import mounting
 from eigassign.mechanism.kinematics.joints import RIDING, sliding_axis
-from eigassign.mechanism.kinematics.poses import Poses as LinkPoses
+from eigassign.mechanism.kinematics.poses import Poses
 from eigassign.mechanism.kinematics.rotations import multiply
 from eigassign.mechanism.kinematics.topology import GROUND, Edge, Node, Tree, split
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.model import Model, ModeShapes
-from eigassign.study.findings import (
-    BodyMark,
-    JointMark,
+from eigassign.study.results import (
+    DrawnBody,
+    DrawnJoint,
+    DrawnPoses,
+    DrawnSpring,
     ModePictures,
-    Poses,
-    SpringMark,
     coordinate_units,
     design_units,
 )
@@ -40,7 +40,7 @@ CROWDED = 12  # lines of a mechanism of which only three poses can be told apart
 AMPLITUDE = 0.1  # a mode's largest displacement, relative to the mechanism's extent
 
 
-def draw_poses(file: CaseFile, model: Model, trajectory: Trajectories, y: Floats) -> Poses:
+def draw_poses(file: CaseFile, model: Model, trajectory: Trajectories, y: Floats) -> DrawnPoses:
     """Poses at samples evenly spread over the trajectory's length in q, at design y."""
     crowded = sum(map(len, model.poses.drawn)) > CROWDED
     chosen = spread_samples(trajectory.q, 3 if crowded else POSES)
@@ -55,7 +55,7 @@ def draw_poses(file: CaseFile, model: Model, trajectory: Trajectories, y: Floats
     return replace(poses, of=tuple(trajectory.name_of(k) for k in chosen))
 
 
-def rest_pose(file: CaseFile, model: Model, q: Floats, y: Floats) -> Poses:
+def rest_pose(file: CaseFile, model: Model, q: Floats, y: Floats) -> DrawnPoses:
     """The one pose of a case without a trajectory."""
     return _posed(file, model, model.one(q, y), np.zeros(1), None)
 
@@ -121,7 +121,7 @@ def _phase(shapes: ModeShapes) -> Floats:
 
 def _displaced(
     file: CaseFile, model: Model, x: Floats, shapes: ModeShapes, factors: Floats
-) -> Poses:
+) -> DrawnPoses:
     """Poses moved by ``factors`` (n_poses, count) of the modes."""
     d, n = _dimension(file), len(factors)
 
@@ -132,16 +132,16 @@ def _displaced(
     moved = [s.places + np.tensordot(factors, s.motions, axes=1) for s in shapes.strands]
     axes = model.poses.values(x, joint_axes(file, model.poses))
     y = x[0, len(model.q_names) :]
-    return Poses(
+    return DrawnPoses(
         time_s=np.zeros(n),
         lines=tuple(tuple(_frozen(line[k]) for line in moved) for k in range(n)),
-        **_marks(file, model, y, at, [np.repeat(axis[:, :d], n, axis=0) for axis in axes]),
+        **_symbols(file, model, y, at, [np.repeat(axis[:, :d], n, axis=0) for axis in axes]),
     )
 
 
 def _posed(
     file: CaseFile, model: Model, x: Floats, time_s: Floats, tip_path: Floats | None
-) -> Poses:
+) -> DrawnPoses:
     """Undeformed poses at samples x, all of one design."""
     poses, d = model.poses, _dimension(file)
     nodes = _named_nodes(file, model)
@@ -154,15 +154,15 @@ def _posed(
         for start, end in pairs
     ]
     directions = [_frozen(value[:, :d]) for value in values[len(nodes) :]]
-    return Poses(
+    return DrawnPoses(
         time_s=_frozen(time_s),
         lines=tuple(tuple(_frozen(line[k]) for line in lines) for k in range(len(x))),
         tip_path=tip_path,
-        **_marks(file, model, x[0, len(model.q_names) :], place.__getitem__, directions),
+        **_symbols(file, model, x[0, len(model.q_names) :], place.__getitem__, directions),
     )
 
 
-def _marks(
+def _symbols(
     file: CaseFile, model: Model, y: Floats, at: At, axes: Sequence[Floats]
 ) -> dict[str, Any]:
     """What poses have besides their lines."""
@@ -192,7 +192,7 @@ def _named_nodes(file: CaseFile, model: Model) -> list[Node]:
         return np.zeros(0)
 
     axes = [np.zeros(0)] * len(edges(poses.motion.tree))
-    _marks(file, model, np.zeros(len(model.y_names)), ask, axes)
+    _symbols(file, model, np.zeros(len(model.y_names)), ask, axes)
     return list(dict.fromkeys(nodes))
 
 
@@ -230,12 +230,12 @@ def edges(tree: Tree) -> tuple[Edge, ...]:
     return tuple(edge.written for edge in (*tree.edges, *tree.loops))
 
 
-def joint_axes(file: CaseFile, poses: LinkPoses) -> list[NDArray[np.object_]]:
+def joint_axes(file: CaseFile, poses: Poses) -> list[NDArray[np.object_]]:
     """Per joint the direction to draw it along, in world axes: where it slides, else its link."""
     return [_axis(file, poses, edge) for edge in edges(poses.motion.tree)]
 
 
-def _axis(file: CaseFile, poses: LinkPoses, edge: Edge) -> NDArray[np.object_]:
+def _axis(file: CaseFile, poses: Poses, edge: Edge) -> NDArray[np.object_]:
     joint: Any = file.mechanism.joints[edge.joint]
     if joint.type not in SLIDING:
         R = poses.motion.placement(edge.follower[0]).world_rotation
@@ -248,29 +248,29 @@ def _axis(file: CaseFile, poses: LinkPoses, edge: Edge) -> NDArray[np.object_]:
     return np.asarray(multiply(poses.motion.placement(edge.base[0]).world_rotation, turned))
 
 
-def joints(file: CaseFile, tree: Tree, at: At, axes: Sequence[Floats]) -> tuple[JointMark, ...]:
-    """A mark for every joint, at its follower's node; ``axes`` are (n, d) each."""
+def joints(file: CaseFile, tree: Tree, at: At, axes: Sequence[Floats]) -> tuple[DrawnJoint, ...]:
+    """Every joint, at its follower's node; ``axes`` are (n, d) each."""
     driven = {coordinate.joint for coordinate in file.coordinates.values()}
-    marks = []
+    found = []
     for edge, axis in zip(edges(tree), axes, strict=True):
         kind = file.mechanism.joints[edge.joint].type
         family = "sliding" if kind in SLIDING else "fixed" if kind == "fixed" else "turning"
         grounded = edge.base == GROUND
         places = at(edge.follower)
-        marks.append(JointMark(edge.joint, family, grounded, edge.joint in driven, places, axis))
-    return tuple(marks)
+        found.append(DrawnJoint(edge.joint, family, grounded, edge.joint in driven, places, axis))
+    return tuple(found)
 
 
-def bodies(file: CaseFile, mass: Callable[[str, float], float], at: At) -> tuple[BodyMark, ...]:
+def bodies(file: CaseFile, mass: Callable[[str, float], float], at: At) -> tuple[DrawnBody, ...]:
     """Every body, and every rigid link that has no extent; ``mass(path, value)`` at the design."""
     found = []
     for name, body in file.mechanism.bodies.items():
-        found.append(BodyMark(name, mass(f"bodies.{name}.mass", body.mass), at(split(body.at))))
+        found.append(DrawnBody(name, mass(f"bodies.{name}.mass", body.mass), at(split(body.at))))
     links: Mapping[str, Any] = file.mechanism.links
     for name, link in links.items():
         if link_type(file, name) == "rigid" and not _has_extent(link):
             node = next(iter(link.nodes or {"start": None}))
-            found.append(BodyMark(name, mass(f"links.{name}.mass", link.mass), at((name, node))))
+            found.append(DrawnBody(name, mass(f"links.{name}.mass", link.mass), at((name, node))))
     return tuple(found)
 
 
@@ -279,16 +279,16 @@ def _has_extent(link: Any) -> bool:
     return link.length is not None or any(map(any, places))
 
 
-def springs(file: CaseFile, at: At) -> tuple[SpringMark, ...]:
+def springs(file: CaseFile, at: At) -> tuple[DrawnSpring, ...]:
     """Every spring."""
     given: Mapping[str, Any] = getattr(file.mechanism, "springs", None) or {}
-    marks = []
+    found = []
     for name, spring in given.items():
         first, second = spring.between
         grounded = "ground" in (first, second)
         ends = [at(split(end)) for end in (first, second) if end != "ground"]
-        marks.append(SpringMark(name, grounded, not spring.translational, ends[0], ends[-1]))
-    return tuple(marks)
+        found.append(DrawnSpring(name, grounded, not spring.translational, ends[0], ends[-1]))
+    return tuple(found)
 
 
 def sizes(

@@ -18,7 +18,7 @@ from eigassign.errors import CaseError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.model import Model
 from eigassign.modal.taylor.expansion import Expansion, picked
-from eigassign.study.findings import Comparison, DesignMap
+from eigassign.study.results import Comparison, DesignMap
 
 # --- A case ready to be studied: its model, trajectory and expansions, in one frozen object
 

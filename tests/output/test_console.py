@@ -5,11 +5,11 @@ from __future__ import annotations
 import io
 
 import pytest
-from synthetic_findings import make_findings
+from synthetic_results import make_results
 
 from eigassign.output import console
 from eigassign.output.formats import number, percent, residual, seconds
-from eigassign.study.findings import ValidationRow
+from eigassign.study.results import ValidationRow
 
 
 class Terminal(io.StringIO):
@@ -28,7 +28,7 @@ def read(stream: io.TextIOWrapper) -> str:
 
 def test_an_assignment_shows_its_numbers_without_colour_codes_in_a_pipe():
     out = piped()
-    console.print_assignment(make_findings(), stream=out)
+    console.print_assignment(make_results(), stream=out)
     text = read(out)
     assert "\x1b" not in text
     for words in ("0.2287", "6.00 %", "1.00 %", "solved", "3.1e-17", "over m1 and m2"):

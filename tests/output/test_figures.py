@@ -10,7 +10,7 @@ import matplotlib
 import numpy as np
 import pytest
 from PIL import Image
-from synthetic_findings import make_findings
+from synthetic_results import make_results
 
 from eigassign.output.figures import plan as figures
 from eigassign.output.figures import png, ticks
@@ -18,7 +18,7 @@ from eigassign.output.figures.curves import spread
 from eigassign.output.figures.frame import Entry, key_rows
 from eigassign.output.figures.ink import Sheet, Stroke, series_stroke, settings, short
 from eigassign.output.figures.lettering import DPI, text_width
-from eigassign.study.findings import Findings
+from eigassign.study.results import RunResults
 
 LONG = "ein_sehr_langer_Name_für_$x_1^2$_中_\x1b[31m_"
 EVERY = {
@@ -36,12 +36,12 @@ EVERY = {
 
 
 @pytest.fixture(scope="module")
-def paper() -> Findings:
-    return make_findings()
+def paper() -> RunResults:
+    return make_results()
 
 
 @pytest.fixture(scope="module")
-def drawn(paper: Findings) -> dict[str, bytes]:
+def drawn(paper: RunResults) -> dict[str, bytes]:
     return figures.render(figures.plan(paper))
 
 
@@ -62,8 +62,8 @@ def test_the_paper_s_case_has_all_of_its_figures(drawn):
 
 
 @pytest.mark.parametrize("options", EVERY.values(), ids=EVERY)
-def test_every_kind_of_findings_gives_pictures_with_something_on_them(options):
-    found = make_findings(**options)
+def test_every_kind_of_results_gives_pictures_with_something_on_them(options):
+    found = make_results(**options)
     images = figures.render(figures.plan(found))
     assert len(images) >= 7
     for name, data in images.items():
@@ -105,9 +105,9 @@ def test_another_answer_gives_another_picture(paper, drawn):
     assert [name for name in drawn if changed[name] != drawn[name]] == ["assignment_mode_1.png"]
 
 
-def test_findings_without_a_trajectory_plan_only_what_they_have():
-    assert figures.plan(make_findings(n_t=0, n_y=0)) == ()
-    (only,) = figures.plan(make_findings(n_t=0, n_y=2))
+def test_results_without_a_trajectory_plan_only_what_they_have():
+    assert figures.plan(make_results(n_t=0, n_y=0)) == ()
+    (only,) = figures.plan(make_results(n_t=0, n_y=2))
     assert only.file == "approximation_mode_1_design.png"
 
 
@@ -126,7 +126,7 @@ def test_an_expansion_that_fails_somewhere_is_still_drawn(paper):
 
 
 def test_a_map_on_which_nothing_varies_is_filled_and_not_left_blank():
-    found = make_findings(varies=False)
+    found = make_results(varies=False)
     plans = [p for p in figures.plan(found) if p.file.endswith("_design.png")]
     (image,) = map(pixels, figures.render(plans).values())
     middle = image[image.shape[0] // 2]

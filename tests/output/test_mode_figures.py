@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from synthetic_findings import make_findings
+from synthetic_results import make_results
 
 import eigassign as ea
 from eigassign.output.figures import ink, plan
@@ -25,7 +25,7 @@ from eigassign.output.figures.mechanism import (
 from eigassign.output.figures.modes import plan_modes, thumbnail
 from eigassign.output.report import write_modes
 from eigassign.study.drawing import draw_modes
-from eigassign.study.findings import BodyMark, ModePictures, Poses
+from eigassign.study.results import DrawnBody, DrawnPoses, ModePictures
 
 CASES = Path(__file__).parents[2] / "cases"
 GALLERY = CASES / "gallery"
@@ -119,7 +119,7 @@ def test_a_mechanism_in_the_plane_of_sight_is_seen_from_another_side() -> None:
 
 
 def test_a_canvas_keeps_angles_and_holds_everything() -> None:
-    poses = make_findings(spatial=True).poses
+    poses = make_results(spatial=True).poses
     held = extent(poses)
     with ink.settings():
         canvas = held.on(ink.Sheet(4.0, 3.0), (0.5, 0.5, 3.0, 2.0))
@@ -134,11 +134,13 @@ def test_a_canvas_keeps_angles_and_holds_everything() -> None:
 
 def test_thick_sections_are_drawn_thick_and_heavy_bodies_large() -> None:
     line = np.zeros((2, 2))
-    poses = Poses(np.zeros(1), ((line,) * 3,), ("a",), sizes=((0.01, 0.01), (0.0025, 0.01), (0, 0)))
+    poses = DrawnPoses(
+        np.zeros(1), ((line,) * 3,), ("a",), sizes=((0.01, 0.01), (0.0025, 0.01), (0, 0))
+    )
     (thick, _), (thin, end), (plain, _) = line_widths(poses)
     assert plain < thick == end
     assert 1.3 < thin < thick
-    bodies = [BodyMark("a", 8.0, line), BodyMark("b", 1.0, line), BodyMark("c", 0.0, line)]
+    bodies = [DrawnBody("a", 8.0, line), DrawnBody("b", 1.0, line), DrawnBody("c", 0.0, line)]
     assert diameters(bodies) == [12.0, 9.0, 6.0]
     assert diameters(bodies[2:]) == [8.0]
 

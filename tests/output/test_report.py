@@ -7,7 +7,7 @@ import re
 from html.parser import HTMLParser
 
 import pytest
-from synthetic_findings import make_findings
+from synthetic_results import make_results
 
 from eigassign.output import report
 from eigassign.output.figures import plan as figures
@@ -41,17 +41,17 @@ class Page(HTMLParser):
         return " ".join(" ".join(self.words).split())
 
 
-def page(findings) -> tuple[str, Page, dict[str, bytes]]:
-    plans = figures.plan(findings)
+def page(results) -> tuple[str, Page, dict[str, bytes]]:
+    plans = figures.plan(results)
     images = {plan.file: f"PNG of {plan.file}".encode() for plan in plans}
-    html = report.to_html(findings, plans, images).decode()
+    html = report.to_html(results, plans, images).decode()
     parsed = Page(html)
     assert parsed.open == []
     return html, parsed, images
 
 
 def test_the_report_asks_nothing_of_the_network():
-    html, parsed, _ = page(make_findings(title="see https://example.org/x.png"))
+    html, parsed, _ = page(make_results(title="see https://example.org/x.png"))
     for tag, attributes in parsed.tags:
         assert tag not in ("script", "link", "iframe", "object", "base", "form"), tag
         assert not any(name.startswith("on") for name in attributes)
@@ -63,35 +63,35 @@ def test_the_report_asks_nothing_of_the_network():
 
 
 def test_every_figure_is_inside_with_its_alternative_text_and_caption():
-    findings = make_findings()
-    _, parsed, images = page(findings)
+    results = make_results()
+    _, parsed, images = page(results)
     shown = [attributes for tag, attributes in parsed.tags if tag == "img"]
     inside = [base64.b64decode((a["src"] or "").split(",", 1)[1]) for a in shown]
     assert inside == list(images.values())
-    plans = figures.plan(findings)
+    plans = figures.plan(results)
     assert [a["alt"] for a in shown] == [plan.alt for plan in plans]
     for plan in plans:
         assert plan.caption in parsed.text
 
 
 def test_numbers_of_the_run_stand_in_the_tables():
-    findings = make_findings()
-    _, parsed, _ = page(findings)
+    results = make_results()
+    _, parsed, _ = page(results)
     for text in ("0.2287", "6.00 %", "1.00 %", "3.1e-17", "solved", "12.3 ms", "0.25", "kg"):
         assert text in parsed.text
-    for line in (*findings.warnings, *findings.notes, findings.case_sha256):
+    for line in (*results.warnings, *results.notes, results.case_sha256):
         assert line in parsed.text
 
 
 def test_text_from_the_case_is_never_markup():
-    _, parsed, _ = page(make_findings(title=EVIL, prefix=EVIL))
+    _, parsed, _ = page(make_results(title=EVIL, prefix=EVIL))
     assert not any(tag == "script" for tag, _ in parsed.tags)
     assert " ".join(EVIL.split()) in parsed.text
     assert all(set(a) <= {"src", "alt"} for tag, a in parsed.tags if tag == "img")
 
 
 def test_unpaired_surrogates_do_not_stop_the_report():
-    html, _, _ = page(make_findings(title="a\udcffb"))
+    html, _, _ = page(make_results(title="a\udcffb"))
     assert "a&#56575;b" in html
 
 
@@ -100,21 +100,21 @@ def test_unpaired_surrogates_do_not_stop_the_report():
     [({"n_t": 0, "n_y": 0}, "Worst distance"), ({"n_t": 0}, "Mechanism")],
 )
 def test_what_was_not_asked_for_is_left_out(options, absent):
-    _, parsed, _ = page(make_findings(**options))
+    _, parsed, _ = page(make_results(**options))
     assert absent not in parsed.text
 
 
 def test_several_targets_are_listed_and_summed_up():
-    _, parsed, _ = page(make_findings(n_targets=3))
+    _, parsed, _ = page(make_results(n_targets=3))
     for label in ("mode 1", "mode 2", "mode 3", "all"):
         assert label in parsed.text
 
 
 def test_a_run_leaves_results_report_and_figures(tmp_path):
-    findings = make_findings()
-    write_run(findings, tmp_path)
+    results = make_results()
+    write_run(results, tmp_path)
     names = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.*")}
-    expected = {f"figures/{plan.file}" for plan in figures.plan(findings)}
+    expected = {f"figures/{plan.file}" for plan in figures.plan(results)}
     assert names == expected | {
         "results.json",
         "report.html",

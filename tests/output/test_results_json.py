@@ -7,42 +7,42 @@ import json
 
 import numpy as np
 import pytest
-from synthetic_findings import make_findings
+from synthetic_results import make_results
 
 from eigassign.errors import EigassignError
 from eigassign.output.results_json import dumps, to_json
-from eigassign.study.findings import ErrorRow
+from eigassign.study.results import ErrorRow
 
 
-def read(findings) -> dict:
-    return json.loads(to_json(findings))
+def read(results) -> dict:
+    return json.loads(to_json(results))
 
 
 def test_the_promised_fields_are_there():
-    findings = make_findings()
-    found = read(findings)
-    target = findings.targets[0]
+    results = make_results()
+    found = read(results)
+    target = results.targets[0]
     assert found["eigassign_version"] == "0.1.0"
-    assert found["case"]["title"] == findings.title
-    assert found["case"]["sha256"] == findings.case_sha256
+    assert found["case"]["title"] == results.title
+    assert found["case"]["sha256"] == results.case_sha256
     assert list(found["design"]) == ["m1", "m2"]
     limits = {k: found["design"]["m1"][k] for k in ("initial", "optimal", "lower", "upper")}
     assert limits == {"initial": 0.0, "optimal": 0.2287, "lower": 0.0, "upper": 0.25}
     for kind in ("initial", "predicted", "exact"):
         assert found["error"][kind] == dataclasses.asdict(getattr(target, kind))
         assert found["frequencies"][f"{kind}_hz"] == getattr(target, f"{kind}_hz").tolist()
-    assert found["frequencies"]["time_s"] == findings.time_s.tolist()
+    assert found["frequencies"]["time_s"] == results.time_s.tolist()
     assert found["frequencies"]["target_hz"] == target.target_hz.tolist()
     solver = ("status", "iterations", "primal_residual", "dual_residual")
     assert [found["solver"][name] for name in solver] == ["solved", 25, 3.1e-17, 2.2e-14]
-    assert found["timing_s"] == dict(findings.timing_s)
+    assert found["timing_s"] == dict(results.timing_s)
 
 
 def test_with_several_targets_the_error_is_over_all_of_them():
-    findings = make_findings(n_targets=2)
-    worse = dataclasses.replace(findings.targets[1], exact=ErrorRow(0.5, 0.3))
-    better = dataclasses.replace(findings.targets[0], exact=ErrorRow(0.1, 0.4))
-    found = read(dataclasses.replace(findings, targets=(better, worse)))
+    results = make_results(n_targets=2)
+    worse = dataclasses.replace(results.targets[1], exact=ErrorRow(0.5, 0.3))
+    better = dataclasses.replace(results.targets[0], exact=ErrorRow(0.1, 0.4))
+    found = read(dataclasses.replace(results, targets=(better, worse)))
     assert found["error"]["exact"]["max_relative"] == 0.5
     assert found["error"]["exact"]["rms_relative"] == pytest.approx(np.sqrt(0.125))
     assert [target["mode"] for target in found["targets"]] == [1, 2]
@@ -51,49 +51,49 @@ def test_with_several_targets_the_error_is_over_all_of_them():
 
 
 def test_what_was_not_asked_for_is_null():
-    found = read(make_findings(n_t=0, n_y=0))
+    found = read(make_results(n_t=0, n_y=0))
     assert found["error"] is found["frequencies"] is found["solver"] is None
     assert found["design"] == {}
     assert found["targets"] == found["other_modes"] == []
 
 
 def test_every_number_comes_back_bit_for_bit():
-    findings = make_findings(scale_hz=np.pi)
-    found = read(findings)
+    results = make_results(scale_hz=np.pi)
+    found = read(results)
     back = np.array(found["frequencies"]["exact_hz"])
-    assert back.tobytes() == findings.targets[0].exact_hz.tobytes()
+    assert back.tobytes() == results.targets[0].exact_hz.tobytes()
 
 
-def test_the_same_findings_give_the_same_bytes_and_end_with_a_newline():
-    assert to_json(make_findings()) == to_json(make_findings())
-    assert to_json(make_findings()).endswith(b"}\n")
+def test_the_same_results_give_the_same_bytes_and_end_with_a_newline():
+    assert to_json(make_results()) == to_json(make_results())
+    assert to_json(make_results()).endswith(b"}\n")
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_a_number_that_is_not_finite_is_refused_by_name(bad):
-    findings = make_findings()
-    target = dataclasses.replace(findings.targets[0], exact=ErrorRow(bad, 0.1))
-    broken = dataclasses.replace(findings, targets=(target,))
+    results = make_results()
+    target = dataclasses.replace(results.targets[0], exact=ErrorRow(bad, 0.1))
+    broken = dataclasses.replace(results, targets=(target,))
     with pytest.raises(EigassignError, match=r"error\.exact\.max_relative"):
         to_json(broken)
-    exact = findings.targets[0].exact_hz.copy()
+    exact = results.targets[0].exact_hz.copy()
     exact[3] = bad
-    target = dataclasses.replace(findings.targets[0], exact_hz=exact)
+    target = dataclasses.replace(results.targets[0], exact_hz=exact)
     with pytest.raises(EigassignError, match=r"frequencies\.exact_hz"):
-        to_json(dataclasses.replace(findings, targets=(target,)))
+        to_json(dataclasses.replace(results, targets=(target,)))
 
 
 def test_what_an_expansion_cannot_say_is_null():
-    findings = make_findings()
-    predicted = findings.targets[0].predicted_hz.copy()
+    results = make_results()
+    predicted = results.targets[0].predicted_hz.copy()
     predicted[3] = np.nan
     target = dataclasses.replace(
-        findings.targets[0], predicted_hz=predicted, predicted=ErrorRow(np.inf, np.inf)
+        results.targets[0], predicted_hz=predicted, predicted=ErrorRow(np.inf, np.inf)
     )
-    study = findings.studies[0]
+    study = results.studies[0]
     values = dataclasses.replace(study.over_time, linearised_hz=predicted)
     studies = (dataclasses.replace(study, over_time=values),)
-    found = read(dataclasses.replace(findings, targets=(target,), studies=studies))
+    found = read(dataclasses.replace(results, targets=(target,), studies=studies))
     assert found["error"]["predicted"] == {"max_relative": None, "rms_relative": None}
     assert found["frequencies"]["predicted_hz"][2:4] == [predicted[2], None]
     assert found["approximation"][0]["max_relative"]["over_time"]["linearised"] is None

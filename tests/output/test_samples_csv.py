@@ -9,37 +9,37 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from synthetic_findings import make_findings
+from synthetic_results import make_results
 
 from eigassign.mechanism.trajectory.csv import read_samples
 from eigassign.output.results_json import sample_files
-from eigassign.study.findings import Comparison, Findings
+from eigassign.study.results import Comparison, RunResults
 
 
 def rows_of(data: bytes) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(data.decode(), newline="")))
 
 
-def with_tips(findings: Findings) -> Findings:
+def with_tips(results: RunResults) -> RunResults:
     rng = np.random.default_rng(5)
-    n = [row.rows.stop - row.rows.start for row in findings.trajectories]
+    n = [row.rows.stop - row.rows.start for row in results.trajectories]
     tips = [rng.normal(size=(k, 3)) * 10.0 ** rng.integers(-9, 9, (k, 1)) for k in n]
-    pairs = zip(findings.trajectories, tips, strict=True)
-    return replace(findings, trajectories=tuple(replace(row, tip=tip) for row, tip in pairs))
+    pairs = zip(results.trajectories, tips, strict=True)
+    return replace(results, trajectories=tuple(replace(row, tip=tip) for row, tip in pairs))
 
 
 @pytest.mark.parametrize("parts", [(152,), (100, 52)])
 def test_a_trajectory_reads_back_bit_for_bit_and_silently(
     tmp_path: Path, parts: tuple[int, ...]
 ) -> None:
-    findings = with_tips(make_findings(n_q=5, parts=parts))
+    results = with_tips(make_results(n_q=5, parts=parts))
     for row, (name, data) in zip(
-        findings.trajectories, list(sample_files(findings).items())[:-1], strict=True
+        results.trajectories, list(sample_files(results).items())[:-1], strict=True
     ):
         (tmp_path / name).write_bytes(data)
-        table = read_samples(tmp_path / name, findings.q_names, findings.q_units)
-        assert table.time_s.tobytes() == np.ascontiguousarray(findings.time_s[row.rows]).tobytes()
-        assert table.q.tobytes() == np.ascontiguousarray(findings.q[row.rows]).tobytes()
+        table = read_samples(tmp_path / name, results.q_names, results.q_units)
+        assert table.time_s.tobytes() == np.ascontiguousarray(results.time_s[row.rows]).tobytes()
+        assert table.q.tobytes() == np.ascontiguousarray(results.q[row.rows]).tobytes()
         assert table.notes == ()
         assert row.tip is not None
         tip = [[float(line[f"tip {axis} [m]"]) for axis in "xyz"] for line in rows_of(data)]
@@ -47,46 +47,46 @@ def test_a_trajectory_reads_back_bit_for_bit_and_silently(
 
 
 def test_files_are_named_after_their_trajectories() -> None:
-    assert list(sample_files(make_findings())) == ["trajectory.csv", "frequencies.csv"]
-    assert list(sample_files(make_findings(parts=(150, 2)))) == [
+    assert list(sample_files(make_results())) == ["trajectory.csv", "frequencies.csv"]
+    assert list(sample_files(make_results(parts=(150, 2)))) == [
         "trajectory_part0.csv",
         "trajectory_part1.csv",
         "frequencies.csv",
     ]
-    assert sample_files(make_findings(n_t=0)) == {}
+    assert sample_files(make_results(n_t=0)) == {}
 
 
 def test_frequencies_stand_beside_time_and_pose() -> None:
-    findings = make_findings(n_targets=2, parts=(100, 52))
-    rows = rows_of(sample_files(findings)["frequencies.csv"])
+    results = make_results(n_targets=2, parts=(100, 52))
+    rows = rows_of(sample_files(results)["frequencies.csv"])
     assert [row["trajectory"] for row in rows] == ["part0"] * 100 + ["part1"] * 52
-    for target in findings.targets:
+    for target in results.targets:
         for kind in ("target", "initial", "predicted", "exact"):
             column = [float(row[f"mode {target.mode} {kind} [Hz]"]) for row in rows]
             np.testing.assert_array_equal(column, getattr(target, f"{kind}_hz"))
-    np.testing.assert_array_equal([float(row["q2 [rad]"]) for row in rows], findings.q[:, 1])
-    assert "trajectory" not in rows_of(sample_files(make_findings())["frequencies.csv"])[0]
+    np.testing.assert_array_equal([float(row["q2 [rad]"]) for row in rows], results.q[:, 1])
+    assert "trajectory" not in rows_of(sample_files(make_results())["frequencies.csv"])[0]
 
 
 def test_a_target_on_one_trajectory_leaves_the_others_empty() -> None:
-    findings = make_findings(parts=(100, 52))
-    (target,) = findings.targets
+    results = make_results(parts=(100, 52))
+    (target,) = results.targets
     rows = slice(100, 152)
     curves = {f"{k}_hz": getattr(target, f"{k}_hz")[rows] for k in ("target", "initial", "exact")}
     narrow = replace(target, rows=rows, predicted_hz=target.predicted_hz[rows], **curves)
-    lines = rows_of(sample_files(replace(findings, targets=(narrow,)))["frequencies.csv"])
+    lines = rows_of(sample_files(replace(results, targets=(narrow,)))["frequencies.csv"])
     assert [line["mode 1 exact [Hz]"] for line in lines[:100]] == [""] * 100
     assert float(lines[100]["mode 1 exact [Hz]"]) == target.exact_hz[100]
 
 
 def test_without_targets_the_expansions_are_written_with_their_gaps() -> None:
-    findings = make_findings(n_targets=0)
-    (study,) = findings.studies
+    results = make_results(n_targets=0)
+    (study,) = results.studies
     assert study.over_time is not None
     holed = study.over_time.taylor_hz.copy()
     holed[3] = np.nan
     over = Comparison(study.over_time.exact_hz, holed, study.over_time.linearised_hz)
-    changed = replace(findings, studies=(replace(study, over_time=over),))
+    changed = replace(results, studies=(replace(study, over_time=over),))
     lines = rows_of(sample_files(changed)["frequencies.csv"])
     assert lines[3]["mode 1 taylor [Hz]"] == ""
     assert float(lines[4]["mode 1 taylor [Hz]"]) == holed[4]

@@ -36,21 +36,21 @@ def test_the_choice_is_within_the_accuracy_of_a_fine_mesh(
     fine = load_case(CASE)._meshed({"upper_arm": 16, "forearm": 16})
     case = load_case(automatic(tmp_path, accuracy))
     q, y = case.trajectory.q, np.zeros(2)
-    expansions = solve_case(case).findings.studies[0].over_time
+    expansions = solve_case(case).results.studies[0].over_time
     assert expansions is not None
     exact = fine.frequencies(q, y, 1)[:, 0]
     assert np.abs(expansions.taylor_hz / exact - 1.0).max() <= limit
 
 
 def test_the_reasons_are_among_the_notes(tmp_path: Path) -> None:
-    notes = solve_case(load_case(automatic(tmp_path, "0.2 %"))).findings.notes
+    notes = solve_case(load_case(automatic(tmp_path, "0.2 %"))).results.notes
     assert any(note.startswith("2 elements: mode 1 moves") for note in notes)
     assert any(note.startswith("order 2: error at most") for note in notes)
 
 
 def test_a_looser_accuracy_takes_a_lower_order_and_a_coarser_mesh(tmp_path: Path) -> None:
     cases = [load_case(automatic(tmp_path, accuracy)) for accuracy in ("3 %", "0.2 %")]
-    loose, tight = (solve_case(case).findings.studies[0].order for case in cases)
+    loose, tight = (solve_case(case).results.studies[0].order for case in cases)
     assert loose < tight
     coarse, fine = (case.model().n_dof for case in cases)
     assert coarse < fine
@@ -62,7 +62,7 @@ def test_where_one_point_cannot_do_several_share_the_trajectory(tmp_path: Path) 
         ("  y: [0.125, 0.125] # kg, the middle of the box", "  y: [0, 0]"),
     )  # fmt: skip
     result = solve_case(load_case(path))
-    study = result.findings.studies[0].over_time
+    study = result.results.studies[0].over_time
     assert study is not None
     assert study.worst_taylor <= 1e-5
 

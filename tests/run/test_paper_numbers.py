@@ -13,7 +13,7 @@ from run_cases import SHIPPED, UNCACHED
 
 import eigassign as ea
 from eigassign.pipeline.run import Result, modes, validate
-from eigassign.study.findings import ValidationRow
+from eigassign.study.results import ValidationRow
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def test_the_optimum_adds_no_tool_mass_and_some_elbow_mass(result: Result) -> No
 
 
 def test_the_worst_error_falls_from_eight_to_one_and_a_half_percent(result: Result) -> None:
-    error = result.findings.error
+    error = result.results.error
     assert error is not None
     assert 0.082 <= error.initial.max_relative <= 0.084
     assert 0.014 <= error.exact.max_relative <= 0.016
@@ -69,9 +69,9 @@ def test_the_prediction_the_optimum_rests_on_is_right_to_a_third_of_a_percent(
     result: Result,
 ) -> None:
     off = np.abs(result.predicted_hz / result.exact_hz - 1.0).max()
-    assert off == result.findings.approximation_error
+    assert off == result.results.approximation_error
     assert 0.0 < off < 0.004
-    assert result.findings.within_tolerance
+    assert result.results.within_tolerance
 
 
 @pytest.mark.parametrize(
@@ -89,4 +89,4 @@ def test_frequencies_at_the_expansion_point(y: list[float], published: list[floa
 
 def test_the_expansion_finds_that_turning_the_whole_arm_changes_nothing(result: Result) -> None:
     assert result.expansion.space.n_variables == 3  # elbow, m1, m2
-    assert any("no frequency depends" in note for note in result.findings.notes)
+    assert any("no frequency depends" in note for note in result.results.notes)

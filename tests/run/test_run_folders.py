@@ -60,7 +60,7 @@ def test_results_json_has_what_programs_rely_on(outcome: Outcome) -> None:
 
 def test_the_resolved_case_solves_to_the_same_bits(outcome: Outcome) -> None:
     again = solve_case(load_case(folder_of(outcome) / "case.yaml"), UNCACHED)
-    design = {row.name: row.optimal for row in outcome.findings.design}
+    design = {row.name: row.optimal for row in outcome.results.design}
     assert again.design == design
 
 
@@ -124,7 +124,7 @@ def test_an_expansion_run_holds_its_coefficients_as_json_and_hdf5(tmp_path: Path
                 expected = getattr(expansion, name)
                 np.testing.assert_array_equal(file[f"{part}_{name}"], expected)
                 np.testing.assert_array_equal(document[part][name], expected)
-    assert outcome.findings.targets == ()
+    assert outcome.results.targets == ()
     assert outcome.within_tolerance
     assert {path.name for path in (tmp_path / "out").iterdir()} >= {"report.html", "results.json"}
 
@@ -136,7 +136,7 @@ def test_order_modes_and_set_can_be_asked_for(tmp_path: Path) -> None:
     assert "full" not in document
     assert document["linearised"]["modes"] == [1, 3]
     assert max(map(sum, document["linearised"]["indices"])) == 2
-    assert [(study.mode, study.order) for study in outcome.findings.studies] == [(1, 2), (3, 2)]
+    assert [(study.mode, study.order) for study in outcome.results.studies] == [(1, 2), (3, 2)]
 
 
 def test_a_case_without_design_is_expanded_in_q_alone(tmp_path: Path) -> None:
@@ -151,10 +151,10 @@ def test_a_case_without_design_is_expanded_in_q_alone(tmp_path: Path) -> None:
 def test_a_case_without_trajectory_is_expanded_where_it_says(tmp_path: Path) -> None:
     text = without(chain(3), "trajectory", "targets") + "expansion: {q: [0.3, 0.5, 0.7]}\n"
     outcome = expand_case(written(tmp_path, text), in_folder(tmp_path / "out"))
-    (study,) = outcome.findings.studies
+    (study,) = outcome.results.studies
     assert study.over_time is None
     assert study.over_design is not None
-    assert outcome.findings.poses.tip_path is None
+    assert outcome.results.poses.tip_path is None
 
 
 def test_modes_expanded_together_are_kept_as_the_series_of_their_matrix(tmp_path: Path) -> None:
@@ -164,7 +164,7 @@ def test_modes_expanded_together_are_kept_as_the_series_of_their_matrix(tmp_path
     document = json.loads((tmp_path / "out" / "coefficients.json").read_text())
     assert document["full"]["cluster_0_modes"] == [1, 2]
     assert np.shape(document["full"]["cluster_0_coefficients"])[:2] == (2, 2)
-    assert any("one cluster" in note for note in outcome.findings.notes)
+    assert any("one cluster" in note for note in outcome.results.notes)
 
 
 TWINS = """
@@ -220,7 +220,7 @@ def test_the_resolved_case_finds_its_matrices_and_samples_from_its_folder(
     (tmp_path / "samples.csv").write_text(samples)
     head, rest = case.read_text().split("trajectory:\n")
     case.write_text(head + "trajectory: {file: samples.csv}\n\ndesign:" + rest.split("design:")[1])
-    first = optimize(case, in_folder(tmp_path / "deep" / "er" / "run")).findings
+    first = optimize(case, in_folder(tmp_path / "deep" / "er" / "run")).results
     monkeypatch.chdir(tmp_path / "deep")
     again = solve_case(load_case("er/run/case.yaml"), UNCACHED)
     assert again.design == {row.name: row.optimal for row in first.design}

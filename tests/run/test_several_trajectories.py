@@ -12,7 +12,7 @@ from scipy.optimize import lsq_linear
 
 import eigassign as ea
 from eigassign.errors import CaseError
-from eigassign.output.results_json import results, sample_files, to_json
+from eigassign.output.results_json import results_document, sample_files, to_json
 from eigassign.pipeline.queries import check
 from eigassign.pipeline.run import Options, Result, optimize, validate
 
@@ -53,7 +53,7 @@ def singles(tmp_path_factory: pytest.TempPathFactory) -> tuple[Result, Result]:
 
 def test_a_list_of_one_is_bit_for_bit_the_mapping(tmp_path: Path) -> None:
     both = [solved(tmp_path, text) for text in (alone(part(PICK)), several(part(PICK)))]
-    one, two = (json.loads(to_json(result.findings)) for result in both)
+    one, two = (json.loads(to_json(result.results)) for result in both)
     for key in ("case", "timing_s"):
         one.pop(key), two.pop(key)
     assert one == two
@@ -65,7 +65,7 @@ def test_what_is_known_before_the_design_is_that_of_two_runs(
     for kind in ("target_hz", "initial_hz", "time_s"):
         stacked = np.concatenate([getattr(single, kind) for single in singles])
         np.testing.assert_allclose(getattr(pair, kind), stacked, rtol=1e-12)
-    over = [study.over_time for r in (pair, *singles) for study in r.findings.studies]
+    over = [study.over_time for r in (pair, *singles) for study in r.results.studies]
     for kind in ("taylor_hz", "linearised_hz"):
         whole, *each = (getattr(comparison, kind) for comparison in over)
         np.testing.assert_allclose(whole, np.concatenate(each), rtol=1e-12)
@@ -111,7 +111,7 @@ def test_a_common_factor_of_all_weights_changes_nothing(pair: Result, tmp_path: 
     text = several(part(PICK, name="pick", weight=4), part(BACK, 0.5, name="return", weight=4))
     scaled = solved(tmp_path, text)
     np.testing.assert_allclose(list(scaled.design.values()), list(pair.design.values()), rtol=1e-10)
-    one, two = (r.findings.error for r in (pair, scaled))
+    one, two = (r.results.error for r in (pair, scaled))
     assert one is not None
     assert two is not None
     assert two.exact.rms_relative == pytest.approx(one.exact.rms_relative, rel=1e-9)
@@ -124,7 +124,7 @@ def test_a_trajectory_cut_in_two_is_still_the_same_problem(tmp_path: Path) -> No
     np.testing.assert_allclose(
         list(halves.design.values()), list(whole.design.values()), rtol=1e-9, atol=1e-12
     )
-    one, two = (r.findings.error for r in (whole, halves))
+    one, two = (r.results.error for r in (whole, halves))
     assert one is not None
     assert two is not None
     for kind in ("initial", "predicted", "exact"):
@@ -134,7 +134,7 @@ def test_a_trajectory_cut_in_two_is_still_the_same_problem(tmp_path: Path) -> No
 
 
 def test_the_errors_of_each_trajectory_are_those_of_its_own_samples(pair: Result) -> None:
-    (target,) = pair.findings.targets
+    (target,) = pair.results.targets
     off = target.exact_hz / target.target_hz - 1.0
     for along, rows in zip(target.along, (slice(0, 21), slice(21, 42)), strict=True):
         assert along.rows == rows
@@ -156,14 +156,14 @@ def test_two_targets_of_a_mode_one_a_trajectory_are_as_good_as_one_for_both(
     text = several(part(PICK, name="pick"), part(BACK, 0.5, name="return"), targets=targets)
     split = solved(tmp_path, text)
     np.testing.assert_allclose(list(split.design.values()), list(pair.design.values()), rtol=1e-10)
-    one, two = pair.findings.error, split.findings.error
+    one, two = pair.results.error, split.results.error
     assert one is not None
     assert two is not None
     assert two.exact.rms_relative == pytest.approx(one.exact.rms_relative, rel=1e-10)
-    assert [t.trajectory for t in split.findings.targets] == ["pick", "return"]
+    assert [t.trajectory for t in split.results.targets] == ["pick", "return"]
     np.testing.assert_array_equal(
-        np.concatenate([t.initial_hz for t in split.findings.targets]),
-        pair.findings.targets[0].initial_hz,
+        np.concatenate([t.initial_hz for t in split.results.targets]),
+        pair.results.targets[0].initial_hz,
     )
 
 
@@ -195,12 +195,12 @@ def test_targets_of_trajectories_with_other_numbers_of_samples_are_each_solved_o
     y = np.array(list(both.design.values()))
     np.testing.assert_allclose(y, found.x, rtol=1e-9, atol=1e-12)
     model = case_of(tmp_path, text).model()
-    for target, q in zip(both.findings.targets, (short, PICK), strict=True):
+    for target, q in zip(both.results.targets, (short, PICK), strict=True):
         exact = model.frequencies(q, y, target.mode)[:, -1]
         np.testing.assert_allclose(target.exact_hz, exact, rtol=1e-12)
-    kept = results(both.findings)
+    kept = results_document(both.results)
     assert [len(t["frequencies"]["time_s"]) for t in kept["targets"]] == [6, 21]
-    table = sample_files(both.findings)["frequencies.csv"].decode().splitlines()
+    table = sample_files(both.results)["frequencies.csv"].decode().splitlines()
     empty = [[not cell for cell in line.split(",")[4:]] for line in table[1:]]
     assert empty == [[True] * 4 + [False] * 4] * 21 + [[False] * 4 + [True] * 4] * 6
 
@@ -212,7 +212,7 @@ def test_a_target_on_one_trajectory_ignores_the_other(
     text = several(part(PICK, name="pick"), part(BACK, 0.5, name="return"), targets=targets)
     result = solved(tmp_path, text)
     assert result.design == pytest.approx(dict(singles[1].design), rel=1e-9, abs=1e-12)
-    found = results(result.findings)
+    found = results_document(result.results)
     assert found["targets"][0]["trajectory"] == "return"
     assert len(found["frequencies"]["time_s"]) == 21
     assert set(found["frequencies"]["trajectory"]) == {"return"}
@@ -231,7 +231,7 @@ FAR = BACK - np.array([0.0, 3.9])  # the elbow jumps by far more than half a tur
 
 
 def slow(result: Result) -> list[str]:
-    return [note for note in result.findings.notes if "slow motion" in note]
+    return [note for note in result.results.notes if "slow motion" in note]
 
 
 def test_a_jump_between_trajectories_is_neither_fast_nor_a_jump(tmp_path: Path) -> None:
@@ -246,16 +246,16 @@ def test_a_jump_between_trajectories_is_neither_fast_nor_a_jump(tmp_path: Path) 
     ]
     joined = json.dumps({"q": [*PICK.tolist(), *FAR.tolist()], "duration": 1.5})
     one_motion = solved(tmp_path, near + TARGETS + f"trajectory: {joined}\n")
-    assert any("jumps by" in note for note in one_motion.findings.notes)
-    assert not any("jumps by" in note for note in far.findings.notes)
+    assert any("jumps by" in note for note in one_motion.results.notes)
+    assert not any("jumps by" in note for note in far.results.notes)
     assert slow(far)[0] in [slow(single)[0] for single in each]
     assert slow(one_motion) != slow(far)
-    assert not any("not slow" in warning for warning in far.findings.warnings)
+    assert not any("not slow" in warning for warning in far.results.warnings)
 
 
 def test_a_quick_trajectory_among_slow_ones_is_named(tmp_path: Path) -> None:
     result = solved(tmp_path, several(part(PICK), part(BACK, 0.001, name="dash")))
-    (warning,) = [line for line in result.findings.warnings if "not slow" in line]
+    (warning,) = [line for line in result.results.warnings if "not slow" in line]
     assert "along trajectory 'dash'" in warning
 
 
@@ -270,15 +270,15 @@ def test_the_expansion_point_is_central_over_all(tmp_path: Path) -> None:
     result = ea.assign(case)
     np.testing.assert_allclose(result.expansion.q0, case.trajectory.q[k])
     name = "pick" if k < 21 else "return"
-    assert any(f"sample {k % 21} of trajectory '{name}'" in note for note in result.findings.notes)
+    assert any(f"sample {k % 21} of trajectory '{name}'" in note for note in result.results.notes)
 
 
 def test_automatic_orders_look_at_every_trajectory_and_name_its_samples(tmp_path: Path) -> None:
     text = several(part(PICK, name="pick"), part(BACK, 0.5, name="return"))
     result = solved(tmp_path, text.replace("order: 4", "order: auto\n  accuracy: 0.5 %"))
-    lines = [note for note in result.findings.notes if note.startswith("order ")]
+    lines = [note for note in result.results.notes if note.startswith("order ")]
     assert any("of trajectory 'return'" in line or "of trajectory 'pick'" in line for line in lines)
-    (study,) = result.findings.studies
+    (study,) = result.results.studies
     assert study.over_time is not None
     assert study.over_time.worst_taylor < 0.005
 
@@ -345,7 +345,7 @@ def test_figures_and_files_of_each_trajectory_carry_its_name(tmp_path: Path) -> 
 
 
 def test_the_drawn_tip_path_stops_where_a_trajectory_does(pair: Result) -> None:
-    poses = pair.findings.poses
+    poses = pair.results.poses
     assert poses.tip_path is not None
     gaps = np.flatnonzero(np.isnan(poses.tip_path).any(axis=1))
     assert gaps.tolist() == [21]

@@ -69,7 +69,7 @@ def test_what_a_result_says_is_what_its_parts_compute(name: str, tmp_path: Path)
     result = solved(tmp_path, MECHANISMS[name])
     case = case_of(tmp_path, MECHANISMS[name])
     q, y = case.trajectory.q, list(result.design.values())
-    for k, target in enumerate(result.findings.targets):
+    for k, target in enumerate(result.results.targets):
         column = result.linearised.modes.index(target.mode)
         exact = case.model().frequencies(q, y, target.mode)[:, -1]
         before = case.model().frequencies(q, case.initial_design, target.mode)[:, -1]
@@ -79,7 +79,7 @@ def test_what_a_result_says_is_what_its_parts_compute(name: str, tmp_path: Path)
         np.testing.assert_allclose(target.predicted_hz, predicted, rtol=1e-9)  # another sum
         assert target.exact.max_relative == np.abs(target.exact_hz / target.target_hz - 1).max()
         assert result.assignment.lam[k].shape == (len(q),)
-    np.testing.assert_array_equal(result.exact_hz, result.findings.targets[0].exact_hz)
+    np.testing.assert_array_equal(result.exact_hz, result.results.targets[0].exact_hz)
 
 
 @pytest.mark.parametrize("name", MECHANISMS)
@@ -89,7 +89,7 @@ def test_no_random_design_within_the_limits_is_predicted_to_be_better(
     result = solved(tmp_path, MECHANISMS[name])
     case = case_of(tmp_path, MECHANISMS[name])
     best = _objective(result, case, np.array(list(result.design.values())))
-    rows = result.findings.design
+    rows = result.results.design
     random = np.random.default_rng(1)
     lower, upper = (np.array([getattr(r, side) for r in rows]) for side in ("lower", "upper"))
     designs = random.uniform(lower, upper, (60, len(rows)))
@@ -105,7 +105,7 @@ def _objective(result: Result, case: ea.Case, y: np.ndarray) -> float:
     """Weighted mean square of the relative error in λ, by hand."""
     lam = result.linearised.eigenvalues(case.trajectory.q, y)
     total = 0.0
-    for target, study in zip(case.file.targets, result.findings.targets, strict=True):
+    for target, study in zip(case.file.targets, result.results.targets, strict=True):
         wanted = (2.0 * np.pi * study.target_hz) ** 2
         error = lam[:, result.linearised.modes.index(target.mode)] / wanted - 1.0
         total += target.weight * np.trapezoid(error**2, result.time_s)
@@ -116,18 +116,18 @@ def _objective(result: Result, case: ea.Case, y: np.ndarray) -> float:
 def test_these_mechanisms_are_brought_nearer_to_their_targets_within_tolerance(
     name: str, tmp_path: Path
 ) -> None:
-    findings = solved(tmp_path, MECHANISMS[name]).findings
-    assert findings.error is not None
-    assert findings.error.exact.rms_relative < findings.error.initial.rms_relative
-    assert findings.within_tolerance
-    assert findings.warnings == ()
+    results = solved(tmp_path, MECHANISMS[name]).results
+    assert results.error is not None
+    assert results.error.exact.rms_relative < results.error.initial.rms_relative
+    assert results.within_tolerance
+    assert results.warnings == ()
 
 
 def test_a_heavier_target_is_met_more_closely(tmp_path: Path) -> None:
     def second_mode(weight: str) -> float:
         both = f"{TARGET}\n  - {{mode: 2, frequency: 450 Hz, weight: {weight}}}"
-        findings = solved(tmp_path, automatic((TARGET, both))).findings
-        return findings.targets[1].predicted.rms_relative
+        results = solved(tmp_path, automatic((TARGET, both))).results
+        return results.targets[1].predicted.rms_relative
 
     assert second_mode("20") < 0.9 * second_mode("0.05")
 
@@ -135,7 +135,7 @@ def test_a_heavier_target_is_met_more_closely(tmp_path: Path) -> None:
 def test_the_active_constraint_is_met_exactly_and_named(tmp_path: Path) -> None:
     result = solved(tmp_path, MECHANISMS["a constraint between masses"])
     assert sum(result.design.values()) == pytest.approx(0.15, abs=1e-12)
-    assert any("upper constraint of total" in note for note in result.findings.notes)
+    assert any("upper constraint of total" in note for note in result.results.notes)
 
 
 def test_constraints_that_contradict_each_other_are_named(tmp_path: Path) -> None:
@@ -172,15 +172,15 @@ def test_a_mode_that_the_mesh_does_not_have_is_refused_at_its_line(tmp_path: Pat
 
 def test_the_highest_mode_of_all_can_be_assigned(tmp_path: Path) -> None:
     text = automatic((TARGET, "{mode: 21, frequency: 19 kHz}"))
-    findings = solved(tmp_path, text).findings
-    assert findings.others is None
-    assert findings.targets[0].mode == 21
+    results = solved(tmp_path, text).results
+    assert results.others is None
+    assert results.targets[0].mode == 21
 
 
 def test_the_three_modes_above_the_assigned_one_are_shown(tmp_path: Path) -> None:
     result = solved(tmp_path, shipped())
     case = case_of(tmp_path, shipped())
-    others = result.findings.others
+    others = result.results.others
     assert others is not None
     assert others.modes == (2, 3, 4)
     exact = case.model().frequencies(case.trajectory.q, list(result.design.values()), 4)
@@ -189,15 +189,15 @@ def test_the_three_modes_above_the_assigned_one_are_shown(tmp_path: Path) -> Non
 
 def test_a_prediction_over_the_tolerance_is_said_with_advice_that_helps(tmp_path: Path) -> None:
     text = shipped(("max_error: 2 %", "max_error: 0.1 %"))
-    findings = solved(tmp_path, text).findings
-    assert not findings.within_tolerance
-    (warning,) = findings.warnings
+    results = solved(tmp_path, text).results
+    assert not results.within_tolerance
+    (warning,) = results.warnings
     assert "0.32 % off" in warning
     assert "try expansion.y: [0.2287, 0]" in warning
-    again = solved(tmp_path, changed_point(text, "[0.2287, 0]")).findings
+    again = solved(tmp_path, changed_point(text, "[0.2287, 0]")).results
     assert again.approximation_error is not None
-    assert findings.approximation_error is not None
-    assert again.approximation_error < findings.approximation_error
+    assert results.approximation_error is not None
+    assert again.approximation_error < results.approximation_error
 
 
 def changed_point(text: str, y: str) -> str:
@@ -215,10 +215,10 @@ def test_an_optimum_that_is_worse_than_the_initial_design_is_not_passed_off_as_o
         ),
         ("elbow_mass.mass, min: 0, max: 250 g", "elbow_mass.mass, min: 0, max: 1"),
     )
-    findings = solved(tmp_path, text).findings
-    assert findings.error is not None
-    assert findings.error.exact.rms_relative > findings.error.initial.rms_relative
-    assert any("do not use this design" in warning for warning in findings.warnings)
+    results = solved(tmp_path, text).results
+    assert results.error is not None
+    assert results.error.exact.rms_relative > results.error.initial.rms_relative
+    assert any("do not use this design" in warning for warning in results.warnings)
 
 
 def test_solving_twice_gives_the_same_bits(tmp_path: Path) -> None:
@@ -236,8 +236,8 @@ def test_stages_are_announced_in_order_and_timed(tmp_path: Path) -> None:
     result = solve_case(
         case_of(tmp_path, shipped()), Options(use_cache=False, progress=told.append)
     )
-    assert len(told) == len(result.findings.timing_s) == 7
-    assert list(result.findings.timing_s) == [
+    assert len(told) == len(result.results.timing_s) == 7
+    assert list(result.results.timing_s) == [
         "model",
         "trajectory",
         "expansion",
@@ -248,11 +248,11 @@ def test_stages_are_announced_in_order_and_timed(tmp_path: Path) -> None:
     ]
 
 
-def test_a_plausibility_warning_reaches_the_findings(tmp_path: Path) -> None:
+def test_a_plausibility_warning_reaches_the_results(tmp_path: Path) -> None:
     misprint = ("bending_inertia: 3.97e-8", "bending_inertia: 3.97e-4")
     text = shipped(misprint, ("190 Hz", "19 kHz"))
-    findings = solved(tmp_path, text).findings
-    assert any("bending_inertia" in warning for warning in findings.warnings)
+    results = solved(tmp_path, text).results
+    assert any("bending_inertia" in warning for warning in results.warnings)
 
 
 def test_a_length_that_moves_the_tip_is_refused_with_a_tip_path_and_another_is_not(

@@ -11,7 +11,7 @@ from scenes import HEAD, SHIPPED, changed, scene_of
 import eigassign as ea
 from eigassign.case import parse
 from eigassign.study.drawing import AMPLITUDE, draw_modes, draw_poses, rest_pose, spread_samples
-from eigassign.study.findings import ModePictures
+from eigassign.study.results import ModePictures
 
 CASES = Path(__file__).parents[2] / "cases"
 ALL = sorted(path.stem for path in CASES.glob("*.yaml"))

@@ -8,7 +8,7 @@ from scenes import HEAD, SHIPPED, changed, scene_of
 
 from eigassign.case import parse
 from eigassign.study.comparison import q_grid, study_modes
-from eigassign.study.findings import PROPERTY_UNITS, coordinate_units, design_units
+from eigassign.study.results import PROPERTY_UNITS, coordinate_units, design_units
 from eigassign.study.scene import COARSE, compare, grid_over
 
 

@@ -22,17 +22,17 @@ def slowed(tmp_path: Path, duration: str) -> Path:
 
 
 def test_the_papers_motion_is_slow_and_that_is_noted() -> None:
-    findings = solve_case(load_case(CASE)).findings
-    assert any(note.startswith("slow motion") for note in findings.notes)
-    assert not any("not slow" in warning for warning in findings.warnings)
+    results = solve_case(load_case(CASE)).results
+    assert any(note.startswith("slow motion") for note in results.notes)
+    assert not any("not slow" in warning for warning in results.warnings)
 
 
 @pytest.mark.parametrize(("duration", "expected"), [("4 ms", True), ("200 ms", False)])
 def test_a_motion_in_milliseconds_is_warned_of(
     tmp_path: Path, duration: str, expected: bool
 ) -> None:
-    findings = solve_case(load_case(slowed(tmp_path, duration))).findings
-    assert any("not slow" in warning for warning in findings.warnings) is expected
+    results = solve_case(load_case(slowed(tmp_path, duration))).results
+    assert any("not slow" in warning for warning in results.warnings) is expected
 
 
 def test_the_corners_of_a_trapezoid_are_judged_by_its_acceleration(tmp_path: Path) -> None:

@@ -28,12 +28,12 @@ from eigassign.output.figures.ink import BLACK, GREY, LINE_IN, Box, Sheet, Strok
 from eigassign.output.figures.lettering import text_width
 from eigassign.output.figures.ticks import Scale, linear, logarithmic
 from eigassign.output.formats import percent
-from eigassign.study.findings import (
+from eigassign.study.results import (
     Comparison,
     DesignMap,
-    Findings,
     ModeStudy,
     OtherModes,
+    RunResults,
     TargetStudy,
 )
 
@@ -50,41 +50,41 @@ OPTIMAL = Stroke(ink.SKY, 3.2)
 PREDICTED = Stroke(ink.BLUE, 1.3, (5.0, 1.8))
 
 
-def joints(findings: Findings) -> Sheet:
+def joints(results: RunResults) -> Sheet:
     """q(t), one panel for each unit."""
-    units = tuple(dict.fromkeys(findings.q_units))
-    strokes = [ink.series_stroke(i) for i in range(len(findings.q_names))]
+    units = tuple(dict.fromkeys(results.q_units))
+    strokes = [ink.series_stroke(i) for i in range(len(results.q_names))]
     bands = [
         Band(
             {"rad": "joint angle", "m": "joint stroke"}.get(unit, "coordinate"),
             unit,
             tuple(
-                Curve(findings.q[:, i], strokes[i])
-                for i, own in enumerate(findings.q_units)
+                Curve(results.q[:, i], strokes[i])
+                for i, own in enumerate(results.q_units)
                 if own == unit
             ),
             2.6 if len(units) == 1 else 1.8,
         )
         for unit in units
     ]
-    entries = [Entry(short(n), s) for n, s in zip(findings.q_names, strokes, strict=True)]
-    return chart(f"Coordinates along {findings.along}", _time(findings), bands, entries)
+    entries = [Entry(short(n), s) for n, s in zip(results.q_names, strokes, strict=True)]
+    return chart(f"Coordinates along {results.along}", _time(results), bands, entries)
 
 
-def _time(findings: Findings) -> tuple[str, str, Floats]:
-    return ("time", "s", findings.time_s)
+def _time(results: RunResults) -> tuple[str, str, Floats]:
+    return ("time", "s", results.time_s)
 
 
-def _where(findings: Findings) -> str:
+def _where(results: RunResults) -> str:
     """Said in a title where there are several trajectories."""
-    return f", {findings.along}" if findings.only is not None else ""
+    return f", {results.along}" if results.only is not None else ""
 
 
-def over_time(findings: Findings, study: ModeStudy, comparison: Comparison) -> Sheet:
+def over_time(results: RunResults, study: ModeStudy, comparison: Comparison) -> Sheet:
     """Exact, Taylor and linearised frequency along the trajectory, and both errors."""
-    title = f"Mode {study.mode}: expansion against exact along {findings.along}, initial design"
+    title = f"Mode {study.mode}: expansion against exact along {results.along}, initial design"
     bands = comparison_bands(comparison)
-    return chart(title, _time(findings), bands, comparison_entries(study, comparison))
+    return chart(title, _time(results), bands, comparison_entries(study, comparison))
 
 
 def over_one(study: ModeStudy, over: DesignMap, around: Floats) -> Sheet:
@@ -127,7 +127,7 @@ def comparison_entries(study: ModeStudy, comparison: Comparison) -> list[Entry]:
     ]
 
 
-def assignment(findings: Findings, target: TargetStudy) -> Sheet:
+def assignment(results: RunResults, target: TargetStudy) -> Sheet:
     """Target, original and optimal frequency in time, and their distance to the target."""
     curves = (
         (target.initial_hz, INITIAL),
@@ -147,11 +147,11 @@ def assignment(findings: Findings, target: TargetStudy) -> Sheet:
         Band("off target", "%", errors, 1.35, zero_line=True),
     ]
     return chart(
-        f"Mode {target.mode}: assigned frequency{_where(findings)}", _time(findings), bands, entries
+        f"Mode {target.mode}: assigned frequency{_where(results)}", _time(results), bands, entries
     )
 
 
-def others(findings: Findings, modes: OtherModes) -> Sheet:
+def others(results: RunResults, modes: OtherModes) -> Sheet:
     """The modes that were not assigned, before and after."""
     curves = []
     for column, mode in enumerate(modes.modes):
@@ -165,7 +165,7 @@ def others(findings: Findings, modes: OtherModes) -> Sheet:
         Entry("optimal design", Stroke(ink.BLACK, 1.8)),
     ]
     return chart(
-        f"Next modes before and after, exact{_where(findings)}", _time(findings), [band], entries
+        f"Next modes before and after, exact{_where(results)}", _time(results), [band], entries
     )
 
 

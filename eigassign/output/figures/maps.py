@@ -21,7 +21,7 @@ from eigassign.output.figures.frame import (
 from eigassign.output.figures.ink import BLACK, LINE_IN, Box, Sheet, ramp, rectangle, short
 from eigassign.output.figures.ticks import Scale, levels, linear
 from eigassign.output.formats import percent
-from eigassign.study.findings import DesignMap, ModeStudy
+from eigassign.study.results import DesignMap, ModeStudy
 
 Floats = NDArray[np.float64]
 _MAP_IN = 1.75

@@ -44,7 +44,7 @@ from eigassign.output.figures.ink import (
 )
 from eigassign.output.figures.lettering import text_width
 from eigassign.output.figures.ticks import Scale, between, power_of_ten
-from eigassign.study.findings import BodyMark, Findings, JointMark, Poses, SpringMark
+from eigassign.study.results import DrawnBody, DrawnJoint, DrawnPoses, DrawnSpring, RunResults
 
 # --- The mechanism drawn in several poses with its tip path (Figures 1 and 2)
 
@@ -56,14 +56,12 @@ _BODIES = (BLUE, GREEN, PURPLE, SKY)
 _BODY_KEYS = 6
 
 
-def mechanism(findings: Findings) -> Sheet:
+def mechanism(results: RunResults) -> Sheet:
     """Links as lines, the pose's time told by its colour; see `symbols` for joints and bodies."""
-    poses = findings.poses
+    poses = results.poses
     held = extent(poses)
     entries = _entries(poses)
-    canvas, frame = _sheet(
-        held, entries, f"{short(findings.title, 70)}: poses along the trajectory"
-    )
+    canvas, frame = _sheet(held, entries, f"{short(results.title, 70)}: poses along the trajectory")
     sheet = canvas.sheet
     if frame is None:
         draw_bearings(canvas, 0.1, 0.1)
@@ -86,7 +84,7 @@ def mechanism(findings: Findings) -> Sheet:
     return sheet
 
 
-def _entries(poses: Poses) -> list[Entry]:
+def _entries(poses: DrawnPoses) -> list[Entry]:
     entries = [Entry("tip path", _TIP)] if poses.tip_path is not None else []
     for at, body in enumerate(poses.bodies[:_BODY_KEYS]):
         entries.append(Entry(short(body.name, 22), Stroke(_BODIES[at % len(_BODIES)], dot=7.0)))
@@ -144,7 +142,9 @@ _PLAIN = 2.6  # points: of lines without a section
 _PIECE = 4  # points of a tapered line that are drawn with one width
 
 
-def draw_lines(canvas: Canvas, poses: Poses, pose: int, colour: str, scale: float = 1.0) -> None:
+def draw_lines(
+    canvas: Canvas, poses: DrawnPoses, pose: int, colour: str, scale: float = 1.0
+) -> None:
     """All links of one pose; thicker sections are drawn thicker, a taper as one."""
     widths = line_widths(poses)
     for points, width in zip(poses.lines[pose], widths, strict=True):
@@ -153,7 +153,7 @@ def draw_lines(canvas: Canvas, poses: Poses, pose: int, colour: str, scale: floa
             canvas.sheet.line(piece, Stroke(colour, scale * canvas.grain * at))
 
 
-def line_widths(poses: Poses) -> list[tuple[float, float]]:
+def line_widths(poses: DrawnPoses) -> list[tuple[float, float]]:
     """Start and end width of each line in points, by the root of its section's size."""
     largest = max((size for pair in poses.sizes for size in pair), default=0.0)
     if largest == 0.0:
@@ -181,7 +181,7 @@ def _pieces(placed: Floats, width: tuple[float, float]) -> list[tuple[Floats, fl
     ]
 
 
-def draw_ground(canvas: Canvas, joints: Sequence[JointMark]) -> None:
+def draw_ground(canvas: Canvas, joints: Sequence[DrawnJoint]) -> None:
     """What the joints on the ground stand on, and the way of those that slide in all poses."""
     for joint in joints:
         if joint.grounded:
@@ -223,7 +223,7 @@ def _hatched(canvas: Canvas, at: Floats, along: Floats, behind: Floats, half: fl
 
 
 def draw_joints(
-    canvas: Canvas, joints: Sequence[JointMark], pose: int, colour: str, kinds: Sequence[str]
+    canvas: Canvas, joints: Sequence[DrawnJoint], pose: int, colour: str, kinds: Sequence[str]
 ) -> None:
     """A ring where it turns, a box where it slides, a square where it is fixed.
 
@@ -250,7 +250,7 @@ def _box(at: Floats, along: Floats, half: float, tall: float) -> Floats:
     return np.array([at + a * half * along + b * tall * across for a, b in signs])
 
 
-def draw_bodies(canvas: Canvas, bodies: Sequence[BodyMark], pose: int, colour: str) -> None:
+def draw_bodies(canvas: Canvas, bodies: Sequence[DrawnBody], pose: int, colour: str) -> None:
     """Dots whose volume tells the mass; a ring for none."""
     for body, diameter in zip(bodies, diameters(bodies), strict=True):
         (at,) = canvas.place(body.places[pose][None])
@@ -258,7 +258,7 @@ def draw_bodies(canvas: Canvas, bodies: Sequence[BodyMark], pose: int, colour: s
         canvas.sheet.dot((at[0], at[1]), diameter * canvas.grain, fill, colour)
 
 
-def diameters(bodies: Sequence[BodyMark]) -> list[float]:
+def diameters(bodies: Sequence[DrawnBody]) -> list[float]:
     """In points."""
     heaviest = max((body.mass for body in bodies), default=0.0)
     if heaviest <= 0.0:
@@ -266,7 +266,7 @@ def diameters(bodies: Sequence[BodyMark]) -> list[float]:
     return [6.0 + 6.0 * (max(body.mass, 0.0) / heaviest) ** (1.0 / 3.0) for body in bodies]
 
 
-def draw_springs(canvas: Canvas, springs: Sequence[SpringMark], pose: int, colour: str) -> None:
+def draw_springs(canvas: Canvas, springs: Sequence[DrawnSpring], pose: int, colour: str) -> None:
     """A zigzag between its ends or to the ground, a spiral where it only resists rotation."""
     for spring in springs:
         start, end = canvas.place(np.stack([spring.starts[pose], spring.ends[pose]]))
@@ -340,7 +340,7 @@ def _seen(flat: Floats) -> float:
     return float(long * max(short, 0.2 * long))
 
 
-def points_of(poses: Poses) -> Floats:
+def points_of(poses: DrawnPoses) -> Floats:
     """Everything that a drawing of these poses has to hold, (n, d)."""
     parts = [line for lines in poses.lines for line in lines]
     parts += [body.places for body in poses.bodies]
@@ -401,7 +401,7 @@ class Extent:
         return Canvas(sheet, self.view, self.box[:2], centre, scale, grain)
 
 
-def extent(poses: Poses, others: Iterable[Floats] = ()) -> Extent:
+def extent(poses: DrawnPoses, others: Iterable[Floats] = ()) -> Extent:
     """The extent of these poses and other points in the view that suits the poses."""
     shown = points_of(poses)
     return Extent(view_of(shown), np.concatenate([shown, *others]))

@@ -32,7 +32,7 @@ from eigassign.output.figures.mechanism import (
 )
 from eigassign.output.figures.plan import FigurePlan
 from eigassign.output.formats import number
-from eigassign.study.findings import ModePictures
+from eigassign.study.results import ModePictures
 
 _MODE_TALL_IN = (1.6, 5.2)
 _MODE_FOOT_IN = {False: 0.75, True: 0.95}  # in a plane, in space: for the axes and the joints' feet

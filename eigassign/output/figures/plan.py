@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.output.formats import percent
-from eigassign.study.findings import (
+from eigassign.study.results import (
     Comparison,
     DesignMap,
-    Findings,
     ModeStudy,
     OtherModes,
+    RunResults,
     TargetStudy,
     along_each,
 )
@@ -41,7 +41,7 @@ class FigurePlan:
 
 
 def render(plans: Sequence[FigurePlan]) -> dict[str, bytes]:
-    """PNG files by file name; the same findings give the same bytes.
+    """PNG files by file name; the same results give the same bytes.
 
     While one figure is drawn, a thread compresses the one before.
     """
@@ -54,25 +54,25 @@ def render(plans: Sequence[FigurePlan]) -> dict[str, bytes]:
     return {name: future.result() for name, future in files.items()}
 
 
-def plan(findings: Findings) -> tuple[FigurePlan, ...]:
-    """The figures that these findings have something to show for, in reading order."""
-    return tuple(_plans(findings))
+def plan(results: RunResults) -> tuple[FigurePlan, ...]:
+    """The figures that these results have something to show for, in reading order."""
+    return tuple(_plans(results))
 
 
-def _plans(findings: Findings) -> Iterator[FigurePlan]:
-    if any(lines for lines in findings.poses.lines):
-        yield _mechanism(findings)
-    each = along_each(findings)
+def _plans(results: RunResults) -> Iterator[FigurePlan]:
+    if any(lines for lines in results.poses.lines):
+        yield _mechanism(results)
+    each = along_each(results)
     yield from (_joints(one) for one in each if one.q.size)
-    for k, study in enumerate(findings.studies):
+    for k, study in enumerate(results.studies):
         for one in each:
             comparison = one.studies[k].over_time
             if comparison is not None and comparison.exact_hz.size:
                 yield _over_time(one, study, comparison)
-        yield from _over(study, study.over_q, study.q0, findings.q_names, "q")
-        names = tuple(row.name for row in findings.design)
+        yield from _over(study, study.over_q, study.q0, results.q_names, "q")
+        names = tuple(row.name for row in results.design)
         yield from _over(study, study.over_design, study.y0, names, "design")
-    for mode in dict.fromkeys(target.mode for target in findings.targets):
+    for mode in dict.fromkeys(target.mode for target in results.targets):
         for one in each:
             own = (target for target in one.targets if target.mode == mode)
             yield from (_assignment(one, target) for target in own if target.target_hz.size)
@@ -81,57 +81,57 @@ def _plans(findings: Findings) -> Iterator[FigurePlan]:
             yield _others(one, one.others)
 
 
-def _mechanism(findings: Findings) -> FigurePlan:
+def _mechanism(results: RunResults) -> FigurePlan:
     def draw() -> Sheet:
         from eigassign.output.figures import mechanism as poses
 
-        return poses.mechanism(findings)
+        return poses.mechanism(results)
 
-    links = ", ".join(findings.poses.link_names)
+    links = ", ".join(results.poses.link_names)
     return FigurePlan(
         "mechanism.png",
         "Mechanism",
-        f"The links ({links}) in {len(findings.poses.lines)} poses, and the path of the tip.",
+        f"The links ({links}) in {len(results.poses.lines)} poses, and the path of the tip.",
         f"Line drawing of the mechanism with links {links} in several poses.",
         draw,
     )
 
 
-def _suffix(findings: Findings) -> str:
+def _suffix(results: RunResults) -> str:
     """What tells the files of several trajectories apart."""
-    return f"_{findings.only}" if findings.only is not None else ""
+    return f"_{results.only}" if results.only is not None else ""
 
 
-def _of(findings: Findings) -> str:
+def _of(results: RunResults) -> str:
     """The same for headings."""
-    return f", {findings.along}" if findings.only is not None else ""
+    return f", {results.along}" if results.only is not None else ""
 
 
-def _joints(findings: Findings) -> FigurePlan:
+def _joints(results: RunResults) -> FigurePlan:
     def draw() -> Sheet:
         from eigassign.output.figures import curves
 
-        return curves.joints(findings)
+        return curves.joints(results)
 
-    names = ", ".join(findings.q_names)
+    names = ", ".join(results.q_names)
     return FigurePlan(
-        f"coordinates{_suffix(findings)}.png",
-        f"Coordinates{_of(findings)}",
-        f"The coordinates {names} along {findings.along} of {findings.time_s.size} samples.",
+        f"coordinates{_suffix(results)}.png",
+        f"Coordinates{_of(results)}",
+        f"The coordinates {names} along {results.along} of {results.time_s.size} samples.",
         f"Curves of {names} over time.",
         draw,
     )
 
 
-def _over_time(findings: Findings, study: ModeStudy, comparison: Comparison) -> FigurePlan:
+def _over_time(results: RunResults, study: ModeStudy, comparison: Comparison) -> FigurePlan:
     def draw() -> Sheet:
         from eigassign.output.figures import curves
 
-        return curves.over_time(findings, study, comparison)
+        return curves.over_time(results, study, comparison)
 
     return FigurePlan(
-        f"approximation_mode_{study.mode}_time{_suffix(findings)}.png",
-        f"Mode {study.mode}: expansion along {findings.along}",
+        f"approximation_mode_{study.mode}_time{_suffix(results)}.png",
+        f"Mode {study.mode}: expansion along {results.along}",
         "Exact, Taylor and linearised frequency at the initial design. " + _worst(comparison),
         f"Frequency of mode {study.mode} over time and the errors of both expansions.",
         draw,
@@ -175,15 +175,15 @@ def _over(
     )
 
 
-def _assignment(findings: Findings, target: TargetStudy) -> FigurePlan:
+def _assignment(results: RunResults, target: TargetStudy) -> FigurePlan:
     def draw() -> Sheet:
         from eigassign.output.figures import curves
 
-        return curves.assignment(findings, target)
+        return curves.assignment(results, target)
 
     return FigurePlan(
-        f"assignment_mode_{target.mode}{_suffix(findings)}.png",
-        f"Mode {target.mode}: original, optimal and target frequency{_of(findings)}",
+        f"assignment_mode_{target.mode}{_suffix(results)}.png",
+        f"Mode {target.mode}: original, optimal and target frequency{_of(results)}",
         f"Worst distance to the target {percent(target.initial.max_relative)} before and "
         f"{percent(target.exact.max_relative)} after, "
         f"where the expansion predicted {percent(target.predicted.max_relative)}.",
@@ -192,16 +192,16 @@ def _assignment(findings: Findings, target: TargetStudy) -> FigurePlan:
     )
 
 
-def _others(findings: Findings, others: OtherModes) -> FigurePlan:
+def _others(results: RunResults, others: OtherModes) -> FigurePlan:
     def draw() -> Sheet:
         from eigassign.output.figures import curves
 
-        return curves.others(findings, others)
+        return curves.others(results, others)
 
     modes = ", ".join(map(str, others.modes))
     return FigurePlan(
-        f"other_modes{_suffix(findings)}.png",
-        f"Next modes{_of(findings)}",
+        f"other_modes{_suffix(results)}.png",
+        f"Next modes{_of(results)}",
         f"Exact frequencies of modes {modes}, which were not assigned, before and after.",
         f"Frequencies of modes {modes} over time before and after.",
         draw,

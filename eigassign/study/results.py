@@ -3,7 +3,7 @@
 Shapes: n_t samples in time, n_q coordinates, n_y design parameters. SI units, frequencies in Hz,
 errors as fractions (0.01 is 1 %) of the frequency in Hz.
 
-The findings of a run along each of its trajectories alone, for what is shown one by one.
+The results of a run along each of its trajectories alone, for what is shown one by one.
 
 The SI unit of every numeric property of a mechanism, by the last key of its path.
 
@@ -194,7 +194,7 @@ class TrajectoryRow:
 
 
 @dataclass(frozen=True)
-class Findings:
+class RunResults:
     """Everything a run folder shows."""
 
     title: str
@@ -207,7 +207,7 @@ class Findings:
     time_s: Floats  # of each trajectory from its own start
     q: Floats  # (n_t, n_q), of several trajectories one after the other
     trajectories: tuple[TrajectoryRow, ...]
-    poses: Poses
+    poses: DrawnPoses
     studies: tuple[ModeStudy, ...]
     design: tuple[DesignRow, ...]
     targets: tuple[TargetStudy, ...]
@@ -288,29 +288,29 @@ class ValidationRow:
     passed: bool
 
 
-# --- The findings of a run along each of its trajectories alone, for what is shown one by one
+# --- The results of a run along each of its trajectories alone, for what is shown one by one
 
 
-def along_each(findings: Findings) -> tuple[Findings, ...]:
+def along_each(results: RunResults) -> tuple[RunResults, ...]:
     """One for each trajectory, whose name is its ``only``; itself where there is none or one.
 
     Poses, maps over q and y, design, solver, warnings and notes stay those of the whole run.
     """
-    if len(findings.trajectories) < 2:
-        return (findings,)
-    return tuple(_along(findings, row) for row in findings.trajectories)
+    if len(results.trajectories) < 2:
+        return (results,)
+    return tuple(_along(results, row) for row in results.trajectories)
 
 
-def _along(findings: Findings, row: TrajectoryRow) -> Findings:
-    rows, others = row.rows, findings.others
-    narrow = (_target(target, row.name) for target in findings.targets)
+def _along(results: RunResults, row: TrajectoryRow) -> RunResults:
+    rows, others = row.rows, results.others
+    narrow = (_target(target, row.name) for target in results.targets)
     return replace(
-        findings,
+        results,
         only=row.name,
-        time_s=findings.time_s[rows],
-        q=findings.q[rows],
+        time_s=results.time_s[rows],
+        q=results.q[rows],
         trajectories=(replace(row, rows=slice(0, rows.stop - rows.start)),),
-        studies=tuple(_study(study, rows) for study in findings.studies),
+        studies=tuple(_study(study, rows) for study in results.studies),
         targets=tuple(target for target in narrow if target is not None),
         others=None
         if others is None
@@ -397,7 +397,7 @@ def coordinate_units(file: CaseFile) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class JointMark:
+class DrawnJoint:
     """One joint: ``kind`` is "turning", "sliding" or "fixed"."""
 
     name: str
@@ -409,7 +409,7 @@ class JointMark:
 
 
 @dataclass(frozen=True)
-class BodyMark:
+class DrawnBody:
     """One body, or rigid link without extent."""
 
     name: str
@@ -418,7 +418,7 @@ class BodyMark:
 
 
 @dataclass(frozen=True)
-class SpringMark:
+class DrawnSpring:
     """One spring, between two places or from one to the ground."""
 
     name: str
@@ -429,18 +429,18 @@ class SpringMark:
 
 
 @dataclass(frozen=True)
-class Poses:
+class DrawnPoses:
     """The mechanism in n poses: ``lines[pose][line]`` is a polyline (n_points, d)."""
 
     time_s: Floats  # (n,)
     lines: tuple[tuple[Floats, ...], ...]
     link_names: tuple[str, ...]
     line_links: tuple[str, ...] = ()  # per line the link it belongs to
-    bodies: tuple[BodyMark, ...] = ()
+    bodies: tuple[DrawnBody, ...] = ()
     tip_path: Floats | None = None  # (…, d), NaN between the end of a trajectory and the next
     of: tuple[str, ...] = ()  # of several trajectories the one that each pose belongs to
-    joints: tuple[JointMark, ...] = ()
-    springs: tuple[SpringMark, ...] = ()
+    joints: tuple[DrawnJoint, ...] = ()
+    springs: tuple[DrawnSpring, ...] = ()
     # per line: its section's largest radius of gyration at start and end; 0 without a section
     sizes: tuple[tuple[float, float], ...] = ()
 
@@ -459,5 +459,5 @@ class ModePictures:
     q: tuple[tuple[str, float, str], ...]  # name, value, SI unit
     y: tuple[tuple[str, float, str], ...]
     amplitude: float
-    rest: Poses  # one pose
-    deformed: Poses  # a pose a mode
+    rest: DrawnPoses  # one pose
+    deformed: DrawnPoses  # a pose a mode

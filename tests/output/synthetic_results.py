@@ -1,4 +1,4 @@
-"""Findings that no mechanics produced: shapes, names and magnitudes of every kind to draw."""
+"""Run results that no mechanics produced: shapes, names and magnitudes of every kind to draw."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.study.findings import (
-    BodyMark,
+from eigassign.study.results import (
     Comparison,
     DesignMap,
     DesignRow,
+    DrawnBody,
+    DrawnJoint,
+    DrawnPoses,
+    DrawnSpring,
     ErrorRow,
     ErrorSummary,
-    Findings,
-    JointMark,
     ModeStudy,
     OtherModes,
-    Poses,
+    RunResults,
     SolverRow,
-    SpringMark,
     TargetAlong,
     TargetStudy,
     TrajectoryRow,
@@ -29,7 +29,7 @@ from eigassign.study.findings import (
 Floats = NDArray[np.float64]
 
 
-def make_findings(
+def make_results(
     *,
     n_t: int = 152,
     n_q: int = 2,
@@ -43,14 +43,14 @@ def make_findings(
     varies: bool = True,
     spatial: bool = False,
     parts: tuple[int, ...] | None = None,
-) -> Findings:
+) -> RunResults:
     time = np.linspace(0.0, 1.0, n_t) if n_t > 1 else np.zeros(n_t)
     names = tuple(f"{prefix}q{i + 1}" for i in range(n_q))
     q = _joint_motion(time, n_q)
     studies = tuple(_study(i + 1, time, n_y, n_q, scale_hz, prefix, varies) for i in range(1))
     parts = (n_t,) if parts is None else parts
     targets = tuple(_target(i + 1, time, scale_hz, parts) for i in range(n_targets if n_t else 0))
-    return Findings(
+    return RunResults(
         title=title,
         reference="Belotti et al., Appl. Sci. 11 (2021) 11558",
         case_name="two_link",
@@ -93,9 +93,9 @@ def _joint_motion(time: Floats, n_q: int) -> Floats:
     return starts + np.outer(blend, travels) + 0.1 * np.outer(np.sin(5 * blend), np.ones(n_q))
 
 
-def _poses(time: Floats, n_links: int, scale: float, prefix: str, spatial: bool) -> Poses:
+def _poses(time: Floats, n_links: int, scale: float, prefix: str, spatial: bool) -> DrawnPoses:
     if time.size == 0 or n_links == 0:
-        return Poses(np.zeros(0), (), ())
+        return DrawnPoses(np.zeros(0), (), ())
     chosen = np.unique(np.linspace(0, time.size - 1, 6).round().astype(int))
     every = [_chain(_joint_motion(time[[k]], n_links)[0], scale, spatial) for k in range(time.size)]
     lines = tuple(every[k] for k in chosen)
@@ -105,24 +105,24 @@ def _poses(time: Floats, n_links: int, scale: float, prefix: str, spatial: bool)
     sideways = np.zeros_like(ends[0])
     sideways[:, 0] = 1.0
     names = tuple(f"{prefix}link_{i + 1}" for i in range(n_links))
-    return Poses(
+    return DrawnPoses(
         time_s=time[chosen],
         lines=lines,
         link_names=names,
         line_links=names,
         bodies=tuple(
-            BodyMark(f"{prefix}{name}", mass, at)
+            DrawnBody(f"{prefix}{name}", mass, at)
             for name, mass, at in (("elbow_mass", 0.0, ends[1]), ("tool_mass", 0.25, ends[2]))
         ),
         tip_path=np.array([pose[-1][-1] for pose in every]),
         joints=(
-            JointMark("shoulder", "turning", True, True, ends[0], sideways),
-            JointMark("elbow", "sliding", False, False, ends[1], sideways),
-            JointMark("wrist", "fixed", False, False, ends[2], sideways),
+            DrawnJoint("shoulder", "turning", True, True, ends[0], sideways),
+            DrawnJoint("elbow", "sliding", False, False, ends[1], sideways),
+            DrawnJoint("wrist", "fixed", False, False, ends[2], sideways),
         ),
         springs=(
-            SpringMark("gear", True, True, ends[0], ends[0]),
-            SpringMark("stay", False, False, ends[0], ends[2]),
+            DrawnSpring("gear", True, True, ends[0], ends[0]),
+            DrawnSpring("stay", False, False, ends[0], ends[2]),
         ),
         sizes=((2e-3, 1e-3),) * n_links,
     )
