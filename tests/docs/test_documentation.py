@@ -1,0 +1,186 @@
+"""README and manual, held to what they describe."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import eigassign
+from eigassign.case import json_schema, parse
+from eigassign.case.schema.joints import JOINTS
+from eigassign.case.schema.links import LINKS, SHAPES
+from eigassign.cli import cli
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = Path(eigassign.__file__).parent
+TWO_LINK = ROOT / "cases" / "two_link.yaml"
+README = ROOT / "README.md"
+MANUAL = PACKAGE / "docs"
+PAGES = [
+    README,
+    *sorted(MANUAL.glob("*.md")),
+    ROOT / "cases" / "README.md",
+    ROOT / "cases" / "stress" / "README.md",
+    ROOT / "benchmarks" / "README.md",
+    *sorted((ROOT / "benchmarks" / "results").glob("*.md")),
+]
+OPTIONS_OF_OTHERS = {"--pyargs", "--collect-only"}
+MOST_WORDS = 1500
+
+
+def page_id(page: Path) -> str:
+    return str(page.relative_to(ROOT if page.is_relative_to(ROOT) else PACKAGE.parent))
+
+
+def read(page: Path) -> str:
+    return page.read_text(encoding="utf-8")
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", read(page), re.DOTALL | re.MULTILINE)
+
+
+def prose(page: Path) -> str:
+    """A page without its code blocks."""
+    return re.sub(r"^```.*?^```", "", read(page), flags=re.DOTALL | re.MULTILINE)
+
+
+def quoted(page: Path) -> list[str]:
+    """What stands between backticks."""
+    return re.findall(r"`([^`\n]+)`", prose(page))
+
+
+def anchors(page: Path) -> Iterator[str]:
+    """Names that headings get on the common hosts: lower case, no punctuation, dashes."""
+    for heading in re.findall(r"^#+ (.*)$", prose(page), re.MULTILINE):
+        yield re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+
+
+def all_options() -> set[str]:
+    groups = [cli, *cli.commands.values()]
+    groups += [sub for each in cli.commands.values() for sub in getattr(each, "commands", {}).values()]
+    return {o for command in groups for p in command.params for o in p.opts if o[:2] == "--"} | {
+        "--help"
+    }
+
+
+def test_the_readme_is_short() -> None:
+    assert len(prose(README).split()) <= MOST_WORDS
+
+
+def test_the_case_shown_is_the_case_shipped() -> None:
+    shown = next(block for block in blocks(README, "yaml") if block.startswith("title:"))
+    assert parse(shown.encode(), TWO_LINK) == parse(TWO_LINK.read_bytes(), TWO_LINK)
+
+
+def test_every_key_of_a_case_file_is_explained() -> None:
+    explained = set(re.findall(r"\w+", " ".join(quoted(MANUAL / "case-file.md"))))
+    schema = json_schema()
+    keys = {key for each in schema["$defs"].values() for key in each.get("properties", {})}
+    assert (keys | set(schema["properties"])) - explained == set()
+
+
+def test_every_type_of_link_joint_and_section_is_explained() -> None:
+    text = read(MANUAL / "case-file.md")
+    for names in (JOINTS, LINKS, SHAPES):
+        for name in names:
+            assert re.search(rf"^\| `(type: |shape: )?{name}`", text, re.MULTILINE), name
+
+
+@pytest.mark.parametrize("page", [README, MANUAL / "python.md"], ids=page_id)
+def test_the_python_shown_runs(
+    page: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "cases").mkdir()
+    shutil.copy(TWO_LINK, tmp_path / "cases")
+    monkeypatch.chdir(tmp_path)  # what it saves goes there
+    names: dict[str, object] = {}
+    for block in blocks(page, "python"):
+        exec(block, names)
+    assert len(names["result"].exact_hz) == 152  # type: ignore[attr-defined]
+
+
+def test_every_command_and_option_is_explained() -> None:
+    text = read(MANUAL / "command-line.md")
+    for name in cli.commands:
+        assert f"`eigassign {name}" in read(README)
+        assert f"`eigassign {name}" in text
+    assert {option for option in all_options() if f"`{option}" not in text} == set()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_id)
+def test_every_command_and_option_named_exists(page: Path) -> None:
+    code = [*quoted(page), *blocks(page, "bash")]
+    named = {name for text in code for name in re.findall(r"\beigassign ([a-z]+)\b", text)}
+    assert named - set(cli.commands) == set()
+    ours = [text for text in code if re.match(r"(\.venv/bin/)?eigassign |--", text)]
+    options = {o for text in ours for o in re.findall(r"--[a-z][a-z-]*", text)}
+    assert options - all_options() - OPTIONS_OF_OTHERS == set()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_id)
+def test_every_link_leads_somewhere(page: Path) -> None:
+    links = re.findall(r"\]\((?!https?:)([^)#]*)(?:#([^)]*))?\)", prose(page))
+    for path, anchor in links:
+        target = page.parent / path if path else page
+        assert target.exists(), path
+        if anchor:
+            assert anchor in set(anchors(target)), f"{path}#{anchor}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_id)
+def test_every_module_and_file_named_exists(page: Path) -> None:
+    parts = {path.stem for path in PACKAGE.iterdir() if path.suffix in ("", ".py")}
+    for text in quoted(page):
+        name = text.removeprefix("eigassign.")
+        if re.fullmatch(r"[a-z_]+(\.[a-z_]+)+", name) and name.split(".")[0] in parts:
+            place = PACKAGE.joinpath(*name.split("."))
+            if place.suffix not in (".yaml", ".json") and "." in name and text != "case.yaml":
+                assert place.is_dir() or place.with_suffix(".py").exists(), text
+        if re.fullmatch(r"(eigassign|tests|benchmarks|cases)/[\w./-]*", text):
+            assert (ROOT / text).exists(), text
+
+
+def test_the_manual_s_index_lists_every_page_and_all_are_installed() -> None:
+    index = read(MANUAL / "index.md")
+    pages = {page.name for page in MANUAL.glob("*.md")} - {"index.md"}
+    assert {name for name in pages if f"]({name})" not in index} == set()
+    assert '"docs/*.md"' in read(ROOT / "pyproject.toml")
+
+
+def test_every_case_shipped_is_listed() -> None:
+    for folder in (ROOT / "cases", ROOT / "cases" / "stress"):
+        text = read(folder / "README.md")
+        assert {c.name for c in folder.glob("*.yaml") if f"]({c.name})" not in text} == set()
+
+
+def test_every_phenomenon_has_its_test() -> None:
+    explained, listed = (
+        re.findall(r"^\| (?!phenomenon|---)([^|]+?) \|", read(page), re.MULTILINE)
+        for page in (MANUAL / "when-methods-fail.md", ROOT / "cases" / "stress" / "README.md")
+    )
+    assert explained == listed
+    for name in re.findall(r"`(test_\w+\.py)`", read(ROOT / "cases" / "stress" / "README.md")):
+        assert (ROOT / "tests" / "stability" / name).exists(), name
+
+
+def test_every_benchmark_is_described_and_its_peers_can_be_installed() -> None:
+    described = read(ROOT / "benchmarks" / "README.md")
+    scripts = {p.name: read(p) for p in ROOT.glob("benchmarks/*.py")}
+    run = {name for name, text in scripts.items() if "__main__" in text}
+    assert len(run) >= 10
+    assert {name for name in run if f"`{name}`" not in described} == set()
+    extra = read(ROOT / "pyproject.toml").split("bench = [")[1]
+    peers = {"eastereig": "EasterEig", "openseespy": "openseespy", "exudyn": "exudyn"}
+    peers |= {"smt": "smt", "sklearn": "scikit-learn"}
+    used = {
+        package
+        for name, package in peers.items()
+        if any(re.search(rf"(import|from) {name}\b", text) for text in scripts.values())
+    }
+    assert used == set(peers.values())
+    assert {package for package in used if f'"{package}==' not in extra} == set()
