@@ -24,6 +24,7 @@ OWNERS = {
     "rich": {"output"},
     "jinja2": {"output"},
     "click": {"cli"},
+    "sklearn": {"chart"},
 }
 EVERYWHERE = {"numpy", "scipy"}
 PRINTING = {"cli.cache", "cli.inspect", "cli.runs", "cli.reporter", "output.console"}

@@ -35,7 +35,7 @@ from eigassign.assignment import (
 from eigassign.chart.effort import Effort, suited
 from eigassign.chart.methods import points_along, reduced_model, solves_per_point
 from eigassign.chart.results import DesignRun, Timing, excess_over
-from eigassign.chart.search import Limits, Watched, by_evolution, by_gradient, by_kriging
+from eigassign.chart.search import Limits, Watched, by_evolution, by_gradient
 from eigassign.chart.timing import measure
 from eigassign.errors import EigassignError
 from eigassign.mechanism.assembly.pencil import Pencil
@@ -51,8 +51,6 @@ Floats = NDArray[np.float64]
 Search = Callable[[Watched, Floats, Limits], None]
 ROUNDS = 12  # programs in a row at most
 STILL = 1e-7  # of the box: a design that moves less has arrived
-MOST_KRIGING = 12  # design parameters up to which Kriging is tried
-FEW = 60  # evaluations of a Kriging search: it is for objectives that cost much
 CHARTED_ONLY = "charted only"  # `optimize` solves one program, on the expansion
 PRECISE_STEP = 1e-4  # of central differences of reduced models, relative to the box
 
@@ -101,12 +99,9 @@ def _searches(task: Task, most: int) -> Iterator[tuple[str, Callable[[], DesignR
         "SLSQP, finite differences": partial(by_gradient, analytic=False),
         "differential evolution": by_evolution,
     }
-    if len(task.box[1]) <= MOST_KRIGING:
-        ways["Kriging search"] = by_kriging
     for name, search in ways.items():
-        few = min(most, FEW) if search is by_kriging else most
         slopes = name == "SLSQP, analytic gradient"
-        yield name, partial(_search, task, name, few, search, slopes)
+        yield name, partial(_search, task, name, most, search, slopes)
 
 
 def _exact(task: Task, y: Floats) -> Floats:

@@ -3,30 +3,24 @@
 Surrogates of f(u) on the unit box from its values at training points: what people fit.
 
 Every fit takes u (n, d) in [0, 1] and f (n, n_modes) and gives a function of u (k, d) that returns
-(k, n_modes). Kriging is in `surrogates_kriging`.
+(k, n_modes).
 
 Surrogates along whole trajectories of many designs: one product of matrices, as fits have it.
 
     f(u) = Σ_k a_k(u_0) b_k(u_1, …)
 
 with the place u_0 along the trajectory and the design in the other variables. What is a polynomial,
-a tensor of splines or a squared-exponential Kriging is of this form: the a_k at all samples are
+a tensor of splines is of this form: the a_k at all samples are
 made once, and a design needs its b_k only.
-
-Ordinary Kriging: a Gaussian process, one length scale a variable, by maximum likelihood.
-
-    R_ij = exp(−½ Σ_k ((u_ik − u_jk)/ℓ_k)²) + ν δ_ij,   f̂(u) = μ + r(u)ᵀ R⁻¹ (f − μ)
-
-with μ and σ² in closed form and ℓ from maximising the concentrated likelihood
-−½ (n log σ² + log |R|) over log ℓ, with its analytic gradient, from several starts. The nugget ν is
-the least that R needs to be factored.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial, reduce
+from importlib.util import find_spec
 from itertools import product
 from typing import Literal
 
@@ -34,13 +28,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.interpolate import BSpline
-from scipy.linalg import cho_solve, eigh
-from scipy.optimize import minimize
-from scipy.spatial.distance import cdist
+from scipy.linalg import eigh
 
 from eigassign.chart.methods import Evaluator, Method
 from eigassign.chart.question import Features, Points
-from eigassign.errors import AccuracyError, UsageError
+from eigassign.errors import UsageError
 from eigassign.interpolation.newton import spread_steps
 from eigassign.modal.exact.condensation import condense
 from eigassign.modal.model import Model
@@ -186,15 +178,15 @@ def _by_lines(features: Features, made: Separable) -> Evaluator:
 
 
 def surrogate_methods(
-    features: Features, counts: Sequence[int], kriging: Sequence[int]
+    features: Features, counts: Sequence[int], kriged: Sequence[int]
 ) -> Iterator[Method]:
-    """Surrogates fitted to the same spread-out exact solves; Kriging for the counts it can bear."""
+    """Surrogates fitted to the same spread-out exact solves; Kriging for the counts ``kriged``."""
     for n in counts:
         u = spread_points(n, features.d)
         yield from (_fitted(features, u, n, *each) for each in _fits(features, u))
-        if n in kriging:
-            how = {"kernel": "squared exponential", "starts": 2}
-            yield _fitted(features, u, n, "Kriging", how, partial(_kriging, features, u))
+        if n in kriged and can_krige():
+            how = {"kernel": "squared exponential", "by": "scikit-learn"}
+            yield _fitted(features, u, n, "Kriging", how, partial(_kriging, u))
 
 
 def _fits(
@@ -235,14 +227,30 @@ def _rbf(u: Floats, kernel: Kernel, f: Floats) -> Evaluator:
     return lambda points: made(points.u)
 
 
-def _kriging(features: Features, u: Floats, f: Floats) -> Evaluator:
-    fitted = [fit_kriging(u, column) for column in f.T]
-    anywhere = partial(_columns, fitted)
-    return _by_lines(features, Separable(anywhere, kriging_lines(fitted)))
+def can_krige() -> bool:
+    """Whether scikit-learn is installed: it is no dependency of eigassign."""
+    return find_spec("sklearn") is not None
 
 
-def _columns(fitted: Sequence[Kriging], at: Floats) -> Floats:
-    return np.column_stack([one(at) for one in fitted])
+def kriging(u: Floats, f: Floats) -> Surrogate:
+    """scikit-learn's Gaussian process for each column of f, one length scale a variable."""
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel
+
+    kernel = ConstantKernel(1.0, (1e-3, 1e6)) * RBF(np.ones(u.shape[1]), (1e-2, 1e2))
+    process = partial(
+        GaussianProcessRegressor,
+        kernel, alpha=1e-10, normalize_y=True, n_restarts_optimizer=1, random_state=1,
+    )  # fmt: skip
+    with warnings.catch_warnings():  # of length scales at their bounds
+        warnings.simplefilter("ignore")
+        fitted = [process().fit(u, column) for column in f.T]
+    return lambda at: np.column_stack([one.predict(at) for one in fitted])
+
+
+def _kriging(u: Floats, f: Floats) -> Evaluator:
+    made = kriging(u, f)
+    return lambda points: made(points.u)
 
 
 # --- Surrogates of f(u) on the unit box from its values at training points: what people fit
@@ -398,10 +406,7 @@ SPARSE = 10  # a dense product is quicker up to so many times the numbers that a
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """``first``: u_0 (n_t,) → (n_modes, N, n_t); ``second``: the rest (n, d − 1) → (n, N).
-
-    ``second`` is (n_modes, n, N) where the modes differ in it.
-    """
+    """``first``: u_0 (n_t,) → (n_modes, N, n_t); ``second``: the rest (n, d − 1) → (n, N)."""
 
     first: Callable[[Floats], Floats]
     second: Callable[[Floats], Second]
@@ -431,7 +436,7 @@ class Trajectory:
         right = self.lines.second(design)
         out = np.empty((len(design), len(self.place), len(self._samples)))
         for k, table in enumerate(self._samples):
-            out[:, :, k] = (right[k] if right.ndim == 3 else right) @ table
+            out[:, :, k] = right @ table
         return out
 
     @cached_property
@@ -505,142 +510,3 @@ def _dense(local: Local, count: int) -> Floats:
     out = np.zeros((len(values), count))
     np.put_along_axis(out, where, values, axis=1)
     return out
-
-
-# --- Ordinary Kriging: a Gaussian process, one length scale a variable, by maximum likelihood
-
-NUGGETS = tuple(10.0**k for k in range(-13, -5))
-LENGTHS = (0.03, 30.0)  # of length scales, on the unit box
-CHUNK = 512  # points predicted at once: the correlations (512, n) then stay in the cache
-
-
-@dataclass(frozen=True, eq=False)
-class Kriging:
-    """A fitted process for one output."""
-
-    u: Floats
-    lengths: Floats
-    nugget: float
-    mean: float
-    variance: float
-    weights: Floats  # R⁻¹ (f − μ)
-    factor: Floats  # lower Cholesky factor of R
-
-    def __call__(self, at: Floats) -> Floats:
-        """f̂ (k,) at points (k, d)."""
-        parts = [self._correlation(at[i : i + CHUNK]) for i in range(0, len(at), CHUNK)]
-        return self.mean + np.concatenate([r @ self.weights for r in parts])
-
-    def deviation(self, at: Floats) -> Floats:
-        """Standard deviation (k,) of the prediction."""
-        r = self._correlation(at)
-        half = np.linalg.solve(self.factor, r.T)
-        left = np.maximum(1.0 - np.square(half).sum(axis=0), 0.0)
-        return np.asarray(np.sqrt(self.variance * left))
-
-    def _correlation(self, at: Floats) -> Floats:
-        a, b = at / self.lengths, self.u / self.lengths
-        squares = np.square(a).sum(1)[:, None] + np.square(b).sum(1) - 2.0 * a @ b.T
-        return np.asarray(np.exp(-0.5 * np.maximum(squares, 0.0)))
-
-
-def kriging_lines(fitted: Sequence[Kriging]) -> Lines:
-    """The correlation is a product over the variables, so that the place stands apart."""
-    return Lines(
-        lambda place: np.array([_places(one, place) for one in fitted]),
-        lambda design: np.array([_designs(one, design) for one in fitted]),
-    )
-
-
-def _places(one: Kriging, place: Floats) -> Floats:
-    """Weights times correlations in u_0, and the mean, (n + 1, n_t)."""
-    off = (place - one.u[:, :1]) / one.lengths[0]
-    return np.vstack([one.weights[:, None] * np.exp(-0.5 * off**2), np.full(len(place), one.mean)])
-
-
-def _designs(one: Kriging, design: Floats) -> Floats:
-    """Correlations in the other variables, and 1, (n_designs, n + 1)."""
-    squares = cdist(design / one.lengths[1:], one.u[:, 1:] / one.lengths[1:], "sqeuclidean")
-    return np.hstack([np.exp(-0.5 * squares), np.ones((len(design), 1))])
-
-
-def fit_kriging(u: Floats, f: Floats, starts: int = 2) -> Kriging:
-    """Fit u (n, d), f (n,). Raises AccuracyError where no nugget makes R definite."""
-    squares = np.square(u[:, None, :] - u[None, :, :])
-    size = float(np.std(f)) or 1.0
-    scaled = (f - f.mean()) / size
-    best = min(
-        (_ascend(squares, scaled, length) for length in np.geomspace(0.4, 2.0, starts)),
-        key=lambda found: found[0],
-    )
-    state = _factored(squares, scaled, best[1])
-    return Kriging(
-        u,
-        np.exp(best[1]),
-        state.nugget,
-        f.mean() + size * state.mean,
-        size**2 * state.variance,
-        size * state.weights,
-        state.factor,
-    )
-
-
-def _ascend(squares: Floats, f: Floats, length: float) -> tuple[float, Floats]:
-    """Least negative log likelihood and log ℓ from one start."""
-    d = squares.shape[2]
-    limits = [(float(np.log(LENGTHS[0])), float(np.log(LENGTHS[1])))] * d
-    start: Floats = np.full(d, float(np.log(length)))
-
-    def negative(log_l: Floats) -> tuple[float, Floats]:
-        return _likelihood(squares, f, log_l)
-
-    found = minimize(
-        negative,
-        start,
-        jac=True,
-        method="L-BFGS-B",
-        bounds=limits,
-        options={"maxiter": 40},
-    )
-    return float(found.fun), np.asarray(found.x)
-
-
-@dataclass(frozen=True, eq=False)
-class _State:
-    R: Floats
-    factor: Floats
-    nugget: float
-    mean: float
-    variance: float
-    weights: Floats
-
-
-def _factored(squares: Floats, f: Floats, log_l: Floats) -> _State:
-    R = np.exp(-0.5 * squares @ np.exp(-2.0 * log_l))
-    factor, nugget = _cholesky(R)
-    ones = cho_solve((factor, True), np.ones(len(f)))
-    mean = float(ones @ f / ones.sum())
-    weights = cho_solve((factor, True), f - mean)
-    variance = max(float((f - mean) @ weights) / len(f), 1e-300)
-    return _State(R, factor, nugget, mean, variance, weights)
-
-
-def _cholesky(R: Floats) -> tuple[Floats, float]:
-    for nugget in NUGGETS:
-        try:
-            return np.asarray(
-                np.linalg.cholesky(R + nugget * np.eye(len(R))), dtype=np.float64
-            ), nugget
-        except np.linalg.LinAlgError:
-            continue
-    raise AccuracyError("Kriging: the correlation matrix is not definite")
-
-
-def _likelihood(squares: Floats, f: Floats, log_l: Floats) -> tuple[float, Floats]:
-    """½ (n log σ² + log |R|) and its gradient over log ℓ."""
-    s = _factored(squares, f, log_l)
-    value = 0.5 * len(f) * np.log(s.variance) + np.log(np.diag(s.factor)).sum()
-    inverse = cho_solve((s.factor, True), np.eye(len(f)))
-    W = (inverse - np.outer(s.weights, s.weights) / s.variance) * s.R
-    slope = 0.5 * np.tensordot(W, squares, axes=2) * np.exp(-2.0 * log_l)
-    return float(value), slope

@@ -1,4 +1,4 @@
-"""Searches for the optimal design on exact eigenvalues: SciPy's, and one by Kriging.
+"""Searches for the optimal design on exact eigenvalues by SciPy.
 
 All minimise J(v) over v in [0, 1]^n; the objective itself counts and times its evaluations.
 """
@@ -14,12 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, differential_evolution, minimize
 
-from eigassign.chart.rivals import Kriging, fit_kriging, spread_points
-
 Floats = NDArray[np.float64]
-Objective = Callable[[Floats], float]
 SEED = 20211204
-CANDIDATES = 400  # designs among which Kriging looks for the next one
 
 
 class SpentError(Exception):
@@ -114,37 +110,3 @@ def by_evolution(watched: Watched, start: Floats, limits: Limits) -> None:
         )
     except SpentError:
         return
-
-
-def by_kriging(watched: Watched, start: Floats, limits: Limits) -> None:
-    """Efficient global optimisation: Kriging of log J, and the largest expected improvement."""
-    random = np.random.default_rng(SEED)
-    n = len(start)
-    designs = [start, *spread_points(4 * n + 4, n)]
-    designs = [v for v in designs if limits.met(v)]
-    try:
-        values = [watched(v) for v in designs]
-        while True:
-            u, f = np.array(designs), np.log(np.array(values))
-            chosen = _improving(fit_kriging(u, f, starts=1), f, random, limits)
-            designs.append(chosen)
-            values.append(watched(chosen))
-    except SpentError:
-        return
-
-
-def _improving(model: Kriging, f: Floats, random: np.random.Generator, limits: Limits) -> Floats:
-    """The candidate of largest expected improvement: all over the box, and around the best."""
-    from scipy.special import ndtr
-
-    n, best = model.u.shape[1], model.u[int(np.argmin(f))]
-    near = best + random.normal(0.0, 1.0, (CANDIDATES, n)) * 10.0 ** random.uniform(
-        -4, -1, (CANDIDATES, 1)
-    )
-    every = np.clip(np.vstack([random.random((CANDIDATES, n)), near]), 0.0, 1.0)
-    every = every[limits.met(every)]
-    every = every if len(every) else best[None]
-    mean, sigma = model(every), np.maximum(model.deviation(every), 1e-12)
-    z = (f.min() - mean) / sigma
-    gain = sigma * (z * ndtr(z) + np.exp(-0.5 * z * z) / np.sqrt(2.0 * np.pi))
-    return np.asarray(every[int(np.argmax(gain))])

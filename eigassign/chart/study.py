@@ -241,6 +241,8 @@ def _size_notes(scene: Scene, features: Features, effort: Effort, solve_s: float
         yield f"no surrogate is trained on over {most} exact solves: {effort.training_s:g} s"
     if scene.model.n_dof > min(effort.most_dense, rivals.MOST_DENSE):
         yield f"no dense solve one by one: {scene.model.n_dof} degrees of freedom"
+    if not rivals.can_krige():
+        yield "no Kriging: it is charted where scikit-learn is installed"
 
 
 # --- One question with its exact answers, put to every method: fitted, evaluated, timed, compar

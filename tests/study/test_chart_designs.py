@@ -10,7 +10,7 @@ from chart_scenes import TINY
 from scenes import SHIPPED, changed, scene_of
 
 from eigassign.chart.designs import chart_designs, eigenvalue_slopes, task_of, theta_slopes
-from eigassign.chart.search import Limits, SpentError, Watched, by_gradient, by_kriging
+from eigassign.chart.search import Limits, SpentError, Watched, by_evolution, by_gradient
 from eigassign.modal.exact.solver import eigenvalues
 from eigassign.series.multi_index import total_degree
 from eigassign.study.scene import Scene
@@ -121,16 +121,10 @@ FREE = Limits(np.zeros((0, 2)), np.zeros(0), np.zeros(0))
 
 def test_a_search_ends_when_its_evaluations_are_used_up() -> None:
     watched = Watched(bowl, FREE.met, 3)
-    by_kriging(watched, np.array([0.5, 0.5]), FREE)
+    by_evolution(watched, np.array([0.5, 0.5]), FREE)
     assert watched.calls == 3
     with pytest.raises(SpentError):
         watched(np.zeros(2))
-
-
-def test_a_kriging_search_finds_the_bottom_of_a_bowl() -> None:
-    watched = Watched(bowl, FREE.met, 40)
-    by_kriging(watched, np.array([0.9, 0.1]), FREE)
-    assert watched.design == pytest.approx(np.array([0.3, 0.8]), abs=0.02)
 
 
 def test_a_design_that_breaks_a_limit_is_never_the_best() -> None:

@@ -11,15 +11,14 @@ from numpy.typing import NDArray
 from eigassign.chart.rivals import (
     Separable,
     Trajectory,
-    _likelihood,
     along,
+    can_krige,
     chebyshev,
     chebyshev_nodes,
     equal_nodes,
-    fit_kriging,
     grid_interpolation,
     grid_points,
-    kriging_lines,
+    kriging,
     radial_basis,
     response_surface,
     spread_points,
@@ -90,31 +89,17 @@ def test_radial_basis_functions_refuse_too_few_points() -> None:
         radial_basis(u, smooth(u), "quintic")
 
 
-def test_kriging_interpolates_and_knows_where_it_does_not_know() -> None:
+def test_kriging_interpolates() -> None:
+    pytest.importorskip("sklearn")
     u = spread_points(60, 3)
-    model = fit_kriging(u, smooth(u)[:, 0])
-    np.testing.assert_allclose(model(u), smooth(u)[:, 0], atol=1e-6)
-    assert np.abs(model(AT) - smooth(AT)[:, 0]).max() < 2e-3
-    far = np.full((1, 3), 3.0)
-    assert model.deviation(u).max() < 1e-2 * model.deviation(far)[0]
+    made = kriging(u, cubic(u))
+    np.testing.assert_allclose(made(u), cubic(u), atol=1e-4)
+    assert np.abs(made(AT) - cubic(AT)).max() < 2e-3
 
 
-def test_kriging_of_a_constant_is_the_constant() -> None:
-    u = spread_points(12, 2)
-    np.testing.assert_allclose(fit_kriging(u, np.full(12, 7.0))(AT[:, :2]), 7.0, rtol=1e-9)
-
-
-def test_the_likelihood_has_the_gradient_it_says() -> None:
-    u = spread_points(15, 3)
-    f = smooth(u)[:, 0] - smooth(u).mean()
-    squares = np.square(u[:, None, :] - u[None, :, :])
-    log_l = np.log(np.array([0.3, 0.5, 0.4]))
-    _, slope = _likelihood(squares, f, log_l)
-    for k in range(3):
-        step = np.zeros(3)
-        step[k] = 1e-5
-        up, down = (_likelihood(squares, f, log_l + s * step)[0] for s in (1, -1))
-        assert slope[k] == pytest.approx((up - down) / 2e-5, rel=1e-5)
+def test_kriging_is_left_out_without_scikit_learn(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("eigassign.chart.rivals.find_spec", lambda name: None)
+    assert not can_krige()
 
 
 def test_training_points_fill_the_box_evenly_and_hold_its_corners() -> None:
@@ -131,11 +116,6 @@ def test_chebyshev_nodes_include_both_ends() -> None:
     assert chebyshev_nodes(5)[[0, 2, 4]] == pytest.approx([0.0, 0.5, 1.0])
 
 
-def _kriging(u: Floats) -> Separable:
-    fitted = [fit_kriging(u, column) for column in wavy(u).T]
-    return Separable(lambda at: np.column_stack([g(at) for g in fitted]), kriging_lines(fitted))
-
-
 def wavy(u: Floats) -> Floats:
     """Two functions that differ in what they need, of any number of variables."""
     return np.column_stack([np.cos(u @ np.arange(1.0, 1 + u.shape[1])), np.exp(-u[:, 0] * u[:, 1])])
@@ -148,12 +128,11 @@ def _grid(k: int, d: int, kind: str) -> Separable:
 
 
 @pytest.mark.parametrize("d", [2, 3, 4])
-@pytest.mark.parametrize("kind", ["linear", "cubic", "Chebyshev", "surface", "Kriging"])
+@pytest.mark.parametrize("kind", ["linear", "cubic", "Chebyshev", "surface"])
 def test_whole_trajectories_are_answered_as_single_points_are(kind: str, d: int) -> None:
     u = spread_points(90, d)
     made = {
         "surface": lambda: response_surface(u, wavy(u), 3),
-        "Kriging": lambda: _kriging(u),
     }.get(kind, lambda: _grid(5, d, kind))()
     place = np.array([0.0, 0.31, 0.32, 0.9, 1.0])
     designs = np.vstack([np.zeros(d - 1), np.ones(d - 1), AT[:, :1].repeat(d - 1, 1) ** 2])
