@@ -13,7 +13,7 @@ from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.assembly import ReducedLinks
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.kinematics.forward import Kinematics
-from eigassign.mechanism.kinematics.poses import Poses
+from eigassign.mechanism.kinematics.link_frames import Poses
 from eigassign.mechanism.kinematics.travel_limits import Label
 from eigassign.modal.arguments import samples
 from eigassign.modal.exact.solver import eigenvalues, modes

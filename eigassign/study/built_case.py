@@ -25,8 +25,8 @@ from eigassign.mechanism.assembly.build import (
     with_reduction,
 )
 from eigassign.mechanism.inverse_kinematics.chain import tip_chain
-from eigassign.mechanism.kinematics.coordinates import initial_design
-from eigassign.mechanism.kinematics.poses import build_poses, design_dependence
+from eigassign.mechanism.kinematics.link_frames import build_poses, design_dependence
+from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.kinematics.travel_limits import resting_pose
 from eigassign.mechanism.trajectory.trajectory import (
     NamedTrajectory,

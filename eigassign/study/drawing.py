@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
-from eigassign.mechanism.elements.mesh import link_type
+from eigassign.case.schema.joints import RIDING
 from eigassign.mechanism.elements.sections import section_values
-from eigassign.mechanism.kinematics.forward import mounting
-from eigassign.mechanism.kinematics.joints import RIDING, sliding_axis
-from eigassign.mechanism.kinematics.poses import Poses
+from eigassign.mechanism.kinematics.joints import mounting, sliding_axis
+from eigassign.mechanism.kinematics.link_frames import Poses
+from eigassign.mechanism.kinematics.parameters import link_type
 from eigassign.mechanism.kinematics.rotations import multiply
 from eigassign.mechanism.kinematics.topology import GROUND, Edge, Node, Tree, split
 from eigassign.mechanism.trajectory.trajectory import Trajectories

@@ -13,11 +13,11 @@ import numpy as np
 
 from eigassign.case import CaseFile
 from eigassign.case.loading import parse
-from eigassign.mechanism.assembly.build import build_pencil
+from eigassign.mechanism.assembly.build import build_pencil, kinematics
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.kinematics.coordinates import Parameters, initial_design, parameters
-from eigassign.mechanism.kinematics.forward import Kinematics, kinematics
-from eigassign.mechanism.kinematics.poses import Poses, build_poses
+from eigassign.mechanism.kinematics.forward import Kinematics
+from eigassign.mechanism.kinematics.link_frames import Poses, build_poses
+from eigassign.mechanism.kinematics.parameters import Parameters, initial_design, parameters
 from eigassign.modal.exact.solver import eigenvalues
 
 Tree = dict[str, Any]

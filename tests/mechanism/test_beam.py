@@ -10,7 +10,7 @@ from frame_oracle import element
 
 from eigassign.mechanism.elements.links import link_mesh
 from eigassign.mechanism.elements.mesh import LinkMesh
-from eigassign.mechanism.kinematics.coordinates import Parameters
+from eigassign.mechanism.kinematics.parameters import Parameters
 from eigassign.mechanism.kinematics.topology import Tree
 from eigassign.series.expression import Recorder
 

@@ -18,10 +18,9 @@ from spatial_cases import ALLOY, Built, built
 from spatial_oracle import Tree
 
 from eigassign.case.loading import parse
-from eigassign.mechanism.assembly.build import local_links
+from eigassign.mechanism.assembly.build import kinematics, local_links
 from eigassign.mechanism.assembly.velocity_terms import VelocityTerms, fields, velocity_terms
-from eigassign.mechanism.kinematics.coordinates import parameters
-from eigassign.mechanism.kinematics.forward import kinematics
+from eigassign.mechanism.kinematics.parameters import parameters
 
 CASES = Path(__file__).parents[2] / "cases"
 LENGTH, ELEMENTS = 1.2, 7  # 3 elements before the carriage, 4 behind

@@ -12,7 +12,7 @@ from eigassign.errors import MechanismError, TrajectoryError
 from eigassign.mechanism.inverse_kinematics.chain import TipChain
 from eigassign.mechanism.inverse_kinematics.follow import RESIDUAL, follow
 from eigassign.mechanism.inverse_kinematics.solver import Trace, interpolated
-from eigassign.mechanism.trajectory.path import Course, Path, spline, straight
+from eigassign.mechanism.inverse_kinematics.tip_path import Course, Path, spline, straight
 from eigassign.mechanism.trajectory.timing import timing_law
 
 TAU = 2.0 * np.pi

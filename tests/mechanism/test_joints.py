@@ -13,9 +13,11 @@ from spatial_examples import arm3r, four_bar, gantry, straight
 from spatial_oracle import FREEDOMS, Tree, world
 from spatial_random import random_closed, random_open
 
+from eigassign.case.schema import joints as schema
 from eigassign.errors import MechanismError
-from eigassign.mechanism.kinematics.forward import Kinematics, all_moving
-from eigassign.mechanism.kinematics.joints import COMPONENTS, JointMotion, joint_motion, turned
+from eigassign.mechanism.kinematics.forward import Kinematics
+from eigassign.mechanism.kinematics.joints import JointMotion, joint_motion, turned
+from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import compile_table
 
@@ -66,7 +68,7 @@ def test_a_joint_turns_rigidly(joint: Any) -> None:
 
 
 def test_every_joint_of_the_language_has_its_freedoms() -> None:
-    assert {kind: len(parts) for kind, parts in COMPONENTS.items()} == FREEDOMS
+    assert {kind: len(parts) for kind, parts in schema.FREEDOMS.items()} == FREEDOMS
 
 
 @pytest.mark.parametrize("joint", JOINTS, ids=KINDS)

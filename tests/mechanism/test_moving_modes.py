@@ -12,9 +12,9 @@ from spatial_examples import four_bar
 from timed_motions import RestToRest, integrated
 
 from eigassign.case.loading import parse
+from eigassign.mechanism.assembly.build import kinematics
 from eigassign.mechanism.assembly.velocity_terms import velocity_terms
-from eigassign.mechanism.kinematics.coordinates import parameters
-from eigassign.mechanism.kinematics.forward import kinematics
+from eigassign.mechanism.kinematics.parameters import parameters
 from eigassign.modal.exact.solver import eigenvalues, modes
 from eigassign.modal.slow_motion import change_at, moving_modes, theta_in_time
 

@@ -16,8 +16,8 @@ from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.build import with_elements, with_reduction
 from eigassign.mechanism.assembly.mode_shapes import shapes
 from eigassign.mechanism.elements.beam import bending_mass, bending_shapes
-from eigassign.mechanism.elements.mesh import node_position
-from eigassign.mechanism.kinematics.forward import all_moving
+from eigassign.mechanism.kinematics.loop_closure import all_moving
+from eigassign.mechanism.kinematics.parameters import node_position
 from eigassign.mechanism.kinematics.rotations import cross, multiply
 
 CASES = Path(__file__).parents[2] / "cases"

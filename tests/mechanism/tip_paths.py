@@ -10,7 +10,7 @@ from spatial_cases import Built
 from spatial_oracle import Pose, Tree, solve_pose
 
 from eigassign.mechanism.inverse_kinematics.chain import TipChain, tip_chain
-from eigassign.mechanism.trajectory.path import (
+from eigassign.mechanism.inverse_kinematics.tip_path import (
     Course,
     planar_attitude,
     spatial_attitude,

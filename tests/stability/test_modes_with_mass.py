@@ -11,7 +11,7 @@ from scipy.linalg import eigh
 from stress import ATLAS, case
 
 from eigassign.errors import MissingMassError
-from eigassign.mechanism.kinematics.coordinates import initial_design
+from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.modal.exact import sparse as exact_sparse
 from eigassign.modal.exact.condensation import condense
 from eigassign.modal.exact.solver import lowest_modes

@@ -1,1 +1,14 @@
-"""assembly."""
+"""Assembly of eq. (1): K = Bᵀ k B and M = Bᵀ m B with B = [Q, N T], affine in scalar functions.
+
+Read in this order; each imports only from those above it:
+
+    pencil            K = Σ θ_j(q, y) K_j, M = Σ θ_j(q, y) M_j: what everything else evaluates
+    assembly          products Bᵀ a B link by link
+    node_motion       Q: the elastic motion of every node from the independent unknowns u
+    rigid_loops       loops between rigid links: passive joints follow elastically
+    springs           springs between nodes
+    rigid_body_modes  free motions that no spring resists, made columns of their own
+    build             from a case to its pencil
+    mode_shapes       displacements of nodes and beams in a vector [u; q̇]
+    velocity_terms    the velocity terms of eq. (1) that the method neglects
+"""

@@ -24,7 +24,7 @@ from scipy import sparse
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.craig_bampton import total
 from eigassign.mechanism.elements.mesh import Reduction, Term
-from eigassign.mechanism.kinematics.coordinates import Parameters
+from eigassign.mechanism.kinematics.parameters import Parameters
 from eigassign.mechanism.kinematics.rotations import multiply
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import Table, compile_table

@@ -14,13 +14,18 @@ from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.assembly import Accumulator, LocalLink, add_links, pattern
 from eigassign.mechanism.assembly.node_motion import NodeMotions
 from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism.assembly.rigid_body_modes import separated
+from eigassign.mechanism.assembly.rigid_loops import close_rigid_loops
+from eigassign.mechanism.assembly.springs import add_springs
 from eigassign.mechanism.elements.craig_bampton import as_asked
 from eigassign.mechanism.elements.links import copies_of, link_mesh
 from eigassign.mechanism.elements.mesh import DOFS, LinkMesh
-from eigassign.mechanism.kinematics.coordinates import Parameters
-from eigassign.mechanism.kinematics.coordinates import parameters as variables
-from eigassign.mechanism.kinematics.forward import Kinematics, kinematics
-from eigassign.mechanism.kinematics.topology import Placement
+from eigassign.mechanism.kinematics.coordinates import coordinates
+from eigassign.mechanism.kinematics.forward import Kinematics, Placement
+from eigassign.mechanism.kinematics.loop_closure import closed_kinematics, reference
+from eigassign.mechanism.kinematics.parameters import Parameters
+from eigassign.mechanism.kinematics.parameters import parameters as variables
+from eigassign.mechanism.kinematics.topology import build_tree
 from eigassign.mechanism.kinematics.travel_limits import rails
 from eigassign.series.compiler import compile_program
 
@@ -29,6 +34,20 @@ Objects = NDArray[np.object_]
 
 
 LocalLinks: TypeAlias = "tuple[list[LocalLink], NodeMotions]"
+
+
+def kinematics(case: CaseFile, parameters: Parameters) -> Kinematics:
+    """ERLS motion of a case: the tree walked, loops closed, rigid-body motions among the columns.
+
+    Raises MechanismError for what cannot be placed, moved or closed.
+    """
+    tree = build_tree(case)
+    motion = closed_kinematics(case, parameters, tree, coordinates(case, tree))
+    drives = [c.drive for c in case.coordinates.values()]
+    free = tuple(k for k, i in enumerate(motion.columns) if drives[i] == "free")
+    if free and getattr(case.mechanism, "springs", None):
+        return separated(case, parameters, motion, free)
+    return replace(motion, rigid=free)
 
 
 def build_pencil(
@@ -41,7 +60,7 @@ def build_pencil(
     links, nodes = local_links(case, parameters, motion) if local is None else local
     stiffness, mass = Accumulator(), Accumulator()
     add_links(stiffness, mass, links, nodes.count)
-    _add_springs(stiffness, case, parameters, motion, nodes)
+    add_springs(stiffness, case, parameters, motion, nodes)
     _add_drives(stiffness, case, parameters, motion, nodes.count)
     return _compile(stiffness, mass, case, parameters, motion, nodes.count)
 
@@ -112,9 +131,6 @@ def local_links(
     nodes = NodeMotions(motion, meshes, case.mechanism.space)
     nodes.number()
     if motion.tree.n_elastic < len(motion.tree.loops):
-        from eigassign.mechanism.assembly.rigid_loops import close_rigid_loops
-        from eigassign.mechanism.kinematics.loop_closure import reference
-
         close_rigid_loops(nodes, parameters, reference(case, parameters))
     else:
         nodes.number_passive(motion.tree.passive)
@@ -141,19 +157,6 @@ def _local_link(placement: Placement, mesh: LinkMesh, nodes: NodeMotions) -> Loc
         carried=carried,
         reduction=mesh.reduction,
     )
-
-
-def _add_springs(
-    target: Accumulator,
-    case: CaseFile,
-    parameters: Parameters,
-    motion: Kinematics,
-    nodes: NodeMotions,
-) -> None:
-    if getattr(case.mechanism, "springs", None):
-        from eigassign.mechanism.assembly.springs import add_springs
-
-        add_springs(target, case, parameters, motion, nodes)
 
 
 def _add_drives(

@@ -18,9 +18,9 @@ from eigassign.mechanism.assembly.build import local_links
 from eigassign.mechanism.elements.beam import bending_shapes
 from eigassign.mechanism.elements.links import axes
 from eigassign.mechanism.elements.mesh import LinkMesh, Strand
-from eigassign.mechanism.kinematics.poses import Poses
+from eigassign.mechanism.kinematics.forward import Placement
+from eigassign.mechanism.kinematics.link_frames import Poses
 from eigassign.mechanism.kinematics.rotations import Objects
-from eigassign.mechanism.kinematics.topology import Placement
 from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]

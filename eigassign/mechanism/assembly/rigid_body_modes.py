@@ -18,9 +18,9 @@ from eigassign.case import CaseFile
 from eigassign.errors import MechanismError, SingularityError
 from eigassign.mechanism.assembly.node_motion import Rows
 from eigassign.mechanism.assembly.springs import resists, spring_ends
-from eigassign.mechanism.kinematics.coordinates import Parameters
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import reference
+from eigassign.mechanism.kinematics.parameters import Parameters
 from eigassign.mechanism.kinematics.rotations import multiply
 from eigassign.mechanism.kinematics.topology import Node
 from eigassign.series.algebra import Samples

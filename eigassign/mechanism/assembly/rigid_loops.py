@@ -21,8 +21,8 @@ from scipy import linalg
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.node_motion import NodeMotions, Row, combined
 from eigassign.mechanism.elements.mesh import DOFS
-from eigassign.mechanism.kinematics.coordinates import Parameters
 from eigassign.mechanism.kinematics.loop_closure import RANK, passive_motion
+from eigassign.mechanism.kinematics.parameters import Parameters
 from eigassign.mechanism.kinematics.rotations import Objects
 from eigassign.mechanism.kinematics.topology import Edge
 from eigassign.series.algebra import Samples

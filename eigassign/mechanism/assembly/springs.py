@@ -16,10 +16,10 @@ import numpy as np
 from eigassign.case import CaseFile
 from eigassign.mechanism.assembly.assembly import Accumulator
 from eigassign.mechanism.assembly.node_motion import NodeMotions, Row, Rows, apply, combined
-from eigassign.mechanism.elements.bodies import mounted
-from eigassign.mechanism.elements.mesh import DOFS, node_position
-from eigassign.mechanism.kinematics.coordinates import Parameters
+from eigassign.mechanism.elements.mesh import DOFS
 from eigassign.mechanism.kinematics.forward import Kinematics
+from eigassign.mechanism.kinematics.joints import mounting
+from eigassign.mechanism.kinematics.parameters import Parameters, node_position
 from eigassign.mechanism.kinematics.rotations import Objects, carried, cross, multiply, present
 from eigassign.mechanism.kinematics.topology import GROUND, Node, split
 from eigassign.series.expression import Scalar, is_constant
@@ -93,8 +93,7 @@ def _ends(
 ) -> tuple[Rows, Rows]:
     """Motion of both ends in the spring's axes over [u; q̇], the first carried to the second."""
     link = ends[0][0]
-    turn = mounted(getattr(spring, "orientation", None), float(getattr(spring, "angle", 0) or 0))
-    R = multiply(motion.placement(link).world_rotation, turn.astype(object))
+    R = multiply(motion.placement(link).world_rotation, mounting(spring))
     first, second = (
         _world_rows(case, parameters, motion, elastic, first_rate, end) for end in ends
     )

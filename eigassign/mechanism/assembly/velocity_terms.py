@@ -52,9 +52,10 @@ from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.assembly import LocalLink, motion_scalars
 from eigassign.mechanism.assembly.build import local_links
 from eigassign.mechanism.elements.beam import bending_shapes, bending_slopes
-from eigassign.mechanism.elements.mesh import DOFS, LinkMesh, Term, link_type
-from eigassign.mechanism.kinematics.coordinates import Parameters
-from eigassign.mechanism.kinematics.forward import Kinematics, all_moving
+from eigassign.mechanism.elements.mesh import DOFS, LinkMesh, Term
+from eigassign.mechanism.kinematics.forward import Kinematics
+from eigassign.mechanism.kinematics.loop_closure import all_moving
+from eigassign.mechanism.kinematics.parameters import Parameters, link_type
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import Table, compile_table
 from eigassign.series.expression import Scalar

@@ -1,1 +1,13 @@
-"""elements."""
+"""The links as finite-element meshes in their own frames, where they do not depend on q.
+
+Read in this order; each imports only from those above it:
+
+    sections       area, moments of inertia and shear coefficient of cross-sections
+    beam           stiffness and consistent mass of a beam element; its shape functions
+    mesh           a link's affine matrices k(y), m(y), its nodes and its rigid motion N(y)
+    bodies         rigid links, point masses and rigid bodies at nodes
+    sparse_factor  factors of symmetric definite sparse matrices
+    craig_bampton  fixed-interface modes instead of a link's interior dofs
+    superelement   links from another finite-element program
+    links          the mesh of any link: beam, frame, rigid or superelement
+"""

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.sections import SectionValues, section_values
-from eigassign.mechanism.kinematics.coordinates import Parameters
+from eigassign.mechanism.kinematics.parameters import Parameters
 from eigassign.series.expression import Scalar, is_constant
 
 # --- Beam elements: axial, torsion and two bendings, Euler-Bernoulli or Timoshenko, consistent

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,12 +14,11 @@ from eigassign.mechanism.elements.mesh import (
     LinkMesh,
     add_scalars,
     body_block,
-    length,
     node_dofs,
     rigid_motion,
 )
-from eigassign.mechanism.kinematics.coordinates import Parameters
-from eigassign.mechanism.kinematics.rotations import Objects, euler, rotation, vector
+from eigassign.mechanism.kinematics.parameters import Parameters, length
+from eigassign.mechanism.kinematics.rotations import Objects, vector
 from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]
@@ -76,10 +74,3 @@ def rigid_nodes(case: CaseFile, parameters: Parameters, name: str) -> dict[str, 
         places["end"] = vector([length(case, parameters, name)])
     given = getattr(link, "nodes", None) or {}
     return places | {key: vector([float(c) for c in X]) for key, X in given.items()}
-
-
-def mounted(orientation: Sequence[float] | None, angle: float) -> Floats:
-    """A constant rotation from spatial angles or a planar one."""
-    if orientation is not None:
-        return euler(orientation)
-    return np.asarray(rotation(np.array([0.0, 0.0, 1.0]), angle), dtype=np.float64)

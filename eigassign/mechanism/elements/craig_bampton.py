@@ -27,9 +27,9 @@ from scipy.sparse import linalg
 
 from eigassign.case import CaseFile
 from eigassign.errors import AccuracyError, MechanismError
-from eigassign.mechanism.elements.mesh import LinkMesh, Reduction, Term, link_type
+from eigassign.mechanism.elements.mesh import LinkMesh, Reduction, Term
 from eigassign.mechanism.elements.sparse_factor import kept_factor
-from eigassign.mechanism.kinematics.coordinates import Parameters
+from eigassign.mechanism.kinematics.parameters import Parameters, link_type
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import compile_table
 

@@ -33,13 +33,11 @@ from eigassign.mechanism.elements.mesh import (
     LinkMesh,
     Strand,
     chain_dofs,
-    length,
-    link_type,
     node_dofs,
     rigid_motion,
-    station,
 )
-from eigassign.mechanism.kinematics.coordinates import Parameters
+from eigassign.mechanism.elements.superelement import superelement_mesh
+from eigassign.mechanism.kinematics.parameters import Parameters, length, link_type, station
 from eigassign.mechanism.kinematics.rotations import Objects, rotation, vector
 from eigassign.mechanism.kinematics.topology import Tree
 from eigassign.series.expression import Scalar, is_constant
@@ -58,8 +56,6 @@ def link_mesh(case: CaseFile, parameters: Parameters, tree: Tree, name: str) -> 
         case "frame":
             return frame_mesh(case, parameters, name)
         case "superelement":
-            from eigassign.mechanism.elements.superelement import superelement_mesh
-
             return superelement_mesh(case, parameters, name)
     return _beam(case, parameters, tree, name)
 

@@ -19,9 +19,9 @@ from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.bodies import add_bodies
 from eigassign.mechanism.elements.craig_bampton import held_factor
-from eigassign.mechanism.elements.mesh import DOFS, Entries, LinkMesh, Term, link_type, rigid_motion
+from eigassign.mechanism.elements.mesh import DOFS, Entries, LinkMesh, Term, rigid_motion
 from eigassign.mechanism.elements.sparse_factor import is_semidefinite
-from eigassign.mechanism.kinematics.coordinates import Parameters
+from eigassign.mechanism.kinematics.parameters import Parameters, link_type, parameters
 from eigassign.mechanism.kinematics.rotations import vector
 
 # --- A link from another finite-element program: K, M and its interface nodes
@@ -45,8 +45,6 @@ def superelement_mesh(case: CaseFile, parameters: Parameters, name: str) -> Link
 
 def weights(case: CaseFile) -> tuple[str, ...]:
     """Mass and centre of mass of every superelement, in words: wrong units show here."""
-    from eigassign.mechanism.kinematics.coordinates import parameters
-
     return tuple(
         _weight(name, superelement_mesh(case, parameters(case), name), case.mechanism.space)
         for name in case.mechanism.links

@@ -21,11 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
-from eigassign.mechanism.elements.mesh import node_position
-from eigassign.mechanism.kinematics.coordinates import Parameters
+from eigassign.case.schema.joints import FREEDOMS
 from eigassign.mechanism.kinematics.forward import Kinematics, walk
-from eigassign.mechanism.kinematics.joints import COMPONENTS
 from eigassign.mechanism.kinematics.loop_closure import closure_rows, reference_coordinates
+from eigassign.mechanism.kinematics.parameters import Parameters, node_position
 from eigassign.mechanism.kinematics.rotations import Objects, cross, multiply
 from eigassign.mechanism.kinematics.topology import Tree, split
 from eigassign.series.algebra import Samples
@@ -236,7 +235,7 @@ def _kinds(case: CaseFile, tree: Tree) -> tuple[str, ...]:
     advancing = any(j.type in ADVANCING for j in case.mechanism.joints.values())
     kinds = []
     for freedom, kind in zip(tree.freedoms, types, strict=True):
-        slides = COMPONENTS[kind][freedom.component] == "translation"
+        slides = FREEDOMS[kind][freedom.component] == "translation"
         turn = "screw" if kind == "screw" or (tree.loops and advancing) else "turn"
         kinds.append("slide" if slides else turn)
     return tuple(kinds)

@@ -7,7 +7,7 @@ import numpy as np
 from eigassign.errors import TrajectoryError
 from eigassign.mechanism.inverse_kinematics.chain import Floats
 from eigassign.mechanism.inverse_kinematics.state import Arm
-from eigassign.mechanism.trajectory.path import WAYPOINTS, Course
+from eigassign.mechanism.inverse_kinematics.tip_path import WAYPOINTS, Course
 
 _NEAR = 1e-6  # of L: what counts as reached when blame is shared between position and turn
 

@@ -37,7 +37,7 @@ from eigassign.mechanism.inverse_kinematics.solver import (
     trace,
 )
 from eigassign.mechanism.inverse_kinematics.state import Arm, prepare
-from eigassign.mechanism.trajectory.path import Course, Target
+from eigassign.mechanism.inverse_kinematics.tip_path import Course, Target
 
 # --- Numerical inverse kinematics of any chain: the coordinates q along a path of its tip
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from eigassign.mechanism.inverse_kinematics.chain import Bools, Floats, Look, Reduced, reduced
 from eigassign.mechanism.inverse_kinematics.state import Arm
-from eigassign.mechanism.trajectory.path import Course, Target
+from eigassign.mechanism.inverse_kinematics.tip_path import Course, Target
 
 # --- Bringing the tip to given points: Levenberg–Marquardt from far away, Newton nearby
 

@@ -21,8 +21,8 @@ import numpy as np
 
 from eigassign.errors import MechanismError, SingularityError
 from eigassign.mechanism.inverse_kinematics.chain import Bools, Floats, Look, TipChain, reduced
+from eigassign.mechanism.inverse_kinematics.tip_path import Course, Target
 from eigassign.mechanism.kinematics.rotations import logarithm
-from eigassign.mechanism.trajectory.path import Course, Target
 
 # --- A chain prepared for inverse kinematics: one measure for metres and radians, and first gue
 

@@ -1,13 +1,8 @@
-"""The case's coordinates q against the freedoms of its joints: s = A q + b, and ċ per q̇.
-
-The numbers of a mechanism: plain floats, or expressions where they are design parameters.
-"""
+"""The case's coordinates q against the freedoms of its joints: s = A q + b, and ċ per q̇."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +10,6 @@ from numpy.typing import NDArray
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics.topology import Edge, Tree
-from eigassign.series.expression import Expression, Recorder, Scalar
-
-# --- The case's coordinates q against the freedoms of its joints: s = A q + b, and ċ per q̇
 
 Floats = NDArray[np.float64]
 Angles = dict[str, tuple[Floats, float] | None]  # per link: row over q and constant, or unknown
@@ -120,75 +112,3 @@ def _joint_rates(relative: Floats, columns: tuple[int, ...], free: tuple[int, ..
         rates[np.ix_(free, free)] = np.linalg.inv(np.linalg.inv(relative)[np.ix_(free, free)])
         rates[np.abs(rates) < 1e-12] = 0.0  # round-off of two inverses of a matrix of 0, ±1
     return np.asarray(rates[:, list(columns)])
-
-
-# --- The numbers of a mechanism: plain floats, or expressions where they are design parameters
-
-
-@dataclass(frozen=True)
-class Parameters:
-    """Variables z = (s, y): joint coordinates s in the order of the case's q, then design y."""
-
-    recorder: Recorder
-    coordinates: tuple[str, ...]
-    design: tuple[str, ...]
-    relative: Floats  # A of s = A q + b
-    offset: Floats
-    by_path: dict[str, Expression] = field(default_factory=dict)
-    passive: tuple[Scalar, ...] = ()
-
-    def number(self, path: str, value: float) -> Scalar:
-        """The value at a key path of the case: the variable if it is a design parameter."""
-        return self.by_path.get(path, value)
-
-    def joint_coordinate(self, index: int) -> Expression:
-        """The relative joint coordinate s belonging to coordinate number ``index``."""
-        return self.recorder.variable(index)
-
-    def freedom(self, k: int) -> Scalar:
-        """Joint freedom k: a coordinate, or a passive one behind them."""
-        n_q = len(self.coordinates)
-        return self.joint_coordinate(k) if k < n_q else self.passive[k - n_q]
-
-    def with_passive(self, values: Sequence[Scalar]) -> Parameters:
-        """The same with the passive freedoms known."""
-        return replace(self, passive=tuple(values))
-
-    def rerecorded(self, recorder: Recorder, n_passive: int) -> Parameters:
-        """The same on another recorder, the passive freedoms being its last variables."""
-        n = len(self.coordinates) + len(self.design)
-        moved = {
-            path: recorder.variable(len(self.coordinates) + k)
-            for k, path in enumerate(self.by_path)
-        }
-        passive = tuple(recorder.variable(n + k) for k in range(n_passive))
-        return replace(self, recorder=recorder, by_path=moved, passive=passive)
-
-
-def parameters(case: CaseFile) -> Parameters:
-    """The variables of a case."""
-    from eigassign.mechanism.kinematics.topology import build_tree
-
-    recorder = Recorder()
-    names, design = tuple(case.coordinates), tuple(case.design.parameters)
-    by_path = {
-        parameter.parameter: recorder.variable(len(names) + k)
-        for k, parameter in enumerate(case.design.parameters.values())
-    }
-    maps = coordinates(case, build_tree(case))
-    return Parameters(recorder, names, design, maps.relative, maps.offset, by_path)
-
-
-def initial_design(case: CaseFile) -> Floats:
-    """y as the mechanism is written in the file, (n_y,) in SI units."""
-    paths = [p.parameter for p in case.design.parameters.values()]
-    return np.array([_value(case, path) for path in paths], dtype=np.float64)
-
-
-def _value(case: CaseFile, path: str) -> float:
-    head, name, *fields = path.split(".")
-    group = case.coordinates if head == "coordinates" else getattr(case.mechanism, head)
-    value: Any = group[name]
-    for field_name in fields:
-        value = getattr(value, field_name)
-    return float(value)

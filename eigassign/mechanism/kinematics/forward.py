@@ -4,37 +4,97 @@ A follower joined to a base at lever r (base axes), with R from follower to base
 subspace A of the joint in the follower's axes, has at its joint node the twist
 
     ω_f = Rᵀ ω_b + A_ω ċ,    v_f = Rᵀ (v_b + ω_b × r) + A_v ċ .
-
-The passive freedoms p of closed loops follow from the coordinates: closure F(p; q, y) = 0 defines
-p(q, y), and the loops' twists J_p ṗ + J_q q̇ = 0 give ṗ = P q̇.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from eigassign.case import CaseFile
-from eigassign.errors import MechanismError
-from eigassign.mechanism.elements.mesh import node_position
-from eigassign.mechanism.kinematics.coordinates import Coordinates, Parameters, coordinates
-from eigassign.mechanism.kinematics.joints import RIDING, JointMotion, joint_motion, turned
+from eigassign.case.schema.joints import RIDING
+from eigassign.mechanism.kinematics.coordinates import Coordinates
+from eigassign.mechanism.kinematics.joints import JointMotion, joint_motion, mounting, turned
+from eigassign.mechanism.kinematics.parameters import Parameters, node_position
 from eigassign.mechanism.kinematics.rotations import (
     Floats,
     Objects,
     cross,
-    euler,
     multiply,
     present,
-    rotation,
     vector,
 )
-from eigassign.mechanism.kinematics.topology import Edge, Loop, Node, Placement, Tree, build_tree
+from eigassign.mechanism.kinematics.topology import Edge, Node, Tree
 from eigassign.series.expression import Scalar
+
+
+@dataclass(frozen=True)
+class Placement:
+    """How one link hangs on its base, and its motion.
+
+    ``rotation`` turns the link's components into base components; ``lever`` runs from the base node
+    to the joint node of the link (base axes); ``freedoms`` is A (6, k). ``twist`` (6, n_columns) is
+    that of the link's own origin per column, in its own axes. ``foot`` and ``root`` are the base
+    node and the joint node, each in its own link's frame.
+    """
+
+    link: str
+    edge: Edge
+    rotation: Objects
+    lever: Objects
+    freedoms: Objects
+    twist: Objects
+    base: Placement | None = field(repr=False)  # of the base link; None for the ground
+    foot: Objects
+    root: Objects
+
+    @property
+    def world_rotation(self) -> Objects:
+        """From the link's axes to those of the world, (3, 3)."""
+        return self._world[0]
+
+    @property
+    def world_origin(self) -> Objects:
+        """The link's origin in the world, m (3,)."""
+        return self._world[1]
+
+    @cached_property
+    def _world(self) -> tuple[Objects, Objects]:
+        """Asked for where something is drawn, reached or closed; links of a model mostly are not.
+
+        The bases come first, one by one: a chain may be longer than Python lets calls nest.
+        """
+        waiting = [self]
+        while waiting[-1].base is not None and "_world" not in waiting[-1].base.__dict__:
+            waiting.append(waiting[-1].base)
+        for base in reversed(waiting[1:]):
+            base._world  # noqa: B018
+        R, foot = (
+            (np.eye(3).astype(object), self.foot) if self.base is None else self.base.at(self.foot)
+        )
+        rotation = multiply(R, self.rotation)
+        return rotation, foot + multiply(R, self.lever) - multiply(rotation, self.root)
+
+    def at(self, X: Objects) -> tuple[Objects, Objects]:
+        """World rotation, and world position of the point X of the link."""
+        return self.world_rotation, self.world_origin + multiply(self.world_rotation, X)
+
+
+@dataclass(frozen=True)
+class Loop:
+    """One loop-closing joint: pose and twist of its follower node, reached along both sides."""
+
+    edge: Edge
+    rotation: Objects  # from the follower's axes to the base link's axes
+    lever: Objects  # from base node to follower node, base axes
+    freedoms: Objects
+    position_gap: Objects  # (3,) world: along the base side minus along the follower side
+    misalignment: Objects  # (3, 3): R_baseᵀ R_follower, the identity when closed
+    twist_gap: Objects  # (6, n_columns): follower's own twist minus the carried and joint twist
 
 
 @dataclass(frozen=True)
@@ -73,43 +133,6 @@ class Kinematics:
     @cached_property
     def _by_link(self) -> dict[str, Placement]:
         return {p.link: p for p in self.placements}
-
-
-def kinematics(case: CaseFile, parameters: Parameters) -> Kinematics:
-    """ERLS motion of a case; raises MechanismError for what cannot be placed, moved or closed."""
-    tree = build_tree(case)
-    motion = replayed(case, parameters, tree, coordinates(case, tree))
-    drives = [c.drive for c in case.coordinates.values()]
-    free = tuple(k for k, i in enumerate(motion.columns) if drives[i] == "free")
-    if free and getattr(case.mechanism, "springs", None):
-        from eigassign.mechanism.assembly.rigid_body_modes import separated
-
-        return separated(case, parameters, motion, free)
-    return replace(motion, rigid=free)
-
-
-def replayed(case: CaseFile, parameters: Parameters, tree: Tree, coords: Coordinates) -> Kinematics:
-    """The motion for any choice of columns."""
-    if tree.loops:
-        from eigassign.mechanism.kinematics.loop_closure import close_loops
-
-        return close_loops(case, parameters, tree, coords)
-    if tree.passive:
-        name = tree.passive[0].joint
-        message = "moves without a coordinate in an open chain: give it one, or make it fixed"
-        raise MechanismError(f"mechanism.joints.{name}", message)
-    values = [parameters.freedom(k) for k in range(len(tree.freedoms))]
-    return walk(case, parameters, tree, coords, values, coords.rates.astype(object))
-
-
-def all_moving(case: CaseFile, parameters: Parameters, motion: Kinematics) -> Kinematics:
-    """The same motion with every coordinate among the columns, locked ones too."""
-    c = motion.coordinates
-    n = len(c.relative)
-    rates = np.zeros((len(motion.tree.freedoms), n))
-    rates[:n] = c.relative
-    coords = replace(c, columns=tuple(range(n)), rates=rates)
-    return replayed(case, parameters, motion.tree, coords)
 
 
 def walk(
@@ -230,14 +253,6 @@ def _mounted(joint: object, mount: Objects, motion: JointMotion) -> JointMotion:
     R = multiply(motion.rotation, mount)
     A = np.concatenate([multiply(mount.T, motion.freedoms[k : k + 3]) for k in (0, 3)])
     return JointMotion(R, motion.translation, A)
-
-
-def mounting(joint: object) -> Objects:
-    """Rotation of the joint's zero position in its base: planar ``angle`` or spatial angles."""
-    orientation = getattr(joint, "orientation", None)
-    if orientation is not None:
-        return euler(orientation).astype(object)
-    return rotation(np.array([0.0, 0.0, 1.0]), float(getattr(joint, "angle", 0.0) or 0.0))
 
 
 def _shifted(twist: Objects, lever: Objects) -> Objects:

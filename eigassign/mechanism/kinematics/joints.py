@@ -14,17 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case.schema.joints import FREEDOMS, RIDING
-from eigassign.mechanism.kinematics.rotations import Objects, carried, multiply, rotation
+from eigassign.mechanism.kinematics.rotations import Objects, carried, euler, multiply, rotation
 from eigassign.series.expression import Scalar
-
-__all__ = ["COMPONENTS", "JointMotion", "RIDING", "joint_motion", "turned", "unit"]
-
 
 Floats = NDArray[np.float64]
 X, Y, Z = np.eye(3)
-
-COMPONENTS = FREEDOMS
 
 
 class JointMotion(NamedTuple):
@@ -73,6 +67,14 @@ def turned(motion: JointMotion) -> JointMotion:
     back = motion.rotation.T
     lever = multiply(back, motion.translation) * -1.0
     return JointMotion(back, lever, multiply(carried(back, lever), motion.freedoms) * -1.0)
+
+
+def mounting(joint: object) -> Objects:
+    """Rotation of a joint's zero position, or of a spring's axes: planar or spatial angles."""
+    orientation = getattr(joint, "orientation", None)
+    if orientation is not None:
+        return euler(orientation).astype(object)
+    return rotation(np.array([0.0, 0.0, 1.0]), float(getattr(joint, "angle", 0.0) or 0.0))
 
 
 def _universal(joint: Any, values: Sequence[Scalar]) -> JointMotion:

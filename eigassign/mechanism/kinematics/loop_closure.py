@@ -2,9 +2,8 @@
 
 For every loop the two ways round must meet: three equations for the position and three for the
 orientation (planar: two and one). With passive freedoms p they define p(q, y) on the branch chosen;
-differentiated, J_p ṗ = −J_q q̇ gives the motion of the rigid links.
-
-The assembly branch of a mechanism with loops: from the user's guess, or found and asked for.
+differentiated, J_p ṗ = −J_q q̇ gives ṗ = P q̇ and so the motion of the rigid links. The branch is
+that of the user's guess, or found and asked for.
 """
 
 from __future__ import annotations
@@ -16,17 +15,43 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
+from eigassign.case.schema.joints import FREEDOMS
 from eigassign.errors import MechanismError
-from eigassign.mechanism.kinematics.coordinates import Coordinates, Parameters, initial_design
+from eigassign.mechanism.kinematics.coordinates import Coordinates
 from eigassign.mechanism.kinematics.forward import Kinematics, walk
-from eigassign.mechanism.kinematics.joints import COMPONENTS
+from eigassign.mechanism.kinematics.parameters import Parameters, initial_design
 from eigassign.mechanism.kinematics.rotations import Floats, Objects, multiply
 from eigassign.mechanism.kinematics.topology import Tree
 from eigassign.series.compiler import Program, compile_program
 from eigassign.series.expression import Expression, Recorder, Scalar, derivative
 from eigassign.series.implicit import ACCEPT, ImplicitFunction
 
-# --- Closed loops: passive freedoms as implicit functions of the coordinates, and their rates
+
+def closed_kinematics(
+    case: CaseFile, parameters: Parameters, tree: Tree, coords: Coordinates
+) -> Kinematics:
+    """ERLS motion of a mechanism for any choice of columns, its loops closed where it has any.
+
+    Raises MechanismError for what cannot be placed, moved or closed.
+    """
+    if tree.loops:
+        return close_loops(case, parameters, tree, coords)
+    if tree.passive:
+        name = tree.passive[0].joint
+        message = "moves without a coordinate in an open chain: give it one, or make it fixed"
+        raise MechanismError(f"mechanism.joints.{name}", message)
+    values = [parameters.freedom(k) for k in range(len(tree.freedoms))]
+    return walk(case, parameters, tree, coords, values, coords.rates.astype(object))
+
+
+def all_moving(case: CaseFile, parameters: Parameters, motion: Kinematics) -> Kinematics:
+    """The same motion with every coordinate among the columns, locked ones too."""
+    c = motion.coordinates
+    n = len(c.relative)
+    rates = np.zeros((len(motion.tree.freedoms), n))
+    rates[:n] = c.relative
+    coords = replace(c, columns=tuple(range(n)), rates=rates)
+    return closed_kinematics(case, parameters, motion.tree, coords)
 
 
 def close_loops(
@@ -176,7 +201,7 @@ def _combined(twist: Objects, P: Objects, n: int) -> Objects:
     return np.asarray(twist[:, :n] + multiply(twist[:, n:], P))
 
 
-# --- The assembly branch of a mechanism with loops: from the user's guess, or found and asked f
+# --- the assembly branch
 
 TRIES = 64  # starting points where no guess is given
 SAME = 1e-6  # rad or m
@@ -258,7 +283,7 @@ def _starts(n: int) -> Floats:
 
 def _turning(case: CaseFile, tree: Tree) -> NDArray[np.bool_]:
     """Which passive freedoms are angles, the same after a full turn."""
-    kinds = [COMPONENTS[case.mechanism.joints[f.joint].type][f.component] for f in tree.passive]
+    kinds = [FREEDOMS[case.mechanism.joints[f.joint].type][f.component] for f in tree.passive]
     return np.array([kind != "translation" for kind in kinds], dtype=bool)
 
 

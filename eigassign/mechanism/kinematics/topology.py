@@ -5,25 +5,18 @@ A spanning tree of links from the ground; the joints left over close loops.
 Each loop is closed, where it can be, at a node that deforms: that node's motion then follows from
 the rest. So a loop is closed at another of its joints where the first choice ends between rigid
 links or at nodes that are carried already.
-
-How links hang on one another, and the joints that close loops: what walking the tree found.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-import numpy as np
-
 from eigassign.case import CaseFile
+from eigassign.case.schema.joints import FREEDOMS, RIDING
 from eigassign.errors import MechanismError
-from eigassign.mechanism.kinematics.joints import COMPONENTS, RIDING
-from eigassign.mechanism.kinematics.rotations import Objects, multiply
-
-# --- The graph of links and joints as it is walked: tree edges, loop edges, freedoms
 
 Node = tuple[str, str]  # (link, node); the ground is ("ground", "")
 GROUND: Node = ("ground", "")
@@ -115,7 +108,7 @@ def freedoms(case: CaseFile) -> tuple[Freedom, ...]:
     passive = [
         Freedom(name, k, None)
         for name, joint in case.mechanism.joints.items()
-        for k in range(len(COMPONENTS[joint.type]))
+        for k in range(len(FREEDOMS[joint.type]))
         if (name, k) not in taken
     ]
     return tuple(driven + passive)
@@ -123,7 +116,7 @@ def freedoms(case: CaseFile) -> tuple[Freedom, ...]:
 
 def component_index(case: CaseFile, coordinate: object) -> int:
     """Which freedom of its joint a coordinate drives, from 0."""
-    names = COMPONENTS[case.mechanism.joints[coordinate.joint].type]  # type: ignore[attr-defined]
+    names = FREEDOMS[case.mechanism.joints[coordinate.joint].type]  # type: ignore[attr-defined]
     component = getattr(coordinate, "component", None)
     return 0 if component is None else names.index(str(component))
 
@@ -241,71 +234,3 @@ def _round(edges: Sequence[Edge], closing: Edge) -> list[str]:
             link = holder[link].base[0]
         sides.append(path)
     return [j for j in (*sides[0], *sides[1]) if (j in sides[0]) != (j in sides[1])]
-
-
-# --- How links hang on one another, and the joints that close loops: what walking the tree found
-
-
-@dataclass(frozen=True)
-class Placement:
-    """How one link hangs on its base, and its motion.
-
-    ``rotation`` turns the link's components into base components; ``lever`` runs from the base node
-    to the joint node of the link (base axes); ``freedoms`` is A (6, k). ``twist`` (6, n_columns) is
-    that of the link's own origin per column, in its own axes. ``foot`` and ``root`` are the base
-    node and the joint node, each in its own link's frame.
-    """
-
-    link: str
-    edge: Edge
-    rotation: Objects
-    lever: Objects
-    freedoms: Objects
-    twist: Objects
-    base: Placement | None = field(repr=False)  # of the base link; None for the ground
-    foot: Objects
-    root: Objects
-
-    @property
-    def world_rotation(self) -> Objects:
-        """From the link's axes to those of the world, (3, 3)."""
-        return self._world[0]
-
-    @property
-    def world_origin(self) -> Objects:
-        """The link's origin in the world, m (3,)."""
-        return self._world[1]
-
-    @cached_property
-    def _world(self) -> tuple[Objects, Objects]:
-        """Asked for where something is drawn, reached or closed; links of a model mostly are not.
-
-        The bases come first, one by one: a chain may be longer than Python lets calls nest.
-        """
-        waiting = [self]
-        while waiting[-1].base is not None and "_world" not in waiting[-1].base.__dict__:
-            waiting.append(waiting[-1].base)
-        for base in reversed(waiting[1:]):
-            base._world  # noqa: B018
-        R, foot = (
-            (np.eye(3).astype(object), self.foot) if self.base is None else self.base.at(self.foot)
-        )
-        rotation = multiply(R, self.rotation)
-        return rotation, foot + multiply(R, self.lever) - multiply(rotation, self.root)
-
-    def at(self, X: Objects) -> tuple[Objects, Objects]:
-        """World rotation, and world position of the point X of the link."""
-        return self.world_rotation, self.world_origin + multiply(self.world_rotation, X)
-
-
-@dataclass(frozen=True)
-class Loop:
-    """One loop-closing joint: pose and twist of its follower node, reached along both sides."""
-
-    edge: Edge
-    rotation: Objects  # from the follower's axes to the base link's axes
-    lever: Objects  # from base node to follower node, base axes
-    freedoms: Objects
-    position_gap: Objects  # (3,) world: along the base side minus along the follower side
-    misalignment: Objects  # (3, 3): R_baseᵀ R_follower, the identity when closed
-    twist_gap: Objects  # (6, n_columns): follower's own twist minus the carried and joint twist

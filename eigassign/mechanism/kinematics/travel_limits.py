@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
+from eigassign.case.schema.joints import RIDING
 from eigassign.errors import TravelError
-from eigassign.mechanism.elements.mesh import length, station
-from eigassign.mechanism.kinematics.coordinates import Parameters
-from eigassign.mechanism.kinematics.joints import RIDING
+from eigassign.mechanism.kinematics.parameters import Parameters, length, station
 from eigassign.mechanism.kinematics.topology import Tree
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import Table, compile_table

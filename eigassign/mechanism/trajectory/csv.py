@@ -17,12 +17,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eigassign.case.suggestions import listed, shown, suggestion
 from eigassign.case.units import DIMENSIONS, Dimension, QuantityError, Unit, parse_unit
 from eigassign.errors import MechanismError, TrajectoryError
-from eigassign.mechanism.inverse_kinematics.chain import Floats
 
+Floats = NDArray[np.float64]
 _KEY = "trajectory.file"
 TIME = "time"
 TIP_COLUMNS = ("tip x", "tip y", "tip z")  # written by runs; passed over without a note

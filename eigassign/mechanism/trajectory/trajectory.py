@@ -30,8 +30,7 @@ from eigassign.case import FileTrajectory, PointTrajectory, SampledTrajectory, T
 from eigassign.errors import MechanismError, TrajectoryError, UsageError
 from eigassign.mechanism.inverse_kinematics.chain import TipChain
 from eigassign.mechanism.inverse_kinematics.follow import follow
-from eigassign.mechanism.trajectory.csv import read_samples
-from eigassign.mechanism.trajectory.path import (
+from eigassign.mechanism.inverse_kinematics.tip_path import (
     WAYPOINTS,
     Course,
     Path,
@@ -40,6 +39,7 @@ from eigassign.mechanism.trajectory.path import (
     spline,
     straight,
 )
+from eigassign.mechanism.trajectory.csv import read_samples
 from eigassign.mechanism.trajectory.timing import point_to_point, shared_times, timing_law
 
 # --- The trajectory q(t) of a case: joint samples, a CSV file of them, or a path of the tip

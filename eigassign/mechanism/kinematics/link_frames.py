@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
-from eigassign.mechanism.elements.mesh import link_type, node_position
-from eigassign.mechanism.kinematics.coordinates import Parameters
 from eigassign.mechanism.kinematics.forward import Kinematics
+from eigassign.mechanism.kinematics.parameters import Parameters, link_type, node_position
+from eigassign.mechanism.kinematics.rotations import multiply
 from eigassign.mechanism.kinematics.topology import split
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import Table, compile_table
@@ -69,8 +69,6 @@ class Poses:
 
     def world(self, link: str, node: str) -> NDArray[np.object_]:
         """World position of a named node, as scalars (3,)."""
-        from eigassign.mechanism.kinematics.rotations import multiply
-
         p = self.motion.placement(link)
         X = node_position(self.case, self.parameters, self.motion.tree, (link, node))
         return np.asarray(p.world_origin + multiply(p.world_rotation, X))
