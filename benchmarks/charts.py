@@ -1,7 +1,7 @@
 """The charts of the paper's arm, a spatial arm of six joints, scenes of 10⁴ and 5 · 10⁴ dof.
 
 What `eigassign chart` writes goes to ``results/chart_<case>/``; here are its fronts and advice as
-Markdown. Then the figures of the README and the table of who holds the fronts are made anew.
+Markdown. Then the figures of fronts and the table of who holds the fronts are made anew.
 The last two are charted with less of everything, since exact solves take long there: what is left
 out is said in their notes.
 """

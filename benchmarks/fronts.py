@@ -1,4 +1,4 @@
-"""From the committed charts: the figures at the top of the README, and who holds each front."""
+"""From the committed charts: two figures, and who holds each front."""
 
 from __future__ import annotations
 
@@ -18,6 +18,19 @@ GROUPS = (  # families that begin so, how they are called, colour
     ("reduced", "reduced models", "#2f7d4f"),
     ("exact", "exact solves", "#222222"),
 )
+INTRODUCTION = """# Who holds the fronts
+
+A method is on a front if no other is both quicker and more accurate. The table counts those with
+relative errors between 1e-2 and 1e-8; the committed charts have all of them. How times are counted:
+
+- Fits, and every other method whose formula separates into a factor of pose and a factor of
+  design (response surfaces, grids), answer whole trajectories of many designs in one matrix
+  product. So do stations, which interpolate between solves along the trajectory. What all designs
+  share is computed once and is not counted, for eigassign's methods and for the others.
+- Radial basis functions, Kriging, the series and the reduced models are evaluated point by point.
+- Fits include their exact solves, checks and error estimate. The other methods are trained on
+  eigassign's exact solves, whose time is counted too, and have no error estimate.
+"""
 PEERS = ("interpolation and surrogates", "#9a9a9a")
 
 
@@ -49,17 +62,7 @@ def write_shares() -> str:
     paths = sorted(common.RESULTS.glob("chart_*/chart.json"))
     rows = [row for path in paths for row in share(path.parent.name[6:], _read(path))]
     lines = [
-        "# Who holds the fronts",
-        "",
-        "Methods on each front between 1e-2 and 1e-8 of relative error; the committed charts have",
-        "the rest. Fits, and every rival whose polynomial or splines separate into place and",
-        "design (response surfaces, all grids), answer whole trajectories of many designs in one",
-        "product of matrices; stations are interpolated by one product, too. What all designs",
-        "share there is made once and not charged, to either side. Radial basis functions,",
-        "scikit-learn's Kriging, the series and reduced models are evaluated by points.",
-        "Fits pay for exact solves, checks and error estimate; rivals are trained on eigassign's",
-        "own exact solves, and have no error estimate.",
-        "",
+        INTRODUCTION,
         "| case | front | methods | eigassign's | others |",
         "|---|---|---|---|---|",
     ]

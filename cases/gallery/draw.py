@@ -1,4 +1,4 @@
-"""Draw the first mode of every shipped case for the README: ``python cases/gallery/draw.py``."""
+"""Draw the first mode of every shipped case: ``python cases/gallery/draw.py``."""
 
 from __future__ import annotations
 
