@@ -19,8 +19,8 @@ import eastereig
 import numpy as np
 
 import eigassign as ea
+from eigassign.modal.expansion import Expansion
 from eigassign.modal.model import Model
-from eigassign.modal.taylor.expansion import Expansion
 from eigassign.series.multi_index import total_degree
 
 ORDER = 4

@@ -1,4 +1,4 @@
-"""Where sparse algebra overtakes dense: sets the limits in ``eigassign/modal/sizes.py``.
+"""Where sparse algebra overtakes dense: sets the limits in ``eigassign/modal/arguments.py``.
 
 Both paths are forced in turn on arms of growing mesh; a row gives the median times of one expansion
 of order 4 and of one exact solve for two modes.
@@ -16,22 +16,23 @@ import numpy as np
 from literal_procedure import Q0, design
 
 import eigassign as ea
+from eigassign.modal import projection
 from eigassign.modal.exact import solver
 from eigassign.modal.model import Model
-from eigassign.modal.taylor import coefficients, rayleigh
+from eigassign.modal.taylor import coefficients
 
 
 def forced(limit: int, job: Callable[[], object]) -> Callable[[], object]:
     """The job with every limit set to ``limit``."""
 
     def run() -> object:
-        kept = [module.DENSE_LIMIT for module in (coefficients, solver, rayleigh)]
-        for module in (coefficients, solver, rayleigh):
+        kept = [module.DENSE_LIMIT for module in (coefficients, solver, projection)]
+        for module in (coefficients, solver, projection):
             module.DENSE_LIMIT = limit
         try:
             return job()
         finally:
-            for module, value in zip((coefficients, solver, rayleigh), kept, strict=True):
+            for module, value in zip((coefficients, solver, projection), kept, strict=True):
                 module.DENSE_LIMIT = value
 
     return run

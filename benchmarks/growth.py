@@ -6,7 +6,7 @@ own. Beside the whole ``ea.expand`` call stand two floors, measured in the same 
 
 plain   one SuperLU factorisation of the bordered matrix as it is, the best of three orderings, and
         one block solve a degree: what textbook sparse algebra would cost;
-own     one factorisation by block elimination as ``eigassign.modal.taylor.sparse`` does it, and
+own     one factorisation by block elimination as ``eigassign.modal.taylor.bordered`` does it, and
         its solves in blocks that stay in the cache: the least that we know how to do.
 
 An expansion must also find its eigenpair, which takes a factorisation of K of its own before λ is
@@ -33,10 +33,10 @@ from scipy.sparse import linalg
 
 import eigassign as ea
 from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism.elements.sparse_factor import factorise
 from eigassign.modal.exact import sparse as symmetric
 from eigassign.modal.exact.solver import modes
-from eigassign.modal.taylor import recursion
-from eigassign.modal.taylor import sparse as bordered_sparse
+from eigassign.modal.taylor import bordered, recursion
 
 BRANCHES = (3, 10, 33, 103, 326)
 Q0 = np.array([0.3, 0.5, -0.4, 0.6])
@@ -73,7 +73,7 @@ def own_floor(
     rows = np.random.default_rng(0).standard_normal((n, len(border)))
 
     def run() -> None:
-        solve = bordered_sparse.factor_sparse(pencil, data, border[None], phi[None])
+        solve = bordered.factor_sparse(pencil, data, border[None], phi[None])
         for i in range(0, n, recursion.BLOCK):
             solve(rows[i : i + recursion.BLOCK])
 
@@ -83,7 +83,7 @@ def own_floor(
 def stiffness_factor(pencil: Pencil, theta: np.ndarray) -> Callable[[], object]:
     """The factorisation of K alone that finding the eigenpair takes."""
     data = pencil.stiffness @ theta
-    return lambda: symmetric.factorise(symmetric.principal(pencil, data, pencil.elastic))
+    return lambda: factorise(symmetric.principal(pencil, data, pencil.elastic))
 
 
 def one(branches: int) -> dict[str, float]:

@@ -20,8 +20,8 @@ import numpy as np
 
 import eigassign as ea
 from eigassign.modal.exact.solver import modes
+from eigassign.modal.expansion import Expansion
 from eigassign.modal.model import Model
-from eigassign.modal.taylor.expansion import Expansion
 from eigassign.series.multi_index import LowerSet, total_degree
 
 ORDER = 4

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 from numpy.typing import ArrayLike
 
 from eigassign.case import load
+from eigassign.modal import expansion as modal_expansion
+from eigassign.modal.expansion import Expansion
 from eigassign.modal.fit.domain import Box
 from eigassign.modal.fit.fit import Fit, PathFit, fit
 from eigassign.modal.model import Model, as_model
 from eigassign.modal.reduced import reduce as modal_reduced
 from eigassign.modal.reduced.reduce import ReducedModel
-from eigassign.modal.taylor import expansion as modal_expansion
-from eigassign.modal.taylor.expansion import Expansion
 from eigassign.series.multi_index import LowerSet
 from eigassign.study.built_case import Case
 
@@ -54,7 +54,7 @@ def expand(
 ) -> Expansion:
     """Taylor expansion of the eigenvalues of ``modes`` about (q0, y0), eqs. (4)-(9).
 
-    See :func:`eigassign.modal.taylor.expansion.expand`.
+    See :func:`eigassign.modal.expansion.expand`.
     """
     return modal_expansion.expand(
         as_model(model).pencil, q0, y0, modes, order, linear_in_y, space, vector_order

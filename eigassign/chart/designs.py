@@ -41,7 +41,7 @@ from eigassign.errors import EigassignError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.solver import modes_at
-from eigassign.modal.taylor.expansion import expand
+from eigassign.modal.expansion import expand
 from eigassign.study.assignment import Wanted, assign_design, target_frequencies, time_weights
 from eigassign.study.scene import Expansions, Scene
 

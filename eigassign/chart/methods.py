@@ -27,11 +27,11 @@ from eigassign.errors import AccuracyError
 from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.modal.exact.clusters import CLUSTER_GAP
 from eigassign.modal.exact.sparse import solve_sparse
+from eigassign.modal.expansion import expand, nearest
 from eigassign.modal.fit.domain import Box
 from eigassign.modal.fit.fit import MOST, Fit, PathFit, fit
 from eigassign.modal.model import Model
 from eigassign.modal.reduced.reduce import ReducedModel, reduce
-from eigassign.modal.taylor.expansion import expand, nearest
 from eigassign.study.drawing import spread_samples
 from eigassign.study.planning import OrderChoice, choose_order
 from eigassign.study.scene import Scene

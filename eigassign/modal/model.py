@@ -4,24 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.assembly import ReducedLinks
+from eigassign.mechanism.assembly.mode_shapes import NodeShape, StrandShape, shapes
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.link_frames import Poses
 from eigassign.mechanism.kinematics.travel_limits import Label
 from eigassign.modal.arguments import samples
 from eigassign.modal.exact.solver import eigenvalues, modes
-
-if TYPE_CHECKING:
-    from eigassign.mechanism.assembly.mode_shapes import NodeShape, StrandShape
-    from eigassign.modal.exact.tracking import Tracked
-
+from eigassign.modal.exact.tracking import Tracked, track
+from eigassign.modal.truncation import truncation_error
 
 Floats = NDArray[np.float64]
 
@@ -93,8 +90,6 @@ class Model:
         x = self.x(q, y)
         if self.reduced is None:
             return np.zeros((len(x), len(modes)))
-        from eigassign.modal.truncation import truncation_error
-
         return truncation_error(self.reduced, x, modes)
 
     def shapes(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> ModeShapes:
@@ -105,8 +100,6 @@ class Model:
         the mass-normalised modes (m per √kg m), rigid motion φ_q included; ``.nodes`` by
         (link, node). Raises UsageError for several samples.
         """
-        from eigassign.mechanism.assembly.mode_shapes import shapes
-
         hz, phi = self.modes(q, y, count)
         found = shapes(self.poses, self.one(q, y), phi[0])
         return ModeShapes(hz[0], found.strands, found.nodes)
@@ -117,8 +110,6 @@ class Model:
         ``.frequencies`` (n_samples, n_modes) in Hz, ``.swaps``, ``.encounters`` and ``.notes``.
         Neighbours must be neighbours: pass each of ``case.trajectories`` by itself.
         """
-        from eigassign.modal.exact.tracking import track
-
         return track(self.pencil, self.x(q, y), modes)
 
     def matrices(self, q: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:

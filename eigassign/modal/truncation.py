@@ -30,9 +30,9 @@ from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.assembly import ReducedLinks
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.craig_bampton import largest_left_out
-from eigassign.mechanism.elements.sparse_factor import kept_factor
+from eigassign.mechanism.elements.sparse_factor import factorise, kept_factor
 from eigassign.modal.exact.solver import lowest_modes
-from eigassign.modal.exact.sparse import factorise, principal
+from eigassign.modal.exact.sparse import principal
 
 Floats = NDArray[np.float64]
 BESIDE = 6  # modes above the highest one asked for that may be drawn in

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from eigassign.errors import StorageError, UsageError
 from eigassign.modal.reduced.model import ReducedModel
-from eigassign.modal.reduced.storage import FORMAT, reduced_arrays, reduced_from_arrays
+from eigassign.modal.storage import FORMAT, reduced_arrays, reduced_from_arrays
 from eigassign.output.cache import DamagedError, key, pack, unpack
 from eigassign.output.run_folder import replace_synced
 

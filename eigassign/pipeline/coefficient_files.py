@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.modal.taylor.expansion import Expansion
+from eigassign.modal.expansion import Expansion
 from eigassign.study.scene import Scene
 
 Array = NDArray[Any]

@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
 from dataclasses import replace
 from math import comb
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from eigassign.errors import UsageError
 from eigassign.modal.arguments import MOST_TERMS
+from eigassign.modal.expansion import expand
 from eigassign.modal.model import Model
-from eigassign.modal.taylor.expansion import Expansion, expand
-from eigassign.modal.taylor.storage import (
+from eigassign.modal.storage import (
     ALGORITHM,
     expansion_arrays,
-    expansion_from_arrays,
-    flatten,
+    expansions_from_arrays,
     pencil_parts,
-    unflatten,
 )
 from eigassign.study.planning import Plan
 from eigassign.study.scene import Expansions
@@ -82,7 +78,7 @@ def _expansions(
     if (found := _stored(cache, entry, model, plan, full_order)) is not None:
         return found, True
     fresh = _computed(model, plan, full_order)
-    cache.store(entry, flatten(_named(fresh)), _meta(plan))
+    cache.store(entry, expansion_arrays(fresh.full, fresh.linear), _meta(plan))
     return fresh, False
 
 
@@ -96,15 +92,6 @@ def _computed(model: Model, plan: Plan, full_order: int) -> Expansions:
     )
 
 
-def _named(expansions: Expansions) -> dict[str, NDArray[Any]]:
-    parts = {"full": expansions.full, "linear": expansions.linear}
-    return {
-        f"{part}.{name}": array
-        for part, expansion in parts.items()
-        for name, array in expansion_arrays(expansion).items()
-    }
-
-
 def _stored(
     cache: Cache, entry: str, model: Model, plan: Plan, full_order: int
 ) -> Expansions | None:
@@ -112,17 +99,12 @@ def _stored(
     if arrays is None:
         return None
     try:
-        named = unflatten(arrays)
-        full, linear = (replace(_part(named, p), pencil=model.pencil) for p in ("full", "linear"))
+        found = expansions_from_arrays(arrays, 2)
+        full, linear = (replace(e, pencil=model.pencil) for e in found)
         return Expansions(full, linear, plan.order, full_order)
     except UsageError as error:
         _log.warning("cache entry %s cannot be used (%s); computed anew", entry[:12], error)
         return None
-
-
-def _part(named: Mapping[str, NDArray[Any]], part: str) -> Expansion:
-    own = {n.removeprefix(f"{part}."): a for n, a in named.items() if n.startswith(f"{part}.")}
-    return expansion_from_arrays(own)
 
 
 def expansion_key(model: Model, plan: Plan, full_order: int) -> str:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from eigassign.api import Case, load_case
 from eigassign.assignment import Assignment
-from eigassign.modal.taylor.expansion import Expansion
+from eigassign.modal.expansion import Expansion
 from eigassign.pipeline.coefficient_files import coefficient_files
 from eigassign.pipeline.expansions import expand_plan
 from eigassign.pipeline.queries import CheckAnswer, ModesAnswer, check, modes

@@ -44,7 +44,7 @@ class Step:
     right: Ints  # second factors of products; of waves 0 for a sine and 1 for a cosine
     numbers: Floats  # exponents of powers; constants of linear forms
     matrix: sparse.csr_array | None  # of linear forms, over the atoms ``left``
-    picked: Ints  # which components of a system's solution are wanted
+    components: Ints  # which components of a system's solution are wanted
     function: Function | None  # of an implicit step
 
     @cached_property
@@ -96,9 +96,9 @@ def _take(step: Step, algebra: Algebra, values: Floats) -> Floats:
         return algebra.power(a, step.numbers)
     if step.kind == "solve":
         right = values.take(step.right, axis=0)
-        return algebra.solve(a, right, int(step.numbers[0]))[step.picked]
+        return algebra.solve(a, right, int(step.numbers[0]))[step.components]
     if step.function is not None:
-        return step.function.evaluate(algebra, a)[step.picked]
+        return step.function.evaluate(algebra, a)[step.components]
     return algebra.wave(a, step.right)
 
 
@@ -217,15 +217,15 @@ def _step(kind: str, atoms: list[int], nodes: Sequence[Node]) -> Step:
 
 def _system_step(targets: Ints, nodes: list[Node]) -> Step:
     empty = np.zeros(0, dtype=np.intp)
-    picked = np.array([int(str(node[-1])) for node in nodes], dtype=np.intp)
+    components = np.array([int(str(node[-1])) for node in nodes], dtype=np.intp)
     match nodes[0]:
         case ("solve", tuple(left), tuple(right), int(n), _):
             a, b = np.array(left, dtype=np.intp), np.array(right, dtype=np.intp)
-            return Step("solve", targets, a, b, np.array([float(n)]), None, picked, None)
+            return Step("solve", targets, a, b, np.array([float(n)]), None, components, None)
         case ("implicit", tuple(arguments), function, _):
             a = np.array(arguments, dtype=np.intp)
             numbers = np.zeros(0)
-            return Step("implicit", targets, a, empty, numbers, None, picked, function)  # type: ignore[arg-type]
+            return Step("implicit", targets, a, empty, numbers, None, components, function)  # type: ignore[arg-type]
     raise UsageError(f"unknown system {nodes[0]!r}")
 
 

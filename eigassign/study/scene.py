@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from eigassign.case import CaseFile
 from eigassign.errors import CaseError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.modal.expansion import Expansion, nearest_values
 from eigassign.modal.model import Model
-from eigassign.modal.taylor.expansion import Expansion, picked
 from eigassign.study.results import Comparison, DesignMap
 
 # --- A case ready to be studied: its model, trajectory and expansions, in one frozen object
@@ -137,7 +137,7 @@ class Expansions:
         return self._pick(q, [part.full.error_estimate(q, y) for part in self.all])
 
     def _pick(self, q: Floats, values: list[Floats]) -> Floats:
-        return picked([part.full for part in self.all], np.atleast_2d(q), values)
+        return nearest_values([part.full for part in self.all], np.atleast_2d(q), values)
 
     def column(self, mode: int) -> int:
         """Column of ``mode`` in what the expansions evaluate to."""

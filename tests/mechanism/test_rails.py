@@ -12,7 +12,7 @@ from test_loops import slotted_lever
 from eigassign.errors import TravelError
 from eigassign.mechanism.kinematics.travel_limits import resting_pose
 from eigassign.modal.exact.solver import eigenvalues
-from eigassign.modal.taylor.expansion import expand
+from eigassign.modal.expansion import expand
 
 FIRST = 6 * 1e-4 * 1.6  # m: six elements of L/10⁴ before the carriage
 

@@ -12,8 +12,8 @@ import pytest
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.exact import solver
 from eigassign.modal.exact.solver import eigenvalues, modes
+from eigassign.modal.expansion import Expansion
 from eigassign.modal.taylor import coefficients
-from eigassign.modal.taylor.expansion import Expansion
 from eigassign.modal.taylor.recursion import expand_subspace
 from eigassign.series.multi_index import total_degree
 

@@ -10,8 +10,8 @@ from chains import model_of, two_link
 
 from eigassign.api import expand, load_case, reduce
 from eigassign.errors import EigassignError, UsageError
+from eigassign.modal.expansion import expand as expand_pencil
 from eigassign.modal.model import Model
-from eigassign.modal.taylor.expansion import expand as expand_pencil
 from eigassign.series.multi_index import lower_set
 
 CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"

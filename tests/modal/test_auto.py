@@ -18,9 +18,8 @@ from eigassign.modal.adaptive.order import (
     go_on,
     reduce_adaptively,
 )
+from eigassign.modal.expansion import expand, radius_share
 from eigassign.modal.model import Model
-from eigassign.modal.taylor.convergence import radius_share
-from eigassign.modal.taylor.expansion import expand
 
 FREE = {"upper": None, "fore": None}
 

@@ -16,13 +16,17 @@ from calibration import draw
 from wide_draws import planar_loop, spatial_loop, spatial_tree
 
 from eigassign.errors import AccuracyError, SingularityError
+from eigassign.mechanism.elements.sparse_factor import factorise
 from eigassign.modal.exact.roundoff import rounding_error, rounding_weights
-from eigassign.modal.exact.sparse import factorise
-from eigassign.modal.reduced import error_estimate as ritz_error
 from eigassign.modal.reduced.basis import ritz_basis
-from eigassign.modal.reduced.error_estimate import frequency_error, gone, half_solve
+from eigassign.modal.reduced.error_estimate import (
+    frequency_error,
+    largest_outside,
+    mode_missing,
+)
+from eigassign.modal.reduced.pencil import ritz_pairs
 from eigassign.modal.reduced.reduce import reduce
-from eigassign.modal.reduced.ritz import ritz_pairs
+from eigassign.modal.reduced.residual import half_solve, residual_gram
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 
@@ -76,7 +80,8 @@ def test_the_residual_is_measured_in_the_stiffness_of_the_pose_at_hand(seed):
     mu, z = ritz_pairs(K, M_c)
     count = reduced.error_terms.anchors.shape[1] - 1
     wide = np.concatenate([z, -coupling @ z], axis=1)[:, :, :count]
-    gram = ritz_error._residual_gram(reduced, theta, theta, mu[:, :count], wide)
+    terms = reduced.error_terms
+    gram = residual_gram(terms.residual, terms.joints, theta, theta, mu[:, :count], wide)
     expected = full_gram(pencil, q, q0, mu[:, :count], count)
     # A residual below 1e-10 of μ is round-off and may differ.
     scale = np.maximum(np.sqrt(np.einsum("nii->ni", expected)), 1e-5 * mu[:, :count])
@@ -142,11 +147,11 @@ def test_modes_outside_the_basis_are_taken_to_grow_as_those_inside_or_as_the_sof
     count = terms.anchors.shape[1] - 1
     mu, last = terms.anchors[:, :count].copy(), terms.anchors[0, -1]
     one, soft = np.ones(1), np.array([0.25])
-    assert ritz_error._outside(terms, mu, one) == pytest.approx(last)
-    assert ritz_error._outside(terms, mu, soft) == pytest.approx(4.0 * last)
+    assert largest_outside(terms, mu, one) == pytest.approx(last)
+    assert largest_outside(terms, mu, soft) == pytest.approx(4.0 * last)
     mu[0, -1] *= 3.0
-    assert ritz_error._outside(terms, mu, one) == pytest.approx(3.0 * last)
-    assert ritz_error._outside(terms, mu, soft) == pytest.approx(4.0 * last)
+    assert largest_outside(terms, mu, one) == pytest.approx(3.0 * last)
+    assert largest_outside(terms, mu, soft) == pytest.approx(4.0 * last)
 
 
 def test_half_a_solve_measures_in_the_inverse():
@@ -174,11 +179,11 @@ def test_a_mode_is_gone_when_its_shape_and_one_frequency_are_missing():
     gram = np.zeros((1, 3, 3))
     shares = np.zeros((1, 1, 3, 5))
     shares[0, 0, [0, 1, 2], [0, 4, 1]] = 1.0  # the second shape is in a pair that is far too stiff
-    assert gone(present, gram, shares, anchors).tolist() == [[False, True, False]]
+    assert mode_missing(present, gram, shares, anchors).tolist() == [[False, True, False]]
     kept = shares[:, :, :, [0, 4, 1, 2, 3]]  # now it is in the second pair: merely faster
-    assert not gone(present, gram, kept, anchors).any()
+    assert not mode_missing(present, gram, kept, anchors).any()
     whole = 1.0 / np.array([[1.1, 4.2, 8.8, 30.0, 90.0]]) ** 2  # none is missing, shapes changed
-    assert not gone(whole, gram, shares, anchors).any()
+    assert not mode_missing(whole, gram, shares, anchors).any()
 
 
 def test_a_pair_whose_residual_is_not_known_stands_for_a_shape_only_nearby():
@@ -188,8 +193,8 @@ def test_a_pair_whose_residual_is_not_known_stands_for_a_shape_only_nearby():
     present = 1.0 / np.array([[1.1, 5.0, 20.0, 27.0, 400.0]]) ** 2
     shares = np.zeros((1, 1, 4, 5))
     shares[0, 0, [0, 1, 2, 3], [0, 1, 3, 2]] = 1.0
-    assert not gone(present, np.zeros((1, 4, 4)), shares, anchors).any()
-    unknown = gone(present, np.zeros((1, 3, 3)), shares[:, :, :3], anchors[:, [0, 1, 2, 4]])
+    assert not mode_missing(present, np.zeros((1, 4, 4)), shares, anchors).any()
+    unknown = mode_missing(present, np.zeros((1, 3, 3)), shares[:, :, :3], anchors[:, [0, 1, 2, 4]])
     assert unknown.tolist() == [[False, True, False]]
 
 

@@ -14,11 +14,12 @@ from rungs import derivative, richardson, treat_as_large
 
 from eigassign.api import expand
 from eigassign.errors import UsageError
+from eigassign.modal import expansion
 from eigassign.modal.exact import solver
+from eigassign.modal.exact.clusters import clusters
+from eigassign.modal.expansion import Expansion
+from eigassign.modal.expansion import expand as expand_pencil
 from eigassign.modal.model import Model
-from eigassign.modal.taylor import expansion
-from eigassign.modal.taylor.expansion import Expansion, clusters
-from eigassign.modal.taylor.expansion import expand as expand_pencil
 from eigassign.modal.taylor.local_coordinates import substitute
 from eigassign.modal.taylor.rayleigh import vector_members
 from eigassign.modal.taylor.recursion import expand_subspace

@@ -21,8 +21,8 @@ from eigassign.case.case_file import plain
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.exact.solver import eigenvalues
+from eigassign.modal.expansion import Expansion
 from eigassign.modal.model import Model
-from eigassign.modal.taylor.expansion import Expansion
 
 SHIPPED = sorted((Path(__file__).parents[2] / "cases").glob("*.yaml"))
 every_case = pytest.mark.parametrize("path", SHIPPED, ids=lambda p: p.stem)

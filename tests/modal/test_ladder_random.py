@@ -16,7 +16,7 @@ from wide_draws import FAMILIES
 
 from eigassign.errors import EigassignError
 from eigassign.modal.exact.roundoff import rounding_error
-from eigassign.modal.taylor.expansion import Expansion, expand
+from eigassign.modal.expansion import Expansion, expand
 
 EVERY = {"planar trees": draw, **FAMILIES}
 SPAN = 0.2  # rad or m, and of the design parameters' middle values

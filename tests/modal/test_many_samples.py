@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import eigassign as ea
-from eigassign.modal.taylor.expansion import MANY, expand
+from eigassign.modal.expansion import MANY, expand
 
 ARM = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 

@@ -14,7 +14,7 @@ from chains import model_of, random_chain, two_link
 from eigassign import api
 from eigassign.errors import StorageError, UsageError
 from eigassign.modal.reduced.reduce import reduce
-from eigassign.modal.reduced.storage import reduced_arrays, reduced_from_arrays
+from eigassign.modal.storage import reduced_arrays, reduced_from_arrays
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 Q = Q0 + np.column_stack([np.zeros(9), np.linspace(-0.5, 0.5, 9)])
@@ -84,7 +84,7 @@ def test_arrays_of_another_version_are_refused(reduced):
 def test_only_known_classes_are_made(reduced):
     arrays = reduced_arrays(reduced)
     tree = json.loads(arrays["tree"].tobytes())
-    tree["model"]["class"] = "Path"
+    tree["content"]["class"] = "Path"
     arrays["tree"] = np.frombuffer(json.dumps(tree).encode(), dtype=np.uint8)
     with pytest.raises(UsageError, match="not a reduced model"):
         reduced_from_arrays(arrays)

@@ -15,20 +15,26 @@ from pencils import crossing
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly import pencil as pencil_module
 from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism.elements.sparse_factor import factorise
+from eigassign.modal import projection
 from eigassign.modal.exact import solver
 from eigassign.modal.exact import sparse as symmetric
 from eigassign.modal.exact.dense import solve_single
+from eigassign.modal.expansion import Expansion, expand
 from eigassign.modal.model import Model
-from eigassign.modal.reduced import error_estimate
+from eigassign.modal.reduced import residual
 from eigassign.modal.reduced.basis import ritz_basis
-from eigassign.modal.taylor import coefficients, rayleigh
-from eigassign.modal.taylor import sparse as bordered_sparse
-from eigassign.modal.taylor.bordered import add_product, factor_dense
-from eigassign.modal.taylor.expansion import Expansion, expand
+from eigassign.modal.taylor import coefficients
+from eigassign.modal.taylor.bordered import (
+    add_product,
+    factor_dense,
+    factor_sparse,
+    with_partial_pivoting,
+)
 
 HELD = {"stiffness": 2e3}
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
-MODULES = (coefficients, solver, rayleigh)
+MODULES = (coefficients, solver, projection)
 
 
 def arm(drives: tuple[Any, Any] = ("free", "free"), elements: tuple[int, int] = (9, 7)) -> Model:
@@ -118,7 +124,7 @@ def test_the_bordered_system_is_solved_without_its_dense_rows(
     data, border, phi = mode_system(pencil, np.concatenate([Q0, Y0]), mode)
     rows = np.random.default_rng(1).standard_normal((5, pencil.n_dof))
     A = pencil.sparse(data).toarray()
-    x, values = bordered_sparse.factor_sparse(pencil, data, border, phi)(rows)
+    x, values = factor_sparse(pencil, data, border, phi)(rows)
     right, right_values = factor_dense(A, border)(rows)
     np.testing.assert_allclose(x, right, atol=1e-8 * np.abs(right).max())
     np.testing.assert_allclose(values, right_values, rtol=1e-7)
@@ -127,25 +133,24 @@ def test_the_bordered_system_is_solved_without_its_dense_rows(
     assert np.abs(x @ border.T).max() < 1e-9 * np.abs(x).max() * np.abs(border).sum()
 
 
-def test_pivots_that_fail_are_replaced_by_safe_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pivots_that_fail_are_replaced_by_safe_ones() -> None:
     pencil = arm().pencil
     data, border, phi = mode_system(pencil, np.concatenate([Q0, Y0]), 1)
     rows = np.random.default_rng(1).standard_normal((2, pencil.n_dof))
-    right, _ = bordered_sparse.factor_sparse(pencil, data, border, phi)(rows)
+    right, _ = factor_sparse(pencil, data, border, phi)(rows)
 
     class Spoiled:
         def __init__(self, matrix: Any) -> None:
-            self.inner = symmetric.factorise(matrix)
+            self.inner = factorise(matrix)
 
         def solve(self, rhs: np.ndarray) -> np.ndarray:
             return np.asarray(self.inner.solve(rhs) * (1.0 + 1e-4))
 
-    monkeypatch.setattr(bordered_sparse, "factorise", Spoiled)
-    x, _ = bordered_sparse.factor_sparse(pencil, data, border, phi)(rows)
+    spoiled: Any = Spoiled
+    x, _ = factor_sparse(pencil, data, border, phi, (spoiled, with_partial_pivoting))(rows)
     np.testing.assert_allclose(x, right, atol=1e-8 * np.abs(right).max())
-    monkeypatch.setattr(bordered_sparse, "_pivoted", Spoiled)
     with pytest.raises(AccuracyError, match="singular"):
-        bordered_sparse.factor_sparse(pencil, data, border, phi)
+        factor_sparse(pencil, data, border, phi, (spoiled, spoiled))
 
 
 def test_a_double_mode_with_half_its_border_is_refused() -> None:
@@ -158,10 +163,10 @@ def test_a_double_mode_with_half_its_border_is_refused() -> None:
     M = pencil.sparse(pencil.mass @ theta[:, 0])
     phi = found.phi[0].T
     rows = np.random.default_rng(1).standard_normal((1, 6))
-    whole, _ = bordered_sparse.factor_sparse(pencil, data, phi @ M, phi)(rows)
+    whole, _ = factor_sparse(pencil, data, phi @ M, phi)(rows)
     assert np.abs(whole).max() < 1e3
     try:  # singular to round-off: refused, or an answer that shows it by its size
-        half, _ = bordered_sparse.factor_sparse(pencil, data, phi[:1] @ M, phi[:1])(rows)
+        half, _ = factor_sparse(pencil, data, phi[:1] @ M, phi[:1])(rows)
     except AccuracyError:
         return
     assert np.abs(half).max() > 1e10
@@ -172,10 +177,10 @@ def test_terms_are_projected_alike_from_stacks_and_from_their_rows(
     drives: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     V = np.random.default_rng(2).standard_normal((arm(drives).n_dof, 4))
-    full = rayleigh.project(arm(drives).pencil, V)
-    thin = sparsely(monkeypatch, lambda: rayleigh.project(arm(drives).pencil, V))
-    monkeypatch.setattr(rayleigh, "CHUNK", 7)  # terms cut into pieces
-    cut = sparsely(monkeypatch, lambda: rayleigh.project(arm(drives).pencil, V))
+    full = projection.project(arm(drives).pencil, V)
+    thin = sparsely(monkeypatch, lambda: projection.project(arm(drives).pencil, V))
+    monkeypatch.setattr(projection, "CHUNK", 7)  # terms cut into pieces
+    cut = sparsely(monkeypatch, lambda: projection.project(arm(drives).pencil, V))
     for a, b, c in zip(full, thin, cut, strict=True):
         np.testing.assert_allclose(b, a, atol=1e-12 * np.abs(a).max())
         np.testing.assert_allclose(c, a, atol=1e-12 * np.abs(a).max())
@@ -237,10 +242,10 @@ def test_residuals_have_the_same_size_from_unit_and_from_chosen_vectors(
     """From half a solve with a basis of the residuals' span, against L⁻¹ B_j."""
     pencil = arm(drives).pencil
     basis = ritz_basis(pencil, np.concatenate([Q0, Y0])[None], (1,), 2, True, None)
-    given = pencil, basis.K0, symmetric.factorise(basis.K0), basis.wide
-    right = error_estimate.residual_factors(*given)
-    monkeypatch.setattr(error_estimate, "UNIT_LIMIT", 0)
-    found = error_estimate.residual_factors(*given)
+    given = pencil, basis.K0, factorise(basis.K0), basis.wide
+    right = residual.residual_terms(*given)
+    monkeypatch.setattr(residual, "UNIT_LIMIT", 0)
+    found = residual.residual_terms(*given)
     np.testing.assert_array_equal(found.stiffness_terms, right.stiffness_terms)
     np.testing.assert_array_equal(found.mass_terms, right.mass_terms)
     rng = np.random.default_rng(5)

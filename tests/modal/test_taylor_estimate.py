@@ -10,8 +10,7 @@ from chains import model_of, two_link
 
 from eigassign.api import load_case
 from eigassign.errors import UsageError
-from eigassign.modal.taylor.convergence import companion_order
-from eigassign.modal.taylor.expansion import expand
+from eigassign.modal.expansion import companion_order, expand
 from eigassign.series.multi_index import box
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import logging
 from collections.abc import Iterator
 from dataclasses import replace
@@ -11,13 +12,12 @@ from run_cases import TARGET, automatic, case_of, chain, shipped
 
 from eigassign.api import Case
 from eigassign.errors import UsageError
-from eigassign.modal.taylor.expansion import Expansion
-from eigassign.modal.taylor.storage import (
+from eigassign.modal.expansion import Expansion
+from eigassign.modal.storage import (
     expansion_arrays,
-    expansion_from_arrays,
+    expansions_from_arrays,
     flatten,
     pencil_parts,
-    unflatten,
 )
 from eigassign.output.cache import Cache
 from eigassign.pipeline.expansions import affordable_order, expand_plan, expansion_key
@@ -71,9 +71,12 @@ def test_what_comes_from_the_cache_is_frozen(tmp_path: Path) -> None:
     expanded(case, cache)
     full, linear, _ = expanded(case, cache)
     for expansion in (full, linear):
-        arrays = expansion_arrays(expansion)
-        for name in set(arrays) - {"modes", "n_linear", "cluster_0_modes"}:  # made on request
-            assert not arrays[name].flags.writeable, name
+        named = {name: getattr(expansion, name) for name in ("q0", "y0", "directions", "kept")}
+        named |= {"indices": expansion.space.indices, "halves": expansion.vector_space.indices}
+        named |= dict(enumerate(expansion.vectors))
+        named |= {c.modes: c.coefficients for c in expansion.clusters}
+        for name, array in named.items():
+            assert not array.flags.writeable, name
 
 
 def test_a_whole_solution_from_the_cache_has_the_same_bits(tmp_path: Path) -> None:
@@ -124,12 +127,14 @@ def test_an_intact_entry_with_other_content_is_recomputed_with_a_warning(
     entry = expansion_key(case.model(), plan_of(case), 4)
     stored = cache.load(entry)
     assert stored is not None
-    named = unflatten(stored)
+    tree = json.loads(stored["tree"].tobytes())
+    full, linear = (part["fields"] for part in tree["content"]["tuple"])
     if spoiled == "missing":
-        del named["full.q0"]
+        del full["q0"]
     elif spoiled == "wrong shape":
-        named["linear.kept"] = named["linear.kept"][:2]
-    flat = {"numbers": np.zeros(3)} if spoiled == "no layout" else flatten(named)
+        linear["kept"] = full["q0"]
+    text = np.frombuffer(json.dumps(tree).encode(), dtype=np.uint8)
+    flat = {"numbers": np.zeros(3)} if spoiled == "no layout" else {**stored, "tree": text}
     cache.store(entry, flat, {})
     with caplog.at_level(logging.WARNING):
         rebuilt = expanded(case, cache)
@@ -212,8 +217,8 @@ def test_only_arrays_that_can_be_stored_exactly_are() -> None:
 
 
 def test_what_is_no_expansion_is_not_taken_for_one() -> None:
-    with pytest.raises(UsageError, match="not an expansion"):
-        expansion_from_arrays({"q0": np.zeros(2)})
+    with pytest.raises(UsageError, match="not expansions"):
+        expansions_from_arrays({"q0": np.zeros(2)}, 2)
 
 
 def test_a_set_too_large_is_taken_to_a_lower_order_and_said_so(tmp_path: Path) -> None:

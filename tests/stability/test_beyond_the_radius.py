@@ -8,8 +8,7 @@ from stress import answered, case, judged
 
 from eigassign.errors import AccuracyError
 from eigassign.modal.adaptive.order import choose_expansion, reduce_adaptively
-from eigassign.modal.taylor.convergence import radius_share
-from eigassign.modal.taylor.expansion import expand
+from eigassign.modal.expansion import expand, radius_share
 
 ELBOW = np.deg2rad(np.linspace(20.0, 170.0, 61))
 Q = np.column_stack([np.zeros(61), ELBOW])

@@ -15,9 +15,9 @@ from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.modal.exact import sparse as exact_sparse
 from eigassign.modal.exact.condensation import condense
 from eigassign.modal.exact.solver import lowest_modes
+from eigassign.modal.expansion import expand
 from eigassign.modal.model import Model
 from eigassign.modal.reduced.reduce import reduce
-from eigassign.modal.taylor.expansion import expand
 
 POSE = [0.3, 0.9]
 ELEMENTS = 3  # of a link: 9 unknowns, and one more where its root turns

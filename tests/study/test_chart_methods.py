@@ -31,8 +31,8 @@ from eigassign.chart.study import (
 from eigassign.chart.timing import Patience
 from eigassign.errors import CaseError
 from eigassign.modal.exact import solver
+from eigassign.modal.expansion import expand, nearest
 from eigassign.modal.fit.fit import FINE
-from eigassign.modal.taylor.expansion import expand, nearest
 from eigassign.study.scene import Scene
 
 

@@ -29,10 +29,15 @@ from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import MOST_TERMS, shown_numbers
 from eigassign.modal.exact.clusters import CLUSTER_GAP
 from eigassign.modal.exact.solver import eigenvalues
+from eigassign.modal.expansion import (
+    Expansion,
+    expand,
+    nearest_values,
+    polynomial_error,
+    radius_share,
+)
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.reduce import reduce
-from eigassign.modal.taylor.convergence import polynomial_error, radius_share
-from eigassign.modal.taylor.expansion import Expansion, expand, picked
 
 # --- The search of `expansion_choice`: candidates in the order of their cost, the first that wi
 
@@ -261,7 +266,7 @@ class Trial:
 
     def errors(self, parts: Sequence[Expansion], values: Sequence[Floats]) -> Floats:
         """(n, n_modes), each sample by the nearest of ``parts``, with their ``values``."""
-        hz = picked(parts, self.x[:, : self.pencil.n_q], values)
+        hz = nearest_values(parts, self.x[:, : self.pencil.n_q], values)
         return polynomial_error(hz, self.reduced_hz, self.beside.estimate)
 
     def share(self, part: Expansion, errors: Floats) -> float:
@@ -441,7 +446,9 @@ class ExpansionChoice:
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """(n, n_modes) in Hz, each sample by the nearest expansion."""
         values = [part.frequencies(q, y) for part in self.expansions]
-        return picked(self.expansions, np.atleast_2d(np.asarray(q, dtype=np.float64)), values)
+        return nearest_values(
+            self.expansions, np.atleast_2d(np.asarray(q, dtype=np.float64)), values
+        )
 
     def error_estimate(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """Relative error of ``frequencies``, (n, n_modes); infinite where refused."""

@@ -1,1 +1,13 @@
-"""exact."""
+"""Exact elastic modes of the affine pencil, the rigid-body modes projected out exactly.
+
+In reading order:
+
+    condensation  the modes as data, and the condensed mass M_c
+    massless      how many modes have mass, and all of them to the digits that arithmetic leaves
+    dense         small pencils: many samples at once, or one through LAPACK
+    sparse        large pencils: Lanczos with one sparse factorisation
+    solver        the dispatcher: dense or sparse, and as many modes as there are
+    roundoff      how many digits of a frequency the matrices themselves hold
+    clusters      neighbouring modes that are expanded together
+    tracking      modes followed along a path by their shapes
+"""

@@ -15,9 +15,6 @@ from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.sparse_factor import factorise
 from eigassign.modal.exact.massless import doubtful, mass_sizes, solve_massive
 
-__all__ = ["block", "factorise", "principal"]
-
-
 # --- Exact elastic modes of a large pencil: Lanczos on M_c z = μ K_E z with K_E factored sparse
 
 Floats = NDArray[np.float64]

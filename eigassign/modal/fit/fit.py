@@ -34,10 +34,10 @@ from eigassign.interpolation.newton import Asking, Interpolant, newton_polynomia
 from eigassign.modal.arguments import DENSE_LIMIT, mode_numbers, shown_numbers, whole_within
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.exact.solver import eigenvalues
+from eigassign.modal.expansion import Expansion, InverseExpansion
 from eigassign.modal.fit.domain import Box, Path, Region, Stretch, build_region, followed, stretches
 from eigassign.modal.model import Model, as_model
 from eigassign.modal.reduced.model import ReducedModel
-from eigassign.modal.taylor.expansion import Expansion, InverseExpansion
 from eigassign.series.power_series import Polynomials
 
 # --- A polynomial in place of an eigensolve, to a stated accuracy over a stated region

@@ -3,6 +3,10 @@
 It holds the Taylor vectors of the wanted modes to order m; those of the modes below them and of the
 next one above to order m − 1; and a few modes above those as they are, so that one that comes down
 is seen.
+
+The inner product is K0 = K_E(θ̄) with θ averaged over turned poses. A vector smooth in one pose
+kinks the joints of another, with a strain energy many times that of a mode. In K_E(x0) numbers of
+that size would have to cancel; in the mean stiffness they do not.
 """
 
 from __future__ import annotations
@@ -14,15 +18,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.exact.solver import lowest_modes
-from eigassign.modal.reduced.ritz import mean_theta, orthonormal
-from eigassign.modal.taylor.expansion import expand
+from eigassign.modal.taylor.vectors import vectors_to_order
+from eigassign.series.algebra import Samples
 
 Floats = NDArray[np.float64]
 PROBES = 6  # modes above the guard that may join as they are at the expansion point
 DISTANT = 10.0  # λ beyond this multiple of the highest wanted one needs no probe
 Plan = Sequence[tuple[Sequence[int], int]]  # modes, and the order of their Taylor vectors
+DEPENDENT = 1e-9  # remainder, relative to the vector, below which it is taken as dependent
+ORTHONORMAL = 1e-8  # post-condition on |VᵀKV − I|, beyond round-off of K itself
+
+INDEFINITE = "the stiffness matrix is not positive definite at an expansion point"
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +72,11 @@ def ritz_basis(
     guard: bool,
     given: Floats | None,
 ) -> RitzBasis:
-    """See :func:`eigassign.modal.reduced.reduce.reduce`."""
+    """The basis at ``points`` for :func:`eigassign.modal.reduced.reduce.reduce`.
+
+    ``given`` are the Taylor vectors (n_dof, N) of the wanted modes at the one point, where they
+    are known.
+    """
     theta0 = pencil.theta(points)
     found = lowest_modes(pencil, theta0, wanted[-1], 2 + PROBES if guard else 1)
     count = _represented(found.lam, wanted[-1]) if guard else wanted[-1]
@@ -97,9 +110,87 @@ def _plan(most: int, wanted: tuple[int, ...], half_order: int, guard: bool) -> P
 
 def _taylor_vectors(pencil: Pencil, x0: Floats, plan: Plan) -> Floats:
     """Columns φ_γ (n_dof, N)."""
-    columns = [np.zeros((pencil.n_dof, 0))]
-    for modes, order in plan:
-        q0, y0 = x0[: pencil.n_q], x0[pencil.n_q :]
-        found = expand(pencil, q0, y0, modes, order=max(order, 1), vector_order=order)
-        columns += [X.transpose(1, 0, 2).reshape(pencil.n_dof, -1) for X in found.vectors]
-    return np.hstack(columns)
+    columns = [vectors_to_order(pencil, x0, modes, order) for modes, order in plan]
+    return np.hstack([np.zeros((pencil.n_dof, 0)), *columns])
+
+
+# --- K0-orthonormal vectors of the same span
+
+
+def orthonormal(K: sparse.csc_array | Floats, vectors: Floats) -> Floats:
+    """V (n, k) with VᵀKV = I spanning the columns of ``vectors`` (n, N), by Gram-Schmidt twice.
+
+    Raises AccuracyError if K is not positive on a vector or the result is not orthonormal.
+    """
+    Q = np.zeros((len(vectors), vectors.shape[1]))
+    KQ = np.zeros_like(Q)
+    rank = 0
+    for v in vectors.T:
+        size = np.sqrt(_square(K, v))
+        if size == 0.0:
+            continue
+        v = v / size
+        for _ in range(2):
+            v = v - Q[:, :rank] @ (KQ[:, :rank].T @ v)
+        Kv = K @ v
+        rest = np.sqrt(max(float(v @ Kv), 0.0))
+        if rest > DEPENDENT:
+            Q[:, rank], KQ[:, rank] = v / rest, Kv / rest
+            rank += 1
+    Q, KQ = Q[:, :rank], KQ[:, :rank]
+    lost = float(np.abs(Q.T @ KQ - np.eye(rank)).max(initial=0.0))
+    if lost > ORTHONORMAL + _rounding(K, Q):
+        raise AccuracyError(f"the basis is orthonormal only to {lost:.1e}")
+    return Q
+
+
+def _rounding(K: sparse.csc_array | Floats, Q: Floats) -> float:
+    """Round-off of QᵀKQ itself: in a fine mesh it is a small difference of large terms."""
+    size = np.abs(Q)
+    terms = np.einsum("ij,ij->j", size, abs(K) @ size)
+    return 10.0 * float(np.finfo(np.float64).eps * terms.max(initial=0.0))
+
+
+def _square(K: sparse.csc_array | Floats, v: Floats) -> float:
+    square = float(v @ (K @ v))
+    if square < 0.0 or not np.isfinite(square):
+        raise AccuracyError(INDEFINITE)
+    return square
+
+
+# --- θ averaged over turned poses
+
+
+def mean_theta(pencil: Pencil, points: Floats) -> Floats:
+    """Mean θ (n_theta,) over quarter turns of all angles from ``points`` (n_points, n_x).
+
+    Loops are not turned: where they close at all, a passive carriage may have left its beam, whose
+    stiffness is then not one.
+    """
+    if pencil.program.is_implicit:
+        return np.asarray(pencil.theta(points).mean(axis=1))
+    z = points @ pencil.to_program.T + pencil.shift
+    z[:, pencil.n_q :] = z[0, pencil.n_q :]
+    turns = np.zeros(len(pencil.shift))
+    turns[: pencil.n_q] = _periodic(pencil, z[0])
+    turned = np.concatenate([z + k * turns * (np.pi / 2.0) for k in range(4)])
+    theta = _theta_at(pencil, turned)
+    return np.asarray(theta[:, np.isfinite(theta).all(axis=0)].mean(axis=1))
+
+
+def _theta_at(pencil: Pencil, z: Floats) -> Floats:
+    """θ (n_theta, n) at program variables z (n, n_z)."""
+    return np.vstack([np.ones((1, len(z))), pencil.program.run(Samples(), z.T)])
+
+
+def _periodic(pencil: Pencil, z: Floats) -> NDArray[np.bool_]:
+    """Which joint coordinates are angles (n_q,): a full turn changes nothing but round-off."""
+    return np.array([_turns(pencil, z, k) for k in range(pencil.n_q)], dtype=bool)
+
+
+def _turns(pencil: Pencil, z: Floats, k: int) -> bool:
+    turned = np.array([z, z])
+    turned[1, k] += 2.0 * np.pi
+    here, there = _theta_at(pencil, turned).T
+    scale = np.maximum(np.abs(here), np.abs(there))
+    return bool((np.abs(there - here) <= 1e-9 * scale).all())

@@ -21,10 +21,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import solve_triangular
 
 from eigassign.errors import UsageError
-from eigassign.modal.reduced.basis import RitzBasis
+from eigassign.modal.reduced.basis import DEPENDENT, RitzBasis
 from eigassign.modal.reduced.error_estimate import error_terms
 from eigassign.modal.reduced.model import ReducedModel
-from eigassign.modal.reduced.ritz import DEPENDENT, ritz_pairs, ritz_values
+from eigassign.modal.reduced.pencil import ritz_pairs, ritz_values
 
 Floats = NDArray[np.float64]
 ACCURACY = 1e-4

@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import mode_numbers, samples, whole_within
+from eigassign.modal.projection import project
 from eigassign.modal.reduced.basis import RitzBasis, ritz_basis
 from eigassign.modal.reduced.compression import ACCURACY, compressed, half_widths
 from eigassign.modal.reduced.error_estimate import error_terms
 from eigassign.modal.reduced.model import ReducedModel
-from eigassign.modal.taylor.rayleigh import project
 
 __all__ = ["ACCURACY", "ReducedModel", "reduce"]
 

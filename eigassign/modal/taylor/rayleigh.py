@@ -6,8 +6,6 @@ The block Rayleigh quotient of X = Σ_{γ ∈ H} X_γ w^γ,
 
 has the eigenvalues of the exact invariant subspace up to products of two missing vectors: exact on
 Λ when no γ ∈ Λ is a sum of two members of Λ \ H.
-
-Projections of the pencil on a basis, term by term: Vᵀ K_j W, Vᵀ M_j W, or at one θ.
 """
 
 from __future__ import annotations
@@ -17,14 +15,11 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.arguments import DENSE_LIMIT
+from eigassign.modal.projection import project_at, project_terms
 from eigassign.series.multi_index import LowerSet, first_of_each
 from eigassign.series.power_series import multiply, power_taylor, reciprocal
-
-# --- 2m + 1: eigenvalues to order p from eigenvectors to order ⌊p/2⌋
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -182,100 +177,3 @@ def inverse_root(space: LowerSet, D: Floats) -> Floats:
         result = matrix_product(space, result, small)
         result[:, :, 0] += coefficient * np.eye(r)
     return result
-
-
-# --- Projections of the pencil on a basis, term by term: Vᵀ K_j W, Vᵀ M_j W, or at one θ
-
-CHUNK = 4_000  # rows multiplied at once, so that the products stay in the cache
-
-
-@dataclass(frozen=True)
-class Terms:
-    """L A_j Rᵀ (n_matrices, n_terms, l, r) of ``terms`` j of the ``matrices``: 0 is K, 1 is M."""
-
-    matrices: slice
-    terms: Ints | slice
-    values: Floats
-
-
-def project(pencil: Pencil, basis: Floats, left: Floats | None = None) -> tuple[Floats, Floats]:
-    """(n_theta, k, k) projections of the stiffness and the mass terms on ``basis`` (n_dof, k).
-
-    With ``left`` (n_dof, j) those on it from the left, (n_theta, j, k).
-    """
-    rows = (basis if left is None else left).T
-    out = np.zeros((2, pencil.n_theta, len(rows), basis.shape[1]))
-    for part in project_terms(pencil, rows, basis.T, np.arange(pencil.n_theta)):
-        out[part.matrices, part.terms] = part.values
-    return out[0], out[1]
-
-
-def project_terms(pencil: Pencil, left: Floats, right: Floats, wanted: Ints) -> list[Terms]:
-    """The ``wanted`` terms of K and M projected on rows L, R (·, n_dof), small pencils' at once."""
-    stacks = pencil.term_stacks
-    if stacks is None:
-        W, V = np.ascontiguousarray(left.T), np.ascontiguousarray(right.T)
-        both = enumerate(pencil.by_term)
-        return [_project(pencil, which, terms, W, V, wanted) for which, terms in both]
-    n = pencil.n_dof
-    half = left @ stacks.reshape(n, -1)
-    full = half.reshape(-1, n) @ right.T
-    values = full.reshape(len(left), 2, pencil.n_theta, len(right)).transpose(1, 2, 0, 3)
-    return [Terms(slice(0, 2), slice(None), values)]
-
-
-def project_at(pencil: Pencil, theta: Floats, rows: Floats) -> Floats:
-    """R K Rᵀ and R M Rᵀ at θ (n_theta, 1), (2, k, k), for rows R (k, n_dof)."""
-    if pencil.n_dof <= DENSE_LIMIT:
-        return np.asarray(rows @ pencil.both_matrices(theta)[:, 0] @ rows.T)
-    V = np.ascontiguousarray(rows.T)
-    weights = (pencil.stiffness, pencil.mass)
-    return np.array([_square(pencil.sparse(w @ theta[:, 0]).T, V) for w in weights])
-
-
-def _square(matrix: sparse.csr_array, V: Floats) -> Floats:
-    """Vᵀ A V."""
-    out = np.zeros((V.shape[1], V.shape[1]))
-    for i in range(0, len(V), CHUNK):
-        out += V[i : i + CHUNK].T @ (matrix[i : i + CHUNK] @ V)
-    return out
-
-
-def _project(
-    pencil: Pencil,
-    which: int,
-    terms: sparse.csc_array,
-    W: Floats,
-    V: Floats,
-    wanted: Ints,
-) -> Terms:
-    """Wᵀ A_j V of every wanted term that there is, over its non-zero rows only."""
-    there = wanted[np.diff(terms.indptr)[wanted] > 0]
-    tall, rows, bounds = _stacked(pencil, terms, there)
-    out = np.zeros((1, len(there), W.shape[1], V.shape[1]))
-    for i in range(0, len(rows), CHUNK):
-        part = tall if len(rows) <= CHUNK else tall[i : i + CHUNK]  # slicing costs as much
-        products, others = part @ W, V[rows[i : i + CHUNK]]
-        first, last = np.searchsorted(bounds, [i + 1, i + len(others)], side="left") - 1
-        for k in range(first, last + 1):
-            a, b = max(bounds[k] - i, 0), bounds[k + 1] - i
-            out[0, k] += products[a:b].T @ others[a:b]
-    return Terms(slice(which, which + 1), there, out)
-
-
-def _stacked(
-    pencil: Pencil, terms: sparse.csc_array, there: Ints
-) -> tuple[sparse.csr_array, Ints, Ints]:
-    """The non-zero rows of the terms below each other, their numbers, and where terms begin."""
-    starts = np.concatenate([[0], np.cumsum(np.diff(terms.indptr)[there])])
-    shift = terms.indptr[there] - starts[:-1]
-    entries = np.arange(starts[-1]) + np.repeat(shift, np.diff(starts))
-    row, column = pencil.rows[terms.indices[entries]], pencil.columns[terms.indices[entries]]
-    new = np.ones(len(row), dtype=bool)  # entries of one term run row by row
-    new[1:] = row[1:] != row[:-1]
-    new[starts[:-1]] = True
-    first = np.flatnonzero(new)
-    shape = (len(first), pencil.n_dof)
-    limits = np.append(first, len(row))
-    tall = sparse.csr_array((terms.data[entries], column, limits), shape=shape)
-    return tall, row[first], np.searchsorted(first, starts).astype(np.intp)

@@ -4,12 +4,9 @@ The expansion is carried out in local variables w: the relative joint coordinate
 parameters on which anything depends, with w = V (x − x0). A coordinate that nothing depends on is
 dropped by construction; coefficients over (q, y) follow by substituting V (x − x0).
 
-The series of 1/λ: the same coefficients as λ's, summed in another way.
+Error estimate: with f̂ of the reduced model on the same Taylor vectors and its own estimate e,
 
-Frequencies that fall with added mass have λ = a / (b + m) in the simplest case: 1/λ is linear in m,
-while λ's own series ends at m = −b. The reciprocal of a truncated series is exact order by order.
-
-Several expansions about points along a trajectory: each pose belongs to the nearest of them.
+    |f_T/f − 1| ≤ |f_T/f̂ − 1| (1 + e) + e .
 """
 
 from __future__ import annotations
@@ -17,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from math import comb
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,25 +22,19 @@ from numpy.typing import ArrayLike, NDArray
 from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import mode_numbers, point, relative_gap, samples, whole_within
-from eigassign.modal.exact.clusters import CLUSTER_GAP, clusters, whole_clusters
-from eigassign.modal.exact.condensation import Modes
-from eigassign.modal.taylor.local_coordinates import Local, local_space, substitute, vector_set
+from eigassign.modal.exact.clusters import CLUSTER_GAP
+from eigassign.modal.reduced.model import ReducedModel
+from eigassign.modal.reduced.reduce import reduce
+from eigassign.modal.taylor.local_coordinates import Local, local_space, substitute
 from eigassign.modal.taylor.rayleigh import eigenvalue_series
-from eigassign.modal.taylor.recursion import expand_subspace
+from eigassign.modal.taylor.vectors import as_columns, taylor_vectors
 from eigassign.series.multi_index import LowerSet
 from eigassign.series.power_series import Polynomials, PowerSeries, monomials, polynomials
-
-if TYPE_CHECKING:
-    from eigassign.modal.reduced.model import ReducedModel
-
-__all__ = ["CLUSTER_GAP", "Cluster", "Expansion", "MAX_ORDER", "clusters", "expand"]
-
-
-# --- The multivariate Taylor expansion of eigenvalues about x0 = (q0, y0) (eqs. (4)-(9))
 
 Floats = NDArray[np.float64]
 MAX_ORDER = 20
 MANY = 1000  # samples from which preparing the polynomials pays
+MOST_VECTORS = 150  # Taylor vectors of one mode in the reduced model beside an expansion
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,23 +92,31 @@ class Expansion:
         Measured against a reduced model on the same Taylor vectors, made at the first call.
         Infinite where λ < 0, or where not even the reduced model vouches for the mode.
         """
-        from eigassign.modal.taylor.convergence import polynomial_error
-
         f = self.frequencies(q, y)
         beside = self.reduced
         return polynomial_error(f, beside.frequencies(q, y), beside.error_estimate(q, y))
 
     @cached_property
     def reduced(self) -> ReducedModel:
-        """The reduced model on these Taylor vectors; UsageError without the pencil."""
-        from eigassign.modal.taylor.convergence import companion
+        """The reduced model on these Taylor vectors; UsageError without the pencil.
 
-        return companion(self.pencil, self.q0, self.y0, self.modes, self.vector_space, self.vectors)
+        Vectors to second order at least, to first order in very many variables.
+        """
+        if self.pencil is None:
+            raise UsageError(
+                "this expansion was read from arrays without its model: no error estimate"
+            )
+        space = self.vector_space
+        order = companion_order(space.n_variables, space.order)
+        keep = space.degrees <= order
+        given = None
+        if keep.sum() == comb(space.n_variables + order, order):
+            given = as_columns([X[keep] for X in self.vectors])
+        return reduce(self.pencil, self.q0, self.y0, self.modes, order, given=given)
 
     @cached_property
     def inverse(self) -> InverseExpansion:
         """The expansion of 1/λ with the same coefficients; UsageError for clusters."""
-
         return inverse(self)
 
     def linear_in_design(self, q: ArrayLike) -> tuple[Floats, Floats]:
@@ -241,46 +240,24 @@ def expand(
     cluster_gap = relative_gap(cluster_gap)
     x0 = point(q0, y0, pencil.n_q, pencil.to_program.shape[1] - pencil.n_q)
     local = local_space(pencil, order, linear_in_y, space)
-    return _about(pencil, x0, wanted, local, vector_order, cluster_gap)
-
-
-def _about(
-    pencil: Pencil,
-    x0: Floats,
-    wanted: tuple[int, ...],
-    local: Local,
-    vector_order: int | None,
-    cluster_gap: float,
-) -> Expansion:
-    """The expansion about x0: eigenpairs there, eigenvectors to half the order, eigenvalues."""
-    theta = pencil.theta_series(local.space, x0, local.to_z)
-    found, groups = whole_clusters(pencil, theta[:, :1], wanted, cluster_gap)
-    half, kept = vector_set(local.space, local.n_linear, vector_order)
-    vectors = tuple(_vectors(pencil, theta[:, kept], half, found, group) for group in groups)
-    series = [eigenvalue_series(pencil, theta, local.space, half, X) for X in vectors]
+    found = taylor_vectors(pencil, x0, wanted, local, vector_order, cluster_gap)
+    series = [
+        eigenvalue_series(pencil, found.theta, local.space, found.space, X) for X in found.vectors
+    ]
     return Expansion(
-        modes=tuple(m for g in groups for m in g if m in wanted),
-        clusters=tuple(Cluster(g, _frozen(s)) for g, s in zip(groups, series, strict=True)),
+        modes=tuple(m for g in found.groups for m in g if m in wanted),
+        clusters=tuple(Cluster(g, _frozen(s)) for g, s in zip(found.groups, series, strict=True)),
         q0=_frozen(x0[: pencil.n_q]),
         y0=_frozen(x0[pencil.n_q :]),
         space=local.space,
         directions=_frozen(local.directions),
         n_linear=local.n_linear,
         kept=_frozen(local.kept.astype(np.float64)),
-        vectors=vectors,
-        vector_space=half,
-        notes=_notes(groups, local, pencil),
+        vectors=found.vectors,
+        vector_space=found.space,
+        notes=_notes(found.groups, local, pencil),
         pencil=pencil,
     )
-
-
-def _vectors(
-    pencil: Pencil, theta: Floats, space: LowerSet, found: Modes, group: tuple[int, ...]
-) -> Floats:
-    """X (N_H, n_dof, r) of one cluster over ``space``, from θ's coefficients there."""
-    pick = np.array(group) - 1
-    lam0, phi0 = found.lam[0, pick], found.phi[0][:, pick]
-    return _frozen(expand_subspace(pencil, theta, space, lam0, phi0).vectors)
 
 
 def _notes(groups: Sequence[tuple[int, ...]], local: Local, pencil: Pencil) -> tuple[str, ...]:
@@ -301,12 +278,72 @@ def _frozen(a: Floats) -> Floats:
     return a
 
 
-# --- The series of 1/λ: the same coefficients as λ's, summed in another way
+# --- The reduced model beside an expansion
+
+
+def companion_order(n_variables: int, known: int) -> int:
+    """Order m of the vectors: as known, but 2 at least and no more vectors than MOST_VECTORS."""
+    orders = range(max(known, 2), 1, -1)
+    fitting = [m for m in orders if comb(n_variables + m, m) <= MOST_VECTORS]
+    return fitting[0] if fitting else 1
+
+
+def polynomial_error(polynomial: Floats, reduced: Floats, estimate: Floats) -> Floats:
+    """Relative error in frequency (n, n_modes); infinite where λ < 0 or f̂ is refused."""
+    apart = np.abs(polynomial / reduced - 1.0)
+    bound = apart * (1.0 + estimate) + estimate
+    return np.where(np.isfinite(bound), bound, np.inf)
+
+
+# --- How far the series reaches: its radius of convergence, seen from the coefficients
+
+LEAST_ORDER = 4
+
+
+def radius_share(expansion: Expansion, q: ArrayLike, y: ArrayLike) -> Floats:
+    """|w|/R (n_samples, n_clusters): below 1 the series converges at that sample.
+
+    At a displacement w the terms of one degree k sum up to t_k(w) ~ (|w|/R)^k, so that over two
+    degrees
+
+        |w| / R ≈ ( (|t_p| + |t_{p−1}|) / (|t_{p−2}| + |t_{p−3}|) )^{1/2} ;
+
+    pairs of degrees, for in a symmetric pose every other one vanishes. Above 1 more order only
+    harms. NaN below order 4, where nothing can be said.
+    """
+    x = samples(q, y, len(expansion.q0), len(expansion.y0)) - expansion.x0
+    powers = monomials(expansion.space, x @ expansion.directions.T)
+    return np.column_stack([_share(expansion, c, powers) for c in expansion.clusters])
+
+
+def _share(expansion: Expansion, cluster: Cluster, powers: Floats) -> Floats:
+    if expansion.order < LEAST_ORDER:
+        return np.full(len(powers), np.nan)
+    size = [_term(expansion, cluster, powers, expansion.order - k) for k in range(4)]
+    late, early = size[0] + size[1], size[2] + size[3]
+    tiny = np.finfo(float).eps * np.abs(cluster.coefficients[:, :, 0]).max()
+    return np.asarray(np.sqrt(np.maximum(late - tiny, 0.0) / np.maximum(early, tiny)))
+
+
+def _term(expansion: Expansion, cluster: Cluster, powers: Floats, degree: int) -> Floats:
+    """‖t_degree(w)‖ of the cluster's matrix, (n_samples,)."""
+    starts = expansion.space.degree_starts
+    here = slice(starts[degree], starts[degree + 1])
+    matrix = np.tensordot(powers[:, here], cluster.coefficients[:, :, here], axes=(1, 2))
+    return np.asarray(np.linalg.norm(matrix, axis=(1, 2)))
+
+
+# --- The series of 1/λ: the same coefficients, summed in another way
 
 
 @dataclass(frozen=True, eq=False)
 class InverseExpansion:
-    """Taylor expansion of 1/λ about the point of ``expansion``, over the same set; immutable."""
+    """Taylor expansion of 1/λ about the point of ``expansion``, over the same set; immutable.
+
+    Frequencies that fall with added mass have λ = a / (b + m) in the simplest case: 1/λ is linear
+    in m, while λ's own series ends at m = −b. The reciprocal of a truncated series is exact order
+    by order.
+    """
 
     expansion: Expansion
     coefficients: Floats  # (n_modes, N) over w, s² over units of w
@@ -332,8 +369,6 @@ class InverseExpansion:
 
         As for the expansion of λ: beside the reduced model on the same Taylor vectors.
         """
-        from eigassign.modal.taylor.convergence import polynomial_error
-
         beside = self.expansion.reduced
         f = self.frequencies(q, y)
         return polynomial_error(f, beside.frequencies(q, y), beside.error_estimate(q, y))
@@ -353,7 +388,7 @@ def inverse(expansion: Expansion) -> InverseExpansion:
     return InverseExpansion(expansion, coefficients)
 
 
-# --- Several expansions about points along a trajectory: each pose belongs to the nearest of th
+# --- Several expansions about points along a trajectory: each pose belongs to the nearest one
 
 
 def nearest(parts: Sequence[Expansion], q: Floats) -> NDArray[np.intp]:
@@ -366,7 +401,7 @@ def nearest(parts: Sequence[Expansion], q: Floats) -> NDArray[np.intp]:
     return np.asarray(np.argmin(away, axis=0), dtype=np.intp)
 
 
-def picked(parts: Sequence[Expansion], q: Floats, values: Sequence[Floats]) -> Floats:
+def nearest_values(parts: Sequence[Expansion], q: Floats, values: Sequence[Floats]) -> Floats:
     """Of ``values``, one array (n, …) for each of ``parts``, the nearest one's at each sample."""
     if len(values) == 1:
         return values[0]
