@@ -9,15 +9,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from eigassign.mechanism.kinematics.travel_limits import Rails
 from eigassign.series.algebra import Samples, Truncated
 from eigassign.series.compiler import Program
 from eigassign.series.multi_index import LowerSet, on_faces
+
+if TYPE_CHECKING:  # a stored reduced model is evaluated without the case layer
+    from eigassign.mechanism.kinematics.travel_limits import Rails
 
 Floats = NDArray[np.float64]
 STACK_LIMIT = 500_000  # numbers: 4 MB
