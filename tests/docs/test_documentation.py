@@ -73,6 +73,14 @@ def test_the_readme_is_short() -> None:
     assert len(prose(README).split()) <= MOST_WORDS
 
 
+def test_two_commands_do_all_set_up_and_the_ci_runs_the_same() -> None:
+    main_job, tests = blocks(README, "bash")
+    assert main_job.endswith("eigassign optimize cases/two_link.yaml\n")
+    assert tests.endswith("python -m pytest\n")
+    ci = (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()
+    assert "python -m pytest" in ci
+
+
 def test_the_case_shown_is_the_case_shipped() -> None:
     shown = next(block for block in blocks(README, "yaml") if block.startswith("title:"))
     assert parse(shown.encode(), TWO_LINK) == parse(TWO_LINK.read_bytes(), TWO_LINK)
