@@ -156,7 +156,7 @@ def test_every_module_and_file_named_exists(page: Path) -> None:
     parts = {path.stem for path in PACKAGE.iterdir() if path.suffix in ("", ".py")}
     for text in quoted(page):
         name = text.removeprefix("eigassign.")
-        is_file = name.endswith((".py", ".json", ".yaml"))
+        is_file = name.endswith((".py", ".json", ".yaml", ".png", ".csv"))
         if re.fullmatch(r"[a-z_]+(\.[A-Za-z_]+)+", name) and not is_file:
             assert name.split(".")[0] not in parts or names_code(name), text
         if re.fullmatch(r"(eigassign|tests|benchmarks|cases)/[\w./-]*", text):
