@@ -1,4 +1,27 @@
-"""Assign the natural frequencies of moving, flexible mechanisms along their trajectory."""
+"""Assign the natural frequencies of moving, flexible mechanisms along their trajectory.
+
+Data flows one way: a module imports only from those above it in this list, which is also the order
+in which to read. The way of a case is `case`, `mechanism`, `modal`, `assignment`, `study`; it is
+one function, `eigassign.pipeline.run.solve_case`.
+
+    _version       the version
+    errors         every error raised on purpose, and its exit code
+    process        the process around a command: errors on stderr, signals, streams, threads
+    series         truncated power series and expressions that are evaluated on them
+    interpolation  polynomial interpolation in several variables
+    case           a case file: schema, units, rules, every problem with its line
+    mechanism      links, joints, kinematics: K and M of eq. (1), and the trajectory
+    modal          exact modes, expansions of eqs. (4)–(9), reduced models, fits
+    assignment     the quadratic program of eqs. (13)–(14)
+    study          what one case asks of all that, and what came of it
+    chart          time against accuracy of every way to the frequencies of a case
+    output         results.json, report, figures, tables, run folder, cache
+    pipeline       one case from its file to its folder
+    api            the functions for notebooks
+    batch          many cases in parallel
+    cli            the command line
+    __main__       python -m eigassign
+"""
 
 from __future__ import annotations
 

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from eigassign.case import load
 from eigassign.modal import expansion as modal_expansion
 from eigassign.modal.expansion import Expansion
 from eigassign.modal.fit.domain import Box
@@ -16,11 +14,10 @@ from eigassign.modal.fit.fit import Fit, PathFit, fit
 from eigassign.modal.model import Model, as_model
 from eigassign.modal.reduced import reduce as modal_reduced
 from eigassign.modal.reduced.reduce import ReducedModel
+from eigassign.output import reduced_file
+from eigassign.pipeline.run import Result, solve_case
 from eigassign.series.multi_index import LowerSet
-from eigassign.study.built_case import Case
-
-if TYPE_CHECKING:
-    from eigassign.pipeline.run import Result
+from eigassign.study.built_case import Case, load_case
 
 __all__ = [
     "Box",
@@ -35,11 +32,6 @@ __all__ = [
     "reduce",
     "save_reduced",
 ]
-
-
-def load_case(path: str | Path) -> Case:
-    """Read and validate a case file; raises CaseError with every problem found."""
-    return Case(load(Path(path)))
 
 
 def expand(
@@ -83,20 +75,14 @@ def reduce(
 
 def assign(case: Case) -> Result:
     """The whole job of ``eigassign optimize``, without writing anything."""
-    from eigassign.pipeline.run import solve_case
-
     return solve_case(case)
 
 
 def save_reduced(reduced: ReducedModel, path: str | Path) -> None:
     """Keep a reduced model in an HDF5 file, for use without its mechanism."""
-    from eigassign.output import reduced_file
-
     reduced_file.save_reduced(reduced, path)
 
 
 def load_reduced(path: str | Path) -> ReducedModel:
     """Read a reduced model, checked before use; raises StorageError for a damaged file."""
-    from eigassign.output import reduced_file
-
     return reduced_file.load_reduced(path)

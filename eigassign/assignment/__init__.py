@@ -1,4 +1,14 @@
-"""Targets, quadratic program, solver and judge: from linear models of λ to the optimal design."""
+"""From linear models of λ to the optimal design: eqs. (13)–(14) built, solved and judged.
+
+Reading order:
+
+    checks      what is not a finite number, or of another shape, is refused
+    targets     wanted frequencies at the samples, weights in time, the distance to a target
+    program     the quadratic program of eqs. (13)–(14), and its dimensionless units
+    solver      its solution: OSQP, then an active-set method that goes to round-off
+    optimality  its judge: Karush–Kuhn–Tucker residuals, and which limits contradict each other
+    assign      build, solve, judge: the three steps of an assignment
+"""
 
 from __future__ import annotations
 

@@ -17,15 +17,14 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from eigassign.batch.workers import cores, process_pool
 from eigassign.errors import StorageError, UsageError
+from eigassign.output.run_folder import MARKER
+from eigassign.output.tables import CaseOutcome, write_junit, write_summary
+from eigassign.pipeline.run import Options, optimize
 from eigassign.process import judged
-
-if TYPE_CHECKING:
-    from eigassign.output.tables import CaseOutcome
-
 
 # --- Many cases in parallel processes: one run folder each, and nothing lost to a case that fai
 
@@ -66,8 +65,6 @@ def _row(path: str, options: CaseOptions, **fields: object) -> Row:
 
 
 def _optimised(path: str, options: CaseOptions) -> Row:
-    from eigassign.pipeline.run import Options, optimize
-
     cache_dir = Path(options.cache_dir) if options.cache_dir else None
     how = Options(Path(options.out), cache_dir, options.use_cache, options.force)
     outcome = optimize(Path(path), how)
@@ -100,8 +97,6 @@ def run_and_summarise(
     jobs: Sequence[Job], workers: int | None, out: Path, on_row: Callable[[Row], None]
 ) -> list[CaseOutcome]:
     """Run the jobs and write summary.csv and junit.xml; after an interrupt, of what there is."""
-    from eigassign.output.tables import CaseOutcome, write_junit, write_summary
-
     done: dict[str, Row] = {}
 
     def keep(row: Row) -> None:
@@ -236,8 +231,6 @@ def find_cases(paths: Sequence[Path]) -> list[Path]:
 
 
 def _in(folder: Path) -> Iterator[Path]:
-    from eigassign.output.run_folder import MARKER
-
     for root, folders, files in os.walk(folder, onerror=_unreadable):
         if MARKER in files:
             folders.clear()

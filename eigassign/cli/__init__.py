@@ -2,6 +2,15 @@
 
 stdout carries results, stderr everything else. Only click is imported here at the top; what a
 command needs is imported when it runs, so that ``--help`` is instant.
+
+Reading order:
+
+    arguments  options that several commands share
+    reporter   stages, warnings and the log on stderr; JSON on stdout
+    runs       optimize, expand, validate, chart
+    inspect    check, modes, schema
+    batch      batch
+    cache      cache path, list, clear
 """
 
 from __future__ import annotations

@@ -1,1 +1,12 @@
-"""pipeline."""
+"""One case from its file to its folder: the stages in order, and what they read and write.
+
+Reading order:
+
+    stages             the stages of a run: announced as they begin, timed as they end
+    expansions         both expansions of a plan, from the cache or computed
+    coefficient_files  expansion coefficients as files for other programs
+    run_files          the run folder, and the log in it
+    run                the paper's flowchart: case, model, expansion, assignment, verification
+    queries            check a case; its frequencies at one point
+    chart              time against accuracy of every method on one case
+"""

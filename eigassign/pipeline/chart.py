@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from eigassign._version import __version__
-from eigassign.api import Case, load_case
 from eigassign.case import CaseFile
 from eigassign.chart.designs import chart_designs
 from eigassign.chart.effort import QUICK, Effort
@@ -21,10 +20,12 @@ from eigassign.chart.study import Compared, Wish, compare_methods, spread_rows
 from eigassign.chart.timing import machine
 from eigassign.errors import AccuracyError
 from eigassign.modal.model import Model
+from eigassign.output.chart_report import write_chart
 from eigassign.pipeline.run import Options, prepare
-from eigassign.pipeline.run_files import keep
+from eigassign.pipeline.run_files import new_run_folder
 from eigassign.pipeline.stages import Stages
 from eigassign.study.accuracy import truncation_notes
+from eigassign.study.built_case import Case, load_case
 from eigassign.study.scene import Scene
 
 POSES = 5  # of the trajectory, on which meshes are compared
@@ -44,11 +45,9 @@ def chart(
 ) -> Charted:
     """`chart_case`, and its folder: chart.json, report.html, figures, case.yaml."""
     case = load_case(path)
-    with keep(case.file, options.out, options.force) as folder:
+    with new_run_folder(case.file, options.out, options.force) as folder:
         made = chart_case(case, options, QUICK if quick else _THOROUGH, wish or Wish())
         options.progress("writing the chart")
-        from eigassign.output.chart_report import write_chart
-
         write_chart(made, folder.hidden)
         (folder.hidden / "case.yaml").write_text(case.file.resolved(), encoding="utf-8")
     return Charted(folder.path, made)

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.modal.expansion import Expansion
+from eigassign.output.cache import key, pack
+from eigassign.output.results_json import dumps
 from eigassign.study.scene import Scene
 
 Array = NDArray[Any]
@@ -21,9 +23,6 @@ def coefficient_files(scene: Scene, linear_only: bool) -> dict[str, bytes]:
     λ = Σ_γ λ_γ (x − x0)^γ in rad²/s², x = (q, y) in SI units; of modes that are expanded together
     ``cluster_<k>_coefficients`` (r, r, N) over w = ``directions`` (x − x0) with ``local_indices``.
     """
-    from eigassign.output.cache import key, pack
-    from eigassign.output.results_json import dumps
-
     expansions = scene.expansions
     parts = {"linearised": expansions.linear}
     if not linear_only:

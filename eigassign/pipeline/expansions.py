@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from dataclasses import replace
 from math import comb
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy
@@ -20,12 +20,9 @@ from eigassign.modal.storage import (
     expansions_from_arrays,
     pencil_parts,
 )
+from eigassign.output.cache import Cache, key
 from eigassign.study.planning import Plan
 from eigassign.study.scene import Expansions
-
-if TYPE_CHECKING:
-    from eigassign.output.cache import Cache
-
 
 _log = logging.getLogger(__name__)
 
@@ -113,8 +110,6 @@ def expansion_key(model: Model, plan: Plan, full_order: int) -> str:
     The pencil's arrays, the point, the modes, the sets, and the versions of this algorithm and of
     the libraries that do its arithmetic: where any of them differs, so may the last bit.
     """
-    from eigassign.output.cache import key
-
     parts: list[Any] = [
         pencil_parts(model.pencil),
         plan.q0,

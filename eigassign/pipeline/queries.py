@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.api import Case, load_case
 from eigassign.case import CaseFile, load
 from eigassign.case.case_file import plain
 from eigassign.case.rules.plausibility import impossible
@@ -22,9 +21,12 @@ from eigassign.case.units import Quantity, QuantityError, quantity
 from eigassign.errors import CaseError, Problem, UsageError
 from eigassign.mechanism.elements.superelement import weights
 from eigassign.mechanism.kinematics.travel_limits import resting_pose
+from eigassign.output import report
+from eigassign.pipeline.run_files import RESULTS, new_run_folder
 from eigassign.study import drawing
 from eigassign.study.accuracy import truncation_lines
 from eigassign.study.assignment import target_frequencies
+from eigassign.study.built_case import Case, load_case
 from eigassign.study.planning import plan_expansion
 
 # --- Quick questions about a case: is it right, and what are its frequencies at one point
@@ -92,17 +94,13 @@ def draw_modes(
 
     Raises what `modes` does, and StorageError where the folder may not be replaced.
     """
-    from eigassign.pipeline.run_files import RESULTS, keep
-
     case = load_case(path)
     at_q, at_y = _point(case, q, y)
     target = RESULTS / f"{case.file.path.stem}_modes" if out is None else out
-    with keep(case.file, target, force) as folder:
+    with new_run_folder(case.file, target, force) as folder:
         with case.located():
             pictures = drawing.draw_modes(case.file, case.model(), at_q, at_y, count)
-        from eigassign.output.report import write_modes
-
-        write_modes(pictures, folder.hidden)
+        report.write_modes(pictures, folder.hidden)
         (folder.hidden / "case.yaml").write_text(case.file.resolved(), encoding="utf-8")
     return _answer(case, at_q, at_y, np.array(pictures.frequencies_hz)), target
 

@@ -1,7 +1,7 @@
-"""One case from its file to its run folder: the paper's flowchart, and what else may be asked.
+"""One case from its file to its run folder: the paper's flowchart.
 
-``solve_case`` computes and writes nothing; ``optimize``, ``expand_case`` and ``validate`` are what
-the commands of the same names do.
+`solve_case` computes and writes nothing; `optimize`, `expand_case` and `validate` are what the
+commands ``optimize``, ``expand`` and ``validate`` do.
 """
 
 from __future__ import annotations
@@ -9,18 +9,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.api import Case, load_case
 from eigassign.assignment import Assignment
 from eigassign.modal.expansion import Expansion
+from eigassign.output.cache import Cache, default_directory
 from eigassign.pipeline.coefficient_files import coefficient_files
 from eigassign.pipeline.expansions import expand_plan
-from eigassign.pipeline.queries import CheckAnswer, ModesAnswer, check, modes
-from eigassign.pipeline.run_files import Kept, keep
+from eigassign.pipeline.run_files import RunFolder, new_run_folder
 from eigassign.pipeline.stages import Stages
 from eigassign.study.accuracy import accuracy_notes, truncation_notes
 from eigassign.study.assignment import (
@@ -29,30 +27,12 @@ from eigassign.study.assignment import (
     study_targets,
     target_frequencies,
 )
-from eigassign.study.collect import Assigned, gather
+from eigassign.study.built_case import Case, load_case
+from eigassign.study.collect import VerifiedAssignment, collect_results
 from eigassign.study.comparison import Validation, study_modes, validate_expansions
 from eigassign.study.planning import plan_expansion
 from eigassign.study.results import RunResults
 from eigassign.study.scene import Expansions, Scene
-
-if TYPE_CHECKING:
-    from eigassign.output.cache import Cache
-
-__all__ = [
-    "CheckAnswer",
-    "ModesAnswer",
-    "Options",
-    "Outcome",
-    "Result",
-    "Validation",
-    "check",
-    "expand_case",
-    "modes",
-    "optimize",
-    "solve_case",
-    "validate",
-]
-
 
 Floats = NDArray[np.float64]
 
@@ -126,8 +106,8 @@ def solve_case(case: Case, options: Options = DEFAULT) -> Result:
             studies = study_modes(scene, initial_hz)
             scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene, assignment.y)))
         targets = study_targets(scene, wanted, assignment, initial_hz, exact_hz)
-    found = Assigned(assignment, targets, initial_hz, exact_hz)
-    results = gather(scene, studies, found, stages.timing_s)
+    found = VerifiedAssignment(assignment, targets, initial_hz, exact_hz)
+    results = collect_results(scene, studies, found, stages.timing_s)
     return _result(results, scene.expansions, assignment)
 
 
@@ -181,7 +161,7 @@ def optimize(path: str | Path, options: Options = DEFAULT) -> Outcome:
     """
     watch = Stages(options.progress)
     case = load_case(path)
-    with keep(case.file, options.out, options.force) as folder:
+    with new_run_folder(case.file, options.out, options.force) as folder:
         results = solve_case(case, options).results
         options.progress("writing the report")
         folder.write(results)
@@ -202,12 +182,12 @@ def expand_case(
     """
     watch = Stages(options.progress)
     case = load_case(path)
-    with keep(case.file, options.out, options.force) as folder, case.located():
+    with new_run_folder(case.file, options.out, options.force) as folder, case.located():
         scene = prepare(case, watch, _cache(options), order, modes)
         with watch("comparison", "comparing the expansion with exact frequencies"):
             studies = study_modes(scene)
             scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene)))
-        results = gather(scene, studies, None, watch.timing_s)
+        results = collect_results(scene, studies, None, watch.timing_s)
         options.progress("writing the report")
         folder.write(results, coefficient_files(scene, linear))
     return _outcome(folder, results, watch)
@@ -225,14 +205,12 @@ def validate(path: str | Path, options: Options = DEFAULT) -> Validation:
     return Validation(rows, notes, scene.warnings, stages.total_s)
 
 
-def _outcome(folder: Kept, results: RunResults, watch: Stages) -> Outcome:
+def _outcome(folder: RunFolder, results: RunResults, watch: Stages) -> Outcome:
     return Outcome(folder.path, results, results.within_tolerance, watch.total_s, results.warnings)
 
 
 def _cache(options: Options) -> Cache | None:
     if not options.use_cache:
         return None
-    from eigassign.output.cache import Cache, default_directory
-
     directory = options.cache_dir if options.cache_dir is not None else default_directory()
     return None if directory is None else Cache(directory)

@@ -1,4 +1,4 @@
-"""What a run leaves behind: its folder, whole or not at all."""
+"""What a run leaves behind: its folder, written whole or not at all."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from eigassign.case import CaseFile
+from eigassign.output import report
+from eigassign.output.run_folder import run_folder
 from eigassign.study.results import ErrorSummary, RunResults
 
 RESULTS = Path("results")  # below the current folder
 
 
 @dataclass(frozen=True)
-class Kept:
+class RunFolder:
     """A run folder being filled; it appears at ``path`` when the run has succeeded."""
 
     path: Path
@@ -23,9 +25,7 @@ class Kept:
 
     def write(self, results: RunResults, extra: Mapping[str, bytes] | None = None) -> None:
         """Results, report and figures; the resolved case; the log; ``extra`` files by name."""
-        from eigassign.output.report import write_run
-
-        write_run(results, self.hidden)
+        report.write_run(results, self.hidden)
         texts = {"case.yaml": self.file.resolved(), "log.txt": log_text(results)}
         encoded = {name: text.encode() for name, text in texts.items()}
         for name, data in {**encoded, **(extra or {})}.items():
@@ -33,17 +33,15 @@ class Kept:
 
 
 @contextmanager
-def keep(file: CaseFile, out: Path | None, force: bool) -> Iterator[Kept]:
+def new_run_folder(file: CaseFile, out: Path | None, force: bool) -> Iterator[RunFolder]:
     """Yield the folder to fill: ``out``, or results/<stem of the case file>.
 
     Raises StorageError on entry already where the folder may not be replaced.
     """
-    from eigassign.output.run_folder import run_folder
-
     target = RESULTS / file.path.stem if out is None else Path(out)
     case = {"case_path": file.path, "case_sha256": file.sha256, "case_files": file.files}
     with run_folder(target, **case, force=force) as hidden:  # type: ignore[arg-type]
-        yield Kept(target, hidden, file)
+        yield RunFolder(target, hidden, file)
 
 
 def log_text(results: RunResults) -> str:

@@ -1,1 +1,16 @@
-"""Many evaluations of the layers to the left, compared with one another."""
+"""What a case asks of the numerics, and what came of it: from a case file to the results of a run.
+
+Reading order:
+
+    results     what a run found, as plain numbers and names: all that the output is given to show
+    build       from a case file in which every number is given to its model and trajectories
+    planning    expansion point, order and modes; what is left to auto, and where it is judged
+    settling    elements and reduced links that are left to auto, and the model with them
+    built_case  a case with its model and trajectories, each built once
+    scene       model, trajectory and expansions together; expansions compared with exact values
+    comparison  how good both expansions are: along the trajectory, over the boxes of q and y
+    assignment  from targets and bounds to the optimal design, and what it does to the frequencies
+    accuracy    errors of mesh, reduction, expansion and round-off; whether the motion is slow
+    drawing     the mechanism as lines and symbols: in poses, and in its modes
+    collect     all of it put together as the results of a run
+"""

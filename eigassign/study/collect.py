@@ -29,8 +29,8 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Assigned:
-    """An assignment with its proof: exact frequencies (n_t, shown modes) before and after."""
+class VerifiedAssignment:
+    """An assignment with exact frequencies (n_t, shown modes) before and after."""
 
     assignment: Assignment
     targets: tuple[TargetStudy, ...]
@@ -38,10 +38,10 @@ class Assigned:
     exact_hz: Floats
 
 
-def gather(
+def collect_results(
     scene: Scene,
     studies: tuple[ModeStudy, ...],
-    assigned: Assigned | None,
+    assigned: VerifiedAssignment | None,
     timing_s: Mapping[str, float],
 ) -> RunResults:
     """The results of a run; without ``assigned`` those of an expansion only."""
@@ -84,7 +84,7 @@ def _trajectories(path: Trajectories | None) -> tuple[TrajectoryRow, ...]:
     )
 
 
-def _motion(scene: Scene, assigned: Assigned | None) -> tuple[list[str], list[str]]:
+def _motion(scene: Scene, assigned: VerifiedAssignment | None) -> tuple[list[str], list[str]]:
     """Notes and warnings on the speed of the motion."""
     if assigned is None:
         return [], []
@@ -100,7 +100,7 @@ def _poses(scene: Scene) -> DrawnPoses:
     return draw_poses(scene.file, scene.model, scene.trajectory, scene.initial)
 
 
-def _others(scene: Scene, assigned: Assigned) -> OtherModes | None:
+def _others(scene: Scene, assigned: VerifiedAssignment) -> OtherModes | None:
     """Up to three modes above the lowest assigned one that have no target themselves."""
     targets = {target.mode for target in assigned.targets}
     rest = [m for m in scene.shown_modes if m > min(targets) and m not in targets][:3]
@@ -111,7 +111,7 @@ def _others(scene: Scene, assigned: Assigned) -> OtherModes | None:
     return OtherModes(tuple(rest), before, after)
 
 
-def _warnings(scene: Scene, assigned: Assigned | None) -> Iterator[str]:
+def _warnings(scene: Scene, assigned: VerifiedAssignment | None) -> Iterator[str]:
     """What keeps the numbers from meaning what they seem to."""
     if assigned is None:
         return
@@ -122,7 +122,7 @@ def _warnings(scene: Scene, assigned: Assigned | None) -> Iterator[str]:
     yield from _worsening(scene, assigned)
 
 
-def _accuracy_warnings(scene: Scene, assigned: Assigned) -> Iterator[str]:
+def _accuracy_warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
     """For each target whose predicted frequency is farther off than the case accepts."""
     limit, y = scene.file.validation.max_error, assigned.assignment.y
     off = [t for t in assigned.targets if not t.approximation_error <= limit]
@@ -144,7 +144,7 @@ def _accuracy_warnings(scene: Scene, assigned: Assigned) -> Iterator[str]:
         )
 
 
-def _worsening(scene: Scene, assigned: Assigned) -> Iterator[str]:
+def _worsening(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
     """Where, in truth, the initial design was nearer to the targets than the optimum is."""
     weighed = list(zip(scene.file.targets, assigned.targets, strict=True))
     shares = [file.weight * target.weight_s for file, target in weighed]

@@ -9,7 +9,9 @@ import pytest
 
 from eigassign.api import load_case
 from eigassign.errors import AccuracyError
+from eigassign.mechanism.assembly.build import with_elements
 from eigassign.pipeline.run import solve_case
+from eigassign.study.build import build_model
 
 CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 
@@ -33,7 +35,7 @@ def automatic(tmp_path: Path, accuracy: str, *changes: tuple[str, str]) -> Path:
 def test_the_choice_is_within_the_accuracy_of_a_fine_mesh(
     tmp_path: Path, accuracy: str, limit: float
 ) -> None:
-    fine = load_case(CASE)._meshed({"upper_arm": 16, "forearm": 16})
+    fine = build_model(with_elements(load_case(CASE).file, {"upper_arm": 16, "forearm": 16}))
     case = load_case(automatic(tmp_path, accuracy))
     q, y = case.trajectory.q, np.zeros(2)
     expansions = solve_case(case).results.studies[0].over_time

@@ -12,7 +12,8 @@ import pytest
 from run_cases import SHIPPED, UNCACHED
 
 import eigassign as ea
-from eigassign.pipeline.run import Result, modes, validate
+from eigassign.pipeline.queries import modes
+from eigassign.pipeline.run import Result, validate
 from eigassign.study.results import ValidationRow
 
 

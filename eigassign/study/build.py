@@ -1,0 +1,119 @@
+"""From a case file in which every number is given to its model and the trajectories it follows.
+
+Nothing is chosen here: what a file leaves to ``auto`` is settled one step further, in `settling`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.case import CaseFile, TipTrajectory
+from eigassign.case import Trajectory as TrajectoryKeys
+from eigassign.errors import CaseError, MechanismError
+from eigassign.mechanism.assembly.assembly import reduced_links
+from eigassign.mechanism.assembly.build import (
+    WholeLinks,
+    build_pencil,
+    local_links,
+    whole_links,
+)
+from eigassign.mechanism.inverse_kinematics.chain import tip_chain
+from eigassign.mechanism.kinematics.link_frames import build_poses, design_dependence
+from eigassign.mechanism.kinematics.parameters import initial_design
+from eigassign.mechanism.trajectory.trajectory import (
+    NamedTrajectory,
+    Trajectories,
+    Trajectory,
+    build_trajectory,
+)
+from eigassign.modal.model import Model
+
+Floats = NDArray[np.float64]
+
+
+@contextmanager
+def located(file: CaseFile, trajectory: str = "trajectory") -> Iterator[None]:
+    """Raise a MechanismError from inside as a CaseError at its line of the case file.
+
+    ``trajectory`` is the key of the one that errors below `trajectory` are about.
+    """
+    try:
+        yield
+    except MechanismError as error:
+        path = error.path
+        if path.split(".")[0] == "trajectory":
+            path = trajectory + path.removeprefix("trajectory")
+        raise CaseError((file.problem(path, error.message),)) from error
+
+
+def build_links(file: CaseFile) -> WholeLinks:
+    """Every link with all dofs of its mesh, before any is reduced; raises CaseError."""
+    with located(file):
+        return whole_links(file)
+
+
+def build_model(file: CaseFile, links: WholeLinks | None = None) -> Model:
+    """K(q, y) and M(q, y) of eq. (1) as an affine pencil, with exact frequencies.
+
+    ``links`` are those of the same file if they are built already; they are reduced as ``file``
+    says. Raises CaseError at the line of what cannot be modelled.
+    """
+    links = build_links(file) if links is None else links
+    parameters, motion = links.parameters, links.motion
+    with located(file):
+        local = local_links(file, parameters, motion, links.meshes)
+        pencil = build_pencil(file, parameters, motion, local)
+        poses = build_poses(file, parameters, motion)
+        reduced = reduced_links(parameters, local[0], pencil)
+    return Model(pencil, poses, motion, parameters.coordinates, parameters.design, reduced)
+
+
+def build_trajectories(file: CaseFile, model: Model) -> Trajectories:
+    """q(t) of every trajectory of the case, a tip path by inverse kinematics at the initial design.
+
+    Raises CaseError where the case has none, or one cannot be followed.
+    """
+    if not file.trajectories:
+        raise CaseError((file.problem("trajectory", "is needed here and missing"),))
+    found = Trajectories(
+        tuple(
+            NamedTrajectory(name, _followed(file, model, keys, path), keys.weight)
+            for path, name, keys in file.trajectories
+        )
+    )
+    with located(file):
+        model.require_on_rails(found.q, initial_design(file), found.sample)
+    return found
+
+
+def _followed(file: CaseFile, model: Model, keys: TrajectoryKeys, path: str) -> Trajectory:
+    """One trajectory, which stands at ``path`` of the case file."""
+    with located(file, path):
+        if isinstance(keys, TipTrajectory):
+            _refuse_moving_tip(model, keys)
+        return build_trajectory(
+            keys,
+            model.q_names,
+            lambda tip, oriented: tip_chain(
+                file, model.poses.parameters, model.motion, tip, initial_design(file), oriented
+            ),
+            file.path.parent,
+            file.coordinate_units,
+        )
+
+
+def _refuse_moving_tip(model: Model, keys: TipTrajectory) -> None:
+    """Raise MechanismError where a design parameter moves the tip: q(t) would depend on it."""
+    oriented = keys.angle is not None or keys.orientation is not None
+    moved = design_dependence(model.poses, keys.tip, oriented)
+    for name, moves in zip(model.y_names, moved, strict=True):
+        if moves:
+            raise MechanismError(
+                f"design.{name}.parameter",
+                "moves the tip, so the joint angles of the tip path would change with it; "
+                "give joint samples instead",
+            )

@@ -1,0 +1,89 @@
+"""What a case leaves to ``auto`` for its links, settled: numbers of elements, reduction, the model.
+
+Both are chosen from estimates at poses of the trajectory and corners of the design's box, within
+their shares of ``expansion.accuracy`` (`planning`). The order and the expansion points are settled
+later, from the model that is built here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.case import CaseFile
+from eigassign.mechanism.assembly.build import WholeLinks, with_elements, with_reduction
+from eigassign.mechanism.kinematics.parameters import initial_design
+from eigassign.mechanism.kinematics.travel_limits import resting_pose
+from eigassign.modal.adaptive.mesh import MeshChoice
+from eigassign.modal.adaptive.reduction import ReductionChoice
+from eigassign.modal.model import Model
+from eigassign.study.build import build_links, build_model, build_trajectories
+from eigassign.study.planning import (
+    at_corners,
+    automatic_elements,
+    automatic_reduction,
+    settle_mesh,
+    settle_reduction,
+)
+
+Floats = NDArray[np.float64]
+TRIAL = 2  # elements of a link left to auto, in the model whose trajectory choices are judged on
+
+
+@dataclass(frozen=True)
+class SettledModel:
+    """A model with the file it is of: ``file`` has numbers in place of ``auto`` for its links."""
+
+    file: CaseFile
+    model: Model
+    mesh: MeshChoice | None  # the elements chosen; None where all are given
+    reduction: ReductionChoice | None  # the frequencies chosen; None without ``reduce_to: auto``
+
+
+def settle_model(file: CaseFile) -> SettledModel:
+    """Choose elements, then the frequencies that links are reduced to, and build the model.
+
+    Raises AccuracyError where no mesh meets ``expansion.accuracy``, CaseError at the line of what
+    cannot be modelled.
+    """
+    mesh = _chosen_elements(file)
+    meshed = file if mesh is None else with_elements(file, mesh.elements)
+    links = build_links(meshed)
+    reduction = _chosen_reduction(meshed, links)
+    settled = meshed if reduction is None else with_reduction(meshed, reduction.frequencies)
+    return SettledModel(settled, build_model(settled, links), mesh, reduction)
+
+
+def _chosen_elements(file: CaseFile) -> MeshChoice | None:
+    wanted = automatic_elements(file)
+    if None not in wanted.values():
+        return None
+
+    def meshed(elements: Mapping[str, int]) -> Model:
+        return build_model(with_elements(file, elements))
+
+    trial = meshed({name: TRIAL for name, given in wanted.items() if given is None})
+    return settle_mesh(file, meshed, _judged_at(file, trial))
+
+
+def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | None:
+    names = automatic_reduction(file)
+    if not names:
+        return None
+
+    def reduced(frequency_hz: float | None) -> Model:
+        return build_model(with_reduction(file, dict.fromkeys(names, frequency_hz)), links)
+
+    return settle_reduction(file, names, reduced, partial(_judged_at, file))
+
+
+def _judged_at(file: CaseFile, trial: Model) -> Floats:
+    """x (n, n_x): poses and designs at which choices are judged."""
+    path = build_trajectories(file, trial) if file.trajectories else None
+    given = file.expansion.q
+    q0 = resting_pose(file) if given == "auto" else np.array(given, dtype=float)
+    return at_corners(file, path, q0, initial_design(file)).x
