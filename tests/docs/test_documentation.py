@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import eigassign
+from eigassign import errors
 from eigassign.case import json_schema, parse
 from eigassign.case.schema.joints import JOINTS
 from eigassign.case.schema.links import LINKS, SHAPES
@@ -159,8 +160,20 @@ def test_every_module_and_file_named_exists(page: Path) -> None:
         is_file = name.endswith((".py", ".json", ".yaml", ".png", ".csv"))
         if re.fullmatch(r"[a-z_]+(\.[A-Za-z_]+)+", name) and not is_file:
             assert name.split(".")[0] not in parts or names_code(name), text
-        if re.fullmatch(r"(eigassign|tests|benchmarks|cases)/[\w./-]*", text):
-            assert (ROOT / text).exists(), text
+        for path in re.findall(r"\b(?:eigassign|tests|benchmarks|cases)/[\w./-]*", text):
+            assert (ROOT / path).exists(), path
+
+
+def test_the_architecture_page_names_every_package() -> None:
+    packages = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
+    assert packages - set(quoted(MANUAL / "architecture.md")) == set()
+
+
+def test_every_public_name_and_error_is_explained() -> None:
+    text = read(MANUAL / "python.md")
+    names = {f"`ea.{name}" for name in eigassign.__all__ if name[0].islower() or name == "Box"}
+    names |= {f"`{name}`" for name in vars(errors) if name.endswith("Error")}
+    assert {name for name in names if name not in text} <= {"`EigassignError`"}
 
 
 def test_the_manual_s_index_lists_every_page_and_all_are_installed() -> None:
