@@ -7,10 +7,8 @@ from pathlib import Path
 import numpy as np
 
 import eigassign as ea
-from eigassign.output.figures import ink
-from eigassign.output.figures.lettering import DPI
+from eigassign.output.figures import style
 from eigassign.output.figures.modes import thumbnail
-from eigassign.output.figures.png import encode
 from eigassign.study.drawing import draw_modes
 
 HERE = Path(__file__).parent
@@ -22,9 +20,8 @@ def main() -> None:
         case = ea.load_case(path)
         q = np.array(case.file.expansion.q, dtype=float)
         pictures = draw_modes(case.file, case.model(), q, case.initial_design, 1)
-        with ink.settings():
-            sheet = thumbnail(pictures)
-        (HERE / f"{path.stem}.png").write_bytes(encode(sheet.pixels(), DPI))
+        with style.applied():
+            (HERE / f"{path.stem}.png").write_bytes(style.encoded(thumbnail(pictures), "png"))
 
 
 if __name__ == "__main__":

@@ -13,9 +13,8 @@ from typing import Any
 
 from eigassign.chart.results import SCHEMA, Advice, Chart, ChartPoint, Front, Timing
 from eigassign.output import report
-from eigassign.output.figures import plan as figures
-from eigassign.output.figures.front import plan
-from eigassign.output.figures.plan import FigurePlan
+from eigassign.output.figures.front import chart_figures
+from eigassign.output.figures.style import FigurePlan
 from eigassign.output.results_json import dumps
 from eigassign.output.tables import Table
 
@@ -184,15 +183,12 @@ def machine(chart: Chart) -> Table:
 # --- chart.json, report.html and the figures of a chart, written into a folder
 
 
-def write_chart(chart: Chart, folder: Path) -> None:
-    """Into ``folder``, which must exist: chart.json, report.html, figures/*.png."""
+def write_chart(chart: Chart, folder: Path, formats: Sequence[str] = ("png",)) -> None:
+    """Into ``folder``, which must exist: chart.json, report.html, the figures in these formats."""
     (folder / "chart.json").write_text(to_json(chart), encoding="utf-8")
-    plans = plan(chart)
-    images = figures.render(plans) if plans else {}
-    (folder / "figures").mkdir()
-    for name, data in images.items():
-        (folder / "figures" / name).write_bytes(data)
-    (folder / "report.html").write_bytes(to_html(chart, plans, images))
+    plans = chart_figures(chart)
+    files = report.write_figures(plans, folder, formats)
+    (folder / "report.html").write_bytes(to_html(chart, plans, files))
 
 
 def to_json(chart: Chart) -> str:
@@ -209,6 +205,6 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def to_html(chart: Chart, plans: Sequence[FigurePlan], images: Mapping[str, bytes]) -> bytes:
-    """The report as UTF-8; ``images`` holds the PNG file of every plan by its file name."""
-    return report.page(chart, None, tables(chart), plans, images)
+def to_html(chart: Chart, plans: Sequence[FigurePlan], files: Mapping[str, bytes]) -> bytes:
+    """The report as UTF-8; ``files`` holds what `render` made of ``plans``."""
+    return report.page(chart, None, tables(chart), plans, files)

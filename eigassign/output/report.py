@@ -1,8 +1,7 @@
-"""report.html: one file that needs no other, no network and no script.
+"""report.html, one file that needs no other, no network and no script; and folders full of results.
 
-Everything a run shows, written into a folder.
-
-What `eigassign modes --draw` leaves: figures, and the shapes as numbers.
+A page shows what a run or a chart found: tables, warnings and notes, figures. `write_run` leaves
+everything that a run shows, `write_modes` the mode shapes as figures and as numbers.
 """
 
 from __future__ import annotations
@@ -14,30 +13,28 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
-
 from eigassign._version import __version__
-from eigassign.output import results_json
-from eigassign.output import results_json as samples_csv
-from eigassign.output.figures import modes, plan
-from eigassign.output.figures import plan as figures
-from eigassign.output.figures.plan import FigurePlan
+from eigassign.chart.results import Chart
+from eigassign.output.figures.modes import mode_figures
+from eigassign.output.figures.run import run_figures
+from eigassign.output.figures.style import FigurePlan, render
 from eigassign.output.formats import percent
+from eigassign.output.results_json import sample_files, to_json
 from eigassign.output.tables import Table, tables
 from eigassign.study.results import ErrorSummary, ModePictures, RunResults
 
 if TYPE_CHECKING:
-    from eigassign.chart.results import Chart
+    from jinja2 import Template
 
-
-# --- report.html: one file that needs no other, no network and no script
+# --- The page
 
 _TEMPLATES = Path(__file__).parent / "templates"
+_EMBEDDED = {".png": "image/png", ".svg": "image/svg+xml"}  # the first that there is
 
 
-def to_html(results: RunResults, plans: Sequence[FigurePlan], images: Mapping[str, bytes]) -> bytes:
-    """The report as UTF-8; ``images`` holds the PNG file of every plan by its file name."""
-    return page(results, results.error, tables(results), plans, images)
+def to_html(results: RunResults, plans: Sequence[FigurePlan], files: Mapping[str, bytes]) -> bytes:
+    """The report of a run as UTF-8; ``files`` holds what `render` made of ``plans``."""
+    return page(results, results.error, tables(results), plans, files)
 
 
 def page(
@@ -45,22 +42,32 @@ def page(
     error: ErrorSummary | None,
     shown: Sequence[Table],
     plans: Sequence[FigurePlan],
-    images: Mapping[str, bytes],
+    files: Mapping[str, bytes],
 ) -> bytes:
-    """Any page of ours: what ``f`` is about, then tables, warnings and notes, then figures."""
-    html = _template().render(
-        f=f,
-        error=error,
-        tables=shown,
-        plans=plans,
-        images={name: base64.b64encode(data).decode() for name, data in images.items()},
-    )
+    """Any page of ours: what ``f`` is about, then tables, warnings and notes, then figures.
+
+    A figure that was written as PDF only is named in its place; of one that was not written
+    nothing is said.
+    """
+    figures = []
+    for plan in plans:
+        own = {Path(name).suffix: name for name in files if Path(name).stem == plan.name}
+        kind = next((kind for kind in _EMBEDDED if kind in own), None)
+        image = None
+        if kind is not None:
+            text = base64.b64encode(files[own[kind]]).decode()
+            image = f"data:{_EMBEDDED[kind]};base64,{text}"
+        if own:
+            figures.append((plan, image, list(own.values())))
+    html = _template().render(f=f, error=error, tables=shown, figures=figures)
     return (html + "\n").encode("utf-8", "xmlcharrefreplace")
 
 
 @cache
 def _template() -> Template:
     """The page's template, compiled once a process."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES),
         autoescape=True,
@@ -72,34 +79,38 @@ def _template() -> Template:
     return environment.get_template("report.html.j2")
 
 
-# --- Everything a run shows, written into a folder
+# --- What is left in a folder
 
 
-def write_run(results: RunResults, folder: Path) -> None:
-    """results.json, report.html, CSV files and figures/*.png in ``folder``.
+def write_run(results: RunResults, folder: Path, formats: Sequence[str] = ("png",)) -> None:
+    """results.json, report.html, CSV files and the figures in these formats, in ``folder``.
 
     It must exist and be empty. Wrap it in :func:`eigassign.output.run_folder.run_folder` to have
     them whole or not at all.
     """
-    (folder / "results.json").write_bytes(results_json.to_json(results))
-    for name, data in samples_csv.sample_files(results).items():
+    (folder / "results.json").write_bytes(to_json(results))
+    for name, data in sample_files(results).items():
         (folder / name).write_bytes(data)
-    plans = figures.plan(results)
-    images = figures.render(plans) if plans else {}
-    (folder / "figures").mkdir()
-    for name, data in images.items():
+    plans = run_figures(results)
+    files = write_figures(plans, folder, formats)
+    (folder / "report.html").write_bytes(to_html(results, plans, files))
+
+
+def write_figures(
+    plans: Sequence[FigurePlan], folder: Path, formats: Sequence[str]
+) -> dict[str, bytes]:
+    """figures/NAME.FORMAT in ``folder``, each figure in each format; the files by their name."""
+    files = render(plans, formats)
+    if files:
+        (folder / "figures").mkdir()
+    for name, data in files.items():
         (folder / "figures" / name).write_bytes(data)
-    (folder / "report.html").write_bytes(to_html(results, plans, images))
+    return files
 
 
-# --- What `eigassign modes --draw` leaves: figures, and the shapes as numbers
-
-
-def write_modes(pictures: ModePictures, folder: Path) -> None:
+def write_modes(pictures: ModePictures, folder: Path, formats: Sequence[str] = ("png",)) -> None:
     """figures/mode_1.png, … and modes.json."""
-    (folder / "figures").mkdir()
-    for name, data in plan.render(modes.plan_modes(pictures)).items():
-        (folder / "figures" / name).write_bytes(data)
+    write_figures(mode_figures(pictures), folder, formats)
     text = json.dumps(document(pictures), ensure_ascii=False, allow_nan=False)
     (folder / "modes.json").write_text(text + "\n", encoding="utf-8")
 

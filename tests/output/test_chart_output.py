@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "study"))
 
@@ -27,9 +28,8 @@ from eigassign.chart.results import (
 )
 from eigassign.output import chart_report
 from eigassign.output.chart_report import write_chart
-from eigassign.output.figures import front as chart_figures
-from eigassign.output.figures import plan as figures
-from eigassign.output.figures.front import Ladder, decades, scatter
+from eigassign.output.figures import style
+from eigassign.output.figures.front import Ladder, chart_figures, ladder_style, scatter
 
 
 def timing(seconds: float, repeats: int = 5) -> Timing:
@@ -112,19 +112,18 @@ CHART = Chart(
 
 
 def test_every_figure_has_a_name_of_its_own_and_is_drawn() -> None:
-    plans = chart_figures.plan(CHART)
-    files = figures.render(plans)
-    assert set(files) == {
-        "cost_one_trajectory.png", "online_alone.png", "mesh.png", "designs.png",
-    }  # fmt: skip
+    plans = chart_figures(CHART)
+    files = style.render(plans)
+    names = ("cost_one_trajectory", "online_alone", "mesh", "designs")
+    assert set(files) == {f"{name}.png" for name in names}
     assert all(data.startswith(b"\x89PNG") for data in files.values())
-    assert figures.render(plans) == files
+    assert style.render(plans) == files
 
 
 def test_captions_tell_what_is_not_drawn() -> None:
-    plans = {plan.file: plan.caption for plan in chart_figures.plan(CHART)}
-    assert "1 methods are wrong by over 100 %" in plans["cost_one_trajectory.png"]
-    assert "0.06 Hz from the limit" in plans["mesh.png"]
+    plans = {plan.name: plan.caption for plan in chart_figures(CHART)}
+    assert "1 methods are wrong by over 100 %" in plans["cost_one_trajectory"]
+    assert "0.06 Hz from the limit" in plans["mesh"]
 
 
 @pytest.mark.parametrize(
@@ -141,18 +140,19 @@ def test_the_mesh_is_drawn_beside_a_taylor_polynomial_that_is_right_somehow(
 ) -> None:
     wrong = point("Taylor 4 full", "Taylor, full", True, 1e-7, worst)
     chart = replace(CHART, points=(CHART.points[0], wrong, *CHART.points[2:]))
-    plan = next(p for p in chart_figures.plan(chart) if p.file == "mesh.png")
+    plan = next(p for p in chart_figures(chart) if p.name == "mesh")
     assert words in plan.caption
-    bare = replace(chart, points=(CHART.points[0], *CHART.points[2:]))
-    drawn = not np.array_equal(plan.draw().pixels(), chart_figures.draw_mesh(bare).pixels())
-    assert drawn == ("dashed" in plan.caption)
+    with style.applied():
+        (axes,) = plan.draw().axes
+    said = [text.get_text() for text in axes.texts]
+    assert said == (["error of Taylor 4 full"] if "dashed" in plan.caption else [])
 
 
 def test_a_chart_without_meshes_or_designs_has_no_such_figures() -> None:
     bare = replace(CHART, mesh=(), designs=())
-    assert {p.file for p in chart_figures.plan(bare)} == {
-        "cost_one_trajectory.png",
-        "online_alone.png",
+    assert {p.name for p in chart_figures(bare)} == {
+        "cost_one_trajectory",
+        "online_alone",
     }
     assert "Designs" not in [table.title for table in chart_report.tables(bare)]
 
@@ -203,9 +203,41 @@ def test_accuracies_for_which_auto_is_not_asked_any_more_are_named() -> None:
 
 
 def test_what_auto_takes_is_ringed() -> None:
-    plan = chart_figures.plan(CHART)[0]
-    bare = chart_figures.plan(replace(CHART, advice=()))[0]
-    assert not np.array_equal(plan.draw().pixels(), bare.draw().pixels())
+    plan = chart_figures(CHART)[0]
+    bare = chart_figures(replace(CHART, advice=()))[0]
+    with style.applied():
+        ringed, plain = plan.draw(), bare.draw()
+    (ring,) = [line for line in ringed.axes[0].get_lines() if line.get_markersize() == 12.0]
+    np.testing.assert_allclose(ring.get_xydata(), [(CHART.points[1].total_s(152.0), 0.1)])
+    assert "taken by order: auto" in words(ringed)
+    assert "taken by order: auto" not in words(plain)
+
+
+def words(figure: Figure) -> list[str]:
+    return [text.get_text() for key in figure.legends for text in key.get_texts()]
+
+
+def test_points_are_drawn_by_family_and_the_front_as_steps_through_the_best() -> None:
+    with style.applied():
+        figure = chart_figures(CHART)[1].draw()
+    (axes,) = figure.axes
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("time [s]", "worst error [Hz]")
+    assert words(figure)[:6] == [
+        "eigassign", "exact", "Taylor, full", "others", "grid, linear", "taken by order: auto",
+    ]  # fmt: skip
+    shown = {line.get_label(): line for line in axes.get_lines()}
+    np.testing.assert_array_equal(shown["Taylor, full"].get_xydata(), [(1e-7, 0.1)])
+    np.testing.assert_array_equal(shown["grid, linear"].get_xydata(), [(2e-7, 0.01)])
+    assert shown["grid, linear"].get_markerfacecolor() == "white"
+    (steps,) = [line for line in axes.get_lines() if line.get_drawstyle() == "steps-post"]
+    np.testing.assert_array_equal(steps.get_ydata()[:2], [0.1, 0.01])
+
+
+def test_no_two_ladders_of_a_kind_share_colour_and_shape() -> None:
+    for ours in (True, False):
+        looks = [ladder_style(k, ours) for k in range(16)]
+        assert len({(look["color"], look["marker"]) for look in looks}) == 16
 
 
 @pytest.mark.parametrize(
@@ -221,14 +253,10 @@ def test_a_time_measured_once_says_so() -> None:
     assert chart_report.spread(timing(2.0)) == "2 s (1.8 s–2.2 s)"
 
 
-def test_decades_hold_all_values_and_label_few() -> None:
-    scale = decades([np.array([3e-11, 5.0, np.inf, 0.0])])
-    assert (scale.low, scale.high) == (1e-11, 10.0)
-    assert 4 <= len(scale.labels) <= 9
-    one = decades([np.array([1.0])])
-    assert one.low < 1.0 < one.high
-
-
 def test_points_without_a_front_and_a_single_ladder_can_be_drawn() -> None:
-    sheet = scatter("t", ("x", "s"), ("y", "Hz"), [Ladder("a", np.ones(1), np.ones(1), True)])
-    assert sheet.pixels().shape[2] == 4
+    with style.applied():
+        figure = scatter("t", ("x", "s"), ("y", "Hz"), [Ladder("a", np.ones(1), np.ones(1), True)])
+        assert style.encoded(figure, "png").startswith(b"\x89PNG")
+    assert words(figure) == ["a"]
+    low, high = figure.axes[0].get_xlim()
+    assert low < 1.0 < high

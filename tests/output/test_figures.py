@@ -1,23 +1,21 @@
-"""Figures are drawn, the same every time, whatever the mechanism is like."""
+"""Figures show what the results say, the same every time, whatever the mechanism is like."""
 
 from __future__ import annotations
 
 import dataclasses
 import io
 import itertools
+import xml.etree.ElementTree as ET
 
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 from synthetic_results import make_results
 
-from eigassign.output.figures import plan as figures
-from eigassign.output.figures import png, ticks
-from eigassign.output.figures.curves import spread
-from eigassign.output.figures.frame import Entry, key_rows
-from eigassign.output.figures.ink import Sheet, Stroke, series_stroke, settings, short
-from eigassign.output.figures.lettering import DPI, text_width
+from eigassign.output.figures import curves, style
+from eigassign.output.figures.run import run_figures
 from eigassign.study.results import RunResults
 
 LONG = "ein_sehr_langer_Name_für_$x_1^2$_中_\x1b[31m_"
@@ -41,16 +39,31 @@ def paper() -> RunResults:
 
 
 @pytest.fixture(scope="module")
-def drawn(paper: RunResults) -> dict[str, bytes]:
-    return figures.render(figures.plan(paper))
+def files(paper: RunResults) -> dict[str, bytes]:
+    return style.render(run_figures(paper))
+
+
+def drawn(results: RunResults) -> dict[str, Figure]:
+    with style.applied():
+        return {plan.name: plan.draw() for plan in run_figures(results)}
+
+
+def title(figure: Figure) -> str:
+    return figure.get_suptitle()
+
+
+def legend(figure: Figure) -> list[str]:
+    owners = [figure, *figure.axes]
+    keys = [each.get_legend() if each is not figure else None for each in owners]
+    return [text.get_text() for key in [*figure.legends, *keys] if key for text in key.get_texts()]
 
 
 def pixels(data: bytes) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(float)
 
 
-def test_the_paper_s_case_has_all_of_its_figures(drawn):
-    assert list(drawn) == [
+def test_the_paper_s_case_has_all_of_its_figures(files):
+    assert list(files) == [
         "mechanism.png",
         "coordinates.png",
         "approximation_mode_1_time.png",
@@ -62,58 +75,160 @@ def test_the_paper_s_case_has_all_of_its_figures(drawn):
 
 
 @pytest.mark.parametrize("options", EVERY.values(), ids=EVERY)
-def test_every_kind_of_results_gives_pictures_with_something_on_them(options):
-    found = make_results(**options)
-    images = figures.render(figures.plan(found))
-    assert len(images) >= 7
-    for name, data in images.items():
+def test_every_kind_of_results_gives_figures_with_nothing_over_their_edge(options):
+    files = style.render(run_figures(make_results(**options)))
+    assert len(files) >= 7
+    for name, data in files.items():
         image = pixels(data)
-        assert image.shape[1] == 8 * DPI, name
-        assert 2 * DPI < image.shape[0] < 8 * DPI, name
-        ink = (image < 250).any(axis=2)
-        assert 0.01 < ink.mean() < 0.6, name
-        edge = np.concatenate([ink[:3].ravel(), ink[-2:].ravel(), ink[:, :3].ravel()])
-        assert not edge.any(), f"{name} runs over its edge"
+        assert image.shape[1] == 880, name
+        assert 200 < image.shape[0] < 900, name
+        there = (image < 250).any(axis=2)
+        assert 0.01 < there.mean() < 0.6, name
+        edges = [there[:2], there[-2:], there[:, :2], there[:, -2:]]
+        assert not any(edge.any() for edge in edges), f"{name} runs over its edge"
 
 
-def test_nothing_runs_over_the_right_edge(drawn):
-    for name, data in drawn.items():
-        assert (pixels(data)[:, -3:] > 250).all(), name
+def test_the_assignment_shows_target_frequencies_and_distances(paper):
+    figure, target = drawn(paper)["assignment_mode_1"], paper.targets[0]
+    assert title(figure) == "Mode 1: assigned frequency"
+    above, below = figure.axes
+    shown = [line.get_ydata() for line in above.get_lines()]
+    wanted = (target.target_hz, target.initial_hz, target.exact_hz, target.predicted_hz)
+    for line, hz in zip(shown, wanted, strict=True):
+        np.testing.assert_array_equal(line, hz)
+    np.testing.assert_array_equal(above.get_lines()[0].get_xdata(), paper.time_s)
+    off = below.get_lines()[2].get_ydata()
+    np.testing.assert_allclose(off, 100.0 * (target.exact_hz / target.target_hz - 1.0))
+    assert (above.get_ylabel(), below.get_ylabel()) == ("frequency [Hz]", "off target [%]")
+    assert below.get_xlabel() == "time [s]"
+    assert legend(figure) == [
+        "target",
+        "original (worst 6.00 %)",
+        "optimal, exact (worst 1.00 %)",
+        "optimal, predicted (worst 1.00 %)",
+    ]
 
 
-def test_drawing_twice_gives_the_same_bytes(paper, drawn):
-    assert figures.render(figures.plan(paper)) == drawn
+def test_the_comparison_shows_both_expansions_and_their_errors(paper):
+    figure, study = drawn(paper)["approximation_mode_1_time"], paper.studies[0]
+    above, below = figure.axes
+    values = study.over_time
+    for line, hz in zip(
+        above.get_lines(), (values.exact_hz, values.taylor_hz, values.linearised_hz), strict=True
+    ):
+        np.testing.assert_array_equal(line.get_ydata(), hz)
+    assert below.get_yscale() == "log"
+    bottom = below.get_ylim()[0]
+    off = np.maximum(100.0 * np.abs(values.taylor_error), bottom)
+    np.testing.assert_array_equal(below.get_lines()[0].get_ydata(), off)
+    assert legend(figure)[:2] == ["exact", "Taylor, order 4 (worst 0.0900 %)"]
 
 
-def test_the_user_s_matplotlib_settings_change_nothing(paper, drawn):
+def test_the_coordinates_have_a_panel_for_each_unit():
+    found = make_results(n_q=5)
+    figure = drawn(found)["coordinates"]
+    angles, strokes = figure.axes
+    assert (angles.get_ylabel(), strokes.get_ylabel()) == ("joint angle [rad]", "joint stroke [m]")
+    (stroke,) = strokes.get_lines()
+    np.testing.assert_array_equal(stroke.get_ydata(), found.q[:, 3])
+    assert sorted(legend(figure)) == ["q1", "q2", "q3", "q4", "q5"]
+
+
+def test_next_modes_are_named_at_the_end_of_their_curves(paper):
+    (axes,) = drawn(paper)["other_modes"].axes
+    assert [text.get_text() for text in axes.texts] == ["mode 2", "mode 3", "mode 4"]
+    solid = [line for line in axes.get_lines() if line.get_linestyle() == "-"]
+    for line, text, hz in zip(solid, axes.texts, paper.others.optimal_hz.T, strict=True):
+        np.testing.assert_array_equal(line.get_ydata(), hz)
+        assert text.get_color() == line.get_color()
+
+
+def test_maps_stand_side_by_side_with_the_expansion_point(paper):
+    figure = drawn(paper)["approximation_mode_1_design"]
+    maps = [axes for axes in figure.axes if axes.get_title(loc="left")]
+    assert [axes.get_title(loc="left").splitlines()[0] for axes in maps] == [
+        "exact",
+        "Taylor, order 4",
+        "linearised in y",
+    ]
+    over = paper.studies[0].over_design
+    for axes in maps:
+        assert axes.get_xlabel() == "m1 [kg]"
+        assert axes.get_xlim() == (over.axes[0][0], over.axes[0][-1])
+        ((x,), (y,)) = axes.get_lines()[0].get_data()
+        assert (x, y) == (0.125, 0.125)
+    (bands,) = [c for c in maps[0].collections if c.get_array() is not None]
+    assert bands.levels[0] <= over.values.exact_hz.min()
+    assert bands.levels[-1] >= over.values.exact_hz.max()
+    assert legend(figure) == ["expansion point"]
+
+
+@pytest.mark.parametrize("spatial", [False, True])
+def test_the_mechanism_is_drawn_at_one_scale_in_all_directions(spatial):
+    found = make_results(spatial=spatial)
+    figure = drawn(found)["mechanism"]
+    axes = figure.axes[0]
+    assert axes.get_aspect() == 1.0
+    box = axes.get_position()
+    width, height = figure.get_size_inches() * (box.width, box.height)
+    x, y = np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())
+    assert width / x == pytest.approx(height / y)
+    assert legend(figure)[:3] == ["tip path", "elbow_mass", "tool_mass"]
+    assert len(legend(figure)) == 3 + len(found.poses.lines)
+    if not spatial:
+        tip = next(line for line in axes.get_lines() if line.get_color() == style.VERMILLION)
+        np.testing.assert_array_equal(tip.get_xydata(), found.poses.tip_path)
+
+
+def test_several_formats_write_each_figure_in_each(paper):
+    plans = run_figures(paper)[:2]
+    files = style.render(plans, ("png", "svg", "pdf"))
+    assert list(files) == [
+        f"{name}.{kind}" for name in ("mechanism", "coordinates") for kind in style.FORMATS
+    ]
+    assert files["coordinates.png"].startswith(b"\x89PNG")
+    assert files["coordinates.pdf"].startswith(b"%PDF")
+    assert ET.fromstring(files["coordinates.svg"]).tag.endswith("svg")
+    assert style.render(plans, ()) == {}
+
+
+@pytest.mark.parametrize("kind", style.FORMATS)
+def test_drawing_twice_gives_the_same_bytes(paper, kind):
+    plans = run_figures(paper)
+    files = style.render(plans, (kind,))
+    assert style.render(plans, (kind,)) == files
+    for word in (b"CreationDate", b"dc:date"):
+        assert not any(word in data for data in files.values())
+
+
+def test_the_user_s_matplotlib_settings_change_nothing(paper, files):
     theirs = {"font.size": 30, "font.family": "monospace", "path.simplify": False}
-    with matplotlib.rc_context({**theirs, "text.hinting": "force_autohint"}):
-        assert figures.render(figures.plan(paper)) == drawn
+    with matplotlib.rc_context({**theirs, "text.hinting": "force_autohint", "axes.grid": False}):
+        assert style.render(run_figures(paper)) == files
 
 
 def test_drawing_leaves_the_user_s_settings_alone(paper):
     before = dict(matplotlib.rcParams)
-    figures.render(figures.plan(paper)[:1])
+    style.render(run_figures(paper)[:1])
     assert dict(matplotlib.rcParams) == before
 
 
-def test_another_answer_gives_another_picture(paper, drawn):
+def test_another_answer_gives_another_picture(paper, files):
     target = paper.targets[0]
     moved = dataclasses.replace(target, exact_hz=target.exact_hz * 1.01)
     other = dataclasses.replace(paper, targets=(moved,))
-    changed = figures.render(figures.plan(other))
-    assert [name for name in drawn if changed[name] != drawn[name]] == ["assignment_mode_1.png"]
+    changed = style.render(run_figures(other))
+    assert [name for name in files if changed[name] != files[name]] == ["assignment_mode_1.png"]
 
 
 def test_results_without_a_trajectory_plan_only_what_they_have():
-    assert figures.plan(make_results(n_t=0, n_y=0)) == ()
-    (only,) = figures.plan(make_results(n_t=0, n_y=2))
-    assert only.file == "approximation_mode_1_design.png"
+    assert run_figures(make_results(n_t=0, n_y=0)) == ()
+    (only,) = run_figures(make_results(n_t=0, n_y=2))
+    assert only.name == "approximation_mode_1_design"
 
 
 def test_an_expansion_that_fails_somewhere_is_still_drawn(paper):
     study = paper.studies[0]
-    assert study.over_design is not None
     values = study.over_design.values
     broken = values.linearised_hz.copy()
     broken[:3] = np.nan
@@ -122,143 +237,77 @@ def test_an_expansion_that_fails_somewhere_is_still_drawn(paper):
     target = dataclasses.replace(paper.targets[0], predicted_hz=np.full(paper.time_s.size, np.nan))
     studies = (dataclasses.replace(study, over_design=over),)
     found = dataclasses.replace(paper, studies=studies, targets=(target,))
-    assert len(figures.render(figures.plan(found))) == 7
+    assert len(style.render(run_figures(found))) == 7
 
 
 def test_a_map_on_which_nothing_varies_is_filled_and_not_left_blank():
     found = make_results(varies=False)
-    plans = [p for p in figures.plan(found) if p.file.endswith("_design.png")]
-    (image,) = map(pixels, figures.render(plans).values())
+    plans = [p for p in run_figures(found) if p.name.endswith("_design")]
+    (image,) = map(pixels, style.render(plans).values())
     middle = image[image.shape[0] // 2]
     assert (middle < 200).all(axis=1).mean() > 0.5
 
 
-def test_a_curve_is_drawn_where_its_numbers_say():
-    with settings():
-        sheet = Sheet(1.0, 1.0)
-        sheet.line(np.array([(0.0, 0.25), (1.0, 0.25)]), Stroke("#000000", 2.0))
-    dark = (sheet.pixels()[:, :, 0] < 128).nonzero()[0]
-    assert abs(dark.mean() - 0.75 * DPI) <= 1.0  # rows count from the top
+SPANS = [(0.0, 1.0), (-3.0, 5.0), (190.0, 190.0), (0.0, 0.0), (123456.0, 123456.0001)]
 
 
-def test_text_stands_where_it_was_put_and_is_as_wide_as_said():
-    with settings():
-        sheet, text = Sheet(4.0, 1.0), "HHHH 0.25 frequency HH"
-        sheet.text(3.0, 0.5, text, align="right")
-        width = text_width(text)
-    rows, columns = (sheet.pixels()[:, :, 0] < 128).nonzero()
-    assert columns.max() == pytest.approx(3.0 * DPI, abs=3)
-    assert columns.min() == pytest.approx((3.0 - width) * DPI, abs=3)
-    assert (rows.min() + rows.max()) / 2 == pytest.approx(0.5 * DPI, abs=3)
-
-
-def test_upright_text_reads_upwards_around_its_centre():
-    with settings():
-        level, upright = Sheet(2.0, 2.0), Sheet(2.0, 2.0)
-        level.text(1.0, 1.0, "Hz [1]", align="center")
-        upright.text(1.0, 1.0, "Hz [1]", upright=True)
-    turned = np.rot90(level.pixels())
-    rows, columns = (turned[:, :, 0] < 128).nonzero()
-    found_rows, found_columns = (upright.pixels()[:, :, 0] < 128).nonzero()
-    assert found_rows.mean() == pytest.approx(rows.mean(), abs=2)
-    assert found_columns.mean() == pytest.approx(columns.mean(), abs=2)
-    assert found_rows.size == rows.size
-
-
-def test_text_over_the_edge_is_cut_and_joined_scripts_are_drawn():
-    with settings():
-        sheet = Sheet(1.0, 0.5)
-        for at in (-1.0, -0.2, 0.9, 5.0):
-            sheet.text(at, 0.25, "over the edge")
-            sheet.text(at, 0.25, "upright", upright=True)
-        before = (sheet.pixels() < 250).sum()
-        sheet.text(0.1, 0.4, "e\u0301 中")
-    assert (sheet.pixels() < 250).sum() > before
-
-
-def test_png_bytes_hold_exactly_the_pixels():
-    picture = np.random.default_rng(1).integers(0, 256, (17, 23, 4), dtype=np.uint8)
-    image = Image.open(io.BytesIO(png.encode(picture, 110)))
-    np.testing.assert_array_equal(np.asarray(image), picture[:, :, :3])
-    assert image.info["dpi"] == pytest.approx((110, 110), abs=0.1)
-
-
-RANGES = [
-    (0.0, 1.0),
-    (189.9, 202.3),
-    (-3.0, 5.0),
-    (1e-9, 2e-9),
-    (-2e12, 5e12),
-    (190.0, 190.0),
-    (0.0, 0.0),
-    (1e300, 2e300),
-    (123456.0, 123456.0001),
-    (-0.004, 0.0),
-]
-
-
-@pytest.mark.parametrize("span", RANGES)
-def test_linear_ticks_say_the_number_they_stand_at(span):
-    values = np.array(span)
-    scale = ticks.linear([values], count=5)
-    assert 2 <= len(scale.positions) <= 7
-    assert scale.low <= values.min() <= values.max() <= scale.high
-    for position, label in zip(scale.positions, scale.labels, strict=True):
-        said = float(label.replace("\N{MINUS SIGN}", "-")) * 10.0**scale.exponent
-        assert said == pytest.approx(position, rel=1e-9, abs=1e-6 * (scale.high - scale.low))
-    assert len(set(scale.labels)) == len(scale.labels)
-    assert max(map(len, scale.labels)) <= 9
-
-
-@pytest.mark.parametrize("span", RANGES)
-def test_contour_levels_enclose_all_values(span):
-    scale = ticks.levels([np.array(span)])
-    assert scale.positions[0] <= min(span)
-    assert scale.positions[-1] >= max(span)
+@pytest.mark.parametrize("span", SPANS)
+def test_bounds_enclose_all_values_and_are_never_one(span):
+    low, high = style.bounds([np.array([np.nan, *span])])
+    assert low <= span[0] <= span[1] <= high
+    assert high - low > 1e-6 * abs(high)
 
 
 @pytest.mark.parametrize(
-    ("values", "labels"),
+    ("values", "most", "limits"),
     [
-        ([0.5, 0.03], ("0.01", "0.1", "1")),
-        ([2e-7, 3e-6], ("10⁻⁷", "10⁻⁶", "10⁻⁵")),
-        ([1.5, 0.0], ("≤1", "10")),
-        ([0.0, 0.0], ("≤10⁻¹¹", "10⁻¹⁰")),
-        ([np.nan, 0.2, 0.5], ("0.1", "1")),
+        ([0.5, 0.03], 5, (0.01, 1.0)),
+        ([2e-7, 3e-6], 5, (1e-7, 1e-5)),
+        ([1e-9, 0.5], 5, (1e-5, 1.0)),
+        ([3e-11, 5.0, np.inf, 0.0], None, (1e-11, 10.0)),
+        ([0.0, 0.0], 5, (1e-11, 1e-10)),
+        ([np.nan, 0.2, 0.5], 5, (0.1, 1.0)),
     ],
 )
-def test_logarithmic_ticks_are_decades_and_own_up_to_what_they_cut(values, labels):
-    assert ticks.logarithmic([np.array(values)]).labels == labels
+def test_decades_hold_all_values_or_the_highest(values, most, limits):
+    assert style.decades([np.array(values)], most) == pytest.approx(limits, abs=0.0)
 
 
-def test_places_on_a_scale_follow_its_kind():
-    linear, log = ticks.between(2.0, 4.0), ticks.logarithmic([np.array([0.5, 0.002])])
-    np.testing.assert_allclose(linear.fraction(np.array([2.0, 3.0, 4.0])), [0.0, 0.5, 1.0])
-    np.testing.assert_allclose(log.fraction(np.array([1e-9, 1e-3, 1.0])), [0.0, 0.0, 1.0])
+def test_the_lowest_label_of_a_logarithmic_axis_owns_up_to_what_it_cuts():
+    with style.applied():
+        _, (axes,) = curves.stacked("", "", (2.0,))
+        curves.plot_logarithmic(axes, np.arange(3.0), [(np.array([0.0, 0.02, 0.5]), {})], "error")
+    show = axes.yaxis.get_major_formatter()
+    assert axes.get_ylim() == (0.01, 1.0)
+    assert [show(at) for at in (0.01, 0.1, 1.0)] == ["≤0.01", "0.1", "1"]
+    np.testing.assert_array_equal(axes.get_lines()[0].get_ydata(), [0.01, 0.02, 0.5])
+
+
+def test_powers_of_ten_are_written_as_people_read_them():
+    assert [style.power(at) for at in (1e-7, 1e-3, 1.0, 1e4, 1e5)] == [
+        "10⁻⁷",
+        "0.001",
+        "1",
+        "10000",
+        "10⁵",
+    ]
 
 
 def test_labels_at_curve_ends_are_moved_apart_and_no_further():
-    assert spread([0.0, 1.0], 0.2) == [0.0, 1.0]
-    np.testing.assert_allclose(spread([0.5, 0.5, 0.5], 0.2), [0.3, 0.5, 0.7])
-    np.testing.assert_allclose(spread([0.0, 0.1, 0.25], 0.2), [-1 / 12, 7 / 60, 19 / 60])
-    assert spread([], 0.2) == []
+    assert curves.spread([0.0, 1.0], 0.2) == [0.0, 1.0]
+    np.testing.assert_allclose(curves.spread([0.5, 0.5, 0.5], 0.2), [0.3, 0.5, 0.7])
+    np.testing.assert_allclose(curves.spread([0.0, 0.1, 0.25], 0.2), [-1 / 12, 7 / 60, 19 / 60])
+    assert curves.spread([], 0.2) == []
 
 
-def test_a_legend_is_broken_into_rows_that_fit_and_loses_nothing():
-    entries = [Entry(f"a rather long entry {i}", Stroke("#000000")) for i in range(7)]
-    rows = key_rows(entries, 5.0)
-    assert [entry for row in rows for entry in row] == entries
-    assert 1 < len(rows) < 7
-
-
-def test_no_two_of_twelve_curves_look_alike_or_differ_by_colour_alone():
-    strokes = [series_stroke(i) for i in range(12)]
-    assert len(set(strokes)) == 12
-    for first, second in itertools.pairwise(strokes):
-        assert first.dashes != second.dashes
+def test_neighbouring_curves_never_differ_by_colour_alone():
+    looks = [style.series(i) for i in range(12)]
+    assert len({str(look) for look in looks}) == 12
+    for first, second in itertools.pairwise(looks):
+        assert first["linestyle"] != second["linestyle"]
 
 
 def test_names_lose_their_control_characters_and_their_middle():
-    assert short("a\x1b[31mb\n") == "a [31mb"
-    assert len(short("x" * 500)) == 34
-    assert short("begin" + "x" * 50 + "end").endswith("end")
+    assert style.short("a\x1b[31mb\n") == "a [31mb"
+    assert len(style.short("x" * 500)) == 34
+    assert style.short("begin" + "x" * 50 + "end").endswith("end")

@@ -8,21 +8,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 from PIL import Image
 from synthetic_results import make_results
 
 import eigassign as ea
-from eigassign.output.figures import ink, plan
-from eigassign.output.figures.lettering import DPI
+from eigassign.output.figures import style
 from eigassign.output.figures.mechanism import (
     diameters,
+    draw_links,
     extent,
     length_label,
     line_widths,
+    points_of,
     round_length,
     view_of,
 )
-from eigassign.output.figures.modes import plan_modes, thumbnail
+from eigassign.output.figures.modes import mode_figures, thumbnail
 from eigassign.output.report import write_modes
 from eigassign.study.drawing import draw_modes
 from eigassign.study.results import DrawnBody, DrawnPoses, ModePictures
@@ -42,44 +45,53 @@ def pixels(data: bytes) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
 
 
-def shows(image: np.ndarray, colour: str) -> int:
-    """How many pixels have just this colour."""
-    rgb = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
-    return int((np.abs(image - rgb).max(axis=2) <= 2).sum())
+def segments(figure: Figure, colour: str) -> list[np.ndarray]:
+    """The links that are drawn in this colour, in order."""
+    drawn = [c for c in figure.axes[0].collections if to_hex(c.get_color()[0]) == colour.lower()]
+    return [piece for collection in drawn for piece in collection.get_segments()]
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_every_shipped_mechanism_has_figures_with_rest_mode_and_a_white_margin(name: str) -> None:
+def test_every_shipped_mechanism_has_figures_that_keep_within_their_edges(name: str) -> None:
     found = pictures(name)
-    files = plan.render(plan_modes(found))
+    files = style.render(mode_figures(found))
     assert list(files) == ["mode_1.png", "mode_2.png"]
     for data in files.values():
         image = pixels(data)
-        assert image.shape[1] == 8 * DPI
-        assert shows(image, ink.BLUE) > 500
-        ink_there = (image < 250).any(axis=2)
-        edge = [ink_there[:3], ink_there[-2:], ink_there[:, :3].T, ink_there[:, -3:].T]
+        assert image.shape[1] == 880
+        there = (image < 250).any(axis=2)
+        edge = [there[:3], there[-2:], there[:, :3].T, there[:, -3:].T]
         assert not any(side.any() for side in edge)
     assert files["mode_1.png"] != files["mode_2.png"]
-    assert plan.render(plan_modes(pictures(name))) == files
+    assert style.render(mode_figures(pictures(name))) == files
 
 
-def test_a_mode_that_bends_shows_the_grey_links_beside_it() -> None:
-    (first, _) = plan.render(plan_modes(pictures("four_bar"))).values()
-    assert shows(pixels(first), "#c4c4c4") > 500
-    assert shows(pixels(first), ink.SKY) > 100
+def test_a_mode_is_drawn_over_the_links_at_rest_with_the_other_phase_beside_it() -> None:
+    found = pictures("four_bar")
+    with style.applied():
+        figure = mode_figures(found)[1].draw()
+    assert figure.get_suptitle().endswith(f"mode 2, {found.frequencies_hz[1]:.5g} Hz")
+    for drawn, line in zip(segments(figure, "#c4c4c4"), found.rest.lines[0], strict=True):
+        np.testing.assert_allclose(drawn, line)
+    for drawn, line in zip(segments(figure, style.BLUE), found.deformed.lines[1], strict=True):
+        np.testing.assert_allclose(drawn, line)
+    other = [line for line in figure.axes[0].get_lines() if line.get_color() == style.SKY]
+    for drawn, rest, moved in zip(other, found.rest.lines[0], found.deformed.lines[1], strict=True):
+        np.testing.assert_allclose(drawn.get_xydata(), 2.0 * rest - moved)
+    assert figure.axes[0].get_aspect() == 1.0
+    where = ", ".join(text.get_text() for text in figure.texts)
+    assert f"{found.q[0][0]} = " in where
 
 
 @pytest.mark.parametrize("name", ALL)
 def test_the_gallery_has_a_small_picture_of_every_shipped_case(name: str) -> None:
     file = GALLERY / f"{name}.png"
     assert file.stat().st_size < 40_000
-    with ink.settings():
-        sheet = thumbnail(pictures(name, 1))
+    with style.applied():
+        drawn = pixels(style.encoded(thumbnail(pictures(name, 1)), "png"))
     committed = pixels(file.read_bytes())
-    drawn = sheet.pixels()[:, :, :3].astype(int)
     assert committed.shape == drawn.shape
-    # letters may differ by the version of the font; what is drawn is the same
+    # letters may differ by the version of matplotlib; what is drawn is the same
     assert (np.abs(committed - drawn).max(axis=2) > 40).mean() < 0.01, "run cases/gallery/draw.py"
 
 
@@ -118,18 +130,34 @@ def test_a_mechanism_in_the_plane_of_sight_is_seen_from_another_side() -> None:
     assert not np.allclose(view_of(sheet).directions, plain.directions)
 
 
-def test_a_canvas_keeps_angles_and_holds_everything() -> None:
-    poses = make_results(spatial=True).poses
+@pytest.mark.parametrize("spatial", [False, True])
+def test_a_drawing_holds_everything_at_one_scale(spatial: bool) -> None:
+    poses = make_results(spatial=spatial).poses
     held = extent(poses)
-    with ink.settings():
-        canvas = held.on(ink.Sheet(4.0, 3.0), (0.5, 0.5, 3.0, 2.0))
-    placed = canvas.place(held.points)
-    assert (placed >= 0.5 - 1e-9).all()
-    assert (placed <= np.array([3.5, 2.5]) + 1e-9).all()
-    touched = np.isclose(np.ptp(placed, axis=0), [3.0, 2.0])
-    assert touched.any()
-    before, after = np.diff(held.view.flat(held.points), axis=0), np.diff(placed, axis=0)
-    np.testing.assert_allclose(after * canvas.per_inch, before, atol=1e-12)
+    with style.applied():
+        figure = style.new_figure("", 3.0, 4.0, layout=None)
+        drawing = held.drawing(figure, (0.5, 0.5, 3.0, 2.0))
+    low, high = np.transpose([drawing.axes.get_xlim(), drawing.axes.get_ylim()])
+    flat = held.view.flat(points_of(poses))
+    assert (flat >= low - 1e-9).all()
+    assert (flat <= high + 1e-9).all()
+    np.testing.assert_allclose(high - low, drawing.per_inch * np.array([3.0, 2.0]))
+    assert np.isclose(np.ptp(flat, axis=0), high - low).any()
+
+
+def test_a_taper_is_drawn_in_pieces_that_grow_thinner() -> None:
+    line = np.array([[0.0, 0.0], [1.0, 0.0]])
+    poses = DrawnPoses(np.zeros(1), ((line,),), ("a",), sizes=((0.01, 0.0025),))
+    with style.applied():
+        figure = style.new_figure("", 3.0, 4.0, layout=None)
+        drawing = extent(poses).drawing(figure, (0.5, 0.5, 3.0, 2.0))
+        draw_links(drawing, poses, 0, style.BLUE)
+    (links,) = drawing.axes.collections
+    widths = np.array(links.get_linewidths())
+    assert len(widths) > 4
+    assert (np.diff(widths) < 0.0).all()
+    np.testing.assert_allclose(links.get_segments()[0][0], line[0])
+    np.testing.assert_allclose(links.get_segments()[-1][-1], line[1], atol=1e-12)
 
 
 def test_thick_sections_are_drawn_thick_and_heavy_bodies_large() -> None:

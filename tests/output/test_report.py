@@ -10,7 +10,7 @@ import pytest
 from synthetic_results import make_results
 
 from eigassign.output import report
-from eigassign.output.figures import plan as figures
+from eigassign.output.figures.run import run_figures
 from eigassign.output.report import write_run
 
 VOID = {"meta", "img", "br"}
@@ -42,8 +42,8 @@ class Page(HTMLParser):
 
 
 def page(results) -> tuple[str, Page, dict[str, bytes]]:
-    plans = figures.plan(results)
-    images = {plan.file: f"PNG of {plan.file}".encode() for plan in plans}
+    plans = run_figures(results)
+    images = {f"{plan.name}.png": f"PNG of {plan.name}".encode() for plan in plans}
     html = report.to_html(results, plans, images).decode()
     parsed = Page(html)
     assert parsed.open == []
@@ -68,7 +68,7 @@ def test_every_figure_is_inside_with_its_alternative_text_and_caption():
     shown = [attributes for tag, attributes in parsed.tags if tag == "img"]
     inside = [base64.b64decode((a["src"] or "").split(",", 1)[1]) for a in shown]
     assert inside == list(images.values())
-    plans = figures.plan(results)
+    plans = run_figures(results)
     assert [a["alt"] for a in shown] == [plan.alt for plan in plans]
     for plan in plans:
         assert plan.caption in parsed.text
@@ -114,7 +114,7 @@ def test_a_run_leaves_results_report_and_figures(tmp_path):
     results = make_results()
     write_run(results, tmp_path)
     names = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.*")}
-    expected = {f"figures/{plan.file}" for plan in figures.plan(results)}
+    expected = {f"figures/{plan.name}.png" for plan in run_figures(results)}
     assert names == expected | {
         "results.json",
         "report.html",
@@ -123,3 +123,30 @@ def test_a_run_leaves_results_report_and_figures(tmp_path):
     }
     picture = (tmp_path / "figures" / "mechanism.png").read_bytes()
     assert base64.b64encode(picture).decode() in (tmp_path / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("formats", "embedded"),
+    [(("svg", "pdf"), "data:image/svg+xml;base64,"), (("pdf",), None), (("svg", "png"), "png")],
+)
+def test_the_report_is_right_with_figures_of_any_format(tmp_path, formats, embedded):
+    results = make_results(n_t=0, n_y=1)
+    write_run(results, tmp_path, formats)
+    (plan,) = run_figures(results)
+    assert {p.name for p in (tmp_path / "figures").iterdir()} == {
+        f"{plan.name}.{kind}" for kind in formats
+    }
+    parsed = Page((tmp_path / "report.html").read_text())
+    assert plan.caption in parsed.text
+    images = [attributes["src"] or "" for tag, attributes in parsed.tags if tag == "img"]
+    assert len(images) == (embedded is not None)
+    assert all((embedded or "") in image for image in images)
+    assert (f"figures/{plan.name}.pdf" in parsed.text) == (embedded is None)
+
+
+def test_the_report_is_right_without_figures(tmp_path):
+    write_run(make_results(), tmp_path, ())
+    assert not (tmp_path / "figures").exists()
+    parsed = Page((tmp_path / "report.html").read_text())
+    assert not any(tag in ("img", "figure") for tag, _ in parsed.tags)
+    assert "6.00 %" in parsed.text

@@ -1,32 +1,20 @@
-"""The figures that are curves: joints, approximation, assignment, other modes.
+"""The figures that are curves over one variable: coordinates, approximation, assignment, modes.
 
-Curves over one variable in stacked panels: most figures of the report are this.
+Each function plans one figure, the next one draws it. Panels stand one above the other over a
+common abscissa; frequencies in Hz, errors in % of the frequency in Hz.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.output.figures import ink
-from eigassign.output.figures.frame import (
-    TITLE_IN,
-    WIDTH_IN,
-    Entry,
-    Frame,
-    axis_label,
-    draw_frame,
-    draw_key,
-    key_rows,
-    label_width,
-    titled_sheet,
-)
-from eigassign.output.figures.ink import BLACK, GREY, LINE_IN, Box, Sheet, Stroke, short
-from eigassign.output.figures.lettering import text_width
-from eigassign.output.figures.ticks import Scale, linear, logarithmic
+from eigassign.output.figures import style
+from eigassign.output.figures.style import FigurePlan, labelled, legend_above, short
 from eigassign.output.formats import percent
 from eigassign.study.results import (
     Comparison,
@@ -37,236 +25,253 @@ from eigassign.study.results import (
     TargetStudy,
 )
 
-# --- The figures that are curves: joints, approximation, assignment, other modes
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Floats = NDArray[np.float64]
+Look = dict[str, Any]  # colour, width and dashes of a line
 
-EXACT = Stroke(ink.GREY, 3.2)
-TAYLOR = Stroke(ink.VERMILLION, 1.4)
-LINEARISED = Stroke(ink.BLUE, 1.4, (5.0, 1.8))
-TARGET = Stroke(ink.BLACK, 1.6, (1.4, 1.4))
-INITIAL = Stroke(ink.ORANGE, 1.8, (6.0, 1.5, 1.4, 1.5))
-OPTIMAL = Stroke(ink.SKY, 3.2)
-PREDICTED = Stroke(ink.BLUE, 1.3, (5.0, 1.8))
+EXACT: Look = {"color": style.GREY, "linewidth": 3.2}
+TAYLOR: Look = {"color": style.VERMILLION, "linewidth": 1.4}
+LINEARISED: Look = {"color": style.BLUE, "linewidth": 1.4, "linestyle": style.DASHED}
+TARGET: Look = {"color": style.BLACK, "linewidth": 1.6, "linestyle": style.DOTTED}
+INITIAL: Look = {"color": style.ORANGE, "linewidth": 1.8, "linestyle": style.DASH_DOTTED}
+OPTIMAL: Look = {"color": style.SKY, "linewidth": 3.2}
+PREDICTED: Look = {"color": style.BLUE, "linewidth": 1.3, "linestyle": style.DASHED}
+_POINT: Look = {"color": style.GREY, "linewidth": 0.9, "linestyle": (0, (3.0, 3.0))}
+_ERROR_DECADES = 5  # of an error axis: what is smaller is as good as nothing
+
+# --- Panels
 
 
-def joints(results: RunResults) -> Sheet:
+def stacked(title: str, x_label: str, heights: Sequence[float]) -> tuple[Figure, list[Axes]]:
+    """A figure of panels with these heights in inches, one below the other."""
+    figure = style.new_figure(title, sum(heights) + 0.15 * len(heights) + 1.1)
+    axes = figure.subplots(
+        len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights}
+    )
+    axes[-1, 0].set_xlabel(x_label)
+    figure.align_ylabels()
+    return figure, list(axes[:, 0])
+
+
+def plot(axes: Axes, x: Floats, curves: Sequence[tuple[Floats, Look]], label: str) -> None:
+    """Curves over ``x`` on a linear scale; a single point is a dot."""
+    for y, look in curves:
+        axes.plot(x, y, **look, marker="o" if x.size == 1 else "")
+    low, high = style.bounds([y for y, _ in curves])
+    margin = 0.05 * (high - low)
+    axes.set(ylabel=label, ylim=(low - margin, high + margin))
+    axes.yaxis.set_offset_position("right")  # a power of ten, away from the legend
+
+
+def plot_logarithmic(
+    axes: Axes, x: Floats, curves: Sequence[tuple[Floats, Look]], label: str
+) -> None:
+    """Curves >= 0 over ``x`` on a logarithmic scale; the lowest label owns up to what it cuts."""
+    low, high = style.decades([y for y, _ in curves], _ERROR_DECADES)
+    for y, look in curves:
+        axes.plot(x, np.maximum(y, low), **look, marker="o" if x.size == 1 else "")
+    cut = any(bool(np.any(y < low)) for y, _ in curves)
+    style.logarithmic(axes, "y", (low, high), cut=cut)
+    axes.set_ylabel(label)
+
+
+# --- Coordinates
+
+
+def coordinates(results: RunResults) -> FigurePlan:
+    """q(t)."""
+    names = ", ".join(results.q_names)
+    return FigurePlan(
+        f"coordinates{_suffix(results)}",
+        f"Coordinates{_where(results)}",
+        f"The coordinates {names} along {results.along} of {results.time_s.size} samples.",
+        f"Curves of {names} over time.",
+        partial(draw_coordinates, results),
+    )
+
+
+def draw_coordinates(results: RunResults) -> Figure:
     """q(t), one panel for each unit."""
-    units = tuple(dict.fromkeys(results.q_units))
-    strokes = [ink.series_stroke(i) for i in range(len(results.q_names))]
-    bands = [
-        Band(
-            {"rad": "joint angle", "m": "joint stroke"}.get(unit, "coordinate"),
-            unit,
-            tuple(
-                Curve(results.q[:, i], strokes[i])
-                for i, own in enumerate(results.q_units)
-                if own == unit
-            ),
-            2.6 if len(units) == 1 else 1.8,
-        )
-        for unit in units
-    ]
-    entries = [Entry(short(n), s) for n, s in zip(results.q_names, strokes, strict=True)]
-    return chart(f"Coordinates along {results.along}", _time(results), bands, entries)
+    units = list(dict.fromkeys(results.q_units))
+    heights = [2.6 if len(units) == 1 else 1.8] * len(units)
+    figure, panels = stacked(f"Coordinates along {results.along}", "time [s]", heights)
+    lines = []
+    for axes, unit in zip(panels, units, strict=True):
+        own = [i for i, each in enumerate(results.q_units) if each == unit]
+        looks = [{**style.series(i), "label": short(results.q_names[i])} for i in own]
+        curves = [(results.q[:, i], look) for i, look in zip(own, looks, strict=True)]
+        quantity = {"rad": "joint angle", "m": "joint stroke"}.get(unit, "coordinate")
+        plot(axes, results.time_s, curves, labelled(quantity, unit))
+        lines += axes.get_lines()
+    legend_above(panels[0], lines)
+    return figure
 
 
-def _time(results: RunResults) -> tuple[str, str, Floats]:
-    return ("time", "s", results.time_s)
+def _suffix(results: RunResults) -> str:
+    """What tells the files of several trajectories apart."""
+    return f"_{results.only}" if results.only is not None else ""
 
 
 def _where(results: RunResults) -> str:
-    """Said in a title where there are several trajectories."""
+    """The same for headings and titles."""
     return f", {results.along}" if results.only is not None else ""
 
 
-def over_time(results: RunResults, study: ModeStudy, comparison: Comparison) -> Sheet:
+# --- Expansion against exact frequencies (the paper's Figure 3)
+
+
+def over_time(results: RunResults, study: ModeStudy, comparison: Comparison) -> FigurePlan:
     """Exact, Taylor and linearised frequency along the trajectory, and both errors."""
     title = f"Mode {study.mode}: expansion against exact along {results.along}, initial design"
-    bands = comparison_bands(comparison)
-    return chart(title, _time(results), bands, comparison_entries(study, comparison))
+    return FigurePlan(
+        f"approximation_mode_{study.mode}_time{_suffix(results)}",
+        f"Mode {study.mode}: expansion along {results.along}",
+        "Exact, Taylor and linearised frequency at the initial design. " + worst_errors(comparison),
+        f"Frequency of mode {study.mode} over time and the errors of both expansions.",
+        partial(draw_comparison, title, "time [s]", results.time_s, study, comparison),
+    )
 
 
-def over_one(study: ModeStudy, over: DesignMap, around: Floats) -> Sheet:
+def worst_errors(comparison: Comparison) -> str:
+    """The sentence of a caption."""
+    return (
+        f"Worst error {percent(comparison.worst_taylor)} for the full expansion, "
+        f"{percent(comparison.worst_linearised)} for the partially linearised one."
+    )
+
+
+def draw_over_one(study: ModeStudy, over: DesignMap, around: Floats) -> Figure:
     """The same over one parameter, the expansion point marked."""
-    (label,) = over.names
-    title = f"Mode {study.mode}: expansion against exact over {short(label)}"
-    x = (short(label), over.units[0], over.axes[0])
-    bands = comparison_bands(over.values)
-    entries = comparison_entries(study, over.values)
-    inside = [float(v) for v in around if over.axes[0].min() <= v <= over.axes[0].max()]
-    if inside:
-        entries.append(Entry("expansion point", Stroke(ink.GREY, 0.9, (2.0, 2.0))))
-    return chart(title, x, bands, entries, marks=inside)
+    name = short(over.names[0])
+    title = f"Mode {study.mode}: expansion against exact over {name}"
+    x_label = labelled(name, over.units[0])
+    return draw_comparison(title, x_label, over.axes[0], study, over.values, around)
 
 
-def comparison_bands(comparison: Comparison) -> list[Band]:
-    """Frequency above, magnitude of the relative errors below."""
-    frequency = (
-        Curve(comparison.exact_hz, EXACT),
-        Curve(comparison.taylor_hz, TAYLOR),
-        Curve(comparison.linearised_hz, LINEARISED),
-    )
-    errors = (
-        Curve(100.0 * np.abs(comparison.taylor_error), TAYLOR),
-        Curve(100.0 * np.abs(comparison.linearised_error), LINEARISED),
-    )
-    return [
-        Band("frequency", "Hz", frequency, 1.9),
-        Band("|error|", "%", errors, 1.35, logarithmic=True),
-    ]
-
-
-def comparison_entries(study: ModeStudy, comparison: Comparison) -> list[Entry]:
-    """What the three curves are and how far off they get."""
-    taylor, linearised = comparison.worst_taylor, comparison.worst_linearised
-    return [
-        Entry("exact", EXACT),
-        Entry(f"Taylor, order {study.order} (worst {percent(taylor)})", TAYLOR),
-        Entry(f"linearised in y (worst {percent(linearised)})", LINEARISED),
-    ]
-
-
-def assignment(results: RunResults, target: TargetStudy) -> Sheet:
-    """Target, original and optimal frequency in time, and their distance to the target."""
-    curves = (
-        (target.initial_hz, INITIAL),
-        (target.exact_hz, OPTIMAL),
-        (target.predicted_hz, PREDICTED),
-    )
-    frequency = (*(Curve(hz, stroke) for hz, stroke in curves), Curve(target.target_hz, TARGET))
-    errors = tuple(Curve(100.0 * (hz / target.target_hz - 1.0), stroke) for hz, stroke in curves)
-    entries = [
-        Entry("target", TARGET),
-        Entry(f"original (worst {percent(target.initial.max_relative)})", INITIAL),
-        Entry(f"optimal, exact (worst {percent(target.exact.max_relative)})", OPTIMAL),
-        Entry(f"optimal, predicted (worst {percent(target.predicted.max_relative)})", PREDICTED),
-    ]
-    bands = [
-        Band("frequency", "Hz", frequency, 2.0),
-        Band("off target", "%", errors, 1.35, zero_line=True),
-    ]
-    return chart(
-        f"Mode {target.mode}: assigned frequency{_where(results)}", _time(results), bands, entries
-    )
-
-
-def others(results: RunResults, modes: OtherModes) -> Sheet:
-    """The modes that were not assigned, before and after."""
-    curves = []
-    for column, mode in enumerate(modes.modes):
-        colour = ink.SERIES[column % len(ink.SERIES)]
-        before = Stroke(colour, 1.3, (5.0, 1.8))
-        curves.append(Curve(modes.initial_hz[:, column], before))
-        curves.append(Curve(modes.optimal_hz[:, column], Stroke(colour, 1.8), f"mode {mode}"))
-    band = Band("frequency", "Hz", tuple(curves), 2.9)
-    entries = [
-        Entry("original design", Stroke(ink.BLACK, 1.3, (5.0, 1.8))),
-        Entry("optimal design", Stroke(ink.BLACK, 1.8)),
-    ]
-    return chart(
-        f"Next modes before and after, exact{_where(results)}", _time(results), [band], entries
-    )
-
-
-# --- Curves over one variable in stacked panels: most figures of the report are this
-
-_GAP_IN = 0.16
-_FOOT_IN = 0.5
-_ZERO = Stroke(BLACK, 0.8)
-_MARK = Stroke(GREY, 0.9, (3.0, 3.0))
-
-
-@dataclass(frozen=True)
-class Curve:
-    """One line of a panel; ``end_label`` is written at its right end instead of in a legend."""
-
-    y: Floats
-    stroke: Stroke
-    end_label: str = ""
-
-
-@dataclass(frozen=True)
-class Band:
-    """One panel of the stack: curves over the common x, on a linear or logarithmic scale."""
-
-    quantity: str
-    unit: str
-    curves: tuple[Curve, ...]
-    height: float
-    logarithmic: bool = False
-    zero_line: bool = False
-
-
-def chart(
+def draw_comparison(
     title: str,
-    x: tuple[str, str, Floats],
-    bands: Sequence[Band],
-    entries: Sequence[Entry] = (),
-    marks: Sequence[float] = (),
-) -> Sheet:
-    """Panels over x = (quantity, unit, values), legend above; ``marks`` are upright lines."""
-    scales = [_scale(band) for band in bands]
-    x_scale = linear([x[2]], count=9, margin=0.0 if x[2].size > 1 else 0.5)
-    left = 0.28 + max(label_width(scale) for scale in scales)
-    width = WIDTH_IN - left - 0.22 - max(_end_width(band) for band in bands)
-    rows = key_rows(entries, WIDTH_IN - left)
-    top = TITLE_IN + len(rows) * LINE_IN + (0.08 if rows else 0.0)
-    height = top + sum(band.height + _GAP_IN for band in bands) - _GAP_IN + _FOOT_IN
-    sheet = titled_sheet(height, title)
-    draw_key(sheet, rows, left, height - TITLE_IN)
-    below = height - top
-    for band, scale in zip(bands, scales, strict=True):
-        below -= band.height
-        frame = Frame((left, below, width, band.height), x_scale, scale)
-        draw_frame(sheet, frame, x_labels=band is bands[-1])
-        _draw_marks(sheet, frame, marks, zero_line=band.zero_line)
-        _draw_curves(sheet, frame, band, x[2])
-        below -= _GAP_IN
-    x_text = axis_label(x[0], x_scale.unit(x[1]))
-    sheet.text(left + width / 2.0, 0.14, x_text, align="center")
-    return sheet
+    x_label: str,
+    x: Floats,
+    study: ModeStudy,
+    comparison: Comparison,
+    points: Floats | Sequence[float] = (),
+) -> Figure:
+    """Frequency above, magnitude of the relative errors below; ``points`` are upright lines."""
+    figure, (above, below) = stacked(title, x_label, (1.9, 1.35))
+    taylor, linearised = comparison.worst_taylor, comparison.worst_linearised
+    taylor_label = f"Taylor, order {study.order} (worst {percent(taylor)})"
+    linearised_label = f"linearised in y (worst {percent(linearised)})"
+    frequencies: list[tuple[Floats, Look]] = [
+        (comparison.exact_hz, {**EXACT, "label": "exact"}),
+        (comparison.taylor_hz, {**TAYLOR, "label": taylor_label}),
+        (comparison.linearised_hz, {**LINEARISED, "label": linearised_label}),
+    ]
+    plot(above, x, frequencies, "frequency [Hz]")
+    errors = [
+        (100.0 * np.abs(comparison.taylor_error), TAYLOR),
+        (100.0 * np.abs(comparison.linearised_error), LINEARISED),
+    ]
+    plot_logarithmic(below, x, errors, "|error| [%]")
+    handles = list(above.get_lines())
+    for at in (float(at) for at in points if x.min() <= at <= x.max()):
+        below.axvline(at, **_POINT)
+        handles.append(above.axvline(at, **_POINT, label="expansion point"))
+    legend_above(above, handles)
+    return figure
 
 
-def _scale(band: Band) -> Scale:
-    values = [curve.y for curve in band.curves]
-    if band.logarithmic:
-        return logarithmic(values)
-    count = max(4, round(3.0 * band.height))
-    return linear([*values, np.zeros(1)] if band.zero_line else values, count=count)
+# --- The assignment (the paper's Figure 4) and the next modes (its Figure 5)
 
 
-def _end_width(band: Band) -> float:
-    return max(text_width(curve.end_label) for curve in band.curves)
+def assignment(results: RunResults, target: TargetStudy) -> FigurePlan:
+    """Target, original and optimal frequency in time, and their distance to the target."""
+    return FigurePlan(
+        f"assignment_mode_{target.mode}{_suffix(results)}",
+        f"Mode {target.mode}: original, optimal and target frequency{_where(results)}",
+        f"Worst distance to the target {percent(target.initial.max_relative)} before and "
+        f"{percent(target.exact.max_relative)} after, "
+        f"where the expansion predicted {percent(target.predicted.max_relative)}.",
+        f"Frequency of mode {target.mode} over time before and after, with its target.",
+        partial(draw_assignment, results, target),
+    )
 
 
-def _draw_marks(sheet: Sheet, frame: Frame, marks: Sequence[float], *, zero_line: bool) -> None:
-    left, bottom, width, height = frame.box
-    for at in left + width * frame.x.fraction(np.array(marks, dtype=float)):
-        sheet.line(np.array([(at, bottom), (at, bottom + height)]), _MARK)
-    if zero_line:
-        at = bottom + height * float(frame.y.fraction(np.zeros(1))[0])
-        sheet.line(np.array([(left, at), (left + width, at)]), _ZERO)
+def draw_assignment(results: RunResults, target: TargetStudy) -> Figure:
+    """Frequencies above, f/f_target − 1 below."""
+    title = f"Mode {target.mode}: assigned frequency{_where(results)}"
+    figure, (above, below) = stacked(title, "time [s]", (2.0, 1.35))
+    curves = [
+        (target.initial_hz, INITIAL, "original", target.initial),
+        (target.exact_hz, OPTIMAL, "optimal, exact", target.exact),
+        (target.predicted_hz, PREDICTED, "optimal, predicted", target.predicted),
+    ]
+    frequencies: list[tuple[Floats, Look]] = [
+        (target.target_hz, {**TARGET, "label": "target", "zorder": 3.0})
+    ]
+    for hz, look, name, error in curves:
+        label = f"{name} (worst {percent(error.max_relative)})"
+        frequencies.append((hz, {**look, "label": label}))
+    plot(above, results.time_s, frequencies, "frequency [Hz]")
+    off = [(100.0 * (hz / target.target_hz - 1.0), look) for hz, look, _, _ in curves]
+    zero = np.zeros(results.time_s.size)
+    zero_line: Look = {"color": style.BLACK, "linewidth": 0.8}
+    plot(below, results.time_s, [(zero, zero_line), *off], "off target [%]")
+    legend_above(above, above.get_lines())
+    return figure
 
 
-def _draw_curves(sheet: Sheet, frame: Frame, band: Band, x: Floats) -> None:
-    left, bottom, width, height = frame.box
-    clip: Box = (left - 0.05, bottom - 0.02, width + 0.1, height + 0.04)
-    for curve in band.curves:
-        sheet.line(frame.place(x, curve.y), curve.stroke, clip)
-    text = axis_label(band.quantity, frame.y.unit(band.unit))
-    sheet.text(0.14, bottom + height / 2.0, text, upright=True)
-    named = sorted((c for c in band.curves if c.end_label), key=lambda c: float(c.y[-1]))
-    ends = [float(frame.place(x[-1:], curve.y[-1:])[0, 1]) for curve in named]
-    for curve, at in zip(named, spread(ends, 0.85 * LINE_IN), strict=True):
-        sheet.text(left + width + 0.08, at, curve.end_label, colour=curve.stroke.colour)
+def other_modes(results: RunResults, others: OtherModes) -> FigurePlan:
+    """The modes that were not assigned, before and after."""
+    modes = ", ".join(map(str, others.modes))
+    return FigurePlan(
+        f"other_modes{_suffix(results)}",
+        f"Next modes{_where(results)}",
+        f"Exact frequencies of modes {modes}, which were not assigned, before and after.",
+        f"Frequencies of modes {modes} over time before and after.",
+        partial(draw_other_modes, results, others),
+    )
 
 
-def spread(wanted: Sequence[float], gap: float) -> list[float]:
+def draw_other_modes(results: RunResults, others: OtherModes) -> Figure:
+    """One colour a mode: dashed before, solid after, its number at the end of its curve."""
+    title, height = f"Next modes before and after, exact{_where(results)}", 2.9
+    figure, (axes,) = stacked(title, "time [s]", (height,))
+    before: Look = {"linewidth": 1.3, "linestyle": style.DASHED}
+    after: Look = {"linewidth": 1.8}
+    colours = [style.SERIES[k % len(style.SERIES)] for k in range(len(others.modes))]
+    curves = []
+    for k, colour in enumerate(colours):
+        curves.append((others.initial_hz[:, k], {**before, "color": colour}))
+        curves.append((others.optimal_hz[:, k], {**after, "color": colour}))
+    plot(axes, results.time_s, curves, "frequency [Hz]")
+    low, high = axes.get_ylim()
+    ends, apart = others.optimal_hz[-1], 0.15 * (high - low) / height
+    order = np.argsort(ends)
+    for k, place in zip(order, spread(ends[order], apart), strict=True):
+        axes.annotate(
+            f"mode {others.modes[k]}", (1.0, place), (6.0, 0.0), color=colours[k], va="center",
+            xycoords=("axes fraction", "data"), textcoords="offset points",
+        )  # fmt: skip
+    from matplotlib.lines import Line2D
+
+    legend_above(
+        axes,
+        [
+            Line2D([], [], color=style.BLACK, **before, label="original design"),
+            Line2D([], [], color=style.BLACK, **after, label="optimal design"),
+        ],
+    )
+    return figure
+
+
+def spread(wanted: Floats | Sequence[float], gap: float) -> list[float]:
     """Ascending places nearest to the ascending ``wanted`` ones with ``gap`` between them."""
     clusters: list[tuple[float, int]] = []  # mean place, how many
     for place in wanted:
-        mean, count = place, 1
+        mean, count = float(place), 1
         while clusters and clusters[-1][0] + gap * (clusters[-1][1] + count) / 2.0 > mean:
             other, size = clusters.pop()
             mean, count = (other * size + mean * count) / (size + count), size + count

@@ -5,35 +5,20 @@ Points over two logarithmic axes with a front through the best of them, legend b
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from eigassign.chart.results import Chart, ChartPoint, DesignRun, Front, excess_over
-from eigassign.output.figures.frame import Frame, axis_label, draw_frame, label_width, titled_sheet
-from eigassign.output.figures.ink import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    LINE_IN,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILLION,
-    Box,
-    Sheet,
-    Stroke,
-    short,
-)
-from eigassign.output.figures.lettering import text_width
-from eigassign.output.figures.plan import FigurePlan
-from eigassign.output.figures.ticks import Scale, power_of_ten
+from eigassign.output.figures import style
+from eigassign.output.figures.style import BLACK, GREY, FigurePlan, labelled, short
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # --- The figures of a chart: what each shows, and how it is drawn
 
@@ -43,12 +28,12 @@ _MARKED = ("filled: eigassign's; hollow: what people do without it; the band: no
            "quicker and more accurate; ringed: taken by `expansion.order: auto`")  # fmt: skip
 
 
-def plan(chart: Chart) -> tuple[FigurePlan, ...]:
+def chart_figures(chart: Chart) -> tuple[FigurePlan, ...]:
     """The figures that this chart has something to show for, in reading order."""
-    return tuple(_plans(chart))
+    return tuple(_figures(chart))
 
 
-def _plans(chart: Chart) -> Iterator[FigurePlan]:
+def _figures(chart: Chart) -> Iterator[FigurePlan]:
     for each in chart.fronts:
         yield _errors(chart, each)
     if chart.mesh:
@@ -58,9 +43,9 @@ def _plans(chart: Chart) -> Iterator[FigurePlan]:
 
 
 def file_name(front: Front) -> str:
-    """``cost_one_trajectory.png``."""
+    """``cost_one_trajectory``."""
     words = "".join(c if c.isalnum() else "_" for c in front.name)
-    return f"cost_{words}.png" if front.evaluations else f"{words}.png"
+    return f"cost_{words}" if front.evaluations else words
 
 
 def _errors(chart: Chart, front: Front) -> FigurePlan:
@@ -97,7 +82,7 @@ def cost(point: ChartPoint, front: Front) -> float:
     return point.total_s(front.evaluations)
 
 
-def draw_errors(chart: Chart, front: Front) -> Sheet:
+def draw_errors(chart: Chart, front: Front) -> Figure:
     """Every method by family, the front through the best."""
 
     floor = chart.asked.floor_hz
@@ -146,7 +131,7 @@ def _mesh(chart: Chart) -> FigurePlan:
         else ""
     )
     return FigurePlan(
-        "mesh.png",
+        "mesh",
         "Elements against discretisation error",
         "Worst error of exact frequencies against the limit that the meshes converge to, "
         f"extrapolated from the two finest ({finest.elements} elements).{here}{_beside(chart)}",
@@ -155,7 +140,7 @@ def _mesh(chart: Chart) -> FigurePlan:
     )
 
 
-def draw_mesh(chart: Chart) -> Sheet:
+def draw_mesh(chart: Chart) -> Figure:
     """Error over elements, with the approximation error beside it."""
 
     rows = [row for row in chart.mesh if row.worst_hz > 0.0]
@@ -202,7 +187,7 @@ def _taylor(points: Sequence[ChartPoint]) -> ChartPoint | None:
 def _designs(chart: Chart) -> FigurePlan:
     best = min(chart.designs, key=lambda run: run.objective)
     return FigurePlan(
-        "designs.png",
+        "designs",
         "Time to a design against the objective it reaches",
         "Exact objective (mean square relative error in λ) above the best one that any method "
         f"found ({best.objective:.6g}, by {best.method}), relative to it; searches with all their "
@@ -212,7 +197,7 @@ def _designs(chart: Chart) -> FigurePlan:
     )
 
 
-def draw_designs(chart: Chart) -> Sheet:
+def draw_designs(chart: Chart) -> Figure:
     """Single answers as points, searches as ladders of their improvements."""
 
     best = min(run.objective for run in chart.designs)
@@ -234,14 +219,13 @@ def _steps(run: DesignRun) -> tuple[Floats, Floats]:
 
 # --- Points over two logarithmic axes with a front through the best of them, legend beside them
 
-_FOOT_IN, _TOP_IN, _KEY_IN, _FRAME_IN = 0.5, 0.42, 0.2, 4.2
-_WHITE = (1.0, 1.0, 1.0)
-_LABELS = 9  # at most, on one axis
-_BELOW = 2.0  # room for a level's name below it, as a factor
-_RING_IN = 0.085
-_FRONT = Stroke("#c9dfee", 7.0)
-_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, BLACK, SKY, GREY)
-_SIDES = {"circle": 0, "square": 4, "triangle": 3, "diamond": -4, "pentagon": 5}
+_TALL_IN, _KEY_IN = 4.9, 0.2  # of the figure, and of a line of its legend
+_COLOURS = (*style.SERIES[:5], BLACK, style.SKY, GREY)
+_MARKERS = {True: ("o", "^"), False: ("s", "D", "p")}
+_RING: dict[str, Any] = {
+    "linestyle": "none", "marker": "o", "markersize": 12.0, "markerfacecolor": "none",
+    "markeredgecolor": BLACK, "markeredgewidth": 1.4, "zorder": 4.0,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -254,34 +238,18 @@ class Ladder:
     ours: bool
 
 
-@dataclass(frozen=True)
-class Style:
-    """How one ladder is drawn."""
-
-    colour: str
-    shape: str
-    filled: bool
-
-
-def style(number: int, ours: bool) -> Style:
+def ladder_style(number: int, ours: bool) -> dict[str, Any]:
     """The ``number``-th ladder of its kind: no two of a kind share colour and shape."""
-    shapes = ("circle", "triangle") if ours else ("square", "diamond", "pentagon")
-    shape = shapes[(number // len(_COLOURS)) % len(shapes)]
-    return Style(_COLOURS[number % len(_COLOURS)], shape, ours)
-
-
-def decades(values: Sequence[Floats]) -> Scale:
-    """Whole decades that hold all positive ``values``, however many."""
-    every = np.concatenate([np.ravel(v) for v in values] or [np.ones(1)])
-    every = every[np.isfinite(every) & (every > 0.0)]
-    low, high = (every.min(), every.max()) if every.size else (1.0, 1.0)
-    bottom = math.floor(math.log10(low) - 0.02)
-    top = max(math.ceil(math.log10(high) + 0.02), bottom + 1)
-    step = 1 + (top - bottom) // _LABELS
-    shown = range(bottom, top + 1, step)
-    labels = tuple(f"{10.0**d:g}" if -3 <= d <= 3 else power_of_ten(d) for d in shown)
-    ticks = tuple(10.0**d for d in shown)
-    return Scale(10.0**bottom, 10.0**top, ticks, labels, logarithmic=True)
+    markers, colour = _MARKERS[ours], _COLOURS[number % len(_COLOURS)]
+    return {
+        "color": colour,
+        "linewidth": 0.9,
+        "linestyle": "solid" if ours else (0, (2.5, 2.0)),
+        "marker": markers[number // len(_COLOURS) % len(markers)],
+        "markersize": 6.0,
+        "markerfacecolor": colour if ours else "white",
+        "markeredgewidth": 0.8,
+    }
 
 
 def scatter(
@@ -292,115 +260,54 @@ def scatter(
     front: Floats | None = None,
     levels: Sequence[tuple[str, float]] = (),
     ringed: tuple[str, Floats] | None = None,
-) -> Sheet:
-    """``front`` (n, 2) is drawn as steps; ``levels`` are named heights across the frame.
+) -> Figure:
+    """``front`` (n, 2) is drawn as steps; ``levels`` are named heights across the axes.
 
     ``ringed``: what the points (n, 2) with a ring around them are.
     """
-    heights = [ladder.y for ladder in ladders] + [np.array([v, v / _BELOW]) for _, v in levels]
-    x_scale, y_scale = decades([ladder.x for ladder in ladders]), decades(heights)
-    key = _KEY_IN * (len(ladders) + (2 if ringed is None else 3))
-    tall = max(_FRAME_IN, key)
-    sheet = titled_sheet(_TOP_IN + tall + _FOOT_IN, title)
-    left = 0.3 + label_width(y_scale)
-    labels = [ladder.label for ladder in ladders] + ([] if ringed is None else [ringed[0]])
-    room = 0.5 + max(text_width(label) for label in labels)
-    box = (left, _FOOT_IN, sheet.width - left - room - 0.15, tall)
-    frame = Frame(box, x_scale, y_scale)
-    draw_frame(sheet, frame)
-    _draw_levels(sheet, frame, levels)
-    if front is not None and len(front):
-        _draw_front(sheet, frame, front)
-    styles = _styles(ladders)
-    for ladder, look in reversed(list(zip(ladders, styles, strict=True))):
-        _draw_ladder(sheet, frame, ladder, look)
-    if ringed is not None:
-        for x_at, y_at in frame.place(*ringed[1].T):
-            _draw_ring(sheet, (x_at, y_at))
-    _draw_key(sheet, ladders, styles, ringed, (box[0] + box[2] + 0.15, _FOOT_IN, room, tall))
-    sheet.text(box[0] + box[2] / 2.0, 0.14, axis_label(*x), align="center")
-    sheet.text(0.14, _FOOT_IN + tall / 2.0, axis_label(*y), upright=True)
-    return sheet
-
-
-def _styles(ladders: Sequence[Ladder]) -> list[Style]:
-    counts = {True: 0, False: 0}
-    styles = []
-    for ladder in ladders:
-        styles.append(style(counts[ladder.ours], ladder.ours))
-        counts[ladder.ours] += 1
-    return styles
-
-
-def _draw_levels(sheet: Sheet, frame: Frame, levels: Sequence[tuple[str, float]]) -> None:
-    left, _, width, _ = frame.box
+    figure = style.new_figure(title, max(_TALL_IN, _KEY_IN * (len(ladders) + 4) + 0.4))
+    axes = figure.subplots()
+    axes.set(xlabel=labelled(*x), ylabel=labelled(*y))
+    x_limits = style.decades([ladder.x for ladder in ladders])
+    heights = [ladder.y for ladder in ladders]
+    y_limits = style.decades([*heights, *(np.array([v, v / 2.0]) for _, v in levels)])
+    style.logarithmic(axes, "x", x_limits)
+    style.logarithmic(axes, "y", y_limits)
     for name, value in levels:
-        at = float(frame.place(np.array([frame.x.low]), np.array([value]))[0, 1])
-        sheet.line(np.array([(left, at), (left + width, at)]), Stroke(GREY, 1.0, (3.0, 3.0)))
-        sheet.text(left + 0.06, at - 0.13, short(name, 60), points=8.0)
+        axes.axhline(value, color=GREY, linewidth=1.0, linestyle=(0, (3.0, 3.0)), zorder=1.5)
+        axes.annotate(
+            short(name, 60), (x_limits[0], value), (4.0, -4.0), textcoords="offset points",
+            va="top", size=style.SMALL_PT,
+        )  # fmt: skip
+    if front is not None and len(front):
+        along, best = front[np.argsort(front[:, 0])].T
+        steps = np.append(along, x_limits[1]), np.append(best, best[-1])
+        axes.step(*steps, where="post", color="#c9dfee", linewidth=7.0, zorder=1.6)
+        axes.vlines(along[0], best[0], y_limits[1], color="#c9dfee", linewidth=7.0, zorder=1.6)
+    handles: dict[bool, list[Any]] = {True: [], False: []}
+    for ladder in ladders:
+        look = ladder_style(len(handles[ladder.ours]), ladder.ours)
+        above = 3.0 - 1e-3 * sum(map(len, handles.values()))  # the first ones lie on top
+        (line,) = axes.plot(
+            ladder.x, np.maximum(ladder.y, y_limits[0]), **look, zorder=above,
+            label=short(ladder.label), clip_on=False,
+        )  # fmt: skip
+        handles[ladder.ours].append(line)
+    rings = [] if ringed is None else axes.plot(*ringed[1].T, **_RING, label=ringed[0])
+    _add_key(figure, handles, rings)
+    return figure
 
 
-def _draw_front(sheet: Sheet, frame: Frame, front: Floats) -> None:
-    """Steps: what can be had for each cost."""
-    left, bottom, width, height = frame.box
-    places = frame.place(*front[np.argsort(front[:, 0])].T)
-    steps = [(places[0, 0], bottom + height)]
-    for (x, y), following in zip(places, [*places[1:, 0], left + width], strict=True):
-        steps += [(x, y), (following, y)]
-    sheet.line(np.array(steps), _FRONT, frame.box)
+def _add_key(figure: Figure, handles: dict[bool, list[Any]], rings: Sequence[Any]) -> None:
+    """The legend at the right: eigassign's ladders, then the others, then the rings."""
+    from matplotlib.lines import Line2D
 
-
-def _draw_ladder(sheet: Sheet, frame: Frame, ladder: Ladder, look: Style) -> None:
-    left, bottom, width, height = frame.box
-    clip: Box = (left - 0.08, bottom - 0.08, width + 0.16, height + 0.16)
-    places = frame.place(ladder.x, ladder.y)
-    if len(places) > 1:
-        dashes = () if ladder.ours else (2.5, 2.0)
-        sheet.line(places, Stroke(look.colour, 0.9, dashes), clip)
-    for x, y in places:
-        marker(sheet, (x, y), look)
-
-
-def marker(sheet: Sheet, centre: tuple[float, float], look: Style) -> None:
-    """One point: filled for ours, hollow for others."""
-    colour = tuple(int(look.colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
-    fill = (colour[0], colour[1], colour[2]) if look.filled else _WHITE
-    sides = _SIDES[look.shape]
-    if not sides:
-        sheet.dot(centre, 6.0, fill, look.colour)
-        return
-    turn = np.pi / 4.0 if sides == 4 else np.pi / 2.0
-    angles = turn + 2.0 * np.pi * np.arange(abs(sides) + 1) / abs(sides)
-    corners = np.column_stack([np.cos(angles), np.sin(angles)]) * 0.052 + np.array(centre)
-    sheet.area(Path(corners), fill, look.colour)
-
-
-def _draw_ring(sheet: Sheet, centre: tuple[float, float]) -> None:
-    angles = 2.0 * np.pi * np.arange(41) / 40.0
-    round_it = np.column_stack([np.cos(angles), np.sin(angles)]) * _RING_IN + np.array(centre)
-    sheet.line(round_it, Stroke(BLACK, 1.4))
-
-
-def _draw_key(
-    sheet: Sheet,
-    ladders: Sequence[Ladder],
-    styles: Sequence[Style],
-    ringed: tuple[str, Floats] | None,
-    box: Box,
-) -> None:
-    left, bottom, _, height = box
-    at, headed = bottom + height - LINE_IN / 2.0, not all(ladder.ours for ladder in ladders)
+    entries: list[Any] = []
     for ours, heading in ((True, "eigassign"), (False, "others")):
-        if not any(ladder.ours is ours for ladder in ladders):
-            continue
-        if headed:
-            sheet.text(left, at, heading, bold=True)
-            at -= _KEY_IN
-        for ladder, look in zip(ladders, styles, strict=True):
-            if ladder.ours is ours:
-                marker(sheet, (left + 0.1, at), look)
-                sheet.text(left + 0.25, at, ladder.label)
-                at -= _KEY_IN
-    if ringed is not None:
-        _draw_ring(sheet, (left + 0.1, at))
-        sheet.text(left + 0.25, at, ringed[0])
+        if handles[ours] and handles[False]:
+            entries.append(Line2D([], [], linestyle="none", label=heading))
+        entries += handles[ours]
+    key = figure.legend(handles=[*entries, *rings], loc="outside right upper", handlelength=1.6)
+    for entry, text in zip([*entries, *rings], key.get_texts(), strict=True):
+        if entry not in handles[True] and entry not in handles[False] and entry not in rings:
+            text.set_fontweight("bold")

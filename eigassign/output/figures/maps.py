@@ -1,133 +1,100 @@
-"""Exact frequency and the errors of both expansions over two parameters (Figure 3)."""
+"""Expansion against exact over entries of q or y: maps over two, curves over one (Figure 3)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from contourpy import FillType, contour_generator
-from matplotlib.path import Path
 from numpy.typing import NDArray
 
-from eigassign.output.figures.frame import (
-    TITLE_IN,
-    WIDTH_IN,
-    Frame,
-    axis_label,
-    draw_frame,
-    label_width,
-    titled_sheet,
-)
-from eigassign.output.figures.ink import BLACK, LINE_IN, Box, Sheet, ramp, rectangle, short
-from eigassign.output.figures.ticks import Scale, levels, linear
+from eigassign.output.figures import style
+from eigassign.output.figures.curves import draw_over_one, worst_errors
+from eigassign.output.figures.style import FigurePlan, labelled, short
 from eigassign.output.formats import percent
 from eigassign.study.results import DesignMap, ModeStudy
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 Floats = NDArray[np.float64]
-_MAP_IN = 1.75
-_FOOT_IN = 0.72
-_BAR_IN = 0.12
-_BETWEEN_IN = 0.16
+_POINT: dict[str, Any] = {
+    "markersize": 5.5,
+    "markerfacecolor": "white",
+    "markeredgecolor": style.BLACK,
+    "label": "expansion point",
+}
 _NOTHING = np.array([0.0, 1e-10])  # percent: an error map never zooms in on less
-_WHITE = (1.0, 1.0, 1.0)
 
 
-@dataclass(frozen=True)
-class _Map:
-    heading: tuple[str, str]
-    values: Floats  # (n_1, n_2)
-    bands: Scale
+def approximation(
+    study: ModeStudy,
+    over: DesignMap | None,
+    x0: Floats,
+    names: Sequence[str],
+    kind: str,
+) -> Iterator[FigurePlan]:
+    """The figure over ``over``, if there is something on it.
 
-
-def over_two(study: ModeStudy, over: DesignMap, around: Floats) -> Sheet:
-    """Three maps side by side, the expansion point marked on each."""
-    maps = _maps(study, over)
-    x, y = (linear([over.axes[i]], count=count, margin=0.0) for i, count in enumerate((4, 5)))
-    left = 0.28 + label_width(y)
-    bars = [_BAR_IN + 0.08 + label_width(m.bands) + _BETWEEN_IN for m in maps]
-    width = (WIDTH_IN - left - sum(bars)) / len(maps)
-    height = TITLE_IN + 2.0 * LINE_IN + 0.06 + _MAP_IN + _FOOT_IN
-    names = " and ".join(short(n, 30) for n in over.names)
-    sheet = titled_sheet(height, f"Mode {study.mode}: expansion against exact over {names}")
-    at = left
-    for number, (one, room) in enumerate(zip(maps, bars, strict=True)):
-        shown = y if number == 0 else _unlabelled(y)
-        frame = Frame((at, _FOOT_IN, width, _MAP_IN), x, shown)
-        _draw_map(sheet, frame, one, over.axes)
-        _draw_point(sheet, frame, around)
-        text = axis_label(short(over.names[0], 20), x.unit(over.units[0]))
-        sheet.text(at + width / 2.0, _FOOT_IN - 0.33, text, align="center")
-        at += width + room
-    label = axis_label(short(over.names[1], 20), y.unit(over.units[1]))
-    sheet.text(0.14, _FOOT_IN + _MAP_IN / 2.0, label, upright=True)
-    sheet.dot((left + 0.05, 0.12), 5.5, _WHITE, BLACK)
-    sheet.text(left + 0.15, 0.12, "expansion point")
-    return sheet
-
-
-def _maps(study: ModeStudy, over: DesignMap) -> tuple[_Map, ...]:
-    values = over.values
-    taylor, linearised = (
-        100.0 * np.abs(error) for error in (values.taylor_error, values.linearised_error)
-    )
-    exact = levels([values.exact_hz])
-    return (
-        _Map(("exact", f"frequency [{exact.unit('Hz')}]"), values.exact_hz, exact),
-        _error_map(f"Taylor, order {study.order}", taylor, values.worst_taylor),
-        _error_map("linearised in y", linearised, values.worst_linearised),
-    )
-
-
-def _error_map(heading: str, error: Floats, worst: float) -> _Map:
-    bands = levels([error, _NOTHING], count=8)
-    below = f"|error| [{bands.unit('%')}], worst {percent(worst)}"
-    return _Map((heading, below), error, bands)
-
-
-def _unlabelled(scale: Scale) -> Scale:
-    labels = ("",) * len(scale.labels)
-    return Scale(scale.low, scale.high, scale.positions, labels, scale.exponent)
-
-
-def _draw_map(sheet: Sheet, frame: Frame, one: _Map, axes: tuple[Floats, ...]) -> None:
-    left, bottom, width, height = frame.box
-    top = bottom + height + 0.06
-    sheet.text(left, top + 1.5 * LINE_IN, one.heading[0], bold=True)
-    sheet.text(left, top + 0.5 * LINE_IN, one.heading[1], points=8.0)
-    places = frame.place(axes[0], np.zeros(axes[0].size))[:, 0]
-    heights = frame.place(np.zeros(axes[1].size), axes[1])[:, 1]
-    known = np.ma.masked_invalid(one.values.T)
-    contours = contour_generator(places, heights, known, fill_type=FillType.OuterCode)
-    edges = one.bands.positions
-    beyond = edges[1] - edges[0]  # a value on an outermost level belongs to its band
-    for number, low in enumerate((edges[0] - beyond, *edges[1:-1])):  # to the top: no seams
-        colour = _band_colour(number, len(edges) - 1)
-        for points, codes in zip(*contours.filled(low, edges[-1] + beyond), strict=True):
-            sheet.area(Path(points, codes), colour)
-    draw_frame(sheet, frame, grid=False)
-    _draw_bar(sheet, (left + width + 0.08, bottom, _BAR_IN, height), one.bands)
-
-
-def _band_colour(number: int, count: int) -> tuple[float, float, float]:
-    return ramp((number + 0.5) / count)
-
-
-def _draw_bar(sheet: Sheet, box: Box, bands: Scale) -> None:
-    left, bottom, width, height = box
-    count = len(bands.positions) - 1
-    for number in range(count):
-        piece = (left, bottom + number * height / count, width, height / count)
-        sheet.area(rectangle(piece), _band_colour(number, count))
-    every = 1 + len(bands.labels) // 7
-    for number, label in list(enumerate(bands.labels))[::every]:
-        sheet.text(left + width + 0.05, bottom + number * height / count, label, points=8.0)
-
-
-def _draw_point(sheet: Sheet, frame: Frame, around: Floats) -> None:
-    """The expansion point, where it lies on the map."""
-    if around.size != 2:
+    ``x0`` is the expansion point in the coordinates ``names``; ``kind`` ends the file's name.
+    """
+    if over is None or not over.axes or min(axis.size for axis in over.axes) < 2:
         return
-    ((x, y),) = frame.place(around[:1], around[1:])
-    left, bottom, width, height = frame.box
-    if left <= x <= left + width and bottom <= y <= bottom + height:
-        sheet.dot((x, y), 5.5, _WHITE, BLACK)
+    point = np.array([x0[names.index(n)] for n in over.names if n in names])
+    shown = " and ".join(over.names)
+    draw = draw_over_one if len(over.axes) == 1 else draw_over_two
+    yield FigurePlan(
+        f"approximation_mode_{study.mode}_{kind}",
+        f"Mode {study.mode}: expansion over {shown}",
+        f"All else at the expansion point. {worst_errors(over.values)}",
+        f"Exact frequency of mode {study.mode} and expansion errors over {shown}.",
+        partial(draw, study, over, point),
+    )
+
+
+def draw_over_two(study: ModeStudy, over: DesignMap, point: Floats) -> Figure:
+    """Exact frequency and both errors side by side, the expansion point marked on each."""
+    values, names = over.values, " and ".join(short(n, 30) for n in over.names)
+    figure = style.new_figure(f"Mode {study.mode}: expansion against exact over {names}", 3.2)
+    panels = figure.subplots(1, 3, sharex=True, sharey=True)
+    errors = (100.0 * np.abs(e) for e in (values.taylor_error, values.linearised_error))
+    headings = (
+        "exact\nfrequency [Hz]",
+        f"Taylor, order {study.order}\n|error| [%], worst {percent(values.worst_taylor)}",
+        f"linearised in y\n|error| [%], worst {percent(values.worst_linearised)}",
+    )
+    x_label, y_label = (labelled(short(over.names[i], 20), over.units[i]) for i in (0, 1))
+    shown = (values.exact_hz, *errors)
+    for axes, heading, numbers in zip(panels, headings, shown, strict=True):
+        held = style.bounds([numbers] if axes is panels[0] else [numbers, _NOTHING])
+        filled_contours(figure, axes, over.axes, numbers, held)
+        axes.set_title(heading)
+        axes.set_xlabel(x_label)
+        if point.size == 2:
+            (dot,) = axes.plot(*point, "o", **_POINT)
+        axes.set(xlim=over.axes[0][[0, -1]], ylim=over.axes[1][[0, -1]])
+    panels[0].set_ylabel(y_label)
+    if point.size == 2:
+        figure.legend(handles=[dot], loc="outside lower left")
+    return figure
+
+
+def filled_contours(
+    figure: Figure,
+    axes: Axes,
+    grids: Sequence[Floats],
+    values: Floats,
+    held: tuple[float, float],
+) -> None:
+    """Bands between round levels that enclose ``held``, with a bar that names the levels."""
+    from matplotlib.ticker import MaxNLocator
+
+    low, high = held
+    levels = MaxNLocator(7, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
+    bands = axes.contourf(*grids, np.ma.masked_invalid(values.T), levels=levels)
+    axes.grid(visible=False)
+    bar = figure.colorbar(bands, ax=axes, aspect=14, pad=0.03)
+    bar.outline.set_visible(False)
+    bar.ax.tick_params(length=0.0, labelsize=style.SMALL_PT)

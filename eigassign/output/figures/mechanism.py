@@ -1,305 +1,38 @@
-"""The mechanism drawn in several poses with its tip path (Figures 1 and 2).
+"""The mechanism in several poses with the path of its tip (the paper's Figures 1 and 2).
 
-Lines, joints, bodies and springs of a mechanism on a canvas, each by one symbol.
-
-From places in a plane or in space to places on a sheet, at one scale in all directions.
+From the bottom up: a parallel projection of a plane or of space on the sheet; a drawing at one
+scale in all directions; a symbol for each joint, body and spring; the figure of the poses.
+Symbols are measured in inches on the sheet, places in m.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import partial
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.path import Path
 from numpy.typing import NDArray
 
-from eigassign.output.figures.frame import (
-    TITLE_IN,
-    WIDTH_IN,
-    Entry,
-    Frame,
-    axis_label,
-    draw_entry,
-    draw_frame,
-    label_width,
-    titled_sheet,
-)
-from eigassign.output.figures.ink import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    LINE_IN,
-    PURPLE,
-    SKY,
-    VERMILLION,
-    Box,
-    Sheet,
-    Stroke,
-    ramp,
-    rgb,
-    short,
-)
-from eigassign.output.figures.lettering import text_width
-from eigassign.output.figures.ticks import Scale, between, power_of_ten
+from eigassign.output.figures import style
+from eigassign.output.figures.style import BLACK, GREY, FigurePlan, short
 from eigassign.study.results import DrawnBody, DrawnJoint, DrawnPoses, DrawnSpring, RunResults
 
-# --- The mechanism drawn in several poses with its tip path (Figures 1 and 2)
-
-_TALL_IN = (2.0, 4.8)
-_FOOT_IN = {False: 0.5, True: 0.8}  # in a plane, in space
-_ROOM = 1.12  # of the axes, relative to what they hold
-_TIP = Stroke(VERMILLION, 1.8)
-_BODIES = (BLUE, GREEN, PURPLE, SKY)
-_BODY_KEYS = 6
-
-
-def mechanism(results: RunResults) -> Sheet:
-    """Links as lines, the pose's time told by its colour; see `symbols` for joints and bodies."""
-    poses = results.poses
-    held = extent(poses)
-    entries = _entries(poses)
-    canvas, frame = _sheet(held, entries, f"{short(results.title, 70)}: poses along the trajectory")
-    sheet = canvas.sheet
-    if frame is None:
-        draw_bearings(canvas, 0.1, 0.1)
-    else:
-        draw_frame(sheet, frame)
-    if poses.tip_path is not None:
-        sheet.line(canvas.place(poses.tip_path), _TIP)
-    draw_ground(canvas, poses.joints)
-    for pose in range(len(poses.lines)):
-        colour = _colour(pose, len(poses.lines))
-        draw_springs(canvas, poses.springs, pose, GREY)
-        draw_lines(canvas, poses, pose, colour, scale=0.8)
-        draw_joints(canvas, poses.joints, pose, colour, KINDS)
-    for at, (body, diameter) in enumerate(zip(poses.bodies, diameters(poses.bodies), strict=True)):
-        stroke = Stroke(_BODIES[at % len(_BODIES)], dot=0.7 * diameter)
-        for place in canvas.place(body.places):
-            sheet.line(place[None], stroke)
-    grounded = [joint for joint in poses.joints if joint.grounded]
-    draw_joints(canvas, grounded, 0, BLACK, ("turning",))
-    return sheet
-
-
-def _entries(poses: DrawnPoses) -> list[Entry]:
-    entries = [Entry("tip path", _TIP)] if poses.tip_path is not None else []
-    for at, body in enumerate(poses.bodies[:_BODY_KEYS]):
-        entries.append(Entry(short(body.name, 22), Stroke(_BODIES[at % len(_BODIES)], dot=7.0)))
-    for at, time in enumerate(poses.time_s):
-        whose = f"{short(poses.of[at], 12)} " if poses.of else ""
-        stroke = Stroke(_colour(at, len(poses.lines)), 2.6)
-        entries.append(Entry(f"{whose}at {time:.3g} s", stroke))
-    return entries
-
-
-def _colour(at: int, count: int) -> str:
-    red, green, blue = (round(255 * part) for part in ramp(0.9 * at / max(count - 1, 1)))
-    return f"#{red:02x}{green:02x}{blue:02x}"
-
-
-def _sheet(held: Extent, entries: list[Entry], title: str) -> tuple[Canvas, Frame | None]:
-    """A sheet with title and key; its canvas, and in a plane the axes around it."""
-    key = max((text_width(entry.label) for entry in entries), default=0.0) + 0.65
-    x, y, across, up = held.box
-    foot = _FOOT_IN[held.view.spatial]
-    edge = 0.2
-    if not held.view.spatial:
-        edge = 0.28 + label_width(_scale(y, _ROOM * up, 5.0))
-    width = WIDTH_IN - edge - key
-    tall = min(max(width * up / across, _TALL_IN[0]), _TALL_IN[1])
-    sheet = titled_sheet(foot + tall + TITLE_IN + 0.06, title)
-    box = (edge, foot, width, tall)
-    inner = (edge + 0.5 * (1 - 1 / _ROOM) * width, foot + 0.5 * (1 - 1 / _ROOM) * tall)
-    canvas = held.on(sheet, (*inner, width / _ROOM, tall / _ROOM))
-    for at, entry in enumerate(entries):
-        draw_entry(sheet, entry, edge + width + 0.15, foot + tall - (at + 0.5) * LINE_IN)
-    if held.view.spatial:
-        return canvas, None
-    frame = Frame(
-        box, _scale(x, canvas.per_inch * width, width), _scale(y, canvas.per_inch * tall, tall)
-    )
-    sheet.text(edge + width / 2.0, 0.14, axis_label("x", frame.x.unit("m")), align="center")
-    sheet.text(0.14, foot + tall / 2.0, axis_label("y", frame.y.unit("m")), upright=True)
-    return canvas, frame
-
-
-def _scale(middle: float, size: float, inches: float) -> Scale:
-    low, high = middle - size / 2.0, middle + size / 2.0
-    return between(low, high, count=max(3, round(1.6 * inches)))
-
-
-# --- Lines, joints, bodies and springs of a mechanism on a canvas, each by one symbol
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Floats = NDArray[np.float64]
-WHITE = (1.0, 1.0, 1.0)
-KINDS = ("turning", "sliding", "fixed")
-_GROUND = (0.9, 0.9, 0.9)
-_WIDTHS = (1.3, 4.2)  # points: of the thinnest lines that can be, and of the thickest line
-_PLAIN = 2.6  # points: of lines without a section
-_PIECE = 4  # points of a tapered line that are drawn with one width
+Box = tuple[float, float, float, float]  # left, bottom, width, height in inches
 
+# --- A parallel projection
 
-def draw_lines(
-    canvas: Canvas, poses: DrawnPoses, pose: int, colour: str, scale: float = 1.0
-) -> None:
-    """All links of one pose; thicker sections are drawn thicker, a taper as one."""
-    widths = line_widths(poses)
-    for points, width in zip(poses.lines[pose], widths, strict=True):
-        placed = canvas.place(points)
-        for piece, at in _pieces(placed, width):
-            canvas.sheet.line(piece, Stroke(colour, scale * canvas.grain * at))
-
-
-def line_widths(poses: DrawnPoses) -> list[tuple[float, float]]:
-    """Start and end width of each line in points, by the root of its section's size."""
-    largest = max((size for pair in poses.sizes for size in pair), default=0.0)
-    if largest == 0.0:
-        return [(_PLAIN, _PLAIN)] * len(poses.lines[0])
-    return [(_width(a / largest), _width(b / largest)) for a, b in poses.sizes]
-
-
-def _width(share: float) -> float:
-    low, high = _WIDTHS
-    return low + (high - low) * share**0.5 if share > 0.0 else _PLAIN
-
-
-def _pieces(placed: Floats, width: tuple[float, float]) -> list[tuple[Floats, float]]:
-    if len(placed) < 2 or not np.ptp(placed, axis=0).any():
-        return []
-    start, end = width
-    if start == end:
-        return [(placed, start)]
-    if len(placed) == 2:
-        placed = np.linspace(placed[0], placed[1], 4 * _PIECE + 1)
-    n = len(placed) - 1
-    cuts = range(0, n, _PIECE)
-    return [
-        (placed[k : k + _PIECE + 1], start + (end - start) * (k + 0.5 * _PIECE) / n) for k in cuts
-    ]
-
-
-def draw_ground(canvas: Canvas, joints: Sequence[DrawnJoint]) -> None:
-    """What the joints on the ground stand on, and the way of those that slide in all poses."""
-    for joint in joints:
-        if joint.grounded:
-            places = canvas.place(joint.places)
-            along = canvas.heading(joint.axes[0])
-            across = np.array([-along[1], along[0]])
-            if joint.kind == "turning":
-                _foot(canvas, places[0])
-            elif joint.kind == "sliding":
-                _guide(canvas, places, along, across if across[1] < 0.0 else -across)
-            else:
-                _hatched(canvas, places[0], across, -along, 0.13)
-
-
-def _guide(canvas: Canvas, places: Floats, along: Floats, behind: Floats) -> None:
-    """A hatched line beside all places, somewhat longer than their way."""
-    way = (places - places[0]) @ along
-    middle = places[0] + 0.5 * (way.min() + way.max()) * along
-    half = 0.5 * float(np.ptp(way)) / canvas.grain + 0.2
-    _hatched(canvas, middle + 0.09 * canvas.grain * behind, along, behind, half)
-
-
-def _foot(canvas: Canvas, at: Floats) -> None:
-    g = canvas.grain
-    corners = at + g * np.array([(0.0, 0.0), (-0.08, -0.14), (0.08, -0.14), (0.0, 0.0)])
-    canvas.sheet.area(Path(corners), _GROUND, GREY)
-    across, down = np.array([1.0, 0.0]), np.array([0.0, -1.0])
-    _hatched(canvas, at + 0.14 * g * down, across, down, 0.14)
-
-
-def _hatched(canvas: Canvas, at: Floats, along: Floats, behind: Floats, half: float) -> None:
-    """A line through ``at`` with short strokes behind it."""
-    g = canvas.grain
-    ends = np.array([at - half * g * along, at + half * g * along])
-    count = round(2.0 * half / 0.055)
-    feet = ends[0] + np.linspace(0.12, 1.0, count)[:, None] * (ends[1] - ends[0])
-    strokes = [np.array([foot, foot + g * (0.06 * behind - 0.05 * along)]) for foot in feet]
-    canvas.sheet.segments([ends, *strokes], Stroke(GREY, 0.8))
-
-
-def draw_joints(
-    canvas: Canvas, joints: Sequence[DrawnJoint], pose: int, colour: str, kinds: Sequence[str]
-) -> None:
-    """A ring where it turns, a box where it slides, a square where it is fixed.
-
-    With a dot inside if a coordinate moves it. Only those of ``kinds`` are drawn.
-    """
-    for joint in (joint for joint in joints if joint.kind in kinds):
-        (at,) = canvas.place(joint.places[pose][None])
-        g = canvas.grain
-        if joint.kind == "turning":
-            canvas.sheet.dot((at[0], at[1]), 5.6 * g, WHITE, colour)
-        elif joint.kind == "sliding":
-            box = _box(at, canvas.heading(joint.axes[pose]), 0.09 * g, 0.055 * g)
-            canvas.sheet.area(Path(box), WHITE, colour)
-        elif not joint.grounded:
-            along = canvas.heading(joint.axes[pose])
-            canvas.sheet.area(Path(_box(at, along, 0.028 * g, 0.028 * g)), rgb(colour), colour)
-        if joint.driven:
-            canvas.sheet.dot((at[0], at[1]), 2.2 * g, rgb(colour))
-
-
-def _box(at: Floats, along: Floats, half: float, tall: float) -> Floats:
-    across = np.array([-along[1], along[0]])
-    signs = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0))
-    return np.array([at + a * half * along + b * tall * across for a, b in signs])
-
-
-def draw_bodies(canvas: Canvas, bodies: Sequence[DrawnBody], pose: int, colour: str) -> None:
-    """Dots whose volume tells the mass; a ring for none."""
-    for body, diameter in zip(bodies, diameters(bodies), strict=True):
-        (at,) = canvas.place(body.places[pose][None])
-        fill = rgb(colour) if body.mass > 0.0 else WHITE
-        canvas.sheet.dot((at[0], at[1]), diameter * canvas.grain, fill, colour)
-
-
-def diameters(bodies: Sequence[DrawnBody]) -> list[float]:
-    """In points."""
-    heaviest = max((body.mass for body in bodies), default=0.0)
-    if heaviest <= 0.0:
-        return [8.0] * len(bodies)
-    return [6.0 + 6.0 * (max(body.mass, 0.0) / heaviest) ** (1.0 / 3.0) for body in bodies]
-
-
-def draw_springs(canvas: Canvas, springs: Sequence[DrawnSpring], pose: int, colour: str) -> None:
-    """A zigzag between its ends or to the ground, a spiral where it only resists rotation."""
-    for spring in springs:
-        start, end = canvas.place(np.stack([spring.starts[pose], spring.ends[pose]]))
-        g, stroke = canvas.grain, Stroke(colour, 1.1)
-        if spring.grounded and not spring.turning:
-            end = start + g * np.array([0.16, -0.3])
-            _hatched(canvas, end, np.array([1.0, 0.0]), np.array([0.0, -1.0]), 0.09)
-        if spring.turning or np.linalg.norm(end - start) < 0.05:
-            canvas.sheet.line(start + g * _spiral(), stroke)
-        else:
-            canvas.sheet.line(_zigzag(start, end, 0.05 * g), stroke)
-
-
-def _spiral() -> Floats:
-    turn = np.linspace(0.0, 4.5 * np.pi, 60)
-    radius = 0.05 + 0.08 * turn / turn[-1]
-    return np.column_stack([radius * np.cos(turn), radius * np.sin(turn)])
-
-
-def _zigzag(start: Floats, end: Floats, tall: float) -> Floats:
-    along = end - start
-    across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
-    at = np.concatenate([[0.0, 0.2], np.linspace(0.25, 0.75, 6), [0.8, 1.0]])
-    side = np.array([0.0, 0.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 0.0, 0.0])
-    return np.asarray(start + at[:, None] * along + tall * side[:, None] * across)
-
-
-# --- From places in a plane or in space to places on a sheet, at one scale in all directions
-
-ELEVATION = np.radians(22.0)
-AZIMUTHS = np.radians([-60.0, -30.0, -120.0])  # of the viewer
+_ELEVATION = np.radians(22.0)
+_AZIMUTHS = np.radians([-60.0, -30.0, -120.0])  # of the viewer
 _ENOUGH = 0.7  # of the area seen from the best side
-_THIN = Stroke(GREY, 1.0)
 
 
 @dataclass(frozen=True)
@@ -322,7 +55,7 @@ def view_of(points: Floats) -> View:
     """A plane as it is; space from above, from the first side that hides little."""
     if points.shape[1] == 2:
         return View(np.eye(2))
-    views = [View(_axonometry(azimuth)) for azimuth in AZIMUTHS]
+    views = [View(_axonometry(azimuth)) for azimuth in _AZIMUTHS]
     seen = [_seen(view.flat(points)) for view in views]
     return next(v for v, area in zip(views, seen, strict=True) if area >= _ENOUGH * max(seen))
 
@@ -330,14 +63,46 @@ def view_of(points: Floats) -> View:
 def _axonometry(azimuth: float) -> Floats:
     """What a viewer far away at this azimuth, above the x-y plane, sees with z upright."""
     c, s = np.cos(azimuth), np.sin(azimuth)
-    low, high = np.sin(ELEVATION), np.cos(ELEVATION)
+    low, high = np.sin(_ELEVATION), np.cos(_ELEVATION)
     return np.array([[-s, c, 0.0], [-low * c, -low * s, high]])
 
 
 def _seen(flat: Floats) -> float:
     """About the area that points take on the sheet; what is nearly a line counts by its length."""
-    long, short = np.linalg.svd(flat - flat.mean(axis=0), compute_uv=False)
-    return float(long * max(short, 0.2 * long))
+    long, wide = np.linalg.svd(flat - flat.mean(axis=0), compute_uv=False)
+    return float(long * max(wide, 0.2 * long))
+
+
+# --- A drawing at one scale in all directions
+
+
+@dataclass(frozen=True)
+class Extent:
+    """The box in the view, m, that holds some points; never without width and height both."""
+
+    view: View
+    middle: Floats  # (2,)
+    size: Floats  # (2,) width and height
+
+    def drawing(self, figure: Figure, box: Box, room: float = 1.0, grain: float = 1.0) -> Drawing:
+        """Axes at ``box`` of the figure that show it in their middle, ``room`` times as large."""
+        inside = np.array(box[2:])
+        per_inch = room * float(np.max(self.size / inside))
+        sheet = np.tile(figure.get_size_inches(), 2)
+        axes = figure.add_axes(tuple(np.array(box) / sheet))
+        low, high = (self.middle + side * per_inch * inside / 2.0 for side in (-1.0, 1.0))
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+        return Drawing(axes, self.view, per_inch, grain)
+
+
+def extent(poses: DrawnPoses, others: Iterable[Floats] = ()) -> Extent:
+    """The extent of these poses and other points in the view that suits the poses."""
+    shown = points_of(poses)
+    view = view_of(shown)
+    flat = view.flat(np.concatenate([shown, *others]))
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    largest = float(np.max(high - low)) or 1.0
+    return Extent(view, 0.5 * (low + high), np.maximum(high - low, 0.02 * largest))
 
 
 def points_of(poses: DrawnPoses) -> Floats:
@@ -351,19 +116,20 @@ def points_of(poses: DrawnPoses) -> Floats:
 
 
 @dataclass(frozen=True)
-class Canvas:
-    """A sheet on which places are drawn; ``grain`` is the size of symbols, 1 in a full figure."""
+class Drawing:
+    """Axes on which places are drawn; ``grain`` is the size of symbols, 1 in a full figure.
 
-    sheet: Sheet
+    What is drawn later lies above what was drawn before, whatever it is.
+    """
+
+    axes: Axes
     view: View
-    middle: tuple[float, float]  # of the drawing, in the view's m
-    centre: tuple[float, float]  # on the sheet, inches
     per_inch: float  # m
     grain: float = 1.0
 
-    def place(self, points: Floats) -> Floats:
-        """Points (n, 2) on the sheet in inches."""
-        return (self.view.flat(points) - self.middle) / self.per_inch + self.centre
+    def symbol(self, at: Floats, shape: Floats) -> Floats:
+        """A shape (n, 2) in inches around the flat place ``at``, in m."""
+        return np.asarray(at + self.per_inch * self.grain * shape)
 
     def heading(self, direction: Floats) -> Floats:
         """Unit vector on the sheet of a direction; across where it points at the viewer."""
@@ -371,61 +137,205 @@ class Canvas:
         length = float(np.linalg.norm(flat))
         return flat / length if length > 0.05 * np.linalg.norm(direction) else np.array([1.0, 0.0])
 
+    def line(self, points: Floats, colour: str, width: float, **look: Any) -> Artist:
+        """A polyline through flat points (n, 2), width in points; NaN interrupts it."""
+        (line,) = self.axes.plot(
+            *points.T, color=colour, linewidth=width, zorder=2.0, clip_on=False, **look
+        )
+        return line
 
-@dataclass(frozen=True)
-class Extent:
-    """The box in the view that holds some points."""
+    def dots(self, places: Floats, diameter: float, edge: str, fill: str) -> None:
+        """Circles at flat places (n, 2), diameter in points."""
+        self.axes.plot(
+            *places.T, "o", markersize=diameter * self.grain, markeredgecolor=edge,
+            markerfacecolor=fill, markeredgewidth=0.8, zorder=2.0, clip_on=False,
+        )  # fmt: skip
 
-    view: View
-    points: Floats
-
-    @cached_property
-    def box(self) -> tuple[float, float, float, float]:
-        """Middle across and up, width and height, in m; never without width and height both."""
-        flat = self.view.flat(self.points)
-        low, high = flat.min(axis=0), flat.max(axis=0)
-        across, up = map(float, high - low)
-        some = max(across, up) or 1.0
-        x, y = map(float, 0.5 * (low + high))
-        return x, y, max(across, 0.02 * some), max(up, 0.02 * some)
-
-    def per_inch(self, width: float, height: float) -> float:
-        """The scale, m per inch, at which it fits into ``width`` by ``height`` inches."""
-        return max(self.box[2] / width, self.box[3] / height)
-
-    def on(self, sheet: Sheet, box: Box, grain: float = 1.0) -> Canvas:
-        """A canvas that shows it in the middle of ``box``."""
-        left, bottom, width, height = box
-        centre = (left + width / 2.0, bottom + height / 2.0)
-        scale = self.per_inch(width, height)
-        return Canvas(sheet, self.view, self.box[:2], centre, scale, grain)
+    def area(self, corners: Floats, edge: str, fill: str) -> None:
+        """A filled polygon."""
+        self.axes.fill(
+            *corners.T, edgecolor=edge, facecolor=fill, linewidth=0.8, zorder=2.0, clip_on=False
+        )
 
 
-def extent(poses: DrawnPoses, others: Iterable[Floats] = ()) -> Extent:
-    """The extent of these poses and other points in the view that suits the poses."""
-    shown = points_of(poses)
-    return Extent(view_of(shown), np.concatenate([shown, *others]))
+# --- A symbol for each joint, body and spring
+
+KINDS = ("turning", "sliding", "fixed")
+_GROUND = "#e6e6e6"
+_WIDTHS = (1.3, 4.2)  # points: of the thinnest lines that can be, and of the thickest line
+_PLAIN = 2.6  # points: of lines without a section
+_PIECES = 8  # of one width each, that a tapered line is drawn as
+_DOWN, _ACROSS = np.array([0.0, -1.0]), np.array([1.0, 0.0])
 
 
-def draw_bearings(canvas: Canvas, left: float, bottom: float) -> None:
+def draw_links(
+    drawing: Drawing, poses: DrawnPoses, pose: int, colour: str, scale: float = 1.0
+) -> None:
+    """All links of one pose; thicker sections are drawn thicker, a taper as one."""
+    from matplotlib.collections import LineCollection
+
+    pieces: list[Floats] = []
+    widths: list[float] = []
+    for points, (start, end) in zip(poses.lines[pose], line_widths(poses), strict=True):
+        flat = drawing.view.flat(points)
+        if len(flat) < 2 or not np.ptp(flat, axis=0).any():
+            continue
+        if start == end:
+            pieces.append(flat)
+            widths.append(start)
+            continue
+        ends = np.linspace(0.0, 1.0, _PIECES + 1)
+        for low, high in pairwise(ends):
+            at = np.linspace(low, high, 1 + max(1, len(flat) // _PIECES))
+            pieces.append(_along(flat, at))
+            widths.append(start + (end - start) * 0.5 * (low + high))
+    drawing.axes.add_collection(
+        LineCollection(
+            pieces, colors=colour, linewidths=scale * drawing.grain * np.array(widths),
+            capstyle="round", joinstyle="round", zorder=2.0, clip_on=False,
+        ),
+        autolim=False,
+    )  # fmt: skip
+
+
+def _along(points: Floats, at: Floats) -> Floats:
+    """Places at the fractions ``at`` of a polyline, by the number of its points."""
+    own = np.linspace(0.0, 1.0, len(points))
+    return np.column_stack([np.interp(at, own, column) for column in points.T])
+
+
+def line_widths(poses: DrawnPoses) -> list[tuple[float, float]]:
+    """Start and end width of each line in points, by the root of its section's size."""
+    largest = max((size for pair in poses.sizes for size in pair), default=0.0)
+    if largest == 0.0:
+        return [(_PLAIN, _PLAIN)] * len(poses.lines[0])
+    return [(_width(a / largest), _width(b / largest)) for a, b in poses.sizes]
+
+
+def _width(share: float) -> float:
+    low, high = _WIDTHS
+    return low + (high - low) * share**0.5 if share > 0.0 else _PLAIN
+
+
+def draw_ground(drawing: Drawing, joints: Sequence[DrawnJoint]) -> None:
+    """What the joints on the ground stand on, and the way of those that slide in all poses."""
+    for joint in (joint for joint in joints if joint.grounded):
+        places = drawing.view.flat(joint.places)
+        along = drawing.heading(joint.axes[0])
+        across = np.array([-along[1], along[0]])
+        if joint.kind == "turning":
+            foot = np.array([(0.0, 0.0), (-0.08, -0.14), (0.08, -0.14)])
+            drawing.area(drawing.symbol(places[0], foot), GREY, _GROUND)
+            _hatched(drawing, drawing.symbol(places[0], 0.14 * _DOWN), _ACROSS, _DOWN, 0.14)
+        elif joint.kind == "sliding":
+            _guide(drawing, places, along, across if across[1] < 0.0 else -across)
+        else:
+            _hatched(drawing, places[0], across, -along, 0.13)
+
+
+def _guide(drawing: Drawing, places: Floats, along: Floats, behind: Floats) -> None:
+    """A hatched line beside all places, somewhat longer than their way."""
+    way = (places - places[0]) @ along
+    middle = places[0] + 0.5 * (way.min() + way.max()) * along
+    half = 0.5 * float(np.ptp(way)) / (drawing.per_inch * drawing.grain) + 0.2
+    _hatched(drawing, drawing.symbol(middle, 0.09 * behind), along, behind, half)
+
+
+def _hatched(drawing: Drawing, at: Floats, along: Floats, behind: Floats, half: float) -> None:
+    """A line through ``at``, ``half`` inches to both sides, with short strokes behind it."""
+    feet = np.linspace(-0.76, 1.0, round(2.0 * half / 0.055))[:, None] * half * along
+    gap = np.full_like(feet, np.nan)
+    strokes = np.stack([feet, feet + 0.06 * behind - 0.05 * along, gap], axis=1).reshape(-1, 2)
+    shape = np.vstack([-half * along, half * along, gap[:1], strokes])
+    drawing.line(drawing.symbol(at, shape), GREY, 0.8)
+
+
+def draw_joints(
+    drawing: Drawing, joints: Sequence[DrawnJoint], pose: int, colour: str, kinds: Sequence[str]
+) -> None:
+    """A ring where it turns, a box where it slides, a square where it is fixed.
+
+    With a dot inside if a coordinate moves it. Only those of ``kinds`` are drawn.
+    """
+    shown = [joint for joint in joints if joint.kind in kinds]
+    places = [drawing.view.flat(joint.places[pose]) for joint in shown]
+    rings = [at for joint, at in zip(shown, places, strict=True) if joint.kind == "turning"]
+    if rings:
+        drawing.dots(np.array(rings), 5.6, colour, "white")
+    for joint, at in zip(shown, places, strict=True):
+        along = drawing.heading(joint.axes[pose])
+        if joint.kind == "sliding":
+            drawing.area(drawing.symbol(at, _box(along, 0.09, 0.055)), colour, "white")
+        elif joint.kind == "fixed" and not joint.grounded:
+            drawing.area(drawing.symbol(at, _box(along, 0.028, 0.028)), colour, colour)
+    driven = [at for joint, at in zip(shown, places, strict=True) if joint.driven]
+    if driven:
+        drawing.dots(np.array(driven), 1.6, colour, colour)
+
+
+def _box(along: Floats, half: float, tall: float) -> Floats:
+    across = np.array([-along[1], along[0]])
+    signs = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
+    return np.array([a * half * along + b * tall * across for a, b in signs])
+
+
+def draw_bodies(drawing: Drawing, bodies: Sequence[DrawnBody], pose: int, colour: str) -> None:
+    """Dots whose volume tells the mass; a ring for none."""
+    for body, diameter in zip(bodies, diameters(bodies), strict=True):
+        at = drawing.view.flat(body.places[[pose]])
+        drawing.dots(at, diameter, colour, colour if body.mass > 0.0 else "white")
+
+
+def diameters(bodies: Sequence[DrawnBody]) -> list[float]:
+    """In points."""
+    heaviest = max((body.mass for body in bodies), default=0.0)
+    if heaviest <= 0.0:
+        return [8.0] * len(bodies)
+    return [6.0 + 6.0 * (max(body.mass, 0.0) / heaviest) ** (1.0 / 3.0) for body in bodies]
+
+
+def draw_springs(drawing: Drawing, springs: Sequence[DrawnSpring], pose: int, colour: str) -> None:
+    """A zigzag between its ends or to the ground, a spiral where it only resists rotation."""
+    for spring in springs:
+        start, end = drawing.view.flat(np.stack([spring.starts[pose], spring.ends[pose]]))
+        if spring.grounded and not spring.turning:
+            end = drawing.symbol(start, np.array([0.16, -0.3]))
+            _hatched(drawing, end, _ACROSS, _DOWN, 0.09)
+        inches = (end - start) / (drawing.per_inch * drawing.grain)
+        coiled = spring.turning or float(np.linalg.norm(inches)) < 0.05
+        drawing.line(drawing.symbol(start, _spiral() if coiled else _zigzag(inches)), colour, 1.1)
+
+
+def _spiral() -> Floats:
+    turn = np.linspace(0.0, 4.5 * np.pi, 60)
+    radius = 0.05 + 0.08 * turn / turn[-1]
+    return np.column_stack([radius * np.cos(turn), radius * np.sin(turn)])
+
+
+def _zigzag(along: Floats) -> Floats:
+    across = 0.05 * np.array([-along[1], along[0]]) / np.linalg.norm(along)
+    at = np.concatenate([[0.0, 0.2], np.linspace(0.25, 0.75, 6), [0.8, 1.0]])
+    side = np.array([0.0, 0.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 0.0, 0.0])
+    return np.asarray(at[:, None] * along + side[:, None] * across)
+
+
+def draw_bearings(figure: Figure, drawing: Drawing, left: float, bottom: float) -> None:
     """The axes' directions, and a bar of round length as scale, from (left, bottom) inches."""
-    size = 0.3 * canvas.grain
-    inset = (0.2, 0.24) if canvas.view.spatial else (0.08, 0.12)
+    width, height = figure.get_size_inches()
+    sheet = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    sheet.set(xlim=(0.0, width), ylim=(0.0, height))
+    sheet.set_axis_off()
+    inset = (0.2, 0.24) if drawing.view.spatial else (0.08, 0.12)
     origin = np.add((left, bottom), inset)
-    for axis, name in zip(np.eye(canvas.view.directions.shape[1]), "xyz", strict=False):
-        end = origin + size * canvas.view.flat(axis)
-        canvas.sheet.line(np.array([origin, end]), _THIN)
-        x, y = end + 0.09 * canvas.heading(axis)
-        canvas.sheet.text(x, y, name, align="center", points=8.0, colour=BLACK)
-    _draw_scale(canvas, left + 0.75, bottom + 0.12)
-
-
-def _draw_scale(canvas: Canvas, left: float, y: float) -> None:
-    length = round_length(canvas.per_inch)
-    right = left + length / canvas.per_inch
-    ends = [np.array([(x, y - 0.03), (x, y + 0.03)]) for x in (left, right)]
-    canvas.sheet.segments([np.array([(left, y), (right, y)]), *ends], Stroke(BLACK, 1.0))
-    canvas.sheet.text(right + 0.08, y, length_label(length), points=8.0)
+    for axis, name in zip(np.eye(drawing.view.directions.shape[1]), "xyz", strict=False):
+        end = origin + 0.3 * drawing.grain * drawing.view.flat(axis)
+        sheet.plot(*np.array([origin, end]).T, color=GREY, linewidth=1.0)
+        x, y = end + 0.09 * drawing.heading(axis)
+        sheet.text(x, y, name, ha="center", va="center", size=style.SMALL_PT)
+    length, start, y = round_length(drawing.per_inch), left + 0.75, bottom + 0.12
+    end = start + length / drawing.per_inch
+    sheet.plot([start, end], [y, y], "|-", color=BLACK, linewidth=1.0, markersize=4.5)
+    sheet.text(end + 0.08, y, length_label(length), va="center", size=style.SMALL_PT)
 
 
 def round_length(most: float) -> float:
@@ -441,4 +351,84 @@ def length_label(length: float) -> str:
     exponent = round(np.floor(np.log10(length)))
     if -3 <= exponent <= 3:
         return f"{length:.6g} m"
-    return f"{length / 10.0**exponent:.0f}·{power_of_ten(int(exponent))} m"
+    return f"{length / 10.0**exponent:.0f}·{style.power(10.0**exponent)} m"
+
+
+# --- The poses along the trajectory
+
+_TALLEST_IN, _LOWEST_IN = 4.8, 2.0
+_FOOT_IN = {False: 0.5, True: 0.8}  # in a plane, in space
+_LEFT_IN = {False: 0.75, True: 0.2}
+_ROOM = 1.12  # of the axes, relative to what they hold
+_BODIES = (style.BLUE, style.GREEN, style.PURPLE, style.SKY)
+_NAMED_BODIES = 6  # in the legend, at most
+
+
+def poses(results: RunResults) -> FigurePlan:
+    """The mechanism at samples of the trajectory, and the path of its tip."""
+    links = ", ".join(results.poses.link_names)
+    return FigurePlan(
+        "mechanism",
+        "Mechanism",
+        f"The links ({links}) in {len(results.poses.lines)} poses, and the path of the tip.",
+        f"Line drawing of the mechanism with links {links} in several poses.",
+        partial(draw_poses, results),
+    )
+
+
+def draw_poses(results: RunResults) -> Figure:
+    """Links as lines whose colour tells the time of the pose."""
+    shown, held = results.poses, extent(results.poses)
+    spatial, colours = held.view.spatial, _colours(len(shown.lines))
+    title = f"{short(results.title, 70)}: poses along the trajectory"
+    figure = style.new_figure(title, 4.0, layout=None)
+    key = figure.legend(handles=_entries(shown, colours), loc="upper left")
+    wide = style.WIDTH_IN - _LEFT_IN[spatial] - key.get_window_extent().width / figure.dpi - 0.2
+    tall = float(np.clip(wide * held.size[1] / held.size[0], _LOWEST_IN, _TALLEST_IN))
+    figure.set_size_inches(style.WIDTH_IN, _FOOT_IN[spatial] + tall + 0.42)
+    drawing = held.drawing(figure, (_LEFT_IN[spatial], _FOOT_IN[spatial], wide, tall), _ROOM)
+    key.set_bbox_to_anchor((1.02, 1.0), drawing.axes.transAxes)
+    if spatial:
+        drawing.axes.set_axis_off()
+        draw_bearings(figure, drawing, 0.1, 0.1)
+    else:
+        drawing.axes.set(xlabel="x [m]", ylabel="y [m]")
+    if shown.tip_path is not None:
+        drawing.line(drawing.view.flat(shown.tip_path), style.VERMILLION, 1.8)
+    draw_ground(drawing, shown.joints)
+    for pose, colour in enumerate(colours):
+        draw_springs(drawing, shown.springs, pose, GREY)
+        draw_links(drawing, shown, pose, colour, scale=0.8)
+        draw_joints(drawing, shown.joints, pose, colour, KINDS)
+    for at, (body, size) in enumerate(zip(shown.bodies, diameters(shown.bodies), strict=True)):
+        colour = _BODIES[at % len(_BODIES)]
+        drawing.dots(drawing.view.flat(body.places), 0.7 * size, colour, colour)
+    grounded = [joint for joint in shown.joints if joint.grounded]
+    draw_joints(drawing, grounded, 0, BLACK, ("turning",))
+    return figure
+
+
+def _colours(count: int) -> list[str]:
+    """From dark to light, one a pose."""
+    import matplotlib
+    from matplotlib.colors import to_hex
+
+    return [
+        to_hex(colour) for colour in matplotlib.colormaps[style.SCALE](np.linspace(0, 0.9, count))
+    ]
+
+
+def _entries(shown: DrawnPoses, colours: Sequence[str]) -> list[Artist]:
+    """The legend: tip path, bodies, and the time of each pose."""
+    from matplotlib.lines import Line2D
+
+    entries = []
+    if shown.tip_path is not None:
+        entries.append(Line2D([], [], color=style.VERMILLION, linewidth=1.8, label="tip path"))
+    for at, body in enumerate(shown.bodies[:_NAMED_BODIES]):
+        look: Any = {"color": _BODIES[at % len(_BODIES)], "linestyle": "none", "marker": "o"}
+        entries.append(Line2D([], [], **look, label=short(body.name, 22)))
+    for at, (colour, time) in enumerate(zip(colours, shown.time_s, strict=True)):
+        whose = f"{short(shown.of[at], 12)} " if shown.of else ""
+        entries.append(Line2D([], [], color=colour, linewidth=2.6, label=f"{whose}at {time:.3g} s"))
+    return list(entries)
