@@ -7,6 +7,11 @@ is seen.
 The inner product is K0 = K_E(θ̄) with θ averaged over turned poses. A vector smooth in one pose
 kinks the joints of another, with a strain energy many times that of a mode. In K_E(x0) numbers of
 that size would have to cancel; in the mean stiffness they do not.
+
+The represented modes of the first point come first, made orthogonal from the stiffest on, so that
+no soft mode is mixed into a stiff one, and stand in V from the softest on. VᵀM_cV is graded by that
+and stiff modes keep their digits: of an arm with one link without mass, μ = 7e-10 μ_1, the
+frequency is right to 1e-15, where vectors in the order of their modes left 3e-5.
 """
 
 from __future__ import annotations
@@ -81,14 +86,15 @@ def ritz_basis(
     found = lowest_modes(pencil, theta0, wanted[-1], 2 + PROBES if guard else 1)
     count = _represented(found.lam, wanted[-1]) if guard else wanted[-1]
     plan = _plan(found.lam.shape[1], wanted, half_order, guard)
+    columns = [phi[:, :count][:, ::-1] for phi in found.phi]
     if given is None:
-        columns = [_taylor_vectors(pencil, x, plan) for x in points]
+        columns += [_taylor_vectors(pencil, x, plan) for x in points]
     else:
-        columns = [given, _taylor_vectors(pencil, points[0], plan[1:])]
-    columns += [phi[:, :count] for phi in found.phi]
+        columns += [given, _taylor_vectors(pencil, points[0], plan[1:])]
     theta_mean = mean_theta(pencil, points)
     K0 = pencil.sparse(pencil.stiffness @ theta_mean)[pencil.elastic][:, pencil.elastic].tocsc()
     V = orthonormal(K0, np.hstack(columns)[pencil.elastic])
+    V = np.hstack([V[:, :count][:, ::-1], V[:, count:]])
     represented = found.phi[:, :, :count]
     return RitzBasis(pencil, wanted, points, theta0, theta_mean, K0, V, found.lam, represented)
 
