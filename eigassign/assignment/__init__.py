@@ -2,12 +2,13 @@
 
 Reading order:
 
-    checks      what is not a finite number, or of another shape, is refused
-    targets     wanted frequencies at the samples, weights in time, the distance to a target
-    program     the quadratic program of eqs. (13)–(14), and its dimensionless units
-    solver      its solution: OSQP, then an active-set method that goes to round-off
-    optimality  its judge: Karush–Kuhn–Tucker residuals, and which limits contradict each other
-    assign      build, solve, judge: the three steps of an assignment
+    checks       what is not a finite number, or of another shape, is refused
+    targets      wanted frequencies at the samples, weights in time, the distance to a target
+    program      build: the quadratic program of eqs. (13)–(14), and its dimensionless units
+    feasibility  which limits contradict each other
+    solver       solve: OSQP, then an active-set method that goes to round-off
+    optimality   judge: Karush–Kuhn–Tucker residuals, recomputed from the data
+    assign       build, solve, judge: from targets to the optimal design
 """
 
 from __future__ import annotations

@@ -1,4 +1,9 @@
-"""Build, solve, judge: the design that brings the frequencies nearest to their targets."""
+"""Build, solve, judge: the design that brings the frequencies nearest to their targets.
+
+`build_program` makes the quadratic program of eqs. (13)–(14) from linear models of λ,
+`solve_program` gives candidates for its optimum, `best_candidate` returns the one whose residuals
+prove it.
+"""
 
 from __future__ import annotations
 
@@ -9,27 +14,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.assignment.checks import Floats, finite, frozen
-from eigassign.assignment.optimality import (
-    ACCEPT,
-    Candidate,
-    Certificate,
-    candidate,
-    contradiction,
-    feasible_point,
-    judge,
-    refuse_impossible,
-)
+from eigassign.assignment.optimality import ACCEPT, best_candidate
 from eigassign.assignment.program import (
     Bounds,
+    Candidate,
     Goal,
     LinearConstraint,
     QuadraticProgram,
-    ScaledProgram,
     build_program,
-    scaled_program,
 )
-from eigassign.assignment.solver import RawSolution, polish, solve_osqp
-from eigassign.errors import AccuracyError
+from eigassign.assignment.solver import solve_program
 
 
 @dataclass(frozen=True)
@@ -52,9 +46,9 @@ class Assignment:
 
     ``y`` and ``dy = y − y0`` (n_y,) in SI units; ``lam`` one array for each goal, (its n_t,) in
     rad²/s², predicted by the linear models. J as in `program`: the mean square relative error in λ.
-    Residuals are recomputed and dimensionless (`certificate`), each at most 1e-8. ``undetermined``
+    Residuals are recomputed and dimensionless (`optimality`), each at most 1e-8. ``undetermined``
     counts the directions of the free parameters that change no target: there the initial design is
-    kept as nearly as the limits allow (`active_set`).
+    kept as nearly as the limits allow (`solver`).
     """
 
     names: tuple[str, ...]
@@ -95,87 +89,24 @@ def solve_assignment(
         KeyboardInterrupt: Ctrl-C while the solver runs.
     """
     program = build_program(goals, time_weights, y0, y_initial, bounds, constraints, names)
-    refuse_impossible(program)
-    solution = _solve(program)
-    dy = solution.answer.y - program.y0
+    solution = solve_program(program)
+    optimum, certificate = best_candidate(program, solution.candidates)
+    dy = optimum.y - program.y0
     return Assignment(
         names=program.names,
-        y=frozen(solution.answer.y),
+        y=frozen(optimum.y),
         dy=frozen(dy),
         lam=tuple(frozen(goal.model(dy)) for goal in goals),
         status=solution.status,
         iterations=solution.iterations,
-        primal_residual=solution.certificate.primal_residual,
-        dual_residual=solution.certificate.dual_residual,
-        gap=solution.certificate.gap,
+        primal_residual=certificate.primal_residual,
+        dual_residual=certificate.dual_residual,
+        gap=certificate.gap,
         objective_initial=program.objective(finite("initial design", y_initial, 1)),
-        objective_optimal=program.objective(solution.answer.y),
-        active=tuple(_active_limits(program, solution.answer)),
+        objective_optimal=program.objective(optimum.y),
+        active=tuple(_active_limits(program, optimum)),
         undetermined=solution.undetermined,
     )
-
-
-@dataclass(frozen=True)
-class _Solution:
-    answer: Candidate
-    certificate: Certificate
-    status: str
-    iterations: int
-    undetermined: int
-
-
-def _solve(program: QuadraticProgram) -> _Solution:
-    """OSQP, polished by the active-set method; the first of the two that the judge accepts."""
-    scaled = scaled_program(program)
-    n = len(program.scales.free)
-    if n == 0:
-        answer = candidate(program, scaled, np.zeros(0), np.zeros(scaled.G.shape[0]))
-        return _Solution(answer, _accept(judge(program, answer)), "nothing is free", 0, 0)
-    raw = solve_osqp(scaled)
-    polished = polish(scaled, _start(program, scaled, raw))
-    answers = [candidate(program, scaled, polished.x, polished.mu)]
-    if raw.x is not None and raw.mu is not None:
-        answers.append(candidate(program, scaled, raw.x, raw.mu))
-    answer, certificate = _better(program, answers)
-    return _Solution(answer, certificate, _status(raw), raw.iterations, n - polished.rank)
-
-
-def _start(program: QuadraticProgram, scaled: ScaledProgram, raw: RawSolution) -> Floats:
-    """OSQP's answer; without one any feasible point, or the proof that there is none."""
-    if raw.x is not None:
-        return raw.x
-    point = feasible_point(scaled)
-    if point is None:
-        raise contradiction(program, scaled)
-    return point
-
-
-def _better(
-    program: QuadraticProgram, answers: Sequence[Candidate]
-) -> tuple[Candidate, Certificate]:
-    """The first answer the judge accepts: the polished one also settles what is undetermined."""
-    judged = [(answer, judge(program, answer)) for answer in answers]
-    for answer, certificate in judged:
-        if certificate.accepted:
-            return answer, certificate
-    answer, certificate = min(judged, key=lambda pair: pair[1].worst)
-    return answer, _accept(certificate)
-
-
-def _accept(certificate: Certificate) -> Certificate:
-    """The certificate, or AccuracyError with its figures."""
-    if not certificate.accepted:
-        raise AccuracyError(
-            f"the quadratic program's best answer has residuals primal "
-            f"{certificate.primal_residual:.1e}, dual {certificate.dual_residual:.1e}, gap "
-            f"{certificate.gap:.1e} where {ACCEPT:.0e} is accepted; wider bounds, or constraints "
-            "further from contradicting each other, may help"
-        )
-    return certificate
-
-
-def _status(raw: RawSolution) -> str:
-    return raw.status.words if raw.x is not None else f"solved (active set; {raw.status.words})"
 
 
 def _active_limits(program: QuadraticProgram, answer: Candidate) -> Iterator[ActiveLimit]:
@@ -192,7 +123,7 @@ def _active_limits(program: QuadraticProgram, answer: Candidate) -> Iterator[Act
 def _limit(
     name: str, kind: str, near: NDArray[np.bool_], multiplier: float
 ) -> Iterator[ActiveLimit]:
-    """One entry if a limit is met; of two equal limits the one that bears the multiplier."""
+    """One entry if a limit is met; of two equal limits the one with the multiplier."""
     if near.any():
         upper = bool(multiplier > 0.0) if near.all() else bool(near[1])
         yield ActiveLimit(name, kind, "upper" if upper else "lower", abs(float(multiplier)))

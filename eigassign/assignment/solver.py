@@ -1,13 +1,13 @@
-"""A scaled program handed to OSQP, whose traps are all handled here.
+"""Solve: OSQP, then an active-set method that goes to round-off.
 
-What OSQP 1.1 does, and the answer to each: its tolerances default to 1e-3 (set to 1e-9); on
-failure x is 2143289344.0 and not NaN (x is read only when the status is 1); NaN in the data is not
-refused (refused here); a lower triangle is ignored (the upper one is given); an interrupt is
+**OSQP.** What OSQP 1.1 does, and the answer to each: its tolerances default to 1e-3 (set to 1e-9);
+on failure x is 2143289344.0 and not NaN (x is read only when the status is 1); NaN in the data is
+not refused (refused here); a lower triangle is ignored (the upper one is given); an interrupt is
 swallowed (raised again); its own polishing may worsen the answer, and prints to stdout in spite of
-``verbose=False`` (off; `active_set` polishes, and `certificate` judges both). With a positive
-semidefinite P and ordered limits nothing is printed, so stdout needs no redirection.
+``verbose=False`` (off; the active-set method below polishes, and `optimality` judges both). With a
+positive semidefinite P and ordered limits nothing is printed, so stdout needs no redirection.
 
-Polish to round-off: least squares with limits by the primal active-set method.
+**Polish.** Least squares with limits by the primal active-set method, to round-off:
 
     min ½‖A x + b‖²  with  lower ≤ G x ≤ upper
 
@@ -30,12 +30,61 @@ from enum import IntEnum
 import numpy as np
 
 from eigassign.assignment.checks import Floats
-from eigassign.assignment.program import ScaledProgram
+from eigassign.assignment.feasibility import contradiction, feasible_point, refuse_impossible
+from eigassign.assignment.program import (
+    Candidate,
+    QuadraticProgram,
+    ScaledProgram,
+    scaled_program,
+    unscaled,
+)
 from eigassign.errors import UsageError
 
-# --- A scaled program handed to OSQP, whose traps are all handled here
+
+@dataclass(frozen=True)
+class Solution:
+    """Candidates for the optimum, the more exact first; `optimality` decides which of them holds.
+
+    ``undetermined`` counts the directions of the free parameters that change no target.
+    """
+
+    candidates: tuple[Candidate, ...]
+    status: str
+    iterations: int
+    undetermined: int
 
 
+def solve_program(program: QuadraticProgram) -> Solution:
+    """OSQP's answer polished, then as it is.
+
+    Raises InfeasibleError with the names of the constraints that contradict each other.
+    """
+    refuse_impossible(program)
+    scaled, n = scaled_program(program), len(program.scales.free)
+    if n == 0:
+        fixed = unscaled(program, scaled, np.zeros(0), np.zeros(scaled.G.shape[0]))
+        return Solution((fixed,), "nothing is free", 0, 0)
+    raw = solve_osqp(scaled)
+    polished = polish(scaled, _start(program, scaled, raw))
+    candidates = [unscaled(program, scaled, polished.x, polished.mu)]
+    status = f"solved (active set; {raw.status.words})"
+    if raw.x is not None and raw.mu is not None:
+        candidates.append(unscaled(program, scaled, raw.x, raw.mu))
+        status = raw.status.words
+    return Solution(tuple(candidates), status, raw.iterations, n - polished.rank)
+
+
+def _start(program: QuadraticProgram, scaled: ScaledProgram, raw: RawSolution) -> Floats:
+    """OSQP's answer; without one any feasible point, or the error that there is none."""
+    if raw.x is not None:
+        return raw.x
+    point = feasible_point(scaled)
+    if point is None:
+        raise contradiction(program, scaled)
+    return point
+
+
+# --- OSQP
 class Status(IntEnum):
     """What OSQP says of a run; the names are its own."""
 

@@ -12,14 +12,13 @@ from assignment_problems import goal, random_problem
 from eigassign.assignment import (
     Bounds,
     LinearConstraint,
-    assign,
     build_program,
     solve_assignment,
     solver,
 )
-from eigassign.assignment.optimality import Candidate, Certificate, candidate, judge
-from eigassign.assignment.program import ScaledProgram, scaled_program
-from eigassign.assignment.solver import SETTINGS, Polished, Status, polish, solve_osqp
+from eigassign.assignment.optimality import Certificate, judge
+from eigassign.assignment.program import Candidate, ScaledProgram, scaled_program, unscaled
+from eigassign.assignment.solver import SETTINGS, Polished, Status, minimise, polish, solve_osqp
 from eigassign.errors import AccuracyError, UsageError
 
 
@@ -87,7 +86,7 @@ def test_the_last_bit_of_a_sum_of_large_numbers_is_no_violation_but_a_hundred_ar
 def test_a_multiplier_of_a_limit_that_does_not_exist_is_dropped():
     program = small_program(upper=np.inf)
     scaled = scaled_program(program)
-    found = candidate(program, scaled, np.array([0.1]), np.array([1e-3, -1e-3]))
+    found = unscaled(program, scaled, np.array([0.1]), np.array([1e-3, -1e-3]))
     np.testing.assert_array_equal(found.bound_multipliers, [0.0])
     np.testing.assert_array_equal(found.constraint_multipliers, [0.0])
 
@@ -96,7 +95,7 @@ def test_an_answer_within_rounding_of_a_bound_is_on_it():
     program = small_program(upper=0.3)
     scaled = scaled_program(program)
     for x, y in ((1e-11, 0.0), (scaled.upper[0] - 1e-11, 0.3)):
-        assert candidate(program, scaled, np.array([x]), np.zeros(2)).y[0] == y
+        assert unscaled(program, scaled, np.array([x]), np.zeros(2)).y[0] == y
 
 
 def test_a_residual_that_is_not_a_number_is_never_accepted():
@@ -118,7 +117,7 @@ def test_a_disturbed_optimum_is_rejected(seed):
     program = build_program(*problem.arguments)
     scaled = scaled_program(program)
     best = polish(scaled, solve_osqp(scaled).x)
-    good = candidate(program, scaled, best.x, best.mu)
+    good = unscaled(program, scaled, best.x, best.mu)
     assert judge(program, good).accepted
     width = problem.upper - problem.lower
     inside = np.where(good.y > 0.5 * (problem.lower + problem.upper), -1.0, 1.0) * width
@@ -206,10 +205,9 @@ def test_an_equality_is_held_whichever_way_it_is_pulled(sign):
         lower=np.array([-1.0, -1.0, 0.0]),
         upper=np.array([1.0, 1.0, 0.0]),
     )
-    state = solver._first_guess(scaled, np.zeros(2))
-    after = solver._step(scaled, state, cautious=False)
-    assert after.done
-    np.testing.assert_allclose(after.mu, [0.0, 0.0, -sign])
+    x, mu = minimise(scaled, np.zeros(2))
+    np.testing.assert_array_equal(x, np.zeros(2))
+    np.testing.assert_allclose(mu, [0.0, 0.0, -sign])
 
 
 def test_an_equality_said_twice_does_no_harm(monkeypatch):
@@ -234,7 +232,7 @@ def test_what_osqp_calls_solved_is_polished_to_round_off(offset, monkeypatch):
 
 def test_an_answer_that_cannot_be_vouched_for_is_withheld_with_its_figures(monkeypatch):
     fake_osqp(monkeypatch, Status.SOLVED, x=0.5, y=0.0)
-    monkeypatch.setattr(assign, "polish", lambda scaled, x: Polished(x, 0.0 * scaled.lower, 1))
+    monkeypatch.setattr(solver, "polish", lambda scaled, x: Polished(x, 0.0 * scaled.lower, 1))
     with pytest.raises(AccuracyError, match=r"primal .*e.*, dual .*e.*, gap .* 1e-08 is accepted"):
         solve_assignment(*random_problem(3).arguments)
 
@@ -243,7 +241,7 @@ def test_if_polishing_spoils_a_good_answer_the_good_one_is_kept(monkeypatch):
     problem = random_problem(3, n_y=2, n_t=20)
     expected = solve_assignment(*problem.arguments)
     spoilt = Polished(np.full(2, 0.3), np.zeros(2), 2)
-    monkeypatch.setattr(assign, "polish", lambda scaled, x: spoilt)
+    monkeypatch.setattr(solver, "polish", lambda scaled, x: spoilt)
     found = solve_assignment(*problem.arguments)
     width = problem.upper - problem.lower
     assert np.max(np.abs(found.y - expected.y) / width) <= 1e-6

@@ -1,0 +1,88 @@
+"""Which limits contradict each other, by name, so that no design meets them all."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from eigassign.assignment.checks import Floats
+from eigassign.assignment.program import QuadraticProgram, ScaledProgram
+from eigassign.errors import InfeasibleError
+
+TOUCH = 1e-9  # in units of `Scales`: a tenth of the violation that `optimality` accepts
+
+
+def refuse_impossible(program: QuadraticProgram) -> None:
+    """Refuse constraints that no design within the bounds meets, each looked at alone.
+
+    Over a box, coefficients @ y ranges exactly over [Σ min(c·lower, c·upper), Σ max(…)].
+
+    Raises:
+        InfeasibleError: with the names of all such constraints.
+    """
+    lowest, highest = reach(program)
+    slack = TOUCH * program.scales.rows
+    slack = slack + 1e-15 * (np.abs(program.C) @ np.abs(program.y_start))  # C y costs this rounding
+    bad = (program.c_lower > highest + slack) | (program.c_upper < lowest - slack)
+    if not bad.any():
+        return
+    lines = [_range_message(program, int(k), lowest[k], highest[k]) for k in np.flatnonzero(bad)]
+    names = tuple(program.constraint_names[k] for k in np.flatnonzero(bad))
+    raise InfeasibleError("; ".join(lines), names)
+
+
+def reach(program: QuadraticProgram) -> tuple[Floats, Floats]:
+    """Smallest and largest value (n_c,) of each constraint over the bounds."""
+    C = program.C
+    with np.errstate(invalid="ignore"):  # 0 · inf, a parameter that does not occur
+        ends = np.stack([C * program.lower, C * program.upper])
+    ends = np.where(C == 0.0, 0.0, ends)
+    return ends.min(axis=0).sum(axis=1), ends.max(axis=0).sum(axis=1)
+
+
+def _range_message(program: QuadraticProgram, k: int, lowest: float, highest: float) -> str:
+    name, low, high = program.constraint_names[k], program.c_lower[k], program.c_upper[k]
+    if low > highest:
+        return (
+            f"constraint {name!r} asks for at least {low:g}, the bounds allow {highest:g} at most"
+        )
+    return (
+        f"constraint {name!r} asks for at most {high:g}, the bounds allow no less than {lowest:g}"
+    )
+
+
+def feasible_point(scaled: ScaledProgram, rows: list[int] | None = None) -> Floats | None:
+    """Some x within the bounds and the given constraints (all, if None); None if there is none."""
+    from scipy.optimize import linprog  # heavy, and needed only when something is wrong
+
+    n = scaled.G.shape[1]
+    kept = [n + k for k in range(scaled.G.shape[0] - n)] if rows is None else [n + k for k in rows]
+    G = np.vstack([scaled.G[kept], -scaled.G[kept]])
+    h = np.concatenate([scaled.upper[kept], -scaled.lower[kept]])
+    finite = np.isfinite(h)
+    box = [(float(scaled.lower[j]), float(scaled.upper[j])) for j in range(n)]
+    found = linprog(
+        np.zeros(n),
+        A_ub=G[finite],
+        b_ub=h[finite],
+        bounds=box,
+        method="highs",
+        options={"primal_feasibility_tolerance": TOUCH},
+    )
+    return np.asarray(found.x) if found.status == 0 else None
+
+
+def contradiction(program: QuadraticProgram, scaled: ScaledProgram) -> InfeasibleError:
+    """The error that names a smallest set of constraints that cannot be met together.
+
+    Deletion filter: a constraint without which the rest is still impossible is left out. Of what
+    remains every one is needed for the contradiction.
+    """
+    needed = list(range(len(program.constraint_names)))
+    for k in list(needed):
+        rest = [other for other in needed if other != k]
+        if feasible_point(scaled, rest) is None:
+            needed = rest
+    names = tuple(program.constraint_names[k] for k in needed)
+    listed = " and ".join(repr(name) for name in names)
+    together = " together" if len(names) > 1 else ""
+    return InfeasibleError(f"no design within the bounds meets {listed}{together}", names)
