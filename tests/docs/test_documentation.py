@@ -14,7 +14,7 @@ from eigassign import errors
 from eigassign.case import json_schema, parse
 from eigassign.case.schema.joints import JOINTS
 from eigassign.case.schema.links import LINKS, SHAPES
-from eigassign.cli import cli
+from eigassign.cli import cli, main
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = Path(eigassign.__file__).parent
@@ -110,6 +110,18 @@ def test_the_python_shown_runs(page: Path, monkeypatch: pytest.MonkeyPatch, tmp_
     for block in blocks(page, "python"):
         exec(block, names)
     assert len(names["result"].exact_hz) == 152  # type: ignore[attr-defined]
+
+
+def test_the_log_shown_is_the_log_written(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = re.sub(r"(elements|order): \d+", r"\1: auto", read(TWO_LINK))
+    (tmp_path / "arm.yaml").write_text(case, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    assert main(["expand", "arm.yaml", "--no-cache", "--quiet"]) == 0
+    log = (tmp_path / "results" / "arm_expansion" / "log.txt").read_text(encoding="utf-8")
+    shown = next(block for block in blocks(MANUAL / "case-file.md", "text") if "order" in block)
+    assert [line for line in shown.splitlines() if line not in log] == []
 
 
 def test_every_command_and_option_is_explained() -> None:
