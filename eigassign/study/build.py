@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from eigassign.case import CaseFile, TipTrajectory
 from eigassign.case import Trajectory as TrajectoryKeys
 from eigassign.errors import CaseError, MechanismError
-from eigassign.mechanism.assembly.assembly import reduced_links
+from eigassign.mechanism.assembly.local_motion import reduced_links
 from eigassign.mechanism.assembly.build import (
     WholeLinks,
     build_pencil,

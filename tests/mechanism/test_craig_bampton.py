@@ -19,7 +19,8 @@ from eigassign.errors import CaseError
 from eigassign.mechanism.assembly.build import local_links
 from eigassign.mechanism.assembly.velocity_terms import velocity_terms
 from eigassign.mechanism.elements import sparse_factor
-from eigassign.mechanism.elements.craig_bampton import coefficients, total
+from eigassign.mechanism.elements.craig_bampton import coefficients
+from eigassign.mechanism.elements.mesh import total
 from eigassign.modal.slow_motion import motion_effect
 
 THIN = {"area": 5e-4, "bending_inertia": 1e-9}

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from spatial_cases import ALLOY, Built, built
 
-from eigassign.mechanism.assembly.assembly import ReducedLinks, reduced_links
 from eigassign.mechanism.assembly.build import build_pencil, local_links
+from eigassign.mechanism.assembly.local_motion import ReducedLinks, reduced_links
 from eigassign.mechanism.assembly.pencil import Pencil
 
 Tree = dict[str, Any]

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
-from eigassign.mechanism.assembly.assembly import Accumulator, LocalLink, add_links, pattern
+from eigassign.mechanism.assembly.affine_entries import AffineEntries, pattern
+from eigassign.mechanism.assembly.congruence import LocalLink, add_links
 from eigassign.mechanism.assembly.node_motion import NodeMotions
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.assembly.rigid_body_modes import separated
@@ -58,7 +59,7 @@ def build_pencil(
     ``local`` is what `local_links` gave, where that is known already.
     """
     links, nodes = local_links(case, parameters, motion) if local is None else local
-    stiffness, mass = Accumulator(), Accumulator()
+    stiffness, mass = AffineEntries(), AffineEntries()
     add_links(stiffness, mass, links, nodes.count)
     add_springs(stiffness, case, parameters, motion, nodes)
     _add_drives(stiffness, case, parameters, motion, nodes.count)
@@ -160,7 +161,7 @@ def _local_link(placement: Placement, mesh: LinkMesh, nodes: NodeMotions) -> Loc
 
 
 def _add_drives(
-    target: Accumulator,
+    target: AffineEntries,
     case: CaseFile,
     parameters: Parameters,
     motion: Kinematics,
@@ -176,8 +177,8 @@ def _add_drives(
 
 
 def _compile(
-    stiffness: Accumulator,
-    mass: Accumulator,
+    stiffness: AffineEntries,
+    mass: AffineEntries,
     case: CaseFile,
     parameters: Parameters,
     motion: Kinematics,

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.mechanism.assembly.assembly import LocalLink, motion_matrix, motion_scalars
 from eigassign.mechanism.assembly.build import local_links
+from eigassign.mechanism.assembly.congruence import LocalLink
+from eigassign.mechanism.assembly.local_motion import motion_matrix, motion_scalars
 from eigassign.mechanism.elements.beam import bending_shapes
 from eigassign.mechanism.elements.links import axes
 from eigassign.mechanism.elements.mesh import LinkMesh, Strand

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from eigassign.case import CaseFile
-from eigassign.mechanism.assembly.assembly import Accumulator
+from eigassign.mechanism.assembly.affine_entries import AffineEntries
 from eigassign.mechanism.assembly.node_motion import NodeMotions, Row, Rows, apply, combined
 from eigassign.mechanism.elements.mesh import DOFS
 from eigassign.mechanism.kinematics.forward import Kinematics
@@ -26,7 +26,7 @@ from eigassign.series.expression import Scalar, is_constant
 
 
 def add_springs(
-    target: Accumulator,
+    target: AffineEntries,
     case: CaseFile,
     parameters: Parameters,
     motion: Kinematics,

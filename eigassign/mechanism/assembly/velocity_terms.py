@@ -49,8 +49,9 @@ from scipy import sparse
 
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
-from eigassign.mechanism.assembly.assembly import LocalLink, motion_scalars
 from eigassign.mechanism.assembly.build import local_links
+from eigassign.mechanism.assembly.congruence import LocalLink
+from eigassign.mechanism.assembly.local_motion import motion_scalars
 from eigassign.mechanism.elements.beam import bending_shapes, bending_slopes
 from eigassign.mechanism.elements.mesh import DOFS, LinkMesh, Term
 from eigassign.mechanism.kinematics.forward import Kinematics

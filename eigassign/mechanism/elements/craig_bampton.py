@@ -27,7 +27,7 @@ from scipy.sparse import linalg
 
 from eigassign.case import CaseFile
 from eigassign.errors import AccuracyError, MechanismError
-from eigassign.mechanism.elements.mesh import LinkMesh, Reduction, Term
+from eigassign.mechanism.elements.mesh import LinkMesh, Reduction, Term, total
 from eigassign.mechanism.elements.sparse_factor import kept_factor
 from eigassign.mechanism.kinematics.parameters import Parameters, link_type
 from eigassign.series.algebra import Samples
@@ -148,14 +148,6 @@ def coefficients(parameters: Parameters, terms: Sequence[Term], y: Floats) -> Fl
     table = compile_table(parameters.recorder, [t.coefficient for t in terms], n_q + y.shape[1])
     z = np.vstack([np.zeros((n_q, len(y))), y.T])
     return np.asarray(np.broadcast_to(table.evaluate(Samples(), z), (len(terms), len(y))))
-
-
-def total(terms: Sequence[Term], values: Floats) -> sparse.csr_array:
-    """Σ value × matrix."""
-    out = terms[0].matrix * float(values[0])
-    for term, value in zip(terms[1:], values[1:], strict=True):
-        out = out + term.matrix * float(value)
-    return sparse.csr_array(out)
 
 
 def _at_centre(case: CaseFile, parameters: Parameters, mesh: LinkMesh) -> Floats:

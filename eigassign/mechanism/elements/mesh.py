@@ -34,6 +34,14 @@ class Term(NamedTuple):
     matrix: sparse.csr_array
 
 
+def total(terms: Sequence[Term], values: Floats) -> sparse.csr_array:
+    """Σ value × matrix."""
+    out = terms[0].matrix * float(values[0])
+    for term, value in zip(terms[1:], values[1:], strict=True):
+        out = out + term.matrix * float(value)
+    return sparse.csr_array(out)
+
+
 class Strand(NamedTuple):
     """A row of beam elements from node to node, for what lies between the nodes."""
 
