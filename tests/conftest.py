@@ -1,4 +1,4 @@
-"""Shared set-up: helper modules that tests of several packages use, and reproducible hypothesis."""
+"""Shared set-up: oracles and helpers for tests of several packages; reproducible hypothesis."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from pathlib import Path
 
 from hypothesis import settings
 
-sys.path.insert(0, str(Path(__file__).parent / "mechanism"))  # chains, frame_oracle
+for folder in ("oracles", "mechanism"):
+    sys.path.insert(0, str(Path(__file__).parent / folder))
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
 settings.load_profile("repeatable")

@@ -188,9 +188,10 @@ class Riding:
         matter = now.h[..., None] * weights[:, None] * now.inertia  # (n, n_xi, 6)
         G = np.einsum("epri,epr,eprj->eij", N, matter, N_rate)
         H = np.einsum("epri,epr,eprj->eij", N_rate, matter, N_rate)
-        return self._assembled(G), self._assembled(H)
+        return self.assembled(G), self.assembled(H)
 
-    def _assembled(self, blocks: Floats) -> sparse.csr_array:
+    def assembled(self, blocks: Floats) -> sparse.csr_array:
+        """Matrices (n, 12, 12) of the elements in the section's axes, on the link's local dofs."""
         blocks = self.turn.T @ blocks @ self.turn
         places = self.dofs[:, :, None], self.dofs[:, None, :]
         rows, columns = (np.broadcast_to(a, blocks.shape) for a in places)

@@ -14,7 +14,7 @@ from eigassign.api import Case
 from eigassign.case.loading import parse
 from eigassign.errors import CaseError
 
-CASES = Path(__file__).parents[2] / "cases"
+CASES = Path(__file__).parents[3] / "cases"
 DEG = np.pi / 180.0
 
 

@@ -12,7 +12,7 @@ from spatial_oracle import Tree
 
 from eigassign.case.loading import load
 
-CASES = Path(__file__).parents[2] / "cases"
+CASES = Path(__file__).parents[3] / "cases"
 PIN = {"type": "revolute", "base": "crank.end", "follower": "coupler.start"}
 
 

@@ -18,7 +18,7 @@ from eigassign.mechanism.kinematics.parameters import parameters
 from eigassign.modal.exact.solver import eigenvalues, modes
 from eigassign.modal.slow_motion import change_at, moving_modes, theta_in_time
 
-CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"
+CASE = Path(__file__).parents[3] / "cases" / "two_link.yaml"
 
 
 def paper_arm() -> Built:

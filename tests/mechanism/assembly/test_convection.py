@@ -22,7 +22,7 @@ from eigassign.mechanism.assembly.build import kinematics, local_links
 from eigassign.mechanism.assembly.velocity_terms import VelocityTerms, fields, velocity_terms
 from eigassign.mechanism.kinematics.parameters import parameters
 
-CASES = Path(__file__).parents[2] / "cases"
+CASES = Path(__file__).parents[3] / "cases"
 LENGTH, ELEMENTS = 1.2, 7  # 3 elements before the carriage, 4 behind
 SECTION = {"shape": "rectangle", "width": 0.03, "height": 0.05}
 
@@ -162,7 +162,7 @@ def test_the_fields_integrate_to_the_consistent_mass() -> None:
         N = fields(np.tile((1 + xi) / 2, (n, 1)), h, phi.reshape(n, 1, 2))
         matter = h[..., None] * (g / 2)[:, None] * rho.reshape(n, 1, 6)
         blocks = np.einsum("epri,epr,eprj->eij", N, matter, N)
-        assembled = one.riding._assembled(blocks).toarray()
+        assembled = one.riding.assembled(blocks).toarray()
         own = slice(one.first, one.first + len(assembled))
         mass = found.stack.mass(values)[own, own]
         np.testing.assert_allclose(unit(mass, assembled), unit(mass, mass), atol=1e-12)

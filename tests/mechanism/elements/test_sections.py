@@ -6,7 +6,10 @@ from types import SimpleNamespace as Shape
 
 import numpy as np
 import pytest
+from spatial_cases import ALLOY, built
+from spatial_oracle import Tree
 
+from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.sections import section_values
 
 
@@ -45,17 +48,19 @@ def test_the_papers_rod_of_30_mm_weighs_what_the_paper_says() -> None:
 
 
 def test_a_design_that_swaps_the_sides_of_a_rectangle_is_refused() -> None:
-    from eigassign.errors import MechanismError
-    from eigassign.mechanism.elements.beam import _refuse_square
+    def arm(low: float, high: float) -> Tree:
+        return {
+            "mechanism": {
+                "space": "spatial",
+                "materials": {"m": ALLOY},
+                "sections": {"s": {"shape": "rectangle", "width": 0.02, "height": 0.03}},
+                "links": {"b": {"length": 1.0, "elements": 1, "material": "m", "section": "s"}},
+                "joints": {"r": {"type": "revolute", "base": "ground", "follower": "b.start"}},
+            },
+            "coordinates": {"q": {"joint": "r"}},
+            "design": {"h": {"parameter": "sections.s.height", "min": low, "max": high}},
+        }
 
-    def case(low: float, high: float) -> Shape:
-        height = Shape(parameter="sections.s.height", min=low, max=high)
-        section = Shape(shape="rectangle", width=0.02, height=0.03)
-        return Shape(
-            mechanism=Shape(space="spatial", sections={"s": section}),
-            design=Shape(parameters={"h": height}),
-        )
-
-    _refuse_square(case(0.021, 0.05), "s")
+    assert built(arm(0.021, 0.05)).pencil.n_dof
     with pytest.raises(MechanismError, match="change places"):
-        _refuse_square(case(0.015, 0.05), "s")
+        assert built(arm(0.015, 0.05)).pencil.n_dof

@@ -20,7 +20,7 @@ from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.mechanism.kinematics.parameters import node_position
 from eigassign.mechanism.kinematics.rotations import cross, multiply
 
-CASES = Path(__file__).parents[2] / "cases"
+CASES = Path(__file__).parents[3] / "cases"
 ALL = sorted(path.stem for path in CASES.glob("*.yaml"))
 SLIDING = {"prismatic", "carriage", "nut", "cylindrical", "screw"}
 

@@ -1,0 +1,62 @@
+"""K = Bᵀ k B and M = Bᵀ m B: the assembled pencil against the product with B written out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from spatial_cases import Built, built
+from spatial_examples import arm3r, four_bar
+from spatial_oracle import Tree
+from spatial_random import random_closed, random_open
+
+from eigassign.mechanism.assembly.build import local_links
+from eigassign.mechanism.assembly.congruence import LocalLink
+from eigassign.mechanism.assembly.local_motion import motion_matrix, motion_scalars
+from eigassign.mechanism.elements.mesh import total
+
+
+def products(model: Built, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Σ Bᵀ k B and Σ Bᵀ m B over all links, with numbers."""
+    links, nodes = local_links(model.case, model.numbers, model.motion)
+    n = model.pencil.n_dof
+    K, M = np.zeros((n, n)), np.zeros((n, n))
+    for link in links:
+        carries, twist, rigid, *factors = numbers(model, link, q)
+        B = motion_matrix(link, carries, twist, rigid, nodes.count, n).toarray()
+        for matrix, terms, values in zip((K, M), (link.stiffness, link.mass), factors, strict=True):
+            if terms:
+                matrix += B.T @ (total(terms, values) @ B)
+    return K, M
+
+
+def numbers(model: Built, link: LocalLink, q: np.ndarray) -> list[np.ndarray]:
+    scalars = [*motion_scalars(link)]
+    scalars += [[t.coefficient for t in terms] for terms in (link.stiffness, link.mass)]
+    arrays = [np.array(group, dtype=object) for group in scalars]
+    return [values[0] for values in model.poses.values(model.x(q), arrays)]
+
+
+def trees() -> list[tuple[Tree, np.ndarray]]:
+    drawn = [random_open(seed, space) for seed in range(6) for space in ("planar", "spatial")]
+    closed = [
+        random_closed(seed, space)[::2] for seed in range(3) for space in ("planar", "spatial")
+    ]
+    plain = [(arm3r("locked"), np.array([0.3, 0.5, -0.9])), (four_bar("free"), np.array([0.4]))]
+    return [*plain, *(pair for pair in (*drawn, *closed) if undriven(pair[0]))]
+
+
+def undriven(tree: Tree) -> bool:
+    """Whether links alone make up K: neither springs nor drives."""
+    drives = [c.get("drive", "free") for c in tree["coordinates"].values()]
+    return not tree["mechanism"].get("springs") and all(isinstance(d, str) for d in drives)
+
+
+@pytest.mark.parametrize(("tree", "q"), trees())
+def test_stiffness_and_mass_are_the_products_of_equation_1(tree: Tree, q: np.ndarray) -> None:
+    model = built(tree)
+    assembled = model.pencil.matrices(model.pencil.theta(model.x(q)))
+    for found, expected in zip(assembled, products(model, q), strict=True):
+        size = np.sqrt(np.abs(np.diag(expected)) + np.abs(expected).max() * 1e-8)
+        np.testing.assert_allclose(
+            found[0] / np.outer(size, size), expected / np.outer(size, size), atol=1e-8
+        )
