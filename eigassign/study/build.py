@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from eigassign.case import CaseFile, TipTrajectory
 from eigassign.case import Trajectory as TrajectoryKeys
 from eigassign.errors import CaseError, MechanismError
-from eigassign.mechanism.assembly.local_motion import reduced_links
 from eigassign.mechanism.assembly.build import (
     WholeLinks,
     build_pencil,
     local_links,
     whole_links,
 )
+from eigassign.mechanism.assembly.local_motion import reduced_links
 from eigassign.mechanism.inverse_kinematics.chain import tip_chain
 from eigassign.mechanism.kinematics.link_frames import build_poses, design_dependence
 from eigassign.mechanism.kinematics.parameters import initial_design
