@@ -162,11 +162,11 @@ def _simple_estimate(scene: Scene, parts: list[NamedTrajectory], hz: Floats) -> 
     """The largest (5 Ω²/g³ + |Ω̇|/g)/λ_1 along any trajectory; None where joints translate."""
     if any(joint.type in SHIFTS for joint in scene.file.mechanism.joints.values()):
         return None
-    lam, gap = float((2.0 * np.pi * hz.min()) ** 2), _nearest(hz, scene.expansions.modes)
+    lam, gap = float((2.0 * np.pi * hz.min()) ** 2), least_gap(hz, scene.expansions.modes)
     return max(_haste(part.trajectory, gap) for part in parts) / lam
 
 
-def _nearest(hz: Floats, wanted: Sequence[int]) -> float:
+def least_gap(hz: Floats, wanted: Sequence[int]) -> float:
     """g ≤ 1: the least distance of a wanted mode's λ from the next, relative to the lower; > 0."""
     distance = np.diff(hz**2, axis=1) / hz[:, :-1] ** 2
     beside = [k for k in range(distance.shape[1]) if k + 1 in wanted or k + 2 in wanted]

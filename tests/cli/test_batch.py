@@ -144,7 +144,7 @@ def test_an_interrupt_leaves_a_summary_of_what_was_finished(
 
     def interrupted(jobs: list[Job], _workers: int, keep: object) -> None:
         assert callable(keep)
-        keep(many._row(jobs[0].case, jobs[0].options, status="ok"))
+        keep({"name": "a", "path": "a.yaml", "seconds": 0.0, "status": "ok"})
         raise Terminated(signal.SIGTERM)
 
     monkeypatch.setattr(many, "run_batch", interrupted)
@@ -185,7 +185,7 @@ def test_any_executor_will_do_and_may_lose_a_case() -> None:
 
 
 def test_a_bug_in_one_case_is_a_row_and_not_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(many, "_optimised", lambda _path, _options: 1 / 0)
+    monkeypatch.setattr(many, "optimize", lambda _path, _options: 1 / 0)
     row = many.run_case("a.yaml", CaseOptions("runs/a"))
     assert row["status"] == "error"
     assert "ZeroDivisionError" in row["message"]

@@ -70,10 +70,10 @@ def test_the_effect_grows_with_the_square_of_the_speed(tmp_path: Path) -> None:
 
 def test_near_modes_are_not_settled_by_the_simple_estimate() -> None:
     """g is the nearest neighbour of a wanted mode, 1 at most and never 0."""
-    from eigassign.study.accuracy import _nearest
+    from eigassign.study.accuracy import least_gap
 
     hz = np.array([[100.0, 150.0, 300.0], [100.0, 110.0, 300.0]])
-    assert _nearest(hz, (1,)) == pytest.approx(0.21)
-    assert _nearest(hz, (3,)) == 1.0
-    assert _nearest(hz[:, :1], (1,)) == 1.0
-    assert _nearest(np.array([[100.0, 100.0]]), (2,)) == pytest.approx(1e-6)
+    assert least_gap(hz, (1,)) == pytest.approx(0.21)
+    assert least_gap(hz, (3,)) == 1.0
+    assert least_gap(hz[:, :1], (1,)) == 1.0
+    assert least_gap(np.array([[100.0, 100.0]]), (2,)) == pytest.approx(1e-6)
