@@ -17,7 +17,7 @@ from eigassign.case.schema.links import LINKS, SHAPES
 from eigassign.cli import cli, main
 
 ROOT = Path(__file__).parents[2]
-PACKAGE = Path(eigassign.__file__).parent
+PACKAGE = ROOT / "eigassign"
 TWO_LINK = ROOT / "cases" / "two_link.yaml"
 README = ROOT / "README.md"
 MANUAL = PACKAGE / "docs"
@@ -33,7 +33,7 @@ MOST_WORDS = 1500
 
 
 def page_id(page: Path) -> str:
-    return str(page.relative_to(ROOT if page.is_relative_to(ROOT) else PACKAGE.parent))
+    return str(page.relative_to(ROOT))
 
 
 def read(page: Path) -> str:
