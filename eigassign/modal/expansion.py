@@ -29,7 +29,7 @@ from eigassign.modal.taylor.local_coordinates import Local, local_space, substit
 from eigassign.modal.taylor.rayleigh import eigenvalue_series
 from eigassign.modal.taylor.vectors import as_columns, taylor_vectors
 from eigassign.series.multi_index import LowerSet
-from eigassign.series.power_series import Polynomials, PowerSeries, monomials, polynomials
+from eigassign.series.power_series import Polynomials, monomials, polynomials, reciprocal
 
 Floats = NDArray[np.float64]
 MAX_ORDER = 20
@@ -379,13 +379,8 @@ def inverse(expansion: Expansion) -> InverseExpansion:
     together = [c.modes for c in expansion.clusters if len(c.modes) > 1]
     if together:
         raise UsageError(f"modes {together[0]} are expanded as a cluster: 1/λ has no series each")
-    series = [
-        (1.0 / PowerSeries(expansion.space, cluster.coefficients[0, 0])).coefficients
-        for cluster in expansion.clusters
-    ]
-    coefficients = np.array(series)
-    coefficients.setflags(write=False)
-    return InverseExpansion(expansion, coefficients)
+    singles = np.array([c.coefficients[0, 0] for c in expansion.clusters])
+    return InverseExpansion(expansion, _frozen(reciprocal(expansion.space, singles)))
 
 
 # --- Several expansions about points along a trajectory: each pose belongs to the nearest one

@@ -11,7 +11,13 @@ from scipy import sparse
 
 from eigassign.errors import SingularityError
 from eigassign.series.multi_index import LowerSet
-from eigassign.series.power_series import compose, multiply, power_taylor, wave_taylor
+from eigassign.series.power_series import (
+    compose,
+    matrix_product,
+    multiply,
+    power_taylor,
+    wave_taylor,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -128,12 +134,6 @@ class Truncated:
         right = B.reshape(n, m * size)
         X = inverse @ right
         for _ in range(self.space.order):
-            X = X + inverse @ (right - self._matrix_product(A, X, n, m).reshape(n, -1))
+            product = matrix_product(self.space, A.reshape(n, n, size), X.reshape(n, m, size))
+            X = X + inverse @ (right - product.reshape(n, -1))
         return np.asarray(X.reshape(n * m, size))
-
-    def _matrix_product(self, A: Floats, X: Floats, n: int, m: int) -> Floats:
-        size = len(self.space)
-        shape = (n, n, m, size)
-        left = np.broadcast_to(A.reshape(n, n, 1, size), shape).reshape(-1, size)
-        right = np.broadcast_to(X.reshape(1, n, m, size), shape).reshape(-1, size)
-        return np.asarray(multiply(self.space, left, right).reshape(shape).sum(axis=1))

@@ -244,22 +244,6 @@ def box(orders: tuple[int, ...]) -> LowerSet:
 
 
 @lru_cache(maxsize=64)
-def weighted_degree(weights: tuple[float, ...], order: float) -> LowerSet:
-    """{γ : Σ w_i γ_i ≤ p}, anisotropic: a variable of weight 2 is taken to half the order."""
-    if not all(w > 0 for w in weights):
-        raise UsageError("weights of an anisotropic set must be positive")
-    members = [np.zeros((1, 0), dtype=np.int64)]
-    for i, weight in enumerate(weights):
-        top = int(np.floor(order / weight + 1e-9))
-        grown = [
-            np.hstack([members[-1], np.full((len(members[-1]), 1), k)]) for k in range(top + 1)
-        ]
-        rows = np.vstack(grown)
-        members.append(rows[rows @ np.array(weights[: i + 1]) <= order + 1e-9])
-    return lower_set(members[-1])
-
-
-@lru_cache(maxsize=64)
 def on_faces(space: LowerSet, faces: bytes) -> tuple[LowerSet, Ints]:
     """The members in the variables of one face (n_faces, n) alone, and their places in the set.
 

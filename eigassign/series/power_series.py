@@ -1,8 +1,7 @@
 """Arithmetic of truncated multivariate power series Σ a_γ x^γ, γ in a lower set.
 
-The kernels act on stacks of series: arrays (..., N) over a :class:`LowerSet` of N members, so that
-a thousand products cost one call. :class:`PowerSeries` is the same algebra for one series, with
-operators; it carries its set, and mixing two sets raises.
+All functions act on stacks of series: arrays (n, N) over a :class:`LowerSet` of N members, so that
+a thousand products cost one call.
 
 Polynomials at many points, quickly: Σ_γ a_γ x^γ with γ in a lower set.
 
@@ -18,17 +17,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.errors import UsageError
 from eigassign.series.multi_index import LowerSet, first_of_each, lower_set
-
-# --- Arithmetic of truncated multivariate power series Σ a_γ x^γ, γ in a lower set
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -79,6 +74,16 @@ def _sums(a: Floats, b: Floats, left: Ints, right: Ints, first: Ints) -> Floats:
     return result
 
 
+def matrix_product(space: LowerSet, a: Floats, b: Floats) -> Floats:
+    """Product of two series of matrices, (r, s, N) × (s, t, N) → (r, t, N)."""
+    r, s, size = a.shape
+    t = b.shape[1]
+    left = np.broadcast_to(a[:, :, None], (r, s, t, size)).reshape(-1, size)
+    right = np.broadcast_to(b[None], (r, s, t, size)).reshape(-1, size)
+    products = multiply(space, left, right).reshape(r, s, t, size)
+    return np.asarray(products.sum(axis=1))
+
+
 def compose(space: LowerSet, taylor: Floats, a: Floats) -> Floats:
     """f(a) for stacks a (n, N), given f's own Taylor coefficients at a_0: ``taylor`` (p + 1, n).
 
@@ -121,18 +126,8 @@ def reciprocal(space: LowerSet, a: Floats) -> Floats:
     return result / a[:, :1]
 
 
-def sine_taylor(at: Floats, order: int) -> Floats:
-    """sin^(k)(a)/k! for k = 0…p: shape (p + 1, n)."""
-    return wave_taylor(at, np.zeros(len(at), dtype=np.intp), order)
-
-
-def cosine_taylor(at: Floats, order: int) -> Floats:
-    """cos^(k)(a)/k! for k = 0…p: shape (p + 1, n)."""
-    return wave_taylor(at, np.ones(len(at), dtype=np.intp), order)
-
-
 def wave_taylor(at: Floats, quarters: Ints, order: int) -> Floats:
-    """Derivatives of sin(a + quarters π/2) over k!, k = 0…p: shape (p + 1, n).
+    """Derivatives of sin(a + quarters π/2) over k!, k = 0…p: shape (p + 1, n); 1 is the cosine.
 
     Every derivative is a quarter turn more: sin, cos, −sin, −cos, and again.
     """
@@ -169,93 +164,7 @@ def monomials(space: LowerSet, x: Floats) -> Floats:
     return result
 
 
-@dataclass(frozen=True, eq=False)
-class PowerSeries:
-    """One truncated series over ``space``; immutable."""
-
-    space: LowerSet
-    coefficients: Floats  # (N,)
-
-    def __post_init__(self) -> None:
-        values = np.array(self.coefficients, dtype=np.float64)
-        if values.shape != (len(self.space),):
-            raise UsageError(f"{values.shape} coefficients for a set of {len(self.space)}")
-        values.setflags(write=False)
-        object.__setattr__(self, "coefficients", values)
-
-    @classmethod
-    def variable(cls, space: LowerSet, which: int, at: float = 0.0) -> PowerSeries:
-        """The series of x_i about x_i = ``at``."""
-        unit = np.eye(space.n_variables, dtype=np.int64)[which]
-        values = np.zeros(len(space))
-        values[0] = at
-        position = int(space.find(unit)[0])
-        if position >= 0:
-            values[position] = 1.0
-        return cls(space, values)
-
-    def _other(self, other: PowerSeries | float) -> Floats:
-        if isinstance(other, PowerSeries):
-            if other.space is not self.space:
-                raise UsageError("two series over different sets cannot be combined")
-            return other.coefficients
-        values = np.zeros(len(self.space))
-        values[0] = other
-        return values
-
-    def __add__(self, other: PowerSeries | float) -> PowerSeries:
-        return PowerSeries(self.space, self.coefficients + self._other(other))
-
-    __radd__ = __add__
-
-    def __neg__(self) -> PowerSeries:
-        return PowerSeries(self.space, -self.coefficients)
-
-    def __sub__(self, other: PowerSeries | float) -> PowerSeries:
-        return PowerSeries(self.space, self.coefficients - self._other(other))
-
-    def __rsub__(self, other: float) -> PowerSeries:
-        return -self + other
-
-    def __mul__(self, other: PowerSeries | float) -> PowerSeries:
-        left, right = self.coefficients[None], self._other(other)[None]
-        return PowerSeries(self.space, multiply(self.space, left, right)[0])
-
-    __rmul__ = __mul__
-
-    def __pow__(self, exponent: float) -> PowerSeries:
-        if self.coefficients[0] == 0.0:
-            raise UsageError("a power of a series needs a non-zero constant term")
-        return self._apply(lambda at, p: power_taylor(at, exponent, p))
-
-    def __truediv__(self, other: PowerSeries | float) -> PowerSeries:
-        if isinstance(other, PowerSeries):
-            return self * other**-1.0
-        return self * (1.0 / other)
-
-    def __rtruediv__(self, other: float) -> PowerSeries:
-        return other * self**-1.0
-
-    def sin(self) -> PowerSeries:
-        """Sine of the series (argument in rad)."""
-        return self._apply(sine_taylor)
-
-    def cos(self) -> PowerSeries:
-        """Cosine of the series (argument in rad)."""
-        return self._apply(cosine_taylor)
-
-    def _apply(self, taylor: Callable[[Floats, int], Floats]) -> PowerSeries:
-        derivatives = taylor(self.coefficients[:1], self.space.order)
-        return PowerSeries(self.space, compose(self.space, derivatives, self.coefficients[None])[0])
-
-    def __call__(self, x: Floats) -> Floats:
-        """Value at displacements x (n,) or (n_points, n) from the expansion point."""
-        points = np.atleast_2d(np.asarray(x, dtype=np.float64))
-        values = monomials(self.space, points) @ self.coefficients
-        return values if np.ndim(x) == 2 else values[0]
-
-
-# --- Polynomials at many points, quickly: Σ_γ a_γ x^γ with γ in a lower set
+# --- Polynomials at many points
 
 BLOCK = 512  # points at once: what they need stays in the cache
 

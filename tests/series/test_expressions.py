@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from series_operators import PowerSeries
 
 from eigassign.errors import UsageError
 from eigassign.series.algebra import Samples, Truncated
 from eigassign.series.compiler import compile_program, compile_table
 from eigassign.series.expression import Expression, Recorder, cos, sin
 from eigassign.series.multi_index import on_faces, total_degree
-from eigassign.series.power_series import PowerSeries
 
 N = 3
 SPACE = total_degree(N, 4)

@@ -15,7 +15,6 @@ from eigassign.series.multi_index import (
     lower_set,
     partially_linear,
     total_degree,
-    weighted_degree,
 )
 
 SETS = {
@@ -26,7 +25,6 @@ SETS = {
     "no variables": total_degree(0, 4),
     "box": box((3, 1, 2)),
     "partially linear": partially_linear(2, 2, 4),
-    "weighted": weighted_degree((1.0, 2.0, 1.5), 4.0),
     "corner": lower_set([[0, 0], [1, 0], [2, 0], [3, 0], [0, 1], [0, 2], [1, 1]]),
 }
 
@@ -60,16 +58,8 @@ def test_partially_linear_keeps_what_the_definition_says(order: int) -> None:
     assert rows(partially_linear(2, 2, order)) == expected
 
 
-def test_boxes_and_weighted_sets_keep_what_their_definitions_say() -> None:
+def test_a_box_keeps_what_its_definition_says() -> None:
     assert rows(box((3, 1, 2))) == {r for r in everything(3, 3) if r[1] <= 1 and r[2] <= 2}
-    weighted = {r for r in everything(3, 4) if r[0] + 2 * r[1] + 1.5 * r[2] <= 4}
-    assert rows(weighted_degree((1.0, 2.0, 1.5), 4.0)) == weighted
-    assert rows(weighted_degree((1.0, 1.0), 3.0)) == rows(total_degree(2, 3))
-
-
-def test_thirds_are_counted_as_thirds_in_spite_of_round_off() -> None:
-    assert weighted_degree((1 / 3,), 1.0).order == 3
-    assert rows(weighted_degree((0.1, 0.1), 0.3)) == rows(total_degree(2, 3))
 
 
 @pytest.mark.parametrize("name", SETS)
@@ -126,13 +116,11 @@ def test_a_set_with_a_gap_is_refused(members: list[list[int]]) -> None:
         lower_set(members)
 
 
-def test_negative_indices_oversized_sets_and_weights_of_zero_are_refused() -> None:
+def test_negative_indices_and_oversized_sets_are_refused() -> None:
     with pytest.raises(UsageError, match="negative"):
         lower_set([[0, 0], [-1, 0]])
     with pytest.raises(UsageError, match="200000"):
         total_degree(2, 700)
-    with pytest.raises(UsageError, match="positive"):
-        weighted_degree((1.0, 0.0), 2.0)
 
 
 def test_restricting_to_a_lower_part_works_and_to_another_part_does_not() -> None:

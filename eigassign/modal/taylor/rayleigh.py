@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.projection import project_at, project_terms
 from eigassign.series.multi_index import LowerSet, first_of_each
-from eigassign.series.power_series import multiply, power_taylor, reciprocal
+from eigassign.series.power_series import matrix_product, multiply, power_taylor, reciprocal
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -153,16 +153,6 @@ def _meet(projected: Floats, p: _Products, i: int, j: int, r: int) -> Floats:
     if i != j:
         pairs = 0.5 * (pairs + projected[..., p.a * r + j, p.b * r + i])
     return np.add.reduceat(pairs * p.weight, p.begin, axis=-1)
-
-
-def matrix_product(space: LowerSet, a: Floats, b: Floats) -> Floats:
-    """Product of two series of matrices, (r, s, N) × (s, t, N) → (r, t, N)."""
-    r, s, size = a.shape
-    t = b.shape[1]
-    left = np.broadcast_to(a[:, :, None], (r, s, t, size)).reshape(-1, size)
-    right = np.broadcast_to(b[None], (r, s, t, size)).reshape(-1, size)
-    products = multiply(space, left, right).reshape(r, s, t, size)
-    return np.asarray(products.sum(axis=1))
 
 
 def inverse_root(space: LowerSet, D: Floats) -> Floats:
