@@ -111,7 +111,7 @@ def exact_methods(model: Model, modes: Sequence[int], most: int | None) -> Itera
 
 def sparse_frequencies(model: Model, x: Floats, count: int) -> Floats:
     """Exact frequencies (n, count) in Hz by the sparse solver, whatever the size."""
-    lam, _ = solve_sparse(model.pencil, model.pencil.theta(x), count, False)
+    lam = solve_sparse(model.pencil, model.pencil.theta(x), count, False).lam
     return np.asarray(np.sqrt(lam) / (2.0 * np.pi))
 
 

@@ -58,13 +58,13 @@ def test_more_accuracy_takes_more_vectors_and_a_wider_span_as_well(arm):
 def test_one_vector_fewer_would_not_do(arm, whole, monkeypatch):
     """The size is the least for which the samples that judge stay within their share."""
     found = []
-    judged = compression._change
+    judged = compression.largest_change
 
     def seen(judges, U, modes):
         found.append((U.shape[1], judged(judges, U, modes)))
         return found[-1][1]
 
-    monkeypatch.setattr(compression, "_change", seen)
+    monkeypatch.setattr(compression, "largest_change", seen)
     small = reduce(arm.pencil, Q0, Y0, (1,), 3, span=SPAN, accuracy=1e-6)
     limit = compression.SHARE * 1e-6
     assert dict(found)[small.size] <= limit

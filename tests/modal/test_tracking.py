@@ -17,7 +17,7 @@ from eigassign.api import load_case
 from eigassign.errors import UsageError
 from eigassign.modal.exact.condensation import Modes
 from eigassign.modal.exact.solver import modes
-from eigassign.modal.exact.tracking import _carried, overlaps, track
+from eigassign.modal.exact.tracking import overlaps, track, turn_coincident
 
 
 @pytest.mark.parametrize("count", [10, 11, 41])
@@ -110,6 +110,6 @@ def test_arbitrary_shapes_of_coincident_modes_are_turned_to_those_before():
     c, s = np.cos(0.7), np.sin(0.7)
     turned = phi.copy()
     turned[:, :2] = phi[:, :2] @ np.array([[c, -s], [s, c]])
-    back = _carried(model.pencil, phi[:, :2], x, Modes(lam, turned))
+    back = turn_coincident(model.pencil, phi[:, :2], x, Modes(lam, turned))
     shares = overlaps(model.pencil, phi[:, :2], x, back)[:, :2]
     np.testing.assert_allclose(shares, np.eye(2), atol=1e-12)

@@ -48,8 +48,8 @@ def batch(model: Model, count: int) -> np.ndarray:
 
 def sparse(model: Model, count: int) -> np.ndarray:
     theta = model.pencil.theta(model.x(POSE, []))
-    lam, _ = exact_sparse.solve_sparse(model.pencil, theta, count, False)
-    return np.sqrt(lam[0]) / (2.0 * np.pi)
+    found = exact_sparse.solve_sparse(model.pencil, theta, count, False)
+    return np.sqrt(found.lam[0]) / (2.0 * np.pi)
 
 
 def reduced(model: Model, count: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What all exact solvers share: the modes they find, and the condensed mass M_c."""
+"""What all exact solvers share: the modes they find, and the condensed mass M_c (eq. (1))."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import lapack
 
 from eigassign.errors import MechanismError
 
 Floats = NDArray[np.float64]
+NO_MASS = "a free coordinate moves no mass: give the mechanism mass or lock it"
 
 
 @dataclass(frozen=True)
@@ -39,10 +41,18 @@ def condense_blocks(M_EE: Floats, M_FE: Floats, M_FF: Floats) -> tuple[Floats, F
         np.linalg.cholesky(M_FF)
         coupling = np.linalg.solve(M_FF, M_FE)
     except np.linalg.LinAlgError as error:
-        raise MechanismError(
-            "mechanism", "a free coordinate moves no mass: give the mechanism mass or lock it"
-        ) from error
+        raise MechanismError("mechanism", NO_MASS) from error
     return np.asarray(coupling, dtype=np.float64), M_EE - np.swapaxes(M_FE, 1, 2) @ coupling
+
+
+def rigid_coupling(M_FF: Floats, M_FE: Floats) -> Floats:
+    """M_FF⁻¹ M_FE of one sample, through LAPACK without detours."""
+    if not len(M_FF):
+        return M_FE
+    L, info = lapack.dpotrf(M_FF, lower=1)
+    if info:
+        raise MechanismError("mechanism", NO_MASS)
+    return np.asarray(lapack.dpotrs(L, M_FE, lower=1)[0])
 
 
 def block(A: Floats, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Floats:

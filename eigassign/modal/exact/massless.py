@@ -39,7 +39,7 @@ def mass_sizes(pencil: Pencil, theta: Floats, coupling: Floats) -> Floats:
     return np.asarray(size * size)
 
 
-def doubtful(mu: Floats, noise: Floats, n: int, margin: float = MARGIN) -> Flags:
+def may_be_roundoff(mu: Floats, noise: Floats, n: int, margin: float = MARGIN) -> Flags:
     """Which μ (…, count), descending, may be round-off; ``noise`` ≥ zᵀ T² z of K_E-unit z.
 
     The eigensolver's counts ``margin`` times, since singular values have less of it; that of M_c
@@ -48,7 +48,7 @@ def doubtful(mu: Floats, noise: Floats, n: int, margin: float = MARGIN) -> Flags
     return np.asarray(mu <= ROUND_OFF * n * (noise + margin * mu[..., :1]))
 
 
-def solve_massive(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
+def modes_with_mass(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
     """λ (count,) and mass-normalised modes (n_dof, count), signs as they come, θ (n_theta, 1).
 
     Raises MissingMassError where fewer have mass, AccuracyError for an indefinite mass.

@@ -5,9 +5,7 @@ With E the elastic unknowns (u and held coordinates) and F the free coordinates,
     K_E φ_E = λ M_c φ_E,   M_c = M_EE − M_EF M_FF⁻¹ M_FE,   φ_F = −M_FF⁻¹ M_FE φ_E
 
 solved in the inverse form M_c z = μ K_E z, μ = 1/λ, so that massless unknowns (μ = 0) are harmless.
-What may be round-off instead of a mode with mass is settled by ``massive``, for all solvers alike.
-
-The lowest modes and some more, where the mechanism has so many with mass.
+What may be round-off instead of a mode with mass is settled by `massless`, for all solvers alike.
 """
 
 from __future__ import annotations
@@ -21,8 +19,6 @@ from eigassign.modal.arguments import DENSE_LIMIT, whole
 from eigassign.modal.exact.condensation import Modes
 from eigassign.modal.exact.dense import solve_dense
 from eigassign.modal.exact.sparse import solve_sparse
-
-# --- Exact elastic modes of the affine pencil, the rigid-body modes projected out exactly
 
 Floats = NDArray[np.float64]
 
@@ -53,13 +49,8 @@ def _solve(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
     if not np.isfinite(theta).all():
         raise UsageError("q or y is not finite, or outside the domain of a section or length")
     if pencil.n_dof <= DENSE_LIMIT or 2 * count > elastic:  # Lanczos is for few modes of many
-        found = solve_dense(pencil, theta, count, vectors)
-    else:
-        found = Modes(*solve_sparse(pencil, theta, count, vectors))
-    return found
-
-
-# --- The lowest modes and some more, where the mechanism has so many with mass
+        return solve_dense(pencil, theta, count, vectors)
+    return solve_sparse(pencil, theta, count, vectors)
 
 
 def lowest_modes(pencil: Pencil, theta: Floats, least: int, extra: int) -> Modes:

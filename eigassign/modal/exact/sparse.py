@@ -1,7 +1,4 @@
-"""Exact elastic modes of a large pencil: Lanczos on M_c z = μ K_E z with K_E factored sparsely.
-
-Symmetric sparse matrices from the non-zeros of the pencil, without sorting or duplicates.
-"""
+"""Exact elastic modes of a large pencil: Lanczos on M_c z = μ K_E z with K_E factored sparsely."""
 
 from __future__ import annotations
 
@@ -13,19 +10,19 @@ from scipy.sparse import linalg
 from eigassign.errors import LIMP, AccuracyError, MechanismError, MissingMassError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.sparse_factor import factorise
-from eigassign.modal.exact.massless import doubtful, mass_sizes, solve_massive
-
-# --- Exact elastic modes of a large pencil: Lanczos on M_c z = μ K_E z with K_E factored sparse
+from eigassign.modal.exact.condensation import Modes, rigid_coupling
+from eigassign.modal.exact.massless import mass_sizes, may_be_roundoff, modes_with_mass
 
 Floats = NDArray[np.float64]
 DENSE_MOST = 4000  # elastic unknowns up to which dense algebra settles what may be round-off
 
 
-def solve_sparse(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> tuple[Floats, Floats]:
-    """λ (n_samples, count) and, where asked for, φ (n_samples, n_dof, count)."""
+def solve_sparse(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
+    """Modes at θ (n_theta, n_samples), one sample after the other."""
     solved = [_one(pencil, theta[:, k], count) for k in range(theta.shape[1])]
     lam = np.array([s[0] for s in solved])
-    return lam, np.array([s[1] for s in solved]) if vectors else np.zeros((len(lam), 0, count))
+    phi = np.array([s[1] for s in solved]) if vectors else np.zeros((len(lam), 0, count))
+    return Modes(lam, phi)
 
 
 def _one(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
@@ -34,16 +31,16 @@ def _one(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
     mass = pencil.mass @ theta
     M_EE, M_F = principal(pencil, mass, E), block(pencil, mass, F)
     M_FE = M_F[:, E]
-    coupling = _coupling(M_F[:, F], M_FE)
+    coupling = rigid_coupling(M_F[:, F], M_FE)
     mu, z = _lanczos(K_E, M_EE, M_FE, coupling, count)
     noise = mass_sizes(pencil, theta[:, None], coupling[None])[0] @ (z * z)
-    sure = ~doubtful(mu, noise, len(E), margin=1.0)  # dense algebra is dear here
+    sure = ~may_be_roundoff(mu, noise, len(E), margin=1.0)  # dense algebra is dear here
     if sure.all():
         lam, phi = 1.0 / mu, np.empty((pencil.n_dof, count))
         phi[E] = z / np.sqrt(mu)
         phi[F] = -coupling @ phi[E]
     elif len(E) <= DENSE_MOST:
-        lam, phi = solve_massive(pencil, theta[:, None], count)
+        lam, phi = modes_with_mass(pencil, theta[:, None], count)
     else:
         raise MissingMassError(int(sure.argmin()))
     at = np.abs(phi).argmax(axis=0)
@@ -54,18 +51,6 @@ def _one(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
 def _krylov_size(count: int) -> int:
     """Lanczos vectors before a restart: few modes converge in fewer than ARPACK's own 20."""
     return min(max(20, 2 * count + 1), 10 + 2 * count)
-
-
-def _coupling(M_FF: Floats, M_FE: Floats) -> Floats:
-    if not len(M_FF):
-        return M_FE
-    try:
-        np.linalg.cholesky(M_FF)
-    except np.linalg.LinAlgError as error:
-        raise MechanismError(
-            "mechanism", "a free coordinate moves no mass: give the mechanism mass or lock it"
-        ) from error
-    return np.asarray(np.linalg.solve(M_FF, M_FE))
 
 
 def _lanczos(

@@ -9,7 +9,8 @@ crossing, where the order of the modes swaps. In a veering the shapes turn into 
 gradually: the curve stays on its branch, and how much of its identity it gave away is reported.
 Modes that coincide have no shapes of their own; those of the sample before are carried over.
 
-Where two neighbouring modes come close along a path: do they cross, or veer, and how closely.
+Where two neighbouring modes come close along the path, an :class:`Encounter` says whether they
+cross or veer, and how closely.
 """
 
 from __future__ import annotations
@@ -24,8 +25,6 @@ from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import mode_numbers
 from eigassign.modal.exact.condensation import Modes
 from eigassign.modal.exact.solver import eigenvalues, lowest_modes
-
-# --- Modes followed along a path of (q, y) by the overlap of their shapes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -115,7 +114,7 @@ def _sample(found: Modes, k: int) -> Modes:
 
 def _advance(pencil: Pencil, here: _Here, x: Floats, there: Modes, depth: int) -> _Here:
     """Match the shapes at hand with the modes at x, by way of the midpoint where unclear."""
-    shapes = _carried(pencil, here.shapes, x, there)
+    shapes = turn_coincident(pencil, here.shapes, x, there)
     squares = overlaps(pencil, here.shapes, x, shapes)
     columns = _assignment(squares)
     clear = squares[np.arange(len(columns)), columns]
@@ -154,7 +153,7 @@ def _elastic_size(pencil: Pencil, M: object, shapes: Floats) -> Floats:
     return np.asarray(size - np.einsum("fm,fm->m", product[rigid], motion))
 
 
-def _carried(pencil: Pencil, before: Floats, x: Floats, there: Modes) -> Floats:
+def turn_coincident(pencil: Pencil, before: Floats, x: Floats, there: Modes) -> Floats:
     """The modes at x, coincident ones turned within their space to the shapes of before."""
     lam, phi = there.lam, there.phi
     apart = np.diff(lam) > COINCIDENT * lam[1:]
@@ -179,7 +178,7 @@ def _rotation(across: Floats) -> Floats:
     return np.asarray(U @ square)
 
 
-# --- Where two neighbouring modes come close along a path: do they cross, or veer, and how clos
+# --- Where two neighbouring modes come close: do they cross, or veer, and how closely
 
 NEAR = 0.15  # relative distance in frequency above which two modes do not meet
 EXCHANGED = 0.1  # share of identity given away from which a veering is reported

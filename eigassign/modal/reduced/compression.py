@@ -56,7 +56,7 @@ def compressed(
     low, high = fixed, directions.shape[1]
     while low < high:
         size = (low + high) // 2
-        if _change(judges, directions[:, :size], basis.modes) <= SHARE * accuracy:
+        if largest_change(judges, directions[:, :size], basis.modes) <= SHARE * accuracy:
             high = size
         else:
             low = size + 1
@@ -82,7 +82,7 @@ def _on(basis: RitzBasis, whole: ReducedModel, U: Floats) -> ReducedModel:
     )
 
 
-def _change(
+def largest_change(
     judges: Sequence[tuple[Floats, Floats, Floats]], U: Floats, modes: tuple[int, ...]
 ) -> float:
     """Largest relative change of the frequencies of ``modes`` on U (k, r) alone."""
