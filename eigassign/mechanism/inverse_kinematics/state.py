@@ -22,7 +22,6 @@ import numpy as np
 from eigassign.errors import MechanismError, SingularityError
 from eigassign.mechanism.inverse_kinematics.chain import Bools, Floats, Look, TipChain, reduced
 from eigassign.mechanism.inverse_kinematics.tip_path import Course, Target
-from eigassign.mechanism.kinematics.rotations import logarithm
 
 # --- A chain prepared for inverse kinematics: one measure for metres and radians, and first gue
 
@@ -88,7 +87,9 @@ def error(chain: TipChain, seen: Look, target: Target, lever: float) -> Floats:
     if chain.turned_by == (2,):
         turn = np.arctan2(missing[:, 1, 0], missing[:, 0, 0])[:, None]
     else:
-        turn = logarithm(missing)
+        from scipy.spatial.transform import Rotation  # takes 0.1 s, which few paths wait for
+
+        turn = Rotation.from_matrix(missing).as_rotvec()
     return np.hstack([apart, lever * turn])
 
 

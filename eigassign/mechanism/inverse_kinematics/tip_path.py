@@ -17,12 +17,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import MechanismError, UsageError
-from eigassign.mechanism.kinematics.rotations import euler_rotation, exponential, logarithm
 
 # --- Paths of the tip through waypoints in the plane or in space, as piecewise cubics
 
@@ -103,12 +103,9 @@ def spline(waypoints: ArrayLike) -> Path:
 
 def smooth(knots: Floats, values: Floats) -> Path:
     """The not-a-knot cubic spline with ``values`` (m, d) at ``knots`` (m,)."""
-    slopes = _slopes(knots, values)
-    step = np.diff(knots)[:, None]
-    chords = np.diff(values, axis=0) / step
-    quadratic = (3.0 * chords - 2.0 * slopes[:-1] - slopes[1:]) / step
-    cubic = (slopes[:-1] + slopes[1:] - 2.0 * chords) / step**2
-    return _path(knots, np.stack([values[:-1], slopes[:-1], quadratic, cubic]))
+    from scipy.interpolate import CubicSpline  # takes 0.1 s, which only splines need to wait for
+
+    return _path(knots, CubicSpline(knots, values).c[::-1].copy())
 
 
 def _path(knots: Floats, coefficients: Floats) -> Path:
@@ -144,55 +141,6 @@ def _checked(waypoints: ArrayLike) -> Floats:
     return points
 
 
-def _slopes(knots: Floats, points: Floats) -> Floats:
-    """dp/ds at the waypoints (m, d) of the not-a-knot spline (de Boor 1978, chapter IV).
-
-    Inside, continuity of p'' with steps h_i and chord slopes δ_i:
-    h_i p'_{i-1} + 2 (h_{i-1} + h_i) p'_i + h_{i-1} p'_{i+1} = 3 (h_i δ_{i-1} + h_{i-1} δ_i).
-    """
-    h = np.diff(knots)
-    chords = np.diff(points, axis=0) / h[:, None]
-    if len(h) == 1:
-        return np.repeat(chords, 2, axis=0)
-    if len(h) == 2:
-        return _parabola_slopes(h, chords)
-    below, on, above = np.zeros((3, len(knots)))  # row i: below[i], on[i], above[i]
-    rhs = np.empty_like(points)
-    below[1:-1], on[1:-1], above[1:-1] = h[1:], 2.0 * (h[:-1] + h[1:]), h[:-1]
-    rhs[1:-1] = 3.0 * (h[1:, None] * chords[:-1] + h[:-1, None] * chords[1:])
-    on[0], above[0], rhs[0] = _end_row(h[0], h[1], chords[0], chords[1])
-    on[-1], below[-1], rhs[-1] = _end_row(h[-1], h[-2], chords[-1], chords[-2])
-    return _tridiagonal(below, on, above, rhs)
-
-
-def _tridiagonal(below: Floats, on: Floats, above: Floats, rhs: Floats) -> Floats:
-    """Solution (m, d) by elimination without exchanges, stable for these rows (de Boor's CUBSPL).
-
-    Not scipy.linalg: importing that would take longer than all the rest of a trajectory.
-    """
-    pivot, x = on.copy(), rhs.copy()
-    for i in range(1, len(x)):
-        factor = below[i] / pivot[i - 1]
-        pivot[i] -= factor * above[i - 1]
-        x[i] -= factor * x[i - 1]
-    x[-1] /= pivot[-1]
-    for i in range(len(x) - 2, -1, -1):
-        x[i] = (x[i] - above[i] * x[i + 1]) / pivot[i]
-    return x
-
-
-def _end_row(h0: float, h1: float, end: Floats, inner: Floats) -> tuple[float, float, Floats]:
-    """Not-a-knot: h1 p'_0 + (h0 + h1) p'_1 = ((3 h0 + 2 h1) h1 δ_0 + h0² δ_1) / (h0 + h1)."""
-    both = h0 + h1
-    return h1, both, ((h0 + 2.0 * both) * h1 * end + h0**2 * inner) / both
-
-
-def _parabola_slopes(h: Floats, chords: Floats) -> Floats:
-    """dp/ds of the parabola through three points: the chord slopes are its slopes midway."""
-    bend = (chords[1] - chords[0]) / h.sum()  # half its second derivative
-    return np.stack([chords[0] - h[0] * bend, chords[0] + h[0] * bend, chords[1] + h[1] * bend])
-
-
 # --- How the tip's link is turned along its path: one orientation that is kept, or one per wayp
 
 _SAME_TURN = 1e-9  # rad: two orientations that do not differ
@@ -211,17 +159,19 @@ class Attitude:
 
 def planar_attitude(path: Path, angle: ArrayLike, kind: str) -> Attitude:
     """Angle θ(s) in rad, from one value that is kept or one per waypoint, full turns counted."""
+    from scipy.spatial.transform import Rotation
+
     knots = path.knots
     values = np.broadcast_to(np.asarray(angle, dtype=np.float64), knots.shape)[:, None]
     if not np.isfinite(values).all():
         raise MechanismError("trajectory.angle", "is not finite")
-    course = smooth(knots, values) if kind == "spline" else polyline(knots, values)
+    theta = smooth(knots, values) if kind == "spline" else polyline(knots, values)
     axis = np.array([0.0, 0.0, 1.0])
     return Attitude(
         "angle",
-        lambda s: exponential(course.point(s) * axis),
-        lambda s: course.derivative(s) * axis,
-        course.corners(),
+        lambda s: np.asarray(Rotation.from_rotvec(theta.point(s) * axis).as_matrix()),
+        lambda s: theta.derivative(s) * axis,
+        theta.corners(),
     )
 
 
@@ -231,51 +181,40 @@ def spatial_attitude(path: Path, orientation: ArrayLike, kind: str) -> Attitude:
     From one waypoint to the next it turns the shorter way. Raises MechanismError where that is half
     a turn, so that there is no shorter way.
     """
+    from scipy.spatial.transform import Rotation, RotationSpline, Slerp
+
     knots = path.knots
     angles = np.broadcast_to(np.asarray(orientation, dtype=np.float64), (len(knots), 3))
     if not np.isfinite(angles).all():
         raise MechanismError("trajectory.orientation", "is not finite")
-    R = euler_rotation(angles)
-    steps = logarithm(R[1:] @ np.swapaxes(R[:-1], 1, 2))
+    R = Rotation.from_euler("xyz", angles)
+    steps = (R[1:] * R[:-1].inv()).as_rotvec()
     size = np.linalg.norm(steps, axis=1)
     for k in np.flatnonzero(size > np.pi - _AMBIGUOUS):
         message = "half a turn from the one before it: say which way by a waypoint in between"
         raise MechanismError(f"trajectory.orientation[{k + 1}]", message)
     if kind == "spline" and len(knots) > 2 and size.max() > _SAME_TURN:
-        return _splined(knots, R)
-    return _slerped(knots, R, steps / np.diff(knots)[:, None])
+        spline = RotationSpline(knots, R)
 
+        def spin(s: Floats) -> Floats:
+            turned = spline(np.atleast_1d(s))  # the rate is in the axes of the turned link
+            return np.asarray(turned.apply(spline(np.atleast_1d(s), 1)))
 
-def _slerped(knots: Floats, R: Floats, rates: Floats) -> Attitude:
-    """R(s) = exp(ω_i (s − s_i)) R_i."""
-
-    def piece(s: Floats) -> tuple[np.ndarray, Floats]:
-        s = np.atleast_1d(s)
-        i = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(knots) - 2)
-        return i, (s - knots[i])[:, None]
-
-    def rotation(s: Floats) -> Floats:
-        i, t = piece(s)
-        return np.asarray(exponential(t * rates[i]) @ R[i])
-
+        return Attitude("orientation", lambda s: _matrices(spline, s), spin, np.zeros(0))
+    slerp, rates = Slerp(knots, R), steps / np.diff(knots)[:, None]  # R(s) = exp(ω_i (s − s_i)) R_i
     jumps = np.abs(np.diff(rates, axis=0)).max(axis=1)
     sharp = jumps > _SMOOTH * max(float(np.abs(rates).max()), 1.0)
-    return Attitude("orientation", rotation, lambda s: rates[piece(s)[0]], knots[1:-1][sharp])
-
-
-def _splined(knots: Floats, R: Floats) -> Attitude:
-    from scipy.spatial.transform import Rotation, RotationSpline
-
-    spline = RotationSpline(knots, Rotation.from_matrix(R))
-
-    def rotation(s: Floats) -> Floats:
-        return np.asarray(spline(np.atleast_1d(s)).as_matrix())
 
     def rate(s: Floats) -> Floats:
-        own = spline(np.atleast_1d(s), 1)  # in the axes of the turned link
-        return np.asarray(np.einsum("nij,nj->ni", rotation(s), own))
+        piece = np.searchsorted(knots, np.atleast_1d(s), side="right") - 1
+        return np.asarray(rates[np.clip(piece, 0, len(rates) - 1)])
 
-    return Attitude("orientation", rotation, rate, np.zeros(0))
+    return Attitude("orientation", lambda s: _matrices(slerp, s), rate, knots[1:-1][sharp])
+
+
+def _matrices(turning: Callable[[Floats], Any], s: Floats) -> Floats:
+    """R (n, 3, 3) at parameters s (n,) within [0, 1] but for round-off."""
+    return np.asarray(turning(np.clip(np.atleast_1d(s), 0.0, 1.0)).as_matrix())
 
 
 # --- When the tip has to be where, and turned how: a path, an attitude and a timing law together

@@ -6,41 +6,16 @@ import numpy as np
 import pytest
 from planar_arms import serial_arm, two_link_angles
 from scipy.spatial.transform import Rotation
+from spatial_oracle import X, Y, Z, turn
 from tip_paths import between, course
 
 from eigassign.errors import MechanismError, TrajectoryError
 from eigassign.mechanism.inverse_kinematics.follow import follow
-from eigassign.mechanism.kinematics.rotations import euler_rotation, exponential, logarithm
 
 POINTS = [(0.6, 0.2), (0.5, 0.5), (0.2, 0.6), (-0.1, 0.5)]
 SPACE = [(*p, 0.1 * k**2) for k, p in enumerate(POINTS)]
 TRIPLES = [(0.1, -0.2, 0.3), (0.6, 0.1, 0.9), (1.4, -0.3, 0.2), (1.0, 0.4, -0.5)]
 KINDS = pytest.mark.parametrize("kind", ["spline", "straight"])
-
-
-# --- rotations as numbers, against SciPy ---
-
-
-@pytest.mark.parametrize("size", [0.0, 1e-9, 1e-5, 1e-3, 1.0, 3.0, np.pi - 1e-3])
-def test_the_exponential_and_the_logarithm_are_those_of_scipy(size: float) -> None:
-    axis = np.random.default_rng(1).normal(size=(20, 3))
-    v = size * axis / np.linalg.norm(axis, axis=1, keepdims=True)
-    R = Rotation.from_rotvec(v).as_matrix()
-    np.testing.assert_allclose(exponential(v), R, atol=1e-15, rtol=1e-15)
-    # near half a turn, the angle is known to round-off and the axis to that over π − θ
-    np.testing.assert_allclose(logarithm(R), v, atol=2e-15 / max(1e-3, np.pi - size))
-
-
-def test_the_logarithm_of_half_a_turn_is_one_of_the_two() -> None:
-    for axis in np.vstack([np.eye(3), [[0.6, 0.0, -0.8], [-0.48, 0.6, 0.64]]]):
-        v = logarithm(exponential(np.pi * axis[None]))[0]
-        assert np.linalg.norm(v) == pytest.approx(np.pi)
-        assert abs(v @ axis) == pytest.approx(np.pi)
-
-
-def test_angles_about_x_then_y_then_z_of_the_world() -> None:
-    expected = Rotation.from_euler("xyz", TRIPLES).as_matrix()
-    np.testing.assert_allclose(euler_rotation(np.array(TRIPLES)), expected, atol=1e-15)
 
 
 # --- the course ---
@@ -50,7 +25,8 @@ def test_angles_about_x_then_y_then_z_of_the_world() -> None:
 def test_each_waypoint_has_its_own_orientation(kind: str) -> None:
     due = course(SPACE, 5, kind, orientation=TRIPLES)
     R = due.target(due.path.knots).rotation
-    np.testing.assert_allclose(R, euler_rotation(np.array(TRIPLES)), atol=1e-12)
+    about = [turn(Z, rz) @ turn(Y, ry) @ turn(X, rx) for rx, ry, rz in TRIPLES]
+    np.testing.assert_allclose(R, about, atol=1e-12)
     angles = [0.3, 2.0, 7.5, -1.0]  # full turns count
     due = course(POINTS, 5, kind, angle=angles)
     R = due.target(due.path.knots).rotation
