@@ -15,8 +15,8 @@ from eigassign.case import CaseFile, load
 from eigassign.mechanism.assembly.build import with_elements
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectories
+from eigassign.modal.adaptive.link_reduction import ReductionChoice
 from eigassign.modal.adaptive.mesh import MeshChoice, mesh_error
-from eigassign.modal.adaptive.reduction import ReductionChoice
 from eigassign.modal.model import Model
 from eigassign.study.build import build_model, build_trajectories, located
 from eigassign.study.planning import automatic_elements

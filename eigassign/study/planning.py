@@ -1,14 +1,10 @@
-"""What is expanded, about which point and why: the case's wishes with every "auto" settled.
+"""What is expanded and about which points: the case's choices, with every ``auto`` settled.
 
-What a case leaves to ``auto``: elements per link, order, expansion points along the trajectory.
-
-The accuracy asked for (``expansion.accuracy``) is shared between what is left to decide. A mesh
-left to auto gets half of it, the series the rest. Where the elements are given, nothing can be
-done about the mesh: the series then gets all, against exact solves of this very mesh. Reduced
-links may use a quarter, of the mesh's half if it has one. Everything is decided from estimates, and
-the reasons are kept as lines of text.
-
-Where what is left to ``auto`` is judged: poses of the trajectory at designs all over the box.
+The accuracy asked for (``expansion.accuracy``) is shared between what is left to ``auto``. Elements
+left to auto get half of it, the series the rest. Where the elements are given, nothing can be done
+about the mesh: the series then gets all, against exact solves of this very mesh. Reduced links may
+use a quarter, out of the mesh's half if it has one. Everything is decided from error estimates, at
+poses of the trajectory and designs all over their bounds; the reasons are kept as lines of text.
 """
 
 from __future__ import annotations
@@ -19,21 +15,24 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import hadamard
 
 from eigassign.case import CaseFile
 from eigassign.errors import AccuracyError, CaseError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.modal.adaptive.link_reduction import ReductionChoice, choose_reduction, few_of
 from eigassign.modal.adaptive.mesh import MeshChoice, choose_mesh
 from eigassign.modal.adaptive.order import ExpansionChoice, choose_expansion
-from eigassign.modal.adaptive.reduction import ReductionChoice, choose_reduction, few_of
 from eigassign.modal.exact.clusters import CLUSTER_GAP
 from eigassign.modal.model import Model
 
-# --- What is expanded, about which point and why: the case's wishes with every "auto" settled
-
 Floats = NDArray[np.float64]
-_SHOWN = 8
-_MANY = 500  # samples up to which every distance between two of them counts
+Ints = NDArray[np.intp]
+
+# --- The expansion of a case: point, design, order and modes
+
+SHOWN = 8  # values of a point that a note names
+MANY_SAMPLES = 500  # up to which the distance to every other sample counts for the most central
 
 
 @dataclass(frozen=True)
@@ -70,10 +69,8 @@ def plan_expansion(
     if isinstance(wanted, int):
         return Plan(q0, y0, wanted, chosen, tuple(note for note in notes if note))
     found = choose_order(file, model, trajectory, q0, y0, chosen)
-    if not np.array_equal(found.q0, q0):
-        notes[0] = f"expansion point: {shown_point(model.q_names, found.q0)}, the chart's first"
-    said = tuple(note for note in (*notes, *found.reasons) if note)
-    return Plan(found.q0, y0, found.order, chosen, said, found.more_q, found.cluster_gap)
+    all_notes = tuple(note for note in (*notes, *found.reasons) if note)
+    return Plan(q0, y0, found.order, chosen, all_notes, found.more_q, found.cluster_gap)
 
 
 def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[Floats, str]:
@@ -105,7 +102,7 @@ def central_sample(points: ArrayLike) -> int:
     rows = np.asarray(points, dtype=np.float64)
     if rows.shape[1] == 0:
         return len(rows) // 2
-    others = rows[:: 1 + len(rows) // _MANY]  # a very long trajectory is seen at every n-th sample
+    others = rows[:: 1 + len(rows) // MANY_SAMPLES]
     farthest = np.zeros(len(rows))
     for other in others:
         distance: Floats = np.square(rows - other).sum(axis=1)
@@ -128,13 +125,14 @@ def _y0(file: CaseFile, model: Model) -> tuple[Floats, str]:
 
 def _modes(file: CaseFile, override: Sequence[int] | None) -> tuple[tuple[int, ...], str]:
     """Modes to expand; that they hold those with a target is the case file's own rule."""
-    given = file.expansion.modes if override is None else override
-    if given != "auto":
-        return tuple(sorted({int(mode) for mode in given})), ""
-    targets = sorted({target.mode for target in file.targets})
-    if not targets:
-        return (1,), "expanded mode: 1, the lowest, for there is no target"
-    return tuple(targets), f"expanded modes: {', '.join(map(str, targets))}, those with a target"
+    if override is not None:
+        return tuple(sorted({int(mode) for mode in override})), ""
+    modes = wanted_modes(file)
+    if file.expansion.modes != "auto":
+        return modes, ""
+    if not file.targets:
+        return modes, "expanded mode: 1, the lowest, for there is no target"
+    return modes, f"expanded modes: {', '.join(map(str, modes))}, those with a target"
 
 
 def _check_modes(file: CaseFile, model: Model, modes: Sequence[int]) -> None:
@@ -167,39 +165,19 @@ def _outside(
 def shown_point(names: Sequence[str], values: Floats) -> str:
     """``"q1 = 1.817, q2 = 5.312"``; of many the first."""
     shown = [f"{n} = {v:.6g}" for n, v in zip(names, values, strict=True)]
-    rest = f" and {len(shown) - _SHOWN} more" if len(shown) > _SHOWN else ""
-    return (", ".join(shown[:_SHOWN]) or "none") + rest
+    rest = f" and {len(shown) - SHOWN} more" if len(shown) > SHOWN else ""
+    return (", ".join(shown[:SHOWN]) or "none") + rest
 
 
 def _wrong(file: CaseFile, key_path: str, message: str) -> CaseError:
     return CaseError((file.problem(key_path, message),))
 
 
-# --- What a case leaves to ``auto``: elements per link, order, expansion points along the traje
+# --- The accuracy asked for, shared between mesh, reduced links and series
 
 ACCURACY = 1e-3  # where the case asks for auto and names none
 MESH = 0.5  # where a number of elements is left to auto
 TRUNCATION = 0.25  # where links are reduced, of the mesh's share if it has one
-FEW, MANY = 200, 1000  # poses and designs that an order is chosen at, and confirmed at
-RANDOM = 600  # of those that it is confirmed at, beside corners of the box
-ADDED = 60  # of the worst of these that are added where it is not
-
-
-@dataclass(frozen=True)
-class OrderChoice:
-    """Order, expansion points q and which modes go together, with the reasons."""
-
-    order: int
-    q0: Floats  # (n_q,)
-    more_q: tuple[tuple[float, ...], ...]
-    cluster_gap: float  # relative, in λ
-    reasons: tuple[str, ...]
-
-
-def _highest(found: ExpansionChoice, x: Floats) -> Floats:
-    """The largest estimate of all modes at x (n, n_x)."""
-    n_q = len(found.expansions[0].q0)
-    return np.asarray(found.error_estimate(x[:, :n_q], x[:, n_q:]).max(axis=1))
 
 
 def asked_accuracy(file: CaseFile) -> float:
@@ -282,6 +260,24 @@ def require_little_truncation(file: CaseFile, model: Model, x: Floats) -> None:
         )
 
 
+# --- Order and expansion points left to auto
+
+FEW, MANY = 200, 1000  # poses at corners that an order is chosen at, and confirmed at: see below
+RANDOM = 600  # further poses and designs that it is confirmed at
+ATTEMPTS = 3  # confirmations before the choice at all that was looked at is taken
+
+
+@dataclass(frozen=True)
+class OrderChoice:
+    """Order, expansion points q and which modes go together, with the reasons."""
+
+    order: int
+    q0: Floats  # (n_q,)
+    more_q: tuple[tuple[float, ...], ...]
+    cluster_gap: float  # relative, in λ
+    reasons: tuple[str, ...]
+
+
 def choose_order(
     file: CaseFile,
     model: Model,
@@ -290,75 +286,59 @@ def choose_order(
     y0: Floats,
     modes: tuple[int, ...],
 ) -> OrderChoice:
-    """The lowest order, with further points only where one cannot do, from error estimates.
+    """Order and expansion points that meet the series' share of the accuracy.
 
-    Raises AccuracyError, naming the pose, where no order and number of points will do.
+    They are chosen at few poses and corners of the design's bounds, and confirmed at many more, at
+    random designs and at those that are worse than the worst of these. (Choosing at all of them at
+    once takes 2.5 times as long and chooses the same for the shipped cases at 1e-3, 1e-5 and 1e-7.)
+    Where the confirmation fails, they are chosen anew at all that was looked at. Raises
+    AccuracyError, naming the pose, where no order and number of points will do.
     """
     at_upper = corners(len(y0))
     few, many = (max(8, rows // (1 + len(at_upper))) for rows in (FEW, MANY))  # samples of each
     seen, every = (at_corners(file, trajectory, q0, y0, at_upper, each) for each in (few, many))
     require_little_truncation(file, model, seen.x)
     if len(y0):
-        every = every.with_rows(at_random(file, trajectory, q0, y0, RANDOM), np.arange(RANDOM))
+        every = every.joined(at_random(file, trajectory, q0, y0, RANDOM))
     accuracy, start = series_share(file), np.concatenate([q0, y0])
-
-    def choice(seen: JudgedAt, begun: ExpansionChoice | None) -> ExpansionChoice:
-        return choose_expansion(
-            model.pencil,
-            seen.x,
-            accuracy,
-            modes,
-            start=start,
-            place=seen.place,
-            begun=begun,
+    reasons: list[str] = []
+    for attempt in range(1 + ATTEMPTS):
+        found = choose_expansion(
+            model.pencil, seen.x, accuracy, modes, start=start, place=seen.place
         )
-
-    found, judged = _confirmed(choice, seen, every, accuracy, file)
-    first, *more = (part.q0 for part in found.expansions)
-    others = tuple(tuple(float(v) for v in q) for q in more)
-    reasons = (*found.reasons, *judged)
-    return OrderChoice(found.order, first, others, found.cluster_gap, reasons)
-
-
-def _confirmed(
-    choice: Callable[[JudgedAt, ExpansionChoice | None], ExpansionChoice],
-    seen: JudgedAt,
-    every: JudgedAt,
-    accuracy: float,
-    file: CaseFile,
-) -> tuple[ExpansionChoice, tuple[str, ...]]:
-    """The choice for ``seen`` that holds for ``every``, and what was found there.
-
-    Where it does not, the worst of these are seen too, and at last all of them.
-    """
-    found = choice(seen, None)
-    said: list[str] = []
-    for last in (False, False, True):
-        every, error = climbed(every, partial(_highest, found), file)
-        what = f"at {len(error)} poses and designs in all: error at most {error.max():.1e}"
-        beyond = np.flatnonzero(~(error <= accuracy))
-        if not len(beyond):
-            return found, (*said, what)
-        said.append(f"{what}, chosen anew")
-        worst = beyond[np.argsort(-error[beyond], kind="stable")[:ADDED]]
-        seen = seen.with_rows(every, np.arange(len(error)) if last else worst)
-        found = choice(seen, found)
-    return found, tuple(said)
+        reasons += found.reasons
+        if attempt == ATTEMPTS:
+            break
+        every, error = with_worse_designs(every, partial(_largest_estimate, found), file)
+        worst = float(error.max())
+        met = worst <= accuracy
+        line = f"at {len(error)} poses and designs in all: error at most {worst:.1e}"
+        reasons.append(line if met else f"{line}, chosen anew")
+        if met:
+            break
+        seen = every
+    _, *more = (part.q0 for part in found.expansions)
+    more_q = tuple(tuple(q.tolist()) for q in more)
+    return OrderChoice(found.order, q0, more_q, found.cluster_gap, tuple(reasons))
 
 
-# --- Where what is left to ``auto`` is judged: poses of the trajectory at designs all over the
+def _largest_estimate(found: ExpansionChoice, x: Floats) -> Floats:
+    """Of all modes at x (n, n_x), (n,)."""
+    n_q = len(found.expansions[0].q0)
+    return np.asarray(found.error_estimate(x[:, :n_q], x[:, n_q:]).max(axis=1))
 
-Ints = NDArray[np.intp]
+
+# --- Poses of the trajectory at designs all over their bounds
+
 ENDS = ((False,), (True,))  # all parameters at their lower bounds, all at their upper ones
 SAMPLES = 40  # along the trajectory, at each design that a mesh is judged at
 SEED = 20211
 CLIMBERS = 8  # poses and designs from which worse designs are looked for
-MASKS = (1, 2, 4, 8, 15, 7, 11, 13, 14, 3, 5, 6, 9, 10, 12)  # of the Walsh functions in 4 bits
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedAt:
-    """x (n, n_x), and which of the trajectory's samples each row is at."""
+class DesignSamples:
+    """Poses and designs x (n, n_x), and which of the trajectory's samples each row is at."""
 
     x: Floats
     samples: Ints
@@ -370,10 +350,10 @@ class JudgedAt:
             return "the expansion point"
         return self.trajectory.sample(int(self.samples[row]))
 
-    def with_rows(self, other: JudgedAt, rows: Ints) -> JudgedAt:
-        """Some rows of another one at the end."""
-        x, samples = np.vstack([self.x, other.x[rows]]), other.samples[rows]
-        return replace(self, x=x, samples=np.append(self.samples, samples))
+    def joined(self, other: DesignSamples) -> DesignSamples:
+        """With the rows of another at the end."""
+        x, samples = np.vstack([self.x, other.x]), np.append(self.samples, other.samples)
+        return replace(self, x=x, samples=samples)
 
 
 def at_corners(
@@ -383,60 +363,58 @@ def at_corners(
     y0: Floats,
     at_upper: ArrayLike = ENDS,
     samples: int = SAMPLES,
-) -> JudgedAt:
-    """At y0 and corners of the box, one for each row of ``at_upper`` (k, n_y or 1).
+) -> DesignSamples:
+    """At y0 and corners of the bounds, one for each row of ``at_upper`` (k, n_y or 1).
 
-    At up to so many ``samples`` each.
+    Each at up to so many ``samples`` of the trajectory.
     """
     lower, upper = _bounds(file)
     outer = np.where(np.asarray(at_upper, dtype=bool), upper, lower)
     designs = np.unique(np.vstack([y0, outer]), axis=0) if len(y0) else np.zeros((1, 0))
-    picked = np.zeros(1, dtype=np.intp) if trajectory is None else trajectory.spread(samples)
-    rows, which = np.tile(picked, len(designs)), np.repeat(np.arange(len(designs)), len(picked))
-    return _judged(trajectory, q0, rows, designs[which])
+    poses = np.zeros(1, dtype=np.intp) if trajectory is None else trajectory.spread(samples)
+    rows, which = np.tile(poses, len(designs)), np.repeat(np.arange(len(designs)), len(poses))
+    return _samples(trajectory, q0, rows, designs[which])
 
 
 def at_random(
     file: CaseFile, trajectory: Trajectories | None, q0: Floats, y0: Floats, count: int
-) -> JudgedAt:
-    """At random samples, half with designs anywhere in the box, half with corners of it."""
+) -> DesignSamples:
+    """At random samples, half with designs anywhere within the bounds, half with corners."""
     lower, upper = _bounds(file)
     random = np.random.default_rng(SEED)
     share = random.random((count, len(y0)))
     share[count // 2 :] = share[count // 2 :] > 0.5
     rows = random.integers(0, 1 if trajectory is None else len(trajectory.q), count)
-    return _judged(trajectory, q0, rows, lower + share * (upper - lower))
+    return _samples(trajectory, q0, rows, lower + share * (upper - lower))
 
 
-def climbed(
-    seen: JudgedAt, error: Callable[[Floats], Floats], file: CaseFile
-) -> tuple[JudgedAt, Floats]:
-    """``seen`` and its errors (n,), with designs like those of the largest errors but worse.
+def with_worse_designs(
+    seen: DesignSamples, error: Callable[[Floats], Floats], file: CaseFile
+) -> tuple[DesignSamples, Floats]:
+    """``seen`` with designs that are worse than its worst, and the ``error`` at all, (n,).
 
-    From these, parameter after parameter goes to the bound at which the error is larger, if it is.
+    From the `CLIMBERS` largest errors one parameter after the other goes to the bound at which the
+    error is larger, if it is.
     """
     errors = error(seen.x)
     top = np.argsort(-errors, kind="stable")[:CLIMBERS]
-    lower, upper = _bounds(file)
     x, most = seen.x[top], errors[top]
-    for j in range(len(lower)):
-        column = x.shape[1] - len(lower) + j
-        tried = np.repeat(x[None], 2, axis=0)
-        tried[0, :, column], tried[1, :, column] = lower[j], upper[j]
-        higher = error(tried.reshape(-1, x.shape[1])).reshape(2, -1)
-        best = higher.argmax(axis=0)
-        better = higher.max(axis=0) > most
-        x = np.where(better[:, None], tried[best, np.arange(len(x))], x)
-        most = np.maximum(most, higher.max(axis=0))
-    new = replace(
-        seen, x=np.vstack([seen.x, x]), samples=np.append(seen.samples, seen.samples[top])
-    )
-    return new, np.append(errors, most)
+    for column, ends in enumerate(
+        zip(*_bounds(file), strict=True), x.shape[1] - len(file.design.parameters)
+    ):
+        for end in ends:
+            moved = x.copy()
+            moved[:, column] = end
+            higher = error(moved)
+            better = higher > most
+            x[better], most[better] = moved[better], higher[better]
+    worse = replace(seen, x=x, samples=seen.samples[top])
+    return seen.joined(worse), np.append(errors, most)
 
 
-def _judged(trajectory: Trajectories | None, q0: Floats, rows: Ints, y: Floats) -> JudgedAt:
+def _samples(trajectory: Trajectories | None, q0: Floats, rows: Ints, y: Floats) -> DesignSamples:
     q = np.repeat(q0[None], len(rows), axis=0) if trajectory is None else trajectory.q[rows]
-    return JudgedAt(np.hstack([q, y]), rows, trajectory)
+    return DesignSamples(np.hstack([q, y]), rows, trajectory)
 
 
 def _bounds(file: CaseFile) -> tuple[Floats, Floats]:
@@ -447,11 +425,11 @@ def _bounds(file: CaseFile) -> tuple[Floats, Floats]:
 def corners(n: int) -> NDArray[np.bool_]:
     """Corners of a box in n parameters, (k, n), True at the upper bound: that is where series err.
 
-    All of up to 16; of more the Walsh functions w_j(r) = parity of r & `MASKS`_j, r = 0…15, in
-    which any two of 15 parameters take all four combinations, and all at their upper bounds.
+    All of up to 16. Of more, columns 15, 14, … 1 of the Hadamard matrix of order 16, in which any
+    two of 15 parameters take all four combinations and any three of the first eight all eight; and
+    all parameters at their upper bounds.
     """
     if n <= 4:
         return np.asarray((np.arange(2**n)[:, None] >> np.arange(n)) % 2 == 1)
-    shared = np.arange(16)[:, None] & np.array(MASKS)[np.arange(n) % len(MASKS)]
-    walsh = np.asarray(np.bitwise_count(shared) % 2 == 1)
-    return np.vstack([walsh, np.ones((1, n), dtype=bool)])
+    upper = hadamard(16)[:, 15 - np.arange(n) % 15] < 0
+    return np.vstack([upper, np.ones((1, n), dtype=bool)])

@@ -18,8 +18,8 @@ from eigassign.case import CaseFile
 from eigassign.mechanism.assembly.build import WholeLinks, with_elements, with_reduction
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.kinematics.travel_limits import resting_pose
+from eigassign.modal.adaptive.link_reduction import ReductionChoice
 from eigassign.modal.adaptive.mesh import MeshChoice
-from eigassign.modal.adaptive.reduction import ReductionChoice
 from eigassign.modal.model import Model
 from eigassign.study.build import build_links, build_model, build_trajectories
 from eigassign.study.planning import (

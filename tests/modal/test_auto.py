@@ -13,11 +13,10 @@ from eigassign.modal.adaptive.order import (
     FINER,
     MAX_POINTS,
     TOLERABLE,
-    central,
     choose_expansion,
-    go_on,
-    reduce_adaptively,
+    more_points_help,
 )
+from eigassign.modal.adaptive.reduced_model import central, reduce_adaptively
 from eigassign.modal.expansion import expand, radius_share
 from eigassign.modal.model import Model
 
@@ -116,19 +115,6 @@ def test_many_points_do_while_more_of_them_help(x):
     assert np.abs(f / exact(model, x, (1,)) - 1.0).max() <= 2e-6
 
 
-def test_what_was_begun_at_fewer_samples_goes_on(x):
-    """The order and the points found there, and some more: nothing else is tried."""
-    model = build({"upper": 4, "fore": 3})
-    x = np.hstack([x[:, :2], np.full((len(x), 2), 0.125)])
-    begun = choose_expansion(model.pencil, x[::8], 1e-5, orders=(3,))
-    chosen = choose_expansion(model.pencil, x, 1e-5, begun=begun)
-    assert chosen.order == 3
-    had = {part.q0.tobytes() for part in begun.expansions}
-    assert had < {part.q0.tobytes() for part in chosen.expansions}
-    assert chosen.estimate.max() <= 1e-5
-    assert len(chosen.reasons) == 2
-
-
 def test_neighbours_that_do_not_help_are_soon_left_alone(x):
     model = build({"upper": 4, "fore": 3})
     chosen = choose_expansion(model.pencil, x, 1e-6, (1,), orders=(2, 3, 4, 5, 6, 8, 12, 14))
@@ -137,19 +123,19 @@ def test_neighbours_that_do_not_help_are_soon_left_alone(x):
 
 
 @pytest.mark.parametrize(
-    ("highest", "more"),
+    ("errors", "more"),
     [
-        ([1.0] * 7, True),  # not yet looked at
-        ([1.0] * 4 + [0.1] * 4, False),  # halved twice more it would be 1e-3
-        ([1.0] * 4 + [0.005] * 4, True),
+        ([1.0] * 7, True),  # too few to tell
+        ([1.0] * 4 + [0.5] * 4, False),
+        ([1.0] * 4 + [0.4] * 4, True),
         ([np.inf] * 8, False),
         ([np.inf] * 7 + [0.005], True),
-        ([1e-9], False),
-        ([0.01] * 32, False),
+        ([1.0] * 16 + [0.01] * 15, True),
+        ([1.0] * 16 + [0.01] * 16, False),  # no more are allowed
     ],
 )
-def test_more_points_are_added_while_they_promise_enough(highest, more):
-    assert go_on(highest, 1e-6) is more
+def test_points_are_added_while_twice_as_many_halve_the_error(errors, more):
+    assert more_points_help(errors) is more
 
 
 def test_an_order_that_cannot_do_it_is_refused_at_the_worst_sample(x):

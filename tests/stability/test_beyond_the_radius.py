@@ -7,7 +7,8 @@ import pytest
 from stress import answered, case, judged
 
 from eigassign.errors import AccuracyError
-from eigassign.modal.adaptive.order import choose_expansion, reduce_adaptively
+from eigassign.modal.adaptive.order import choose_expansion
+from eigassign.modal.adaptive.reduced_model import reduce_adaptively
 from eigassign.modal.expansion import expand, radius_share
 
 ELBOW = np.deg2rad(np.linspace(20.0, 170.0, 61))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import SHIPPED, scene_of
 
-from eigassign.study.planning import at_corners, at_random, climbed, corners
+from eigassign.study.planning import at_corners, at_random, corners, with_worse_designs
 from eigassign.study.scene import Scene
 
 
@@ -47,7 +47,7 @@ def test_the_worst_corner_is_climbed_to_from_a_bad_one(scene: Scene) -> None:
     def error(x: np.ndarray) -> np.ndarray:
         return 1.0 + x[:, 3] - x[:, 2]
 
-    more, errors = climbed(seen, error, scene.file)
+    more, errors = with_worse_designs(seen, error, scene.file)
     assert len(more.x) == len(errors) == len(more.samples) > len(seen.x)
     np.testing.assert_array_equal(errors[: len(seen.x)], error(seen.x))
     np.testing.assert_allclose(errors.max(), 1.0 + high[1] - low[0])
@@ -58,6 +58,6 @@ def test_rows_of_another_keep_their_samples(scene: Scene, tmp_path: Path) -> Non
     full = scene.expansions.full
     one = at_corners(scene.file, scene.trajectory, full.q0, full.y0, samples=4)
     two = at_random(scene.file, scene.trajectory, full.q0, full.y0, 10)
-    both = one.with_rows(two, np.array([7, 2]))
-    np.testing.assert_array_equal(both.x[-2:], two.x[[7, 2]])
-    assert both.place(len(both.x) - 1) == two.place(2)
+    both = one.joined(two)
+    np.testing.assert_array_equal(both.x, np.vstack([one.x, two.x]))
+    assert both.place(len(both.x) - 1) == two.place(9)

@@ -2,7 +2,8 @@
 
 Reading order:
 
-    mesh       elements of each link, judged by a twice finer mesh
-    reduction  the frequency up to which links keep their fixed-interface modes
-    order      order and expansion points of the Taylor polynomial, judged by its error estimate
+    mesh            elements of each link, judged by a twice finer mesh
+    link_reduction  the frequency up to which links keep their fixed-interface modes
+    reduced_model   the smallest reduced model that meets an accuracy
+    order           order and expansion points of the Taylor polynomial, judged by its estimate
 """
