@@ -40,6 +40,7 @@ class CaseOptions:
     cache_dir: str | None = None
     use_cache: bool = True
     force: bool = False
+    figures: tuple[str, ...] = ("png",)
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ def _row(path: str, options: CaseOptions, **fields: object) -> Row:
 
 def _optimised(path: str, options: CaseOptions) -> Row:
     cache_dir = Path(options.cache_dir) if options.cache_dir else None
-    how = Options(Path(options.out), cache_dir, options.use_cache, options.force)
+    how = Options(Path(options.out), cache_dir, options.use_cache, options.force, options.figures)
     outcome = optimize(Path(path), how)
     error = outcome.results.error
     return {

@@ -38,6 +38,22 @@ class Number(click.FloatRange):
         return number
 
 
+FORMATS = ("png", "svg", "pdf")  # those of output.figures, which is not imported for --help
+
+
+def figure_formats(ctx: click.Context, param: click.Parameter, value: str) -> tuple[str, ...]:
+    """``"png,svg"`` → ``("png", "svg")``, ``"none"`` → ``()``; else a usage error."""
+    names = tuple(dict.fromkeys(name.strip().lower() for name in value.split(",")))
+    if names == ("none",):
+        return ()
+    for name in names:
+        if name not in FORMATS:
+            raise click.BadParameter(
+                f"{name!r} is not one of {', '.join(FORMATS)} (or none, alone)."
+            )
+    return names
+
+
 PATH = click.Path(path_type=Path)
 POSITIVE = Number(0.0, min_open=True)
 COUNT = Number(1.0)
@@ -58,8 +74,17 @@ caching = several(
     click.option("--no-cache", is_flag=True, help="Neither read nor write the cache."), cache_dir
 )
 force = click.option("--force", is_flag=True, help="Move what is in the way aside, whatever it is.")
+figures = click.option(
+    "--figures",
+    callback=figure_formats,
+    metavar="FORMATS",
+    default="png",
+    show_default=True,
+    help="Formats of the figures: png, svg, pdf, a comma between; or none.",
+)
 running = several(
     click.option("--out", type=PATH, help="Run folder (default: results/<case>)."),
     caching,
     force,
+    figures,
 )

@@ -70,6 +70,7 @@ def _described(name: str, answer: CheckAnswer) -> str:
 @click.option("--draw", is_flag=True, help="Draw their shapes, in results/<case>_modes.")
 @click.option("--out", type=arguments.PATH, help="Draw their shapes, in this folder.")
 @arguments.force
+@arguments.figures
 @arguments.json
 @arguments.common
 def modes(
@@ -87,7 +88,9 @@ def modes(
     with reporting(how) as tell:
         at = point(case, q, y)
         if draw or how["out"] is not None:
-            answer, folder = queries.draw_modes(case, *at, count, how["out"], how["force"])
+            answer, folder = queries.draw_modes(
+                case, *at, count, how["out"], how["force"], how["figures"]
+            )
         else:
             answer = queries.modes(case, *at, count)
         if as_json and folder is not None:

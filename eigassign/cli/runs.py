@@ -75,6 +75,7 @@ def _options(how: Mapping[str, Any], tell: Reporter) -> Options:
         cache_dir=how["cache_dir"],
         use_cache=not how["no_cache"],
         force=how.get("force", False),
+        figures=how.get("figures", ()),
         progress=tell.stage,
     )
 
@@ -134,6 +135,7 @@ def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
 @click.option("--evaluations", type=arguments.COUNT, help="How many evaluations are wanted.")
 @click.option("--out", type=arguments.PATH, help="Folder (default: results/<case>_chart).")
 @arguments.force
+@arguments.figures
 @arguments.json
 @arguments.common
 def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:

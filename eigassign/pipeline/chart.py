@@ -48,7 +48,7 @@ def chart(
     with new_run_folder(case.file, options.out, options.force) as folder:
         made = chart_case(case, options, QUICK if quick else _THOROUGH, wish or Wish())
         options.progress("writing the chart")
-        write_chart(made, folder.hidden)
+        write_chart(made, folder.hidden, options.figures)
         (folder.hidden / "case.yaml").write_text(case.file.resolved(), encoding="utf-8")
     return Charted(folder.path, made)
 

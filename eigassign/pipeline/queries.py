@@ -89,6 +89,7 @@ def draw_modes(
     count: int = 3,
     out: Path | None = None,
     force: bool = False,
+    formats: Sequence[str] = ("png",),
 ) -> tuple[ModesAnswer, Path]:
     """`modes`, and a folder with a figure of each: ``out``, or results/<case>_modes.
 
@@ -100,7 +101,7 @@ def draw_modes(
     with new_run_folder(case.file, target, force) as folder:
         with case.located():
             pictures = drawing.draw_modes(case.file, case.model(), at_q, at_y, count)
-        report.write_modes(pictures, folder.hidden)
+        report.write_modes(pictures, folder.hidden, formats)
         (folder.hidden / "case.yaml").write_text(case.file.resolved(), encoding="utf-8")
     return _answer(case, at_q, at_y, np.array(pictures.frequencies_hz)), target
 

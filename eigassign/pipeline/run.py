@@ -49,6 +49,7 @@ class Options:
     cache_dir: Path | None = None  # the user's cache folder if None
     use_cache: bool = True
     force: bool = False  # a folder that another case wrote is moved aside
+    figures: tuple[str, ...] = ("png",)  # of png, svg and pdf; none are drawn if empty
     progress: Callable[[str], None] = field(default=_silent)  # told one line as each stage begins
 
 
@@ -164,7 +165,7 @@ def optimize(path: str | Path, options: Options = DEFAULT) -> Outcome:
     with new_run_folder(case.file, options.out, options.force) as folder:
         results = solve_case(case, options).results
         options.progress("writing the report")
-        folder.write(results)
+        folder.write(results, options.figures)
     return _outcome(folder, results, watch)
 
 
@@ -189,7 +190,7 @@ def expand_case(
             scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene)))
         results = collect_results(scene, studies, None, watch.timing_s)
         options.progress("writing the report")
-        folder.write(results, coefficient_files(scene, linear))
+        folder.write(results, options.figures, coefficient_files(scene, linear))
     return _outcome(folder, results, watch)
 
 

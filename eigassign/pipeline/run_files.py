@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,9 +23,14 @@ class RunFolder:
     hidden: Path
     file: CaseFile
 
-    def write(self, results: RunResults, extra: Mapping[str, bytes] | None = None) -> None:
-        """Results, report and figures; the resolved case; the log; ``extra`` files by name."""
-        report.write_run(results, self.hidden)
+    def write(
+        self,
+        results: RunResults,
+        formats: Sequence[str],
+        extra: Mapping[str, bytes] | None = None,
+    ) -> None:
+        """Results, report, figures in these formats; the case; the log; ``extra`` by name."""
+        report.write_run(results, self.hidden, formats)
         texts = {"case.yaml": self.file.resolved(), "log.txt": log_text(results)}
         encoded = {name: text.encode() for name, text in texts.items()}
         for name, data in {**encoded, **(extra or {})}.items():

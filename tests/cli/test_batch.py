@@ -227,3 +227,10 @@ def test_workers_end_when_their_parent_is_killed() -> None:
     done = python("parent.py")  # returns once every holder of its stdout, the worker too, is gone
     assert done.returncode == -signal.SIGKILL
     assert done.stdout.strip().isdigit()
+
+
+def test_a_batch_writes_figures_in_the_formats_asked_for() -> None:
+    write("a.yaml")
+    assert main(["batch", "a.yaml", "--jobs", "1", "--figures", "none"]) == 0
+    assert Path("results/a/report.html").exists()
+    assert not Path("results/a/figures").exists()

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import TWO_LINK
+from commands import TWO_LINK, python
 from wrong_inputs import GOOD
 
 from eigassign import __version__
-from eigassign.cli import main
+from eigassign.cli import arguments, main
 from eigassign.cli.reporter import dumps
 from eigassign.errors import UsageError
+from eigassign.output.figures import style
 from eigassign.pipeline.queries import split
 
 # Belotti et al. 2021, recomputed with an independent frame program (same mesh)
@@ -280,3 +281,33 @@ def test_errors_of_the_python_face_are_those_of_the_command_line() -> None:
 
     with pytest.raises(UsageError, match="no such case file"):
         ea.load_case("gone.yaml")
+
+
+def test_figures_are_written_in_every_format_asked_for(capsys: Captured) -> None:
+    draw = ("modes", TWO_LINK, "--count", 1, "--out", "shapes", "--figures")
+    answer(capsys, *draw, "svg, PDF")
+    assert sorted(p.name for p in Path("shapes/figures").iterdir()) == ["mode_1.pdf", "mode_1.svg"]
+    answer(capsys, *draw, "none")
+    assert not Path("shapes/figures").exists()
+    assert Path("shapes/modes.json").exists()
+    assert arguments.FORMATS == style.FORMATS
+
+
+@pytest.mark.parametrize("formats", ["gif", "png,none", "", "png,,svg"])
+def test_unknown_formats_of_figures_are_named(capsys: Captured, formats: str) -> None:
+    assert main(["optimize", "good.yaml", "--figures", formats]) == 2
+    assert "is not one of png, svg, pdf (or none, alone)" in capsys.readouterr().err
+    assert not Path("results").exists()
+
+
+def test_a_run_without_figures_does_not_load_matplotlib() -> None:
+    script = (
+        "import sys; from eigassign.cli import main\n"
+        "assert main(['optimize', 'good.yaml', '--figures', 'none']) == 0\n"
+        "assert 'matplotlib' not in sys.modules\n"
+    )
+    done = python("-c", script)
+    assert done.returncode == 0, done.stderr
+    left = {path.name for path in Path("results/good").iterdir()}
+    assert {"results.json", "report.html"} <= left
+    assert "figures" not in left
