@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eigassign._version import __version__
-from eigassign.chart.results import Chart
 from eigassign.output.figures.modes import mode_figures
 from eigassign.output.figures.run import run_figures
 from eigassign.output.figures.style import FigurePlan, render
@@ -25,6 +24,8 @@ from eigassign.study.results import ErrorSummary, ModePictures, RunResults
 
 if TYPE_CHECKING:
     from jinja2 import Template
+
+    from eigassign.chart.results import Chart
 
 # --- The page
 

@@ -110,8 +110,14 @@ def render(plans: Sequence[FigurePlan], formats: Sequence[str] = FORMATS[:1]) ->
 
 def encoded(figure: Figure, kind: str) -> bytes:
     """The figure as a file of one of `FORMATS`, without date: the same bytes every time."""
-    data = io.BytesIO()
-    figure.savefig(data, format=kind, metadata=_METADATA[kind])
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    data, metadata = io.BytesIO(), _METADATA[kind]
+    if kind == "png":  # savefig draws twice where it has a layout to settle
+        canvas: Any = FigureCanvasAgg(figure)
+        canvas.print_png(data, metadata=metadata)
+    else:
+        figure.savefig(data, format=kind, metadata=metadata)
     return data.getvalue()
 
 
