@@ -1,58 +1,63 @@
-"""Time to a design against the exact objective it reaches: programs on expansions, and searches.
+"""Ways to a design: time against the exact objective that each reaches.
 
-The assignment that ways to a design are charted on: exact objective, slopes and limits.
+    program on the expansion       `optimize`'s own: expand, linearise, one quadratic program
+    program on a reduced model     the same, linearised on a reduced model
+    programs in a row              linearised anew at each other's optimum, until the design stays
+    SLSQP, differential evolution  SciPy's searches on exact eigenvalues
 
-Exact eigenvalues with their analytic derivatives over the design parameters.
+The objective J is that of eqs. (13)–(14): the weighted mean square of the relative error in λ. Its
+slope for SLSQP is that of the exact eigenvalues, without a further eigensolve:
 
-    ∂λ/∂y = φᵀ (∂K/∂y − λ ∂M/∂y) φ,   φᵀ M φ = 1,
-
-with ∂K = Σ_j K_j ∂θ_j: no further eigensolve. The coefficient functions θ are differentiated by
-central differences of θ alone, which is cheap and accurate to about 1e-10; of parameters without
-room the derivatives are left at 0.
+    ∂λ/∂y = φᵀ (∂K/∂y − λ ∂M/∂y) φ,   φᵀ M φ = 1,   ∂K/∂y = Σ_j K_j ∂θ_j/∂y
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import Bounds, LinearConstraint, differential_evolution, minimize
 
 from eigassign.assignment import (
     Assignment,
-    Bounds,
     Goal,
-    LinearConstraint,
     LinearModel,
     hz_from_lam,
     lam_from_hz,
     relative_error,
     solve_assignment,
 )
+from eigassign.assignment import Bounds as DesignBounds
 from eigassign.chart.effort import Effort, suited
 from eigassign.chart.methods import points_along, reduced_model, solves_per_point
+from eigassign.chart.question import SEED
 from eigassign.chart.results import DesignRun, Timing, excess_over
-from eigassign.chart.search import Limits, Watched, by_evolution, by_gradient
 from eigassign.chart.timing import measure
 from eigassign.errors import EigassignError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.solver import modes_at
 from eigassign.modal.expansion import expand
-from eigassign.study.assignment import Wanted, assign_design, target_frequencies, time_weights
+from eigassign.study.assignment import (
+    Wanted,
+    assign_design,
+    linear_constraints,
+    target_frequencies,
+    time_weights,
+)
 from eigassign.study.scene import Expansions, Scene
 
-# --- Time to a design against the exact objective it reaches: programs on expansions, and searc
-
 Floats = NDArray[np.float64]
-Search = Callable[[Watched, Floats, Limits], None]
 ROUNDS = 12  # programs in a row at most
 STILL = 1e-7  # of the box: a design that moves less has arrived
 CHARTED_ONLY = "charted only"  # `optimize` solves one program, on the expansion
-PRECISE_STEP = 1e-4  # of central differences of reduced models, relative to the box
+REDUCED_STEP = 1e-4  # of central differences of reduced models, relative to the box
+THETA_STEP = 1e-5  # of central differences of θ, relative to the box: right to about 1e-10
 
 
 def chart_designs(
@@ -63,16 +68,16 @@ def chart_designs(
     if not scene.file.targets or not len(lower) or not np.isfinite(upper - lower).all():
         return (), ()
     effort = suited(effort, scene.model.n_dof)
-    task, runs, notes = task_of(scene, effort, solve_s), [], []
-    if len(task.rows) < len(scene.path.time_s):
+    task, runs, notes = design_task(scene, effort, solve_s), [], []
+    if len(task.q) < len(scene.path.q):
         notes.append(
-            f"designs are charted on {len(task.rows)} of {len(scene.path.time_s)} samples of the "
+            f"designs are charted on {len(task.q)} of {len(scene.path.q)} samples of the "
             "trajectory, for an exact solve takes long"
         )
-    for name, make in _ways(task, effort, solve_s):
+    for name, run in _ways(task, effort, solve_s):
         progress(f"designing by {name}")
         try:
-            runs.append(make())
+            runs.append(run(name))
         except EigassignError as error:
             notes.append(f"no design by {name}: {error}")
     best = min((run.objective for run in runs), default=0.0)
@@ -80,188 +85,32 @@ def chart_designs(
 
 
 def _ways(
-    task: Task, effort: Effort, solve_s: float
-) -> Iterator[tuple[str, Callable[[], DesignRun]]]:
-    yield "program on the expansion", partial(_one_shot, task, effort)
-    for m, count, guard in ((2, 1, False), (2, 3, True)):
-        if count > max(effort.expansion_points):
-            continue
-        for rounds, kind in ((1, "program"), (ROUNDS, "programs in a row")):
-            name = f"{kind} on reduced m = {m}, {count} point{'s' if count > 1 else ''}"
-            yield name, partial(_on_reduced, task, effort, name, (m, count, guard), rounds)
-    most = min(effort.objectives, max(1, int(effort.searched_s / (len(task.rows) * solve_s))))
-    yield from _searches(task, most)
+    task: DesignTask, effort: Effort, solve_s: float
+) -> Iterator[tuple[str, Callable[[str], DesignRun]]]:
+    yield "program on the expansion", partial(_on_expansion, task, effort)
+    for count, guard in ((1, False), (3, True)):
+        if count <= max(effort.expansion_points):
+            where = f"reduced m = 2, {count} point{'s' if count > 1 else ''}"
+            reduced = partial(_on_reduced, task, effort, 2, count, guard)
+            yield f"program on {where}", partial(reduced, 1)
+            yield f"programs in a row on {where}", partial(reduced, ROUNDS)
+    most = min(effort.objectives, max(1, int(effort.searched_s / (len(task.q) * solve_s))))
+    yield "SLSQP, analytic gradient", partial(_search, task, most, by_slsqp, True)
+    yield "SLSQP, finite differences", partial(_search, task, most, by_slsqp, False)
+    yield "differential evolution", partial(_search, task, most, by_evolution, False)
 
 
-def _searches(task: Task, most: int) -> Iterator[tuple[str, Callable[[], DesignRun]]]:
-    ways: dict[str, Search] = {
-        "SLSQP, analytic gradient": partial(by_gradient, analytic=True),
-        "SLSQP, finite differences": partial(by_gradient, analytic=False),
-        "differential evolution": by_evolution,
-    }
-    for name, search in ways.items():
-        slopes = name == "SLSQP, analytic gradient"
-        yield name, partial(_search, task, name, most, search, slopes)
-
-
-def _exact(task: Task, y: Floats) -> Floats:
-    """λ (n_t, highest mode) at one design."""
-    hz = task.scene.model.frequencies(task.q, y, max(task.modes))
-    return (2.0 * np.pi * hz) ** 2
-
-
-def _run(
-    task: Task,
-    name: str,
-    ours: bool,
-    parameters: dict[str, object],
-    spent: Timing,
-    solves: int,
-    y: Floats,
-    trace: tuple[tuple[float, float], ...] = (),
-    note: str = "",
-) -> DesignRun:
-    lam = _exact(task, y)
-    worst, square = 0.0, 0.0
-    for target, own in zip(task.scene.file.targets, task.wanted, strict=True):
-        hz, weights = hz_from_lam(lam[own.rows, target.mode - 1]), task.weights[own.rows]
-        off = relative_error(hz, own.hz, weights)
-        worst = max(worst, off.max_relative)
-        square += target.weight * weights.sum() / task.total_s * off.rms_relative**2
-    value = task.objective(lam)
-    return DesignRun(
-        name, ours, parameters, spent, solves, tuple(y.tolist()), value, worst, square**0.5, 0.0,
-        trace, note,
-    )  # fmt: skip
-
-
-def _one_shot(task: Task, effort: Effort) -> DesignRun:
-    """`optimize`'s own way: expand, linearise, one quadratic program."""
-    scene, full = task.scene, task.scene.expansions.full
-    order = scene.expansions.order
-    point = (scene.model.pencil, full.q0, full.y0, full.modes)
-
-    def design() -> Assignment:
-        linear = expand(*point, order, linear_in_y=True)
-        made = Expansions(full, linear, order, order)
-        return assign_design(replace(scene, expansions=made, trajectory=task.path), task.wanted)
-
-    found, spent = measure(design, effort.patience)
-    parameters: dict[str, object] = {"order": order, "q0": full.q0, "y0": full.y0}
-    return _run(task, "program on the expansion", True, parameters, spent, 1, found.y)
-
-
-def _on_reduced(
-    task: Task, effort: Effort, name: str, kind: tuple[int, int, bool], rounds: int
-) -> DesignRun:
-    """Programs linearised anew at each other's optimum, all on one reduced model."""
-    scene, (m, count, guard) = task.scene, kind
-    q, y = points_along(scene, count)
-
-    def design() -> tuple[Floats, int]:
-        made = reduced_model(scene, m, q, y, guard)
-
-        def lam(at: Floats) -> Floats:
-            hz = made.frequencies(task.q, at)
-            return (2.0 * np.pi * hz) ** 2
-
-        return _programs(task, lam, list(made.modes), rounds)
-
-    (found, programs), spent = measure(design, effort.patience)
-    parameters: dict[str, object] = {
-        "half_order": m, "q": q, "y": y, "guard": guard, "programs": programs,
-    }  # fmt: skip
-    solves = len(q) * solves_per_point(scene, m, guard)
-    return _run(task, name, True, parameters, spent, solves, found, note=CHARTED_ONLY)
-
-
-def _programs(
-    task: Task, lam: Callable[[Floats], Floats], columns: list[int], rounds: int
-) -> tuple[Floats, int]:
-    """Gauss-Newton: the quadratic program of the model linearised at y, until y stays."""
-    lower, width = task.box
-    y = task.scene.expansions.full.y0
-    bounds, constraints, names = limits_of(task.scene)
-    done, moved = 0, np.inf
-    while done < rounds and moved >= STILL:
-        l0, slope = _linearised(lam, y, width)
-        goals = [
-            Goal(LinearModel(l0[own.rows, k], slope[own.rows, k]), own.hz, target.weight, own.rows)
-            for target, own in zip(task.scene.file.targets, task.wanted, strict=True)
-            for k in [columns.index(target.mode)]
-        ]
-        found = solve_assignment(
-            goals, task.weights, y, np.clip(y, *task.scene.bounds), bounds, constraints, names
-        )
-        moved = float((np.abs(found.y - y) / np.where(width > 0.0, width, 1.0)).max())
-        y, done = found.y, done + 1
-    return np.clip(y, lower, lower + width), done
-
-
-def _linearised(lam: Callable[[Floats], Floats], y: Floats, width: Floats) -> tuple[Floats, Floats]:
-    """λ (n_t, n_modes) and ∂λ/∂y (n_t, n_modes, n_y) by central differences."""
-    l0 = lam(y)
-    slope = np.zeros((*l0.shape, len(y)))
-    for j in np.flatnonzero(width > 0.0):
-        step = np.zeros(len(y))
-        step[j] = PRECISE_STEP * width[j]
-        slope[:, :, j] = (lam(y + step) - lam(y - step)) / (2.0 * step[j])
-    return l0, slope
-
-
-def _search(task: Task, name: str, most: int, search: Search, slopes: bool) -> DesignRun:
-    """A search on exact eigenvalues, run once: its trace says how it went."""
-    lower, width = task.box
-    limits = _unit_limits(task)
-    count = max(task.modes)
-
-    def objective(v: Floats) -> tuple[float, Floats | None]:
-        y = lower + width * v
-        if not slopes:
-            return task.objective(_exact(task, y)), None
-        x = task.scene.model.x(task.q, y)
-        lam, rates = eigenvalue_slopes(task.scene.model.pencil, x, count, width)
-        return task.objective(lam), task.slope(lam, rates) * width
-
-    start = np.clip((task.scene.initial - lower) / np.where(width > 0.0, width, 1.0), 0.0, 1.0)
-    watched = Watched(objective, limits.met, most)
-    begun = perf_counter()
-    search(watched, start, limits)
-    seconds = perf_counter() - begun
-    spent = Timing(seconds, seconds, seconds, 0)
-    y = lower + width * (start if watched.design is None else watched.design)
-    stopped = "stopped: no evaluation left" if watched.calls >= most else ""
-    parameters: dict[str, object] = {"evaluations": watched.calls, "most": most}
-    return _run(
-        task, name, False, parameters, spent, watched.calls * len(task.q), y,
-        tuple(watched.trace), stopped,
-    )  # fmt: skip
-
-
-def _unit_limits(task: Task) -> Limits:
-    """The case's linear constraints over v, y = lower + width v."""
-    lower, width = task.box
-    _, constraints, _ = limits_of(task.scene)
-    C = np.array([c.coefficients for c in constraints]).reshape(len(constraints), len(lower))
-    base = C @ lower
-    return Limits(
-        C * width,
-        np.array([c.lower for c in constraints]) - base,
-        np.array([c.upper for c in constraints]) - base,
-    )
-
-
-# --- The assignment that ways to a design are charted on: exact objective, slopes and limits
+# --- The assignment that all are put
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class DesignTask:
     """The assignment of one case on (perhaps thinned) samples of its trajectory."""
 
     scene: Scene
     path: Trajectories  # with these samples only
     wanted: tuple[Wanted, ...]  # at them
-    rows: NDArray[np.intp]
+    rows: NDArray[np.intp]  # which samples of the whole trajectory these are
 
     @property
     def q(self) -> Floats:
@@ -280,15 +129,19 @@ class Task:
         return float(sum(t.weight * self.weights[own.rows].sum() for t, own in pairs))
 
     @property
-    def modes(self) -> tuple[int, ...]:
-        """Of the targets, in their order."""
-        return tuple(target.mode for target in self.scene.file.targets)
+    def count(self) -> int:
+        """The highest mode with a target."""
+        return max(target.mode for target in self.scene.file.targets)
 
     @property
     def box(self) -> tuple[Floats, Floats]:
         """Lower bound and width of y."""
         lower, upper = self.scene.bounds
         return lower, upper - lower
+
+    def exact_lam(self, y: Floats) -> Floats:
+        """λ (n_t, highest mode) at one design."""
+        return lam_from_hz(self.scene.model.frequencies(self.q, y, self.count))
 
     def objective(self, lam: Floats) -> float:
         """J, the weighted mean square of the relative error in λ; lam (n_t, highest mode)."""
@@ -307,52 +160,250 @@ class Task:
             value += 2.0 * target.weight / self.total_s * push @ slopes[own.rows, k]
         return value
 
-
-def task_of(scene: Scene, effort: Effort, solve_s: float) -> Task:
-    """All samples, or so few that one exact objective takes about a fortieth of a search."""
-    affordable = max(5, int(effort.searched_s / 40.0 / solve_s))
-    rows = scene.path.spread(affordable)
-    path = scene.path.chosen(rows)
-    return Task(scene, path, target_frequencies(scene.file, path), rows)
-
-
-def limits_of(scene: Scene) -> tuple[Bounds, list[LinearConstraint], tuple[str, ...]]:
-    """Bounds, linear constraints and names of the design parameters, as programs want them."""
-    names = tuple(scene.file.design.parameters)
-    constraints = [
-        LinearConstraint(
-            name,
-            np.array([c.terms.get(parameter, 0.0) for parameter in names]),
-            -np.inf if c.min is None else c.min,
-            np.inf if c.max is None else c.max,
+    def reached(self, name: str, spent: Timing, solves: int, y: Floats, **more: Any) -> DesignRun:
+        """What a way to the design y has reached, by exact solves."""
+        lam = self.exact_lam(y)
+        worst, square = 0.0, 0.0
+        for target, own in zip(self.scene.file.targets, self.wanted, strict=True):
+            hz, weights = hz_from_lam(lam[own.rows, target.mode - 1]), self.weights[own.rows]
+            off = relative_error(hz, own.hz, weights)
+            worst = max(worst, off.max_relative)
+            square += target.weight * weights.sum() / self.total_s * off.rms_relative**2
+        return DesignRun(
+            method=name,
+            seconds=spent,
+            solves=solves,
+            design=tuple(y.tolist()),
+            objective=self.objective(lam),
+            max_relative=worst,
+            rms_relative=square**0.5,
+            excess=0.0,
+            **more,
         )
-        for name, c in scene.file.design.constraints.items()
-    ]
-    return Bounds(*scene.bounds), constraints, names
 
 
-# --- Exact eigenvalues with their analytic derivatives over the design parameters
+def design_task(scene: Scene, effort: Effort, solve_s: float) -> DesignTask:
+    """All samples, or so few that one exact objective takes about a fortieth of a search."""
+    rows = scene.path.spread(max(5, int(effort.searched_s / 40.0 / solve_s)))
+    path = scene.path.chosen(rows)
+    return DesignTask(scene, path, target_frequencies(scene.file, path), rows)
 
-STEP = 1e-5  # of a central difference, relative to a parameter's range
+
+# --- Quadratic programs on models of λ
 
 
-def theta_slopes(pencil: Pencil, x: Floats, ranges: Floats) -> Floats:
-    """∂θ/∂y (n_y, n_theta, n) at samples x (n, n_x); ``ranges`` (n_y,) set the steps."""
-    slopes = []
-    for j, size in enumerate(ranges):
-        if size == 0.0:  # a parameter that is kept
-            slopes.append(np.zeros((pencil.n_theta, len(x))))
-            continue
-        step = np.zeros(x.shape[1])
-        step[pencil.n_q + j] = STEP * size
-        slopes.append((pencil.theta(x + step) - pencil.theta(x - step)) / (2.0 * STEP * size))
-    return np.array(slopes)
+def _on_expansion(task: DesignTask, effort: Effort, name: str) -> DesignRun:
+    scene, full, order = task.scene, task.scene.expansions.full, task.scene.expansions.order
+
+    def design() -> Assignment:
+        linear = expand(scene.model.pencil, full.q0, full.y0, full.modes, order, linear_in_y=True)
+        made = Expansions(full, linear, order, order)
+        return assign_design(replace(scene, expansions=made, trajectory=task.path), task.wanted)
+
+    found, spent = measure(design, effort.patience)
+    how = {"order": order, "q0": full.q0, "y0": full.y0}
+    return task.reached(name, spent, 1, found.y, ours=True, parameters=how)
+
+
+def _on_reduced(
+    task: DesignTask, effort: Effort, m: int, count: int, guard: bool, rounds: int, name: str
+) -> DesignRun:
+    scene = task.scene
+    q, y = points_along(scene, count)
+
+    def design() -> tuple[Floats, int]:
+        made = reduced_model(scene, m, q, y, guard)
+        return _programs(
+            task, lambda at: lam_from_hz(made.frequencies(task.q, at)), list(made.modes), rounds
+        )
+
+    (found, programs), spent = measure(design, effort.patience)
+    how = {"half_order": m, "q": q, "y": y, "guard": guard, "programs": programs}
+    solves = len(q) * solves_per_point(scene, m, guard)
+    return task.reached(name, spent, solves, found, ours=True, parameters=how, note=CHARTED_ONLY)
+
+
+def _programs(
+    task: DesignTask, lam: Callable[[Floats], Floats], columns: list[int], rounds: int
+) -> tuple[Floats, int]:
+    """Gauss–Newton: the quadratic program of the model linearised at y, until y stays."""
+    scene, (lower, width) = task.scene, task.box
+    y, moved, done = scene.expansions.full.y0, np.inf, 0
+    while done < rounds and moved >= STILL:
+        l0, slope = _linearised(lam, y, width)
+        goals = [
+            Goal(LinearModel(l0[own.rows, k], slope[own.rows, k]), own.hz, target.weight, own.rows)
+            for target, own in zip(scene.file.targets, task.wanted, strict=True)
+            for k in [columns.index(target.mode)]
+        ]
+        found = solve_assignment(
+            goals,
+            task.weights,
+            y,
+            np.clip(y, *scene.bounds),
+            DesignBounds(*scene.bounds),
+            linear_constraints(scene.file),
+            tuple(scene.file.design.parameters),
+        )
+        moved = float((np.abs(found.y - y) / np.where(width > 0.0, width, 1.0)).max())
+        y, done = found.y, done + 1
+    return np.clip(y, lower, lower + width), done
+
+
+def _linearised(lam: Callable[[Floats], Floats], y: Floats, width: Floats) -> tuple[Floats, Floats]:
+    """λ (n_t, n_modes) and ∂λ/∂y (n_t, n_modes, n_y) by central differences."""
+    l0 = lam(y)
+    slope = np.zeros((*l0.shape, len(y)))
+    for j in np.flatnonzero(width > 0.0):
+        step = REDUCED_STEP * width[j] * np.eye(len(y))[j]
+        slope[:, :, j] = (lam(y + step) - lam(y - step)) / (2.0 * REDUCED_STEP * width[j])
+    return l0, slope
+
+
+# --- Searches on exact eigenvalues, over v in [0, 1]^n with y = lower + width v
+
+
+class SpentError(Exception):
+    """The evaluations that a search may make are used up."""
+
+
+@dataclass(frozen=True, eq=False)
+class UnitLimits:
+    """The case's linear constraints, lower ≤ C v ≤ upper."""
+
+    C: Floats
+    lower: Floats
+    upper: Floats
+
+    def met(self, v: Floats) -> bool:
+        """Whether the design v (n,) keeps them, up to rounding."""
+        row = self.C @ v
+        slack = 1e-8 * (1.0 + np.abs(row))
+        return bool(((row >= self.lower - slack) & (row <= self.upper + slack)).all())
+
+    @property
+    def constraints(self) -> Any:
+        """As SciPy wants them."""
+        return (LinearConstraint(self.C, self.lower, self.upper),) if len(self.C) else ()
+
+
+@dataclass
+class SearchRecord:
+    """An objective that counts its evaluations, and remembers its best design and when it came.
+
+    ``objective`` gives J(v) and, where it has one, its gradient. A design counts as the best only
+    where it keeps the ``limits``, up to rounding.
+    """
+
+    objective: Callable[[Floats], tuple[float, Floats | None]]
+    limits: UnitLimits
+    most: int
+    start: float = field(default_factory=perf_counter)
+    calls: int = 0
+    best: float = np.inf
+    design: Floats | None = None
+    trace: list[tuple[float, float]] = field(default_factory=list)
+
+    def __call__(self, v: Floats) -> float:
+        """J(v); raises SpentError when no evaluation is left."""
+        return self.with_slope(v)[0]
+
+    def with_slope(self, v: Floats) -> tuple[float, Floats]:
+        """J(v) and its gradient (0 where the objective has none)."""
+        if self.calls >= self.most:
+            raise SpentError
+        self.calls += 1
+        value, slope = self.objective(np.clip(v, 0.0, 1.0))
+        if value < self.best and self.limits.met(v):
+            self.best, self.design = value, np.clip(v, 0.0, 1.0)
+            self.trace.append((perf_counter() - self.start, value))
+        return value, np.zeros(len(v)) if slope is None else slope
+
+
+def by_slsqp(record: SearchRecord, start: Floats, analytic: bool) -> None:
+    """SLSQP from ``start``, with the objective's own gradient or with finite differences."""
+    how: dict[str, Any] = {
+        "method": "SLSQP",
+        "bounds": Bounds(np.zeros(len(start)), np.ones(len(start))),
+        "constraints": record.limits.constraints,
+        "options": {"ftol": 1e-12, "maxiter": 100},
+    }
+    if analytic:
+        minimize(record.with_slope, start, jac=True, **how)
+    else:
+        minimize(record, start, **how)
+
+
+def by_evolution(record: SearchRecord, start: Floats, _: bool = False) -> None:
+    """Differential evolution, without polishing, until the evaluations are used up."""
+    differential_evolution(
+        record,
+        Bounds(np.zeros(len(start)), np.ones(len(start))),
+        x0=start,
+        seed=SEED,
+        popsize=8,
+        tol=1e-10,
+        polish=False,
+        constraints=record.limits.constraints,
+    )
+
+
+def _search(
+    task: DesignTask,
+    most: int,
+    search: Callable[[SearchRecord, Floats, bool], None],
+    analytic: bool,
+    name: str,
+) -> DesignRun:
+    """Run once: its trace says how it went."""
+    lower, width = task.box
+
+    def objective(v: Floats) -> tuple[float, Floats | None]:
+        y = lower + width * v
+        if not analytic:
+            return task.objective(task.exact_lam(y)), None
+        x = task.scene.model.x(task.q, y)
+        lam, rates = eigenvalue_slopes(task.scene.model.pencil, x, task.count, width)
+        return task.objective(lam), task.slope(lam, rates) * width
+
+    start = np.clip((task.scene.initial - lower) / np.where(width > 0.0, width, 1.0), 0.0, 1.0)
+    record = SearchRecord(objective, _unit_limits(task), most)
+    begun = perf_counter()
+    try:
+        search(record, start, analytic)
+        stopped = ""
+    except SpentError:
+        stopped = "stopped: no evaluation left"
+    seconds = perf_counter() - begun
+    y = lower + width * (start if record.design is None else record.design)
+    return task.reached(
+        name,
+        Timing(seconds, seconds, seconds, 0),
+        record.calls * len(task.q),
+        y,
+        ours=False,
+        parameters={"evaluations": record.calls, "most": most},
+        trace=tuple(record.trace),
+        note=stopped,
+    )
+
+
+def _unit_limits(task: DesignTask) -> UnitLimits:
+    """The case's linear constraints over v."""
+    lower, width = task.box
+    rows = linear_constraints(task.scene.file)
+    C = np.array([row.coefficients for row in rows]).reshape(len(rows), len(lower))
+    low, high = (np.array([getattr(row, side) for row in rows]) for side in ("lower", "upper"))
+    return UnitLimits(C * width, low - C @ lower, high - C @ lower)
 
 
 def eigenvalue_slopes(
     pencil: Pencil, x: Floats, count: int, ranges: Floats
 ) -> tuple[Floats, Floats]:
-    """λ (n, count) and ∂λ/∂y (n, count, n_y) of the lowest elastic modes at x (n, n_x)."""
+    """λ (n, count) and ∂λ/∂y (n, count, n_y) of the lowest elastic modes at x (n, n_x).
+
+    A parameter whose range (``ranges``, (n_y,)) is 0 is kept: its derivatives are 0.
+    """
     theta = pencil.theta(x)
     found = modes_at(pencil, theta, count)
     slopes = theta_slopes(pencil, x, ranges)
@@ -365,3 +416,14 @@ def eigenvalue_slopes(
         forms = products @ stiffness - found.lam[:, [mode]] * (products @ mass)
         result[:, mode] = np.einsum("nt,jtn->nj", forms, slopes[:, moving])
     return found.lam, result
+
+
+def theta_slopes(pencil: Pencil, x: Floats, ranges: Floats) -> Floats:
+    """∂θ/∂y (n_y, n_theta, n) at x (n, n_x) by central differences; ``ranges`` set the steps."""
+    slopes = np.zeros((len(ranges), pencil.n_theta, len(x)))
+    for j in np.flatnonzero(ranges):
+        step = np.zeros(x.shape[1])
+        step[pencil.n_q + j] = THETA_STEP * ranges[j]
+        ahead, behind = pencil.theta(x + step), pencil.theta(x - step)
+        slopes[j] = (ahead - behind) / (2.0 * THETA_STEP * ranges[j])
+    return slopes

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.chart.results import Advice, ChartPoint, Front
+from eigassign.chart.methods import AutoOrder
+from eigassign.chart.results import Advice, AutoTakes, ChartPoint, Front
+from eigassign.chart.timing import time_in_words
 
 Floats = NDArray[np.float64]
 DOUBTED = 100.0  # times an accuracy that an estimate may be where it is advised: most are cautious
+LOW, HIGH = 1e-8, 1e-2  # relative errors between which the methods of a front are counted
 
 
 def pareto(cost: Floats, error: Floats) -> list[int]:
@@ -19,10 +23,9 @@ def pareto(cost: Floats, error: Floats) -> list[int]:
     A point that equals another in one of the two and is no better in the other is beaten; numbers
     that are not finite never win.
     """
-    order = np.lexsort((error, cost))
     kept: list[int] = []
     best = np.inf
-    for k in order.tolist():
+    for k in np.lexsort((error, cost)).tolist():
         if np.isfinite(cost[k]) and error[k] < best:
             kept.append(k)
             best = error[k]
@@ -37,14 +40,26 @@ def front(
     A method that is set up anew for every design answers whole trajectories only: it has no part in
     the front of single evaluations.
     """
+    made = Front(name, evaluations, ())
     able = [p for p in points if p.random is not None or evaluations is not None]
-    cost = np.array([_cost(p, evaluations) for p in able])
+    cost = np.array([made.cost_s(p) for p in able])
     error = np.array([max(p.everywhere.worst_hz, floor) for p in able])
-    return Front(name, evaluations, tuple(able[k].method for k in pareto(cost, error)))
+    return replace(made, methods=tuple(able[k].method for k in pareto(cost, error)))
 
 
-def _cost(point: ChartPoint, evaluations: float | None) -> float:
-    return point.online.median_s if evaluations is None else point.total_s(evaluations)
+def front_notes(points: Sequence[ChartPoint], fronts: Sequence[Front]) -> Iterator[str]:
+    """How many methods of each front are eigassign's, and the others by name."""
+    known = {p.method: p for p in points}
+    for each in fronts:
+        inside = [
+            known[name]
+            for name in each.methods
+            if LOW <= known[name].everywhere.worst_relative <= HIGH
+        ]
+        others = [p.method for p in inside if not p.ours]
+        ours = f"{len(inside) - len(others)} of {len(inside)} methods are eigassign's"
+        named = f"; the others: {', '.join(others)}" if others else ""
+        yield f"front between 1e-2 and 1e-8, {each.name}: {ours}{named}"
 
 
 def break_even(offline_s: float, online_s: float, exact_s: float) -> float | None:
@@ -87,19 +102,18 @@ def advise_accuracy(
     Nothing is advised below ``floor`` (relative): no method can be seen to be that accurate.
     """
     asked = f"for {evaluations:.3g} evaluations, each within {accuracy:.1e} of exact"
-    if accuracy < floor:
-        words = f"{asked}: nothing, for round-off moves even exact solves by {floor:.1e}"
-        return Advice(
-            "accuracy", accuracy, None, evaluations, None, {}, None, None, words, True
-        )  # fmt: skip
-    found = cheapest(points, accuracy, evaluations)
-    return _advice("accuracy", accuracy, None, evaluations, found, asked)
+    if accuracy >= floor:
+        found = cheapest(points, accuracy, evaluations)
+        return _advice("accuracy", accuracy, None, evaluations, found, asked)
+    nothing = _advice("accuracy", accuracy, None, evaluations, None, asked)
+    words = f"{asked}: nothing, for round-off moves even exact solves by {floor:.1e}"
+    return replace(nothing, words=words, is_below_round_off=True)
 
 
 def advise_budget(points: Sequence[ChartPoint], budget_s: float, evaluations: float) -> Advice:
     """What to choose for a time, set-up and all evaluations together."""
     found = most_accurate(points, budget_s, evaluations)
-    asked = f"for {evaluations:.3g} evaluations within {time_words(budget_s)}"
+    asked = f"for {evaluations:.3g} evaluations within {time_in_words(budget_s)}"
     return _advice("budget", None, budget_s, evaluations, found, asked)
 
 
@@ -112,38 +126,35 @@ def _advice(
     asked: str,
 ) -> Advice:
     if found is None:
-        return Advice(
-            kind, accuracy, budget_s, evaluations, None, {}, None, None, f"{asked}: nothing charted"
-        )
+        words = f"{asked}: no charted method does that"
+        return Advice(kind, accuracy, budget_s, evaluations, None, {}, None, None, words)
     total, worst = found.total_s(evaluations), found.everywhere.worst_relative
     anew = "" if found.random else ", solved anew for every design"
-    words = (
-        f"{asked}: {found.method}{anew}, {time_words(total)} in all, worst error {worst:.1e}"
-        f"{'; ' + found.use if found.use else ''}"
-    )
+    use = f"; {found.use}" if found.use else ""
+    words = f"{asked}: {found.method}{anew}, {time_in_words(total)} in all, worst error {worst:.1e}{use}"
     return Advice(
         kind, accuracy, budget_s, evaluations, found.method, found.parameters, worst, total, words
     )
 
 
-def time_words(seconds: float) -> str:
-    """Three digits with a unit."""
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds / 1e-9:.3g} ns"
-
-
-def front_notes(points: Sequence[ChartPoint], fronts: Sequence[Front]) -> Iterator[str]:
-    """Who holds each front between 1e-2 and 1e-8 of relative error, peers by name."""
-    known = {p.method: p for p in points}
-    for each in fronts:
-        inside = [
-            known[name]
-            for name in each.methods
-            if 1e-8 <= known[name].everywhere.worst_relative <= 1e-2
-        ]
-        peers = [p.method for p in inside if not p.ours]
-        held = f"{len(inside) - len(peers)} of {len(inside)} methods are eigassign's"
-        others = f"; the others: {', '.join(peers)}" if peers else ""
-        yield f"front between 1e-2 and 1e-8, {each.name}: {held}{others}"
+def beside_auto(advice: Advice, points: Sequence[ChartPoint], autos: Sequence[AutoOrder]) -> Advice:
+    """The advice with what ``expansion.order: auto`` takes for the same accuracy."""
+    own = next((each for each in autos if each.accuracy == advice.accuracy), None)
+    if own is None or advice.is_below_round_off:
+        return advice
+    point = next((p for p in points if p.method == own.method), None)
+    if point is None:
+        why = own.refused or f"{own.method} could not be charted"
+        auto = AutoTakes(None, None, None, own.seconds, why)
+        said = f"`expansion.order: auto` refuses: {why}"
+        return replace(advice, auto=auto, words=f"{advice.words}; {said}")
+    total, worst = point.total_s(advice.evaluations), point.everywhere.worst_relative
+    against = ""
+    if advice.total_s and advice.method != point.method:
+        against = f", {total / advice.total_s:.2g} times as long as {advice.method}"
+    said = (
+        f"`expansion.order: auto` takes {point.method}, {time_in_words(total)} in all{against}, "
+        f"worst error {worst:.1e}, after {time_in_words(own.seconds)} of choosing"
+    )
+    auto = AutoTakes(point.method, worst, total, own.seconds, "")
+    return replace(advice, auto=auto, words=f"{advice.words}; {said}")

@@ -1,12 +1,10 @@
-"""What a charted method is, and eigassign's own: exact, Taylor, 1/λ, reduced models.
+"""What a charted method is, and those of eigassign.
 
-eigassign's fits as charted methods: along one trajectory at a design, and over trajectory × box.
-
-To a stated accuracy, or of a given number of exact solves. Their set-up holds every exact solve,
-the checks and the error estimate, but for round-off that decides nothing and is looked at when the
-estimate is asked for; what can state none is left out, as what is refused.
-
-What ``expansion.order: auto`` takes for each accuracy, charted beside everything else.
+exact               dense in batches, and sparse
+Taylor, 1/λ         expanded to each order, in full and linearised in y; at several points
+auto                what ``expansion.order: auto`` takes for each accuracy
+reduced             on Taylor vectors at one or several points
+fit                 of given solves or to an accuracy; along one trajectory, or over the box
 """
 
 from __future__ import annotations
@@ -19,10 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.chart.front import time_words
-from eigassign.chart.question import Features, Points
-from eigassign.chart.results import Advice, AutoTakes, ChartPoint
-from eigassign.chart.timing import timed
+from eigassign.chart.question import EvaluationPoints, Features
+from eigassign.chart.timing import time_in_words, timed
 from eigassign.errors import AccuracyError
 from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.modal.exact.clusters import CLUSTER_GAP
@@ -32,78 +28,70 @@ from eigassign.modal.fit.domain import Box
 from eigassign.modal.fit.fit import MOST, Fit, PathFit, fit
 from eigassign.modal.model import Model
 from eigassign.modal.reduced.reduce import ReducedModel, reduce
+from eigassign.modal.expansion import expand, nearest
 from eigassign.study.drawing import spread_samples
 from eigassign.study.planning import OrderChoice, choose_order
 from eigassign.study.scene import Scene
 
-# --- What a charted method is, and eigassign's own: exact, Taylor, 1/λ, reduced models
-
 Floats = NDArray[np.float64]
-Evaluator = Callable[[Points], Floats]  # → Hz (n, n_modes)
-
-
-FULL, SEVERAL, CLUSTERED = "Taylor, full", "Taylor, several points", "Taylor, wider cluster"
+Evaluator = Callable[[EvaluationPoints], Floats]  # → Hz (n, n_modes)
 UNGUARDED = "eigassign.modal.reduced.reduce.reduce"
 
 
-def said(scene: Scene) -> str:
+@dataclass(frozen=True)
+class Method:
+    """``build`` makes an evaluator from exact answers (n, n_modes) in Hz at the points of ``train``.
+
+    A method that asks for no exact answers has no ``train``; ``solves`` are the exact eigensolves
+    inside ``build``. With ``per_design`` everything is done anew for every design, and its cost is
+    an online one; ``one`` does it for one design, where `build` makes something for each. ``most``
+    limits the evaluation points of slow methods.
+    """
+
+    name: str
+    family: str
+    parameters: Mapping[str, Any]
+    build: Callable[[Floats], Evaluator]
+    train: Callable[[EvaluationPoints], Floats] | None = None  # → x (n, n_x)
+    ours: bool = True
+    solves: int = 0
+    exact: bool = False
+    per_design: bool = False
+    one: Callable[[], object] | None = None
+    most: int | None = None
+    note: str = ""
+    use: str = ""  # how to ask for it: a line of a case file, or a call
+
+
+def modes_argument(scene: Scene) -> str:
     """The charted modes as an argument of `ea.fit`, `ea.expand`, `ea.reduce`, if they need it."""
     modes = scene.expansions.modes
     return "" if modes == (1,) else f", modes={modes}"
 
 
-def nowhere(points: Points) -> Floats:
-    """Training points of methods that ask for no exact answers."""
-    return np.zeros((0, points.x.shape[1]))
+def _at_points(count: int) -> str:
+    return f"{count} point{'s' if count > 1 else ''}"
 
 
-@dataclass(frozen=True)
-class Method:
-    """``fit`` makes an evaluator from exact answers (n, n_modes) in Hz at ``train``'s points x.
-
-    ``solves`` are exact eigensolves inside ``fit`` itself. With ``per_design`` the training is
-    repeated for every design of the runs along the trajectory, and its cost is an online one; so is
-    that of the fit, timed as ``one`` design's where each has a fit of its own. ``most`` limits the
-    evaluation points of slow methods.
-    """
-
-    name: str
-    family: str
-    ours: bool
-    parameters: Mapping[str, Any]
-    fit: Callable[[Floats], Evaluator]
-    train: Callable[[Points], Floats] = nowhere
-    solves: int = 0
-    exact: bool = False
-    per_design: bool = False
-    most: int | None = None
-    note: str = ""
-    one: Callable[[], object] | None = None
-    use: str = ""  # how to ask for it: a line of a case file, or a call
+# --- Exact solves
 
 
 def exact_methods(model: Model, modes: Sequence[int], most: int | None) -> Iterator[Method]:
     """The exact solves that eigassign offers: dense in batches where small, and sparse."""
-    count, pick = max(modes), np.array(modes) - 1
+    count, wanted = max(modes), np.array(modes) - 1
     if model.n_dof <= DENSE_LIMIT:
-
-        def dense(points: Points) -> Floats:
-            return model.frequencies(points.q, points.y, count)[:, pick]
-
         yield Method(
             "exact dense",
             "exact",
-            True,
             {"solver": "dense, in batches"},
-            lambda _: dense,
+            lambda _: lambda points: model.frequencies(points.q, points.y, count)[:, wanted],
             exact=True,
         )
     yield Method(
         "exact sparse",
         "exact",
-        True,
         {"solver": "sparse Lanczos", "points": most},
-        lambda _: lambda points: sparse_frequencies(model, points.x, count)[:, pick],
+        lambda _: lambda points: sparse_frequencies(model, points.x, count)[:, wanted],
         exact=True,
         most=most,
     )
@@ -115,58 +103,40 @@ def sparse_frequencies(model: Model, x: Floats, count: int) -> Floats:
     return np.asarray(np.sqrt(lam) / (2.0 * np.pi))
 
 
-def taylor_methods(
-    scene: Scene, orders: Sequence[int], linear_orders: Sequence[int]
+# --- Series
+
+
+def series_methods(
+    scene: Scene, orders: Sequence[int], full_orders: Sequence[int]
 ) -> Iterator[Method]:
-    """λ expanded to each order, in full and partially linearised in y."""
-    for linear, wanted in ((False, orders), (True, linear_orders)):
-        for order in wanted:
-            yield _taylor(scene, order, linear)
+    """λ and 1/λ expanded to each of ``orders``, λ in full to each of ``full_orders``.
 
-
-def _taylor(scene: Scene, order: int, linear: bool) -> Method:
-    kind = "linearised" if linear else "full"
-    point = scene.expansions.full
-
-    def fit(_: Floats) -> Evaluator:
-        made = expand(scene.model.pencil, point.q0, point.y0, point.modes, order, linear)
-        return lambda points: made.frequencies(points.q, points.y)
-
-    return Method(
-        f"Taylor {order} {kind}",
-        "Taylor, linearised" if linear else FULL,
-        True,
-        {"order": order, "linear_in_y": linear, "q0": point.q0, "y0": point.y0},
-        fit,
-        solves=1,
-        use=f"in the case file, expansion: {{order: {order}}}",
-    )
-
-
-def reciprocal_methods(scene: Scene, orders: Sequence[int]) -> Iterator[Method]:
-    """1/λ by the reciprocal of λ's series: the same coefficients, summed in another way."""
-    for order in orders:
+    1/λ is the reciprocal of λ's series: the same coefficients, summed in another way.
+    """
+    for symbol in ("Taylor", "1/λ"):
         for linear in (False, True):
-            yield _reciprocal(scene, order, linear)
+            plain = symbol == "Taylor" and not linear
+            for order in full_orders if plain else orders:
+                yield _series(scene, symbol, order, linear)
 
 
-def _reciprocal(scene: Scene, order: int, linear: bool) -> Method:
-    kind = "linearised" if linear else "full"
-    point = scene.expansions.full
+def _series(scene: Scene, symbol: str, order: int, linear: bool) -> Method:
+    kind, point = "linearised" if linear else "full", scene.expansions.full
 
-    def fit(_: Floats) -> Evaluator:
-        made = expand(scene.model.pencil, point.q0, point.y0, point.modes, order, linear).inverse
-        return lambda points: made.frequencies(points.q, points.y)
+    def build(_: Floats) -> Evaluator:
+        made = expand(scene.model.pencil, point.q0, point.y0, point.modes, order, linear)
+        series = made if symbol == "Taylor" else made.inverse
+        return lambda points: series.frequencies(points.q, points.y)
 
+    line = f"in the case file, expansion: {{order: {order}}}"
+    call = f"{modes_argument(scene)}, order={order}{', linear_in_y=True' * linear}"
     return Method(
-        f"1/λ {order} {kind}",
-        f"1/λ, {kind}",
-        True,
+        f"{symbol} {order} {kind}",
+        f"{symbol}, {kind}",
         {"order": order, "linear_in_y": linear, "q0": point.q0, "y0": point.y0},
-        fit,
+        build,
         solves=1,
-        use=f"ea.expand(model, q0, y0{said(scene)}, order={order}"
-        f"{', linear_in_y=True' * linear}).inverse",
+        use=line if symbol == "Taylor" else f"ea.expand(model, q0, y0{call}).inverse",
     )
 
 
@@ -175,7 +145,7 @@ def points_along(scene: Scene, count: int) -> tuple[Floats, Floats]:
     full = scene.expansions.full
     q = full.q0[None]
     if count > 1:
-        q = scene.path.q[spread_samples(scene.path.q @ np.eye(q.shape[1]), count)]
+        q = scene.path.q[spread_samples(scene.path.q, count)]
     return q, np.tile(full.y0, (len(q), 1))
 
 
@@ -184,28 +154,27 @@ def piecewise_methods(
 ) -> Iterator[Method]:
     """Taylor polynomials at several points of the trajectory, the nearest one evaluated."""
     for count in counts:
+        q, y = points_along(scene, count)
         for order in orders:
-            q, y = points_along(scene, count)
+            call = f"ea.expand(model, q, y{modes_argument(scene)}, order={order})"
             yield Method(
                 f"Taylor {order} at {len(q)} points",
-                SEVERAL,
-                True,
+                "Taylor, several points",
                 {"order": order, "q0": q, "y0": y},
-                partial(nearest_expansion, scene, q, y[0], order, CLUSTER_GAP),
+                partial(_nearest_expansion, scene, q, y[0], order, CLUSTER_GAP),
                 solves=len(q),
-                use=f"[ea.expand(model, q, y{said(scene)}, order={order}) for q, y in zip(q0, y0)]"
-                ", at a pose the one whose q is nearest",
+                use=f"[{call} for q, y in zip(q0, y0)], at a pose the one whose q is nearest",
             )
 
 
-def nearest_expansion(
+def _nearest_expansion(
     scene: Scene, q: Floats, y0: Floats, order: int, cluster_gap: float, _: Floats
 ) -> Evaluator:
     """Expansions about q (k, n_q) at the design y0, the nearest one evaluated."""
     pencil, modes = scene.model.pencil, scene.expansions.full.modes
     made = [expand(pencil, each, y0, modes, order, cluster_gap=cluster_gap) for each in q]
 
-    def evaluate(points: Points) -> Floats:
+    def evaluate(points: EvaluationPoints) -> Floats:
         owner = nearest(made, points.q)
         hz = np.empty((len(owner), len(modes)))
         for k in np.unique(owner):
@@ -216,198 +185,11 @@ def nearest_expansion(
     return evaluate
 
 
-def reduced_methods(
-    scene: Scene, half_orders: Sequence[int], counts: Sequence[int]
-) -> Iterator[Method]:
-    """The reduced model with m = 0 … at one or several points; at one also without guards."""
-    for count in counts:
-        for m in half_orders:
-            yield _reduced(scene, m, count, True)
-    for m in half_orders:
-        yield _reduced(scene, m, 1, False)
-
-
-def _reduced(scene: Scene, m: int, count: int, guard: bool) -> Method:
-    q, y = points_along(scene, count)
-    where = f"{len(q)} point{'s' if len(q) > 1 else ''}"
-    source = "model, q0, y0" if guard else "model.pencil, q0, y0"
-    asked = f"({source}{said(scene)}, half_order={m}{'' if guard else ', guard=False'})"
-
-    def fit(_: Floats) -> Evaluator:
-        made = reduced_model(scene, m, q, y, guard)
-        return lambda points: made.frequencies(points.q, points.y)
-
-    return Method(
-        f"reduced m = {m}, {where}" + ("" if guard else ", no guard"),
-        f"reduced, {where}" if guard else "reduced, no guard",
-        True,
-        {"half_order": m, "guard": guard, "q": q, "y": y},
-        fit,
-        solves=len(q) * solves_per_point(scene, m, guard),
-        use=f"ea.reduce{asked}" if guard else f"no argument of ea.reduce: {UNGUARDED}{asked}",
-    )
-
-
-def reduced_model(scene: Scene, m: int, q: Floats, y: Floats, guard: bool = True) -> ReducedModel:
-    """The reduced model of the charted modes."""
-    return reduce(scene.model.pencil, q, y, scene.expansions.full.modes, m, guard)
-
-
-def solves_per_point(scene: Scene, m: int, guard: bool) -> int:
-    """Exact eigensolves at one expansion point: the modes, the wanted vectors, the guards'."""
-    modes, elastic = scene.expansions.full.modes, len(scene.model.pencil.elastic)
-    others = set(range(1, min(max(modes) + 1, elastic) + 1)) - set(modes)
-    return 3 if guard and others and m >= 2 else 2
-
-
-# --- eigassign's fits as charted methods: along one trajectory at a design, and over trajectory
-
-Made = Fit | PathFit
-ALONG = (3, 4, 5, 6, 7, 9, 11, 13, 17, 25)  # exact solves of a fit along one trajectory
-OVER_BOX = (9, 12, 16, 22, 30, 42, 60, 84, 120, 160, 220, 300, 400, 550)  # over all designs
+# --- What ``expansion.order: auto`` takes
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
-    """Fits that answer points, and how many exact solves they took."""
-
-    fits: tuple[Made, ...]  # one for all designs, or one for each
-    solves: int
-
-    def __call__(self, points: Points) -> Floats:
-        """(n, n_modes) in Hz."""
-        n = points.n_random
-        parts = [] if not n else [self.fits[0].frequencies(points.q[:n], points.y[:n])]
-        if points.designs:
-            hz = self._runs(points.y[n :: len(points.along)])
-            if len(points.along) < hz.shape[1]:
-                hz = hz[:, points.along]
-            parts.append(hz.reshape(-1, hz.shape[2]))
-        return parts[0] if len(parts) == 1 else np.vstack(parts)
-
-    @property
-    def estimate(self) -> float:
-        """The largest error estimate of all fits, relative in Hz."""
-        return max(each.error_estimate for each in self.fits)
-
-    def _runs(self, y: Floats) -> Floats:
-        if len(self.fits) == 1:
-            return self.fits[0].along(y)
-        return np.array([each.along() for each in self.fits])
-
-
-def fit_methods(
-    scene: Scene,
-    features: Features,
-    points: Points,
-    accuracies: Sequence[float],
-    sources: Sequence[tuple[int, int]],
-    most: int,
-) -> Iterator[Method]:
-    """Every fit for every accuracy; ``most`` exact solves at most for one.
-
-    ``sources`` are half order and expansion points of the reduced models that are fitted.
-    """
-    if features.place is not None:
-        counts: list[dict[str, Any]] = [{"solves": k} for k in ALONG if k * points.designs <= most]
-        for how in (*counts, *_to_accuracies(accuracies, min(most, MOST))):
-            yield _method(
-                f"fit {_named(how)} along",
-                f"fit {_kind(how)} along one trajectory",
-                how,
-                partial(_along, scene, points, how),
-                per_design=True,
-                one=partial(_one, scene, points, how),
-                use=f"ea.fit(model, q, y{said(scene)}, {_call(how)}).along()",
-                note="fitted anew for every design: answers the runs along the trajectory only",
-            )
-    over: list[dict[str, Any]] = [{"solves": k} for k in OVER_BOX if k <= most]
-    for how in (*over, *_to_accuracies(accuracies, most)):
-        yield _method(
-            f"fit {_named(how)}",
-            f"fit {_kind(how)}",
-            how,
-            partial(_over_box, scene, features, how),
-            use=f"ea.fit(model, q, ea.Box(lower, upper){said(scene)}, {_call(how)}).along(designs)",
-        )
-    for m, count in sources:
-        q, y = points_along(scene, count)
-        name = f"reduced m = {m}, {len(q)} point{'s' if len(q) > 1 else ''}"
-        for accuracy in accuracies:
-            yield _method(
-                f"fit {accuracy:.0e} of {name}",
-                f"fit of {name}",
-                {"accuracy": accuracy, "half_order": m, "q": q, "y": y},
-                partial(_of_reduced, scene, features, accuracy, m, q, y),
-                use=f"ea.fit(ea.reduce(model, q0, y0{said(scene)}, half_order={m}), q, "
-                f"ea.Box(lower, upper), accuracy={accuracy:g})",
-            )
-
-
-def _method(name: str, family: str, parameters: dict[str, Any], fit: Any, **more: Any) -> Method:
-    return Method(name, family, True, parameters, fit, **more)
-
-
-def _to_accuracies(accuracies: Sequence[float], most: int) -> Iterator[dict[str, Any]]:
-    """What is asked of fits, ``most`` frequencies for each."""
-    yield from ({"accuracy": accuracy, "most": most} for accuracy in accuracies)
-
-
-def _kind(how: Mapping[str, Any]) -> str:
-    return "of given solves" if "solves" in how else "to an accuracy"
-
-
-def _named(how: Mapping[str, Any]) -> str:
-    return f"of {how['solves']} solves" if "solves" in how else f"{how['accuracy']:.0e}"
-
-
-def _call(how: Mapping[str, Any]) -> str:
-    """As arguments of `ea.fit`; ``most`` only where its default might not do."""
-    if "solves" in how:
-        return f"solves={how['solves']}"
-    more = f", most={how['most']}" if how["most"] > MOST else ""
-    return f"accuracy={how['accuracy']:g}{more}"
-
-
-def _one(scene: Scene, points: Points, how: Mapping[str, Any]) -> Made:
-    """The fit of the first design of the runs."""
-    y = points.y[points.n_random]
-    return fit(scene.model, scene.path, y, scene.expansions.modes, **how)
-
-
-def _along(scene: Scene, points: Points, how: Mapping[str, Any], _: Floats) -> Evaluator:
-    """One fit for each design of the runs."""
-    y = points.y[points.n_random :: len(points.along)]
-    modes, q = scene.expansions.modes, scene.path
-    fits = tuple(fit(scene.model, q, each, modes, **how) for each in y)
-    return Fitted(fits, sum(each.solves for each in fits))
-
-
-def _box(features: Features) -> Box:
-    """The bounds of y, parameters without room where they are kept."""
-    free = features.upper > features.lower
-    low = np.where(free, features.lower, features.fixed_y)
-    return Box(low, np.where(free, features.upper, features.fixed_y))
-
-
-def _over_box(scene: Scene, features: Features, how: Mapping[str, Any], _: Floats) -> Evaluator:
-    made = fit(scene.model, scene.path, _box(features), scene.expansions.modes, **how)
-    return Fitted((made,), made.solves)
-
-
-def _of_reduced(
-    scene: Scene, features: Features, accuracy: float, m: int, q: Floats, y: Floats, _: Floats
-) -> Evaluator:
-    reduced = reduced_model(scene, m, q, y)
-    made = fit(reduced, scene.path, _box(features), scene.expansions.modes, accuracy)
-    return Fitted((made,), len(q) * solves_per_point(scene, m, True))
-
-
-# --- What ``expansion.order: auto`` takes for each accuracy, charted beside everything else
-
-
-@dataclass(frozen=True, eq=False)
-class Taken:
+class AutoOrder:
     """The choice for one accuracy, or in words why there is none, and the seconds it took."""
 
     accuracy: float
@@ -427,93 +209,223 @@ class Taken:
         return f"Taylor {order}, modes in a wider cluster" if wider else f"Taylor {order} full"
 
     @property
-    def is_plain(self) -> bool:
-        """Whether it is one of the charted orders about the case's own point."""
-        return self.choice is not None and self.method == f"Taylor {self.choice.order} full"
+    def plain_order(self) -> int | None:
+        """Its order where it is in full about the case's own point, as are the charted orders."""
+        order = self.choice.order if self.choice is not None else None
+        return order if self.method == f"Taylor {order} full" else None
 
 
-def taken_by_auto(
+def auto_orders(
     scene: Scene, accuracies: Sequence[float], most_s: float
-) -> tuple[tuple[Taken, ...], tuple[str, ...]]:
+) -> tuple[tuple[AutoOrder, ...], tuple[str, ...]]:
     """The choices by the very function that a run asks, the loosest accuracy first; notes.
 
-    None is made any more after one that took over ``most_s`` seconds.
+    After one that took over ``most_s`` seconds no other is made.
     """
-    made: list[Taken] = []
+    made: list[AutoOrder] = []
     for accuracy in sorted(accuracies, reverse=True):
         if made and made[-1].seconds > most_s:
             note = (
                 f"what auto takes is not charted from {accuracy:.0e} on: its choice for "
-                f"{made[-1].accuracy:.0e} took {time_words(made[-1].seconds)}"
+                f"{made[-1].accuracy:.0e} took {time_in_words(made[-1].seconds)}"
             )
             return tuple(made), (note,)
         (choice, refused), spent = timed(partial(_choice, scene, accuracy))
-        made.append(Taken(accuracy, choice, refused, spent))
+        made.append(AutoOrder(accuracy, choice, refused, spent))
     return tuple(made), ()
 
 
 def _choice(scene: Scene, accuracy: float) -> tuple[OrderChoice | None, str]:
-    full = scene.expansions.full
+    full, modes = scene.expansions.full, scene.expansions.modes
     expansion = scene.file.expansion.model_copy(update={"accuracy": accuracy})
     file = replace(scene.file, expansion=expansion)
     try:
-        made = choose_order(
-            file, scene.model, scene.trajectory, full.q0, full.y0, scene.expansions.modes
-        )
+        return choose_order(file, scene.model, scene.trajectory, full.q0, full.y0, modes), ""
     except AccuracyError as error:
         return None, str(error)
-    return made, ""
 
 
-def auto_methods(scene: Scene, taken: Sequence[Taken]) -> Iterator[Method]:
-    """Choices that are no plain order about the case's own point, each once."""
-    special = [t for t in taken if t.choice is not None and not t.is_plain]
-    for each in {t.method: t for t in special}.values():
-        choice, y0 = each.choice, scene.expansions.full.y0
-        assert choice is not None
-        q = np.vstack([choice.q0, *choice.more_q])
+def auto_methods(scene: Scene, autos: Sequence[AutoOrder]) -> Iterator[Method]:
+    """The choices that are no plain order, each once."""
+    for auto in {each.method: each for each in autos}.values():
+        choice, y0 = auto.choice, scene.expansions.full.y0
+        if choice is None or auto.plain_order is not None:
+            continue
+        q, order, gap = np.vstack([choice.q0, *choice.more_q]), choice.order, choice.cluster_gap
         yield Method(
-            str(each.method),
-            SEVERAL if len(q) > 1 else CLUSTERED,
-            True,
-            {
-                "order": choice.order,
-                "q0": q,
-                "y0": np.tile(y0, (len(q), 1)),
-                "cluster_gap": choice.cluster_gap,
-            },
-            partial(nearest_expansion, scene, q, y0, choice.order, choice.cluster_gap),
+            str(auto.method),
+            "Taylor, several points" if len(q) > 1 else "Taylor, wider cluster",
+            {"order": order, "q0": q, "y0": np.tile(y0, (len(q), 1)), "cluster_gap": gap},
+            partial(_nearest_expansion, scene, q, y0, order, gap),
             solves=len(q),
-            use=f"in the case file, expansion: {{order: auto, accuracy: {each.accuracy:g}}}",
+            use=f"in the case file, expansion: {{order: auto, accuracy: {auto.accuracy:g}}}",
         )
 
 
-def beside_auto(advice: Advice, points: Sequence[ChartPoint], taken: Sequence[Taken]) -> Advice:
-    """The advice with what ``auto`` takes for the same accuracy."""
-    own = next((t for t in taken if t.accuracy == advice.accuracy), None)
-    if own is None or advice.is_below_round_off:
-        return advice
-    auto = _takes(own, {p.method: p for p in points}, advice.evaluations)
-    return replace(advice, auto=auto, words=f"{advice.words}; {_words(advice, auto)}")
+# --- Reduced models
 
 
-def _takes(own: Taken, known: dict[str, ChartPoint], evaluations: float) -> AutoTakes:
-    point = known.get(own.method or "")
-    if point is None:
-        why = own.refused or f"{own.method} could not be charted"
-        return AutoTakes(None, None, None, own.seconds, why)
-    worst, total = point.everywhere.worst_relative, point.total_s(evaluations)
-    return AutoTakes(point.method, worst, total, own.seconds, "")
+def reduced_methods(
+    scene: Scene, half_orders: Sequence[int], counts: Sequence[int]
+) -> Iterator[Method]:
+    """The reduced model of each half order m at one or several points; at one without guards too."""
+    for count, guard in (*((count, True) for count in counts), (1, False)):
+        q, y = points_along(scene, count)
+        where = _at_points(len(q))
+        for m in half_orders:
+            call = f"q0, y0{modes_argument(scene)}, half_order={m}"
+            yield Method(
+                f"reduced m = {m}, {where}" + ("" if guard else ", no guard"),
+                f"reduced, {where}" if guard else "reduced, no guard",
+                {"half_order": m, "guard": guard, "q": q, "y": y},
+                partial(_reduced, scene, m, q, y, guard),
+                solves=len(q) * solves_per_point(scene, m, guard),
+                use=f"ea.reduce(model, {call})"
+                if guard
+                else f"no argument of ea.reduce: {UNGUARDED}(model.pencil, {call}, guard=False)",
+            )
 
 
-def _words(advice: Advice, auto: AutoTakes) -> str:
-    if auto.total_s is None:
-        return f"`expansion.order: auto` refuses: {auto.refused}"
-    against = ""
-    if advice.total_s and advice.method != auto.method:
-        times = auto.total_s / advice.total_s
-        against = f", {times:.2g} times as long as {advice.method}"
-    return (
-        f"`expansion.order: auto` takes {auto.method}, {time_words(auto.total_s)} in all{against}, "
-        f"worst error {auto.worst_relative:.1e}, after {time_words(auto.choosing_s)} of choosing"
+def _reduced(scene: Scene, m: int, q: Floats, y: Floats, guard: bool, _: Floats) -> Evaluator:
+    made = reduced_model(scene, m, q, y, guard)
+    return lambda points: made.frequencies(points.q, points.y)
+
+
+def reduced_model(scene: Scene, m: int, q: Floats, y: Floats, guard: bool = True) -> ReducedModel:
+    """The reduced model of the charted modes at points q (k, n_q), y (k, n_y)."""
+    return reduce(scene.model.pencil, q, y, scene.expansions.full.modes, m, guard)
+
+
+def solves_per_point(scene: Scene, m: int, guard: bool) -> int:
+    """Exact eigensolves at one expansion point: the modes, the wanted vectors, the guards'."""
+    modes, elastic = scene.expansions.full.modes, len(scene.model.pencil.elastic)
+    others = set(range(1, min(max(modes) + 1, elastic) + 1)) - set(modes)
+    return 3 if guard and others and m >= 2 else 2
+
+
+# --- Fits
+
+ALONG = (3, 4, 5, 6, 7, 9, 11, 13, 17, 25)  # exact solves of a fit along one trajectory
+OVER_BOX = (9, 12, 16, 22, 30, 42, 60, 84, 120, 160, 220, 300, 400, 550)  # over all designs
+
+
+@dataclass(frozen=True, eq=False)
+class FitEvaluator:
+    """Fits that answer points, and how many exact solves they took."""
+
+    fits: tuple[Fit | PathFit, ...]  # one for all designs, or one for each
+    solves: int
+
+    def __call__(self, points: EvaluationPoints) -> Floats:
+        """(n, n_modes) in Hz."""
+        n = points.n_random
+        parts = [self.fits[0].frequencies(points.q[:n], points.y[:n])] if n else []
+        if points.designs:
+            one = len(self.fits) == 1
+            hz = (
+                self.fits[0].along(points.run_designs)
+                if one
+                else np.array([each.along() for each in self.fits])
+            )
+            if len(points.along) < hz.shape[1]:
+                hz = hz[:, points.along]
+            parts.append(hz.reshape(-1, hz.shape[2]))
+        return parts[0] if len(parts) == 1 else np.vstack(parts)
+
+    @property
+    def estimate(self) -> float:
+        """The largest error estimate of all fits, relative in Hz."""
+        return max(each.error_estimate for each in self.fits)
+
+
+def fit_methods(
+    scene: Scene,
+    features: Features,
+    points: EvaluationPoints,
+    accuracies: Sequence[float],
+    reduced: Sequence[tuple[int, int]],
+    most: int,
+) -> Iterator[Method]:
+    """Fits of given solves and to ``accuracies``, of at most ``most`` exact solves each.
+
+    Along the trajectory for each design, and over trajectory × box; and fits over both of the
+    ``reduced`` models with these half orders and numbers of points.
+    """
+    modes, free = scene.expansions.modes, features.upper > features.lower
+    box = Box(
+        np.where(free, features.lower, features.fixed_y),
+        np.where(free, features.upper, features.fixed_y),
     )
+    if features.place is not None:
+        counts = [k for k in ALONG if k * points.designs <= most]
+        for how in _of_fits(counts, accuracies, min(most, MOST)):
+            name, kind, arguments = _in_words(how)
+            along = partial(_fit_along, scene, how)
+            yield Method(
+                f"fit {name} along",
+                f"fit {kind} along one trajectory",
+                how,
+                partial(along, points.run_designs),
+                per_design=True,
+                one=partial(along, points.run_designs[:1], np.zeros(0)),
+                use=f"ea.fit(model, q, y{modes_argument(scene)}, {arguments}).along()",
+                note="fitted anew for every design: answers the runs along the trajectory only",
+            )
+    for how in _of_fits([k for k in OVER_BOX if k <= most], accuracies, most):
+        name, kind, arguments = _in_words(how)
+        call = f"model, q, ea.Box(lower, upper){modes_argument(scene)}, {arguments}"
+        yield Method(
+            f"fit {name}",
+            f"fit {kind}",
+            how,
+            partial(_fit_over_box, scene, box, how),
+            use=f"ea.fit({call}).along(designs)",
+        )
+    for m, count in reduced:
+        q, y = points_along(scene, count)
+        name = f"reduced m = {m}, {_at_points(len(q))}"
+        call = f"ea.reduce(model, q0, y0{modes_argument(scene)}, half_order={m})"
+        for accuracy in accuracies:
+            yield Method(
+                f"fit {accuracy:.0e} of {name}",
+                f"fit of {name}",
+                {"accuracy": accuracy, "half_order": m, "q": q, "y": y},
+                partial(_fit_of_reduced, scene, box, accuracy, m, q, y),
+                use=f"ea.fit({call}, q, ea.Box(lower, upper), accuracy={accuracy:g})",
+            )
+
+
+def _of_fits(
+    solves: Sequence[int], accuracies: Sequence[float], most: int
+) -> Iterator[dict[str, Any]]:
+    """What is asked of each fit, as keywords of `ea.fit`."""
+    yield from ({"solves": k} for k in solves)
+    yield from ({"accuracy": accuracy, "most": most} for accuracy in accuracies)
+
+
+def _in_words(how: Mapping[str, Any]) -> tuple[str, str, str]:
+    """Name, kind and arguments of a fit; ``most`` only where its default might not do."""
+    if "solves" in how:
+        return f"of {how['solves']} solves", "of given solves", f"solves={how['solves']}"
+    more = f", most={how['most']}" if how["most"] > MOST else ""
+    return f"{how['accuracy']:.0e}", "to an accuracy", f"accuracy={how['accuracy']:g}{more}"
+
+
+def _fit_along(scene: Scene, how: Mapping[str, Any], designs: Floats, _: Floats) -> FitEvaluator:
+    """One fit for each design."""
+    modes = scene.expansions.modes
+    fits = tuple(fit(scene.model, scene.path, y, modes, **how) for y in designs)
+    return FitEvaluator(fits, sum(each.solves for each in fits))
+
+
+def _fit_over_box(scene: Scene, box: Box, how: Mapping[str, Any], _: Floats) -> FitEvaluator:
+    made = fit(scene.model, scene.path, box, scene.expansions.modes, **how)
+    return FitEvaluator((made,), made.solves)
+
+
+def _fit_of_reduced(
+    scene: Scene, box: Box, accuracy: float, m: int, q: Floats, y: Floats, _: Floats
+) -> FitEvaluator:
+    model = reduced_model(scene, m, q, y)
+    made = fit(model, scene.path, box, scene.expansions.modes, accuracy)
+    return FitEvaluator((made,), len(q) * solves_per_point(scene, m, True))

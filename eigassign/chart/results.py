@@ -1,7 +1,7 @@
-"""What a chart holds, as plain numbers: time against accuracy of every way to get frequencies.
+"""What a chart holds, as plain numbers: time against accuracy of every way to the frequencies.
 
-Seconds and Hz; errors of a frequency, over all charted modes. Every number can be computed again
-from ``parameters``, the seeds and the case file.
+Seconds and Hz; errors are those of a frequency, over all charted modes. Every number can be
+computed again from ``parameters``, the seed and the case file.
 """
 
 from __future__ import annotations
@@ -11,10 +11,13 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Any
 
+SCHEMA = 3  # of chart.json
+NEARLY_NOTHING = 1e-12  # of an objective: a rms relative error of 1e-6
+
 
 @dataclass(frozen=True)
 class Timing:
-    """Seconds: median and quartiles of ``repeats`` runs after a warm-up.
+    """Seconds: median and quartiles of ``repeats`` runs after a first one that does not count.
 
     ``repeats`` is 0 where the first run took so long that it alone was timed.
     """
@@ -39,9 +42,7 @@ class Timing:
         )
 
 
-SCHEMA = 3  # of chart.json
-NEARLY_NOTHING = 1e-12  # of an objective: a rms relative error of 1e-6
-NOTHING = Timing(0.0, 0.0, 0.0, 0)
+NO_TIME = Timing(0.0, 0.0, 0.0, 0)
 
 
 @dataclass(frozen=True)
@@ -57,14 +58,14 @@ class Errors:
 
 @dataclass(frozen=True)
 class ChartPoint:
-    """One way to get the frequencies: what it costs and how wrong it is."""
+    """One method: what it costs and how wrong it is."""
 
     method: str  # unique in its chart
     family: str
     ours: bool  # offered by eigassign; the others are what people do without it
     parameters: Mapping[str, Any]
     offline: Timing  # set-up, exact solves included
-    online: Timing  # one evaluation out of a batch of `Errors.samples`
+    online: Timing  # one evaluation out of a large batch
     solves: int  # exact eigensolves of the set-up
     solves_online: float  # exact eigensolves of one evaluation
     everywhere: Errors
@@ -93,6 +94,12 @@ class Front:
     evaluations: float | None
     methods: tuple[str, ...]
 
+    def cost_s(self, point: ChartPoint) -> float:
+        """Seconds that count on this front."""
+        if self.evaluations is None:
+            return point.online.median_s
+        return point.total_s(self.evaluations)
+
 
 @dataclass(frozen=True)
 class AutoTakes:
@@ -116,7 +123,7 @@ class Advice:
     accuracy: float | None  # worst relative error in Hz
     budget_s: float | None
     evaluations: float
-    method: str | None  # None: nothing charted does it
+    method: str | None  # None: no charted method does it
     parameters: Mapping[str, Any]
     worst_relative: float | None
     total_s: float | None
@@ -156,7 +163,7 @@ class DesignRun:
     max_relative: float  # distance to the target in Hz, exact
     rms_relative: float
     excess: float  # objective over the best one found by any method: see `excess_over`
-    trace: tuple[tuple[float, float], ...]
+    trace: tuple[tuple[float, float], ...] = ()
     note: str = ""
 
 
@@ -179,7 +186,7 @@ class Machine:
 
 @dataclass(frozen=True)
 class Asked:
-    """The evaluation question that every method is put."""
+    """The question that every method is put."""
 
     modes: tuple[int, ...]
     n_dof: int
@@ -191,7 +198,7 @@ class Asked:
     evaluations: float  # what was asked for: the samples of one trajectory if nothing else
     seed: int
     typical_hz: float
-    floor_hz: float  # disagreement of the two exact solvers: no error below it means anything
+    floor_hz: float  # what round-off does to exact answers: no error below it means anything
 
 
 @dataclass(frozen=True)

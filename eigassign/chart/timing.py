@@ -1,4 +1,4 @@
-"""Honest times: a warm-up, repeats, medians with quartiles; and what machine they are from.
+"""How jobs are timed: a first run, repeats in turns, medians with quartiles; and the machine.
 
 Processor time, which on one thread is the time it takes where nothing else runs.
 """
@@ -20,6 +20,8 @@ from eigassign._version import __version__
 from eigassign.chart.results import Machine, Timing
 
 T = TypeVar("T")
+Clock = Callable[[], float]
+CPU_INFO = Path("/proc/cpuinfo")
 
 
 @dataclass(frozen=True)
@@ -34,9 +36,6 @@ class Patience:
     long_s: float = 1.0
 
 
-Clock = Callable[[], float]
-
-
 def timed(job: Callable[[], T], clock: Clock = process_time) -> tuple[T, float]:
     """What the job returns, and the seconds it took."""
     start = clock()
@@ -49,7 +48,7 @@ def take_turns(
     patience: Patience,
     clock: Clock = process_time,
 ) -> list[Timing]:
-    """Time (job, seconds of its first run) for each; all have run once, and are warm.
+    """Time each (job, seconds of its first run), all of which have run once.
 
     The jobs take turns, round after round, so that all see the same machine; within a round a short
     job is repeated and its quickest run counts, which is the one least disturbed.
@@ -59,7 +58,7 @@ def take_turns(
         for (job, first), mine in zip(jobs, spent, strict=True):
             if first <= patience.long_s:
                 mine.append(_quickest(job, patience.seconds, clock))
-    return [summary(mine, first) for (_, first), mine in zip(jobs, spent, strict=True)]
+    return [_summary(mine, first) for (_, first), mine in zip(jobs, spent, strict=True)]
 
 
 def _quickest(job: Callable[[], object], seconds: float, clock: Clock) -> float:
@@ -70,7 +69,7 @@ def _quickest(job: Callable[[], object], seconds: float, clock: Clock) -> float:
     return best
 
 
-def summary(spent: Sequence[float], first: float) -> Timing:
+def _summary(spent: Sequence[float], first: float) -> Timing:
     """Median and quartiles; of a job that was not repeated, its first run."""
     if not spent:
         return Timing(first, first, first, 0)
@@ -81,46 +80,42 @@ def summary(spent: Sequence[float], first: float) -> Timing:
 def measure(
     job: Callable[[], T], patience: Patience, clock: Clock = process_time
 ) -> tuple[T, Timing]:
-    """What one job returns, and how long it takes once it is warm."""
+    """What one job returns, and how long it takes after a first run."""
     result, first = timed(job, clock)
     return result, take_turns([(job, first)], patience, clock)[0]
 
 
-def machine() -> Machine:
-    """Processor, cores, versions, linear algebra and its threads; no names of host or user."""
-    versions = {
-        "eigassign": __version__,
-        "Python": platform.python_version(),
-        "NumPy": np.__version__,
-        "SciPy": scipy.__version__,
-    }
-    return Machine(
-        processor=_processor(),
-        cores=os.cpu_count() or 1,
-        system=f"{platform.system()} {platform.machine()}",
-        versions=versions,
-        blas=_blas(),
-        threads=_threads(),
-    )
+def time_in_words(seconds: float) -> str:
+    """Three digits with a unit: ``12.3 µs``."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds / 1e-9:.3g} ns" if seconds > 0.0 else "0"
 
 
-def _processor(where: Path = Path("/proc/cpuinfo")) -> str:
-    """The model's name as the operating system gives it."""
+def machine(cpu_info: Path = CPU_INFO) -> Machine:
+    """Processor, cores, versions, linear algebra and its threads; no names of host or user.
+
+    ``cpu_info`` is where the operating system names the processor.
+    """
     try:
-        lines = where.read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = cpu_info.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         lines = []
     named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return (named or [platform.processor()])[0] or platform.machine()
-
-
-def _blas() -> str:
     settings: Any = np.show_config(mode="dicts")
-    found = settings.get("Build Dependencies", {}).get("blas", {})
-    return f"{found.get('name', 'unknown')} {found.get('version', '')}".strip()
-
-
-def _threads() -> str:
-    """What the environment grants the linear algebra: read, for NumPy does not tell."""
-    limits = {os.environ.get(f"{name}_NUM_THREADS") for name in ("OPENBLAS", "OMP", "MKL")}
-    return "1" if limits == {"1"} else "as the library chooses"
+    blas = settings.get("Build Dependencies", {}).get("blas", {})
+    threads = {os.environ.get(f"{name}_NUM_THREADS") for name in ("OPENBLAS", "OMP", "MKL")}
+    return Machine(
+        processor=(named or [platform.processor()])[0] or platform.machine(),
+        cores=os.cpu_count() or 1,
+        system=f"{platform.system()} {platform.machine()}",
+        versions={
+            "eigassign": __version__,
+            "Python": platform.python_version(),
+            "NumPy": np.__version__,
+            "SciPy": scipy.__version__,
+        },
+        blas=f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip(),
+        threads="1" if threads == {"1"} else "as the library chooses",  # NumPy does not tell
+    )

@@ -145,14 +145,15 @@ def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
     exact answers on this machine; the mesh; and ways to a design. Leaves figures, chart.json and
     report.html, and says what to choose.
     """
-    from eigassign.chart.study import Wish
+    from eigassign.chart.comparison import Request
+    from eigassign.chart.effort import QUICK, Effort
     from eigassign.pipeline import chart as charting
 
-    wish = Wish(how["accuracy"], how["budget_s"], how["evaluations"])
+    request = Request(how["accuracy"], how["budget_s"], how["evaluations"])
     out = how["out"] or Path("results", f"{case.stem}_chart")
     with reporting(how) as tell:
         given = _options({**how, "out": out, "cache_dir": None, "no_cache": True}, tell)
-        made = charting.chart(case, given, quick, wish)
+        made = charting.chart(case, given, QUICK if quick else Effort(), request)
         tell.warn(made.chart.warnings)
     if as_json:
         print_json({"run_folder": str(made.folder), **vars(made.chart)})

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from eigassign.chart.results import SCHEMA, Advice, Chart, ChartPoint, Front, Timing
+from eigassign.chart.timing import time_in_words as time
 from eigassign.output import report
 from eigassign.output.figures.front import chart_figures
 from eigassign.output.figures.style import FigurePlan
@@ -27,14 +28,6 @@ def tables(chart: Chart) -> tuple[Table, ...]:
     made = (advice(chart), auto(chart), *fronts, methods(chart),
             mesh(chart), designs(chart), machine(chart))  # fmt: skip
     return tuple(table for table in made if table.rows)
-
-
-def time(seconds: float) -> str:
-    """Three digits with a unit: ``12.3 µs``."""
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds / 1e-9:.3g} ns" if seconds > 0.0 else "0"
 
 
 def spread(timing: Timing) -> str:

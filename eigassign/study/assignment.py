@@ -124,7 +124,7 @@ def assign_design(scene: Scene, targets: tuple[Wanted, ...]) -> Assignment:
         scene.expansions.linear.y0,
         scene.initial,
         Bounds(*scene.bounds),
-        _constraints(file),
+        linear_constraints(file),
         _names(file),
     )
 
@@ -147,7 +147,8 @@ def _names(file: CaseFile) -> tuple[str, ...]:
     return tuple(file.design.parameters)
 
 
-def _constraints(file: CaseFile) -> list[LinearConstraint]:
+def linear_constraints(file: CaseFile) -> list[LinearConstraint]:
+    """The case's linear limits between design parameters."""
     return [
         LinearConstraint(
             name,
