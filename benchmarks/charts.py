@@ -21,8 +21,8 @@ import chart_cases
 import fronts
 
 from eigassign.api import load_case
+from eigassign.chart.comparison import Request
 from eigassign.chart.effort import QUICK, Effort
-from eigassign.chart.study import Wish
 from eigassign.output.chart_report import tables, write_chart
 from eigassign.output.tables import Table
 from eigassign.pipeline import chart as charting
@@ -31,7 +31,7 @@ from eigassign.pipeline.run import Options
 WHOLE = Effort()
 LARGE = replace(
     QUICK,
-    brief=False,
+    quick=False,
     orders=(1, 2, 3, 4, 6, 8),
     half_orders=(1, 2, 3),
     expansion_points=(1,),
@@ -56,7 +56,7 @@ def main(names: list[str]) -> None:
             path = Path(folder) / f"{name}.yaml"
             path.write_text(text(), encoding="utf-8")
             chart = charting.chart_case(
-                load_case(path), Options(use_cache=False, progress=_say), effort, Wish()
+                load_case(path), Options(use_cache=False, progress=_say), effort, Request()
             )
         chart = replace(chart, warnings=())
         target = common.RESULTS / f"chart_{name}"

@@ -16,10 +16,10 @@ from collections.abc import Callable
 import numpy as np
 
 import eigassign as ea
-from eigassign.chart.methods import reciprocal_methods, reduced_methods
+from eigassign.chart.comparison import exact_frequencies
+from eigassign.chart.methods import reduced_methods, series_methods
 from eigassign.chart.question import build_features, build_points
-from eigassign.chart.rivals import spread_points
-from eigassign.chart.study import exact_frequencies
+from eigassign.chart.surrogates import spread_points
 from eigassign.pipeline.run import prepare
 from eigassign.pipeline.stages import Stages
 
@@ -66,12 +66,11 @@ def main() -> None:
             online = common.medians({"": lambda made=made: made(many.u)}, 3)[""] / len(many.u)
             off = np.abs(made(points.u) - exact)
             rows.append(_row(name, count, count * solve, fitting, online, off))
-    for method in (*reciprocal_methods(scene, [4, 8]), *reduced_methods(scene, [2], [1])):
-        if "linearised" in method.name:
-            continue
-        made = method.fit(np.zeros((0, 1)))
+    series = [m for m in series_methods(scene, [4, 8], []) if m.family == "1/λ, full"]
+    for method in (*series, *reduced_methods(scene, [2], [1])):
+        made = method.build(np.zeros((0, 1)))
         jobs = {
-            "fit": lambda m=method: m.fit(np.zeros((0, 1))),
+            "fit": lambda m=method: m.build(np.zeros((0, 1))),
             "run": lambda made=made: made(many),
         }
         spent = common.medians(jobs, 5)

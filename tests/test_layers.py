@@ -45,7 +45,6 @@ PRIVATE_PENDING = {
 MODULES = sorted(ROOT.rglob("*.py"))
 PACKAGES = sorted(path.parent for path in ROOT.rglob("__init__.py"))
 PENDING = {
-    "chart",
     "output",
     "output.figures",
 }

@@ -130,8 +130,8 @@ def _advice(
         return Advice(kind, accuracy, budget_s, evaluations, None, {}, None, None, words)
     total, worst = found.total_s(evaluations), found.everywhere.worst_relative
     anew = "" if found.random else ", solved anew for every design"
-    use = f"; {found.use}" if found.use else ""
-    words = f"{asked}: {found.method}{anew}, {time_in_words(total)} in all, worst error {worst:.1e}{use}"
+    words = f"{asked}: {found.method}{anew}, {time_in_words(total)} in all, worst error {worst:.1e}"
+    words += f"; {found.use}" if found.use else ""
     return Advice(
         kind, accuracy, budget_s, evaluations, found.method, found.parameters, worst, total, words
     )

@@ -28,7 +28,6 @@ from eigassign.modal.fit.domain import Box
 from eigassign.modal.fit.fit import MOST, Fit, PathFit, fit
 from eigassign.modal.model import Model
 from eigassign.modal.reduced.reduce import ReducedModel, reduce
-from eigassign.modal.expansion import expand, nearest
 from eigassign.study.drawing import spread_samples
 from eigassign.study.planning import OrderChoice, choose_order
 from eigassign.study.scene import Scene
@@ -40,11 +39,11 @@ UNGUARDED = "eigassign.modal.reduced.reduce.reduce"
 
 @dataclass(frozen=True)
 class Method:
-    """``build`` makes an evaluator from exact answers (n, n_modes) in Hz at the points of ``train``.
+    """``build`` makes an evaluator from exact frequencies (n, n_modes) in Hz at ``train``'s points.
 
-    A method that asks for no exact answers has no ``train``; ``solves`` are the exact eigensolves
-    inside ``build``. With ``per_design`` everything is done anew for every design, and its cost is
-    an online one; ``one`` does it for one design, where `build` makes something for each. ``most``
+    A method that wants no exact frequencies has no ``train``; ``solves`` are the exact eigensolves
+    inside ``build``. With ``per_design`` all is done anew for every design, and counts as a cost of
+    the evaluation; ``one`` does it for a single design where ``build`` does it for each. ``most``
     limits the evaluation points of slow methods.
     """
 
@@ -268,7 +267,7 @@ def auto_methods(scene: Scene, autos: Sequence[AutoOrder]) -> Iterator[Method]:
 def reduced_methods(
     scene: Scene, half_orders: Sequence[int], counts: Sequence[int]
 ) -> Iterator[Method]:
-    """The reduced model of each half order m at one or several points; at one without guards too."""
+    """Reduced models of each half order m at one or several points; at one without guards too."""
     for count, guard in (*((count, True) for count in counts), (1, False)):
         q, y = points_along(scene, count)
         where = _at_points(len(q))
@@ -351,7 +350,7 @@ def fit_methods(
     Along the trajectory for each design, and over trajectory × box; and fits over both of the
     ``reduced`` models with these half orders and numbers of points.
     """
-    modes, free = scene.expansions.modes, features.upper > features.lower
+    free = features.upper > features.lower
     box = Box(
         np.where(free, features.lower, features.fixed_y),
         np.where(free, features.upper, features.fixed_y),

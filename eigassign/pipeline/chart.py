@@ -9,7 +9,7 @@ from pathlib import Path
 from eigassign._version import __version__
 from eigassign.chart.comparison import Request, compare_methods, spread_rows
 from eigassign.chart.designs import chart_designs
-from eigassign.chart.effort import QUICK, Effort
+from eigassign.chart.effort import Effort
 from eigassign.chart.mesh import chart_meshes, meshes
 from eigassign.chart.results import Chart
 from eigassign.chart.timing import machine

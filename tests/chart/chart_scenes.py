@@ -16,7 +16,6 @@ TINY = Effort(
     stations=(5,),
     accuracies=(1e-4,),
     training=(27,),
-    kriging=27,
     reference_s=1e9,
     training_s=1e9,
     factors=(0.5, 1.0, 2.0),

@@ -11,9 +11,11 @@ from chart_scenes import TINY
 from scenes import SHIPPED, scene_of
 
 from eigassign.api import load_case
-from eigassign.chart.methods import auto_methods, beside_auto, taken_by_auto
+from eigassign.chart.comparison import Bench, Comparison, chart_methods, exact_frequencies
+from eigassign.chart.front import beside_auto
+from eigassign.chart.methods import auto_methods, auto_orders, exact_methods
+from eigassign.chart.question import build_features, build_points
 from eigassign.chart.results import Advice
-from eigassign.chart.study import Compared, Wish, compare_methods
 from eigassign.modal.adaptive import order as expansion_choice
 from eigassign.pipeline.run import prepare
 from eigassign.pipeline.stages import Stages
@@ -23,18 +25,8 @@ from eigassign.study.scene import Scene
 CASES = Path(__file__).parents[2] / "cases"
 
 
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
-    return scene_of(tmp_path_factory.mktemp("arm"), SHIPPED)
-
-
-@pytest.fixture(scope="module")
-def compared(scene: Scene) -> Compared:
-    return compare_methods(scene, TINY, Wish(), lambda line: None)
-
-
-def test_it_is_what_a_run_takes(scene: Scene, tmp_path: Path) -> None:
-    (taken,), _ = taken_by_auto(scene, [1e-4], 1e9)
+def test_it_is_what_a_run_takes(arm: Scene, tmp_path: Path) -> None:
+    (taken,), _ = auto_orders(arm, [1e-4], 1e9)
     order = next(line for line in SHIPPED.splitlines(True) if line.startswith("  order: 4"))
     text = SHIPPED.replace(order, "  order: auto\n  accuracy: 1e-4\n")
     assert taken.choice is not None
@@ -42,7 +34,7 @@ def test_it_is_what_a_run_takes(scene: Scene, tmp_path: Path) -> None:
     assert taken.method == f"Taylor {taken.choice.order} full"
 
 
-def test_it_is_charted_and_as_accurate_as_promised(compared: Compared) -> None:
+def test_it_is_charted_and_as_accurate_as_promised(compared: Comparison) -> None:
     known = {p.method: p for p in compared.points}
     charted = [a for a in compared.advice if a.auto is not None and a.auto.method]
     assert len(charted) >= 2
@@ -55,25 +47,27 @@ def test_it_is_charted_and_as_accurate_as_promised(compared: Compared) -> None:
         assert f"`expansion.order: auto` takes {point.method}" in advice.words
 
 
-def test_a_refusal_is_given_in_words(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_refusal_is_given_in_words(
+    arm: Scene, compared: Comparison, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(expansion_choice, "MOST_TERMS", 50)
-    compared = compare_methods(scene, TINY, Wish(accuracy=1e-8), lambda line: None)
-    assert len(compared.advice) == 2
-    for advice in compared.advice:
-        assert advice.auto is not None
-        assert advice.auto.method is None
-        assert advice.auto.refused.startswith("no expansion of order up to 4 at up to 32 points")
-        assert f"`expansion.order: auto` refuses: {advice.auto.refused}" in advice.words
+    autos, _ = auto_orders(arm, [1e-8], 1e9)
+    given = next(a for a in compared.advice if a.accuracy == 1e-8)
+    advice = beside_auto(given, compared.points, autos)
+    assert advice.auto is not None
+    assert advice.auto.method is None
+    assert advice.auto.refused.startswith("no expansion of order up to 4 at up to 32 points")
+    assert f"`expansion.order: auto` refuses: {advice.auto.refused}" in advice.words
 
 
-def test_below_round_off_nothing_is_said_of_it(scene: Scene, compared: Compared) -> None:
-    taken, _ = taken_by_auto(scene, [1e-2], 1e9)
+def test_below_round_off_nothing_is_said_of_it(arm: Scene, compared: Comparison) -> None:
+    taken, _ = auto_orders(arm, [1e-2], 1e9)
     below = Advice("accuracy", 1e-2, None, 1.0, None, {}, None, None, "words", True)
     assert beside_auto(below, compared.points, taken) == below
 
 
-def test_a_choice_that_took_long_is_the_last(scene: Scene) -> None:
-    taken, (note,) = taken_by_auto(scene, [1e-3, 1e-2, 1e-6], 0.0)
+def test_a_choice_that_took_long_is_the_last(arm: Scene) -> None:
+    taken, (note,) = auto_orders(arm, [1e-3, 1e-2, 1e-6], 0.0)
     assert [t.accuracy for t in taken] == [1e-2]
     assert note.startswith("what auto takes is not charted from 1e-03 on")
 
@@ -83,7 +77,7 @@ def test_it_holds_all_over_the_box_of_several_parameters(name: str) -> None:
     """Also where some parameters are at their upper bounds and others at their lower ones."""
     case = load_case(CASES / f"{name}.yaml")
     scene = prepare(case, Stages(lambda line: None), None)
-    (taken,), _ = taken_by_auto(scene, [1e-4], 1e9)
+    (taken,), _ = auto_orders(scene, [1e-4], 1e9)
     assert taken.choice is not None
     run = replace(case.file, expansion=case.file.expansion.model_copy(
         update={"order": "auto", "accuracy": 1e-4}))  # fmt: skip
@@ -103,12 +97,16 @@ def test_choices_at_several_points_are_charted_as_they_are_evaluated(
     monkeypatch.setattr(expansion_choice, "MOST_TERMS", 200)
     text = SHIPPED.replace("max: 250 g", "max: 1 g").replace("  y: [0.125, 0.125]", "  y: [0, 0]")
     scene = scene_of(tmp_path, text)
-    taken, _ = taken_by_auto(scene, [1e-8], 1e9)
+    taken, _ = auto_orders(scene, [1e-8], 1e9)
     assert taken[0].choice is not None
     assert taken[0].choice.more_q
     (method,) = auto_methods(scene, taken)
-    compared = compare_methods(scene, TINY, Wish(accuracy=1e-8), lambda line: None)
-    (point,) = [p for p in compared.points if p.method == method.name]
+    features = build_features(scene)
+    points = build_points(scene, features, 30, 2, 9)
+    hz = exact_frequencies(scene, points.x)
+    bench = Bench(scene, points, hz, TINY.patience, points.whole_runs(features))
+    exact = exact_methods(scene.model, (1,), 1)
+    (_, _, point), _ = chart_methods(bench, [*exact, method], 0.0, lambda line: None)
     assert point.everywhere.worst_relative <= 1e-8
     assert point.parameters["q0"].shape == (1 + len(taken[0].choice.more_q), 2)
 

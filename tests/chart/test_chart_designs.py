@@ -9,20 +9,24 @@ import pytest
 from chart_scenes import TINY
 from scenes import SHIPPED, changed, scene_of
 
-from eigassign.chart.designs import chart_designs, eigenvalue_slopes, task_of, theta_slopes
-from eigassign.chart.search import Limits, SpentError, Watched, by_evolution, by_gradient
+from eigassign.chart.designs import (
+    SearchRecord,
+    SpentError,
+    UnitLimits,
+    by_evolution,
+    by_slsqp,
+    chart_designs,
+    design_task,
+    eigenvalue_slopes,
+    theta_slopes,
+)
 from eigassign.modal.exact.solver import eigenvalues
 from eigassign.series.multi_index import total_degree
 from eigassign.study.scene import Scene
 
 
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
-    return scene_of(tmp_path_factory.mktemp("arm"), SHIPPED)
-
-
-def test_slopes_of_the_coefficient_functions_are_those_of_their_series(scene: Scene) -> None:
-    pencil, ranges = scene.model.pencil, np.array([0.25, 0.25])
+def test_slopes_of_the_coefficient_functions_are_those_of_their_series(arm: Scene) -> None:
+    pencil, ranges = arm.model.pencil, np.array([0.25, 0.25])
     x = np.array([1.8, 5.2, 0.1, 0.2])
     space = total_degree(2, 1)
     series = pencil.theta_series(space, x, pencil.to_program[:, 2:])[:, space.units]
@@ -30,8 +34,8 @@ def test_slopes_of_the_coefficient_functions_are_those_of_their_series(scene: Sc
     np.testing.assert_allclose(found, series, atol=1e-8 * np.abs(series).max())
 
 
-def test_eigenvalue_slopes_are_those_of_finite_differences(scene: Scene) -> None:
-    pencil, ranges = scene.model.pencil, np.array([0.25, 0.25])
+def test_eigenvalue_slopes_are_those_of_finite_differences(arm: Scene) -> None:
+    pencil, ranges = arm.model.pencil, np.array([0.25, 0.25])
     x = np.array([[1.8, 5.2, 0.1, 0.2], [1.9, 5.4, 0.0, 0.05]])
     lam, slopes = eigenvalue_slopes(pencil, x, 2, ranges)
     np.testing.assert_allclose(lam, eigenvalues(pencil, x, 2), rtol=1e-10)
@@ -42,21 +46,21 @@ def test_eigenvalue_slopes_are_those_of_finite_differences(scene: Scene) -> None
         np.testing.assert_allclose(slopes[:, :, j], off, rtol=1e-5)
 
 
-def test_a_parameter_without_room_has_no_slope_and_spoils_none(scene: Scene) -> None:
+def test_a_parameter_without_room_has_no_slope_and_spoils_none(arm: Scene) -> None:
     x = np.array([[1.8, 5.2, 0.1, 0.2]])
-    both = eigenvalue_slopes(scene.model.pencil, x, 1, np.array([0.25, 0.25]))[1]
-    one = eigenvalue_slopes(scene.model.pencil, x, 1, np.array([0.0, 0.25]))[1]
+    both = eigenvalue_slopes(arm.model.pencil, x, 1, np.array([0.25, 0.25]))[1]
+    one = eigenvalue_slopes(arm.model.pencil, x, 1, np.array([0.0, 0.25]))[1]
     assert one[0, 0, 0] == 0.0
     np.testing.assert_allclose(one[:, :, 1], both[:, :, 1], rtol=1e-12)
 
 
-def test_the_objective_has_the_slope_it_says(scene: Scene) -> None:
-    task = task_of(scene, TINY, 1e-4)
+def test_the_objective_has_the_slope_it_says(arm: Scene) -> None:
+    task = design_task(arm, TINY, 1e-4)
     width = task.box[1]
 
     def at(y: np.ndarray) -> tuple[float, np.ndarray]:
-        x = scene.model.x(task.q, y)
-        lam, slopes = eigenvalue_slopes(scene.model.pencil, x, 1, width)
+        x = arm.model.x(task.q, y)
+        lam, slopes = eigenvalue_slopes(arm.model.pencil, x, 1, width)
         return task.objective(lam), task.slope(lam, slopes)
 
     y = np.array([0.1, 0.05])
@@ -67,8 +71,8 @@ def test_the_objective_has_the_slope_it_says(scene: Scene) -> None:
         assert slope[j] == pytest.approx(difference, rel=1e-6)
 
 
-def test_ways_to_a_design_reach_the_exact_optimum_or_say_that_they_stopped(scene: Scene) -> None:
-    runs, notes = chart_designs(scene, TINY, 1e-4, lambda line: None)
+def test_ways_to_a_design_reach_the_exact_optimum_or_say_that_they_stopped(arm: Scene) -> None:
+    runs, notes = chart_designs(arm, TINY, 1e-4, lambda line: None)
     assert not notes
     by_name = {run.method: run for run in runs}
     for name in ("SLSQP, analytic gradient", "programs in a row on reduced m = 2, 1 point"):
@@ -82,7 +86,7 @@ def test_ways_to_a_design_reach_the_exact_optimum_or_say_that_they_stopped(scene
     for run in runs:
         values = [value for _, value in run.trace]
         assert values == sorted(values, reverse=True)
-        lower, upper = scene.bounds
+        lower, upper = arm.bounds
         assert np.all((np.array(run.design) >= lower) & (np.array(run.design) <= upper))
 
 
@@ -99,8 +103,8 @@ def test_linear_constraints_bind_every_way(tmp_path: Path) -> None:
     assert {run.method for run in runs if run.excess < 1e-6} >= {"SLSQP, analytic gradient"}
 
 
-def test_a_long_trajectory_is_thinned_where_solves_are_dear(scene: Scene) -> None:
-    dear = task_of(scene, TINY, TINY.searched_s)
+def test_a_long_trajectory_is_thinned_where_solves_are_dear(arm: Scene) -> None:
+    dear = design_task(arm, TINY, TINY.searched_s)
     assert len(dear.rows) == 5
     assert dear.rows[[0, -1]].tolist() == [0, 151]
 
@@ -116,19 +120,20 @@ def bowl(v: np.ndarray) -> tuple[float, np.ndarray]:
     return float(off @ off) + 1e-3, 2.0 * off
 
 
-FREE = Limits(np.zeros((0, 2)), np.zeros(0), np.zeros(0))
+FREE = UnitLimits(np.zeros((0, 2)), np.zeros(0), np.zeros(0))
 
 
 def test_a_search_ends_when_its_evaluations_are_used_up() -> None:
-    watched = Watched(bowl, FREE.met, 3)
-    by_evolution(watched, np.array([0.5, 0.5]), FREE)
-    assert watched.calls == 3
+    record = SearchRecord(bowl, FREE, 3)
     with pytest.raises(SpentError):
-        watched(np.zeros(2))
+        by_evolution(record, np.array([0.5, 0.5]))
+    assert record.calls == 3
+    with pytest.raises(SpentError):
+        record(np.zeros(2))
 
 
 def test_a_design_that_breaks_a_limit_is_never_the_best() -> None:
-    limits = Limits(np.array([[1.0, 1.0]]), np.array([-np.inf]), np.array([0.5]))
-    watched = Watched(bowl, limits.met, 100)
-    by_gradient(watched, np.array([0.1, 0.1]), limits, analytic=True)
-    assert watched.design == pytest.approx(np.array([0.0, 0.5]), abs=1e-6)
+    limits = UnitLimits(np.array([[1.0, 1.0]]), np.array([-np.inf]), np.array([0.5]))
+    record = SearchRecord(bowl, limits, 100)
+    by_slsqp(record, np.array([0.1, 0.1]), analytic=True)
+    assert record.design == pytest.approx(np.array([0.0, 0.5]), abs=1e-6)

@@ -16,7 +16,7 @@ from eigassign.chart.front import (
     front_notes,
     pareto,
 )
-from eigassign.chart.results import NOTHING, ChartPoint, Errors, Timing, excess_over
+from eigassign.chart.results import NO_TIME, ChartPoint, Errors, Timing, excess_over
 
 
 def timing(seconds: float) -> Timing:
@@ -127,5 +127,5 @@ def test_peers_on_a_front_are_named() -> None:
 
 
 def test_nothing_takes_no_time() -> None:
-    assert NOTHING.plus(timing(2.0)).median_s == 2.0
+    assert NO_TIME.plus(timing(2.0)).median_s == 2.0
     assert timing(2.0).times(3.0).high_s == 6.0

@@ -9,25 +9,25 @@ import pytest
 from scenes import SHIPPED, changed
 
 from eigassign.api import Case, load_case
-from eigassign.chart.mesh import mesh_axis
+from eigassign.chart.mesh import chart_meshes, meshes, refined
 from eigassign.chart.timing import Patience
-from eigassign.pipeline.chart import _meshes, refined
+from eigassign.study.build import build_model
 
 ONCE = Patience(rounds=1, seconds=0.0)
 
 
 @pytest.fixture(scope="module")
-def arm(tmp_path_factory: pytest.TempPathFactory) -> Case:
+def case(tmp_path_factory: pytest.TempPathFactory) -> Case:
     path: Path = tmp_path_factory.mktemp("arm") / "arm.yaml"
     path.write_text(SHIPPED)
     return load_case(path)
 
 
-def test_links_are_refined_together_and_keep_an_element(arm: Case) -> None:
-    assert refined(arm.file, 2.0)[1] == (8, 6)
-    assert refined(arm.file, 0.5)[1] == (2, 2)
-    assert refined(arm.file, 0.01)[1] == (1, 1)
-    assert arm.file.mechanism.links["forearm"].elements == 3
+def test_links_are_refined_together_and_keep_an_element(case: Case) -> None:
+    assert refined(case.file, 2.0)[1] == (8, 6)
+    assert refined(case.file, 0.5)[1] == (2, 2)
+    assert refined(case.file, 0.01)[1] == (1, 1)
+    assert case.file.mechanism.links["forearm"].elements == 3
 
 
 PORTAL = """    portal:
@@ -54,20 +54,22 @@ def test_links_left_to_auto_are_refined_from_the_elements_that_were_chosen(tmp_p
     own = (case.mesh.elements["upper_arm"], case.mesh.elements["forearm"], 2, 3)
     assert refined(case.settled, 1.0)[1] == own
     assert refined(case.settled, 2.0)[1] == tuple(2 * n for n in own)
-    (same, finer) = _meshes(case, (1.0, 2.0))
+    (same, finer) = meshes(case.settled, (1.0, 2.0))
     assert same.elements == sum(own)
     x = np.array([[1.817, 5.312, 0.125, 0.125]])
-    hz, hz_finer = (mesh.build().frequencies(x[:, :2], x[:, 2:], 1) for mesh in (same, finer))
+    hz, hz_finer = (
+        build_model(mesh.file).frequencies(x[:, :2], x[:, 2:], 1) for mesh in (same, finer)
+    )
     assert hz == pytest.approx(case.model().frequencies(x[:, :2], x[:, 2:], 1), rel=1e-12)
     assert 0.0 < abs(hz_finer / hz - 1.0) < 0.01
     reduced = case.settled.mechanism.links["upper_arm"].reduce_to
     assert reduced == case.reduction.frequencies["upper_arm"]
 
 
-def test_errors_fall_with_the_fourth_power_and_the_own_mesh_is_that_far_off(arm: Case) -> None:
-    meshes = list(_meshes(arm, (1.0, 2.0, 4.0, 8.0)))
+def test_errors_fall_with_the_fourth_power_and_the_own_mesh_is_that_far_off(case: Case) -> None:
+    listed = list(meshes(case.settled, (1.0, 2.0, 4.0, 8.0)))
     x = np.array([[1.817, 5.312, 0.125, 0.125]])
-    rows = mesh_axis(meshes, x, (1,), 10_000, ONCE)
+    rows = chart_meshes(listed, x, (1,), 10_000, ONCE)
     assert [row.elements for row in rows] == [7, 14, 28, 56]
     # a known figure: 193.1130 Hz on the paper's mesh, 193.0537 Hz converged
     assert rows[0].worst_hz == pytest.approx(193.1130 - 193.0537, abs=1e-4)
@@ -76,12 +78,12 @@ def test_errors_fall_with_the_fourth_power_and_the_own_mesh_is_that_far_off(arm:
     assert rows[-1].order is None
 
 
-def test_meshes_that_would_be_too_large_are_left_out(arm: Case) -> None:
+def test_meshes_that_would_be_too_large_are_left_out(case: Case) -> None:
     x = np.array([[1.817, 5.312, 0.125, 0.125]])
-    rows = mesh_axis(list(_meshes(arm, (1.0, 2.0, 4.0))), x, (1,), 50, ONCE)
+    rows = chart_meshes(list(meshes(case.settled, (1.0, 2.0, 4.0))), x, (1,), 50, ONCE)
     assert [row.factor for row in rows] == [1.0, 2.0]
-    assert mesh_axis(list(_meshes(arm, (1.0, 2.0))), x, (1,), 30, ONCE) == ()
+    assert chart_meshes(list(meshes(case.settled, (1.0, 2.0))), x, (1,), 30, ONCE) == ()
 
 
-def test_factors_that_give_the_same_mesh_count_once(arm: Case) -> None:
-    assert [mesh.factor for mesh in _meshes(arm, (0.01, 0.02, 1.0))] == [0.01, 1.0]
+def test_factors_that_give_the_same_mesh_count_once(case: Case) -> None:
+    assert [mesh.factor for mesh in meshes(case.settled, (0.01, 0.02, 1.0))] == [0.01, 1.0]

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scenes import HEAD, SHIPPED, changed, scene_of
 
+from eigassign.chart.comparison import affordable_points
 from eigassign.chart.effort import QUICK, Effort
-from eigassign.chart.question import Points, _corners, build_features, build_points
-from eigassign.chart.study import _affordable_points
+from eigassign.chart.question import EvaluationPoints, box_corners, build_features, build_points
 from eigassign.errors import CaseError
 from eigassign.study.planning import joint_map
 
@@ -60,13 +60,13 @@ def test_points_are_the_same_every_time_and_inside_the_box(tmp_path: Path) -> No
     assert len(one.repeated(3).x) == 3 * len(one.x)
 
 
-def at_corners(points: Points, rows: slice) -> int:
+def at_corners(points: EvaluationPoints, rows: slice) -> int:
     """Of these points how many have a design at a corner of the box; places do not count."""
     u = points.u[rows, 1:]
     return int(((u == 0.0) | (u == 1.0)).all(axis=1).sum())
 
 
-def test_a_third_of_the_points_and_of_the_designs_followed_are_corners(tmp_path: Path) -> None:
+def test_a_third_of_the_points_and_of_the_designs_followed_arebox_corners(tmp_path: Path) -> None:
     scene = scene_of(tmp_path, SHIPPED)
     points = build_points(scene, build_features(scene), 60, 9, 11)
     assert at_corners(points, slice(0, 60)) == 20
@@ -79,11 +79,11 @@ def test_a_third_of_the_points_and_of_the_designs_followed_are_corners(tmp_path:
 
 
 def test_of_many_corners_random_ones_and_their_opposites_are_taken() -> None:
-    found = _corners(7, 40, np.random.default_rng(1))
+    found = box_corners(7, 40, np.random.default_rng(1))
     assert found.shape == (7, 40)
     np.testing.assert_array_equal(found[1::2], 1.0 - found[:-1:2])
     assert len(np.unique(found, axis=0)) == 7
-    all_three = _corners(16, 3, np.random.default_rng(1))
+    all_three = box_corners(16, 3, np.random.default_rng(1))
     assert len(np.unique(all_three[:8], axis=0)) == len(np.unique(all_three[8:], axis=0)) == 8
 
 
@@ -98,9 +98,9 @@ def test_as_many_designs_are_followed_as_the_exact_solves_allow(tmp_path: Path) 
     scene = scene_of(tmp_path, SHIPPED)
     features = build_features(scene)
     for effort, wanted in ((QUICK, 9), (Effort(), 15)):
-        cheap = _affordable_points(scene, features, effort, 1e-4)
+        cheap = affordable_points(scene, features, effort, 1e-4)
         assert (cheap.designs, cheap.n_random) == (wanted, effort.random_points)
-        dear = _affordable_points(scene, features, effort, effort.reference_s / 100.0)
+        dear = affordable_points(scene, features, effort, effort.reference_s / 100.0)
         assert dear.designs == 3
         assert len(dear.x) <= 100
 
@@ -109,7 +109,7 @@ def test_whole_trajectories_are_those_of_the_same_designs(tmp_path: Path) -> Non
     scene = scene_of(tmp_path, SHIPPED)
     features = build_features(scene)
     points = build_points(scene, features, 5, 3, 7)
-    whole = points.whole(features)
+    whole = points.whole_runs(features)
     assert len(whole.x) == 3 * 152
     assert whole.n_random == 0
     thinned = whole.x.reshape(3, 152, -1)[:, points.along].reshape(21, -1)

@@ -9,7 +9,7 @@ import pytest
 from chart_scenes import TINY
 from scenes import scene_of
 
-from eigassign.chart.designs import task_of
+from eigassign.chart.designs import design_task
 from eigassign.chart.question import build_features
 from eigassign.study.assignment import assign_design, target_frequencies
 from eigassign.study.scene import Scene
@@ -30,7 +30,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 
 def test_the_charted_objective_is_the_program_s(scene: Scene) -> None:
-    task = task_of(scene, TINY, 1e-6)
+    task = design_task(scene, TINY, 1e-6)
     assert len(task.rows) == len(scene.path.time_s)
     found = assign_design(scene, target_frequencies(scene.file, scene.path))
     lam = np.full((len(task.q), 1), np.nan)
@@ -40,7 +40,7 @@ def test_the_charted_objective_is_the_program_s(scene: Scene) -> None:
 
 
 def test_its_slope_is_its_finite_difference(scene: Scene) -> None:
-    task = task_of(scene, TINY, 1e-6)
+    task = design_task(scene, TINY, 1e-6)
     rng = np.random.default_rng(3)
     lam, slopes = 27e3 * (1 + 0.1 * rng.random((14, 1))), 1e3 * rng.normal(size=(14, 1, 2))
     for k, direction in enumerate(np.eye(2)):
@@ -49,7 +49,7 @@ def test_its_slope_is_its_finite_difference(scene: Scene) -> None:
 
 
 def test_few_affordable_samples_still_hold_both_ends_of_each(scene: Scene) -> None:
-    dear = task_of(scene, TINY, TINY.searched_s)
+    dear = design_task(scene, TINY, TINY.searched_s)
     assert {0, 6, 7, 13} <= set(dear.rows.tolist())
     assert len(dear.rows) < 14
     assert [own.rows.stop - own.rows.start for own in dear.wanted] == [
@@ -62,7 +62,7 @@ def test_places_lead_back_to_their_poses_and_the_seam_to_neither_side_s_spline(
 ) -> None:
     features = build_features(scene)
     assert features.place is not None
-    np.testing.assert_allclose(features.travel(features.place), scene.path.q, atol=1e-12)
+    np.testing.assert_allclose(features.pose(features.place), scene.path.q, atol=1e-12)
     end, start = features.place[6:8]
-    middle = features.travel(np.array([0.5 * (end + start)]))[0]
+    middle = features.pose(np.array([0.5 * (end + start)]))[0]
     np.testing.assert_allclose(middle, scene.path.q[6:8].mean(axis=0), rtol=1e-12)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from eigassign.chart.timing import Patience, _processor, machine, measure, take_turns
+from eigassign.chart.timing import Patience, machine, measure, take_turns, time_in_words
 
 
 class FakeClock:
@@ -70,5 +70,13 @@ def test_the_machine_is_described_without_names_of_host_or_paths() -> None:
 def test_a_processor_has_its_model_name(tmp_path: Path) -> None:
     file = tmp_path / "cpuinfo"
     file.write_text("processor: 0\nmodel name\t: Fast CPU @ 3 GHz\n")
-    assert _processor(file) == "Fast CPU @ 3 GHz"
-    assert _processor(tmp_path / "none")
+    assert machine(file).processor == "Fast CPU @ 3 GHz"
+    assert machine(tmp_path / "none").processor
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(2.5, "2.5 s"), (2.5e-3, "2.5 ms"), (2.5e-6, "2.5 µs"), (2e-8, "20 ns"), (0, "0")],
+)
+def test_times_are_written_with_a_fitting_unit(seconds: float, text: str) -> None:
+    assert time_in_words(seconds) == text

@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
 
-from eigassign.chart.rivals import (
+from eigassign.chart.surrogates import (
+    KINDS,
+    Kind,
     Separable,
-    Trajectory,
-    along,
-    can_krige,
-    chebyshev,
-    chebyshev_nodes,
-    equal_nodes,
-    grid_interpolation,
     grid_points,
+    has_kriging,
     kriging,
+    nodes,
     radial_basis,
     response_surface,
     spread_points,
+    tensor_interpolation,
 )
 from eigassign.errors import UsageError
 
@@ -51,25 +51,27 @@ def test_a_response_surface_needs_as_many_points_as_coefficients() -> None:
 
 
 def test_a_chebyshev_polynomial_of_the_right_degree_is_exact() -> None:
-    u = grid_points(chebyshev_nodes(4), 3)
-    np.testing.assert_allclose(chebyshev(4, 3, cubic(u))(AT), cubic(AT), atol=1e-13)
+    u = grid_points(nodes("Chebyshev", 4), 3)
+    found = tensor_interpolation("Chebyshev", 4, 3, cubic(u))(AT)
+    np.testing.assert_allclose(found, cubic(AT), atol=1e-13)
 
 
-@pytest.mark.parametrize(("kind", "rate"), [(False, 2.0), (True, 4.0)], ids=["linear", "cubic"])
-def test_grid_interpolation_converges_as_it_should(kind: bool, rate: float) -> None:
+@pytest.mark.parametrize(("kind", "rate"), [("linear", 2.0), ("cubic", 4.0)])
+def test_grid_interpolation_converges_as_it_should(kind: Kind, rate: float) -> None:
     off = []
     for k in (9, 17):
-        f = smooth(grid_points(equal_nodes(k), 3))
-        off.append(np.abs(grid_interpolation(k, 3, f, kind)(AT) - smooth(AT)).max())
+        f = smooth(grid_points(nodes(kind, k), 3))
+        off.append(np.abs(tensor_interpolation(kind, k, 3, f)(AT) - smooth(AT)).max())
     assert math.log2(off[0] / off[1]) == pytest.approx(rate, abs=0.5)
 
 
-@pytest.mark.parametrize(("kind", "rate"), [(False, 2.0), (True, 4.0)], ids=["linear", "cubic"])
-def test_interpolation_along_one_variable_converges_as_it_should(kind: bool, rate: float) -> None:
+@pytest.mark.parametrize(("kind", "rate"), [("linear", 2.0), ("cubic", 4.0)])
+def test_interpolation_along_one_variable_converges_as_it_should(kind: Kind, rate: float) -> None:
     off = []
     for k in (17, 33):
-        t = equal_nodes(k)
-        made = along(t, np.column_stack([np.sin(3.0 * t), np.exp(t)]), kind)
+        t = nodes(kind, k)
+        f = np.column_stack([np.sin(3.0 * t), np.exp(t)])
+        made = tensor_interpolation(kind, k, 1, f)
         exact = np.column_stack([np.sin(3.0 * AT[:, 0]), np.exp(AT[:, 0])])
         off.append(np.abs(made(AT[:, :1]) - exact).max())
     assert math.log2(off[0] / off[1]) == pytest.approx(rate, abs=0.6)
@@ -98,8 +100,8 @@ def test_kriging_interpolates() -> None:
 
 
 def test_kriging_is_left_out_without_scikit_learn(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("eigassign.chart.rivals.find_spec", lambda name: None)
-    assert not can_krige()
+    monkeypatch.setattr("eigassign.chart.surrogates.find_spec", lambda name: None)
+    assert not has_kriging()
 
 
 def test_training_points_fill_the_box_evenly_and_hold_its_corners() -> None:
@@ -113,7 +115,7 @@ def test_training_points_fill_the_box_evenly_and_hold_its_corners() -> None:
 
 
 def test_chebyshev_nodes_include_both_ends() -> None:
-    assert chebyshev_nodes(5)[[0, 2, 4]] == pytest.approx([0.0, 0.5, 1.0])
+    assert nodes("Chebyshev", 5)[[0, 2, 4]] == pytest.approx([0.0, 0.5, 1.0])
 
 
 def wavy(u: Floats) -> Floats:
@@ -121,30 +123,47 @@ def wavy(u: Floats) -> Floats:
     return np.column_stack([np.cos(u @ np.arange(1.0, 1 + u.shape[1])), np.exp(-u[:, 0] * u[:, 1])])
 
 
-def _grid(k: int, d: int, kind: str) -> Separable:
-    if kind == "Chebyshev":
-        return chebyshev(k, d, wavy(grid_points(chebyshev_nodes(k), d)))
-    return grid_interpolation(k, d, wavy(grid_points(equal_nodes(k), d)), kind == "cubic")
+def _grid(k: int, d: int, kind: Kind) -> Separable:
+    return tensor_interpolation(kind, k, d, wavy(grid_points(nodes(kind, k), d)))
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_interpolated_is_met_at_the_nodes(kind: Kind, d: int) -> None:
+    u = grid_points(nodes(kind, 5), d)
+    f = np.random.default_rng(2).random((5**d, 2))
+    np.testing.assert_allclose(tensor_interpolation(kind, 5, d, f)(u), f, atol=1e-12)
+
+
+def test_a_cubic_spline_is_exact_for_cubic_polynomials() -> None:
+    u = grid_points(nodes("cubic", 6), 3)
+    found = tensor_interpolation("cubic", 6, 3, cubic(u))(AT)
+    np.testing.assert_allclose(found, cubic(AT), atol=1e-13)
+
+
+def test_linear_interpolation_is_scipy_s() -> None:
+    axis = nodes("linear", 6)
+    f = np.random.default_rng(2).random((6**3, 2))
+    oracle = RegularGridInterpolator((axis,) * 3, f.reshape(6, 6, 6, 2))
+    np.testing.assert_allclose(tensor_interpolation("linear", 6, 3, f)(AT), oracle(AT), atol=1e-13)
 
 
 @pytest.mark.parametrize("d", [2, 3, 4])
-@pytest.mark.parametrize("kind", ["linear", "cubic", "Chebyshev", "surface"])
-def test_whole_trajectories_are_answered_as_single_points_are(kind: str, d: int) -> None:
+@pytest.mark.parametrize("kind", [*KINDS, "surface"])
+def test_whole_trajectories_are_answered_as_single_points_are(kind: Any, d: int) -> None:
     u = spread_points(90, d)
-    made = {
-        "surface": lambda: response_surface(u, wavy(u), 3),
-    }.get(kind, lambda: _grid(5, d, kind))()
+    made = response_surface(u, wavy(u), 3) if kind == "surface" else _grid(5, d, kind)
     place = np.array([0.0, 0.31, 0.32, 0.9, 1.0])
     designs = np.vstack([np.zeros(d - 1), np.ones(d - 1), AT[:, :1].repeat(d - 1, 1) ** 2])
     points = np.column_stack([np.tile(place, len(designs)), designs.repeat(len(place), 0)])
-    found = Trajectory(made.lines, place)(designs)
+    found = made.along(place)(designs)
     assert found.shape == (len(designs), 5, 2)
     np.testing.assert_allclose(found.reshape(-1, 2), made(points), atol=1e-9)
 
 
 def test_splines_on_many_nodes_are_multiplied_sparsely_and_the_same() -> None:
     made = _grid(11, 4, "linear")
-    assert not isinstance(made.lines.second(AT), np.ndarray)
-    found = Trajectory(made.lines, np.array([0.2, 0.7]))(AT)
+    assert not isinstance(made.rest(AT), np.ndarray)
+    found = made.along(np.array([0.2, 0.7]))(AT)
     points = np.column_stack([np.tile([0.2, 0.7], len(AT)), AT.repeat(2, 0)])
     np.testing.assert_allclose(found.reshape(-1, 2), made(points), atol=1e-12)

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from eigassign.chart.comparison import Request
+from eigassign.chart.effort import QUICK
 from eigassign.cli import main
 from eigassign.pipeline.chart import chart
 from eigassign.pipeline.run import Options
@@ -72,5 +74,5 @@ def test_a_folder_of_something_else_is_not_replaced(tmp_path: Path) -> None:
     from eigassign.errors import StorageError
 
     with pytest.raises(StorageError):
-        chart(ARM, Options(out=tmp_path), quick=True)
+        chart(ARM, Options(out=tmp_path), QUICK, Request())
     assert (tmp_path / "mine.txt").read_text() == "keep"

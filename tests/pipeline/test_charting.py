@@ -7,17 +7,17 @@ from pathlib import Path
 import pytest
 
 from eigassign.api import load_case
+from eigassign.chart.comparison import Request
 from eigassign.chart.effort import Effort
-from eigassign.chart.study import Wish
 from eigassign.chart.timing import Patience
 from eigassign.modal.adaptive import order as expansion_choice
-from eigassign.pipeline.chart import _unanswered, chart_case
+from eigassign.pipeline.chart import chart_case, skipped_notes
 from eigassign.pipeline.run import Options
 
 SHIPPED = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
 EFFORT = Effort(
     random_points=20, designs=2, samples_per_design=9, orders=(3, 4, 5, 6), half_orders=(),
-    expansion_points=(1,), nodes=(), stations=(), accuracies=(), training=(27,), kriging=0,
+    expansion_points=(1,), nodes=(), stations=(), accuracies=(), training=(27,),
     reference_s=1e9, training_s=1e9, factors=(1.0,), objectives=3, searched_s=0.1,
     patience=Patience(rounds=1, seconds=0.0, long_s=60.0),
 )  # fmt: skip
@@ -30,15 +30,15 @@ def test_a_case_whose_auto_refuses_is_charted_all_the_same(
     start, end = SHIPPED.index("expansion:"), SHIPPED.index("targets:")
     line = "expansion: {order: auto, accuracy: 1e-9}\n"
     (tmp_path / "arm.yaml").write_text(f"{SHIPPED[:start]}{line}{SHIPPED[end:]}")
-    made = chart_case(load_case(tmp_path / "arm.yaml"), Options(), EFFORT, Wish(accuracy=1e-9))
+    made = chart_case(load_case(tmp_path / "arm.yaml"), Options(), EFFORT, Request(accuracy=1e-9))
     assert made.advice[0].auto is not None
     assert made.advice[0].auto.refused.startswith("no expansion of order up to 4")
 
 
 def test_a_reason_that_many_methods_share_is_said_once_with_their_names() -> None:
     skipped = (("fit 1", "too many axes"), ("RBF", "too few points"), ("fit 2", "too many axes"))
-    assert list(_unanswered(skipped)) == [
+    assert list(skipped_notes(skipped)) == [
         "fit 1, fit 2 have no answer: too many axes",
         "RBF has no answer: too few points",
     ]
-    assert not list(_unanswered(()))
+    assert not list(skipped_notes(()))

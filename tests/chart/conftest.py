@@ -1,0 +1,26 @@
+"""The shipped arm, and what a small chart of it shows, made once for all tests."""
+
+from __future__ import annotations
+
+import pytest
+from chart_scenes import TINY
+from scenes import SHIPPED, scene_of
+
+from eigassign.chart.comparison import Comparison, Request, compare_methods
+from eigassign.chart.question import EvaluationPoints, build_features, build_points
+from eigassign.study.scene import Scene
+
+
+@pytest.fixture(scope="session")
+def arm(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    return scene_of(tmp_path_factory.mktemp("arm"), SHIPPED)
+
+
+@pytest.fixture(scope="session")
+def points(arm: Scene) -> EvaluationPoints:
+    return build_points(arm, build_features(arm), 25, 2, 7)
+
+
+@pytest.fixture(scope="session")
+def compared(arm: Scene) -> Comparison:
+    return compare_methods(arm, TINY, Request(budget_s=10.0, evaluations=1e4), lambda line: None)
