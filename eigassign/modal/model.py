@@ -13,7 +13,7 @@ from eigassign.mechanism.assembly.local_motion import ReducedLinks
 from eigassign.mechanism.assembly.mode_shapes import NodeShape, StrandShape, shapes
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.kinematics.forward import Kinematics
-from eigassign.mechanism.kinematics.link_frames import Poses
+from eigassign.mechanism.kinematics.link_frames import LinkFrames
 from eigassign.mechanism.kinematics.travel_limits import Label
 from eigassign.modal.arguments import samples
 from eigassign.modal.exact.solver import eigenvalues, modes
@@ -37,7 +37,7 @@ class Model:
     """A mechanism as functions of its coordinates q (rad) and design parameters y (SI)."""
 
     pencil: Pencil
-    poses: Poses
+    poses: LinkFrames
     motion: Kinematics
     q_names: tuple[str, ...]
     y_names: tuple[str, ...]

@@ -22,7 +22,7 @@ from eigassign.mechanism.assembly.build import (
 )
 from eigassign.mechanism.assembly.local_motion import reduced_links
 from eigassign.mechanism.inverse_kinematics.chain import tip_chain
-from eigassign.mechanism.kinematics.link_frames import build_poses, design_dependence
+from eigassign.mechanism.kinematics.link_frames import build_link_frames, design_dependence
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import (
     NamedTrajectory,
@@ -67,7 +67,7 @@ def build_model(file: CaseFile, links: WholeLinks | None = None) -> Model:
     with located(file):
         local = local_links(file, parameters, motion, links.meshes)
         pencil = build_pencil(file, parameters, motion, local)
-        poses = build_poses(file, parameters, motion)
+        poses = build_link_frames(file, parameters, motion)
         reduced = reduced_links(parameters, local[0], pencil)
     return Model(pencil, poses, motion, parameters.coordinates, parameters.design, reduced)
 

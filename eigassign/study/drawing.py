@@ -16,10 +16,10 @@ from eigassign.case import CaseFile
 from eigassign.case.schema.joints import RIDING
 from eigassign.mechanism.elements.sections import section_values
 from eigassign.mechanism.kinematics.joints import mounting, sliding_axis
-from eigassign.mechanism.kinematics.link_frames import Poses
+from eigassign.mechanism.kinematics.link_frames import LinkFrames
 from eigassign.mechanism.kinematics.parameters import link_type
 from eigassign.mechanism.kinematics.rotations import multiply
-from eigassign.mechanism.kinematics.topology import GROUND, Edge, Node, Tree, split
+from eigassign.mechanism.kinematics.topology import GROUND, JointEdge, NodeName, Topology, split
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.model import Model, ModeShapes
 from eigassign.study.results import (
@@ -125,7 +125,7 @@ def _displaced(
     """Poses moved by ``factors`` (n_poses, count) of the modes."""
     d, n = _dimension(file), len(factors)
 
-    def at(node: Node) -> Floats:
+    def at(node: NodeName) -> Floats:
         shape = shapes.nodes[node]
         return _frozen((shape.place + factors @ shape.motion[:, :3])[:, :d])
 
@@ -181,13 +181,13 @@ def _symbols(
     }
 
 
-def _named_nodes(file: CaseFile, model: Model) -> list[Node]:
+def _named_nodes(file: CaseFile, model: Model) -> list[NodeName]:
     """Every node that something is drawn at, once."""
     poses = model.poses
     drawn = zip(poses.links, poses.drawn, strict=True)
     nodes = [(link, name) for link, pairs in drawn for pair in pairs for name in pair]
 
-    def ask(node: Node) -> Floats:
+    def ask(node: NodeName) -> Floats:
         nodes.append(node)
         return np.zeros(0)
 
@@ -220,22 +220,22 @@ def _frozen(array: Floats) -> Floats:
 
 # --- Which joints, bodies and springs of a case are drawn where, and how thick its lines are
 
-At = Callable[[Node], Floats]  # places (n, d) of a node in n poses
+At = Callable[[NodeName], Floats]  # places (n, d) of a node in n poses
 SLIDING = ("prismatic", "cylindrical", "screw", *RIDING)
 _ALONG = np.array([1.0, 0.0, 0.0])
 
 
-def edges(tree: Tree) -> tuple[Edge, ...]:
+def edges(tree: Topology) -> tuple[JointEdge, ...]:
     """All joints as the file has them, those that close loops last."""
     return tuple(edge.written for edge in (*tree.edges, *tree.loops))
 
 
-def joint_axes(file: CaseFile, poses: Poses) -> list[NDArray[np.object_]]:
+def joint_axes(file: CaseFile, poses: LinkFrames) -> list[NDArray[np.object_]]:
     """Per joint the direction to draw it along, in world axes: where it slides, else its link."""
     return [_axis(file, poses, edge) for edge in edges(poses.motion.tree)]
 
 
-def _axis(file: CaseFile, poses: Poses, edge: Edge) -> NDArray[np.object_]:
+def _axis(file: CaseFile, poses: LinkFrames, edge: JointEdge) -> NDArray[np.object_]:
     joint: Any = file.mechanism.joints[edge.joint]
     if joint.type not in SLIDING:
         R = poses.motion.placement(edge.follower[0]).world_rotation
@@ -248,7 +248,9 @@ def _axis(file: CaseFile, poses: Poses, edge: Edge) -> NDArray[np.object_]:
     return np.asarray(multiply(poses.motion.placement(edge.base[0]).world_rotation, turned))
 
 
-def joints(file: CaseFile, tree: Tree, at: At, axes: Sequence[Floats]) -> tuple[DrawnJoint, ...]:
+def joints(
+    file: CaseFile, tree: Topology, at: At, axes: Sequence[Floats]
+) -> tuple[DrawnJoint, ...]:
     """Every joint, at its follower's node; ``axes`` are (n, d) each."""
     driven = {coordinate.joint for coordinate in file.coordinates.values()}
     found = []

@@ -16,8 +16,8 @@ from eigassign.case.loading import parse
 from eigassign.mechanism.assembly.build import build_pencil, kinematics
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.kinematics.forward import Kinematics
-from eigassign.mechanism.kinematics.link_frames import Poses, build_poses
-from eigassign.mechanism.kinematics.parameters import Parameters, initial_design, parameters
+from eigassign.mechanism.kinematics.link_frames import LinkFrames, build_link_frames
+from eigassign.mechanism.kinematics.parameters import ModelParameters, initial_design, parameters
 from eigassign.modal.exact.solver import eigenvalues
 
 Tree = dict[str, Any]
@@ -35,7 +35,7 @@ class Built:
     """A case with everything the mechanism layer makes of it."""
 
     case: CaseFile
-    numbers: Parameters
+    numbers: ModelParameters
     motion: Kinematics
 
     @cached_property
@@ -43,8 +43,8 @@ class Built:
         return build_pencil(self.case, self.numbers, self.motion)
 
     @cached_property
-    def poses(self) -> Poses:
-        return build_poses(self.case, self.numbers, self.motion)
+    def poses(self) -> LinkFrames:
+        return build_link_frames(self.case, self.numbers, self.motion)
 
     @cached_property
     def y(self) -> np.ndarray:

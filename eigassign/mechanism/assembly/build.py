@@ -24,7 +24,7 @@ from eigassign.mechanism.elements.mesh import DOFS, LinkMesh
 from eigassign.mechanism.kinematics.coordinates import coordinates
 from eigassign.mechanism.kinematics.forward import Kinematics, Placement
 from eigassign.mechanism.kinematics.loop_closure import closed_kinematics, reference
-from eigassign.mechanism.kinematics.parameters import Parameters
+from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.parameters import parameters as variables
 from eigassign.mechanism.kinematics.topology import build_tree
 from eigassign.mechanism.kinematics.travel_limits import rails
@@ -37,7 +37,7 @@ Objects = NDArray[np.object_]
 LocalLinks: TypeAlias = "tuple[list[LocalLink], NodeMotions]"
 
 
-def kinematics(case: CaseFile, parameters: Parameters) -> Kinematics:
+def kinematics(case: CaseFile, parameters: ModelParameters) -> Kinematics:
     """ERLS motion of a case: the tree walked, loops closed, rigid-body motions among the columns.
 
     Raises MechanismError for what cannot be placed, moved or closed.
@@ -52,7 +52,7 @@ def kinematics(case: CaseFile, parameters: Parameters) -> Kinematics:
 
 
 def build_pencil(
-    case: CaseFile, parameters: Parameters, motion: Kinematics, local: LocalLinks | None = None
+    case: CaseFile, parameters: ModelParameters, motion: Kinematics, local: LocalLinks | None = None
 ) -> Pencil:
     """Assemble K and M of eq. (1) for a mechanism; raises MechanismError naming what is wrong.
 
@@ -93,7 +93,7 @@ class WholeLinks:
     """A case with its links before they are reduced, to any frequency."""
 
     case: CaseFile
-    parameters: Parameters
+    parameters: ModelParameters
     motion: Kinematics
     meshes: Mapping[str, LinkMesh]
 
@@ -105,7 +105,7 @@ def whole_links(case: CaseFile) -> WholeLinks:
     return WholeLinks(case, numbers, motion, _meshes(case, numbers, motion))
 
 
-def _meshes(case: CaseFile, parameters: Parameters, motion: Kinematics) -> dict[str, LinkMesh]:
+def _meshes(case: CaseFile, parameters: ModelParameters, motion: Kinematics) -> dict[str, LinkMesh]:
     """The mesh of every link; copies of a beam share theirs."""
     known = parameters.with_passive(motion.passive)
     copies = copies_of(case, known, motion.tree)
@@ -119,7 +119,7 @@ def _meshes(case: CaseFile, parameters: Parameters, motion: Kinematics) -> dict[
 
 def local_links(
     case: CaseFile,
-    parameters: Parameters,
+    parameters: ModelParameters,
     motion: Kinematics,
     whole: Mapping[str, LinkMesh] | None = None,
 ) -> LocalLinks:
@@ -163,7 +163,7 @@ def _local_link(placement: Placement, mesh: LinkMesh, nodes: NodeMotions) -> Loc
 def _add_drives(
     target: AffineEntries,
     case: CaseFile,
-    parameters: Parameters,
+    parameters: ModelParameters,
     motion: Kinematics,
     n_u: int,
 ) -> None:
@@ -180,7 +180,7 @@ def _compile(
     stiffness: AffineEntries,
     mass: AffineEntries,
     case: CaseFile,
-    parameters: Parameters,
+    parameters: ModelParameters,
     motion: Kinematics,
     n_u: int,
 ) -> Pencil:

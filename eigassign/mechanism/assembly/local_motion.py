@@ -16,7 +16,7 @@ from scipy import sparse
 from eigassign.mechanism.assembly.congruence import LocalLink
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.mesh import total
-from eigassign.mechanism.kinematics.parameters import Parameters
+from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import Table, compile_table
 from eigassign.series.expression import Scalar
@@ -86,7 +86,7 @@ class ReducedLinks:
 
 
 def reduced_links(
-    parameters: Parameters, links: Sequence[LocalLink], pencil: Pencil
+    parameters: ModelParameters, links: Sequence[LocalLink], pencil: Pencil
 ) -> ReducedLinks | None:
     """Those links of a mechanism that are reduced; None where none is."""
     reduced = tuple(link for link in links if link.reduction is not None)

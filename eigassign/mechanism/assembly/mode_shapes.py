@@ -20,7 +20,7 @@ from eigassign.mechanism.elements.beam import bending_shapes
 from eigassign.mechanism.elements.links import axes
 from eigassign.mechanism.elements.mesh import LinkMesh, Strand
 from eigassign.mechanism.kinematics.forward import Placement
-from eigassign.mechanism.kinematics.link_frames import Poses
+from eigassign.mechanism.kinematics.link_frames import LinkFrames
 from eigassign.mechanism.kinematics.rotations import Objects
 from eigassign.series.expression import Scalar
 
@@ -58,7 +58,7 @@ class Shapes:
     nodes: Mapping[tuple[str, str], NodeShape]  # by (link, node)
 
 
-def shapes(poses: Poses, x: Floats, phi: Floats) -> Shapes:
+def shapes(poses: LinkFrames, x: Floats, phi: Floats) -> Shapes:
     """The motion of all nodes and beams in the vectors ``phi`` (n_dof, count) at one sample x."""
     case = poses.case
     links, numbering = local_links(case, poses.parameters, poses.motion)
@@ -88,7 +88,7 @@ class _Symbols:
     arrays: tuple[Objects, ...]
 
 
-def _symbols(local: LocalLink, placement: Placement, mesh: LinkMesh, poses: Poses) -> _Symbols:
+def _symbols(local: LocalLink, placement: Placement, mesh: LinkMesh, poses: LinkFrames) -> _Symbols:
     mesh = mesh if mesh.reduction is None else mesh.reduction.mesh
     strands = tuple(mesh.strands) or _spokes(placement.link, mesh, poses)
     arrays = [
@@ -103,7 +103,7 @@ def _symbols(local: LocalLink, placement: Placement, mesh: LinkMesh, poses: Pose
     return _Symbols(placement.link, local, mesh, strands, tuple(arrays))
 
 
-def _spokes(link: str, mesh: LinkMesh, poses: Poses) -> tuple[Strand, ...]:
+def _spokes(link: str, mesh: LinkMesh, poses: LinkFrames) -> tuple[Strand, ...]:
     """The connections drawn of a rigid link or a superelement, each as one element.
 
     That is straight for a rigid link; between the nodes of a superelement, of which nothing else

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from eigassign.mechanism.elements.mesh import LinkMesh
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.rotations import Objects, carried, present, some
-from eigassign.mechanism.kinematics.topology import GROUND, Edge, Freedom, Node
+from eigassign.mechanism.kinematics.topology import GROUND, Freedom, JointEdge, NodeName
 from eigassign.series.expression import Scalar
 
 Ints = NDArray[np.intp]
-Row = dict[int, Scalar]
-Rows = list[Row]  # six components (v, ω)
+MotionRow = dict[int, Scalar]
+MotionRows = list[MotionRow]  # six components (v, ω)
 
 
 @dataclass
@@ -33,10 +33,10 @@ class NodeMotions:
     meshes: dict[str, LinkMesh]
     space: str
     own: dict[str, Ints] = field(default_factory=dict)  # per link: unknown of each local dof or −1
-    slaves: dict[Node, Edge] = field(default_factory=dict)
-    passive: dict[tuple[str, int], Row] = field(default_factory=dict)  # δ over the unknowns
+    slaves: dict[NodeName, JointEdge] = field(default_factory=dict)
+    passive: dict[tuple[str, int], MotionRow] = field(default_factory=dict)  # δ over the unknowns
     count: int = 0
-    known: dict[Node, Rows] = field(default_factory=dict)
+    known: dict[NodeName, MotionRows] = field(default_factory=dict)
 
     def number(self) -> None:
         """Number what no other node carries, link by link."""
@@ -55,7 +55,7 @@ class NodeMotions:
         """Derive every motion anew: what passive joints do has changed."""
         self.known.clear()
 
-    def _number_link(self, link: str, edge: Edge) -> None:
+    def _number_link(self, link: str, edge: JointEdge) -> None:
         mesh = self.meshes[link]
         taken = np.zeros(mesh.n_local, dtype=bool)
         for name, slots in mesh.nodes.items():
@@ -68,7 +68,7 @@ class NodeMotions:
         self.count += int((~taken).sum())
         self.own[link] = own
 
-    def rows(self, node: Node) -> Rows:
+    def rows(self, node: NodeName) -> MotionRows:
         """Six rows of a node's elastic motion in its link's axes; missing components stay empty."""
         if node == GROUND:
             return [{} for _ in range(6)]
@@ -76,7 +76,7 @@ class NodeMotions:
             self.known[node] = self._derive(node)
         return self.known[node]
 
-    def _derive(self, node: Node) -> Rows:
+    def _derive(self, node: NodeName) -> MotionRows:
         if node in self.slaves:
             return self.closed(self.slaves[node])
         placement = self.motion.placement(node[0])
@@ -90,7 +90,7 @@ class NodeMotions:
         own = self.own[node[0]]
         return [{int(own[s]): 1.0} if s >= 0 else {} for s in slots]
 
-    def joined(self, edge: Edge, X: Objects, freedoms: Objects) -> Rows:
+    def joined(self, edge: JointEdge, X: Objects, freedoms: Objects) -> MotionRows:
         """X u_b + A δ."""
         rows = apply(X, self.rows(edge.base))
         for component, column in enumerate(freedoms.T):
@@ -99,12 +99,12 @@ class NodeMotions:
                 rows[i] = combined(rows[i], moving, column[i])
         return rows
 
-    def closed(self, edge: Edge) -> Rows:
+    def closed(self, edge: JointEdge) -> MotionRows:
         """What a loop's joint demands of its follower node."""
         loop = next(one for one in self.motion.loops if one.edge == edge)
         return self.joined(edge, carried(loop.rotation, loop.lever), loop.freedoms)
 
-    def _on_rigid(self, node: Node, root: Node, mesh: LinkMesh) -> Rows:
+    def _on_rigid(self, node: NodeName, root: NodeName, mesh: LinkMesh) -> MotionRows:
         """Another point of the same rigid body: v + ω × (X − X_root)."""
         here = np.zeros(3, dtype=object) if node[1] == "@origin" else mesh.positions[node[1]]
         lever = here - mesh.positions[root[1]]
@@ -112,7 +112,7 @@ class NodeMotions:
         return apply(carried(eye, lever), self.rows(root))
 
 
-def combined(row: Row, other: Row, factor: Scalar) -> Row:
+def combined(row: MotionRow, other: MotionRow, factor: Scalar) -> MotionRow:
     """row + factor × other."""
     out = dict(row)
     for unknown, value in other.items():
@@ -120,11 +120,11 @@ def combined(row: Row, other: Row, factor: Scalar) -> Row:
     return out
 
 
-def apply(X: Objects, rows: Rows) -> Rows:
+def apply(X: Objects, rows: MotionRows) -> MotionRows:
     """A (6, 6) map of rows: Σ_b X_ab row_b."""
-    out: Rows = []
+    out: MotionRows = []
     for factors in X.tolist():
-        total: Row = {}
+        total: MotionRow = {}
         for factor, row in zip(factors, rows, strict=True):
             if row and some(factor):
                 for unknown, carry in row.items():

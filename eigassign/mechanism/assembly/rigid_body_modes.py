@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError, SingularityError
-from eigassign.mechanism.assembly.node_motion import Rows
+from eigassign.mechanism.assembly.node_motion import MotionRows
 from eigassign.mechanism.assembly.springs import resists, spring_ends
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import reference
-from eigassign.mechanism.kinematics.parameters import Parameters
+from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.rotations import multiply
-from eigassign.mechanism.kinematics.topology import Node
+from eigassign.mechanism.kinematics.topology import NodeName
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import Table, compile_table
 
@@ -34,7 +34,7 @@ ROUND_OFF = 1e-12  # of an entry of W, whose largest is about 1, and of m or rad
 
 
 def separated(
-    case: CaseFile, parameters: Parameters, motion: Kinematics, free: Sequence[int]
+    case: CaseFile, parameters: ModelParameters, motion: Kinematics, free: Sequence[int]
 ) -> Kinematics:
     """The motion with its rigid motions as columns ``rigid``.
 
@@ -52,11 +52,11 @@ def separated(
 
 
 def _rows(
-    case: CaseFile, parameters: Parameters, motion: Kinematics, free: Sequence[int]
+    case: CaseFile, parameters: ModelParameters, motion: Kinematics, free: Sequence[int]
 ) -> Floats:
     """r (n_rows, n_poses, n_free) over the free columns; zero where it is but round-off."""
 
-    def stiff(_: Node) -> Rows:
+    def stiff(_: NodeName) -> MotionRows:
         return [{} for _ in range(6)]
 
     known = parameters.with_passive(motion.passive)
@@ -73,7 +73,7 @@ def _rows(
     return np.asarray(rows[[resists(k) for k, *_ in springs]])
 
 
-def _reach(case: CaseFile, parameters: Parameters) -> Floats:
+def _reach(case: CaseFile, parameters: ModelParameters) -> Floats:
     """How far each of z = (s, y) varies: 1 rad or m, half the range of a design parameter."""
     ranges = [0.5 * (p.max - p.min) for p in case.design.parameters.values()]
     return np.concatenate([np.ones(len(parameters.coordinates)), ranges])

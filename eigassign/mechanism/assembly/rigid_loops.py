@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from eigassign.errors import MechanismError
-from eigassign.mechanism.assembly.node_motion import NodeMotions, Row, combined
+from eigassign.mechanism.assembly.node_motion import MotionRow, NodeMotions, combined
 from eigassign.mechanism.elements.mesh import DOFS
 from eigassign.mechanism.kinematics.loop_closure import RANK, passive_motion
-from eigassign.mechanism.kinematics.parameters import Parameters
+from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.rotations import Objects
-from eigassign.mechanism.kinematics.topology import Edge
+from eigassign.mechanism.kinematics.topology import JointEdge
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import compile_table
 
@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 CONSISTENT = 1e-8  # of the largest entry: round-off of the closure, of its solution and of a turn
 
 
-def close_rigid_loops(nodes: NodeMotions, parameters: Parameters, reference: Floats) -> None:
+def close_rigid_loops(nodes: NodeMotions, parameters: ModelParameters, reference: Floats) -> None:
     """Number the passive joints that stay free, and derive the others from all unknowns.
 
     ``reference`` z = (s, y) is the pose at which the dependent ones are chosen. Raises
@@ -63,19 +63,19 @@ def _key(freedom: object) -> tuple[str, int]:
     return freedom.joint, freedom.component  # type: ignore[attr-defined]
 
 
-def _gap(nodes: NodeMotions, edge: Edge) -> list[Row]:
+def _gap(nodes: NodeMotions, edge: JointEdge) -> list[MotionRow]:
     """Motion of the closing joint's follower node: its own minus what the joint demands."""
     pairs = zip(nodes.rows(edge.follower), nodes.closed(edge), strict=True)
     rows = [combined(own, demanded, -1.0) for own, demanded in pairs]
     return [rows[a] for a in DOFS[nodes.space]]
 
 
-def _matrix(rows: Sequence[Row], unknowns: Sequence[int]) -> Objects:
+def _matrix(rows: Sequence[MotionRow], unknowns: Sequence[int]) -> Objects:
     entries = [[row.get(u, 0.0) for u in unknowns] for row in rows]
     return np.array(entries, dtype=object).reshape(len(rows), len(unknowns))
 
 
-def _numbers(parameters: Parameters, entries: Objects, z: Floats) -> Floats:
+def _numbers(parameters: ModelParameters, entries: Objects, z: Floats) -> Floats:
     table = compile_table(parameters.recorder, entries.ravel().tolist(), len(z))
     values = np.asarray(table.evaluate(Samples(), z[:, None]), dtype=np.float64)
     return values[:, 0].reshape(entries.shape)
@@ -90,7 +90,7 @@ def _pivots(J: Floats) -> list[int]:
     return sorted(order[: int((sizes > RANK * sizes[0]).sum())].tolist())
 
 
-def require_consistent(J: Floats, G: Floats, loops: Sequence[Edge], space: str) -> None:
+def require_consistent(J: Floats, G: Floats, loops: Sequence[JointEdge], space: str) -> None:
     """Whatever u is, some δ closes the loops."""
     if not G.size:
         return

@@ -15,20 +15,26 @@ import numpy as np
 
 from eigassign.case import CaseFile
 from eigassign.mechanism.assembly.affine_entries import AffineEntries
-from eigassign.mechanism.assembly.node_motion import NodeMotions, Row, Rows, apply, combined
+from eigassign.mechanism.assembly.node_motion import (
+    MotionRow,
+    MotionRows,
+    NodeMotions,
+    apply,
+    combined,
+)
 from eigassign.mechanism.elements.mesh import DOFS
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.joints import mounting
-from eigassign.mechanism.kinematics.parameters import Parameters, node_position
+from eigassign.mechanism.kinematics.parameters import ModelParameters, node_position
 from eigassign.mechanism.kinematics.rotations import Objects, carried, cross, multiply, present
-from eigassign.mechanism.kinematics.topology import GROUND, Node, split
+from eigassign.mechanism.kinematics.topology import GROUND, NodeName, split
 from eigassign.series.expression import Scalar, is_constant
 
 
 def add_springs(
     target: AffineEntries,
     case: CaseFile,
-    parameters: Parameters,
+    parameters: ModelParameters,
     motion: Kinematics,
     nodes: NodeMotions,
 ) -> None:
@@ -49,11 +55,11 @@ def resists(stiffness: Scalar) -> bool:
 
 def spring_ends(
     case: CaseFile,
-    parameters: Parameters,
+    parameters: ModelParameters,
     motion: Kinematics,
-    elastic: Callable[[Node], Rows],
+    elastic: Callable[[NodeName], MotionRows],
     first: int,
-) -> Iterator[tuple[Scalar, Row, Row]]:
+) -> Iterator[tuple[Scalar, MotionRow, MotionRow]]:
     """Stiffness and motions of both ends, six rows for every spring, as `_ends` has them.
 
     ``elastic`` gives a node's rows over u; the q̇ are numbered from ``first`` on.
@@ -66,7 +72,7 @@ def spring_ends(
         yield from zip(values, here, there, strict=True)
 
 
-def _stiffness(parameters: Parameters, path: str, spring: Any, space: str) -> list[Scalar]:
+def _stiffness(parameters: ModelParameters, path: str, spring: Any, space: str) -> list[Scalar]:
     """Six values k_t, k_r per axis; a number stands for every axis of the space."""
     out: list[Scalar] = []
     for key, first in (("translational", 0), ("rotational", 3)):
@@ -84,13 +90,13 @@ def _stiffness(parameters: Parameters, path: str, spring: Any, space: str) -> li
 
 def _ends(
     case: CaseFile,
-    parameters: Parameters,
+    parameters: ModelParameters,
     motion: Kinematics,
-    elastic: Callable[[Node], Rows],
+    elastic: Callable[[NodeName], MotionRows],
     first_rate: int,
     spring: Any,
-    ends: list[Node],
-) -> tuple[Rows, Rows]:
+    ends: list[NodeName],
+) -> tuple[MotionRows, MotionRows]:
     """Motion of both ends in the spring's axes over [u; q̇], the first carried to the second."""
     link = ends[0][0]
     R = multiply(motion.placement(link).world_rotation, mounting(spring))
@@ -106,7 +112,7 @@ def _ends(
 
 
 def _world_position(
-    case: CaseFile, parameters: Parameters, motion: Kinematics, end: Node
+    case: CaseFile, parameters: ModelParameters, motion: Kinematics, end: NodeName
 ) -> Objects:
     placement = motion.placement(end[0])
     X = node_position(case, parameters, motion.tree, end)
@@ -115,12 +121,12 @@ def _world_position(
 
 def _world_rows(
     case: CaseFile,
-    parameters: Parameters,
+    parameters: ModelParameters,
     motion: Kinematics,
-    elastic: Callable[[Node], Rows],
+    elastic: Callable[[NodeName], MotionRows],
     first_rate: int,
-    end: Node,
-) -> Rows:
+    end: NodeName,
+) -> MotionRows:
     """Full motion of a node in world axes: elastic rows and N T columns."""
     if end == GROUND:
         return [{} for _ in range(6)]

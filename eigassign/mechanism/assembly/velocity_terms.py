@@ -56,7 +56,7 @@ from eigassign.mechanism.elements.beam import bending_shapes, bending_slopes
 from eigassign.mechanism.elements.mesh import DOFS, LinkMesh, Term
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import all_moving
-from eigassign.mechanism.kinematics.parameters import Parameters, link_type
+from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import Table, compile_table
 from eigassign.series.expression import Scalar
@@ -120,7 +120,9 @@ def placeless(case: CaseFile) -> tuple[str, ...]:
     return tuple(n for n in case.mechanism.links if link_type(case, n) == "superelement")
 
 
-def velocity_terms(case: CaseFile, parameters: Parameters, motion: Kinematics) -> VelocityTerms:
+def velocity_terms(
+    case: CaseFile, parameters: ModelParameters, motion: Kinematics
+) -> VelocityTerms:
     """Collect what varies along a motion: carried nodes, twists, spins, mass coefficients.
 
     Raises MechanismError for a superelement, whose inner dofs have no directions.
@@ -139,7 +141,7 @@ def velocity_terms(case: CaseFile, parameters: Parameters, motion: Kinematics) -
         parts = [list(spin.ravel()), *motion_scalars(link), mass]
         parts.append(mesh_scalars(mesh) if rides else [])
         cuts = np.cumsum([len(scalars), *(len(p) for p in parts)]).tolist()
-        rows.append(Rows(*(slice(a, b) for a, b in itertools.pairwise(cuts))))
+        rows.append(ScalarRows(*(slice(a, b) for a, b in itertools.pairwise(cuts))))
         scalars += [s for part in parts for s in part]
         ridings.append(riding(mesh) if rides else None)
     n = len(parameters.coordinates) + len(parameters.design)
@@ -154,7 +156,7 @@ def velocity_terms(case: CaseFile, parameters: Parameters, motion: Kinematics) -
 
 # --- What a mesh that moves along its beam adds to the velocity of the beam's matter
 
-Numbers = NDArray[Any]  # real or complex
+RealOrComplex = NDArray[Any]  # real or complex
 PLANES = ((1, 5, 1.0), (2, 4, -1.0))  # deflection, rotation: θ_z = dv/dx, θ_y = −dw/dx
 IMAGINARY = 1e-30  # step of derivatives along the imaginary axis, which lose no digits
 
@@ -228,7 +230,7 @@ def mesh_scalars(mesh: LinkMesh) -> list[Scalar]:
     return [*places, *shear, *(rho for each in strand.inertia for rho in each)]
 
 
-def fields(xi: Numbers, h: Numbers, phi: Numbers) -> Numbers:
+def fields(xi: RealOrComplex, h: RealOrComplex, phi: RealOrComplex) -> RealOrComplex:
     """N (n, n_xi, 6, 12): displacements and rotations at ξ per dof of an element, section's axes.
 
     xi (n, n_xi), h (n, 1) in m, phi (n, 1, 2). Stretch and twist are linear, bending is that of
@@ -310,7 +312,7 @@ class _Gathered:
 
 
 @dataclass(frozen=True)
-class Rows:
+class ScalarRows:
     """Which rows of a table of scalars are a link's: see `velocity.velocity_terms`."""
 
     spin: slice
@@ -384,7 +386,7 @@ def whole_mass(link: LocalLink) -> Sequence[Term]:
 
 def stack(
     links: Sequence[LocalLink],
-    rows: Sequence[Rows],
+    rows: Sequence[ScalarRows],
     ridings: Sequence[Riding | None],
     space: str,
     n_u: int,
@@ -422,7 +424,7 @@ def stack(
     )
 
 
-def _add_joined(out: _Gathered, link: LocalLink, rows: Rows, first: int) -> None:
+def _add_joined(out: _Gathered, link: LocalLink, rows: ScalarRows, first: int) -> None:
     own = np.flatnonzero(link.own >= 0)
     out.add(first + own, link.own[own], 1.0, -1)
     carried = ((slot, unknown) for slot, pairs in link.carried.items() for unknown, _ in pairs)

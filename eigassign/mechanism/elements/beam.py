@@ -24,13 +24,13 @@ from numpy.typing import NDArray
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.sections import SectionValues, section_values
-from eigassign.mechanism.kinematics.parameters import Parameters
+from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.series.expression import Scalar, is_constant
 
 # --- Beam elements: axial, torsion and two bendings, Euler-Bernoulli or Timoshenko, consistent
 
 Floats = NDArray[np.float64]
-Numbers = NDArray[Any]  # real or complex: polynomials do not mind
+RealOrComplex = NDArray[Any]  # real or complex: polynomials do not mind
 
 
 class ElementTerm(NamedTuple):
@@ -119,7 +119,7 @@ def field_inertia(beam: BeamValues) -> tuple[Scalar, ...]:
     return (beam.mass, beam.mass, beam.mass, beam.polar, *rotary)
 
 
-def bending_shapes(xi: Numbers, phi: Numbers) -> Numbers:
+def bending_shapes(xi: RealOrComplex, phi: RealOrComplex) -> RealOrComplex:
     """Deflection per (w1, h θ1, w2, h θ2) at ξ = x/h in an element with shear ratio Φ, (…, 4).
 
     (1+Φ) w = (1−3ξ²+2ξ³ + Φ(1−ξ)) w1 + (ξ−2ξ²+ξ³ + Φ(ξ−ξ²)/2) h θ1
@@ -138,7 +138,7 @@ def bending_shapes(xi: Numbers, phi: Numbers) -> Numbers:
     return np.stack(shapes, axis=-1) / (1.0 + phi)[..., None]
 
 
-def bending_slopes(xi: Numbers, phi: Numbers) -> Numbers:
+def bending_slopes(xi: RealOrComplex, phi: RealOrComplex) -> RealOrComplex:
     """h × rotation of the section per (w1, h θ1, w2, h θ2) at ξ, of `bending_shapes`, (…, 4).
 
     (1+Φ) h θ = −6(ξ−ξ²) w1 + (1−4ξ+3ξ² + Φ(1−ξ)) h θ1
@@ -286,7 +286,7 @@ def rotary_mass(plane: str) -> tuple[tuple[Floats, ...], ...]:
 # --- Stiffness and mass values of the beams of a case: its sections and materials put together
 
 
-def beam_values(case: CaseFile, parameters: Parameters, beam: Any, section: str) -> BeamValues:
+def beam_values(case: CaseFile, parameters: ModelParameters, beam: Any, section: str) -> BeamValues:
     """Stiffness and mass values of a beam of the case with one section."""
 
     def number(key: str, value: float) -> Scalar:
@@ -315,7 +315,7 @@ def _refuse_square(case: CaseFile, section: str) -> None:
 
 
 def _values(
-    case: CaseFile, parameters: Parameters, beam: Any, section: SectionValues
+    case: CaseFile, parameters: ModelParameters, beam: Any, section: SectionValues
 ) -> BeamValues:
     data = case.mechanism.materials[beam.material]
     path = f"materials.{beam.material}."
@@ -337,7 +337,7 @@ def _values(
 
 
 def _shear_modulus(
-    case: CaseFile, parameters: Parameters, beam: Any, E: Scalar, sheared: bool
+    case: CaseFile, parameters: ModelParameters, beam: Any, E: Scalar, sheared: bool
 ) -> Scalar:
     """G = E/(2(1 + ν)), or as given; not needed by planar beams without shear."""
     data: Any = case.mechanism.materials[beam.material]
@@ -354,7 +354,7 @@ def _shear_modulus(
 
 
 def tapered_values(
-    case: CaseFile, parameters: Parameters, link: Any, share: Scalar | Floats
+    case: CaseFile, parameters: ModelParameters, link: Any, share: Scalar | Floats
 ) -> BeamValues:
     """Values at a share of the length, the sections' dimensions running linearly.
 
@@ -370,7 +370,7 @@ def tapered_values(
     return _values(case, parameters, link, section_values(a, number))
 
 
-def is_settled(parameters: Parameters, link: Any) -> bool:
+def is_settled(parameters: ModelParameters, link: Any) -> bool:
     """Whether no design parameter touches the sections and the material of a tapered beam."""
     owners = (
         f"sections.{link.section.start}.",

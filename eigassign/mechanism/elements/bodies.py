@@ -17,7 +17,7 @@ from eigassign.mechanism.elements.mesh import (
     node_dofs,
     rigid_motion,
 )
-from eigassign.mechanism.kinematics.parameters import Parameters, length
+from eigassign.mechanism.kinematics.parameters import ModelParameters, length
 from eigassign.mechanism.kinematics.rotations import Objects, vector
 from eigassign.series.expression import Scalar
 
@@ -26,7 +26,7 @@ Ints = NDArray[np.intp]
 
 
 def add_bodies(
-    case: CaseFile, parameters: Parameters, name: str, mass: Entries, nodes: dict[str, Ints]
+    case: CaseFile, parameters: ModelParameters, name: str, mass: Entries, nodes: dict[str, Ints]
 ) -> None:
     """The point masses and rigid bodies fixed to a link's nodes."""
     for key, body in case.mechanism.bodies.items():
@@ -36,12 +36,14 @@ def add_bodies(
             add_scalars(mass, nodes[node], _body(case, parameters, f"bodies.{key}", body, lever))
 
 
-def _body(case: CaseFile, parameters: Parameters, path: str, body: Any, lever: Objects) -> Objects:
+def _body(
+    case: CaseFile, parameters: ModelParameters, path: str, body: Any, lever: Objects
+) -> Objects:
     value = parameters.number(f"{path}.mass", body.mass)
     return body_block(value, _inertia(parameters, path, body.inertia), lever)
 
 
-def _inertia(parameters: Parameters, path: str, given: Any) -> list[Scalar]:
+def _inertia(parameters: ModelParameters, path: str, given: Any) -> list[Scalar]:
     """(Ixx, Iyy, Izz, Ixy, Ixz, Iyz): a number is I_zz of a planar body."""
     if isinstance(given, (tuple, list)):
         return [*(float(v) for v in given), *([0.0] * (6 - len(given)))]
@@ -49,7 +51,7 @@ def _inertia(parameters: Parameters, path: str, given: Any) -> list[Scalar]:
     return [0.0, 0.0, zz, 0.0, 0.0, 0.0]
 
 
-def rigid_link(case: CaseFile, parameters: Parameters, name: str) -> LinkMesh:
+def rigid_link(case: CaseFile, parameters: ModelParameters, name: str) -> LinkMesh:
     """A rigid link: one node at its origin carries its mass, named nodes hang on it rigidly."""
     space, link = case.mechanism.space, case.mechanism.links[name]
     width, kept = len(DOFS[space]), node_dofs(0, case.mechanism.space)
@@ -66,7 +68,7 @@ def rigid_link(case: CaseFile, parameters: Parameters, name: str) -> LinkMesh:
     return LinkMesh(width, {"@origin": kept}, places, [], mass.terms(), rigid)
 
 
-def rigid_nodes(case: CaseFile, parameters: Parameters, name: str) -> dict[str, Objects]:
+def rigid_nodes(case: CaseFile, parameters: ModelParameters, name: str) -> dict[str, Objects]:
     """Named nodes of a rigid link in its frame, m."""
     link = case.mechanism.links[name]
     places = {"start": vector([0.0])}

@@ -29,7 +29,7 @@ from eigassign.case import CaseFile
 from eigassign.errors import AccuracyError, MechanismError
 from eigassign.mechanism.elements.mesh import LinkMesh, Reduction, Term, total
 from eigassign.mechanism.elements.sparse_factor import kept_factor
-from eigassign.mechanism.kinematics.parameters import Parameters, link_type
+from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import compile_table
 
@@ -43,7 +43,7 @@ CLEAN = 1e-15  # entries this small beside their diagonal are zeros
 NEW = 1e-4  # part of a vector of another design, relative, that is worth a dof of its own
 
 
-def as_asked(case: CaseFile, parameters: Parameters, name: str, mesh: LinkMesh) -> LinkMesh:
+def as_asked(case: CaseFile, parameters: ModelParameters, name: str, mesh: LinkMesh) -> LinkMesh:
     """A link's mesh, reduced where it says to what frequency.
 
     A ``reduce_to: auto`` that nobody settled leaves the link whole.
@@ -55,7 +55,7 @@ def as_asked(case: CaseFile, parameters: Parameters, name: str, mesh: LinkMesh) 
 
 
 def reduce_mesh(
-    case: CaseFile, parameters: Parameters, name: str, mesh: LinkMesh, frequency_hz: float
+    case: CaseFile, parameters: ModelParameters, name: str, mesh: LinkMesh, frequency_hz: float
 ) -> LinkMesh:
     """The link with its interior replaced by what moves below ``frequency_hz``.
 
@@ -123,7 +123,7 @@ def held_factor(K_ii: sparse.csc_array, path: str) -> linalg.SuperLU:
 
 
 def _matrices(
-    case: CaseFile, parameters: Parameters, mesh: LinkMesh
+    case: CaseFile, parameters: ModelParameters, mesh: LinkMesh
 ) -> list[tuple[sparse.csr_array, sparse.csr_array]]:
     """K and M in the middle of the bounds, then at both ends where they differ there."""
     terms = [*mesh.stiffness, *mesh.mass]
@@ -142,7 +142,7 @@ def _designs(case: CaseFile) -> Floats:
     return np.array([0.5 * (low + high), low, high])
 
 
-def coefficients(parameters: Parameters, terms: Sequence[Term], y: Floats) -> Floats:
+def coefficients(parameters: ModelParameters, terms: Sequence[Term], y: Floats) -> Floats:
     """The coefficients of a link's terms at designs y (n, n_y), (n_terms, n)."""
     n_q = len(parameters.coordinates)
     table = compile_table(parameters.recorder, [t.coefficient for t in terms], n_q + y.shape[1])
@@ -150,7 +150,7 @@ def coefficients(parameters: Parameters, terms: Sequence[Term], y: Floats) -> Fl
     return np.asarray(np.broadcast_to(table.evaluate(Samples(), z), (len(terms), len(y))))
 
 
-def _at_centre(case: CaseFile, parameters: Parameters, mesh: LinkMesh) -> Floats:
+def _at_centre(case: CaseFile, parameters: ModelParameters, mesh: LinkMesh) -> Floats:
     """N in the middle of the bounds, (n_local, n_twist)."""
     values = coefficients(parameters, mesh.rigid, _designs(case)[:1])[:, 0]
     return total(mesh.rigid, values).toarray()

@@ -37,9 +37,9 @@ from eigassign.mechanism.elements.mesh import (
     rigid_motion,
 )
 from eigassign.mechanism.elements.superelement import superelement_mesh
-from eigassign.mechanism.kinematics.parameters import Parameters, length, link_type, station
+from eigassign.mechanism.kinematics.parameters import ModelParameters, length, link_type, station
 from eigassign.mechanism.kinematics.rotations import Objects, rotation, vector
-from eigassign.mechanism.kinematics.topology import Tree
+from eigassign.mechanism.kinematics.topology import Topology
 from eigassign.series.expression import Scalar, is_constant
 
 # --- Each kind of link as a mesh in its own frame: beam, rigid body, frame of beams, supereleme
@@ -48,7 +48,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 
-def link_mesh(case: CaseFile, parameters: Parameters, tree: Tree, name: str) -> LinkMesh:
+def link_mesh(case: CaseFile, parameters: ModelParameters, tree: Topology, name: str) -> LinkMesh:
     """The mesh of one link with all its dofs, its bodies included."""
     match link_type(case, name):
         case "rigid":
@@ -60,7 +60,9 @@ def link_mesh(case: CaseFile, parameters: Parameters, tree: Tree, name: str) -> 
     return _beam(case, parameters, tree, name)
 
 
-def copies_of(case: CaseFile, parameters: Parameters, tree: Tree) -> dict[str, tuple[object, ...]]:
+def copies_of(
+    case: CaseFile, parameters: ModelParameters, tree: Topology
+) -> dict[str, tuple[object, ...]]:
     """By name of a plain beam all that its mesh depends on, equal for those that are copies.
 
     Beams with bodies or riders, or of a length that varies, are left out: they have their own.
@@ -78,7 +80,7 @@ def copies_of(case: CaseFile, parameters: Parameters, tree: Tree) -> dict[str, t
 # --- beams ---
 
 
-def _beam(case: CaseFile, parameters: Parameters, tree: Tree, name: str) -> LinkMesh:
+def _beam(case: CaseFile, parameters: ModelParameters, tree: Topology, name: str) -> LinkMesh:
     """A straight beam along x, in two segments where a carriage or nut rides on it."""
     space = case.mechanism.space
     link: Any = case.mechanism.links[name]
@@ -96,7 +98,7 @@ def _beam(case: CaseFile, parameters: Parameters, tree: Tree, name: str) -> Link
 
 def _chain(
     case: CaseFile,
-    parameters: Parameters,
+    parameters: ModelParameters,
     name: str,
     space: str,
     pieces: Sequence[tuple[Scalar, Scalar, int]],
@@ -157,7 +159,7 @@ def _chain_rigid(pieces: Sequence[tuple[Scalar, Scalar, int]], space: str) -> li
 
 def _segment(
     case: CaseFile,
-    parameters: Parameters,
+    parameters: ModelParameters,
     name: str,
     stiffness: Entries,
     mass: Entries,
@@ -227,7 +229,7 @@ def rolled(angle: float) -> Floats:
 # --- A link made of several beams: lattice booms, delta forearms, portals
 
 
-def frame_mesh(case: CaseFile, parameters: Parameters, name: str) -> LinkMesh:
+def frame_mesh(case: CaseFile, parameters: ModelParameters, name: str) -> LinkMesh:
     """Nodes joined by beams, each in as many elements as asked for; nodes are rigid connections."""
     space = case.mechanism.space
     link: Any = case.mechanism.links[name]
@@ -257,7 +259,7 @@ def frame_mesh(case: CaseFile, parameters: Parameters, name: str) -> LinkMesh:
 
 def _add_beam(
     case: CaseFile,
-    parameters: Parameters,
+    parameters: ModelParameters,
     beam: Any,
     stiffness: Entries,
     mass: Entries,

@@ -14,7 +14,7 @@ import numpy as np
 
 from eigassign.series.expression import Scalar, is_constant
 
-Number = Callable[[str, float], Scalar]
+Lookup = Callable[[str, float], Scalar]
 # Energy values of κ for a solid circle and a rectangle, the thin-walled limit for a tube, a typical
 # rolled profile; they do not depend on ν. A bare section may state its own.
 SHEAR = {"circle": 0.9, "tube": 0.5, "rectangle": 5.0 / 6.0, "i_profile": 0.44}
@@ -31,7 +31,7 @@ class SectionValues(NamedTuple):
     shear_coefficient: Scalar
 
 
-def section_values(section: Any, number: Number) -> SectionValues:
+def section_values(section: Any, number: Lookup) -> SectionValues:
     """Properties of a section of the case; ``number(key, value)`` yields a float or an expression.
 
     circle: A = πd²/4, I = πd⁴/64, J = 2I; tube: differences of two circles; rectangle b × h (h
@@ -60,7 +60,7 @@ def _circle(diameter: Scalar) -> tuple[Scalar, Scalar]:
     return diameter**2.0 * (math.pi / 4.0), diameter**4.0 * (math.pi / 64.0)
 
 
-def _tube(section: Any, number: Number) -> tuple[Scalar, Scalar]:
+def _tube(section: Any, number: Lookup) -> tuple[Scalar, Scalar]:
     outer = number("outer_diameter", section.outer_diameter)
     if section.inner_diameter is not None:
         inner = number("inner_diameter", section.inner_diameter)
@@ -70,7 +70,7 @@ def _tube(section: Any, number: Number) -> tuple[Scalar, Scalar]:
     return a - b, i - j
 
 
-def _rectangle(section: Any, number: Number, kappa: float) -> SectionValues:
+def _rectangle(section: Any, number: Lookup, kappa: float) -> SectionValues:
     b, h = number("width", section.width), number("height", section.height)
     area = b * h
     I_z, I_y = b * h**3.0 * (1.0 / 12.0), h * b**3.0 * (1.0 / 12.0)
@@ -80,7 +80,7 @@ def _rectangle(section: Any, number: Number, kappa: float) -> SectionValues:
     return SectionValues(area, I_z, I_y, long * short**3.0 * fitted, I_z + I_y, kappa)
 
 
-def _i_profile(section: Any, number: Number, kappa: float) -> SectionValues:
+def _i_profile(section: Any, number: Lookup, kappa: float) -> SectionValues:
     h, b = number("height", section.height), number("width", section.width)
     t = number("flange_thickness", section.flange_thickness)
     w = number("web_thickness", section.web_thickness)
@@ -92,7 +92,7 @@ def _i_profile(section: Any, number: Number, kappa: float) -> SectionValues:
     return SectionValues(area, I_z, I_y, J, I_z + I_y, kappa)
 
 
-def _bare(section: Any, number: Number, kappa: float) -> SectionValues:
+def _bare(section: Any, number: Lookup, kappa: float) -> SectionValues:
     def given(key: str, default: Scalar) -> Scalar:
         value = getattr(section, key, None)
         return default if value is None else number(key, value)

@@ -21,7 +21,7 @@ from eigassign.mechanism.elements.bodies import add_bodies
 from eigassign.mechanism.elements.craig_bampton import held_factor
 from eigassign.mechanism.elements.mesh import DOFS, Entries, LinkMesh, Term, rigid_motion
 from eigassign.mechanism.elements.sparse_factor import is_semidefinite
-from eigassign.mechanism.kinematics.parameters import Parameters, link_type, parameters
+from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type, parameters
 from eigassign.mechanism.kinematics.rotations import vector
 
 # --- A link from another finite-element program: K, M and its interface nodes
@@ -32,7 +32,7 @@ STRAIN_FREE = 1e-6  # largest |K N|_i relative to √K_ii ‖√K_jj N_j‖ that
 ALIKE = 1e-3  # relative difference of a part's mass by direction that passes for round-off
 
 
-def superelement_mesh(case: CaseFile, parameters: Parameters, name: str) -> LinkMesh:
+def superelement_mesh(case: CaseFile, parameters: ModelParameters, name: str) -> LinkMesh:
     """The mesh of a superelement; raises MechanismError for matrices that cannot be one."""
     link: Any = case.mechanism.links[name]
     path = f"mechanism.links.{name}"
@@ -64,7 +64,7 @@ def _weight(name: str, mesh: LinkMesh, space: str) -> str:
 
 def _mesh(
     case: CaseFile,
-    parameters: Parameters,
+    parameters: ModelParameters,
     name: str,
     K: sparse.csr_array,
     M: sparse.csr_array,

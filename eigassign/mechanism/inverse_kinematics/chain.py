@@ -24,9 +24,9 @@ from eigassign.case import CaseFile
 from eigassign.case.schema.joints import FREEDOMS
 from eigassign.mechanism.kinematics.forward import Kinematics, walk
 from eigassign.mechanism.kinematics.loop_closure import closure_rows, reference_coordinates
-from eigassign.mechanism.kinematics.parameters import Parameters, node_position
+from eigassign.mechanism.kinematics.parameters import ModelParameters, node_position
 from eigassign.mechanism.kinematics.rotations import Objects, cross, multiply
-from eigassign.mechanism.kinematics.topology import Tree, split
+from eigassign.mechanism.kinematics.topology import Topology, split
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import compile_table
 from eigassign.series.expression import Recorder, derivative
@@ -48,7 +48,7 @@ class Look(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Assembly:
+class LoopAssembly:
     """How the loops of a chain are put together."""
 
     reference: Floats  # q (n_q,) at which the assembly is chosen
@@ -69,7 +69,7 @@ class TipChain:
     relative_map: tuple[Floats, Floats]  # A (n_q, n_q), b (n_q,): joint coordinates A q + b
     kinds: tuple[str, ...]
     turned_by: tuple[int, ...] = ()  # the components of a rotation vector that a tip can have
-    assembly: Assembly | None = None
+    assembly: LoopAssembly | None = None
 
     @property
     def n_q(self) -> int:
@@ -124,13 +124,13 @@ ADVANCING = ("screw", "nut")  # a full turn of theirs moves something on
 class _Unbound:
     """A mechanism whose loops are open: closure is an equation to be met, not a fact."""
 
-    parameters: Parameters
+    parameters: ModelParameters
     motion: Kinematics
 
 
 def tip_chain(
     case: CaseFile,
-    parameters: Parameters,
+    parameters: ModelParameters,
     motion: Kinematics,
     tip: str,
     y: Floats,
@@ -151,7 +151,7 @@ def tip_chain(
     )
 
 
-def _unbound(case: CaseFile, parameters: Parameters, motion: Kinematics) -> _Unbound:
+def _unbound(case: CaseFile, parameters: ModelParameters, motion: Kinematics) -> _Unbound:
     """The mechanism with its passive freedoms as variables, and every freedom moving by itself."""
     recorder, tree = Recorder(), motion.tree
     variables = parameters.rerecorded(recorder, len(tree.passive))
@@ -229,7 +229,7 @@ def _closure(case: CaseFile, free: _Unbound, A: Floats) -> tuple[Objects, Object
     return np.array(F, dtype=object), _per_coordinate(dF, A)
 
 
-def _kinds(case: CaseFile, tree: Tree) -> tuple[str, ...]:
+def _kinds(case: CaseFile, tree: Topology) -> tuple[str, ...]:
     """What each freedom is; where a loop is closed over a screw, no turn leads back."""
     types = [case.mechanism.joints[f.joint].type for f in tree.freedoms]
     advancing = any(j.type in ADVANCING for j in case.mechanism.joints.values())
@@ -242,8 +242,8 @@ def _kinds(case: CaseFile, tree: Tree) -> tuple[str, ...]:
 
 
 def _assembly(
-    case: CaseFile, parameters: Parameters, motion: Kinematics, y: Floats
-) -> Assembly | None:
+    case: CaseFile, parameters: ModelParameters, motion: Kinematics, y: Floats
+) -> LoopAssembly | None:
     """The branch of the model itself: where it was chosen, and its passive freedoms."""
     if not motion.passive:
         return None
@@ -258,4 +258,4 @@ def _assembly(
 
     gaps, sines = (2, 1) if case.mechanism.space == "planar" else (3, 3)
     turning = np.array(([False] * gaps + [True] * sines) * len(motion.tree.loops), dtype=bool)
-    return Assembly(reference_coordinates(case), passive, turning)
+    return LoopAssembly(reference_coordinates(case), passive, turning)

@@ -37,7 +37,7 @@ from eigassign.mechanism.inverse_kinematics.solver import (
     trace,
 )
 from eigassign.mechanism.inverse_kinematics.state import Arm, prepare
-from eigassign.mechanism.inverse_kinematics.tip_path import Course, Target
+from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipTarget
 
 # --- Numerical inverse kinematics of any chain: the coordinates q along a path of its tip
 
@@ -114,11 +114,11 @@ def _along(arm: Arm, course: Course, u0: Floats) -> Floats:
     return _assembled(arm, course, u, target)
 
 
-def _first(target: Target, n: int) -> Target:
-    return Target(target.point[:n], None if target.rotation is None else target.rotation[:n])
+def _first(target: TipTarget, n: int) -> TipTarget:
+    return TipTarget(target.point[:n], None if target.rotation is None else target.rotation[:n])
 
 
-def _check(arm: Arm, course: Course, u: Floats, target: Target) -> None:
+def _check(arm: Arm, course: Course, u: Floats, target: TipTarget) -> None:
     """Raises TrajectoryError for the first of the samples u that leaves its branch or its point."""
     off_path = _off(arm, u, target, RESIDUAL)
     off_branch = ~arm.inside(u).all(axis=1)
@@ -128,13 +128,13 @@ def _check(arm: Arm, course: Course, u: Floats, target: Target) -> None:
         raise why(arm, course, k, u[k])
 
 
-def _off(arm: Arm, u: Floats, target: Target, tolerance: float) -> Bools:
+def _off(arm: Arm, u: Floats, target: TipTarget, tolerance: float) -> Bools:
     """Whether tips are off their points or their orientations, (n,)."""
     distance, turn = arm.misses(arm.error(arm.look(u), target))
     return np.asarray((distance > tolerance * arm.lever) | (turn > tolerance))
 
 
-def _assembled(arm: Arm, course: Course, u: Floats, target: Target) -> Floats:
+def _assembled(arm: Arm, course: Course, u: Floats, target: TipTarget) -> Floats:
     """The same with the passive freedoms as the model has them; TrajectoryError if others."""
     assembly = arm.chain.assembly
     if assembly is None:
@@ -258,7 +258,7 @@ def _normalised(arm: Arm, u: Floats, turns: Bools) -> Floats:
     return np.where(turns, turned, u)
 
 
-def assembled(arm: Arm, target: Target, u: Floats) -> Floats | None:
+def assembled(arm: Arm, target: TipTarget, u: Floats) -> Floats | None:
     """The same solution if the model itself has the loops in that assembly, coming from its
     reference; else None.
     """

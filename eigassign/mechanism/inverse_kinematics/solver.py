@@ -15,14 +15,14 @@ import numpy as np
 
 from eigassign.mechanism.inverse_kinematics.chain import Bools, Floats, Look, Reduced, reduced
 from eigassign.mechanism.inverse_kinematics.state import Arm
-from eigassign.mechanism.inverse_kinematics.tip_path import Course, Target
+from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipTarget
 
 # --- Bringing the tip to given points: Levenberg–Marquardt from far away, Newton nearby
 
 ROUND_OFF = 1e-13  # of L: as near to a point as the tip can be computed
 
 
-def levenberg(arm: Arm, u: Floats, target: Target, iterations: int) -> tuple[Floats, Floats]:
+def levenberg(arm: Arm, u: Floats, target: TipTarget, iterations: int) -> tuple[Floats, Floats]:
     """Least |(target − tip, −F)| from many u at once; returns u and that length (n,) in m.
 
     δ = (JᵀJ + μ L² I)⁻¹ Jᵀ e, μ falling while it helps and rising where it does not. Loops are
@@ -48,7 +48,7 @@ def levenberg(arm: Arm, u: Floats, target: Target, iterations: int) -> tuple[Flo
     return u, miss
 
 
-def _residual(arm: Arm, u: Floats, target: Target) -> tuple[Floats, Floats]:
+def _residual(arm: Arm, u: Floats, target: TipTarget) -> tuple[Floats, Floats]:
     """The error and the open gaps together, and their derivative."""
     seen = arm.look(u)
     error = arm.error(seen, target)
@@ -58,7 +58,7 @@ def _residual(arm: Arm, u: Floats, target: Target) -> tuple[Floats, Floats]:
 
 
 def newton(
-    arm: Arm, u: Floats, target: Target, tolerance: float
+    arm: Arm, u: Floats, target: TipTarget, tolerance: float
 ) -> tuple[Floats, Look, Reduced, Bools]:
     """Newton for tip(u) = target with closed loops; returns u, what is seen there, who settled.
 
@@ -149,7 +149,7 @@ _MIN_ADVANCE = 1e-8  # below, the joints turn faster and faster without advancin
 
 
 @dataclass(frozen=True)
-class Pose:
+class TracePoint:
     """A solution u (1, n_z) at path parameter s, with du/ds."""
 
     s: float
@@ -194,8 +194,8 @@ def trace(arm: Arm, course: Course, u0: Floats, turn: float) -> Trace:
 
 
 def _step(
-    arm: Arm, course: Course, here: Pose, s: float, bend: Floats, sense: Floats, turn: float
-) -> Pose | None:
+    arm: Arm, course: Course, here: TracePoint, s: float, bend: Floats, sense: Floats, turn: float
+) -> TracePoint | None:
     """The pose at s ahead: a quadratic guess, corrected; None if that is not the same branch."""
     guess = here.u + (s - here.s) * (here.slope + (s - here.s) * bend)
     u, seen, motion, settled = newton(arm, guess, course.target(np.array([s])), _TRACE)
@@ -215,12 +215,12 @@ def _singular(arm: Arm, seen: Look, motion: Reduced) -> bool:
     return bool(stretched or loop_regularity(arm, seen)[0] < DEAD)
 
 
-def _pose(arm: Arm, course: Course, s: float, u: Floats, motion: Reduced) -> Pose:
+def _pose(arm: Arm, course: Course, s: float, u: Floats, motion: Reduced) -> TracePoint:
     velocity, spin = course.rates(s)
     spin = arm.lever * spin[:, list(arm.chain.turned_by)]
     slope = least_norm(motion.J, np.hstack([velocity, spin]), arm.rank)
     passive = np.einsum("npq,nq->np", motion.following, slope)
-    return Pose(s, u, np.hstack([slope, passive]))
+    return TracePoint(s, u, np.hstack([slope, passive]))
 
 
 def interpolated(path: Trace, s: Floats) -> Floats:

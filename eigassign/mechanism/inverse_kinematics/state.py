@@ -21,7 +21,7 @@ import numpy as np
 
 from eigassign.errors import MechanismError, SingularityError
 from eigassign.mechanism.inverse_kinematics.chain import Bools, Floats, Look, TipChain, reduced
-from eigassign.mechanism.inverse_kinematics.tip_path import Course, Target
+from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipTarget
 
 # --- A chain prepared for inverse kinematics: one measure for metres and radians, and first gue
 
@@ -54,7 +54,7 @@ class Arm:
         """The chain's look with both measures made one."""
         return _measured(self.chain, u, self.scale, self.lever)
 
-    def error(self, seen: Look, target: Target) -> Floats:
+    def error(self, seen: Look, target: TipTarget) -> Floats:
         """What is missing to the target (n, m): m, and L times rad."""
         return error(self.chain, seen, target, self.lever)
 
@@ -78,7 +78,7 @@ class Arm:
         return np.asarray((above >= 0.0) & (above <= self.width + 2.0 * _SLACK))
 
 
-def error(chain: TipChain, seen: Look, target: Target, lever: float) -> Floats:
+def error(chain: TipChain, seen: Look, target: TipTarget, lever: float) -> Floats:
     """Target minus tip (n, m): position in m, and L log(R_target Rᵀ) of what can turn."""
     apart = target.point - seen.point
     if not chain.turned_by or seen.rotation is None or target.rotation is None:

@@ -35,7 +35,7 @@ _ROUND_OFF = 1e-12  # how far outside [0, 1] a parameter is still taken for its 
 
 
 @dataclass(frozen=True)
-class Path:
+class TipPath:
     """p(s) = Σ_k c_k (s − s_i)^k on s_i ≤ s ≤ s_{i+1}, for m waypoints in d = 2 or 3 dimensions."""
 
     knots: Floats  # (m,) s at the waypoints, from 0 to 1
@@ -73,7 +73,7 @@ class Path:
         return piece, (inside - self.knots[piece])[:, None]
 
 
-def straight(waypoints: ArrayLike) -> Path:
+def straight(waypoints: ArrayLike) -> TipPath:
     """Polyline through the waypoints (m, d), in m, parameterised by arc length.
 
     Raises MechanismError if there are fewer than two waypoints, if they are not finite, not (m, 2)
@@ -83,14 +83,14 @@ def straight(waypoints: ArrayLike) -> Path:
     return replace(polyline(knots, points), chord_length=length)
 
 
-def polyline(knots: Floats, values: Floats) -> Path:
+def polyline(knots: Floats, values: Floats) -> TipPath:
     """The piecewise linear curve with ``values`` (m, d) at ``knots`` (m,)."""
     chords = np.diff(values, axis=0) / np.diff(knots)[:, None]
     zero = np.zeros_like(chords)
     return _path(knots, np.stack([values[:-1], chords, zero, zero]))
 
 
-def spline(waypoints: ArrayLike) -> Path:
+def spline(waypoints: ArrayLike) -> TipPath:
     """Cubic spline through the waypoints (m, d), in m, parameterised by cumulative chord length.
 
     Twice continuously differentiable, with not-a-knot ends (the third derivative is continuous at
@@ -101,17 +101,17 @@ def spline(waypoints: ArrayLike) -> Path:
     return replace(smooth(knots, points), chord_length=length)
 
 
-def smooth(knots: Floats, values: Floats) -> Path:
+def smooth(knots: Floats, values: Floats) -> TipPath:
     """The not-a-knot cubic spline with ``values`` (m, d) at ``knots`` (m,)."""
     from scipy.interpolate import CubicSpline  # takes 0.1 s, which only splines need to wait for
 
     return _path(knots, CubicSpline(knots, values).c[::-1].copy())
 
 
-def _path(knots: Floats, coefficients: Floats) -> Path:
+def _path(knots: Floats, coefficients: Floats) -> TipPath:
     knots.setflags(write=False)
     coefficients.setflags(write=False)
-    return Path(knots, coefficients)
+    return TipPath(knots, coefficients)
 
 
 def _measure(waypoints: ArrayLike) -> tuple[Floats, Floats, float]:
@@ -157,7 +157,7 @@ class Attitude:
     corners: Floats  # s at which the rate jumps
 
 
-def planar_attitude(path: Path, angle: ArrayLike, kind: str) -> Attitude:
+def planar_attitude(path: TipPath, angle: ArrayLike, kind: str) -> Attitude:
     """Angle θ(s) in rad, from one value that is kept or one per waypoint, full turns counted."""
     from scipy.spatial.transform import Rotation
 
@@ -175,7 +175,7 @@ def planar_attitude(path: Path, angle: ArrayLike, kind: str) -> Attitude:
     )
 
 
-def spatial_attitude(path: Path, orientation: ArrayLike, kind: str) -> Attitude:
+def spatial_attitude(path: TipPath, orientation: ArrayLike, kind: str) -> Attitude:
     """Rotation from one triple (rx, ry, rz) that is kept or one per waypoint, R = Rz Ry Rx.
 
     From one waypoint to the next it turns the shorter way. Raises MechanismError where that is half
@@ -221,7 +221,7 @@ def _matrices(turning: Callable[[Floats], Any], s: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class Target:
+class TipTarget:
     """Where n tips should be: ``point`` (n, d) in m, and ``rotation`` (n, 3, 3) where asked for."""
 
     point: Floats
@@ -232,15 +232,15 @@ class Target:
 class Course:
     """Sample k is due at path parameter ``s[k]`` and time ``time_s[k]``."""
 
-    path: Path
+    path: TipPath
     s: Floats  # (n,) not decreasing, from 0 to 1
     time_s: Floats  # (n,)
     attitude: Attitude | None = None
 
-    def target(self, s: Floats) -> Target:
+    def target(self, s: Floats) -> TipTarget:
         """Where the tip should be at parameters s (n,)."""
         rotation = None if self.attitude is None else self.attitude.rotation(np.atleast_1d(s))
-        return Target(self.path.point(s), rotation)
+        return TipTarget(self.path.point(s), rotation)
 
     def rates(self, s: float) -> tuple[Floats, Floats]:
         """dp/ds (1, d) in m and ω (1, 3) in rad, per unit of s, from the right at a corner."""

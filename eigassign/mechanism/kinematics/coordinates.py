@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
-from eigassign.mechanism.kinematics.topology import Edge, Tree
+from eigassign.mechanism.kinematics.topology import JointEdge, Topology
 
 Floats = NDArray[np.float64]
 Angles = dict[str, tuple[Floats, float] | None]  # per link: row over q and constant, or unknown
 
 
 @dataclass(frozen=True)
-class Coordinates:
+class CoordinateMap:
     """s = ``relative`` q + ``offset`` are the joint coordinates in the order of q.
 
     ``columns`` are the coordinates that are not locked: the q̇ of eq. (1); ``rates``
@@ -31,7 +31,7 @@ class Coordinates:
     rates: Floats
 
 
-def coordinates(case: CaseFile, tree: Tree) -> Coordinates:
+def coordinates(case: CaseFile, tree: Topology) -> CoordinateMap:
     """The maps of a case."""
     relative, offset = _relative(case, tree)
     drives = [c.drive for c in case.coordinates.values()]
@@ -39,10 +39,10 @@ def coordinates(case: CaseFile, tree: Tree) -> Coordinates:
     free = tuple(i for i in columns if drives[i] == "free")
     rates = np.zeros((len(tree.freedoms), len(columns)))
     rates[: len(drives)] = _joint_rates(relative, columns, free)
-    return Coordinates(relative, offset, columns, rates)
+    return CoordinateMap(relative, offset, columns, rates)
 
 
-def _relative(case: CaseFile, tree: Tree) -> tuple[Floats, Floats]:
+def _relative(case: CaseFile, tree: Topology) -> tuple[Floats, Floats]:
     """An absolute angle minus the absolute angle of the base and the mounting angle."""
     n = len(case.coordinates)
     relative, offset = np.eye(n), np.zeros(n)
@@ -62,12 +62,12 @@ def _relative(case: CaseFile, tree: Tree) -> tuple[Floats, Floats]:
     return relative, offset
 
 
-def _mount(case: CaseFile, edge: Edge) -> float:
+def _mount(case: CaseFile, edge: JointEdge) -> float:
     return float(getattr(case.mechanism.joints[edge.joint], "angle", 0.0))
 
 
 def _absolute_base(
-    case: CaseFile, tree: Tree, edge: Edge, i: int, absolute: Angles
+    case: CaseFile, tree: Topology, edge: JointEdge, i: int, absolute: Angles
 ) -> tuple[Floats, float]:
     """Absolute angle of the base of a joint whose coordinate i is the follower's."""
     path, (base, _) = f"coordinates.{tuple(case.coordinates)[i]}.angle", edge.written.base
@@ -85,8 +85,8 @@ def _absolute_base(
 
 def _carried_angle(
     case: CaseFile,
-    tree: Tree,
-    edge: Edge,
+    tree: Topology,
+    edge: JointEdge,
     absolute: Angles,
     relative: Floats,
     offset: Floats,

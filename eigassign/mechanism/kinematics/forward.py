@@ -17,9 +17,9 @@ import numpy as np
 
 from eigassign.case import CaseFile
 from eigassign.case.schema.joints import RIDING
-from eigassign.mechanism.kinematics.coordinates import Coordinates
+from eigassign.mechanism.kinematics.coordinates import CoordinateMap
 from eigassign.mechanism.kinematics.joints import JointMotion, joint_motion, mounting, turned
-from eigassign.mechanism.kinematics.parameters import Parameters, node_position
+from eigassign.mechanism.kinematics.parameters import ModelParameters, node_position
 from eigassign.mechanism.kinematics.rotations import (
     Floats,
     Objects,
@@ -28,7 +28,7 @@ from eigassign.mechanism.kinematics.rotations import (
     present,
     vector,
 )
-from eigassign.mechanism.kinematics.topology import Edge, Node, Tree
+from eigassign.mechanism.kinematics.topology import JointEdge, NodeName, Topology
 from eigassign.series.expression import Scalar
 
 
@@ -43,7 +43,7 @@ class Placement:
     """
 
     link: str
-    edge: Edge
+    edge: JointEdge
     rotation: Objects
     lever: Objects
     freedoms: Objects
@@ -88,7 +88,7 @@ class Placement:
 class Loop:
     """One loop-closing joint: pose and twist of its follower node, reached along both sides."""
 
-    edge: Edge
+    edge: JointEdge
     rotation: Objects  # from the follower's axes to the base link's axes
     lever: Objects  # from base node to follower node, base axes
     freedoms: Objects
@@ -106,8 +106,8 @@ class Kinematics:
 
     placements: tuple[Placement, ...]
     loops: tuple[Loop, ...]
-    tree: Tree
-    coordinates: Coordinates
+    tree: Topology
+    coordinates: CoordinateMap
     passive: tuple[Scalar, ...] = ()  # the loops' passive freedoms as functions of (q, y)
     rigid: tuple[int, ...] = ()  # columns that nothing resists
 
@@ -137,9 +137,9 @@ class Kinematics:
 
 def walk(
     case: CaseFile,
-    parameters: Parameters,
-    tree: Tree,
-    coords: Coordinates,
+    parameters: ModelParameters,
+    tree: Topology,
+    coords: CoordinateMap,
     values: Sequence[Scalar],
     rates: Objects,
 ) -> Kinematics:
@@ -156,15 +156,15 @@ class _Walk:
     """What is known on the way from the ground to the tips; each joint and each node once."""
 
     case: CaseFile
-    parameters: Parameters
-    tree: Tree
+    parameters: ModelParameters
+    tree: Topology
     values: Sequence[Scalar]
     rates: Objects
     placed: dict[str, Placement] = field(default_factory=dict)
-    _twists: dict[Node, Objects] = field(default_factory=dict)
+    _twists: dict[NodeName, Objects] = field(default_factory=dict)
     _rigid: dict[object, JointMotion] = field(default_factory=dict)
 
-    def place(self, edge: Edge) -> Placement:
+    def place(self, edge: JointEdge) -> Placement:
         """The link that this joint carries."""
         motion = self._motion(edge)
         root = self._position(edge.follower)
@@ -180,7 +180,7 @@ class _Walk:
             root=root,
         )
 
-    def loop(self, edge: Edge) -> Loop:
+    def loop(self, edge: JointEdge) -> Loop:
         """Both ways to the follower of a joint that closes a loop."""
         motion = self._motion(edge)
         R_base, x_base = self._stands(edge.base)
@@ -195,18 +195,18 @@ class _Walk:
             twist_gap=self._twist(edge.follower) - self._reached(edge, motion),
         )
 
-    def _position(self, node: Node) -> Objects:
+    def _position(self, node: NodeName) -> Objects:
         if node[0] == "ground":
             return np.zeros(3, dtype=object)
         return node_position(self.case, self.parameters, self.tree, node)
 
-    def _stands(self, node: Node) -> tuple[Objects, Objects]:
+    def _stands(self, node: NodeName) -> tuple[Objects, Objects]:
         """World rotation and world position of a node."""
         if node[0] == "ground":
             return np.eye(3).astype(object), np.zeros(3, dtype=object)
         return self.placed[node[0]].at(self._position(node))
 
-    def _twist(self, node: Node) -> Objects:
+    def _twist(self, node: NodeName) -> Objects:
         """Twist (6, n) of a node in its link's axes."""
         if node not in self._twists:
             ground = node[0] == "ground"
@@ -217,7 +217,7 @@ class _Walk:
             )
         return self._twists[node]
 
-    def _reached(self, edge: Edge, motion: JointMotion) -> Objects:
+    def _reached(self, edge: JointEdge, motion: JointMotion) -> Objects:
         """Twist of the follower's joint node: carried from the base, and the joint's own."""
         base = _shifted(self._twist(edge.base), motion.translation)
         rotated = multiply(motion.rotation.T, np.concatenate([base[:3], base[3:]], axis=1))
@@ -225,7 +225,7 @@ class _Walk:
         own = self.tree.of_joint(edge.joint)
         return moved + multiply(motion.freedoms, self.rates[own]) if own else moved
 
-    def _motion(self, edge: Edge) -> JointMotion:
+    def _motion(self, edge: JointEdge) -> JointMotion:
         """R, lever and A of a joint as it is walked, mounting and position included."""
         own = self.tree.of_joint(edge.joint)
         joint = self.case.mechanism.joints[edge.joint]

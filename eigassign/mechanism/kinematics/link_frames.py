@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.mechanism.kinematics.forward import Kinematics
-from eigassign.mechanism.kinematics.parameters import Parameters, link_type, node_position
+from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type, node_position
 from eigassign.mechanism.kinematics.rotations import multiply
 from eigassign.mechanism.kinematics.topology import split
 from eigassign.series.algebra import Samples
@@ -26,11 +26,11 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Poses:
+class LinkFrames:
     """World frames of all links as functions of x = (q, y)."""
 
     case: CaseFile
-    parameters: Parameters
+    parameters: ModelParameters
     motion: Kinematics
     links: tuple[str, ...]
     drawn: tuple[tuple[tuple[str, str], ...], ...]  # per link: the node pairs of its lines
@@ -91,11 +91,13 @@ class Poses:
         return self._evaluate(self._compile(list(self.world(link, node))), x)
 
 
-def build_poses(case: CaseFile, parameters: Parameters, motion: Kinematics) -> Poses:
+def build_link_frames(
+    case: CaseFile, parameters: ModelParameters, motion: Kinematics
+) -> LinkFrames:
     """The poses of a case's mechanism."""
     links = tuple(p.link for p in motion.placements)
     drawn = tuple(_lines(case, motion, link) for link in links)
-    return Poses(case, parameters, motion, links, drawn)
+    return LinkFrames(case, parameters, motion, links, drawn)
 
 
 def _lines(case: CaseFile, motion: Kinematics, link: str) -> tuple[tuple[str, str], ...]:
@@ -114,7 +116,7 @@ def _lines(case: CaseFile, motion: Kinematics, link: str) -> tuple[tuple[str, st
     return tuple((root, name) for name in others) or ((root, root),)
 
 
-def design_dependence(poses: Poses, tip: str, oriented: bool = False) -> NDArray[np.bool_]:
+def design_dependence(poses: LinkFrames, tip: str, oriented: bool = False) -> NDArray[np.bool_]:
     """Which design parameters a node's place, and its turning, depend on (n_y,): structural."""
     link, node = split(tip)
     scalars = list(poses.world(link, node))

@@ -17,18 +17,18 @@ from numpy.typing import NDArray
 from eigassign.case import CaseFile
 from eigassign.case.schema.joints import FREEDOMS
 from eigassign.errors import MechanismError
-from eigassign.mechanism.kinematics.coordinates import Coordinates
+from eigassign.mechanism.kinematics.coordinates import CoordinateMap
 from eigassign.mechanism.kinematics.forward import Kinematics, walk
-from eigassign.mechanism.kinematics.parameters import Parameters, initial_design
+from eigassign.mechanism.kinematics.parameters import ModelParameters, initial_design
 from eigassign.mechanism.kinematics.rotations import Floats, Objects, multiply
-from eigassign.mechanism.kinematics.topology import Tree
+from eigassign.mechanism.kinematics.topology import Topology
 from eigassign.series.compiler import Program, compile_program
 from eigassign.series.expression import Expression, Recorder, Scalar, derivative
 from eigassign.series.implicit import ACCEPT, ImplicitFunction
 
 
 def closed_kinematics(
-    case: CaseFile, parameters: Parameters, tree: Tree, coords: Coordinates
+    case: CaseFile, parameters: ModelParameters, tree: Topology, coords: CoordinateMap
 ) -> Kinematics:
     """ERLS motion of a mechanism for any choice of columns, its loops closed where it has any.
 
@@ -44,7 +44,7 @@ def closed_kinematics(
     return walk(case, parameters, tree, coords, values, coords.rates.astype(object))
 
 
-def all_moving(case: CaseFile, parameters: Parameters, motion: Kinematics) -> Kinematics:
+def all_moving(case: CaseFile, parameters: ModelParameters, motion: Kinematics) -> Kinematics:
     """The same motion with every coordinate among the columns, locked ones too."""
     c = motion.coordinates
     n = len(c.relative)
@@ -55,7 +55,7 @@ def all_moving(case: CaseFile, parameters: Parameters, motion: Kinematics) -> Ki
 
 
 def close_loops(
-    case: CaseFile, parameters: Parameters, tree: Tree, coords: Coordinates
+    case: CaseFile, parameters: ModelParameters, tree: Topology, coords: CoordinateMap
 ) -> Kinematics:
     """ERLS motion of a mechanism with loops.
 
@@ -76,8 +76,8 @@ def close_loops(
 
 
 def _bind_passive(
-    case: CaseFile, parameters: Parameters, tree: Tree, coords: Coordinates, planar: bool
-) -> Parameters:
+    case: CaseFile, parameters: ModelParameters, tree: Topology, coords: CoordinateMap, planar: bool
+) -> ModelParameters:
     """The parameters with each passive freedom as a component of the implicit function."""
     if not tree.passive:
         _check_rigid_loops(case, parameters, tree, coords, planar)
@@ -108,7 +108,7 @@ def _bind_passive(
     )
 
 
-def _joint_names(case: CaseFile, coords: Coordinates) -> list[str]:
+def _joint_names(case: CaseFile, coords: CoordinateMap) -> list[str]:
     """What the joint coordinates s are called: q's names, but where q counts absolute angles."""
     plain = (coords.relative == np.eye(len(coords.relative))).all(axis=1) & (coords.offset == 0.0)
     return [
@@ -118,7 +118,7 @@ def _joint_names(case: CaseFile, coords: Coordinates) -> list[str]:
 
 
 def _equations(
-    case: CaseFile, parameters: Parameters, tree: Tree, coords: Coordinates, planar: bool
+    case: CaseFile, parameters: ModelParameters, tree: Topology, coords: CoordinateMap, planar: bool
 ) -> tuple[list[Scalar], list[Scalar]]:
     """Closure rows F and check rows of all loops, on passive freedoms as plain variables."""
     values = [parameters.freedom(k) for k in range(len(tree.freedoms))]
@@ -140,7 +140,7 @@ def closure_rows(motion: Kinematics, planar: bool) -> tuple[list[Scalar], list[S
 
 
 def _check_rigid_loops(
-    case: CaseFile, parameters: Parameters, tree: Tree, coords: Coordinates, planar: bool
+    case: CaseFile, parameters: ModelParameters, tree: Topology, coords: CoordinateMap, planar: bool
 ) -> None:
     """Loops without passive freedoms must close as they are drawn."""
     F, check = _equations(case, parameters, tree, coords, planar)
@@ -212,10 +212,10 @@ RANK = 1e-7  # of the largest singular value of ∂F/∂p: those below do not co
 
 def choose_branch(
     case: CaseFile,
-    tree: Tree,
+    tree: Topology,
     function: ImplicitFunction,
     used: Sequence[int],
-    parameters: Parameters,
+    parameters: ModelParameters,
 ) -> tuple[Floats, Floats]:
     """A solution (a_0, p_0) of the closure at the reference configuration.
 
@@ -242,7 +242,7 @@ def choose_branch(
     return a0, found[0]
 
 
-def reference(case: CaseFile, parameters: Parameters) -> Floats:
+def reference(case: CaseFile, parameters: ModelParameters) -> Floats:
     """z = (s, y) where the branch is chosen, y as written."""
     s = parameters.relative @ reference_coordinates(case) + parameters.offset
     return np.concatenate([s, initial_design(case)])
@@ -260,7 +260,7 @@ def reference_coordinates(case: CaseFile) -> Floats:
     return q
 
 
-def _guess(tree: Tree, assembly: object) -> Floats | None:
+def _guess(tree: Topology, assembly: object) -> Floats | None:
     given = dict(getattr(assembly, "guess", None) or {})
     if not given:
         return None
@@ -281,7 +281,7 @@ def _starts(n: int) -> Floats:
     return np.asarray(np.pi * (2.0 * fractions - 1.0))
 
 
-def _turning(case: CaseFile, tree: Tree) -> NDArray[np.bool_]:
+def _turning(case: CaseFile, tree: Topology) -> NDArray[np.bool_]:
     """Which passive freedoms are angles, the same after a full turn."""
     kinds = [FREEDOMS[case.mechanism.joints[f.joint].type][f.component] for f in tree.passive]
     return np.array([kind != "translation" for kind in kinds], dtype=bool)
@@ -313,7 +313,7 @@ def _apart(difference: Floats, turning: NDArray[np.bool_]) -> float:
     return float(np.abs(np.where(turning, turned, difference)).max())
 
 
-def _check_determined(tree: Tree, function: ImplicitFunction, a0: Floats, p0: Floats) -> None:
+def _check_determined(tree: Topology, function: ImplicitFunction, a0: Floats, p0: Floats) -> None:
     J = function.equations(a0[:, None], p0[:, None])[2][0]
     missing = function.size - int(np.linalg.matrix_rank(J, RANK))
     if missing:
@@ -351,7 +351,7 @@ def _check_movable(
             )
 
 
-def _unclosable(tree: Tree, function: ImplicitFunction, a0: Floats) -> str:
+def _unclosable(tree: Topology, function: ImplicitFunction, a0: Floats) -> str:
     """Where the loops do not close, and whether there are too many conditions or too little length.
 
     Conditions beyond the rank of ∂F/∂p at general places are no passive freedom's to meet.
@@ -374,7 +374,7 @@ def _at(names: Sequence[str], a: Floats) -> str:
     return ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, a, strict=True)) or "its only pose"
 
 
-def _ambiguous(tree: Tree, names: Sequence[str], a0: Floats, found: Floats) -> str:
+def _ambiguous(tree: Topology, names: Sequence[str], a0: Floats, found: Floats) -> str:
     """All branches in words."""
     lines = ["; ".join(_guesses(tree, p)) for p in found]
     listed = " | ".join(f"({line})" for line in lines)
@@ -384,7 +384,7 @@ def _ambiguous(tree: Tree, names: Sequence[str], a0: Floats, found: Floats) -> s
     )
 
 
-def _guesses(tree: Tree, p: Floats) -> list[str]:
+def _guesses(tree: Topology, p: Floats) -> list[str]:
     """One solution as the guess that leads to it: a list for a joint with several freedoms."""
     values: dict[str, list[str]] = {}
     for freedom, value in zip(tree.passive, p, strict=True):

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from eigassign.case import CaseFile
 from eigassign.mechanism.kinematics.coordinates import coordinates
 from eigassign.mechanism.kinematics.rotations import Objects, vector
-from eigassign.mechanism.kinematics.topology import Node, Tree, build_tree
+from eigassign.mechanism.kinematics.topology import NodeName, Topology, build_tree
 from eigassign.series.expression import Expression, Recorder, Scalar
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Parameters:
+class ModelParameters:
     """Variables z = (s, y): joint coordinates s in the order of the case's q, then design y."""
 
     recorder: Recorder
@@ -47,11 +47,11 @@ class Parameters:
         n_q = len(self.coordinates)
         return self.joint_coordinate(k) if k < n_q else self.passive[k - n_q]
 
-    def with_passive(self, values: Sequence[Scalar]) -> Parameters:
+    def with_passive(self, values: Sequence[Scalar]) -> ModelParameters:
         """The same with the passive freedoms known."""
         return replace(self, passive=tuple(values))
 
-    def rerecorded(self, recorder: Recorder, n_passive: int) -> Parameters:
+    def rerecorded(self, recorder: Recorder, n_passive: int) -> ModelParameters:
         """The same on another recorder, the passive freedoms being its last variables."""
         n = len(self.coordinates) + len(self.design)
         moved = {
@@ -62,7 +62,7 @@ class Parameters:
         return replace(self, recorder=recorder, by_path=moved, passive=passive)
 
 
-def parameters(case: CaseFile) -> Parameters:
+def parameters(case: CaseFile) -> ModelParameters:
     """The variables of a case."""
     recorder = Recorder()
     names, design = tuple(case.coordinates), tuple(case.design.parameters)
@@ -71,7 +71,7 @@ def parameters(case: CaseFile) -> Parameters:
         for k, parameter in enumerate(case.design.parameters.values())
     }
     maps = coordinates(case, build_tree(case))
-    return Parameters(recorder, names, design, maps.relative, maps.offset, by_path)
+    return ModelParameters(recorder, names, design, maps.relative, maps.offset, by_path)
 
 
 def initial_design(case: CaseFile) -> Floats:
@@ -94,13 +94,15 @@ def link_type(case: CaseFile, link: str) -> str:
     return str(getattr(case.mechanism.links[link], "type", "beam"))
 
 
-def length(case: CaseFile, parameters: Parameters, link: str) -> Scalar:
+def length(case: CaseFile, parameters: ModelParameters, link: str) -> Scalar:
     """Length of a link in m: a number, or a design parameter."""
     data: Any = case.mechanism.links[link]
     return parameters.number(f"links.{link}.length", data.length)
 
 
-def node_position(case: CaseFile, parameters: Parameters, tree: Tree, node: Node) -> Objects:
+def node_position(
+    case: CaseFile, parameters: ModelParameters, tree: Topology, node: NodeName
+) -> Objects:
     """Position of a named node in its link's frame, m (3,).
 
     A node "@joint" is the place where a carriage or nut stands: the joint's own coordinate.
@@ -118,7 +120,7 @@ def node_position(case: CaseFile, parameters: Parameters, tree: Tree, node: Node
     return np.zeros(3, dtype=object)
 
 
-def station(parameters: Parameters, tree: Tree, joint: str) -> Scalar:
+def station(parameters: ModelParameters, tree: Topology, joint: str) -> Scalar:
     """Distance of a carriage or nut from the start of the link it rides on, m."""
     (k,) = tree.of_joint(joint)
     return parameters.freedom(k)

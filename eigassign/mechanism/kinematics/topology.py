@@ -18,12 +18,12 @@ from eigassign.case import CaseFile
 from eigassign.case.schema.joints import FREEDOMS, RIDING
 from eigassign.errors import MechanismError
 
-Node = tuple[str, str]  # (link, node); the ground is ("ground", "")
-GROUND: Node = ("ground", "")
+NodeName = tuple[str, str]  # (link, node); the ground is ("ground", "")
+GROUND: NodeName = ("ground", "")
 
 
 @dataclass(frozen=True)
-class Edge:
+class JointEdge:
     """One joint as it is walked: ``follower`` hangs on ``base``.
 
     ``turned`` where the file names the two the other way round: the joint is then walked against
@@ -31,16 +31,16 @@ class Edge:
     """
 
     joint: str
-    base: Node
-    follower: Node
+    base: NodeName
+    follower: NodeName
     turned: bool = False
 
-    def reversed(self) -> Edge:
+    def reversed(self) -> JointEdge:
         """The same joint walked the other way."""
-        return Edge(self.joint, self.follower, self.base, not self.turned)
+        return JointEdge(self.joint, self.follower, self.base, not self.turned)
 
     @property
-    def written(self) -> Edge:
+    def written(self) -> JointEdge:
         """The same joint as the file has it."""
         return self.reversed() if self.turned else self
 
@@ -55,15 +55,15 @@ class Freedom:
 
 
 @dataclass(frozen=True)
-class Tree:
+class Topology:
     """Tree edges in an order where every base is placed first; loop edges; freedoms.
 
     The first ``n_elastic`` loops end in a node that deforms and carries nothing else: it follows.
     The others close between nodes that are rigid, or carried themselves.
     """
 
-    edges: tuple[Edge, ...]
-    loops: tuple[Edge, ...]
+    edges: tuple[JointEdge, ...]
+    loops: tuple[JointEdge, ...]
     n_elastic: int
     freedoms: tuple[Freedom, ...]  # the coordinates in their order, then the passive ones
 
@@ -92,7 +92,7 @@ class Tree:
         return found
 
 
-def split(node: str) -> Node:
+def split(node: str) -> NodeName:
     """ "link.node" → (link, node)."""
     link, _, name = node.partition(".")
     return link, name
@@ -127,12 +127,12 @@ def component_index(case: CaseFile, coordinate: object) -> int:
 class _Walk(NamedTuple):
     """Tree edges, and the other joints sorted: ending in a free node that deforms, or not."""
 
-    edges: list[Edge]
-    elastic: list[Edge]
-    rigid: list[Edge]
+    edges: list[JointEdge]
+    elastic: list[JointEdge]
+    rigid: list[JointEdge]
 
 
-def build_tree(case: CaseFile) -> Tree:
+def build_tree(case: CaseFile) -> Topology:
     """From the ground, joints in the order of the file, each from base to follower if possible.
 
     Raises MechanismError for a link that no joint connects to the ground.
@@ -144,20 +144,20 @@ def build_tree(case: CaseFile) -> Tree:
     while better := _better(joints, walk, rigid):
         walk = better
     loops = (*walk.elastic, *walk.rigid)
-    return Tree(tuple(walk.edges), loops, len(walk.elastic), freedoms(case))
+    return Topology(tuple(walk.edges), loops, len(walk.elastic), freedoms(case))
 
 
-def _edge(case: CaseFile, name: str) -> Edge:
+def _edge(case: CaseFile, name: str) -> JointEdge:
     joint = case.mechanism.joints[name]
     base = GROUND
     if joint.type in RIDING:
         base = (joint.base, f"@{name}")
     elif joint.base != "ground":
         base = split(joint.base)
-    return Edge(name, base, split(joint.follower))
+    return JointEdge(name, base, split(joint.follower))
 
 
-def _require_connected(case: CaseFile, edges: Sequence[Edge]) -> None:
+def _require_connected(case: CaseFile, edges: Sequence[JointEdge]) -> None:
     placed = {edge.follower[0] for edge in edges}
     for link in case.mechanism.links:
         if link not in placed:
@@ -165,9 +165,9 @@ def _require_connected(case: CaseFile, edges: Sequence[Edge]) -> None:
             raise MechanismError(f"mechanism.links.{link}", message)
 
 
-def _walk(joints: Sequence[Edge], closing: frozenset[str], rigid: set[str]) -> _Walk:
+def _walk(joints: Sequence[JointEdge], closing: frozenset[str], rigid: set[str]) -> _Walk:
     """Hang link after link, keeping the joints ``closing`` for loops."""
-    placed, tree = {"ground"}, list[Edge]()
+    placed, tree = {"ground"}, list[JointEdge]()
     waiting = [e for e in joints if e.joint not in closing]
     while step := next(_steps(waiting, placed), None):
         tree.append(step)
@@ -177,13 +177,13 @@ def _walk(joints: Sequence[Edge], closing: frozenset[str], rigid: set[str]) -> _
     return _sorted(tree, [e for e in joints if e.joint not in used], rigid)
 
 
-def _steps(waiting: Sequence[Edge], placed: set[str]) -> Iterator[Edge]:
+def _steps(waiting: Sequence[JointEdge], placed: set[str]) -> Iterator[JointEdge]:
     """Joints that reach a new link: as the file has them first, then against their direction."""
     for edges in (waiting, (e.reversed() for e in waiting)):
         yield from (e for e in edges if e.base[0] in placed and e.follower[0] not in placed)
 
 
-def _sorted(tree: list[Edge], loops: Sequence[Edge], rigid: set[str]) -> _Walk:
+def _sorted(tree: list[JointEdge], loops: Sequence[JointEdge], rigid: set[str]) -> _Walk:
     """Loop edges towards a node of their own that deforms, and those that have none."""
     carriers = {edge.follower: edge.base for edge in tree}
     roots = {edge.follower[0]: edge.follower for edge in tree}
@@ -199,7 +199,9 @@ def _sorted(tree: list[Edge], loops: Sequence[Edge], rigid: set[str]) -> _Walk:
     return walk
 
 
-def _free(edge: Edge, carriers: dict[Node, Node], roots: dict[str, Node], rigid: set[str]) -> bool:
+def _free(
+    edge: JointEdge, carriers: dict[NodeName, NodeName], roots: dict[str, NodeName], rigid: set[str]
+) -> bool:
     """Whether nothing carries the follower node yet, and it does not carry the base node itself."""
     node = edge.base
     while node != edge.follower:
@@ -212,7 +214,7 @@ def _free(edge: Edge, carriers: dict[Node, Node], roots: dict[str, Node], rigid:
     return False
 
 
-def _better(joints: Sequence[Edge], walk: _Walk, rigid: set[str]) -> _Walk | None:
+def _better(joints: Sequence[JointEdge], walk: _Walk, rigid: set[str]) -> _Walk | None:
     """The walk with one more loop closed at a node that deforms, by exchanging two joints."""
     closing = frozenset(e.joint for e in (*walk.elastic, *walk.rigid))
     for edge in walk.rigid:
@@ -223,7 +225,7 @@ def _better(joints: Sequence[Edge], walk: _Walk, rigid: set[str]) -> _Walk | Non
     return None
 
 
-def _round(edges: Sequence[Edge], closing: Edge) -> list[str]:
+def _round(edges: Sequence[JointEdge], closing: JointEdge) -> list[str]:
     """The tree joints of the loop that a joint closes."""
     holder = {edge.follower[0]: edge for edge in edges}
     sides = []

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from eigassign.case import CaseFile
 from eigassign.case.schema.joints import RIDING
 from eigassign.errors import TravelError
-from eigassign.mechanism.kinematics.parameters import Parameters, length, station
-from eigassign.mechanism.kinematics.topology import Tree
+from eigassign.mechanism.kinematics.parameters import ModelParameters, length, station
+from eigassign.mechanism.kinematics.topology import Topology
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import Table, compile_table
 from eigassign.series.expression import Scalar
@@ -68,7 +68,7 @@ class Rails:
         return TravelError(f"mechanism.joints.{self.joints[rider]}", message, k)
 
 
-def rails(case: CaseFile, parameters: Parameters, tree: Tree) -> Rails | None:
+def rails(case: CaseFile, parameters: ModelParameters, tree: Topology) -> Rails | None:
     """The ranges of a mechanism; None where nothing rides."""
     riders = [(joint, link) for link in case.mechanism.links for joint in tree.riders(link)]
     if not riders:

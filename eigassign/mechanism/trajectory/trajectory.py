@@ -33,7 +33,7 @@ from eigassign.mechanism.inverse_kinematics.follow import follow
 from eigassign.mechanism.inverse_kinematics.tip_path import (
     WAYPOINTS,
     Course,
-    Path,
+    TipPath,
     planar_attitude,
     spatial_attitude,
     spline,
@@ -45,7 +45,7 @@ from eigassign.mechanism.trajectory.timing import point_to_point, shared_times, 
 # --- The trajectory q(t) of a case: joint samples, a CSV file of them, or a path of the tip
 
 _BACKWARDS = "time must increase, and goes from {:g} s to {:g} s"
-_PATHS: dict[str, Callable[[ArrayLike], Path]] = {"spline": spline, "straight": straight}
+_PATHS: dict[str, Callable[[ArrayLike], TipPath]] = {"spline": spline, "straight": straight}
 
 Floats = NDArray[np.float64]
 
@@ -112,7 +112,7 @@ def _from_tip_path(
     )
 
 
-def _check_dimension(chain: TipChain, path: Path) -> None:
+def _check_dimension(chain: TipChain, path: TipPath) -> None:
     d = chain.look(np.zeros((1, len(chain.kinds)))).point.shape[1]
     if path.coefficients.shape[2] != d:
         raise MechanismError(WAYPOINTS, f"the tip moves in {d} dimensions: give {d} coordinates")

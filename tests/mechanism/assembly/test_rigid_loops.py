@@ -14,7 +14,7 @@ from test_spatial import agree
 
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.rigid_loops import require_consistent
-from eigassign.mechanism.kinematics.topology import Edge
+from eigassign.mechanism.kinematics.topology import JointEdge
 
 MASS, INERTIA = 1.3, 0.02
 
@@ -167,7 +167,7 @@ def test_rows_that_no_passive_joint_can_meet_are_refused_at_their_joint() -> Non
     J, G = np.zeros((6, 2)), np.zeros((6, 1))
     J[[0, 4], [0, 1]] = 1.0
     G[0] = G[4] = 0.3
-    loops = [Edge(name, ("a", "end"), ("b", "end")) for name in ("first", "second")]
+    loops = [JointEdge(name, ("a", "end"), ("b", "end")) for name in ("first", "second")]
     require_consistent(J, G, loops, "planar")
     G[5] = 1e-6
     with pytest.raises(MechanismError, match="no room to move") as caught:

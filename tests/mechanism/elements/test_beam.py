@@ -10,8 +10,8 @@ from frame_oracle import element
 
 from eigassign.mechanism.elements.links import link_mesh
 from eigassign.mechanism.elements.mesh import LinkMesh
-from eigassign.mechanism.kinematics.parameters import Parameters
-from eigassign.mechanism.kinematics.topology import Tree
+from eigassign.mechanism.kinematics.parameters import ModelParameters
+from eigassign.mechanism.kinematics.topology import Topology
 from eigassign.series.expression import Recorder
 
 E, A, I, RHO, L = 70e9, 3e-4, 5e-9, 2700.0, 0.8  # noqa: E741
@@ -27,8 +27,8 @@ def chain(n: int, bodies: dict[str, Given] | None = None) -> LinkMesh:
         links={"beam": beam},
         bodies=bodies or {},
     )
-    numbers = Parameters(Recorder(), (), (), np.zeros((0, 0)), np.zeros(0))
-    return link_mesh(Given(mechanism=mechanism), numbers, Tree((), (), 0, ()), "beam")
+    numbers = ModelParameters(Recorder(), (), (), np.zeros((0, 0)), np.zeros(0))
+    return link_mesh(Given(mechanism=mechanism), numbers, Topology((), (), 0, ()), "beam")
 
 
 def stiffness(n: int) -> np.ndarray:

@@ -12,7 +12,7 @@ from eigassign.errors import MechanismError, TrajectoryError
 from eigassign.mechanism.inverse_kinematics.chain import TipChain
 from eigassign.mechanism.inverse_kinematics.follow import RESIDUAL, follow
 from eigassign.mechanism.inverse_kinematics.solver import Trace, interpolated
-from eigassign.mechanism.inverse_kinematics.tip_path import Course, Path, spline, straight
+from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipPath, spline, straight
 from eigassign.mechanism.trajectory.timing import timing_law
 
 TAU = 2.0 * np.pi
@@ -21,7 +21,7 @@ PAPER = [(0.33, 0.12), (0.30, 0.19), (0.108, 0.2104), (0.02, 0.1845), (-0.01, 0.
 PAPER_BRANCH = {"elbow": (np.pi, np.radians(217.0))}
 
 
-def course(path: Path, n: int = 50) -> Course:
+def course(path: TipPath, n: int = 50) -> Course:
     s = np.linspace(0.0, 1.0, n)
     return Course(path, s, 2.0 * s)
 
@@ -31,7 +31,7 @@ def away(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.abs((a - b + np.pi) % TAU - np.pi).max())
 
 
-def reachable_path(seed: int, l1: float, l2: float) -> Path:
+def reachable_path(seed: int, l1: float, l2: float) -> TipPath:
     """A random spline or polyline that stays off both ends of a two-link arm's reach."""
     rng = np.random.default_rng(seed)
     inner, outer = abs(l1 - l2), l1 + l2
@@ -157,7 +157,7 @@ def test_a_branch_counts_modulo_full_turns(turns):
 # --- what cannot be followed ---
 
 
-def failure(arm: TipChain, path: Path, n: int = 50, **wishes: object) -> TrajectoryError:
+def failure(arm: TipChain, path: TipPath, n: int = 50, **wishes: object) -> TrajectoryError:
     with pytest.raises(TrajectoryError) as error:
         follow(arm, course(path, n), **wishes)
     return error.value

@@ -10,7 +10,7 @@ from frame_oracle import frame
 
 from eigassign.mechanism.kinematics.forward import Placement
 from eigassign.mechanism.kinematics.rotations import rotation, vector
-from eigassign.mechanism.kinematics.topology import GROUND, Edge
+from eigassign.mechanism.kinematics.topology import GROUND, JointEdge
 
 
 def test_a_two_link_arm_reaches_where_trigonometry_says() -> None:
@@ -41,7 +41,7 @@ def test_a_chain_may_have_more_links_than_calls_may_nest() -> None:
     link: Placement | None = None
     for _ in range(count):
         foot = none if link is None else end
-        edge = Edge("", GROUND, ("", "start"))
+        edge = JointEdge("", GROUND, ("", "start"))
         link = Placement("", edge, R, none, np.zeros((6, 0)), np.zeros((6, 0)), link, foot, none)
     assert link is not None
     angles = bend * np.arange(1, count)  # of all links that carry another
