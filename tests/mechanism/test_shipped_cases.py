@@ -79,5 +79,5 @@ def test_the_first_mode_of_a_ball_screw_is_that_of_two_masses_and_two_springs() 
     turning = (6e-4 + rho * math.pi * d**4 / 32 * 0.6) / p**2
     table = 120.0 + rho * math.pi * d**2 / 4 * x / 3  # a third of the bar that stretches
     K = np.array([[shaft, -shaft], [-shaft, shaft + servo]])
-    lam = np.linalg.eigvals(K / np.array([[table], [turning]])).min()
+    lam = np.linalg.eigvals(K / np.array([[table], [turning]])).real.min()
     assert found == pytest.approx(math.sqrt(lam) / 2 / math.pi, rel=0.01)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, get_args, get_origin
 
-from pydantic import Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 from pydantic.json_schema import GenerateJsonSchema
 
 from eigassign.case.reader import Finding, KeyPath
@@ -221,6 +221,12 @@ class _Quiet(GenerateJsonSchema):
     """Empty mappings as defaults need no mention (and no warning)."""
 
     ignored_warning_kinds = {"skipped-choice", "non-serializable-default"}  # noqa: RUF012
+
+    def encode_default(self, dft: Any) -> Any:
+        """A model as default is built first (`defer_build`): pydantic before 2.14 does not."""
+        if isinstance(dft, BaseModel):
+            type(dft).model_rebuild()
+        return super().encode_default(dft)
 
 
 def json_schema() -> dict[str, Any]:

@@ -8,6 +8,7 @@ K and M of a part from files of another program: read, and refused where they ca
 from __future__ import annotations
 
 import zipfile
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -196,7 +197,8 @@ def _read(file: Path, key: str) -> Any:
         raise MechanismError(key, f"{file.name} is skew-symmetric, expected a symmetric matrix")
     if max(rows, columns) > MOST:
         raise MechanismError(key, f"{file.name} has {rows} rows; up to {MOST} are supported")
-    return mmread(file)
+    explicit = "spmatrix" in signature(mmread).parameters  # from SciPy 1.15 on, where False is new
+    return mmread(file, spmatrix=False) if explicit else mmread(file)
 
 
 def _checked(A: sparse.csr_array, key: str, name: str) -> sparse.csr_array:
