@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-from rungs import residual, slope
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "stability"))
-
 from calibration import Drawn, draw
+from rungs import residual, slope
 from wide_draws import FAMILIES
 
 from eigassign.errors import EigassignError

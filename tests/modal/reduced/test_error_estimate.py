@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from calibration import draw
 from chains import model_of, random_chain, two_link
 from scipy import sparse
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "stability"))
-
-from calibration import draw
 from wide_draws import planar_loop, spatial_loop, spatial_tree
 
 from eigassign.errors import AccuracyError, SingularityError

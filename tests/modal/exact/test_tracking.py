@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from chains import model_of, two_link
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "stability"))
-
 from meetings import E_ONE, line, two_bars
 
 from eigassign.api import load_case

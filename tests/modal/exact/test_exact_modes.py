@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from chains import bar, model_of, random_chain, two_link
+from large import HELD, Q0, Y0, arm
 
 from eigassign.errors import UsageError
 from eigassign.modal.exact import dense, solver
+from eigassign.modal.exact.dense import solve_single
 from eigassign.modal.exact.roundoff import rounding_error
+from eigassign.modal.exact.sparse import block, principal
 from eigassign.modal.model import Model
 
 POSES = np.array([[0.3, 1.9], [1.0, 0.2], [-2.0, 0.5]])
@@ -241,3 +246,28 @@ def test_a_design_outside_the_domain_of_a_formula_is_refused() -> None:
     model = model_of(two_link(design=design))
     with pytest.raises(UsageError, match="outside the domain"):
         model.frequencies([0.1, 0.2], [0.0], 1)
+
+
+def test_a_principal_part_is_what_slicing_gives() -> None:
+    pencil = arm((HELD, "free")).pencil
+    data = pencil.mass @ pencil.theta(np.concatenate([Q0, Y0])[None])[:, 0]
+    whole = pencil.sparse(data).toarray()
+    dofs = np.flatnonzero(np.random.default_rng(3).random(pencil.n_dof) < 0.6)
+    np.testing.assert_array_equal(
+        principal(pencil, data, dofs).toarray(), whole[np.ix_(dofs, dofs)]
+    )
+    assert principal(pencil, data, dofs).nnz == np.count_nonzero(whole[np.ix_(dofs, dofs)])
+    np.testing.assert_array_equal(block(pencil, data, dofs), whole[dofs])
+
+
+@pytest.mark.parametrize("drives", [("free", "free"), ("free", HELD), (HELD, "free")], ids=str)
+@pytest.mark.parametrize("elements", [(4, 3), (20, 15)])
+def test_one_sample_has_the_modes_of_the_batch(
+    drives: tuple[Any, Any], elements: tuple[int, int]
+) -> None:
+    model = arm(drives, elements)
+    x = model.x(np.tile(Q0, (2, 1)), np.tile(Y0, (2, 1)))
+    batch = solver.modes(model.pencil, x, 4)
+    lam, phi = solve_single(model.pencil, model.pencil.theta(x[:1]), 4)
+    np.testing.assert_allclose(lam, batch.lam[0], rtol=1e-10)
+    np.testing.assert_allclose(phi, batch.phi[0], atol=1e-7 * np.abs(phi).max())

@@ -1,0 +1,64 @@
+"""Large pencils: sparse and dense algebra say the same, and memory stays with the vectors."""
+
+from __future__ import annotations
+
+import itertools
+import tracemalloc
+from typing import Any
+
+import numpy as np
+import pytest
+from large import DRIVES, Q0, Y0, arm, sparsely
+
+from eigassign.modal.expansion import Expansion, expand
+
+
+def agree(thin: Expansion, full: Expansion, tolerance: float) -> None:
+    """Coefficients and vectors, relative to the largest of their degree or kind."""
+    starts = full.space.degree_starts
+    for a, b in zip(thin.clusters, full.clusters, strict=True):
+        assert a.modes == b.modes
+        for first, last in itertools.pairwise(starts):
+            right = b.coefficients[..., first:last]
+            wrong = np.abs(a.coefficients[..., first:last] - right).max()
+            assert wrong <= tolerance * np.abs(right).max()
+    for v, w in zip(thin.vectors, full.vectors, strict=True):
+        np.testing.assert_allclose(v, w, atol=10 * tolerance * np.abs(w).max())
+
+
+@pytest.mark.parametrize("drives", DRIVES, ids=str)
+@pytest.mark.parametrize("linear", [False, True])
+def test_every_kind_of_drive_is_expanded_sparsely_to_the_same_series(
+    drives: tuple[Any, Any], linear: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def job() -> Expansion:
+        return expand(arm(drives).pencil, Q0, Y0, (1, 2), 4, linear)
+
+    # round-off of K0 itself: 1e-16 (elements)^4 times its stiffest over its softest, ~1e-9
+    agree(sparsely(monkeypatch, job), job(), 1e-8)
+
+
+def test_clusters_are_expanded_sparsely_to_the_same_series(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def job() -> Expansion:
+        return expand(arm().pencil, Q0, Y0, (1, 5), 5, cluster_gap=0.5)
+
+    full = job()
+    assert [c.modes for c in full.clusters] == [(1,), (4, 5, 6)]
+    agree(sparsely(monkeypatch, job), full, 1e-8)
+
+
+def test_no_array_of_unknowns_times_coefficients_is_ever_stored(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pencil = arm(elements=(500, 400)).pencil
+    expand(pencil, Q0, Y0, (1,), 2)
+    tracemalloc.start()
+    found = expand(pencil, Q0, Y0, (1,), 9)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    vectors = found.vectors[0].nbytes
+    assert len(found.space) > 6 * len(found.vector_space)
+    assert peak < 6 * vectors
+    assert peak < pencil.n_dof * len(found.space) * 8
