@@ -15,9 +15,9 @@ from eigassign.case.reader import KeyPath, Mark, dotted, resolve
 from eigassign.case.schema.document import Document, json_schema
 from eigassign.case.schema.joints import JointBase, freedom_of
 from eigassign.case.schema.mechanism import Coordinate, Mechanism, Spring
+from eigassign.case.schema.parts import Part, keys_of
 from eigassign.case.schema.study import Design, Expansion, Target, Validation
 from eigassign.case.schema.trajectory import Timed, Trajectory, named_trajectories
-from eigassign.case.units import Part, keys_of
 from eigassign.errors import Problem
 
 # --- The case file as the rest of the program sees it: frozen, SI-valued, aware of its lines

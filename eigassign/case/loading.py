@@ -14,9 +14,10 @@ from pathlib import Path
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import MAX_BYTES, Finding, Source, read_yaml
-from eigassign.case.rules.plausibility import implausible, infeasible
-from eigassign.case.rules.references import inconsistent, too_many
-from eigassign.case.rules.values import in_context
+from eigassign.case.rules.consistency import inconsistent, too_many
+from eigassign.case.rules.plausibility import implausible
+from eigassign.case.rules.properties import bounds_hold_no_impossible_section
+from eigassign.case.rules.values import completed
 from eigassign.case.schema.document import Document, validated
 from eigassign.case.schema.trajectory import named_trajectories
 from eigassign.errors import CaseError, Problem, StorageError, UsageError
@@ -40,12 +41,10 @@ def parse(data: bytes, path: str | Path) -> CaseFile:
     source = _read(data, Path(path))
     if crowded := [source.problem(*finding) for finding in too_many(source.tree)]:
         raise CaseError(tuple(crowded))
-    tree, unit_findings = in_context(source.tree, Path(path).parent)
-    document, schema_findings = validated(tree)
-    findings = [*unit_findings, *islice(inconsistent(source.tree), 2 * MOST_PROBLEMS)]
-    findings += [f for f in schema_findings if not f[1].endswith("got nothing")]  # said: empty key
+    document, schema_findings = validated(completed(source.tree, Path(path).parent))
+    findings = [*islice(inconsistent(source.tree), 2 * MOST_PROBLEMS), *schema_findings]
     if document is not None:
-        findings += infeasible(document.mechanism, document.design.parameters)
+        findings += bounds_hold_no_impossible_section(document.mechanism, document.design)
     problems = _unique([*source.problems, *(source.problem(*f) for f in findings)])
     if problems or document is None:
         raise CaseError(_capped(problems))

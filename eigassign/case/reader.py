@@ -4,8 +4,6 @@ The tree is built straight from the parser's events, so depth is bounded before 
 (libyaml's own composer overflows the C stack on deep nesting). Mappings become dicts, sequences
 tuples; numbers, booleans and nulls follow the YAML 1.2 core schema (`1e3` is a number, `no`, `on`
 and `12:30` are text, `012` is twelve).
-
-Looking into a file's plain data before anything about it is known to be right.
 """
 
 from __future__ import annotations
@@ -20,11 +18,10 @@ import yaml
 from eigassign.case.suggestions import shown
 from eigassign.errors import CaseError, Problem
 
-# --- Bytes → plain data with the line and column of every key; hostile files are refused
-
 MAX_BYTES = 10_000_000
 MAX_DEPTH = 50
 KeyPath = tuple[str | int, ...]
+Tree = Mapping[str, object]
 Finding = tuple[KeyPath, str]  # where, and what is wrong there
 
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -247,9 +244,7 @@ def _mark(event: Any) -> Mark:
     return Mark(event.start_mark.line + 1, event.start_mark.column + 1)
 
 
-# --- Looking into a file's plain data before anything about it is known to be right
-
-Tree = Mapping[str, object]
+# --- Looking into a tree: what is missing, or of another kind, is None or empty
 
 
 def at(node: object, *keys: str) -> object:
@@ -287,22 +282,3 @@ def text(node: object, *keys: str) -> str | None:
     """Text below ``keys``, or None."""
     inner = at(node, *keys)
     return inner if isinstance(inner, str) else None
-
-
-def trajectories(tree: object) -> list[tuple[tuple[str | int, ...], object]]:
-    """Key path and content of each trajectory: the one below `trajectory`, or those of the list."""
-    given = at(tree, "trajectory")
-    if isinstance(given, tuple):
-        return [(("trajectory", k), body) for k, body in enumerate(given)]
-    return [] if given is None else [(("trajectory",), given)]
-
-
-def trajectory_names(tree: object) -> list[str]:
-    """What each trajectory is called: its name, or its place counted from 1."""
-    bodies = [body for _, body in trajectories(tree)]
-    return [text(body, "name") or str(k) for k, body in enumerate(bodies, start=1)]
-
-
-def parameters(tree: object) -> list[tuple[str, object]]:
-    """Design parameters as the file has them: what stands under `design` but the constraints."""
-    return [(name, body) for name, body in items(tree, "design") if name != "constraints"]

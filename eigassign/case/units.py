@@ -2,28 +2,16 @@
 
 A bare number is SI already. Angles and cycles are dimensions of their own, so that nothing converts
 between rad/s, 1/s and Hz silently: 5 rpm is neither 5 Hz nor 0.52 Hz here, it is an error.
-
-Field types of the case file: physical quantities, names, and immutable mappings.
-
-One value of the file → SI number, where the schema cannot know its dimension.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from fractions import Fraction
 
-from pydantic import AfterValidator, BaseModel, ConfigDict
-from pydantic.fields import FieldInfo
-from pydantic_core import PydanticCustomError, core_schema
-
-from eigassign.case.reader import Finding, KeyPath
 from eigassign.case.suggestions import shown, suggestion
-
-# --- Quantities as people write them (`30 mm`, `69 GPa`, `104.1 deg`) → SI numbers, dimension-c
 
 Exponents = tuple[int, int, int, int, int]  # of kg, m, s, rad, cycle
 
@@ -48,31 +36,26 @@ class Dimension:
 
 @dataclass(frozen=True)
 class Unit:
-    """``factor = numerator / denominator · π^pi`` SI units; integers keep the rounding to one."""
+    """``factor · π^pi`` SI units; the exact fraction keeps a conversion to one rounding."""
 
-    numerator: int
-    denominator: int
-    pi: int
+    factor: Fraction
     exponents: Exponents
+    pi: int = 0
 
     def power(self, n: int) -> Unit:
         """Unit to the integer power ``n``."""
-        top, bottom = (self.numerator, self.denominator)[:: 1 if n > 0 else -1]
-        k = tuple(n * e for e in self.exponents)
-        return Unit(top ** abs(n), bottom ** abs(n), n * self.pi, (k[0], k[1], k[2], k[3], k[4]))
+        kg, m, s, rad, cycle = (n * e for e in self.exponents)
+        return Unit(self.factor**n, (kg, m, s, rad, cycle), n * self.pi)
 
     def times(self, other: Unit) -> Unit:
-        """Product of two units, in lowest terms."""
-        top = self.numerator * other.numerator
-        bottom = self.denominator * other.denominator
-        k = tuple(a + b for a, b in zip(self.exponents, other.exponents, strict=True))
-        g = math.gcd(top, bottom)
-        pi = self.pi + other.pi
-        return Unit(top // g, bottom // g, pi, (k[0], k[1], k[2], k[3], k[4]))
+        """Product of two units."""
+        pairs = zip(self.exponents, other.exponents, strict=True)
+        kg, m, s, rad, cycle = (a + b for a, b in pairs)
+        return Unit(self.factor * other.factor, (kg, m, s, rad, cycle), self.pi + other.pi)
 
     def to_si(self, value: float) -> float:
         """``value`` in SI."""
-        return value * self.numerator / self.denominator * math.pi**self.pi
+        return value * self.factor.numerator / self.factor.denominator * math.pi**self.pi
 
     def decimal_to_si(self, number: str) -> float:
         """Decimal ``number`` in SI, rounded once (a second time where π is involved).
@@ -80,15 +63,11 @@ class Unit:
         `30 mm` is the very float 0.03; a min, a max and an initial value written in different
         units then compare as their author expects.
         """
-        digits, _, exponent = number.lower().partition("e")
-        whole, _, decimals = digits.partition(".")
-        shift = int(exponent or 0) - len(decimals)
-        if abs(shift) > _LARGEST_SHIFT:
+        exponent = number.lower().partition("e")[2]
+        if abs(int(exponent or 0)) > _LARGEST_EXPONENT:
             return float(number)  # 0 or infinite, in any unit
-        top = int(whole + decimals) * self.numerator * 10 ** max(shift, 0)
-        bottom = self.denominator * 10 ** max(-shift, 0)
         try:
-            return float(top / bottom * math.pi**self.pi)
+            return float(Fraction(number) * self.factor) * math.pi**self.pi
         except OverflowError:
             return math.inf
 
@@ -118,55 +97,33 @@ _DIMENSIONS = (
 DIMENSIONS = {d.name: d for d in _DIMENSIONS}
 _BY_EXPONENTS = {d.exponents: d for d in _DIMENSIONS}
 
+_PREFIXES = {"n": -9, "u": -6, "µ": -6, "μ": -6, "m": -3, "c": -2, "k": 3, "M": 6, "G": 9, "T": 12}
+_PREFIXED: tuple[tuple[str, str, Exponents], ...] = (  # the µ of two: micro sign, Greek mu
+    ("m", "n u µ μ m c k", (0, 1, 0, 0, 0)),
+    ("s", "u µ μ m", (0, 0, 1, 0, 0)),
+    ("N", "m k M", (1, 1, -2, 0, 0)),
+    ("Nm", "k", (1, 2, -2, 0, 0)),
+    ("Pa", "k M G T", (1, -1, -2, 0, 0)),
+    ("Hz", "m k M", (0, 0, -1, 0, 1)),
+    ("rad", "m", (0, 0, 0, 1, 0)),
+)
+_PLAIN: Exponents = (0, 0, 0, 0, 0)
 _KG: Exponents = (1, 0, 0, 0, 0)
-_M: Exponents = (0, 1, 0, 0, 0)
-_S: Exponents = (0, 0, 1, 0, 0)
-_RAD: Exponents = (0, 0, 0, 1, 0)
-_N: Exponents = (1, 1, -2, 0, 0)
-_NM: Exponents = (1, 2, -2, 0, 0)
-_PA: Exponents = (1, -1, -2, 0, 0)
-_HZ: Exponents = (0, 0, -1, 0, 1)
 UNITS: dict[str, Unit] = {
-    "nm": Unit(1, 10**9, 0, _M),
-    "um": Unit(1, 10**6, 0, _M),
-    "µm": Unit(1, 10**6, 0, _M),  # micro sign
-    "μm": Unit(1, 10**6, 0, _M),  # Greek mu
-    "mm": Unit(1, 1000, 0, _M),
-    "cm": Unit(1, 100, 0, _M),
-    "m": Unit(1, 1, 0, _M),
-    "km": Unit(1000, 1, 0, _M),
-    "mg": Unit(1, 10**6, 0, _KG),
-    "g": Unit(1, 1000, 0, _KG),
-    "kg": Unit(1, 1, 0, _KG),
-    "t": Unit(1000, 1, 0, _KG),
-    "us": Unit(1, 10**6, 0, _S),
-    "µs": Unit(1, 10**6, 0, _S),
-    "μs": Unit(1, 10**6, 0, _S),
-    "ms": Unit(1, 1000, 0, _S),
-    "s": Unit(1, 1, 0, _S),
-    "min": Unit(60, 1, 0, _S),
-    "h": Unit(3600, 1, 0, _S),
-    "mN": Unit(1, 1000, 0, _N),
-    "N": Unit(1, 1, 0, _N),
-    "kN": Unit(1000, 1, 0, _N),
-    "MN": Unit(10**6, 1, 0, _N),
-    "Nm": Unit(1, 1, 0, _NM),
-    "kNm": Unit(1000, 1, 0, _NM),
-    "Pa": Unit(1, 1, 0, _PA),
-    "kPa": Unit(1000, 1, 0, _PA),
-    "MPa": Unit(10**6, 1, 0, _PA),
-    "GPa": Unit(10**9, 1, 0, _PA),
-    "TPa": Unit(10**12, 1, 0, _PA),
-    "mHz": Unit(1, 1000, 0, _HZ),
-    "Hz": Unit(1, 1, 0, _HZ),
-    "kHz": Unit(1000, 1, 0, _HZ),
-    "MHz": Unit(10**6, 1, 0, _HZ),
-    "mrad": Unit(1, 1000, 0, _RAD),
-    "rad": Unit(1, 1, 0, _RAD),
-    "deg": Unit(1, 180, 1, _RAD),
-    "°": Unit(1, 180, 1, _RAD),
-    "%": Unit(1, 100, 0, (0, 0, 0, 0, 0)),
+    "mg": Unit(Fraction(1, 10**6), _KG),
+    "g": Unit(Fraction(1, 1000), _KG),
+    "kg": Unit(Fraction(1), _KG),
+    "t": Unit(Fraction(1000), _KG),
+    "min": Unit(Fraction(60), (0, 0, 1, 0, 0)),
+    "h": Unit(Fraction(3600), (0, 0, 1, 0, 0)),
+    "deg": Unit(Fraction(1, 180), (0, 0, 0, 1, 0), pi=1),
+    "°": Unit(Fraction(1, 180), (0, 0, 0, 1, 0), pi=1),
+    "%": Unit(Fraction(1, 100), _PLAIN),
 }
+for _unit, _prefixes, _exponents in _PREFIXED:
+    UNITS[_unit] = Unit(Fraction(1), _exponents)
+    for _p in _prefixes.split():
+        UNITS[_p + _unit] = Unit(Fraction(10) ** _PREFIXES[_p], _exponents)
 _TURNS = (
     "rpm and turns are not converted: write a frequency in Hz (one cycle per turn is rpm / 60), "
     "an angle in deg or rad"
@@ -175,7 +132,7 @@ _TURNS = (
 _NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _FACTOR = re.compile(r"([^\W\d_]+|[%°])(?:(?:\^|\*\*)?([-+]?[1-9]))?")
 _SUPERSCRIPTS = str.maketrans("⁻¹²³⁴⁵⁶⁷⁸⁹", "-123456789")
-_LARGEST_SHIFT = 1000  # decimal places
+_LARGEST_EXPONENT = 1000  # of ten
 _LONGEST = 60  # characters of a quantity; keeps the integers of a nonsense unit small
 
 
@@ -250,7 +207,7 @@ def parse_unit(text: str, dimension: Dimension | None = None) -> Unit:
     factors = [(f, 1) for f in re.split(r"(?<!\*)\*(?!\*)|[\s·⋅]+", over)] + [
         (f, -1) for f in under
     ]
-    product = Unit(1, 1, 0, (0, 0, 0, 0, 0))
+    product = Unit(Fraction(1), _PLAIN)
     for factor, sign in factors:
         product = product.times(_factor(factor, text, dimension).power(sign))
     return product
@@ -273,172 +230,3 @@ def _unknown(symbol: str, text: str, dimension: Dimension | None) -> str:
     hint = f"; did you mean {folded!r}?" if folded else suggestion(symbol, UNITS)
     allowed = f"; {_expected(dimension)}" if dimension else ""
     return f"unknown unit {shown(symbol or text)}{hint}{allowed}"
-
-
-# --- Field types of the case file: physical quantities, names, and immutable mappings
-
-V = TypeVar("V")
-
-
-class Part(BaseModel):
-    """Base of everything in a case file: frozen, strict, no unknown keys, built with its parent."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, defer_build=True)
-
-
-def keys_of(model: type[Part]) -> dict[str, FieldInfo]:
-    """Fields of a model by the key a file gives them with."""
-    return {field.alias or name: field for name, field in model.model_fields.items()}
-
-
-class FrozenDict(Mapping[str, V]):
-    """An immutable, hashable, picklable mapping that keeps the order of the file."""
-
-    __slots__ = ("_items",)
-    _items: dict[str, V]
-
-    def __init__(self, items: Mapping[str, V] | None = None) -> None:
-        object.__setattr__(self, "_items", dict(items or {}))
-
-    def __setattr__(self, name: str, value: object) -> None:
-        raise TypeError("a case file's mapping is immutable")
-
-    __delattr__ = None  # type: ignore[assignment]
-
-    def __getitem__(self, key: str) -> V:
-        return self._items[key]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._items)
-
-    def __len__(self) -> int:
-        return len(self._items)
-
-    def __hash__(self) -> int:
-        return hash(tuple(self._items.items()))
-
-    def __eq__(self, other: object) -> bool:
-        """Equal when keys, values *and order* agree: the order of q and y carries meaning."""
-        if not isinstance(other, Mapping):
-            return NotImplemented
-        return list(self.items()) == list(other.items())
-
-    def __reduce__(self) -> tuple[type[FrozenDict[V]], tuple[dict[str, V]]]:
-        return type(self), (self._items,)
-
-    def __repr__(self) -> str:
-        return repr(self._items)
-
-
-Frozen = AfterValidator(FrozenDict)
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A real number with a dimension and limits, as pydantic annotation: ``Annotated[float, ...]``.
-
-    Accepts a bare number (SI) or text with a unit; the validated value is SI. ``elsewhere`` says
-    where the dimension comes from when it is another key that decides it (documentation only: such
-    values are SI numbers already when the schema sees them).
-    """
-
-    dimension: Dimension | None = None
-    above: float | None = None
-    at_least: float | None = None
-    below: float | None = None
-    at_most: float | None = None
-    elsewhere: str = ""
-
-    def read(self, value: object) -> float:
-        """SI value within the limits. Raises QuantityError."""
-        if self.dimension is None and isinstance(value, str):
-            raise QuantityError(f"expected a number without unit, got text {shown(value)}")
-        si = read(value, self.dimension)
-        return self.checked(si, shown(value))
-
-    def checked(self, si: float, given: str) -> float:
-        """``si`` if it is within the limits. Raises QuantityError."""
-        if self.above is not None and not si > self.above:
-            raise QuantityError(f"must be > {self._limit(self.above)}, got {given}")
-        if self.at_least is not None and not si >= self.at_least:
-            raise QuantityError(f"must be >= {self._limit(self.at_least)}, got {given}")
-        if self.below is not None and not si < self.below:
-            raise QuantityError(f"must be < {self._limit(self.below)}, got {given}")
-        if self.at_most is not None and not si <= self.at_most:
-            raise QuantityError(f"must be <= {self._limit(self.at_most)}, got {given}")
-        return si
-
-    def _limit(self, value: float) -> str:
-        unit = self.dimension.si if self.dimension else ""
-        return f"{value:g} {unit}".rstrip()
-
-    def _validate(self, value: object) -> float:
-        try:
-            return self.read(value)
-        except QuantityError as error:
-            raise PydanticCustomError("quantity", "{text}", {"text": str(error)}) from None
-
-    def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> core_schema.CoreSchema:
-        return core_schema.no_info_plain_validator_function(
-            self._validate,
-            metadata={"pydantic_js_functions": [lambda _schema, _handler: self.json_schema()]},
-        )
-
-    def json_schema(self) -> dict[str, Any]:
-        """JSON Schema: a number (SI), or text with a unit where there is a dimension."""
-        number: dict[str, Any] = {"type": "number"}
-        if self.above is not None:
-            number["exclusiveMinimum"] = self.above
-        if self.at_least is not None:
-            number["minimum"] = self.at_least
-        if self.below is not None:
-            number["exclusiveMaximum"] = self.below
-        if self.at_most is not None:
-            number["maximum"] = self.at_most
-        if self.dimension is None and not self.elsewhere:
-            return number
-        text = {"type": "string", "pattern": r"^\s*[-+]?(\.\d|\d).*$"}
-        return {"anyOf": [number, text], "description": self.elsewhere or str(self.dimension)}
-
-
-def quantity(dimension: str, above: float | None = None, at_least: float | None = None) -> Quantity:
-    """Quantity of a named dimension (a key of ``units.DIMENSIONS``)."""
-    return Quantity(DIMENSIONS[dimension], above=above, at_least=at_least)
-
-
-def wrong(message: str, *keys: str | int) -> PydanticCustomError:
-    """Error of a model validator, to be shown at ``keys`` below the model."""
-    return PydanticCustomError("at_key", "{text}", {"text": message, "keys": keys})
-
-
-# --- One value of the file → SI number, where the schema cannot know its dimension
-
-
-def si(
-    value: object,
-    quantity: Quantity | None,
-    path: KeyPath,
-    findings: list[Finding],
-    harmless: float = 0.0,
-) -> object:
-    """``value`` in SI; ``harmless``, and a finding, if it is not such a quantity.
-
-    Lists and mappings are left as they are. None as quantity: no unit can be meant.
-    """
-    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
-        return value
-    try:
-        if quantity is None:
-            return _bare(value)
-        return quantity.checked(read(value, quantity.dimension), shown(value))
-    except QuantityError as error:
-        findings.append((path, str(error)))
-        return harmless
-
-
-def _bare(value: object) -> float:
-    if isinstance(value, str):
-        raise QuantityError(
-            f"terms of different dimensions: give a plain number in SI units, got {shown(value)}"
-        )
-    return read(value, None)

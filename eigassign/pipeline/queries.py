@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from eigassign.case import CaseFile, load
 from eigassign.case.case_file import plain
-from eigassign.case.rules.plausibility import impossible
-from eigassign.case.rules.values import find
-from eigassign.case.units import Quantity, QuantityError, quantity
+from eigassign.case.rules.properties import impossible, property_at
+from eigassign.case.schema.parts import Quantity, quantity
+from eigassign.case.units import QuantityError
 from eigassign.errors import CaseError, Problem, UsageError
 from eigassign.mechanism.elements.superelement import weights
 from eigassign.mechanism.kinematics.travel_limits import resting_pose
@@ -218,13 +218,13 @@ def design(case: CaseFile, text: str | None) -> Numbers:
     if text is None:
         return None
     tree = {"mechanism": plain(case.mechanism), "coordinates": plain(case.coordinates)}
-    properties = {name: find(tree, p.parameter) for name, p in case.design.parameters.items()}
+    paths = {name: p.parameter for name, p in case.design.parameters.items()}
+    properties = {name: property_at(tree, path) for name, path in paths.items()}
     quantities = [p.quantity if p else Quantity() for p in properties.values()]
     values = _read(text, "--y", list(properties), quantities)
-    paths = [p.parameter for p in case.design.parameters.values()]
-    point = {path: (value, value) for path, value in zip(paths, values, strict=True)}
+    point = {path: (value, value) for path, value in zip(paths.values(), values, strict=True)}
     for *_, message in impossible(case.mechanism.sections, point):
-        raise UsageError(f"--y: {message.removesuffix('; narrow the bounds')}")
+        raise UsageError(f"--y: {message}")
     return values
 
 

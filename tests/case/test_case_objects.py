@@ -28,7 +28,7 @@ from eigassign.case import (
     load,
     parse,
 )
-from eigassign.case.units import FrozenDict
+from eigassign.case.schema.parts import FrozenDict
 
 CASES = Path(__file__).parents[2] / "cases"
 MINIMAL = """\

@@ -6,8 +6,8 @@ import pytest
 from small_case import TEXT, edited
 
 from eigassign.case import parse
-from eigassign.case.rules.plausibility import impossible
-from eigassign.case.schema.links import IProfileSection
+from eigassign.case.rules.properties import impossible
+from eigassign.case.schema.sections import IProfileSection
 from eigassign.errors import CaseError
 
 DIAMETER = "{parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}"

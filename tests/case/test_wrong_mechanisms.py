@@ -23,7 +23,7 @@ LINKS = [
     Wrong("taper between shapes", "section: {start: bar, end: thin}", "¦section: {start: bar, end: profile}", "mechanism.links.rod.section", "sections of one shape, given by the same keys: 'bar' and 'profile' are not"),
     Wrong("section is a list", "section: {start: bar, end: thin}", "¦section: [bar, thin]", "mechanism.links.rod.section", "expected text"),
     Wrong("flanges that meet", "flange_thickness: 5 mm", "¦flange_thickness: 40 mm", "mechanism.sections.profile.flange_thickness", "less than half of height"),
-    Wrong("web wider than its flanges", "web_thickness: 3 mm", "¦web_thickness: 41 mm", "mechanism.sections.profile.web_thickness", "at most the width"),
+    Wrong("web wider than its flanges", "web_thickness: 3 mm", "¦web_thickness: 41 mm", "mechanism.sections.profile.web_thickness", "at most width, which is 0.04 m"),
     Wrong("profile without web", ", web_thickness: 3 mm", "", "mechanism.sections.profile.web_thickness", "required key is missing: length"),
     Wrong("Poisson's ratio of a liquid", "poissons_ratio: 0.3", "¦poissons_ratio: 0.5", "mechanism.materials.steel.poissons_ratio", "must be < 0.5, got 0.5"),
     Wrong("impossible Poisson's ratio", "poissons_ratio: 0.3", "¦poissons_ratio: -1", "mechanism.materials.steel.poissons_ratio", "must be > -1"),

@@ -76,12 +76,13 @@ def test_without_trajectory_and_design_there_is_nothing_to_map(tmp_path: Path) -
 
 
 def test_every_property_that_can_be_designed_has_a_unit(tmp_path: Path) -> None:
-    from eigassign.case.rules.values import _quantities
-    from eigassign.case.schema.links import LINKS, SHAPES, Material
+    from eigassign.case.rules.properties import quantities as quantities_of
+    from eigassign.case.schema.links import LINKS
     from eigassign.case.schema.mechanism import Body, Spring
+    from eigassign.case.schema.sections import SHAPES, Material
 
     models = [Material, Body, Spring, *LINKS.values(), *SHAPES.values()]
-    quantities = {name: q for model in models for name, q in _quantities(model).items()}
+    quantities = {name: q for model in models for name, q in quantities_of(model).items()}
     assert len(quantities) > 20
     for name, quantity in quantities.items():
         unit = quantity.dimension.si.replace("·", " ") if quantity.dimension else ""

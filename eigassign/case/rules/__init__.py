@@ -1,11 +1,17 @@
 """What several keys of a case file must have in common, checked over its plain data.
 
+The schema sees one part at a time, and stops where a part is wrong. The rules see the whole file as
+it is written, so that problems of both kinds are reported at once.
+
 In reading order, each importing only from those above it:
 
-    nodes         the named nodes of links
-    values        values whose unit another key decides → SI
-    links         materials, sections, nodes and matrices of links
-    joints        how joints connect the links, and the coordinates that move them
-    references    everything that does not fit together
-    plausibility  what is allowed but looks like a slip; sections that a design could break
+    lookups       what the names in the plain data stand for: nodes, joints, parameters
+    properties    design parameters: the number that a path names, and its bounds
+    values        values whose unit another key decides → SI, before the schema sees them
+    space         rules: planar and spatial mechanisms
+    links         rules: links, materials, sections, and what stands on nodes
+    joints        rules: joints between links, coordinates, loops
+    study         rules: trajectory, design, expansion, targets, validation
+    consistency   the table of all rules
+    plausibility  warnings: what is allowed but looks like a slip
 """

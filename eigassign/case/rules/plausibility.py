@@ -21,22 +21,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from eigassign.case.reader import Finding, KeyPath
-from eigassign.case.rules.joints import joined_twice
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.joints import freedom_of
-from eigassign.case.schema.links import (
-    BareSection,
-    BeamLink,
-    CircleSection,
-    FrameBeam,
-    FrameLink,
-    IProfileSection,
-    RigidLink,
-    Section,
-    Taper,
-    TubeSection,
-)
+from eigassign.case.schema.links import BeamLink, FrameBeam, FrameLink, RigidLink, Taper
 from eigassign.case.schema.mechanism import Body, Coordinate, Mechanism
+from eigassign.case.schema.sections import BareSection
 from eigassign.case.schema.study import FrequencyProfile
 from eigassign.case.schema.trajectory import (
     PointTrajectory,
@@ -229,22 +218,6 @@ def _twist(section: BareSection, path: KeyPath) -> Iterator[Finding]:
         yield (*path, "torsion_constant"), f"{message} = {polar:g} m4, which no section can have"
 
 
-def depth(section: Section, spatial: bool = False) -> float:
-    """Depth in the plane of bending, m, in space the larger one; for a bare section the least.
-
-    No section of depth h has a radius of gyration above h/2 (a mean square distance from the
-    centroid over an interval of length h is at most h²/4), so h ≥ 2 √(I/A).
-    """
-    if isinstance(section, BareSection):
-        inertia = max(section.in_plane, (section.inertia_y or 0.0) if spatial else 0.0)
-        return 2 * math.sqrt(inertia / section.area)
-    if isinstance(section, CircleSection):
-        return section.diameter
-    if isinstance(section, TubeSection):
-        return section.outer_diameter
-    return max(section.height, section.width) if spatial else section.height
-
-
 def _links(document: Document) -> Iterator[Finding]:
     for name, link in document.mechanism.links.items():
         path: KeyPath = ("mechanism", "links", name)
@@ -265,8 +238,8 @@ def _slenderness(document: Document, link: BeamLink, path: KeyPath) -> Iterator[
         return
     spatial = document.mechanism.space == "spatial"
     sections = document.mechanism.sections
-    name = max(_ends(link.section), key=lambda n: depth(sections[n], spatial))
-    slenderness = link.length / depth(sections[name], spatial)
+    name = max(_ends(link.section), key=lambda n: sections[n].depth(spatial))
+    slenderness = link.length / sections[name].depth(spatial)
     if slenderness < SLENDER:
         at_most = "at most " if isinstance(sections[name], BareSection) else ""
         yield (
@@ -321,52 +294,46 @@ def _beams(document: Document) -> Iterator[BeamLink | FrameBeam]:
             yield from link.beams.values()
 
 
-# --- Dimensions that a design may move past one another: refused wherever in its bounds they co
+# --- Joints that close a loop without any link in it: several on one pin, of which one is too many
 
-Ranges = Mapping[str, tuple[float, float]]  # SI, by path of the parameter
-
-
-def infeasible(mechanism: Any, parameters: Mapping[str, Any]) -> Iterator[Finding]:
-    """Design parameters whose bounds hold sections that cannot exist, each at its bound."""
-    ranges = {p.parameter: (p.min, p.max) for p in parameters.values()}
-    names = {p.parameter: name for name, p in parameters.items()}
-    for path, bound, message in impossible(mechanism.sections, ranges):
-        yield ("design", names[path], bound), f"at this bound {message}"
+Node = tuple[str, tuple[float, ...]]  # a node, and how far from it
 
 
-def impossible(sections: Mapping[str, Section], ranges: Ranges) -> Iterator[tuple[str, str, str]]:
-    """(path, "min" or "max", what is wrong there) of parameters that can break a section."""
-    for name, section in sections.items():
-        for small, factor, large, may_meet in _conditions(section):
-            low, high = f"sections.{name}.{small}", f"sections.{name}.{large}"
-            a = ranges.get(low, (0.0, getattr(section, small)))[1] * factor
-            b = ranges.get(high, (getattr(section, large), 0.0))[0]
-            if a > b or (a == b and not may_meet):
-                path, bound = (low, "max") if low in ranges else (high, "min")
-                if path in ranges:
-                    yield path, bound, _words(name, small, factor, large, a / factor, b, may_meet)
+def joined_twice(joints: Mapping[str, Any]) -> Iterator[Finding]:
+    """A warning for each joint whose two nodes earlier joints join already."""
+    led: dict[Node, dict[Node, str]] = {}
+    for name, joint in joints.items():
+        base, follower = _node(joint.base, joint), (joint.follower, ())
+        others = _path(led, base, follower)
+        if others:
+            yield ("mechanism", "joints", name), _message(joint, others)
+        else:
+            led.setdefault(base, {})[follower] = name
+            led.setdefault(follower, {})[base] = name
 
 
-def _conditions(section: Section) -> tuple[tuple[str, float, str, bool], ...]:
-    """(small, factor, large, whether factor × small may equal large)."""
-    if isinstance(section, TubeSection):
-        if section.inner_diameter is not None:
-            return (("inner_diameter", 1.0, "outer_diameter", False),)
-        return (("thickness", 2.0, "outer_diameter", True),)
-    if isinstance(section, IProfileSection):
-        return (
-            ("flange_thickness", 2.0, "height", False),
-            ("web_thickness", 1.0, "width", True),
-        )
-    return ()
+def _node(name: str, joint: Any) -> Node:
+    """The base's node, or a place beside it."""
+    position = tuple(float(x) for x in getattr(joint, "position", None) or ())
+    return name, position if any(position) else ()
 
 
-def _words(
-    name: str, small: str, factor: float, large: str, a: float, b: float, may_meet: bool
-) -> str:
-    share = large if factor == 1.0 else f"half of {large}"
-    rule = "at most" if may_meet else "less than"
+def _path(led: Mapping[Node, Mapping[Node, str]], start: Node, end: Node) -> list[str]:
+    """The joints on the way from one node to another; none where there is no way."""
+    ways: dict[Node, list[str]] = {start: []}
+    queue = [start]
+    for here in queue:
+        for there, joint in led.get(here, {}).items():
+            if there not in ways:
+                ways[there] = [*ways[here], joint]
+                queue.append(there)
+    return ways.get(end, [])
+
+
+def _message(joint: Any, others: list[str]) -> str:
+    held = " and ".join(repr(name) for name in others)
+    verb = "joins" if len(others) == 1 else "join"
     return (
-        f"section {name!r} cannot exist: {small} {a:g} m must be {rule} {share}, "
-        f"which can be {b / factor:g} m; narrow the bounds"
+        f"is redundant: {held} {verb} {joint.base} and {joint.follower} already, so that it holds "
+        "nothing new where it allows the same motion; leave it out, or was another node meant?"
     )

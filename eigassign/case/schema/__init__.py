@@ -2,8 +2,10 @@
 
 In reading order, each importing only from those above it:
 
+    parts       the base of all models; field types: quantities, names, values of several kinds
     vectors     points, directions, angles, inertia tensors
-    links       the keys `materials`, `sections` and `links` of a mechanism
+    sections    the keys `materials` and `sections` of a mechanism; the shapes of sections
+    links       the key `links`
     joints      the key `joints`, and what each type of joint lets move
     mechanism   bodies, springs, drives, coordinates, and the mechanism as a whole
     trajectory  the key `trajectory`

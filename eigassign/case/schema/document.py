@@ -1,6 +1,6 @@
-"""The whole case file as one pydantic model, and its errors as readable findings.
+"""The whole case file as one pydantic model, its errors as readable findings, its JSON Schema.
 
-JSON Schema of case files, from the same models that validate them.
+To add a key: give `Document` a field, with a model of what stands below it.
 """
 
 from __future__ import annotations
@@ -8,34 +8,33 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, get_args, get_origin
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, Field, ValidationError
 from pydantic.json_schema import GenerateJsonSchema
 
-from eigassign.case.reader import Finding, KeyPath
+from eigassign.case.reader import Finding, KeyPath, Tree
 from eigassign.case.schema.joints import JOINTS
-from eigassign.case.schema.links import LINKS, SHAPES, Taper
-from eigassign.case.schema.mechanism import Coordinate, Drive, Mechanism
-from eigassign.case.schema.study import Design, Expansion, FrequencyProfile, Target, Validation
-from eigassign.case.schema.trajectory import (
-    FileTrajectory,
-    PointTrajectory,
-    SampledTrajectory,
-    TipTrajectory,
-    Trajectories,
-)
+from eigassign.case.schema.links import LINKS
+from eigassign.case.schema.mechanism import Coordinate, Mechanism
+from eigassign.case.schema.parts import FrozenDict, Named, Part, Quantity, keys_of, wrong
+from eigassign.case.schema.sections import SHAPES
+from eigassign.case.schema.study import Design, Expansion, Target, Validation
+from eigassign.case.schema.trajectory import MOTIONS, Trajectories
 from eigassign.case.suggestions import listed, shown, suggestion, unknown
-from eigassign.case.units import Frozen, FrozenDict, Part, Quantity, keys_of
 
-# --- The whole case file as one pydantic model, and its errors as readable findings
+
+def _one_line(text: str) -> str:
+    if not text.isprintable():
+        raise wrong("expected one line of printable text")
+    return text
 
 
 class Document(Part):
     """Everything a case file may hold."""
 
-    title: Annotated[str, Field(min_length=1, max_length=200)]
-    reference: Annotated[str, Field(max_length=1000)] | None = None
+    title: Annotated[str, Field(min_length=1, max_length=200), AfterValidator(_one_line)]
+    reference: Annotated[str, Field(max_length=1000), AfterValidator(_one_line)] | None = None
     mechanism: Mechanism
-    coordinates: Annotated[Mapping[str, Coordinate], Frozen] = FrozenDict()
+    coordinates: Named[Coordinate] = FrozenDict()
     trajectory: Trajectories | None = None
     design: Design = Design.model_construct()
     expansion: Expansion = Expansion.model_construct()
@@ -43,28 +42,33 @@ class Document(Part):
     validation: Validation = Validation.model_construct()
 
 
-_TAGGED: dict[object, type[Part]] = {
-    **{f"<{name}>": model for name, model in (SHAPES | LINKS | JOINTS).items()},
-    "<taper>": Taper,
-    "<drive>": Drive,
-    "<tip>": TipTrajectory,
-    "<file>": FileTrajectory,
-    "<samples>": SampledTrajectory,
-    "<points>": PointTrajectory,
-    "<profile>": FrequencyProfile,
-}
+# --- Errors of the schema as findings
+
+_KINDS: dict[str, type[Part]] = SHAPES | LINKS | JOINTS | MOTIONS
+_TAGS = {f"<{kind}>" for kind in _KINDS}
+_TAGS |= {"<one>", "<list>", "<number>", "<auto>", "<value>", "<part>"}
 _MOST = 200  # errors explained; nobody reads more
-_LEAF_TAGS = {"<word>", "<one>", "<list>", "<constant>", "<number>", "<auto>"}
-_TAGS = _LEAF_TAGS | set(_TAGGED)
+_Explained = tuple[KeyPath, str]  # keys to append to the path, message
 
 
-def validated(tree: Mapping[str, object]) -> tuple[Document | None, list[Finding]]:
+def validated(tree: Tree) -> tuple[Document | None, list[Finding]]:
     """The document, or None and everything the schema has against it."""
     try:
-        return Document.model_validate(tree), []
+        return Document.model_validate(_with_parameters_apart(tree)), []
     except ValidationError as error:
-        details = error.errors(include_url=False)
-        return None, [_finding(e) for e in details[:_MOST] if not _is_echo(e)]
+        details = error.errors(include_url=False)[:_MOST]
+        findings = [_finding(detail) for detail in details if not _is_echo(detail)]
+        return None, [f for f in findings if not f[1].endswith("got nothing")]  # a rule finds those
+
+
+def _with_parameters_apart(tree: Tree) -> Tree:
+    """In the file the parameters stand directly under `design`, beside `constraints`."""
+    design = tree.get("design")
+    if not isinstance(design, Mapping):
+        return tree
+    parameters = {name: body for name, body in design.items() if name != "constraints"}
+    apart = {key: body for key, body in design.items() if key == "constraints"}
+    return {**tree, "design": {"parameters": parameters, **apart}}
 
 
 def _is_echo(error: Any) -> bool:
@@ -74,14 +78,10 @@ def _is_echo(error: Any) -> bool:
 
 def _finding(error: Any) -> Finding:
     path = tuple(p for p in error["loc"] if p not in _TAGS and p != "[key]")
-    if path[:2] in (("design", "parameters"),):
-        path = (path[0], *path[2:])  # in the file the parameters stand directly under `design`
-    explain = _EXPLAIN.get(error["type"], _by_message)
-    suffix, message = explain(error)
+    if path[:2] == ("design", "parameters"):
+        path = (path[0], *path[2:])
+    suffix, message = _EXPLAIN.get(error["type"], _by_message)(error)
     return (*path, *suffix), message
-
-
-_Explained = tuple[KeyPath, str]  # keys to append to the path, message
 
 
 def _by_message(error: Any) -> _Explained:
@@ -108,11 +108,10 @@ def _model_at(loc: Any) -> type[Part]:
     model: type[Part] = Document
     in_container = False
     for item in loc:
-        if in_container:
+        if in_container:  # a name, or a place in a list
             in_container = False
-        elif item in _TAGGED:
-            model = _TAGGED[item]
-        elif item in _LEAF_TAGS:
+        elif item in _TAGS:
+            model = _KINDS.get(item[1:-1], model)
             in_container = item == "<list>"
         else:
             annotation = keys_of(model)[item].annotation
@@ -128,7 +127,9 @@ def _parts_in(annotation: object) -> Iterator[type[Part]]:
         yield from _parts_in(argument)
 
 
-def _choice(key: str, known: Mapping[str, object]) -> Any:
+def _no_kind(key: str, known: Mapping[str, object]) -> Any:
+    """Of a mapping whose ``key`` names none of the ``known`` kinds."""
+
     def explain(error: Any) -> _Explained:
         if not isinstance(error["input"], Mapping):
             return (), f"expected a mapping, got {shown(error['input'])}"
@@ -142,21 +143,17 @@ def _choice(key: str, known: Mapping[str, object]) -> Any:
     return explain
 
 
-def _motion(error: Any) -> _Explained:
+def _no_motion(error: Any) -> _Explained:
     if not isinstance(error["input"], Mapping):
         return (), f"expected a mapping, got {shown(error['input'])}"
     return (), (
         "expected one of the keys tip (path of a link's node), points (point to point), q (joint "
-        "samples) or file (CSV); "
-        f"got {listed(error['input'])}"
+        f"samples) or file (CSV); got {listed(error['input'])}"
     )
 
 
 def _expected(what: str) -> Any:
-    def explain(error: Any) -> _Explained:
-        return (), f"expected {what}, got {shown(error['input'])}"
-
-    return explain
+    return lambda error: ((), f"expected {what}, got {shown(error['input'])}")
 
 
 def _text(error: Any) -> _Explained:
@@ -170,7 +167,7 @@ def _literal(error: Any) -> _Explained:
     expected = error["ctx"]["expected"]
     value = error["input"]
     words = expected.replace("'", "").replace(" or ", ", ").split(", ")
-    others = {"<word>": "{stiffness: ...}", "<one>": "a list", "<auto>": "a whole number"}
+    others = {"<value>": "{stiffness: ...}", "<one>": "a list", "<auto>": "a whole number"}
     also = others.get(error["loc"][-1], "")
     also = f", or {also}" if also else ""
     hint = suggestion(value, words) if isinstance(value, str) else ""
@@ -180,14 +177,13 @@ def _literal(error: Any) -> _Explained:
 _MAPPING = _expected("a mapping (key: value)")
 _LIST = _expected("a list")
 _EXPLAIN: dict[str, Any] = {
-    "quantity": lambda e: ((), e["ctx"]["text"]),
     "at_key": lambda e: (e["ctx"]["keys"], e["ctx"]["text"]),
     "missing": _missing,
     "extra_forbidden": _extra,
-    "choice:shape": _choice("shape", SHAPES),
-    "choice:link": _choice("type", LINKS),
-    "choice:joint": _choice("type", JOINTS),
-    "choice:motion": _motion,
+    "no_shape": _no_kind("shape", SHAPES),
+    "no_link": _no_kind("type", LINKS),
+    "no_joint": _no_kind("type", JOINTS),
+    "no_motion": _no_motion,
     "literal_error": _literal,
     "model_type": _MAPPING,
     "model_attributes_type": _MAPPING,
@@ -214,7 +210,7 @@ _EXPLAIN: dict[str, Any] = {
 }
 
 
-# --- JSON Schema of case files, from the same models that validate them
+# --- JSON Schema
 
 
 class _Quiet(GenerateJsonSchema):

@@ -1,28 +1,17 @@
-"""The key `joints` of a mechanism.
+"""The key `joints` of a mechanism: what each type needs, and what it lets move.
 
-What each kind of joint lets move, and what quantity a coordinate therefore is.
+To add a type of joint: write its model and put it into the union `Joint`. How it moves,
+`mechanism.kinematics.joints` says.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, ClassVar, Literal, Self, TypeAlias
 
-from pydantic import Discriminator, Tag, model_validator
+from pydantic import AfterValidator, model_validator
 
-from eigassign.case.reader import Tree, at, items, text
-from eigassign.case.schema.links import given
-from eigassign.case.schema.vectors import (
-    ANGLE,
-    PLACE,
-    Angle,
-    Direction,
-    Orientation,
-    Vector,
-    parallel,
-)
-from eigassign.case.units import Part, Quantity, wrong
-
-# --- The key `joints` of a mechanism
+from eigassign.case.schema.parts import KindBy, Part, kinds, wrong
+from eigassign.case.schema.vectors import PLACE, Angle, Direction, Orientation, Vector, parallel
 
 
 class JointBase(Part):
@@ -33,6 +22,10 @@ class JointBase(Part):
     planar) or `orientation` ([rx, ry, rz] in rad, R = Rz Ry Rx, spatial).
     """
 
+    freedoms: ClassVar[tuple[str, ...]]  # names of its coordinates: what `component` may be
+    planar: ClassVar[bool] = False  # whether planar mechanisms may have it
+    travels: ClassVar[bool] = False  # whether its base is a beam along which it moves
+
     type: str
     base: str
     follower: str
@@ -41,62 +34,59 @@ class JointBase(Part):
     orientation: Orientation | None = None
 
 
-class _AxisJoint(JointBase):
-    axis: Direction | None = None
-
-    @model_validator(mode="after")
-    def _points_somewhere(self) -> _AxisJoint:
-        if self.axis is not None and not any(self.axis):
-            raise wrong("has no direction: all components are zero", "axis")
-        return self
-
-
-def _check_lead(lead: float) -> None:
+def _travels(lead: float) -> float:
     if lead == 0:
-        raise wrong("must not be 0 m: a screw travels as it turns", "lead")
+        raise wrong("must not be 0 m: a screw travels as it turns")
+    return lead
 
 
-class RevoluteJoint(_AxisJoint):
+Lead: TypeAlias = Annotated[float, PLACE, AfterValidator(_travels)]
+
+
+class RevoluteJoint(JointBase):
     """Free to turn about `axis` (z unless given; always z in a plane)."""
 
+    freedoms = ("rotation",)
+    planar = True
     type: Literal["revolute"]
+    axis: Direction | None = None
 
 
-class PrismaticJoint(_AxisJoint):
+class PrismaticJoint(JointBase):
     """Free to slide along `axis` (x unless given)."""
 
+    freedoms = ("translation",)
+    planar = True
     type: Literal["prismatic"]
+    axis: Direction | None = None
 
 
-class CylindricalJoint(_AxisJoint):
+class CylindricalJoint(JointBase):
     """Free to slide along and turn about `axis` (z unless given)."""
 
+    freedoms = ("translation", "rotation")
     type: Literal["cylindrical"]
+    axis: Direction | None = None
 
 
-class ScrewJoint(_AxisJoint):
+class ScrewJoint(JointBase):
     """Turns about `axis` (z unless given) and slides along it by `lead` (m) a turn."""
 
+    freedoms = ("rotation",)
     type: Literal["screw"]
-    lead: Annotated[float, PLACE]
-
-    @model_validator(mode="after")
-    def _travels(self) -> ScrewJoint:
-        _check_lead(self.lead)
-        return self
+    axis: Direction | None = None
+    lead: Lead
 
 
 class UniversalJoint(JointBase):
     """Turns about the first of two `axes`, then about the second, which the first carries."""
 
+    freedoms = ("1", "2")
     type: Literal["universal"]
     axes: tuple[Direction, Direction]
 
     @model_validator(mode="after")
-    def _has_two_axes(self) -> UniversalJoint:
-        for k, axis in enumerate(self.axes):
-            if not any(axis):
-                raise wrong("has no direction: all components are zero", "axes", k)
+    def _axes_cross(self) -> Self:
         if parallel(*self.axes):
             raise wrong("the two axes are parallel: a universal joint's must cross", "axes")
         return self
@@ -105,18 +95,24 @@ class UniversalJoint(JointBase):
 class SphericalJoint(JointBase):
     """Free to turn in any way: successive rotations about x, y, z are its three components."""
 
+    freedoms = ("1", "2", "3")
     type: Literal["spherical"]
 
 
 class FixedJoint(JointBase):
     """Clamps `follower` to `base`."""
 
+    freedoms = ()
+    planar = True
     type: Literal["fixed"]
 
 
 class CarriageJoint(JointBase):
     """Rides along a flexible beam, `base: <link>`; its coordinate is the distance from `start`."""
 
+    freedoms = ("translation",)
+    planar = True
+    travels = True
     type: Literal["carriage"]
 
 
@@ -126,93 +122,30 @@ class NutJoint(JointBase):
     Its coordinate is the distance (m) from the shaft's `start`.
     """
 
+    freedoms = ("translation",)
+    travels = True
     type: Literal["nut"]
-    lead: Annotated[float, PLACE]
-
-    @model_validator(mode="after")
-    def _travels(self) -> NutJoint:
-        _check_lead(self.lead)
-        return self
-
-
-JOINTS: dict[str, type[Part]] = {
-    "revolute": RevoluteJoint,
-    "prismatic": PrismaticJoint,
-    "cylindrical": CylindricalJoint,
-    "screw": ScrewJoint,
-    "universal": UniversalJoint,
-    "spherical": SphericalJoint,
-    "fixed": FixedJoint,
-    "carriage": CarriageJoint,
-    "nut": NutJoint,
-}
-
-
-def _joint_tag(value: object) -> str | None:
-    kind = given(value, "type")
-    return f"<{kind}>" if isinstance(kind, str) and kind in JOINTS else None
+    lead: Lead
 
 
 Joint: TypeAlias = Annotated[
-    Annotated[RevoluteJoint, Tag("<revolute>")]
-    | Annotated[PrismaticJoint, Tag("<prismatic>")]
-    | Annotated[CylindricalJoint, Tag("<cylindrical>")]
-    | Annotated[ScrewJoint, Tag("<screw>")]
-    | Annotated[UniversalJoint, Tag("<universal>")]
-    | Annotated[SphericalJoint, Tag("<spherical>")]
-    | Annotated[FixedJoint, Tag("<fixed>")]
-    | Annotated[CarriageJoint, Tag("<carriage>")]
-    | Annotated[NutJoint, Tag("<nut>")],
-    Discriminator(_joint_tag, custom_error_type="choice:joint", custom_error_message="type"),
+    RevoluteJoint
+    | PrismaticJoint
+    | CylindricalJoint
+    | ScrewJoint
+    | UniversalJoint
+    | SphericalJoint
+    | FixedJoint
+    | CarriageJoint
+    | NutJoint,
+    KindBy("type", "joint"),
 ]
-
-
-# --- What each kind of joint lets move, and what quantity a coordinate therefore is
-
-FREEDOMS: dict[str, tuple[str, ...]] = {
-    "fixed": (),
-    "revolute": ("rotation",),
-    "prismatic": ("translation",),
-    "carriage": ("translation",),
-    "nut": ("translation",),
-    "screw": ("rotation",),
-    "cylindrical": ("translation", "rotation"),
-    "universal": ("1", "2"),
-    "spherical": ("1", "2", "3"),
-}
-RIDING = ("carriage", "nut")  # their base is a beam along which they travel
-PLANAR = ("revolute", "prismatic", "fixed", "carriage")
-ANY = Quantity()  # dimension unknown because of an error elsewhere
-
-
-def freedoms(tree: Tree, joint: str) -> tuple[str, ...] | None:
-    """Names of a joint's freedoms, in order; None if the joint or its type is unknown."""
-    return FREEDOMS.get(text(tree, "mechanism", "joints", joint, "type") or "")
-
-
-def driven(tree: Tree, coordinate: object) -> str | None:
-    """Which freedom of its joint a coordinate is; None where that cannot be told."""
-    known = freedoms(tree, text(coordinate, "joint") or "")
-    component = at(coordinate, "component")
-    if not known or isinstance(component, bool):
-        return None
-    if component is None:
-        return known[0] if len(known) == 1 else None
-    return str(component) if str(component) in known else None
-
-
-def of_freedom(freedom: str | None) -> Quantity:
-    """Angle or length; anything where the freedom is unknown."""
-    if freedom is None:
-        return ANY
-    return PLACE if freedom == "translation" else ANGLE
+JOINTS: dict[str, type[JointBase]] = kinds(Joint)  # type: ignore[assignment]
+FREEDOMS = {kind: model.freedoms for kind, model in JOINTS.items()}
+RIDING = tuple(kind for kind, model in JOINTS.items() if model.travels)
+PLANAR = tuple(kind for kind, model in JOINTS.items() if model.planar)
 
 
 def freedom_of(kind: str, component: object) -> str:
     """Name of the freedom that a valid coordinate of a joint of this kind is."""
     return FREEDOMS[kind][0] if component is None else str(component)
-
-
-def coordinate_quantities(tree: Tree) -> list[Quantity]:
-    """What each coordinate is, in the order of q."""
-    return [of_freedom(driven(tree, body)) for _, body in items(tree, "coordinates")]

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated, Literal, TypeAlias
 
-from pydantic import Discriminator, Field, Tag, model_validator
-
 from eigassign.case.schema.joints import Joint
-from eigassign.case.schema.links import Link, Material, Section
-from eigassign.case.schema.vectors import (
-    Angle,
-    Inertia,
-    Orientation,
-    Vector,
-    check_inertia,
-    one_or_list,
+from eigassign.case.schema.links import Link
+from eigassign.case.schema.parts import (
+    ByReference,
+    FrozenDict,
+    Named,
+    OneOrList,
+    OneOrMoreNamed,
+    Part,
+    Quantity,
+    ValueOr,
+    quantity,
 )
-from eigassign.case.units import Frozen, FrozenDict, Part, Quantity, quantity
+from eigassign.case.schema.sections import Material, Section
+from eigassign.case.schema.vectors import Angle, Inertia, Orientation, Vector
 
 Q_VALUE = Quantity(elsewhere="angle (in rad when bare; or deg), or length, as its coordinate")
-SPRING = quantity("stiffness", at_least=0)
-TURNING_SPRING = quantity("rotational stiffness", at_least=0)
+QValue: TypeAlias = Annotated[float, Q_VALUE]
+Stiffness: TypeAlias = Annotated[float, quantity("stiffness", at_least=0)]
+TurningStiffness: TypeAlias = Annotated[float, quantity("rotational stiffness", at_least=0)]
 
 
 class Body(Part):
@@ -37,23 +39,6 @@ class Body(Part):
     inertia: Inertia = 0.0
     offset: Vector | None = None
 
-    @model_validator(mode="after")
-    def _turns(self) -> Body:
-        check_inertia(self.inertia)
-        return self
-
-
-Translational: TypeAlias = Annotated[
-    Annotated[Annotated[float, SPRING], Tag("<one>")]
-    | Annotated[tuple[Annotated[float, SPRING], ...], Tag("<list>")],
-    Discriminator(one_or_list),
-]
-Rotational: TypeAlias = Annotated[
-    Annotated[Annotated[float, TURNING_SPRING], Tag("<one>")]
-    | Annotated[tuple[Annotated[float, TURNING_SPRING], ...], Tag("<list>")],
-    Discriminator(one_or_list),
-]
-
 
 class Spring(Part):
     """A spring between two nodes, or a node and `ground`: N/m and N m/rad, per axis or for all.
@@ -63,8 +48,8 @@ class Spring(Part):
     """
 
     between: tuple[str, str]
-    translational: Translational = 0.0
-    rotational: Rotational = 0.0
+    translational: OneOrList[Stiffness, tuple[Stiffness, ...]] = 0.0
+    rotational: OneOrList[TurningStiffness, tuple[TurningStiffness, ...]] = 0.0
     angle: Angle = 0.0
     orientation: Orientation | None = None
 
@@ -72,18 +57,8 @@ class Spring(Part):
 class Assembly(Part):
     """Which way the loops are put together: guesses of passive joints, where `at` holds."""
 
-    at: Annotated[Mapping[str, Annotated[float, Q_VALUE]], Frozen] = FrozenDict()
-    guess: Annotated[
-        Mapping[
-            str,
-            Annotated[
-                Annotated[Annotated[float, Q_VALUE], Tag("<one>")]
-                | Annotated[tuple[Annotated[float, Q_VALUE], ...], Tag("<list>")],
-                Discriminator(one_or_list),
-            ],
-        ],
-        Frozen,
-    ] = FrozenDict()
+    at: ByReference[QValue] = FrozenDict()
+    guess: ByReference[OneOrList[QValue, tuple[QValue, ...]]] = FrozenDict()
 
 
 class Drive(Part):
@@ -92,10 +67,6 @@ class Drive(Part):
     stiffness: Annotated[
         float, Quantity(above=0, elsewhere="stiffness (N m/rad, or N/m where the joint slides)")
     ]
-
-
-def _drive_tag(value: object) -> str:
-    return "<drive>" if isinstance(value, (Mapping, Drive)) else "<word>"
 
 
 class Coordinate(Part):
@@ -108,20 +79,17 @@ class Coordinate(Part):
     joint: str
     component: Literal[1, 2, 3, "rotation", "translation"] | None = None
     angle: Literal["relative", "absolute"] = "relative"
-    drive: Annotated[
-        Annotated[Literal["free", "locked"], Tag("<word>")] | Annotated[Drive, Tag("<drive>")],
-        Discriminator(_drive_tag),
-    ] = "free"
+    drive: ValueOr[Literal["free", "locked"], Drive] = "free"
 
 
 class Mechanism(Part):
     """Materials, sections, links, joints, bodies and springs by name, in the order of the file."""
 
     space: Literal["planar", "spatial"]
-    materials: Annotated[Mapping[str, Material], Frozen] = FrozenDict()
-    sections: Annotated[Mapping[str, Section], Frozen] = FrozenDict()
-    links: Annotated[Mapping[str, Link], Field(min_length=1), Frozen]
-    joints: Annotated[Mapping[str, Joint], Frozen]
-    bodies: Annotated[Mapping[str, Body], Frozen] = FrozenDict()
-    springs: Annotated[Mapping[str, Spring], Frozen] = FrozenDict()
+    materials: Named[Material] = FrozenDict()
+    sections: Named[Section] = FrozenDict()
+    links: OneOrMoreNamed[Link]
+    joints: Named[Joint]
+    bodies: Named[Body] = FrozenDict()
+    springs: Named[Spring] = FrozenDict()
     assembly: Assembly | None = None

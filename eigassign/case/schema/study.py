@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal, Self, TypeAlias
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Field, model_validator
 
 from eigassign.case.schema.mechanism import Q_VALUE
-from eigassign.case.schema.trajectory import Coordinates, Times, increasing
-from eigassign.case.schema.vectors import one_or_list, word_or_number
-from eigassign.case.units import Frozen, FrozenDict, Part, Quantity, quantity, wrong
+from eigassign.case.schema.parts import (
+    Frozen,
+    FrozenDict,
+    Named,
+    NumberOr,
+    OneOrList,
+    Part,
+    Quantity,
+    ValueOr,
+    quantity,
+    wrong,
+)
+from eigassign.case.schema.trajectory import Coordinates, Times
 
-FREQUENCY = quantity("frequency", above=0)
-Q_SPAN = Quantity(at_least=0, elsewhere=Q_VALUE.elsewhere)
-Y_VALUE = Quantity(elsewhere="quantity of the parameter's dimension (SI when bare)")
-Parameters: TypeAlias = tuple[Annotated[float, Y_VALUE], ...]
+QSpan: TypeAlias = Annotated[float, Quantity(at_least=0, elsewhere=Q_VALUE.elsewhere)]
+YValue: TypeAlias = Annotated[
+    float, Quantity(elsewhere="quantity of the parameter's dimension (SI when bare)")
+]
+Frequency: TypeAlias = Annotated[float, quantity("frequency", above=0)]
+Auto: TypeAlias = Literal["auto"]
 Mode: TypeAlias = Annotated[int, Field(ge=1, le=1000)]
 Modes: TypeAlias = Annotated[tuple[Mode, ...], Field(min_length=1)]
 
@@ -24,11 +36,11 @@ class Parameter(Part):
     """One design parameter y: path of a numeric property, and its bounds in SI units."""
 
     parameter: str
-    min: Annotated[float, Y_VALUE]
-    max: Annotated[float, Y_VALUE]
+    min: YValue
+    max: YValue
 
     @model_validator(mode="after")
-    def _has_room(self) -> Parameter:
+    def _has_room(self) -> Self:
         if self.min > self.max:
             raise wrong(f"min {self.min:g} is above max {self.max:g} (SI units)", "min")
         return self
@@ -38,11 +50,11 @@ class Constraint(Part):
     """min ≤ Σ coefficient · y ≤ max over the named design parameters."""
 
     terms: Annotated[Mapping[str, Annotated[float, Quantity()]], Field(min_length=1), Frozen]
-    min: Annotated[float, Y_VALUE] | None = None
-    max: Annotated[float, Y_VALUE] | None = None
+    min: YValue | None = None
+    max: YValue | None = None
 
     @model_validator(mode="after")
-    def _binds(self) -> Constraint:
+    def _binds(self) -> Self:
         if self.min is None and self.max is None:
             raise wrong("a constraint needs min, max or both")
         if self.min is not None and self.max is not None and self.min > self.max:
@@ -55,12 +67,8 @@ class Constraint(Part):
 class Design(Part):
     """Design parameters y in the order of the file, and linear constraints between them."""
 
-    parameters: Annotated[Mapping[str, Parameter], Frozen] = FrozenDict()
-    constraints: Annotated[Mapping[str, Constraint], Frozen] = FrozenDict()
-
-
-_Auto: TypeAlias = Annotated[Literal["auto"], Tag("<one>")]
-_WORD_OR_LIST = Discriminator(one_or_list)
+    parameters: Named[Parameter] = FrozenDict()
+    constraints: Named[Constraint] = FrozenDict()
 
 
 class Expansion(Part):
@@ -69,33 +77,24 @@ class Expansion(Part):
     `accuracy` (relative error in Hz) is what an `auto` order, and `auto` elements, have to meet.
     """
 
-    order: Annotated[
-        Annotated[Annotated[int, Field(ge=1, le=20)], Tag("<number>")]
-        | Annotated[Literal["auto"], Tag("<auto>")],
-        Discriminator(word_or_number),
-    ] = 4
+    order: NumberOr[Annotated[int, Field(ge=1, le=20)], Auto] = 4
     accuracy: Annotated[float, quantity("fraction", above=0)] = 1e-3
-    q: Annotated[_Auto | Annotated[Coordinates, Tag("<list>")], _WORD_OR_LIST] = "auto"
-    y: Annotated[_Auto | Annotated[Parameters, Tag("<list>")], _WORD_OR_LIST] = "auto"
-    modes: Annotated[_Auto | Annotated[Modes, Tag("<list>")], _WORD_OR_LIST] = "auto"
+    q: OneOrList[Auto, Coordinates] = "auto"
+    y: OneOrList[Auto, tuple[YValue, ...]] = "auto"
+    modes: OneOrList[Auto, Modes] = "auto"
 
 
 class FrequencyProfile(Part):
     """A wanted frequency (Hz) that changes in time (s), linear between the points given."""
 
     time: Times
-    frequency: Annotated[tuple[Annotated[float, FREQUENCY], ...], Field(min_length=2)]
+    frequency: Annotated[tuple[Frequency, ...], Field(min_length=2)]
 
     @model_validator(mode="after")
-    def _is_a_function(self) -> FrequencyProfile:
+    def _is_a_function(self) -> Self:
         if len(self.time) != len(self.frequency):
             raise wrong(f"{len(self.time)} times for {len(self.frequency)} frequencies", "time")
-        increasing(self.time)
         return self
-
-
-def _frequency_tag(value: object) -> str:
-    return "<profile>" if isinstance(value, (Mapping, FrequencyProfile)) else "<constant>"
 
 
 class Target(Part):
@@ -105,11 +104,7 @@ class Target(Part):
     """
 
     mode: Mode
-    frequency: Annotated[
-        Annotated[Annotated[float, FREQUENCY], Tag("<constant>")]
-        | Annotated[FrequencyProfile, Tag("<profile>")],
-        Discriminator(_frequency_tag),
-    ]
+    frequency: ValueOr[Frequency, FrequencyProfile]
     weight: Annotated[float, Quantity(above=0)] = 1.0
     trajectory: str | None = None
 
@@ -118,12 +113,5 @@ class Validation(Part):
     """How far from exact is too far (fraction), and the box in q that is sampled at random."""
 
     max_error: Annotated[float, quantity("fraction", above=0)] = 0.02
-    q_span: (
-        Annotated[
-            Annotated[Annotated[float, Q_SPAN], Tag("<one>")]
-            | Annotated[tuple[Annotated[float, Q_SPAN], ...], Tag("<list>")],
-            Discriminator(one_or_list),
-        ]
-        | None
-    ) = None
+    q_span: OneOrList[QSpan, tuple[QSpan, ...]] | None = None
     samples: Annotated[int, Field(ge=1, le=1_000_000)] = 200

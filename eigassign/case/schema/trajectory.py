@@ -1,6 +1,7 @@
 """The key `trajectory`: joint samples, a CSV file, point to point, or a path of a link's node.
 
-The key `trajectory` as a whole: one mapping, or a list of them with names.
+It holds one of them, or a list. To add a kind: write its model, put it into the union `Trajectory`,
+and name the key by which it is known in `MOTIONS`.
 """
 
 from __future__ import annotations
@@ -9,49 +10,58 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Literal, Self, TypeAlias
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from eigassign.case.reader import KeyPath
-from eigassign.case.schema.mechanism import Q_VALUE
-from eigassign.case.schema.vectors import Angle, Orientation, Vector, one_or_list
-from eigassign.case.units import Frozen, FrozenDict, Part, Quantity, quantity, wrong
-
-# --- The key `trajectory`: joint samples, a CSV file, point to point, or a path of a link's node
+from eigassign.case.schema.mechanism import QValue
+from eigassign.case.schema.parts import (
+    ByReference,
+    File,
+    FrozenDict,
+    Name,
+    OneOrList,
+    Part,
+    Quantity,
+    quantity,
+    wrong,
+)
+from eigassign.case.schema.vectors import Angle, Orientation, Vector
 
 DURATION = quantity("time", above=0)
 TIME = quantity("time")
-Times: TypeAlias = Annotated[tuple[Annotated[float, TIME], ...], Field(min_length=2)]
-Coordinates: TypeAlias = tuple[Annotated[float, Q_VALUE], ...]
-Timing: TypeAlias = Literal["quintic", "cubic", "trapezoidal", "linear"]
-Share: TypeAlias = Annotated[float, Quantity(above=0, at_most=0.5)]
-SHARE = 1 / 3
+
+
+def _increasing(times: tuple[float, ...]) -> tuple[float, ...]:
+    for k, (before, after) in enumerate(pairwise(times), 1):
+        if after <= before:
+            raise wrong(f"time must increase: {after:g} s after {before:g} s", k)
+    return times
+
+
+Times: TypeAlias = Annotated[
+    tuple[Annotated[float, TIME], ...], Field(min_length=2), AfterValidator(_increasing)
+]
+Coordinates: TypeAlias = tuple[QValue, ...]
 Samples: TypeAlias = Annotated[int, Field(ge=2, le=100_000)]
 
 
-def increasing(time: tuple[float, ...], key: str = "time") -> None:
-    """Raises ValueError at the first of the times (s) that does not come after its predecessor."""
-    for k, (before, after) in enumerate(pairwise(time), 1):
-        if after <= before:
-            raise wrong(f"time must increase: {after:g} s after {before:g} s", key, k)
-
-
-def _one_or_many(value: object) -> str:
+def _nested_tag(value: object) -> str:
     """Tag of one triple of angles, or a list of them."""
     nested = isinstance(value, (tuple, list)) and any(isinstance(v, (tuple, list)) for v in value)
     return "<list>" if nested else "<one>"
 
 
-class Named(Part):
+class AnyTrajectory(Part):
     """What every trajectory may have: a `name`, and what each of its seconds weighs beside others.
 
     Without a name it is called by its place: "1", "2", …
     """
 
-    name: str | None = None
+    name: Name | None = None
     weight: Annotated[float, Quantity(above=0)] = 1.0
 
 
-class SampledTrajectory(Named):
+class SampledTrajectory(AnyTrajectory):
     """Joint samples: q (n_samples, n_q); `time` (s), or `duration` (s) for equal steps from 0."""
 
     q: Annotated[tuple[Coordinates, ...], Field(min_length=2)]
@@ -59,26 +69,25 @@ class SampledTrajectory(Named):
     duration: Annotated[float, DURATION] | None = None
 
     @model_validator(mode="after")
-    def _has_one_clock(self) -> SampledTrajectory:
+    def _has_one_clock(self) -> Self:
         if (self.time is None) == (self.duration is None):
             raise wrong("give either time (one per sample) or duration, and not both")
         if self.time is not None and len(self.time) != len(self.q):
             raise wrong(f"{len(self.time)} times for {len(self.q)} samples of q", "time")
-        increasing(self.time or ())
         return self
 
 
-class FileTrajectory(Named):
+class FileTrajectory(AnyTrajectory):
     """Joint samples in a CSV file: columns `time` (s) and one per coordinate (rad, or [deg])."""
 
-    file: str
+    file: File
 
 
-class Timed(Named):
+class Timed(AnyTrajectory):
     """What moves by a timing law: from rest to rest, but for `linear`, in equal steps of time."""
 
-    timing: Timing = "quintic"
-    acceleration_share: Share = SHARE
+    timing: Literal["quintic", "cubic", "trapezoidal", "linear"] = "quintic"
+    acceleration_share: Annotated[float, Quantity(above=0, at_most=0.5)] = 1 / 3
     samples: Samples = 101
 
     @model_validator(mode="after")
@@ -100,12 +109,11 @@ class PointTrajectory(Timed):
     duration: Annotated[float, DURATION] | None = None
 
     @model_validator(mode="after")
-    def _has_one_clock(self) -> PointTrajectory:
+    def _has_one_clock(self) -> Self:
         if (self.times is None) == (self.duration is None):
             raise wrong("give either times (one per point) or duration, and not both")
         if self.times is not None and len(self.times) != len(self.points):
             raise wrong(f"{len(self.times)} times for {len(self.points)} points", "times")
-        increasing(self.times or (), "times")
         for k, (a, b) in enumerate(pairwise(self.points), 1):
             if a == b and self.times is None:
                 message = "the same point as the one before it: give times instead of duration"
@@ -123,30 +131,22 @@ class TipTrajectory(Timed):
 
     tip: str
     waypoints: Annotated[tuple[Vector, ...], Field(min_length=2)]
-    angle: (
-        Annotated[
-            Annotated[Angle, Tag("<one>")] | Annotated[tuple[Angle, ...], Tag("<list>")],
-            Discriminator(one_or_list),
-        ]
-        | None
-    ) = None
+    angle: OneOrList[Angle, tuple[Angle, ...]] | None = None
     orientation: (
         Annotated[
             Annotated[Orientation, Tag("<one>")]
             | Annotated[tuple[Orientation, ...], Tag("<list>")],
-            Discriminator(_one_or_many),
+            Discriminator(_nested_tag),
         ]
         | None
     ) = None
     path: Literal["spline", "straight"] = "spline"
     duration: Annotated[float, DURATION] = 1.0
-    branch: Annotated[
-        Mapping[str, tuple[Annotated[float, Q_VALUE], Annotated[float, Q_VALUE]]], Frozen
-    ] = FrozenDict()
+    branch: ByReference[tuple[QValue, QValue]] = FrozenDict()
     start: Coordinates | None = None
 
     @model_validator(mode="after")
-    def _goes_somewhere(self) -> TipTrajectory:
+    def _goes_somewhere(self) -> Self:
         for k, (a, b) in enumerate(pairwise(self.waypoints), 1):
             if a == b:
                 raise wrong("the same point as the one before it", "waypoints", k)
@@ -156,7 +156,7 @@ class TipTrajectory(Timed):
         return self
 
     @model_validator(mode="after")
-    def _turns_at_each_waypoint(self) -> TipTrajectory:
+    def _turns_at_each_waypoint(self) -> Self:
         many = {"angle": self.angle} if isinstance(self.angle, tuple) else {}
         if self.orientation is not None and isinstance(self.orientation[0], tuple):
             many["orientation"] = self.orientation  # type: ignore[assignment]
@@ -169,31 +169,32 @@ class TipTrajectory(Timed):
         return self
 
 
-def _trajectory_tag(value: object) -> str | None:
+MOTIONS: dict[str, type[AnyTrajectory]] = {
+    "tip": TipTrajectory,
+    "file": FileTrajectory,
+    "q": SampledTrajectory,
+    "points": PointTrajectory,
+}  # by the key that only they have
+
+
+def _motion_tag(value: object) -> str | None:
     keys = value if isinstance(value, Mapping) else getattr(type(value), "model_fields", {})
-    tags = {"tip": "<tip>", "file": "<file>", "q": "<samples>", "points": "<points>"}
-    return next((tag for key, tag in tags.items() if key in keys), None)
+    return next((f"<{key}>" for key in MOTIONS if key in keys), None)
 
 
 Trajectory: TypeAlias = Annotated[
     Annotated[TipTrajectory, Tag("<tip>")]
     | Annotated[FileTrajectory, Tag("<file>")]
-    | Annotated[SampledTrajectory, Tag("<samples>")]
+    | Annotated[SampledTrajectory, Tag("<q>")]
     | Annotated[PointTrajectory, Tag("<points>")],
-    Discriminator(_trajectory_tag, custom_error_type="choice:motion", custom_error_message="-"),
+    Discriminator(_motion_tag, "no_motion", "no key names a motion"),
 ]
-
-
-# --- The key `trajectory` as a whole: one mapping, or a list of them with names
 
 MOST = 100  # trajectories of one case
 
-Trajectories: TypeAlias = Annotated[
-    Annotated[Trajectory, Tag("<one>")]
-    | Annotated[
-        Annotated[tuple[Trajectory, ...], Field(min_length=1, max_length=MOST)], Tag("<list>")
-    ],
-    Discriminator(one_or_list),
+Trajectories: TypeAlias = OneOrList[
+    Trajectory,
+    Annotated[tuple[Trajectory, ...], Field(min_length=1, max_length=MOST)],
 ]
 
 

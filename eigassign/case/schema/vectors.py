@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, TypeAlias
 
-from pydantic import Discriminator, Tag
+from pydantic import AfterValidator
 
-from eigassign.case.units import Quantity, quantity, wrong
+from eigassign.case.schema.parts import OneOrList, Quantity, quantity, wrong
 
 LENGTH = quantity("length", above=0)
 ANGLE = quantity("angle")
 PLACE = quantity("length")
-INERTIA = quantity("rotary inertia", at_least=0)
-TENSOR = quantity("rotary inertia")
 _ROUND_OFF = 1e-12  # of the trace: a thin rod's zero inertia computed elsewhere
 
 
@@ -25,26 +23,31 @@ class _Components:
 
 
 Vector: TypeAlias = Annotated[tuple[Annotated[float, PLACE], ...], _Components()]
-Direction: TypeAlias = Annotated[tuple[Annotated[float, Quantity()], ...], _Components()]
 Angle: TypeAlias = Annotated[float, ANGLE]
-Orientation: TypeAlias = tuple[Angle, Angle, Angle]
+Orientation: TypeAlias = tuple[Angle, Angle, Angle]  # rad, about x, y, z: R = Rz Ry Rx
 
 
-def word_or_number(value: object) -> str:
-    """Tag of a value that may be a word or a number."""
-    return "<auto>" if isinstance(value, str) else "<number>"
+def _points_somewhere(direction: tuple[float, ...]) -> tuple[float, ...]:
+    if not any(direction):
+        raise wrong("has no direction: all components are zero")
+    return direction
 
 
-def one_or_list(value: object) -> str:
-    """Tag of a value that may be one number or a list."""
-    return "<list>" if isinstance(value, (tuple, list)) else "<one>"
-
-
-Inertia: TypeAlias = Annotated[
-    Annotated[Annotated[float, INERTIA], Tag("<one>")]
-    | Annotated[tuple[Annotated[float, TENSOR], ...], Tag("<list>")],
-    Discriminator(one_or_list),
+Direction: TypeAlias = Annotated[
+    tuple[Annotated[float, Quantity()], ...], _Components(), AfterValidator(_points_somewhere)
 ]
+
+
+def parallel(a: Sequence[float], b: Sequence[float]) -> bool:
+    """Whether two directions agree within a millionth of a radian."""
+    n = max(len(a), len(b), 3)
+    x, y = [[*v, *([0.0] * (n - len(v)))] for v in (a, b)]
+    cross = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
+    norms = sum(v * v for v in x) * sum(v * v for v in y)
+    return sum(c * c for c in cross) <= 1e-12 * norms
+
+
+# --- Inertia tensors
 
 
 def tensor(inertia: Sequence[float]) -> list[list[float]]:
@@ -78,21 +81,20 @@ def spread(inertia: Sequence[float]) -> list[list[float]]:
     return [[half * (i == j) - J[i][j] for j in range(3)] for i in range(3)]
 
 
-def check_inertia(inertia: float | Sequence[float]) -> None:
-    """Raises the error of a list that is no inertia tensor."""
-    if isinstance(inertia, (int, float)):
-        return
-    if len(inertia) not in (3, 6):
-        message = "expected 3 (Ixx, Iyy, Izz) or 6 (… Ixy, Ixz, Iyz) entries, got "
-        raise wrong(f"{message}{len(inertia)}", "inertia")
-    if not semidefinite(tensor(inertia)):
-        raise wrong("not positive: turning about some axis would take no energy", "inertia")
+def _is_inertia(inertia: float | tuple[float, ...]) -> float | tuple[float, ...]:
+    if isinstance(inertia, tuple):
+        if len(inertia) not in (3, 6):
+            message = "expected 3 (Ixx, Iyy, Izz) or 6 (… Ixy, Ixz, Iyz) entries, got "
+            raise wrong(f"{message}{len(inertia)}")
+        if not semidefinite(tensor(inertia)):
+            raise wrong("not positive: turning about some axis would take no energy")
+    return inertia
 
 
-def parallel(a: Sequence[float], b: Sequence[float]) -> bool:
-    """Whether two directions agree within a millionth of a radian."""
-    n = max(len(a), len(b), 3)
-    x, y = [[*v, *([0.0] * (n - len(v)))] for v in (a, b)]
-    cross = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
-    norms = sum(v * v for v in x) * sum(v * v for v in y)
-    return sum(c * c for c in cross) <= 1e-12 * norms
+Inertia: TypeAlias = Annotated[
+    OneOrList[
+        Annotated[float, quantity("rotary inertia", at_least=0)],
+        tuple[Annotated[float, quantity("rotary inertia")], ...],
+    ],
+    AfterValidator(_is_inertia),
+]

@@ -1,0 +1,109 @@
+"""The table of rules: what several keys must have in common, over the plain data of a file.
+
+The rules see the data as they are written, not what the schema makes of them, so that they find
+their problems even where the schema has some of its own: all are reported at once. A rule keeps
+silent about what it cannot judge. Its name and docstring say what must hold; it yields where it
+does not, and why. To add one: write it, and name it here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+
+from eigassign.case.reader import Finding, KeyPath, Tree, items, names
+from eigassign.case.rules import joints, links, properties, space, study
+from eigassign.case.schema.mechanism import Mechanism
+
+Rule = Callable[[Tree], Iterator[Finding]]
+
+
+def keys_have_values(tree: Tree) -> Iterator[Finding]:
+    """No key and no entry of a list is left empty."""
+    yield from _empty(tree, ())
+
+
+def _empty(node: object, path: KeyPath) -> Iterator[Finding]:
+    if node is None:
+        comma = bool(path) and str(path[-1])[:1].isdigit()
+        hint = " (decimals take a point, not a comma)" if comma else ""
+        yield path, f"has no value: give one, or leave the key out{hint}"
+    for key, inner in node.items() if isinstance(node, Mapping) else ():
+        yield from _empty(inner, (*path, key))
+    for k, inner in enumerate(node) if isinstance(node, tuple) else ():
+        if not isinstance(inner, (int, float)):
+            yield from _empty(inner, (*path, k))
+
+
+def reserved_names_are_not_used(tree: Tree) -> Iterator[Finding]:
+    """`ground` is no link, and `time` is the first column of every table over time."""
+    if "time" in names(tree, "coordinates"):
+        yield ("coordinates", "time"), "'time' heads a column of its own: name it otherwise"
+    if "ground" in names(tree, "mechanism", "links"):
+        path = ("mechanism", "links", "ground")
+        yield path, "'ground' is the fixed frame: name the link otherwise"
+
+
+RULES: tuple[Rule, ...] = (
+    keys_have_values,
+    reserved_names_are_not_used,
+    space.vectors_have_as_many_components_as_the_space,
+    space.keys_belong_to_a_planar_mechanism,
+    space.keys_belong_to_a_spatial_mechanism,
+    links.beams_have_known_materials,
+    links.beams_have_known_sections,
+    links.materials_have_a_shear_modulus_where_beams_need_it,
+    links.bare_sections_have_the_moments_of_their_space,
+    links.rigid_links_have_one_end,
+    links.frames_hang_together,
+    links.superelements_have_rows_of_their_own_for_each_node,
+    links.superelements_have_matrix_files,
+    links.links_that_a_joint_travels_along_are_not_reduced,
+    links.bodies_and_tips_are_on_nodes,
+    links.springs_join_two_nodes,
+    joints.joints_connect_two_links,
+    joints.links_are_connected_to_the_ground,
+    joints.coordinates_move_one_freedom_each,
+    joints.assembly_names_coordinates_and_joints,
+    joints.assembly_is_for_loops,
+    properties.parameters_name_properties,
+    properties.initial_values_are_within_bounds,
+    study.lists_have_an_entry_for_each_coordinate,
+    study.expansion_point_has_an_entry_for_each_parameter,
+    study.trajectories_have_names_of_their_own,
+    study.branches_are_ranges_of_driven_joints,
+    study.parameters_vary_different_properties,
+    study.constraints_are_between_design_parameters,
+    study.expanded_modes_differ,
+    study.targets_are_for_expanded_modes_once_each,
+    study.profiles_cover_their_trajectories,
+)
+
+
+def inconsistent(tree: Tree) -> Iterator[Finding]:
+    """Everything that does not fit together."""
+    for rule in RULES:
+        yield from rule(tree)
+
+
+# --- Files that are no mechanism's
+
+_MOST = 1000  # entries of a group
+_MOST_INSIDE = 10_000  # nodes or beams of one link
+_GROUPS = (
+    *(("mechanism", group) for group in Mechanism.model_fields),
+    ("coordinates",),
+    ("design",),
+    ("design", "constraints"),
+)
+
+
+def too_many(tree: Tree) -> Iterator[Finding]:
+    """Groups so large that looking for further problems could take minutes."""
+    for place in _GROUPS:
+        if len(items(tree, *place)) > _MOST:
+            yield place, f"more than {_MOST} entries"
+    for name in names(tree, "mechanism", "links"):
+        for key in ("nodes", "beams"):
+            place = ("mechanism", "links", name, key)
+            if len(items(tree, *place)) > _MOST_INSIDE:
+                yield place, f"more than {_MOST_INSIDE} entries: make it a superelement"

@@ -1,0 +1,157 @@
+"""What the names in a case file's plain data stand for, before anything is known to be right.
+
+Where the data do not say (a key is missing, or holds another kind of value), the answer is None or
+empty: the schema reports such a key, and no rule reports it again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from eigassign.case.reader import KeyPath, Tree, at, items, lacks, names, text
+from eigassign.case.schema.joints import FREEDOMS
+from eigassign.case.schema.links import LINKS
+from eigassign.case.schema.parts import Quantity
+from eigassign.case.schema.vectors import ANGLE, PLACE
+from eigassign.case.suggestions import listed, shown, suggestion, unknown
+from eigassign.case.units import QuantityError
+
+ANY = Quantity()  # dimension unknown because of an error elsewhere
+_MOST = 6  # node names spelt out in a message
+
+
+def number(value: object, quantity: Quantity) -> float | None:
+    """SI value; None where there is none, or the schema reports it."""
+    try:
+        return None if value is None else quantity.read(value)
+    except QuantityError:
+        return None
+
+
+def is_spatial(tree: Tree) -> bool:
+    """Whether the mechanism is said to be spatial."""
+    return text(tree, "mechanism", "space") == "spatial"
+
+
+def is_planar(tree: Tree) -> bool:
+    """Whether the mechanism is said to be planar."""
+    return text(tree, "mechanism", "space") == "planar"
+
+
+# --- Links and their nodes
+
+
+def links(tree: Tree, kind: str) -> Iterator[tuple[str, KeyPath, object]]:
+    """Name, key path and content of each link of a type."""
+    for name, body in items(tree, "mechanism", "links"):
+        if type_of(body) == kind:
+            yield name, ("mechanism", "links", name), body
+
+
+def type_of(link: object) -> str | None:
+    """beam, rigid, frame or superelement; None if it is none of them."""
+    if not isinstance(link, Mapping):
+        return None
+    kind = link.get("type", "beam")
+    return kind if isinstance(kind, str) and kind in LINKS else None
+
+
+def beams(tree: Tree) -> Iterator[tuple[KeyPath, object]]:
+    """Key path and content of every beam: links that are one, and those of frames."""
+    for _, path, body in links(tree, "beam"):
+        yield path, body
+    for _, path, body in links(tree, "frame"):
+        for beam, inner in items(body, "beams"):
+            yield (*path, "beams", beam), inner
+
+
+def node_names(link: object) -> list[str] | None:
+    """Nodes of one link; None where its type or its nodes are not known."""
+    kind = type_of(link)
+    if kind == "beam":
+        return ["start", "end"]
+    nodes = at(link, "nodes")
+    if kind is None or (nodes is not None and not isinstance(nodes, Mapping)):
+        return None
+    if kind != "rigid":
+        return names(link, "nodes") if nodes is not None else None
+    implied = ["start", "end"] if at(link, "length") is not None else ["start"]
+    return list(dict.fromkeys([*implied, *names(link, "nodes")]))
+
+
+def node_problem(tree: Tree, value: str, also: str = "") -> str | None:
+    """What is wrong with ``value`` as `<link>.<node>`; ``also`` is what else may stand there."""
+    link, _, node = value.partition(".")
+    or_else = [also] if also else []
+    if lacks(tree, ("mechanism", "links"), link):
+        known = [*or_else, *names(tree, "mechanism", "links")]
+        expected = f"{also}, " if also else ""
+        return (
+            f"{unknown('link', link, known)}; expected {expected}'<link>.start', '<link>.end' or "
+            "another node"
+        )
+    nodes = node_names(at(tree, "mechanism", "links", link))
+    if nodes is None or node in nodes:
+        return None
+    few = [repr(f"{link}.{name}") for name in nodes]
+    spelt = few if len(nodes) <= _MOST else [f"'{link}.<node>' ({listed(nodes)})"]
+    expected = " or ".join([*or_else, *spelt])
+    return f"expected {expected}, got {shown(value)}{suggestion(node, nodes)}"
+
+
+# --- Joints and coordinates
+
+
+def freedoms(tree: Tree, joint: str) -> tuple[str, ...] | None:
+    """Names of a joint's freedoms, in order; None if the joint or its type is unknown."""
+    return FREEDOMS.get(text(tree, "mechanism", "joints", joint, "type") or "")
+
+
+def moving(tree: Tree) -> list[str]:
+    """Names of the joints that are not fixed."""
+    return [name for name in names(tree, "mechanism", "joints") if freedoms(tree, name)]
+
+
+def driven(tree: Tree, coordinate: object) -> str | None:
+    """Which freedom of its joint a coordinate is; None where that cannot be told."""
+    known = freedoms(tree, text(coordinate, "joint") or "")
+    component = at(coordinate, "component")
+    if not known or isinstance(component, bool):
+        return None
+    if component is None:
+        return known[0] if len(known) == 1 else None
+    return str(component) if str(component) in known else None
+
+
+def of_freedom(freedom: str | None) -> Quantity:
+    """Angle or length; anything where the freedom is unknown."""
+    if freedom is None:
+        return ANY
+    return PLACE if freedom == "translation" else ANGLE
+
+
+def coordinate_quantities(tree: Tree) -> list[Quantity]:
+    """What each coordinate is, in the order of q."""
+    return [of_freedom(driven(tree, body)) for _, body in items(tree, "coordinates")]
+
+
+# --- Trajectories and design parameters
+
+
+def trajectories(tree: Tree) -> list[tuple[KeyPath, object]]:
+    """Key path and content of each trajectory: the one below `trajectory`, or those of the list."""
+    given = at(tree, "trajectory")
+    if isinstance(given, tuple):
+        return [(("trajectory", k), body) for k, body in enumerate(given)]
+    return [] if given is None else [(("trajectory",), given)]
+
+
+def trajectory_names(tree: Tree) -> list[str]:
+    """What each trajectory is called: its name, or its place counted from 1."""
+    bodies = [body for _, body in trajectories(tree)]
+    return [text(body, "name") or str(k) for k, body in enumerate(bodies, start=1)]
+
+
+def parameters(tree: Tree) -> list[tuple[str, object]]:
+    """Design parameters as the file has them: what stands under `design` but the constraints."""
+    return [(name, body) for name, body in items(tree, "design") if name != "constraints"]

@@ -1,0 +1,214 @@
+"""Design parameters: which number of the mechanism a path names, and whether its bounds make sense.
+
+A path is `materials.<name>.<property>` and the like below `mechanism`, or
+`coordinates.<name>.drive.stiffness`. What can vary follows from the models of the schema: every
+field that is one real number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, get_args, get_origin
+
+from pydantic_core import PydanticUndefined
+
+from eigassign.case.reader import Finding, Tree, at, names, text
+from eigassign.case.rules.lookups import driven, is_spatial, number, parameters, type_of
+from eigassign.case.schema.links import LINKS
+from eigassign.case.schema.mechanism import Body, Spring
+from eigassign.case.schema.parts import Part, Quantity, quantity
+from eigassign.case.schema.sections import SHAPES, Material, Section
+from eigassign.case.suggestions import listed, suggestion, unknown
+
+_GROUPS = {
+    "materials": "material",
+    "sections": "section",
+    "links": "link",
+    "bodies": "body",
+    "springs": "spring",
+}
+_FORMS = (
+    "expected materials.<name>.<property>, sections.<name>.<property>, links.<name>.length, "
+    "bodies.<name>.<property>, springs.<name>.<property> or coordinates.<name>.drive.stiffness"
+)
+_FIXED = {"roll", "reduce_to", "angle"}  # real numbers that the mechanism is built with
+
+
+class NoPropertyError(ValueError):
+    """The path names nothing that can be varied; the message says why."""
+
+
+@dataclass(frozen=True)
+class Property:
+    """A real-valued property: what it may be, and what the file says it is (not yet SI)."""
+
+    quantity: Quantity
+    written: object
+
+
+def property_at(tree: Tree, path: str) -> Property | None:
+    """Property at ``path`` (relative to `mechanism`, or from `coordinates` on).
+
+    None where the path may be right but the file has another error there; raises NoPropertyError
+    where it names nothing, or something that is not a real number.
+    """
+    group, *rest = path.split(".")
+    if group == "mechanism" and rest and rest[0] in _GROUPS:
+        raise NoPropertyError(f"paths start below mechanism: write {'.'.join(rest)!r}")
+    if group == "coordinates" and len(rest) == 3 and rest[1:] == ["drive", "stiffness"]:
+        return _drive_stiffness(tree, rest[0])
+    if group not in _GROUPS or len(rest) != 2:
+        hint = suggestion(group, (*_GROUPS, "coordinates")) if group not in _GROUPS else ""
+        raise NoPropertyError(f"{_FORMS}; got {path!r}{hint}")
+    return _of_part(tree, group, *rest)
+
+
+def properties(tree: Tree) -> dict[str, Property | None]:
+    """Property of each design parameter, None where it is unknown."""
+    found: dict[str, Property | None] = {}
+    for name, body in parameters(tree):
+        path = text(body, "parameter")
+        try:
+            found[name] = None if path is None else property_at(tree, path)
+        except NoPropertyError:
+            found[name] = None
+    return found
+
+
+def _of_part(tree: Tree, group: str, name: str, key: str) -> Property | None:
+    known = at(tree, "mechanism", group)
+    if known is None and group != "links":
+        known = {}
+    if isinstance(known, Mapping) and name not in known:
+        raise NoPropertyError(unknown(_GROUPS[group], name, known))
+    body, owner = at(known, name), f"{group}.{name}"
+    model = _model(group, body)
+    if model is None:
+        return None
+    real = quantities(model)
+    if key not in real:
+        message = f"{owner} has no property {key!r}{suggestion(key, real)}"
+        if key in model.model_fields:
+            message = f"{owner}.{key} is not a real number and cannot vary"
+        raise NoPropertyError(f"{message}; can vary: {listed(real)}")
+    if key == "inertia" and is_spatial(tree):
+        raise NoPropertyError(f"{owner}.inertia is a tensor in space and cannot vary")
+    written = at(body, key)
+    if written is None:
+        written = model.model_fields[key].get_default()
+    if written is None or written is PydanticUndefined:
+        raise NoPropertyError(f"{owner}.{key} has no value in this file: give it an initial value")
+    if isinstance(written, tuple):
+        raise NoPropertyError(
+            f"{owner}.{key} is a list in this file and cannot vary: give one number"
+        )
+    return Property(real[key], written)
+
+
+def _model(group: str, body: object) -> type[Part] | None:
+    if not isinstance(body, Mapping):
+        return None
+    if group == "sections":
+        shape = body.get("shape", "bare")
+        return SHAPES.get(shape) if isinstance(shape, str) else None
+    if group == "links":
+        return LINKS.get(type_of(body) or "")
+    models: dict[str, type[Part]] = {"materials": Material, "bodies": Body, "springs": Spring}
+    return models[group]
+
+
+def quantities(model: type[Part]) -> dict[str, Quantity]:
+    """The real-valued properties that a mechanism can be built with as variables."""
+    found = {k: _quantity(f.annotation, f.metadata) for k, f in model.model_fields.items()}
+    return {key: q for key, q in found.items() if q is not None and key not in _FIXED}
+
+
+def _quantity(annotation: Any, metadata: Sequence[object]) -> Quantity | None:
+    """Quantity of a field that is one number, or may be; not of the entries of a list."""
+    for item in metadata:
+        if isinstance(item, Quantity):
+            return item
+    if get_origin(annotation) in (tuple, Mapping):
+        return None
+    inner = (get_args(a) for a in get_args(annotation) if get_origin(a) is Annotated)
+    return next((q for kind, *more in inner if (q := _quantity(kind, more)) is not None), None)
+
+
+def _drive_stiffness(tree: Tree, name: str) -> Property:
+    if name not in (known := names(tree, "coordinates")):
+        raise NoPropertyError(unknown("coordinate", name, known))
+    written = at(tree, "coordinates", name, "drive", "stiffness")
+    if written is None:
+        raise NoPropertyError(
+            f"coordinate {name!r} has no drive stiffness: write drive: {{stiffness: ... N m/rad}}"
+        )
+    return Property(drive_quantity(tree, at(tree, "coordinates", name)), written)
+
+
+def drive_quantity(tree: Tree, coordinate: object) -> Quantity:
+    """What the drive stiffness of a coordinate is."""
+    freedom = driven(tree, coordinate)
+    if freedom is None:
+        return Quantity(above=0)
+    return quantity("stiffness" if freedom == "translation" else "rotational stiffness", above=0)
+
+
+# --- Rules
+
+
+def parameters_name_properties(tree: Tree) -> Iterator[Finding]:
+    """The path of a design parameter names a number that can vary."""
+    for name, body in parameters(tree):
+        path = text(body, "parameter")
+        try:
+            _ = path and property_at(tree, path)
+        except NoPropertyError as error:
+            yield ("design", name, "parameter"), str(error)
+
+
+def initial_values_are_within_bounds(tree: Tree) -> Iterator[Finding]:
+    """The value that the file gives to a design parameter lies between its bounds."""
+    for name, prop in properties(tree).items():
+        if prop is None:
+            continue
+        body = at(tree, "design", name)
+        values = [prop.written, at(body, "min"), at(body, "max")]
+        initial, low, high = (number(value, prop.quantity) for value in values)
+        if initial is None or low is None or high is None:
+            continue
+        if low <= high and not low <= initial <= high:
+            unit = prop.quantity.dimension.si if prop.quantity.dimension else ""
+            path = at(body, "parameter")
+            message = f"initial value {initial:g} {unit} of {path} is outside "
+            yield ("design", name), f"{message}[{low:g}, {high:g}] {unit}"
+
+
+# --- Sections that a design could break
+
+Ranges = Mapping[str, tuple[float, float]]  # SI, by path of the parameter
+
+
+def bounds_hold_no_impossible_section(mechanism: Any, design: Any) -> Iterator[Finding]:
+    """Every section exists wherever the design may go, each problem at the bound to narrow."""
+    ranges = {p.parameter: (p.min, p.max) for p in design.parameters.values()}
+    named = {p.parameter: name for name, p in design.parameters.items()}
+    for path, bound, message in impossible(mechanism.sections, ranges):
+        yield ("design", named[path], bound), f"at this bound {message}; narrow the bounds"
+
+
+def impossible(sections: Mapping[str, Section], ranges: Ranges) -> Iterator[tuple[str, str, str]]:
+    """(path, "min" or "max", what is wrong there) of parameters that can break a section.
+
+    Each limit is linear in dimensions that vary independently, so the worst corner of the bounds
+    decides for all of them; along a taper the limits hold between ends at which they hold.
+    """
+    for name, section in sections.items():
+        for limit in section.limits():
+            small, large = f"sections.{name}.{limit.small}", f"sections.{name}.{limit.large}"
+            a = ranges[small][1] if small in ranges else getattr(section, limit.small)
+            b = ranges[large][0] if large in ranges else getattr(section, limit.large)
+            if not limit.holds(a, b) and (small in ranges or large in ranges):
+                path, bound = (small, "max") if small in ranges else (large, "min")
+                message = f"section {name!r} cannot exist: {limit.small} {a:g} m {limit}, "
+                yield path, bound, f"{message}which can be {b / limit.factor:g} m"

@@ -1,0 +1,195 @@
+"""The keys `materials` and `sections` of a mechanism.
+
+To add a shape: write its model and put it into the union `Section`; say how deep it is and which
+of its dimensions limit one another. What its area and moments are, `mechanism.elements.sections`
+says.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Literal, Self, TypeAlias
+
+from pydantic import model_validator
+
+from eigassign.case.schema.parts import KindBy, Part, Quantity, kinds, quantity, wrong
+from eigassign.case.schema.vectors import LENGTH
+
+MODULUS = quantity("pressure or modulus", above=0)
+SECOND_MOMENT = quantity("second moment of area", above=0)
+
+
+class Material(Part):
+    """Linear elastic, homogeneous, isotropic: moduli in Pa, density in kg/m3.
+
+    Torsion and shear need Poisson's ratio or the shear modulus, G = E / (2 (1 + ν)).
+    """
+
+    youngs_modulus: Annotated[float, MODULUS]
+    density: Annotated[float, quantity("density", at_least=0)]
+    poissons_ratio: Annotated[float, Quantity(above=-1, below=0.5)] | None = None
+    shear_modulus: Annotated[float, MODULUS] | None = None
+
+    @model_validator(mode="after")
+    def _has_one_shear_modulus(self) -> Self:
+        if self.poissons_ratio is not None and self.shear_modulus is not None:
+            raise wrong("give poissons_ratio or shear_modulus, not both", "shear_modulus")
+        return self
+
+
+@dataclass(frozen=True)
+class Limit:
+    """``factor × small < large`` between two dimensions of a section, or ≤ where they may meet."""
+
+    small: str
+    large: str
+    factor: int = 1
+    may_meet: bool = False
+
+    def holds(self, small: float, large: float) -> bool:
+        """Whether these values of the two dimensions are possible."""
+        a = self.factor * small
+        return a < large or (self.may_meet and a == large)
+
+    def __str__(self) -> str:
+        share = self.large if self.factor == 1 else f"half of {self.large}"
+        return f"must be {'at most' if self.may_meet else 'less than'} {share}"
+
+
+class Shape(Part):
+    """What all sections say of themselves."""
+
+    def depth(self, spatial: bool) -> float:
+        """Depth in the plane of bending, m; in space the larger of the two."""
+        raise NotImplementedError
+
+    def limits(self) -> tuple[Limit, ...]:
+        """What must hold between its dimensions for the section to exist."""
+        return ()
+
+    @model_validator(mode="after")
+    def _exists(self) -> Self:
+        for limit in self.limits():
+            large = getattr(self, limit.large)
+            if not limit.holds(getattr(self, limit.small), large):
+                raise wrong(f"{limit}, which is {large / limit.factor:g} m", limit.small)
+        return self
+
+
+class BareSection(Shape):
+    """Properties as given: area in m2, second moments of area in m4.
+
+    `bending_inertia` (or `inertia_z`) resists bending in the local x-y plane, which is the plane of
+    a planar mechanism; `inertia_y` in x-z. `torsion_constant` (m4) resists torsion;
+    `polar_inertia` (m4) is the inertia of twisting, inertia_y + inertia_z unless given.
+    `shear_coefficient` is κ of κGA, 5/6 unless given.
+    """
+
+    shape: Literal["bare"] = "bare"
+    area: Annotated[float, quantity("area", above=0)]
+    bending_inertia: Annotated[float, SECOND_MOMENT] | None = None
+    inertia_y: Annotated[float, SECOND_MOMENT] | None = None
+    inertia_z: Annotated[float, SECOND_MOMENT] | None = None
+    torsion_constant: Annotated[float, SECOND_MOMENT] | None = None
+    polar_inertia: Annotated[float, SECOND_MOMENT] | None = None
+    shear_coefficient: Annotated[float, Quantity(above=0)] | None = None
+
+    @model_validator(mode="after")
+    def _bends_one_way(self) -> Self:
+        if self.bending_inertia is not None and self.inertia_z is not None:
+            raise wrong("is the same as bending_inertia: give one of them", "inertia_z")
+        return self
+
+    @property
+    def in_plane(self) -> float:
+        """Second moment of area that resists bending in the local x-y plane, m4."""
+        return self.inertia_z or self.bending_inertia or 0.0
+
+    def depth(self, spatial: bool) -> float:
+        """The least that a section of this area and inertia has.
+
+        No section of depth h has a radius of gyration above h/2 (a mean square distance from the
+        centroid over an interval of length h is at most h²/4), so h ≥ 2 √(I/A).
+        """
+        inertia = max(self.in_plane, (self.inertia_y or 0.0) if spatial else 0.0)
+        return 2 * math.sqrt(inertia / self.area)
+
+
+class CircleSection(Shape):
+    """Solid round bar; diameter in m."""
+
+    shape: Literal["circle"]
+    diameter: Annotated[float, LENGTH]
+
+    def depth(self, spatial: bool) -> float:
+        """The diameter."""
+        return self.diameter
+
+
+class TubeSection(Shape):
+    """Round tube; outer diameter and either inner diameter or wall thickness, in m."""
+
+    shape: Literal["tube"]
+    outer_diameter: Annotated[float, LENGTH]
+    inner_diameter: Annotated[float, LENGTH] | None = None
+    thickness: Annotated[float, LENGTH] | None = None
+
+    @model_validator(mode="after")
+    def _has_one_wall(self) -> Self:
+        if (self.inner_diameter is None) == (self.thickness is None):
+            raise wrong("a tube needs either inner_diameter or thickness, and not both")
+        return self
+
+    def depth(self, spatial: bool) -> float:
+        """The outer diameter."""
+        return self.outer_diameter
+
+    def limits(self) -> tuple[Limit, ...]:
+        """The wall ends at the middle, where a tube is solid; a bore needs a wall around it."""
+        if self.inner_diameter is not None:
+            return (Limit("inner_diameter", "outer_diameter"),)
+        if self.thickness is not None:
+            return (Limit("thickness", "outer_diameter", factor=2, may_meet=True),)
+        return ()
+
+
+class RectangleSection(Shape):
+    """Solid rectangle, in m; `height` lies along local y, the plane of motion of a planar
+    mechanism: I_z = width height³ / 12."""
+
+    shape: Literal["rectangle"]
+    width: Annotated[float, LENGTH]
+    height: Annotated[float, LENGTH]
+
+    def depth(self, spatial: bool) -> float:
+        """The height, or the larger side."""
+        return max(self.height, self.width) if spatial else self.height
+
+
+class IProfileSection(Shape):
+    """Two flanges of `width` × `flange_thickness` and a web, in m; `height` along local y."""
+
+    shape: Literal["i_profile"]
+    height: Annotated[float, LENGTH]
+    width: Annotated[float, LENGTH]
+    flange_thickness: Annotated[float, LENGTH]
+    web_thickness: Annotated[float, LENGTH]
+
+    def depth(self, spatial: bool) -> float:
+        """The height, or the larger side."""
+        return max(self.height, self.width) if spatial else self.height
+
+    def limits(self) -> tuple[Limit, ...]:
+        """There is a web between the flanges, no wider than they are."""
+        return (
+            Limit("flange_thickness", "height", factor=2),
+            Limit("web_thickness", "width", may_meet=True),
+        )
+
+
+Section: TypeAlias = Annotated[
+    BareSection | CircleSection | TubeSection | RectangleSection | IProfileSection,
+    KindBy("shape", "shape", default="bare"),
+]
+SHAPES = kinds(Section)
