@@ -13,7 +13,8 @@ import eigassign
 from eigassign import errors
 from eigassign.case import json_schema, parse
 from eigassign.case.schema.joints import JOINTS
-from eigassign.case.schema.links import LINKS, SHAPES
+from eigassign.case.schema.links import LINKS
+from eigassign.case.schema.sections import SHAPES
 from eigassign.cli import cli, main
 
 ROOT = Path(__file__).parents[2]
