@@ -189,7 +189,7 @@ def wrong_inputs() -> Iterator[Wrong]:
                 "{shape: tube, outer_diameter: 20 mm, inner_diameter: 30 mm}",
             )
         ),
-        "inner_diameter: must be smaller than outer_diameter",
+        "inner_diameter: must be less than outer_diameter, which is 0.02 m",
     )
     yield Wrong(
         "half an element",
