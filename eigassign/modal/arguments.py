@@ -1,12 +1,7 @@
-"""Samples of (q, y) as callers give them: one or many, checked and broadcast.
+"""What callers give, checked: samples of (q, y), modes, orders and gaps; and limits on sizes.
 
-Checks of what callers give by number: modes, orders, counts, gaps.
-
-Samples in parts, so that what is worked out for each of them stays in the processor's cache.
-
-Where dense algebra gives way to sparse: one number for the exact solve and the expansion alike.
-
-Measured by ``benchmarks/dense_or_sparse.py``: dense arrays win below, sparse ones above.
+Errors name the argument. Samples are worked through in chunks that stay in the processor's cache,
+and dense algebra gives way to sparse at one size for the exact solve and the expansion alike.
 """
 
 from __future__ import annotations
@@ -20,8 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import UsageError
-
-# --- Samples of (q, y) as callers give them: one or many, checked and broadcast
 
 Floats = NDArray[np.float64]
 
@@ -67,7 +60,7 @@ def _rows(values: ArrayLike, width: int, name: str) -> Floats:
     return array.reshape(-1, width) if width else np.zeros((max(1, len(np.atleast_2d(array))), 0))
 
 
-# --- Checks of what callers give by number: modes, orders, counts, gaps
+# --- Modes, orders, counts and gaps
 
 
 def whole(value: object, name: str) -> int:
@@ -114,7 +107,7 @@ def shown_numbers(x: Floats) -> str:
     return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"
 
 
-# --- Samples in parts, so that what is worked out for each of them stays in the processor's cac
+# --- Chunks of samples
 
 CHUNK = 2048  # samples at once, at most
 NUMBERS = 30_000  # of one matrix for each sample at once: some five of them fit the cache
@@ -128,7 +121,7 @@ def chunks(rows: Array, numbers: int) -> Iterator[Array]:
     return (rows[i : i + size] for i in range(0, max(len(rows), 1), size))
 
 
-# --- Where dense algebra gives way to sparse: one number for the exact solve and the expansion
+# --- Sizes
 
-DENSE_LIMIT = 220  # n_dof up to which matrices are kept dense
+DENSE_LIMIT = 220  # n_dof up to which matrices are kept dense (benchmarks/dense_or_sparse.py)
 MOST_TERMS = 20_000  # of one full series that is made without being asked for by order

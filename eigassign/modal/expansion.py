@@ -25,7 +25,7 @@ from eigassign.modal.arguments import mode_numbers, point, relative_gap, samples
 from eigassign.modal.exact.clusters import CLUSTER_GAP
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.reduce import reduce
-from eigassign.modal.taylor.local_coordinates import Local, local_space, substitute
+from eigassign.modal.taylor.local_coordinates import LocalSpace, local_space, substitute
 from eigassign.modal.taylor.rayleigh import eigenvalue_series
 from eigassign.modal.taylor.vectors import as_columns, taylor_vectors
 from eigassign.series.multi_index import LowerSet
@@ -56,7 +56,6 @@ class Expansion:
     space: LowerSet  # over w
     directions: Floats  # V (n_w, n_x): w = V (x − x0)
     n_linear: int  # the last n_linear of w enter at most linearly, 0 for a full expansion
-    kept: Floats  # (n_x,): 1 where the variable matters
     vectors: tuple[Floats, ...]  # per cluster, (N_H, n_dof, r)
     vector_space: LowerSet
     notes: tuple[str, ...]
@@ -252,7 +251,6 @@ def expand(
         space=local.space,
         directions=_frozen(local.directions),
         n_linear=local.n_linear,
-        kept=_frozen(local.kept.astype(np.float64)),
         vectors=found.vectors,
         vector_space=found.space,
         notes=_notes(found.groups, local, pencil),
@@ -260,7 +258,7 @@ def expand(
     )
 
 
-def _notes(groups: Sequence[tuple[int, ...]], local: Local, pencil: Pencil) -> tuple[str, ...]:
+def _notes(groups: Sequence[tuple[int, ...]], local: LocalSpace, pencil: Pencil) -> tuple[str, ...]:
     lines = [
         f"modes {g[0]}-{g[-1]} lie close together and are expanded as one cluster"
         for g in groups

@@ -17,9 +17,8 @@ modes, the rigid ones too, and is one solution of the bordered system.
 Where near modes mix, Σ_j |η_j|² no longer small, their subspace is followed as a whole and the same
 terms are small matrices; as it may leave any of them in any other, their distance counts as well.
 
-Modes along a motion: Φ(t) and Λ(t) with their first and second derivatives in time.
-
-The recursion's invariant subspace X(t), K X = M X Λ_X with Φ0ᵀ M0 X = I, becomes mass-normalised as
+Φ(t) and Λ(t) with two derivatives in time come from the recursion in one variable, t. Its invariant
+subspace X(t), K X = M X Λ_X with Φ0ᵀ M0 X = I, becomes mass-normalised as
 
     Φ = X N^(−1/2),   Λ = N^(1/2) Λ_X N^(−1/2),   N = XᵀMX,
 
@@ -41,8 +40,6 @@ from eigassign.modal.exact.clusters import CLUSTER_GAP, whole_clusters
 from eigassign.modal.taylor.coefficients import pencil_series
 from eigassign.modal.taylor.recursion import expand_subspace
 from eigassign.series.multi_index import lower_set, total_degree
-
-# --- Is the motion slow? How much the neglected velocity terms would move the frequencies
 
 Floats = NDArray[np.float64]
 MIXED = 0.05  # Σ_j |η_j|² from which on a mode is followed together with its near neighbours
@@ -165,7 +162,7 @@ def _turning(K: Floats, C: Floats) -> Floats:
     return np.asarray(frequencies[::2])
 
 
-# --- Modes along a motion: Φ(t) and Λ(t) with their first and second derivatives in time
+# --- Modes along a motion, with two derivatives in time
 
 Series = tuple[Floats, Floats, Floats]  # coefficients of 1, t and t², or derivatives
 IN_TIME = total_degree(1, 2)

@@ -59,8 +59,12 @@ def expansions_from_arrays(arrays: Mapping[str, Array], count: int) -> tuple[Exp
     found = _object(arrays, ALGORITHM, "expansions")
     if not (isinstance(found, tuple) and [type(e) for e in found] == [Expansion] * count):
         raise UsageError(f"these arrays are not {count} expansions")
-    for expansion in found:
-        _check_shapes(expansion)
+    try:
+        fits = all(_shapes_fit(expansion) for expansion in found)
+    except (ValueError, TypeError, IndexError, AttributeError):
+        fits = False
+    if not fits:
+        raise UsageError("these arrays are not an expansion: their shapes do not fit")
     return found
 
 
@@ -80,18 +84,17 @@ def reduced_from_arrays(arrays: Mapping[str, Array]) -> ReducedModel:
     return model
 
 
-def _check_shapes(expansion: Expansion) -> None:
+def _shapes_fit(expansion: Expansion) -> bool:
     n_w, n_x = expansion.directions.shape
     fits = expansion.space.indices.shape[1] == expansion.vector_space.indices.shape[1] == n_w
-    fits &= len(expansion.x0) == len(expansion.kept) == n_x
+    fits &= expansion.x0.shape == (n_x,)
     fits &= set(expansion.modes) <= {m for c in expansion.clusters for m in c.modes}
     fits &= len(expansion.clusters) == len(expansion.vectors)
     for cluster, vectors in zip(expansion.clusters, expansion.vectors, strict=False):
         r = len(cluster.modes)
         fits &= cluster.coefficients.shape == (r, r, len(expansion.space))
         fits &= vectors.shape[::2] == (len(expansion.vector_space), r)
-    if not fits:
-        raise UsageError("these arrays are not an expansion: their shapes do not fit")
+    return bool(fits)
 
 
 # --- Objects as a tree, its leaves in arrays

@@ -71,7 +71,7 @@ def test_what_comes_from_the_cache_is_frozen(tmp_path: Path) -> None:
     expanded(case, cache)
     full, linear, _ = expanded(case, cache)
     for expansion in (full, linear):
-        named = {name: getattr(expansion, name) for name in ("q0", "y0", "directions", "kept")}
+        named = {name: getattr(expansion, name) for name in ("q0", "y0", "directions")}
         named |= {"indices": expansion.space.indices, "halves": expansion.vector_space.indices}
         named |= dict(enumerate(expansion.vectors))
         named |= {c.modes: c.coefficients for c in expansion.clusters}
@@ -132,7 +132,7 @@ def test_an_intact_entry_with_other_content_is_recomputed_with_a_warning(
     if spoiled == "missing":
         del full["q0"]
     elif spoiled == "wrong shape":
-        linear["kept"] = full["q0"]
+        linear["directions"] = full["q0"]
     text = np.frombuffer(json.dumps(tree).encode(), dtype=np.uint8)
     flat = {"numbers": np.zeros(3)} if spoiled == "no layout" else {**stored, "tree": text}
     cache.store(entry, flat, {})

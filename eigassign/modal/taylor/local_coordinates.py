@@ -1,9 +1,7 @@
-"""The set of multi-indices an expansion is carried out over, in local variables w = V (x − x0).
+"""The local variables w = V (x − x0) of an expansion, and the set of multi-indices over them.
 
 w are the relative joint coordinates and design parameters on which anything depends, or, for a set
-that was given over x, those of x.
-
-From a series in local variables w to one in x, by w = V (x − x0).
+that was given over x, those of x. A series over w becomes one over x by substituting V (x − x0).
 """
 
 from __future__ import annotations
@@ -20,43 +18,42 @@ from eigassign.modal.taylor.rayleigh import vector_members
 from eigassign.series.multi_index import LowerSet, lower_set, partially_linear, total_degree
 from eigassign.series.power_series import multiply
 
-# --- The set of multi-indices an expansion is carried out over, in local variables w = V (x − x
-
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Local:
+class LocalSpace:
     """The set over w, dz/dw and dw/dx."""
 
     space: LowerSet
     to_z: Floats
     directions: Floats
-    n_linear: int
-    kept: NDArray[np.bool_]
+    n_linear: int  # the last variables, which enter at most linearly
 
 
-def local_space(pencil: Pencil, order: int, linear_in_y: bool, space: LowerSet | None) -> Local:
+def local_space(
+    pencil: Pencil, order: int, linear_in_y: bool, space: LowerSet | None
+) -> LocalSpace:
     """The set over w that was asked for; raises UsageError for one of the wrong width."""
     if space is not None:
         if not isinstance(space, LowerSet):
             raise UsageError(f"space must be a lower set, not {type(space).__name__}")
         return _given_space(pencil, space)
-    to_z, directions, kept = pencil.local_directions
+    to_z, directions, _ = pencil.local_directions
     n_a = int(np.count_nonzero(pencil.active[: pencil.n_q]))
     n_b = to_z.shape[1] - n_a
     chosen = partially_linear(n_a, n_b, order) if linear_in_y else total_degree(n_a + n_b, order)
-    return Local(chosen, to_z, directions, n_b if linear_in_y else 0, kept)
+    return LocalSpace(chosen, to_z, directions, n_b if linear_in_y else 0)
 
 
-def _given_space(pencil: Pencil, space: LowerSet) -> Local:
+def _given_space(pencil: Pencil, space: LowerSet) -> LocalSpace:
     """A set over x as it was given, the variables that do not matter taken out."""
     n_x = pencil.to_program.shape[1]
     if space.n_variables != n_x:
         raise UsageError(f"the set has {space.n_variables} variables, the model {n_x}")
     kept = (pencil.to_program[pencil.active] != 0.0).any(axis=0)
     selection = np.eye(n_x)[kept]
-    return Local(_over(space, kept.tobytes()), pencil.to_program[:, kept], selection, 0, kept)
+    return LocalSpace(_over(space, kept.tobytes()), pencil.to_program[:, kept], selection, 0)
 
 
 @lru_cache(maxsize=64)
@@ -81,7 +78,7 @@ def vector_set(
     return half, space.find(half.indices)
 
 
-# --- From a series in local variables w to one in x, by w = V (x − x0)
+# --- From a series over w to one over x
 
 
 def substitute(

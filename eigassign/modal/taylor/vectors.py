@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.exact.clusters import CLUSTER_GAP, whole_clusters
-from eigassign.modal.taylor.local_coordinates import Local, local_space, vector_set
+from eigassign.modal.taylor.local_coordinates import LocalSpace, local_space, vector_set
 from eigassign.modal.taylor.recursion import expand_subspace
 from eigassign.series.multi_index import LowerSet
 
@@ -37,7 +37,7 @@ def taylor_vectors(
     pencil: Pencil,
     x0: Floats,
     modes: Sequence[int],
-    local: Local,
+    local: LocalSpace,
     order: int | None = None,
     cluster_gap: float = CLUSTER_GAP,
 ) -> TaylorVectors:
