@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from eigassign.modal import expansion as modal_expansion
 from eigassign.modal.expansion import Expansion
-from eigassign.modal.fit.domain import Box
 from eigassign.modal.fit.fit import Fit, PathFit, fit
+from eigassign.modal.fit.region import Box
 from eigassign.modal.model import Model, as_model
 from eigassign.modal.reduced import reduce as modal_reduced
 from eigassign.modal.reduced.reduce import ReducedModel

@@ -24,8 +24,8 @@ from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.modal.exact.clusters import CLUSTER_GAP
 from eigassign.modal.exact.sparse import solve_sparse
 from eigassign.modal.expansion import expand, nearest
-from eigassign.modal.fit.domain import Box
 from eigassign.modal.fit.fit import MOST, Fit, PathFit, fit
+from eigassign.modal.fit.region import Box
 from eigassign.modal.model import Model
 from eigassign.modal.reduced.reduce import ReducedModel, reduce
 from eigassign.study.drawing import spread_samples

@@ -19,7 +19,7 @@ from eigassign.chart.methods import fit_methods
 from eigassign.chart.question import EvaluationPoints, build_features, build_points
 from eigassign.modal.exact import solver
 from eigassign.modal.expansion import nearest
-from eigassign.modal.fit.fit import FINE
+from eigassign.modal.fit.source import FINE
 from eigassign.study.scene import Scene
 
 

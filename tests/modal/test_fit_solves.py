@@ -182,7 +182,7 @@ def test_several_trajectories_have_a_polynomial_each() -> None:
 
 
 def test_a_smooth_curve_has_no_corners_and_a_rough_one_is_left_whole() -> None:
-    from eigassign.modal.fit.domain import stretches
+    from eigassign.modal.fit.path import stretches
 
     angle = np.linspace(0.0, 3.0, 30)
     curve = np.column_stack([np.cos(angle), np.sin(angle)])

@@ -2,6 +2,8 @@
 
 Reading order:
 
-    domain  the region: a trajectory or a box of q, times a box of y, as axes v ∈ [−1, 1]
-    fit     what is asked of the model, and the polynomial that answers in its place
+    path    a trajectory as axes v ∈ [−1, 1] between its corners, with nodes
+    region  a trajectory or a box of q, times a box of y, as axes
+    source  what is asked for frequencies, and its own error
+    fit     the polynomial that answers in its place
 """
