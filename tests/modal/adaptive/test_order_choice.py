@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from chains import model_of, two_link
+from paper_arm import FREE, build, exact, samples
 
-from eigassign.api import load_case
 from eigassign.errors import AccuracyError
-from eigassign.modal.adaptive.mesh import choose_mesh, mesh_error
+from eigassign.modal.adaptive.mesh import choose_mesh
 from eigassign.modal.adaptive.order import (
     FINER,
     MAX_POINTS,
@@ -16,26 +16,12 @@ from eigassign.modal.adaptive.order import (
     choose_expansion,
     more_points_help,
 )
-from eigassign.modal.adaptive.reduced_model import central, reduce_adaptively
 from eigassign.modal.expansion import expand, radius_share
-from eigassign.modal.model import Model
-
-FREE = {"upper": None, "fore": None}
-
-
-def build(elements) -> Model:
-    return model_of(two_link(elements=(elements["upper"], elements["fore"])))
 
 
 @pytest.fixture(scope="module")
 def x() -> np.ndarray:
-    """Every fourth pose of the paper's trajectory with random masses of its design box."""
-    q = load_case("cases/two_link.yaml").trajectory.q[::4]
-    return np.hstack([q, np.random.default_rng(5).uniform(0.0, 0.25, (len(q), 2))])
-
-
-def exact(model: Model, x: np.ndarray, modes) -> np.ndarray:
-    return model.frequencies(x[:, :2], x[:, 2:], max(modes))[:, np.array(modes) - 1]
+    return samples()
 
 
 @pytest.mark.parametrize(
@@ -63,26 +49,6 @@ def test_what_is_fixed_stays(x):
     expansion = choose_expansion(build(mesh.elements).pencil, x, 2.5e-3, orders=(4,), start=x[0])
     assert expansion.order == 4
     np.testing.assert_array_equal(expansion.expansions[0].x0, x[0])
-
-
-def test_a_fixed_mesh_that_is_too_coarse_is_refused(x):
-    with pytest.raises(AccuracyError, match=r"the mesh leaves .* mode 1 moves 0.36 % with 4"):
-        choose_mesh(build, {"upper": 2, "fore": 2}, x, 1e-4)
-
-
-def test_the_mesh_error_is_not_below_the_true_one(x):
-    true = exact(build({"upper": 40, "fore": 40}), x, (1, 2, 3))
-    for n in (2, 3, 5, 8):
-        elements = {"upper": n, "fore": n}
-        error = np.abs(exact(build(elements), x, (1, 2, 3)) / true - 1.0)
-        estimate = mesh_error(build, elements, x, (1, 2, 3))
-        assert (estimate >= error).all()
-        assert np.median(estimate / error) < 2.0
-
-
-def test_a_mesh_that_round_off_forbids_is_refused(x):
-    with pytest.raises(AccuracyError, match="round-off"):
-        choose_mesh(build, FREE, x, 1e-13)
 
 
 def test_what_only_several_designs_could_reach_is_refused(x):
@@ -144,17 +110,6 @@ def test_an_order_that_cannot_do_it_is_refused_at_the_worst_sample(x):
         choose_expansion(model.pencil, x, 1e-7, (1, 2), orders=(2,))
 
 
-@pytest.mark.parametrize("accuracy", [1e-3, 1e-6, 1e-9])
-def test_the_reduced_model_is_as_small_as_the_accuracy_allows(x, accuracy):
-    model = build({"upper": 4, "fore": 3})
-    found = reduce_adaptively(model.pencil, x, accuracy, (1,))
-    f = found.reduced.frequencies(x[:, :2], x[:, 2:])
-    error = np.abs(f / exact(model, x, (1,)) - 1.0)
-    assert (error <= found.estimate).all()
-    assert found.estimate.max() <= accuracy
-    assert found.reduced.size <= 15
-
-
 def test_round_off_of_a_fine_mesh_is_no_refusal_while_it_leaves_half_of_the_accuracy(x):
     model = build({"upper": 100, "fore": 100})
     x = x[::3]
@@ -163,17 +118,6 @@ def test_round_off_of_a_fine_mesh_is_no_refusal_while_it_leaves_half_of_the_accu
     assert chosen.estimate.max() <= 1e-5
     f = chosen.frequencies(x[:, :2], x[:, 2:])
     assert np.abs(f / exact(model, x, (1,)) - 1.0).max() <= 1e-5
-
-
-def test_a_reduced_model_that_may_not_grow_is_refused_at_the_worst_sample(x):
-    model = build({"upper": 4, "fore": 3})
-    with pytest.raises(AccuracyError, match=r"up to 8 vectors .* at sample \d+, \(q, y\) = \("):
-        reduce_adaptively(model.pencil, x, 1e-9, (1, 2), max_size=8)
-
-
-def test_the_central_sample_is_nearest_to_the_middle_in_every_coordinate():
-    x = np.array([[0.0, 0.0], [10.0, 1.0], [5.0, 0.1], [4.0, 0.5]])
-    assert central(x) == 3
 
 
 def test_the_radius_of_convergence_is_that_of_a_pole():

@@ -7,6 +7,7 @@ import pytest
 
 import eigassign as ea
 from eigassign.errors import AccuracyError, UsageError
+from eigassign.modal.fit.path import stretches
 from eigassign.modal.model import Model
 
 BOX = ea.Box([0.0, 0.0], [0.25, 0.25])
@@ -182,8 +183,6 @@ def test_several_trajectories_have_a_polynomial_each() -> None:
 
 
 def test_a_smooth_curve_has_no_corners_and_a_rough_one_is_left_whole() -> None:
-    from eigassign.modal.fit.path import stretches
-
     angle = np.linspace(0.0, 3.0, 30)
     curve = np.column_stack([np.cos(angle), np.sin(angle)])
     assert len(stretches(curve, np.eye(2), 2).parts) == 1
