@@ -1,10 +1,12 @@
 """What a charted method is, and those of eigassign.
 
-exact               dense in batches, and sparse
-Taylor, 1/λ         expanded to each order, in full and linearised in y; at several points
-auto                what ``expansion.order: auto`` takes for each accuracy
-reduced             on Taylor vectors at one or several points
-fit                 of given solves or to an accuracy; along one trajectory, or over the box
+In the order in which they are charted:
+
+    exact        dense in batches, and sparse
+    Taylor, 1/λ  expanded to each order, in full and linearised in y; at several points
+    auto         what ``expansion.order: auto`` takes for each accuracy
+    reduced      on Taylor vectors at one or several points
+    fit          of given solves or to an accuracy; along one trajectory, or over the box
 """
 
 from __future__ import annotations
@@ -362,7 +364,7 @@ def fit_methods(
             along = partial(_fit_along, scene, how)
             yield Method(
                 f"fit {name} along",
-                f"fit {kind} along one trajectory",
+                f"fit {kind}, one trajectory",
                 how,
                 partial(along, points.run_designs),
                 per_design=True,

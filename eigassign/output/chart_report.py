@@ -1,25 +1,21 @@
-"""The tables of a chart, as text: for the console, the report and Markdown.
-
-chart.json, report.html and the figures of a chart, written into a folder.
-"""
+"""What a chart leaves: its tables, for console, report and Markdown; chart.json; the report."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from eigassign.chart.results import SCHEMA, Advice, Chart, ChartPoint, Front, Timing
-from eigassign.chart.timing import time_in_words as time
+from eigassign.chart.results import SCHEMA, Advice, Chart, Front, Timing
+from eigassign.chart.timing import time_in_words
 from eigassign.output import report
 from eigassign.output.figures.front import chart_figures
-from eigassign.output.figures.style import FigurePlan
 from eigassign.output.results_json import dumps
 from eigassign.output.tables import Table
 
-# --- The tables of a chart, as text: for the console, the report and Markdown
+# --- The tables
 
 
 def tables(chart: Chart) -> tuple[Table, ...]:
@@ -32,11 +28,12 @@ def tables(chart: Chart) -> tuple[Table, ...]:
 
 def spread(timing: Timing) -> str:
     """Median and quartiles; one run alone is marked."""
+    median = time_in_words(timing.median_s)
     if not timing.median_s:
-        return "0"
+        return median
     if not timing.repeats:
-        return f"{time(timing.median_s)} (once)"
-    return f"{time(timing.median_s)} ({time(timing.low_s)}–{time(timing.high_s)})"
+        return f"{median} (once)"
+    return f"{median} ({time_in_words(timing.low_s)}–{time_in_words(timing.high_s)})"
 
 
 def advice(chart: Chart) -> Table:
@@ -44,76 +41,78 @@ def advice(chart: Chart) -> Table:
     rows = []
     for a in chart.advice:
         found = ("none", "", "") if a.method is None else (
-            a.method, f"{a.worst_relative:.1e}", time(a.total_s or 0.0),
+            a.method, f"{a.worst_relative:.1e}", time_in_words(a.total_s or 0.0),
         )  # fmt: skip
-        rows.append((_accuracy(a), f"{a.evaluations:,.0f}", *found))
+        rows.append((_asked_for(a), f"{a.evaluations:,.0f}", *found))
     columns = ("asked for", "evaluations", "choose", "worst error", "time in all")
     caption = "Accuracy is the worst relative error in Hz; time is set-up and all evaluations."
     return Table("What to choose", columns, tuple(rows), caption)
 
 
+def _asked_for(a: Advice) -> str:
+    if a.accuracy is not None:
+        return f"{a.accuracy:.0e}"
+    return f"in {time_in_words(a.budget_s or 0.0)}"
+
+
 def auto(chart: Chart) -> Table:
-    """What ``auto`` takes, against the recommendation."""
-    looked_at = [a for a in chart.advice if a.auto is not None]
-    rows = tuple((_accuracy(a), f"{a.evaluations:,.0f}", *_taken(a)) for a in looked_at)
+    """What ``auto`` takes, against the recommendation; and where it refuses or was not asked."""
+    rows, refused, unasked = [], dict[str, str](), dict[str, None]()
+    for a in chart.advice:
+        taken = a.auto
+        if taken is None:
+            if a.accuracy is not None and not a.is_below_round_off:
+                unasked[_asked_for(a)] = None
+            continue
+        if taken.total_s is None:
+            refused[taken.refused] = _asked_for(a)
+            found = ("refused", "", "", "")
+        else:
+            against = f"{taken.total_s / a.total_s:.2g} × as long" if a.total_s else ""
+            worst, total = f"{taken.worst_relative:.1e}", time_in_words(taken.total_s)
+            found = (str(taken.method), worst, total, against)
+        spent = time_in_words(taken.choosing_s)
+        rows.append((_asked_for(a), f"{a.evaluations:,.0f}", *found, spent))
     columns = (
         "asked for", "evaluations", "auto takes", "worst error", "time in all",
         "against the choice", "choosing took",
     )  # fmt: skip
-    refused = {a.auto.refused: _accuracy(a) for a in looked_at if a.auto and a.auto.refused}
-    caption = (
+    caption = [
         "expansion.order: auto takes the fewest coefficients, by its own error estimate and no "
-        "timing."
-    )
-    why = [f"{accuracy} is refused: {words}." for words, accuracy in refused.items()]
-    return Table(
-        "What auto takes", columns, rows, " ".join([caption, *why, *_not_looked_at(chart)])
-    )
-
-
-def _not_looked_at(chart: Chart) -> Iterator[str]:
-    """The accuracies for which auto was not asked any more."""
-    asked = [a for a in chart.advice if a.accuracy is not None and not a.is_below_round_off]
-    left = dict.fromkeys(_accuracy(a) for a in asked if a.auto is None)
-    if left:
-        yield f"Not asked for {', '.join(left)}: choosing had already taken too long."
-
-
-def _accuracy(a: Advice) -> str:
-    return f"{a.accuracy:.0e}" if a.accuracy is not None else f"in {time(a.budget_s or 0.0)}"
-
-
-def _taken(a: Advice) -> tuple[str, ...]:
-    if a.auto is None or a.auto.total_s is None:
-        return ("refused", "", "", "", "" if a.auto is None else time(a.auto.choosing_s))
-    against = f"{a.auto.total_s / a.total_s:.2g} × as long" if a.total_s else ""
-    own = (str(a.auto.method), f"{a.auto.worst_relative:.1e}", time(a.auto.total_s), against)
-    return (*own, time(a.auto.choosing_s))
+        "timing.",
+        *(f"{accuracy} is refused: {words}." for words, accuracy in refused.items()),
+    ]
+    if unasked:
+        caption.append(f"Not asked for {', '.join(unasked)}: choosing had already taken too long.")
+    return Table("What auto takes", columns, tuple(rows), " ".join(caption))
 
 
 def front(chart: Chart, each: Front) -> Table:
     """The methods of one front, the quickest first."""
     known = {p.method: p for p in chart.points}
     rows = tuple(
-        (name, "yes" if known[name].ours else "no", *_cost(known[name], each),
-         f"{known[name].everywhere.worst_hz:.2e}", f"{known[name].everywhere.worst_relative:.1e}")
-        for name in reversed(each.methods)
+        (p.method, "yes" if p.ours else "no", time_in_words(each.cost_s(p)),
+         f"{p.everywhere.worst_hz:.2e}", f"{p.everywhere.worst_relative:.1e}")
+        for p in (known[name] for name in reversed(each.methods))
     )  # fmt: skip
     columns = ("method", "eigassign's", "time", "worst error [Hz]", "relative")
     what = "one evaluation" if each.evaluations is None else f"{each.evaluations:,.0f} evaluations"
-    caption = f"Nothing charted is both quicker and more accurate; time is that of {what}."
+    caption = f"No charted method is both quicker and more accurate; time is that of {what}."
     return Table(f"Front: {each.name}", columns, rows, caption)
-
-
-def _cost(point: ChartPoint, each: Front) -> tuple[str]:
-    if each.evaluations is None:
-        return (time(point.online.median_s),)
-    return (time(point.total_s(each.evaluations)),)
 
 
 def methods(chart: Chart) -> Table:
     """Every method, the most accurate first."""
-    ordered = sorted(chart.points, key=lambda p: p.everywhere.worst_hz)
+    rows = []
+    for p in sorted(chart.points, key=lambda p: p.everywhere.worst_hz):
+        along = "" if p.trajectory is None else f"{p.trajectory.worst_hz:.2e}"
+        gain = "never" if p.break_even is None else f"{p.break_even:,.0f}"
+        solves = f"{p.solves}" + (f" + {p.solves_online:.2g} each" if p.solves_online else "")
+        errors, failed = p.everywhere, str(p.everywhere.failed or "")
+        rows.append(
+            (p.method, spread(p.offline), spread(p.online), solves, f"{errors.worst_hz:.2e}",
+             f"{errors.rms_hz:.2e}", along, failed, gain)
+        )  # fmt: skip
     columns = (
         "method", "set-up", "one evaluation", "exact solves", "worst [Hz]", "rms [Hz]",
         "worst along the trajectory [Hz]", "no number", "pays from",
@@ -122,18 +121,7 @@ def methods(chart: Chart) -> Table:
         'Time as median (quartiles); errors against the same exact solves; "pays from" is the '
         "number of evaluations from which it beats exact solves."
     )
-    return Table("All methods", columns, tuple(_methods(ordered)), caption)
-
-
-def _methods(points: Sequence[ChartPoint]) -> Iterator[tuple[str, ...]]:
-    for p in points:
-        along = "" if p.trajectory is None else f"{p.trajectory.worst_hz:.2e}"
-        gain = "never" if p.break_even is None else f"{p.break_even:,.0f}"
-        solves = f"{p.solves}" + (f" + {p.solves_online:.2g} each" if p.solves_online else "")
-        yield (
-            p.method, spread(p.offline), spread(p.online), solves, f"{p.everywhere.worst_hz:.2e}",
-            f"{p.everywhere.rms_hz:.2e}", along, str(p.everywhere.failed or ""), gain,
-        )  # fmt: skip
+    return Table("All methods", columns, tuple(rows), caption)
 
 
 def mesh(chart: Chart) -> Table:
@@ -173,7 +161,7 @@ def machine(chart: Chart) -> Table:
     return Table("Machine", ("", ""), rows)
 
 
-# --- chart.json, report.html and the figures of a chart, written into a folder
+# --- The files
 
 
 def write_chart(chart: Chart, folder: Path, formats: Sequence[str] = ("png",)) -> None:
@@ -181,7 +169,8 @@ def write_chart(chart: Chart, folder: Path, formats: Sequence[str] = ("png",)) -
     (folder / "chart.json").write_text(to_json(chart), encoding="utf-8")
     plans = chart_figures(chart)
     files = report.write_figures(plans, folder, formats)
-    (folder / "report.html").write_bytes(to_html(chart, plans, files))
+    page = report.page(chart, None, tables(chart), plans, files)
+    (folder / "report.html").write_bytes(page)
 
 
 def to_json(chart: Chart) -> str:
@@ -196,8 +185,3 @@ def _finite(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_finite(inner) for inner in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def to_html(chart: Chart, plans: Sequence[FigurePlan], files: Mapping[str, bytes]) -> bytes:
-    """The report as UTF-8; ``files`` holds what `render` made of ``plans``."""
-    return report.page(chart, None, tables(chart), plans, files)

@@ -29,7 +29,7 @@ from eigassign.chart.results import (
 from eigassign.output import chart_report
 from eigassign.output.chart_report import write_chart
 from eigassign.output.figures import style
-from eigassign.output.figures.front import Ladder, chart_figures, ladder_style, scatter
+from eigassign.output.figures.front import MethodLine, chart_figures, line_style, scatter
 
 
 def timing(seconds: float, repeats: int = 5) -> Timing:
@@ -122,7 +122,7 @@ def test_every_figure_has_a_name_of_its_own_and_is_drawn() -> None:
 
 def test_captions_tell_what_is_not_drawn() -> None:
     plans = {plan.name: plan.caption for plan in chart_figures(CHART)}
-    assert "1 methods are wrong by over 100 %" in plans["cost_one_trajectory"]
+    assert "1 method is wrong by over 100 %" in plans["cost_one_trajectory"]
     assert "0.06 Hz from the limit" in plans["mesh"]
 
 
@@ -234,18 +234,10 @@ def test_points_are_drawn_by_family_and_the_front_as_steps_through_the_best() ->
     np.testing.assert_array_equal(steps.get_ydata()[:2], [0.1, 0.01])
 
 
-def test_no_two_ladders_of_a_kind_share_colour_and_shape() -> None:
+def test_no_two_lines_of_a_kind_share_colour_and_shape() -> None:
     for ours in (True, False):
-        looks = [ladder_style(k, ours) for k in range(16)]
+        looks = [line_style(k, ours) for k in range(16)]
         assert len({(look["color"], look["marker"]) for look in looks}) == 16
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"),
-    [(2.5, "2.5 s"), (2.5e-3, "2.5 ms"), (2.5e-6, "2.5 µs"), (2e-8, "20 ns"), (0, "0")],
-)
-def test_times_are_written_with_a_fitting_unit(seconds: float, text: str) -> None:
-    assert chart_report.time(seconds) == text
 
 
 def test_a_time_measured_once_says_so() -> None:
@@ -253,9 +245,11 @@ def test_a_time_measured_once_says_so() -> None:
     assert chart_report.spread(timing(2.0)) == "2 s (1.8 s–2.2 s)"
 
 
-def test_points_without_a_front_and_a_single_ladder_can_be_drawn() -> None:
+def test_points_without_a_front_and_a_single_line_can_be_drawn() -> None:
     with style.applied():
-        figure = scatter("t", ("x", "s"), ("y", "Hz"), [Ladder("a", np.ones(1), np.ones(1), True)])
+        figure = scatter(
+            "t", ("x", "s"), ("y", "Hz"), [MethodLine("a", np.ones(1), np.ones(1), True)]
+        )
         assert style.encoded(figure, "png").startswith(b"\x89PNG")
     assert words(figure) == ["a"]
     low, high = figure.axes[0].get_xlim()
