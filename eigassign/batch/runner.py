@@ -21,8 +21,8 @@ from typing import Any
 
 from eigassign.batch.workers import cores, process_pool
 from eigassign.errors import StorageError, UsageError
+from eigassign.output.batch_summary import CaseOutcome, write_junit, write_summary
 from eigassign.output.run_folder import MARKER
-from eigassign.output.tables import CaseOutcome, write_junit, write_summary
 from eigassign.pipeline.run import Options, optimize
 from eigassign.process import judged
 

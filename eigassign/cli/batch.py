@@ -13,7 +13,7 @@ from eigassign.cli.reporter import Reporter, reporting
 
 if TYPE_CHECKING:
     from eigassign.batch.runner import Job
-    from eigassign.output.tables import CaseOutcome
+    from eigassign.output.batch_summary import CaseOutcome
 
 
 @click.command()
@@ -52,7 +52,5 @@ def _watched(
         outcomes = run_and_summarise(
             jobs, workers, out, lambda row: advance(f"{row['name']}: {row['status']}")
         )
-    console.print_batch(
-        [(o.name, o.status, o.seconds, o.exact_max_relative, o.message) for o in outcomes]
-    )
+    console.print_batch(outcomes)
     return outcomes

@@ -82,7 +82,7 @@ def _options(how: Mapping[str, Any], tell: Reporter) -> Options:
 
 def _show(outcome: Outcome, as_json: bool) -> None:
     if as_json:
-        from eigassign.output.results_json import results_document
+        from eigassign.output.result_files import results_document
 
         print_json({"run_folder": str(outcome.folder), **results_document(outcome.results)})
     else:

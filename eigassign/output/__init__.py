@@ -1,1 +1,17 @@
-"""Run folders, caches, figures, reports; computes nothing."""
+"""What people and programs see of the results; computes nothing.
+
+In reading order; each imports from those above it only:
+
+    formats        numbers as people read them
+    storage        files and folders that are written whole or not at all
+    run_folder     the folder of a run: hidden until it is finished, never in another's place
+    cache          arrays by content key, checked byte for byte
+    reduced_file   a reduced model in one file
+    result_files   results.json and the CSV files
+    tables         the tables of a run as text
+    batch_summary  summary.csv and junit.xml of a batch
+    figures        the figures of runs, modes and charts, through matplotlib
+    report         report.html, and what a run or modes leave in a folder
+    chart_report   the tables and the folder of a chart
+    console        results on stdout, progress on stderr
+"""

@@ -1,16 +1,14 @@
 """A folder of results that need not be computed again, one HDF5 file per content key.
 
-A hit is bit for bit what was stored. A file that is not exactly what its writer finished is
-renamed to ``*.damaged`` with a warning, and the caller computes anew. A folder that cannot be
-read or written costs one warning, never the run.
-
-What a cache file is: its key, its bytes, and how they are believed.
-
-A file is 512 bytes of header, which HDF5 skips as its user block, and then plain HDF5:
+First what a cache file is: 512 bytes of header, which HDF5 skips as its user block, and then
+plain HDF5:
 
     eigassign-cache 1 | key=<sha256> | sha256=<of all bytes after the header> | complete | zeros
 
-The hash is checked before HDF5 parses anything, so no damaged byte reaches the library.
+The hash is checked before HDF5 parses anything, so no damaged byte reaches the library. Then the
+folder: a hit is bit for bit what was stored. A file that is not exactly what its writer finished
+is renamed to ``*.damaged`` with a warning, and the caller computes anew. A folder that cannot be
+read or written costs one warning, never the run.
 """
 
 from __future__ import annotations
@@ -21,7 +19,6 @@ import logging
 import os
 import re
 import struct
-import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -32,12 +29,137 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import EigassignError, StorageError, UsageError
-from eigassign.output.run_folder import replace_synced
+from eigassign.output.storage import replace_synced
 
-__all__ = ["Cache", "CacheEntry", "DamagedError", "Part", "default_directory", "key"]
+# --- A file: its key, its bytes, and how they are checked
+
+Array = NDArray[Any]
+Part = Array | np.generic | bool | int | float | complex | str | bytes | None | Sequence["Part"]
+
+SCHEMA = 1  # raise it when the layout of the file or the encoding of the key changes
+HEADER_BYTES = 512
+MARKER = "complete"
+_NAME = re.compile(r"[A-Za-z0-9_]+\Z")
+_KINDS = {"b": (1,), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8), "f": (2, 4, 8), "c": (8, 16)}
 
 
-# --- A folder of results that need not be computed again, one HDF5 file per content key
+class DamagedError(EigassignError):
+    """The bytes are not what a finished writer left; ``str()`` says how they differ."""
+
+
+def key(parts: Part, *, algorithm: str = "") -> str:
+    """SHA-256, 64 hex digits, of ``parts`` in canonical bytes, ``algorithm`` and the schema.
+
+    Every part is written as type tag, length, content, so no two different inputs share bytes.
+    Arrays count by dtype, shape and all their values (little-endian, C order), never by ``repr``.
+    Raises UsageError for anything that has no canonical bytes (sets, dicts, objects).
+    """
+    digest = hashlib.sha256()
+    digest.update(_encode(("eigassign", SCHEMA, algorithm)))
+    digest.update(_encode(parts))
+    return digest.hexdigest()
+
+
+def _encode(part: object) -> bytes:
+    tag, content = _content(part)
+    return tag + struct.pack("<Q", len(content)) + content
+
+
+def _content(part: object) -> tuple[bytes, bytes]:
+    match part:
+        case None:
+            return b"n", b""
+        case bool() | np.bool_():
+            return b"b", bytes([bool(part)])
+        case int() | np.integer():
+            return b"i", str(int(part)).encode()
+        case float() | np.floating():
+            return b"f", struct.pack("<d", float(part))
+        case complex() | np.complexfloating():
+            return b"c", struct.pack("<dd", part.real, part.imag)
+        case str():
+            return b"s", part.encode("utf-8", "surrogatepass")
+        case bytes():
+            return b"y", part
+        case np.ndarray():
+            return b"a", _array_content(part)
+        case tuple() | list():
+            return b"t", b"".join(map(_encode, part))
+    raise UsageError(f"a cache key cannot be made from a {type(part).__name__}")
+
+
+def _array_content(array: Array) -> bytes:
+    _require_plain("a cache key", array)
+    little = array.astype(array.dtype.newbyteorder("<"), copy=False)
+    return _encode((little.dtype.str, array.shape)) + little.tobytes(order="C")
+
+
+def _require_plain(name: str, array: Array) -> None:
+    if array.dtype.itemsize not in _KINDS.get(array.dtype.kind, ()):
+        raise UsageError(f"{name}: arrays of dtype {array.dtype} cannot be stored")
+
+
+def pack(entry_key: str, arrays: Mapping[str, Array], meta: Mapping[str, str]) -> bytes:
+    """The whole file for ``arrays`` and ``meta``; the same input gives the same bytes."""
+    import h5py
+
+    body = io.BytesIO()
+    with h5py.File(body, "w", userblock_size=HEADER_BYTES) as file:
+        for name in sorted(arrays):
+            _write_array(file, name, np.asarray(arrays[name]))
+        file.create_group("meta").attrs.update({name: meta[name] for name in sorted(meta)})
+        file.attrs["datasets"] = len(arrays)
+        file.attrs[MARKER] = True
+    content = body.getbuffer()[HEADER_BYTES:]
+    return b"".join((header(entry_key, content), content))
+
+
+def _write_array(file: Any, name: str, array: Array) -> None:
+    if not _NAME.match(name) or name == "meta":
+        raise UsageError(f"{name!r} cannot name a stored array: use letters, digits and _")
+    _require_plain(name, array)
+    checked = array.ndim > 0 and array.size > 0  # HDF5 filters need chunks, chunks need extent
+    file.create_dataset(name, data=array, **({"fletcher32": True} if checked else {}))
+
+
+def header(entry_key: str, content: bytes | memoryview) -> bytes:
+    """The first 512 bytes of a file with this content under this key."""
+    digest = hashlib.sha256(content).hexdigest()
+    text = f"eigassign-cache {SCHEMA}\nkey={entry_key}\nsha256={digest}\n{MARKER}\n"
+    return text.encode().ljust(HEADER_BYTES, b"\0")
+
+
+def unpack(entry_key: str, data: bytes) -> tuple[dict[str, Array], dict[str, str]]:
+    """Arrays (read-only) and meta of a file made by :func:`pack`.
+
+    Raises DamagedError when any byte differs from what was written under ``entry_key``.
+    """
+    view = memoryview(data)
+    if len(data) <= HEADER_BYTES:
+        raise DamagedError(f"only {len(data)} bytes long")
+    if view[:HEADER_BYTES] != header(entry_key, view[HEADER_BYTES:]):
+        raise DamagedError("its content does not have the hash that its header promises")
+    try:
+        return _read(data)
+    except (OSError, KeyError, RuntimeError, ValueError) as error:
+        raise DamagedError(f"HDF5 cannot read it ({error})") from error
+
+
+def _read(data: bytes) -> tuple[dict[str, Array], dict[str, str]]:
+    import h5py
+
+    with h5py.File(io.BytesIO(data), "r") as file:
+        names = [name for name in file if name != "meta"]
+        if not file.attrs.get(MARKER, False) or file.attrs["datasets"] != len(names):
+            raise DamagedError("it was never completed")
+        arrays = {name: np.asarray(file[name][()]) for name in names}
+        meta = {name: str(text) for name, text in file["meta"].attrs.items()}
+    for array in arrays.values():
+        array.setflags(write=False)
+    return arrays, meta
+
+
+# --- The folder
 
 _log = logging.getLogger(__name__)
 _SUFFIX = ".h5"
@@ -61,19 +183,12 @@ def default_directory() -> Path | None:
     """``EIGASSIGN_CACHE_DIR``, else the platform's cache folder; None where there is no home."""
     if chosen := os.environ.get("EIGASSIGN_CACHE_DIR"):
         return Path(chosen).expanduser()
-    xdg = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    if xdg.is_absolute():
-        return xdg / "eigassign"
+    from platformdirs import user_cache_path
+
     try:
-        return _platform_cache() / "eigassign"
+        return user_cache_path("eigassign", appauthor=False, opinion=False)
     except RuntimeError:  # no home folder known
         return None
-
-
-def _platform_cache() -> Path:
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    return Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache")
 
 
 class Cache:
@@ -174,130 +289,3 @@ def _read_entry(path: Path) -> Iterator[CacheEntry]:
     except DamagedError:
         meta, intact = {}, False
     yield CacheEntry(path.stem, path, status.st_size, status.st_mtime, meta, intact)
-
-
-# --- What a cache file is: its key, its bytes, and how they are believed
-
-Array = NDArray[Any]
-Part = Array | np.generic | bool | int | float | complex | str | bytes | None | Sequence["Part"]
-
-SCHEMA = 1  # raise it when the layout of the file or the encoding of the key changes
-HEADER_BYTES = 512
-MARKER = "complete"
-_NAME = re.compile(r"[A-Za-z0-9_]+\Z")
-_KINDS = {"b": (1,), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8), "f": (2, 4, 8), "c": (8, 16)}
-
-
-class DamagedError(EigassignError):
-    """The bytes are not what a finished writer left; ``str()`` says how they differ."""
-
-
-def key(parts: Part, *, algorithm: str = "") -> str:
-    """SHA-256, 64 hex digits, of ``parts`` in canonical bytes, ``algorithm`` and the schema.
-
-    Every part is written as type tag, length, content, so no two different inputs share bytes.
-    Arrays count by dtype, shape and all their values (little-endian, C order), never by ``repr``.
-    Raises UsageError for anything that has no canonical bytes (sets, dicts, objects).
-    """
-    digest = hashlib.sha256()
-    digest.update(_encode(("eigassign", SCHEMA, algorithm)))
-    digest.update(_encode(parts))
-    return digest.hexdigest()
-
-
-def _encode(part: object) -> bytes:
-    tag, content = _content(part)
-    return tag + struct.pack("<Q", len(content)) + content
-
-
-def _content(part: object) -> tuple[bytes, bytes]:
-    match part:
-        case None:
-            return b"n", b""
-        case bool() | np.bool_():
-            return b"b", bytes([bool(part)])
-        case int() | np.integer():
-            return b"i", str(int(part)).encode()
-        case float() | np.floating():
-            return b"f", struct.pack("<d", float(part))
-        case complex() | np.complexfloating():
-            return b"c", struct.pack("<dd", part.real, part.imag)
-        case str():
-            return b"s", part.encode("utf-8", "surrogatepass")
-        case bytes():
-            return b"y", part
-        case np.ndarray():
-            return b"a", _array_content(part)
-        case tuple() | list():
-            return b"t", b"".join(map(_encode, part))
-    raise UsageError(f"a cache key cannot be made from a {type(part).__name__}")
-
-
-def _array_content(array: Array) -> bytes:
-    _require_plain("a cache key", array)
-    little = array.astype(array.dtype.newbyteorder("<"), copy=False)
-    return _encode((little.dtype.str, array.shape)) + little.tobytes(order="C")
-
-
-def _require_plain(name: str, array: Array) -> None:
-    if array.dtype.itemsize not in _KINDS.get(array.dtype.kind, ()):
-        raise UsageError(f"{name}: arrays of dtype {array.dtype} cannot be stored")
-
-
-def pack(entry_key: str, arrays: Mapping[str, Array], meta: Mapping[str, str]) -> bytes:
-    """The whole file for ``arrays`` and ``meta``; the same input gives the same bytes."""
-    import h5py
-
-    body = io.BytesIO()
-    with h5py.File(body, "w", userblock_size=HEADER_BYTES) as file:
-        for name in sorted(arrays):
-            _write_array(file, name, np.asarray(arrays[name]))
-        file.create_group("meta").attrs.update({name: meta[name] for name in sorted(meta)})
-        file.attrs["datasets"] = len(arrays)
-        file.attrs[MARKER] = True
-    content = body.getbuffer()[HEADER_BYTES:]
-    return b"".join((_header(entry_key, content), content))
-
-
-def _write_array(file: Any, name: str, array: Array) -> None:
-    if not _NAME.match(name) or name == "meta":
-        raise UsageError(f"{name!r} cannot name a stored array: use letters, digits and _")
-    _require_plain(name, array)
-    checked = array.ndim > 0 and array.size > 0  # HDF5 filters need chunks, chunks need extent
-    file.create_dataset(name, data=array, **({"fletcher32": True} if checked else {}))
-
-
-def _header(entry_key: str, content: bytes | memoryview) -> bytes:
-    digest = hashlib.sha256(content).hexdigest()
-    text = f"eigassign-cache {SCHEMA}\nkey={entry_key}\nsha256={digest}\n{MARKER}\n"
-    return text.encode().ljust(HEADER_BYTES, b"\0")
-
-
-def unpack(entry_key: str, data: bytes) -> tuple[dict[str, Array], dict[str, str]]:
-    """Arrays (read-only) and meta of a file made by :func:`pack`.
-
-    Raises DamagedError when any byte differs from what was written under ``entry_key``.
-    """
-    view = memoryview(data)
-    if len(data) <= HEADER_BYTES:
-        raise DamagedError(f"only {len(data)} bytes long")
-    if view[:HEADER_BYTES] != _header(entry_key, view[HEADER_BYTES:]):
-        raise DamagedError("its content does not have the hash that its header promises")
-    try:
-        return _read(data)
-    except (OSError, KeyError, RuntimeError, ValueError) as error:
-        raise DamagedError(f"HDF5 cannot read it ({error})") from error
-
-
-def _read(data: bytes) -> tuple[dict[str, Array], dict[str, str]]:
-    import h5py
-
-    with h5py.File(io.BytesIO(data), "r") as file:
-        names = [name for name in file if name != "meta"]
-        if not file.attrs.get(MARKER, False) or file.attrs["datasets"] != len(names):
-            raise DamagedError("it was never completed")
-        arrays = {name: np.asarray(file[name][()]) for name in names}
-        meta = {name: str(text) for name, text in file["meta"].attrs.items()}
-    for array in arrays.values():
-        array.setflags(write=False)
-    return arrays, meta

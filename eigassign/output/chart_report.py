@@ -12,7 +12,7 @@ from eigassign.chart.results import SCHEMA, Advice, Chart, Front, Timing
 from eigassign.chart.timing import time_in_words
 from eigassign.output import report
 from eigassign.output.figures.front import chart_figures
-from eigassign.output.results_json import dumps
+from eigassign.output.result_files import dumps
 from eigassign.output.tables import Table
 
 # --- The tables

@@ -7,20 +7,19 @@ import io
 import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
 from rich import box
 from rich.console import Console
 from rich.table import Table as RichTable
 from rich.text import Text
 
+from eigassign.chart.results import Chart
+from eigassign.output import chart_report
 from eigassign.output import tables as summary
+from eigassign.output.batch_summary import CaseOutcome
 from eigassign.output.formats import number, percent
 from eigassign.study.results import RunResults, ValidationRow
-
-if TYPE_CHECKING:
-    from eigassign.chart.results import Chart
-
 
 _ENDLESS = 100_000  # columns: off a terminal nothing is wrapped or cut
 
@@ -102,8 +101,6 @@ def print_validation(rows: Sequence[ValidationRow], *, stream: TextIO | None = N
 
 def print_chart(chart: Chart, *, stream: TextIO | None = None) -> None:
     """What to choose, the fronts and the ways to a design; the report has the rest."""
-    from eigassign.output import chart_report
-
     fronts = [chart_report.front(chart, each) for each in chart.fronts]
     advice = (chart_report.advice(chart), chart_report.auto(chart))
     for table in (*fronts, chart_report.designs(chart), *advice):
@@ -146,14 +143,12 @@ def _bounded(error: float) -> str:
     return f"{100 * error:.2g} %" if math.isfinite(error) else "cannot be bounded"
 
 
-def print_batch(
-    outcomes: Sequence[tuple[str, str, float, float | None, str]], *, stream: TextIO | None = None
-) -> None:
-    """One line a case: (name, status, seconds, worst exact error or None, message)."""
-    rows = [
-        (name, status, f"{spent:.2f} s", "" if worst is None else percent(worst), message)
-        for name, status, spent, worst, message in outcomes
-    ]
+def print_batch(outcomes: Sequence[CaseOutcome], *, stream: TextIO | None = None) -> None:
+    """One line a case: name, status, seconds, worst exact error if there is one, message."""
+    rows = []
+    for one in outcomes:
+        worst = "" if one.exact_max_relative is None else percent(one.exact_max_relative)
+        rows.append((one.name, one.status, f"{one.seconds:.2f} s", worst, one.message))
     columns = ("case", "status", "time", "worst error", "message")
     print_table("Batch", columns, rows, stream=stream)
 

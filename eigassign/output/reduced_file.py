@@ -8,7 +8,7 @@ from eigassign.errors import StorageError, UsageError
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.storage import FORMAT, reduced_arrays, reduced_from_arrays
 from eigassign.output.cache import DamagedError, key, pack, unpack
-from eigassign.output.run_folder import replace_synced
+from eigassign.output.storage import replace_synced
 
 
 def save_reduced(reduced: ReducedModel, path: str | Path) -> None:

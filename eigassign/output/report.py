@@ -18,7 +18,7 @@ from eigassign.output.figures.modes import mode_figures
 from eigassign.output.figures.run import run_figures
 from eigassign.output.figures.style import FigurePlan, render
 from eigassign.output.formats import percent
-from eigassign.output.results_json import sample_files, to_json
+from eigassign.output.result_files import sample_files, to_json
 from eigassign.output.tables import Table, tables
 from eigassign.study.results import ErrorSummary, ModePictures, RunResults
 

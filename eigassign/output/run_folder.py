@@ -1,6 +1,6 @@
-"""A run folder appears whole or not at all, and never at the cost of something else.
+"""A run folder is written whole or not at all, and never at the cost of something else.
 
-A run is written into a hidden sibling folder, synced, and swapped with the earlier one in a
+A run is written into a hidden sibling folder, synced, and exchanged with the earlier one in a
 single rename. What may give way to it:
 
 - nothing there, or an empty folder;
@@ -8,24 +8,16 @@ single rename. What may give way to it:
   to it, it is kept beside the new one as ``<name>.1``;
 - anything else only with ``force``, and then it is kept as ``<name>.1`` too: nothing that a run
   did not write is ever deleted.
-
-Writing bytes so that they are on disk before anything points at them.
-
-Putting one folder in the place of another, and knowing whether its owner still lives.
 """
 
 from __future__ import annotations
 
 import contextlib
-import ctypes
-import errno
 import json
 import logging
 import os
 import re
-import secrets
 import shutil
-import sys
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -33,8 +25,14 @@ from pathlib import Path
 from types import MappingProxyType
 
 from eigassign.errors import StorageError
-
-# --- A run folder appears whole or not at all, and never at the cost of something else
+from eigassign.output.storage import (
+    put_in_place,
+    sync_path,
+    sync_tree,
+    temporary_name,
+    try_lock,
+    write_synced,
+)
 
 _log = logging.getLogger(__name__)
 MARKER = "run.json"  # written last: a folder that has it was finished
@@ -248,7 +246,7 @@ def _free_sibling(target: Path) -> Path:
 def _remove_leftovers(target: Path) -> None:
     """Remove temporary folders of killed runs: nobody holds their lock any more.
 
-    What :mod:`swap` had moved away to make room (``-old``) comes back if its place is empty.
+    What `put_in_place` had moved away to make room (``-old``) comes back if its place is empty.
     """
     pattern = re.compile(rf"\.{re.escape(target.name)}\.\d+-[0-9a-f]{{8}}(-old)?\.tmp")
     for leftover in filter(lambda path: pattern.fullmatch(path.name), target.parent.iterdir()):
@@ -268,138 +266,3 @@ def _relative(case_path: Path, target: Path) -> str:
         return Path(os.path.relpath(case, target)).as_posix()
     except ValueError:  # another drive
         return Path(case).as_posix()
-
-
-# --- Writing bytes so that they are on disk before anything points at them
-
-
-def write_synced(path: Path, data: bytes) -> None:
-    """Create ``path`` (which must not exist) with ``data`` and wait until it is on disk."""
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
-    descriptor = os.open(path, flags, 0o666)  # 0o666 and not mkstemp's 0o600: umask decides
-    with os.fdopen(descriptor, "wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def sync_path(path: Path) -> None:
-    """Wait until a file or folder is on disk; folders of file systems that cannot are skipped."""
-    try:
-        descriptor = os.open(path, os.O_RDONLY)
-    except PermissionError:  # Windows opens no folders
-        return
-    try:
-        with contextlib.suppress(OSError):
-            os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
-def sync_tree(folder: Path) -> None:
-    """Wait until every file and folder below ``folder``, and itself, is on disk."""
-    for root, _, files in os.walk(folder):
-        for name in files:
-            sync_path(Path(root, name))
-        sync_path(Path(root))
-
-
-def replace_synced(path: Path, data: bytes) -> None:
-    """Make ``path`` hold ``data``, whole or not at all, whoever else writes it.
-
-    A temporary file in the same folder is filled, synced and renamed over ``path``.
-    """
-    temporary = path.with_name(temporary_name(path.name))
-    try:
-        write_synced(temporary, data)
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-    sync_path(path.parent)
-
-
-def temporary_name(name: str) -> str:
-    """Hidden sibling name that no other writer uses."""
-    return f".{name}.{os.getpid()}-{secrets.token_hex(4)}.tmp"
-
-
-# --- Putting one folder in the place of another, and knowing whether its owner still lives
-
-_RENAME_EXCHANGE = 2
-_AT_FDCWD = -100
-_ATTEMPTS = 20
-
-
-def put_in_place(new: Path, target: Path) -> Path | None:
-    """Make ``new`` be ``target``; where something was there, return where that is now.
-
-    One atomic exchange where the system has it (Linux); else two renames, undone if the second
-    fails. Raises StorageError when other writers keep getting in between, OSError otherwise.
-    """
-    for _ in range(_ATTEMPTS):
-        try:
-            if not os.path.lexists(target):
-                os.rename(new, target)
-                return None
-            if _exchange(new, target):
-                return new
-            return _rename_twice(new, target)
-        except OSError as error:
-            if error.errno not in (errno.ENOENT, errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR):
-                raise
-            if not new.exists():
-                raise
-    raise StorageError(f"{target} is being written by another run; try again")
-
-
-def _exchange(first: Path, second: Path) -> bool:
-    """Swap two paths in one step; False where the system or the file system cannot."""
-    if not sys.platform.startswith("linux"):
-        return False
-    rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
-    if rename is None:
-        return False
-    paths = (_AT_FDCWD, os.fsencode(first), _AT_FDCWD, os.fsencode(second))
-    if rename(*paths, _RENAME_EXCHANGE) == 0:
-        return True
-    code = ctypes.get_errno()
-    if code in (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP, errno.EPERM):
-        return False
-    raise OSError(code, os.strerror(code), str(second))
-
-
-def _rename_twice(new: Path, target: Path) -> Path:
-    old = new.with_name(new.name.removesuffix(".tmp") + "-old.tmp")
-    os.rename(target, old)
-    try:
-        os.rename(new, target)
-    except BaseException:
-        os.rename(old, target)
-        raise
-    return old
-
-
-@contextlib.contextmanager
-def try_lock(folder: Path) -> Iterator[bool]:
-    """Hold the lock of ``folder`` if nobody else does; yields whether it is held.
-
-    The system lets go of it when its holder dies, however it dies. Where folders cannot be
-    locked (Windows, some network file systems) it is never held.
-    """
-    try:
-        import fcntl
-
-        descriptor = os.open(folder, os.O_RDONLY)
-    except (ImportError, OSError):
-        yield False
-        return
-    try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            held = True
-        except OSError:
-            held = False
-        yield held
-    finally:
-        os.close(descriptor)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from eigassign.modal.expansion import Expansion
 from eigassign.output.cache import key, pack
-from eigassign.output.results_json import dumps
+from eigassign.output.result_files import dumps
 from eigassign.study.scene import Scene
 
 Array = NDArray[Any]

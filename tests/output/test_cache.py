@@ -114,19 +114,19 @@ def resealed(path: Path, change) -> bytes:
 
     import h5py
 
-    from eigassign.output.cache import _header
+    from eigassign.output.cache import header
 
     buffer = io.BytesIO(path.read_bytes())
     with h5py.File(buffer, "r+") as file:
         change(file)
     content = buffer.getvalue()[HEADER_BYTES:]
-    return _header(KEY, content) + content
+    return header(KEY, content) + content
 
 
 def not_hdf5(path: Path) -> bytes:
-    from eigassign.output.cache import _header
+    from eigassign.output.cache import header
 
-    return _header(KEY, b"rubbish") + b"rubbish"
+    return header(KEY, b"rubbish") + b"rubbish"
 
 
 @pytest.mark.parametrize(

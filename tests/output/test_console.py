@@ -8,6 +8,7 @@ import pytest
 from synthetic_results import make_results
 
 from eigassign.output import console
+from eigassign.output.batch_summary import CaseOutcome
 from eigassign.output.formats import number, percent, residual, seconds
 from eigassign.study.results import ValidationRow
 
@@ -101,8 +102,8 @@ def test_a_validation_says_which_line_failed():
 
 def test_a_batch_lists_every_case():
     out = piped()
-    good = ("arm", "ok", 1.25, 0.0155, "")
-    bad = ("leg", "error", 0.5, None, "leg.yaml:3:1: [what] is wrong")
+    good = CaseOutcome("arm", "arm.yaml", "ok", 1.25, exact_max_relative=0.0155)
+    bad = CaseOutcome("leg", "leg.yaml", "error", 0.5, "leg.yaml:3:1: [what] is wrong")
     console.print_batch([good, bad], stream=out)
     text = read(out)
     for words in ("arm", "1.55 %", "1.25 s", "leg.yaml:3:1: [what] is wrong"):

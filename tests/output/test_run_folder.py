@@ -14,7 +14,7 @@ import pytest
 
 from eigassign.errors import StorageError
 from eigassign.output import run_folder as module
-from eigassign.output import run_folder as swap
+from eigassign.output import storage
 from eigassign.output.run_folder import MARKER, run_folder
 
 
@@ -50,7 +50,7 @@ def hidden(target: Path) -> list[str]:
 @pytest.fixture(params=["exchange", "two renames"])
 def any_system(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     if request.param == "two renames":
-        monkeypatch.setattr(swap, "_exchange", lambda first, second: False)
+        monkeypatch.setattr(storage, "exchange", lambda first, second: False)
 
 
 def test_a_first_run_appears_with_its_marker_and_leaves_nothing_hidden(target, case):
@@ -179,7 +179,7 @@ def test_a_full_disk_is_a_storage_error_and_leaves_the_earlier_run(target, case)
     assert hidden(target) == []
 
 
-@pytest.mark.parametrize("step", ["sync_tree", "put_in_place", "_write_marker"])
+@pytest.mark.parametrize("step", ["sync_tree", "put_in_place", "write_synced"])
 def test_a_failure_while_publishing_leaves_the_earlier_run(target, case, step, monkeypatch):
     write(target, case, "one")
     (target / "notes.md").write_text("mine")
@@ -204,7 +204,7 @@ def test_a_second_rename_that_fails_brings_the_earlier_run_back(target, case, mo
             raise OSError(errno.EIO, "input/output error")
         real(source, destination)
 
-    monkeypatch.setattr(swap, "_exchange", lambda first, second: False)
+    monkeypatch.setattr(storage, "exchange", lambda first, second: False)
     monkeypatch.setattr(os, "rename", rename)
     with pytest.raises(StorageError):
         write(target, case, "two")
@@ -240,7 +240,7 @@ def test_the_folder_of_a_killed_run_is_removed_by_the_next_but_not_that_of_a_liv
     for folder in (dead, alive):
         (folder / "figures").mkdir(parents=True)
         os.utime(folder, (old, old))
-    with swap.try_lock(alive) as held:
+    with storage.try_lock(alive) as held:
         assert held
         write(target, case)
     assert hidden(target) == [alive.name]

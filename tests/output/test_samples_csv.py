@@ -12,7 +12,7 @@ import pytest
 from synthetic_results import make_results
 
 from eigassign.mechanism.trajectory.csv import read_samples
-from eigassign.output.results_json import sample_files
+from eigassign.output.result_files import sample_files
 from eigassign.study.results import Comparison, RunResults
 
 

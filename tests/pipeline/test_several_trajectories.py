@@ -12,7 +12,7 @@ from scipy.optimize import lsq_linear
 
 import eigassign as ea
 from eigassign.errors import CaseError
-from eigassign.output.results_json import results_document, sample_files, to_json
+from eigassign.output.result_files import results_document, sample_files, to_json
 from eigassign.pipeline.queries import check
 from eigassign.pipeline.run import Options, Result, optimize, validate
 

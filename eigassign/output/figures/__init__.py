@@ -1,1 +1,12 @@
-"""figures."""
+"""Figures through matplotlib's `Figure` and `Axes`, planned first and drawn when they are written.
+
+In reading order; each imports from those above it only:
+
+    style      the style sheet, an empty figure, limits of axes, file formats
+    curves     curves over time or one parameter: coordinates, approximation, assignment
+    maps       expansion errors over two parameters
+    mechanism  links, joints, bodies and springs; poses along the trajectory
+    modes      mode shapes
+    run        which figures a run has
+    front      time against error of a chart's methods
+"""

@@ -10,7 +10,7 @@ import pytest
 from synthetic_results import make_results
 
 from eigassign.errors import EigassignError
-from eigassign.output.results_json import dumps, to_json
+from eigassign.output.result_files import dumps, to_json
 from eigassign.study.results import ErrorRow
 
 

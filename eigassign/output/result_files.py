@@ -1,6 +1,6 @@
-"""results.json: what a run found, for programs. Same results, same bytes.
+"""What a run found as numbers for programs: results.json, and every sample of it as CSV.
 
-trajectory.csv, as `trajectory: {file: …}` reads it, and frequencies.csv: every sample of a run.
+The same results give the same bytes. trajectory.csv is what `trajectory: {file: …}` reads.
 
 Numbers are written as ``repr`` writes them, so that they read back to the last bit; a number that
 an expansion could not give is left empty.
@@ -31,7 +31,7 @@ from eigassign.study.results import (
     TrajectoryRow,
 )
 
-# --- results.json: what a run found, for programs. Same results, same bytes
+# --- results.json
 
 SCHEMA = 1
 _NESTED = (Mapping, list, tuple, str, np.ndarray)
@@ -78,14 +78,14 @@ def results_document(results: RunResults) -> dict[str, Any]:
 
 
 def _error(summary: ErrorSummary) -> dict[str, Any]:
-    predicted = {name: _said(value) for name, value in asdict(summary.predicted).items()}
+    predicted = {name: _finite(value) for name, value in asdict(summary.predicted).items()}
     return {**asdict(summary), "predicted": predicted}
 
 
-def _said(value: Any) -> Any:
+def _finite(value: Any) -> Any:
     """A number, or numbers, of an expansion: null for what is not finite."""
     if isinstance(value, np.ndarray):
-        return [_said(one) for one in value.tolist()]
+        return [_finite(one) for one in value.tolist()]
     return value if math.isfinite(value) else None
 
 
@@ -95,7 +95,7 @@ def _frequencies(results: RunResults, target: TargetStudy) -> dict[str, Any]:
         **_named(results, target.rows),
         "target_hz": target.target_hz,
         "initial_hz": target.initial_hz,
-        "predicted_hz": _said(target.predicted_hz),
+        "predicted_hz": _finite(target.predicted_hz),
         "exact_hz": target.exact_hz,
     }
 
@@ -154,7 +154,7 @@ def _worst(comparison: Comparison | None) -> dict[str, float | None] | None:
     if comparison is None:
         return None
     taylor, linearised = comparison.worst_taylor, comparison.worst_linearised
-    return {"taylor": _said(taylor), "linearised": _said(linearised)}
+    return {"taylor": _finite(taylor), "linearised": _finite(linearised)}
 
 
 def _coordinates(results: RunResults) -> dict[str, Any]:
@@ -205,7 +205,7 @@ def _leaf(value: Any, path: str) -> str:
         raise EigassignError(f"results.json: {where} holds a number that is not finite") from error
 
 
-# --- trajectory.csv, as `trajectory: {file: …}` reads it, and frequencies.csv: every sample of
+# --- trajectory.csv and frequencies.csv
 
 Floats = NDArray[np.float64]
 Column = tuple[str, Sequence[object]]  # heading, one entry a sample

@@ -6,7 +6,7 @@ import csv
 import io
 import xml.etree.ElementTree as ET
 
-from eigassign.output.tables import (
+from eigassign.output.batch_summary import (
     COLUMNS,
     CaseOutcome,
     junit_xml,
