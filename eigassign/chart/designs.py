@@ -44,7 +44,7 @@ from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.solver import modes_at
 from eigassign.modal.expansion import expand
 from eigassign.study.assignment import (
-    Wanted,
+    WantedFrequency,
     assign_design,
     linear_constraints,
     target_frequencies,
@@ -109,7 +109,7 @@ class DesignTask:
 
     scene: Scene
     path: Trajectories  # with these samples only
-    wanted: tuple[Wanted, ...]  # at them
+    wanted: tuple[WantedFrequency, ...]  # at them
     rows: NDArray[np.intp]  # which samples of the whole trajectory these are
 
     @property

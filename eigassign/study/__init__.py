@@ -7,7 +7,7 @@ Reading order:
     planning    expansion point, order and modes; what is left to auto, and where it is judged
     settling    elements and reduced links that are left to auto, and the model with them
     built_case  a case with its model and trajectories, each built once
-    scene       model, trajectory and expansions together; expansions compared with exact values
+    scene       model, trajectory and expansions of a case in one object
     comparison  how good both expansions are: along the trajectory, over the boxes of q and y
     assignment  from targets and bounds to the optimal design, and what it does to the frequencies
     accuracy    errors of mesh, reduction, expansion and round-off; whether the motion is slow

@@ -1,12 +1,13 @@
-"""How far the numbers of a run can be trusted, stated side by side: mesh, approximation, round-off.
+"""How far the numbers of a run can be trusted: errors stated side by side, and the motion's speed.
 
-None of it needs an exact solve beyond those of the mesh comparison at a few poses.
+`accuracy_notes` states the errors of mesh, reduced links, expansion and round-off. It needs no
+exact solves but those that compare the mesh with a finer one, at a few poses.
 
-Is the motion slow? What the velocity terms of eq. (1), which the method neglects, would change.
-
-Where the links only turn, (5 Ω²/g³ + |Ω̇|/g)/λ_1 with the sum Ω of all joint rates bounds the order
-of the relative change of λ: g ≤ 1 is the relative distance to the next mode, with which modes turn
-by Ω/g and mix by C ~ Ω/g. Where that is far below the accuracy asked for, nothing more is computed.
+`study_motion` estimates what the velocity terms of eq. (1) would change, which the method neglects.
+Where all joints turn, (5 Ω²/g³ + |Ω̇|/g)/λ_1 bounds the order of the relative change of λ: Ω is the
+sum of all joint rates, and g ≤ 1 the relative distance to the next mode, with which modes turn by
+Ω/g and mix by C ~ Ω/g. Only where that is not far below the accuracy asked for, the quadratic
+eigenproblem with these terms is solved (`modal.slow_motion`).
 """
 
 from __future__ import annotations
@@ -24,8 +25,6 @@ from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.model import Model
 from eigassign.modal.slow_motion import motion_effect
 from eigassign.study.scene import Scene
-
-# --- How far the numbers of a run can be trusted, stated side by side: mesh, approximation, rou
 
 Floats = NDArray[np.float64]
 POSES = 3  # at which the mesh is compared with one twice as fine
@@ -103,14 +102,15 @@ def truncation_lines(model: Model, modes: tuple[int, ...], q: Floats, designs: F
 
 
 def _spread(q: Floats, count: int) -> Floats:
-    keep = np.unique(np.linspace(0, len(q) - 1, min(count, len(q))).round().astype(int))
-    return np.asarray(q[keep])
+    """At most ``count`` rows of q (n, n_q), evenly spaced; the first and last too."""
+    rows = np.unique(np.linspace(0, len(q) - 1, min(count, len(q))).round().astype(int))
+    return np.asarray(q[rows])
 
 
-# --- Is the motion slow? What the velocity terms of eq. (1), which the method neglects, would c
+# --- Is the motion slow?
 
 NEGLIGIBLE = 0.05  # share of validation.max_error below which the simple estimate settles it
-EQUAL = 1e-6  # distance of modes that are taken for equal
+EQUAL = 1e-6  # relative distance below which modes count as this far apart
 SHIFTS = ("prismatic", "cylindrical", "screw", "carriage", "nut")  # joints that also translate
 
 
@@ -135,13 +135,13 @@ def study_motion(scene: Scene, hz: Floats) -> MotionStudy | None:
         note = f"slow motion: the neglected velocity terms change λ by less than about {simple:.1g}"
         return MotionStudy(simple, note, None)
     if names := placeless(scene.file):
-        return _roughly(simple, names, limit)
-    change, name = max((_effect(scene, part), part.name) for part in timed)
+        return _rough_study(simple, names, limit)
+    change, name = max((_change(scene, part), part.name) for part in timed)
     along = f"trajectory {name!r}" if len(parts) > 1 else "the trajectory"
-    return _stated(change, limit, along)
+    return _motion_study(change, limit, along)
 
 
-def _roughly(simple: float | None, names: tuple[str, ...], limit: float) -> MotionStudy:
+def _rough_study(simple: float | None, names: tuple[str, ...], limit: float) -> MotionStudy:
     """Superelements: their inner dofs have no directions, so only the simple estimate is left."""
     why = f"the inner dofs of {', '.join(names)} have no directions"
     if simple is None:
@@ -163,7 +163,7 @@ def _simple_estimate(scene: Scene, parts: list[NamedTrajectory], hz: Floats) -> 
     if any(joint.type in SHIFTS for joint in scene.file.mechanism.joints.values()):
         return None
     lam, gap = float((2.0 * np.pi * hz.min()) ** 2), least_gap(hz, scene.expansions.modes)
-    return max(_haste(part.trajectory, gap) for part in parts) / lam
+    return max(_neglected_terms(part.trajectory, gap) for part in parts) / lam
 
 
 def least_gap(hz: Floats, wanted: Sequence[int]) -> float:
@@ -173,7 +173,7 @@ def least_gap(hz: Floats, wanted: Sequence[int]) -> float:
     return max(float(distance[:, beside].min(initial=1.0)), EQUAL)
 
 
-def _haste(trajectory: Trajectory, gap: float) -> float:
+def _neglected_terms(trajectory: Trajectory, gap: float) -> float:
     """5 Ω²/g³ + |Ω̇|/g at its largest, rad²/s²."""
     motion = rates(trajectory)
     speed = np.abs(motion.rate).sum(axis=1)
@@ -181,14 +181,15 @@ def _haste(trajectory: Trajectory, gap: float) -> float:
     return float((5.0 * speed**2 / gap**3 + push / gap).max(initial=0.0))
 
 
-def _effect(scene: Scene, part: NamedTrajectory) -> float:
+def _change(scene: Scene, part: NamedTrajectory) -> float:
+    """The largest relative change of a frequency along one trajectory, velocity terms included."""
     model = scene.model
     terms = velocity_terms(scene.file, model.poses.parameters, model.motion)
     modes = tuple(scene.expansions.modes)
     return motion_effect(model.pencil, terms, rates(part.trajectory), scene.initial, modes).worst
 
 
-def _stated(change: float, limit: float, along: str) -> MotionStudy:
+def _motion_study(change: float, limit: float, along: str) -> MotionStudy:
     text = f"the neglected velocity terms change a frequency by about {100 * change:.2g} %"
     if change <= limit:
         return MotionStudy(change, f"speed of the motion: {text} along {along}", None)

@@ -1,6 +1,7 @@
 """From a case's targets and bounds to the optimal design, and what it does to the frequencies.
 
-Where the number of a mode may not be believed: neighbouring frequencies that nearly meet.
+The linear model of eq. (9) comes from the partially linearised expansion, the design from the
+quadratic program of eqs. (13)–(14) (`eigassign.assignment`).
 """
 
 from __future__ import annotations
@@ -38,8 +39,6 @@ from eigassign.study.results import (
 )
 from eigassign.study.scene import Scene
 
-# --- From a case's targets and bounds to the optimal design, and what it does to the frequencies
-
 Floats = NDArray[np.float64]
 _Curves = tuple[Floats, Floats, Floats, Floats]  # wanted, initial, predicted and exact, (n,) in Hz
 
@@ -61,19 +60,19 @@ def require_assignable(file: CaseFile) -> None:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class WantedFrequency:
     """What one target asks for: a frequency (n,) in Hz at those ``rows`` of all samples."""
 
     hz: Floats
     rows: slice
 
 
-def target_frequencies(file: CaseFile, path: Trajectories) -> tuple[Wanted, ...]:
+def target_frequencies(file: CaseFile, path: Trajectories) -> tuple[WantedFrequency, ...]:
     """What each target asks for; CaseError where a profile ends before a trajectory does."""
     return tuple(_wanted(file, k, target, path) for k, target in enumerate(file.targets))
 
 
-def _wanted(file: CaseFile, k: int, target: Target, path: Trajectories) -> Wanted:
+def _wanted(file: CaseFile, k: int, target: Target, path: Trajectories) -> WantedFrequency:
     hz = []
     for part in path.parts:
         if target.trajectory not in (None, part.name):
@@ -84,7 +83,7 @@ def _wanted(file: CaseFile, k: int, target: Target, path: Trajectories) -> Wante
             which = f" (trajectory {part.name!r})" if path.several else ""
             problem = file.problem(f"targets[{k}].frequency", f"{error}{which}")
             raise CaseError((problem,)) from error
-    return Wanted(frozen(np.concatenate(hz)), path.rows_of(target.trajectory))
+    return WantedFrequency(frozen(np.concatenate(hz)), path.rows_of(target.trajectory))
 
 
 def time_weights(path: Trajectories) -> Floats:
@@ -99,7 +98,7 @@ def _sampled(target: Target, time_s: Floats) -> Floats:
     return sample_target(time_s, wanted.frequency, wanted.time)
 
 
-def assign_design(scene: Scene, targets: tuple[Wanted, ...]) -> Assignment:
+def assign_design(scene: Scene, targets: tuple[WantedFrequency, ...]) -> Assignment:
     """Build and solve the quadratic program of eqs. (13)–(14) on the linearised expansion.
 
     Raises InfeasibleError with the names of the constraints that contradict each other.
@@ -162,7 +161,7 @@ def linear_constraints(file: CaseFile) -> list[LinearConstraint]:
 
 def study_targets(
     scene: Scene,
-    targets: tuple[Wanted, ...],
+    targets: tuple[WantedFrequency, ...],
     assignment: Assignment,
     initial_hz: Floats,
     exact_hz: Floats,
@@ -260,7 +259,7 @@ def limit_notes(assignment: Assignment) -> list[str]:
     return notes
 
 
-# --- Where the number of a mode may not be believed: neighbouring frequencies that nearly meet
+# --- Neighbouring frequencies that nearly meet, where two modes may swap their numbers
 
 NEAR = 0.01  # relative gap in Hz below which two modes may swap numbers between samples
 

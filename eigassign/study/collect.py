@@ -21,7 +21,6 @@ from eigassign.study.results import (
     RunResults,
     TargetStudy,
     TrajectoryRow,
-    coordinate_units,
 )
 from eigassign.study.scene import Scene
 
@@ -56,7 +55,7 @@ def collect_results(
         case_files=file.files,
         version=__version__,
         q_names=scene.model.q_names,
-        q_units=coordinate_units(file),
+        q_units=file.coordinate_units,
         time_s=np.zeros(0) if trajectory is None else trajectory.time_s,
         q=np.zeros((0, n_q)) if trajectory is None else trajectory.q,
         trajectories=_trajectories(trajectory),
@@ -112,7 +111,7 @@ def _others(scene: Scene, assigned: VerifiedAssignment) -> OtherModes | None:
 
 
 def _warnings(scene: Scene, assigned: VerifiedAssignment | None) -> Iterator[str]:
-    """What keeps the numbers from meaning what they seem to."""
+    """Where the results may mislead: crossing modes, a poor prediction, a worse design."""
     if assigned is None:
         return
     modes = tuple(sorted({target.mode for target in assigned.targets}))
@@ -145,7 +144,7 @@ def _accuracy_warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[s
 
 
 def _worsening(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
-    """Where, in truth, the initial design was nearer to the targets than the optimum is."""
+    """A warning where, solved exactly, the initial design is nearer to the targets."""
     weighed = list(zip(scene.file.targets, assigned.targets, strict=True))
     shares = [file.weight * target.weight_s for file, target in weighed]
     before, after = (

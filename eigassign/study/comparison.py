@@ -1,9 +1,9 @@
-"""The expansions of a run compared with exact frequencies, over time, over y and over q.
+"""How good an expansion is: full Taylor and partially linearised frequencies against exact ones.
 
-Is the expansion of a case good enough: full Taylor and linearised against exact.
-
-Three places are looked at, and all of them count against ``validation.max_error``, since together
-they are what an assignment relies on:
+Only the exact solves cost anything, so all points of one study are solved in one batch. A mode
+study holds what the figures show: along the trajectory, over the box of y, over the box of q. A
+validation compares at three places, all of which count against ``validation.max_error``, since
+together they are what an assignment relies on:
 
 trajectory
     every sample of the trajectory, or of each of several, at the initial design;
@@ -23,7 +23,7 @@ wrong. Where the full set was too large for the order asked for, only the linear
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product, zip_longest
 
@@ -33,19 +33,120 @@ from numpy.typing import NDArray
 from eigassign.case import CaseFile
 from eigassign.errors import CaseError
 from eigassign.modal.arguments import DENSE_LIMIT
+from eigassign.modal.model import Model
 from eigassign.study.planning import joint_map
 from eigassign.study.results import (
     Comparison,
+    DesignMap,
     ModeStudy,
     ValidationRow,
-    coordinate_units,
     design_units,
+    frozen,
 )
-from eigassign.study.scene import AXES, COARSE, Grid, Scene, compare, grid_over, map_over
-
-# --- The expansions of a run compared with exact frequencies, over time, over y and over q
+from eigassign.study.scene import Expansions, Scene
 
 Floats = NDArray[np.float64]
+
+# --- At given points, and on grids over one or two entries of x = (q, y)
+
+# Points along the axes of a map of one and of two variables, both ends included; odd, so that the
+# middle is one of them; fewer where a single exact solve takes milliseconds.
+AXES = {1: 61, 2: 13}
+COARSE = {1: 21, 2: 7}
+
+
+def compare(
+    model: Model,
+    expansions: Expansions,
+    x: Floats,
+    exact_hz: Floats | None = None,
+) -> tuple[Comparison, ...]:
+    """One comparison for each expanded mode at the points x (n, n_x), arrays (n,) in Hz.
+
+    ``exact_hz`` (n, at least the highest mode) are exact frequencies already known there.
+    """
+    q, y = _split(model, x)
+    if exact_hz is None:
+        exact_hz = model.frequencies(q, y, max(expansions.modes))
+    taylor, linearised = expansions.taylor_hz(q, y), expansions.linearised_hz(q, y)
+    return tuple(
+        Comparison(frozen(exact_hz[:, mode - 1]), frozen(taylor[:, k]), frozen(linearised[:, k]))
+        for k, mode in enumerate(expansions.modes)
+    )
+
+
+def _split(model: Model, x: Floats) -> tuple[Floats, Floats]:
+    n_q = len(model.q_names)
+    return x[:, :n_q], x[:, n_q:]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A tensor grid over one or two entries of x, the others as in ``x0``."""
+
+    entries: tuple[int, ...]
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    axes: tuple[Floats, ...]
+    x0: Floats
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Points along each axis."""
+        return tuple(len(axis) for axis in self.axes)
+
+    def points(self) -> Floats:
+        """All of them, (n, n_x), the last axis varying fastest."""
+        mesh = np.meshgrid(*self.axes, indexing="ij")
+        x = np.tile(self.x0, (mesh[0].size, 1))
+        for entry, values in zip(self.entries, mesh, strict=True):
+            x[:, entry] = values.ravel()
+        return x
+
+
+def grid_over(
+    entries: Sequence[int],
+    names: Sequence[str],
+    units: Sequence[str],
+    lower: Floats,
+    upper: Floats,
+    x0: Floats,
+    counts: Mapping[int, int] = AXES,
+) -> Grid | None:
+    """A grid over the first two of ``entries`` of x that have room between their bounds.
+
+    ``names``, ``units``, ``lower`` and ``upper`` belong to the entries, ``counts`` are points an
+    axis by the number of axes. None without room.
+    """
+    chosen = [k for k in range(len(entries)) if upper[k] > lower[k]][:2]
+    if not chosen:
+        return None
+    count = counts[len(chosen)]
+    return Grid(
+        tuple(entries[k] for k in chosen),
+        tuple(names[k] for k in chosen),
+        tuple(units[k] for k in chosen),
+        tuple(frozen(np.linspace(lower[k], upper[k], count)) for k in chosen),
+        x0,
+    )
+
+
+def map_over(model: Model, expansions: Expansions, grid: Grid | None) -> tuple[DesignMap, ...]:
+    """One map for each expanded mode; none without a grid."""
+    if grid is None:
+        return ()
+    return tuple(
+        DesignMap(grid.names, grid.units, grid.axes, _reshaped(values, grid.shape))
+        for values in compare(model, expansions, grid.points())
+    )
+
+
+def _reshaped(values: Comparison, shape: tuple[int, ...]) -> Comparison:
+    parts = (values.exact_hz, values.taylor_hz, values.linearised_hz)
+    return Comparison(*(part.reshape(shape) for part in parts))
+
+
+# --- Mode studies: what the figures show
 
 
 def study_modes(scene: Scene, initial_hz: Floats | None = None) -> tuple[ModeStudy, ...]:
@@ -94,7 +195,7 @@ def q_grid(scene: Scene) -> Grid | None:
     ends = np.array([travelled.min(axis=0), travelled.max(axis=0)]) - s0
     ends = np.array([np.minimum(ends[0], 0.0), np.maximum(ends[1], 0.0)])  # q0 is always inside
     lower, upper = np.sort(ends / S[range(len(S)), moved], axis=0) + q0[moved]
-    names, units = scene.model.q_names, coordinate_units(scene.file)
+    names, units = scene.model.q_names, scene.file.coordinate_units
     return grid_over(
         moved,
         [names[k] for k in moved],
@@ -106,7 +207,7 @@ def q_grid(scene: Scene) -> Grid | None:
     )
 
 
-# --- Is the expansion of a case good enough: full Taylor and linearised against exact
+# --- Validation: is the expansion good enough
 
 TRAJECTORY, DESIGN_BOX, RANDOM_BOX = "trajectory", "box of y at q0", "box of q and y"
 SEED = 20211204  # any: the same points every time

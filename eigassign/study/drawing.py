@@ -1,6 +1,7 @@
 """The mechanism as polylines and symbols: in poses that it passes through, and in its modes.
 
-Which joints, bodies and springs of a case are drawn where, and how thick its lines are.
+Links are polylines through their nodes, as thick as their sections; joints, bodies and springs are
+symbols at their nodes. Everything is plain numbers, in m.
 """
 
 from __future__ import annotations
@@ -28,11 +29,9 @@ from eigassign.study.results import (
     DrawnPoses,
     DrawnSpring,
     ModePictures,
-    coordinate_units,
     design_units,
+    frozen,
 )
-
-# --- The mechanism as polylines and symbols: in poses that it passes through, and in its modes
 
 Floats = NDArray[np.float64]
 POSES = 7  # drawn, first and last sample included
@@ -48,7 +47,7 @@ def draw_poses(file: CaseFile, model: Model, trajectory: Trajectories, y: Floats
     if trajectory.tip is None:
         tip = _farthest_travelled(file, model, model.x(trajectory.q, y), seams)
     else:
-        tip = _frozen(np.insert(trajectory.tip, seams, np.nan, axis=0))
+        tip = frozen(np.insert(trajectory.tip, seams, np.nan, axis=0))
     poses = _posed(file, model, model.x(trajectory.q[chosen], y), trajectory.time_s[chosen], tip)
     if not trajectory.several:
         return poses
@@ -78,7 +77,7 @@ def draw_modes(file: CaseFile, model: Model, q: Floats, y: Floats, count: int) -
     shapes, x = model.shapes(q, y, count), model.one(q, y)
     n_q = len(model.q_names)
     scales = AMPLITUDE * _extent(shapes) / _largest(shapes) * _phase(shapes)
-    coordinates = zip(model.q_names, x[0, :n_q], coordinate_units(file), strict=True)
+    coordinates = zip(model.q_names, x[0, :n_q], file.coordinate_units, strict=True)
     design = zip(model.y_names, x[0, n_q:], design_units(file), strict=True)
     return ModePictures(
         title=file.title,
@@ -127,14 +126,14 @@ def _displaced(
 
     def at(node: NodeName) -> Floats:
         shape = shapes.nodes[node]
-        return _frozen((shape.place + factors @ shape.motion[:, :3])[:, :d])
+        return frozen((shape.place + factors @ shape.motion[:, :3])[:, :d])
 
     moved = [s.places + np.tensordot(factors, s.motions, axes=1) for s in shapes.strands]
     axes = model.poses.values(x, joint_axes(file, model.poses))
     y = x[0, len(model.q_names) :]
     return DrawnPoses(
         time_s=np.zeros(n),
-        lines=tuple(tuple(_frozen(line[k]) for line in moved) for k in range(n)),
+        lines=tuple(tuple(frozen(line[k]) for line in moved) for k in range(n)),
         **_symbols(file, model, y, at, [np.repeat(axis[:, :d], n, axis=0) for axis in axes]),
     )
 
@@ -147,16 +146,16 @@ def _posed(
     nodes = _named_nodes(file, model)
     axes = joint_axes(file, poses)
     values = poses.values(x, [*(poses.world(*node) for node in nodes), *axes])
-    place = {node: _frozen(value[:, :d]) for node, value in zip(nodes, values, strict=False)}
+    place = {node: frozen(value[:, :d]) for node, value in zip(nodes, values, strict=False)}
     lines = [
         np.stack([place[link, start], place[link, end]], axis=1)
         for link, pairs in zip(poses.links, poses.drawn, strict=True)
         for start, end in pairs
     ]
-    directions = [_frozen(value[:, :d]) for value in values[len(nodes) :]]
+    directions = [frozen(value[:, :d]) for value in values[len(nodes) :]]
     return DrawnPoses(
-        time_s=_frozen(time_s),
-        lines=tuple(tuple(_frozen(line[k]) for line in lines) for k in range(len(x))),
+        time_s=frozen(time_s),
+        lines=tuple(tuple(frozen(line[k]) for line in lines) for k in range(len(x))),
         tip_path=tip_path,
         **_symbols(file, model, x[0, len(model.q_names) :], place.__getitem__, directions),
     )
@@ -205,20 +204,14 @@ def _farthest_travelled(file: CaseFile, model: Model, x: Floats, seams: Sequence
     paths = np.insert(np.stack(model.poses.values(x, nodes)), list(seams), np.nan, axis=1)
     way = np.nansum(np.linalg.norm(np.diff(paths, axis=1), axis=2), axis=1)
     farthest = int(np.argmax(way >= way.max() * (1.0 - 1e-9)))  # the first of those that coincide
-    return _frozen(paths[farthest, :, : _dimension(file)])
+    return frozen(paths[farthest, :, : _dimension(file)])
 
 
 def _dimension(file: CaseFile) -> int:
     return 2 if file.mechanism.space == "planar" else 3
 
 
-def _frozen(array: Floats) -> Floats:
-    array = np.ascontiguousarray(array)
-    array.setflags(write=False)
-    return array
-
-
-# --- Which joints, bodies and springs of a case are drawn where, and how thick its lines are
+# --- Joints, bodies and springs, and the size of sections
 
 At = Callable[[NodeName], Floats]  # places (n, d) of a node in n poses
 SLIDING = ("prismatic", "cylindrical", "screw", *RIDING)

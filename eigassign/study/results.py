@@ -1,15 +1,8 @@
 """What one run found, as plain numbers: the only thing the output layer is given to show.
 
-Shapes: n_t samples in time, n_q coordinates, n_y design parameters. SI units, frequencies in Hz,
-errors as fractions (0.01 is 1 %) of the frequency in Hz.
-
-The results of a run along each of its trajectories alone, for what is shown one by one.
-
-The SI unit of every numeric property of a mechanism, by the last key of its path.
-
-What there is to draw of a mechanism, as plain numbers: poses, and modes as deformed poses.
-
-``n`` counts the poses; d is 2 in a plane and 3 in space; lengths in m.
+Shapes: n_t samples in time, n_q coordinates, n_y design parameters, n poses in d dimensions (2 in a
+plane, 3 in space). SI units, frequencies in Hz, errors as fractions (0.01 is 1 %) of the frequency
+in Hz.
 """
 
 from __future__ import annotations
@@ -22,9 +15,17 @@ from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 
-# --- What one run found, as plain numbers: the only thing the output layer is given to show
-
 Floats = NDArray[np.float64]
+
+
+def frozen(array: Floats) -> Floats:
+    """The same numbers, contiguous, in an array that cannot be written to."""
+    array = np.ascontiguousarray(array)
+    array.setflags(write=False)
+    return array
+
+
+# --- How good an expansion is
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,26 @@ class ModeStudy:
     over_time: Comparison | None  # (n_t,) along the trajectory, at the initial design
     over_design: DesignMap | None  # at q0
     over_q: DesignMap | None = None  # at y0, over the range the trajectory travels
+
+
+@dataclass(frozen=True)
+class ValidationRow:
+    """One line of a validation: both expansions of one mode against exact, somewhere."""
+
+    case: str
+    mode: int
+    order: int
+    where: str  # "trajectory", "box of q and y", ...
+    points: int
+    worst_taylor: float  # relative error in Hz, fraction; infinite where λ came out negative
+    worst_linearised: float
+    rms_taylor: float
+    rms_linearised: float
+    limit: float
+    passed: bool
+
+
+# --- What an assignment reaches
 
 
 @dataclass(frozen=True)
@@ -182,218 +203,7 @@ class SolverRow:
     gap: float
 
 
-@dataclass(frozen=True)
-class TrajectoryRow:
-    """One trajectory: the ``rows`` of all samples that are its own, and what it counts."""
-
-    name: str
-    rows: slice
-    duration_s: float
-    weight: float
-    tip: Floats | None  # (n, 2 or 3) in m, where the case gives a path of the tip
-
-
-@dataclass(frozen=True)
-class RunResults:
-    """Everything a run folder shows."""
-
-    title: str
-    reference: str | None
-    case_name: str
-    case_sha256: str
-    version: str
-    q_names: tuple[str, ...]
-    q_units: tuple[str, ...]
-    time_s: Floats  # of each trajectory from its own start
-    q: Floats  # (n_t, n_q), of several trajectories one after the other
-    trajectories: tuple[TrajectoryRow, ...]
-    poses: DrawnPoses
-    studies: tuple[ModeStudy, ...]
-    design: tuple[DesignRow, ...]
-    targets: tuple[TargetStudy, ...]
-    others: OtherModes | None
-    solver: SolverRow | None
-    warnings: tuple[str, ...]
-    notes: tuple[str, ...]  # what was chosen and why, one line each
-    timing_s: Mapping[str, float]
-    case_files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of what the case names
-    tolerance: float = 0.02  # the largest approximation error the case accepts, a fraction
-    only: str | None = None  # the one of several trajectories that these are narrowed to
-
-    @property
-    def along(self) -> str:
-        """What the samples belong to, in words."""
-        if self.only is not None:
-            return f"trajectory {self.only!r}"
-        several = len(self.trajectories) > 1
-        return f"{len(self.trajectories)} trajectories" if several else "the trajectory"
-
-    @property
-    def approximation_error(self) -> float | None:
-        """How far the predicted frequencies are from the exact ones at most; None without."""
-        if not self.targets:
-            return None
-        return max(target.approximation_error for target in self.targets)
-
-    @property
-    def within_tolerance(self) -> bool:
-        """Whether the prediction that the optimum rests on is as exact as the case asks for."""
-        error = self.approximation_error
-        return error is None or error <= self.tolerance
-
-    @property
-    def error(self) -> ErrorSummary | None:
-        """Over all targets: the largest maximum and the root of the mean square; None without."""
-        if not self.targets:
-            return None
-        return over_all([(target.error, target.weight_s) for target in self.targets])
-
-    def error_along(self, name: str) -> ErrorSummary | None:
-        """The same along one trajectory; None where no target holds on it."""
-        along = [one.error for target in self.targets for one in target.along if one.name == name]
-        return over_all([(error, 1.0) for error in along]) if along else None
-
-
-def over_all(errors: Sequence[tuple[ErrorSummary, float]]) -> ErrorSummary:
-    """The largest of the maxima, and of the mean squares their mean by the time they stand for."""
-    weights = np.array([weight for _, weight in errors])
-    return ErrorSummary(
-        *(
-            _combined([getattr(error, kind) for error, _ in errors], weights)
-            for kind in ("initial", "predicted", "exact")
-        )
-    )
-
-
-def _combined(rows: list[ErrorRow], weights: Floats) -> ErrorRow:
-    square = np.array([row.rms_relative**2 for row in rows])
-    mean_square = float(square @ weights / weights.sum())
-    return ErrorRow(max(row.max_relative for row in rows), float(np.sqrt(mean_square)))
-
-
-@dataclass(frozen=True)
-class ValidationRow:
-    """One line of a validation: both expansions of one mode against exact, somewhere."""
-
-    case: str
-    mode: int
-    order: int
-    where: str  # "trajectory", "box of q and y", ...
-    points: int
-    worst_taylor: float  # relative error in Hz, fraction; infinite where λ came out negative
-    worst_linearised: float
-    rms_taylor: float
-    rms_linearised: float
-    limit: float
-    passed: bool
-
-
-# --- The results of a run along each of its trajectories alone, for what is shown one by one
-
-
-def along_each(results: RunResults) -> tuple[RunResults, ...]:
-    """One for each trajectory, whose name is its ``only``; itself where there is none or one.
-
-    Poses, maps over q and y, design, solver, warnings and notes stay those of the whole run.
-    """
-    if len(results.trajectories) < 2:
-        return (results,)
-    return tuple(_along(results, row) for row in results.trajectories)
-
-
-def _along(results: RunResults, row: TrajectoryRow) -> RunResults:
-    rows, others = row.rows, results.others
-    narrow = (_target(target, row.name) for target in results.targets)
-    return replace(
-        results,
-        only=row.name,
-        time_s=results.time_s[rows],
-        q=results.q[rows],
-        trajectories=(replace(row, rows=slice(0, rows.stop - rows.start)),),
-        studies=tuple(_study(study, rows) for study in results.studies),
-        targets=tuple(target for target in narrow if target is not None),
-        others=None
-        if others is None
-        else OtherModes(others.modes, others.initial_hz[rows], others.optimal_hz[rows]),
-    )
-
-
-def _study(study: ModeStudy, rows: slice) -> ModeStudy:
-    over = study.over_time
-    if over is None:
-        return study
-    parts = (over.exact_hz, over.taylor_hz, over.linearised_hz)
-    return replace(study, over_time=Comparison(*(part[rows] for part in parts)))
-
-
-def _target(target: TargetStudy, name: str) -> TargetStudy | None:
-    """The target along the trajectory of that name; None where it does not hold there."""
-    along = next((one for one in target.along if one.name == name), None)
-    if along is None:
-        return None
-    rows = along.rows
-    return replace(
-        target,
-        target_hz=target.target_hz[rows],
-        initial_hz=target.initial_hz[rows],
-        predicted_hz=target.predicted_hz[rows],
-        exact_hz=target.exact_hz[rows],
-        initial=along.error.initial,
-        predicted=along.error.predicted,
-        exact=along.error.exact,
-        rows=slice(0, rows.stop - rows.start),
-        along=(replace(along, rows=slice(0, rows.stop - rows.start)),),
-    )
-
-
-# --- The SI unit of every numeric property of a mechanism, by the last key of its path
-
-PROPERTY_UNITS = {
-    "youngs_modulus": "Pa",
-    "density": "kg/m3",
-    "area": "m2",
-    "bending_inertia": "m4",
-    "inertia_y": "m4",
-    "inertia_z": "m4",
-    "torsion_constant": "m4",
-    "polar_inertia": "m4",
-    "shear_modulus": "Pa",
-    "flange_thickness": "m",
-    "web_thickness": "m",
-    "diameter": "m",
-    "outer_diameter": "m",
-    "inner_diameter": "m",
-    "thickness": "m",
-    "width": "m",
-    "height": "m",
-    "length": "m",
-    "mass": "kg",
-    "inertia": "kg m2",
-    "stiffness": "N m/rad",
-    "translational": "N/m",
-    "rotational": "N m/rad",
-}
-
-
-def design_units(file: CaseFile) -> tuple[str, ...]:
-    """SI unit of each design parameter, in the order of y; empty text for one without a unit."""
-    held = dict(zip(file.coordinates, file.coordinate_units, strict=True))
-    return tuple(_unit(p.parameter, held) for p in file.design.parameters.values())
-
-
-def _unit(path: str, coordinates: Mapping[str, str]) -> str:
-    group, name, *_ = path.split(".")
-    if group == "coordinates" and coordinates[name] == "m":
-        return "N/m"
-    return PROPERTY_UNITS.get(path.rpartition(".")[2], "")
-
-
-def coordinate_units(file: CaseFile) -> tuple[str, ...]:
-    """SI unit of each coordinate, in the order of q."""
-    return file.coordinate_units
-
-
-# --- What there is to draw of a mechanism, as plain numbers: poses, and modes as deformed poses
+# --- What there is to draw of a mechanism
 
 
 @dataclass(frozen=True)
@@ -461,3 +271,195 @@ class ModePictures:
     amplitude: float
     rest: DrawnPoses  # one pose
     deformed: DrawnPoses  # a pose a mode
+
+
+# --- Everything together
+
+
+@dataclass(frozen=True)
+class TrajectoryRow:
+    """One trajectory: the ``rows`` of all samples that are its own, and what it counts."""
+
+    name: str
+    rows: slice
+    duration_s: float
+    weight: float
+    tip: Floats | None  # (n, 2 or 3) in m, where the case gives a path of the tip
+
+
+@dataclass(frozen=True)
+class RunResults:
+    """Everything a run folder shows."""
+
+    title: str
+    reference: str | None
+    case_name: str
+    case_sha256: str
+    version: str
+    q_names: tuple[str, ...]
+    q_units: tuple[str, ...]
+    time_s: Floats  # of each trajectory from its own start
+    q: Floats  # (n_t, n_q), of several trajectories one after the other
+    trajectories: tuple[TrajectoryRow, ...]
+    poses: DrawnPoses
+    studies: tuple[ModeStudy, ...]
+    design: tuple[DesignRow, ...]
+    targets: tuple[TargetStudy, ...]
+    others: OtherModes | None
+    solver: SolverRow | None
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]  # what was chosen and why, one line each
+    timing_s: Mapping[str, float]
+    case_files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of what the case names
+    tolerance: float = 0.02  # the largest approximation error the case accepts, a fraction
+    only: str | None = None  # of several trajectories the one that these are results of
+
+    @property
+    def along(self) -> str:
+        """What the samples belong to, in words."""
+        if self.only is not None:
+            return f"trajectory {self.only!r}"
+        several = len(self.trajectories) > 1
+        return f"{len(self.trajectories)} trajectories" if several else "the trajectory"
+
+    @property
+    def approximation_error(self) -> float | None:
+        """How far the predicted frequencies are from the exact ones at most; None without."""
+        if not self.targets:
+            return None
+        return max(target.approximation_error for target in self.targets)
+
+    @property
+    def within_tolerance(self) -> bool:
+        """Whether the prediction that the optimum rests on is as exact as the case asks for."""
+        error = self.approximation_error
+        return error is None or error <= self.tolerance
+
+    @property
+    def error(self) -> ErrorSummary | None:
+        """Over all targets: the largest maximum and the root of the mean square; None without."""
+        if not self.targets:
+            return None
+        return over_all([(target.error, target.weight_s) for target in self.targets])
+
+    def error_along(self, name: str) -> ErrorSummary | None:
+        """The same along one trajectory; None where no target holds on it."""
+        along = [one.error for target in self.targets for one in target.along if one.name == name]
+        return over_all([(error, 1.0) for error in along]) if along else None
+
+
+def over_all(errors: Sequence[tuple[ErrorSummary, float]]) -> ErrorSummary:
+    """The largest of the maxima, and of the mean squares their mean by the time they stand for."""
+    weights = np.array([weight for _, weight in errors])
+    return ErrorSummary(
+        *(
+            _combined([getattr(error, kind) for error, _ in errors], weights)
+            for kind in ("initial", "predicted", "exact")
+        )
+    )
+
+
+def _combined(rows: list[ErrorRow], weights: Floats) -> ErrorRow:
+    square = np.array([row.rms_relative**2 for row in rows])
+    mean_square = float(square @ weights / weights.sum())
+    return ErrorRow(max(row.max_relative for row in rows), float(np.sqrt(mean_square)))
+
+
+# --- The results along one of several trajectories
+
+
+def along_each(results: RunResults) -> tuple[RunResults, ...]:
+    """One for each trajectory, whose name is its ``only``; itself where there is none or one.
+
+    Poses, maps over q and y, design, solver, warnings and notes stay those of the whole run.
+    """
+    if len(results.trajectories) < 2:
+        return (results,)
+    return tuple(_along(results, row) for row in results.trajectories)
+
+
+def _along(results: RunResults, row: TrajectoryRow) -> RunResults:
+    rows, others = row.rows, results.others
+    targets = (_target(target, row.name) for target in results.targets)
+    return replace(
+        results,
+        only=row.name,
+        time_s=results.time_s[rows],
+        q=results.q[rows],
+        trajectories=(replace(row, rows=slice(0, rows.stop - rows.start)),),
+        studies=tuple(_study(study, rows) for study in results.studies),
+        targets=tuple(target for target in targets if target is not None),
+        others=None
+        if others is None
+        else OtherModes(others.modes, others.initial_hz[rows], others.optimal_hz[rows]),
+    )
+
+
+def _study(study: ModeStudy, rows: slice) -> ModeStudy:
+    over = study.over_time
+    if over is None:
+        return study
+    parts = (over.exact_hz, over.taylor_hz, over.linearised_hz)
+    return replace(study, over_time=Comparison(*(part[rows] for part in parts)))
+
+
+def _target(target: TargetStudy, name: str) -> TargetStudy | None:
+    """The target along the trajectory of that name; None where it does not hold there."""
+    along = next((one for one in target.along if one.name == name), None)
+    if along is None:
+        return None
+    rows = along.rows
+    return replace(
+        target,
+        target_hz=target.target_hz[rows],
+        initial_hz=target.initial_hz[rows],
+        predicted_hz=target.predicted_hz[rows],
+        exact_hz=target.exact_hz[rows],
+        initial=along.error.initial,
+        predicted=along.error.predicted,
+        exact=along.error.exact,
+        rows=slice(0, rows.stop - rows.start),
+        along=(replace(along, rows=slice(0, rows.stop - rows.start)),),
+    )
+
+
+# --- The SI unit of every design parameter, by the last key of its path
+
+PROPERTY_UNITS = {
+    "youngs_modulus": "Pa",
+    "density": "kg/m3",
+    "area": "m2",
+    "bending_inertia": "m4",
+    "inertia_y": "m4",
+    "inertia_z": "m4",
+    "torsion_constant": "m4",
+    "polar_inertia": "m4",
+    "shear_modulus": "Pa",
+    "flange_thickness": "m",
+    "web_thickness": "m",
+    "diameter": "m",
+    "outer_diameter": "m",
+    "inner_diameter": "m",
+    "thickness": "m",
+    "width": "m",
+    "height": "m",
+    "length": "m",
+    "mass": "kg",
+    "inertia": "kg m2",
+    "stiffness": "N m/rad",
+    "translational": "N/m",
+    "rotational": "N m/rad",
+}
+
+
+def design_units(file: CaseFile) -> tuple[str, ...]:
+    """SI unit of each design parameter, in the order of y; empty text for one without a unit."""
+    held = dict(zip(file.coordinates, file.coordinate_units, strict=True))
+    return tuple(_unit(p.parameter, held) for p in file.design.parameters.values())
+
+
+def _unit(path: str, coordinates: Mapping[str, str]) -> str:
+    group, name, *_ = path.split(".")
+    if group == "coordinates" and coordinates[name] == "m":
+        return "N/m"
+    return PROPERTY_UNITS.get(path.rpartition(".")[2], "")

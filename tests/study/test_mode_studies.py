@@ -7,9 +7,8 @@ import pytest
 from scenes import HEAD, SHIPPED, changed, scene_of
 
 from eigassign.case import parse
-from eigassign.study.comparison import q_grid, study_modes
-from eigassign.study.results import PROPERTY_UNITS, coordinate_units, design_units
-from eigassign.study.scene import COARSE, compare, grid_over
+from eigassign.study.comparison import COARSE, compare, grid_over, q_grid, study_modes
+from eigassign.study.results import PROPERTY_UNITS, design_units
 
 
 def test_a_map_holds_at_each_point_what_a_solve_there_gives(tmp_path: Path) -> None:
@@ -98,5 +97,5 @@ def test_what_slides_is_measured_in_metres() -> None:
     )
     text += "design: {k: {parameter: coordinates.q2.drive.stiffness, min: 1, max: 1e5}}"
     file = parse(text.encode(), "case.yaml")
-    assert coordinate_units(file) == ("rad", "m")
+    assert file.coordinate_units == ("rad", "m")
     assert design_units(file) == ("N/m",)
