@@ -2,8 +2,8 @@
 
 With the local motion w = B x of a link whose frame turns at ω(t), the velocity of its nodes in its
 own axes is B ẋ + P x, P = Ḃ + ω̃ B, and that of its matter N (B ẋ + P x) + Ṅ B x: the shapes N
-change at a place of the link where its mesh moves with a carriage or nut (`convection`). With
-m = ∫ ρ Nᵀ N, G = ∫ ρ Nᵀ Ṅ and H = ∫ ρ Ṅᵀ Ṅ the kinetic energy gives
+change at a place of the link where its mesh moves with a carriage or nut. With m = ∫ ρ Nᵀ N,
+G = ∫ ρ Nᵀ Ṅ and H = ∫ ρ Ṅᵀ Ṅ the kinetic energy gives
 
     M = Bᵀ m B,   C = Ṁ + Q − Qᵀ,   K_v = Q̇ − R,
     Q = Bᵀ (m P + G B),   R = Pᵀ m P + Pᵀ G B + Bᵀ Gᵀ P + Bᵀ H B .
@@ -11,28 +11,16 @@ m = ∫ ρ Nᵀ N, G = ∫ ρ Nᵀ Ṅ and H = ∫ ρ Ṅᵀ Ṅ the kinetic ene
 C is gyroscopic up to Ṁ; K_v holds the centrifugal and Euler terms. Derivatives in time are central
 differences of the kinematics along the motion q(t), q̇(t), q̈(t).
 
-What a mesh that moves along its beam adds to the velocity of the beam's matter.
+Convection: nodes travel with a carriage or nut, x_a(s) and h(s) in an element, so that the shapes
+change at a fixed place x of the beam: with ξ = (x − x_a)/h and Φ of `beam`,
 
-Nodes travel with a carriage or nut, x_a(s) and h(s) in an element, so that the shapes change at a
-fixed place x of the beam: with ξ = (x − x_a)/h and Φ of `beam`,
+    Ṅ = d/dt N(ξ, h, Φ),   ξ̇ = −(ẋ_a + ξ ḣ)/h .
 
-    Ṅ = d/dt N(ξ, h, Φ),   ξ̇ = −(ẋ_a + ξ ḣ)/h,
+N and Ṅ are cubic in ξ: four Gauss points integrate their products exactly.
 
-and the velocity of matter is N ẇ + Ṅ w for nodal motion w. Its kinetic energy needs
-
-    G = ∫ ρ Nᵀ Ṅ dx,   H = ∫ ρ Ṅᵀ Ṅ dx
-
-with the inertia ρ of each field, as in the consistent mass ∫ ρ Nᵀ N dx of `beam`. N and Ṅ are cubic
-in ξ: four Gauss points integrate their products exactly.
-
-All links of a mechanism one below the other, as few sparse matrices of varying numbers.
-
-With the local motion w = B x of all links at once,
-
-    B = Ψ (U + N T),   m,   ω̃
-
-hold joined nodes U, twists T spread over the nodes by N, what reduced links stand for Ψ, the masses
-and the spins of the frames. Each is a fixed pattern: only its numbers change along a motion.
+All links stand one below the other in few sparse matrices: B = Ψ (U + N T), with joined nodes U,
+twists T spread over the nodes by N, and Ψ what reduced links stand for; m; and the spins ω̃ of the
+frames. Each is a fixed pattern: only its numbers change along a motion.
 """
 
 from __future__ import annotations
@@ -60,8 +48,6 @@ from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import Table, compile_table
 from eigassign.series.expression import Scalar
-
-# --- The velocity terms of eq. (1), which the method neglects: built here so that they can be c
 
 Floats = NDArray[np.float64]
 STEP = 1e-4  # of the time in which the fastest coordinate or spin moves, or would, by 1 rad or m
@@ -154,7 +140,7 @@ def velocity_terms(
     )
 
 
-# --- What a mesh that moves along its beam adds to the velocity of the beam's matter
+# --- convection: a mesh that moves along its beam
 
 RealOrComplex = NDArray[Any]  # real or complex
 PLANES = ((1, 5, 1.0), (2, 4, -1.0))  # deflection, rotation: θ_z = dv/dx, θ_y = −dw/dx
@@ -249,7 +235,7 @@ def fields(xi: RealOrComplex, h: RealOrComplex, phi: RealOrComplex) -> RealOrCom
     return N
 
 
-# --- All links of a mechanism one below the other, as few sparse matrices of varying numbers
+# --- all links one below the other
 
 Ints = NDArray[np.intp]
 Matrix = Any  # sparse, or dense where that is quicker

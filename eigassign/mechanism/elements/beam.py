@@ -9,8 +9,6 @@ An element of length h has matrices that are affine in few scalars; per plane of
 (cubic Hermite bending; Przemieniecki, Theory of Matrix Structural Analysis, §5.6 and §11.7 with
 shear and rotary inertia). Dofs of an element: (u_x, u_y, u_z, θ_x, θ_y, θ_z) at both nodes; a
 planar mechanism keeps (u_x, u_y, θ_z).
-
-Stiffness and mass values of the beams of a case: its sections and materials put together.
 """
 
 from __future__ import annotations
@@ -26,8 +24,6 @@ from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.sections import SectionValues, section_values
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.series.expression import Scalar, is_constant
-
-# --- Beam elements: axial, torsion and two bendings, Euler-Bernoulli or Timoshenko, consistent
 
 Floats = NDArray[np.float64]
 RealOrComplex = NDArray[Any]  # real or complex: polynomials do not mind
@@ -283,7 +279,7 @@ def rotary_mass(plane: str) -> tuple[tuple[Floats, ...], ...]:
     return tuple(out)
 
 
-# --- Stiffness and mass values of the beams of a case: its sections and materials put together
+# --- values of the beams of a case: its sections and materials put together
 
 
 def beam_values(case: CaseFile, parameters: ModelParameters, beam: Any, section: str) -> BeamValues:

@@ -9,9 +9,8 @@ constant matrix of the link is projected on it. Where the link itself changes wi
 what Ψ and Φ become at both ends of the bounds, and the part of N(y) that Ψ does not carry, so that
 rigid-body motion is in the span at every y. What is left out is estimated in modal/truncation.py.
 
-Modes of a part whose interface is held: K_ii φ = λ M_ii φ, solved as M_ii φ = μ K_ii φ.
-
-In this inverse form massless dofs (μ = 0, as of rotations without inertia) do no harm.
+The modes are solved in the inverse form M_ii φ = μ K_ii φ, μ = 1/λ, in which massless dofs (μ = 0,
+as of rotations without inertia) do no harm.
 """
 
 from __future__ import annotations
@@ -32,8 +31,6 @@ from eigassign.mechanism.elements.sparse_factor import kept_factor
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import compile_table
-
-# --- Craig-Bampton reduction of a link: few fixed-interface modes instead of its interior dofs
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -233,7 +230,7 @@ def project(A: sparse.csr_array, T: Floats) -> sparse.csr_array:
     return sparse.csr_array(out)
 
 
-# --- Modes of a part whose interface is held: K_ii φ = λ M_ii φ, solved as M_ii φ = μ K_ii φ
+# --- fixed-interface modes: K_ii φ = λ M_ii φ, solved as M_ii φ = μ K_ii φ
 
 DENSE = 400  # interior dofs up to which all eigenvalues are computed
 FIRST = 16  # modes that Lanczos is asked for first

@@ -1,7 +1,4 @@
-"""Each kind of link as a mesh in its own frame: beam, rigid body, frame of beams, superelement.
-
-A link made of several beams: lattice booms, delta forearms, portals.
-"""
+"""The mesh of any link in its own frame: beam, rigid body, frame of beams, superelement."""
 
 from __future__ import annotations
 
@@ -42,8 +39,6 @@ from eigassign.mechanism.kinematics.rotations import Objects, rotation, vector
 from eigassign.mechanism.kinematics.topology import Topology
 from eigassign.series.expression import Scalar, is_constant
 
-# --- Each kind of link as a mesh in its own frame: beam, rigid body, frame of beams, supereleme
-
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
@@ -77,7 +72,7 @@ def copies_of(
     return found
 
 
-# --- beams ---
+# --- beams
 
 
 def _beam(case: CaseFile, parameters: ModelParameters, tree: Topology, name: str) -> LinkMesh:
@@ -226,7 +221,7 @@ def rolled(angle: float) -> Floats:
     return np.asarray(np.kron(np.eye(4), R), dtype=np.float64)
 
 
-# --- A link made of several beams: lattice booms, delta forearms, portals
+# --- frames: links of several beams
 
 
 def frame_mesh(case: CaseFile, parameters: ModelParameters, name: str) -> LinkMesh:

@@ -1,8 +1,7 @@
 """A link from another finite-element program: K, M and its interface nodes.
 
-The rigid motion of the interior follows from the interface, N_i = −K_ii⁻¹ K_ib N_b, for K N = 0.
-
-K and M of a part from files of another program: read, and refused where they cannot be one.
+The matrices are read from files and refused where they cannot be those of a part. The rigid motion
+of the interior follows from the interface, N_i = −K_ii⁻¹ K_ib N_b, so that K N = 0.
 """
 
 from __future__ import annotations
@@ -24,8 +23,6 @@ from eigassign.mechanism.elements.mesh import DOFS, Entries, LinkMesh, Term, rig
 from eigassign.mechanism.elements.sparse_factor import is_semidefinite
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type, parameters
 from eigassign.mechanism.kinematics.rotations import vector
-
-# --- A link from another finite-element program: K, M and its interface nodes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -143,7 +140,7 @@ def _boundary(link: Any, n: int, path: str) -> Ints:
     return np.array(dofs, dtype=np.intp)
 
 
-# --- K and M of a part from files of another program: read, and refused where they cannot be one
+# --- K and M from files
 
 SYMMETRY = 1e-8  # relative asymmetry of K or M that is taken for round-off
 ROUNDED = 1e-6  # of the diagonal: files of six digits make eigenvalues that small negative

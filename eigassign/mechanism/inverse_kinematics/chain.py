@@ -1,14 +1,11 @@
-"""The tip of a mechanism as a function of its state: what inverse kinematics asks of a chain.
+"""The tip of a mechanism as a function of its state, with its Jacobian and the closure of loops.
 
-A state z = (q, p) holds the coordinates and, where loops are closed, the passive freedoms. Shapes:
-n states, n_q coordinates, n_p passive freedoms, n_e closure equations, d = 2 or 3 components of the
-tip's position, r = 1 or 3 of its turning.
+A state z = (q, p) holds the coordinates and, where loops are closed, the passive freedoms. The
+links are placed anew with every freedom of every joint as a variable, the passive ones too: so
+inverse kinematics closes the loops and reaches the point together, on the branch that it follows.
 
-The chain of a tip, built from the kinematics of its case.
-
-The links are placed anew with every freedom of every joint as a variable, the passive ones too: so
-inverse kinematics closes the loops and reaches the point together, and knows of no branch but the
-one it follows.
+Shapes: n states, n_q coordinates, n_p passive freedoms, n_e closure equations, d = 2 or 3
+components of the tip's position, r = 1 or 3 of its turning.
 """
 
 from __future__ import annotations
@@ -30,8 +27,6 @@ from eigassign.mechanism.kinematics.topology import Topology, split
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import compile_table
 from eigassign.series.expression import Recorder, derivative
-
-# --- The tip of a mechanism as a function of its state: what inverse kinematics asks of a chain
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -115,7 +110,7 @@ def _solved(A: Floats, B: Floats) -> Floats:
     return np.asarray(np.linalg.pinv(A, rcond=1e-12) @ B)
 
 
-# --- The chain of a tip, built from the kinematics of its case
+# --- the chain of a tip, built from the kinematics of its case
 
 ADVANCING = ("screw", "nut")  # a full turn of theirs moves something on
 

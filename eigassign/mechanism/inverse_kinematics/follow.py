@@ -1,12 +1,10 @@
 """Numerical inverse kinematics of any chain: the coordinates q along a path of its tip.
 
-The first sample is solved from many seeds at once. From there the path is traced, position and
-orientation, coordinates and the passive freedoms of loops together; Hermite interpolation of that
-trace seeds one Newton iteration over all samples.
+The first sample is solved from many seeds at once; all solutions are kept, the preferred one first.
+From there the path is traced, position and orientation, coordinates and the passive freedoms of
+loops together; Hermite interpolation of that trace seeds one Newton iteration over all samples.
 
 Shapes: n samples, n_q coordinates.
-
-The first sample of a tip path: every way to reach it, the preferred one first.
 """
 
 from __future__ import annotations
@@ -38,8 +36,6 @@ from eigassign.mechanism.inverse_kinematics.solver import (
 )
 from eigassign.mechanism.inverse_kinematics.state import Arm, prepare
 from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipTarget
-
-# --- Numerical inverse kinematics of any chain: the coordinates q along a path of its tip
 
 _TURNS = (0.2, 0.02)  # rad: largest step of the trace, and of a second try where that was too bold
 _REDUNDANT = (0.05, 0.01)  # the same where the least motion is wanted, which large steps miss
@@ -196,7 +192,7 @@ def _notes(arm: Arm, candidates: Sequence[Floats]) -> tuple[str, ...]:
     )
 
 
-# --- The first sample of a tip path: every way to reach it, the preferred one first
+# --- the first sample
 
 RESIDUAL = 1e-10  # largest miss of a sample: of L in m, and in rad
 _SAME = 1e-4  # rad, or of L: solutions nearer than this are one solution

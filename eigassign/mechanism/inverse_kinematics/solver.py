@@ -1,10 +1,9 @@
-"""Bringing the tip to given points: Levenberg–Marquardt from far away, Newton nearby.
+"""Bringing the tip to given points: Levenberg–Marquardt from far away, Newton nearby, and tracing.
+
+A solution is traced along a tip path by a predictor and a Newton corrector, in steps of a bounded
+size, whatever the samples are; Hermite interpolation of the trace gives first guesses for those.
 
 Shapes: n states u (n, n_q + n_p) of an `Arm`, m task components.
-
-A solution traced along a tip path, in steps of a bounded size, whatever the samples are.
-
-Predictor and Newton corrector; Hermite interpolation of the trace seeds the samples.
 """
 
 from __future__ import annotations
@@ -16,8 +15,6 @@ import numpy as np
 from eigassign.mechanism.inverse_kinematics.chain import Bools, Floats, Look, Reduced, reduced
 from eigassign.mechanism.inverse_kinematics.state import Arm
 from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipTarget
-
-# --- Bringing the tip to given points: Levenberg–Marquardt from far away, Newton nearby
 
 ROUND_OFF = 1e-13  # of L: as near to a point as the tip can be computed
 
@@ -137,7 +134,7 @@ def loop_regularity(arm: Arm, seen: Look) -> Floats:
     return np.asarray(s[:, -1] / s[:, 0])
 
 
-# --- A solution traced along a tip path, in steps of a bounded size, whatever the samples are
+# --- tracing the path
 
 _TRACE = 1e-7  # miss of the trace, relative to L, which only seeds the samples
 _SINGULAR = 1e-3  # of L: a smaller singular value of J is a chain stretched or folded;

@@ -3,13 +3,11 @@
 Inside, states are u = z / c with c = 1 rad for what turns and c = L for what slides, and turning
 counts L per radian among the residuals: so everything is in metres over a dimensionless u. L is the
 longest lever of a loop-free chain of turning joints, else the size of the path: its length, or its
-largest distance from the origin if that is more.
+largest distance from the origin if that is more. First guesses are spread over all that the chain
+can do.
 
-Shapes: n states or seeds, n_q coordinates, n_p passive freedoms, m task components.
-
-First guesses for inverse kinematics: states spread over all that a chain can do.
-
-Shapes: n_q coordinates, n_z = n_q + n_p entries of a state.
+Shapes: n states or seeds, n_q coordinates, n_p passive freedoms, n_z = n_q + n_p entries of a
+state, m task components.
 """
 
 from __future__ import annotations
@@ -22,8 +20,6 @@ import numpy as np
 from eigassign.errors import MechanismError, SingularityError
 from eigassign.mechanism.inverse_kinematics.chain import Bools, Floats, Look, TipChain, reduced
 from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipTarget
-
-# --- A chain prepared for inverse kinematics: one measure for metres and radians, and first gue
 
 _SLACK = 1e-9  # rad: round-off at the end of a branch's range
 _STRUCTURAL = 1e-6  # of L: a smaller singular value everywhere is round-off
@@ -105,7 +101,7 @@ def _measured(chain: TipChain, u: Floats, scale: Floats, lever: float) -> Look:
     return Look(seen.point, seen.rotation, J, seen.gap * weight, closure)
 
 
-# --- before solving ---
+# --- before solving
 
 
 def prepare(
@@ -204,7 +200,7 @@ def _check_idle(J: Floats, lever: float, start: Floats | None) -> None:
         raise MechanismError("trajectory.start", message)
 
 
-# --- First guesses for inverse kinematics: states spread over all that a chain can do
+# --- first guesses
 
 _CLOSED = 1e-9  # of the path's size: gaps of loops that are closed
 _TURNS_OF_A_SCREW = 500.0  # rad: as far as first guesses go

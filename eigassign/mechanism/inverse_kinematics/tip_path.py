@@ -1,16 +1,12 @@
-"""Paths of the tip through waypoints in the plane or in space, as piecewise cubics.
+"""Where the tip has to be and how its link is turned: paths, attitudes, and both with their times.
 
-Both kinds are parameterised by the cumulative chord length, scaled to 0 ≤ s ≤ 1. For the polyline
-that is the arc length.
+A path runs through waypoints in the plane or in space as piecewise cubics: a polyline, or a
+not-a-knot cubic spline. Its parameter is the cumulative chord length, scaled to 0 ≤ s ≤ 1.
 
-How the tip's link is turned along its path: one orientation that is kept, or one per waypoint.
-
-Between waypoints the orientation follows the same parameter s as the position. On a straight path
-the link turns at a constant rate about a fixed axis from each waypoint to the next; on a spline its
-angle is the same cubic spline (planar), or its angular acceleration is continuous (spatial, SciPy's
+The orientation follows the same parameter s: kept, or one per waypoint. On a straight path the link
+turns at a constant rate about a fixed axis from each waypoint to the next; on a spline its angle is
+the same cubic spline (planar), or its angular acceleration is continuous (spatial, SciPy's
 RotationSpline).
-
-When the tip has to be where, and turned how: a path, an attitude and a timing law together.
 """
 
 from __future__ import annotations
@@ -23,8 +19,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import MechanismError, UsageError
-
-# --- Paths of the tip through waypoints in the plane or in space, as piecewise cubics
 
 Floats = NDArray[np.float64]
 
@@ -141,7 +135,7 @@ def _checked(waypoints: ArrayLike) -> Floats:
     return points
 
 
-# --- How the tip's link is turned along its path: one orientation that is kept, or one per wayp
+# --- attitude
 
 _SAME_TURN = 1e-9  # rad: two orientations that do not differ
 _AMBIGUOUS = 1e-6  # rad from half a turn: which way round cannot be told
@@ -217,7 +211,7 @@ def _matrices(turning: Callable[[Floats], Any], s: Floats) -> Floats:
     return np.asarray(turning(np.clip(np.atleast_1d(s), 0.0, 1.0)).as_matrix())
 
 
-# --- When the tip has to be where, and turned how: a path, an attitude and a timing law together
+# --- path, attitude and times together
 
 
 @dataclass(frozen=True)

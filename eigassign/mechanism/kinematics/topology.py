@@ -1,10 +1,8 @@
-"""The graph of links and joints as it is walked: tree edges, loop edges, freedoms.
+"""The graph of links and joints: a spanning tree from the ground, loop-closing joints, freedoms.
 
-A spanning tree of links from the ground; the joints left over close loops.
-
-Each loop is closed, where it can be, at a node that deforms: that node's motion then follows from
-the rest. So a loop is closed at another of its joints where the first choice ends between rigid
-links or at nodes that are carried already.
+The joints that the tree leaves over close loops. Each loop is closed, where it can be, at a node
+that deforms: that node's motion then follows from the rest. So a loop is closed at another of its
+joints where the first choice ends between rigid links or at nodes that are carried already.
 """
 
 from __future__ import annotations
@@ -121,7 +119,7 @@ def component_index(case: CaseFile, coordinate: object) -> int:
     return 0 if component is None else names.index(str(component))
 
 
-# --- A spanning tree of links from the ground; the joints left over close loops
+# --- the spanning tree
 
 
 class _Walk(NamedTuple):

@@ -1,6 +1,6 @@
-"""Timing laws: how far along its path (s, 0 to 1) the tip is at the relative time τ = t / T.
+"""Timing laws s(τ), how far along its path the tip is at the relative time τ = t/T; point to point.
 
-Point to point: q(t) between joint coordinates, each segment by the same timing law.
+Point to point, q(t) runs between joint coordinates, each segment by the same timing law.
 
 Shapes: m points, n samples in time, n_q coordinates. SI units, angles in rad.
 """
@@ -15,8 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import MechanismError, UsageError
-
-# --- Timing laws: how far along its path (s, 0 to 1) the tip is at the relative time τ = t / T
 
 Floats = NDArray[np.float64]
 SHARE = 1.0 / 3.0  # of the time in which a trapezoidal motion accelerates, and as much it brakes
@@ -105,7 +103,7 @@ def timing_law(name: str, acceleration_share: float = SHARE) -> TimingLaw:
     return POLYNOMIALS[name]
 
 
-# --- Point to point: q(t) between joint coordinates, each segment by the same timing law
+# --- point to point
 
 
 @dataclass(frozen=True)

@@ -1,16 +1,12 @@
-"""The trajectory q(t) of a case: joint samples, a CSV file of them, or a path of the tip.
+"""The trajectory q(t) of a case: joint samples, a CSV file, points, or a path of the tip.
+
+Several trajectories may be studied together. Their samples are stacked, but nothing is
+differentiated, integrated or drawn from the end of one into the start of the next.
+
+Rates q̇ and q̈ are differences within smooth parts. Where the velocity jumps (straight tip paths,
+points joined by linear timing) there is a blow and no acceleration.
 
 Shapes: n samples in time, n_q coordinates. SI units, angles in rad.
-
-One or several trajectories studied together: their samples stacked, never joined.
-
-Nothing that is differentiated, integrated or drawn over time may run from the end of one trajectory
-into the start of the next; what does so goes part by part.
-
-How fast a sampled motion is: q̇ and q̈ at its samples, never across a corner.
-
-Where the velocity jumps (straight tip paths, points joined by linear timing) there is a blow and no
-acceleration that samples could tell: each smooth part is differentiated by itself.
 """
 
 from __future__ import annotations
@@ -41,8 +37,6 @@ from eigassign.mechanism.inverse_kinematics.tip_path import (
 )
 from eigassign.mechanism.trajectory.csv import read_samples
 from eigassign.mechanism.trajectory.timing import point_to_point, shared_times, timing_law
-
-# --- The trajectory q(t) of a case: joint samples, a CSV file of them, or a path of the tip
 
 _BACKWARDS = "time must increase, and goes from {:g} s to {:g} s"
 _PATHS: dict[str, Callable[[ArrayLike], TipPath]] = {"spline": spline, "straight": straight}
@@ -201,7 +195,7 @@ def _jumps(q: Floats, q_names: Sequence[str], q_units: Sequence[str]) -> tuple[s
     )
 
 
-# --- One or several trajectories studied together: their samples stacked, never joined
+# --- several trajectories
 
 Ints = NDArray[np.intp]
 
@@ -334,7 +328,7 @@ def _stacked(arrays: Sequence[Floats]) -> Floats:
     return stacked
 
 
-# --- How fast a sampled motion is: q̇ and q̈ at its samples, never across a corner
+# --- rates q̇ and q̈
 
 SAME = 1e-9  # of the duration: a sample this near to a corner is on it, and ends both parts
 
