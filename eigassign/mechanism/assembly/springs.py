@@ -23,10 +23,10 @@ from eigassign.mechanism.assembly.node_motion import (
     combined,
 )
 from eigassign.mechanism.elements.mesh import DOFS
-from eigassign.mechanism.kinematics.forward import Kinematics
+from eigassign.mechanism.kinematics.forward import Kinematics, shifted
 from eigassign.mechanism.kinematics.joints import mounting
 from eigassign.mechanism.kinematics.parameters import ModelParameters, node_position
-from eigassign.mechanism.kinematics.rotations import Objects, carried, cross, multiply, present
+from eigassign.mechanism.kinematics.rotations import carried, multiply, present
 from eigassign.mechanism.kinematics.topology import GROUND, NodeName, split
 from eigassign.series.expression import Scalar, is_constant
 
@@ -105,18 +105,13 @@ def _ends(
     )
     none = np.zeros(3, dtype=object)
     if ends[1] != GROUND:
-        here, there = (_world_position(case, parameters, motion, end) for end in ends)
+        here, there = (
+            motion.placement(end[0]).at(node_position(case, parameters, motion.tree, end))[1]
+            for end in ends
+        )
         first = apply(carried(np.eye(3).astype(object), there - here), first)
     seen = carried(R, none)
     return apply(seen, first), apply(seen, second)
-
-
-def _world_position(
-    case: CaseFile, parameters: ModelParameters, motion: Kinematics, end: NodeName
-) -> Objects:
-    placement = motion.placement(end[0])
-    X = node_position(case, parameters, motion.tree, end)
-    return np.asarray(placement.world_origin + multiply(placement.world_rotation, X))
 
 
 def _world_rows(
@@ -131,16 +126,9 @@ def _world_rows(
     if end == GROUND:
         return [{} for _ in range(6)]
     placement = motion.placement(end[0])
-    X = node_position(case, parameters, motion.tree, end)
-    rigid = np.concatenate(
-        [placement.twist[:3] + cross(placement.twist[3:], X), placement.twist[3:]]
-    )
+    rigid = shifted(placement.twist, node_position(case, parameters, motion.tree, end))
     rows = [dict(row) for row in elastic(end)]
-    for a, k in zip(*np.nonzero(_some(rigid)), strict=True):
+    for a, k in zip(*np.nonzero(present(rigid)), strict=True):
         rows[a][first_rate + int(k)] = rigid[a, k]
     to_world = carried(placement.world_rotation.T, np.zeros(3, dtype=object))
     return apply(to_world, rows)
-
-
-def _some(a: Objects) -> np.ndarray:
-    return present(a) if a.size else np.zeros(a.shape, dtype=bool)

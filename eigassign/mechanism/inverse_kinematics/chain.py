@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.case.schema.joints import FREEDOMS
-from eigassign.mechanism.kinematics.forward import Kinematics, walk
+from eigassign.mechanism.kinematics.forward import Kinematics, shifted, walk
 from eigassign.mechanism.kinematics.loop_closure import closure_rows, reference_coordinates
 from eigassign.mechanism.kinematics.parameters import ModelParameters, node_position
-from eigassign.mechanism.kinematics.rotations import Objects, cross, multiply
+from eigassign.mechanism.kinematics.rotations import Objects, multiply
 from eigassign.mechanism.kinematics.topology import Topology, split
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import compile_table
@@ -161,11 +161,9 @@ def _tip_scalars(case: CaseFile, free: _Unbound, tip: str) -> tuple[Objects, ...
     link, node = split(tip)
     placed = free.motion.placement(link)
     X = node_position(case, free.parameters, free.motion.tree, (link, node))
-    R = placed.world_rotation
-    place = placed.world_origin + multiply(R, X)
-    velocity = multiply(R, placed.twist[:3] + cross(placed.twist[3:], X))
-    spin = multiply(R, placed.twist[3:])
-    return np.asarray(place), R, velocity, spin
+    R, place = placed.at(X)
+    twist = shifted(placed.twist, X)
+    return place, R, multiply(R, twist[:3]), multiply(R, twist[3:])
 
 
 def _looking(

@@ -20,6 +20,7 @@ import numpy as np
 from eigassign.errors import MechanismError, SingularityError
 from eigassign.mechanism.inverse_kinematics.chain import Bools, Floats, Look, TipChain, reduced
 from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipTarget
+from eigassign.mechanism.kinematics.loop_closure import kronecker
 
 _SLACK = 1e-9  # rad: round-off at the end of a branch's range
 _STRUCTURAL = 1e-6  # of L: a smaller singular value everywhere is round-off
@@ -230,9 +231,7 @@ def _spread(
     turns = chain.of_kind("turn")[:n_j]
     width = np.where(turns, np.minimum(width, 2.0 * np.pi), width)
     count = min(128, 8 * 2**n_j)
-    strides = _harmonious(n_j) ** -np.arange(1.0, n_j + 1.0)
-    fractions = np.mod(0.5 + np.arange(count)[:, None] * strides, 1.0)
-    return np.asarray((low + width * fractions - offset) @ np.linalg.pinv(matrix).T)
+    return np.asarray((low + width * kronecker(count, n_j) - offset) @ np.linalg.pinv(matrix).T)
 
 
 def _ranges(chain: TipChain, course: Course, middle: Floats) -> tuple[Floats, Floats]:
@@ -264,11 +263,3 @@ def _closed(chain: TipChain, z: Floats, size: float) -> Floats:
     good = np.abs(chain.look(z).gap).max(axis=1) <= _CLOSED * max(size, 1.0)
     good[0] = True  # the pose at which the loops are known to close
     return np.asarray(z[good])
-
-
-def _harmonious(n: int) -> float:
-    """The root > 1 of x^(n+1) = x + 1: the golden ratio for n = 1 and its kin above."""
-    x = 1.5
-    for _ in range(60):  # contracts by at least 2 a step
-        x = (1.0 + x) ** (1.0 / (n + 1.0))
-    return float(x)

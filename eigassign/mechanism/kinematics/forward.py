@@ -174,7 +174,7 @@ class _Walk:
             rotation=motion.rotation,
             lever=motion.translation,
             freedoms=motion.freedoms,
-            twist=_shifted(self._reached(edge, motion), root * -1.0),
+            twist=shifted(self._reached(edge, motion), root * -1.0),
             base=self.placed.get(edge.base[0]),
             foot=self._position(edge.base),
             root=root,
@@ -213,13 +213,13 @@ class _Walk:
             self._twists[node] = (
                 np.zeros((6, self.rates.shape[1]), dtype=object)
                 if ground
-                else _shifted(self.placed[node[0]].twist, self._position(node))
+                else shifted(self.placed[node[0]].twist, self._position(node))
             )
         return self._twists[node]
 
     def _reached(self, edge: JointEdge, motion: JointMotion) -> Objects:
         """Twist of the follower's joint node: carried from the base, and the joint's own."""
-        base = _shifted(self._twist(edge.base), motion.translation)
+        base = shifted(self._twist(edge.base), motion.translation)
         rotated = multiply(motion.rotation.T, np.concatenate([base[:3], base[3:]], axis=1))
         moved = np.concatenate(np.split(rotated, 2, axis=1))
         own = self.tree.of_joint(edge.joint)
@@ -255,7 +255,7 @@ def _mounted(joint: object, mount: Objects, motion: JointMotion) -> JointMotion:
     return JointMotion(R, motion.translation, A)
 
 
-def _shifted(twist: Objects, lever: Objects) -> Objects:
+def shifted(twist: Objects, lever: Objects) -> Objects:
     """The twist at another point of the same body: v + ω × lever."""
     if not present(lever).any():
         return twist

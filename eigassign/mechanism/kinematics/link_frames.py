@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from eigassign.case import CaseFile
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type, node_position
-from eigassign.mechanism.kinematics.rotations import multiply
 from eigassign.mechanism.kinematics.topology import split
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import Table, compile_table
@@ -69,9 +68,8 @@ class LinkFrames:
 
     def world(self, link: str, node: str) -> NDArray[np.object_]:
         """World position of a named node, as scalars (3,)."""
-        p = self.motion.placement(link)
         X = node_position(self.case, self.parameters, self.motion.tree, (link, node))
-        return np.asarray(p.world_origin + multiply(p.world_rotation, X))
+        return self.motion.placement(link).at(X)[1]
 
     def segments(self, x: Floats) -> tuple[Floats, ...]:
         """Per link its straight lines, (n, n_lines, 2 ends, 3) in m."""

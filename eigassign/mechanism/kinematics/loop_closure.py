@@ -272,13 +272,19 @@ def _guess(tree: Topology, assembly: object) -> Floats | None:
 
 
 def _starts(n: int) -> Floats:
-    """Evenly spread starting points (Kronecker sequence) over a turn or a metre each way."""
-    root = 2.0
-    for _ in range(60):
-        root = (1.0 + root) ** (1.0 / (n + 1.0))
-    steps = root ** -np.arange(1.0, n + 1.0)
-    fractions = np.mod(0.5 + np.arange(TRIES)[:, None] * steps, 1.0)
-    return np.asarray(np.pi * (2.0 * fractions - 1.0))
+    """Evenly spread starting points over a turn, or π metres, each way."""
+    return np.pi * (2.0 * kronecker(TRIES, n) - 1.0)
+
+
+def kronecker(count: int, n: int) -> Floats:
+    """Evenly spread points (count, n) of the unit cube: a Kronecker sequence.
+
+    Its strides are powers of 1/x for the root x > 1 of x^(n+1) = x + 1, the golden ratio for n = 1.
+    """
+    x = 1.5
+    for _ in range(60):  # contracts by at least 2 a step
+        x = (1.0 + x) ** (1.0 / (n + 1.0))
+    return np.mod(0.5 + np.arange(count)[:, None] * x ** -np.arange(1.0, n + 1.0), 1.0)
 
 
 def _turning(case: CaseFile, tree: Topology) -> NDArray[np.bool_]:
