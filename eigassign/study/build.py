@@ -101,7 +101,6 @@ def _followed(file: CaseFile, model: Model, keys: TrajectoryKeys, path: str) -> 
             lambda tip, oriented: tip_chain(
                 file, model.poses.parameters, model.motion, tip, initial_design(file), oriented
             ),
-            file.path.parent,
             file.coordinate_units,
         )
 

@@ -34,8 +34,7 @@ def superelement_mesh(case: CaseFile, parameters: ModelParameters, name: str) ->
     """The mesh of a superelement; raises MechanismError for matrices that cannot be one."""
     link: Any = case.mechanism.links[name]
     path = f"mechanism.links.{name}"
-    folder = Path(getattr(case, "path", ".")).parent
-    K, M = read_pair(folder / link.stiffness, folder / link.mass, path)
+    K, M = read_pair(Path(link.stiffness), Path(link.mass), path)
     boundary = _boundary(link, K.shape[0], path)
     K, M = _interface_first(K, M, boundary)
     return _mesh(case, parameters, name, K, M, len(boundary), path)

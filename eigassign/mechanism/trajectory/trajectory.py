@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -64,21 +64,19 @@ def build_trajectory(
     spec: SampledTrajectory | FileTrajectory | PointTrajectory | TipTrajectory,
     q_names: Sequence[str],
     tip_chain: Callable[[str, bool], TipChain],
-    folder: FilePath = FilePath(),
     q_units: Sequence[str] = (),
 ) -> Trajectory:
     """The trajectory that a case asks for, in the coordinates ``q_names``.
 
     ``tip_chain(node, oriented)`` gives the chain of a tip path's node, its turning looked at if
-    oriented, and is called for nothing else;
-    ``folder`` is what the name of a CSV file is relative to; ``q_units`` are "rad" or "m" for each
-    coordinate, all rad if empty. Raises MechanismError for what is
-    wrong as a whole, TrajectoryError for what is wrong with one sample.
+    oriented, and is called for nothing else; ``q_units`` are "rad" or "m" for each coordinate, all
+    rad if empty. Raises MechanismError for what is wrong as a whole, TrajectoryError for what is
+    wrong with one sample.
     """
     if isinstance(spec, TipTrajectory):
         return _from_tip_path(spec, q_names, tip_chain)
     if isinstance(spec, FileTrajectory):
-        return _from_file(spec, q_names, q_units, folder)
+        return _from_file(spec, q_names, q_units)
     if isinstance(spec, PointTrajectory):
         return _from_points(spec, q_names)
     return _from_samples(spec, q_names, q_units)
@@ -112,10 +110,8 @@ def _check_dimension(chain: TipChain, path: TipPath) -> None:
         raise MechanismError(WAYPOINTS, f"the tip moves in {d} dimensions: give {d} coordinates")
 
 
-def _from_file(
-    spec: FileTrajectory, q_names: Sequence[str], q_units: Sequence[str], folder: FilePath
-) -> Trajectory:
-    table = read_samples(folder / spec.file, q_names, q_units)
+def _from_file(spec: FileTrajectory, q_names: Sequence[str], q_units: Sequence[str]) -> Trajectory:
+    table = read_samples(Path(spec.file), q_names, q_units)
     for k in _not_later(table.time_s):
         message = f"{table.where(k)}: {_BACKWARDS.format(*table.time_s[k - 1 : k + 1])}"
         raise TrajectoryError("trajectory.file", message, k)

@@ -130,9 +130,9 @@ def test_wrong_samples_are_named(keys, key, sample, message):
     assert getattr(error.value, "sample", None) == sample
 
 
-def test_a_file_is_found_beside_the_case(tmp_path):
+def test_a_file_gives_its_samples(tmp_path):
     (tmp_path / "arm.csv").write_text("time,q2,q1\n0,10,1\n2,11,2\n")
-    trajectory = build_trajectory(FileTrajectory(file="arm.csv"), Q, no_arm, tmp_path)
+    trajectory = build_trajectory(FileTrajectory(file=str(tmp_path / "arm.csv")), Q, no_arm)
     np.testing.assert_array_equal(trajectory.time_s, [0.0, 2.0])
     np.testing.assert_array_equal(trajectory.q, [[1.0, 10.0], [2.0, 11.0]])
     assert trajectory.tip is None
@@ -141,13 +141,13 @@ def test_a_file_is_found_beside_the_case(tmp_path):
 def test_time_that_stands_still_in_a_file_is_named_by_line(tmp_path):
     (tmp_path / "arm.csv").write_text("time,q1,q2\n0,0,0\n\n2,0,0\n2,0,0\n")
     with pytest.raises(TrajectoryError, match=r"arm\.csv:5: .* from 2 s to 2 s") as error:
-        build_trajectory(FileTrajectory(file="arm.csv"), Q, no_arm, tmp_path)
+        build_trajectory(FileTrajectory(file=str(tmp_path / "arm.csv")), Q, no_arm)
     assert (error.value.sample, error.value.path) == (2, "trajectory.file")
 
 
 def test_notes_of_a_file_are_those_of_its_columns_and_its_jumps(tmp_path):
     (tmp_path / "arm.csv").write_text("time,q1 [deg],q2,force\n0,179,0,7\n2,-179,0,7\n")
-    notes = build_trajectory(FileTrajectory(file="arm.csv"), Q, no_arm, tmp_path).notes
+    notes = build_trajectory(FileTrajectory(file=str(tmp_path / "arm.csv")), Q, no_arm).notes
     assert "force" in notes[0]
     assert "q1 jumps by 6.25 rad" in notes[1]
 
