@@ -4,10 +4,11 @@ In reading order, each importing only from those above it:
 
     suggestions  wording of error messages: what was found, what was probably meant
     reader       bytes → plain data (a tree) with the line and column of every key
-    units        quantities with units, dimension-checked, and the base of all models
+    units        quantities with units, dimension-checked → SI
     schema       what each key may hold: one pydantic model for each part of a case file
     rules        what keys must have in common, over the plain data; what looks like a slip
-    case_file    the validated case, its canonical YAML text and its hash
+    canonical    content of a case → canonical YAML text that reads back equal
+    case_file    the validated case as the rest of the program sees it
     loading      path → CaseFile, or all problems of the file at once
 """
 

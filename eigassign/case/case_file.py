@@ -1,7 +1,4 @@
-"""The case file as the rest of the program sees it: frozen, SI-valued, aware of its lines.
-
-A case's content → canonical YAML 1.2 text that reads back equal.
-"""
+"""The case file as the rest of the program sees it: frozen, SI-valued, aware of its lines."""
 
 from __future__ import annotations
 
@@ -9,20 +6,17 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from eigassign.case.reader import KeyPath, Mark, dotted, resolve
-from eigassign.case.schema.document import Document, json_schema
-from eigassign.case.schema.joints import JointBase, freedom_of
-from eigassign.case.schema.mechanism import Coordinate, Mechanism, Spring
-from eigassign.case.schema.parts import Part, keys_of
+from eigassign.case.canonical import to_yaml
+from eigassign.case.reader import KeyPath, Mark, dotted
+from eigassign.case.schema.document import Document
+from eigassign.case.schema.joints import freedom_of
+from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.schema.study import Design, Expansion, Target, Validation
-from eigassign.case.schema.trajectory import Timed, Trajectory, named_trajectories
+from eigassign.case.schema.trajectory import Trajectory, named_trajectories
 from eigassign.errors import Problem
 
-# --- The case file as the rest of the program sees it: frozen, SI-valued, aware of its lines
-
-_STEP = re.compile(r"\[(\d+)\]|([^.\[\]]+)")
+_STEP = re.compile(r"\[(\d+)\]|([^.\[\]]+)")  # of a key path: targets[0].mode
 
 
 @dataclass(frozen=True)
@@ -54,7 +48,7 @@ class CaseFile:
 
         ``key_path`` may start below `mechanism`, as the paths of design parameters do.
         """
-        path = undotted(key_path)
+        path: KeyPath = tuple(int(i) if i else name for i, name in _STEP.findall(key_path))
         mechanism = self.marks.find(("mechanism",))
         if mechanism.find(path[:1]) is not mechanism:
             path = ("mechanism", *path)  # paths of properties start below `mechanism`
@@ -76,104 +70,4 @@ class CaseFile:
 
     def resolved(self) -> str:
         """The case as canonical YAML: SI values, defaults filled in; reads back equal."""
-
-        names = Document.model_fields
-        return to_yaml({name: getattr(self, name) for name in names})
-
-    @staticmethod
-    def json_schema() -> dict[str, Any]:
-        """JSON Schema (2020-12) of case files, for editors and documentation."""
-        return json_schema()
-
-
-def undotted(text: str) -> KeyPath:
-    """``"targets[0].mode"`` → ``("targets", 0, "mode")``."""
-    return tuple(int(i) if i else name for i, name in _STEP.findall(text))
-
-
-# --- A case's content → canonical YAML 1.2 text that reads back equal
-
-_PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
-_WIDTH = 90
-
-
-def to_yaml(content: Mapping[str, object]) -> str:
-    """Block style for what is long, flow style for what fits on a line; None is left out."""
-    return "".join(_entry(key, plain(value), 0) for key, value in content.items())
-
-
-def plain(value: object) -> object:
-    """Objects → mappings, lists, numbers and text, in the shape of the file."""
-    if isinstance(value, Design):
-        apart = {"constraints": value.constraints} if value.constraints else {}
-        return plain({**value.parameters, **apart})
-    if isinstance(value, Part):
-        names = zip(keys_of(type(value)), type(value).model_fields, strict=True)
-        fields = {key: getattr(value, name) for key, name in names}
-        return plain({key: v for key, v in fields.items() if key not in _superfluous(value)})
-    if isinstance(value, Mapping):
-        return {key: plain(inner) for key, inner in value.items() if inner is not None}
-    if isinstance(value, (tuple, list)):
-        return [plain(inner) for inner in value]
-    return value
-
-
-def _superfluous(value: Part) -> set[str]:
-    """Keys that say nothing: zero offsets from a link's node, the other space's turn, a share of
-    time for a timing law that has none."""
-    if isinstance(value, (JointBase, Spring)) and value.orientation is not None:
-        keys = {"angle"}
-    else:
-        keys = set()
-    if isinstance(value, JointBase) and value.base != "ground" and not any(value.position or ()):
-        keys.add("position")
-    if isinstance(value, Timed) and value.timing != "trapezoidal":
-        keys.add("acceleration_share")
-    return keys
-
-
-def _entry(key: str, value: object, depth: int) -> str:
-    """One ``key: value`` of a block mapping."""
-    pad = "  " * depth
-    flow = _flow(value)
-    fits = len(pad) + len(key) + 2 + len(flow) <= _WIDTH
-    if value is None or value in ({}, []):
-        return f"{pad}{_word(key)}: {flow}\n" if value is not None else ""
-    if isinstance(value, dict) and not (fits and depth):
-        inner = "".join(_entry(k, v, depth + 1) for k, v in value.items())
-        return f"{pad}{_word(key)}:\n{inner}"
-    if isinstance(value, list) and not fits:
-        return f"{pad}{_word(key)}:\n" + "".join(_item(v, depth + 1) for v in value)
-    return f"{pad}{_word(key)}: {flow}\n"
-
-
-def _item(value: object, depth: int) -> str:
-    """One entry of a block list; of a long mapping the first key stands beside the dash."""
-    pad, flow = "  " * depth, _flow(value)
-    if not isinstance(value, dict) or len(pad) + 2 + len(flow) <= _WIDTH:
-        return f"{pad}- {flow}\n"
-    inner = "".join(_entry(k, v, depth + 1) for k, v in value.items())
-    return f"{pad}- {inner.removeprefix(pad + '  ')}"
-
-
-def _flow(value: object) -> str:
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{_word(k)}: {_flow(v)}" for k, v in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(_flow(v) for v in value) + "]"
-    return _word(value) if isinstance(value, str) else repr(value)
-
-
-def _word(text: str) -> str:
-    """``text`` as it is where YAML reads it back as text, else in double quotes."""
-    if _PLAIN.fullmatch(text) and resolve(text) == text:
-        return text
-    return '"' + "".join(_escaped(c) for c in text) + '"'
-
-
-def _escaped(c: str) -> str:
-    if c in '"\\':
-        return "\\" + c
-    if c.isprintable():
-        return c
-    return f"\\U{ord(c):08x}"
+        return to_yaml({name: getattr(self, name) for name in Document.model_fields})

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile, load
-from eigassign.case.case_file import plain
+from eigassign.case.canonical import plain
 from eigassign.case.rules.properties import impossible, property_at
 from eigassign.case.schema.parts import Quantity, quantity
 from eigassign.case.units import QuantityError

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from small_case import TEXT, edited
 
 from eigassign.case import load, parse
-from eigassign.case.case_file import to_yaml
+from eigassign.case.canonical import to_yaml
 from eigassign.case.reader import read_yaml
 
 CASES = Path(__file__).parents[2] / "cases"

@@ -17,7 +17,7 @@ from rungs import derivative, residual, slope, treat_as_large
 from spatial_oracle import world
 
 from eigassign.api import Case, expand, load_case, reduce
-from eigassign.case.case_file import plain
+from eigassign.case.canonical import plain
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.exact.solver import eigenvalues
