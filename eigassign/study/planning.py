@@ -239,10 +239,10 @@ def settle_reduction(
     file: CaseFile,
     names: tuple[str, ...],
     build: Callable[[float | None], Model],
-    look: Callable[[Model], Floats],
+    samples: Callable[[Model], Floats],
 ) -> ReductionChoice:
-    """The lowest frequency to which links may be reduced at the poses looked at, if it pays."""
-    return choose_reduction(names, build, look, truncation_share(file), wanted_modes(file))
+    """The lowest frequency to which links may be reduced at ``samples(model)``, if it pays."""
+    return choose_reduction(names, build, samples, truncation_share(file), wanted_modes(file))
 
 
 def require_little_truncation(file: CaseFile, model: Model, x: Floats) -> None:

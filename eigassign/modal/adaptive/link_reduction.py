@@ -1,9 +1,9 @@
-"""To which frequency links are reduced, and whether that pays: judged by the truncation error.
+"""The frequency up to which links keep their fixed-interface modes, and whether reducing pays.
 
-Reduced to their interfaces alone, links give frequencies that are too high; twice the highest that
-matters is the first trial, and it is raised until the bound on the truncation error fits. A model
-with fewer than half of the dofs pays: its dense blocks then cost less than the sparse ones of the
-whole mechanism (benchmarks/craig_bampton.py).
+With no such modes at all the links give frequencies that are too high. The first trial is twice the
+highest frequency that matters in that model; it is raised until the bound on the truncation error
+fits. A model with fewer than half of the dofs pays: its dense blocks then cost less than the sparse
+ones of the whole mechanism (benchmarks/craig_bampton.py).
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from eigassign.modal.model import Model
 
 Floats = NDArray[np.float64]
 STATIC = 1e-6  # Hz: below every fixed-interface mode
-FIRST = 2.0  # of the highest frequency that matters
-STEP = 1.5
-ROUNDS = 16
-PAYS = 0.5  # of the dofs that the whole mechanism has
-SAMPLES = 30  # poses and designs at which it is judged
+FIRST = 2.0  # times the highest frequency that matters
+STEP = 1.5  # from one trial to the next
+MAX_TRIALS = 16  # up to some 900 times the highest frequency that matters
+PAYS = 0.5  # of the dofs of the whole mechanism: a model with more does not pay
+SAMPLES = 30  # poses and designs at which it is judged; each costs an exact solve
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,20 +37,20 @@ class ReductionChoice:
 def choose_reduction(
     names: Sequence[str],
     build: Callable[[float | None], Model],
-    look: Callable[[Model], Floats],
+    samples: Callable[[Model], Floats],
     accuracy: float,
     modes: Sequence[int],
 ) -> ReductionChoice:
-    """The lowest frequency tried that leaves ``accuracy`` at the samples that ``look`` gives.
+    """The lowest frequency tried whose truncation error is ≤ ``accuracy`` at ``samples(model)``.
 
     The links stay whole where the model keeps more than `PAYS` of its dofs.
     """
     whole = build(None)
-    x = few_of(look(whole))
+    x = few_of(samples(whole))
     reasons: list[str] = []
     frequency = FIRST * _highest(build(STATIC), x, max(modes))
     size = 0
-    for _ in range(ROUNDS):
+    for _ in range(MAX_TRIALS):
         model = build(frequency)
         if model.reduced is None or model.n_dof > PAYS * whole.n_dof:
             reasons.append(f"reduced to {frequency:.4g} Hz: {model.n_dof} of {whole.n_dof} dofs")

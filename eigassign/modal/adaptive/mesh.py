@@ -1,7 +1,7 @@
-"""Elements per link: as few as the accuracy needs, judged by what twice as many would change.
+"""Elements per link: as few as the accuracy needs, judged by a mesh twice as fine.
 
-Halving the elements of a link changes a frequency by Δ; with an error that falls at least as h²
-(axial; bending falls as h⁴) what is left is at most 4/3 |Δ| (Richardson).
+Halving the elements changes a frequency by the factor 1 + Δ. With an error that falls at least as
+h² (axial; bending falls as h⁴) at most 4/3 |Δ| of it is left (Richardson).
 """
 
 from __future__ import annotations
@@ -19,14 +19,15 @@ from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.exact.solver import eigenvalues
 
 Floats = NDArray[np.float64]
-START = 2
-MAX_ELEMENTS = 256
-ROUNDS = 8
-POSES = 9  # samples at which meshes are compared
+START = 2  # elements of a link at first
+MAX_ELEMENTS = 256  # of a link; with more round-off, which grows as n⁴, is the larger error
+MAX_MESHES = 8  # tried at most
+POSES = 9  # samples at which meshes are compared; each costs exact solves of every mesh
+RICHARDSON = 4.0 / 3.0
 
 
 class HasPencil(Protocol):
-    """What a mesh is judged on."""
+    """A model of which only the pencil counts."""
 
     @property
     def pencil(self) -> Pencil:
@@ -49,8 +50,8 @@ def mesh_error(
     build: Build, elements: Mapping[str, int], x: Floats, modes: Sequence[int]
 ) -> Floats:
     """Estimated discretisation error (n_samples, n_modes), relative in frequency."""
-    doubled = {name: 2 * n for name, n in elements.items()}
-    return 4.0 / 3.0 * _moved(_frequencies(build, elements, x, modes), build, doubled, x, modes)
+    f = _frequencies(build, elements, x, modes)
+    return RICHARDSON * _change(f, build, _doubled(elements), x, modes)
 
 
 def choose_mesh(
@@ -68,19 +69,19 @@ def choose_mesh(
     now = {name: START if n is None else n for name, n in elements.items()}
     x = _spread(x)
     reasons: list[str] = []
-    for _ in range(ROUNDS):
+    for _ in range(MAX_MESHES):
         f = _frequencies(build, now, x, modes)
-        moved = _moved(f, build, {n: 2 * k for n, k in now.items()}, x, modes)
-        reasons.append(_line(now, moved, modes))
-        if 4.0 / 3.0 * moved.max() <= accuracy:
-            return MeshChoice(dict(now), 4.0 / 3.0 * moved.max(axis=0), tuple(reasons))
+        change = _change(f, build, _doubled(now), x, modes)
+        error = RICHARDSON * change.max(axis=0)
+        reasons.append(_line(now, change, modes))
+        if error.max() <= accuracy:
+            return MeshChoice(dict(now), error, tuple(reasons))
         if not free:
             break
         now = _refined(build, now, free, f, x, modes, accuracy)
         _check_rounding(build, now, x, modes, accuracy)
     raise AccuracyError(
-        f"the mesh leaves {4.0 / 3.0 * moved.max():.1e} where {accuracy:.1e} is asked for: "
-        f"{reasons[-1]}"
+        f"the mesh leaves {error.max():.1e} where {accuracy:.1e} is asked for: {reasons[-1]}"
     )
 
 
@@ -98,10 +99,10 @@ def _refined(
     after = dict(now)
     for name in free:
         alone = {**now, name: 2 * now[name]}
-        effect = 4.0 / 3.0 * float(_moved(f, build, alone, x, modes).max())
-        if effect > share:
-            wished = int(np.ceil(now[name] * (effect / share) ** 0.25))
-            after[name] = min(max(wished, now[name] + 1), MAX_ELEMENTS)
+        error = RICHARDSON * float(_change(f, build, alone, x, modes).max())
+        if error > share:
+            predicted = int(np.ceil(now[name] * (error / share) ** 0.25))
+            after[name] = min(max(predicted, now[name] + 1), MAX_ELEMENTS)
     if after == dict(now):
         after = {name: n + (name in free) for name, n in now.items()}
     return after
@@ -126,9 +127,14 @@ def _frequencies(
     return np.asarray(np.sqrt(eigenvalues(pencil, x, max(modes))[:, pick]) / (2.0 * np.pi))
 
 
-def _moved(
+def _doubled(elements: Mapping[str, int]) -> dict[str, int]:
+    return {name: 2 * n for name, n in elements.items()}
+
+
+def _change(
     f: Floats, build: Build, elements: Mapping[str, int], x: Floats, modes: Sequence[int]
 ) -> Floats:
+    """|f / f of ``elements`` − 1|, (n_samples, n_modes)."""
     finer = _frequencies(build, elements, x, modes)
     return np.asarray(np.abs(f / finer - 1.0))
 
@@ -146,10 +152,10 @@ def _shown(elements: Mapping[str, int]) -> str:
     return ", ".join(f"{name} {n}" for name, n in elements.items())
 
 
-def _line(elements: Mapping[str, int], moved: Floats, modes: Sequence[int]) -> str:
+def _line(elements: Mapping[str, int], change: Floats, modes: Sequence[int]) -> str:
     each = ", ".join(
-        f"mode {mode} moves {change:.2g} %"
-        for mode, change in zip(modes, 100.0 * moved.max(axis=0), strict=True)
+        f"mode {mode} moves {percent:.2g} %"
+        for mode, percent in zip(modes, 100.0 * change.max(axis=0), strict=True)
     )
     counts = set(elements.values())
     twice = f"with {2 * counts.pop()}" if len(counts) == 1 else "with twice as many"
