@@ -1,11 +1,13 @@
-"""Interpolants of a positive function to a stated relative accuracy, from as few values as will do.
+"""Interpolants of a positive function on several axes, to a stated relative accuracy.
 
-With f also f² and f⁻² are interpolated on the same members, and the one whose coefficients fall
-fastest is kept. What is missing is estimated from the coefficients (`series.margin`), and checked
-at points held out. The members wanted next are all those predicted to matter: few rounds, each of
-them one batch of values.
+f, f² and f⁻² are interpolated on the same lower set, and the one with the smallest error is kept.
+Round by round the set grows by the members whose coefficients are predicted to be largest
+(`margin`), each round one batch of values. The error is estimated from the coefficients that are
+missing, and from values at points held out.
 
-Members to add to a lower set, chosen by what their coefficients are predicted to be.
+One axis has its own scheme (`single_axis`). This one would do there too, but it asks for 20 % more
+values over the shipped cases (16 684 beside 13 869 for 1 022 fits of a trajectory), and it gives up
+where values agree at its first nodes, as those of an even function do.
 """
 
 from __future__ import annotations
@@ -38,21 +40,19 @@ from eigassign.interpolation.newton import (
 from eigassign.interpolation.single_axis import adaptive_on_line
 from eigassign.series.multi_index import total_degree
 
-# --- Interpolants of a positive function to a stated relative accuracy, from as few values as w
-
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-STATED = 2.0  # on what is stated of several axes, though no more than the accuracy asked for
-MISSED = 3.0  # how much worse than at the points held out it may be elsewhere
-CHECKED = 12  # members for each further point that is held out
-TRUSTED = 4  # degree from which a rate is believed
-STARTS = (5e-3, 5e-4)  # accuracies below each of which one degree more is started with
-FEW = 12  # nodes below which an axis is taken whole
-GROWTH = 3  # times as many members in one round at most
+STATED = 2.0  # times the estimate is what is stated, though no more than the accuracy asked for
+MISSED = 3.0  # times the error at the points held out is what it may be elsewhere
+CHECKED = 12  # members for each further point held out
+TRUSTED = 4  # degree from which a rate of decay is believed
+STARTS = (5e-3, 5e-4)  # accuracies below each of which the first set has one degree more
+FEW = 12  # nodes up to which all of an axis are asked for at once
+GROWTH = 3  # times as many members in one round, at most
 
 
 def interpolate(sample: Callable[[Ints], Floats], run: Asking) -> Interpolant:
-    """What a run ends with that is sent f = ``sample``(members) (n, n_outputs)."""
+    """What a run ends with when it is sent f = ``sample``(members) (n, n_outputs)."""
     wanted = next(run)
     while True:
         try:
@@ -100,9 +100,9 @@ def _on_box(axes: Sequence[Nodes], accuracy: float, most: int) -> Asking:
 
 
 def _start(axes: Sequence[Nodes], accuracy: float) -> Ints:
-    """All members of degree 2, and the axes alone to what the accuracy will surely need.
+    """All members of degree 2, and those on the axes to a degree that the accuracy will need.
 
-    A whole axis of few nodes is taken at once: so few samples show no rate.
+    Of an axis of few nodes all are asked for: so few show no rate of decay.
     """
     tops = tuple(len(each.v) - 1 for each in axes)
     all_ = tuple(each.whole and len(each.v) <= FEW for each in axes)
@@ -141,7 +141,7 @@ def _corners(d: int) -> Ints:
 
 
 class Growing:
-    """Members so far, and the coefficients of every power; ``border`` may be ahead of them."""
+    """Members so far and the coefficients of every power; ``border`` may have more of them."""
 
     def __init__(self, axes: Sequence[Nodes]) -> None:
         """Before any value is known."""
@@ -154,7 +154,7 @@ class Growing:
         self.asked = 0
 
     def take(self, fresh: Ints, values: Floats) -> None:
-        """Further members, with whose ``values`` those held out come; other c stay as they are."""
+        """Add members, whose values are the first of ``values``; known coefficients stay."""
         g = rest = powers_of(values[: len(fresh)])
         if len(self.c):
             rest = g - products(self.tables, fresh, self.members) @ self.c
@@ -165,7 +165,7 @@ class Growing:
         self.asked += len(values)
 
     def best(self) -> Interpolant:
-        """The power with the least error, or nearly; all of ``border`` must be known."""
+        """The power with about the least error; values at all members of ``border`` must be known."""
         sizes = sizes_of(self.c, self.smallest)
         rates = rates_of(self.members, sizes)
         errors = self._rest(sizes, rates)
@@ -212,11 +212,11 @@ def _wanted(border: Border, found: Interpolant, accuracy: float) -> tuple[Ints, 
     return adding.rows, adding.expected
 
 
-# --- Members to add to a lower set, chosen by what their coefficients are predicted to be
+# --- Members to add to a lower set
 
 
 class Adding:
-    """What is added to the members of ``border``, which grows with it, and what might be next."""
+    """Members added to ``border``, which grows with them, and the candidates for the next."""
 
     def __init__(self, border: Border, found: Interpolant) -> None:
         self.border, self.rates, self.sizes = border, found.rates[None], found.sizes
@@ -226,7 +226,7 @@ class Adding:
         self._fresh = list(border.next)  # of unknown size as yet
 
     def take(self, keys: Sequence[int]) -> None:
-        """Add some of what is next, predecessors first."""
+        """Add some of the candidates, predecessors first."""
         taken = [self.next.pop(key) for key in keys]
         self.keys.extend(keys)
         self.expected += sum(taken)
@@ -234,7 +234,7 @@ class Adding:
         self._fresh += self.border.grow(keys)
 
     def ranked(self) -> list[int]:
-        """What is next, the largest first."""
+        """The candidates by predicted size, the largest first."""
         self._predict()
         return sorted(self.next, key=lambda key: (-self.next[key], key))
 

@@ -1,8 +1,8 @@
-"""Interpolants of a positive function from a given number of values, with what they leave as error.
+"""Interpolants of a positive function from a given number of values, with an error estimate.
 
-On a single axis all values are asked for at once. On more, first the axes alone to degree 2; then,
-in a few batches, the members that are predicted to matter most, and with the last some points that
-are held out for a check.
+On a single axis all values are asked for at once. On several, first come members on the axes to
+degree 2; then, in a few batches, those whose coefficients are predicted to be largest, and with the
+last batch some points that are held out as a check.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from eigassign.interpolation.newton import Asking, Interpolant, Nodes, cross, fr
 from eigassign.interpolation.single_axis import given_on_line
 
 Ints = NDArray[np.intp]
-LOOK = 2  # degree on each axis that is looked at first
-CHECKS, CHECKED = 2, 25  # values held out on several axes, and for how many there is one more
+FIRST = 2  # degree on each axis in the first batch
+CHECKS, CHECKED = 2, 25  # values held out on several axes, and one more for so many values
 GROWTH = 4.5  # times as many members after a batch as before, at most
-DOUBT = 2.0  # on what the coefficients show on several axes
-WORTHLESS = 0.5  # an estimate that is no estimate
+DOUBT = 2.0  # times the error that the coefficients show is the estimate on several axes
+WORTHLESS = 0.5  # estimate from which the interpolant is refused
 
 
 def given(axes: Sequence[Nodes], count: int) -> Asking:
@@ -45,14 +45,14 @@ def given(axes: Sequence[Nodes], count: int) -> Asking:
 
 
 def fewest(d: int) -> int:
-    """Values on ``d`` axes that tell an error."""
-    return 1 + LOOK if d == 1 else 1 + LOOK * d + CHECKS
+    """Values on ``d`` axes that an error estimate needs at least."""
+    return 1 + FIRST if d == 1 else 1 + FIRST * d + CHECKS
 
 
 def _on_box(axes: Sequence[Nodes], count: int) -> Asking:
     state = Growing(axes)
     count = min(count, int(np.prod(np.array(state.border.tops) + 1.0)))
-    fresh, expected = _looks(state.border.tops), np.inf
+    fresh, expected = _on_axes(state.border.tops), np.inf
     state.border.grow(keys(fresh).tolist())
     for target in _targets(len(fresh), count - CHECKS - count // CHECKED):
         state.take(fresh, (yield fresh))
@@ -68,14 +68,14 @@ def _on_box(axes: Sequence[Nodes], count: int) -> Asking:
 
 
 @lru_cache(maxsize=64)
-def _looks(tops: tuple[int, ...]) -> Ints:
-    """The axes alone."""
-    lines = cross(len(tops), LOOK)
+def _on_axes(tops: tuple[int, ...]) -> Ints:
+    """Members on the axes to degree `FIRST`."""
+    lines = cross(len(tops), FIRST)
     return frozen(lines[(lines <= tops).all(axis=1)])
 
 
 def _targets(start: int, members: int) -> list[int]:
-    """How many members there are to be after each batch but the first of ``start``."""
+    """Numbers of members after each batch but the first, which has ``start``."""
     ratio = max(members / start, 1.0)
     batches = ceil(log(ratio) / log(GROWTH))
     return [round(start * ratio ** (k / batches)) for k in range(1, batches + 1)]

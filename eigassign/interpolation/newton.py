@@ -6,10 +6,10 @@ candidates, so that the basis functions
     h_k(v) = Π_{i<k} (v − v_i) / (v_k − v_i)
 
 are at most 1 there, and so are their products h_γ(v) = Π_j h_{γ_j}(v_j). The interpolant on a lower
-set is Σ_γ c_γ h_γ, and c_γ is what the interpolant on the members below γ was wrong by at the
-node of γ: an error at a point not seen before. Adding members changes no coefficient.
+set is Σ_γ c_γ h_γ, and c_γ is the error of the interpolant on the members below γ at the node of γ,
+a point not used before. Adding members changes no coefficient.
 
-An interpolant of a positive function in Newton's basis: of f, f² or f⁻², and its error.
+A positive function f is interpolated as f, f² or f⁻², whichever has the smallest estimated error.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from eigassign.errors import AccuracyError
 from eigassign.series.multi_index import LowerSet, lower_set
 from eigassign.series.power_series import Monomials, Polynomials
 
-# --- Newton's interpolation on lower sets of multi-indices, at Leja points: every value is a ch
-
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+# --- Nodes and basis
+
 CANDIDATES = 129  # of an interval, as dense at its ends as Chebyshev points
 
 
@@ -49,7 +49,7 @@ def roots(count: int) -> Floats:
 
 
 def generic(count: int) -> Floats:
-    """Places all over [−1, 1] that no symmetry and no period has in common: multiples of √5."""
+    """Places all over [−1, 1], without symmetry or period: multiples of the golden ratio mod 1."""
     return np.asarray(2.0 * (np.arange(1, count + 1) * 0.5 * (np.sqrt(5.0) - 1.0) % 1.0) - 1.0)
 
 
@@ -185,7 +185,7 @@ def spread_steps(d: int) -> Floats:
 
 
 def frozen(members: Ints) -> Ints:
-    """Members that all may share who ask for them again."""
+    """Members read-only, as caches return them."""
     members.setflags(write=False)
     return members
 
@@ -202,12 +202,12 @@ def cross(d: int, degree: int) -> Ints:
     return ordered(lines.reshape(-1, d))
 
 
-# --- An interpolant of a positive function in Newton's basis: of f, f² or f⁻², and its error
+# --- Interpolants of f, f² or f⁻² with their error
 
 POWERS = (1.0, 2.0, -2.0)  # of f that are tried, the quickest to evaluate first
-SAFETY = 4.0  # on the predicted rest
-NEAR = 2.0  # how much better another power must be than one that is quicker to evaluate
-ROUNDS = 12  # to an accuracy, at most
+SAFETY = 4.0  # times the predicted sum of missing coefficients
+NEAR = 2.0  # factor by which another power must be better than one that is quicker to evaluate
+ROUNDS = 12  # of values, at most, to an accuracy
 
 
 class Interpolant(NamedTuple):
@@ -261,7 +261,7 @@ def tail(rate: float) -> float:
 
 
 def refuse(reached: tuple[int, float], accuracy: float, count: int, most: int) -> NoReturn:
-    """Raise AccuracyError: ``reached`` is how many values leave how large an error."""
+    """Raise AccuracyError: ``reached`` is a number of values and the error that they leave."""
     done = f"{reached[0]} values leave an estimated error of {reached[1]:.1e}, not {accuracy:.1e}"
     why = f"over {most} are not allowed" if count > most else "more do not help"
     raise AccuracyError(f"{done}, and {why}")
