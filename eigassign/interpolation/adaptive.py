@@ -165,7 +165,7 @@ class Growing:
         self.asked += len(values)
 
     def best(self) -> Interpolant:
-        """The power with about the least error; values at all members of ``border`` must be known."""
+        """The power with about the least error; values at all of ``border`` must be known."""
         sizes = sizes_of(self.c, self.smallest)
         rates = rates_of(self.members, sizes)
         errors = self._rest(sizes, rates)

@@ -5,9 +5,9 @@ those of the basis: the coefficients of f, f² and f⁻² at the first n nodes a
 
     c = (T⁻¹)_nn [f, f², f⁻²] ,
 
-with T⁻¹ made once for the nodes. Every value was a check of the interpolant before it, but values
-at nodes that lie symmetrically can agree where nothing is constant: to an accuracy one more point,
-at an irrational place, is held out with each round. The first coefficient missing is about
+with T⁻¹ made once for the nodes. Every value is a check of the interpolant before it, but values at
+symmetric nodes can agree though f is not constant: where an accuracy is asked for, one more point,
+at an irrational place, is held out in each round. The first coefficient missing is about
 
     |c_N| ≈ max_k |c_{N−k}| r^k ,
 
@@ -40,14 +40,14 @@ from eigassign.interpolation.newton import (
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-TRUSTED = 6  # degree from which the rate is believed
-LAST = 4  # coefficients looked at
-FIRST = 3  # degree started with: one too many costs less than a round more
-STARTS = (5e-3, 5e-3, 5e-3, 5e-6, 5e-7, 5e-8)  # accuracies: one degree more below each
-FEW = 12  # nodes below which all are taken at once: so few samples show no rate
-STEPS = 4  # further members in one round at most
-MISSED = 3.0  # how much worse than at the points held out it may be elsewhere
-LEAST_SHARE = 0.2  # of the largest Π |v − v_i|, that a point held out is believed to have
+TRUSTED = 6  # degree from which the rate of decay is believed
+LAST = 4  # coefficients from which the next is predicted
+FIRST = 3  # degree at first: one too many costs less than a round more
+STARTS = (5e-3, 5e-3, 5e-3, 5e-6, 5e-7, 5e-8)  # accuracies below each of which it is one more
+FEW = 12  # nodes up to which all are asked for at once: so few show no rate
+STEPS = 4  # further members in one round, at most
+MISSED = 3.0  # times the error at the points held out is what it may be elsewhere
+LEAST_SHARE = 0.2  # of the largest Π |v − v_i| that a point held out has, at least
 
 
 def given_on_line(nodes: Nodes, count: int) -> Asking:
@@ -64,13 +64,13 @@ def adaptive_on_line(nodes: Nodes, accuracy: float, most: int) -> Asking:
     """
     have, n, expected = 0, _start(nodes, accuracy), np.inf
     rounds: list[tuple[int, float]] = []
-    values, apart = np.empty((0, 0)), Apart(nodes)
+    values, apart = np.empty((0, 0)), HeldOut(nodes)
     while True:
-        wanted = apart.with_one(have, n)
+        wanted = apart.members_and_check(have, n)
         asked = n + len(apart.rows)
         if asked > most:
             refuse(rounds[-1] if rounds else (0, np.inf), accuracy, asked, most)
-        fresh = apart.without((yield wanted), n - have)
+        fresh = apart.values_of_members((yield wanted), n - have)
         values = np.concatenate([values, fresh]) if have else fresh
         found = on_line(nodes, powers_of(values))
         surprise = max(1.0, sum(found.sizes[have:].tolist()) / (expected or np.inf))
@@ -83,8 +83,8 @@ def adaptive_on_line(nodes: Nodes, accuracy: float, most: int) -> Asking:
             refuse(rounds[-1], accuracy, asked, most)
 
 
-class Apart:
-    """Points held out, one more with each round: rows of ``nodes.table``, and values there."""
+class HeldOut:
+    """Points held out, one more in each round: rows of ``nodes.table``, and values there."""
 
     def __init__(self, nodes: Nodes) -> None:
         """Before any is chosen."""
@@ -92,7 +92,7 @@ class Apart:
         self.rows: list[int] = []
         self.values: list[Floats] = []
 
-    def with_one(self, have: int, n: int) -> Ints:
+    def members_and_check(self, have: int, n: int) -> Ints:
         """Members ``have`` … n − 1 and the point held out with them, none if nothing is missing."""
         row = None if self.nodes.whole and n == len(self.nodes.v) else farthest(self.nodes, n)
         if row is None or row in self.rows:
@@ -100,7 +100,7 @@ class Apart:
         self.rows.append(row)
         return _with(have, n, row)
 
-    def without(self, values: Floats, fresh: int) -> Floats:
+    def values_of_members(self, values: Floats, fresh: int) -> Floats:
         """Those of the members; that of the point held out is kept."""
         self.values.extend(values[fresh:])
         return values[:fresh]

@@ -25,7 +25,7 @@ from eigassign.interpolation.given import fewest, given
 from eigassign.interpolation.newton import Asking, Interpolant, newton_polynomials
 from eigassign.modal.arguments import whole_within
 from eigassign.modal.fit.path import Path, Stretch, stretches
-from eigassign.modal.fit.region import Box, Region, build_region, followed
+from eigassign.modal.fit.region import Box, Region, build_region, require_path_followed
 from eigassign.modal.fit.source import (
     SHARE,
     cause,
@@ -243,7 +243,7 @@ def fit(
     """
     if solves is not None and accuracy is not None:
         raise UsageError("a fit has an accuracy or a number of solves, not both")
-    _meant(accuracy, most)
+    _check_numbers(accuracy, most)
     directions, n_q = dependence(source)
     path = None if isinstance(q, Box) else stretches(q, directions, n_q)
     parts: tuple[Any, ...] = (q,) if path is None else path.parts
@@ -254,7 +254,7 @@ def fit(
     else:
         count = whole_within(solves, "solves", 1, MOST)
         regions, floors, runs = _by_solves(source, path, parts, y, wanted, count)
-    found, seen = _driven(source, wanted, regions, runs)
+    found, seen = _run(source, wanted, regions, runs)
     if not isinstance(source, Model):
         each_ = zip(floors, seen, strict=True)
         floors = [max(floor, known_error(source, x, wanted, accuracy)) for floor, x in each_]
@@ -280,7 +280,10 @@ def _to_accuracy(
     regions = [build_region(directions, n_q, part, y, rests=rests) for part in parts]
     floors = [floor_of(source, region, modes, accuracy) for region in regions]
     pairs = zip(regions, floors, strict=True)
-    runs = [adaptive(region.nodes, _left(source, accuracy, floor), most) for region, floor in pairs]
+    runs = [
+        adaptive(region.nodes, _polynomial_share(source, accuracy, floor), most)
+        for region, floor in pairs
+    ]
     return regions, floors, runs
 
 
@@ -299,7 +302,7 @@ def _by_solves(
         d = max(build_region(directions, n_q, each, y, rests=True).d for each in parts)
         counts = path.shares(count, fewest(d))
     regions, floors = _best_nodes(source, parts, y, modes, counts)
-    followed(regions)
+    require_path_followed(regions)
     pairs = zip(regions, counts, strict=True)
     return regions, floors, [given(region.nodes, own) for region, own in pairs]
 
@@ -309,7 +312,7 @@ def _some_move(parts: Sequence[Any]) -> bool:
     return any(isinstance(part, Stretch) and part.line(None) is not None for part in parts)
 
 
-def _meant(accuracy: object, most: object) -> None:
+def _check_numbers(accuracy: object, most: object) -> None:
     """Raise UsageError for an accuracy or a number of solves that cannot be meant."""
     whole_within(most, "most", 1, sys.maxsize)
     if accuracy is None:
@@ -321,7 +324,7 @@ def _meant(accuracy: object, most: object) -> None:
         )
 
 
-def _left(source: Any, accuracy: float, floor: float) -> float:
+def _polynomial_share(source: Any, accuracy: float, floor: float) -> float:
     """What the polynomial may cost; that of another source is only known where it was asked."""
     return accuracy - (floor if isinstance(source, Model) else SHARE * accuracy)
 
@@ -346,7 +349,7 @@ def _best_nodes(
     return regions, [floor_of(source, region, modes, None) for region in nested]
 
 
-def _driven(
+def _run(
     source: Any, modes: tuple[int, ...], regions: Sequence[Region], runs: Sequence[Asking]
 ) -> tuple[list[Interpolant], list[Floats]]:
     """What all runs end with, and the x (n, n_x) that each asked for.

@@ -109,10 +109,10 @@ class Line:
         return basis(self.axis.nodes, self.place)
 
     @cached_property
-    def strays(self) -> float:
-        """By how much of its reach the path itself is missed by its interpolant at all nodes.
+    def missed(self) -> float:
+        """Error of the path's own interpolant at all nodes, as a part of its reach.
 
-        What depends on the path is no better known, whatever few frequencies show.
+        The error of frequencies along it is not smaller, whatever few of them show.
         """
         if self.straight:
             return 0.0

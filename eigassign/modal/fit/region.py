@@ -30,9 +30,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 MOST_NODES = 20  # on an axis of a box
 MOST_AXES = 10
-INSIDE = 1e-9  # by how much |v| may exceed 1
-OFF = 10.0 * STILL  # what is farther lies off the path
-STRAYS = 0.03  # of a path's reach by which its interpolant may miss it
+OUTSIDE = 1e-9  # by how much |v| may exceed 1
+OFF_PATH = 10.0 * STILL  # what is farther lies off the path
+MOST_MISSED = 0.03  # of its reach by which a path may be missed by its interpolant
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class Region:
         v = x @ self.to_v.T + self.offset
         if self.path is not None:
             off = self._project(x[:, : self.n_q], v).max(initial=0.0)
-            if not off <= OFF:
+            if not off <= OFF_PATH:
                 raise UsageError(f"q lies off the path that was fitted, by up to {off:.3g}")
         self._inside(v)
         self._kept(x)
@@ -116,10 +116,10 @@ class Region:
         return samples(q, y, self.n_q, len(self.centre) - self.n_q)
 
     def on_path(self, x: Floats) -> NDArray[np.bool_]:
-        """Which of x (n, n_x) are on the path, and not beyond its ends."""
+        """Which of x (n, n_x) lie on the path between its ends."""
         v = x @ self.to_v.T + self.offset
         off = self._project(x[:, : self.n_q], v)
-        return np.asarray((off <= OFF) & (np.abs(v[:, 0]) <= 1.0 + INSIDE))
+        return np.asarray((off <= OFF_PATH) & (np.abs(v[:, 0]) <= 1.0 + OUTSIDE))
 
     def design(self, y: ArrayLike) -> Floats:
         """v (n_designs, d) of designs y (n_y,) or (n_designs, n_y), on the path's first sample."""
@@ -144,11 +144,11 @@ class Region:
 
     def _inside(self, v: Floats) -> None:
         reach = float(np.abs(v).max())
-        if not reach <= 1.0 + INSIDE:
+        if not reach <= 1.0 + OUTSIDE:
             raise UsageError(f"q or y lies outside the region of the fit: {reach:.6g} half-widths")
 
     def _kept(self, x: Floats) -> None:
-        """Refuse another value of what matters and was not varied."""
+        """Raise UsageError for another value of what matters and was not varied."""
         if len(self.still):
             off = np.abs(x[:, self.still] - self.centre[self.still])
             if not (off <= STILL * (1.0 + np.abs(self.centre[self.still]))).all():
@@ -265,11 +265,11 @@ def _designs(y: ArrayLike, n_y: int) -> Floats:
     return samples([], y, 0, n_y)
 
 
-def followed(regions: Sequence[Region]) -> None:
+def require_path_followed(regions: Sequence[Region]) -> None:
     """Raise AccuracyError where nodes that were given do not even show the path."""
     for region in regions:
-        if region.d == 1 and region.line is not None and region.line.strays > STRAYS:
+        if region.d == 1 and region.line is not None and region.line.missed > MOST_MISSED:
             raise AccuracyError(
                 f"{len(region.axes[0].nodes)} solves do not follow the path: between them it is "
-                f"missed by {region.line.strays:.0%} of its reach; give more"
+                f"missed by {region.line.missed:.0%} of its reach; give more"
             )

@@ -96,18 +96,18 @@ def floor_of(source: Any, region: Region, modes: tuple[int, ...], accuracy: floa
         floor = rounding_error(source.pencil, region.centre, modes[-1])
     else:
         return known_error(source, region.x(_ends(region)), modes, accuracy)
-    return _borne("round-off", floor, accuracy)
+    return _affordable("round-off", floor, accuracy)
 
 
 def known_error(source: Any, x: Floats, modes: tuple[int, ...], accuracy: float | None) -> float:
-    """The largest of the source's own error estimates at x (n, n_x); see `_borne`."""
+    """The largest of the source's own error estimates at x (n, n_x); see `_affordable`."""
     n_q = dependence(source)[1]
     columns = [source.modes.index(m) for m in modes]
     estimates = source.error_estimate(x[:, :n_q], x[:, n_q:])[:, columns]
-    return _borne("the source itself", float(estimates.max()), accuracy)
+    return _affordable("the source itself", float(estimates.max()), accuracy)
 
 
-def _borne(what: str, error: float, accuracy: float | None) -> float:
+def _affordable(what: str, error: float, accuracy: float | None) -> float:
     """The error, unless it is unknown or leaves nothing of an accuracy: then AccuracyError."""
     if not error < np.inf:
         raise AccuracyError(f"{what} may cost any amount: it vouches for no number in the region")
