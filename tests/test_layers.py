@@ -36,11 +36,6 @@ PRIVATE_PENDING = {
     "test_tracking.py",
     "test_cache.py",
     "test_run_folder.py",
-    "test_charting.py",
-    "test_chart_mesh.py",
-    "test_chart_methods.py",
-    "test_chart_question.py",
-    "test_chart_timing.py",
     "test_mode_studies.py",
 }
 MODULES = sorted(ROOT.rglob("*.py"))
