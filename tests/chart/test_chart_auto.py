@@ -72,25 +72,6 @@ def test_a_choice_that_took_long_is_the_last(arm: Scene) -> None:
     assert note.startswith("what auto takes is not charted from 1e-03 on")
 
 
-@pytest.mark.parametrize("name", ["five_bar", "arm_3r"])
-def test_it_holds_all_over_the_box_of_several_parameters(name: str) -> None:
-    """Also where some parameters are at their upper bounds and others at their lower ones."""
-    case = load_case(CASES / f"{name}.yaml")
-    scene = prepare(case, Stages(lambda line: None), None)
-    (taken,), _ = auto_orders(scene, [1e-4], 1e9)
-    assert taken.choice is not None
-    run = replace(case.file, expansion=case.file.expansion.model_copy(
-        update={"order": "auto", "accuracy": 1e-4}))  # fmt: skip
-    made = prepare(replace(case, file=run), Stages(lambda line: None), None).expansions
-    low, high = scene.bounds
-    y = np.random.default_rng(3).uniform(low, high, (60, len(low)))
-    y = np.vstack([y, np.where(corners(len(low)), high, low)])
-    q = np.repeat(scene.path.q, len(y), axis=0)
-    y = np.tile(y, (len(scene.path.q), 1))
-    exact = scene.model.frequencies(q, y, max(made.modes))[:, np.array(made.modes) - 1]
-    assert np.abs(made.taylor_hz(q, y) / exact - 1.0).max() <= 1e-4
-
-
 def test_choices_at_several_points_are_charted_as_they_are_evaluated(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -109,14 +90,3 @@ def test_choices_at_several_points_are_charted_as_they_are_evaluated(
     (_, _, point), _ = chart_methods(bench, [*exact, method], 0.0, lambda line: None)
     assert point.everywhere.worst_relative <= 1e-8
     assert point.parameters["q0"].shape == (1 + len(taken[0].choice.more_q), 2)
-
-
-@pytest.mark.parametrize("n", [0, 1, 2, 4, 5, 9, 15])
-def test_corners_show_every_two_parameters_in_all_four_combinations(n: int) -> None:
-    at = corners(n)
-    assert at.shape == (2**n if n <= 4 else 17, n)
-    for i in range(n):
-        for j in range(i):
-            assert len(np.unique(at[:, [i, j]], axis=0)) == 4
-    assert at.all(axis=1).any()
-    assert (~at).all(axis=1).any()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,10 @@ import pytest
 from eigassign.api import load_case
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.build import with_elements
-from eigassign.pipeline.run import solve_case
+from eigassign.pipeline.run import prepare, solve_case
+from eigassign.pipeline.stages import Stages
 from eigassign.study.build import build_model
+from eigassign.study.planning import corners
 
 CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 
@@ -73,3 +76,20 @@ def test_an_accuracy_out_of_reach_is_refused_with_the_reason(tmp_path: Path) -> 
     case = load_case(automatic(tmp_path, "1e-14"))
     with pytest.raises(AccuracyError, match="elements"):
         case.model()
+
+
+@pytest.mark.parametrize("name", ["five_bar", "arm_3r"])
+def test_an_order_left_to_auto_holds_all_over_the_box_of_several_parameters(name: str) -> None:
+    """Also where some parameters are at their upper bounds and others at their lower ones."""
+    case = load_case(CASE.parent / f"{name}.yaml")
+    run = replace(case.file, expansion=case.file.expansion.model_copy(
+        update={"order": "auto", "accuracy": 1e-4}))  # fmt: skip
+    scene = prepare(replace(case, file=run), Stages(lambda line: None), None)
+    made = scene.expansions
+    low, high = scene.bounds
+    y = np.random.default_rng(3).uniform(low, high, (60, len(low)))
+    y = np.vstack([y, np.where(corners(len(low)), high, low)])
+    q = np.repeat(scene.path.q, len(y), axis=0)
+    y = np.tile(y, (len(scene.path.q), 1))
+    exact = scene.model.frequencies(q, y, max(made.modes))[:, np.array(made.modes) - 1]
+    assert np.abs(made.taylor_hz(q, y) / exact - 1.0).max() <= 1e-4
