@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from chart_scenes import TINY
 from scenes import SHIPPED, scene_of
 
-from eigassign.api import load_case
 from eigassign.chart.comparison import Bench, Comparison, chart_methods, exact_frequencies
 from eigassign.chart.front import beside_auto
 from eigassign.chart.methods import auto_methods, auto_orders, exact_methods
 from eigassign.chart.question import build_features, build_points
 from eigassign.chart.results import Advice
 from eigassign.modal.adaptive import order as expansion_choice
-from eigassign.pipeline.run import prepare
-from eigassign.pipeline.stages import Stages
-from eigassign.study.planning import corners
 from eigassign.study.scene import Scene
 
 CASES = Path(__file__).parents[2] / "cases"

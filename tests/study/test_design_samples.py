@@ -61,3 +61,14 @@ def test_rows_of_another_keep_their_samples(scene: Scene, tmp_path: Path) -> Non
     both = one.joined(two)
     np.testing.assert_array_equal(both.x, np.vstack([one.x, two.x]))
     assert both.place(len(both.x) - 1) == two.place(9)
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 4, 5, 9, 15])
+def test_corners_show_every_two_parameters_in_all_four_combinations(n: int) -> None:
+    at = corners(n)
+    assert at.shape == (2**n if n <= 4 else 17, n)
+    for i in range(n):
+        for j in range(i):
+            assert len(np.unique(at[:, [i, j]], axis=0)) == 4
+    assert at.all(axis=1).any()
+    assert (~at).all(axis=1).any()
