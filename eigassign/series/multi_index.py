@@ -83,22 +83,6 @@ class LowerSet:
         return self.find(np.eye(self.n_variables, dtype=np.int64))
 
     @cached_property
-    def variable_of(self) -> Ints:
-        """For every member the variable i where it is e_i, else -1."""
-        found = np.full(len(self), -1, dtype=np.intp)
-        present = np.flatnonzero(self.units >= 0)
-        found[self.units[present]] = present
-        return found
-
-    @cached_property
-    def powers(self) -> Ints:
-        """Positions (n, p + 1) of the k-fold e_i, -1 where the set leaves one out."""
-        exponents = np.arange(self.order + 1)[:, None, None] * np.eye(
-            self.n_variables, dtype=np.int64
-        )
-        return self.find(exponents.reshape(-1, self.n_variables)).reshape(self.order + 1, -1).T
-
-    @cached_property
     def by_degree(self) -> tuple[DegreePairs, ...]:
         """All pairs with left ≠ 0, degree by degree of their target."""
         table, starts = self.table, self.degree_starts
