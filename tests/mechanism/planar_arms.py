@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from eigassign.mechanism.inverse_kinematics.chain import Look, TipChain
+from eigassign.mechanism.inverse_kinematics.chain import TipChain, TipEvaluation
 
 NAMES = ("shoulder", "elbow", "wrist", "j4", "j5", "j6")
 
@@ -14,7 +14,7 @@ def serial_arm(*lengths: float, absolute: bool = True, oriented: bool = False) -
     L, n = np.array(lengths), len(lengths)
     to_absolute = np.eye(n) if absolute else np.tril(np.ones((n, n)))
 
-    def look(q: np.ndarray) -> Look:
+    def evaluate(q: np.ndarray) -> TipEvaluation:
         a = q @ to_absolute.T
         c, s = np.cos(a), np.sin(a)
         J = [(-s * L) @ to_absolute, (c * L) @ to_absolute]
@@ -24,17 +24,17 @@ def serial_arm(*lengths: float, absolute: bool = True, oriented: bool = False) -
             R[:, 0, 0] = R[:, 1, 1] = c[:, -1]
             R[:, 1, 0], R[:, 0, 1], R[:, 2, 2] = s[:, -1], -s[:, -1], 1.0
             J.append(np.broadcast_to(to_absolute[-1], q.shape))
-        return open_look(np.stack([c @ L, s @ L], axis=1), np.stack(J, axis=1), R)
+        return open_chain_tip(np.stack([c @ L, s @ L], axis=1), np.stack(J, axis=1), R)
 
     relative = np.eye(n) - np.eye(n, k=-1) if absolute else np.eye(n)
     turned_by = (2,) if oriented else ()
-    return TipChain(look, NAMES[:n], (relative, np.zeros(n)), ("turn",) * n, turned_by)
+    return TipChain(evaluate, NAMES[:n], (relative, np.zeros(n)), ("turn",) * n, turned_by)
 
 
-def open_look(point: np.ndarray, J: np.ndarray, R: np.ndarray | None = None) -> Look:
+def open_chain_tip(point: np.ndarray, J: np.ndarray, R: np.ndarray | None = None) -> TipEvaluation:
     """What a chain without loops shows."""
     n = len(point)
-    return Look(point, R, J, np.zeros((n, 0)), np.zeros((n, 0, J.shape[2])))
+    return TipEvaluation(point, R, J, np.zeros((n, 0)), np.zeros((n, 0, J.shape[2])))
 
 
 def two_link_angles(points: np.ndarray, l1: float, l2: float, sign: float) -> np.ndarray:

@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 
-class Look(NamedTuple):
+class TipEvaluation(NamedTuple):
     """The tip at n states, and how far the loops are from closed there."""
 
     point: Floats  # (n, d) m
@@ -59,7 +59,7 @@ class TipChain:
     back), "screw" (rad, it does not) or "slide" (m).
     """
 
-    look: Callable[[Floats], Look]  # z (n, n_q + n_p)
+    evaluate: Callable[[Floats], TipEvaluation]  # z (n, n_q + n_p)
     joints: tuple[str, ...]  # of the coordinates, in their order
     relative_map: tuple[Floats, Floats]  # A (n_q, n_q), b (n_q,): joint coordinates A q + b
     kinds: tuple[str, ...]
@@ -78,7 +78,7 @@ class TipChain:
 
 @dataclass(frozen=True)
 class Reduced:
-    """A look with the passive freedoms eliminated: the loops closed to first order, and kept so."""
+    """A tip evaluation with the passive freedoms eliminated: loops closed to first order."""
 
     J: Floats  # (n, m, n_q): task components per u of the coordinates
     drift: Floats  # (n, m): what closing the loops adds
@@ -86,7 +86,7 @@ class Reduced:
     following: Floats  # (n, n_p, n_q): how the passive freedoms follow
 
 
-def reduced(seen: Look, n_q: int) -> Reduced:
+def reduced(seen: TipEvaluation, n_q: int) -> Reduced:
     """Passive freedoms from ∂F/∂p δp = −F and ∂F/∂p ∂p/∂q = −∂F/∂q, least squares if redundant."""
     J = seen.jacobian
     n, m, n_z = J.shape
@@ -137,7 +137,7 @@ def tip_chain(
     points, turns = (2, (2,)) if planar else (3, (0, 1, 2))
     names = tuple(c.joint for c in case.coordinates.values())
     return TipChain(
-        look=_looking(case, free, motion, tip, y, points, turns if oriented else ()),
+        evaluate=_evaluator(case, free, motion, tip, y, points, turns if oriented else ()),
         joints=names,
         relative_map=(motion.relative, motion.offset),
         kinds=_kinds(case, motion.tree),
@@ -166,7 +166,7 @@ def _tip_scalars(case: CaseFile, free: _Unbound, tip: str) -> tuple[Objects, ...
     return place, R, multiply(R, twist[:3]), multiply(R, twist[3:])
 
 
-def _looking(
+def _evaluator(
     case: CaseFile,
     free: _Unbound,
     motion: Kinematics,
@@ -174,8 +174,8 @@ def _looking(
     y: Floats,
     d: int,
     turns: tuple[int, ...],
-) -> Callable[[Floats], Look]:
-    """The chain's look: one table of scalars, evaluated for all states together."""
+) -> Callable[[Floats], TipEvaluation]:
+    """The chain's `evaluate`: one table of scalars, evaluated for all states together."""
     A, b = motion.relative, motion.offset
     place, rotation, velocity, spin = _tip_scalars(case, free, tip)
     J = _per_coordinate(np.concatenate([velocity[:d], spin[list(turns)]]), A)
@@ -187,7 +187,7 @@ def _looking(
     weights, constants = table.weights.toarray(), table.constants[:, None]  # small: dense is quick
     i, j, k, m = np.cumsum([len(part) for part in parts])[:-1].tolist()
 
-    def look(z: Floats) -> Look:
+    def evaluate(z: Floats) -> TipEvaluation:
         n = len(z)
         variables = np.empty((n_z + n_y, n))
         variables[:n_q] = (z[:, :n_q] @ A.T + b).T
@@ -196,9 +196,11 @@ def _looking(
         v = weights @ table.program.run(Samples(), variables) + constants
         R = v[i:j].T.reshape(n, 3, 3) if turns else None
         closure = v[m:].T.reshape(n, len(F), n_z)
-        return Look(v[:i].T, R, v[j:k].T.reshape(n, d + len(turns), n_z), v[k:m].T, closure)
+        return TipEvaluation(
+            v[:i].T, R, v[j:k].T.reshape(n, d + len(turns), n_z), v[k:m].T, closure
+        )
 
-    return look
+    return evaluate
 
 
 def _per_coordinate(rates: Objects, A: Floats) -> Objects:

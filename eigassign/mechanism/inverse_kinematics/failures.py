@@ -20,7 +20,7 @@ def pose(arm: Arm, u: Floats) -> str:
 
 def out_of_reach(arm: Arm, course: Course, k: int, u: Floats) -> TrajectoryError:
     """Sample k cannot be reached; u (n_z,) comes as near as possible to point and turn together."""
-    seen = arm.look(u[None])
+    seen = arm.evaluate(u[None])
     distance, turn = arm.misses(arm.error(seen, course.target(course.s[[k]])))
     near = "(" + ", ".join(f"{x:.6g}" for x in seen.point[0]) + ") m"
     if arm.chain.assembly is not None:

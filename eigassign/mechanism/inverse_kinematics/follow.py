@@ -85,7 +85,7 @@ def follow(
             continue
         q = np.ascontiguousarray((u * arm.scale)[:, : arm.n_q])
         q.setflags(write=False)
-        return Followed(q, arm.look(u).point, _notes(arm, candidates))
+        return Followed(q, arm.evaluate(u).point, _notes(arm, candidates))
     if not failures:
         raise other_assembly(arm, course)
     raise max(failures, key=lambda error: error.sample)
@@ -126,7 +126,7 @@ def _check(arm: Arm, course: Course, u: Floats, target: TipTarget) -> None:
 
 def _off(arm: Arm, u: Floats, target: TipTarget, tolerance: float) -> Bools:
     """Whether tips are off their points or their orientations, (n,)."""
-    distance, turn = arm.misses(arm.error(arm.look(u), target))
+    distance, turn = arm.misses(arm.error(arm.evaluate(u), target))
     return np.asarray((distance > tolerance * arm.lever) | (turn > tolerance))
 
 
@@ -166,7 +166,7 @@ def _blocked(arm: Arm, course: Course, k: int, path: Trace) -> TrajectoryError:
     last = path.u[-1]
     u, miss = levenberg(arm, np.vstack([last, arm.seeds]), course.target(course.s[[k]]), 115)
     best = int(np.argmin(miss))
-    dead = bool(loop_regularity(arm, arm.look(last[None]))[0] < 10.0 * DEAD)
+    dead = bool(loop_regularity(arm, arm.evaluate(last[None]))[0] < 10.0 * DEAD)
     if miss[best] > (_DOUBLE_ROOT if dead else RESIDUAL) * arm.lever:
         return out_of_reach(arm, course, k, u[best])
     return blocked(arm, course, k, float(path.s[-1]), last, dead)
@@ -267,6 +267,6 @@ def assembled(arm: Arm, target: TipTarget, u: Floats) -> Floats | None:
     except SingularityError:
         return None
     own = np.concatenate([q, p]) / arm.scale
-    distance, turn = arm.misses(arm.error(arm.look(own[None]), target))
+    distance, turn = arm.misses(arm.error(arm.evaluate(own[None]), target))
     met = distance[0] <= 10.0 * RESIDUAL * arm.lever and turn[0] <= 10.0 * RESIDUAL
     return own if met else None

@@ -12,7 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eigassign.mechanism.inverse_kinematics.chain import Bools, Floats, Look, Reduced, reduced
+from eigassign.mechanism.inverse_kinematics.chain import (
+    Bools,
+    Floats,
+    Reduced,
+    TipEvaluation,
+    reduced,
+)
 from eigassign.mechanism.inverse_kinematics.state import Arm
 from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipTarget
 
@@ -47,7 +53,7 @@ def levenberg(arm: Arm, u: Floats, target: TipTarget, iterations: int) -> tuple[
 
 def _residual(arm: Arm, u: Floats, target: TipTarget) -> tuple[Floats, Floats]:
     """The error and the open gaps together, and their derivative."""
-    seen = arm.look(u)
+    seen = arm.evaluate(u)
     error = arm.error(seen, target)
     if arm.chain.assembly is None:
         return error, seen.jacobian
@@ -56,13 +62,13 @@ def _residual(arm: Arm, u: Floats, target: TipTarget) -> tuple[Floats, Floats]:
 
 def newton(
     arm: Arm, u: Floats, target: TipTarget, tolerance: float
-) -> tuple[Floats, Look, Reduced, Bools]:
+) -> tuple[Floats, TipEvaluation, Reduced, Bools]:
     """Newton for tip(u) = target with closed loops; returns u, what is seen there, who settled.
 
     A chain that cannot fill the space (rank < m) settles, more slowly, on the nearest point.
     """
     for _ in range(8 if arm.rank == target.point.shape[1] + len(arm.chain.turned_by) else 40):
-        seen = arm.look(u)
+        seen = arm.evaluate(u)
         motion = reduced(seen, arm.n_q)
         error = arm.error(seen, target) - motion.drift
         settled = _settled(arm, error, motion, tolerance)
@@ -105,7 +111,7 @@ def least_norm(J: Floats, error: Floats, rank: int) -> Floats:
     return np.asarray(step[:, :, 0])
 
 
-def handedness(arm: Arm, seen: Look, motion: Reduced) -> Floats:
+def handedness(arm: Arm, seen: TipEvaluation, motion: Reduced) -> Floats:
     """The signs of det J and det ∂F/∂p, (n, 2): they flip where the solution changes branch.
 
     0 for what is not square.
@@ -125,7 +131,7 @@ def regularity(arm: Arm, motion: Reduced) -> Floats:
     return np.asarray(np.linalg.svd(motion.J, compute_uv=False)[:, arm.rank - 1] / arm.lever)
 
 
-def loop_regularity(arm: Arm, seen: Look) -> Floats:
+def loop_regularity(arm: Arm, seen: TipEvaluation) -> Floats:
     """Smallest over largest singular value of ∂F/∂p (n,): 0 at a dead point; 1 without loops."""
     F_p = seen.closure[:, :, arm.n_q :]
     if not F_p.shape[2]:
@@ -170,7 +176,7 @@ def trace(arm: Arm, course: Course, u0: Floats, turn: float) -> Trace:
     It steps onto every corner of the path, lest it cuts one that is out of reach.
     """
     stops = np.append(course.corners(), course.s[-1])
-    seen = arm.look(u0[None])
+    seen = arm.evaluate(u0[None])
     motion = reduced(seen, arm.n_q)
     sense = handedness(arm, seen, motion)[0]
     here = _pose(arm, course, float(course.s[0]), u0[None], motion)
@@ -202,12 +208,12 @@ def _step(
     return _pose(arm, course, s, u, motion)
 
 
-def crossed(arm: Arm, seen: Look, motion: Reduced, sense: Floats) -> Floats:
+def crossed(arm: Arm, seen: TipEvaluation, motion: Reduced, sense: Floats) -> Floats:
     """Whether a branch other than that of ``sense`` has been met, (n,)."""
     return np.asarray((handedness(arm, seen, motion) * sense < 0.0).any(axis=1))
 
 
-def _singular(arm: Arm, seen: Look, motion: Reduced) -> bool:
+def _singular(arm: Arm, seen: TipEvaluation, motion: Reduced) -> bool:
     stretched = regularity(arm, motion)[0] < _SINGULAR
     return bool(stretched or loop_regularity(arm, seen)[0] < DEAD)
 

@@ -18,7 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from eigassign.errors import MechanismError, SingularityError
-from eigassign.mechanism.inverse_kinematics.chain import Bools, Floats, Look, TipChain, reduced
+from eigassign.mechanism.inverse_kinematics.chain import (
+    Bools,
+    Floats,
+    TipChain,
+    TipEvaluation,
+    reduced,
+)
 from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipTarget
 from eigassign.mechanism.kinematics.loop_closure import kronecker
 
@@ -47,11 +53,11 @@ class Arm:
         """How many coordinates there are."""
         return self.chain.n_q
 
-    def look(self, u: Floats) -> Look:
+    def evaluate(self, u: Floats) -> TipEvaluation:
         """The chain's look with both measures made one."""
         return _measured(self.chain, u, self.scale, self.lever)
 
-    def error(self, seen: Look, target: TipTarget) -> Floats:
+    def error(self, seen: TipEvaluation, target: TipTarget) -> Floats:
         """What is missing to the target (n, m): m, and L times rad."""
         return error(self.chain, seen, target, self.lever)
 
@@ -75,7 +81,7 @@ class Arm:
         return np.asarray((above >= 0.0) & (above <= self.width + 2.0 * _SLACK))
 
 
-def error(chain: TipChain, seen: Look, target: TipTarget, lever: float) -> Floats:
+def error(chain: TipChain, seen: TipEvaluation, target: TipTarget, lever: float) -> Floats:
     """Target minus tip (n, m): position in m, and L log(R_target Rᵀ) of what can turn."""
     apart = target.point - seen.point
     if not chain.turned_by or seen.rotation is None or target.rotation is None:
@@ -90,8 +96,8 @@ def error(chain: TipChain, seen: Look, target: TipTarget, lever: float) -> Float
     return np.hstack([apart, lever * turn])
 
 
-def _measured(chain: TipChain, u: Floats, scale: Floats, lever: float) -> Look:
-    seen = chain.look(u * scale)
+def _measured(chain: TipChain, u: Floats, scale: Floats, lever: float) -> TipEvaluation:
+    seen = chain.evaluate(u * scale)
     J, r = seen.jacobian * scale, len(chain.turned_by)
     if r:
         J[:, -r:] *= lever
@@ -99,7 +105,7 @@ def _measured(chain: TipChain, u: Floats, scale: Floats, lever: float) -> Look:
         return seen._replace(jacobian=J)
     weight = _GAP * np.where(chain.assembly.turning, lever, 1.0)
     closure = seen.closure * scale * weight[:, None]
-    return Look(seen.point, seen.rotation, J, seen.gap * weight, closure)
+    return TipEvaluation(seen.point, seen.rotation, J, seen.gap * weight, closure)
 
 
 # --- before solving
@@ -213,10 +219,10 @@ def first_guesses(
     """States z (n_seeds, n_z) with closed loops, and their J (n_seeds, d + r, n_q), not scaled."""
     q = _spread(chain, course, rows, limits, near)
     if near is None:
-        return q, reduced(chain.look(q), chain.n_q).J
+        return q, reduced(chain.evaluate(q), chain.n_q).J
     z = np.hstack([q, np.broadcast_to(near[chain.n_q :], (len(q), len(near) - chain.n_q))])
     z = _closed(chain, np.vstack([near, z]), course.size)
-    return z, reduced(chain.look(z), chain.n_q).J
+    return z, reduced(chain.evaluate(z), chain.n_q).J
 
 
 def _spread(
@@ -242,7 +248,7 @@ def _ranges(chain: TipChain, course: Course, middle: Floats) -> tuple[Floats, Fl
     if set(far) == {"turn"}:
         return low, width
     state = np.zeros((1, len(chain.kinds)))
-    seen = chain.look(state)
+    seen = chain.evaluate(state)
     reach = course.size + float(np.linalg.norm(seen.point))
     pitch = np.abs(seen.jacobian[0, : seen.point.shape[1], :n_q]).max(axis=0)
     turns = np.clip(reach / np.maximum(pitch, 1e-12), 2.0 * np.pi, _TURNS_OF_A_SCREW)
@@ -258,8 +264,8 @@ def _closed(chain: TipChain, z: Floats, size: float) -> Floats:
         return z
     z = z.copy()
     for _ in range(20):
-        step = reduced(chain.look(z), n_q).closing
+        step = reduced(chain.evaluate(z), n_q).closing
         z[:, n_q:] += np.clip(step, -0.5, 0.5)
-    good = np.abs(chain.look(z).gap).max(axis=1) <= _CLOSED * max(size, 1.0)
+    good = np.abs(chain.evaluate(z).gap).max(axis=1) <= _CLOSED * max(size, 1.0)
     good[0] = True  # the pose at which the loops are known to close
     return np.asarray(z[good])

@@ -68,7 +68,7 @@ def build_trajectory(
 ) -> Trajectory:
     """The trajectory that a case asks for, in the coordinates ``q_names``.
 
-    ``tip_chain(node, oriented)`` gives the chain of a tip path's node, its turning looked at if
+    ``tip_chain(node, oriented)`` gives the chain of a tip path's node, with its turning if
     oriented, and is called for nothing else; ``q_units`` are "rad" or "m" for each coordinate, all
     rad if empty. Raises MechanismError for what is wrong as a whole, TrajectoryError for what is
     wrong with one sample.
@@ -105,7 +105,7 @@ def _from_tip_path(
 
 
 def _check_dimension(chain: TipChain, path: TipPath) -> None:
-    d = chain.look(np.zeros((1, len(chain.kinds)))).point.shape[1]
+    d = chain.evaluate(np.zeros((1, len(chain.kinds)))).point.shape[1]
     if path.coefficients.shape[2] != d:
         raise MechanismError(WAYPOINTS, f"the tip moves in {d} dimensions: give {d} coordinates")
 

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from planar_arms import open_look, serial_arm, two_link_angles
+from planar_arms import open_chain_tip, serial_arm, two_link_angles
 
 from eigassign.errors import MechanismError, TrajectoryError
 from eigassign.mechanism.inverse_kinematics.chain import TipChain
@@ -76,7 +76,7 @@ def test_the_papers_arm_passes_its_expansion_point():
 def test_the_tip_is_on_its_path_to_the_stated_residual(seed):
     arm, path = serial_arm(0.6, 0.45), reachable_path(seed, 0.6, 0.45)
     samples = course(path, 101)
-    tip = arm.look(follow(arm, samples, UP).q).point
+    tip = arm.evaluate(follow(arm, samples, UP).q).point
     assert np.linalg.norm(tip - path.point(samples.s), axis=1).max() <= RESIDUAL * 0.6
 
 
@@ -108,7 +108,7 @@ def test_the_first_sample_is_normalised_to_one_turn_or_near_the_start():
 def test_round_off_below_zero_does_not_become_a_full_turn():
     arm = serial_arm(0.6, 0.45)
     for elbow in np.linspace(0.5, 2.5, 12):  # the shoulder comes out at 0 give or take 1e-16
-        path = straight([arm.look(np.array([[0.0, elbow]])).point[0], (0.3, 0.5)])
+        path = straight([arm.evaluate(np.array([[0.0, elbow]])).point[0], (0.3, 0.5)])
         assert abs(follow(arm, course(path, 2), UP).q[0, 0]) < 1e-9
 
 
@@ -264,7 +264,7 @@ def test_redundant_arms_follow_random_paths_and_say_so(lengths, seed):
     path = reachable_path(seed, 0.6, 0.5)
     samples = course(path, 80)
     followed = follow(arm, samples)
-    tip = arm.look(followed.q).point
+    tip = arm.evaluate(followed.q).point
     np.testing.assert_allclose(tip, path.point(samples.s), atol=1e-10, rtol=0)
     assert np.abs(np.diff(followed.q, axis=0)).max() < 0.5
     assert f"fixes 2 of {len(lengths)} coordinates" in followed.notes[0]
@@ -276,7 +276,7 @@ def test_redundant_arms_take_the_steps_of_least_norm():
     path = straight([(0.5, 0.3), (-0.2, 0.5)])
     q = follow(arm, course(path, 2001)).q
     middle, step = (q[1:] + q[:-1]) / 2, np.diff(q, axis=0)
-    along_null_space = np.linalg.svd(arm.look(middle).jacobian)[2][:, 2]
+    along_null_space = np.linalg.svd(arm.evaluate(middle).jacobian)[2][:, 2]
     idle = np.abs(np.einsum("na,na->n", along_null_space, step))
     # trace steps of 0.2 rad with the corrector bend off the ideal line by some percent
     assert (idle < 0.05 * np.linalg.norm(step, axis=1)).all()
@@ -308,14 +308,14 @@ def test_one_link_is_refused_a_sample_off_its_circle():
 def test_a_coordinate_that_does_not_move_the_tip_stays_at_its_start():
     whole, upper = serial_arm(0.6, 0.45), serial_arm(0.6)
 
-    def look(q):
-        seen = upper.look(q[:, :1])
+    def evaluate(q):
+        seen = upper.evaluate(q[:, :1])
         still = np.zeros((len(q), 2, 1))
-        return open_look(seen.point, np.concatenate([seen.jacobian, still], axis=2))
+        return open_chain_tip(seen.point, np.concatenate([seen.jacobian, still], axis=2))
 
-    arm = dataclasses.replace(whole, look=look)
+    arm = dataclasses.replace(whole, evaluate=evaluate)
     theta = np.linspace(0.2, 1.4, 9)
-    samples = course(straight(upper.look(theta[:, None]).point), 9)
+    samples = course(straight(upper.evaluate(theta[:, None]).point), 9)
     q = follow(arm, samples, start=[0.0, 2.5]).q
     np.testing.assert_allclose(q, np.stack([theta, np.full(9, 2.5)], axis=1), atol=1e-9)
     with pytest.raises(MechanismError, match="does not depend on coordinate 2") as error:
@@ -327,22 +327,22 @@ def test_three_joints_place_a_tip_in_space():
     """Turntable and two links (yaw, shoulder, elbow): three coordinates, three components."""
     planar = serial_arm(0.6, 0.45)
 
-    def look(q):
-        seen = planar.look(q[:, 1:])
+    def evaluate(q):
+        seen = planar.evaluate(q[:, 1:])
         (r, z), J = seen.point.T, seen.jacobian
         c, s = np.cos(q[:, 0]), np.sin(q[:, 0])
         yaw = np.stack([-r * s, r * c, 0 * r], axis=1)
         rest = np.stack([c[:, None] * J[:, 0], s[:, None] * J[:, 0], J[:, 1]], axis=1)
         point = np.stack([r * c, r * s, z], axis=1)
-        return open_look(point, np.concatenate([yaw[:, :, None], rest], axis=2))
+        return open_chain_tip(point, np.concatenate([yaw[:, :, None], rest], axis=2))
 
     relative = np.array([[1.0, 0, 0], [0, 1, 0], [0, -1, 1]])
     joints = ("yaw", "shoulder", "elbow")
-    arm = TipChain(look, joints, (relative, np.zeros(3)), ("turn",) * 3)
+    arm = TipChain(evaluate, joints, (relative, np.zeros(3)), ("turn",) * 3)
     path = spline([(0.5, 0.1, 0.3), (0.3, 0.4, 0.5), (-0.2, 0.5, 0.2), (-0.5, 0.2, 0.3)])
     samples = course(path, 60)
     q = follow(arm, samples, UP, start=[0.2, 0.0, 1.0]).q
-    np.testing.assert_allclose(look(q).point, path.point(samples.s), atol=1e-10, rtol=0)
+    np.testing.assert_allclose(evaluate(q).point, path.point(samples.s), atol=1e-10, rtol=0)
     x, y, z = path.point(samples.s).T
     assert away(q[:, 0], np.arctan2(y, x)) < 1e-8
     expected = two_link_angles(np.stack([np.hypot(x, y), z], axis=1), 0.6, 0.45, 1.0)

@@ -31,9 +31,9 @@ def test_derivatives_by_every_freedom_are_those_of_differences(seed: int, space:
         chain = chain_of(built(tree), last_node(tree), oriented=True)
         z = states(chain, q)
         z = z + 0.01 * np.sin(np.arange(z.size) + seed)  # the loops need not be closed
-        seen = chain.look(z)
+        seen = chain.evaluate(z)
         for i, e in enumerate(H * np.eye(z.shape[1])):
-            ahead, behind = chain.look(z + e), chain.look(z - e)
+            ahead, behind = chain.evaluate(z + e), chain.evaluate(z - e)
             by_differences = [(ahead.point - behind.point)[0] / (2 * H)]
             turn = ahead.rotation[0] @ behind.rotation[0].T
             spin = Rotation.from_matrix(turn).as_rotvec() / (2 * H)
@@ -49,7 +49,7 @@ def test_the_tip_is_where_the_oracle_has_it_and_the_loops_are_closed(seed: int, 
     for tree, q in mechanisms(seed, space):
         tip = last_node(tree)
         chain = chain_of(built(tree), tip, oriented=True)
-        seen = chain.look(states(chain, q))
+        seen = chain.evaluate(states(chain, q))
         point, R = tips(tree, q[None], tip)
         np.testing.assert_allclose(seen.point, point[:, : seen.point.shape[1]], atol=1e-8)
         np.testing.assert_allclose(seen.rotation, R, atol=1e-8)

@@ -107,7 +107,7 @@ def test_a_fourth_link_is_redundant_and_says_so() -> None:
     arm = serial_arm(0.4, 0.3, 0.2, 0.15, absolute=False, oriented=True)
     due = course(POINTS, 40, "spline", angle=[0.4, 0.9, 2.4, 2.0])
     followed = follow(arm, due)
-    seen, target = arm.look(followed.q), due.target(due.s)
+    seen, target = arm.evaluate(followed.q), due.target(due.s)
     np.testing.assert_allclose(seen.point, target.point, atol=1e-10)
     assert between(seen.rotation, target.rotation).max() < 1e-8
     assert "fixes 3 of 4 coordinates" in followed.notes[0]
@@ -122,7 +122,7 @@ def test_the_least_motion_does_not_depend_on_the_samples() -> None:
     due = course(POINTS, 2, "spline")
 
     def slope(q: np.ndarray, s: float) -> np.ndarray:
-        J = arm.look(q).jacobian[0]
+        J = arm.evaluate(q).jacobian[0]
         return (np.linalg.pinv(J) @ due.rates(min(s, 1.0))[0][0])[None]
 
     for k in range(4000):

@@ -22,7 +22,7 @@ SIZE = 1e-9  # of the path's size: a tip on its path
 def regularity(tree: Tree, q: np.ndarray, oriented: bool) -> float:
     """The smallest singular value of J at q, in m and rad; 0 if the tip cannot move every way."""
     chain = chain_of(built(tree), last_node(tree), oriented)
-    J = reduced(chain.look(states(chain, q)), chain.n_q).J[0]
+    J = reduced(chain.evaluate(states(chain, q)), chain.n_q).J[0]
     s = np.linalg.svd(J, compute_uv=False)
     return float(s[-1]) if len(s) == J.shape[0] else 0.0
 
@@ -78,7 +78,7 @@ def follow_and_judge(tree: Tree, q: np.ndarray, seed: int, oriented: bool) -> No
     """From the tip's place at q along a short bent path, turning a little if oriented."""
     tip, rng = last_node(tree), np.random.default_rng(seed)
     chain = chain_of(built(tree), tip, oriented)
-    seen = chain.look(states(chain, q))
+    seen = chain.evaluate(states(chain, q))
     d = seen.point.shape[1]
     far = min(0.02, 0.1 * regularity(tree, q, oriented) ** 2)  # within reach, to second order
     points = seen.point + np.vstack([np.zeros(d), rng.uniform(-far, far, (2, d))])

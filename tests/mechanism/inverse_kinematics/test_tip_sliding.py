@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from planar_arms import open_look
+from planar_arms import open_chain_tip
 from spatial_cases import built
 from tip_paths import chain_of, course
 
@@ -18,12 +18,12 @@ FAR = [(0.5, 3.0), (2.0, 7.5), (6.0, 5.0)]  # m: far more than 2π, all of it
 def polar_arm() -> TipChain:
     """A boom that turns by q1 and slides by q2: the tip is at q2 (cos q1, sin q1)."""
 
-    def look(q):
+    def evaluate(q):
         c, s, r = np.cos(q[:, 0]), np.sin(q[:, 0]), q[:, 1]
         J = np.stack([np.stack([-r * s, c], axis=1), np.stack([r * c, s], axis=1)], axis=1)
-        return open_look(np.stack([r * c, r * s], axis=1), J)
+        return open_chain_tip(np.stack([r * c, r * s], axis=1), J)
 
-    return TipChain(look, ("turn", "boom"), (np.eye(2), np.zeros(2)), ("turn", "slide"))
+    return TipChain(evaluate, ("turn", "boom"), (np.eye(2), np.zeros(2)), ("turn", "slide"))
 
 
 def expected(points: np.ndarray, sign: float) -> np.ndarray:
