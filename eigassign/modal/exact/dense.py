@@ -82,9 +82,8 @@ def _with_mass(pencil: Pencil, theta: Floats, mu: Floats, noise: Floats, phi: Fl
     """Modes of μ (n_samples, count); those samples anew whose μ may be round-off."""
     count = mu.shape[1]
     lam = 1.0 / np.where(mu > 0.0, mu, np.inf)
-    for k in np.flatnonzero(
-        may_be_roundoff(mu, noise, len(pencil.elastic))[:, -1]
-    ):  # the least of them
+    least_is_doubtful = may_be_roundoff(mu, noise, len(pencil.elastic))[:, -1]
+    for k in np.flatnonzero(least_is_doubtful):
         lam[k], modes = modes_with_mass(pencil, theta[:, [k]], count)
         if phi.size:
             phi[k] = modes

@@ -81,9 +81,8 @@ def relative_error(reduced: ReducedPencil, terms: ErrorTerms, x: Floats) -> Floa
     gram = gram / softest[:, None, None]
     error = frequency_error(mu, gram, largest_outside(terms, mu, softest), terms.anchors)
     error[~closes] = np.inf
-    error[mode_missing(all_mu, gram, _mass_shares(terms, M_c, all_mu, all_z), terms.anchors)] = (
-        np.inf
-    )
+    shares = _mass_shares(terms, M_c, all_mu, all_z)
+    error[mode_missing(all_mu, gram, shares, terms.anchors)] = np.inf
     return np.asarray(error + _rounding(reduced, terms, theta, mu, wide, hardest))
 
 
