@@ -198,9 +198,7 @@ def test_solves_that_do_not_follow_the_path_are_refused_whatever_they_show() -> 
     ring = case.trajectory.q[0] + 0.3 * np.stack([0.0 * t, np.cos(t), np.sin(t)], axis=1)
     with pytest.raises(AccuracyError, match="4 solves do not follow the path"):
         ea.fit(case.model(), ring, case.initial_design, solves=4)
-    with pytest.raises(
-        AccuracyError, match="leave an estimated error"
-    ):  # require_path_followed, but no more
+    with pytest.raises(AccuracyError, match="leave an estimated error"):  # followed, but no more
         ea.fit(case.model(), ring, case.initial_design, solves=13)
 
 
