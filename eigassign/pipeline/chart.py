@@ -100,10 +100,14 @@ def _prepared(case: Case, stages: Stages) -> Scene:
 
 
 def skipped_notes(skipped: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """Each reason once, with the methods (name, reason) that it kept from an answer."""
-    methods: dict[str, list[str]] = {}
+    """Each reason once, with the methods (name, reason) that it kept from an answer.
+
+    Reasons that differ by the number in front count as one: ``"3 solves for …"``.
+    """
+    groups: dict[str, list[tuple[str, str]]] = {}
     for name, why in skipped:
-        methods.setdefault(why, []).append(name)
-    for why, names in methods.items():
-        verb = "has" if len(names) == 1 else "have"
-        yield f"{', '.join(names)} {verb} no answer: {why}"
+        groups.setdefault(why.lstrip("0123456789"), []).append((name, why))
+    for rest, group in groups.items():
+        names, whys = [name for name, _ in group], {why for _, why in group}
+        why = whys.pop() if len(whys) == 1 else f"that many{rest}"
+        yield f"{', '.join(names)} {'has' if len(names) == 1 else 'have'} no answer: {why}"

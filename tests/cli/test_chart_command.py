@@ -61,7 +61,7 @@ def test_a_case_without_a_trajectory_is_refused_and_leaves_nothing(
         ("--evaluations", "0.5"), ("--evaluations", "nan"), ("--evaluations", "many"),
     ],
 )  # fmt: skip
-def test_wishes_that_cannot_be_are_refused_by_name(
+def test_requests_that_cannot_be_met_are_refused_by_name(
     option: str, value: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["chart", str(ARM), option, value, "--out", str(tmp_path / "out")]) == 2

@@ -42,3 +42,10 @@ def test_a_reason_that_many_methods_share_is_said_once_with_their_names() -> Non
         "RBF has no answer: too few points",
     ]
     assert not list(skipped_notes(()))
+
+
+def test_reasons_that_differ_by_a_number_in_front_are_said_once() -> None:
+    skipped = tuple((f"fit of {k}", f"{k} solves for 4 stretches: 12 are needed") for k in (3, 5))
+    assert list(skipped_notes(skipped)) == [
+        "fit of 3, fit of 5 have no answer: that many solves for 4 stretches: 12 are needed"
+    ]
