@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,31 +147,29 @@ def _by_runs(features: Features, made: Separable) -> Evaluator:
 
 def surrogate_methods(features: Features, counts: Sequence[int]) -> Iterator[Method]:
     """Surrogates fitted to ``counts`` spread-out points; Kriging where scikit-learn is there."""
-    separable: dict[str, tuple[Callable[..., Separable], dict[str, Any]]] = {
-        "response surface, quadratic": (response_surface, {"degree": 2}),
-        "response surface, cubic": (response_surface, {"degree": 3}),
+    fits: dict[str, tuple[Callable[[Floats, Floats], Surrogate], dict[str, Any]]] = {
+        "response surface, quadratic": (partial(response_surface, degree=2), {"degree": 2}),
+        "response surface, cubic": (partial(response_surface, degree=3), {"degree": 3}),
     }
-    others: dict[str, tuple[Callable[..., Surrogate], dict[str, Any]]] = {
-        "RBF, thin plate spline": (radial_basis, {"kernel": "thin_plate_spline"}),
-        "RBF, quintic": (radial_basis, {"kernel": "quintic"}),
-    }
+    kernels: tuple[Literal["thin_plate_spline", "quintic"], ...] = ("thin_plate_spline", "quintic")
+    for kernel in kernels:
+        name = f"RBF, {kernel.replace('_', ' ')}"
+        fits[name] = (partial(radial_basis, kernel=kernel), {"kernel": kernel})
     if has_kriging():
-        others["Kriging"] = (kriging, {})
+        fits["Kriging"] = (kriging, {"kernel": "squared exponential", "by": "scikit-learn"})
     for n in counts:
         u = spread_points(n, features.d)
-        for family, (fit, how) in {**separable, **others}.items():
+        for family, (fit, how) in fits.items():
             yield Method(
                 f"{family.replace(',', '')} {n}",
                 family,
                 {**how, "training_points": n, "features": features.names},
-                partial(_surrogate, features, partial(fit, u, **how), family in separable),
+                partial(_surrogate, features, partial(fit, u)),
                 partial(_at, features, u),
                 ours=False,
             )
 
 
-def _surrogate(
-    features: Features, fit: Callable[[Floats], Any], separable: bool, f: Floats
-) -> Evaluator:
+def _surrogate(features: Features, fit: Callable[[Floats], Surrogate], f: Floats) -> Evaluator:
     made = fit(f)
-    return _by_runs(features, made) if separable else lambda points: np.asarray(made(points.u))
+    return _by_runs(features, made) if isinstance(made, Separable) else lambda at: made(at.u)

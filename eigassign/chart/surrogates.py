@@ -15,7 +15,6 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial, reduce
-from importlib.util import find_spec
 from itertools import product
 from typing import Literal
 
@@ -202,8 +201,15 @@ def radial_basis(
 
 
 def has_kriging() -> bool:
-    """Whether scikit-learn is installed: eigassign itself does not need it."""
-    return find_spec("sklearn") is not None
+    """Whether scikit-learn is installed: eigassign itself does not need it.
+
+    It is imported here, or the first fit would be charged for the import.
+    """
+    try:
+        import sklearn.gaussian_process  # noqa: F401
+    except ImportError:
+        return False
+    return True
 
 
 def kriging(u: Floats, f: Floats) -> Surrogate:
