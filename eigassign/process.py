@@ -1,7 +1,4 @@
-"""Errors as people read them on stderr, and the exit code of each.
-
-The process around a command: signals, streams, threads of the linear algebra, collections.
-"""
+"""The process around a command: errors on stderr with their exit codes, signals, streams."""
 
 from __future__ import annotations
 
@@ -32,7 +29,7 @@ _WIDEST = 120
 
 @dataclass(frozen=True)
 class Failure:
-    """What an error amounts to: exit code, one line, and what there is to list before it."""
+    """An error on the command line: exit code, one line, and the problems listed before it."""
 
     exit_code: int
     summary: str
@@ -44,7 +41,7 @@ class Failure:
         return "\n".join(map(str, self.problems)) or self.summary
 
 
-def judged(error: BaseException) -> Failure:
+def failure_of(error: BaseException) -> Failure:
     """Exit code and message of any error; a closed pipe has no message."""
     match error:
         case KeyboardInterrupt():
@@ -52,7 +49,7 @@ def judged(error: BaseException) -> Failure:
         case Terminated():
             return Failure(error.exit_code, str(error))
         case CaseError():
-            return Failure(error.exit_code, counted(error.problems), error.problems)
+            return Failure(error.exit_code, problem_count(error.problems), error.problems)
         case EigassignError() if error.exit_code != BUG:
             return Failure(error.exit_code, f"error: {error}")
         case BrokenPipeError():
@@ -67,7 +64,7 @@ def judged(error: BaseException) -> Failure:
 
 def report(error: BaseException, debug: bool = False) -> int:
     """Say on stderr what went wrong; returns the exit code."""
-    failure = judged(error)
+    failure = failure_of(error)
     if debug and failure.summary:
         import traceback
 
@@ -78,7 +75,7 @@ def report(error: BaseException, debug: bool = False) -> int:
 
 
 def say(lines: Iterable[str]) -> None:
-    """Write lines to stderr; if that is closed the exit code must do."""
+    """Write lines to stderr; if that is closed only the exit code is left."""
     with suppress(OSError, AttributeError, ValueError):
         for line in lines:
             sys.stderr.write(f"{line}\n")
@@ -109,7 +106,7 @@ def _line(problem: Problem) -> str:
         return ""
 
 
-def counted(problems: Sequence[Problem]) -> str:
+def problem_count(problems: Sequence[Problem]) -> str:
     """``3 problems in case.yaml``."""
     files = Counter(problem.file for problem in problems)
     return "; ".join(f"{n} problem{'s' if n > 1 else ''} in {file}" for file, n in files.items())
@@ -136,11 +133,11 @@ def _internal(error: BaseException) -> str:
 
 def problems(error: BaseException) -> list[Problem]:
     """What is wrong, for programs: the problems with their lines, or the message without a line."""
-    failure = judged(error)
+    failure = failure_of(error)
     return list(failure.problems) or [Problem("", 0, 0, "", str(error))]
 
 
-# --- The process around a command: signals, streams, threads of the linear algebra, collections
+# --- Signals, streams, threads of the linear algebra, garbage collection
 
 _THREADS = ("OPENBLAS", "OMP", "MKL", "BLIS", "VECLIB_MAXIMUM", "NUMEXPR")
 ONE_THREAD: Mapping[str, str] = {f"{library}_NUM_THREADS": "1" for library in _THREADS}
@@ -186,7 +183,7 @@ def unwind_when_terminated() -> dict[signal.Signals, Any]:
 
 def _terminate(number: int, _frame: FrameType | None) -> None:
     for each in _ENDING:
-        signal.signal(each, signal.SIG_IGN)  # the cleanup is not to be disturbed
+        signal.signal(each, signal.SIG_IGN)  # nothing interrupts the cleanup
     raise Terminated(number)
 
 
@@ -199,10 +196,10 @@ def prefer_one_thread() -> None:
         os.environ.setdefault(name, value)
 
 
-def expect_to_be_brief() -> None:
-    """Spare a process its walks over all that it imported: fewer while it runs, none at its end.
+def collect_garbage_rarely() -> None:
+    """Search for cyclic garbage rarely, and not at the end: a fifth of a short run's time.
 
-    Worth a fifth of a short run. Memory is freed by reference counts as ever.
+    Memory is freed by reference counts as ever.
     """
     gc.set_threshold(50_000, 10, 10)
     atexit.register(gc.freeze)
@@ -224,14 +221,14 @@ def environment(changes: Mapping[str, str]) -> Iterator[None]:
 
 
 class _ClosedOutput(io.TextIOBase):
-    """Stands for a stdout that was closed before the process began: an answer would be lost."""
+    """In place of a stdout that was closed before the process began: writing to it fails."""
 
     def write(self, _text: str) -> int:
         raise OSError(errno.EBADF, "standard output is closed")
 
 
-def mind_closed_streams() -> None:
-    """Let writing to a closed stdout fail, and no file opened later take its descriptor.
+def refuse_closed_stdout() -> None:
+    """Make writing to a closed stdout fail, and let no file opened later take its descriptor.
 
     Python leaves ``sys.stdout`` None then, and what is printed vanishes without an error.
     """
@@ -242,7 +239,7 @@ def mind_closed_streams() -> None:
         sys.stdout = _ClosedOutput()
 
 
-def never_fail_to_encode() -> None:
+def replace_what_cannot_be_encoded() -> None:
     """Write ``?`` for what the terminal's character set lacks, instead of failing."""
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(AttributeError, ValueError):

@@ -1,9 +1,7 @@
-"""Many cases in parallel processes: one run folder each, and nothing lost to a case that fails.
+"""Many cases in parallel processes, a run folder for each; a case that fails does not stop others.
 
 The one seam is ``Executor.submit(run_case, path, options) -> small dict``: any
 ``concurrent.futures`` executor will do, here or on a cluster. Workers write their own folders.
-
-Which case files are meant by files and folders, and a name for the run of each.
 """
 
 from __future__ import annotations
@@ -24,9 +22,7 @@ from eigassign.errors import StorageError, UsageError
 from eigassign.output.batch_summary import CaseOutcome, write_junit, write_summary
 from eigassign.output.run_folder import MARKER
 from eigassign.pipeline.run import Options, optimize
-from eigassign.process import judged
-
-# --- Many cases in parallel processes: one run folder each, and nothing lost to a case that fai
+from eigassign.process import failure_of
 
 Row = dict[str, Any]  # what a worker sends back: plain text and numbers only
 MakePool = Callable[[int], contextlib.AbstractContextManager[Executor]]
@@ -82,7 +78,7 @@ def _optimised(path: str, options: CaseOptions) -> Row:
 
 
 def _failure(error: Exception) -> Row:
-    failure = judged(error)
+    failure = failure_of(error)
     return {"status": "failed" if failure.exit_code == 1 else "error", "message": failure.text}
 
 
@@ -100,13 +96,13 @@ def run_and_summarise(
     """Run the jobs and write summary.csv and junit.xml; after an interrupt, of what there is."""
     done: dict[str, Row] = {}
 
-    def keep(row: Row) -> None:
+    def record(row: Row) -> None:
         done[row["path"]] = row
         on_row(row)
 
     out.mkdir(parents=True, exist_ok=True)
     try:
-        run_batch(jobs, workers or cores(), keep)
+        run_batch(jobs, workers or cores(), record)
     finally:
         rows = [done.get(job.case) or not_run(job) for job in jobs]
         outcomes = [CaseOutcome(**row) for row in rows]
@@ -123,27 +119,27 @@ def run_batch(
 ) -> dict[str, Row]:
     """Run every job; a row per case, in the order the jobs were given.
 
-    ``on_row`` hears of each as it comes in. When a worker dies, the pool is rebuilt and the cases
-    that were running are run again, each alone in its own pool, which tells the culprit.
+    ``on_row`` is called with each as it comes in. When a worker dies, the pool is rebuilt, and the
+    cases that were running are run again, each alone in its own pool: so the one at fault shows.
     """
     rows: dict[str, Row] = {}
     make = executor or process_pool
 
-    def keep(row: Row) -> None:
+    def record(row: Row) -> None:
         rows[row["path"]] = row
         on_row(row)
 
     waiting = list(jobs)
     while waiting:
-        for suspect in _until_broken(waiting, workers, make, keep):
-            if _until_broken([suspect], 1, make, keep):
-                keep(_killed(suspect))
+        for suspect in _until_broken(waiting, workers, make, record):
+            if _until_broken([suspect], 1, make, record):
+                record(_killed(suspect))
         waiting = [job for job in waiting if job.case not in rows]
     return {job.case: rows[job.case] for job in jobs}
 
 
 def _until_broken(
-    jobs: Sequence[Job], workers: int, make: MakePool, keep: Callable[[Row], None]
+    jobs: Sequence[Job], workers: int, make: MakePool, record: Callable[[Row], None]
 ) -> list[Job]:
     """Run jobs, at most ``workers`` in flight; the jobs in flight when the pool broke, if it did.
 
@@ -157,14 +153,14 @@ def _until_broken(
                     running[_submitted(pool, waiting[0])] = waiting[0]
                     del waiting[0]
                 wait(running, return_when=FIRST_COMPLETED)
-                _collect(running, keep)
+                _collect(running, record)
         except BrokenProcessPool:
             return list(running.values()) or waiting[:1]
     return []
 
 
-def _collect(running: dict[Future[Row], Job], keep: Callable[[Row], None]) -> None:
-    """Take out what is done; raises BrokenProcessPool once all other results are kept."""
+def _collect(running: dict[Future[Row], Job], record: Callable[[Row], None]) -> None:
+    """Take out what is done; raises BrokenProcessPool once all other results are recorded."""
     broken: BrokenProcessPool | None = None
     for future in [future for future in running if future.done()]:
         error = future.exception()
@@ -172,7 +168,7 @@ def _collect(running: dict[Future[Row], Job], keep: Callable[[Row], None]) -> No
             broken = error
             continue
         job = running.pop(future)
-        keep(_killed(job) if error else future.result())
+        record(_killed(job) if error else future.result())
     if broken:
         raise broken
 

@@ -34,11 +34,11 @@ _CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 def main(args: Sequence[str] | None = None) -> int:
     """Run the command line on ``args`` (default: those of the process); returns the exit code."""
     if args is None:
-        process.expect_to_be_brief()
+        process.collect_garbage_rarely()
     arguments = sys.argv[1:] if args is None else list(args)
     process.prefer_one_thread()
-    process.mind_closed_streams()
-    process.never_fail_to_encode()
+    process.refuse_closed_stdout()
+    process.replace_what_cannot_be_encoded()
     try:
         with process.terminable():
             code = _invoke(arguments)

@@ -33,22 +33,22 @@ def batch(paths: tuple[Path, ...], jobs: int | None, **how: Any) -> int:
     out = how["out"] or Path("results")
     cache_dir = how["cache_dir"] and str(how["cache_dir"])
     each = many.CaseOptions(str(out), cache_dir, not how["no_cache"], how["force"], how["figures"])
-    with reporting(how) as tell:
-        outcomes = _watched(many.plan(cases_in(paths), each), jobs, out, tell)
+    with reporting(how) as reporter:
+        outcomes = _watched(many.plan(cases_in(paths), each), jobs, out, reporter)
         bad = sum(outcome.status != "ok" for outcome in outcomes)
         if bad:
-            tell.error(f"{bad} of {len(outcomes)} cases failed")
+            reporter.error(f"{bad} of {len(outcomes)} cases failed")
     return 1 if bad else 0
 
 
 def _watched(
-    jobs: Sequence[Job], workers: int | None, out: Path, tell: Reporter
+    jobs: Sequence[Job], workers: int | None, out: Path, reporter: Reporter
 ) -> list[CaseOutcome]:
     """Run the jobs with a line of progress each, and a table at the end."""
     from eigassign.batch.runner import run_and_summarise
     from eigassign.output import console
 
-    with console.progress("case", len(jobs), stream=tell.stream()) as advance:
+    with console.progress("case", len(jobs), stream=reporter.stream()) as advance:
         outcomes = run_and_summarise(
             jobs, workers, out, lambda row: advance(f"{row['name']}: {row['status']}")
         )

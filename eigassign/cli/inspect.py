@@ -25,11 +25,11 @@ def check(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
     from eigassign.pipeline.queries import check as checked
 
     codes, answers = [0], dict[str, Any]()
-    with reporting(how) as tell:
+    with reporting(how) as reporter:
         for case in cases:
             try:
                 answers[str(case)] = answer = checked(case)
-                tell.warn(answer.warnings)
+                reporter.warn(answer.warnings)
             except EigassignError as error:
                 codes.append(process.report(error))
                 if as_json:
@@ -85,7 +85,7 @@ def modes(
     from eigassign.pipeline.queries import point
 
     folder = None
-    with reporting(how) as tell:
+    with reporting(how) as reporter:
         at = point(case, q, y)
         if draw or how["out"] is not None:
             answer, folder = queries.draw_modes(
@@ -94,11 +94,11 @@ def modes(
         else:
             answer = queries.modes(case, *at, count)
         if as_json and folder is not None:
-            tell.stage(f"{folder} written")
+            reporter.stage(f"{folder} written")
     if as_json:
-        told = {"rigid_modes": answer.rigid_modes, "frequencies_hz": answer.frequencies_hz}
+        document = {"rigid_modes": answer.rigid_modes, "frequencies_hz": answer.frequencies_hz}
         lost = answer.truncation_error
-        print_json(told if lost is None else {**told, "truncation_error": lost})
+        print_json(document if lost is None else {**document, "truncation_error": lost})
     else:
         _show_modes(answer, folder)
     return 0

@@ -1,9 +1,4 @@
-"""What every command shares: how it speaks on stderr, and JSON on stdout.
-
-What a command says on stderr while it works: stages, warnings, the log.
-
-Answers of any kind as one line of JSON: ASCII, so that every terminal can carry it.
-"""
+"""What every command writes: stages, warnings and the log on stderr, JSON on stdout."""
 
 from __future__ import annotations
 
@@ -14,7 +9,7 @@ import math
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any, TextIO
@@ -24,21 +19,7 @@ import click
 from eigassign.errors import Problem
 from eigassign.process import say
 
-# --- What every command shares: how it speaks on stderr, and JSON on stdout
-
-
-def reporting(how: Mapping[str, Any]) -> AbstractContextManager[Reporter]:
-    """A teller as loud as ``--quiet`` and ``-v`` say."""
-    return _reporting_at(how["verbose"], how["quiet"])
-
-
-def print_json(value: object, indent: int | None = None) -> None:
-    """``value`` on stdout, as JSON."""
-
-    click.echo(dumps(value, indent))
-
-
-# --- What a command says on stderr while it works: stages, warnings, the log
+# --- stderr while a command works
 
 _PLACE = re.compile(r"(.+?:\d+:\d+: )(.+)", re.DOTALL)  # of a problem that is text already
 
@@ -71,9 +52,9 @@ class Reporter:
 
 
 @contextmanager
-def _reporting_at(verbose: int, quiet: bool) -> Iterator[Reporter]:
-    """A teller, with the log of this package on stderr meanwhile."""
-    level = 0 if quiet else 1 + verbose
+def reporting(how: Mapping[str, Any]) -> Iterator[Reporter]:
+    """A reporter of the level that ``--quiet`` and ``-v`` ask for; the package's log on stderr."""
+    level = 0 if how["quiet"] else 1 + how["verbose"]
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(_Formatter())
     ours = logging.getLogger("eigassign")
@@ -94,7 +75,12 @@ class _Formatter(logging.Formatter):
         return f"{record.levelname.lower()}: {super().format(record)}"
 
 
-# --- Answers of any kind as one line of JSON: ASCII, so that every terminal can carry it
+# --- JSON on stdout, in ASCII, which every terminal shows
+
+
+def print_json(value: object, indent: int | None = None) -> None:
+    """``value`` on stdout, as JSON."""
+    click.echo(dumps(value, indent))
 
 
 def dumps(value: object, indent: int | None = None) -> str:

@@ -58,16 +58,16 @@ def _finished(
     work: Callable[[Path, Options], Outcome], case: Path, as_json: bool, how: Mapping[str, Any]
 ) -> int:
     """Run one case into its folder and show what it found; the exit code."""
-    with reporting(how) as tell:
-        outcome = work(case, _options(how, tell))
-        tell.warn(outcome.warnings)
+    with reporting(how) as reporter:
+        outcome = work(case, _options(how, reporter))
+        reporter.warn(outcome.warnings)
         _show(outcome, as_json)
         if not outcome.within_tolerance:
-            tell.error("the expansion is further from exact than validation.max_error allows")
+            reporter.error("the expansion is further from exact than validation.max_error allows")
     return 0 if outcome.within_tolerance else 1
 
 
-def _options(how: Mapping[str, Any], tell: Reporter) -> Options:
+def _options(how: Mapping[str, Any], reporter: Reporter) -> Options:
     from eigassign.pipeline.run import Options
 
     return Options(
@@ -76,7 +76,7 @@ def _options(how: Mapping[str, Any], tell: Reporter) -> Options:
         use_cache=not how["no_cache"],
         force=how.get("force", False),
         figures=how.get("figures", ()),
-        progress=tell.stage,
+        progress=reporter.stage,
     )
 
 
@@ -108,14 +108,14 @@ def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
 
     rows: list[ValidationRow] = []
     codes = [0]
-    with reporting(how) as tell:
+    with reporting(how) as reporter:
         for case in cases_in(cases or default_cases()):
             try:
-                answer = run.validate(case, _options(how, tell))
+                answer = run.validate(case, _options(how, reporter))
             except EigassignError as error:
                 codes.append(process.report(error))
                 continue
-            tell.warn(answer.warnings)
+            reporter.warn(answer.warnings)
             rows.extend(answer.rows)
             codes.append(0 if answer.passed else 1)
     if as_json:
@@ -151,10 +151,10 @@ def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
 
     request = Request(how["accuracy"], how["budget_s"], how["evaluations"])
     out = how["out"] or Path("results", f"{case.stem}_chart")
-    with reporting(how) as tell:
-        given = _options({**how, "out": out, "cache_dir": None, "no_cache": True}, tell)
+    with reporting(how) as reporter:
+        given = _options({**how, "out": out, "cache_dir": None, "no_cache": True}, reporter)
         made = charting.chart(case, given, QUICK if quick else Effort(), request)
-        tell.warn(made.chart.warnings)
+        reporter.warn(made.chart.warnings)
     if as_json:
         print_json({"run_folder": str(made.folder), **vars(made.chart)})
     else:

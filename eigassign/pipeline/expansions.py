@@ -1,4 +1,4 @@
-"""Expansions that were computed before: taken from the cache, bit for bit, or made and kept."""
+"""Both expansions of a plan: from the cache, bit for bit, or computed and stored there."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ Floats = NDArray[np.float64]
 
 
 def _silent(line: str) -> None:
-    """Progress that nobody watches."""
+    """No progress is shown."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,9 @@ class Options:
     use_cache: bool = True
     force: bool = False  # a folder that another case wrote is moved aside
     figures: tuple[str, ...] = ("png",)  # of png, svg and pdf; none are drawn if empty
-    progress: Callable[[str], None] = field(default=_silent)  # told one line as each stage begins
+    progress: Callable[[str], None] = field(
+        default=_silent
+    )  # called with a line as each stage begins
 
 
 @dataclass(frozen=True)
@@ -160,13 +162,13 @@ def optimize(path: str | Path, options: Options = DEFAULT) -> Outcome:
 
     Raises StorageError before anything is computed where the folder may not be replaced.
     """
-    watch = Stages(options.progress)
+    stages = Stages(options.progress)
     case = load_case(path)
     with new_run_folder(case.file, options.out, options.force) as folder:
         results = solve_case(case, options).results
         options.progress("writing the report")
         folder.write(results, options.figures)
-    return _outcome(folder, results, watch)
+    return _outcome(folder, results, stages)
 
 
 def expand_case(
@@ -181,17 +183,17 @@ def expand_case(
     ``order`` and ``modes`` override the case's; ``linear`` keeps the full set's coefficients out
     of the files. The case needs neither design nor targets, and no trajectory if it gives q.
     """
-    watch = Stages(options.progress)
+    stages = Stages(options.progress)
     case = load_case(path)
     with new_run_folder(case.file, options.out, options.force) as folder, case.located():
-        scene = prepare(case, watch, _cache(options), order, modes)
-        with watch("comparison", "comparing the expansion with exact frequencies"):
+        scene = prepare(case, stages, _cache(options), order, modes)
+        with stages("comparison", "comparing the expansion with exact frequencies"):
             studies = study_modes(scene)
             scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene)))
-        results = collect_results(scene, studies, None, watch.timing_s)
+        results = collect_results(scene, studies, None, stages.timing_s)
         options.progress("writing the report")
         folder.write(results, options.figures, coefficient_files(scene, linear))
-    return _outcome(folder, results, watch)
+    return _outcome(folder, results, stages)
 
 
 def validate(path: str | Path, options: Options = DEFAULT) -> Validation:
@@ -206,8 +208,8 @@ def validate(path: str | Path, options: Options = DEFAULT) -> Validation:
     return Validation(rows, notes, scene.warnings, stages.total_s)
 
 
-def _outcome(folder: RunFolder, results: RunResults, watch: Stages) -> Outcome:
-    return Outcome(folder.path, results, results.within_tolerance, watch.total_s, results.warnings)
+def _outcome(folder: RunFolder, results: RunResults, stages: Stages) -> Outcome:
+    return Outcome(folder.path, results, results.within_tolerance, stages.total_s, results.warnings)
 
 
 def _cache(options: Options) -> Cache | None:

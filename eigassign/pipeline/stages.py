@@ -16,7 +16,7 @@ class Stages:
         self.timing_s: dict[str, float] = {}
         self._progress = progress
         self._start = perf_counter()
-        self._told = self._start
+        self._last_line = self._start
 
     @contextmanager
     def __call__(self, name: str, announcement: str) -> Iterator[None]:
@@ -27,10 +27,10 @@ class Stages:
         self.timing_s[name] = self.timing_s.get(name, 0.0) + perf_counter() - start
 
     def advance(self, done: int, of: int) -> None:
-        """Tell how far a long stage is, at most every two seconds."""
+        """Say how far a long stage is, at most every two seconds."""
         now = perf_counter()
-        if now - self._told >= EVERY_S:
-            self._told = now
+        if now - self._last_line >= EVERY_S:
+            self._last_line = now
             self._progress(f"  {done} of {of}")
 
     @property

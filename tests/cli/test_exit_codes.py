@@ -17,7 +17,7 @@ from wrong_inputs import GOOD
 from eigassign.cli import main
 from eigassign.errors import AccuracyError, EigassignError, InfeasibleError, StorageError
 from eigassign.pipeline import queries, run
-from eigassign.process import Terminated, judged
+from eigassign.process import Terminated, failure_of
 
 ERRORS: list[tuple[BaseException, int, str]] = [
     (InfeasibleError("limits contradict each other", ("a", "b")), 1, "limits contradict"),
@@ -72,8 +72,8 @@ def test_a_bug_is_told_with_its_place_and_with_a_traceback_only_when_asked(
 
 
 def test_a_case_error_is_no_bug_even_where_it_wraps_another() -> None:
-    assert judged(StorageError("x")).exit_code == 3
-    assert judged(BrokenPipeError(errno.EPIPE, "Broken pipe")).summary == ""
+    assert failure_of(StorageError("x")).exit_code == 3
+    assert failure_of(BrokenPipeError(errno.EPIPE, "Broken pipe")).summary == ""
 
 
 def test_help_imports_click_and_nothing_heavy() -> None:
@@ -175,9 +175,9 @@ import sys, time
 from pathlib import Path
 from eigassign.output import report
 
-def write_run(findings, folder):
+def write_run(results, folder, formats):
     (folder / "half").touch()
-    Path(f"{findings.case_name}.ready").touch()
+    Path(f"{results.case_name}.ready").touch()
     time.sleep(600)
 
 report.write_run = write_run  # in worker processes too: they import this file

@@ -122,7 +122,7 @@ def test_beyond_a_dead_point_the_loop_cannot_close() -> None:
     assert f"sample {first} (t = " in message
     assert "m out of reach; the tip comes to" in message
     q = float(re.search(r"q = \((.*?)\)", message)[1])
-    assert np.degrees(q) == pytest.approx(DEAD, abs=0.5)
+    assert np.degrees(q) % 360.0 == pytest.approx(DEAD, abs=0.5)  # SciPy 1.13 comes round once more
 
 
 def test_a_guess_that_no_loop_can_take_is_refused() -> None:
