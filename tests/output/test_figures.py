@@ -311,3 +311,28 @@ def test_names_lose_their_control_characters_and_their_middle():
     assert style.short("a\x1b[31mb\n") == "a [31mb"
     assert len(style.short("x" * 500)) == 34
     assert style.short("begin" + "x" * 50 + "end").endswith("end")
+
+
+def test_numbers_beside_maps_never_run_into_each_other(paper):
+    study = paper.studies[0]
+    wide = dataclasses.replace(study.over_design, axes=(np.linspace(1.2e5, 1.8e5, 21),) * 2)
+    values = dataclasses.replace(
+        wide.values,
+        exact_hz=np.ones((21, 21)),
+        taylor_hz=np.ones((21, 21)),
+        linearised_hz=np.ones((21, 21)),
+    )
+    over = dataclasses.replace(wide, values=values)
+    found = dataclasses.replace(paper, studies=(dataclasses.replace(study, over_design=over),))
+    figure = drawn(found)["approximation_mode_1_design"]
+    figure.canvas.draw()
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = axis.get_view_interval()
+            boxes = [
+                tick.label1.get_window_extent()
+                for tick in axis.get_major_ticks()
+                if low <= tick.get_loc() <= high and tick.label1.get_visible()
+            ]
+            boxes = [box for box in boxes if box.width > 1.0]
+            assert not any(a.overlaps(b) for a, b in itertools.pairwise(boxes))

@@ -71,11 +71,13 @@ def draw_over_two(study: ModeStudy, over: DesignMap, point: Floats) -> Figure:
         held = style.bounds([numbers] if axes is panels[0] else [numbers, _NOTHING])
         filled_contours(figure, axes, over.axes, numbers, held)
         axes.set_title(heading)
-        axes.set_xlabel(x_label)
+        axes.set_xlabel(x_label, loc="left")  # a power of ten stands at the right
         if point.size == 2:
             (dot,) = axes.plot(*point, "o", **_POINT)
         axes.set(xlim=over.axes[0][[0, -1]], ylim=over.axes[1][[0, -1]])
     panels[0].set_ylabel(y_label)
+    panels[0].locator_params(axis="x", nbins=3)
+    panels[0].ticklabel_format(scilimits=(-2, 4))
     if point.size == 2:
         figure.legend(handles=[dot], loc="outside lower left")
     return figure
@@ -95,6 +97,6 @@ def filled_contours(
     levels = MaxNLocator(7, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
     bands = axes.contourf(*grids, np.ma.masked_invalid(values.T), levels=levels)
     axes.grid(visible=False)
-    bar = figure.colorbar(bands, ax=axes, aspect=14, pad=0.03)
+    bar = figure.colorbar(bands, ax=axes, aspect=14, pad=0.03, format="{x:g}")
     bar.outline.set_visible(False)
     bar.ax.tick_params(length=0.0, labelsize=style.SMALL_PT)
