@@ -4,8 +4,8 @@ In reading order; each imports from those above it only:
 
     formats        numbers as people read them
     storage        files and folders that are written whole or not at all
-    run_folder     the folder of a run: hidden until it is finished, never in another's place
-    cache          arrays by content key, checked byte for byte
+    run_folder     the folder of a run: hidden until finished; replaces only runs of the same case
+    cache          arrays by content key, checked by their hash
     reduced_file   a reduced model in one file
     result_files   results.json and the CSV files
     tables         the tables of a run as text

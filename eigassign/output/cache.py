@@ -44,7 +44,7 @@ _KINDS = {"b": (1,), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8), "f": (2, 4, 8), "c": 
 
 
 class DamagedError(EigassignError):
-    """The bytes are not what a finished writer left; ``str()`` says how they differ."""
+    """The bytes are not what a finished writer left; the message says how they differ."""
 
 
 def key(parts: Part, *, algorithm: str = "") -> str:
@@ -169,7 +169,7 @@ _STALE_S = 3600.0  # a temporary file this old belongs to a writer that was kill
 
 @dataclass(frozen=True)
 class CacheEntry:
-    """One file of the cache; ``intact`` says whether its content could be believed."""
+    """One file of the cache; ``intact``: its content has the hash that its header gives."""
 
     key: str
     path: Path
@@ -192,14 +192,14 @@ def default_directory() -> Path | None:
 
 
 class Cache:
-    """Arrays by content key in ``directory``; ``Cache(None)`` holds nothing and keeps nothing."""
+    """Arrays by content key in ``directory``; ``Cache(None)`` stores nothing."""
 
     def __init__(self, directory: Path | None) -> None:
         self.directory = directory
         self._warned = False
 
     def load(self, entry_key: str) -> dict[str, Array] | None:
-        """The arrays stored under ``entry_key``, read-only; None if there are none to believe."""
+        """The arrays stored under ``entry_key``, read-only; None if missing or damaged."""
         if self.directory is None:
             return None
         path = self.directory / f"{entry_key}{_SUFFIX}"
@@ -228,24 +228,24 @@ class Cache:
             self._warn(f"the cache cannot be written ({error}); going on without it")
 
     def entries(self) -> tuple[CacheEntry, ...]:
-        """Every file of the cache, oldest first, each read and checked; touches none of them."""
+        """Every file of the cache, oldest first, each read and checked; changes none of them."""
         found = [entry for path in self._files(f"*{_SUFFIX}") for entry in _read_entry(path)]
         return tuple(sorted(found, key=lambda entry: (entry.modified_s, entry.key)))
 
     def clear(self) -> int:
-        """Delete all entries, damaged ones and leftovers of killed writers; how many went.
+        """Delete all entries, damaged ones and temporary files of killed writers; returns how many.
 
         Raises StorageError when one cannot be deleted.
         """
         leftovers = [path for path in self._files(f".*{_SUFFIX}.*.tmp") if _is_stale(path)]
         damaged = self._files(f"*{_SUFFIX}{_DAMAGED}")
-        doomed = [*self._files(f"*{_SUFFIX}"), *damaged, *leftovers]
-        for path in doomed:
+        files = [*self._files(f"*{_SUFFIX}"), *damaged, *leftovers]
+        for path in files:
             try:
                 path.unlink(missing_ok=True)
             except OSError as error:
                 raise StorageError(f"cannot delete {path}: {error.strerror}") from error
-        return len(doomed)
+        return len(files)
 
     def _files(self, pattern: str) -> list[Path]:
         if self.directory is None:

@@ -32,7 +32,7 @@ def print_table(
     caption: str = "",
     stream: TextIO | None = None,
 ) -> None:
-    """A table of finished text. Nothing in it is taken for markup, nothing is cut or lost."""
+    """A table of finished text; none of it is read as markup, and no cell is cut."""
     out = sys.stdout if stream is None else stream
     table = RichTable(box=box.SIMPLE_HEAD if _speaks_unicode(out) else box.ASCII2, pad_edge=False)
     for at, column in enumerate(columns):
@@ -75,7 +75,7 @@ def _speaks_unicode(out: TextIO) -> bool:
 
 
 def _printable(text: str) -> str:
-    """Without control characters: no file name moves the cursor."""
+    """Without control characters, so that no file name can move the cursor."""
     return "".join(c if c.isprintable() else " " for c in text)
 
 

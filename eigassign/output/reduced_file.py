@@ -1,4 +1,4 @@
-"""A reduced model in one HDF5 file, checked byte for byte before it is believed."""
+"""A reduced model in one HDF5 file, checked by its hash before it is read."""
 
 from __future__ import annotations
 

@@ -101,7 +101,7 @@ def _frequencies(results: RunResults, target: TargetStudy) -> dict[str, Any]:
 
 
 def _named(results: RunResults, rows: slice) -> dict[str, Any]:
-    """Of several trajectories the name of each sample's own."""
+    """With several trajectories, the name of the one that each sample belongs to."""
     if len(results.trajectories) < 2:
         return {}
     return {"trajectory": trajectory_names(results, rows)}
@@ -276,7 +276,7 @@ def _scattered(targets: Sequence[TargetStudy], kind: str, n: int) -> list[float]
 
 
 def _expanded(results: RunResults) -> Iterator[Column]:
-    """At the initial design, with what both expansions make of it."""
+    """Exact frequencies at the initial design, and those of both expansions."""
     for study in results.studies:
         if study.over_time is not None:
             for kind in ("exact", "taylor", "linearised"):

@@ -42,7 +42,7 @@ _YOUNG_S = 60.0  # a temporary folder this fresh may not have been locked yet by
 
 @dataclass(frozen=True)
 class RunOf:
-    """Whose run a folder is: ``case_path`` relative to the folder, so that both may move."""
+    """The case of a run; ``case_path`` is relative to the folder, so that both may move."""
 
     case_path: str
     case_sha256: str
@@ -98,7 +98,7 @@ def _make_parents(folder: Path) -> list[Path]:
 
 
 def _remove_empty(folders: list[Path]) -> None:
-    """Take back folders that were made for a run that left nothing."""
+    """Remove the folders that were made for a run that failed, if they are empty."""
     for folder in folders:
         with contextlib.suppress(OSError):
             folder.rmdir()
@@ -184,7 +184,7 @@ def _require_still_ours(target: Path, run: RunOf, *, force: bool) -> None:
 
 @contextlib.contextmanager
 def _kept_aside(target: Path, run: RunOf) -> Iterator[None]:
-    """Move what runs did not write out of the way first, so that no step can lose it."""
+    """Move files that no run wrote out of the way first, so that no step can delete them."""
     if not _is_worth_keeping(target, run):
         yield
         return

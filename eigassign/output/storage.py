@@ -1,7 +1,7 @@
 """Files and folders that are written whole or not at all, whatever happens in between.
 
 Bytes are on disk before anything points at them; one folder takes another's place in a single
-step; a lock on a folder says whether its writer still lives, and leaves no file behind.
+step; the lock on a folder is held while its writer lives, and needs no file.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def sync_tree(folder: Path) -> None:
 
 
 def replace_synced(path: Path, data: bytes) -> None:
-    """Make ``path`` hold ``data``, whole or not at all, whoever else writes it.
+    """Replace the content of ``path`` by ``data`` in one step, whoever else writes it.
 
     A temporary file in the same folder is filled, synced and renamed over ``path``.
     """
@@ -79,7 +79,7 @@ _ATTEMPTS = 20
 
 
 def put_in_place(new: Path, target: Path) -> Path | None:
-    """Make ``new`` be ``target``; where something was there, return where that is now.
+    """Move ``new`` to ``target``; returns where what was there is now, None if nothing was.
 
     One atomic exchange where the system has it (Linux); else two renames, undone if the second
     fails. Raises StorageError when other writers keep getting in between, OSError otherwise.

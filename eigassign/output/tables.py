@@ -85,7 +85,7 @@ def _approximations(results: RunResults) -> Iterator[tuple[str, ...]]:
 
 
 def solver(results: RunResults) -> Table:
-    """What the solver says, and what its answer is worth by our own residuals."""
+    """The solver's status, and the residuals of its answer, recomputed from the data."""
     columns = ("status", "iterations", "primal residual", "dual residual", "gap")
     found = results.solver
     if found is None:

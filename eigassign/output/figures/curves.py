@@ -69,7 +69,7 @@ def plot(axes: Axes, x: Floats, curves: Sequence[tuple[Floats, Look]], label: st
 def plot_logarithmic(
     axes: Axes, x: Floats, curves: Sequence[tuple[Floats, Look]], label: str
 ) -> None:
-    """Curves >= 0 over ``x`` on a logarithmic scale; the lowest label owns up to what it cuts."""
+    """Curves >= 0 over ``x`` on a logarithmic scale; the lowest label says ≤ if values are cut."""
     low, high = style.decades([y for y, _ in curves], _ERROR_DECADES)
     for y, look in curves:
         axes.plot(x, np.maximum(y, low), **look, marker="o" if x.size == 1 else "")

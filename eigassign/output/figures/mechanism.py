@@ -280,7 +280,7 @@ def _box(along: Floats, half: float, tall: float) -> Floats:
 
 
 def draw_bodies(drawing: Drawing, bodies: Sequence[DrawnBody], pose: int, colour: str) -> None:
-    """Dots whose volume tells the mass; a ring for none."""
+    """Dots, their diameter by the cube root of the mass; a ring without mass."""
     for body, diameter in zip(bodies, diameters(bodies), strict=True):
         at = drawing.view.flat(body.places[[pose]])
         drawing.dots(at, diameter, colour, colour if body.mass > 0.0 else "white")
@@ -377,7 +377,7 @@ def poses(results: RunResults) -> FigurePlan:
 
 
 def draw_poses(results: RunResults) -> Figure:
-    """Links as lines whose colour tells the time of the pose."""
+    """Links as lines, coloured by the time of the pose."""
     shown, held = results.poses, extent(results.poses)
     spatial, colours = held.view.spatial, _colours(len(shown.lines))
     title = f"{short(results.title, 70)}: poses along the trajectory"

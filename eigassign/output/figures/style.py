@@ -31,7 +31,7 @@ FORMATS = ("png", "svg", "pdf")
 WIDTH_IN = 8.0
 SMALL_PT = 8.0
 
-# Okabe and Ito: told apart with every kind of colour vision
+# Okabe and Ito: can be distinguished with every kind of colour vision
 BLACK, ORANGE, SKY, GREEN = "#1a1a1a", "#E69F00", "#56B4E9", "#009E73"
 BLUE, VERMILLION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#8c8c8c"
 SERIES = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
