@@ -59,7 +59,7 @@ def front_notes(points: Sequence[ChartPoint], fronts: Sequence[Front]) -> Iterat
         others = [p.method for p in inside if not p.ours]
         ours = f"{len(inside) - len(others)} of {len(inside)} methods are eigassign's"
         named = f"; the others: {', '.join(others)}" if others else ""
-        yield f"front between 1e-2 and 1e-8, {each.name}: {ours}{named}"
+        yield f"front of {each.name}, errors between 1e-2 and 1e-8: {ours}{named}"
 
 
 def break_even(offline_s: float, online_s: float, exact_s: float) -> float | None:
@@ -101,7 +101,7 @@ def advise_accuracy(
 
     Nothing is advised below ``floor`` (relative): no method can be seen to be that accurate.
     """
-    asked = f"for {evaluations:.3g} evaluations, each within {accuracy:.1e} of exact"
+    asked = f"for {evaluations:,.0f} evaluations, each within {accuracy:.1e} of exact"
     if accuracy >= floor:
         found = cheapest(points, accuracy, evaluations)
         return _advice("accuracy", accuracy, None, evaluations, found, asked)
@@ -113,7 +113,7 @@ def advise_accuracy(
 def advise_budget(points: Sequence[ChartPoint], budget_s: float, evaluations: float) -> Advice:
     """What to choose for a time, set-up and all evaluations together."""
     found = most_accurate(points, budget_s, evaluations)
-    asked = f"for {evaluations:.3g} evaluations within {time_in_words(budget_s)}"
+    asked = f"for {evaluations:,.0f} evaluations within {time_in_words(budget_s)}"
     return _advice("budget", None, budget_s, evaluations, found, asked)
 
 
