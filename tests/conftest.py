@@ -7,7 +7,7 @@ from pathlib import Path
 
 from hypothesis import settings
 
-for folder in ("oracles", "mechanism", "modal", "stability", "study"):
+for folder in ("oracles", "case", "mechanism", "modal", "stability", "study"):
     sys.path.insert(0, str(Path(__file__).parent / folder))
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)

@@ -6,8 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from mistakes import Wrong, problems_of
 from small_case import unmarked
-from test_wrong_cases import Wrong, problems_of
 from wide_cases import PLANAR, SPATIAL, changed, write
 
 # fmt: off

@@ -6,8 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from json_schema_reader import SCHEMA, accepts
 from small_case import edited, unmarked
-from test_case_schema import SCHEMA, accepts
 
 from eigassign.case import CaseFile, SampledTrajectory, TipTrajectory, parse
 from eigassign.case.reader import read_yaml
@@ -185,7 +185,7 @@ def test_no_coordinate_is_called_time_for_that_is_a_column() -> None:
 
 
 def test_a_branch_of_a_passive_joint_is_refused_and_the_driven_ones_named() -> None:
-    text = Path(__file__).parents[2].joinpath("cases/five_bar.yaml").read_text(encoding="utf-8")
+    text = Path(__file__).parents[3].joinpath("cases/five_bar.yaml").read_text(encoding="utf-8")
     head, rest = text.split("trajectory:\n")
     path = "  tip: left_arm.end\n  waypoints: [[0.1, 0.3], [0.12, 0.3]]\n"
     path += "  branch: {left_elbow: [0, 1]}\n\n"

@@ -4,22 +4,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
+from mistakes import Wrong, problems_of
 from small_case import edited, unmarked
-
-from eigassign.case import load
-from eigassign.errors import CaseError
-
-
-class Wrong(NamedTuple):
-    name: str
-    old: str  # of the small case
-    new: str  # with ¦ where the problem must be shown
-    path: str
-    message: str  # fragment
-
 
 # fmt: off
 MECHANISM = [
@@ -183,13 +171,6 @@ SAMPLED = [
     Wrong("file and tip", MOTION, "  tip: hand.end\n  waypoints: [[0, 1], [1, 0]]\n  ¦file: nowhere.csv\n", "trajectory.file", "unknown key"),
 ]
 # fmt: on
-
-
-def problems_of(text: str, path: Path) -> list[tuple[int, int, str, str]]:
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(CaseError) as caught:
-        load(path)
-    return [(p.line, p.column, p.path, p.message) for p in caught.value.problems]
 
 
 @pytest.mark.parametrize("wrong", [*MECHANISM, *STUDY, *SAMPLED], ids=lambda wrong: wrong.name)

@@ -7,7 +7,7 @@ import pickle
 from pathlib import Path
 
 import pytest
-from test_case_schema import SCHEMA, accepts
+from json_schema_reader import SCHEMA, accepts
 from wide_cases import PLANAR, SPATIAL, changed, write
 
 from eigassign.case import (

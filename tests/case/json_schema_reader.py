@@ -1,0 +1,55 @@
+"""As much of JSON Schema as that of case files uses, written down once more, independently."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from eigassign.case import json_schema
+
+SCHEMA = json_schema()
+
+
+def accepts(schema: dict[str, Any], value: Any) -> bool:
+    """Whether ``value``, as read from YAML, is what ``schema`` describes."""
+    if "$ref" in schema:
+        return accepts(SCHEMA["$defs"][schema["$ref"].rpartition("/")[2]], value)
+    for key in ("anyOf", "oneOf"):
+        if key in schema and sum(accepts(option, value) for option in schema[key]) < 1:
+            return False
+    if "const" in schema and value != schema["const"]:
+        return False
+    if "enum" in schema and value not in schema["enum"]:
+        return False
+    return _typed(schema, value)
+
+
+def _typed(schema: dict[str, Any], value: Any) -> bool:
+    kinds = {"object": dict, "array": tuple, "string": str, "number": (int, float), "integer": int}
+    kind = schema.get("type")
+    if kind == "boolean" or isinstance(value, bool):
+        return kind == "boolean" and isinstance(value, bool)
+    if kind and not isinstance(value, kinds[kind]):
+        return False
+    if kind == "object":
+        return _object(schema, value)
+    if kind == "array":
+        short = not schema.get("minItems", 0) <= len(value) <= schema.get("maxItems", 10**9)
+        each = schema.get("prefixItems") or [schema.get("items", {})] * len(value)
+        return not short and len(each) == len(value) and all(map(accepts, each, value))
+    if kind == "string":
+        return re.search(schema.get("pattern", ""), value) is not None
+    low, high = schema.get("minimum", -1e99), schema.get("maximum", 1e99)
+    above = schema.get("exclusiveMinimum", -1e99)
+    below = schema.get("exclusiveMaximum", 1e99)
+    return kind is None or (low <= value <= high and above < value < below)
+
+
+def _object(schema: dict[str, Any], value: dict[str, Any]) -> bool:
+    known, others = schema.get("properties", {}), schema.get("additionalProperties", True)
+    if any(key not in value for key in schema.get("required", ())):
+        return False
+    return all(
+        accepts(known[key], inner) if key in known else others and accepts(others, inner)
+        for key, inner in value.items()
+    )

@@ -1,0 +1,26 @@
+"""A mistake in a case file, where it must be shown and what must be said of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from eigassign.case import load
+from eigassign.errors import CaseError
+
+
+class Wrong(NamedTuple):
+    name: str
+    old: str  # of the small case
+    new: str  # with ¦ where the problem must be shown
+    path: str
+    message: str  # fragment
+
+
+def problems_of(text: str, path: Path) -> list[tuple[int, int, str, str]]:
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(CaseError) as caught:
+        load(path)
+    return [(p.line, p.column, p.path, p.message) for p in caught.value.problems]
