@@ -28,7 +28,6 @@ OWNERS = {
 EVERYWHERE = {"numpy", "scipy"}
 PRINTING = {"cli.cache", "cli.inspect", "cli.runs", "cli.reporter", "output.console"}
 PRIVATE_PENDING = {
-    "test_case_objects.py",
     "test_convection.py",
     "test_craig_bampton.py",
     "test_sections.py",
