@@ -33,8 +33,6 @@ PRIVATE_PENDING = {
     "test_sections.py",
     "test_compression.py",
     "test_tracking.py",
-    "test_cache.py",
-    "test_run_folder.py",
     "test_mode_studies.py",
 }
 MODULES = sorted(ROOT.rglob("*.py"))
