@@ -27,17 +27,8 @@ OWNERS = {
 }
 EVERYWHERE = {"numpy", "scipy"}
 PRINTING = {"cli.cache", "cli.inspect", "cli.runs", "cli.reporter", "output.console"}
-PRIVATE_PENDING = {
-    "test_convection.py",
-    "test_craig_bampton.py",
-    "test_sections.py",
-    "test_compression.py",
-    "test_tracking.py",
-    "test_mode_studies.py",
-}
 MODULES = sorted(ROOT.rglob("*.py"))
 PACKAGES = sorted(path.parent for path in ROOT.rglob("__init__.py"))
-PENDING = {}
 
 
 def name_of(path: Path) -> str:
@@ -72,8 +63,6 @@ def reading_order(package: Path) -> list[str]:
 @pytest.mark.parametrize("package", PACKAGES, ids=lambda p: name_of(p / "__init__.py") or "top")
 def test_modules_import_only_from_those_above_them_in_the_reading_order(package: Path) -> None:
     prefix = name_of(package / "__init__.py")
-    if prefix in PENDING:
-        pytest.skip("not in order yet")
     order = reading_order(package)
     inside = {p.stem for p in package.glob("*.py")} | {
         p.parent.name for p in package.glob("*/*.py")
@@ -92,8 +81,6 @@ def test_modules_import_only_from_those_above_them_in_the_reading_order(package:
 def test_our_own_modules_are_imported_at_the_top(path: Path) -> None:
     """But in the command line and ``import eigassign``, which load what is used only."""
     name = name_of(path)
-    if name in PENDING or name.rpartition(".")[0] in PENDING:
-        pytest.skip("not in order yet")
     functions = (n for n in ast.walk(parsed(path)) if isinstance(n, ast.FunctionDef))
     inside = {used for function in functions for used in imports(function)}
     if name and name.split(".")[0] != "cli":
@@ -175,8 +162,6 @@ def private_names(tree: ast.Module) -> Iterator[str]:
 @pytest.mark.parametrize("path", TESTS, ids=lambda path: path.stem)
 def test_no_test_uses_a_private_name_of_the_package(path: Path) -> None:
     used = {n for n in private_names(parsed(path)) if re.match("_[^_]", n)} - STANDARD
-    if path.name in PRIVATE_PENDING:
-        pytest.skip(f"to be cleaned: {sorted(used)}")
     assert not used
 
 

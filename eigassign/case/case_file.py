@@ -5,13 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
-from eigassign.case.canonical import to_yaml
+from eigassign.case.canonical import plain, to_yaml
 from eigassign.case.reader import KeyPath, Mark, dotted
+from eigassign.case.rules.properties import property_at
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.joints import freedom_of
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
+from eigassign.case.schema.parts import Quantity
 from eigassign.case.schema.study import Design, Expansion, Target, Validation
 from eigassign.case.schema.trajectory import Trajectory, named_trajectories
 from eigassign.errors import Problem
@@ -61,6 +64,19 @@ class CaseFile:
         joints = self.mechanism.joints
         moved = (freedom_of(joints[c.joint].type, c.component) for c in self.coordinates.values())
         return tuple("m" if freedom == "translation" else "rad" for freedom in moved)
+
+    @cached_property
+    def design_quantities(self) -> tuple[Quantity, ...]:
+        """Dimension and limits of each design parameter, in the order of y."""
+        tree = {"mechanism": plain(self.mechanism), "coordinates": plain(self.coordinates)}
+        found = (property_at(tree, p.parameter) for p in self.design.parameters.values())
+        return tuple(each.quantity if each else Quantity() for each in found)
+
+    @property
+    def design_units(self) -> tuple[str, ...]:
+        """SI unit of each design parameter, in the order of y; empty for a plain number."""
+        dimensions = (quantity.dimension for quantity in self.design_quantities)
+        return tuple(each.si.replace("·", " ") if each else "" for each in dimensions)
 
     @property
     def trajectories(self) -> tuple[tuple[str, str, Trajectory], ...]:

@@ -1,7 +1,4 @@
-"""Quick questions about a case: is it right, and what are its frequencies at one point.
-
-``--q`` and ``--y`` of the command line: text → SI numbers of the case's dimensions.
-"""
+"""Quick questions about a case: is it right, and what are its frequencies at one point."""
 
 from __future__ import annotations
 
@@ -14,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile, load
-from eigassign.case.canonical import plain
-from eigassign.case.rules.properties import impossible, property_at
+from eigassign.case.rules.properties import impossible
 from eigassign.case.schema.parts import Quantity, quantity
 from eigassign.case.units import QuantityError
 from eigassign.errors import CaseError, Problem, UsageError
@@ -28,8 +24,6 @@ from eigassign.study.accuracy import truncation_lines
 from eigassign.study.assignment import target_frequencies
 from eigassign.study.built_case import Case, load_case
 from eigassign.study.planning import plan_expansion
-
-# --- Quick questions about a case: is it right, and what are its frequencies at one point
 
 Floats = NDArray[np.float64]
 
@@ -217,12 +211,9 @@ def design(case: CaseFile, text: str | None) -> Numbers:
     """y in SI units, one value per design parameter of the case; raises UsageError."""
     if text is None:
         return None
-    tree = {"mechanism": plain(case.mechanism), "coordinates": plain(case.coordinates)}
-    paths = {name: p.parameter for name, p in case.design.parameters.items()}
-    properties = {name: property_at(tree, path) for name, path in paths.items()}
-    quantities = [p.quantity if p else Quantity() for p in properties.values()]
-    values = _read(text, "--y", list(properties), quantities)
-    point = {path: (value, value) for path, value in zip(paths.values(), values, strict=True)}
+    values = _read(text, "--y", list(case.design.parameters), case.design_quantities)
+    paths = [p.parameter for p in case.design.parameters.values()]
+    point = {path: (value, value) for path, value in zip(paths, values, strict=True)}
     for *_, message in impossible(case.mechanism.sections, point):
         raise UsageError(f"--y: {message}")
     return values

@@ -35,7 +35,6 @@ from eigassign.study.results import (
     SolverRow,
     TargetAlong,
     TargetStudy,
-    design_units,
 )
 from eigassign.study.scene import Scene
 
@@ -224,7 +223,7 @@ def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:
     """One row for each design parameter, in the order of the file."""
     parameters, units, initial = (
         scene.file.design.parameters,
-        design_units(scene.file),
+        scene.file.design_units,
         scene.initial,
     )
     return tuple(

@@ -40,7 +40,6 @@ from eigassign.study.results import (
     DesignMap,
     ModeStudy,
     ValidationRow,
-    design_units,
     frozen,
 )
 from eigassign.study.scene import Expansions, Scene
@@ -173,7 +172,7 @@ def design_grid(scene: Scene) -> Grid | None:
     return grid_over(
         range(n_q, n_q + len(names)),
         names,
-        design_units(scene.file),
+        scene.file.design_units,
         lower,
         upper,
         scene.expansions.full.x0,

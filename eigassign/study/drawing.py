@@ -29,7 +29,6 @@ from eigassign.study.results import (
     DrawnPoses,
     DrawnSpring,
     ModePictures,
-    design_units,
     frozen,
 )
 
@@ -78,7 +77,7 @@ def draw_modes(file: CaseFile, model: Model, q: Floats, y: Floats, count: int) -
     n_q = len(model.q_names)
     scales = AMPLITUDE * _extent(shapes) / _largest(shapes) * _phase(shapes)
     coordinates = zip(model.q_names, x[0, :n_q], file.coordinate_units, strict=True)
-    design = zip(model.y_names, x[0, n_q:], design_units(file), strict=True)
+    design = zip(model.y_names, x[0, n_q:], file.design_units, strict=True)
     return ModePictures(
         title=file.title,
         rigid_modes=model.n_rigid,
