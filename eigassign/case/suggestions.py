@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
 from itertools import islice
 
 _LONGEST = 60
@@ -31,8 +32,6 @@ def shown(value: object) -> str:
 
 def suggestion(name: str, known: Iterable[str]) -> str:
     """``"; did you mean 'x'?"`` when something known is close, else nothing."""
-    from difflib import get_close_matches  # only needed once something is wrong
-
     candidates = islice(known, _MOST_CANDIDATES)
     close = get_close_matches(name[:_LONGEST], list(candidates), n=1, cutoff=0.6)
     return f"; did you mean {close[0]!r}?" if close else ""

@@ -14,7 +14,7 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic_core import PydanticUndefined
 
 from eigassign.case.reader import Finding, Tree, at, names, text
-from eigassign.case.rules.lookups import driven, is_spatial, number, parameters, type_of
+from eigassign.case.rules.lookups import ANY, driven, is_spatial, number, parameters, type_of
 from eigassign.case.schema.links import LINKS
 from eigassign.case.schema.mechanism import Body, Spring
 from eigassign.case.schema.parts import Part, Quantity, quantity
@@ -150,7 +150,7 @@ def drive_quantity(tree: Tree, coordinate: object) -> Quantity:
     """What the drive stiffness of a coordinate is."""
     freedom = driven(tree, coordinate)
     if freedom is None:
-        return Quantity(above=0)
+        return ANY
     return quantity("stiffness" if freedom == "translation" else "rotational stiffness", above=0)
 
 

@@ -66,8 +66,10 @@ def _numbers(tree: Tree) -> Iterator[tuple[KeyPath, object]]:
 
 
 def _in_si(value: object, quantity: Quantity | None) -> float:
+    if quantity is ANY:
+        return read(value, None)
     if quantity is not None:
-        return quantity.checked(read(value, quantity.dimension), shown(value))
+        return quantity.read(value)
     if isinstance(value, str):
         raise QuantityError(
             f"terms of different dimensions: give a plain number in SI units, got {shown(value)}"

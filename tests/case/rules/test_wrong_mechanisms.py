@@ -27,6 +27,7 @@ LINKS = [
     Wrong("profile without web", ", web_thickness: 3 mm", "", "mechanism.sections.profile.web_thickness", "required key is missing: length"),
     Wrong("Poisson's ratio of a liquid", "poissons_ratio: 0.3", "¦poissons_ratio: 0.5", "mechanism.materials.steel.poissons_ratio", "must be < 0.5, got 0.5"),
     Wrong("impossible Poisson's ratio", "poissons_ratio: 0.3", "¦poissons_ratio: -1", "mechanism.materials.steel.poissons_ratio", "must be > -1"),
+    Wrong("bound of a Poisson's ratio with a unit", "coordinates.place.drive.stiffness, min: 1 kN/m, max: 4 kN/m", "materials.steel.poissons_ratio, ¦min: 0.1 mm, max: 0.4", "design.d.min", "expected a number without unit, got text '0.1 mm'"),
     Wrong("Poisson's ratio with a unit", "poissons_ratio: 0.3", "¦poissons_ratio: 30 %", "mechanism.materials.steel.poissons_ratio", "expected a number without unit"),
     Wrong("both shear constants", "poissons_ratio: 0.3", "poissons_ratio: 0.3, ¦shear_modulus: 80 GPa", "mechanism.materials.steel.shear_modulus", "not both"),
     Wrong("shear without its modulus", "steel: {youngs_modulus: 210 GPa, density: 7850, poissons_ratio: 0.3}", "¦steel: {youngs_modulus: 210 GPa, density: 7850}", "mechanism.materials.steel", "a beam with shear: true uses it"),
