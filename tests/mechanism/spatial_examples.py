@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
 
 Tree = dict[str, Any]
 STEEL = {"youngs_modulus": 200e9, "density": 7800.0, "poissons_ratio": 0.3}
+MASS, INERTIA = 1.3, 0.02  # of a rigid link
 TUBE = {"shape": "tube", "outer_diameter": 0.04, "inner_diameter": 0.034}
 
 
@@ -105,3 +107,51 @@ def gantry(drive: Any) -> Tree:
         },
         "coordinates": {"x": {"joint": "car", "drive": drive}},
     }  # fmt: skip
+
+
+def slotted_lever(drive: Any) -> Tree:
+    """A crank whose block rides, passively, along a flexible lever (quick return)."""
+    tree = four_bar(drive)
+    m = tree["mechanism"]
+    m["links"] = {"crank": straight(0.12, 2), "block": {"type": "rigid", "mass": 0.1,
+                  "inertia": 1e-4}, "lever": straight(0.7, 6)}  # fmt: skip
+    m["joints"] = {
+        "A": {"type": "revolute", "base": "ground", "follower": "crank.start"},
+        "L": {"type": "revolute", "base": "ground", "follower": "lever.start",
+              "position": [0.0, -0.3]},
+        "S": {"type": "carriage", "base": "lever", "follower": "block.start"},
+        "B": {"type": "revolute", "base": "crank.end", "follower": "block.start"},
+    }  # fmt: skip
+    m["assembly"] = {"at": {"th": 0.0}, "guess": {"L": 1.2, "S": 0.3, "B": 1.0}}
+    return tree
+
+
+def ball_screw(orientation: list[float]) -> Tree:
+    """A screw shaft with a travelling nut that carries a table's arm."""
+    return {
+        "mechanism": {
+            "space": "spatial",
+            "materials": {"m": {"youngs_modulus": 210e9, "density": 7850.0, "poissons_ratio": 0.3}},
+            "sections": {"s": {"shape": "circle", "diameter": 0.02}},
+            "links": {"shaft": straight(1.0, 4), "arm": straight(0.2, 2)},
+            "joints": {
+                "bearing": {"type": "fixed", "base": "ground", "follower": "shaft.start"},
+                "nut": {"type": "nut", "base": "shaft", "follower": "arm.start", "lead": 0.05,
+                        "orientation": orientation},
+            },
+            "bodies": {"table": {"at": "arm.end", "mass": 2.0, "inertia": [0.01, 0.02, 0.02]}},
+        },
+        "coordinates": {"s": {"joint": "nut", "drive": {"stiffness": 1e7}}},
+    }  # fmt: skip
+
+
+def rigid(tree: Tree, *links: str) -> Tree:
+    """The tree with these links rigid, of one mass and inertia each, centred on their axis."""
+    out = copy.deepcopy(tree)
+    for name in links or tuple(tree["mechanism"]["links"]):
+        length = tree["mechanism"]["links"][name]["length"]
+        out["mechanism"]["links"][name] = {
+            "type": "rigid", "length": length, "mass": MASS, "inertia": INERTIA,
+            "center": [0.5 * length, 0.0],
+        }  # fmt: skip
+    return out

@@ -109,6 +109,11 @@ def nodes(tree: Tree, link: str) -> list[str]:
     return list({"start": 0, **data.get("nodes", {}), **({"end": 0} if "length" in data else {})})
 
 
+def last_node(tree: Tree) -> str:
+    link = list(tree["mechanism"]["links"])[-1]
+    return f"{link}.{nodes(tree, link)[-1]}"
+
+
 def joint_of(space: str, kind: str, rng: Random) -> Tree:
     joint: Tree = {"type": kind}
     if kind in ("prismatic", "revolute", "cylindrical", "screw") and rng.random() < 0.7:

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from spatial_cases import ALLOY, Built, built, changed
-from spatial_examples import four_bar
+from spatial_examples import four_bar, rigid
 from spatial_oracle import Tree, world
 from spatial_random import add_springs as add_random_springs
 from spatial_random import random_closed, random_open
-from test_rigid_loops import rigid
 
 from eigassign.errors import MechanismError
 from eigassign.modal.exact.solver import eigenvalues

@@ -6,29 +6,15 @@ import copy
 
 import numpy as np
 import pytest
+from frame_comparison import agree
 from spatial_cases import built
-from spatial_examples import four_bar
+from spatial_examples import INERTIA, MASS, four_bar, rigid
 from spatial_oracle import Tree, world
 from spatial_random import random_closed
-from test_spatial import agree
 
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.rigid_loops import require_consistent
 from eigassign.mechanism.kinematics.topology import JointEdge
-
-MASS, INERTIA = 1.3, 0.02
-
-
-def rigid(tree: Tree, *links: str) -> Tree:
-    """The tree with these links rigid, of one mass and inertia each, centred on their axis."""
-    out = copy.deepcopy(tree)
-    for name in links or tuple(tree["mechanism"]["links"]):
-        length = tree["mechanism"]["links"][name]["length"]
-        out["mechanism"]["links"][name] = {
-            "type": "rigid", "length": length, "mass": MASS, "inertia": INERTIA,
-            "center": [0.5 * length, 0.0],
-        }  # fmt: skip
-    return out
 
 
 def effective_inertia(theta: float) -> float:

@@ -1,9 +1,4 @@
-"""The ERLS pencil of every kind of mechanism against a plain frame program in world axes.
-
-Both are the same discretisation in other unknowns, so the spectra agree to round-off. That is the
-machine's 1e-16 times the ratio of the stiffest entry (EA/h, 1e9) to the lowest modes' (1e3) or so,
-amplified by loops near (not at) a dead point; over 1600 random poses the worst was 3e-9.
-"""
+"""The ERLS pencil of every kind of mechanism against a plain frame program in world axes."""
 
 from __future__ import annotations
 
@@ -11,38 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spatial_cases import Built, built
+from frame_comparison import agree
+from spatial_cases import built
 from spatial_examples import arm3r, four_bar, gantry, slider_crank
-from spatial_oracle import Tree, World, world
-from spatial_random import nodes, random_closed, random_open
+from spatial_oracle import world
+from spatial_random import random_closed, random_open
 
 from eigassign.modal.exact.solver import eigenvalues
-
-TOLERANCE = 3e-8
-
-
-def agree(tree: Tree, poses: tuple[np.ndarray, ...]) -> None:
-    model = built(tree)
-    for q in poses:
-        frame = world(tree, q)
-        same_spectrum(model, frame, q)
-        same_places(model, frame, tree, q)
-
-
-def same_spectrum(model: Built, frame: World, q: np.ndarray) -> None:
-    K, _ = frame.projected()
-    assert model.pencil.n_dof == len(K)
-    assert len(model.pencil.rigid) == frame.n_free
-    count = min(6, model.n_elastic)
-    np.testing.assert_allclose(model.lam(q, count), frame.spectrum(count), rtol=TOLERANCE)
-
-
-def same_places(model: Built, frame: World, tree: Tree, q: np.ndarray) -> None:
-    assert frame.pose is not None
-    for link in tree["mechanism"]["links"]:
-        for node in nodes(tree, link):
-            here = model.poses.position(model.x(q), link, node)[0]
-            np.testing.assert_allclose(here, frame.pose.node(tree, f"{link}.{node}"), atol=1e-9)
 
 
 @pytest.mark.parametrize("space", ["planar", "spatial"])

@@ -7,18 +7,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 from spatial_cases import built
 from spatial_oracle import Tree
-from spatial_random import nodes, random_closed, random_open
+from spatial_random import last_node, random_closed, random_open
 from tip_paths import chain_of, states, tips
 
 from eigassign.mechanism.inverse_kinematics.chain import TipChain
 
 H = 1e-6  # central differences: error about h² and 1e-16 / h
 EVERY = [(seed, space) for seed in range(12) for space in ("planar", "spatial")]
-
-
-def last_node(tree: Tree) -> str:
-    link = list(tree["mechanism"]["links"])[-1]
-    return f"{link}.{nodes(tree, link)[-1]}"
 
 
 def mechanisms(seed: int, space: str) -> list[tuple[Tree, np.ndarray]]:

@@ -9,8 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from spatial_cases import built
 from spatial_oracle import Tree
-from spatial_random import Random, random_closed, random_open
-from test_tip_motion import last_node
+from spatial_random import Random, last_node, random_closed, random_open
 from tip_paths import between, chain_of, course, states, tips
 
 from eigassign.mechanism.inverse_kinematics.chain import reduced

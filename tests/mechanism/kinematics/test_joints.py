@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from spatial_cases import Built, built, changed
-from spatial_examples import arm3r, four_bar, gantry, straight
+from spatial_examples import arm3r, ball_screw, four_bar, gantry
 from spatial_oracle import FREEDOMS, Tree, world
 from spatial_random import random_closed, random_open
 
@@ -240,25 +240,6 @@ def test_a_carriage_travels_along_its_beam_however_its_follower_is_mounted(angle
     np.testing.assert_allclose(ahead - behind, [0.2, 0.0, 0.0], atol=1e-12)
     frame = world(tree, [0.5])
     np.testing.assert_allclose(model.lam([0.5], 6), frame.spectrum(6), rtol=1e-9)
-
-
-def ball_screw(orientation: list[float]) -> Tree:
-    """A screw shaft with a travelling nut that carries a table's arm."""
-    return {
-        "mechanism": {
-            "space": "spatial",
-            "materials": {"m": {"youngs_modulus": 210e9, "density": 7850.0, "poissons_ratio": 0.3}},
-            "sections": {"s": {"shape": "circle", "diameter": 0.02}},
-            "links": {"shaft": straight(1.0, 4), "arm": straight(0.2, 2)},
-            "joints": {
-                "bearing": {"type": "fixed", "base": "ground", "follower": "shaft.start"},
-                "nut": {"type": "nut", "base": "shaft", "follower": "arm.start", "lead": 0.05,
-                        "orientation": orientation},
-            },
-            "bodies": {"table": {"at": "arm.end", "mass": 2.0, "inertia": [0.01, 0.02, 0.02]}},
-        },
-        "coordinates": {"s": {"joint": "nut", "drive": {"stiffness": 1e7}}},
-    }  # fmt: skip
 
 
 @pytest.mark.parametrize("orientation", [[0, 0, 0], [0.3, 0, 0], [0, 0, np.pi / 2], [0.4, -1, 2]])

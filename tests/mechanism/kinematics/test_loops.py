@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from spatial_cases import ALLOY, Built, built, changed
-from spatial_examples import arm3r, four_bar, gantry, slider_crank, straight
+from spatial_examples import arm3r, four_bar, gantry, slider_crank, slotted_lever, straight
 from spatial_oracle import Tree, world
 
 from eigassign.errors import CaseError, MechanismError, SingularityError
@@ -342,23 +342,6 @@ def six_bar() -> Tree:
         "G": {"type": "revolute", "base": "bar.end", "follower": "swing.end"},
     }
     m["assembly"]["guess"] |= {"F": -1.5, "H": 1.5, "G": 1.5}
-    return tree
-
-
-def slotted_lever(drive: Any) -> Tree:
-    """A crank whose block rides, passively, along a flexible lever (quick return)."""
-    tree = four_bar(drive)
-    m = tree["mechanism"]
-    m["links"] = {"crank": straight(0.12, 2), "block": {"type": "rigid", "mass": 0.1,
-                  "inertia": 1e-4}, "lever": straight(0.7, 6)}  # fmt: skip
-    m["joints"] = {
-        "A": {"type": "revolute", "base": "ground", "follower": "crank.start"},
-        "L": {"type": "revolute", "base": "ground", "follower": "lever.start",
-              "position": [0.0, -0.3]},
-        "S": {"type": "carriage", "base": "lever", "follower": "block.start"},
-        "B": {"type": "revolute", "base": "crank.end", "follower": "block.start"},
-    }  # fmt: skip
-    m["assembly"] = {"at": {"th": 0.0}, "guess": {"L": 1.2, "S": 0.3, "B": 1.0}}
     return tree
 
 

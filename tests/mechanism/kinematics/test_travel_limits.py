@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from spatial_cases import built, changed
-from spatial_examples import gantry
-from test_joints import ball_screw
-from test_loops import slotted_lever
+from spatial_examples import ball_screw, gantry, slotted_lever
 
 from eigassign.errors import TravelError
 from eigassign.mechanism.kinematics.travel_limits import resting_pose
