@@ -142,11 +142,13 @@ def _add_pair(
     """What a column c_s on the right gives with any other, and its transpose for a rigid one."""
     factor = scale * left.factor * right.factor
     for of_left, of_right in zip(left.rows, right.rows, strict=True):
-        for (i, a), (j, b) in itertools.product(of_left, of_right):
-            entry = factor * a * b * value
-            target.add_small(i, j, entry)
-            if left.slot is None:
-                target.add_small(j, i, entry)
+        for i, a in of_left:
+            scaled = factor * a
+            for j, b in of_right:
+                entry = scaled * b * value
+                target.add_small(i, j, entry)
+                if left.slot is None:
+                    target.add_small(j, i, entry)
 
 
 def _add_rigid_inertia(M: AffineEntries, copies: Sequence[LocalLink], n_u: int) -> None:
