@@ -47,10 +47,11 @@ def _watched(
     """Run the jobs with a line of progress each, and a table at the end."""
     from eigassign.batch.runner import run_and_summarise
     from eigassign.output import console
+    from eigassign.output.batch_summary import batch_table
 
     with console.progress("case", len(jobs), stream=reporter.stream()) as advance:
         outcomes = run_and_summarise(
             jobs, workers, out, lambda row: advance(f"{row['name']}: {row['status']}")
         )
-    console.print_batch(outcomes)
+    console.print_tables([batch_table(outcomes)])
     return outcomes

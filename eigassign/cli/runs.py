@@ -158,8 +158,9 @@ def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
     if as_json:
         print_json({"run_folder": str(made.folder), **vars(made.chart)})
     else:
-        from eigassign.output.console import print_chart
+        from eigassign.output.chart_report import main_tables
+        from eigassign.output.console import print_tables
 
-        print_chart(made.chart)
+        print_tables(main_tables(made.chart))
         click.echo(f"{made.folder} written in {made.chart.seconds:.1f} s")
     return 0

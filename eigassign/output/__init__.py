@@ -9,9 +9,9 @@ In reading order; each imports from those above it only:
     reduced_file   a reduced model in one file
     result_files   results.json and the CSV files
     tables         the tables of a run as text
+    console        results on stdout, progress on stderr
     batch_summary  summary.csv and junit.xml of a batch
     figures        the figures of runs, modes and charts, through matplotlib
     report         report.html, and what a run or modes leave in a folder
     chart_report   the tables and the folder of a chart
-    console        results on stdout, progress on stderr
 """

@@ -11,7 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from eigassign.output.formats import percent
 from eigassign.output.storage import replace_synced
+from eigassign.output.tables import Table
 
 Status = Literal["ok", "tolerance", "failed", "error"]
 
@@ -42,6 +44,15 @@ class CaseOutcome:
     predicted_max_relative: float | None = None
     exact_max_relative: float | None = None
     design: tuple[tuple[str, float], ...] = ()
+
+
+def batch_table(outcomes: Sequence[CaseOutcome]) -> Table:
+    """One line a case: name, status, seconds, worst exact error if there is one, message."""
+    rows = []
+    for one in outcomes:
+        worst = "" if one.exact_max_relative is None else percent(one.exact_max_relative)
+        rows.append((one.name, one.status, f"{one.seconds:.2f} s", worst, one.message))
+    return Table("Batch", ("case", "status", "time", "worst error", "message"), tuple(rows))
 
 
 def write_summary(path: Path, outcomes: Sequence[CaseOutcome]) -> None:

@@ -26,6 +26,13 @@ def tables(chart: Chart) -> tuple[Table, ...]:
     return tuple(table for table in made if table.rows)
 
 
+def main_tables(chart: Chart) -> tuple[Table, ...]:
+    """For the terminal: the fronts, the ways to a design and what to choose."""
+    fronts = (front(chart, each) for each in chart.fronts)
+    made = (*fronts, designs(chart), advice(chart), auto(chart))
+    return tuple(table for table in made if table.rows)
+
+
 def spread(timing: Timing) -> str:
     """Median and quartiles; one run alone is marked."""
     median = time_in_words(timing.median_s)

@@ -6,7 +6,7 @@ import contextlib
 import io
 import math
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TextIO
 
 from rich import box
@@ -14,11 +14,8 @@ from rich.console import Console
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from eigassign.chart.results import Chart
-from eigassign.output import chart_report
 from eigassign.output import tables as summary
-from eigassign.output.batch_summary import CaseOutcome
-from eigassign.output.formats import number, percent
+from eigassign.output.formats import number
 from eigassign.study.results import RunResults, ValidationRow
 
 _ENDLESS = 100_000  # columns: off a terminal nothing is wrapped or cut
@@ -89,27 +86,18 @@ def _is_number(text: str) -> bool:
 
 def print_assignment(results: RunResults, *, stream: TextIO | None = None) -> None:
     """Design, distances to the targets, approximation errors and the solver's certificate."""
-    for table in summary.tables(results):
-        if table.title != "Timing":
-            _print_summary(table, stream)
+    print_tables((t for t in summary.tables(results) if t.title != "Timing"), stream=stream)
 
 
 def print_validation(rows: Sequence[ValidationRow], *, stream: TextIO | None = None) -> None:
     """Both expansions against exact, one line a mode and place."""
-    _print_summary(summary.validation(tuple(rows)), stream)
+    print_tables([summary.validation(tuple(rows))], stream=stream)
 
 
-def print_chart(chart: Chart, *, stream: TextIO | None = None) -> None:
-    """What to choose, the fronts and the ways to a design; the report has the rest."""
-    fronts = [chart_report.front(chart, each) for each in chart.fronts]
-    advice = (chart_report.advice(chart), chart_report.auto(chart))
-    for table in (*fronts, chart_report.designs(chart), *advice):
-        if table.rows:
-            _print_summary(table, stream)
-
-
-def _print_summary(table: summary.Table, stream: TextIO | None) -> None:
-    print_table(table.title, table.columns, table.rows, caption=table.caption, stream=stream)
+def print_tables(tables: Iterable[summary.Table], *, stream: TextIO | None = None) -> None:
+    """Tables of a run, a chart or a batch, one below the other."""
+    for table in tables:
+        print_table(table.title, table.columns, table.rows, caption=table.caption, stream=stream)
 
 
 def print_modes(
@@ -141,16 +129,6 @@ def print_modes(
 
 def _bounded(error: float) -> str:
     return f"{100 * error:.2g} %" if math.isfinite(error) else "cannot be bounded"
-
-
-def print_batch(outcomes: Sequence[CaseOutcome], *, stream: TextIO | None = None) -> None:
-    """One line a case: name, status, seconds, worst exact error if there is one, message."""
-    rows = []
-    for one in outcomes:
-        worst = "" if one.exact_max_relative is None else percent(one.exact_max_relative)
-        rows.append((one.name, one.status, f"{one.seconds:.2f} s", worst, one.message))
-    columns = ("case", "status", "time", "worst error", "message")
-    print_table("Batch", columns, rows, stream=stream)
 
 
 @contextlib.contextmanager

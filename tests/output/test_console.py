@@ -8,7 +8,7 @@ import pytest
 from synthetic_results import make_results
 
 from eigassign.output import console
-from eigassign.output.batch_summary import CaseOutcome
+from eigassign.output.batch_summary import CaseOutcome, batch_table
 from eigassign.output.formats import number, percent, residual, seconds
 from eigassign.study.results import ValidationRow
 
@@ -104,7 +104,7 @@ def test_a_batch_lists_every_case():
     out = piped()
     good = CaseOutcome("arm", "arm.yaml", "ok", 1.25, exact_max_relative=0.0155)
     bad = CaseOutcome("leg", "leg.yaml", "error", 0.5, "leg.yaml:3:1: [what] is wrong")
-    console.print_batch([good, bad], stream=out)
+    console.print_tables([batch_table([good, bad])], stream=out)
     text = read(out)
     for words in ("arm", "1.55 %", "1.25 s", "leg.yaml:3:1: [what] is wrong"):
         assert words in text
