@@ -1,4 +1,4 @@
-"""The error estimate of a polynomial: it covers the error, and refuses where there is no number."""
+"""The error estimate of a polynomial covers the error, and its radius of convergence is found."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from chains import model_of, two_link
 
 from eigassign.api import load_case
 from eigassign.errors import UsageError
-from eigassign.modal.expansion import companion_order, expand
+from eigassign.modal.expansion import companion_order, expand, radius_share
 from eigassign.series.multi_index import box
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
@@ -73,3 +73,16 @@ def test_the_vectors_taken_along_stay_few():
     assert companion_order(3, 2) == 2
     assert companion_order(3, 10) == 7
     assert companion_order(50, 2) == 1
+
+
+def test_the_radius_of_convergence_is_that_of_a_pole():
+    """An almost massless bar with a tip mass y: λ = k/(m0 + y), a pole at y = −m0."""
+    tree = two_link(elements=(2, 2), drives=("locked", "locked"))
+    tree["mechanism"]["materials"]["al"]["density"] = 1e-6
+    tree["mechanism"]["bodies"]["elbow_mass"]["mass"] = 1e-6
+    tree["design"] = {"m": {"parameter": "bodies.tool_mass.mass", "min": 0.0, "max": 1.0}}
+    model = model_of(tree)
+    expansion = expand(model.pencil, [0.0, 1.0], [0.2], (1,), order=9)
+    y = np.array([[0.1], [0.3], [0.5]])
+    share = radius_share(expansion, [0.0, 1.0], y)[:, 0]
+    np.testing.assert_allclose(share, np.abs(y[:, 0] - 0.2) / 0.2, rtol=1e-3)

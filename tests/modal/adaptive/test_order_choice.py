@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from chains import model_of, two_link
 from paper_arm import FREE, build, exact, samples
 
 from eigassign.errors import AccuracyError
@@ -16,7 +15,6 @@ from eigassign.modal.adaptive.order import (
     choose_expansion,
     more_points_help,
 )
-from eigassign.modal.expansion import expand, radius_share
 
 
 @pytest.fixture(scope="module")
@@ -118,19 +116,6 @@ def test_round_off_of_a_fine_mesh_is_no_refusal_while_it_leaves_half_of_the_accu
     assert chosen.estimate.max() <= 1e-5
     f = chosen.frequencies(x[:, :2], x[:, 2:])
     assert np.abs(f / exact(model, x, (1,)) - 1.0).max() <= 1e-5
-
-
-def test_the_radius_of_convergence_is_that_of_a_pole():
-    """An almost massless bar with a tip mass y: λ = k/(m0 + y), a pole at y = −m0."""
-    tree = two_link(elements=(2, 2), drives=("locked", "locked"))
-    tree["mechanism"]["materials"]["al"]["density"] = 1e-6
-    tree["mechanism"]["bodies"]["elbow_mass"]["mass"] = 1e-6
-    tree["design"] = {"m": {"parameter": "bodies.tool_mass.mass", "min": 0.0, "max": 1.0}}
-    model = model_of(tree)
-    expansion = expand(model.pencil, [0.0, 1.0], [0.2], (1,), order=9)
-    y = np.array([[0.1], [0.3], [0.5]])
-    share = radius_share(expansion, [0.0, 1.0], y)[:, 0]
-    np.testing.assert_allclose(share, np.abs(y[:, 0] - 0.2) / 0.2, rtol=1e-3)
 
 
 def test_several_points_are_preferred_to_one_series_of_very_many_terms(x, monkeypatch):
