@@ -12,8 +12,9 @@ from eigassign.modal.expansion import Expansion
 from eigassign.modal.fit.fit import Fit, PathFit, fit
 from eigassign.modal.fit.region import Box
 from eigassign.modal.model import Model, as_model
+from eigassign.modal.reduced import compression
 from eigassign.modal.reduced import reduce as modal_reduced
-from eigassign.modal.reduced.reduce import ReducedModel
+from eigassign.modal.reduced.model import ReducedModel
 from eigassign.output import reduced_file
 from eigassign.pipeline.run import Result, solve_case
 from eigassign.series.multi_index import LowerSet
@@ -60,7 +61,7 @@ def reduce(
     modes: Sequence[int] = (1,),
     half_order: int = 2,
     span: tuple[ArrayLike, ArrayLike] | None = None,
-    accuracy: float = modal_reduced.ACCURACY,
+    accuracy: float = compression.ACCURACY,
 ) -> ReducedModel:
     """Reduced model on the Taylor vectors at one or several expansion points, with its own error.
 

@@ -29,7 +29,8 @@ from eigassign.modal.expansion import expand, nearest
 from eigassign.modal.fit.fit import MOST, Fit, PathFit, fit
 from eigassign.modal.fit.region import Box
 from eigassign.modal.model import Model
-from eigassign.modal.reduced.reduce import ReducedModel, reduce
+from eigassign.modal.reduced.model import ReducedModel
+from eigassign.modal.reduced.reduce import reduce
 from eigassign.study.drawing import spread_samples
 from eigassign.study.planning import OrderChoice, choose_order
 from eigassign.study.scene import Scene

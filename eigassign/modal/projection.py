@@ -58,25 +58,16 @@ def project_at(pencil: Pencil, theta: Floats, rows: Floats) -> Floats:
     if pencil.n_dof <= DENSE_LIMIT:
         return np.asarray(rows @ pencil.both_matrices(theta)[:, 0] @ rows.T)
     V = np.ascontiguousarray(rows.T)
-    weights = (pencil.stiffness, pencil.mass)
-    return np.array([_square(pencil.sparse(w @ theta[:, 0]).T, V) for w in weights])
-
-
-def _square(matrix: sparse.csr_array, V: Floats) -> Floats:
-    """Vᵀ A V."""
-    out = np.zeros((V.shape[1], V.shape[1]))
-    for i in range(0, len(V), CHUNK):
-        out += V[i : i + CHUNK].T @ (matrix[i : i + CHUNK] @ V)
+    out = np.zeros((2, len(rows), len(rows)))
+    for square, weights in zip(out, (pencil.stiffness, pencil.mass), strict=True):
+        matrix = pencil.sparse(weights @ theta[:, 0]).T
+        for i in range(0, len(V), CHUNK):
+            square += V[i : i + CHUNK].T @ (matrix[i : i + CHUNK] @ V)
     return out
 
 
 def _project(
-    pencil: Pencil,
-    which: int,
-    terms: sparse.csc_array,
-    W: Floats,
-    V: Floats,
-    wanted: Ints,
+    pencil: Pencil, which: int, terms: sparse.csc_array, W: Floats, V: Floats, wanted: Ints
 ) -> ProjectedTerms:
     """Wᵀ A_j V of every wanted term that there is, over its non-zero rows only."""
     there = wanted[np.diff(terms.indptr)[wanted] > 0]

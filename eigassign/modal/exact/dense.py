@@ -24,8 +24,11 @@ UPPER: Literal["U"] = "U"  # half of (L⁻¹ M_c) L⁻ᵀ that is read: the othe
 
 def solve_dense(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
     """Modes at θ (n_theta, n_samples); one sample goes to LAPACK alone, many in chunks."""
+    if theta.shape[1] == 1 and not vectors:
+        return Modes(single_values(pencil, theta, count)[None], np.zeros((1, 0, count)))
     if theta.shape[1] == 1:
-        return _single(pencil, theta, count, vectors)
+        lam, phi = solve_single(pencil, theta, count)
+        return Modes(lam[None], phi[None])
     columns = np.arange(theta.shape[1])
     if pencil.n_dof**2 * len(columns) <= NUMBERS:
         return _batch(pencil, theta, count, vectors)
@@ -35,21 +38,16 @@ def solve_dense(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Mod
     return Modes(np.concatenate([p.lam for p in parts]), np.concatenate([p.phi for p in parts]))
 
 
-def _single(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
-    if not vectors:
-        return Modes(single_values(pencil, theta, count)[None], np.zeros((1, 0, count)))
-    lam, phi = solve_single(pencil, theta, count)
-    return Modes(lam[None], phi[None])
-
-
 def _batch(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
     """Modes at θ (n_theta, n_samples): as many samples as stay in the processor's cache."""
     K, M = _elastic_first(pencil, theta)
     n = len(pencil.elastic)
     coupling, M_c = condense_blocks(M[:, :n, :n], M[:, n:, :n], M[:, n:, n:])
-    L_inverse = triangular_inverse(_cholesky(K[:, :n, :n]))
+    L_inverse = inverse_factor(K[:, :n, :n])
     A = (L_inverse @ M_c) @ np.swapaxes(L_inverse, 1, 2)
-    noise = _noise(L_inverse, mass_sizes(pencil, theta, coupling))
+    # Σ_i (K_E⁻¹)_ii t_i²: zᵀ T² z of no K_E-unit z is more
+    sizes = mass_sizes(pencil, theta, coupling)
+    noise = np.asarray(np.einsum("kij,kij,kj->k", L_inverse, L_inverse, sizes)[:, None])
     if not vectors:
         mu = np.asarray(np.linalg.eigvalsh(A, UPPER)[:, ::-1][:, :count], dtype=np.float64)
         return _with_mass(pencil, theta, mu, noise, np.zeros((len(mu), 0, count)))
@@ -73,11 +71,6 @@ def _elastic_first(pencil: Pencil, theta: Floats) -> tuple[Floats, Floats]:
     return block(K, order, order), block(M, order, order)
 
 
-def _noise(L_inverse: Floats, sizes: Floats) -> Floats:
-    """Σ_i (K_E⁻¹)_ii t_i² (n_samples, 1): zᵀ T² z of no K_E-unit z is more."""
-    return np.asarray(np.einsum("kij,kij,kj->k", L_inverse, L_inverse, sizes)[:, None])
-
-
 def _with_mass(pencil: Pencil, theta: Floats, mu: Floats, noise: Floats, phi: Floats) -> Modes:
     """Modes of μ (n_samples, count); those samples anew whose μ may be round-off."""
     count = mu.shape[1]
@@ -87,21 +80,11 @@ def _with_mass(pencil: Pencil, theta: Floats, mu: Floats, noise: Floats, phi: Fl
         lam[k], modes = modes_with_mass(pencil, theta[:, [k]], count)
         if phi.size:
             phi[k] = modes
-    return Modes(lam, _signed(phi) if phi.size else phi)
-
-
-def _cholesky(K: Floats) -> Floats:
-    try:
-        return np.asarray(np.linalg.cholesky(K), dtype=np.float64)
-    except np.linalg.LinAlgError as error:
-        raise MechanismError("mechanism", LIMP) from error
-
-
-def _signed(phi: Floats) -> Floats:
-    """Each mode with its entry of largest magnitude positive."""
+    if not phi.size:
+        return Modes(lam, phi)
     at = np.abs(phi).argmax(axis=1)
     largest = np.take_along_axis(phi, at[:, None, :], axis=1)
-    return np.asarray(phi * np.where(largest < 0.0, -1.0, 1.0))
+    return Modes(lam, phi * np.where(largest < 0.0, -1.0, 1.0))
 
 
 # --- One sample, through LAPACK without detours
@@ -173,10 +156,21 @@ def _largest(A: Floats, count: int) -> tuple[Floats, Floats]:
     return np.asarray(mu[::-1][:count]), np.asarray(v[:, ::-1][:, :count])
 
 
-# --- Many small triangular matrices
+# --- Many small matrices factored at once
 
 LEAF = 16  # order up to which LAPACK's general inverse is quicker than halving
 FEW, LEAF_OF_FEW = 8, 32  # so many matrices, for which calls cost more than arithmetic
+
+
+def inverse_factor(K: Floats) -> Floats:
+    """L⁻¹ for K = L Lᵀ (n, k, k), of which the lower triangle is read.
+
+    Raises MechanismError where K is not positive definite.
+    """
+    try:
+        return triangular_inverse(np.asarray(np.linalg.cholesky(K), dtype=np.float64))
+    except np.linalg.LinAlgError as error:
+        raise MechanismError("mechanism", LIMP) from error
 
 
 def triangular_inverse(L: Floats) -> Floats:

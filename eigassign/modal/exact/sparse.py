@@ -48,11 +48,6 @@ def _one(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
     return lam, phi
 
 
-def _krylov_size(count: int) -> int:
-    """Lanczos vectors before a restart: few modes converge in fewer than ARPACK's own 20."""
-    return min(max(20, 2 * count + 1), 10 + 2 * count)
-
-
 def _lanczos(
     K_E: sparse.csc_array, M_EE: sparse.csc_array, M_FE: Floats, coupling: Floats, count: int
 ) -> tuple[Floats, Floats]:
@@ -66,10 +61,10 @@ def _lanczos(
     M_c = linalg.LinearOperator((n, n), matvec=lambda v: M_rows @ v - (coupling @ v) @ M_FE)
     inverse = linalg.LinearOperator((n, n), matvec=factor.solve)
     start = np.random.default_rng(0).standard_normal(n)
+    # Lanczos vectors before a restart: few modes converge in fewer than ARPACK's own 20
+    krylov = min(max(20, 2 * count + 1), 10 + 2 * count)
     try:
-        mu, z = linalg.eigsh(
-            M_c, count, M=K_rows, Minv=inverse, which="LM", v0=start, ncv=_krylov_size(count)
-        )
+        mu, z = linalg.eigsh(M_c, count, M=K_rows, Minv=inverse, which="LM", v0=start, ncv=krylov)
     except linalg.ArpackNoConvergence as error:
         raise AccuracyError(f"the exact modes did not converge: {error}") from error
     except linalg.ArpackError as error:

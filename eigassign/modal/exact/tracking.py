@@ -114,9 +114,11 @@ def _sample(found: Modes, k: int) -> Modes:
 
 def _advance(pencil: Pencil, here: _Here, x: Floats, there: Modes, depth: int) -> _Here:
     """Match the shapes at hand with the modes at x, by way of the midpoint where unclear."""
+    from scipy.optimize import linear_sum_assignment
+
     shapes = turn_coincident(pencil, here.shapes, x, there)
     squares = overlaps(pencil, here.shapes, x, shapes)
-    columns = _assignment(squares)
+    columns = np.asarray(linear_sum_assignment(-squares)[1], dtype=np.intp)
     clear = squares[np.arange(len(columns)), columns]
     if clear.min() < CLEAR and depth < HALVINGS:
         middle = 0.5 * (here.x + x)
@@ -126,12 +128,6 @@ def _advance(pencil: Pencil, here: _Here, x: Floats, there: Modes, depth: int) -
         rest = _advance(pencil, half, x, there, depth + 1)
         return _Here(x, rest.shapes, rest.ordinals, np.minimum(half.overlap, rest.overlap))
     return _Here(x, shapes[:, columns], columns, clear)
-
-
-def _assignment(squares: Floats) -> Ints:
-    from scipy.optimize import linear_sum_assignment
-
-    return np.asarray(linear_sum_assignment(-squares)[1], dtype=np.intp)
 
 
 def overlaps(pencil: Pencil, shapes: Floats, x: Floats, modes: Floats) -> Floats:

@@ -35,7 +35,6 @@ DISTANT = 10.0  # λ beyond this multiple of the highest wanted one needs no pro
 Plan = Sequence[tuple[Sequence[int], int]]  # modes, and the order of their Taylor vectors
 DEPENDENT = 1e-9  # remainder, relative to the vector, below which it is taken as dependent
 ORTHONORMAL = 1e-8  # post-condition on |VᵀKV − I|, beyond round-off of K itself
-
 INDEFINITE = "the stiffness matrix is not positive definite at an expansion point"
 
 
@@ -132,10 +131,12 @@ def orthonormal(K: sparse.csc_array | Floats, vectors: Floats) -> Floats:
     KQ = np.zeros_like(Q)
     rank = 0
     for v in vectors.T:
-        size = np.sqrt(_square(K, v))
-        if size == 0.0:
+        square = float(v @ (K @ v))
+        if square < 0.0 or not np.isfinite(square):
+            raise AccuracyError(INDEFINITE)
+        if square == 0.0:
             continue
-        v = v / size
+        v = v / np.sqrt(square)
         for _ in range(2):
             v = v - Q[:, :rank] @ (KQ[:, :rank].T @ v)
         Kv = K @ v
@@ -157,13 +158,6 @@ def _rounding(K: sparse.csc_array | Floats, Q: Floats) -> float:
     return 10.0 * float(np.finfo(np.float64).eps * terms.max(initial=0.0))
 
 
-def _square(K: sparse.csc_array | Floats, v: Floats) -> float:
-    square = float(v @ (K @ v))
-    if square < 0.0 or not np.isfinite(square):
-        raise AccuracyError(INDEFINITE)
-    return square
-
-
 # --- θ averaged over turned poses
 
 
@@ -178,7 +172,7 @@ def mean_theta(pencil: Pencil, points: Floats) -> Floats:
     z = points @ pencil.to_program.T + pencil.shift
     z[:, pencil.n_q :] = z[0, pencil.n_q :]
     turns = np.zeros(len(pencil.shift))
-    turns[: pencil.n_q] = _periodic(pencil, z[0])
+    turns[: pencil.n_q] = [_is_angle(pencil, z[0], k) for k in range(pencil.n_q)]
     turned = np.concatenate([z + k * turns * (np.pi / 2.0) for k in range(4)])
     theta = _theta_at(pencil, turned)
     return np.asarray(theta[:, np.isfinite(theta).all(axis=0)].mean(axis=1))
@@ -189,12 +183,8 @@ def _theta_at(pencil: Pencil, z: Floats) -> Floats:
     return np.vstack([np.ones((1, len(z))), pencil.program.run(Samples(), z.T)])
 
 
-def _periodic(pencil: Pencil, z: Floats) -> NDArray[np.bool_]:
-    """Which joint coordinates are angles (n_q,): a full turn changes nothing but round-off."""
-    return np.array([_turns(pencil, z, k) for k in range(pencil.n_q)], dtype=bool)
-
-
-def _turns(pencil: Pencil, z: Floats, k: int) -> bool:
+def _is_angle(pencil: Pencil, z: Floats, k: int) -> bool:
+    """Whether joint coordinate k is one: a full turn changes nothing but round-off."""
     turned = np.array([z, z])
     turned[1, k] += 2.0 * np.pi
     here, there = _theta_at(pencil, turned).T

@@ -105,16 +105,11 @@ def _directions(basis: RitzBasis, whole: ReducedModel, x: Floats) -> tuple[Float
     """V's coordinates (k, k) in the order of their use, and how many of them must stay."""
     found = [(K, ritz_pairs(K, M_c)[1]) for K, M_c, _ in whole.matrices(x)]
     root = np.linalg.cholesky(np.mean(np.concatenate([K for K, _ in found]), axis=0)).T
-    fixed = _range(root @ np.hstack(list(basis.shapes)))
+    U, size, _ = np.linalg.svd(root @ np.hstack(list(basis.shapes)), full_matrices=False)
+    fixed = U[:, size > DEPENDENT * size[0]]  # an orthonormal basis of their span
     modes = np.concatenate([z[:, :, : basis.modes[-1]] for _, z in found])
     rest = root @ modes.transpose(1, 0, 2).reshape(len(root), -1)
     for _ in range(2):
         rest = rest - fixed @ (fixed.T @ rest)
     others = np.linalg.svd(rest, full_matrices=False)[0][:, : len(root) - fixed.shape[1]]
     return solve_triangular(root, np.hstack([fixed, others])), fixed.shape[1]
-
-
-def _range(columns: Floats) -> Floats:
-    """An orthonormal basis of the span of ``columns``, round-off left out."""
-    U, size, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(U[:, size > DEPENDENT * size[0]])

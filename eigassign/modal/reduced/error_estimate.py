@@ -26,7 +26,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import SingularityError
-from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.sparse_factor import factorise
 from eigassign.modal.exact.roundoff import rounding_weights
 from eigassign.modal.reduced.basis import RitzBasis
@@ -209,17 +208,14 @@ def _at_first_design(reduced: ReducedPencil, x: Floats) -> tuple[Floats, Flags]:
     try:
         return reduced.theta(turned), np.ones(len(x), dtype=bool)
     except SingularityError:
-        closes = np.array([_closes(reduced, row) for row in turned])
+        closes = np.ones(len(x), dtype=bool)
+        for k, row in enumerate(turned):
+            try:
+                reduced.theta(row[None])
+            except SingularityError:
+                closes[k] = False
         turned[~closes] = reduced.points[0]
         return reduced.theta(turned), closes
-
-
-def _closes(reduced: ReducedPencil, x: Floats) -> bool:
-    try:
-        reduced.theta(x[None])
-    except SingularityError:
-        return False
-    return True
 
 
 def _rounding(
@@ -260,28 +256,21 @@ def error_terms(basis: RitzBasis) -> ErrorTerms:
     factor = factorise(basis.K0)
     theta0 = basis.theta0[:, 0]
     d_K, d_M = rounding_weights(pencil, theta0)
-    material = _material_terms(pencil, theta0)
+    count = basis.represented.shape[2]
+    following = 1.0 / basis.lam[:, count : count + 1]
+    if not following.size:
+        following = np.zeros((len(basis.lam), 1))
+    # Stiffness terms that design parameters scale and no joint enters
+    jointless = ~np.asarray(pencil.program.dependence[:, : pencil.n_q].any(axis=1))
+    stiff = np.flatnonzero(np.diff(pencil.by_term[0].indptr)).tolist()
+    material = np.array([t for t in stiff if t and jointless[t - 1] and theta0[t]], dtype=np.intp)
     return ErrorTerms(
         residual=residual_terms(pencil, basis.K0, factor, wide),
         joints=joint_correction(pencil, factor, basis.theta_mean, wide),
         material_terms=material,
         material=theta0[material],
-        anchors=_anchors(basis.lam, basis.represented.shape[2]),
+        anchors=np.hstack([1.0 / basis.lam[:, :count], following]),
         shapes=basis.shapes,
         stiffness_rounding=(wide[:, :k].T * d_K) @ wide[:, :k],
         mass_rounding=(wide.T * d_M) @ wide,
     )
-
-
-def _anchors(lam: Floats, count: int) -> Floats:
-    """μ of the represented modes and of the next one; 0 where there is none."""
-    following = 1.0 / lam[:, count : count + 1] if lam.shape[1] > count else np.zeros((len(lam), 1))
-    return np.hstack([1.0 / lam[:, :count], following])
-
-
-def _material_terms(pencil: Pencil, theta0: Floats) -> Ints:
-    """Indices of θ with a stiffness term that design parameters scale and no joint enters."""
-    jointless = ~np.asarray(pencil.program.dependence[:, : pencil.n_q].any(axis=1))
-    stiff = np.flatnonzero(np.diff(pencil.by_term[0].indptr))
-    scaled = [t for t in stiff.tolist() if t and jointless[t - 1] and theta0[t]]
-    return np.array(scaled, dtype=np.intp)

@@ -17,10 +17,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.errors import LIMP, MechanismError, UsageError
+from eigassign.errors import UsageError
 from eigassign.modal.arguments import chunks
 from eigassign.modal.exact.condensation import condense_blocks
-from eigassign.modal.exact.dense import triangular_inverse
+from eigassign.modal.exact.dense import inverse_factor
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import Program
 
@@ -132,8 +132,5 @@ def ritz_pairs(K: Floats, M_c: Floats) -> tuple[Floats, Floats]:
 
 def _standard(K: Floats, M_c: Floats) -> tuple[Floats, Floats]:
     """L⁻¹ M_c L⁻ᵀ and L⁻¹; MechanismError where K is not positive definite."""
-    try:
-        inverse = triangular_inverse(np.asarray(np.linalg.cholesky(K), dtype=np.float64))
-    except np.linalg.LinAlgError as error:
-        raise MechanismError("mechanism", LIMP) from error
+    inverse = inverse_factor(K)
     return inverse @ M_c @ np.swapaxes(inverse, 1, 2), inverse

@@ -16,9 +16,6 @@ from eigassign.modal.reduced.compression import ACCURACY, compressed, half_width
 from eigassign.modal.reduced.error_estimate import error_terms
 from eigassign.modal.reduced.model import ReducedModel
 
-__all__ = ["ACCURACY", "ReducedModel", "reduce"]
-
-
 Floats = NDArray[np.float64]
 MAX_HALF_ORDER = 10
 
@@ -56,7 +53,8 @@ def reduce(
 def _projected(basis: RitzBasis, half_order: int) -> ReducedModel:
     """The pencil on the basis; what only the error estimate needs waits until it is asked for."""
     pencil, k = basis.pencil, basis.V.shape[1]
-    stiffness, mass = (_symmetric(terms) for terms in project(pencil, basis.wide))
+    # Terms are large and cancel, so their round-off counts: the mean with their transposes.
+    stiffness, mass = (0.5 * (A + A.transpose(0, 2, 1)) for A in project(pencil, basis.wide))
     k_terms, m_terms = (np.flatnonzero(np.diff(w.indptr)) for w in pencil.by_term)
     return ReducedModel(
         modes=basis.modes,
@@ -73,8 +71,3 @@ def _projected(basis: RitzBasis, half_order: int) -> ReducedModel:
         mass=mass[m_terms],
         certified=partial(error_terms, basis),
     )
-
-
-def _symmetric(terms: Floats) -> Floats:
-    """The mean with their transposes: terms are large and cancel, so their round-off counts."""
-    return np.asarray(0.5 * (terms + terms.transpose(0, 2, 1)))

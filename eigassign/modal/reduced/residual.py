@@ -117,7 +117,10 @@ def residual_terms(
     heavy = _blocks(pencil, pencil.by_term[1], wide)
     k_terms, m_terms = (np.array([b.theta for b in some], np.intp) for some in (stiff, heavy))
     if n <= UNIT_LIMIT:
-        L = _root_of(K0.toarray())
+        try:
+            L = np.asarray(np.linalg.cholesky(K0.toarray()), dtype=np.float64)
+        except np.linalg.LinAlgError as error:
+            raise AccuracyError(INDEFINITE) from error
         return ResidualTerms(k_terms, _dense(stiff, L), m_terms, _dense(heavy, L))
     A, coordinates = _span(stiff + heavy, n)
     R = np.asarray(np.linalg.qr(half_solve(factor, A), mode="r"), dtype=np.float64)
@@ -211,13 +214,6 @@ def _columns(
             wide.append((block.rows, column))
         at.append(offset + where[key])
     return np.array(at, dtype=np.intp), signs[:, None] * values
-
-
-def _root_of(K: Floats) -> Floats:
-    try:
-        return np.asarray(np.linalg.cholesky(K), dtype=np.float64)
-    except np.linalg.LinAlgError as error:
-        raise AccuracyError(INDEFINITE) from error
 
 
 # --- Offline: what turned joints need

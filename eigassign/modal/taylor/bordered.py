@@ -142,11 +142,7 @@ def _trial(A: sparse.csc_array, border: Floats, solve: Solve) -> float:
 
 
 def _solver(
-    pencil: Pencil,
-    data: Floats,
-    border: Floats,
-    pins: Ints,
-    factorise: Factorise,
+    pencil: Pencil, data: Floats, border: Floats, pins: Ints, factorise: Factorise
 ) -> _Bordered:
     n_u, n = pencil.n_u, pencil.n_dof
     f, r = n - n_u, len(border)
@@ -163,8 +159,7 @@ def _solver(
     D[f : f + r, :f] = -scale * border[:, n_u:]
     D[:f, f : f + r] = D[f : f + r, :f].T
     D[np.arange(f + r, f + 2 * r), np.arange(f + r, f + 2 * r)] = tau
-    pinned = A + sparse.csc_array((tau, (pins, pins)), shape=A.shape)
-    factor = factorise(pinned)
+    factor = factorise(A + sparse.csc_array((tau, (pins, pins)), shape=A.shape))
     Z = factor.solve(W.T).T
     lu, pivots, info = lapack.dgetrf(D - W @ Z.T)
     if info:

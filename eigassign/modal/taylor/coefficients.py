@@ -179,8 +179,11 @@ class SparseTerms:
         """out_γ += sign Σ A_δ X_β over the pairs; X (N_below, r, n), out (N_degree, r, n)."""
         for slot in range(p.slots.start, p.slots.stop):
             if slot in self.bodies:
-                hit = p.left == slot - p.slots.start
-                _add_body(self.bodies[slot], X, p.right[hit], sign, out, p.into[hit])
+                rows, C = self.bodies[slot]
+                hit, columns = p.left == slot - p.slots.start, np.arange(X.shape[1])
+                block = X[np.ix_(p.right[hit], columns, rows)]
+                product = (C @ block.reshape(-1, len(rows)).T).T.reshape(block.shape)
+                out[np.ix_(p.into[hit], columns, rows)] += sign * product
         begin, end = np.searchsorted(self.edge_slots, [p.slots.start, p.slots.stop])
         if begin < end:
             self._add_edges(p, slice(begin, end), X, sign, out)
@@ -197,14 +200,6 @@ class SparseTerms:
         columns = np.arange(out.shape[1])
         where = (into[:, None], columns, at[:, None])
         np.add.at(out, where, sign * inner[right[:, None], columns, edge[:, None]])
-
-
-def _add_body(body: Body, X: Floats, right: Ints, sign: float, out: Floats, into: Ints) -> None:
-    rows, C = body
-    columns = np.arange(X.shape[1])
-    block = X[np.ix_(right, columns, rows)]
-    product = (C @ block.reshape(-1, len(rows)).T).T.reshape(block.shape)
-    out[np.ix_(into, columns, rows)] += sign * product
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,26 +34,24 @@ class LocalSpace:
 def local_space(
     pencil: Pencil, order: int, linear_in_y: bool, space: LowerSet | None
 ) -> LocalSpace:
-    """The set over w that was asked for; raises UsageError for one of the wrong width."""
+    """The set over w that was asked for; raises UsageError for one of the wrong width.
+
+    Of a ``space`` given over x the variables that do not matter are taken out.
+    """
     if space is not None:
         if not isinstance(space, LowerSet):
             raise UsageError(f"space must be a lower set, not {type(space).__name__}")
-        return _given_space(pencil, space)
+        n_x = pencil.to_program.shape[1]
+        if space.n_variables != n_x:
+            raise UsageError(f"the set has {space.n_variables} variables, the model {n_x}")
+        kept = (pencil.to_program[pencil.active] != 0.0).any(axis=0)
+        selection, over = np.eye(n_x)[kept], _over(space, kept.tobytes())
+        return LocalSpace(over, pencil.to_program[:, kept], selection, 0)
     to_z, directions, _ = pencil.local_directions
     n_a = int(np.count_nonzero(pencil.active[: pencil.n_q]))
     n_b = to_z.shape[1] - n_a
     chosen = partially_linear(n_a, n_b, order) if linear_in_y else total_degree(n_a + n_b, order)
     return LocalSpace(chosen, to_z, directions, n_b if linear_in_y else 0)
-
-
-def _given_space(pencil: Pencil, space: LowerSet) -> LocalSpace:
-    """A set over x as it was given, the variables that do not matter taken out."""
-    n_x = pencil.to_program.shape[1]
-    if space.n_variables != n_x:
-        raise UsageError(f"the set has {space.n_variables} variables, the model {n_x}")
-    kept = (pencil.to_program[pencil.active] != 0.0).any(axis=0)
-    selection = np.eye(n_x)[kept]
-    return LocalSpace(_over(space, kept.tobytes()), pencil.to_program[:, kept], selection, 0)
 
 
 @lru_cache(maxsize=64)
@@ -86,8 +84,8 @@ def substitute(
 ) -> tuple[LowerSet, Floats]:
     """The set over x and coefficients (k, N_x) of Σ c_γ (V (x − x0))^γ, c (k, N)."""
     selection = (np.count_nonzero(directions, axis=1) == 1).all()
-    if selection and (directions.max(axis=1, initial=0.0) == 1.0).all():
-        return _embed(space, coefficients, directions)
+    if selection and (directions.max(axis=1, initial=0.0) == 1.0).all():  # each w is one of x
+        return _sorted(space.indices @ (directions != 0.0).astype(np.int64), coefficients)
     used = np.flatnonzero((directions != 0.0).any(axis=0))
     n_y = int((used >= n_q).sum())
     n_a = len(used) - n_y
@@ -102,12 +100,6 @@ def substitute(
     return _sorted(wide, values)
 
 
-def _embed(space: LowerSet, coefficients: Floats, directions: Floats) -> tuple[LowerSet, Floats]:
-    """Every w is one of x: indices are only spread over the columns."""
-    wide = space.indices @ (directions != 0.0).astype(np.int64)
-    return _sorted(wide, coefficients)
-
-
 def _sorted(wide: NDArray[np.int64], values: Floats) -> tuple[LowerSet, Floats]:
     target = lower_set(wide)
     ordered = np.empty_like(values)
@@ -117,8 +109,7 @@ def _sorted(wide: NDArray[np.int64], values: Floats) -> tuple[LowerSet, Floats]:
 
 def _monomial_series(space: LowerSet, inner: LowerSet, directions: Floats) -> Floats:
     """Rows: the series in x of w^γ for every γ, each a parent's times one linear form."""
-    linear = np.zeros((space.n_variables, len(inner)))
-    units = inner.find(np.eye(inner.n_variables, dtype=np.int64))
+    linear, units = np.zeros((space.n_variables, len(inner))), inner.units
     linear[:, units[units >= 0]] = directions[:, units >= 0]
     rows = np.zeros((len(space), len(inner)))
     rows[0, 0] = 1.0

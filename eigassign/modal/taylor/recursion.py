@@ -63,7 +63,10 @@ def _fill(
         mixing = _mixing(space, degree, L) if degree > 1 else None
         if mixing is not None:
             add_product(_flat(X[here]), mixing, _flat(MX[1 : here.start]))
-        _solve(solvers, X, L, here)
+        for j, solve in enumerate(solvers):  # right-hand sides become solutions, in blocks
+            for start in range(here.start, here.stop, BLOCK):
+                block = slice(start, min(start + BLOCK, here.stop))
+                X[block, j], L[block, :, j] = solve(X[block, j])
         if degree < space.order:
             MX[here] = series.mass_times(_flat(X[here])).reshape(X[here].shape)
             Y[here] = L[0] @ X[here] + L[here].transpose(0, 2, 1) @ X[0]
@@ -74,14 +77,6 @@ def _fill(
 def _flat(X: Floats) -> Floats:
     """(N, r, n) as (N r, n)."""
     return X.reshape(-1, X.shape[2])
-
-
-def _solve(solvers: list[Solve], X: Floats, L: Floats, here: slice) -> None:
-    """Right-hand sides become solutions, a block at a time."""
-    for j, solve in enumerate(solvers):
-        for start in range(here.start, here.stop, BLOCK):
-            block = slice(start, min(start + BLOCK, here.stop))
-            X[block, j], L[block, :, j] = solve(X[block, j])
 
 
 def _mixing(space: LowerSet, degree: int, L: Floats) -> Floats:
