@@ -32,7 +32,7 @@ from eigassign.case.schema.trajectory import (
     PointTrajectory,
     SampledTrajectory,
     TipTrajectory,
-    Trajectory,
+    TrajectoryForm,
 )
 
 __all__ = [
@@ -56,7 +56,7 @@ __all__ = [
     "Taper",
     "Target",
     "TipTrajectory",
-    "Trajectory",
+    "TrajectoryForm",
     "TubeSection",
     "UniversalJoint",
     "json_schema",

@@ -16,7 +16,7 @@ from eigassign.case.schema.joints import freedom_of
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.schema.parts import Quantity
 from eigassign.case.schema.study import Design, Expansion, Target, Validation
-from eigassign.case.schema.trajectory import Trajectory, named_trajectories
+from eigassign.case.schema.trajectory import TrajectoryForm, named_trajectories
 from eigassign.errors import Problem
 
 _STEP = re.compile(r"\[(\d+)\]|([^.\[\]]+)")  # of a key path: targets[0].mode
@@ -34,7 +34,7 @@ class CaseFile:
     reference: str | None
     mechanism: Mechanism
     coordinates: Mapping[str, Coordinate]
-    trajectory: Trajectory | tuple[Trajectory, ...] | None
+    trajectory: TrajectoryForm | tuple[TrajectoryForm, ...] | None
     design: Design
     expansion: Expansion
     targets: tuple[Target, ...]
@@ -79,7 +79,7 @@ class CaseFile:
         return tuple(each.si.replace("·", " ") if each else "" for each in dimensions)
 
     @property
-    def trajectories(self) -> tuple[tuple[str, str, Trajectory], ...]:
+    def trajectories(self) -> tuple[tuple[str, str, TrajectoryForm], ...]:
         """Key path, name ("1", "2", … where the file gives none) and content of each trajectory."""
         named = named_trajectories(self.trajectory)
         return tuple((dotted(path), name, trajectory) for path, name, trajectory in named)

@@ -11,8 +11,7 @@ from contextlib import contextmanager
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile, TipTrajectory
-from eigassign.case import Trajectory as TrajectoryKeys
+from eigassign.case import CaseFile, TipTrajectory, TrajectoryForm
 from eigassign.errors import CaseError, MechanismError
 from eigassign.mechanism.assembly.build import (
     WholeLinks,
@@ -90,7 +89,7 @@ def build_trajectories(file: CaseFile, model: Model) -> Trajectories:
     return found
 
 
-def _followed(file: CaseFile, model: Model, keys: TrajectoryKeys, path: str) -> Trajectory:
+def _followed(file: CaseFile, model: Model, keys: TrajectoryForm, path: str) -> Trajectory:
     """One trajectory, which stands at ``path`` of the case file."""
     with located(file, path):
         if isinstance(keys, TipTrajectory):

@@ -18,7 +18,7 @@ from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.schema.parts import FrozenDict, Named, Part, Quantity, keys_of, wrong
 from eigassign.case.schema.sections import SHAPES
 from eigassign.case.schema.study import Design, Expansion, Target, Validation
-from eigassign.case.schema.trajectory import MOTIONS, Trajectories
+from eigassign.case.schema.trajectory import MOTIONS, TrajectoryForms
 from eigassign.case.suggestions import listed, shown, suggestion, unknown
 
 
@@ -35,7 +35,7 @@ class Document(Part):
     reference: Annotated[str, Field(max_length=1000), AfterValidator(_one_line)] | None = None
     mechanism: Mechanism
     coordinates: Named[Coordinate] = FrozenDict()
-    trajectory: Trajectories | None = None
+    trajectory: TrajectoryForms | None = None
     design: Design = Design.model_construct()
     expansion: Expansion = Expansion.model_construct()
     targets: tuple[Target, ...] = ()

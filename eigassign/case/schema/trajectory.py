@@ -1,7 +1,7 @@
 """The key `trajectory`: joint samples, a CSV file, point to point, or a path of a link's node.
 
-It holds one of them, or a list. To add a kind: write its model, put it into the union `Trajectory`,
-and name the key by which it is known in `MOTIONS`.
+It holds one of them, or a list. To add a kind: write its model, put it into the union
+`TrajectoryForm`, and name the key by which it is known in `MOTIONS`.
 """
 
 from __future__ import annotations
@@ -182,7 +182,7 @@ def _motion_tag(value: object) -> str | None:
     return next((f"<{key}>" for key in MOTIONS if key in keys), None)
 
 
-Trajectory: TypeAlias = Annotated[
+TrajectoryForm: TypeAlias = Annotated[
     Annotated[TipTrajectory, Tag("<tip>")]
     | Annotated[FileTrajectory, Tag("<file>")]
     | Annotated[SampledTrajectory, Tag("<q>")]
@@ -192,15 +192,15 @@ Trajectory: TypeAlias = Annotated[
 
 MOST = 100  # trajectories of one case
 
-Trajectories: TypeAlias = OneOrList[
-    Trajectory,
-    Annotated[tuple[Trajectory, ...], Field(min_length=1, max_length=MOST)],
+TrajectoryForms: TypeAlias = OneOrList[
+    TrajectoryForm,
+    Annotated[tuple[TrajectoryForm, ...], Field(min_length=1, max_length=MOST)],
 ]
 
 
 def named_trajectories(
-    given: Trajectory | tuple[Trajectory, ...] | None,
-) -> tuple[tuple[KeyPath, str, Trajectory], ...]:
+    given: TrajectoryForm | tuple[TrajectoryForm, ...] | None,
+) -> tuple[tuple[KeyPath, str, TrajectoryForm], ...]:
     """Key path, name and content of each trajectory, in the order of the file."""
     if given is None:
         return ()

@@ -20,12 +20,13 @@ from eigassign.mechanism.assembly.rigid_loops import close_rigid_loops
 from eigassign.mechanism.assembly.springs import add_springs
 from eigassign.mechanism.elements.craig_bampton import as_asked
 from eigassign.mechanism.elements.links import copies_of, link_mesh
-from eigassign.mechanism.elements.mesh import DOFS, LinkMesh
+from eigassign.mechanism.elements.mesh import LinkMesh
 from eigassign.mechanism.kinematics.coordinates import coordinates
 from eigassign.mechanism.kinematics.forward import Kinematics, Placement
 from eigassign.mechanism.kinematics.loop_closure import closed_kinematics, reference
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.parameters import parameters as variables
+from eigassign.mechanism.kinematics.rotations import DOFS
 from eigassign.mechanism.kinematics.topology import build_tree
 from eigassign.mechanism.kinematics.travel_limits import rails
 from eigassign.series.compiler import compile_program

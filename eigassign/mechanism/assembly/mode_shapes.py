@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from eigassign.mechanism.assembly.build import local_links
 from eigassign.mechanism.assembly.congruence import LocalLink
 from eigassign.mechanism.assembly.local_motion import motion_matrix, motion_scalars
-from eigassign.mechanism.elements.beam import bending_shapes
+from eigassign.mechanism.elements.beam import PLANES, bending_shapes
 from eigassign.mechanism.elements.links import axes
 from eigassign.mechanism.elements.mesh import LinkMesh, Strand
 from eigassign.mechanism.kinematics.forward import Placement
@@ -198,10 +198,7 @@ def _between(local: Floats, h: Floats, shear: Floats, xi: Floats) -> Floats:
     axial = np.einsum(
         "xj,jnc->cnx", np.stack([1.0 - xi, xi], 1), np.stack([first, second])[:, :, 0]
     )
-    bent = [
-        _bent(first, second, h, shear[:, k], xi, (w, slope, sign))
-        for k, (w, slope, sign) in enumerate(((1, 5, 1.0), (2, 4, -1.0)))
-    ]  # θ_z = dv/dx, θ_y = −dw/dx
+    bent = [_bent(first, second, h, shear[:, k], xi, plane) for k, plane in enumerate(PLANES)]
     return np.stack([axial, *bent], axis=-1)
 
 

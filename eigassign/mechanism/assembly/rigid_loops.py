@@ -20,10 +20,9 @@ from scipy import linalg
 
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.node_motion import MotionRow, NodeMotions, combined
-from eigassign.mechanism.elements.mesh import DOFS
 from eigassign.mechanism.kinematics.loop_closure import RANK, passive_motion
 from eigassign.mechanism.kinematics.parameters import ModelParameters
-from eigassign.mechanism.kinematics.rotations import Objects
+from eigassign.mechanism.kinematics.rotations import DOFS, Objects
 from eigassign.mechanism.kinematics.topology import JointEdge
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import compile_table

@@ -22,11 +22,10 @@ from eigassign.mechanism.assembly.node_motion import (
     apply,
     combined,
 )
-from eigassign.mechanism.elements.mesh import DOFS
 from eigassign.mechanism.kinematics.forward import Kinematics, shifted
 from eigassign.mechanism.kinematics.joints import mounting
 from eigassign.mechanism.kinematics.parameters import ModelParameters, node_position
-from eigassign.mechanism.kinematics.rotations import carried, multiply, present
+from eigassign.mechanism.kinematics.rotations import DOFS, carried, multiply, present
 from eigassign.mechanism.kinematics.topology import GROUND, NodeName, split
 from eigassign.series.expression import Scalar, is_constant
 

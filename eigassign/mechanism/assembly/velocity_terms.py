@@ -40,17 +40,25 @@ from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.build import local_links
 from eigassign.mechanism.assembly.congruence import LocalLink
 from eigassign.mechanism.assembly.local_motion import motion_scalars
-from eigassign.mechanism.elements.beam import bending_shapes, bending_slopes
-from eigassign.mechanism.elements.mesh import DOFS, LinkMesh, Term
+from eigassign.mechanism.elements.beam import PLANES, RealOrComplex, bending_shapes, bending_slopes
+from eigassign.mechanism.elements.mesh import LinkMesh, Term
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type
+from eigassign.mechanism.kinematics.rotations import DOFS
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import Table, compile_table
 from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+Matrix = Any  # sparse, or dense where that is quicker
 STEP = 1e-4  # of the time in which the fastest coordinate or spin moves, or would, by 1 rad or m
+IMAGINARY = 1e-30  # step of derivatives along the imaginary axis, which lose no digits
+# entries (i, j) of ω̃: which component of ω, and its sign
+CROSS = ((0, 1, 2, -1.0), (0, 2, 1, 1.0), (1, 0, 2, 1.0), (1, 2, 0, -1.0), (2, 0, 1, -1.0),
+         (2, 1, 0, 1.0))  # fmt: skip
+SMALL = 128  # rows and columns of a matrix up to which dense is quicker
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,10 +149,6 @@ def velocity_terms(
 
 
 # --- convection: a mesh that moves along its beam
-
-RealOrComplex = NDArray[Any]  # real or complex
-PLANES = ((1, 5, 1.0), (2, 4, -1.0))  # deflection, rotation: θ_z = dv/dx, θ_y = −dw/dx
-IMAGINARY = 1e-30  # step of derivatives along the imaginary axis, which lose no digits
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,13 +241,6 @@ def fields(xi: RealOrComplex, h: RealOrComplex, phi: RealOrComplex) -> RealOrCom
 
 # --- all links one below the other
 
-Ints = NDArray[np.intp]
-Matrix = Any  # sparse, or dense where that is quicker
-SMALL = 128  # rows and columns up to which it is
-CROSS = ((0, 1, 2, -1.0), (0, 2, 1, 1.0), (1, 0, 2, 1.0), (1, 2, 0, -1.0), (2, 0, 1, -1.0),
-         (2, 1, 0, 1.0))  # fmt: skip
-"""Entries (i, j) of ω̃: which component of ω, and its sign."""
-
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
@@ -272,7 +269,7 @@ class Pattern:
 
 
 @dataclass
-class _Gathered:
+class _PatternEntries:
     """Parts of entries on their way to a `Pattern`."""
 
     parts: list[tuple[Ints, Ints, Floats, Ints]] = field(default_factory=list)
@@ -299,7 +296,7 @@ class _Gathered:
 
 @dataclass(frozen=True)
 class ScalarRows:
-    """Which rows of a table of scalars are a link's: see `velocity.velocity_terms`."""
+    """Which rows of a table of scalars are a link's: see `velocity_terms`."""
 
     spin: slice
     carries: slice
@@ -379,7 +376,7 @@ def stack(
     n_dof: int,
 ) -> StackedLinks:
     """Those of the links that have mass; ``rows`` are where each has its scalars."""
-    joined, spread, twist, masses, spins, turns = (_Gathered() for _ in range(6))
+    joined, spread, twist, masses, spins, turns = (_PatternEntries() for _ in range(6))
     riders, bases = [], []
     local = whole = turned = spun = 0
     for link, own, riding in zip(links, rows, ridings, strict=True):
@@ -410,7 +407,7 @@ def stack(
     )
 
 
-def _add_joined(out: _Gathered, link: LocalLink, rows: ScalarRows, first: int) -> None:
+def _add_joined(out: _PatternEntries, link: LocalLink, rows: ScalarRows, first: int) -> None:
     own = np.flatnonzero(link.own >= 0)
     out.add(first + own, link.own[own], 1.0, -1)
     carried = ((slot, unknown) for slot, pairs in link.carried.items() for unknown, _ in pairs)
@@ -419,14 +416,14 @@ def _add_joined(out: _Gathered, link: LocalLink, rows: ScalarRows, first: int) -
 
 
 def _add_dense(
-    out: _Gathered, scalars: slice, shape: tuple[int, ...], row: int, column: int
+    out: _PatternEntries, scalars: slice, shape: tuple[int, ...], row: int, column: int
 ) -> None:
     """A full block whose entries are scalars, row by row."""
     i, j = np.indices(shape)
     out.add((row + i).ravel(), (column + j).ravel(), 1.0, np.arange(scalars.start, scalars.stop))
 
 
-def _add_turns(out: _Gathered, space: str, n: int, first: int, spin: int) -> None:
+def _add_turns(out: _PatternEntries, space: str, n: int, first: int, spin: int) -> None:
     """ω̃ at every node of a link with n dofs, for translations and rotations alike."""
     kept = DOFS[space]
     nodes = first + len(kept) * np.arange(n // len(kept))

@@ -13,7 +13,7 @@ planar mechanism keeps (u_x, u_y, θ_z).
 
 from __future__ import annotations
 
-from functools import cache, lru_cache
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +27,7 @@ from eigassign.series.expression import Scalar, is_constant
 
 Floats = NDArray[np.float64]
 RealOrComplex = NDArray[Any]  # real or complex: polynomials do not mind
+PLANES = ((1, 5, 1.0), (2, 4, -1.0))  # deflection, rotation: θ_z = dv/dx, θ_y = −dw/dx
 
 
 class ElementTerm(NamedTuple):
@@ -75,9 +76,9 @@ def element_mass(beam: BeamValues, h: Scalar) -> list[ElementTerm]:
     for EI, rotary, plane in ((beam.EI_z, beam.rotary_z, "z"), (beam.EI_y, beam.rotary_y, "y")):
         phi = _phi(beam, EI, h)
         scale = 1.0 if _is_zero(phi) else (phi + 1.0) ** -2.0
-        terms += _translation(beam.mass * scale, phi, h, plane)
+        terms += _polynomial(beam.mass * scale, phi, bending_mass(plane), (h, h**2.0, h**3.0))
         if beam.shear is not None:
-            terms += _rotary(rotary * scale, phi, h, plane)
+            terms += _polynomial(rotary * scale, phi, rotary_mass(plane), (h**-1.0, 1.0, h))
     return _folded(terms)
 
 
@@ -156,14 +157,6 @@ def _phi(beam: BeamValues, EI: Scalar, h: Scalar) -> Scalar:
     return 0.0 if beam.shear is None else EI * 12.0 / (beam.shear * h**2.0)
 
 
-def _translation(scale: Scalar, phi: Scalar, h: Scalar, plane: str) -> list[ElementTerm]:
-    return _polynomial(scale, phi, bending_mass(plane), (h, h**2.0, h**3.0))
-
-
-def _rotary(scale: Scalar, phi: Scalar, h: Scalar, plane: str) -> list[ElementTerm]:
-    return _polynomial(scale, phi, rotary_mass(plane), (h**-1.0, 1.0, h))
-
-
 def _polynomial(
     scale: Scalar,
     phi: Scalar,
@@ -225,7 +218,7 @@ def _blocks(ww: Floats, wt: Floats, tt: Floats) -> tuple[Floats, Floats, Floats]
     return a, b, c
 
 
-@lru_cache(maxsize=2)
+@cache
 def bending_stiffness(plane: str) -> tuple[Floats, ...]:
     """k_0, k_1, k_2, k_3 of one plane."""
     a, b, c = _blocks(
@@ -238,7 +231,7 @@ def bending_stiffness(plane: str) -> tuple[Floats, ...]:
     return tuple(_embed(m, plane) for m in (a, b, c, d))
 
 
-@lru_cache(maxsize=2)
+@cache
 def bending_mass(plane: str) -> tuple[tuple[Floats, ...], ...]:
     """m_ij of one plane: rows i the powers of Φ, columns j those of h."""
     rows = (
@@ -246,21 +239,18 @@ def bending_mass(plane: str) -> tuple[tuple[Floats, ...], ...]:
         ((7 / 10, 3 / 10), (11 / 120, -3 / 40), (1 / 60, -1 / 60)),
         ((1 / 3, 1 / 6), (1 / 24, -1 / 24), (1 / 120, -1 / 120)),
     )
-    return tuple(tuple(_embed(m, plane) for m in _symmetric(*row)) for row in rows)
+    out = []
+    for (ww, ww_across), (wt, wt_across), (tt, tt_across) in rows:  # alike from both ends
+        blocks = _blocks(
+            np.array([[ww, ww_across], [ww_across, ww]]),
+            np.array([[wt, wt_across], [-wt_across, -wt]]),
+            np.array([[tt, tt_across], [tt_across, tt]]),
+        )
+        out.append(tuple(_embed(m, plane) for m in blocks))
+    return tuple(out)
 
 
-def _symmetric(
-    ww: tuple[float, float], wt: tuple[float, float], tt: tuple[float, float]
-) -> tuple[Floats, Floats, Floats]:
-    """Mass blocks of an element that looks the same from both ends."""
-    return _blocks(
-        np.array([[ww[0], ww[1]], [ww[1], ww[0]]]),
-        np.array([[wt[0], wt[1]], [-wt[1], -wt[0]]]),
-        np.array([[tt[0], tt[1]], [tt[1], tt[0]]]),
-    )
-
-
-@lru_cache(maxsize=2)
+@cache
 def rotary_mass(plane: str) -> tuple[tuple[Floats, ...], ...]:
     """Rotary inertia ρI of one plane: powers of Φ by powers 1/h, 1, h."""
     rows = (

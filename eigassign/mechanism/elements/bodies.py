@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.mechanism.elements.mesh import (
-    DOFS,
     Entries,
     LinkMesh,
     add_scalars,
@@ -18,7 +17,7 @@ from eigassign.mechanism.elements.mesh import (
     rigid_motion,
 )
 from eigassign.mechanism.kinematics.parameters import ModelParameters, length
-from eigassign.mechanism.kinematics.rotations import Objects, vector
+from eigassign.mechanism.kinematics.rotations import DOFS, Objects, vector
 from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]

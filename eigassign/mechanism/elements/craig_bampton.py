@@ -67,7 +67,9 @@ def reduce_mesh(
         return mesh
     lam = (2.0 * np.pi * frequency_hz) ** 2
     parts = [_Interior(K, M, b, i, path) for K, M in _matrices(case, parameters, mesh)]
-    Psi = _static(parts[0], _at_centre(case, parameters, mesh), b, i)
+    central = coefficients(parameters, mesh.rigid, _designs(case)[:1])[:, 0]
+    N, Psi = total(mesh.rigid, central).toarray(), parts[0].Psi
+    Psi = Psi + (N[i] - Psi @ N[b]) @ np.linalg.pinv(N[b])  # Ψ N_b = N_i to the last digit
     W = _span(parts, Psi, mesh.rigid, b, i, lam)
     if W.shape[1] >= len(i):
         return mesh
@@ -145,17 +147,6 @@ def coefficients(parameters: ModelParameters, terms: Sequence[Term], y: Floats) 
     table = compile_table(parameters.recorder, [t.coefficient for t in terms], n_q + y.shape[1])
     z = np.vstack([np.zeros((n_q, len(y))), y.T])
     return np.asarray(np.broadcast_to(table.evaluate(Samples(), z), (len(terms), len(y))))
-
-
-def _at_centre(case: CaseFile, parameters: ModelParameters, mesh: LinkMesh) -> Floats:
-    """N in the middle of the bounds, (n_local, n_twist)."""
-    values = coefficients(parameters, mesh.rigid, _designs(case)[:1])[:, 0]
-    return total(mesh.rigid, values).toarray()
-
-
-def _static(part: _Interior, N: Floats, b: Ints, i: Ints) -> Floats:
-    """Ψ, with round-off mended so that Ψ N_b = N_i to the last digit."""
-    return np.asarray(part.Psi + (N[i] - part.Psi @ N[b]) @ np.linalg.pinv(N[b]))
 
 
 def _span(
@@ -242,9 +233,10 @@ def fixed_modes(
 ) -> Floats:
     """All modes (n, k) with λ ≤ ``lam``, φᵀ K φ = I; ``factor`` is that of K."""
     n, least = K.shape[0], 1.0 / lam
-    count = FIRST
+    rows, count = M.T, FIRST  # M is symmetric: products run faster row by row
+    mass = linalg.LinearOperator(M.shape, matvec=lambda v: rows @ v, dtype=np.float64)
     while n > DENSE and count < n // 2:
-        mu, phi = _lanczos(K, _mass(M), factor, count, 0.0)
+        mu, phi = _lanczos(K, mass, factor, count, 0.0)
         if mu[-1] < least:
             return np.asarray(phi[:, mu >= least])
         count *= 2
@@ -275,11 +267,6 @@ def largest_left_out(
     mass = linalg.LinearOperator((n, n), matvec=deflated, dtype=np.float64)
     mu, _ = _lanczos(K, mass, factor, 1, LOOSE)
     return float(mu[0]) * (1.0 + LOOSE)
-
-
-def _mass(M: sparse.csc_array) -> linalg.LinearOperator:
-    rows = M.T  # symmetric: products run faster row by row
-    return linalg.LinearOperator(M.shape, matvec=lambda v: rows @ v, dtype=np.float64)
 
 
 def _lanczos(

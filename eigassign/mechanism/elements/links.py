@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.beam import (
+    PLANES,
     BeamValues,
     ElementTerm,
     beam_values,
@@ -25,7 +26,6 @@ from eigassign.mechanism.elements.beam import (
 )
 from eigassign.mechanism.elements.bodies import add_bodies, rigid_link
 from eigassign.mechanism.elements.mesh import (
-    DOFS,
     Entries,
     LinkMesh,
     Strand,
@@ -35,7 +35,7 @@ from eigassign.mechanism.elements.mesh import (
 )
 from eigassign.mechanism.elements.superelement import superelement_mesh
 from eigassign.mechanism.kinematics.parameters import ModelParameters, length, link_type, station
-from eigassign.mechanism.kinematics.rotations import Objects, rotation, vector
+from eigassign.mechanism.kinematics.rotations import DOFS, Objects, rotation, vector
 from eigassign.mechanism.kinematics.topology import Topology
 from eigassign.series.expression import Scalar, is_constant
 
@@ -84,21 +84,10 @@ def _beam(case: CaseFile, parameters: ModelParameters, tree: Topology, name: str
     if len(riders) > 1:
         message = "carries more than one carriage or nut; one is supported"
         raise MechanismError(f"mechanism.links.{name}", message)
-    pieces: list[tuple[Scalar, Scalar, int]] = [(0.0, total, n)]
+    pieces: list[tuple[Scalar, Scalar, int]] = [(0.0, total, n)]  # start, span, elements
     if riders:
         at, first = station(parameters, tree, riders[0]), max(1, n // 2)
         pieces = [(0.0, at, first), (at, total - at, max(1, n - first))]
-    return _chain(case, parameters, name, space, pieces, f"@{riders[0]}" if riders else None)
-
-
-def _chain(
-    case: CaseFile,
-    parameters: ModelParameters,
-    name: str,
-    space: str,
-    pieces: Sequence[tuple[Scalar, Scalar, int]],
-    rider: str | None,
-) -> LinkMesh:
     width = len(DOFS[space])
     count = sum(n for _, _, n in pieces) + 1
     stiffness, mass = Entries((width * count,) * 2), Entries((width * count,) * 2)
@@ -107,29 +96,21 @@ def _chain(
     inertia: list[Sequence[Scalar]] = []
     for start, span, n in pieces:
         first = len(positions) - 1
-        positions += _places(start, span, n)
-        beams = _segment(case, parameters, name, stiffness, mass, first, (start, span), n, space)
+        positions += [vector([start + span * (k / n)]) for k in range(1, n + 1)]
+        beams = _segment(case, parameters, name, stiffness, mass, first, (start, span), n)
         for beam, number in beams:
             shear += [(z, y) for z, y in repeated(shear_ratios(beam, span * (1.0 / n)), number)]
             inertia += repeated(field_inertia(beam), number)
     slots = list(chain_dofs(count, space))
     nodes = {"start": slots[0], "end": slots[-1]}
     places = {"start": positions[0], "end": positions[-1]}
-    if rider is not None:
-        nodes[rider], places[rider] = slots[pieces[0][2]], positions[pieces[0][2]]
+    for rider in riders:
+        nodes[f"@{rider}"], places[f"@{rider}"] = slots[pieces[0][2]], positions[pieces[0][2]]
     add_bodies(case, parameters, name, mass, nodes)
     rigid = _chain_rigid(pieces, space)
-    turn = rolled(_roll(case.mechanism.links[name]))[:3, :3]
-    strand = Strand(slots, positions, turn, shear, inertia)
+    strand = Strand(slots, positions, _rolled(link)[:3, :3], shear, inertia)
     terms = stiffness.terms(), mass.terms(), rigid
     return LinkMesh(width * count, nodes, places, *terms, (strand,))
-
-
-def _places(start: Scalar, span: Scalar, n: int) -> list[Objects]:
-    """Where the n nodes behind the first one of a piece are."""
-    out = np.full((n, 3), 0.0, dtype=object)
-    out[:, 0] = [start + span * (k / n) for k in range(1, n + 1)]
-    return list(out)
 
 
 def _chain_rigid(pieces: Sequence[tuple[Scalar, Scalar, int]], space: str) -> list[Any]:
@@ -143,7 +124,7 @@ def _chain_rigid(pieces: Sequence[tuple[Scalar, Scalar, int]], space: str) -> li
     for start, span, n in pieces:
         k = np.arange(1, n + 1)
         for part, values in ((start, np.ones(n)), (span, k / n)):
-            for dof, turn, sign in ((1, 5, 1.0), (2, 4, -1.0)):  # ω × x e_x = (0, ω_z x, −ω_y x)
+            for dof, turn, sign in PLANES:  # ω × x e_x = (0, ω_z x, −ω_y x)
                 if dof in kept and turn in kept and not (is_constant(part) and part == 0.0):
                     rows = width * (first + k) + kept.index(dof)
                     columns = np.full(n, kept.index(turn))
@@ -161,16 +142,16 @@ def _segment(
     first: int,
     piece: tuple[Scalar, Scalar],
     n: int,
-    space: str,
 ) -> list[tuple[BeamValues, int]]:
     """n elements of equal length from node ``first`` on; their values, and how many have them.
 
     A taper gives each element its own section; where these are plain numbers, as arrays over all.
     """
-    span = piece[1]
+    start, span = piece
+    space = case.mechanism.space
     link: Any = case.mechanism.links[name]
     h = span * (1.0 / n)
-    turn = rolled(_roll(link))
+    turn = _rolled(link)
 
     def add(beam: BeamValues, first: int, count: int) -> tuple[BeamValues, int]:
         _tile(stiffness, element_stiffness(beam, h), turn, first, count, space)
@@ -183,15 +164,9 @@ def _segment(
     total = length(case, parameters, name)
     if is_constant(total) and span is total and is_settled(parameters, link):
         return [add(tapered_values(case, parameters, link, shares), first, n)]
-    varying = _shares(piece, shares.tolist(), total)
-    beams = (tapered_values(case, parameters, link, share) for share in varying)
+    of_whole = [k if span is total else (start + span * k) / total for k in shares.tolist()]
+    beams = (tapered_values(case, parameters, link, share) for share in of_whole)
     return [add(beam, first + k, 1) for k, beam in enumerate(beams)]
-
-
-def _shares(piece: tuple[Scalar, Scalar], shares: list[float], total: Scalar) -> list[Scalar]:
-    """Shares of the whole length from those of a piece; a rider splits the beam."""
-    start, span = piece
-    return [share if span is total else (start + span * share) / total for share in shares]
 
 
 def _tile(
@@ -211,12 +186,9 @@ def _tile(
             entries.add(coefficient, rows, columns, values)
 
 
-def _roll(beam: Any) -> float:
-    return float(getattr(beam, "roll", 0.0) or 0.0)
-
-
-def rolled(angle: float) -> Floats:
+def _rolled(beam: Any) -> Floats:
     """(12, 12) turn of the section's axes about the beam's."""
+    angle = float(getattr(beam, "roll", 0.0) or 0.0)
     R = np.asarray(rotation(np.array([1.0, 0.0, 0.0]), angle), dtype=np.float64).T
     return np.asarray(np.kron(np.eye(4), R), dtype=np.float64)
 
@@ -266,7 +238,7 @@ def _add_beam(
     along = points[ends[-1]] - points[ends[0]]
     h = float(np.linalg.norm(along)) / (len(ends) - 1)
     values = beam_values(case, parameters, beam, beam.section)
-    turn = rolled(float(getattr(beam, "roll", 0.0) or 0.0)) @ np.kron(np.eye(4), axes(along))
+    turn = _rolled(beam) @ np.kron(np.eye(4), axes(along))
     width = len(DOFS[space])
     for terms, target in (
         (element_stiffness(values, h), stiffness),

@@ -14,13 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from eigassign.mechanism.kinematics.rotations import Objects, skew
+from eigassign.mechanism.kinematics.rotations import DOFS, Objects, skew, some
 from eigassign.series.expression import Expression, Scalar
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-DOFS = {"planar": (0, 1, 5), "spatial": (0, 1, 2, 3, 4, 5)}
-
 _PLACES = {
     space: np.array([kept.index(dof) if dof in kept else -1 for dof in range(6)])
     for space, kept in DOFS.items()
@@ -140,14 +138,10 @@ def rigid_motion(
         for i in range(3):
             for j in range(3):
                 value = lever[i, j]
-                if slots[i] >= 0 and 3 + j in kept and _some(value):
+                if slots[i] >= 0 and 3 + j in kept and some(value):
                     at = np.array([slots[i]]), np.array([kept.index(3 + j)])
                     entries.add(value, *at, np.ones(1))
     return entries.terms()
-
-
-def _some(value: Scalar) -> bool:
-    return isinstance(value, Expression) or value != 0.0
 
 
 def body_block(mass: Scalar, inertia: Sequence[Scalar], lever: Objects) -> Objects:
@@ -162,11 +156,11 @@ def body_block(mass: Scalar, inertia: Sequence[Scalar], lever: Objects) -> Objec
     for i in range(3):
         out[i, i] = mass
         for j in range(3):
-            out[i, 3 + j] = S[i, j] * -1.0 * mass if _some(S[i, j]) else 0.0
-            out[3 + i, j] = S[i, j] * mass if _some(S[i, j]) else 0.0
+            out[i, 3 + j] = S[i, j] * -1.0 * mass if some(S[i, j]) else 0.0
+            out[3 + i, j] = S[i, j] * mass if some(S[i, j]) else 0.0
             square: Scalar = J[i, j]
             for k in range(3):
-                if _some(S[i, k]) and _some(S[k, j]):
+                if some(S[i, k]) and some(S[k, j]):
                     square = square - S[i, k] * S[k, j] * mass
             out[3 + i, 3 + j] = square
     return out
@@ -176,6 +170,6 @@ def add_scalars(entries: Entries, slots: Ints, block: Objects) -> None:
     """Add a small matrix of scalars at one node."""
     for i in range(len(slots)):
         for j in range(len(slots)):
-            if slots[i] >= 0 and slots[j] >= 0 and _some(block[i, j]):
+            if slots[i] >= 0 and slots[j] >= 0 and some(block[i, j]):
                 at = np.array([slots[i]]), np.array([slots[j]])
                 entries.add(block[i, j], *at, np.ones(1))

@@ -19,10 +19,10 @@ from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.bodies import add_bodies
 from eigassign.mechanism.elements.craig_bampton import held_factor
-from eigassign.mechanism.elements.mesh import DOFS, Entries, LinkMesh, Term, rigid_motion
+from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Term, rigid_motion
 from eigassign.mechanism.elements.sparse_factor import is_semidefinite
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type, parameters
-from eigassign.mechanism.kinematics.rotations import vector
+from eigassign.mechanism.kinematics.rotations import DOFS, vector
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -31,13 +31,30 @@ ALIKE = 1e-3  # relative difference of a part's mass by direction that passes fo
 
 
 def superelement_mesh(case: CaseFile, parameters: ModelParameters, name: str) -> LinkMesh:
-    """The mesh of a superelement; raises MechanismError for matrices that cannot be one."""
+    """The mesh of a superelement: interface dofs first, node by node; then interior or modal ones.
+
+    Raises MechanismError for matrices that cannot be those of a part.
+    """
     link: Any = case.mechanism.links[name]
     path = f"mechanism.links.{name}"
     K, M = read_pair(Path(link.stiffness), Path(link.mass), path)
     boundary = _boundary(link, K.shape[0], path)
-    K, M = _interface_first(K, M, boundary)
-    return _mesh(case, parameters, name, K, M, len(boundary), path)
+    order = np.concatenate([boundary, np.setdiff1d(np.arange(K.shape[0]), boundary)])
+    K, M = K[order][:, order].tocsr(), M[order][:, order].tocsr()
+    space, n = case.mechanism.space, K.shape[0]
+    width, kept = len(DOFS[space]), list(DOFS[space])
+    nodes, places = {}, {}
+    for k, (key, node) in enumerate(link.nodes.items()):
+        slots = np.full(6, -1, dtype=np.intp)
+        slots[kept] = width * k + np.arange(width)
+        nodes[key], places[key] = slots, vector([float(c) for c in node.position])
+    at_interface = rigid_motion(list(places.values()), list(nodes.values()), n, space)
+    rigid = [Term(t.coefficient, _follow(K, t.matrix, len(boundary), path)) for t in at_interface]
+    _check_rigid(K, rigid, path)
+    _check_mass(M, rigid, space, path)
+    mass = Entries((n, n))
+    add_bodies(case, parameters, name, mass, nodes)
+    return LinkMesh(n, nodes, places, [Term(1.0, K)], [Term(1.0, M), *mass.terms()], rigid)
 
 
 def weights(case: CaseFile) -> tuple[str, ...]:
@@ -57,33 +74,6 @@ def _weight(name: str, mesh: LinkMesh, space: str) -> str:
     places = (J[1, 2], -J[0, 2]) if space == "planar" else (J[1, 5], J[2, 3], J[0, 4])
     centre = ", ".join(f"{c / m + 0.0:.4g}" for c in places) if m > 0.0 else "nowhere"
     return f"superelement {name}: {mesh.n_local} dofs, {m:.4g} kg, centre of mass at ({centre}) m"
-
-
-def _mesh(
-    case: CaseFile,
-    parameters: ModelParameters,
-    name: str,
-    K: sparse.csr_array,
-    M: sparse.csr_array,
-    n_b: int,
-    path: str,
-) -> LinkMesh:
-    """Interface dofs first, node by node; then the interior or modal ones."""
-    space, n = case.mechanism.space, K.shape[0]
-    link: Any = case.mechanism.links[name]
-    width, kept = len(DOFS[space]), list(DOFS[space])
-    nodes, places = {}, {}
-    for k, (key, node) in enumerate(link.nodes.items()):
-        slots = np.full(6, -1, dtype=np.intp)
-        slots[kept] = width * k + np.arange(width)
-        nodes[key], places[key] = slots, vector([float(c) for c in node.position])
-    at_interface = rigid_motion(list(places.values()), list(nodes.values()), n, space)
-    rigid = [Term(t.coefficient, _follow(K, t.matrix, n_b, path)) for t in at_interface]
-    _check_rigid(K, rigid, path)
-    _check_mass(M, rigid, space, path)
-    mass = Entries((n, n))
-    add_bodies(case, parameters, name, mass, nodes)
-    return LinkMesh(n, nodes, places, [Term(1.0, K)], [Term(1.0, M), *mass.terms()], rigid)
 
 
 def _follow(K: sparse.csr_array, N: sparse.csr_array, n_b: int, path: str) -> sparse.csr_array:
@@ -107,14 +97,6 @@ def _check_rigid(K: sparse.csr_array, rigid: list[Term], path: str) -> None:
             "strains under rigid motion: the node positions or dof numbers do not fit the "
             "matrix, or the part is supported (its own supports must be released)",
         )
-
-
-def _interface_first(
-    K: sparse.csr_array, M: sparse.csr_array, boundary: Ints
-) -> tuple[sparse.csr_array, sparse.csr_array]:
-    interior = np.setdiff1d(np.arange(K.shape[0]), boundary)
-    order = np.concatenate([boundary, interior])
-    return K[order][:, order].tocsr(), M[order][:, order].tocsr()
 
 
 def _check_mass(M: sparse.csr_array, rigid: list[Term], space: str, path: str) -> None:

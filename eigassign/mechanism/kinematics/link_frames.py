@@ -34,18 +34,14 @@ class LinkFrames:
     links: tuple[str, ...]
     drawn: tuple[tuple[tuple[str, str], ...], ...]  # per link: the node pairs of its lines
 
-    def _variables(self, x: Floats) -> Floats:
-        q, y = np.split(np.atleast_2d(x), [len(self.parameters.coordinates)], axis=1)
-        s = q @ self.motion.relative.T + self.motion.offset
-        return np.hstack([s, y]).T
-
     def _compile(self, scalars: Sequence[Scalar]) -> Table:
         n = len(self.parameters.coordinates) + len(self.parameters.design)
         return compile_table(self.parameters.recorder, scalars, n)
 
     def _evaluate(self, table: Table, x: Floats) -> Floats:
         """(n_samples, n_scalars)."""
-        z = self._variables(x)
+        q, y = np.split(np.atleast_2d(x), [len(self.parameters.coordinates)], axis=1)
+        z = np.hstack([q @ self.motion.relative.T + self.motion.offset, y]).T
         rows = table.evaluate(Samples(), z)
         return np.broadcast_to(rows, (len(rows), z.shape[1])).T
 
@@ -92,7 +88,7 @@ class LinkFrames:
 def build_link_frames(
     case: CaseFile, parameters: ModelParameters, motion: Kinematics
 ) -> LinkFrames:
-    """The poses of a case's mechanism."""
+    """The world frames of a case's links."""
     links = tuple(p.link for p in motion.placements)
     drawn = tuple(_lines(case, motion, link) for link in links)
     return LinkFrames(case, parameters, motion, links, drawn)

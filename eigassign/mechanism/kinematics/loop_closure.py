@@ -20,7 +20,7 @@ from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics.coordinates import CoordinateMap
 from eigassign.mechanism.kinematics.forward import Kinematics, walk
 from eigassign.mechanism.kinematics.parameters import ModelParameters, initial_design
-from eigassign.mechanism.kinematics.rotations import Floats, Objects, multiply
+from eigassign.mechanism.kinematics.rotations import DOFS, Floats, Objects, multiply
 from eigassign.mechanism.kinematics.topology import Topology
 from eigassign.series.compiler import Program, compile_program
 from eigassign.series.expression import Expression, Recorder, Scalar, derivative
@@ -35,7 +35,7 @@ def closed_kinematics(
     Raises MechanismError for what cannot be placed, moved or closed.
     """
     if tree.loops:
-        return close_loops(case, parameters, tree, coords)
+        return _close_loops(case, parameters, tree, coords)
     if tree.passive:
         name = tree.passive[0].joint
         message = "moves without a coordinate in an open chain: give it one, or make it fixed"
@@ -54,38 +54,40 @@ def all_moving(case: CaseFile, parameters: ModelParameters, motion: Kinematics) 
     return closed_kinematics(case, parameters, motion.tree, coords)
 
 
-def close_loops(
+def _close_loops(
     case: CaseFile, parameters: ModelParameters, tree: Topology, coords: CoordinateMap
 ) -> Kinematics:
-    """ERLS motion of a mechanism with loops.
+    """ERLS motion of a mechanism with loops: twists T = T_q + T_p P over q̇ alone.
 
-    Raises MechanismError when a loop cannot be closed, the branch is ambiguous, or the mechanism
-    has more freedoms than coordinates.
+    P (n_passive, n) of ṗ = P q̇ comes from the loops' twist gaps.
     """
-    planar = case.mechanism.space == "planar"
-    bound = _bind_passive(case, parameters, tree, coords, planar)
+    bound = _bind_passive(case, parameters, tree, coords)
     values = [bound.freedom(k) for k in range(len(tree.freedoms))]
     unit = np.eye(len(tree.freedoms), dtype=object)[:, len(coords.relative) :]
     rates = np.concatenate([coords.rates.astype(object), unit], axis=1)
     free = replace(walk(case, bound, tree, coords, values, rates), passive=bound.passive)
-    n = len(coords.columns)
-    if not n:
-        return _narrowed(free, np.zeros((0, 0), dtype=object))
-    P = _passive_rates(bound.recorder, free, n, planar)
-    return _narrowed(free, P)
+    n, kept = len(coords.columns), list(DOFS[case.mechanism.space])
+    gaps = np.concatenate([loop.twist_gap[kept] for loop in free.loops])
+    P = passive_motion(bound.recorder, gaps[:, n:], gaps[:, :n])
+
+    def narrowed(twist: Objects) -> Objects:
+        return twist[:, :n] + multiply(twist[:, n:], P) if P.size else twist[:, :n]
+
+    placements = tuple(replace(p, twist=narrowed(p.twist)) for p in free.placements)
+    return replace(free, placements=placements)
 
 
 def _bind_passive(
-    case: CaseFile, parameters: ModelParameters, tree: Topology, coords: CoordinateMap, planar: bool
+    case: CaseFile, parameters: ModelParameters, tree: Topology, coords: CoordinateMap
 ) -> ModelParameters:
     """The parameters with each passive freedom as a component of the implicit function."""
     if not tree.passive:
-        _check_rigid_loops(case, parameters, tree, coords, planar)
+        _check_rigid_loops(case, parameters, tree, coords)
         return parameters
     recorder = Recorder()
     n_q, n_y, n_p = len(coords.relative), len(parameters.design), len(tree.passive)
     trial = parameters.rerecorded(recorder, n_p)
-    F, check = _equations(case, trial, tree, coords, planar)
+    F, check = _equations(case, trial, tree, coords)
     J = [[derivative(f, n_q + n_y + k) for k in range(n_p)] for f in F]
     used = _used_variables(recorder, [*F, *check], n_q + n_y, n_p)
     scalars = [*F, *check, *(entry for row in J for entry in row)]
@@ -118,13 +120,13 @@ def _joint_names(case: CaseFile, coords: CoordinateMap) -> list[str]:
 
 
 def _equations(
-    case: CaseFile, parameters: ModelParameters, tree: Topology, coords: CoordinateMap, planar: bool
+    case: CaseFile, parameters: ModelParameters, tree: Topology, coords: CoordinateMap
 ) -> tuple[list[Scalar], list[Scalar]]:
     """Closure rows F and check rows of all loops, on passive freedoms as plain variables."""
     values = [parameters.freedom(k) for k in range(len(tree.freedoms))]
     still = np.zeros((len(tree.freedoms), 0), dtype=object)
     motion = walk(case, parameters, tree, coords, values, still)
-    return closure_rows(motion, planar)
+    return closure_rows(motion, case.mechanism.space == "planar")
 
 
 def closure_rows(motion: Kinematics, planar: bool) -> tuple[list[Scalar], list[Scalar]]:
@@ -140,13 +142,13 @@ def closure_rows(motion: Kinematics, planar: bool) -> tuple[list[Scalar], list[S
 
 
 def _check_rigid_loops(
-    case: CaseFile, parameters: ModelParameters, tree: Topology, coords: CoordinateMap, planar: bool
+    case: CaseFile, parameters: ModelParameters, tree: Topology, coords: CoordinateMap
 ) -> None:
     """Loops without passive freedoms must close as they are drawn."""
-    F, check = _equations(case, parameters, tree, coords, planar)
+    F, check = _equations(case, parameters, tree, coords)
     for k, value in enumerate([*F, *check]):
         if isinstance(value, Expression) or abs(value) > 1e-9:
-            loop = tree.loops[min(k // (3 if planar else 6), len(tree.loops) - 1)]
+            loop = tree.loops[min(k // len(DOFS[case.mechanism.space]), len(tree.loops) - 1)]
             raise MechanismError(
                 f"mechanism.joints.{loop.joint}", "closes a loop whose two sides do not meet"
             )
@@ -169,14 +171,6 @@ def _reordered(
     return replace(program, input_variables=renamed, n_variables=len(order))
 
 
-def _passive_rates(recorder: Recorder, motion: Kinematics, n: int, planar: bool) -> Objects:
-    """P (n_passive, n) of ṗ = P q̇ from the loops' twist gaps; least squares where redundant."""
-    keep = [0, 1, 5] if planar else list(range(6))
-    gaps = np.concatenate([loop.twist_gap[keep] for loop in motion.loops])
-    J_q, J_p = gaps[:, :n], gaps[:, n:]
-    return passive_motion(recorder, J_p, J_q)
-
-
 def passive_motion(recorder: Recorder, J: Objects, right: Objects) -> Objects:
     """X of J X + ``right`` = 0, by normal equations where rows are redundant."""
     if not J.shape[1] or not right.shape[1]:
@@ -186,19 +180,6 @@ def passive_motion(recorder: Recorder, J: Objects, right: Objects) -> Objects:
         A, B = multiply(J.T, J), multiply(J.T, B)
     solved = recorder.solve(A.tolist(), B.tolist())
     return np.array(solved, dtype=object).reshape(B.shape)
-
-
-def _narrowed(motion: Kinematics, P: Objects) -> Kinematics:
-    """Twists over q̇ alone: T = T_q + T_p P."""
-    n = P.shape[1]
-    placements = tuple(replace(p, twist=_combined(p.twist, P, n)) for p in motion.placements)
-    return replace(motion, placements=placements)
-
-
-def _combined(twist: Objects, P: Objects, n: int) -> Objects:
-    if not n or not len(P):
-        return twist[:, :n]
-    return np.asarray(twist[:, :n] + multiply(twist[:, n:], P))
 
 
 # --- the assembly branch

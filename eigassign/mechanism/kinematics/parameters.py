@@ -38,14 +38,10 @@ class ModelParameters:
         """The value at a key path of the case: the variable if it is a design parameter."""
         return self.by_path.get(path, value)
 
-    def joint_coordinate(self, index: int) -> Expression:
-        """The relative joint coordinate s belonging to coordinate number ``index``."""
-        return self.recorder.variable(index)
-
     def freedom(self, k: int) -> Scalar:
         """Joint freedom k: a coordinate, or a passive one behind them."""
         n_q = len(self.coordinates)
-        return self.joint_coordinate(k) if k < n_q else self.passive[k - n_q]
+        return self.recorder.variable(k) if k < n_q else self.passive[k - n_q]
 
     def with_passive(self, values: Sequence[Scalar]) -> ModelParameters:
         """The same with the passive freedoms known."""

@@ -14,6 +14,7 @@ from eigassign.series.expression import Expression, Scalar, cos, sin
 
 Objects = NDArray[np.object_]
 Floats = NDArray[np.float64]
+DOFS = {"planar": (0, 1, 5), "spatial": (0, 1, 2, 3, 4, 5)}  # of a motion (v, ω): x, y, z each
 
 
 def vector(values: Sequence[Scalar]) -> Objects:
