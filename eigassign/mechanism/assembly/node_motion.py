@@ -43,7 +43,17 @@ class NodeMotions:
         tree = self.motion.tree
         self.slaves = {edge.follower: edge for edge in tree.loops[: tree.n_elastic]}
         for placement in self.motion.placements:
-            self._number_link(placement.link, placement.edge)
+            link, mesh = placement.link, self.meshes[placement.link]
+            taken = np.zeros(mesh.n_local, dtype=bool)
+            for name, slots in mesh.nodes.items():
+                if (link, name) == placement.edge.follower or (link, name) in self.slaves:
+                    taken[slots[slots >= 0]] = True
+            if "@origin" in mesh.nodes:
+                taken[:] = True
+            free = np.flatnonzero(~taken)
+            self.own[link] = np.full(mesh.n_local, -1, dtype=np.intp)
+            self.own[link][free] = self.count + np.arange(len(free))
+            self.count += len(free)
 
     def number_passive(self, freedoms: Iterable[Freedom]) -> None:
         """Unknowns for the elastic motions of these passive joints."""
@@ -54,19 +64,6 @@ class NodeMotions:
     def forget(self) -> None:
         """Derive every motion anew: what passive joints do has changed."""
         self.known.clear()
-
-    def _number_link(self, link: str, edge: JointEdge) -> None:
-        mesh = self.meshes[link]
-        taken = np.zeros(mesh.n_local, dtype=bool)
-        for name, slots in mesh.nodes.items():
-            if (link, name) == edge.follower or (link, name) in self.slaves:
-                taken[slots[slots >= 0]] = True
-        if "@origin" in mesh.nodes:
-            taken[:] = True
-        own = np.full(mesh.n_local, -1, dtype=np.intp)
-        own[~taken] = self.count + np.arange(int((~taken).sum()))
-        self.count += int((~taken).sum())
-        self.own[link] = own
 
     def rows(self, node: NodeName) -> MotionRows:
         """Six rows of a node's elastic motion in its link's axes; missing components stay empty."""

@@ -7,9 +7,10 @@ between exact, Taylor and reduced evaluation.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +20,21 @@ from eigassign.series.algebra import Samples, Truncated
 from eigassign.series.compiler import Program
 from eigassign.series.multi_index import LowerSet, on_faces
 
-if TYPE_CHECKING:  # a stored reduced model is evaluated without the case layer
-    from eigassign.mechanism.kinematics.travel_limits import Rails
-
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 STACK_LIMIT = 500_000  # numbers: 4 MB
 TINY_STACK = 20_000
 MANY = 200  # coefficients from which it pays to know which of them are zero
-Ints = NDArray[np.intp]
+
+
+class TravelRanges(Protocol):
+    """Where carriages and nuts may stand: see `kinematics.travel_limits`.
+
+    A stored reduced model is evaluated without kinematics and case, so they are not imported here.
+    """
+
+    def require(self, z: Floats, x: Floats, label: Callable[[int], str] = ...) -> None:
+        """Raise TravelError for the first sample at which one leaves its range."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +56,7 @@ class Pencil:
     to_program: Floats  # (n_z, n_x)
     shift: Floats  # (n_z,)
     n_q: int
-    rails: Rails | None = None  # where carriages and nuts may stand
+    rails: TravelRanges | None = None  # where carriages and nuts may stand
 
     @property
     def n_theta(self) -> int:
@@ -97,10 +105,9 @@ class Pencil:
         return sparse.csr_array(sparse.csr_array(place, shape=(self.n_dof, len(on))) @ sizes)
 
     @cached_property
-    def local_directions(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-        """dz/dw, dw/dx for w the active ones of z, and which of x they depend on."""
-        directions = self.to_program[self.active]
-        return np.eye(len(self.shift))[:, self.active], directions, (directions != 0.0).any(axis=0)
+    def local_directions(self) -> tuple[Floats, Floats]:
+        """dz/dw and dw/dx for w the active ones of z."""
+        return np.eye(len(self.shift))[:, self.active], self.to_program[self.active]
 
     def theta(self, x: Floats) -> Floats:
         """θ at samples x (n_samples, n_x): shape (n_theta, n_samples).
@@ -190,12 +197,12 @@ class Pencil:
 
     def sparse(self, data: Floats) -> sparse.csc_array:
         """One sparse matrix from its non-zeros (n_nonzeros,) on the common pattern."""
-        columns, starts = self._by_row
+        columns, starts = self._row_pointers
         shape = (self.n_dof, self.n_dof)
         return sparse.csr_array((data, columns, starts), shape=shape).tocsc()
 
     @cached_property
-    def _by_row(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    def _row_pointers(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Column of each non-zero, and where rows begin: the pattern runs row by row."""
         starts = np.searchsorted(self.rows, np.arange(self.n_dof + 1))
         return self.columns.astype(np.int32), starts.astype(np.int32)

@@ -64,19 +64,15 @@ def _rows(
     entries = [row.get(k, 0.0) for _, *pair in springs for row in pair for k in free]
     z = reference(case, parameters)
     table = compile_table(parameters.recorder, entries, len(z))
-    values = _at_poses(table, z, _reach(case, parameters))
+    ranges = [0.5 * (p.max - p.min) for p in case.design.parameters.values()]
+    span = np.concatenate([np.ones(len(parameters.coordinates)), ranges])  # rad or m; half of y's
+    values = _at_poses(table, z, span)
     ends = values.reshape(-1, 3, 2, len(free), values.shape[1])  # three axes of v or ω together
     size = np.abs(ends).max(axis=(1, 2, 3, 4), initial=0.0)[:, None, None, None]
     apart = ends[:, :, 1] - ends[:, :, 0]
     noise = np.abs(apart).max(axis=3, keepdims=True) <= np.maximum(RESISTED * size, ROUND_OFF)
     rows = np.where(noise, 0.0, apart).reshape(len(springs), len(free), -1).swapaxes(1, 2)
     return np.asarray(rows[[resists(k) for k, *_ in springs]])
-
-
-def _reach(case: CaseFile, parameters: ModelParameters) -> Floats:
-    """How far each of z = (s, y) varies: 1 rad or m, half the range of a design parameter."""
-    ranges = [0.5 * (p.max - p.min) for p in case.design.parameters.values()]
-    return np.concatenate([np.ones(len(parameters.coordinates)), ranges])
 
 
 def _at_poses(table: Table, z: Floats, span: Floats) -> Floats:

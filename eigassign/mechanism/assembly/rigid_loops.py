@@ -39,27 +39,25 @@ def close_rigid_loops(nodes: NodeMotions, parameters: ModelParameters, reference
     """
     tree = nodes.motion.tree
     passive = tree.passive
-    for k, freedom in enumerate(passive):  # told apart from the unknowns by their sign
-        nodes.passive[freedom.joint, freedom.component] = {-1 - k: 1.0}
+    keys = [(freedom.joint, freedom.component) for freedom in passive]
+    for k, key in enumerate(keys):  # told apart from the unknowns by their sign
+        nodes.passive[key] = {-1 - k: 1.0}
     loops = tree.loops[tree.n_elastic :]
     gaps = [row for edge in loops for row in _gap(nodes, edge)]
     labels = [-1 - k for k in range(len(passive))]
     unknowns = sorted({u for row in gaps for u in row if u >= 0})
     J, G = _matrix(gaps, labels), _matrix(gaps, unknowns)
-    at = _numbers(parameters, np.hstack([J, G]), reference)
+    table = compile_table(parameters.recorder, np.hstack([J, G]).ravel().tolist(), len(reference))
+    at = table.evaluate(Samples(), reference[:, None]).reshape(len(gaps), -1)
     dependent = _pivots(at[:, : len(labels)])
     require_consistent(at[:, dependent], at[:, len(labels) :], loops, nodes.space)
     free = [k for k in range(len(passive)) if k not in dependent]
     nodes.number_passive([passive[k] for k in free])
-    masters = [*(next(iter(nodes.passive[_key(passive[k])])) for k in free), *unknowns]
+    masters = [*(next(iter(nodes.passive[keys[k]])) for k in free), *unknowns]
     solved = passive_motion(parameters.recorder, J[:, dependent], np.hstack([J[:, free], G]))
     for k, row in zip(dependent, solved, strict=True):
-        nodes.passive[_key(passive[k])] = dict(zip(masters, row, strict=True))
+        nodes.passive[keys[k]] = dict(zip(masters, row, strict=True))
     nodes.forget()
-
-
-def _key(freedom: object) -> tuple[str, int]:
-    return freedom.joint, freedom.component  # type: ignore[attr-defined]
 
 
 def _gap(nodes: NodeMotions, edge: JointEdge) -> list[MotionRow]:
@@ -72,12 +70,6 @@ def _gap(nodes: NodeMotions, edge: JointEdge) -> list[MotionRow]:
 def _matrix(rows: Sequence[MotionRow], unknowns: Sequence[int]) -> Objects:
     entries = [[row.get(u, 0.0) for u in unknowns] for row in rows]
     return np.array(entries, dtype=object).reshape(len(rows), len(unknowns))
-
-
-def _numbers(parameters: ModelParameters, entries: Objects, z: Floats) -> Floats:
-    table = compile_table(parameters.recorder, entries.ravel().tolist(), len(z))
-    values = np.asarray(table.evaluate(Samples(), z[:, None]), dtype=np.float64)
-    return values[:, 0].reshape(entries.shape)
 
 
 def _pivots(J: Floats) -> list[int]:
