@@ -115,14 +115,6 @@ def _solved(A: Floats, B: Floats) -> Floats:
 ADVANCING = ("screw", "nut")  # a full turn of theirs moves something on
 
 
-@dataclass(frozen=True)
-class _Unbound:
-    """A mechanism whose loops are open: closure is an equation to be met, not a fact."""
-
-    parameters: ModelParameters
-    motion: Kinematics
-
-
 def tip_chain(
     case: CaseFile,
     parameters: ModelParameters,
@@ -132,68 +124,58 @@ def tip_chain(
     oriented: bool = False,
 ) -> TipChain:
     """The chain that carries the node ``tip`` ("link.node") at design y, turned if oriented."""
-    planar = case.mechanism.space == "planar"
-    free = _unbound(case, parameters, motion)
-    points, turns = (2, (2,)) if planar else (3, (0, 1, 2))
-    names = tuple(c.joint for c in case.coordinates.values())
+    points, turns = (2, (2,)) if case.mechanism.space == "planar" else (3, (0, 1, 2))
+    turned_by = turns if oriented else ()
     return TipChain(
-        evaluate=_evaluator(case, free, motion, tip, y, points, turns if oriented else ()),
-        joints=names,
+        evaluate=_evaluator(case, parameters, motion, tip, y, points, turned_by),
+        joints=tuple(c.joint for c in case.coordinates.values()),
         relative_map=(motion.relative, motion.offset),
         kinds=_kinds(case, motion.tree),
-        turned_by=turns if oriented else (),
+        turned_by=turned_by,
         assembly=_assembly(case, parameters, motion, y),
     )
 
 
-def _unbound(case: CaseFile, parameters: ModelParameters, motion: Kinematics) -> _Unbound:
-    """The mechanism with its passive freedoms as variables, and every freedom moving by itself."""
-    recorder, tree = Recorder(), motion.tree
-    variables = parameters.rerecorded(recorder, len(tree.passive))
-    n = len(tree.freedoms)
-    values = [variables.freedom(k) for k in range(n)]
-    walked = walk(case, variables, tree, motion.coordinates, values, np.eye(n, dtype=object))
-    return _Unbound(variables, walked)
-
-
-def _tip_scalars(case: CaseFile, free: _Unbound, tip: str) -> tuple[Objects, ...]:
-    """World place (3,), rotation (3, 3), and velocity and spin (3, n_freedoms)."""
-    link, node = split(tip)
-    placed = free.motion.placement(link)
-    X = node_position(case, free.parameters, free.motion.tree, (link, node))
-    R, place = placed.at(X)
-    twist = shifted(placed.twist, X)
-    return place, R, multiply(R, twist[:3]), multiply(R, twist[3:])
-
-
 def _evaluator(
     case: CaseFile,
-    free: _Unbound,
+    parameters: ModelParameters,
     motion: Kinematics,
     tip: str,
     y: Floats,
     d: int,
     turns: tuple[int, ...],
 ) -> Callable[[Floats], TipEvaluation]:
-    """The chain's `evaluate`: one table of scalars, evaluated for all states together."""
-    A, b = motion.relative, motion.offset
-    place, rotation, velocity, spin = _tip_scalars(case, free, tip)
+    """The chain's `evaluate`: one table of scalars, evaluated for all states together.
+
+    The links are placed anew with open loops: passive freedoms are variables, closure is an
+    equation to be met, and every freedom moves by itself.
+    """
+    A, b, tree = motion.relative, motion.offset, motion.tree
+    n_q, n_z, n_y = len(b), len(tree.freedoms), len(y)
+    recorder = Recorder()
+    variables = parameters.rerecorded(recorder, len(tree.passive))
+    values = [variables.freedom(k) for k in range(n_z)]
+    moving = walk(case, variables, tree, motion.coordinates, values, np.eye(n_z, dtype=object))
+    link, node = split(tip)
+    X = node_position(case, variables, tree, (link, node))
+    rotation, place = moving.placement(link).at(X)
+    twist = shifted(moving.placement(link).twist, X)
+    velocity, spin = multiply(rotation, twist[:3]), multiply(rotation, twist[3:])
     J = _per_coordinate(np.concatenate([velocity[:d], spin[list(turns)]]), A)
-    F, dF = _closure(case, free, A)
+    F, dF = _closure(moving, d == 2, n_y, A)
     turned = rotation.ravel() if turns else rotation[:0].ravel()
     parts = [place[:d], turned, J.ravel(), F, dF.ravel()]
-    n_q, n_z, n_y = len(b), len(free.motion.tree.freedoms), len(y)
-    table = compile_table(free.parameters.recorder, list(np.concatenate(parts)), n_z + n_y)
+    table = compile_table(recorder, list(np.concatenate(parts)), n_z + n_y)
     weights, constants = table.weights.toarray(), table.constants[:, None]  # small: dense is quick
     i, j, k, m = np.cumsum([len(part) for part in parts])[:-1].tolist()
 
     def evaluate(z: Floats) -> TipEvaluation:
         n = len(z)
-        variables = np.empty((n_z + n_y, n))
-        variables[:n_q] = (z[:, :n_q] @ A.T + b).T
-        variables[n_q : n_q + n_y] = y[:, None]
-        variables[n_q + n_y :] = z[:, n_q:].T
-        v = weights @ table.program.run(Samples(), variables) + constants
+        at = np.empty((n_z + n_y, n))  # (s, y, p)
+        at[:n_q] = (z[:, :n_q] @ A.T + b).T
+        at[n_q : n_q + n_y] = y[:, None]
+        at[n_q + n_y :] = z[:, n_q:].T
+        v = weights @ table.program.run(Samples(), at) + constants
         R = v[i:j].T.reshape(n, 3, 3) if turns else None
         closure = v[m:].T.reshape(n, len(F), n_z)
         return TipEvaluation(
@@ -211,14 +193,12 @@ def _per_coordinate(rates: Objects, A: Floats) -> Objects:
     return np.concatenate([multiply(rates[:, :n_q], A), rates[:, n_q:]], axis=1)
 
 
-def _closure(case: CaseFile, free: _Unbound, A: Floats) -> tuple[Objects, Objects]:
+def _closure(motion: Kinematics, planar: bool, n_y: int, A: Floats) -> tuple[Objects, Objects]:
     """F (n_e,) and ∂F/∂(q, p) (n_e, n_z) of loops that passive freedoms close."""
-    tree = free.motion.tree
-    n_z = len(tree.freedoms)
-    if not tree.passive:
+    n_q, n_z = len(A), len(motion.tree.freedoms)
+    if not motion.tree.passive:
         return np.zeros(0, dtype=object), np.zeros((0, n_z), dtype=object)
-    F, _ = closure_rows(free.motion, case.mechanism.space == "planar")
-    n_q, n_y = len(free.parameters.coordinates), len(free.parameters.design)
+    F, _ = closure_rows(motion, planar)
     variables = [*range(n_q), *range(n_q + n_y, n_z + n_y)]
     dF = np.array([[derivative(f, k) for k in variables] for f in F], dtype=object)
     return np.array(F, dtype=object), _per_coordinate(dF, A)

@@ -6,61 +6,61 @@ import numpy as np
 
 from eigassign.errors import TrajectoryError
 from eigassign.mechanism.inverse_kinematics.chain import Floats
-from eigassign.mechanism.inverse_kinematics.state import Arm
+from eigassign.mechanism.inverse_kinematics.state import TipProblem
 from eigassign.mechanism.inverse_kinematics.tip_path import WAYPOINTS, Course
 
 _NEAR = 1e-6  # of L: what counts as reached when blame is shared between position and turn
 
 
-def pose(arm: Arm, u: Floats) -> str:
+def pose(ik: TipProblem, u: Floats) -> str:
     """The coordinates of a state in words."""
-    q = (u * arm.scale)[: arm.n_q]
+    q = (u * ik.scale)[: ik.n_q]
     return "q = (" + ", ".join(f"{value:.6g}" for value in q) + ")"
 
 
-def out_of_reach(arm: Arm, course: Course, k: int, u: Floats) -> TrajectoryError:
+def out_of_reach(ik: TipProblem, course: Course, k: int, u: Floats) -> TrajectoryError:
     """Sample k cannot be reached; u (n_z,) comes as near as possible to point and turn together."""
-    seen = arm.evaluate(u[None])
-    distance, turn = arm.misses(arm.error(seen, course.target(course.s[[k]])))
+    seen = ik.evaluate(u[None])
+    distance, turn = ik.misses(ik.error(seen, course.target(course.s[[k]])))
     near = "(" + ", ".join(f"{x:.6g}" for x in seen.point[0]) + ") m"
-    if arm.chain.assembly is not None:
-        near += f", at {pose(arm, u)}"
+    if ik.chain.assembly is not None:
+        near += f", at {pose(ik, u)}"
     if course.attitude is None or turn[0] <= _NEAR:
         message = f"is {distance[0]:.3g} m out of reach; the tip comes to {near}"
-        return TrajectoryError(WAYPOINTS, f"{course.label(k)} {message}{_bound(arm, course)}", k)
+        return TrajectoryError(WAYPOINTS, f"{course.label(k)} {message}{_bound(ik, course)}", k)
     key = f"trajectory.{course.attitude.key}"
     message = (
         f"cannot be reached with the {course.attitude.key} asked for; the nearest compromise "
         f"misses the point by {distance[0]:.3g} m and the {course.attitude.key} by "
         f"{np.degrees(turn[0]):.3g} deg"
     )
-    return TrajectoryError(key, f"{course.label(k)} {message}{_bound(arm, course)}", k)
+    return TrajectoryError(key, f"{course.label(k)} {message}{_bound(ik, course)}", k)
 
 
-def _bound(arm: Arm, course: Course) -> str:
+def _bound(ik: TipProblem, course: Course) -> str:
     """A word about tips that have fewer freedoms than the path asks for."""
-    wanted = course.path.coefficients.shape[2] + len(arm.chain.turned_by)
-    if arm.rank >= wanted:
+    wanted = course.path.coefficients.shape[2] + len(ik.chain.turned_by)
+    if ik.rank >= wanted:
         return ""
     return (
-        f"; the coordinates move {arm.rank} of the {wanted} components asked for, so the path must "
+        f"; the coordinates move {ik.rank} of the {wanted} components asked for, so the path must "
         "lie exactly where the tip can go: give points or samples of the coordinates instead"
     )
 
 
-def outside(arm: Arm, course: Course, k: int, u: Floats) -> TrajectoryError:
+def outside(ik: TipProblem, course: Course, k: int, u: Floats) -> TrajectoryError:
     """Sample k can be reached, but not in the branch."""
-    ranged = int(np.argmin(arm.inside(u[None])[0]))
-    row = arm.rows[ranged]
-    value = float(arm.joint_coordinates(u[None])[0, row])
-    low, high = float(arm.low[ranged]), float(arm.low[ranged] + arm.width[ranged])
-    kind, modulo = arm.chain.kinds[row], ""
+    ranged = int(np.argmin(ik.inside(u[None])[0]))
+    row = ik.rows[ranged]
+    value = float(ik.joint_coordinates(u[None])[0, row])
+    low, high = float(ik.low[ranged]), float(ik.low[ranged] + ik.width[ranged])
+    kind, modulo = ik.chain.kinds[row], ""
     unit = "m" if kind == "slide" else "deg"
     if kind != "slide":
         value, low, high = (float(np.degrees(x)) for x in (value, low, high))
     if kind == "turn":
         value, modulo = value % 360.0, " (modulo 360)"
-    joint = arm.chain.joints[row]
+    joint = ik.chain.joints[row]
     message = (
         f"{course.label(k)} needs joint {joint} at {value:.6g} {unit}, "
         f"outside its range [{low:.6g}, {high:.6g}] {unit}{modulo}"
@@ -68,23 +68,25 @@ def outside(arm: Arm, course: Course, k: int, u: Floats) -> TrajectoryError:
     return TrajectoryError(f"trajectory.branch.{joint}", message, k)
 
 
-def other_assembly(arm: Arm, course: Course) -> TrajectoryError:
+def other_assembly(ik: TipProblem, course: Course) -> TrajectoryError:
     """The first sample can be reached only with the loops put together otherwise."""
     message = (
         f"{course.label(0)} can be reached, but only with the loops put together in another way "
-        f"than at {pose(arm, arm.seeds[0])}, or past a dead point; move the path, or choose the "
+        f"than at {pose(ik, ik.seeds[0])}, or past a dead point; move the path, or choose the "
         "other way by mechanism.assembly"
     )
     return TrajectoryError(WAYPOINTS, message, 0)
 
 
-def lost_assembly(arm: Arm, course: Course, k: int, u: Floats, why: str) -> TrajectoryError:
+def lost_assembly(ik: TipProblem, course: Course, k: int, u: Floats, why: str) -> TrajectoryError:
     """The model itself cannot follow sample k, for it comes from its own reference."""
-    message = f"{course.label(k)} is reached at {pose(arm, u)}, but {why}"
+    message = f"{course.label(k)} is reached at {pose(ik, u)}, but {why}"
     return TrajectoryError(WAYPOINTS, message, k)
 
 
-def blocked(arm: Arm, course: Course, k: int, s: float, u: Floats, dead: bool) -> TrajectoryError:
+def blocked(
+    ik: TipProblem, course: Course, k: int, s: float, u: Floats, dead: bool
+) -> TrajectoryError:
     """The path was followed to parameter s and state u (n_z,), and not on to sample k."""
     where = ", ".join(f"{x:.6g}" for x in course.path.point(s)[0])
     why = (
@@ -93,7 +95,7 @@ def blocked(arm: Arm, course: Course, k: int, s: float, u: Floats, dead: bool) -
         else "the links stand stretched or folded in line, at the end of their reach"
     )
     message = (
-        f"{course.label(k)} cannot be reached without a jump: near ({where}) m, {pose(arm, u)}, "
+        f"{course.label(k)} cannot be reached without a jump: near ({where}) m, {pose(ik, u)}, "
         f"{why}; keep the path away from there"
     )
     return TrajectoryError(WAYPOINTS, message, k)

@@ -34,7 +34,7 @@ from eigassign.mechanism.inverse_kinematics.solver import (
     newton,
     trace,
 )
-from eigassign.mechanism.inverse_kinematics.state import Arm, prepare
+from eigassign.mechanism.inverse_kinematics.state import TipProblem, prepare
 from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipTarget
 
 _TURNS = (0.2, 0.02)  # rad: largest step of the trace, and of a second try where that was too bold
@@ -64,126 +64,126 @@ def follow(
     The first sample is the solution nearest to ``start`` (angles modulo 2π, and within π of it);
     without one, nearest to where the loops were put together, else bent least, with angles in
     [0, 2π). Chains with more coordinates than the tip fixes take the steps of least norm,
-    dq = J⁺ dp, a slide of L (see `arm`) counting as 1 rad. The tip is on its path to RESIDUAL times
-    L in m, and RESIDUAL in rad; loops stay in the assembly of the model.
+    dq = J⁺ dp, a slide of L (see `state`) counting as 1 rad. The tip is on its path to RESIDUAL
+    times L in m, and RESIDUAL in rad; loops stay in the assembly of the model.
 
     Raises TrajectoryError naming the first sample that is out of reach, outside the branch, or
     behind a stretched, folded or dead configuration; MechanismError if branch or start make no
     sense.
     """
-    arm = prepare(chain, course, branch or {}, start)
-    candidates = first_solutions(arm, course)
+    ik = prepare(chain, course, branch or {}, start)
+    candidates = first_solutions(ik, course)
     failures = []
     for candidate in candidates[:_ATTEMPTS]:
-        u0 = assembled(arm, course.target(course.s[:1]), candidate)
+        u0 = assembled(ik, course.target(course.s[:1]), candidate)
         if u0 is None:
             continue
         try:
-            u = _along(arm, course, u0)
+            u = _along(ik, course, u0)
         except TrajectoryError as error:
             failures.append(error)
             continue
-        q = np.ascontiguousarray((u * arm.scale)[:, : arm.n_q])
+        q = np.ascontiguousarray((u * ik.scale)[:, : ik.n_q])
         q.setflags(write=False)
-        return Followed(q, arm.evaluate(u).point, _notes(arm, candidates))
+        return Followed(q, ik.evaluate(u).point, _notes(ik, candidates))
     if not failures:
-        raise other_assembly(arm, course)
+        raise other_assembly(ik, course)
     raise max(failures, key=lambda error: error.sample)
 
 
-def _along(arm: Arm, course: Course, u0: Floats) -> Floats:
+def _along(ik: TipProblem, course: Course, u0: Floats) -> Floats:
     """All samples (n, n_z) of the solution that begins with u0; TrajectoryError where it ends."""
     target = course.target(course.s)
-    for turn in _TURNS if arm.rank == arm.n_q else _REDUNDANT:
-        path = trace(arm, course, u0, turn)
+    for turn in _TURNS if ik.rank == ik.n_q else _REDUNDANT:
+        path = trace(ik, course, u0, turn)
         n = int(np.searchsorted(course.s, path.s[-1], side="right"))
         seeds = interpolated(path, course.s[:n])
-        u, seen, motion, settled = newton(arm, seeds, _first(target, n), ROUND_OFF)
+        u, seen, motion, settled = newton(ik, seeds, _first(target, n), ROUND_OFF)
         strayed = ~settled | (np.abs(u - seeds).max(axis=1) > turn)
-        strayed |= crossed(arm, seen, motion, path.sense)
+        strayed |= crossed(ik, seen, motion, path.sense)
         if not strayed.any():
             break
     n = int(np.argmax(strayed)) if strayed.any() else n
-    _check(arm, course, u[:n], _first(target, n))
+    _check(ik, course, u[:n], _first(target, n))
     if n < len(course.s):
-        raise _blocked(arm, course, n, path)
-    return _assembled(arm, course, u, target)
+        raise _blocked(ik, course, n, path)
+    return _assembled(ik, course, u, target)
 
 
 def _first(target: TipTarget, n: int) -> TipTarget:
     return TipTarget(target.point[:n], None if target.rotation is None else target.rotation[:n])
 
 
-def _check(arm: Arm, course: Course, u: Floats, target: TipTarget) -> None:
+def _check(ik: TipProblem, course: Course, u: Floats, target: TipTarget) -> None:
     """Raises TrajectoryError for the first of the samples u that leaves its branch or its point."""
-    off_path = _off(arm, u, target, RESIDUAL)
-    off_branch = ~arm.inside(u).all(axis=1)
+    off_path = _off(ik, u, target, RESIDUAL)
+    off_branch = ~ik.inside(u).all(axis=1)
     if (off_path | off_branch).any():
         k = int(np.argmax(off_path | off_branch))
         why = out_of_reach if off_path[k] else outside
-        raise why(arm, course, k, u[k])
+        raise why(ik, course, k, u[k])
 
 
-def _off(arm: Arm, u: Floats, target: TipTarget, tolerance: float) -> Bools:
+def _off(ik: TipProblem, u: Floats, target: TipTarget, tolerance: float) -> Bools:
     """Whether tips are off their points or their orientations, (n,)."""
-    distance, turn = arm.misses(arm.error(arm.evaluate(u), target))
-    return np.asarray((distance > tolerance * arm.lever) | (turn > tolerance))
+    distance, turn = ik.misses(ik.error(ik.evaluate(u), target))
+    return np.asarray((distance > tolerance * ik.lever) | (turn > tolerance))
 
 
-def _assembled(arm: Arm, course: Course, u: Floats, target: TipTarget) -> Floats:
+def _assembled(ik: TipProblem, course: Course, u: Floats, target: TipTarget) -> Floats:
     """The same with the passive freedoms as the model has them; TrajectoryError if others."""
-    assembly = arm.chain.assembly
+    assembly = ik.chain.assembly
     if assembly is None:
         return u
-    q = (u * arm.scale)[:, : arm.n_q]
+    q = (u * ik.scale)[:, : ik.n_q]
     try:
         p = assembly.passive(q)
     except SingularityError:
-        raise _first_lost(arm, course, u) from None
-    own = np.hstack([q, p]) / arm.scale
-    other = _off(arm, own, target, 100.0 * RESIDUAL)
+        raise _first_lost(ik, course, u) from None
+    own = np.hstack([q, p]) / ik.scale
+    other = _off(ik, own, target, 100.0 * RESIDUAL)
     if other.any():
         k = int(np.argmax(other))
         why = "the model, coming straight from its reference, has its loops put together otherwise"
-        raise lost_assembly(arm, course, k, u[k], f"{why}; choose mechanism.assembly.at nearer")
+        raise lost_assembly(ik, course, k, u[k], f"{why}; choose mechanism.assembly.at nearer")
     return own
 
 
-def _first_lost(arm: Arm, course: Course, u: Floats) -> TrajectoryError:
+def _first_lost(ik: TipProblem, course: Course, u: Floats) -> TrajectoryError:
     """The first sample whose loops the model cannot close."""
-    assembly = arm.chain.assembly
+    assembly = ik.chain.assembly
     assert assembly is not None
-    for k, q in enumerate((u * arm.scale)[:, : arm.n_q]):
+    for k, q in enumerate((u * ik.scale)[:, : ik.n_q]):
         try:
             assembly.passive(q[None])
         except SingularityError as error:
-            return lost_assembly(arm, course, k, u[k], str(error))
-    return lost_assembly(arm, course, 0, u[0], "its loops cannot be closed together with the rest")
+            return lost_assembly(ik, course, k, u[k], str(error))
+    return lost_assembly(ik, course, 0, u[0], "its loops cannot be closed together with the rest")
 
 
-def _blocked(arm: Arm, course: Course, k: int, path: Trace) -> TrajectoryError:
+def _blocked(ik: TipProblem, course: Course, k: int, path: Trace) -> TrajectoryError:
     """Why the solution could not be continued from the end of the trace to sample k."""
     last = path.u[-1]
-    u, miss = levenberg(arm, np.vstack([last, arm.seeds]), course.target(course.s[[k]]), 115)
+    u, miss = levenberg(ik, np.vstack([last, ik.seeds]), course.target(course.s[[k]]), 115)
     best = int(np.argmin(miss))
-    dead = bool(loop_regularity(arm, arm.evaluate(last[None]))[0] < 10.0 * DEAD)
-    if miss[best] > (_DOUBLE_ROOT if dead else RESIDUAL) * arm.lever:
-        return out_of_reach(arm, course, k, u[best])
-    return blocked(arm, course, k, float(path.s[-1]), last, dead)
+    dead = bool(loop_regularity(ik, ik.evaluate(last[None]))[0] < 10.0 * DEAD)
+    if miss[best] > (_DOUBLE_ROOT if dead else RESIDUAL) * ik.lever:
+        return out_of_reach(ik, course, k, u[best])
+    return blocked(ik, course, k, float(path.s[-1]), last, dead)
 
 
-def _notes(arm: Arm, candidates: Sequence[Floats]) -> tuple[str, ...]:
+def _notes(ik: TipProblem, candidates: Sequence[Floats]) -> tuple[str, ...]:
     """What was chosen where the case leaves a choice."""
-    if arm.rank < arm.n_q:
-        slides = arm.chain.of_kind("slide")[: arm.n_q].any()
-        measure = f" (a slide of {arm.lever:.3g} m counting as 1 rad)" if slides else ""
+    if ik.rank < ik.n_q:
+        slides = ik.chain.of_kind("slide")[: ik.n_q].any()
+        measure = f" (a slide of {ik.lever:.3g} m counting as 1 rad)" if slides else ""
         return (
-            f"the tip fixes {arm.rank} of {arm.n_q} coordinates: of the many solutions, the one "
+            f"the tip fixes {ik.rank} of {ik.n_q} coordinates: of the many solutions, the one "
             f"that moves the joints least from sample to sample is taken{measure}",
         )
-    if len(candidates) == 1 or arm.guessed:
+    if len(candidates) == 1 or ik.guessed:
         return ()
-    if arm.chain.assembly is not None:
+    if ik.chain.assembly is not None:
         said = "nearest to where the loops are put together"
         return (f"the first sample is the solution {said}; name a branch or a start for another",)
     return (
@@ -199,38 +199,38 @@ _SAME = 1e-4  # rad, or of L: solutions nearer than this are one solution
 _FULL_TURN_SLACK = 1e-9  # rad below 2π, taken for round-off below 0
 
 
-def first_solutions(arm: Arm, course: Course) -> list[Floats]:
+def first_solutions(ik: TipProblem, course: Course) -> list[Floats]:
     """Solutions u (n_q + n_p,) of the first sample within the branch, whatever the assembly.
 
     The nearest to the start comes first, else the least bent. Raises TrajectoryError where there
     is none.
     """
     target = course.target(course.s[:1])
-    u = arm.seeds
+    u = ik.seeds
     for iterations in (8, 20, 100):  # the last for targets at the end of the reach
-        u, miss = levenberg(arm, u, target, iterations)
-        reached = miss <= RESIDUAL * arm.lever
-        wanted = reached & arm.inside(u).all(axis=1)
+        u, miss = levenberg(ik, u, target, iterations)
+        reached = miss <= RESIDUAL * ik.lever
+        wanted = reached & ik.inside(u).all(axis=1)
         if wanted.any():
-            return _distinct(arm, u[wanted])
+            return _distinct(ik, u[wanted])
     if reached.any():
-        raise outside(arm, course, 0, u[np.argmax(reached)])
-    raise out_of_reach(arm, course, 0, u[np.argmin(miss)])
+        raise outside(ik, course, 0, u[np.argmax(reached)])
+    raise out_of_reach(ik, course, 0, u[np.argmin(miss)])
 
 
-def _distinct(arm: Arm, u: Floats) -> list[Floats]:
+def _distinct(ik: TipProblem, u: Floats) -> list[Floats]:
     """Distinct solutions: nearest to the start first, else least bent, else bent anticlockwise."""
 
     def preference(candidate: Floats) -> tuple[float, ...]:
-        if arm.start is not None:
-            return (float(np.linalg.norm((candidate - arm.start)[: arm.n_q])),)
-        turns = arm.chain.of_kind("turn")[: arm.n_q]
-        bend = _wrapped(arm.joint_coordinates(candidate[None])[0])[turns][1:].round(6)
+        if ik.start is not None:
+            return (float(np.linalg.norm((candidate - ik.start)[: ik.n_q])),)
+        turns = ik.chain.of_kind("turn")[: ik.n_q]
+        bend = _wrapped(ik.joint_coordinates(candidate[None])[0])[turns][1:].round(6)
         return (round(float(bend @ bend), 6), *(-bend))
 
-    turns = arm.chain.of_kind("turn")
+    turns = ik.chain.of_kind("turn")
     distinct: list[Floats] = []
-    for candidate in sorted(_normalised(arm, u, turns), key=preference):
+    for candidate in sorted(_normalised(ik, u, turns), key=preference):
         if all(_apart(candidate - other, turns) > _SAME for other in distinct):
             distinct.append(candidate)
     return distinct
@@ -245,28 +245,28 @@ def _wrapped(angle: Floats) -> Floats:
     return np.asarray(np.mod(angle + np.pi, 2.0 * np.pi) - np.pi)
 
 
-def _normalised(arm: Arm, u: Floats, turns: Bools) -> Floats:
+def _normalised(ik: TipProblem, u: Floats, turns: Bools) -> Floats:
     """The same pose within π of the start, else in [0, 2π), where round-off below 0 stays 0."""
-    if arm.start is not None:
-        return np.where(turns, arm.start + _wrapped(u - arm.start), u)
+    if ik.start is not None:
+        return np.where(turns, ik.start + _wrapped(u - ik.start), u)
     turned = np.mod(u, 2.0 * np.pi)
     turned = np.where(turned >= 2.0 * np.pi - _FULL_TURN_SLACK, turned - 2.0 * np.pi, turned)
     return np.where(turns, turned, u)
 
 
-def assembled(arm: Arm, target: TipTarget, u: Floats) -> Floats | None:
+def assembled(ik: TipProblem, target: TipTarget, u: Floats) -> Floats | None:
     """The same solution if the model itself has the loops in that assembly, coming from its
     reference; else None.
     """
-    assembly = arm.chain.assembly
+    assembly = ik.chain.assembly
     if assembly is None:
         return u
-    q = (u * arm.scale)[: arm.n_q]
+    q = (u * ik.scale)[: ik.n_q]
     try:
         p = assembly.passive(q[None])[0]
     except SingularityError:
         return None
-    own = np.concatenate([q, p]) / arm.scale
-    distance, turn = arm.misses(arm.error(arm.evaluate(own[None]), target))
-    met = distance[0] <= 10.0 * RESIDUAL * arm.lever and turn[0] <= 10.0 * RESIDUAL
+    own = np.concatenate([q, p]) / ik.scale
+    distance, turn = ik.misses(ik.error(ik.evaluate(own[None]), target))
+    met = distance[0] <= 10.0 * RESIDUAL * ik.lever and turn[0] <= 10.0 * RESIDUAL
     return own if met else None

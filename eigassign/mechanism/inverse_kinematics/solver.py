@@ -3,7 +3,7 @@
 A solution is traced along a tip path by a predictor and a Newton corrector, in steps of a bounded
 size, whatever the samples are; Hermite interpolation of the trace gives first guesses for those.
 
-Shapes: n states u (n, n_q + n_p) of an `Arm`, m task components.
+Shapes: n states u (n, n_q + n_p) of an `TipProblem`, m task components.
 """
 
 from __future__ import annotations
@@ -19,62 +19,64 @@ from eigassign.mechanism.inverse_kinematics.chain import (
     TipEvaluation,
     reduced,
 )
-from eigassign.mechanism.inverse_kinematics.state import Arm
+from eigassign.mechanism.inverse_kinematics.state import TipProblem
 from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipTarget
 
 ROUND_OFF = 1e-13  # of L: as near to a point as the tip can be computed
 
 
-def levenberg(arm: Arm, u: Floats, target: TipTarget, iterations: int) -> tuple[Floats, Floats]:
+def levenberg(
+    ik: TipProblem, u: Floats, target: TipTarget, iterations: int
+) -> tuple[Floats, Floats]:
     """Least |(target − tip, −F)| from many u at once; returns u and that length (n,) in m.
 
     δ = (JᵀJ + μ L² I)⁻¹ Jᵀ e, μ falling while it helps and rising where it does not. Loops are
     open on the way and closed at the end.
     """
-    error, J = _residual(arm, u, target)
+    error, J = _residual(ik, u, target)
     miss = np.linalg.norm(error, axis=1)
-    mu = np.full(len(u), 1e-2 * arm.lever**2)
+    mu = np.full(len(u), 1e-2 * ik.lever**2)
     for _ in range(iterations):
-        if (miss <= ROUND_OFF * arm.lever).all():
+        if (miss <= ROUND_OFF * ik.lever).all():
             break
         Jt = np.swapaxes(J, 1, 2)
         H = Jt @ J + mu[:, None, None] * np.eye(u.shape[1])
         trial = u + np.linalg.solve(H, Jt @ error[:, :, None])[:, :, 0]
-        trial_error, trial_J = _residual(arm, trial, target)
+        trial_error, trial_J = _residual(ik, trial, target)
         trial_miss = np.linalg.norm(trial_error, axis=1)
         better = trial_miss < miss
         u = np.where(better[:, None], trial, u)
         error = np.where(better[:, None], trial_error, error)
         J = np.where(better[:, None, None], trial_J, J)
         miss = np.where(better, trial_miss, miss)
-        mu = np.clip(mu * np.where(better, 0.2, 4.0), 1e-15 * arm.lever**2, arm.lever**2)
+        mu = np.clip(mu * np.where(better, 0.2, 4.0), 1e-15 * ik.lever**2, ik.lever**2)
     return u, miss
 
 
-def _residual(arm: Arm, u: Floats, target: TipTarget) -> tuple[Floats, Floats]:
+def _residual(ik: TipProblem, u: Floats, target: TipTarget) -> tuple[Floats, Floats]:
     """The error and the open gaps together, and their derivative."""
-    seen = arm.evaluate(u)
-    error = arm.error(seen, target)
-    if arm.chain.assembly is None:
+    seen = ik.evaluate(u)
+    error = ik.error(seen, target)
+    if ik.chain.assembly is None:
         return error, seen.jacobian
     return np.hstack([error, -seen.gap]), np.concatenate([seen.jacobian, seen.closure], axis=1)
 
 
 def newton(
-    arm: Arm, u: Floats, target: TipTarget, tolerance: float
+    ik: TipProblem, u: Floats, target: TipTarget, tolerance: float
 ) -> tuple[Floats, TipEvaluation, Reduced, Bools]:
     """Newton for tip(u) = target with closed loops; returns u, what is seen there, who settled.
 
     A chain that cannot fill the space (rank < m) settles, more slowly, on the nearest point.
     """
-    for _ in range(8 if arm.rank == target.point.shape[1] + len(arm.chain.turned_by) else 40):
-        seen = arm.evaluate(u)
-        motion = reduced(seen, arm.n_q)
-        error = arm.error(seen, target) - motion.drift
-        settled = _settled(arm, error, motion, tolerance)
+    for _ in range(8 if ik.rank == target.point.shape[1] + len(ik.chain.turned_by) else 40):
+        seen = ik.evaluate(u)
+        motion = reduced(seen, ik.n_q)
+        error = ik.error(seen, target) - motion.drift
+        settled = _settled(ik, error, motion, tolerance)
         if settled.all():
             break
-        step = least_norm(motion.J, error, arm.rank)
+        step = least_norm(motion.J, error, ik.rank)
         passive = motion.closing + np.einsum("npq,nq->np", motion.following, step)
         step = np.hstack([step, passive])
         settled |= np.abs(step).max(axis=1) <= tolerance
@@ -84,12 +86,12 @@ def newton(
     return u, seen, motion, settled
 
 
-def _settled(arm: Arm, error: Floats, motion: Reduced, tolerance: float) -> Bools:
+def _settled(ik: TipProblem, error: Floats, motion: Reduced, tolerance: float) -> Bools:
     """Whether distance, turn and loops are each within the tolerance."""
-    distance, turn = arm.misses(error)
+    distance, turn = ik.misses(error)
     open_by = np.abs(motion.closing).max(axis=1, initial=0.0)
     return np.asarray(
-        (distance <= tolerance * arm.lever) & (turn <= tolerance) & (open_by <= tolerance)
+        (distance <= tolerance * ik.lever) & (turn <= tolerance) & (open_by <= tolerance)
     )
 
 
@@ -111,7 +113,7 @@ def least_norm(J: Floats, error: Floats, rank: int) -> Floats:
     return np.asarray(step[:, :, 0])
 
 
-def handedness(arm: Arm, seen: TipEvaluation, motion: Reduced) -> Floats:
+def handedness(ik: TipProblem, seen: TipEvaluation, motion: Reduced) -> Floats:
     """The signs of det J and det ∂F/∂p, (n, 2): they flip where the solution changes branch.
 
     0 for what is not square.
@@ -119,21 +121,21 @@ def handedness(arm: Arm, seen: TipEvaluation, motion: Reduced) -> Floats:
     m, n_q = motion.J.shape[1:]
     F_p = seen.closure[:, :, n_q:]
     signs = np.zeros((len(motion.J), 2))
-    if arm.rank == m == n_q:
+    if ik.rank == m == n_q:
         signs[:, 0] = np.sign(np.linalg.det(motion.J))
     if F_p.shape[2] and F_p.shape[1] == F_p.shape[2]:
         signs[:, 1] = np.sign(np.linalg.det(F_p))
     return signs
 
 
-def regularity(arm: Arm, motion: Reduced) -> Floats:
+def regularity(ik: TipProblem, motion: Reduced) -> Floats:
     """The smallest singular value of J (n,) over L: 0 in a singular pose."""
-    return np.asarray(np.linalg.svd(motion.J, compute_uv=False)[:, arm.rank - 1] / arm.lever)
+    return np.asarray(np.linalg.svd(motion.J, compute_uv=False)[:, ik.rank - 1] / ik.lever)
 
 
-def loop_regularity(arm: Arm, seen: TipEvaluation) -> Floats:
+def loop_regularity(ik: TipProblem, seen: TipEvaluation) -> Floats:
     """Smallest over largest singular value of ∂F/∂p (n,): 0 at a dead point; 1 without loops."""
-    F_p = seen.closure[:, :, arm.n_q :]
+    F_p = seen.closure[:, :, ik.n_q :]
     if not F_p.shape[2]:
         return np.ones(len(F_p))
     s = np.linalg.svd(F_p, compute_uv=False)
@@ -170,22 +172,22 @@ class Trace:
     sense: Floats  # (2,) signs of det J and det ∂F/∂p all along
 
 
-def trace(arm: Arm, course: Course, u0: Floats, turn: float) -> Trace:
+def trace(ik: TipProblem, course: Course, u0: Floats, turn: float) -> Trace:
     """du/ds = J⁺ dp/ds from u0 in steps of about ``turn``, corrected back onto the path.
 
     It steps onto every corner of the path, lest it cuts one that is out of reach.
     """
     stops = np.append(course.corners(), course.s[-1])
-    seen = arm.evaluate(u0[None])
-    motion = reduced(seen, arm.n_q)
-    sense = handedness(arm, seen, motion)[0]
-    here = _pose(arm, course, float(course.s[0]), u0[None], motion)
+    seen = ik.evaluate(u0[None])
+    motion = reduced(seen, ik.n_q)
+    sense = handedness(ik, seen, motion)[0]
+    here = _pose(ik, course, float(course.s[0]), u0[None], motion)
     poses, advance, bend = [here], _MAX_ADVANCE, np.zeros_like(here.u)
     while here.s < stops[-1] and advance >= _MIN_ADVANCE:
-        fastest = float(np.abs(here.slope[:, : arm.n_q]).max())
+        fastest = float(np.abs(here.slope[:, : ik.n_q]).max())
         advance = min(advance, turn / max(fastest, turn))
         stop = float(stops[np.searchsorted(stops, here.s, side="right")])
-        there = _step(arm, course, here, min(here.s + advance, stop), bend, sense, turn)
+        there = _step(ik, course, here, min(here.s + advance, stop), bend, sense, turn)
         if there is None:
             advance = 0.5 * min(advance, stop - here.s)
             continue
@@ -197,31 +199,37 @@ def trace(arm: Arm, course: Course, u0: Floats, turn: float) -> Trace:
 
 
 def _step(
-    arm: Arm, course: Course, here: TracePoint, s: float, bend: Floats, sense: Floats, turn: float
+    ik: TipProblem,
+    course: Course,
+    here: TracePoint,
+    s: float,
+    bend: Floats,
+    sense: Floats,
+    turn: float,
 ) -> TracePoint | None:
     """The pose at s ahead: a quadratic guess, corrected; None if that is not the same branch."""
     guess = here.u + (s - here.s) * (here.slope + (s - here.s) * bend)
-    u, seen, motion, settled = newton(arm, guess, course.target(np.array([s])), _TRACE)
+    u, seen, motion, settled = newton(ik, guess, course.target(np.array([s])), _TRACE)
     strayed = not settled[0] or np.abs(u - guess).max() > _STRAY * turn
-    if strayed or crossed(arm, seen, motion, sense)[0] or _singular(arm, seen, motion):
+    if strayed or crossed(ik, seen, motion, sense)[0] or _singular(ik, seen, motion):
         return None
-    return _pose(arm, course, s, u, motion)
+    return _pose(ik, course, s, u, motion)
 
 
-def crossed(arm: Arm, seen: TipEvaluation, motion: Reduced, sense: Floats) -> Floats:
+def crossed(ik: TipProblem, seen: TipEvaluation, motion: Reduced, sense: Floats) -> Floats:
     """Whether a branch other than that of ``sense`` has been met, (n,)."""
-    return np.asarray((handedness(arm, seen, motion) * sense < 0.0).any(axis=1))
+    return np.asarray((handedness(ik, seen, motion) * sense < 0.0).any(axis=1))
 
 
-def _singular(arm: Arm, seen: TipEvaluation, motion: Reduced) -> bool:
-    stretched = regularity(arm, motion)[0] < _SINGULAR
-    return bool(stretched or loop_regularity(arm, seen)[0] < DEAD)
+def _singular(ik: TipProblem, seen: TipEvaluation, motion: Reduced) -> bool:
+    stretched = regularity(ik, motion)[0] < _SINGULAR
+    return bool(stretched or loop_regularity(ik, seen)[0] < DEAD)
 
 
-def _pose(arm: Arm, course: Course, s: float, u: Floats, motion: Reduced) -> TracePoint:
+def _pose(ik: TipProblem, course: Course, s: float, u: Floats, motion: Reduced) -> TracePoint:
     velocity, spin = course.rates(s)
-    spin = arm.lever * spin[:, list(arm.chain.turned_by)]
-    slope = least_norm(motion.J, np.hstack([velocity, spin]), arm.rank)
+    spin = ik.lever * spin[:, list(ik.chain.turned_by)]
+    slope = least_norm(motion.J, np.hstack([velocity, spin]), ik.rank)
     passive = np.einsum("npq,nq->np", motion.following, slope)
     return TracePoint(s, u, np.hstack([slope, passive]))
 

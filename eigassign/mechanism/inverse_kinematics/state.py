@@ -34,8 +34,8 @@ _GAP = 100.0  # weight of open loops against a missed point: what is nearest mus
 
 
 @dataclass(frozen=True)
-class Arm:
-    """A chain with its wanted branch, and what to know before solving."""
+class TipProblem:
+    """Inverse kinematics of one chain: its wanted branch, and what to know before solving."""
 
     chain: TipChain
     rows: tuple[int, ...]  # joint coordinates with a wanted range
@@ -54,12 +54,30 @@ class Arm:
         return self.chain.n_q
 
     def evaluate(self, u: Floats) -> TipEvaluation:
-        """The chain's look with both measures made one."""
-        return _measured(self.chain, u, self.scale, self.lever)
+        """The chain's evaluation with metres and radians in one measure."""
+        chain, seen = self.chain, self.chain.evaluate(u * self.scale)
+        J, r = seen.jacobian * self.scale, len(chain.turned_by)
+        if r:
+            J[:, -r:] *= self.lever
+        if chain.assembly is None:
+            return seen._replace(jacobian=J)
+        weight = _GAP * np.where(chain.assembly.turning, self.lever, 1.0)
+        closure = seen.closure * self.scale * weight[:, None]
+        return TipEvaluation(seen.point, seen.rotation, J, seen.gap * weight, closure)
 
     def error(self, seen: TipEvaluation, target: TipTarget) -> Floats:
-        """What is missing to the target (n, m): m, and L times rad."""
-        return error(self.chain, seen, target, self.lever)
+        """Target minus tip (n, m): position in m, and L log(R_target Rᵀ) of what can turn."""
+        turned_by, apart = self.chain.turned_by, target.point - seen.point
+        if not turned_by or seen.rotation is None or target.rotation is None:
+            return apart
+        missing = target.rotation @ np.swapaxes(seen.rotation, 1, 2)
+        if turned_by == (2,):
+            turn = np.arctan2(missing[:, 1, 0], missing[:, 0, 0])[:, None]
+        else:
+            from scipy.spatial.transform import Rotation  # takes 0.1 s, which few paths wait for
+
+            turn = Rotation.from_matrix(missing).as_rotvec()
+        return np.hstack([apart, self.lever * turn])
 
     def misses(self, error: Floats) -> tuple[Floats, Floats]:
         """Distance in m and turn in rad of an error, (n,) each."""
@@ -81,33 +99,6 @@ class Arm:
         return np.asarray((above >= 0.0) & (above <= self.width + 2.0 * _SLACK))
 
 
-def error(chain: TipChain, seen: TipEvaluation, target: TipTarget, lever: float) -> Floats:
-    """Target minus tip (n, m): position in m, and L log(R_target Rᵀ) of what can turn."""
-    apart = target.point - seen.point
-    if not chain.turned_by or seen.rotation is None or target.rotation is None:
-        return apart
-    missing = target.rotation @ np.swapaxes(seen.rotation, 1, 2)
-    if chain.turned_by == (2,):
-        turn = np.arctan2(missing[:, 1, 0], missing[:, 0, 0])[:, None]
-    else:
-        from scipy.spatial.transform import Rotation  # takes 0.1 s, which few paths wait for
-
-        turn = Rotation.from_matrix(missing).as_rotvec()
-    return np.hstack([apart, lever * turn])
-
-
-def _measured(chain: TipChain, u: Floats, scale: Floats, lever: float) -> TipEvaluation:
-    seen = chain.evaluate(u * scale)
-    J, r = seen.jacobian * scale, len(chain.turned_by)
-    if r:
-        J[:, -r:] *= lever
-    if chain.assembly is None:
-        return seen._replace(jacobian=J)
-    weight = _GAP * np.where(chain.assembly.turning, lever, 1.0)
-    closure = seen.closure * scale * weight[:, None]
-    return TipEvaluation(seen.point, seen.rotation, J, seen.gap * weight, closure)
-
-
 # --- before solving
 
 
@@ -116,8 +107,8 @@ def prepare(
     course: Course,
     branch: Mapping[str, tuple[float, float]],
     start: Sequence[float] | Floats | None,
-) -> Arm:
-    """The arm for a branch {joint: (low, high)} in rad or m and a guess of the first q.
+) -> TipProblem:
+    """The problem for a branch {joint: (low, high)} in rad or m and a guess of the first q.
 
     Raises MechanismError if a joint does not exist, a range does not go upwards, the guess does
     not fit the coordinates or the loops, or there is none for a coordinate that does not move the
@@ -132,14 +123,16 @@ def prepare(
     z, J = first_guesses(chain, course, rows, limits, near)
     lever = _lever(chain, course, J)
     scale = np.where(chain.of_kind("slide"), lever, 1.0)
-    J = _weighted(chain, J, scale, lever)
+    rows_of_J = np.ones(J.shape[1])
+    rows_of_J[J.shape[1] - len(chain.turned_by) :] = lever
+    J = J * rows_of_J[:, None] * scale[: chain.n_q]
     _check_idle(J, lever, guess)
     singular_values = np.linalg.svd(J, compute_uv=False)
     rank = int((singular_values > _STRUCTURAL * lever).sum(axis=1).max())
     first = None if near is None else near / scale
     guessed = guess is not None
     low, width = limits.T
-    return Arm(chain, rows, low, width, first, guessed, z / scale, scale, lever, rank)
+    return TipProblem(chain, rows, low, width, first, guessed, z / scale, scale, lever, rank)
 
 
 def _row(chain: TipChain, joint: str) -> int:
@@ -190,12 +183,6 @@ def _lever(chain: TipChain, course: Course, J: Floats) -> float:
     if chain.assembly is not None or not turning.all():
         return course.size
     return float(np.linalg.norm(J[:, :d], axis=1).max())
-
-
-def _weighted(chain: TipChain, J: Floats, scale: Floats, lever: float) -> Floats:
-    rows = np.ones(J.shape[1])
-    rows[J.shape[1] - len(chain.turned_by) :] = lever
-    return np.asarray(J * rows[:, None] * scale[: chain.n_q])
 
 
 def _check_idle(J: Floats, lever: float, start: Floats | None) -> None:

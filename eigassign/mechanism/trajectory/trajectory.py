@@ -11,7 +11,6 @@ Shapes: n samples in time, n_q coordinates. SI units, angles in rad.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -38,10 +37,12 @@ from eigassign.mechanism.inverse_kinematics.tip_path import (
 from eigassign.mechanism.trajectory.csv import read_samples
 from eigassign.mechanism.trajectory.timing import point_to_point, shared_times, timing_law
 
+SAME = 1e-9  # of the duration: a sample this near to a corner is on it, and ends both parts
 _BACKWARDS = "time must increase, and goes from {:g} s to {:g} s"
 _PATHS: dict[str, Callable[[ArrayLike], TipPath]] = {"spline": spline, "straight": straight}
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -143,9 +144,9 @@ def _from_points(spec: PointTrajectory, q_names: Sequence[str]) -> Trajectory:
     else:
         reached, said = _checked_time(spec.times, len(points), "times", "point"), ()
     law = timing_law(spec.timing, spec.acceleration_share)
-    motion = point_to_point(points, reached, law, spec.samples)
+    time_s, q = point_to_point(points, reached, law, spec.samples)
     corners = tuple(reached[1:-1].tolist()) if spec.timing == "linear" else ()  # elsewhere at rest
-    return Trajectory(motion.time_s, motion.q, None, said if len(points) > 2 else (), corners)
+    return Trajectory(time_s, q, None, said if len(points) > 2 else (), corners)
 
 
 def _checked_rows(
@@ -192,8 +193,6 @@ def _jumps(q: Floats, q_names: Sequence[str], q_units: Sequence[str]) -> tuple[s
 
 
 # --- several trajectories
-
-Ints = NDArray[np.intp]
 
 
 class NamedTrajectory(NamedTuple):
@@ -309,13 +308,11 @@ class Trajectories:
         for part, rows in zip(self.parts, self.rows, strict=True):
             own = kept[(kept >= rows.start) & (kept < rows.stop)] - rows.start
             if len(own):
-                parts.append(part._replace(trajectory=_thinned(part.trajectory, own)))
+                whole = part.trajectory
+                tip = None if whole.tip is None else whole.tip[own]
+                thinned = replace(whole, time_s=whole.time_s[own], q=whole.q[own], tip=tip)
+                parts.append(part._replace(trajectory=thinned))
         return Trajectories(tuple(parts))
-
-
-def _thinned(trajectory: Trajectory, rows: Ints) -> Trajectory:
-    tip = None if trajectory.tip is None else trajectory.tip[rows]
-    return replace(trajectory, time_s=trajectory.time_s[rows], q=trajectory.q[rows], tip=tip)
 
 
 def _stacked(arrays: Sequence[Floats]) -> Floats:
@@ -326,14 +323,12 @@ def _stacked(arrays: Sequence[Floats]) -> Floats:
 
 # --- rates q̇ and q̈
 
-SAME = 1e-9  # of the duration: a sample this near to a corner is on it, and ends both parts
-
 
 @dataclass(frozen=True, eq=False)
 class Rates:
     """q, q̇ and q̈ (m, n_q) at ``samples`` (m,); a sample on a corner stands there for both sides."""
 
-    samples: NDArray[np.intp]
+    samples: Ints
     q: Floats
     rate: Floats
     acceleration: Floats
@@ -350,15 +345,12 @@ def rates(trajectory: Trajectory) -> Rates:
     return Rates(samples, q[samples], rate, acceleration)
 
 
-def _smooth_parts(trajectory: Trajectory) -> list[NDArray[np.intp]]:
+def _smooth_parts(trajectory: Trajectory) -> list[Ints]:
     """The samples from each corner to the next."""
     time_s = trajectory.time_s
     near = SAME * float(np.ptp(time_s))
     cuts = [time_s[0], *trajectory.corners_s, time_s[-1]]
-    return [
-        np.flatnonzero((time_s >= a - near) & (time_s <= b + near))
-        for a, b in itertools.pairwise(cuts)
-    ]
+    return [np.flatnonzero((time_s >= a - near) & (time_s <= b + near)) for a, b in pairwise(cuts)]
 
 
 def _differences(time_s: Floats, q: Floats) -> tuple[Floats, Floats]:
