@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
@@ -31,11 +30,7 @@ from eigassign.mechanism.kinematics.topology import build_tree
 from eigassign.mechanism.kinematics.travel_limits import rails
 from eigassign.series.compiler import compile_program
 
-Ints = NDArray[np.intp]
-Objects = NDArray[np.object_]
-
-
-LocalLinks: TypeAlias = "tuple[list[LocalLink], NodeMotions]"
+LocalLinks: TypeAlias = tuple[list[LocalLink], NodeMotions]
 
 
 def kinematics(case: CaseFile, parameters: ModelParameters) -> Kinematics:

@@ -38,16 +38,14 @@ def add_bodies(
 def _body(
     case: CaseFile, parameters: ModelParameters, path: str, body: Any, lever: Objects
 ) -> Objects:
-    value = parameters.number(f"{path}.mass", body.mass)
-    return body_block(value, _inertia(parameters, path, body.inertia), lever)
-
-
-def _inertia(parameters: ModelParameters, path: str, given: Any) -> list[Scalar]:
-    """(Ixx, Iyy, Izz, Ixy, Ixz, Iyz): a number is I_zz of a planar body."""
+    """Mass matrix (6, 6) at the node; an inertia that is one number is I_zz of a planar body."""
+    mass, given = parameters.number(f"{path}.mass", body.mass), body.inertia
+    inertia: list[Scalar] = [0.0] * 6  # Ixx, Iyy, Izz, Ixy, Ixz, Iyz
     if isinstance(given, (tuple, list)):
-        return [*(float(v) for v in given), *([0.0] * (6 - len(given)))]
-    zz = parameters.number(f"{path}.inertia", given)
-    return [0.0, 0.0, zz, 0.0, 0.0, 0.0]
+        inertia[: len(given)] = [float(v) for v in given]
+    else:
+        inertia[2] = parameters.number(f"{path}.inertia", given)
+    return body_block(mass, inertia, lever)
 
 
 def rigid_link(case: CaseFile, parameters: ModelParameters, name: str) -> LinkMesh:

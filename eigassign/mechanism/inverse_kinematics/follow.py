@@ -37,6 +37,9 @@ from eigassign.mechanism.inverse_kinematics.solver import (
 from eigassign.mechanism.inverse_kinematics.state import TipProblem, prepare
 from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipTarget
 
+RESIDUAL = 1e-10  # largest miss of a sample: of L in m, and in rad
+_SAME = 1e-4  # rad, or of L: solutions nearer than this are one solution
+_FULL_TURN_SLACK = 1e-9  # rad below 2π, taken for round-off below 0
 _TURNS = (0.2, 0.02)  # rad: largest step of the trace, and of a second try where that was too bold
 _REDUNDANT = (0.05, 0.01)  # the same where the least motion is wanted, which large steps miss
 _DOUBLE_ROOT = 1e-6  # of L: as near as a dead point can be come to, where two assemblies meet
@@ -193,10 +196,6 @@ def _notes(ik: TipProblem, candidates: Sequence[Floats]) -> tuple[str, ...]:
 
 
 # --- the first sample
-
-RESIDUAL = 1e-10  # largest miss of a sample: of L in m, and in rad
-_SAME = 1e-4  # rad, or of L: solutions nearer than this are one solution
-_FULL_TURN_SLACK = 1e-9  # rad below 2π, taken for round-off below 0
 
 
 def first_solutions(ik: TipProblem, course: Course) -> list[Floats]:

@@ -25,6 +25,8 @@ Floats = NDArray[np.float64]
 WAYPOINTS = "trajectory.waypoints"  # key path in the case file
 _COINCIDENT = 1e-12  # of the chord length: round-off of coordinates, no distance anybody means
 _SMOOTH = 1e-9  # of the slope: a change of direction nobody sees
+_SAME_TURN = 1e-9  # rad: two orientations that do not differ
+_AMBIGUOUS = 1e-6  # rad from half a turn: which way round cannot be told
 _ROUND_OFF = 1e-12  # how far outside [0, 1] a parameter is still taken for its end
 
 
@@ -136,9 +138,6 @@ def _checked(waypoints: ArrayLike) -> Floats:
 
 
 # --- attitude
-
-_SAME_TURN = 1e-9  # rad: two orientations that do not differ
-_AMBIGUOUS = 1e-6  # rad from half a turn: which way round cannot be told
 
 
 @dataclass(frozen=True)
