@@ -237,17 +237,14 @@ class Adding:
 
     def ranked(self) -> list[int]:
         """The candidates by predicted size, the largest first."""
-        self._predict()
+        inside = [key for key in self._fresh if key not in self.border.outside]
+        self._fresh = []
+        if inside:
+            sizes = self.border.margin(inside).predicted(self.sizes[None], self.rates)[0]
+            self.next.update(zip(inside, sizes.tolist(), strict=True))
         return sorted(self.next, key=lambda key: (-self.next[key], key))
 
     @property
     def rows(self) -> Ints:
         """Multi-indices (n, d) of what is added."""
         return rows_of(np.array(self.keys, dtype=np.intp), len(self.border.tops))
-
-    def _predict(self) -> None:
-        inside = [key for key in self._fresh if key not in self.border.outside]
-        self._fresh = []
-        if inside:
-            sizes = self.border.margin(inside).predicted(self.sizes[None], self.rates)[0]
-            self.next.update(zip(inside, sizes.tolist(), strict=True))

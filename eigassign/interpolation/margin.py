@@ -76,7 +76,10 @@ class Border:
                 degree, after = key >> BITS * j & DEGREE, key + (1 << BITS * j)
                 if degree >= limit:
                     continue
-                befores = self.later.get(after) or self._unseen(after)
+                befores = self.later.get(after)
+                if befores is None:
+                    d = len(self.tops)
+                    befores = self.later[after] = ([ANYTHING] * d, [NOTHING] * d)
                 befores[0][j], befores[1][j] = place, one[j] if degree else NOTHING
                 if befores[0].count(ANYTHING) == idle - (not degree):  # none is missing
                     fresh.append(after)
@@ -89,11 +92,6 @@ class Border:
     def complete(self) -> bool:
         """Whether nothing is missing: all of whole axes is there."""
         return not self.next
-
-    def _unseen(self, key: int) -> tuple[list[int], list[int]]:
-        d = len(self.tops)
-        befores = self.later[key] = ([ANYTHING] * d, [NOTHING] * d)
-        return befores
 
     def margin(self, keys: Sequence[int] | None = None) -> Margin:
         """What is next to the members, or those of ``keys`` of it."""

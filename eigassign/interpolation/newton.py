@@ -29,6 +29,7 @@ from eigassign.series.power_series import Monomials, Polynomials
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+
 # --- Nodes and basis
 
 CANDIDATES = 129  # of an interval, as dense at its ends as Chebyshev points

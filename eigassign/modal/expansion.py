@@ -33,7 +33,6 @@ from eigassign.series.power_series import Polynomials, monomials, polynomials, r
 
 Floats = NDArray[np.float64]
 MAX_ORDER = 20
-MANY = 1000  # samples from which preparing the polynomials pays
 MOST_VECTORS = 150  # Taylor vectors of one mode in the reduced model beside an expansion
 
 
@@ -64,9 +63,6 @@ class Expansion:
     def eigenvalues(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """λ (n_samples, n_modes) in rad²/s²; q (n_samples, n_q) or (n_q,), y likewise."""
         w = (samples(q, y, len(self.q0), len(self.y0)) - self.x0) @ self.directions.T
-        if len(w) < MANY:
-            powers = monomials(self.space, w)
-            return np.hstack([_evaluate(c, powers, self.modes) for c in self.clusters])
         return np.hstack(
             [
                 _eigenvalues(c, made(w).reshape(len(w), *c.coefficients.shape[:2]), self.modes)
@@ -76,7 +72,7 @@ class Expansion:
 
     @cached_property
     def _prepared(self) -> tuple[Polynomials, ...]:
-        """The entries of every cluster's matrix, made ready for many samples."""
+        """The entries of every cluster's matrix, made ready: quicker even for one sample."""
         n = len(self.space)
         return tuple(polynomials(self.space, c.coefficients.reshape(-1, n)) for c in self.clusters)
 
@@ -115,8 +111,14 @@ class Expansion:
 
     @cached_property
     def inverse(self) -> InverseExpansion:
-        """The expansion of 1/λ with the same coefficients; UsageError for clusters."""
-        return inverse(self)
+        """The expansion of 1/λ; UsageError for clusters: their eigenvalues have no series each."""
+        together = [c.modes for c in self.clusters if len(c.modes) > 1]
+        if together:
+            raise UsageError(
+                f"modes {together[0]} are expanded as a cluster: 1/λ has no series each"
+            )
+        singles = np.array([c.coefficients[0, 0] for c in self.clusters])
+        return InverseExpansion(self, _frozen(reciprocal(self.space, singles)))
 
     def linear_in_design(self, q: ArrayLike) -> tuple[Floats, Floats]:
         """l_0 (n_samples, n_modes) and l (n_samples, n_modes, n_y) of eq. (9) at samples of q.
@@ -124,7 +126,17 @@ class Expansion:
         λ ≈ l_0(q) + Σ_j l_j(q) (y_j − y0_j), rad²/s² over units of y: the terms |β| ≤ 1.
         """
         w = (samples(q, self.y0, len(self.q0), len(self.y0)) - self.x0) @ self.directions.T
-        return _linear_part(self, monomials(self.space, w), w)
+        powers, n_q, n_y = monomials(self.space, w), len(self.q0), len(self.y0)
+        l0 = np.hstack([_evaluate(c, powers, self.modes) for c in self.clusters])
+        slopes = np.zeros((len(w), l0.shape[1], n_y))
+        for j in range(n_y):
+            (local,) = np.nonzero(self.directions[:, n_q + j])
+            if len(local):
+                derivative = _derivative_powers(self.space, powers, int(local[0]))
+                slopes[:, :, j] = np.hstack(
+                    [_slope(c, powers, derivative, self.modes) for c in self.clusters]
+                )
+        return l0, slopes
 
     @property
     def x0(self) -> Floats:
@@ -175,21 +187,6 @@ def _eigenvalues(cluster: Cluster, matrices: Floats, wanted: tuple[int, ...]) ->
         return matrices[:, 0]
     columns = [k for k, mode in enumerate(cluster.modes) if mode in wanted]
     return np.asarray(np.linalg.eigvalsh(matrices)[:, columns])
-
-
-def _linear_part(expansion: Expansion, powers: Floats, w: Floats) -> tuple[Floats, Floats]:
-    """Value and ∂/∂y at y = y0 of every mode, from the members with |β| = 0 and 1."""
-    space, n_q, n_y = expansion.space, len(expansion.q0), len(expansion.y0)
-    l0 = np.hstack([_evaluate(c, powers, expansion.modes) for c in expansion.clusters])
-    slopes = np.zeros((len(w), l0.shape[1], n_y))
-    for j in range(n_y):
-        (local,) = np.nonzero(expansion.directions[:, n_q + j])
-        if len(local):
-            derivative = _derivative_powers(space, powers, int(local[0]))
-            slopes[:, :, j] = np.hstack(
-                [_slope(c, powers, derivative, expansion.modes) for c in expansion.clusters]
-            )
-    return l0, slopes
 
 
 def _derivative_powers(space: LowerSet, powers: Floats, variable: int) -> Floats:
@@ -310,25 +307,20 @@ def radius_share(expansion: Expansion, q: ArrayLike, y: ArrayLike) -> Floats:
     harms. NaN below order 4, where nothing can be said.
     """
     x = samples(q, y, len(expansion.q0), len(expansion.y0)) - expansion.x0
+    p, starts = expansion.order, expansion.space.degree_starts
+    if p < LEAST_ORDER:
+        return np.full((len(x), len(expansion.clusters)), np.nan)
     powers = monomials(expansion.space, x @ expansion.directions.T)
-    return np.column_stack([_share(expansion, c, powers) for c in expansion.clusters])
-
-
-def _share(expansion: Expansion, cluster: Cluster, powers: Floats) -> Floats:
-    if expansion.order < LEAST_ORDER:
-        return np.full(len(powers), np.nan)
-    size = [_term(expansion, cluster, powers, expansion.order - k) for k in range(4)]
-    late, early = size[0] + size[1], size[2] + size[3]
-    tiny = np.finfo(float).eps * np.abs(cluster.coefficients[:, :, 0]).max()
-    return np.asarray(np.sqrt(np.maximum(late - tiny, 0.0) / np.maximum(early, tiny)))
-
-
-def _term(expansion: Expansion, cluster: Cluster, powers: Floats, degree: int) -> Floats:
-    """‖t_degree(w)‖ of the cluster's matrix, (n_samples,)."""
-    starts = expansion.space.degree_starts
-    here = slice(starts[degree], starts[degree + 1])
-    matrix = np.tensordot(powers[:, here], cluster.coefficients[:, :, here], axes=(1, 2))
-    return np.asarray(np.linalg.norm(matrix, axis=(1, 2)))
+    shares = []
+    for cluster in expansion.clusters:
+        size = []  # ‖t_k(w)‖ of the cluster's matrix for k = p, p − 1, p − 2, p − 3
+        for here in (slice(starts[k], starts[k + 1]) for k in range(p, p - 4, -1)):
+            term = np.tensordot(powers[:, here], cluster.coefficients[:, :, here], axes=(1, 2))
+            size.append(np.linalg.norm(term, axis=(1, 2)))
+        late, early = size[0] + size[1], size[2] + size[3]
+        tiny = np.finfo(float).eps * np.abs(cluster.coefficients[:, :, 0]).max()
+        shares.append(np.sqrt(np.maximum(late - tiny, 0.0) / np.maximum(early, tiny)))
+    return np.column_stack(shares)
 
 
 # --- The series of 1/λ: the same coefficients, summed in another way
@@ -370,15 +362,6 @@ class InverseExpansion:
         beside = self.expansion.reduced
         f = self.frequencies(q, y)
         return polynomial_error(f, beside.frequencies(q, y), beside.error_estimate(q, y))
-
-
-def inverse(expansion: Expansion) -> InverseExpansion:
-    """1/λ of every mode; UsageError for clusters, whose eigenvalues have no series of their own."""
-    together = [c.modes for c in expansion.clusters if len(c.modes) > 1]
-    if together:
-        raise UsageError(f"modes {together[0]} are expanded as a cluster: 1/λ has no series each")
-    singles = np.array([c.coefficients[0, 0] for c in expansion.clusters])
-    return InverseExpansion(expansion, _frozen(reciprocal(expansion.space, singles)))
 
 
 # --- Several expansions about points along a trajectory: each pose belongs to the nearest one

@@ -145,13 +145,8 @@ def _moved(
     z = solve(np.ascontiguousarray(c.T))[0].T  # Σ_j φ_j C_jk / (λ_j − λ)
     mixed = lam * float(np.einsum("ik,ik->k", z, M @ z).max())
     K = moving.lam[0] + phi.T @ (K_v @ phi + C @ phi_rate + M @ phi_push) - lam * c.T @ z
-    return _turning(K + _growth(moving, lam), phi.T @ c), mixed
-
-
-def _growth(moving: MovingModes, lam: float) -> Floats:
-    """5/16 (λ̇/λ)² − λ̈/(4 λ): that the amplitude changes moves the phase."""
-    _, rate, push = moving.lam
-    return np.asarray(0.3125 * rate @ rate / lam**2 - 0.25 * push / lam)
+    _, rate, push = moving.lam  # that the amplitude changes moves the phase
+    return _turning(K + (0.3125 * rate @ rate / lam**2 - 0.25 * push / lam), phi.T @ c), mixed
 
 
 def _turning(K: Floats, C: Floats) -> Floats:

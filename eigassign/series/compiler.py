@@ -104,11 +104,17 @@ def _take(step: Step, algebra: Algebra, values: Floats) -> Floats:
 
 def compile_program(recorder: Recorder, outputs: Sequence[int], n_variables: int) -> Program:
     """Schedule what the output atoms need; raises UsageError for an unknown variable."""
-    needed = _needed(recorder.nodes, outputs)
+    wanted = set(outputs)
+    for atom in range(len(recorder.nodes) - 1, -1, -1):
+        if atom in wanted:
+            wanted.update(_arguments(recorder.nodes[atom]))
+    needed = sorted(wanted)
     renumbered = {atom: k for k, atom in enumerate(needed)}
     nodes = [_renumber(recorder.nodes[atom], renumbered) for atom in needed]
     arguments = [_arguments(node) for node in nodes]
-    levels = _levels(arguments)
+    levels: list[int] = []
+    for atoms in arguments:
+        levels.append(1 + max((levels[a] for a in atoms), default=-1))
     depends = _dependence(nodes, arguments, n_variables)
     variables = [(k, int(str(node[1]))) for k, node in enumerate(nodes) if node[0] == "variable"]
     final = np.array([renumbered[atom] for atom in outputs], dtype=np.intp)
@@ -140,14 +146,6 @@ def _arguments(node: Node) -> tuple[int, ...]:
     raise UsageError(f"unknown expression {node!r}")
 
 
-def _needed(nodes: Sequence[Node], outputs: Sequence[int]) -> list[int]:
-    wanted = set(outputs)
-    for atom in range(len(nodes) - 1, -1, -1):
-        if atom in wanted:
-            wanted.update(_arguments(nodes[atom]))
-    return sorted(wanted)
-
-
 def _renumber(node: Node, new: dict[int, int]) -> Node:
     match node:
         case ("variable", _):
@@ -163,13 +161,6 @@ def _renumber(node: Node, new: dict[int, int]) -> Node:
         case (kind, int(a), *rest):
             return (kind, new[a], *rest)
     raise UsageError(f"unknown expression {node!r}")
-
-
-def _levels(arguments: Sequence[tuple[int, ...]]) -> list[int]:
-    levels: list[int] = []
-    for atoms in arguments:
-        levels.append(1 + max([levels[a] for a in atoms], default=-1))
-    return levels
 
 
 def _dependence(
@@ -240,16 +231,8 @@ def _linear_step(targets: Ints, nodes: list[Node]) -> Step:
     shape = (len(nodes), len(sources))
     matrix = sparse.csr_array((values, (rows, local)), shape=shape, dtype=np.float64)
     constants = np.array([float(str(node[1])) for node in nodes])
-    return Step(
-        "linear",
-        targets,
-        sources.astype(np.intp),
-        targets[:0],
-        constants,
-        matrix,
-        targets[:0],
-        None,
-    )
+    sources, empty = sources.astype(np.intp), targets[:0]
+    return Step("linear", targets, sources, empty, constants, matrix, empty, None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,6 +266,8 @@ def compile_table(recorder: Recorder, scalars: Sequence[Scalar], n_variables: in
         ),
     )
 
+
+# --- Faces of a program
 
 MOST = 16  # faces that an atom may have; more are taken together
 Faces = frozenset[int]  # bit k of a face is variable k

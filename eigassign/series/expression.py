@@ -162,20 +162,15 @@ class Expression:
         return Expression(self.recorder, constant, terms) if terms else constant
 
 
-def _function(name: str, x: Expression) -> Expression:
-    factor, atom = x.single()
-    if factor != 1.0:
-        _, atom = x._recorded().single()
-    return x.recorder._atom((name, atom))
-
-
 @overload
 def sin(x: float) -> float: ...
 @overload
 def sin(x: Expression) -> Expression: ...
 def sin(x: Scalar) -> Scalar:
     """Sine of an angle in rad."""
-    return _function("sine", x) if isinstance(x, Expression) else math.sin(x)
+    if not isinstance(x, Expression):
+        return math.sin(x)
+    return x.recorder._atom(("sine", x.recorder.atom(x)))
 
 
 @overload
@@ -184,7 +179,9 @@ def cos(x: float) -> float: ...
 def cos(x: Expression) -> Expression: ...
 def cos(x: Scalar) -> Scalar:
     """Cosine of an angle in rad."""
-    return _function("cosine", x) if isinstance(x, Expression) else math.cos(x)
+    if not isinstance(x, Expression):
+        return math.cos(x)
+    return x.recorder._atom(("cosine", x.recorder.atom(x)))
 
 
 def derivative(x: Scalar, variable: int) -> Scalar:

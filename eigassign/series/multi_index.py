@@ -236,11 +236,9 @@ def on_faces(space: LowerSet, faces: bytes) -> tuple[LowerSet, Ints]:
     allowed = np.frombuffer(faces, dtype=bool).reshape(-1, space.n_variables)
     inside = ((space.indices > 0).astype(np.int64) @ ~allowed.T == 0).any(axis=1)
     where = np.flatnonzero(inside | (space.degrees == 0))
-    return (
-        (space, where)
-        if len(where) == len(space)
-        else (LowerSet(_frozen(space.indices[where])), where)
-    )
+    if len(where) == len(space):
+        return space, where
+    return LowerSet(_frozen(space.indices[where])), where
 
 
 def _simplex(n: int, order: int) -> NDArray[np.int64]:

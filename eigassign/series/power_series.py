@@ -3,9 +3,8 @@
 All functions act on stacks of series: arrays (n, N) over a :class:`LowerSet` of N members, so that
 a thousand products cost one call.
 
-Polynomials at many points, quickly: Σ_γ a_γ x^γ with γ in a lower set.
-
-The variables are split in two groups, x = (v, w), and with them every index, γ = (μ, ν):
+To evaluate a polynomial at many points the variables are split in two groups, x = (v, w), and with
+them every index, γ = (μ, ν):
 
     Σ_γ a_γ x^γ = Σ_ν w^ν Σ_μ v^μ A_μν ,
 
@@ -175,16 +174,13 @@ class Polynomials:
 
     def __call__(self, x: Floats) -> Floats:
         """Values (n_points, n_polynomials) at displacements x (n_points, n)."""
-        values = np.empty((len(x), len(self.table)))
+        values, cut = np.empty((len(x), len(self.table))), self.first.n_variables
         for i in range(0, len(x), BLOCK):
-            self._block(x[i : i + BLOCK].T, values[i : i + BLOCK])
+            part = x[i : i + BLOCK].T
+            left, right = self.first(part[:cut]), self.second(part[cut:])
+            for k, A in enumerate(self.table):
+                values[i : i + BLOCK, k] = np.einsum("ij,ij->j", A @ left, right)
         return values
-
-    def _block(self, x: Floats, values: Floats) -> None:
-        cut = self.first.n_variables
-        left, right = self.first(x[:cut]), self.second(x[cut:])
-        for k, A in enumerate(self.table):
-            values[:, k] = np.einsum("ij,ij->j", A @ left, right)
 
 
 def polynomials(space: LowerSet, coefficients: Floats) -> Polynomials:

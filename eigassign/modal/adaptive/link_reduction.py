@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.modal.arguments import spread
 from eigassign.modal.model import Model
 
 Floats = NDArray[np.float64]
@@ -22,7 +23,7 @@ FIRST = 2.0  # times the highest frequency that matters
 STEP = 1.5  # from one trial to the next
 MAX_TRIALS = 16  # up to some 900 times the highest frequency that matters
 PAYS = 0.5  # of the dofs of the whole mechanism: a model with more does not pay
-SAMPLES = 30  # poses and designs at which it is judged; each costs an exact solve
+POSES = 30  # poses and designs at which it is judged; each costs an exact solve
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +47,12 @@ def choose_reduction(
     The links stay whole where the model keeps more than `PAYS` of its dofs.
     """
     whole = build(None)
-    x = few_of(samples(whole))
+    x = spread(samples(whole), POSES)
+    q, y = x[:, : len(whole.q_names)], x[:, len(whole.q_names) :]
     reasons: list[str] = []
-    frequency = FIRST * _highest(build(STATIC), x, max(modes))
+    static = build(STATIC)
+    highest = static.frequencies(q, y, min(max(modes), len(static.pencil.elastic))).max()
+    frequency = FIRST * float(highest)
     size = 0
     for _ in range(MAX_TRIALS):
         model = build(frequency)
@@ -58,30 +62,13 @@ def choose_reduction(
         if model.n_dof == size:  # no mode in between
             frequency *= STEP
             continue
-        size, n_q = model.n_dof, len(model.q_names)
-        error = model.truncation_error(x[:, :n_q], x[:, n_q:], modes).max(axis=0)
-        reasons.append(_line(frequency, model, whole, error))
+        size = model.n_dof
+        error = model.truncation_error(q, y, modes).max(axis=0)
+        worst = float(error.max())
+        stated = f"truncation error at most {100 * worst:.2g} %" if worst < np.inf else "no bound"
+        reasons.append(f"reduced to {frequency:.4g} Hz: {size} of {whole.n_dof} dofs, {stated}")
         if error.max() <= accuracy:
             return ReductionChoice(dict.fromkeys(names, frequency), error, tuple(reasons))
         frequency *= STEP
     reasons.append(f"not reduced, it does not pay: {', '.join(names)}")
     return ReductionChoice(dict.fromkeys(names), np.zeros(len(modes)), tuple(reasons))
-
-
-def few_of(x: Floats) -> Floats:
-    """At most `SAMPLES` of the samples, spread evenly."""
-    keep = np.unique(np.linspace(0, len(x) - 1, min(SAMPLES, len(x))).round().astype(int))
-    return np.asarray(x[keep])
-
-
-def _highest(model: Model, x: Floats, count: int) -> float:
-    """The highest frequency of the lowest ``count`` modes over the samples, Hz."""
-    n_q = len(model.q_names)
-    available = min(count, len(model.pencil.elastic))
-    return float(model.frequencies(x[:, :n_q], x[:, n_q:], available).max())
-
-
-def _line(frequency: float, model: Model, whole: Model, error: Floats) -> str:
-    worst = float(error.max())
-    stated = f"truncation error at most {100 * worst:.2g} %" if np.isfinite(worst) else "no bound"
-    return f"reduced to {frequency:.4g} Hz: {model.n_dof} of {whole.n_dof} dofs, {stated}"

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.modal.arguments import spread
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.exact.solver import eigenvalues
 
 Floats = NDArray[np.float64]
 START = 2  # elements of a link at first
 MAX_ELEMENTS = 256  # of a link; with more round-off, which grows as n⁴, is the larger error
-MAX_MESHES = 8  # tried at most
+MAX_MESHES = 8  # tried at most; the paper's arm needs three at most, down to 1e-6
 POSES = 9  # samples at which meshes are compared; each costs exact solves of every mesh
 RICHARDSON = 4.0 / 3.0
 
@@ -67,7 +68,7 @@ def choose_mesh(
     """
     free = [name for name, n in elements.items() if n is None]
     now = {name: START if n is None else n for name, n in elements.items()}
-    x = _spread(x)
+    x = spread(x, POSES)
     reasons: list[str] = []
     for _ in range(MAX_MESHES):
         f = _frequencies(build, now, x, modes)
@@ -79,7 +80,12 @@ def choose_mesh(
         if not free:
             break
         now = _refined(build, now, free, f, x, modes, accuracy)
-        _check_rounding(build, now, x, modes, accuracy)
+        lost = rounding_error(build(now).pencil, x[0], max(modes))
+        if lost > accuracy:
+            raise AccuracyError(
+                f"with {_shown(now)} elements round-off is {lost:.1e}, above the {accuracy:.1e} "
+                "that is asked for: a finer mesh makes it worse"
+            )
     raise AccuracyError(
         f"the mesh leaves {error.max():.1e} where {accuracy:.1e} is asked for: {reasons[-1]}"
     )
@@ -108,17 +114,6 @@ def _refined(
     return after
 
 
-def _check_rounding(
-    build: Build, now: Mapping[str, int], x: Floats, modes: Sequence[int], accuracy: float
-) -> None:
-    lost = rounding_error(build(now).pencil, x[0], max(modes))
-    if lost > accuracy:
-        raise AccuracyError(
-            f"with {_shown(now)} elements round-off is {lost:.1e}, above the {accuracy:.1e} "
-            "that is asked for: a finer mesh makes it worse"
-        )
-
-
 def _frequencies(
     build: Build, elements: Mapping[str, int], x: Floats, modes: Sequence[int]
 ) -> Floats:
@@ -137,12 +132,6 @@ def _change(
     """|f / f of ``elements`` − 1|, (n_samples, n_modes)."""
     finer = _frequencies(build, elements, x, modes)
     return np.asarray(np.abs(f / finer - 1.0))
-
-
-def _spread(x: Floats) -> Floats:
-    """At most `POSES` samples, the first and the last among them."""
-    keep = np.unique(np.linspace(0, len(x) - 1, min(POSES, len(x))).round().astype(int))
-    return np.asarray(x[keep])
 
 
 def _shown(elements: Mapping[str, int]) -> str:

@@ -52,7 +52,9 @@ MOST_IN_ALL = 10 * MOST_TERMS  # what several points may cost where one will not
 FINER = 0.05  # part of the accuracy that the reduced model beside them should reach
 TOLERABLE = 0.5  # the same where round-off does not allow that
 WIDEST_CLUSTER = 0.7  # relative gap in λ up to which two neighbours are tried as one cluster
-FAIR_ORDER = 5  # from which a cluster that does not halve the error of the modes alone is given up
+# Order from which a cluster that does not halve the error of the modes alone is given up. Followed
+# on, it costs 1.7 times as many coefficients for the paper's arm at 1e-5, for the same choice.
+FAIR_ORDER = 5
 FAIR_COUNT = 8  # of points, from which doubling them must halve the error
 FARTHEST = 32  # samples at which the radius of convergence is looked at
 

@@ -11,7 +11,7 @@ all of them ask for in one round is one batch of frequencies.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
@@ -90,7 +90,17 @@ class Fit:
     @property
     def reasons(self) -> tuple[str, ...]:
         """What was chosen and why, as lines of text."""
-        return tuple(_reasons(self.interpolant, self.floor))
+        found = self.interpolant
+        degrees = " x ".join(map(str, found.members.max(axis=0)))
+        idle = sum(rate == 0.0 for rate in found.rates)
+        lines = [
+            f"{self.quantity} is the polynomial: its coefficients fall fastest",
+            *(f"{count} terms: error at most {error:.1e}" for count, error in found.rounds),
+            f"degrees {degrees}" + (f", {idle} idle" if idle else ""),
+        ]
+        if self.floor:
+            lines.append(f"the source itself may be off by {self.floor:.1e}")
+        return tuple(lines)
 
     @property
     def quantity(self) -> str:
@@ -115,18 +125,15 @@ class Fit:
         if y is None:
             raise UsageError("the fit is over a box of y: along which design?")
         v = self.region.design(y)
-        hz = self._hz(self._on_path(v, len(path)))
+        if line is None:
+            g = np.repeat(self._ready(v)[:, None], len(path), axis=1)
+        else:  # one product of matrices for all designs
+            right = self._ready.second(np.ascontiguousarray(v[:, 1:].T))
+            g = np.empty((len(v), len(path), len(self.modes)))
+            for k, table in enumerate(self._samples):
+                np.matmul(right.T, table, out=g[:, :, k])
+        hz = self._hz(g)
         return hz[0] if np.ndim(y) == 1 else hz
-
-    def _on_path(self, v: Floats, n_t: int) -> Floats:
-        """f^p (n_designs, n_t, n_modes): one product of matrices for all designs."""
-        if self.region.line is None:
-            return np.repeat(self._ready(v)[:, None], n_t, axis=1)
-        right = self._ready.second(np.ascontiguousarray(v[:, 1:].T))
-        g = np.empty((len(v), n_t, len(self.modes)))
-        for k, table in enumerate(self._samples):
-            np.matmul(right.T, table, out=g[:, :, k])
-        return g
 
     @cached_property
     def _samples(self) -> Floats:
@@ -145,17 +152,6 @@ class Fit:
             return g
         np.sqrt(g, out=g)  # in place: fresh pages cost more than the roots
         return g if self.power == 2.0 else np.divide(1.0, g, out=g)
-
-
-def _reasons(found: Interpolant, floor: float) -> Iterator[str]:
-    yield f"{QUANTITIES[found.power]} is the polynomial: its coefficients fall fastest"
-    for count, error in found.rounds:
-        yield f"{count} terms: error at most {error:.1e}"
-    degrees = found.members.max(axis=0)
-    idle = sum(rate == 0.0 for rate in found.rates)
-    yield f"degrees {' x '.join(map(str, degrees))}" + (f", {idle} idle" if idle else "")
-    if floor:
-        yield f"the source itself may be off by {floor:.1e}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,8 +254,10 @@ def fit(
     if not isinstance(source, Model):
         each_ = zip(floors, seen, strict=True)
         floors = [max(floor, known_error(source, x, wanted, accuracy)) for floor, x in each_]
-    made = zip(regions, found, floors, strict=True)
-    fits = tuple(_fit(source, wanted, accuracy, *each) for each in made)
+    fits = tuple(
+        Fit(wanted, region, accuracy, made, partial(own_error, source, region, wanted, made, floor))
+        for region, made, floor in zip(regions, found, floors, strict=True)
+    )
     return fits[0] if path is None or len(fits) == 1 else PathFit(fits, path.rows)
 
 
@@ -279,11 +277,11 @@ def _to_accuracy(
     rests = _some_move(parts)
     regions = [build_region(directions, n_q, part, y, rests=rests) for part in parts]
     floors = [floor_of(source, region, modes, accuracy) for region in regions]
-    pairs = zip(regions, floors, strict=True)
-    runs = [
-        adaptive(region.nodes, _polynomial_share(source, accuracy, floor), most)
-        for region, floor in pairs
-    ]
+    runs = []
+    for region, floor in zip(regions, floors, strict=True):
+        # what another source than a model costs is only known where it was asked
+        cost = floor if isinstance(source, Model) else SHARE * accuracy
+        runs.append(adaptive(region.nodes, accuracy - cost, most))
     return regions, floors, runs
 
 
@@ -322,11 +320,6 @@ def _check_numbers(accuracy: object, most: object) -> None:
         raise UsageError(
             f"accuracy {accuracy!r} is not a number within {LEAST_ACCURACY} to 1, as 1e-4"
         )
-
-
-def _polynomial_share(source: Any, accuracy: float, floor: float) -> float:
-    """What the polynomial may cost; that of another source is only known where it was asked."""
-    return accuracy - (floor if isinstance(source, Model) else SHARE * accuracy)
 
 
 def _best_nodes(
@@ -370,26 +363,10 @@ def _run(
                 found[k] = end.value
             except AccuracyError as error:
                 raise AccuracyError(f"{error}{cause(source, regions[k], modes)}") from None
-        hz = _batch(ask, wanted)
+        if len(wanted) < 2:
+            hz = {k: ask(x) for k, x in wanted.items()}
+        else:
+            ends = np.cumsum([len(x) for x in wanted.values()])[:-1]
+            all_ = ask(np.vstack(list(wanted.values())))
+            hz = dict(zip(wanted, np.split(all_, ends), strict=True))
     return [found[k] for k in range(len(runs))], [np.vstack(each) for each in seen]
-
-
-def _batch(ask: Callable[[Floats], Floats], wanted: dict[int, Floats]) -> dict[int, Floats | None]:
-    """Frequencies at x (n, n_x) for each, asked for at once."""
-    if len(wanted) < 2:
-        return {k: ask(x) for k, x in wanted.items()}
-    hz = ask(np.vstack(list(wanted.values())))
-    ends = np.cumsum([len(x) for x in wanted.values()])[:-1]
-    return dict(zip(wanted, np.split(hz, ends), strict=True))
-
-
-def _fit(
-    source: Any,
-    modes: tuple[int, ...],
-    accuracy: float | None,
-    region: Region,
-    found: Interpolant,
-    floor: float,
-) -> Fit:
-    own = partial(own_error, source, region, modes, found.error, floor)
-    return Fit(modes, region, accuracy, found, own)

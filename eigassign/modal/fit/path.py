@@ -172,8 +172,7 @@ def _line(stretch: Stretch, count: int | None) -> Line | None:
 
 def _placed(reach: Floats, S: Floats) -> tuple[Floats, Floats, bool]:
     """v (n_t,) in [−1, 1], dv/dq, and whether the path s − s_0 (n_t, n_s) is straight."""
-    far = reach[np.argmax(np.square(reach).sum(axis=1))]
-    along = reach @ far / (far @ far)
+    far, along = _along(reach)
     straight = bool(np.abs(reach - np.outer(along, far)).max() <= STILL)
     if not straight:
         steps = np.linalg.norm(np.diff(reach, axis=0), axis=1)
@@ -181,6 +180,12 @@ def _placed(reach: Floats, S: Floats) -> tuple[Floats, Floats, bool]:
     low, width = along.min(), np.ptp(along)
     row = 2.0 / width * (far / (far @ far)) @ S if straight else np.zeros(S.shape[1])
     return 2.0 * (along - low) / width - 1.0, row, straight
+
+
+def _along(reach: Floats) -> tuple[Floats, Floats]:
+    """The farthest sample from the first (n_s,), and each as a part of the way there (n_t,)."""
+    far = reach[np.argmax(np.square(reach).sum(axis=1))]
+    return far, reach @ far / max(float(far @ far), 1e-300)
 
 
 # --- Where a sampled path turns sharply: no frequency along it is smooth there
@@ -198,21 +203,16 @@ def smooth_parts(s: Floats) -> tuple[slice, ...]:
     """
     moving = np.flatnonzero(np.append(True, np.linalg.norm(np.diff(s, axis=0), axis=1) > STILL))
     whole = (slice(0, len(s)),)
-    if len(moving) < 4 or _straight(s):
+    if len(moving) < 4:
+        return whole
+    far, along = _along(s - s[0])
+    if np.abs(s - s[0] - np.outer(along, far)).max() <= STILL:  # straight, in whatever order
         return whole
     ends = moving[_corners(s[moving]) + 1]  # the first sample after each
     bounds = np.concatenate([[0], _apart(ends, len(s)), [len(s)]])
     if len(bounds) - 1 > min(MOST_PARTS, len(s) // (2 * LEAST_SAMPLES)):
         return whole
     return tuple(slice(a, b) for a, b in itertools.pairwise(bounds.tolist()))
-
-
-def _straight(s: Floats) -> bool:
-    """Whether all samples lie on one line, whatever their order."""
-    reach = s - s[0]
-    far = reach[np.argmax(np.square(reach).sum(axis=1))]
-    along = reach @ far / max(float(far @ far), 1e-300)
-    return bool(np.abs(reach - np.outer(along, far)).max() <= STILL)
 
 
 def _corners(s: Floats) -> NDArray[np.intp]:

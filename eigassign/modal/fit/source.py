@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import AccuracyError, UsageError
+from eigassign.interpolation.newton import Interpolant
 from eigassign.modal.arguments import DENSE_LIMIT, mode_numbers, shown_numbers
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.exact.solver import eigenvalues
@@ -31,10 +32,10 @@ CLOSE = 1e-2  # relative gap in Hz below which neighbouring modes are named as a
 
 
 def own_error(
-    source: Any, region: Region, modes: tuple[int, ...], error: float, floor: float
+    source: Any, region: Region, modes: tuple[int, ...], found: Interpolant, floor: float
 ) -> float:
     """The floor, or round-off where that was not looked at and may matter beside the error."""
-    if floor or not isinstance(source, Model) or error >= fine(source):
+    if floor or not isinstance(source, Model) or found.error >= fine(source):
         return floor
     return rounding_error(source.pencil, region.centre, modes[-1])
 
