@@ -17,7 +17,7 @@ from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.assembly.rigid_body_modes import separated
 from eigassign.mechanism.assembly.rigid_loops import close_rigid_loops
 from eigassign.mechanism.assembly.springs import add_springs
-from eigassign.mechanism.elements.craig_bampton import as_asked
+from eigassign.mechanism.elements.craig_bampton import reduced_where_asked
 from eigassign.mechanism.elements.links import copies_of, link_mesh
 from eigassign.mechanism.elements.mesh import LinkMesh
 from eigassign.mechanism.kinematics.coordinates import coordinates
@@ -124,7 +124,9 @@ def local_links(
     Links are reduced as the case asks; ``whole`` are their meshes where they are known already.
     """
     meshes = _meshes(case, parameters, motion) if whole is None else whole
-    meshes = {name: as_asked(case, parameters, name, mesh) for name, mesh in meshes.items()}
+    meshes = {
+        name: reduced_where_asked(case, parameters, name, mesh) for name, mesh in meshes.items()
+    }
     nodes = NodeMotions(motion, meshes, case.mechanism.space)
     nodes.number()
     if motion.tree.n_elastic < len(motion.tree.loops):

@@ -40,7 +40,9 @@ CLEAN = 1e-15  # entries this small beside their diagonal are zeros
 NEW = 1e-4  # part of a vector of another design, relative, that is worth a dof of its own
 
 
-def as_asked(case: CaseFile, parameters: ModelParameters, name: str, mesh: LinkMesh) -> LinkMesh:
+def reduced_where_asked(
+    case: CaseFile, parameters: ModelParameters, name: str, mesh: LinkMesh
+) -> LinkMesh:
     """A link's mesh, reduced where it says to what frequency.
 
     A ``reduce_to: auto`` that nobody settled leaves the link whole.
@@ -104,10 +106,6 @@ class _Interior:
         self.factor = held_factor(self.K_ii, path)
         self.Psi = np.asarray(-self.factor.solve(self.K_ib))
 
-    def modes(self, lam: float) -> Floats:
-        """Φ up to λ, of unit stiffness."""
-        return fixed_modes(self.K_ii, self.M_ii, self.factor, lam)
-
 
 def held_factor(K_ii: sparse.csc_array, path: str) -> linalg.SuperLU:
     """The factor of K_ii; raises MechanismError where the part is limp with its interface held."""
@@ -153,16 +151,17 @@ def _span(
     parts: Sequence[_Interior], Psi: Floats, rigid: Sequence[Term], b: Ints, i: Ints, lam: float
 ) -> Floats:
     """W (n_i, k), K_ii-orthonormal: rigid remainders, fixed-interface modes, other designs."""
-    K = parts[0].K_ii
+    first = parts[0]
+    K = first.K_ii
     W = np.zeros((len(i), 0))
     for term in rigid:
         N = term.matrix.toarray()
         W = _extended(W, K, N[i] - Psi @ N[b], _norms(K, N[i]), EXACT)
-    Phi = parts[0].modes(lam)
+    Phi = fixed_modes(K, first.M_ii, first.factor, lam)
     W = _extended(W, K, Phi, np.ones(Phi.shape[1]), EXACT)
     for part in parts[1:]:
         W = _extended(W, K, part.Psi - Psi, _norms(K, Psi), NEW)
-        Phi = part.modes(lam)
+        Phi = fixed_modes(part.K_ii, part.M_ii, part.factor, lam)
         W = _extended(W, K, Phi, _norms(K, Phi), NEW)
     return W
 

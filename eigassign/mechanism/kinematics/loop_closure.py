@@ -363,17 +363,17 @@ def _at(names: Sequence[str], a: Floats) -> str:
 
 def _ambiguous(tree: Topology, names: Sequence[str], a0: Floats, found: Floats) -> str:
     """All branches in words."""
-    lines = ["; ".join(_guesses(tree, p)) for p in found]
-    listed = " | ".join(f"({line})" for line in lines)
+    listed = " | ".join(f"({_as_guess(tree, p)})" for p in found)
     return (
         f"the loops close in {len(found)} ways at {_at(names, a0)}: {listed}; choose one with "
         "mechanism.assembly: {at: …, guess: {joint: value, …}} (rad, m)"
     )
 
 
-def _guesses(tree: Topology, p: Floats) -> list[str]:
+def _as_guess(tree: Topology, p: Floats) -> str:
     """One solution as the guess that leads to it: a list for a joint with several freedoms."""
     values: dict[str, list[str]] = {}
     for freedom, value in zip(tree.passive, p, strict=True):
         values.setdefault(freedom.joint, []).append(f"{value:.4g}")
-    return [f"{j}: {v[0] if len(v) == 1 else '[' + ', '.join(v) + ']'}" for j, v in values.items()]
+    listed = {j: v[0] if len(v) == 1 else f"[{', '.join(v)}]" for j, v in values.items()}
+    return "; ".join(f"{joint}: {value}" for joint, value in listed.items())
