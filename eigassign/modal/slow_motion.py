@@ -117,15 +117,12 @@ def _changes(
         moving = moving_modes(pencil, theta, found.lam[0, part], found.phi[0][:, part])
         moved, mixed = _moved(pencil, theta, moving, *velocity)
         if mixed < MIXED or gap > 0.0:
-            changes |= zip(group, _relative(moved, np.sqrt(found.lam[0, part])), strict=True)
+            still = np.sqrt(found.lam[0, part])
+            change, apart = moved / still - 1.0, np.ptp(still) / still
+            # of a cluster the distance of its modes if that is more
+            most = np.where(np.abs(change) < apart, apart, change)
+            changes |= zip(group, most.tolist(), strict=True)
     return changes
-
-
-def _relative(moved: Floats, still: Floats) -> list[float]:
-    """Ω/ω − 1, of a cluster with the distance of its modes if that is more."""
-    change = moved / still - 1.0
-    apart = np.ptp(still) / still
-    return [float(v) for v in np.where(np.abs(change) < apart, apart, change)]
 
 
 def _moved(

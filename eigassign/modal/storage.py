@@ -126,20 +126,16 @@ def _tree(thing: Any, arrays: dict[str, Array]) -> Any:
         csr = (thing.data, thing.indices, thing.indptr)
         return {"csr": list(thing.shape), "parts": [_tree(p, arrays) for p in csr]}
     if isinstance(thing, np.ndarray):
-        return _leaf(thing, arrays)
+        stored = {"f": np.float64, "i": np.int64, "b": np.uint8}.get(thing.dtype.kind)
+        if stored is None:
+            raise UsageError(f"arrays of dtype {thing.dtype} cannot be stored")
+        name = f"a{len(arrays)}"
+        arrays[name] = np.ascontiguousarray(thing, dtype=stored)
+        return {"array": name, "kind": thing.dtype.kind}
     if is_dataclass(thing) and type(thing).__name__ in CLASSES:
         members = {f.name: _tree(getattr(thing, f.name), arrays) for f in fields(thing)}
         return {"class": type(thing).__name__, "fields": members}
     raise UsageError(f"a {type(thing).__name__} cannot be stored")
-
-
-def _leaf(array: Array, arrays: dict[str, Array]) -> dict[str, Any]:
-    stored = {"f": np.float64, "i": np.int64, "b": np.uint8}.get(array.dtype.kind)
-    if stored is None:
-        raise UsageError(f"arrays of dtype {array.dtype} cannot be stored")
-    name = f"a{len(arrays)}"
-    arrays[name] = np.ascontiguousarray(array, dtype=stored)
-    return {"array": name, "kind": array.dtype.kind}
 
 
 def _built(tree: Any, arrays: Mapping[str, Array]) -> Any:

@@ -105,17 +105,11 @@ def _at(parts: ReducedLinks, interiors: Sequence[_Interior], x: Floats, highest:
         gram += a.T @ one.gram @ a
         n_b = len(one.drawn)
         pull += np.asarray(B[:n_b].T @ (one.drawn @ a))
-    gram += SAFETY * _carried(pencil, theta[:, 0], pull)
-    return _bounds(mu, 0.5 * (gram + gram.T), max(one.beta for one in interiors), highest, pencil)
-
-
-def _carried(pencil: Pencil, theta: Floats, pull: Floats) -> Floats:
-    """gᵀ S⁻¹ g."""
     g = pull[pencil.elastic]
-    if not g.any():
-        return np.zeros((g.shape[1], g.shape[1]))
-    K = principal(pencil, pencil.stiffness @ theta, pencil.elastic)
-    return np.asarray(g.T @ factorise(K).solve(g))
+    if g.any():
+        K = principal(pencil, pencil.stiffness @ theta[:, 0], pencil.elastic)
+        gram += SAFETY * (g.T @ factorise(K).solve(g))  # gᵀ S⁻¹ g
+    return _bounds(mu, 0.5 * (gram + gram.T), max(one.beta for one in interiors), highest, pencil)
 
 
 def _bounds(mu: Floats, gram: Floats, beta: float, highest: int, pencil: Pencil) -> Floats:

@@ -74,7 +74,11 @@ class ImplicitFunction:
             left, reached = left[~ok], reached[:, ~ok]
             if not len(left):
                 return p
-        raise self._failure(a[:, left[0]], reached[:, 0])
+        asked, met = a[:, left[0]], reached[:, 0]
+        message = f"{self.title} cannot be closed, or is at a dead point, at {self._named(met)}"
+        if not np.array_equal(asked, met):
+            message += f" on the way to {self._named(asked)}"
+        raise SingularityError(message)
 
     def _continue(self, a: Floats, steps: int) -> tuple[Floats, NDArray[np.bool_], Floats]:
         """p after ``steps`` equal steps from a_0, where no step could have changed the branch, and
@@ -145,12 +149,6 @@ class ImplicitFunction:
         if isinstance(algebra, Truncated):
             return self.series(algebra, a)
         return self.samples(a)
-
-    def _failure(self, a: Floats, reached: Floats) -> SingularityError:
-        message = f"{self.title} cannot be closed, or is at a dead point, at {self._named(reached)}"
-        if not np.array_equal(a, reached):
-            message += f" on the way to {self._named(a)}"
-        return SingularityError(message)
 
     def _named(self, a: Floats) -> str:
         return ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.names, a, strict=True))
