@@ -177,13 +177,14 @@ def unwind_when_terminated() -> dict[signal.Signals, Any]:
     before = {number: signal.getsignal(number) for number in _ENDING}
     before = {number: handler for number, handler in before.items() if handler == signal.SIG_DFL}
     for number in before:
-        signal.signal(number, _terminate)
+        signal.signal(number, raise_terminated)
     return before
 
 
-def _terminate(number: int, _frame: FrameType | None) -> None:
+def raise_terminated(number: int, _frame: FrameType | None) -> None:
+    """Handler of such a signal: raises Terminated, and lets no second one disturb the cleanup."""
     for each in _ENDING:
-        signal.signal(each, signal.SIG_IGN)  # nothing interrupts the cleanup
+        signal.signal(each, signal.SIG_IGN)
     raise Terminated(number)
 
 

@@ -10,9 +10,15 @@ import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
+from types import FrameType
 from typing import Any
 
-from eigassign.process import ONE_THREAD, environment, unwind_when_terminated
+from eigassign.process import (
+    ONE_THREAD,
+    environment,
+    raise_terminated,
+    unwind_when_terminated,
+)
 
 _PATIENCE_S = 5.0  # for workers to clean up after an interrupt
 
@@ -65,8 +71,20 @@ def _end(workers: set[Any]) -> None:
 def _prepare_worker() -> None:
     """SIGTERM unwinds, Ctrl-C is left to the parent, and no worker outlives its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    unwind_when_terminated()
+    for number in unwind_when_terminated():
+        signal.signal(number, _end_soon)
     threading.Thread(target=_follow_parent, daemon=True).start()
+
+
+def _end_soon(number: int, frame: FrameType | None) -> None:
+    """Unwind, and end in any case.
+
+    The exception may be lost: the pool's loop takes what a task raises for its result, and Python
+    ignores what a callback of a weak reference raises. A pool that ends its workers, because one of
+    them was killed, would wait for such a worker for ever.
+    """
+    signal.alarm(int(_PATIENCE_S))  # ends the process
+    raise_terminated(number, frame)
 
 
 def _follow_parent() -> None:

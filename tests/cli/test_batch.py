@@ -27,10 +27,11 @@ STRICT = GOOD.replace("50 %", "1e-9")
 BOUND = "max: 1}\n  constraints: {heavy: {terms: {m: 1}, min: 3}}"
 INFEASIBLE = GOOD.replace("max: 1}", BOUND)
 
-# A program like eigassign, whose cases named kill* take their process with them. Worker processes
-# import this file too, so that they behave so as well.
+# A program like eigassign, whose cases named kill* take their process with them, and whose cases
+# named slow* are at work meanwhile. Worker processes import this file too, so that they behave so
+# as well.
 KILLING = """
-import os, signal, sys
+import os, signal, sys, time
 from pathlib import Path
 import eigassign.pipeline.run
 
@@ -38,7 +39,10 @@ solved = eigassign.pipeline.run.optimize
 
 def optimize(path, options):
     if Path(path).stem.startswith("kill"):
+        time.sleep(0.5)
         os.kill(os.getpid(), signal.SIGKILL)
+    if Path(path).stem.startswith("slow"):
+        time.sleep(1.5)
     return solved(path, options)
 
 eigassign.pipeline.run.optimize = optimize
@@ -110,6 +114,19 @@ def test_a_killed_worker_costs_its_own_case_only() -> None:
     rows = summary()
     assert [name for name, row in rows.items() if row["status"] == "ok"] == ["a", "b", "c"]
     assert all("killed" in rows[name]["message"] for name in ("kill_1", "kill_2"))
+
+
+def test_a_case_at_work_when_another_worker_is_killed_is_run_again() -> None:
+    """The pool tells the other worker to end: it must, though it is in the middle of its case."""
+    write("killing.py", KILLING)
+    for name in ("kill", "slow"):
+        write(f"cases/{name}.yaml")
+    done = python("killing.py", "batch", "cases", "--jobs", "2", "--no-cache")
+    assert done.returncode == 1, done.stderr
+    assert {name: row["status"] for name, row in summary().items()} == {
+        "kill": "error",
+        "slow": "ok",
+    }
     assert "Traceback" not in done.stderr
 
 
