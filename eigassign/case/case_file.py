@@ -15,7 +15,7 @@ from eigassign.case.schema.document import Document
 from eigassign.case.schema.joints import freedom_of
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.schema.parts import Quantity
-from eigassign.case.schema.study import Design, Expansion, Target, Validation
+from eigassign.case.schema.study import Design, ExpansionKeys, Target, ValidationKeys
 from eigassign.case.schema.trajectory import TrajectoryForm, named_trajectories
 from eigassign.errors import Problem
 
@@ -36,9 +36,9 @@ class CaseFile:
     coordinates: Mapping[str, Coordinate]
     trajectory: TrajectoryForm | tuple[TrajectoryForm, ...] | None
     design: Design
-    expansion: Expansion
+    expansion: ExpansionKeys
     targets: tuple[Target, ...]
-    validation: Validation
+    validation: ValidationKeys
     path: Path = field(compare=False)
     sha256: str = field(compare=False)
     warnings: tuple[Problem, ...] = field(compare=False)

@@ -66,7 +66,7 @@ class Request:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class MethodComparison:
     """All methods on one case."""
 
     asked: Asked
@@ -79,7 +79,7 @@ class Comparison:
 
 def compare_methods(
     scene: Scene, effort: Effort, request: Request, progress: Callable[[str], None]
-) -> Comparison:
+) -> MethodComparison:
     """Time against error of every method. Raises CaseError where nothing varies."""
     features, effort = build_features(scene), suited(effort, scene.model.n_dof)
     solve_s = _solve_cost(scene)
@@ -110,7 +110,7 @@ def compare_methods(
     advice = tuple(beside_auto(each, charted, autos) for each in given)
     left_out = _left_out(scene, features, effort, solve_s)
     notes = (*unasked, *left_out, *front_notes(charted, fronts))
-    return Comparison(asked, charted, skipped, fronts, advice, notes)
+    return MethodComparison(asked, charted, skipped, fronts, advice, notes)
 
 
 def _fronts(charted: Sequence[ChartPoint], asked: Asked, request: Request) -> tuple[Front, ...]:

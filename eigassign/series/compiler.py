@@ -2,7 +2,7 @@
 
 The same program runs in two algebras: over samples (values (n_atoms, n_samples)) and over
 truncated power series (values (n_atoms, N)), where the product is the Cauchy product. A
-:class:`Table` evaluates a list of scalars, numbers and expressions mixed, by one program.
+:class:`CompiledTable` evaluates a list of scalars, numbers and expressions mixed, by one program.
 
 Power series have few coefficients where few variables meet in one function. A *face* is a set of
 variables; every atom of a program is a sum of functions of one face each: a sum has the faces of
@@ -236,7 +236,7 @@ def _linear_step(targets: Ints, nodes: list[Node]) -> Step:
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class CompiledTable:
     """values = constants + weights × program outputs."""
 
     program: Program
@@ -250,14 +250,14 @@ class Table:
         )
 
 
-def compile_table(recorder: Recorder, scalars: Sequence[Scalar], n_variables: int) -> Table:
+def compile_table(recorder: Recorder, scalars: Sequence[Scalar], n_variables: int) -> CompiledTable:
     """Compile scalars over the variables of one recorder."""
     forms = [s.terms if isinstance(s, Expression) else {} for s in scalars]
     atoms = sorted({atom for form in forms for atom in form})
     at = {atom: k for k, atom in enumerate(atoms)}
     entries = [(row, at[a], c) for row, form in enumerate(forms) for a, c in form.items()]
     rows, columns, values = zip(*entries, strict=True) if entries else ((), (), ())
-    return Table(
+    return CompiledTable(
         compile_program(recorder, atoms, n_variables),
         np.array([s.constant if isinstance(s, Expression) else float(s) for s in scalars]),
         sparse.csr_array(

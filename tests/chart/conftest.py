@@ -6,7 +6,7 @@ import pytest
 from chart_scenes import TINY
 from scenes import SHIPPED, scene_of
 
-from eigassign.chart.comparison import Comparison, Request, compare_methods
+from eigassign.chart.comparison import MethodComparison, Request, compare_methods
 from eigassign.chart.question import EvaluationPoints, build_features, build_points
 from eigassign.study.scene import Scene
 
@@ -22,5 +22,5 @@ def points(arm: Scene) -> EvaluationPoints:
 
 
 @pytest.fixture(scope="session")
-def compared(arm: Scene) -> Comparison:
+def compared(arm: Scene) -> MethodComparison:
     return compare_methods(arm, TINY, Request(budget_s=10.0, evaluations=1e4), lambda line: None)

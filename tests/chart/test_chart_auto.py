@@ -8,7 +8,7 @@ import pytest
 from chart_scenes import TINY
 from scenes import SHIPPED, scene_of
 
-from eigassign.chart.comparison import Bench, Comparison, chart_methods, exact_frequencies
+from eigassign.chart.comparison import Bench, MethodComparison, chart_methods, exact_frequencies
 from eigassign.chart.front import beside_auto
 from eigassign.chart.methods import auto_methods, auto_orders, exact_methods
 from eigassign.chart.question import build_features, build_points
@@ -28,7 +28,7 @@ def test_it_is_what_a_run_takes(arm: Scene, tmp_path: Path) -> None:
     assert taken.method == f"Taylor {taken.choice.order} full"
 
 
-def test_it_is_charted_and_as_accurate_as_promised(compared: Comparison) -> None:
+def test_it_is_charted_and_as_accurate_as_promised(compared: MethodComparison) -> None:
     known = {p.method: p for p in compared.points}
     charted = [a for a in compared.advice if a.auto is not None and a.auto.method]
     assert len(charted) >= 2
@@ -42,7 +42,7 @@ def test_it_is_charted_and_as_accurate_as_promised(compared: Comparison) -> None
 
 
 def test_a_refusal_is_given_in_words(
-    arm: Scene, compared: Comparison, monkeypatch: pytest.MonkeyPatch
+    arm: Scene, compared: MethodComparison, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(expansion_choice, "MOST_TERMS", 50)
     autos, _ = auto_orders(arm, [1e-8], 1e9)
@@ -54,7 +54,7 @@ def test_a_refusal_is_given_in_words(
     assert f"`expansion.order: auto` refuses: {advice.auto.refused}" in advice.words
 
 
-def test_below_round_off_nothing_is_said_of_it(arm: Scene, compared: Comparison) -> None:
+def test_below_round_off_nothing_is_said_of_it(arm: Scene, compared: MethodComparison) -> None:
     taken, _ = auto_orders(arm, [1e-2], 1e9)
     below = Advice("accuracy", 1e-2, None, 1.0, None, {}, None, None, "words", True)
     assert beside_auto(below, compared.points, taken) == below

@@ -13,7 +13,7 @@ from eigassign.chart import comparison, rivals
 from eigassign.chart import methods as own
 from eigassign.chart.comparison import (
     Bench,
-    Comparison,
+    MethodComparison,
     errors,
     exact_frequencies,
     timed_batch,
@@ -82,7 +82,9 @@ def test_errors_count_what_gives_no_number_as_infinitely_wrong() -> None:
     assert found.worst_relative == 1.0
 
 
-def test_every_method_of_a_chart_has_numbers_and_a_name_of_its_own(compared: Comparison) -> None:
+def test_every_method_of_a_chart_has_numbers_and_a_name_of_its_own(
+    compared: MethodComparison,
+) -> None:
     names = [p.method for p in compared.points]
     assert len(set(names)) == len(names)
     assert not compared.skipped
@@ -94,7 +96,7 @@ def test_every_method_of_a_chart_has_numbers_and_a_name_of_its_own(compared: Com
         assert p.trajectory is not None or p.solves_online == 1.0
 
 
-def test_a_chart_shows_what_is_known_of_the_arm(compared: Comparison) -> None:
+def test_a_chart_shows_what_is_known_of_the_arm(compared: MethodComparison) -> None:
     by_name = {p.method: p for p in compared.points}
     worst = {name: p.everywhere.worst_relative for name, p in by_name.items()}
     assert worst["Taylor 4 full"] < worst["Taylor 2 full"] < worst["Taylor 1 full"] < 0.03
@@ -106,7 +108,7 @@ def test_a_chart_shows_what_is_known_of_the_arm(compared: Comparison) -> None:
     assert by_name["grid linear 4"].solves == 64
 
 
-def test_fronts_and_advice_are_made_of_charted_methods(compared: Comparison) -> None:
+def test_fronts_and_advice_are_made_of_charted_methods(compared: MethodComparison) -> None:
     names = {p.method for p in compared.points}
     assert {f.evaluations for f in compared.fronts} == {152.0, 152000.0, 1e4, None}
     for each in compared.fronts:
@@ -118,7 +120,7 @@ def test_fronts_and_advice_are_made_of_charted_methods(compared: Comparison) -> 
 
 
 def test_a_point_can_be_computed_again_from_its_parameters(
-    arm: Scene, compared: Comparison
+    arm: Scene, compared: MethodComparison
 ) -> None:
     features, asked = build_features(arm), compared.asked
     points = build_points(

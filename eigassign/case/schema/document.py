@@ -17,7 +17,7 @@ from eigassign.case.schema.links import LINKS
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.schema.parts import FrozenDict, Named, Part, Quantity, keys_of, wrong
 from eigassign.case.schema.sections import SHAPES
-from eigassign.case.schema.study import Design, Expansion, Target, Validation
+from eigassign.case.schema.study import Design, ExpansionKeys, Target, ValidationKeys
 from eigassign.case.schema.trajectory import MOTIONS, TrajectoryForms
 from eigassign.case.suggestions import listed, shown, suggestion, unknown
 
@@ -37,9 +37,9 @@ class Document(Part):
     coordinates: Named[Coordinate] = FrozenDict()
     trajectory: TrajectoryForms | None = None
     design: Design = Design.model_construct()
-    expansion: Expansion = Expansion.model_construct()
+    expansion: ExpansionKeys = ExpansionKeys.model_construct()
     targets: tuple[Target, ...] = ()
-    validation: Validation = Validation.model_construct()
+    validation: ValidationKeys = ValidationKeys.model_construct()
 
 
 # --- Errors of the schema as findings

@@ -71,7 +71,7 @@ class Design(Part):
     constraints: Named[Constraint] = FrozenDict()
 
 
-class Expansion(Part):
+class ExpansionKeys(Part):
     """Order of the power series, its point (q, y), and the modes expanded; or `auto`.
 
     `accuracy` (relative error in Hz) is what an `auto` order, and `auto` elements, have to meet.
@@ -109,7 +109,7 @@ class Target(Part):
     trajectory: str | None = None
 
 
-class Validation(Part):
+class ValidationKeys(Part):
     """How far from exact is too far (fraction), and the box in q that is sampled at random."""
 
     max_error: Annotated[float, quantity("fraction", above=0)] = 0.02

@@ -18,7 +18,7 @@ from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.mesh import total
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.series.algebra import Samples
-from eigassign.series.compiler import Table, compile_table
+from eigassign.series.compiler import CompiledTable, compile_table
 from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]
@@ -59,7 +59,7 @@ class ReducedLinks:
     """The reduced links of a mechanism, each with its motion and its whole matrices."""
 
     links: tuple[LocalLink, ...]
-    table: Table
+    table: CompiledTable
     cuts: tuple[int, ...]  # of the table's rows: three groups for the motion, two for k and m
     pencil: Pencil
 

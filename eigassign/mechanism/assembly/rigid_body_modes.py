@@ -24,7 +24,7 @@ from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.rotations import multiply
 from eigassign.mechanism.kinematics.topology import NodeName
 from eigassign.series.algebra import Samples
-from eigassign.series.compiler import Table, compile_table
+from eigassign.series.compiler import CompiledTable, compile_table
 
 Floats = NDArray[np.float64]
 POSES = 6
@@ -75,7 +75,7 @@ def _rows(
     return np.asarray(rows[[resists(k) for k, *_ in springs]])
 
 
-def _at_poses(table: Table, z: Floats, span: Floats) -> Floats:
+def _at_poses(table: CompiledTable, z: Floats, span: Floats) -> Floats:
     """Values (n, n_poses) at the reference and at random places about it."""
     rng = np.random.default_rng(0)
     directions = rng.uniform(-1.0, 1.0, (len(z), POSES)) * span[:, None]

@@ -47,7 +47,7 @@ from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type
 from eigassign.mechanism.kinematics.rotations import DOFS
 from eigassign.series.algebra import Samples
-from eigassign.series.compiler import Table, compile_table
+from eigassign.series.compiler import CompiledTable, compile_table
 from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]
@@ -66,7 +66,7 @@ class VelocityTerms:
     """C and K_v of a mechanism along a motion; built once, evaluated at instants."""
 
     stack: StackedLinks
-    table: Table
+    table: CompiledTable
     relative: Floats
     offset: Floats
 

@@ -18,7 +18,7 @@ from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type, node_position
 from eigassign.mechanism.kinematics.topology import split
 from eigassign.series.algebra import Samples
-from eigassign.series.compiler import Table, compile_table
+from eigassign.series.compiler import CompiledTable, compile_table
 from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]
@@ -34,11 +34,11 @@ class LinkFrames:
     links: tuple[str, ...]
     drawn: tuple[tuple[tuple[str, str], ...], ...]  # per link: the node pairs of its lines
 
-    def _compile(self, scalars: Sequence[Scalar]) -> Table:
+    def _compile(self, scalars: Sequence[Scalar]) -> CompiledTable:
         n = len(self.parameters.coordinates) + len(self.parameters.design)
         return compile_table(self.parameters.recorder, scalars, n)
 
-    def _evaluate(self, table: Table, x: Floats) -> Floats:
+    def _evaluate(self, table: CompiledTable, x: Floats) -> Floats:
         """(n_samples, n_scalars)."""
         q, y = np.split(np.atleast_2d(x), [len(self.parameters.coordinates)], axis=1)
         z = np.hstack([q @ self.motion.relative.T + self.motion.offset, y]).T
@@ -54,7 +54,7 @@ class LinkFrames:
         return [part.reshape(len(rows), *array.shape) for part, array in parts]
 
     @cached_property
-    def _ends(self) -> Table:
+    def _ends(self) -> CompiledTable:
         """World positions of both ends of every drawn line."""
         scalars: list[Scalar] = []
         for link, pairs in zip(self.links, self.drawn, strict=True):

@@ -20,7 +20,7 @@ from eigassign.errors import TravelError
 from eigassign.mechanism.kinematics.parameters import ModelParameters, length, station
 from eigassign.mechanism.kinematics.topology import Topology
 from eigassign.series.algebra import Samples
-from eigassign.series.compiler import Table, compile_table
+from eigassign.series.compiler import CompiledTable, compile_table
 from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]
@@ -36,7 +36,7 @@ class Rails:
     joints: tuple[str, ...]
     links: tuple[str, ...]
     margins: Floats  # (n_riders, 2): of the length, at start and end
-    table: Table  # station and length of every rider
+    table: CompiledTable  # station and length of every rider
     names: tuple[str, ...]  # of the coordinates
 
     def require(self, z: Floats, x: Floats, label: Label = "sample {}".format) -> None:
