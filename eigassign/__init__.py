@@ -13,8 +13,8 @@ one function, `eigassign.pipeline.run.solve_case`.
     mechanism      links, joints, kinematics: K and M of eq. (1), and the trajectory
     modal          exact modes, expansions of eqs. (4)–(9), reduced models, fits
     assignment     the quadratic program of eqs. (13)–(14)
-    study          what one case asks of all that, and what came of it
-    chart          time against accuracy of every way to the frequencies of a case
+    study          one case: choices left to auto, optimal design, comparison with exact
+    chart          time against accuracy of every method on one case
     output         results.json, report, figures, tables, run folder, cache
     pipeline       one case from its file to its folder
     api            the functions for notebooks

@@ -1,4 +1,4 @@
-"""The Python face: a case with its model, and the functions notebooks use (docs/python.md)."""
+"""The Python functions: a case with its model, and the functions notebooks use (docs/python.md)."""
 
 from __future__ import annotations
 

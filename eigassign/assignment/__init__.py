@@ -2,7 +2,7 @@
 
 Reading order:
 
-    checks       what is not a finite number, or of another shape, is refused
+    checks       refuses input that is not finite or has another shape
     targets      wanted frequencies at the samples, weights in time, the distance to a target
     program      build: the quadratic program of eqs. (13)–(14), and its dimensionless units
     feasibility  which limits contradict each other

@@ -39,8 +39,6 @@ from eigassign.assignment.checks import Floats, finite, frozen, limit, positive,
 from eigassign.assignment.targets import lam_from_hz, positive_hz
 from eigassign.errors import UsageError
 
-# --- The quadratic program of eqs. (13)–(14), in relative error
-
 
 @dataclass(frozen=True)
 class LinearModel:

@@ -46,11 +46,11 @@ def figure_formats(ctx: click.Context, param: click.Parameter, value: str) -> tu
     names = tuple(dict.fromkeys(name.strip().lower() for name in value.split(",")))
     if names == ("none",):
         return ()
+    if "none" in names:
+        raise click.BadParameter("none cannot be combined with other formats.")
     for name in names:
         if name not in FORMATS:
-            raise click.BadParameter(
-                f"{name!r} is not one of {', '.join(FORMATS)} (or none, alone)."
-            )
+            raise click.BadParameter(f"{name!r} is not one of {', '.join(FORMATS)} (or none).")
     return names
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from eigassign import process
 from eigassign.cli import arguments
@@ -85,9 +86,11 @@ def modes(
     from eigassign.pipeline.queries import point
 
     folder = None
+    given = click.get_current_context().get_parameter_source("figures")
+    draw = draw or how["out"] is not None or given is ParameterSource.COMMANDLINE
     with reporting(how) as reporter:
         at = point(case, q, y)
-        if draw or how["out"] is not None:
+        if draw:
             answer, folder = queries.draw_modes(
                 case, *at, count, how["out"], how["force"], how["figures"]
             )

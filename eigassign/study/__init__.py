@@ -1,11 +1,11 @@
-"""What a case asks of the numerics, and what came of it: from a case file to the results of a run.
+"""One case: choices left to auto, optimal design, comparison with exact frequencies.
 
 Reading order:
 
     results     what a run found, as plain numbers and names: all that the output is given to show
     build       from a case file in which every number is given to its model and trajectories
     planning    expansion point, order and modes; what is left to auto, and where it is judged
-    settling    elements and reduced links that are left to auto, and the model with them
+    settling    chooses elements and reduced links left to auto, and builds the model
     built_case  a case with its model and trajectories, each built once
     scene       model, trajectory and expansions of a case in one object
     comparison  how good both expansions are: along the trajectory, over the boxes of q and y

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.case.schema.joints import SLIDING
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.velocity_terms import placeless, velocity_terms
 from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectory, rates
@@ -111,7 +112,6 @@ def _spread(q: Floats, count: int) -> Floats:
 
 NEGLIGIBLE = 0.05  # share of validation.max_error below which the simple estimate settles it
 EQUAL = 1e-6  # relative distance below which modes count as this far apart
-SHIFTS = ("prismatic", "cylindrical", "screw", "carriage", "nut")  # joints that also translate
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def _rough_study(simple: float | None, names: tuple[str, ...], limit: float) -> 
 
 def _simple_estimate(scene: Scene, parts: list[NamedTrajectory], hz: Floats) -> float | None:
     """The largest (5 Ω²/g³ + |Ω̇|/g)/λ_1 along any trajectory; None where joints translate."""
-    if any(joint.type in SHIFTS for joint in scene.file.mechanism.joints.values()):
+    if any(joint.type in SLIDING for joint in scene.file.mechanism.joints.values()):
         return None
     lam, gap = float((2.0 * np.pi * hz.min()) ** 2), least_gap(hz, scene.expansions.modes)
     return max(_neglected_terms(part.trajectory, gap) for part in parts) / lam

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
-from eigassign.case.schema.joints import RIDING
+from eigassign.case.schema.joints import RIDING, SLIDING
 from eigassign.mechanism.elements.sections import section_values
 from eigassign.mechanism.kinematics.joints import mounting, sliding_axis
 from eigassign.mechanism.kinematics.link_frames import LinkFrames
@@ -213,7 +213,6 @@ def _dimension(file: CaseFile) -> int:
 # --- Joints, bodies and springs, and the size of sections
 
 At = Callable[[NodeName], Floats]  # places (n, d) of a node in n poses
-SLIDING = ("prismatic", "cylindrical", "screw", *RIDING)
 _ALONG = np.array([1.0, 0.0, 0.0])
 
 

@@ -80,7 +80,7 @@ def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[
         q0 = np.array(given, dtype=np.float64)
         if len(q0) != n_q:
             raise _wrong(file, "expansion.q", f"{len(q0)} values for {n_q} coordinates")
-        return q0, f"expansion point: {shown_point(model.q_names, q0)}, as the case asks"
+        return q0, f"expansion point: {shown_point(model.q_names, q0)}, from the case file"
     if trajectory is None:
         if n_q == 0:
             return np.zeros(0), ""
@@ -119,7 +119,7 @@ def _y0(file: CaseFile, model: Model) -> tuple[Floats, str]:
         y0 = np.array(given, dtype=np.float64)
         if len(y0) != n_y:
             raise _wrong(file, "expansion.y", f"{len(y0)} values for {n_y} design parameters")
-        return y0, f"expansion design: {shown_point(model.y_names, y0)}, as the case asks"
+        return y0, f"expansion design: {shown_point(model.y_names, y0)}, from the case file"
     y0 = np.array([0.5 * (p.min + p.max) for p in file.design.parameters.values()])
     return y0, f"expansion design: {shown_point(model.y_names, y0)}, the middle of the bounds"
 

@@ -293,11 +293,27 @@ def test_figures_are_written_in_every_format_asked_for(capsys: Captured) -> None
     assert arguments.FORMATS == style.FORMATS
 
 
-@pytest.mark.parametrize("formats", ["gif", "png,none", "", "png,,svg"])
-def test_unknown_formats_of_figures_are_named(capsys: Captured, formats: str) -> None:
+@pytest.mark.parametrize(
+    ("formats", "words"),
+    [
+        ("gif", "'gif' is not one of png, svg, pdf (or none)"),
+        ("png,none", "none cannot be combined with other formats"),
+        ("", "'' is not one of png, svg, pdf (or none)"),
+        ("png,,svg", "'' is not one of png, svg, pdf (or none)"),
+    ],
+)
+def test_wrong_formats_of_figures_are_named(capsys: Captured, formats: str, words: str) -> None:
     assert main(["optimize", "good.yaml", "--figures", formats]) == 2
-    assert "is not one of png, svg, pdf (or none, alone)" in capsys.readouterr().err
+    assert words in capsys.readouterr().err
     assert not Path("results").exists()
+
+
+def test_formats_of_figures_ask_for_a_drawing(capsys: Captured) -> None:
+    """``modes --figures svg`` draws as ``--draw`` does; without either nothing is written."""
+    assert main(["modes", "good.yaml"]) == 0
+    assert not Path("results").exists()
+    assert main(["modes", "good.yaml", "--count", "1", "--figures", "svg"]) == 0
+    assert Path("results/good_modes/figures/mode_1.svg").exists()
 
 
 def test_a_run_without_figures_does_not_load_matplotlib() -> None:

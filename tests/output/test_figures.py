@@ -103,7 +103,7 @@ def test_the_assignment_shows_target_frequencies_and_distances(paper):
     assert below.get_xlabel() == "time [s]"
     assert legend(figure) == [
         "target",
-        "original (worst 6.00 %)",
+        "initial (worst 6.00 %)",
         "optimal, exact (worst 1.00 %)",
         "optimal, predicted (worst 1.00 %)",
     ]

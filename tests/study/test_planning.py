@@ -26,7 +26,7 @@ def test_what_the_case_asks_for_is_taken(tmp_path: Path) -> None:
     assert plan.q0.tolist() == [1.817, 5.312]
     assert plan.y0.tolist() == [0.125, 0.125]
     assert (plan.order, plan.modes) == (4, (1,))
-    assert all("as the case asks" in note for note in plan.notes)
+    assert all("from the case file" in note for note in plan.notes)
 
 
 def test_auto_takes_the_most_central_pose_the_middle_of_the_bounds_and_the_target_modes(

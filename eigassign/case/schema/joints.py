@@ -25,6 +25,8 @@ class JointBase(Part):
     freedoms: ClassVar[tuple[str, ...]]  # names of its coordinates: what `component` may be
     planar: ClassVar[bool] = False  # whether planar mechanisms may have it
     travels: ClassVar[bool] = False  # whether its base is a beam along which it moves
+    slides: ClassVar[bool] = False  # whether it moves along its axis
+    advances: ClassVar[bool] = False  # whether a full turn moves something on
 
     type: str
     base: str
@@ -57,6 +59,7 @@ class PrismaticJoint(JointBase):
 
     freedoms = ("translation",)
     planar = True
+    slides = True
     type: Literal["prismatic"]
     axis: Direction | None = None
 
@@ -65,6 +68,7 @@ class CylindricalJoint(JointBase):
     """Free to slide along and turn about `axis` (z unless given)."""
 
     freedoms = ("translation", "rotation")
+    slides = True
     type: Literal["cylindrical"]
     axis: Direction | None = None
 
@@ -73,6 +77,8 @@ class ScrewJoint(JointBase):
     """Turns about `axis` (z unless given) and slides along it by `lead` (m) a turn."""
 
     freedoms = ("rotation",)
+    slides = True
+    advances = True
     type: Literal["screw"]
     axis: Direction | None = None
     lead: Lead
@@ -113,6 +119,7 @@ class CarriageJoint(JointBase):
     freedoms = ("translation",)
     planar = True
     travels = True
+    slides = True
     type: Literal["carriage"]
 
 
@@ -124,6 +131,8 @@ class NutJoint(JointBase):
 
     freedoms = ("translation",)
     travels = True
+    slides = True
+    advances = True
     type: Literal["nut"]
     lead: Lead
 
@@ -143,6 +152,8 @@ Joint: TypeAlias = Annotated[
 JOINTS: dict[str, type[JointBase]] = kinds(Joint)  # type: ignore[assignment]
 FREEDOMS = {kind: model.freedoms for kind, model in JOINTS.items()}
 RIDING = tuple(kind for kind, model in JOINTS.items() if model.travels)
+SLIDING = tuple(kind for kind, model in JOINTS.items() if model.slides)
+ADVANCING = tuple(kind for kind, model in JOINTS.items() if model.advances)
 PLANAR = tuple(kind for kind, model in JOINTS.items() if model.planar)
 
 

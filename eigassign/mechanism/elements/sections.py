@@ -17,7 +17,7 @@ from eigassign.series.expression import Scalar, is_constant
 Lookup = Callable[[str, float], Scalar]
 # Energy values of κ for a solid circle and a rectangle, the thin-walled limit for a tube, a typical
 # rolled profile; they do not depend on ν. A bare section may state its own.
-SHEAR = {"circle": 0.9, "tube": 0.5, "rectangle": 5.0 / 6.0, "i_profile": 0.44}
+SHEAR = {"circle": 0.9, "tube": 0.5, "rectangle": 5.0 / 6.0, "i_profile": 0.44, "bare": 5.0 / 6.0}
 
 
 class SectionValues(NamedTuple):
@@ -38,7 +38,7 @@ def section_values(section: Any, number: Lookup) -> SectionValues:
     along y): A = bh, I_z = bh³/12, I_y = hb³/12, J by Saint-Venant's series as fitted by Roark
     (Formulas for Stress and Strain, table 10.7); I-profile: three rectangles, J = Σ bt³/3.
     """
-    kappa = SHEAR.get(section.shape, 5.0 / 6.0)
+    kappa = SHEAR[section.shape]
     match section.shape:
         case "circle":
             area, inertia = _circle(number("diameter", section.diameter))
@@ -49,7 +49,9 @@ def section_values(section: Any, number: Lookup) -> SectionValues:
             return _rectangle(section, number, kappa)
         case "i_profile":
             return _i_profile(section, number, kappa)
-    return _bare(section, number, kappa)
+        case "bare":
+            return _bare(section, number, kappa)
+    raise NotImplementedError(f"no properties are defined for sections of shape {section.shape!r}")
 
 
 def _round(area: Scalar, inertia: Scalar, kappa: float) -> SectionValues:

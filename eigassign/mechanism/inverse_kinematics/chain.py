@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
-from eigassign.case.schema.joints import FREEDOMS
+from eigassign.case.schema.joints import ADVANCING, FREEDOMS
 from eigassign.mechanism.kinematics.forward import Kinematics, shifted, walk
 from eigassign.mechanism.kinematics.loop_closure import closure_rows, reference_coordinates
 from eigassign.mechanism.kinematics.parameters import ModelParameters, node_position
@@ -111,8 +111,6 @@ def _solved(A: Floats, B: Floats) -> Floats:
 
 
 # --- the chain of a tip, built from the kinematics of its case
-
-ADVANCING = ("screw", "nut")  # a full turn of theirs moves something on
 
 
 def tip_chain(

@@ -56,7 +56,9 @@ def joint_motion(joint: Any, values: Sequence[Scalar]) -> JointMotion:
             return _universal(joint, values)
         case "spherical":
             return _spherical(values)
-    return JointMotion(_eye(), none, np.zeros((6, 0), dtype=object))
+        case "fixed":
+            return JointMotion(_eye(), none, np.zeros((6, 0), dtype=object))
+    raise NotImplementedError(f"no motion is defined for joints of type {joint.type!r}")
 
 
 def turned(motion: JointMotion) -> JointMotion:

@@ -3,7 +3,7 @@
 In reading order:
 
     condensation  the modes as data, and the condensed mass M_c
-    massless      how many modes have mass, and all of them to the digits that arithmetic leaves
+    massless      counts the modes with mass, and solves nearly massless models to full precision
     dense         small pencils: many samples at once, or one through LAPACK
     sparse        large pencils: Lanczos with one sparse factorisation
     solver        the dispatcher: dense or sparse, and as many modes as there are

@@ -4,6 +4,6 @@ Reading order:
 
     path    a trajectory as axes v ∈ [−1, 1] between its corners, with nodes
     region  a trajectory or a box of q, times a box of y, as axes
-    source  what is asked for frequencies, and its own error
+    source  where a fit takes frequencies from: a model, a reduced model or an expansion
     fit     the polynomial that answers in its place
 """

@@ -187,10 +187,10 @@ def draw_comparison(
 
 
 def assignment(results: RunResults, target: TargetStudy) -> FigurePlan:
-    """Target, original and optimal frequency in time, and their distance to the target."""
+    """Target, initial and optimal frequency in time, and their distance to the target."""
     return FigurePlan(
         f"assignment_mode_{target.mode}{_suffix(results)}",
-        f"Mode {target.mode}: original, optimal and target frequency{_where(results)}",
+        f"Mode {target.mode}: initial, optimal and target frequency{_where(results)}",
         f"Worst distance to the target {percent(target.initial.max_relative)} before and "
         f"{percent(target.exact.max_relative)} after, "
         f"where the expansion predicted {percent(target.predicted.max_relative)}.",
@@ -204,7 +204,7 @@ def draw_assignment(results: RunResults, target: TargetStudy) -> Figure:
     title = f"Mode {target.mode}: assigned frequency{_where(results)}"
     figure, (above, below) = stacked(title, "time [s]", (2.0, 1.35))
     curves = [
-        (target.initial_hz, INITIAL, "original", target.initial),
+        (target.initial_hz, INITIAL, "initial", target.initial),
         (target.exact_hz, OPTIMAL, "optimal, exact", target.exact),
         (target.predicted_hz, PREDICTED, "optimal, predicted", target.predicted),
     ]
@@ -260,7 +260,7 @@ def draw_other_modes(results: RunResults, others: OtherModes) -> Figure:
     legend_above(
         axes,
         [
-            Line2D([], [], color=style.BLACK, **before, label="original design"),
+            Line2D([], [], color=style.BLACK, **before, label="initial design"),
             Line2D([], [], color=style.BLACK, **after, label="optimal design"),
         ],
     )
