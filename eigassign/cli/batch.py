@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from eigassign.cli import arguments
+import eigassign.cli.arguments as arguments
 from eigassign.cli.reporter import Reporter, reporting
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from eigassign.cli import arguments
+import eigassign.cli.arguments as arguments
 from eigassign.errors import UsageError
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+import eigassign.cli.arguments as arguments
 from eigassign import process
-from eigassign.cli import arguments
 from eigassign.cli.reporter import print_json, reporting
 from eigassign.errors import EigassignError
 

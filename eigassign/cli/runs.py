@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+import eigassign.cli.arguments as arguments
 from eigassign import process
-from eigassign.cli import arguments
 from eigassign.cli.reporter import Reporter, print_json, reporting
 from eigassign.errors import EigassignError
 
