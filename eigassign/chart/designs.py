@@ -6,9 +6,7 @@
     SLSQP, differential evolution  SciPy's searches on exact eigenvalues
 
 The objective J is that of eqs. (13)–(14): the weighted mean square of the relative error in λ. Its
-slope for SLSQP is that of the exact eigenvalues, without a further eigensolve:
-
-    ∂λ/∂y = φᵀ (∂K/∂y − λ ∂M/∂y) φ,   φᵀ M φ = 1,   ∂K/∂y = Σ_j K_j ∂θ_j/∂y
+slope for SLSQP is that of the exact eigenvalues (`eigassign.modal.slopes`).
 """
 
 from __future__ import annotations
@@ -39,10 +37,9 @@ from eigassign.chart.question import SEED
 from eigassign.chart.results import DesignRun, Timing, excess_over
 from eigassign.chart.timing import measure
 from eigassign.errors import EigassignError
-from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.modal.exact.solver import modes_at
 from eigassign.modal.expansion import expand
+from eigassign.modal.slopes import eigenvalue_slopes
 from eigassign.study.assignment import (
     WantedFrequency,
     assign_design,
@@ -57,7 +54,6 @@ ROUNDS = 12  # programs in a row at most
 STILL = 1e-7  # of the box: a design that moves less has arrived
 CHARTED_ONLY = "charted only"  # `optimize` solves one program, on the expansion
 REDUCED_STEP = 1e-4  # of central differences of reduced models, relative to the box
-THETA_STEP = 1e-5  # of central differences of θ, relative to the box: right to about 1e-10
 
 
 def chart_designs(
@@ -363,8 +359,9 @@ def _search(
         if not analytic:
             return task.objective(task.exact_lam(y)), None
         x = task.scene.model.x(task.q, y)
-        lam, rates = eigenvalue_slopes(task.scene.model.pencil, x, task.count, width)
-        return task.objective(lam), task.slope(lam, rates) * width
+        scales = np.append(np.zeros(task.q.shape[1]), width)
+        lam, rates = eigenvalue_slopes(task.scene.model.pencil, x, task.count, scales)
+        return task.objective(lam), task.slope(lam, rates[..., task.q.shape[1] :]) * width
 
     start = np.clip((task.scene.initial - lower) / np.where(width > 0.0, width, 1.0), 0.0, 1.0)
     record = SearchRecord(objective, _unit_limits(task), most)
@@ -395,35 +392,3 @@ def _unit_limits(task: DesignTask) -> UnitLimits:
     C = np.array([row.coefficients for row in rows]).reshape(len(rows), len(lower))
     low, high = (np.array([getattr(row, side) for row in rows]) for side in ("lower", "upper"))
     return UnitLimits(C * width, low - C @ lower, high - C @ lower)
-
-
-def eigenvalue_slopes(
-    pencil: Pencil, x: Floats, count: int, ranges: Floats
-) -> tuple[Floats, Floats]:
-    """λ (n, count) and ∂λ/∂y (n, count, n_y) of the lowest elastic modes at x (n, n_x).
-
-    A parameter whose range (``ranges``, (n_y,)) is 0 is kept: its derivatives are 0.
-    """
-    theta = pencil.theta(x)
-    found = modes_at(pencil, theta, count)
-    slopes = theta_slopes(pencil, x, ranges)
-    moving = np.flatnonzero(np.abs(slopes).max(axis=(0, 2)) > 0.0)
-    stiffness, mass = pencil.stiffness[:, moving], pencil.mass[:, moving]
-    result = np.empty((len(x), count, len(ranges)))
-    for mode in range(count):
-        phi = found.phi[:, :, mode]
-        products = phi[:, pencil.rows] * phi[:, pencil.columns]
-        forms = products @ stiffness - found.lam[:, [mode]] * (products @ mass)
-        result[:, mode] = np.einsum("nt,jtn->nj", forms, slopes[:, moving])
-    return found.lam, result
-
-
-def theta_slopes(pencil: Pencil, x: Floats, ranges: Floats) -> Floats:
-    """∂θ/∂y (n_y, n_theta, n) at x (n, n_x) by central differences; ``ranges`` set the steps."""
-    slopes = np.zeros((len(ranges), pencil.n_theta, len(x)))
-    for j in np.flatnonzero(ranges):
-        step = np.zeros(x.shape[1])
-        step[pencil.n_q + j] = THETA_STEP * ranges[j]
-        ahead, behind = pencil.theta(x + step), pencil.theta(x - step)
-        slopes[j] = (ahead - behind) / (2.0 * THETA_STEP * ranges[j])
-    return slopes

@@ -4,6 +4,7 @@ In reading order:
 
     arguments    samples of (q, y), modes and orders as callers give them, checked
     exact        exact elastic modes
+    slopes       slopes of exact eigenvalues in coordinates and design
     projection   the pencil's terms projected on a basis
     taylor       Taylor coefficients of eigenvalues and eigenvectors (eqs. (4)-(6))
     reduced      Ritz on the Taylor vectors, with an error estimate

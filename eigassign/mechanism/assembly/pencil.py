@@ -115,11 +115,15 @@ class Pencil:
         Raises TravelError where a carriage or nut leaves its beam.
         """
         x = np.atleast_2d(x)
-        z = self.to_program @ x.T + self.shift[:, None]
         if self.rails is not None:
-            self.rails.require(z, x)
+            self.rails.require(self.to_program @ x.T + self.shift[:, None], x)
+        return self.theta_anywhere(x)
+
+    def theta_anywhere(self, x: Floats) -> Floats:
+        """The same on both sides of where a carriage's beam ends, as a difference needs it."""
         theta = np.empty((self.n_theta, len(x)))
-        theta[0], theta[1:] = 1.0, self.program.run(Samples(), z)
+        theta[0] = 1.0
+        theta[1:] = self.program.run(Samples(), self.to_program @ x.T + self.shift[:, None])
         return theta
 
     def theta_series(self, space: LowerSet, x0: Floats, directions: Floats) -> Floats:

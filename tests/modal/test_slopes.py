@@ -1,0 +1,46 @@
+"""Slopes of eigenvalues and of the coefficient functions are what they say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scenes import SHIPPED, scene_of
+
+from eigassign.modal.exact.solver import eigenvalues
+from eigassign.modal.slopes import eigenvalue_slopes, theta_slopes
+from eigassign.series.multi_index import total_degree
+from eigassign.study.scene import Scene
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    return scene_of(tmp_path_factory.mktemp("arm"), SHIPPED)
+
+
+def test_slopes_of_the_coefficient_functions_are_those_of_their_series(arm: Scene) -> None:
+    pencil, scales = arm.model.pencil, np.array([0.0, 0.0, 0.25, 0.25])
+    x = np.array([1.8, 5.2, 0.1, 0.2])
+    space = total_degree(2, 1)
+    series = pencil.theta_series(space, x, pencil.to_program[:, 2:])[:, space.units]
+    found = theta_slopes(pencil.theta, x[None], scales)[2:, :, 0].T
+    np.testing.assert_allclose(found, series, atol=1e-8 * np.abs(series).max())
+
+
+def test_eigenvalue_slopes_are_those_of_finite_differences(arm: Scene) -> None:
+    pencil = arm.model.pencil
+    x = np.array([[1.8, 5.2, 0.1, 0.2], [1.9, 5.4, 0.0, 0.05]])
+    lam, slopes = eigenvalue_slopes(pencil, x, 2, np.array([1.0, 1.0, 0.25, 0.25]))
+    np.testing.assert_allclose(lam, eigenvalues(pencil, x, 2), rtol=1e-10)
+    for j in range(4):
+        step = np.zeros(4)
+        step[j] = 1e-5
+        off = (eigenvalues(pencil, x + step, 2) - eigenvalues(pencil, x - step, 2)) / 2e-5
+        np.testing.assert_allclose(slopes[:, :, j], off, rtol=1e-5, atol=1e-3)
+
+
+def test_a_parameter_without_room_has_no_slope_and_spoils_none(arm: Scene) -> None:
+    x = np.array([[1.8, 5.2, 0.1, 0.2]])
+    both = eigenvalue_slopes(arm.model.pencil, x, 1, np.array([0.0, 0.0, 0.25, 0.25]))[1]
+    one = eigenvalue_slopes(arm.model.pencil, x, 1, np.array([0.0, 0.0, 0.0, 0.25]))[1]
+    assert one[0, 0, 2] == 0.0
+    np.testing.assert_allclose(one[:, :, 3], both[:, :, 3], rtol=1e-12)
