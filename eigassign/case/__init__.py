@@ -5,6 +5,7 @@ In reading order, each importing only from those above it:
     suggestions  wording of error messages: what was found, what was probably meant
     reader       bytes → plain data (a tree) with the line and column of every key
     units        quantities with units, dimension-checked → SI
+    table        a table in a CSV file → columns in SI
     schema       what each key may hold: one pydantic model for each part of a case file
     rules        what keys must have in common, over the plain data; what looks like a slip
     canonical    content of a case → canonical YAML text that reads back equal

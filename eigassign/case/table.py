@@ -1,0 +1,195 @@
+"""A table in a CSV file: a header `time [ms], q1 [deg], mode`, then one line a row.
+
+Columns may stand in any order; SI units are meant where none is written. Columns with other names
+are ignored with a note. Blank lines and lines that begin with `#` are skipped.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+from eigassign.case.suggestions import listed, shown, suggestion
+from eigassign.case.units import Dimension, QuantityError, Unit, parse_unit
+from eigassign.errors import MechanismError
+
+_HEADER_CELL = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
+_NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+_LARGEST = 100_000_000  # bytes: far more than anybody's table, less than memory
+_MOST = 1_000_000  # rows
+_PLAIN = Unit(Fraction(1), (0, 0, 0, 0, 0))
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column to be read: numbers of one of these dimensions, or words where it has none.
+
+    The first dimension is meant where the header gives no unit.
+    """
+
+    name: str
+    dimensions: tuple[Dimension, ...] = ()
+    optional: bool = False
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns by their name, the line each row stands in, and what was passed over."""
+
+    file: str
+    lines: tuple[int, ...]  # (n,) counted from 1
+    numbers: Mapping[str, tuple[float, ...]]  # (n,) in SI units
+    words: Mapping[str, tuple[str, ...]]
+    dimensions: Mapping[str, Dimension]  # which one each column of numbers has
+    notes: tuple[str, ...]
+
+    def where(self, k: int) -> str:
+        """``file:line`` of row k."""
+        return f"{self.file}:{self.lines[k]}"
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A column in the header; the unit of its numbers, None for words."""
+
+    name: str
+    index: int
+    unit: Unit | None
+    dimension: Dimension | None
+
+
+def read_table(
+    file: Path,
+    key: str,
+    columns: Sequence[Column],
+    row_error: Callable[[str, str, int], MechanismError] = lambda key, text, _: MechanismError(
+        key, text
+    ),
+    known: Collection[str] = (),
+) -> Table:
+    """The ``columns`` of a CSV file; ``known`` others are ignored without a note.
+
+    ``key`` of the case names the file. Raises MechanismError at ``key`` if the file cannot be read
+    or has a wrong header, and ``row_error(key, message, row)`` for a row that does not hold what
+    the header promises; both name the line.
+    """
+    rows = _rows(_text(file, key), file.name, key)
+    line, header = next(rows, (1, []))
+    if not header:
+        raise MechanismError(key, f"{file.name}: is empty; a header and rows are expected")
+    where = f"{file.name}:{line}"
+    names = [_split(cell, where, key) for cell in header]
+    present = {name for name, _ in names}
+    found = [
+        _found(column, names, where, key)
+        for column in columns
+        if column.name in present or not column.optional
+    ]
+    lines, values = [], list[list[float | str]]([] for _ in found)
+    for k, (number, row) in enumerate(rows):
+        try:
+            for column, value in zip(values, _values(row, found, len(header), k), strict=True):
+                column.append(value)
+        except ValueError as error:
+            raise row_error(key, f"{file.name}:{number}: {error}", k) from error
+        lines.append(number)
+    both = list(zip(found, values, strict=True))
+    used = {column.index for column in found}
+    passed_over = [n for i, (n, _) in enumerate(names) if i not in used and n not in known]
+    extra = listed(name or "(no name)" for name in passed_over)
+    return Table(
+        file=file.name,
+        lines=tuple(lines),
+        numbers={c.name: tuple(map(float, v)) for c, v in both if c.unit},
+        words={c.name: tuple(map(str, v)) for c, v in both if not c.unit},
+        dimensions={c.name: c.dimension for c in found if c.dimension},
+        notes=(f"{file.name}: ignored the columns {extra}",) if passed_over else (),
+    )
+
+
+def _text(file: Path, key: str) -> str:
+    try:
+        if file.stat().st_size > _LARGEST:
+            raise MechanismError(key, f"{file.name}: larger than {_LARGEST // 10**6} MB")
+        text = file.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise MechanismError(key, f"{file}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise MechanismError(key, f"{file.name}: is not a text file in UTF-8") from error
+    if "\0" in text:
+        raise MechanismError(key, f"{file.name}: is not a text file (it contains zero bytes)")
+    return text
+
+
+def _rows(text: str, name: str, key: str) -> Iterator[tuple[int, list[str]]]:
+    """Line number and cells of every line that says something."""
+    reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
+    try:
+        for row in reader:
+            cells = [cell.strip() for cell in row]
+            if any(cells) and not cells[0].startswith("#"):
+                yield reader.line_num, cells
+    except csv.Error as error:
+        raise MechanismError(key, f"{name}:{reader.line_num}: {error}") from error
+
+
+def _split(cell: str, where: str, key: str) -> tuple[str, str]:
+    """``"q1 [deg]"`` → ``("q1", "deg")``."""
+    match = _HEADER_CELL.fullmatch(cell)
+    if match is None:
+        raise MechanismError(
+            key, f"{where}: column {shown(cell)} must read `name` or `name [unit]`"
+        )
+    return match.group(1), match.group(2) or ""
+
+
+def _found(column: Column, names: Sequence[tuple[str, str]], where: str, key: str) -> _Found:
+    """The one column of that name, with its unit."""
+    name, known = column.name, [other for other, _ in names]
+    if known.count(name) != 1:
+        raise MechanismError(key, f"{where}: {_miscounted(name, known)}")
+    index = known.index(name)
+    if not column.dimensions:
+        return _Found(name, index, None, None)
+    first, written = column.dimensions[0], names[index][1]
+    try:
+        unit = parse_unit(written or first.si, first) if written or first.si else _PLAIN
+    except QuantityError as error:
+        raise MechanismError(key, f"{where}: column {name}: {error}") from error
+    for dimension in column.dimensions:
+        if unit.exponents == dimension.exponents:
+            return _Found(name, index, unit, dimension)
+    kinds = " or ".join(map(str, column.dimensions))
+    raise MechanismError(key, f"{where}: column {name}: [{written}] is no unit of {kinds}")
+
+
+def _miscounted(name: str, known: Sequence[str]) -> str:
+    if name in known:
+        return f"column {name} appears {known.count(name)} times"
+    hint = suggestion(name, known)
+    if len(known) == 1 and re.search(r"[;\t ]", known[0]):
+        hint = "; columns are separated by commas"
+    return f"no column {name}; the columns are {listed(known)}{hint}"
+
+
+def _values(row: list[str], columns: Sequence[_Found], n: int, k: int) -> Iterator[float | str]:
+    """One row in SI units; raises ValueError with what is wrong with it."""
+    if k >= _MOST:
+        raise ValueError(f"more than {_MOST} rows")
+    if len(row) != n:
+        raise ValueError(f"{len(row)} values for {n} columns")
+    for column in columns:
+        cell = row[column.index]
+        if column.unit is None:
+            yield cell
+            continue
+        value = float(cell) if _NUMBER.fullmatch(cell) else math.nan
+        if not math.isfinite(value):
+            raise ValueError(f"column {column.name}: {shown(cell)} is not a finite number")
+        yield column.unit.to_si(value)
