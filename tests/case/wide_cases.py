@@ -52,7 +52,7 @@ mechanism:
     guess: {B: -75 deg, guide: 500 mm, pin: 0}
 coordinates:
   turn: {joint: A, component: rotation}
-  place: {joint: ride, drive: {stiffness: 3 kN/m}}
+  place: {joint: ride, drive: {stiffness: 3 kN/m, inertia: 200 g}}
 trajectory:
   q: [[10 deg, 300 mm], [20 deg, 0.4]]
   duration: 1

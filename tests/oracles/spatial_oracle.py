@@ -584,9 +584,12 @@ class Builder:
             c = self.new(1)
             for i in range(6):
                 self.rows[first + i][c] = -A[i, k]
-            if isinstance(drive, dict):
+            held = isinstance(drive, dict) and "stiffness" in drive
+            if held:
                 self.K.append((np.array([c]), np.array([[drive["stiffness"]]])))
-            free += drive == "free"
+            if isinstance(drive, dict) and "inertia" in drive:
+                self.M.append((np.array([c]), np.array([[drive["inertia"]]])))
+            free += drive != "passive" and not held
         return free
 
 

@@ -1,8 +1,8 @@
 """Design parameters: which number of the mechanism a path names, and whether its bounds make sense.
 
 A path is `materials.<name>.<property>` and the like below `mechanism`, or
-`coordinates.<name>.drive.stiffness`. What can vary follows from the models of the schema: every
-field that is one real number.
+`coordinates.<name>.drive.stiffness` (or `inertia`). What can vary follows from the models of the
+schema: every field that is one real number.
 """
 
 from __future__ import annotations
@@ -30,8 +30,16 @@ _GROUPS = {
 }
 _FORMS = (
     "expected materials.<name>.<property>, sections.<name>.<property>, links.<name>.length, "
-    "bodies.<name>.<property>, springs.<name>.<property> or coordinates.<name>.drive.stiffness"
+    "bodies.<name>.<property>, springs.<name>.<property>, coordinates.<name>.drive.stiffness or "
+    "coordinates.<name>.drive.inertia"
 )
+DRIVEN = {  # of a drive: what it is where the joint turns, and where it slides
+    "stiffness": (
+        quantity("rotational stiffness", above=0),
+        quantity("stiffness", above=0),
+    ),
+    "inertia": (quantity("rotary inertia", at_least=0), quantity("mass", at_least=0)),
+}
 _FIXED = {"roll", "reduce_to", "angle"}  # real numbers that the mechanism is built with
 
 
@@ -56,8 +64,8 @@ def property_at(tree: Tree, path: str) -> Property | None:
     group, *rest = path.split(".")
     if group == "mechanism" and rest and rest[0] in _GROUPS:
         raise NoPropertyError(f"paths start below mechanism: write {'.'.join(rest)!r}")
-    if group == "coordinates" and len(rest) == 3 and rest[1:] == ["drive", "stiffness"]:
-        return _drive_stiffness(tree, rest[0])
+    if group == "coordinates" and len(rest) == 3 and rest[1] == "drive" and rest[2] in DRIVEN:
+        return _of_drive(tree, rest[0], rest[2])
     if group not in _GROUPS or len(rest) != 2:
         hint = suggestion(group, (*_GROUPS, "coordinates")) if group not in _GROUPS else ""
         raise NoPropertyError(f"{_FORMS}; got {path!r}{hint}")
@@ -135,23 +143,24 @@ def _quantity(annotation: Any, metadata: Sequence[object]) -> Quantity | None:
     return next((q for kind, *more in inner if (q := _quantity(kind, more)) is not None), None)
 
 
-def _drive_stiffness(tree: Tree, name: str) -> Property:
+def _of_drive(tree: Tree, name: str, key: str) -> Property:
     if name not in (known := names(tree, "coordinates")):
         raise NoPropertyError(unknown("coordinate", name, known))
-    written = at(tree, "coordinates", name, "drive", "stiffness")
+    written = at(tree, "coordinates", name, "drive", key)
     if written is None:
         raise NoPropertyError(
-            f"coordinate {name!r} has no drive stiffness: write drive: {{stiffness: ... N m/rad}}"
+            f"coordinate {name!r} has no drive {key}: write drive: {{{key}: ...}}"
         )
-    return Property(drive_quantity(tree, at(tree, "coordinates", name)), written)
+    return Property(drive_quantity(tree, at(tree, "coordinates", name), key), written)
 
 
-def drive_quantity(tree: Tree, coordinate: object) -> Quantity:
-    """What the drive stiffness of a coordinate is."""
+def drive_quantity(tree: Tree, coordinate: object, key: str) -> Quantity:
+    """What the stiffness or inertia of a coordinate's drive is."""
     freedom = driven(tree, coordinate)
     if freedom is None:
         return ANY
-    return quantity("stiffness" if freedom == "translation" else "rotational stiffness", above=0)
+    turning, sliding = DRIVEN[key]
+    return sliding if freedom == "translation" else turning
 
 
 # --- Rules

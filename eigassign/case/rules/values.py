@@ -24,7 +24,7 @@ from eigassign.case.rules.lookups import (
     parameters,
     trajectories,
 )
-from eigassign.case.rules.properties import Property, drive_quantity, properties
+from eigassign.case.rules.properties import DRIVEN, Property, drive_quantity, properties
 from eigassign.case.schema.parts import Quantity
 from eigassign.case.suggestions import shown
 from eigassign.case.units import QuantityError, read
@@ -99,8 +99,9 @@ def _undecided(tree: Tree) -> Iterator[Undecided]:
     yield from _in_list(span, kinds, ("validation", "q_span"))
     yield from _of_assembly(tree)
     for name, body in items(tree, "coordinates"):
-        path = ("coordinates", name, "drive", "stiffness")
-        yield path, at(body, "drive", "stiffness"), drive_quantity(tree, body)
+        for key in DRIVEN:
+            path = ("coordinates", name, "drive", key)
+            yield path, at(body, "drive", key), drive_quantity(tree, body, key)
 
 
 def _of_design(tree: Tree, known: Mapping[str, Property | None]) -> Iterator[Undecided]:

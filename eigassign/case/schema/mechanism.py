@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal, Self, TypeAlias
+
+from pydantic import model_validator
 
 from eigassign.case.schema.joints import Joint
 from eigassign.case.schema.links import Link
@@ -16,6 +18,7 @@ from eigassign.case.schema.parts import (
     Quantity,
     ValueOr,
     quantity,
+    wrong,
 )
 from eigassign.case.schema.sections import Material, Section
 from eigassign.case.schema.vectors import Angle, Inertia, Orientation, Vector
@@ -62,11 +65,30 @@ class Assembly(Part):
 
 
 class Drive(Part):
-    """A joint held by a spring of the given stiffness: N m/rad, or N/m where it slides."""
+    """A motor on a joint: a spring that holds it, and the inertia reflected through its gear.
 
-    stiffness: Annotated[
-        float, Quantity(above=0, elsewhere="stiffness (N m/rad, or N/m where the joint slides)")
-    ]
+    Both act on the joint's own motion, follower against base: N m/rad and kg m2, or N/m and kg
+    where it slides. Without a stiffness the joint is free.
+    """
+
+    stiffness: (
+        Annotated[
+            float, Quantity(above=0, elsewhere="stiffness (N m/rad, or N/m where the joint slides)")
+        ]
+        | None
+    ) = None
+    inertia: (
+        Annotated[
+            float, Quantity(at_least=0, elsewhere="inertia (kg m2, or kg where the joint slides)")
+        ]
+        | None
+    ) = None
+
+    @model_validator(mode="after")
+    def _acts(self) -> Self:
+        if self.stiffness is None and self.inertia is None:
+            raise wrong("a drive needs stiffness, inertia or both; else write free or locked")
+        return self
 
 
 class Coordinate(Part):
@@ -80,6 +102,13 @@ class Coordinate(Part):
     component: Literal[1, 2, 3, "rotation", "translation"] | None = None
     angle: Literal["relative", "absolute"] = "relative"
     drive: ValueOr[Literal["free", "locked"], Drive] = "free"
+
+    @property
+    def moves(self) -> Literal["free", "held", "locked"]:
+        """Whether it moves freely, against the drive's stiffness, or not at all."""
+        if isinstance(self.drive, str):
+            return self.drive
+        return "free" if self.drive.stiffness is None else "held"
 
 
 class Mechanism(Part):

@@ -40,8 +40,8 @@ def kinematics(case: CaseFile, parameters: ModelParameters) -> Kinematics:
     """
     tree = build_tree(case)
     motion = closed_kinematics(case, parameters, tree, coordinates(case, tree))
-    drives = [c.drive for c in case.coordinates.values()]
-    free = tuple(k for k, i in enumerate(motion.columns) if drives[i] == "free")
+    moves = [c.moves for c in case.coordinates.values()]
+    free = tuple(k for k, i in enumerate(motion.columns) if moves[i] == "free")
     if free and getattr(case.mechanism, "springs", None):
         return separated(case, parameters, motion, free)
     return replace(motion, rigid=free)
@@ -58,7 +58,7 @@ def build_pencil(
     stiffness, mass = AffineEntries(), AffineEntries()
     add_links(stiffness, mass, links, nodes.count)
     add_springs(stiffness, case, parameters, motion, nodes)
-    _add_drives(stiffness, case, parameters, motion, nodes.count)
+    _add_drives(stiffness, mass, case, parameters, motion, nodes.count)
     return _compile(stiffness, mass, case, parameters, motion, nodes.count)
 
 
@@ -159,19 +159,25 @@ def _local_link(placement: Placement, mesh: LinkMesh, nodes: NodeMotions) -> Loc
 
 
 def _add_drives(
-    target: AffineEntries,
+    stiffness: AffineEntries,
+    mass: AffineEntries,
     case: CaseFile,
     parameters: ModelParameters,
     motion: Kinematics,
     n_u: int,
 ) -> None:
-    """Drive stiffness k on the deflection of its joint, which is that coordinate's unknown."""
-    for column, i in enumerate(motion.columns):
-        name, coordinate = tuple(case.coordinates.items())[i]
-        if not isinstance(coordinate.drive, str):
-            path = f"coordinates.{name}.drive.stiffness"
-            stiffness = parameters.number(path, coordinate.drive.stiffness)
-            target.add_small(n_u + column, n_u + column, stiffness)
+    """½ k ṡ² of a held joint and ½ J ṡ² of any driven one, with its rate ṡ = r q̇."""
+    for i, (name, coordinate) in enumerate(case.coordinates.items()):
+        if isinstance(coordinate.drive, str):
+            continue
+        r = motion.coordinates.rates[i]
+        for target, key in ((stiffness, "stiffness"), (mass, "inertia")):
+            given = getattr(coordinate.drive, key)
+            if given is None:
+                continue
+            value = parameters.number(f"coordinates.{name}.drive.{key}", given)
+            for row, column in zip(*np.nonzero(np.outer(r, r)), strict=True):
+                target.add_small(n_u + row, n_u + column, value * (r[row] * r[column]))
 
 
 def _compile(

@@ -34,11 +34,11 @@ class CoordinateMap:
 def coordinates(case: CaseFile, tree: Topology) -> CoordinateMap:
     """The maps of a case."""
     relative, offset = _relative(case, tree)
-    drives = [c.drive for c in case.coordinates.values()]
-    columns = tuple(i for i, drive in enumerate(drives) if drive != "locked")
-    free = tuple(i for i in columns if drives[i] == "free")
+    moves = [c.moves for c in case.coordinates.values()]
+    columns = tuple(i for i, how in enumerate(moves) if how != "locked")
+    free = tuple(i for i in columns if moves[i] == "free")
     rates = np.zeros((len(tree.freedoms), len(columns)))
-    rates[: len(drives)] = _joint_rates(relative, columns, free)
+    rates[: len(moves)] = _joint_rates(relative, columns, free)
     return CoordinateMap(relative, offset, columns, rates)
 
 

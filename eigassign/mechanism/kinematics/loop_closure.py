@@ -324,12 +324,12 @@ def _check_movable(
     F = function.equations(steps, np.repeat(p0[:, None], steps.shape[1], axis=1))[0]
     slope = (F[:, : len(a0)] - F[:, len(a0) :]) / (2.0 * CHANGE)
     unmet = np.linalg.norm(slope - J @ (np.linalg.pinv(J) @ slope), axis=0)
-    drives = [c.drive for c in case.coordinates.values()]
+    moves = [c.moves for c in case.coordinates.values()]
     for k, v in enumerate(used):
-        held = v < len(drives) and drives[v] == "locked"  # the only pose it has is then enough
+        held = v < len(moves) and moves[v] == "locked"  # the only pose it has is then enough
         if unmet[k] > IMMOBILE * np.linalg.norm(slope[:, k]) and not held:
             raise MechanismError(
-                "coordinates" if v < len(drives) else "design",
+                "coordinates" if v < len(moves) else "design",
                 f"{function.names[k]} cannot change at {_at(function.names, a0)}: the loops pose "
                 f"{function.n_equations} conditions, of which the {function.size} passive "
                 "freedom(s) can meet none more. It is a structure, or stretched to a dead point: "

@@ -96,8 +96,9 @@ STUDY = [
     Wrong("component that is no word", "component: rotation}", "¦component: spin}", "coordinates.turn.component", "expected 1, 2, 3, 'rotation' or 'translation', got 'spin'"),
     Wrong("component that is true", "component: rotation}", "¦component: true}", "coordinates.turn.component", "got true"),
     Wrong("absolute stroke", "place: {joint: ride,", "place: {joint: ride, ¦angle: absolute,", "coordinates.place.angle", "only the angle of a revolute joint can be absolute"),
-    Wrong("drive of a slide in N m/rad", "stiffness: 3 kN/m}", "¦stiffness: 3 N m/rad}", "coordinates.place.drive.stiffness", "expected a stiffness (in N/m when bare"),
-    Wrong("slack drive of a slide", "stiffness: 3 kN/m}", "¦stiffness: 0}", "coordinates.place.drive.stiffness", "must be > 0 N/m, got 0"),
+    Wrong("drive of a slide in N m/rad", "stiffness: 3 kN/m,", "¦stiffness: 3 N m/rad,", "coordinates.place.drive.stiffness", "expected a stiffness (in N/m when bare"),
+    Wrong("inertia of a slide's drive in kg m2", "inertia: 200 g}", "¦inertia: 1 kg m2}", "coordinates.place.drive.inertia", "expected a mass"),
+    Wrong("slack drive of a slide", "stiffness: 3 kN/m,", "¦stiffness: 0,", "coordinates.place.drive.stiffness", "must be > 0 N/m, got 0"),
     Wrong("stroke in degrees", "[20 deg, 0.4]", "[20 deg, ¦4 deg]", "trajectory.q[1][1]", "expected a length"),
     Wrong("angle in millimetres", "[20 deg, 0.4]", "[¦20 mm, 0.4]", "trajectory.q[1][0]", "expected an angle"),
     Wrong("expansion stroke in degrees", "q: [15 deg, 35 cm]", "q: [15 deg, ¦35 deg]", "expansion.q[1]", "expected a length"),
@@ -224,7 +225,7 @@ def test_every_mistake_of_a_file_is_told_at_once(tmp_path: Path) -> None:
         ("axis: [1, 0.1]", "axis: [0, 0]"),
         ("translational: 100", "translational: 100 N"),
         ("at: {turn: 60 deg}", "at: {turm: 60 deg}"),
-        ("stiffness: 3 kN/m}", "stiffness: 3 N m/rad}"),
+        ("stiffness: 3 kN/m,", "stiffness: 3 N m/rad,"),
     ):
         text = changed(text, old, new)
     paths = {path for *_, path, _ in problems_of(text, write(tmp_path, text))}

@@ -60,6 +60,7 @@ def test_coordinates_that_slide_are_read_in_metres(tmp_path: Path) -> None:
     assert case.mechanism.assembly.at == {"turn": math.radians(60)}
     assert case.mechanism.assembly.guess["guide"] == 0.5
     assert case.coordinates["place"].drive.stiffness == 3000.0  # type: ignore[union-attr]
+    assert case.coordinates["place"].drive.inertia == 0.2  # type: ignore[union-attr]
     assert isinstance(case.trajectory, SampledTrajectory)
     assert case.trajectory.q == ((math.radians(10), 0.3), (math.radians(20), 0.4))
     assert case.expansion.q == (math.radians(15), 0.35)
