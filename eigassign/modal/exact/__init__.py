@@ -7,6 +7,7 @@ In reading order:
     dense         small pencils: many samples at once, or one through LAPACK
     sparse        large pencils: Lanczos with one sparse factorisation
     solver        the dispatcher: dense or sparse, and as many modes as there are
+    inertia       how many modes lie below a frequency, by pivots alone
     roundoff      how many digits of a frequency the matrices themselves hold
     clusters      neighbouring modes that are expanded together
     tracking      modes followed along a path by their shapes
