@@ -15,6 +15,7 @@ In reading order, each importing only from those above it:
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.loading import load, parse
+from eigassign.case.schema.design import Catalogue, Choices, DesignColumn, Tolerance
 from eigassign.case.schema.document import json_schema
 from eigassign.case.schema.joints import (
     CarriageJoint,
@@ -27,7 +28,19 @@ from eigassign.case.schema.joints import (
 from eigassign.case.schema.links import FrameLink, RigidLink, SuperelementLink, Taper
 from eigassign.case.schema.mechanism import Drive
 from eigassign.case.schema.sections import BareSection, CircleSection, IProfileSection, TubeSection
-from eigassign.case.schema.study import FrequencyProfile, Target
+from eigassign.case.schema.targets import (
+    AtLeastTarget,
+    AtMostTarget,
+    FollowedMode,
+    FrequencyFile,
+    FrequencyProfile,
+    FrequencyTarget,
+    GapTarget,
+    Harmonic,
+    KeepOutTarget,
+    Requirement,
+    TargetForm,
+)
 from eigassign.case.schema.trajectory import (
     FileTrajectory,
     PointTrajectory,
@@ -37,26 +50,39 @@ from eigassign.case.schema.trajectory import (
 )
 
 __all__ = [
+    "AtLeastTarget",
+    "AtMostTarget",
     "BareSection",
     "CarriageJoint",
     "CaseFile",
+    "Catalogue",
+    "Choices",
     "CircleSection",
+    "DesignColumn",
     "Drive",
     "FileTrajectory",
     "FixedJoint",
+    "FollowedMode",
     "FrameLink",
+    "FrequencyFile",
     "FrequencyProfile",
+    "FrequencyTarget",
+    "GapTarget",
+    "Harmonic",
     "IProfileSection",
+    "KeepOutTarget",
     "NutJoint",
     "PointTrajectory",
+    "Requirement",
     "RevoluteJoint",
     "RigidLink",
     "SampledTrajectory",
     "ScrewJoint",
     "SuperelementLink",
     "Taper",
-    "Target",
+    "TargetForm",
     "TipTrajectory",
+    "Tolerance",
     "TrajectoryForm",
     "TubeSection",
     "UniversalJoint",

@@ -6,10 +6,10 @@ import re
 from collections.abc import Mapping
 
 from eigassign.case.reader import resolve
+from eigassign.case.schema.design import Design, Tolerance
 from eigassign.case.schema.joints import JointBase
 from eigassign.case.schema.mechanism import Spring
 from eigassign.case.schema.parts import Part
-from eigassign.case.schema.study import Design
 from eigassign.case.schema.trajectory import Timed
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
@@ -24,8 +24,10 @@ def to_yaml(content: Mapping[str, object]) -> str:
 def plain(value: object) -> object:
     """Objects → mappings, lists, numbers and text, in the shape of the file."""
     if isinstance(value, Design):
-        apart = {"constraints": value.constraints} if value.constraints else {}
-        return plain({**value.parameters, **apart})
+        constraints = value.constraints or None
+        return plain({**value.entries, "constraints": constraints, "mass": value.mass})
+    if isinstance(value, Tolerance):
+        return value.written()
     if isinstance(value, Part):
         fields = {
             f.alias or name: getattr(value, name) for name, f in type(value).model_fields.items()

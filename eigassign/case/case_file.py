@@ -11,11 +11,13 @@ from pathlib import Path
 from eigassign.case.canonical import plain, to_yaml
 from eigassign.case.reader import KeyPath, Mark, dotted
 from eigassign.case.rules.properties import property_at
+from eigassign.case.schema.design import Design
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.joints import freedom_of
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.schema.parts import Quantity
-from eigassign.case.schema.study import Design, ExpansionKeys, Target, ValidationKeys
+from eigassign.case.schema.study import AssignmentKeys, ExpansionKeys, ValidationKeys
+from eigassign.case.schema.targets import Requirement, TargetForm, requirements
 from eigassign.case.schema.trajectory import TrajectoryForm, named_trajectories
 from eigassign.errors import Problem
 
@@ -37,7 +39,8 @@ class CaseFile:
     trajectory: TrajectoryForm | tuple[TrajectoryForm, ...] | None
     design: Design
     expansion: ExpansionKeys
-    targets: tuple[Target, ...]
+    targets: tuple[TargetForm, ...]
+    assignment: AssignmentKeys
     validation: ValidationKeys
     path: Path = field(compare=False)
     sha256: str = field(compare=False)
@@ -77,6 +80,11 @@ class CaseFile:
         """SI unit of each design parameter, in the order of y; empty for a plain number."""
         dimensions = (quantity.dimension for quantity in self.design_quantities)
         return tuple(each.si.replace("·", " ") if each else "" for each in dimensions)
+
+    @cached_property
+    def requirements(self) -> tuple[Requirement, ...]:
+        """The targets, one for each mode that they name."""
+        return requirements(self.targets)
 
     @property
     def trajectories(self) -> tuple[tuple[str, str, TrajectoryForm], ...]:

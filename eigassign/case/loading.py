@@ -19,9 +19,10 @@ from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import MAX_BYTES, Source, read_yaml
 from eigassign.case.rules.consistency import inconsistent, too_many
 from eigassign.case.rules.plausibility import implausible
-from eigassign.case.rules.properties import bounds_hold_no_impossible_section
+from eigassign.case.rules.properties import bounds_hold_no_impossible_section, starts_outside
 from eigassign.case.rules.values import completed
 from eigassign.case.schema.document import Document, validated
+from eigassign.case.schema.targets import FrequencyFile
 from eigassign.case.schema.trajectory import FileTrajectory, named_trajectories
 from eigassign.errors import CaseError, Problem, StorageError, UsageError
 
@@ -79,7 +80,8 @@ def _first(problems: Sequence[Problem]) -> tuple[Problem, ...]:
 
 def _case_file(document: Document, source: Source, data: bytes, path: Path) -> CaseFile:
     content = {name: getattr(document, name) for name in Document.model_fields}
-    warnings = [source.problem(*finding) for finding in implausible(document)]
+    doubts = [*implausible(document), *starts_outside(source.tree, document.design)]
+    warnings = [source.problem(*finding) for finding in doubts]
     return CaseFile(
         **content,
         path=path,
@@ -97,6 +99,8 @@ def attached(document: Document, folder: Path) -> dict[str, str]:
     """
     motions = [motion for _, _, motion in named_trajectories(document.trajectory)]
     named = [motion.file for motion in motions if isinstance(motion, FileTrajectory)]
+    curves = [curve for target in document.targets for _, curve in target.frequencies]
+    named += [curve.file for curve in curves if isinstance(curve, FrequencyFile)]
     for link in document.mechanism.links.values():
         if link.type == "superelement":
             named += [link.stiffness, link.mass]

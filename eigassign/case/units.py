@@ -154,6 +154,21 @@ def read(value: object, dimension: Dimension | None) -> float:
     return si
 
 
+def read_rate(value: object, dimension: Dimension | None) -> float:
+    """``value`` for one SI unit of ``dimension``: a bare number, or text such as `3 / kg`.
+
+    Raises QuantityError as `read` does.
+    """
+    if not isinstance(value, str):
+        return read(value, None)
+    amount, slash, unit_text = value.partition("/")
+    number, rest = _split(amount, None)
+    if not slash or rest:
+        si = dimension.si if dimension and dimension.si else "kg"
+        raise QuantityError(f"expected an amount per unit, such as 3 / {si}, got {shown(value)}")
+    return read(float(number) / _checked(value, unit_text.strip(), dimension).to_si(1.0), None)
+
+
 def _expected(dimension: Dimension | None) -> str:
     if dimension is None:
         return "expected a number"

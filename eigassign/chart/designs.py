@@ -31,6 +31,7 @@ from eigassign.assignment import (
     solve_assignment,
 )
 from eigassign.assignment import Bounds as DesignBounds
+from eigassign.case import CaseFile
 from eigassign.chart.effort import Effort, suited
 from eigassign.chart.methods import points_along, reduced_model, solves_per_point
 from eigassign.chart.question import SEED
@@ -40,14 +41,9 @@ from eigassign.errors import EigassignError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.expansion import expand
 from eigassign.modal.slopes import eigenvalue_slopes
-from eigassign.study.assignment import (
-    WantedFrequency,
-    assign_design,
-    linear_constraints,
-    target_frequencies,
-    time_weights,
-)
+from eigassign.study.assignment import assign_design, linear_constraints
 from eigassign.study.scene import Expansions, Scene
+from eigassign.study.wanted import Wanted, target_frequencies, time_weights
 
 Floats = NDArray[np.float64]
 ROUNDS = 12  # programs in a row at most
@@ -61,7 +57,7 @@ def chart_designs(
 ) -> tuple[tuple[DesignRun, ...], tuple[str, ...]]:
     """Every way to a design; none where the case has no targets or bounds without limit."""
     lower, upper = scene.bounds
-    if not scene.file.targets or not len(lower) or not np.isfinite(upper - lower).all():
+    if not len(lower) or not np.isfinite(upper - lower).all() or not _are_frequencies(scene.file):
         return (), ()
     effort = suited(effort, scene.model.n_dof)
     task, runs, notes = design_task(scene, effort, solve_s), [], []
@@ -78,6 +74,13 @@ def chart_designs(
             notes.append(f"no design by {name}: {error}")
     best = min((run.objective for run in runs), default=0.0)
     return tuple(replace(r, excess=excess_over(best, r.objective)) for r in runs), tuple(notes)
+
+
+def _are_frequencies(file: CaseFile) -> bool:
+    """Whether there are targets, and all are frequencies of numbered modes along a whole motion."""
+    wanted = file.requirements
+    plain = (r.kind == "frequency" and not r.followed and not r.target.during for r in wanted)
+    return bool(wanted) and all(plain) and not file.design.catalogues
 
 
 def _ways(
@@ -105,7 +108,7 @@ class DesignTask:
 
     scene: Scene
     path: Trajectories  # with these samples only
-    wanted: tuple[WantedFrequency, ...]  # at them
+    wanted: tuple[Wanted, ...]  # at them
     rows: NDArray[np.intp]  # which samples of the whole trajectory these are
 
     @property
@@ -121,13 +124,12 @@ class DesignTask:
     @cached_property
     def total_s(self) -> float:
         """The time that all targets stand for, each by its weight."""
-        pairs = zip(self.scene.file.targets, self.wanted, strict=True)
-        return float(sum(t.weight * self.weights[own.rows].sum() for t, own in pairs))
+        return float(sum(own.weight * self.weights[own.rows].sum() for own in self.wanted))
 
     @property
     def count(self) -> int:
         """The highest mode with a target."""
-        return max(target.mode for target in self.scene.file.targets)
+        return max(own.mode for own in self.wanted)
 
     @property
     def box(self) -> tuple[Floats, Floats]:
@@ -142,29 +144,29 @@ class DesignTask:
     def objective(self, lam: Floats) -> float:
         """J, the weighted mean square of the relative error in λ; lam (n_t, highest mode)."""
         value = 0.0
-        for target, own in zip(self.scene.file.targets, self.wanted, strict=True):
-            off = lam[own.rows, target.mode - 1] / lam_from_hz(own.hz) - 1.0
-            value += float(target.weight / self.total_s * self.weights[own.rows] @ off**2)
+        for own in self.wanted:
+            off = lam[own.rows, own.mode - 1] / lam_from_hz(own.hz) - 1.0
+            value += float(own.weight / self.total_s * self.weights[own.rows] @ off**2)
         return value
 
     def slope(self, lam: Floats, slopes: Floats) -> Floats:
         """∂J/∂y (n_y,) from ∂λ/∂y (n_t, highest mode, n_y)."""
         value = np.zeros(slopes.shape[2])
-        for target, own in zip(self.scene.file.targets, self.wanted, strict=True):
-            lam_d, k = lam_from_hz(own.hz), target.mode - 1
+        for own in self.wanted:
+            lam_d, k = lam_from_hz(own.hz), own.mode - 1
             push = self.weights[own.rows] * (lam[own.rows, k] / lam_d - 1.0) / lam_d
-            value += 2.0 * target.weight / self.total_s * push @ slopes[own.rows, k]
+            value += 2.0 * own.weight / self.total_s * push @ slopes[own.rows, k]
         return value
 
     def reached(self, name: str, spent: Timing, solves: int, y: Floats, **more: Any) -> DesignRun:
         """What a way to the design y has reached, by exact solves."""
         lam = self.exact_lam(y)
         worst, square = 0.0, 0.0
-        for target, own in zip(self.scene.file.targets, self.wanted, strict=True):
-            hz, weights = hz_from_lam(lam[own.rows, target.mode - 1]), self.weights[own.rows]
+        for own in self.wanted:
+            hz, weights = hz_from_lam(lam[own.rows, own.mode - 1]), self.weights[own.rows]
             off = relative_error(hz, own.hz, weights)
             worst = max(worst, off.max_relative)
-            square += target.weight * weights.sum() / self.total_s * off.rms_relative**2
+            square += own.weight * weights.sum() / self.total_s * off.rms_relative**2
         return DesignRun(
             method=name,
             seconds=spent,
@@ -228,9 +230,9 @@ def _programs(
     while done < rounds and moved >= STILL:
         l0, slope = _linearised(lam, y, width)
         goals = [
-            Goal(LinearModel(l0[own.rows, k], slope[own.rows, k]), own.hz, target.weight, own.rows)
-            for target, own in zip(scene.file.targets, task.wanted, strict=True)
-            for k in [columns.index(target.mode)]
+            Goal(LinearModel(l0[own.rows, k], slope[own.rows, k]), own.hz, own.weight, own.rows)
+            for own in task.wanted
+            for k in [columns.index(own.mode)]
         ]
         found = solve_assignment(
             goals,

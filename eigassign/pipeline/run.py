@@ -25,7 +25,6 @@ from eigassign.study.assignment import (
     assign_design,
     require_assignable,
     study_targets,
-    target_frequencies,
 )
 from eigassign.study.built_case import Case, load_case
 from eigassign.study.collect import VerifiedAssignment, collect_results
@@ -33,6 +32,7 @@ from eigassign.study.comparison import Validation, study_modes, validate_expansi
 from eigassign.study.planning import plan_expansion
 from eigassign.study.results import RunResults
 from eigassign.study.scene import Expansions, Scene
+from eigassign.study.wanted import target_frequencies
 
 Floats = NDArray[np.float64]
 

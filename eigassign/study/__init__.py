@@ -9,6 +9,7 @@ Reading order:
     built_case  a case with its model and trajectories, each built once
     scene       model, trajectory and expansions of a case in one object
     comparison  how good both expansions are: along the trajectory, over the boxes of q and y
+    wanted      what the targets ask for, at the samples of the trajectories
     assignment  from targets and bounds to the optimal design, and what it does to the frequencies
     accuracy    errors of mesh, reduction, expansion and round-off; whether the motion is slow
     drawing     the mechanism as lines and symbols: in poses, and in its modes

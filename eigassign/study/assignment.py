@@ -7,7 +7,6 @@ quadratic program of eqs. (13)–(14) (`eigassign.assignment`).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +19,10 @@ from eigassign.assignment import (
     LinearModel,
     hz_from_lam,
     relative_error,
-    sample_target,
     solve_assignment,
-    trapezoidal_weights,
 )
-from eigassign.assignment.checks import frozen
-from eigassign.case import CaseFile, Target
-from eigassign.errors import AccuracyError, CaseError, UsageError
+from eigassign.case import CaseFile
+from eigassign.errors import AccuracyError, CaseError, Problem
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.results import (
     DesignRow,
@@ -37,6 +33,7 @@ from eigassign.study.results import (
     TargetStudy,
 )
 from eigassign.study.scene import Scene
+from eigassign.study.wanted import Wanted, time_weights
 
 Floats = NDArray[np.float64]
 _Curves = tuple[Floats, Floats, Floats, Floats]  # wanted, initial, predicted and exact, (n,) in Hz
@@ -54,50 +51,24 @@ def require_assignable(file: CaseFile) -> None:
         for key, (given, why) in needs.items()
         if not given
     )
-    if problems:
+    if problems := (*problems, *_not_yet(file)):
         raise CaseError(problems)
 
 
-@dataclass(frozen=True)
-class WantedFrequency:
-    """What one target asks for: a frequency (n,) in Hz at those ``rows`` of all samples."""
-
-    hz: Floats
-    rows: slice
-
-
-def target_frequencies(file: CaseFile, path: Trajectories) -> tuple[WantedFrequency, ...]:
-    """What each target asks for; CaseError where a profile ends before a trajectory does."""
-    return tuple(_wanted(file, k, target, path) for k, target in enumerate(file.targets))
-
-
-def _wanted(file: CaseFile, k: int, target: Target, path: Trajectories) -> WantedFrequency:
-    hz = []
-    for part in path.parts:
-        if target.trajectory not in (None, part.name):
-            continue
-        try:
-            hz.append(_sampled(target, part.trajectory.time_s))
-        except UsageError as error:
-            which = f" (trajectory {part.name!r})" if path.several else ""
-            problem = file.problem(f"targets[{k}].frequency", f"{error}{which}")
-            raise CaseError((problem,)) from error
-    return WantedFrequency(frozen(np.concatenate(hz)), path.rows_of(target.trajectory))
+def _not_yet(file: CaseFile) -> Iterator[Problem]:
+    """What the quadratic program cannot take."""
+    why = "is not assigned yet: only wanted frequencies of numbered modes are"
+    for each in file.requirements:
+        if each.kind != "frequency" or each.followed is not None:
+            key = each.kind if each.followed is None else "mode"
+            yield file.problem(f"{each.place}.{key}", why)
+    for catalogue in file.design.catalogues:
+        yield file.problem(f"design.{catalogue.name}", "is not assigned yet: only bounds are")
+    if file.design.mass is not None:
+        yield file.problem("design.mass", "is not assigned yet: only linear constraints are")
 
 
-def time_weights(path: Trajectories) -> Floats:
-    """ω (n_t,) in s of the integral over every trajectory for itself, by the trapezoidal rule."""
-    return path.weights(trapezoidal_weights)
-
-
-def _sampled(target: Target, time_s: Floats) -> Floats:
-    wanted = target.frequency
-    if isinstance(wanted, float | int):
-        return sample_target(time_s, float(wanted))
-    return sample_target(time_s, wanted.frequency, wanted.time)
-
-
-def assign_design(scene: Scene, targets: tuple[WantedFrequency, ...]) -> Assignment:
+def assign_design(scene: Scene, targets: tuple[Wanted, ...]) -> Assignment:
     """Build and solve the quadratic program of eqs. (13)–(14) on the linearised expansion.
 
     Raises InfeasibleError with the names of the constraints that contradict each other.
@@ -110,11 +81,11 @@ def assign_design(scene: Scene, targets: tuple[WantedFrequency, ...]) -> Assignm
         Goal(
             LinearModel(l0[wanted.rows, k], slope[wanted.rows, k]),
             wanted.hz,
-            target.weight,
+            wanted.weight,
             wanted.rows,
         )
-        for target, wanted in zip(file.targets, targets, strict=True)
-        for k in [column(target.mode)]
+        for wanted in targets
+        for k in [column(wanted.mode)]
     ]
     return solve_assignment(
         goals,
@@ -160,7 +131,7 @@ def linear_constraints(file: CaseFile) -> list[LinearConstraint]:
 
 def study_targets(
     scene: Scene,
-    targets: tuple[WantedFrequency, ...],
+    targets: tuple[Wanted, ...],
     assignment: Assignment,
     initial_hz: Floats,
     exact_hz: Floats,
@@ -168,21 +139,19 @@ def study_targets(
     """Each target before, as predicted, and exactly; ``initial_hz``, ``exact_hz`` (n_t, modes)."""
     weights = time_weights(scene.path)
     studies = []
-    for k, (target, wanted) in enumerate(zip(scene.file.targets, targets, strict=True)):
-        rows, column = wanted.rows, target.mode - 1
+    for k, wanted in enumerate(targets):
+        rows, column = wanted.rows, wanted.mode - 1
         predicted = hz_from_lam(assignment.lam[k])
         hz = (wanted.hz, initial_hz[rows, column], predicted, exact_hz[rows, column])
-        studies.append(_studied(scene.path, target, rows, hz, weights[rows]))
+        studies.append(_studied(scene.path, wanted, hz, weights[rows]))
     return tuple(studies)
 
 
-def _studied(
-    path: Trajectories, target: Target, rows: slice, hz: _Curves, weights: Floats
-) -> TargetStudy:
-    """``hz`` and ``weights`` are those at ``rows`` of all samples."""
+def _studied(path: Trajectories, wanted: Wanted, hz: _Curves, weights: Floats) -> TargetStudy:
+    """``hz`` and ``weights`` are those at its rows of all samples."""
     error = _errors(hz, weights)
     return TargetStudy(
-        target.mode,
+        wanted.mode,
         target_hz=hz[0],
         initial_hz=hz[1],
         predicted_hz=hz[2],
@@ -190,10 +159,10 @@ def _studied(
         initial=error.initial,
         predicted=error.predicted,
         exact=error.exact,
-        trajectory=target.trajectory,
-        rows=rows,
+        trajectory=wanted.requirement.target.trajectory,
+        rows=wanted.rows,
         weight_s=float(weights.sum()),
-        along=tuple(_along(path, rows, hz, weights)),
+        along=tuple(_along(path, wanted.rows, hz, weights)),
     )
 
 
@@ -202,8 +171,9 @@ def _along(
 ) -> Iterator[TargetAlong]:
     """The errors along each trajectory that the target holds on; ``hz`` and ``weights`` its own."""
     for part, rows in zip(path.parts, path.rows, strict=True):
-        if wanted.start <= rows.start and rows.stop <= wanted.stop:
-            own = slice(rows.start - wanted.start, rows.stop - wanted.start)
+        first, last = max(wanted.start, rows.start), min(wanted.stop, rows.stop)
+        if first < last:
+            own = slice(first - wanted.start, last - wanted.start)
             target, initial, predicted, exact = (curve[own] for curve in hz)
             error = _errors((target, initial, predicted, exact), weights[own])
             yield TargetAlong(part.name, own, error)

@@ -145,8 +145,8 @@ def _accuracy_warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[s
 
 def _worsening(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
     """A warning where, solved exactly, the initial design is nearer to the targets."""
-    weighed = list(zip(scene.file.targets, assigned.targets, strict=True))
-    shares = [file.weight * target.weight_s for file, target in weighed]
+    weighed = list(zip(scene.file.requirements, assigned.targets, strict=True))
+    shares = [wanted.target.weight * target.weight_s for wanted, target in weighed]
     before, after = (
         sum(
             share * getattr(target, when).rms_relative ** 2
@@ -162,7 +162,10 @@ def _worsening(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
 
 
 def _is_feasible(scene: Scene) -> bool:
-    """Whether the initial design meets the constraints (its bounds it always does)."""
+    """Whether the initial design meets the bounds and constraints."""
+    lower, upper = scene.bounds
+    if np.any((scene.initial < lower) | (scene.initial > upper)):
+        return False
     names = scene.model.y_names
     initial = dict(zip(names, scene.initial, strict=True))
     for constraint in scene.file.design.constraints.values():

@@ -125,20 +125,22 @@ def _y0(file: CaseFile, model: Model) -> tuple[Floats, str]:
 
 
 def _modes(file: CaseFile, override: Sequence[int] | None) -> tuple[tuple[int, ...], str]:
-    """Modes to expand; that they hold those with a target is the case file's own rule."""
+    """Modes to expand, and why these."""
     if override is not None:
         return tuple(sorted({int(mode) for mode in override})), ""
     modes = wanted_modes(file)
-    if file.expansion.modes != "auto":
-        return modes, ""
-    if not file.targets:
-        return modes, "expanded mode: 1, the lowest, for there is no target"
-    return modes, f"expanded modes: {', '.join(map(str, modes))}, those with a target"
+    shown = f"expanded modes: {', '.join(map(str, modes))}"
+    if (given := file.expansion.modes) != "auto":
+        more = set(modes) - set(given)
+        return modes, f"{shown}, those of the file and those with a target" if more else ""
+    if not target_modes(file):
+        return modes, "expanded mode: 1, the lowest, for there is no target on a mode"
+    return modes, f"{shown}, those with a target"
 
 
 def _check_modes(file: CaseFile, model: Model, modes: Sequence[int]) -> None:
     available = model.n_dof - model.n_rigid
-    places = {t.mode: f"targets[{k}].mode" for k, t in enumerate(file.targets)}
+    places = {m: f"{each.place}.mode" for each in file.requirements for m in each.modes}
     for mode in modes:
         if mode > available:
             where = places.get(mode, "expansion.modes")
@@ -186,12 +188,16 @@ def asked_accuracy(file: CaseFile) -> float:
     return float(getattr(file.expansion, "accuracy", None) or ACCURACY)
 
 
+def target_modes(file: CaseFile) -> set[int]:
+    """The modes that a target names."""
+    return {mode for each in file.requirements for mode in each.modes}
+
+
 def wanted_modes(file: CaseFile) -> tuple[int, ...]:
-    """The modes that matter: those with a target, or expanded, or the lowest."""
+    """The modes that matter: those with a target, those of the file, or the lowest."""
     given = file.expansion.modes
-    if given != "auto":
-        return tuple(sorted({int(mode) for mode in given}))
-    return tuple(sorted({target.mode for target in file.targets})) or (1,)
+    named = target_modes(file) | ({int(m) for m in given} if given != "auto" else set())
+    return tuple(sorted(named)) or (1,)
 
 
 def automatic_elements(file: CaseFile) -> dict[str, int | None]:

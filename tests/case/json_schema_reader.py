@@ -26,7 +26,7 @@ def accepts(schema: dict[str, Any], value: Any) -> bool:
 
 def _typed(schema: dict[str, Any], value: Any) -> bool:
     kinds = {"object": dict, "array": tuple, "string": str, "number": (int, float), "integer": int}
-    kind = schema.get("type")
+    kind = schema.get("type", "object" if "required" in schema else None)
     if kind == "boolean" or isinstance(value, bool):
         return kind == "boolean" and isinstance(value, bool)
     if kind and not isinstance(value, kinds[kind]):
@@ -46,10 +46,12 @@ def _typed(schema: dict[str, Any], value: Any) -> bool:
 
 
 def _object(schema: dict[str, Any], value: dict[str, Any]) -> bool:
-    known, others = schema.get("properties", {}), schema.get("additionalProperties", True)
+    known, others = schema.get("properties", {}), schema.get("additionalProperties", {})
     if any(key not in value for key in schema.get("required", ())):
         return False
     return all(
-        accepts(known[key], inner) if key in known else others and accepts(others, inner)
+        accepts(known[key], inner)
+        if key in known
+        else others is not False and accepts(others, inner)
         for key, inner in value.items()
     )

@@ -287,11 +287,6 @@ def wrong_inputs() -> Iterator[Wrong]:
         "min 2 is above max 1",
     )
     yield Wrong(
-        "a start outside the bounds",
-        _edited((M, "{parameter: bodies.tool.mass, min: 0.5, max: 1}")),
-        "initial value 0.1 kg of bodies.tool.mass is outside [0.5, 1] kg",
-    )
-    yield Wrong(
         "a parameter that is not there",
         _edited((M, "{parameter: bodies.tol.mass, min: 0, max: 1}")),
         "unknown body 'tol'; did you mean 'tool'?",

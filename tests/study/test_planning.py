@@ -90,7 +90,7 @@ def test_without_a_design_only_q_is_planned(tmp_path: Path) -> None:
     plan = plan_of(tmp_path, HEAD + "expansion: {q: [1.8, 5.3], order: 3}\n")
     assert plan.y0.shape == (0,)
     assert (plan.order, plan.modes) == (3, (1,))
-    assert any("there is no target" in note for note in plan.notes)
+    assert any("there is no target on a mode" in note for note in plan.notes)
 
 
 def test_order_and_modes_can_be_overridden(tmp_path: Path) -> None:

@@ -11,7 +11,8 @@ In reading order, each importing only from those above it:
     space         rules: planar and spatial mechanisms
     links         rules: links, materials, sections, and what stands on nodes
     joints        rules: joints between links, coordinates, loops
-    study         rules: trajectory, design, expansion, targets, validation
+    study         rules: trajectory, design, expansion, validation
+    targets       rules: targets, the modes they follow, the method that takes them
     consistency   the table of all rules
     plausibility  warnings: what is allowed but looks like a slip
 """

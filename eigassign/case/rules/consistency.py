@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
-from eigassign.case.reader import Finding, KeyPath, Tree, items, names
-from eigassign.case.rules import joints, links, properties, space, study
+from eigassign.case.reader import Finding, KeyPath, Tree, at, items, names
+from eigassign.case.rules import joints, links, properties, space, study, targets
 from eigassign.case.schema.mechanism import Mechanism
 
 Rule = Callable[[Tree], Iterator[Finding]]
@@ -35,7 +35,11 @@ def _empty(node: object, path: KeyPath) -> Iterator[Finding]:
 
 
 def reserved_names_are_not_used(tree: Tree) -> Iterator[Finding]:
-    """`ground` is no link, and `time` is the first column of every table over time."""
+    """`ground` is no link, `time` heads every table over time, `mass` limits the whole."""
+    for key in ("parameter", "choices"):
+        if at(tree, "design", "mass", key) is not None:
+            message = "'mass' is for limits of the total mass: name the design parameter otherwise"
+            yield ("design", "mass"), message
     if "time" in names(tree, "coordinates"):
         yield ("coordinates", "time"), "'time' heads a column of its own: name it otherwise"
     if "ground" in names(tree, "mechanism", "links"):
@@ -66,16 +70,17 @@ RULES: tuple[Rule, ...] = (
     joints.assembly_names_coordinates_and_joints,
     joints.assembly_is_for_loops,
     properties.parameters_name_properties,
-    properties.initial_values_are_within_bounds,
     study.lists_have_an_entry_for_each_coordinate,
     study.expansion_point_has_an_entry_for_each_parameter,
     study.trajectories_have_names_of_their_own,
     study.branches_are_ranges_of_driven_joints,
     study.parameters_vary_different_properties,
     study.constraints_are_between_design_parameters,
-    study.expanded_modes_differ,
-    study.targets_are_for_expanded_modes_once_each,
-    study.profiles_cover_their_trajectories,
+    targets.targets_are_on_trajectories,
+    targets.a_mode_has_one_frequency_at_a_time,
+    targets.followed_modes_are_at_a_pose,
+    targets.one_shot_has_a_quadratic_program,
+    targets.profiles_cover_their_trajectories,
 )
 
 

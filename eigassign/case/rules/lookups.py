@@ -7,8 +7,10 @@ empty: the schema reports such a key, and no rule reports it again.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
-from eigassign.case.reader import KeyPath, Tree, at, items, lacks, names, text
+from eigassign.case.reader import KeyPath, Tree, at, entries, items, lacks, names, text
+from eigassign.case.schema.design import RESERVED, column_names
 from eigassign.case.schema.joints import FREEDOMS
 from eigassign.case.schema.links import LINKS
 from eigassign.case.schema.parts import Quantity
@@ -135,7 +137,7 @@ def coordinate_quantities(tree: Tree) -> list[Quantity]:
     return [of_freedom(driven(tree, body)) for _, body in items(tree, "coordinates")]
 
 
-# --- Trajectories and design parameters
+# --- Trajectories, targets and design parameters
 
 
 def trajectories(tree: Tree) -> list[tuple[KeyPath, object]]:
@@ -152,6 +154,50 @@ def trajectory_names(tree: Tree) -> list[str]:
     return [text(body, "name") or str(k) for k, body in enumerate(bodies, start=1)]
 
 
-def parameters(tree: Tree) -> list[tuple[str, object]]:
-    """Design parameters as the file has them: what stands under `design` but the constraints."""
-    return [(name, body) for name, body in items(tree, "design") if name != "constraints"]
+def design_entries(tree: Tree) -> list[tuple[str, object]]:
+    """Parameters and lists of choices: what stands under `design` but its reserved names."""
+    return [(name, body) for name, body in items(tree, "design") if name not in RESERVED]
+
+
+def choices(entry: object) -> list[tuple[str, object]] | None:
+    """Name and content of each choice of a design entry; None of one that is a parameter."""
+    return None if at(entry, "choices") is None else items(entry, "choices")
+
+
+class Column(NamedTuple):
+    """One component of y as the file has it: its name, its property, and where that is named."""
+
+    name: str
+    parameter: str | None
+    place: KeyPath
+
+
+def columns(tree: Tree) -> list[Column]:
+    """The components of y, in order: parameters, and what the first choice of a list sets."""
+    found = []
+    for name, body in design_entries(tree):
+        listed_choices = choices(body)
+        if listed_choices is None:
+            found.append(Column(name, text(body, "parameter"), ("design", name, "parameter")))
+        for first, choice in (listed_choices or ())[:1]:
+            paths = names(choice)
+            place: KeyPath = ("design", name, "choices", first)
+            pairs = zip(column_names(name, paths), paths, strict=True)
+            found += [Column(column, path, (*place, path)) for column, path in pairs]
+    return found
+
+
+def curves(tree: Tree) -> list[tuple[KeyPath, object]]:
+    """Key path and content of every frequency of a target that may change in time."""
+    found: list[tuple[KeyPath, object]] = []
+    for k, target in enumerate(entries(tree, "targets")):
+        for keys in (("frequency",), ("at_least",), ("at_most",), ("keep_out", "of")):
+            if (curve := at(target, *keys)) is not None:
+                found.append((("targets", k, *keys), curve))
+    return found
+
+
+def followed_modes(tree: Tree) -> list[tuple[KeyPath, object]]:
+    """Key path and content of every mode that is named by its shape."""
+    bodies = [at(target, "mode") for target in entries(tree, "targets")]
+    return [(("targets", k, "mode"), b) for k, b in enumerate(bodies) if isinstance(b, Mapping)]

@@ -15,7 +15,7 @@ from eigassign.case.schema.joints import freedom_of
 from eigassign.case.schema.links import BeamLink, FrameBeam, FrameLink, RigidLink, Taper
 from eigassign.case.schema.mechanism import Body
 from eigassign.case.schema.sections import BareSection
-from eigassign.case.schema.study import FrequencyProfile
+from eigassign.case.schema.targets import FrequencyFile, FrequencyProfile
 from eigassign.case.schema.trajectory import (
     PointTrajectory,
     SampledTrajectory,
@@ -275,13 +275,17 @@ def _way(joined: Mapping[Node, Mapping[Node, str]], start: Node, end: Node) -> l
 def goals_can_be_meant(document: Document) -> Iterator[Finding]:
     """Targets are frequencies, tolerances are small, the expansion point is a possible design."""
     for k, target in enumerate(document.targets):
-        wanted = target.frequency
-        values = wanted.frequency if isinstance(wanted, FrequencyProfile) else (wanted,)
-        for value in (min(values), max(values)):
-            yield from _outside(value, FREQUENCY, ("targets", k, "frequency"), "Hz")
-    if document.validation.max_error > LARGEST_ERROR:
-        percent = 100 * document.validation.max_error
-        yield ("validation", "max_error"), f"this is {percent:g} %; write the % if it was meant so"
+        for keys, curve in target.frequencies:
+            if isinstance(curve, FrequencyFile):
+                continue
+            values = curve.frequency if isinstance(curve, FrequencyProfile) else (curve,)
+            for value in (min(values), max(values)):
+                yield from _outside(value, FREQUENCY, ("targets", k, *keys), "Hz")
+    for part in ("assignment", "validation"):
+        accepted = getattr(document, part).max_error
+        if accepted is not None and accepted > LARGEST_ERROR:
+            message = f"this is {100 * accepted:g} %; write the % if it was meant so"
+            yield (part, "max_error"), message
     if document.expansion.y != "auto":
         bounds = document.design.parameters.items()
         for k, (value, (name, p)) in enumerate(zip(document.expansion.y, bounds, strict=True)):

@@ -13,8 +13,9 @@ from typing import Annotated, Any, get_args, get_origin
 
 from pydantic_core import PydanticUndefined
 
-from eigassign.case.reader import Finding, Tree, at, names, text
-from eigassign.case.rules.lookups import ANY, driven, is_spatial, number, parameters, type_of
+from eigassign.case.reader import Finding, Tree, at, names
+from eigassign.case.rules.lookups import ANY, columns, driven, is_spatial, number, type_of
+from eigassign.case.schema.design import Choices, Design, Entry
 from eigassign.case.schema.links import LINKS
 from eigassign.case.schema.mechanism import Body, Spring
 from eigassign.case.schema.parts import Part, Quantity, quantity
@@ -72,16 +73,17 @@ def property_at(tree: Tree, path: str) -> Property | None:
     return _of_part(tree, group, *rest)
 
 
+def known_property(tree: Tree, path: str | None) -> Property | None:
+    """Property at ``path``, None where it is unknown."""
+    try:
+        return None if path is None else property_at(tree, path)
+    except NoPropertyError:
+        return None
+
+
 def properties(tree: Tree) -> dict[str, Property | None]:
-    """Property of each design parameter, None where it is unknown."""
-    found: dict[str, Property | None] = {}
-    for name, body in parameters(tree):
-        path = text(body, "parameter")
-        try:
-            found[name] = None if path is None else property_at(tree, path)
-        except NoPropertyError:
-            found[name] = None
-    return found
+    """Property of each component of y, None where it is unknown."""
+    return {column.name: known_property(tree, column.parameter) for column in columns(tree)}
 
 
 def _of_part(tree: Tree, group: str, name: str, key: str) -> Property | None:
@@ -168,29 +170,34 @@ def drive_quantity(tree: Tree, coordinate: object, key: str) -> Quantity:
 
 def parameters_name_properties(tree: Tree) -> Iterator[Finding]:
     """The path of a design parameter names a number that can vary."""
-    for name, body in parameters(tree):
-        path = text(body, "parameter")
+    for _, path, place in columns(tree):
         try:
             _ = path and property_at(tree, path)
         except NoPropertyError as error:
-            yield ("design", name, "parameter"), str(error)
+            yield place, str(error)
 
 
-def initial_values_are_within_bounds(tree: Tree) -> Iterator[Finding]:
-    """The value that the file gives to a design parameter lies between its bounds."""
-    for name, prop in properties(tree).items():
-        if prop is None:
+def starts_outside(tree: Tree, design: Design) -> Iterator[Finding]:
+    """Warnings where what the file has as design is outside its bounds, or none of those listed.
+
+    Bounds and lists say where the answer may be, so that the start need not be there.
+    """
+    found = [property_at(tree, column.parameter) for column in design.parameters.values()]
+    units = [p.quantity.dimension.si if p and p.quantity.dimension else "" for p in found]
+    start = [number(p.written, p.quantity) if p else None for p in found]
+    catalogued = {k for catalogue in design.catalogues for k in catalogue.columns}
+    why = "; the optimum will lie inside"
+    for k, (name, column) in enumerate(design.parameters.items()):
+        value, unit = start[k], units[k]
+        if k in catalogued or value is None or column.min <= value <= column.max:
             continue
-        body = at(tree, "design", name)
-        values = [prop.written, at(body, "min"), at(body, "max")]
-        initial, low, high = (number(value, prop.quantity) for value in values)
-        if initial is None or low is None or high is None:
-            continue
-        if low <= high and not low <= initial <= high:
-            unit = prop.quantity.dimension.si if prop.quantity.dimension else ""
-            path = at(body, "parameter")
-            message = f"initial value {initial:g} {unit} of {path} is outside "
-            yield ("design", name), f"{message}[{low:g}, {high:g}] {unit}"
+        message = f"initial value {value:g} {unit} of {column.parameter} is outside "
+        yield ("design", name), f"{message}[{column.min:g}, {column.max:g}] {unit}{why}"
+    for catalogue in design.catalogues:
+        own = tuple(start[k] for k in catalogue.columns)
+        if own not in catalogue.rows:
+            message = f"the initial value is none of those listed, {listed(catalogue.choices)}"
+            yield ("design", catalogue.name), message
 
 
 # --- Sections that a design could break
@@ -198,12 +205,22 @@ def initial_values_are_within_bounds(tree: Tree) -> Iterator[Finding]:
 Ranges = Mapping[str, tuple[float, float]]  # SI, by path of the parameter
 
 
-def bounds_hold_no_impossible_section(mechanism: Any, design: Any) -> Iterator[Finding]:
+def bounds_hold_no_impossible_section(mechanism: Any, design: Design) -> Iterator[Finding]:
     """Every section exists wherever the design may go, each problem at the bound to narrow."""
     ranges = {p.parameter: (p.min, p.max) for p in design.parameters.values()}
-    named = {p.parameter: name for name, p in design.parameters.items()}
+    entry = {p: name for name, e in design.entries.items() for p in _paths(e)}
     for path, bound, message in impossible(mechanism.sections, ranges):
-        yield ("design", named[path], bound), f"at this bound {message}; narrow the bounds"
+        body = design.entries[name := entry[path]]
+        if isinstance(body, Choices):
+            advice = "give the choices by dimensions that can be combined, such as thickness"
+            yield ("design", name, "choices"), f"between these choices {message}; {advice}"
+        else:
+            key = bound if body.values is None else "values"
+            yield ("design", name, key), f"at this bound {message}; narrow the bounds"
+
+
+def _paths(entry: Entry) -> tuple[str, ...]:
+    return entry.properties if isinstance(entry, Choices) else (entry.parameter,)
 
 
 def impossible(sections: Mapping[str, Section], ranges: Ranges) -> Iterator[tuple[str, str, str]]:

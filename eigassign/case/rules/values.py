@@ -15,19 +15,28 @@ from typing import Any
 from eigassign.case.reader import KeyPath, Tree, at, entries, items, text
 from eigassign.case.rules.lookups import (
     ANY,
+    choices,
     coordinate_quantities,
+    curves,
+    design_entries,
     driven,
+    followed_modes,
     freedoms,
     is_spatial,
     links,
     of_freedom,
-    parameters,
     trajectories,
 )
-from eigassign.case.rules.properties import DRIVEN, Property, drive_quantity, properties
+from eigassign.case.rules.properties import (
+    DRIVEN,
+    Property,
+    drive_quantity,
+    known_property,
+    properties,
+)
 from eigassign.case.schema.parts import Quantity
 from eigassign.case.suggestions import shown
-from eigassign.case.units import QuantityError, read
+from eigassign.case.units import QuantityError, read, read_rate
 
 Undecided = tuple[KeyPath, object, Quantity | None]  # None: no unit can be meant
 
@@ -35,7 +44,12 @@ Undecided = tuple[KeyPath, object, Quantity | None]  # None: no unit can be mean
 def completed(tree: Tree, folder: Path) -> Tree:
     """``tree`` with such values in SI, absolute files, and the defaults of joints and springs."""
     changes: dict[Any, Any] = {}
-    for path, value in [*_numbers(tree), *_files(tree, folder), *_defaults(tree)]:
+    for path, value in [
+        *_numbers(tree),
+        *_prices(tree),
+        *_files(tree, folder),
+        *_defaults(tree),
+    ]:
         inner = changes
         for key in path[:-1]:
             inner = inner.setdefault(key, {})
@@ -65,6 +79,18 @@ def _numbers(tree: Tree) -> Iterator[tuple[KeyPath, object]]:
                 yield path, error
 
 
+def _prices(tree: Tree) -> Iterator[tuple[KeyPath, object]]:
+    """Prices for one SI unit of their parameter."""
+    for name, body in design_entries(tree):
+        price, prop = at(body, "price"), known_property(tree, text(body, "parameter"))
+        if isinstance(price, str):
+            try:
+                unit = prop.quantity.dimension if prop else None
+                yield ("design", name, "price"), read_rate(price, unit)
+            except QuantityError as error:
+                yield ("design", name, "price"), error
+
+
 def _in_si(value: object, quantity: Quantity | None) -> float:
     if quantity is ANY:
         return read(value, None)
@@ -92,6 +118,12 @@ def _undecided(tree: Tree) -> Iterator[Undecided]:
             freedom = freedoms(tree, joint) or ()
             both = [of_freedom(freedom[0] if len(freedom) == 1 else None)] * 2
             yield from _in_list(limits, both, (*path, "branch", joint))
+    for path, body in followed_modes(tree):
+        yield from _in_list(at(body, "at", "q"), kinds, (*path, "at", "q"))
+        for name, value in items(body, "design"):
+            if name in known:
+                prop = known[name]
+                yield (*path, "design", name), value, prop.quantity if prop else ANY
     span = at(tree, "validation", "q_span")
     alike = len({kind.dimension for kind in kinds}) <= 1
     common = (kinds[0] if kinds else ANY) if alike else None
@@ -106,10 +138,22 @@ def _undecided(tree: Tree) -> Iterator[Undecided]:
 
 def _of_design(tree: Tree, known: Mapping[str, Property | None]) -> Iterator[Undecided]:
     """Bounds of parameters, and of sums of parameters that have a dimension in common."""
-    for name, body in parameters(tree):
-        prop = known[name]
+    for name, body in design_entries(tree):
+        for choice, values in choices(body) or ():
+            for path, value in items(values):
+                prop = known_property(tree, path)
+                place = ("design", name, "choices", choice, path)
+                yield place, value, prop.quantity if prop else ANY
+        prop = known.get(name)
+        own = prop.quantity if prop else ANY
         for key in ("min", "max"):
-            yield ("design", name, key), at(body, key), prop.quantity if prop else ANY
+            yield ("design", name, key), at(body, key), own
+        for k, value in enumerate(entries(body, "values")):
+            yield ("design", name, "values", k), value, own
+        amount = at(body, "tolerance")
+        if isinstance(amount, str) and not amount.rstrip().endswith("%"):
+            either = Quantity(own.dimension, above=0) if prop else ANY
+            yield ("design", name, "tolerance"), amount, either
     for name, body in items(tree, "design", "constraints"):
         terms = [known.get(term) for term, _ in items(body, "terms")]
         dimensions = {term.quantity.dimension for term in terms if term}
@@ -147,6 +191,7 @@ def _files(tree: Tree, folder: Path) -> Iterator[tuple[KeyPath, object]]:
     named: list[tuple[KeyPath, object, tuple[str, ...]]]
     named = [(path, body, ("stiffness", "mass")) for _, path, body in links(tree, "superelement")]
     named += [(p, body, ("file",)) for p, body in trajectories(tree) if at(body, "tip") is None]
+    named += [(path, body, ("file",)) for path, body in curves(tree)]
     for path, body, keys in named:
         for key in keys:
             file = text(body, key)

@@ -9,6 +9,8 @@ In reading order, each importing only from those above it:
     joints      the key `joints`, and what each type of joint lets move
     mechanism   bodies, springs, drives, coordinates, and the mechanism as a whole
     trajectory  the key `trajectory`
-    study       the keys `design`, `expansion`, `targets` and `validation`
+    design      the key `design`: parameters, catalogues, limits, and the one vector y they make
+    targets     the key `targets`, and the requirements that they come to
+    study       the keys `assignment`, `expansion` and `validation`
     document    the whole case file, its errors as readable findings, its JSON Schema
 """

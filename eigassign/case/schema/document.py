@@ -12,12 +12,14 @@ from pydantic import AfterValidator, BaseModel, Field, ValidationError
 from pydantic.json_schema import GenerateJsonSchema
 
 from eigassign.case.reader import Finding, KeyPath, Tree
+from eigassign.case.schema.design import ENTRIES, RESERVED, Design
 from eigassign.case.schema.joints import JOINTS
 from eigassign.case.schema.links import LINKS
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.schema.parts import FrozenDict, Named, Part, Quantity, keys_of, wrong
 from eigassign.case.schema.sections import SHAPES
-from eigassign.case.schema.study import Design, ExpansionKeys, Target, ValidationKeys
+from eigassign.case.schema.study import AssignmentKeys, ExpansionKeys, ValidationKeys
+from eigassign.case.schema.targets import CURVES, TARGETS, TargetForm
 from eigassign.case.schema.trajectory import MOTIONS, TrajectoryForms
 from eigassign.case.suggestions import listed, shown, suggestion, unknown
 
@@ -38,13 +40,22 @@ class Document(Part):
     trajectory: TrajectoryForms | None = None
     design: Design = Design.model_construct()
     expansion: ExpansionKeys = ExpansionKeys.model_construct()
-    targets: tuple[Target, ...] = ()
+    targets: tuple[TargetForm, ...] = ()
+    assignment: AssignmentKeys = AssignmentKeys.model_construct()
     validation: ValidationKeys = ValidationKeys.model_construct()
 
 
 # --- Errors of the schema as findings
 
-_KINDS: dict[str, type[Part]] = SHAPES | LINKS | JOINTS | MOTIONS
+_KINDS: dict[str, type[Part]] = {
+    **SHAPES,
+    **LINKS,
+    **JOINTS,
+    **MOTIONS,
+    **TARGETS,
+    **CURVES,
+    **ENTRIES,
+}
 _TAGS = {f"<{kind}>" for kind in _KINDS}
 _TAGS |= {"<one>", "<list>", "<number>", "<auto>", "<value>", "<part>"}
 _MOST = 200  # errors explained; nobody reads more
@@ -54,21 +65,21 @@ _Explained = tuple[KeyPath, str]  # keys to append to the path, message
 def validated(tree: Tree) -> tuple[Document | None, list[Finding]]:
     """The document, or None and everything the schema has against it."""
     try:
-        return Document.model_validate(_with_parameters_apart(tree)), []
+        return Document.model_validate(_with_entries_apart(tree)), []
     except ValidationError as error:
         details = error.errors(include_url=False)[:_MOST]
         findings = [_finding(detail) for detail in details if not _is_echo(detail)]
         return None, [f for f in findings if not f[1].endswith("got nothing")]  # a rule finds those
 
 
-def _with_parameters_apart(tree: Tree) -> Tree:
-    """In the file the parameters stand directly under `design`, beside `constraints`."""
+def _with_entries_apart(tree: Tree) -> Tree:
+    """In the file the entries stand directly under `design`, beside the reserved names."""
     design = tree.get("design")
     if not isinstance(design, Mapping):
         return tree
-    parameters = {name: body for name, body in design.items() if name != "constraints"}
-    apart = {key: body for key, body in design.items() if key == "constraints"}
-    return {**tree, "design": {"parameters": parameters, **apart}}
+    entries = {name: body for name, body in design.items() if name not in RESERVED}
+    apart = {key: body for key, body in design.items() if key in RESERVED}
+    return {**tree, "design": {"entries": entries, **apart}}
 
 
 def _is_echo(error: Any) -> bool:
@@ -78,7 +89,7 @@ def _is_echo(error: Any) -> bool:
 
 def _finding(error: Any) -> Finding:
     path = tuple(p for p in error["loc"] if p not in _TAGS and p != "[key]")
-    if path[:2] == ("design", "parameters"):
+    if path[:2] == ("design", "entries"):
         path = (path[0], *path[2:])
     suffix, message = _EXPLAIN.get(error["type"], _by_message)(error)
     return (*path, *suffix), message
@@ -152,6 +163,18 @@ def _no_motion(error: Any) -> _Explained:
     )
 
 
+def _no_target(error: Any) -> _Explained:
+    given = error["input"]
+    if not isinstance(given, Mapping):
+        return (), f"expected a mapping, got {shown(given)}"
+    kinds = [key for key in TARGETS if key in given]
+    if kinds:
+        return (kinds[1],), f"{kinds[0]} is given already: write a target of its own for each"
+    near = [(key, hint) for key in given if (hint := suggestion(key, TARGETS))]
+    place, hint = ((near[0][0],), near[0][1]) if near else ((), "")
+    return place, f"expected one of the keys {listed(TARGETS)}; got {listed(given)}{hint}"
+
+
 def _expected(what: str) -> Any:
     return lambda error: ((), f"expected {what}, got {shown(error['input'])}")
 
@@ -184,6 +207,7 @@ _EXPLAIN: dict[str, Any] = {
     "no_link": _no_kind("type", LINKS),
     "no_joint": _no_kind("type", JOINTS),
     "no_motion": _no_motion,
+    "no_target": _no_target,
     "literal_error": _literal,
     "model_type": _MAPPING,
     "model_attributes_type": _MAPPING,
@@ -230,9 +254,8 @@ def json_schema() -> dict[str, Any]:
     schema = _without_null(Document.model_json_schema(schema_generator=_Quiet))
     definitions = schema["$defs"]
     design = definitions["Design"]
-    parameters, constraints = (design["properties"][k] for k in ("parameters", "constraints"))
-    design["properties"] = {"constraints": constraints}
-    design["additionalProperties"] = parameters["additionalProperties"]
+    entries = design["properties"].pop("entries")
+    design["additionalProperties"] = entries["additionalProperties"]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias, TypeVar, Union, get_args
 
@@ -30,6 +30,12 @@ class Part(BaseModel):
     """Base of everything in a case file: frozen, strict, no unknown keys, built with its parent."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, defer_build=True)
+
+
+def needs_one_of(*groups: Sequence[str]) -> ConfigDict:
+    """As ``model_config``: one of the groups of keys is needed, which a validator sees to."""
+    options: list[Any] = [{"required": list(group)} for group in groups]
+    return ConfigDict(json_schema_extra={"anyOf": options})
 
 
 def keys_of(model: type[Part]) -> dict[str, FieldInfo]:

@@ -1,74 +1,34 @@
-"""The keys behind the trajectory: `design`, `expansion`, `targets`, `validation`."""
+"""The keys that say how the work is done: `assignment`, `expansion`, `validation`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Literal, Self, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
+from eigassign.case.schema.design import YValue
 from eigassign.case.schema.mechanism import Q_VALUE
-from eigassign.case.schema.parts import (
-    Frozen,
-    FrozenDict,
-    Named,
-    NumberOr,
-    OneOrList,
-    Part,
-    Quantity,
-    ValueOr,
-    quantity,
-    wrong,
-)
-from eigassign.case.schema.trajectory import Coordinates, Times
+from eigassign.case.schema.parts import NumberOr, OneOrList, Part, Quantity, quantity
+from eigassign.case.schema.targets import Modes
+from eigassign.case.schema.trajectory import DURATION, Coordinates
 
 QSpan: TypeAlias = Annotated[float, Quantity(at_least=0, elsewhere=Q_VALUE.elsewhere)]
-YValue: TypeAlias = Annotated[
-    float, Quantity(elsewhere="quantity of the parameter's dimension (SI when bare)")
-]
-Frequency: TypeAlias = Annotated[float, quantity("frequency", above=0)]
 Auto: TypeAlias = Literal["auto"]
-Mode: TypeAlias = Annotated[int, Field(ge=1, le=1000)]
-Modes: TypeAlias = Annotated[tuple[Mode, ...], Field(min_length=1)]
 
 
-class Parameter(Part):
-    """One design parameter y: path of a numeric property, and its bounds in SI units."""
+class AssignmentKeys(Part):
+    """How the optimal design is looked for, and how good it has to be.
 
-    parameter: str
-    min: YValue
-    max: YValue
+    `starts`, `steps` and `seconds` limit the work; `max_error` (relative, in Hz) is how far a
+    frequency may be from its target (2 %; if it is given, a larger error sets the exit code).
+    """
 
-    @model_validator(mode="after")
-    def _has_room(self) -> Self:
-        if self.min > self.max:
-            raise wrong(f"min {self.min:g} is above max {self.max:g} (SI units)", "min")
-        return self
-
-
-class Constraint(Part):
-    """min ≤ Σ coefficient · y ≤ max over the named design parameters."""
-
-    terms: Annotated[Mapping[str, Annotated[float, Quantity()]], Field(min_length=1), Frozen]
-    min: YValue | None = None
-    max: YValue | None = None
-
-    @model_validator(mode="after")
-    def _binds(self) -> Self:
-        if self.min is None and self.max is None:
-            raise wrong("a constraint needs min, max or both")
-        if self.min is not None and self.max is not None and self.min > self.max:
-            raise wrong(f"min {self.min:g} is above max {self.max:g} (SI units)", "min")
-        if not any(self.terms.values()):
-            raise wrong("all coefficients are zero", "terms")
-        return self
-
-
-class Design(Part):
-    """Design parameters y in the order of the file, and linear constraints between them."""
-
-    parameters: Named[Parameter] = FrozenDict()
-    constraints: Named[Constraint] = FrozenDict()
+    method: Literal["sequential", "one_shot"] = "sequential"
+    objective: Literal["least_squares", "worst_case"] = "least_squares"
+    starts: NumberOr[Annotated[int, Field(ge=1, le=1000)], Auto] = "auto"
+    steps: Annotated[int, Field(ge=1, le=1_000_000)] = 100
+    seconds: Annotated[float, DURATION] | None = None
+    max_error: Annotated[float, quantity("fraction", above=0)] | None = None
 
 
 class ExpansionKeys(Part):
@@ -82,31 +42,6 @@ class ExpansionKeys(Part):
     q: OneOrList[Auto, Coordinates] = "auto"
     y: OneOrList[Auto, tuple[YValue, ...]] = "auto"
     modes: OneOrList[Auto, Modes] = "auto"
-
-
-class FrequencyProfile(Part):
-    """A wanted frequency (Hz) that changes in time (s), linear between the points given."""
-
-    time: Times
-    frequency: Annotated[tuple[Frequency, ...], Field(min_length=2)]
-
-    @model_validator(mode="after")
-    def _is_a_function(self) -> Self:
-        if len(self.time) != len(self.frequency):
-            raise wrong(f"{len(self.time)} times for {len(self.frequency)} frequencies", "time")
-        return self
-
-
-class Target(Part):
-    """Wanted frequency (Hz) of one elastic mode (1 is the lowest), and its weight.
-
-    It holds along every trajectory, or along the one that `trajectory` names.
-    """
-
-    mode: Mode
-    frequency: ValueOr[Frequency, FrequencyProfile]
-    weight: Annotated[float, Quantity(above=0)] = 1.0
-    trajectory: str | None = None
 
 
 class ValidationKeys(Part):

@@ -1,0 +1,295 @@
+"""The key `design`: parameters between bounds, lists of values and choices, and common limits.
+
+Whatever its entries are, a design is one vector y (`Design.parameters`): a parameter is one column
+of it, and `choices` make a column of each property that they set. `Design.catalogues` says which
+columns only take listed values, and which of these belong together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from functools import cached_property
+from typing import Annotated, Any, Self, TypeAlias
+
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+from pydantic_core import core_schema
+
+from eigassign.case.schema.parts import (
+    Frozen,
+    FrozenDict,
+    Named,
+    Part,
+    Quantity,
+    needs_one_of,
+    quantity,
+    wrong,
+)
+from eigassign.case.suggestions import listed
+from eigassign.case.units import QuantityError
+
+YValue: TypeAlias = Annotated[
+    float, Quantity(elsewhere="quantity of the parameter's dimension (SI when bare)")
+]
+Price: TypeAlias = Annotated[
+    float, Quantity(elsewhere="amount for one SI unit of the parameter, or such as 3 / kg")
+]
+RESERVED = ("constraints", "mass")  # names under `design` that are no entries of it
+MOST_CHOICES = 1000
+_SHARE = quantity("fraction", above=0)
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How far a parameter may deviate either way: a share of its value, or an amount in SI units.
+
+    In a file `2 %` is a share, everything else an amount.
+    """
+
+    amount: float
+    relative: bool
+
+    def deviation(self, value: float) -> float:
+        """Half-width of the range about ``value``, in SI units."""
+        return self.amount * abs(value) if self.relative else self.amount
+
+    def written(self) -> str | float:
+        """As a file may hold it; a share reads back as the very same number."""
+        return f"{100 * Decimal(repr(self.amount)):f} %" if self.relative else self.amount
+
+    @classmethod
+    def _validate(cls, value: object) -> Tolerance:
+        if isinstance(value, Tolerance):
+            return value
+        relative = isinstance(value, str) and value.rstrip().endswith("%")
+        try:
+            amount = (_SHARE if relative else Quantity(above=0)).read(value)
+        except QuantityError as error:
+            raise wrong(str(error)) from None
+        if relative and amount >= 1.0:
+            raise wrong(f"must be below 100 %, got {100 * amount:g} %")
+        return cls(amount, relative)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, _source: Any, _handler: Any) -> core_schema.CoreSchema:
+        read = Quantity(above=0, elsewhere="2 % of the value, or an amount in the parameter's unit")
+        return core_schema.no_info_plain_validator_function(
+            cls._validate,
+            metadata={"pydantic_js_functions": [lambda _schema, _handler: read.json_schema()]},
+        )
+
+
+def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
+    for k, value in enumerate(values):
+        if value in values[:k]:
+            raise wrong(f"{value:g} (SI units) is listed twice", k)
+    return tuple(sorted(values))
+
+
+def _require_order(low: float | None, high: float | None) -> None:
+    if low is not None and high is not None and low > high:
+        raise wrong(f"min {low:g} is above max {high:g} (SI units)", "min")
+
+
+class Parameter(Part):
+    """One design parameter: path of a numeric property, and its bounds or the values it may take.
+
+    `price` counts where no target asks for a frequency; `tolerance` is how far it may deviate.
+    """
+
+    model_config = needs_one_of(("min", "max"), ("values",))
+
+    parameter: str
+    min: YValue | None = None
+    max: YValue | None = None
+    values: (
+        Annotated[
+            tuple[YValue, ...],
+            Field(min_length=1, max_length=MOST_CHOICES),
+            AfterValidator(_ascending),
+        ]
+        | None
+    ) = None
+    price: Price | None = None
+    tolerance: Tolerance | None = None
+
+    @model_validator(mode="after")
+    def _has_a_range(self) -> Self:
+        for key, bound in (("min", self.min), ("max", self.max)):
+            if self.values is None and bound is None:
+                raise wrong("required key is missing: give min and max, or values", key)
+            if self.values is not None and bound is not None:
+                raise wrong(f"values are given, and leave nothing to limit: leave {key} out", key)
+        _require_order(self.min, self.max)
+        return self
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """The bounds, or the smallest and the largest of the values."""
+        bounds = self.values or tuple(v for v in (self.min, self.max) if v is not None)
+        return bounds[0], bounds[-1]
+
+
+class Choices(Part):
+    """Properties that are set together: one of the named choices (a list of sections, of motors).
+
+    All choices set the same properties.
+    """
+
+    choices: Annotated[
+        Mapping[str, Annotated[Mapping[str, YValue], Field(min_length=1), Frozen]],
+        Field(min_length=1, max_length=MOST_CHOICES),
+        Frozen,
+    ]
+
+    @model_validator(mode="after")
+    def _are_alike_and_differ(self) -> Self:
+        (first, model), *others = self.choices.items()
+        seen = {self._row(model): first}
+        for name, choice in others:
+            for path in choice:
+                if path not in model:
+                    message = f"choice {first!r} does not set it, and all must set the same"
+                    raise wrong(message, "choices", name, path)
+            if missing := [path for path in model if path not in choice]:
+                message = f"choice {first!r} sets {listed(missing)} too, and all must set the same"
+                raise wrong(message, "choices", name)
+            if same := seen.get(self._row(choice)):
+                raise wrong(f"has the same values as {same!r}", "choices", name)
+            seen[self._row(choice)] = name
+        return self
+
+    @property
+    def properties(self) -> tuple[str, ...]:
+        """Paths of the properties that every choice sets, in the order of the first choice."""
+        return tuple(next(iter(self.choices.values())))
+
+    @property
+    def rows(self) -> tuple[tuple[float, ...], ...]:
+        """The values of each choice, (n_choices, n_properties)."""
+        return tuple(self._row(choice) for choice in self.choices.values())
+
+    def _row(self, choice: Mapping[str, float]) -> tuple[float, ...]:
+        return tuple(choice[path] for path in self.properties if path in choice)
+
+
+class Constraint(Part):
+    """min ≤ Σ coefficient · y ≤ max over the named design parameters."""
+
+    terms: Annotated[Mapping[str, Annotated[float, Quantity()]], Field(min_length=1), Frozen]
+    min: YValue | None = None
+    max: YValue | None = None
+
+    @model_validator(mode="after")
+    def _binds(self) -> Self:
+        if self.min is None and self.max is None:
+            raise wrong("a constraint needs min, max or both")
+        _require_order(self.min, self.max)
+        if not any(self.terms.values()):
+            raise wrong("all coefficients are zero", "terms")
+        return self
+
+
+class MassLimits(Part):
+    """min ≤ mass of the whole mechanism (kg) ≤ max."""
+
+    min: Annotated[float, quantity("mass", above=0)] | None = None
+    max: Annotated[float, quantity("mass", above=0)] | None = None
+
+    @model_validator(mode="after")
+    def _binds(self) -> Self:
+        if self.min is None and self.max is None:
+            raise wrong("the mass needs min, max or both")
+        _require_order(self.min, self.max)
+        return self
+
+
+def _entry_tag(value: object) -> str:
+    if isinstance(value, Mapping):
+        return "<choices>" if "choices" in value and "parameter" not in value else "<parameter>"
+    return "<choices>" if isinstance(value, Choices) else "<parameter>"
+
+
+Entry: TypeAlias = Annotated[
+    Annotated[Parameter, Tag("<parameter>")] | Annotated[Choices, Tag("<choices>")],
+    Discriminator(_entry_tag),
+]
+ENTRIES: dict[str, type[Part]] = {"parameter": Parameter, "choices": Choices}
+
+
+# --- The design as one vector y
+
+
+@dataclass(frozen=True)
+class DesignColumn:
+    """One component of y: the property that it is, and its bounds in SI units.
+
+    Of a catalogue they are the smallest and the largest value listed. ``price`` is for one SI unit.
+    """
+
+    parameter: str
+    min: float
+    max: float
+    price: float | None = None
+    tolerance: Tolerance | None = None
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """Columns of y that take one of the listed ``rows`` together, (n_choices, n_columns) in SI."""
+
+    name: str
+    columns: tuple[int, ...]
+    choices: tuple[str, ...]
+    rows: tuple[tuple[float, ...], ...]
+
+
+def column_names(entry: str, properties: Sequence[str]) -> list[str]:
+    """Names in y of what the choices of an ``entry`` set: `boom.area` for `sections.boom.area`.
+
+    Where two paths end alike, the whole path.
+    """
+    ends = [path.rpartition(".")[2] for path in properties]
+    pairs = zip(properties, ends, strict=True)
+    return [f"{entry}.{end if ends.count(end) == 1 else path}" for path, end in pairs]
+
+
+class Design(Part):
+    """Design parameters and choices in the order of the file, and limits that they share."""
+
+    entries: Named[Entry] = FrozenDict()
+    constraints: Named[Constraint] = FrozenDict()
+    mass: MassLimits | None = None
+
+    @cached_property
+    def parameters(self) -> Mapping[str, DesignColumn]:
+        """y by the names of its columns, in order."""
+        found: dict[str, DesignColumn] = {}
+        for name, entry in self.entries.items():
+            if isinstance(entry, Choices):
+                columns = zip(*entry.rows, strict=True)
+                names = column_names(name, entry.properties)
+                for column, path, values in zip(names, entry.properties, columns, strict=True):
+                    found[column] = DesignColumn(path, min(values), max(values))
+            else:
+                found[name] = DesignColumn(
+                    entry.parameter, *entry.range, entry.price, entry.tolerance
+                )
+        return FrozenDict(found)
+
+    @cached_property
+    def catalogues(self) -> tuple[Catalogue, ...]:
+        """What can only take listed values, in the order of the file."""
+        found, start = [], 0
+        for name, entry in self.entries.items():
+            if isinstance(entry, Choices):
+                columns = tuple(range(start, start + len(entry.properties)))
+                found.append(Catalogue(name, columns, tuple(entry.choices), entry.rows))
+                start += len(columns)
+                continue
+            if entry.values is not None:
+                names = tuple(f"{value:g}" for value in entry.values)
+                found.append(Catalogue(name, (start,), names, tuple((v,) for v in entry.values)))
+            start += 1
+        return tuple(found)

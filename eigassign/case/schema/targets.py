@@ -1,0 +1,352 @@
+"""The key `targets`: wanted frequencies, limits, bands to keep out of, gaps between modes.
+
+A target has exactly one of the keys in `TARGETS`, which say what kind it is. What the rest of the
+program goes through are `requirements`: one for each mode that a target names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal, Self, TypeAlias
+
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+
+from eigassign.case.reader import KeyPath
+from eigassign.case.schema.design import YValue
+from eigassign.case.schema.parts import (
+    ByReference,
+    File,
+    FrozenDict,
+    NumberOr,
+    OneOrList,
+    Part,
+    Quantity,
+    ValueOr,
+    needs_one_of,
+    quantity,
+    wrong,
+)
+from eigassign.case.schema.trajectory import TIME, Coordinates, Times
+from eigassign.case.units import DIMENSIONS
+
+FREQUENCY = quantity("frequency", above=0)
+Frequency: TypeAlias = Annotated[float, FREQUENCY]
+Mode: TypeAlias = Annotated[int, Field(ge=1, le=1000)]
+
+
+def _differ(modes: tuple[int, ...]) -> tuple[int, ...]:
+    for k, mode in enumerate(modes):
+        if mode in modes[:k]:
+            raise wrong(f"mode {mode} is listed twice", k)
+    return modes
+
+
+Modes: TypeAlias = Annotated[tuple[Mode, ...], Field(min_length=1), AfterValidator(_differ)]
+
+# --- Frequencies that may change in time
+
+
+class FrequencyProfile(Part):
+    """A frequency (Hz) that changes in time (s), linear between the points given."""
+
+    time: Times
+    frequency: Annotated[tuple[Frequency, ...], Field(min_length=2)]
+
+    @model_validator(mode="after")
+    def _is_a_function(self) -> Self:
+        if len(self.time) != len(self.frequency):
+            raise wrong(f"{len(self.time)} times for {len(self.frequency)} frequencies", "time")
+        return self
+
+
+class FrequencyFile(Part):
+    """The same in a CSV file with the columns `time` (s) and `frequency` (Hz)."""
+
+    file: File
+
+
+CURVES: dict[str, type[Part]] = {"profile": FrequencyProfile, "csv": FrequencyFile}
+
+
+def _curve_tag(value: object) -> str:
+    if isinstance(value, FrequencyFile) or (isinstance(value, Mapping) and "file" in value):
+        return "<csv>"
+    return "<profile>" if isinstance(value, (FrequencyProfile, Mapping)) else "<value>"
+
+
+Curve: TypeAlias = Annotated[
+    Annotated[Frequency, Tag("<value>")]
+    | Annotated[FrequencyProfile, Tag("<profile>")]
+    | Annotated[FrequencyFile, Tag("<csv>")],
+    Discriminator(_curve_tag),
+]
+
+
+class Harmonic(Part):
+    """The band `harmonic` · f(t) · (1 ± `margin`) about a multiple of a frequency `of` (Hz)."""
+
+    harmonic: Annotated[float, Quantity(above=0)]
+    of: Curve
+    margin: Annotated[float, Quantity(DIMENSIONS["fraction"], above=0, below=1)]
+
+
+# --- Modes that are followed by their shape
+
+
+class Pose(Part):
+    """Where the mechanism stands: at a `time` (s) of a trajectory, or at `q`."""
+
+    time: Annotated[float, TIME] | None = None
+    trajectory: str | None = None
+    q: Coordinates | None = None
+
+    @model_validator(mode="after")
+    def _is_one(self) -> Self:
+        if (self.time is None) == (self.q is None):
+            raise wrong("give either time or q, and not both")
+        if self.q is not None and self.trajectory is not None:
+            raise wrong("belongs to time; q stands for itself", "trajectory")
+        return self
+
+
+class FollowedMode(Part):
+    """The mode whose shape is that of mode `like` at a pose and design, whatever its number.
+
+    `design` gives values of parameters and names of choices; what it does not name is as in the
+    file.
+    """
+
+    like: Mode
+    at: Pose
+    design: ByReference[NumberOr[YValue, str]] = FrozenDict()
+
+
+# --- Targets
+
+
+class AnyTarget(Part):
+    """What every target may have: a weight, and where it holds (everywhere if it does not say).
+
+    `trajectory` names the only one on which it holds, `during` is the part of it, from one time to
+    another (s).
+    """
+
+    kind: ClassVar[str]
+    weight: Annotated[float, Quantity(above=0)] = 1.0
+    trajectory: str | None = None
+    during: tuple[Annotated[float, TIME], Annotated[float, TIME]] | None = None
+
+    @model_validator(mode="after")
+    def _lasts(self) -> Self:
+        if self.during is not None and self.during[0] >= self.during[1]:
+            first, last = self.during
+            message = f"the first time must be before the last, got [{first:g}, {last:g}] s"
+            raise wrong(message, "during")
+        return self
+
+
+class ModeTarget(AnyTarget):
+    """A target on a `mode`, or on each of several `modes`."""
+
+    model_config = needs_one_of(("mode",), ("modes",))
+
+    mode: ValueOr[Mode, FollowedMode] | None = None
+    modes: OneOrList[Literal["all"], Modes] | None = None
+
+    @property
+    def curve(self) -> Curve:
+        """The frequency that is wanted, or the limit, in Hz."""
+        curve: Curve = getattr(self, self.kind)
+        return curve
+
+    @property
+    def frequencies(self) -> tuple[tuple[KeyPath, Curve], ...]:
+        """The same, as `KeepOutTarget.frequencies`."""
+        return (((self.kind,), self.curve),)
+
+    @model_validator(mode="after")
+    def _names_modes(self) -> Self:
+        if self.mode is None and self.modes is None:
+            raise wrong("required key is missing: the number of a mode (or modes: [...])", "mode")
+        if self.mode is not None and self.modes is not None:
+            raise wrong("mode is given already: one of them is enough", "modes")
+        return self
+
+
+class FrequencyTarget(ModeTarget):
+    """Wanted frequency (Hz) of an elastic mode (1 is the lowest)."""
+
+    kind = "frequency"
+    frequency: Curve
+
+    @model_validator(mode="after")
+    def _is_of_some(self) -> Self:
+        if self.modes == "all":
+            raise wrong("all modes cannot have one frequency: list those that shall", "modes")
+        return self
+
+
+class AtLeastTarget(ModeTarget):
+    """A frequency (Hz) that a mode must not fall below."""
+
+    kind = "at_least"
+    at_least: Curve
+
+
+class AtMostTarget(ModeTarget):
+    """A frequency (Hz) that a mode must not exceed."""
+
+    kind = "at_most"
+    at_most: Curve
+
+    @model_validator(mode="after")
+    def _is_of_some(self) -> Self:
+        if self.modes == "all":
+            raise wrong("there is always a higher mode: list those that are meant", "modes")
+        return self
+
+
+class KeepOutTarget(AnyTarget):
+    """A band (Hz), fixed or about a harmonic, that no mode may be in, or none of those named."""
+
+    kind = "keep_out"
+    keep_out: OneOrList[Harmonic, tuple[Frequency, Frequency]]
+    mode: Mode | None = None
+    modes: OneOrList[Literal["all"], Modes] | None = None
+
+    @property
+    def frequencies(self) -> tuple[tuple[KeyPath, Curve], ...]:
+        """What the file says in Hz, each with its keys below the target."""
+        if isinstance(self.keep_out, Harmonic):
+            return ((("keep_out", "of"), self.keep_out.of),)
+        return tuple((("keep_out", k), edge) for k, edge in enumerate(self.keep_out))
+
+    @model_validator(mode="after")
+    def _is_a_band(self) -> Self:
+        if self.mode is not None and self.modes is not None:
+            raise wrong("mode is given already: one of them is enough", "modes")
+        if isinstance(self.keep_out, tuple) and self.keep_out[0] >= self.keep_out[1]:
+            low, high = self.keep_out
+            raise wrong(f"the band must go upwards, got [{low:g}, {high:g}] Hz", "keep_out")
+        return self
+
+
+class Gap(Part):
+    """At least so many Hz between two modes."""
+
+    between: tuple[Mode, Mode]
+    at_least: Frequency
+
+    @model_validator(mode="after")
+    def _is_between_two(self) -> Self:
+        low, high = self.between
+        if low == high:
+            raise wrong(f"a gap is between two modes, got {low} twice", "between")
+        if low > high:
+            raise wrong(f"the lower mode comes first: [{high}, {low}]", "between")
+        return self
+
+
+class GapTarget(AnyTarget):
+    """Two modes that must stay apart."""
+
+    kind = "gap"
+    gap: Gap
+
+    @property
+    def frequencies(self) -> tuple[tuple[KeyPath, Curve], ...]:
+        """The same, as `KeepOutTarget.frequencies`."""
+        return ((("gap", "at_least"), self.gap.at_least),)
+
+
+TARGETS: dict[str, type[AnyTarget]] = {
+    target.kind: target
+    for target in (FrequencyTarget, AtLeastTarget, AtMostTarget, KeepOutTarget, GapTarget)
+}  # by the key that only they have
+
+
+def _target_tag(value: object) -> str | None:
+    if isinstance(value, AnyTarget):
+        return f"<{value.kind}>"
+    keys = [key for key in TARGETS if isinstance(value, Mapping) and key in value]
+    return f"<{keys[0]}>" if len(keys) == 1 else None
+
+
+TargetForm: TypeAlias = Annotated[
+    Annotated[FrequencyTarget, Tag("<frequency>")]
+    | Annotated[AtLeastTarget, Tag("<at_least>")]
+    | Annotated[AtMostTarget, Tag("<at_most>")]
+    | Annotated[KeepOutTarget, Tag("<keep_out>")]
+    | Annotated[GapTarget, Tag("<gap>")],
+    Discriminator(_target_tag, "no_target", "no key names a kind of target"),
+]
+
+
+# --- One requirement for each mode that a target names
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """One target on one mode; a keep-out on all the modes it names, a gap on its two.
+
+    ``place`` is the key path of its target. ``modes`` are one, the two of a gap, or those of a
+    keep-out (none: all there are); of a ``followed`` mode the number at the pose that names it.
+    """
+
+    place: str
+    kind: str  # of TARGETS
+    modes: tuple[int, ...]
+    target: TargetForm
+    followed: FollowedMode | None = None
+
+    @property
+    def label(self) -> str:
+        """The requirement in words: "mode 2 at least 320 Hz"."""
+        who = f"mode {self.modes[0]}" if self.modes else "every mode"
+        if self.followed is not None:
+            who = f"the mode like {who}"
+        if len(self.modes) > 1:
+            who = f"modes {', '.join(map(str, self.modes[:-1]))} and {self.modes[-1]}"
+        where = f" along {self.target.trajectory!r}" if self.target.trajectory else ""
+        if self.target.during:
+            where += " from {:g} to {:g} s".format(*self.target.during)
+        return f"{who} {_asked(self.target)}{where}"
+
+
+def _asked(target: TargetForm) -> str:
+    if isinstance(target, GapTarget):
+        return f"at least {target.gap.at_least:g} Hz apart"
+    if isinstance(target, KeepOutTarget):
+        if isinstance(target.keep_out, tuple):
+            return "clear of {:g} … {:g} Hz".format(*target.keep_out)
+        band = target.keep_out
+        return f"clear of {band.harmonic:g} times {_in_hz(band.of)} ± {100 * band.margin:g} %"
+    words = {"frequency": "at", "at_least": "at least", "at_most": "at most"}
+    return f"{words[target.kind]} {_in_hz(target.curve)}"
+
+
+def _in_hz(curve: float | FrequencyProfile | FrequencyFile) -> str:
+    return f"{curve:g} Hz" if isinstance(curve, (int, float)) else "its profile"
+
+
+def requirements(targets: Iterable[TargetForm]) -> tuple[Requirement, ...]:
+    """One for each mode that a target names, in the order of the file.
+
+    All modes are at least f if and only if mode 1 is.
+    """
+    found = []
+    for k, target in enumerate(targets):
+        place, kind = f"targets[{k}]", target.kind
+        if isinstance(target, GapTarget):
+            found.append(Requirement(place, kind, target.gap.between, target))
+        elif isinstance(target, KeepOutTarget):
+            named = (target.mode,) if target.mode is not None else target.modes or ()
+            found.append(Requirement(place, kind, () if named == "all" else named, target))
+        elif isinstance(target.mode, FollowedMode):
+            found.append(Requirement(place, kind, (target.mode.like,), target, target.mode))
+        else:
+            modes: tuple[int, ...] = () if target.mode is None else (target.mode,)
+            modes = (1,) if target.modes == "all" else target.modes or modes
+            found += [Requirement(place, kind, (mode,), target) for mode in modes]
+    return tuple(found)
