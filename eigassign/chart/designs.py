@@ -59,6 +59,8 @@ def chart_designs(
     lower, upper = scene.bounds
     if not len(lower) or not np.isfinite(upper - lower).all() or not _are_frequencies(scene.file):
         return (), ()
+    if scene.path.follows_design:
+        return (), ("no designs are charted where the coordinates follow the design",)
     effort = suited(effort, scene.model.n_dof)
     task, runs, notes = design_task(scene, effort, solve_s), [], []
     if len(task.q) < len(scene.path.q):

@@ -125,18 +125,21 @@ class Expansion:
 
         λ ≈ l_0(q) + Σ_j l_j(q) (y_j − y0_j), rad²/s² over units of y: the terms |β| ≤ 1.
         """
+        l0, slopes = self.gradient(q)
+        return l0, slopes[:, :, len(self.q0) :]
+
+    def gradient(self, q: ArrayLike) -> tuple[Floats, Floats]:
+        """λ (n_samples, n_modes) and ∂λ/∂x (n_samples, n_modes, n_x) at samples of q, y = y0."""
         w = (samples(q, self.y0, len(self.q0), len(self.y0)) - self.x0) @ self.directions.T
-        powers, n_q, n_y = monomials(self.space, w), len(self.q0), len(self.y0)
+        powers = monomials(self.space, w)
         l0 = np.hstack([_evaluate(c, powers, self.modes) for c in self.clusters])
-        slopes = np.zeros((len(w), l0.shape[1], n_y))
-        for j in range(n_y):
-            (local,) = np.nonzero(self.directions[:, n_q + j])
-            if len(local):
-                derivative = _derivative_powers(self.space, powers, int(local[0]))
-                slopes[:, :, j] = np.hstack(
-                    [_slope(c, powers, derivative, self.modes) for c in self.clusters]
-                )
-        return l0, slopes
+        slopes = np.zeros((*l0.shape, len(self.directions)))
+        for local in range(len(self.directions)):
+            derivative = _derivative_powers(self.space, powers, local)
+            slopes[:, :, local] = np.hstack(
+                [_slope(c, powers, derivative, self.modes) for c in self.clusters]
+            )
+        return l0, slopes @ self.directions
 
     @property
     def x0(self) -> Floats:
@@ -190,17 +193,18 @@ def _eigenvalues(cluster: Cluster, matrices: Floats, wanted: tuple[int, ...]) ->
 
 
 def _derivative_powers(space: LowerSet, powers: Floats, variable: int) -> Floats:
-    """∂ w^γ/∂w_j where w_j = 0: the powers of the other variables for γ_j = 1, else 0."""
+    """∂ w^γ/∂w_j = γ_j w^(γ − e_j), (n, N), from the powers w^γ (n, N)."""
     out = np.zeros_like(powers)
-    once = np.flatnonzero(space.indices[:, variable] == 1)
-    lower = space.indices[once].copy()
-    lower[:, variable] = 0
-    out[:, once] = powers[:, space.find(lower)]
+    present = np.flatnonzero(space.indices[:, variable])
+    lower = space.indices[present].copy()
+    times = lower[:, variable].astype(np.float64)
+    lower[:, variable] -= 1
+    out[:, present] = times * powers[:, space.find(lower)]
     return out
 
 
 def _slope(cluster: Cluster, powers: Floats, derivative: Floats, wanted: tuple[int, ...]) -> Floats:
-    """∂λ/∂y_j; in a cluster vᵀ (∂Λ/∂y_j) v with the eigenvectors v of Λ."""
+    """∂λ/∂w_j; in a cluster vᵀ (∂Λ/∂w_j) v with the eigenvectors v of Λ."""
     if len(cluster.modes) == 1:
         return np.asarray((derivative @ cluster.coefficients[0, 0])[:, None])
     columns = [k for k, mode in enumerate(cluster.modes) if mode in wanted]

@@ -25,6 +25,7 @@ from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajector
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.model import Model
 from eigassign.modal.slow_motion import motion_effect
+from eigassign.study.planning import travelled
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -74,7 +75,7 @@ def _mesh_lines(error: Floats | None, modes: tuple[int, ...]) -> list[str]:
 
 def truncation_notes(scene: Scene, optimum: Floats | None = None) -> list[str]:
     """`truncation_lines` along the trajectory, at the initial design, both bounds, the optimum."""
-    q = scene.q0[None] if scene.trajectory is None else scene.path.q
+    q = scene.q0[None] if scene.trajectory is None else travelled(scene.file, scene.trajectory)
     designs = [scene.initial, *scene.bounds, *([] if optimum is None else [optimum])]
     return truncation_lines(scene.model, scene.expansions.modes, q, np.array(designs))
 

@@ -74,7 +74,7 @@ def assign_design(scene: Scene, targets: tuple[Wanted, ...]) -> Assignment:
     Raises InfeasibleError with the names of the constraints that contradict each other.
     """
     file, path = scene.file, scene.path
-    l0, slope = scene.expansions.linear_in_design(path.q)
+    l0, slope = scene.expansions.linear_in_design(path)
     _require_near(scene, l0)
     column = scene.expansions.column
     goals = [

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile, TipTrajectory, TrajectoryForm
+from eigassign.case import CaseFile, TrajectoryForm
 from eigassign.errors import CaseError, MechanismError
 from eigassign.mechanism.assembly.build import (
     WholeLinks,
@@ -92,8 +92,6 @@ def build_trajectories(file: CaseFile, model: Model) -> Trajectories:
 def _followed(file: CaseFile, model: Model, keys: TrajectoryForm, path: str) -> Trajectory:
     """One trajectory, which stands at ``path`` of the case file."""
     with located(file, path):
-        if isinstance(keys, TipTrajectory):
-            _refuse_moving_tip(model, keys)
         return build_trajectory(
             keys,
             model.q_names,
@@ -101,17 +99,5 @@ def _followed(file: CaseFile, model: Model, keys: TrajectoryForm, path: str) -> 
                 file, model.poses.parameters, model.motion, tip, initial_design(file), oriented
             ),
             file.coordinate_units,
+            lambda tip, oriented: bool(design_dependence(model.poses, tip, oriented).any()),
         )
-
-
-def _refuse_moving_tip(model: Model, keys: TipTrajectory) -> None:
-    """Raise MechanismError where a design parameter moves the tip: q(t) would depend on it."""
-    oriented = keys.angle is not None or keys.orientation is not None
-    moved = design_dependence(model.poses, keys.tip, oriented)
-    for name, moves in zip(model.y_names, moved, strict=True):
-        if moves:
-            raise MechanismError(
-                f"design.{name}.parameter",
-                "moves the tip, so the joint angles of the tip path would change with it; "
-                "give joint samples instead",
-            )

@@ -126,7 +126,7 @@ def _accuracy_warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[s
     limit, y = scene.file.validation.max_error, assigned.assignment.y
     off = [t for t in assigned.targets if not t.approximation_error <= limit]
     for target in off:
-        taylor = scene.expansions.taylor_hz(scene.path.q[target.rows], y)
+        taylor = scene.expansions.taylor_hz(scene.path.at(y)[0][target.rows], y)
         taylor_hz = taylor[:, scene.expansions.column(target.mode)]
         enough = np.all(np.abs(taylor_hz / target.exact_hz - 1.0) <= limit)
         point = ", ".join(f"{value:.4g}" for value in y)

@@ -12,10 +12,11 @@ box of y at q0
     parameters, corners and seeded random designs beyond;
 box of q and y
     seeded random points (``validation.samples`` of them). In q the box is what the joint angles
-    travel along the trajectory. It is spanned in the joints' *relative* angles, on which the
-    frequencies depend: the box of the absolute angles would also hold poses far from any that the
-    mechanism takes. With ``validation.q_span`` it is instead q0 ± the span in the coordinates of
-    the case, whatever poses that gives. In y it is the bounds.
+    travel along the trajectory, with the corners of the bounds too where they follow the design. It
+    is spanned in the joints' *relative* angles, on which the frequencies depend: the box of the
+    absolute angles would also hold poses far from any that the mechanism takes. With
+    ``validation.q_span`` it is instead q0 ± the span in the coordinates of the case, whatever poses
+    that gives. In y it is the bounds.
 
 Errors are in frequency (Hz), relative; a point where a polynomial gives λ < 0 counts as infinitely
 wrong. Where the full set was too large for the order asked for, only the linearised error counts.
@@ -34,7 +35,7 @@ from eigassign.case import CaseFile
 from eigassign.errors import CaseError
 from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.modal.model import Model
-from eigassign.study.planning import joint_map
+from eigassign.study.planning import joint_map, travelled
 from eigassign.study.results import (
     Comparison,
     DesignMap,
@@ -189,9 +190,9 @@ def q_grid(scene: Scene) -> Grid | None:
     S, q0 = joint_map(scene.model), scene.q0
     if scene.trajectory is None or not len(S):
         return None
-    travelled, s0 = scene.trajectory.q @ S.T, S @ q0
+    s, s0 = travelled(scene.file, scene.trajectory) @ S.T, S @ q0
     moved = [int(np.flatnonzero(row)[-1]) for row in S]
-    ends = np.array([travelled.min(axis=0), travelled.max(axis=0)]) - s0
+    ends = np.array([s.min(axis=0), s.max(axis=0)]) - s0
     ends = np.array([np.minimum(ends[0], 0.0), np.maximum(ends[1], 0.0)])  # q0 is always inside
     lower, upper = np.sort(ends / S[range(len(S)), moved], axis=0) + q0[moved]
     names, units = scene.model.q_names, scene.file.coordinate_units
@@ -289,8 +290,8 @@ def random_q(scene: Scene, random: np.random.Generator) -> Floats | None:
     S = joint_map(scene.model)
     if scene.trajectory is None or not len(S):
         return None
-    travelled = scene.trajectory.q @ S.T
-    s = random.uniform(travelled.min(axis=0), travelled.max(axis=0), (n, len(S)))
+    along = travelled(scene.file, scene.trajectory) @ S.T
+    s = random.uniform(along.min(axis=0), along.max(axis=0), (n, len(S)))
     return np.asarray(q0 + (s - S @ q0) @ np.linalg.pinv(S).T)
 
 

@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import hadamard
 
 from eigassign.case import CaseFile
-from eigassign.errors import AccuracyError, CaseError
+from eigassign.errors import AccuracyError, CaseError, TrajectoryError
+from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.adaptive.link_reduction import POSES, ReductionChoice, choose_reduction
 from eigassign.modal.adaptive.mesh import MeshChoice, choose_mesh
@@ -378,9 +379,10 @@ def at_corners(
     lower, upper = _bounds(file)
     outer = np.where(np.asarray(at_upper, dtype=bool), upper, lower)
     designs = np.unique(np.vstack([y0, outer]), axis=0) if len(y0) else np.zeros((1, 0))
-    poses = np.zeros(1, dtype=np.intp) if trajectory is None else trajectory.spread(samples)
-    rows, which = np.tile(poses, len(designs)), np.repeat(np.arange(len(designs)), len(poses))
-    return _samples(trajectory, q0, rows, designs[which])
+    rows = np.zeros(1, dtype=np.intp) if trajectory is None else trajectory.spread(samples)
+    q = [q0[None] if trajectory is None else _poses(trajectory, y)[rows] for y in designs]
+    x = np.hstack([np.concatenate(q), np.repeat(designs, len(rows), axis=0)])
+    return DesignSamples(x, np.tile(rows, len(designs)), trajectory)
 
 
 def at_random(
@@ -391,8 +393,10 @@ def at_random(
     random = np.random.default_rng(SEED)
     share = random.random((count, len(y0)))
     share[count // 2 :] = share[count // 2 :] > 0.5
-    rows = random.integers(0, 1 if trajectory is None else len(trajectory.q), count)
-    return _samples(trajectory, q0, rows, lower + share * (upper - lower))
+    q = q0[None] if trajectory is None else travelled(file, trajectory)
+    rows = random.integers(0, len(q), count)
+    x = np.hstack([q[rows], lower + share * (upper - lower)])
+    return DesignSamples(x, rows % (1 if trajectory is None else len(trajectory.q)), trajectory)
 
 
 def with_worse_designs(
@@ -419,9 +423,30 @@ def with_worse_designs(
     return seen.joined(worse), np.append(errors, most)
 
 
-def _samples(trajectory: Trajectories | None, q0: Floats, rows: Ints, y: Floats) -> DesignSamples:
-    q = np.repeat(q0[None], len(rows), axis=0) if trajectory is None else trajectory.q[rows]
-    return DesignSamples(np.hstack([q, y]), rows, trajectory)
+def travelled(file: CaseFile, trajectory: Trajectories) -> Floats:
+    """Poses q (m, n_q) along the trajectory: at the initial design, all samples in their order.
+
+    Where they follow the design, then at the corners of the bounds of what moves the tip, as far as
+    these can follow it.
+    """
+    if not trajectory.follows_design:
+        return trajectory.q
+    y, (lower, upper) = initial_design(file), _bounds(file)
+    moving = np.flatnonzero(np.abs(trajectory.at(y)[1]).max(axis=(0, 1)))
+    found = [trajectory.q]
+    for at_upper in corners(len(moving)):
+        corner = y.copy()
+        corner[moving] = np.where(at_upper, upper[moving], lower[moving])
+        found.append(_poses(trajectory, corner))
+    return np.concatenate(found)
+
+
+def _poses(trajectory: Trajectories, y: Floats) -> Floats:
+    """q (n, n_q) at design y; at the initial one where y cannot follow the path of its tip."""
+    try:
+        return trajectory.at(y)[0]
+    except TrajectoryError:
+        return trajectory.q
 
 
 def _bounds(file: CaseFile) -> tuple[Floats, Floats]:

@@ -52,10 +52,17 @@ class Expansions:
         """Partially linearised expansion at samples, (n, n_modes) in Hz."""
         return self._nearest(q, [part.linear.frequencies(q, y) for part in self.all])
 
-    def linear_in_design(self, q: Floats) -> tuple[Floats, Floats]:
-        """l_0 (n, n_modes) and l (n, n_modes, n_y) of eq. (9); all points share y0."""
-        found = [part.linear.linear_in_design(q) for part in self.all]
-        return self._nearest(q, [f[0] for f in found]), self._nearest(q, [f[1] for f in found])
+    def linear_in_design(self, path: Trajectories) -> tuple[Floats, Floats]:
+        """l_0 (n, n_modes) and l (n, n_modes, n_y) of eq. (9) along a path; all points share y0.
+
+        Where q follows the design, l is the total derivative ∂λ/∂y + ∂λ/∂q dq/dy at (q(y0), y0).
+        Raises TrajectoryError where the design y0 cannot follow the path.
+        """
+        q, of_design = path.at(self.full.y0)
+        found = [part.linear.gradient(q) for part in self.all]
+        l0, slopes = (self._nearest(q, [f[k] for f in found]) for k in (0, 1))
+        by_q, by_y = np.split(slopes, [q.shape[1]], axis=2)
+        return l0, by_y + by_q @ of_design if path.follows_design else by_y
 
     def estimate(self, q: Floats, y: Floats) -> Floats:
         """Error estimate of the full expansion, relative in Hz, (n, n_modes)."""
@@ -113,12 +120,12 @@ class Scene:
     def exact(
         self, y: Floats, progress: Callable[[int, int], None] = lambda _done, _of: None
     ) -> Floats:
-        """Exact frequencies (n_t, n_shown_modes) in Hz on every sample of the trajectory.
+        """Exact frequencies (n_t, n_shown_modes) in Hz on every sample of the trajectory at y.
 
         They are solved in blocks: between two of them ``progress`` is called with the number of
         samples done and of all, and signals are handled.
         """
-        q, count = self.path.q, len(self.shown_modes)
+        q, count = self.path.at(y)[0], len(self.shown_modes)
         block = max(1, BLOCK // self.model.n_dof**2)
         parts = []
         for start in range(0, len(q), block):

@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
+from redesigned_arms import (
+    extrapolated,
+    five_bar,
+    five_bar_in_joints,
+    six_joints,
+    slider_crank,
+    three_links,
+    two_link_lengths,
+)
 from scenes import SHIPPED, scene_of
 
+from eigassign.api import Case
 from eigassign.modal.exact.solver import eigenvalues
 from eigassign.modal.slopes import eigenvalue_slopes, theta_slopes
 from eigassign.series.multi_index import total_degree
@@ -44,3 +56,30 @@ def test_a_parameter_without_room_has_no_slope_and_spoils_none(arm: Scene) -> No
     one = eigenvalue_slopes(arm.model.pencil, x, 1, np.array([0.0, 0.0, 0.0, 0.25]))[1]
     assert one[0, 0, 2] == 0.0
     np.testing.assert_allclose(one[:, :, 3], both[:, :, 3], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [two_link_lengths, three_links, six_joints, five_bar, slider_crank, five_bar_in_joints],
+)
+def test_slopes_where_coordinates_follow_the_design_are_those_of_extrapolated_differences(
+    make: Callable[[], Case],
+) -> None:
+    case = make()
+    model, path = case.model(), case.trajectory
+    y = case.initial_design * (1.0 + 0.01 * np.cos(np.arange(len(case.initial_design))))
+    y = np.where(y == 0.0, 0.1, y)
+    q, of_design = path.at(y)
+    scales = np.concatenate([np.ones(q.shape[1]), y])
+    _, slopes = eigenvalue_slopes(model.pencil, model.x(q, y), 2, scales)
+    by_q, by_y = np.split(slopes, [q.shape[1]], axis=2)
+    total = by_y + by_q @ of_design  # dλ/dy = ∂λ/∂y + ∂λ/∂q dq/dy
+
+    def lam(v: np.ndarray) -> np.ndarray:
+        return eigenvalues(model.pencil, model.x(path.at(v)[0], v), 2)
+
+    beside = extrapolated(lam, y, 1e-3)
+    worst = np.abs(total - beside).max(axis=(0, 1)) / np.abs(total).max(axis=(0, 1))
+    assert worst.max() <= 1e-7
+    missing = np.abs(by_y - beside).max(axis=(0, 1)) / np.abs(total).max(axis=(0, 1))
+    assert (missing.max() > 1e-2) == path.follows_design  # it would be wrong without the chain rule

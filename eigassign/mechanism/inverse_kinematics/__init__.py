@@ -8,4 +8,5 @@ Read in this order; each imports only from those above it:
     solver    Newton, Levenberg-Marquardt, and tracing a path
     failures  why a path cannot be followed, in words
     follow    from the first sample along the whole path
+    redesign  how the coordinates along a path follow the design
 """

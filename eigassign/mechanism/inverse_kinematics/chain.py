@@ -10,8 +10,10 @@ components of the tip's position, r = 1 or 3 of its turning.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property, partial
+from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +27,7 @@ from eigassign.mechanism.kinematics.parameters import ModelParameters, node_posi
 from eigassign.mechanism.kinematics.rotations import Objects, multiply
 from eigassign.mechanism.kinematics.topology import Topology, split
 from eigassign.series.algebra import Samples
-from eigassign.series.compiler import compile_table
+from eigassign.series.compiler import CompiledTable, Program, compile_table
 from eigassign.series.expression import Recorder, derivative
 
 Floats = NDArray[np.float64]
@@ -65,6 +67,7 @@ class TipChain:
     kinds: tuple[str, ...]
     turned_by: tuple[int, ...] = ()  # the components of a rotation vector that a tip can have
     assembly: LoopAssembly | None = None
+    design: ChainDesign | None = None  # how it changes with the design; None of a chain without one
 
     @property
     def n_q(self) -> int:
@@ -74,6 +77,16 @@ class TipChain:
     def of_kind(self, kind: str) -> Bools:
         """Which entries of a state are of this kind, (n_q + n_p,)."""
         return np.array([k == kind for k in self.kinds], dtype=bool)
+
+
+@dataclass(frozen=True)
+class ChainDesign:
+    """A chain as a function of the design parameters y, written down once for all of them."""
+
+    names: tuple[str, ...]
+    y: Floats  # (n_y,) of this chain
+    chain: Callable[[Floats], TipChain]  # y (n_y,) -> the same chain at another design
+    evaluate: Callable[[Floats, Floats], TipEvaluation]  # z, y -> the columns of y after those of q
 
 
 @dataclass(frozen=True)
@@ -123,64 +136,134 @@ def tip_chain(
 ) -> TipChain:
     """The chain that carries the node ``tip`` ("link.node") at design y, turned if oriented."""
     points, turns = (2, (2,)) if case.mechanism.space == "planar" else (3, (0, 1, 2))
-    turned_by = turns if oriented else ()
-    return TipChain(
-        evaluate=_evaluator(case, parameters, motion, tip, y, points, turned_by),
-        joints=tuple(c.joint for c in case.coordinates.values()),
-        relative_map=(motion.relative, motion.offset),
-        kinds=_kinds(case, motion.tree),
-        turned_by=turned_by,
-        assembly=_assembly(case, parameters, motion, y),
-    )
+    tables = _TipTables(case, parameters, motion, tip, points, turns if oriented else ())
+    passive = _passive_table(parameters, motion, len(y))
 
-
-def _evaluator(
-    case: CaseFile,
-    parameters: ModelParameters,
-    motion: Kinematics,
-    tip: str,
-    y: Floats,
-    d: int,
-    turns: tuple[int, ...],
-) -> Callable[[Floats], TipEvaluation]:
-    """The chain's `evaluate`: one table of scalars, evaluated for all states together.
-
-    The links are placed anew with open loops: passive freedoms are variables, closure is an
-    equation to be met, and every freedom moves by itself.
-    """
-    A, b, tree = motion.relative, motion.offset, motion.tree
-    n_q, n_z, n_y = len(b), len(tree.freedoms), len(y)
-    recorder = Recorder()
-    variables = parameters.rerecorded(recorder, len(tree.passive))
-    values = [variables.freedom(k) for k in range(n_z)]
-    moving = walk(case, variables, tree, motion.coordinates, values, np.eye(n_z, dtype=object))
-    link, node = split(tip)
-    X = node_position(case, variables, tree, (link, node))
-    rotation, place = moving.placement(link).at(X)
-    twist = shifted(moving.placement(link).twist, X)
-    velocity, spin = multiply(rotation, twist[:3]), multiply(rotation, twist[3:])
-    J = _per_coordinate(np.concatenate([velocity[:d], spin[list(turns)]]), A)
-    F, dF = _closure(moving, d == 2, n_y, A)
-    turned = rotation.ravel() if turns else rotation[:0].ravel()
-    parts = [place[:d], turned, J.ravel(), F, dF.ravel()]
-    table = compile_table(recorder, list(np.concatenate(parts)), n_z + n_y)
-    weights, constants = table.weights.toarray(), table.constants[:, None]  # small: dense is quick
-    i, j, k, m = np.cumsum([len(part) for part in parts])[:-1].tolist()
-
-    def evaluate(z: Floats) -> TipEvaluation:
-        n = len(z)
-        at = np.empty((n_z + n_y, n))  # (s, y, p)
-        at[:n_q] = (z[:, :n_q] @ A.T + b).T
-        at[n_q : n_q + n_y] = y[:, None]
-        at[n_q + n_y :] = z[:, n_q:].T
-        v = weights @ table.program.run(Samples(), at) + constants
-        R = v[i:j].T.reshape(n, 3, 3) if turns else None
-        closure = v[m:].T.reshape(n, len(F), n_z)
-        return TipEvaluation(
-            v[:i].T, R, v[j:k].T.reshape(n, d + len(turns), n_z), v[k:m].T, closure
+    def at(y: Floats) -> TipChain:
+        return TipChain(
+            evaluate=partial(tables.evaluate, y=y),
+            joints=tuple(c.joint for c in case.coordinates.values()),
+            relative_map=(motion.relative, motion.offset),
+            kinds=_kinds(case, motion.tree),
+            turned_by=tables.turns,
+            assembly=_assembly(case, passive, motion, y),
+            design=ChainDesign(parameters.design, y, at, tables.evaluate_with_design),
         )
 
-    return evaluate
+    return at(y)
+
+
+@dataclass(frozen=True, eq=False)
+class _TipTables:
+    """The chain's scalars over z and y, compiled once, and evaluated for all states together.
+
+    The links are placed anew with open loops: passive freedoms are variables, closure is an
+    equation to be met, and every freedom moves by itself. A design parameter then turns no link.
+    """
+
+    case: CaseFile
+    parameters: ModelParameters
+    motion: Kinematics
+    tip: str
+    d: int
+    turns: tuple[int, ...]
+
+    @cached_property
+    def _recorded(self) -> tuple[Recorder, list[Objects]]:
+        """Place (d,), rotation (9,) or nothing, J (d + r, n_z), F (n_e,) and ∂F/∂z."""
+        case, tree, A = self.case, self.motion.tree, self.motion.relative
+        n_z = len(tree.freedoms)
+        recorder = Recorder()
+        variables = self.parameters.rerecorded(recorder, len(tree.passive))
+        values = [variables.freedom(k) for k in range(n_z)]
+        moving = walk(
+            case, variables, tree, self.motion.coordinates, values, np.eye(n_z, dtype=object)
+        )
+        link, node = split(self.tip)
+        X = node_position(case, variables, tree, (link, node))
+        rotation, place = moving.placement(link).at(X)
+        twist = shifted(moving.placement(link).twist, X)
+        velocity, spin = multiply(rotation, twist[:3]), multiply(rotation, twist[3:])
+        J = _per_coordinate(np.concatenate([velocity[: self.d], spin[list(self.turns)]]), A)
+        F, dF = _closure(moving, self.d == 2, self._n_y, A)
+        turned = rotation.ravel() if self.turns else rotation[:0].ravel()
+        return recorder, [place[: self.d], turned, J, F, dF]
+
+    @property
+    def _n_y(self) -> int:
+        return len(self.parameters.design)
+
+    @cached_property
+    def _state_table(self) -> _Table:
+        recorder, parts = self._recorded
+        return _Table.of(recorder, parts, len(self.motion.tree.freedoms) + self._n_y)
+
+    @cached_property
+    def _design_table(self) -> _Table:
+        """∂(place)/∂y (d, n_y) and ∂F/∂y (n_e, n_y)."""
+        recorder, (place, _, _, F, _) = self._recorded
+        n_q, n_z = len(self.motion.offset), len(self.motion.tree.freedoms)
+        parts = [
+            np.array([[derivative(f, n_q + k) for k in range(self._n_y)] for f in of], dtype=object)
+            for of in (place, F)
+        ]
+        shaped = [part.reshape(-1, self._n_y) for part in parts]
+        return _Table.of(recorder, shaped, n_z + self._n_y)
+
+    def evaluate(self, z: Floats, y: Floats) -> TipEvaluation:
+        """What a chain's ``evaluate`` gives, z (n, n_z), at design y."""
+        point, turned, J, F, dF = self._state_table(self._variables(z, y))
+        R = turned.reshape(len(z), 3, 3) if self.turns else None
+        return TipEvaluation(point, R, J, F, dF)
+
+    def evaluate_with_design(self, z: Floats, y: Floats) -> TipEvaluation:
+        """The same with derivatives by (q, y, p) instead of (q, p)."""
+        seen = self.evaluate(z, y)
+        place, closing = self._design_table(self._variables(z, y))
+        J = np.zeros((*seen.jacobian.shape[:2], self._n_y))
+        J[:, : self.d] = place
+        after = [len(self.motion.offset)]
+        parted = [np.split(both, after, axis=2) for both in (seen.jacobian, seen.closure)]
+        tip, closure = (
+            np.concatenate([by_q, by_y, by_p], axis=2)
+            for (by_q, by_p), by_y in zip(parted, (J, closing), strict=True)
+        )
+        return seen._replace(jacobian=tip, closure=closure)
+
+    def _variables(self, z: Floats, y: Floats) -> Floats:
+        """(s, y, p) as rows, s = A q + b."""
+        A, b = self.motion.relative, self.motion.offset
+        n_q = len(b)
+        at = np.empty((z.shape[1] + len(y), len(z)))
+        at[:n_q] = (z[:, :n_q] @ A.T + b).T
+        at[n_q : n_q + len(y)] = y[:, None]
+        at[n_q + len(y) :] = z[:, n_q:].T
+        return at
+
+
+@dataclass(frozen=True, eq=False)
+class _Table:
+    """Arrays of scalars, evaluated for many samples together."""
+
+    program: Program
+    weights: Floats  # small: dense is quick
+    constants: Floats
+    shapes: tuple[tuple[int, ...], ...]
+
+    @staticmethod
+    def of(recorder: Recorder, arrays: Sequence[Objects], n_variables: int) -> _Table:
+        """Compile them over the recorder's variables."""
+        scalars = [scalar for array in arrays for scalar in array.ravel()]
+        table = compile_table(recorder, scalars, n_variables)
+        shapes = tuple(array.shape for array in arrays)
+        return _Table(table.program, table.weights.toarray(), table.constants[:, None], shapes)
+
+    def __call__(self, variables: Floats) -> list[Floats]:
+        """Each array at variables (n_variables, n), (n, *shape)."""
+        values = (self.weights @ self.program.run(Samples(), variables) + self.constants).T
+        cuts = np.cumsum([prod(shape) for shape in self.shapes])[:-1]
+        parts = zip(np.split(values, cuts, axis=1), self.shapes, strict=True)
+        return [part.reshape(len(values), *shape) for part, shape in parts]
 
 
 def _per_coordinate(rates: Objects, A: Floats) -> Objects:
@@ -214,14 +297,21 @@ def _kinds(case: CaseFile, tree: Topology) -> tuple[str, ...]:
     return tuple(kinds)
 
 
-def _assembly(
-    case: CaseFile, parameters: ModelParameters, motion: Kinematics, y: Floats
-) -> LoopAssembly | None:
-    """The branch of the model itself: where it was chosen, and its passive freedoms."""
+def _passive_table(
+    parameters: ModelParameters, motion: Kinematics, n_y: int
+) -> CompiledTable | None:
+    """The passive freedoms of the model itself; None without any."""
     if not motion.passive:
         return None
-    n = len(motion.offset) + len(y)
-    table = compile_table(parameters.recorder, motion.passive, n)
+    return compile_table(parameters.recorder, motion.passive, len(motion.offset) + n_y)
+
+
+def _assembly(
+    case: CaseFile, table: CompiledTable | None, motion: Kinematics, y: Floats
+) -> LoopAssembly | None:
+    """The branch of the model itself: where it was chosen, and its passive freedoms."""
+    if table is None:
+        return None
 
     def passive(q: Floats) -> Floats:
         s = q @ motion.relative.T + motion.offset

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from eigassign.errors import TrajectoryError
@@ -99,3 +101,23 @@ def blocked(
         f"{why}; keep the path away from there"
     )
     return TrajectoryError(WAYPOINTS, message, k)
+
+
+def other_branch(ik: TipProblem, course: Course, k: int, u: Floats) -> TrajectoryError:
+    """Sample k can be reached with another design, but not from state u (n_z,) of the first one."""
+    why = (
+        "the links come to stand stretched or folded in line, or the loops at a dead point"
+        if ik.rank == ik.n_q
+        else "the motion that leaves the tip in place, kept as in the initial design, has to change"
+    )
+    message = (
+        f"{course.label(k)} can be reached, but not by changing the design steadily from the "
+        f"initial one: near {pose(ik, u)} {why}; take narrower bounds"
+    )
+    return TrajectoryError(WAYPOINTS, message, k)
+
+
+def with_design(values: Mapping[str, float], error: TrajectoryError) -> TrajectoryError:
+    """The same error with the design parameters at which it was met, SI."""
+    design = ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
+    return TrajectoryError(error.path, f"with {design}: {error.message}", error.sample)

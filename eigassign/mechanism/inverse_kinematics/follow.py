@@ -53,6 +53,8 @@ class Followed:
     q: Floats
     tip: Floats
     notes: tuple[str, ...]
+    problem: TipProblem
+    u: Floats  # its states (n, n_q + n_p)
 
 
 def follow(
@@ -88,7 +90,7 @@ def follow(
             continue
         q = np.ascontiguousarray((u * ik.scale)[:, : ik.n_q])
         q.setflags(write=False)
-        return Followed(q, ik.evaluate(u).point, _notes(ik, candidates))
+        return Followed(q, ik.evaluate(u).point, _notes(ik, candidates), ik, u)
     if not failures:
         raise other_assembly(ik, course)
     raise max(failures, key=lambda error: error.sample)
@@ -107,17 +109,17 @@ def _along(ik: TipProblem, course: Course, u0: Floats) -> Floats:
         if not strayed.any():
             break
     n = int(np.argmax(strayed)) if strayed.any() else n
-    _check(ik, course, u[:n], _first(target, n))
+    require_reached(ik, course, u[:n], _first(target, n))
     if n < len(course.s):
         raise _blocked(ik, course, n, path)
-    return _assembled(ik, course, u, target)
+    return as_assembled(ik, course, u, target)
 
 
 def _first(target: TipTarget, n: int) -> TipTarget:
     return TipTarget(target.point[:n], None if target.rotation is None else target.rotation[:n])
 
 
-def _check(ik: TipProblem, course: Course, u: Floats, target: TipTarget) -> None:
+def require_reached(ik: TipProblem, course: Course, u: Floats, target: TipTarget) -> None:
     """Raises TrajectoryError for the first of the samples u that leaves its branch or its point."""
     off_path = _off(ik, u, target, RESIDUAL)
     off_branch = ~ik.inside(u).all(axis=1)
@@ -133,7 +135,7 @@ def _off(ik: TipProblem, u: Floats, target: TipTarget, tolerance: float) -> Bool
     return np.asarray((distance > tolerance * ik.lever) | (turn > tolerance))
 
 
-def _assembled(ik: TipProblem, course: Course, u: Floats, target: TipTarget) -> Floats:
+def as_assembled(ik: TipProblem, course: Course, u: Floats, target: TipTarget) -> Floats:
     """The same with the passive freedoms as the model has them; TrajectoryError if others."""
     assembly = ik.chain.assembly
     if assembly is None:

@@ -8,7 +8,7 @@ Shapes: n states u (n, n_q + n_p) of an `TipProblem`, m task components.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -63,20 +63,27 @@ def _residual(ik: TipProblem, u: Floats, target: TipTarget) -> tuple[Floats, Flo
 
 
 def newton(
-    ik: TipProblem, u: Floats, target: TipTarget, tolerance: float
+    ik: TipProblem,
+    u: Floats,
+    target: TipTarget,
+    tolerance: float,
+    directions: Floats | None = None,
 ) -> tuple[Floats, TipEvaluation, Reduced, Bools]:
     """Newton for tip(u) = target with closed loops; returns u, what is seen there, who settled.
 
-    A chain that cannot fill the space (rank < m) settles, more slowly, on the nearest point.
+    A chain that cannot fill the space (rank < m) settles, more slowly, on the nearest point. With
+    ``directions`` V (n, n_q, rank) the coordinates move in these only, and J returned is J V.
     """
     for _ in range(8 if ik.rank == target.point.shape[1] + len(ik.chain.turned_by) else 40):
         seen = ik.evaluate(u)
-        motion = reduced(seen, ik.n_q)
+        motion = within(reduced(seen, ik.n_q), directions)
         error = ik.error(seen, target) - motion.drift
         settled = _settled(ik, error, motion, tolerance)
         if settled.all():
             break
         step = least_norm(motion.J, error, ik.rank)
+        if directions is not None:
+            step = np.einsum("nqr,nr->nq", directions, step)
         passive = motion.closing + np.einsum("npq,nq->np", motion.following, step)
         step = np.hstack([step, passive])
         settled |= np.abs(step).max(axis=1) <= tolerance
@@ -84,6 +91,11 @@ def newton(
             break
         u = u + np.clip(step, -1.0, 1.0)
     return u, seen, motion, settled
+
+
+def within(motion: Reduced, directions: Floats | None) -> Reduced:
+    """With J V (n, m, rank) in place of J, where the coordinates move in directions V only."""
+    return motion if directions is None else replace(motion, J=motion.J @ directions)
 
 
 def _settled(ik: TipProblem, error: Floats, motion: Reduced, tolerance: float) -> Bools:
@@ -211,7 +223,7 @@ def _step(
     guess = here.u + (s - here.s) * (here.slope + (s - here.s) * bend)
     u, seen, motion, settled = newton(ik, guess, course.target(np.array([s])), _TRACE)
     strayed = not settled[0] or np.abs(u - guess).max() > _STRAY * turn
-    if strayed or crossed(ik, seen, motion, sense)[0] or _singular(ik, seen, motion):
+    if strayed or crossed(ik, seen, motion, sense)[0] or singular(ik, seen, motion)[0]:
         return None
     return _pose(ik, course, s, u, motion)
 
@@ -221,9 +233,9 @@ def crossed(ik: TipProblem, seen: TipEvaluation, motion: Reduced, sense: Floats)
     return np.asarray((handedness(ik, seen, motion) * sense < 0.0).any(axis=1))
 
 
-def _singular(ik: TipProblem, seen: TipEvaluation, motion: Reduced) -> bool:
-    stretched = regularity(ik, motion)[0] < _SINGULAR
-    return bool(stretched or loop_regularity(ik, seen)[0] < DEAD)
+def singular(ik: TipProblem, seen: TipEvaluation, motion: Reduced) -> Bools:
+    """Whether the chain is stretched or folded, or its loops at a dead point, (n,)."""
+    return (regularity(ik, motion) < _SINGULAR) | (loop_regularity(ik, seen) < DEAD)
 
 
 def _pose(ik: TipProblem, course: Course, s: float, u: Floats, motion: Reduced) -> TracePoint:

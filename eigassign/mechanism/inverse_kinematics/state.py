@@ -20,6 +20,7 @@ import numpy as np
 from eigassign.errors import MechanismError, SingularityError
 from eigassign.mechanism.inverse_kinematics.chain import (
     Bools,
+    ChainDesign,
     Floats,
     TipChain,
     TipEvaluation,
@@ -55,14 +56,21 @@ class TipProblem:
 
     def evaluate(self, u: Floats) -> TipEvaluation:
         """The chain's evaluation with metres and radians in one measure."""
-        chain, seen = self.chain, self.chain.evaluate(u * self.scale)
-        J, r = seen.jacobian * self.scale, len(chain.turned_by)
+        return self._measured(self.chain.evaluate(u * self.scale), self.scale)
+
+    def evaluate_with_design(self, u: Floats, design: ChainDesign, y: Floats) -> TipEvaluation:
+        """The same at design y, with its columns, per unit of y, after those of q."""
+        scale = np.insert(self.scale, self.n_q, np.ones(len(y)))
+        return self._measured(design.evaluate(u * self.scale, y), scale)
+
+    def _measured(self, seen: TipEvaluation, scale: Floats) -> TipEvaluation:
+        chain, J, r = self.chain, seen.jacobian * scale, len(self.chain.turned_by)
         if r:
             J[:, -r:] *= self.lever
         if chain.assembly is None:
             return seen._replace(jacobian=J)
         weight = _GAP * np.where(chain.assembly.turning, self.lever, 1.0)
-        closure = seen.closure * self.scale * weight[:, None]
+        closure = seen.closure * scale * weight[:, None]
         return TipEvaluation(seen.point, seen.rotation, J, seen.gap * weight, closure)
 
     def error(self, seen: TipEvaluation, target: TipTarget) -> Floats:

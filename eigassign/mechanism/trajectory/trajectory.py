@@ -25,6 +25,7 @@ from eigassign.case import FileTrajectory, PointTrajectory, SampledTrajectory, T
 from eigassign.errors import MechanismError, TrajectoryError, UsageError
 from eigassign.mechanism.inverse_kinematics.chain import TipChain
 from eigassign.mechanism.inverse_kinematics.follow import follow
+from eigassign.mechanism.inverse_kinematics.redesign import path_of_design
 from eigassign.mechanism.inverse_kinematics.tip_path import (
     WAYPOINTS,
     Course,
@@ -43,22 +44,49 @@ _PATHS: dict[str, Callable[[ArrayLike], TipPath]] = {"spline": spline, "straight
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+OfDesign = Callable[[Floats], tuple[Floats, Floats]]  # y (n_y,) -> q (n, n_q), dq/dy (n, n_q, n_y)
 
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Where the mechanism is when. ``tip`` is None unless the case gives a path of the tip."""
+    """Where the mechanism is when, at the initial design.
+
+    ``tip`` is None unless the case gives a path of the tip, which is the same for every design.
+    """
 
     time_s: Floats  # (n,) strictly increasing, n >= 2
     q: Floats  # (n, n_q) in rad or m
     tip: Floats | None  # (n, 2 or 3) in m
     notes: tuple[str, ...] = ()  # what a reader should know: choices made, columns ignored
     corners_s: tuple[float, ...] = ()  # times in between at which it is known that q̇ may jump
+    of_design: OfDesign | None = None  # how q follows y; None where it does not
 
     def __post_init__(self) -> None:
         for array in (self.time_s, self.q, self.tip):
             if array is not None:
                 array.setflags(write=False)
+
+    def at(self, y: Floats) -> tuple[Floats, Floats]:
+        """q (n, n_q) and dq/dy (n, n_q, n_y) at design y (n_y,), SI; slopes 0 where q is given."""
+        if self.of_design is None:
+            return self.q, np.zeros((*self.q.shape, len(y)))
+        return self.of_design(y)
+
+    def chosen(self, samples: Ints) -> Trajectory:
+        """Some of the samples only, given by ascending numbers."""
+        tip, whole = None if self.tip is None else self.tip[samples], self.of_design
+
+        def own(y: Floats) -> tuple[Floats, Floats]:
+            q, slopes = self.at(y)
+            return q[samples], slopes[samples]
+
+        return replace(
+            self,
+            time_s=self.time_s[samples],
+            q=self.q[samples],
+            tip=tip,
+            of_design=None if whole is None else own,
+        )
 
 
 def build_trajectory(
@@ -66,16 +94,18 @@ def build_trajectory(
     q_names: Sequence[str],
     tip_chain: Callable[[str, bool], TipChain],
     q_units: Sequence[str] = (),
+    moved: Callable[[str, bool], bool] = lambda _node, _oriented: False,
 ) -> Trajectory:
     """The trajectory that a case asks for, in the coordinates ``q_names``.
 
     ``tip_chain(node, oriented)`` gives the chain of a tip path's node, with its turning if
     oriented, and is called for nothing else; ``q_units`` are "rad" or "m" for each coordinate, all
     rad if empty. Raises MechanismError for what is wrong as a whole, TrajectoryError for what is
-    wrong with one sample.
+    wrong with one sample. Where ``moved`` says that the design moves the tip's node (oriented or
+    not), the coordinates of a tip path follow the design.
     """
     if isinstance(spec, TipTrajectory):
-        return _from_tip_path(spec, q_names, tip_chain)
+        return _from_tip_path(spec, q_names, tip_chain, moved)
     if isinstance(spec, FileTrajectory):
         return _from_file(spec, q_names, q_units)
     if isinstance(spec, PointTrajectory):
@@ -84,7 +114,10 @@ def build_trajectory(
 
 
 def _from_tip_path(
-    spec: TipTrajectory, q_names: Sequence[str], tip_chain: Callable[[str, bool], TipChain]
+    spec: TipTrajectory,
+    q_names: Sequence[str],
+    tip_chain: Callable[[str, bool], TipChain],
+    moved: Callable[[str, bool], bool],
 ) -> Trajectory:
     """q(t) with tip(q(t)) = p(s(t/T)), turned as asked for, at equal steps in time."""
     path, attitude = _PATHS[spec.path](spec.waypoints), None
@@ -100,8 +133,12 @@ def _from_tip_path(
     course = Course(path, s, spec.duration * tau, attitude)
     followed = follow(chain, course, spec.branch, spec.start)
     corners = np.interp(course.corners(), course.s, course.time_s)
+    of_design, notes = None, followed.notes
+    if moved(spec.tip, attitude is not None):
+        of_design = path_of_design(followed, course)
+        notes = (*notes, f"{of_design.said}; q is written for the initial design")
     return Trajectory(
-        course.time_s, followed.q, followed.tip, followed.notes, tuple(corners.tolist())
+        course.time_s, followed.q, followed.tip, notes, tuple(corners.tolist()), of_design
     )
 
 
@@ -224,8 +261,29 @@ class Trajectories:
 
     @cached_property
     def q(self) -> Floats:
-        """(n, n_q) in rad or m."""
+        """(n, n_q) in rad or m, at the initial design."""
         return _stacked([part.trajectory.q for part in self.parts])
+
+    @property
+    def follows_design(self) -> bool:
+        """Whether q depends on the design: along a path of a tip that the design moves."""
+        return any(part.trajectory.of_design is not None for part in self.parts)
+
+    def at(self, y: Floats) -> tuple[Floats, Floats]:
+        """q (n, n_q) and dq/dy (n, n_q, n_y) at design y (n_y,), SI; see `redesign`.
+
+        Raises TrajectoryError where that design cannot follow a path of its tip.
+        """
+        found = []
+        for part in self.parts:
+            try:
+                found.append(part.trajectory.at(y))
+            except TrajectoryError as error:
+                if not self.several:
+                    raise
+                message = f"trajectory {part.name!r}: {error.message}"
+                raise TrajectoryError(error.path, message, error.sample) from None
+        return _stacked([q for q, _ in found]), _stacked([slopes for _, slopes in found])
 
     @cached_property
     def tip(self) -> Floats | None:
@@ -308,10 +366,7 @@ class Trajectories:
         for part, rows in zip(self.parts, self.rows, strict=True):
             own = kept[(kept >= rows.start) & (kept < rows.stop)] - rows.start
             if len(own):
-                whole = part.trajectory
-                tip = None if whole.tip is None else whole.tip[own]
-                thinned = replace(whole, time_s=whole.time_s[own], q=whole.q[own], tip=tip)
-                parts.append(part._replace(trajectory=thinned))
+                parts.append(part._replace(trajectory=part.trajectory.chosen(own)))
         return Trajectories(tuple(parts))
 
 

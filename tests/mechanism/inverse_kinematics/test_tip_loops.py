@@ -257,31 +257,12 @@ def length_as_design(name: str, link: str, wish: dict[str, Any]) -> Case:
     return Case(parse(text.encode(), CASES / f"{name}.yaml"))
 
 
-@pytest.mark.parametrize(
-    ("name", "link", "tip"),
-    [
-        ("five_bar", "left_arm", "left_arm.end"),
-        ("five_bar", "right_crank", "left_arm.end"),  # through the loop
-        ("four_bar", "follower", "coupler.end"),
-        ("slider_crank", "rod", "slider.start"),
-    ],
-)
-def test_a_length_that_moves_the_tip_through_a_loop_is_refused(
-    name: str, link: str, tip: str
-) -> None:
-    case = length_as_design(name, link, {"tip": tip, "waypoints": [[0.1, 0.5], [0.12, 0.5]]})
-    with pytest.raises(CaseError, match=r"design\.long\.parameter: moves the tip"):
-        _ = case.trajectory
-
-
-def test_a_length_that_only_turns_the_tip_is_refused_where_its_angle_is_asked_for() -> None:
+def test_a_length_that_only_turns_the_tip_is_refused_where_it_cannot_be_turned_back() -> None:
     crank = [0.12 * np.array([np.cos(a), np.sin(a)]) for a in (1.0, 1.1)]
     wish = {"tip": "coupler.start", "waypoints": [p.tolist() for p in crank], "start": [1.0]}
-    case = length_as_design("four_bar", "follower", wish | {"angle": 0.3})
-    with pytest.raises(CaseError, match=r"design\.long\.parameter: moves the tip"):
-        _ = case.trajectory
-    with pytest.raises(CaseError, match="m out of reach"):  # a chord of the crank's circle
-        _ = length_as_design("four_bar", "follower", wish).trajectory
+    for angle in ({"angle": 0.3}, {}):  # the crank cannot keep an angle, nor go along a chord
+        with pytest.raises(CaseError, match=r"cannot be reached|m out of reach"):
+            _ = length_as_design("four_bar", "follower", wish | angle).trajectory
 
 
 def test_a_length_that_cannot_move_the_tip_is_allowed() -> None:

@@ -1,0 +1,149 @@
+"""Mechanisms whose tip follows a path while design parameters move it, and extrapolated slopes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from chains import bar, case_of, two_link
+
+from eigassign.api import Case
+from eigassign.case.loading import parse
+
+CASES = Path(__file__).parents[2] / "cases"
+
+
+def lengths(**links: str) -> dict[str, Any]:
+    """Design parameters that are lengths of links."""
+    return {
+        name: {"parameter": f"links.{link}.length", "min": 0.01, "max": 2.0}
+        for name, link in links.items()
+    }
+
+
+def two_link_lengths(branch: tuple[float, float] = (3.2, 5.2)) -> Case:
+    """The paper's arm on its path, with both lengths and the mass at the elbow as parameters."""
+    tree = two_link()
+    waypoints = [[0.33, 0.12], [0.30, 0.19], [0.108, 0.2104], [0.02, 0.1845], [-0.01, 0.19]]
+    tree["trajectory"] = {
+        "tip": "fore.end",
+        "waypoints": waypoints,
+        "samples": 24,
+        "branch": {"elbow": list(branch)},
+    }
+    mass = {"parameter": "bodies.elbow_mass.mass", "min": 0.0, "max": 0.25}
+    return case_of(tree | {"design": {**lengths(a="upper"), "m": mass, **lengths(b="fore")}})
+
+
+def three_links() -> Case:
+    """A planar arm with one joint more than its path needs."""
+    tree = two_link()
+    mechanism = tree["mechanism"]
+    mechanism["links"]["hand"] = mechanism["links"]["fore"] | {"length": 0.3}
+    joint = {"type": "revolute", "base": "fore.end", "follower": "hand.start"}
+    mechanism["joints"]["wrist"] = joint
+    tree["coordinates"]["q3"] = {"joint": "wrist"}
+    tree["trajectory"] = {
+        "tip": "hand.end",
+        "waypoints": [[0.7, 0.1], [0.6, 0.5], [0.3, 0.6]],
+        "samples": 15,
+        "start": [-0.6, 0.9, 0.4],
+    }
+    return case_of(tree | {"design": lengths(a="upper", b="fore", c="hand")})
+
+
+def shipped(name: str, trajectory: str, design: str) -> Case:
+    """A shipped case with another trajectory and design."""
+    text = (CASES / f"{name}.yaml").read_text(encoding="utf-8")
+    text = re.sub(r"^trajectory:.*?(?=^design:)", trajectory + "\n", text, flags=re.M | re.S)
+    text = re.sub(r"^design:.*?(?=^expansion:)", design + "\n", text, flags=re.M | re.S)
+    text = re.sub(r"^expansion:.*", "", text, flags=re.M | re.S)
+    return Case(parse(text.encode(), CASES / f"{name}.yaml"))
+
+
+def six_joints() -> Case:
+    """The 6R arm, its hand held level, with the length of a beam and of a rigid link."""
+    return shipped(
+        "arm_6r",
+        "trajectory:\n"
+        "  tip: hand.end\n"
+        "  waypoints: [[0.75, -0.2, 0.6], [0.8, 0.1, 0.7], [0.7, 0.3, 0.65]]\n"
+        "  orientation: [0, 20 deg, 0]\n"
+        "  start: [-0.2, 0.9, -1.4, 0.2, -0.6, 0.4]\n"
+        "  samples: 12\n",
+        "design:\n"
+        "  upper: {parameter: links.upper_arm.length, min: 0.6, max: 0.8}\n"
+        "  wrist: {parameter: links.wrist.length, min: 0.05, max: 0.1}\n"
+        "  m: {parameter: bodies.payload.mass, min: 3, max: 6}\n",
+    )
+
+
+def five_bar() -> Case:
+    """Two cranks and two forearms that meet at the tool: lengths on both sides of the loop."""
+    return shipped(
+        "five_bar",
+        "trajectory:\n"
+        "  tip: left_arm.end\n"
+        "  waypoints: [[0.05, 0.5], [0.1, 0.48], [0.15, 0.5]]\n"
+        "  samples: 12\n",
+        "design:\n"
+        "  left: {parameter: links.left_arm.length, min: 0.3, max: 0.4}\n"
+        "  right: {parameter: links.right_crank.length, min: 0.2, max: 0.3}\n"
+        "  m: {parameter: bodies.tool.mass, min: 0.3, max: 0.5}\n",
+    )
+
+
+def five_bar_in_joints() -> Case:
+    """The same with its cranks' angles given: only what closes the loop follows the design."""
+    return shipped(
+        "five_bar",
+        "trajectory:\n  q: [[126 deg, 68 deg], [120 deg, 62 deg], [114 deg, 56 deg]]\n"
+        "  duration: 1 s\n",
+        "design:\n"
+        "  left: {parameter: links.left_arm.length, min: 0.3, max: 0.4}\n"
+        "  right: {parameter: links.right_crank.length, min: 0.2, max: 0.3}\n",
+    )
+
+
+def slider_crank() -> Case:
+    """One coordinate that moves the slider; the rod's length moves it the same way."""
+    return shipped(
+        "slider_crank",
+        "trajectory:\n"
+        "  tip: slider.start\n"
+        "  waypoints: [[0.54, 0], [0.45, 0]]\n"
+        "  start: [60 deg]\n"
+        "  samples: 12\n",
+        "design:\n  rod: {parameter: links.rod.length, min: 0.4, max: 0.5}\n",
+    )
+
+
+def cart(path: list[list[float]]) -> Case:
+    """A bar upright on a cart: the cart can bring back no change of the bar's length."""
+    tree = bar(2, 0.5, 70e9, 2700.0, {"shape": "circle", "diameter": 0.02})
+    tree["mechanism"]["links"]["cart"] = {"type": "rigid", "mass": 1.0}
+    tree["mechanism"]["joints"] = {
+        "rail": {"type": "prismatic", "base": "ground", "follower": "cart.start", "axis": [1, 0]},
+        "root": {
+            "type": "fixed", "base": "cart.start", "follower": "bar.start", "angle": "90 deg"
+        },
+    }  # fmt: skip
+    tree["coordinates"] = {"q1": {"joint": "rail"}}
+    tree["trajectory"] = {"tip": "bar.end", "waypoints": path, "path": "straight", "samples": 5}
+    return case_of(tree | {"design": lengths(h="bar")})
+
+
+def extrapolated(f: Callable[[np.ndarray], np.ndarray], y: np.ndarray, h: float) -> np.ndarray:
+    """∂f/∂y (…, n_y) by central differences of three steps, extrapolated to the sixth order."""
+    slopes = []
+    for direction in np.eye(len(y)):
+        rows = []
+        for step in (h, h / 2.0, h / 4.0):
+            rows.append((f(y + step * direction) - f(y - step * direction)) / (2.0 * step))
+        first = [(4.0 * b - a) / 3.0 for a, b in pairwise(rows)]
+        slopes.append((16.0 * first[1] - first[0]) / 15.0)
+    return np.stack(slopes, axis=-1)
