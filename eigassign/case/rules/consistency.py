@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 
 from eigassign.case.reader import Finding, KeyPath, Tree, at, items, names
 from eigassign.case.rules import joints, links, properties, space, study, targets
+from eigassign.case.schema.design import is_entry
 from eigassign.case.schema.mechanism import Mechanism
 
 Rule = Callable[[Tree], Iterator[Finding]]
@@ -36,10 +37,9 @@ def _empty(node: object, path: KeyPath) -> Iterator[Finding]:
 
 def reserved_names_are_not_used(tree: Tree) -> Iterator[Finding]:
     """`ground` is no link, `time` heads every table over time, `mass` limits the whole."""
-    for key in ("parameter", "choices"):
-        if at(tree, "design", "mass", key) is not None:
-            message = "'mass' is for limits of the total mass: name the design parameter otherwise"
-            yield ("design", "mass"), message
+    if is_entry(at(tree, "design", "mass")):
+        message = "'mass' is for limits of the total mass: name the design parameter otherwise"
+        yield ("design", "mass"), message
     if "time" in names(tree, "coordinates"):
         yield ("coordinates", "time"), "'time' heads a column of its own: name it otherwise"
     if "ground" in names(tree, "mechanism", "links"):

@@ -205,6 +205,11 @@ class MassLimits(Part):
         return self
 
 
+def is_entry(value: object) -> bool:
+    """Whether what stands under `design` looks like a parameter or a list of choices."""
+    return isinstance(value, Mapping) and ("parameter" in value or "choices" in value)
+
+
 def _entry_tag(value: object) -> str:
     if isinstance(value, Mapping):
         return "<choices>" if "choices" in value and "parameter" not in value else "<parameter>"

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, BaseModel, Field, ValidationError
 from pydantic.json_schema import GenerateJsonSchema
 
 from eigassign.case.reader import Finding, KeyPath, Tree
-from eigassign.case.schema.design import ENTRIES, RESERVED, Design
+from eigassign.case.schema.design import ENTRIES, RESERVED, Design, Parameter, is_entry
 from eigassign.case.schema.joints import JOINTS
 from eigassign.case.schema.links import LINKS
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
@@ -73,12 +73,15 @@ def validated(tree: Tree) -> tuple[Document | None, list[Finding]]:
 
 
 def _with_entries_apart(tree: Tree) -> Tree:
-    """In the file the entries stand directly under `design`, beside the reserved names."""
+    """In the file the entries stand directly under `design`, beside the reserved names.
+
+    An entry by a reserved name is an error, which a rule finds.
+    """
     design = tree.get("design")
     if not isinstance(design, Mapping):
         return tree
-    entries = {name: body for name, body in design.items() if name not in RESERVED}
-    apart = {key: body for key, body in design.items() if key in RESERVED}
+    apart = {key: design[key] for key in RESERVED if key in design and not is_entry(design[key])}
+    entries = {name: body for name, body in design.items() if name not in apart}
     return {**tree, "design": {"entries": entries, **apart}}
 
 
@@ -110,7 +113,8 @@ def _missing(error: Any) -> _Explained:
 
 def _extra(error: Any) -> _Explained:
     *parent, key = error["loc"]
-    known = keys_of(_model_at(parent))
+    model = _model_at(parent)
+    known = [*keys_of(model), *(["choices"] if model is Parameter else [])]
     return (), f"unknown key{suggestion(key, known)}; allowed: {listed(known)}"
 
 
@@ -175,6 +179,13 @@ def _no_target(error: Any) -> _Explained:
     return place, f"expected one of the keys {listed(TARGETS)}; got {listed(given)}{hint}"
 
 
+def _mapping(error: Any) -> _Explained:
+    what = "a mapping (key: value)"
+    if error["loc"][-2:] == ("keep_out", "<one>"):
+        what = "[low, high] or {harmonic: ..., of: ..., margin: ...}"
+    return (), f"expected {what}, got {shown(error['input'])}"
+
+
 def _expected(what: str) -> Any:
     return lambda error: ((), f"expected {what}, got {shown(error['input'])}")
 
@@ -197,7 +208,6 @@ def _literal(error: Any) -> _Explained:
     return (), f"expected {expected}{also}, got {shown(value)}{hint}"
 
 
-_MAPPING = _expected("a mapping (key: value)")
 _LIST = _expected("a list")
 _EXPLAIN: dict[str, Any] = {
     "at_key": lambda e: (e["ctx"]["keys"], e["ctx"]["text"]),
@@ -209,11 +219,11 @@ _EXPLAIN: dict[str, Any] = {
     "no_motion": _no_motion,
     "no_target": _no_target,
     "literal_error": _literal,
-    "model_type": _MAPPING,
-    "model_attributes_type": _MAPPING,
-    "dict_type": _MAPPING,
-    "mapping_type": _MAPPING,
-    "is_instance_of": _MAPPING,
+    "model_type": _mapping,
+    "model_attributes_type": _mapping,
+    "dict_type": _mapping,
+    "mapping_type": _mapping,
+    "is_instance_of": _mapping,
     "tuple_type": _LIST,
     "bool_type": _expected("true or false"),
     "int_type": _expected("a whole number"),

@@ -1,0 +1,157 @@
+# ruff: noqa: E501  (a table)
+"""Mistakes in targets, design entries and the assignment: each told once, at its place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from mistakes import problems_of
+from small_case import TEXT, edited, unmarked
+
+T = "  - {mode: 1, frequency: 190 Hz}\n"
+D = "  d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}\n"
+ROD = "parameter: sections.rod.diameter"
+ONE = "sections.rod.diameter: 2 cm"
+
+# fmt: off
+TARGETS = {
+    "two kinds": ("{mode: 1, frequency: 1, ¦at_least: 3}", "at_least", "frequency is given already: write a target of its own"),
+    "no kind": ("¦{mode: 1}", "", "expected one of the keys frequency, at_least, at_most, keep_out, gap; got mode"),
+    "misspelt kind": ("{mode: 1, ¦frequncy: 3}", "frequncy", "did you mean 'frequency'?"),
+    "no mapping": ("¦7", "", "expected a mapping, got 7"),
+    "no mode": ("¦{at_least: 3}", "mode", "the number of a mode (or modes: [...])"),
+    "mode and modes": ("{mode: 1, ¦modes: [2], at_most: 3}", "modes", "mode is given already"),
+    "frequency of all": ("{¦modes: all, frequency: 3}", "modes", "all modes cannot have one frequency"),
+    "at most of all": ("{¦modes: all, at_most: 3}", "modes", "there is always a higher mode"),
+    "misspelt all": ("{¦modes: al, at_least: 3}", "modes", "expected 'all', or a list, got 'al'"),
+    "mode twice": ("{modes: [1, ¦1], at_least: 3}", "modes[1]", "mode 1 is listed twice"),
+    "mode in words": ("{¦mode: first, at_least: 3}", "mode", "expected a whole number, got 'first'"),
+    "limit in words": ("{mode: 1, ¦at_least: fast}", "at_least", "expected a frequency (in Hz"),
+    "limit of zero": ("{mode: 1, ¦at_least: 0}", "at_least", "must be > 0 Hz"),
+    "band downwards": ("{¦keep_out: [52, 48]}", "keep_out", "the band must go upwards, got [52, 48] Hz"),
+    "band of nothing": ("{¦keep_out: [48, 48 Hz]}", "keep_out", "the band must go upwards"),
+    "half a band": ("{¦keep_out: [48]}", "keep_out[1]", "entry 2 is missing"),
+    "band of one number": ("{¦keep_out: 50 Hz}", "keep_out", "expected [low, high] or {harmonic"),
+    "harmonic of nothing": ("{¦keep_out: {harmonic: 2, margin: 5 %}}", "keep_out.of", "required key is missing"),
+    "margin of all": ("{keep_out: {harmonic: 2, of: 3, ¦margin: 100 %}}", "keep_out.margin", "must be < 1"),
+    "followed band": ("{keep_out: [1, 2], ¦mode: {like: 1, at: {time: 0}}}", "mode", "expected a whole number, got a mapping"),
+    "gap in itself": ("{gap: {¦between: [1, 1], at_least: 2}}", "gap.between", "a gap is between two modes, got 1 twice"),
+    "gap downwards": ("{gap: {¦between: [2, 1], at_least: 2}}", "gap.between", "the lower mode comes first: [1, 2]"),
+    "gap of a mode": ("{gap: {between: [1, 2], at_least: 2}, ¦mode: 1}", "mode", "unknown key; allowed: weight"),
+    "part backwards": ("{mode: 1, at_least: 3, ¦during: [1, 0]}", "during", "the first time must be before the last"),
+    "part outside": ("{mode: 1, at_least: 3, ¦during: [2, 3]}", "during", "is no part of it: the trajectory lasts from 0 to 1 s"),
+    "profile of a part that ends early": ("{mode: 1, at_least: {¦time: [0, 0.5], frequency: [1, 2]}, during: [0.1, 0.6]}", "at_least.time", "covers 0 … 0.5 s only; the trajectory is wanted from 0.1 to 0.6 s"),
+    "profile of a harmonic that ends early": ("{keep_out: {harmonic: 2, of: {¦time: [0, 0.5], frequency: [1, 2]}, margin: 1 %}}", "keep_out.of.time", "the trajectory lasts from 0 to 1 s"),
+    "no such file": ("{mode: 1, at_least: {¦file: no.csv}}", "at_least.file", "no such file"),
+    "unknown trajectory": ("{mode: 1, at_least: 3, ¦trajectory: pick}", "trajectory", "unknown trajectory 'pick'; known: 1"),
+    "two frequencies of a mode in a list": ("{mode: 2, frequency: 3}\n  - {modes: [1, ¦2], frequency: 3}", "modes[1]", "mode 2 has a target already"),
+    "followed from nowhere": ("{¦mode: {like: 1}, frequency: 3}", "mode.at", "required key is missing"),
+    "followed from no pose": ("{mode: {like: 1, ¦at: {}}, frequency: 3}", "mode.at", "either time or q"),
+    "followed from outside": ("{mode: {like: 1, at: {¦time: 3}}, frequency: 3}", "mode.at.time", "3 s is outside: the trajectory lasts from 0 to 1 s"),
+    "followed on no trajectory": ("{mode: {like: 1, at: {time: 0, ¦trajectory: x}}, frequency: 3}", "mode.at.trajectory", "unknown trajectory 'x'"),
+    "followed from half a pose": ("{mode: {like: 1, at: {¦q: [1]}}, frequency: 3}", "mode.at.q", "needs 2 entries, one for each coordinate (q1, q2); got 1"),
+    "followed at no design": ("{mode: {like: 1, at: {time: 0}, design: {¦x: 3}}, frequency: 3}", "mode.design.x", "unknown design parameter 'x'; known: m, d"),
+    "followed at a design in kg": ("{mode: {like: 1, at: {time: 0}, design: {¦d: 3 kg}}, frequency: 3}", "mode.design.d", "which is mass"),
+}
+ENTRIES = {
+    "no values": (f"d: {{{ROD}, ¦values: []}}", "d.values", "needs at least 1 entries"),
+    "value twice": (f"d: {{{ROD}, values: [20 mm, ¦2 cm]}}", "d.values[1]", "0.02 (SI units) is listed twice"),
+    "value in kg": (f"d: {{{ROD}, values: [20 mm, ¦2 kg]}}", "d.values[1]", "which is mass"),
+    "value it cannot have": (f"d: {{{ROD}, values: [20 mm, ¦0]}}", "d.values[1]", "must be > 0 m"),
+    "values and bounds": (f"d: {{{ROD}, values: [30 mm], ¦min: 1 mm}}", "d.min", "values are given, and leave nothing to limit"),
+    "neither values nor bounds": (f"¦d: {{{ROD}}}", "d.min", "give min and max, or values"),
+    "price without unit": (f"d: {{{ROD}, min: 2 cm, max: 4 cm, ¦price: 3 mm}}", "d.price", "expected an amount per unit, such as 3 / m"),
+    "price of another unit": (f"d: {{{ROD}, min: 2 cm, max: 4 cm, ¦price: 3 / kg}}", "d.price", "which is mass"),
+    "no tolerance": (f"d: {{{ROD}, min: 2 cm, max: 4 cm, ¦tolerance: 0}}", "d.tolerance", "must be > 0"),
+    "tolerance in kg": (f"d: {{{ROD}, min: 2 cm, max: 4 cm, ¦tolerance: 2 g}}", "d.tolerance", "which is mass"),
+    "tolerance of all": (f"d: {{{ROD}, min: 2 cm, max: 4 cm, ¦tolerance: 100 %}}", "d.tolerance", "must be below 100 %"),
+    "no choice": ("b: {¦choices: {}}", "b.choices", "needs at least 1 entries"),
+    "choices without names": ("b: {¦choices: [1]}", "b.choices", "expected a mapping"),
+    "empty choice": (f"b: {{choices: {{x: {{{ONE}}}, ¦y: {{}}}}}}", "b.choices.y", "needs at least 1 entries"),
+    "same choice": (f"b: {{choices: {{x: {{{ONE}}}, ¦y: {{{ONE}}}}}}}", "b.choices.y", "has the same values as 'x'"),
+    "choice of less": (f"b: {{choices: {{x: {{{ONE}, links.fore.length: 1}}, ¦y: {{{ONE}}}}}}}", "b.choices.y", "choice 'x' sets links.fore.length too"),
+    "choice of more": (f"b: {{choices: {{x: {{{ONE}}}, y: {{{ONE}, ¦links.fore.length: 1}}}}}}", "b.choices.y.links.fore.length", "choice 'x' does not set it"),
+    "choice of nothing": ("b: {choices: {x: {¦sections.rod.diametr: 3}}}", "b.choices.x.sections.rod.diametr", "did you mean 'diameter'"),
+    "choice in kg": ("b: {choices: {x: {¦sections.rod.diameter: 3 kg}}}", "b.choices.x.sections.rod.diameter", "which is mass"),
+    "choice of a parameter": ("b: {choices: {x: {¦bodies.tool.mass: 3 kg}}}", "b.choices.x.bodies.tool.mass", "is a design parameter already: 'm'"),
+    "choices between which no section is": ("b: {¦choices: {x: {sections.pipe.outer_diameter: 20 mm, sections.pipe.thickness: 1 mm}, y: {sections.pipe.outer_diameter: 60 mm, sections.pipe.thickness: 15 mm}}}", "b.choices", "between these choices section 'pipe' cannot exist"),
+    "parameter called mass": ("¦mass: {parameter: bodies.hand.mass, min: 0, max: 3}", "mass", "is for limits of the total mass"),
+    "mass without limits": ("¦mass: {}", "mass", "needs min, max or both"),
+    "mass upside down": ("mass: {¦min: 3, max: 1}", "mass.min", "min 3 is above max 1"),
+    "mass in m": ("mass: {¦max: 1 m}", "mass.max", "which is length"),
+}
+ASSIGNMENT = {
+    "misspelt method": ("{¦method: oneshot}", "method", "did you mean 'one_shot'"),
+    "misspelt objective": ("{¦objective: worst}", "objective", "did you mean 'worst_case'"),
+    "no start": ("{¦starts: 0}", "starts", "must be >= 1"),
+    "too many starts": ("{¦starts: 1001}", "starts", "must be <= 1000"),
+    "no step": ("{¦steps: 0}", "steps", "must be >= 1"),
+    "no time": ("{¦seconds: 0}", "seconds", "must be > 0 s"),
+    "no error": ("{¦max_error: 0 %}", "max_error", "must be > 0"),
+    "unknown key": ("{¦step: 3}", "step", "did you mean 'steps'"),
+    "worst case in one shot": ("{method: one_shot, ¦objective: worst_case}", "objective", "is not least_squares; method: one_shot takes frequency targets"),
+}
+NOT_IN_ONE_SHOT = {
+    "limit": (T, "  - {mode: 1, ¦at_least: 3}\n", "targets[0].at_least"),
+    "followed mode": (T, "  - {¦mode: {like: 1, at: {time: 0}}, frequency: 3}\n", "targets[0].mode"),
+    "values": (D, f"  d: {{{ROD}, ¦values: [30 mm]}}\n", "design.d.values"),
+    "choices": (D, f"  d: {{¦choices: {{x: {{{ONE}}}}}}}\n", "design.d.choices"),
+    "mass": (D, "  ¦mass: {max: 3}\n", "design.mass"),
+}
+# fmt: on
+
+
+def check(marked: str, path: str, message: str, folder: Path) -> None:
+    text, ((line, column),) = unmarked(marked)
+    ((*place, found_path, found),) = problems_of(text, folder / "case.yaml")
+    assert (place, found_path) == ([line, column], path)
+    assert message in found
+
+
+@pytest.mark.parametrize(("target", "key", "message"), TARGETS.values(), ids=TARGETS)
+def test_a_wrong_target_is_told_once(target: str, key: str, message: str, tmp_path: Path) -> None:
+    k = target[: target.index("¦")].count("\n")
+    path = f"targets[{k}].{key}".removesuffix(".")
+    check(edited(T, f"  - {target}\n"), path, message, tmp_path)
+
+
+@pytest.mark.parametrize(("entry", "key", "message"), ENTRIES.values(), ids=ENTRIES)
+def test_a_wrong_entry_of_the_design_is_told_once(
+    entry: str, key: str, message: str, tmp_path: Path
+) -> None:
+    check(edited(D, f"  {entry}\n"), f"design.{key}", message, tmp_path)
+
+
+@pytest.mark.parametrize(("keys", "key", "message"), ASSIGNMENT.values(), ids=ASSIGNMENT)
+def test_a_wrong_assignment_is_told_once(keys: str, key: str, message: str, tmp_path: Path) -> None:
+    check(TEXT + f"assignment: {keys}\n", f"assignment.{key}", message, tmp_path)
+
+
+@pytest.mark.parametrize(("old", "new", "path"), NOT_IN_ONE_SHOT.values(), ids=NOT_IN_ONE_SHOT)
+def test_one_shot_refuses_by_name_what_its_program_cannot_take(
+    old: str, new: str, path: str, tmp_path: Path
+) -> None:
+    text = edited(old, new) + "assignment: {method: one_shot}\n"
+    check(text, path, "take method: sequential", tmp_path)
+
+
+def test_a_constraint_does_not_name_choices(tmp_path: Path) -> None:
+    text = edited(D, f"  d: {{choices: {{x: {{{ONE}}}}}}}\n")
+    text = text.replace("terms: {m: 1}", "terms: {m: 1, ¦d: 1}")
+    message = "'d' is a list of choices; a constraint is between parameters"
+    check(text, "design.constraints.budget.terms.d", message, tmp_path)
+
+
+def test_a_followed_mode_is_named_at_one_of_the_choices(tmp_path: Path) -> None:
+    target = "{mode: {like: 1, at: {time: 0}, design: {¦d: z}}, frequency: 3}"
+    text = edited(D, f"  d: {{choices: {{x: {{{ONE}}}}}}}\n").replace(T, f"  - {target}\n")
+    check(text, "targets[0].mode.design.d", "unknown choice 'z'; known: x", tmp_path)
+
+
+def test_a_part_is_of_a_named_trajectory_where_there_are_several(tmp_path: Path) -> None:
+    motion = TEXT[TEXT.index("trajectory:\n") : TEXT.index("design:\n")]
+    several = "trajectory:\n" + 2 * "  - {q: [[0, 0], [1, 1]], duration: 1}\n"
+    target = "  - {mode: 1, at_least: 3, ¦during: [0.1, 0.2]}\n"
+    text = edited(motion, several).replace(T, target)
+    check(text, "targets[0].during", "is a part of one trajectory: name it (1, 2)", tmp_path)

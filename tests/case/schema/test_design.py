@@ -1,0 +1,146 @@
+"""What stands under `design` becomes one vector y, catalogues over its columns, and limits."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from json_schema_reader import SCHEMA, accepts
+from small_case import TEXT, edited
+
+from eigassign.case import CaseFile, Catalogue, DesignColumn, Tolerance, parse
+from eigassign.case.reader import read_yaml
+from eigassign.case.schema.design import Design, column_names
+from eigassign.case.units import DIMENSIONS, QuantityError, read_rate
+
+D = "  d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}\n"
+BOOM = """\
+  boom:
+    choices:
+      light: {sections.bar.area: 4 cm2, sections.bar.bending_inertia: 2 cm4}
+      heavy: {sections.bar.bending_inertia: 5 cm4, sections.bar.area: 6 cm2}
+"""
+LISTED = "  d: {parameter: sections.rod.diameter, values: [30 mm, 20 mm, 25 mm], price: 3 / mm}\n"
+
+
+def read(text: str) -> CaseFile:
+    return parse(text.encode(), "case.yaml")
+
+
+def with_entries(text: str) -> CaseFile:
+    return read(edited(D, text))
+
+
+def test_a_parameter_with_values_is_a_column_between_the_least_and_the_largest() -> None:
+    design = with_entries(LISTED).design
+    assert design.parameters["d"] == DesignColumn("sections.rod.diameter", 0.02, 0.03, price=3000.0)
+    assert design.catalogues == (
+        Catalogue("d", (1,), ("0.02", "0.025", "0.03"), ((0.02,), (0.025,), (0.03,))),
+    )
+
+
+def test_choices_make_a_column_of_each_property_and_say_which_belong_together() -> None:
+    case = with_entries(BOOM + LISTED)
+    assert list(case.design.parameters) == ["m", "boom.area", "boom.bending_inertia", "d"]
+    assert case.design_units == ("kg", "m2", "m4", "m")
+    area = case.design.parameters["boom.area"]
+    assert (area.parameter, area.min, area.max) == ("sections.bar.area", 4e-4, 6e-4)
+    boom, d = case.design.catalogues
+    assert boom == Catalogue("boom", (1, 2), ("light", "heavy"), ((4e-4, 2e-8), (6e-4, 5e-8)))
+    assert d.columns == (3,)
+
+
+def test_properties_that_end_alike_keep_their_whole_path() -> None:
+    assert column_names("arm", ["sections.a.area", "sections.b.area", "links.c.length"]) == [
+        "arm.sections.a.area",
+        "arm.sections.b.area",
+        "arm.length",
+    ]
+
+
+def test_the_expansion_point_has_an_entry_for_each_column() -> None:
+    text = edited(D, BOOM).replace("order: 4", "order: 4, y: [100 g, 5 cm2, 3 cm4]")
+    assert read(text).expansion.y == (0.1, 5e-4, 3e-8)
+
+
+def test_the_mass_is_limited_beside_the_parameters() -> None:
+    design = with_entries("  mass: {min: 500 g, max: 12}\n").design
+    assert design.mass is not None
+    assert (design.mass.min, design.mass.max) == (0.5, 12.0)
+    assert list(design.parameters) == ["m"]
+    assert read(TEXT).design.mass is None
+
+
+@pytest.mark.parametrize(
+    ("written", "tolerance", "about_2"),
+    [
+        ("2 %", Tolerance(0.02, relative=True), 0.04),
+        ("0.1 mm", Tolerance(1e-4, relative=False), 1e-4),
+        ("0.5", Tolerance(0.5, relative=False), 0.5),
+    ],
+)
+def test_a_tolerance_is_a_share_or_an_amount(
+    written: str, tolerance: Tolerance, about_2: float
+) -> None:
+    case = with_entries(D.replace("}", f", tolerance: {written}}}"))
+    assert case.design.parameters["d"].tolerance == tolerance
+    assert tolerance.deviation(-2.0) == pytest.approx(about_2, rel=1e-15)
+
+
+@given(st.floats(1e-12, 0.999))
+def test_a_share_is_written_so_that_the_same_number_is_read_back(share: float) -> None:
+    written = Tolerance(share, relative=True).written()
+    entry = {"parameter": "bodies.a.mass", "min": 0.0, "max": 1.0, "tolerance": written}
+    design = Design.model_validate({"entries": {"m": entry}})
+    assert design.parameters["m"].tolerance == Tolerance(share, relative=True)
+
+
+def test_a_price_is_for_one_si_unit() -> None:
+    mass, length = DIMENSIONS["mass"], DIMENSIONS["length"]
+    assert read_rate(3, mass) == 3.0
+    assert read_rate("3 / kg", mass) == 3.0
+    assert read_rate("3/g", mass) == pytest.approx(3000.0, rel=1e-15)
+    assert read_rate("-0.5 / mm", length) == pytest.approx(-500.0, rel=1e-15)
+    assert read_rate("1 / N m/rad", DIMENSIONS["rotational stiffness"]) == 1.0
+    for wrong in ("3 kg", "kg", "3 /", "3 g / kg", "1e999 / kg"):
+        with pytest.raises(QuantityError):
+            read_rate(wrong, mass)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        BOOM + LISTED + "  mass: {max: 12 kg}\n",
+        D.replace("}", ", price: 3 / kg, tolerance: 2.5 %}").replace("/ kg", "/ cm"),
+        D.replace("}", ", tolerance: 1 mm}"),
+    ],
+)
+def test_every_entry_reads_back_equal_and_is_described_by_the_schema(text: str) -> None:
+    case = with_entries(text)
+    again = read(case.resolved())
+    assert again == case
+    assert hash(again) == hash(case)
+    assert again.resolved() == case.resolved()
+    assert (again.design.parameters, again.design.catalogues) == (
+        case.design.parameters,
+        case.design.catalogues,
+    )
+    for written in (edited(D, text), case.resolved()):
+        assert accepts(SCHEMA, read_yaml(written.encode(), "f").tree)
+
+
+@pytest.mark.parametrize(
+    ("text", "messages"),
+    [
+        (BOOM, ["design.boom: the initial value is none of those listed, light, heavy"]),
+        (LISTED, []),
+        (LISTED.replace("30 mm, ", ""), ["design.d: the initial value is none of those listed"]),
+        (D.replace("40 mm", "25 mm"), ["initial value 0.03 m of sections.rod.diameter is outside"]),
+    ],
+)
+def test_the_start_may_lie_outside_bounds_and_lists_with_a_warning(
+    text: str, messages: list[str]
+) -> None:
+    found = [str(warning) for warning in with_entries(text).warnings]
+    assert len(found) == len(messages)
+    assert all(message in warning for message, warning in zip(messages, found, strict=True))

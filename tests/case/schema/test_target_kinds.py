@@ -1,0 +1,177 @@
+# ruff: noqa: E501  (a table)
+"""Every kind of target is read in Hz, comes to requirements by mode, and is written out again."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from pathlib import Path
+
+import pytest
+from json_schema_reader import SCHEMA, accepts
+from small_case import TEXT, edited
+
+from eigassign.case import (
+    CaseFile,
+    FollowedMode,
+    FrequencyFile,
+    FrequencyProfile,
+    Harmonic,
+    KeepOutTarget,
+    load,
+    parse,
+)
+from eigassign.case.reader import read_yaml
+
+T = "  - {mode: 1, frequency: 190 Hz}\n"
+KINDS = {
+    "several modes": "{modes: [1, 3], frequency: 0.19 kHz, weight: 2}",
+    "at least": "{mode: 2, at_least: 320 Hz, during: [200 ms, 0.5]}",
+    "every mode at least": "{modes: all, at_least: 20}",
+    "at most, in time": "{mode: 2, at_most: {time: [0, 1], frequency: [300, 400 Hz]}}",
+    "band": "{keep_out: [48 Hz, 52 Hz]}",
+    "band of some": "{modes: [1, 2], keep_out: [48, 52]}",
+    "band of one": "{mode: 2, keep_out: [48, 52]}",
+    "harmonic": "{keep_out: {harmonic: 2, of: 25 Hz, margin: 5 %}}",
+    "harmonic in time": "{keep_out: {harmonic: 0.5, of: {time: [0, 1], frequency: [9, 10]}, margin: 0.1}}",
+    "gap": "{gap: {between: [1, 3], at_least: 20 Hz}}",
+    "followed from a time": "{mode: {like: 2, at: {time: 0.2 s}, design: {m: 10 g}}, frequency: 20}",
+    "followed from a pose": "{mode: {like: 2, at: {q: [10 deg, 1]}}, at_least: 20}",
+}  # fmt: skip
+ASSIGNMENTS = (
+    "{}",
+    "{method: one_shot}",
+    "{objective: worst_case, starts: 3, steps: 20, seconds: 1 min, max_error: 1 %}",
+)
+
+
+def with_target(*targets: str) -> CaseFile:
+    return parse(edited(T, "".join(f"  - {t}\n" for t in targets)).encode(), "case.yaml")
+
+
+@pytest.mark.parametrize("target", KINDS.values(), ids=KINDS)
+def test_every_kind_reads_back_equal_and_is_described_by_the_schema(target: str) -> None:
+    case = with_target(target)
+    assert case.warnings == ()
+    again = parse(case.resolved().encode(), "case.yaml")
+    assert again == case
+    assert hash(again) == hash(case)
+    assert again.resolved() == case.resolved()
+    for text in (edited(T, f"  - {target}\n"), case.resolved()):
+        assert accepts(SCHEMA, read_yaml(text.encode(), "f").tree)
+
+
+@pytest.mark.parametrize(
+    ("target", "requirements"),
+    [
+        ("several modes", [("frequency", (1,)), ("frequency", (3,))]),
+        ("every mode at least", [("at_least", (1,))]),
+        ("band", [("keep_out", ())]),
+        ("band of some", [("keep_out", (1, 2))]),
+        ("band of one", [("keep_out", (2,))]),
+        ("gap", [("gap", (1, 3))]),
+        ("followed from a time", [("frequency", (2,))]),
+    ],
+)
+def test_a_target_comes_to_one_requirement_for_each_mode(
+    target: str, requirements: list[tuple[str, tuple[int, ...]]]
+) -> None:
+    found = with_target("{mode: 4, frequency: 500}", KINDS[target]).requirements
+    assert [(each.place, each.kind, each.modes) for each in found] == [
+        ("targets[0]", "frequency", (4,)),
+        *(("targets[1]", kind, modes) for kind, modes in requirements),
+    ]
+
+
+def test_requirements_are_called_by_what_they_ask_for() -> None:
+    assert [each.label for each in with_target(*KINDS.values()).requirements] == [
+        "mode 1 at 190 Hz",
+        "mode 3 at 190 Hz",
+        "mode 2 at least 320 Hz from 0.2 to 0.5 s",
+        "mode 1 at least 20 Hz",
+        "mode 2 at most its profile",
+        "every mode clear of 48 … 52 Hz",
+        "modes 1 and 2 clear of 48 … 52 Hz",
+        "mode 2 clear of 48 … 52 Hz",
+        "every mode clear of 2 times 25 Hz ± 5 %",
+        "every mode clear of 0.5 times its profile ± 10 %",
+        "modes 1 and 3 at least 20 Hz apart",
+        "the mode like mode 2 at 20 Hz",
+        "the mode like mode 2 at least 20 Hz",
+    ]
+
+
+def test_values_are_read_in_si() -> None:
+    harmonic, from_time, from_pose = (
+        with_target(KINDS[kind]).targets[0]
+        for kind in ("harmonic in time", "followed from a time", "followed from a pose")
+    )
+    assert isinstance(harmonic, KeepOutTarget)
+    assert harmonic.keep_out == Harmonic(
+        harmonic=0.5, of=FrequencyProfile(time=(0, 1), frequency=(9, 10)), margin=0.1
+    )
+    followed = from_time.mode  # type: ignore[union-attr]
+    assert isinstance(followed, FollowedMode)
+    assert (followed.like, followed.at.time, followed.design) == (2, 0.2, {"m": 0.01})
+    assert from_pose.mode.at.q == (math.radians(10), 1.0)  # type: ignore[union-attr]
+
+
+def test_a_followed_mode_may_be_named_at_a_choice() -> None:
+    old = "  d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}\n"
+    new = "  d: {choices: {thin: {sections.rod.diameter: 2 cm}, thick: {sections.rod.diameter: 4 cm}}}\n"
+    target = "{mode: {like: 1, at: {time: 0}, design: {d: thick}}, frequency: 9}"
+    case = parse(edited(old, new).replace(T, f"  - {target}\n").encode(), "case.yaml")
+    assert case.targets[0].mode.design == {"d": "thick"}  # type: ignore[union-attr]
+    assert parse(case.resolved().encode(), "case.yaml") == case
+
+
+@pytest.mark.parametrize(
+    "target",
+    [
+        "{mode: 1, frequency: {file: f.csv}}",
+        "{mode: 1, at_most: {file: f.csv}}",
+        "{keep_out: {harmonic: 2, of: {file: f.csv}, margin: 5 %}}",
+    ],
+)
+def test_a_file_of_frequencies_is_found_beside_the_case_and_its_content_known(
+    target: str, tmp_path: Path
+) -> None:
+    (tmp_path / "f.csv").write_text("time,frequency\n0,1\n1,2\n")
+    (tmp_path / "case.yaml").write_text(edited(T, f"  - {target}\n"))
+    case = load(tmp_path / "case.yaml")
+    ((_, curve),) = case.targets[0].frequencies
+    assert curve == FrequencyFile(file=str(tmp_path / "f.csv"))
+    assert case.files == {"f.csv": hashlib.sha256(b"time,frequency\n0,1\n1,2\n").hexdigest()}
+
+
+@pytest.mark.parametrize("given", ASSIGNMENTS)
+def test_assignments_read_back_equal_and_are_described_by_the_schema(given: str) -> None:
+    text = TEXT + f"assignment: {given}\n"
+    case = parse(text.encode(), "case.yaml")
+    assert parse(case.resolved().encode(), "case.yaml") == case
+    for written in (text, case.resolved()):
+        assert accepts(SCHEMA, read_yaml(written.encode(), "f").tree)
+
+
+def test_the_assignment_has_defaults() -> None:
+    keys = parse(TEXT.encode(), "case.yaml").assignment
+    assert (keys.method, keys.objective, keys.starts) == ("sequential", "least_squares", "auto")
+    assert (keys.steps, keys.seconds, keys.max_error) == (100, None, None)
+    given = parse((TEXT + f"assignment: {ASSIGNMENTS[2]}\n").encode(), "case.yaml").assignment
+    assert (given.starts, given.seconds, given.max_error) == (3, 60.0, 0.01)
+
+
+def test_a_mode_may_have_limits_beside_its_frequency_and_frequencies_one_after_the_other() -> None:
+    with_target("{mode: 1, frequency: 9}", "{mode: 1, at_least: 8}", "{mode: 1, at_most: 10}")
+    with_target(
+        "{mode: 1, frequency: 9, during: [0, 0.5]}", "{mode: 1, frequency: 8, during: [0.5, 1]}"
+    )
+
+
+def test_a_profile_covers_only_the_part_that_is_wanted() -> None:
+    with_target("{mode: 1, at_least: {time: [0, 0.5], frequency: [1, 2]}, during: [0.1, 0.4]}")
+
+
+def test_targets_may_be_on_modes_that_the_file_does_not_expand() -> None:
+    case = with_target("{mode: 3, frequency: 300}")
+    assert case.expansion.modes == (1, 2)
