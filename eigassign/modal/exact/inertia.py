@@ -6,12 +6,12 @@ Schur complement of −σ M_FF in A = K − σ M is K_E − σ M_c, and inertias
 
     n₋(K − σ M) = n₋(−σ M_FF) + n₋(K_E − σ M_c) = n_rigid + number of elastic modes with λ < σ .
 
-Neither M_c nor an eigenvalue is needed. Where Mz = 0 for some z, A is K there and positive: unknowns
-without mass are never counted.
+Neither M_c nor an eigenvalue is needed. Where Mz = 0 for some z, A is K there and positive, so that
+unknowns without mass are never counted.
 
 A is scaled to S A S with s_i = (K_ii + σ Σ_j |θ_j (M_j)_ii|)^{−1/2}: units do not mix, and no entry
-exceeds one. A factor computed in floating point is that of S A S + δ with |δ| ≲ c ε |L| |D| |L|ᵀ. It
-counts what it should where δ cannot carry the eigenvalue nearest to zero (vector v, |v| = 1) across,
+exceeds one. A factor computed in floating point is that of S A S + δ, |δ| ≲ c ε |L| |D| |L|ᵀ. Its
+count is right where δ cannot carry the eigenvalue nearest to zero (vector v, |v| = 1) across,
 
     |v|ᵀ |δ| |v| ‖(S A S)⁻¹‖ < 1 ,
 
@@ -24,7 +24,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
 from scipy.linalg import lapack
 
 from eigassign.errors import MechanismError, UsageError
