@@ -2,13 +2,15 @@
 
 Reading order:
 
-    checks       refuses input that is not finite or has another shape
-    targets      wanted frequencies at the samples, weights in time, the distance to a target
-    program      build: the quadratic program of eqs. (13)–(14), and its dimensionless units
-    feasibility  which limits contradict each other
-    solver       solve: OSQP, then an active-set method that goes to round-off
-    optimality   judge: Karush–Kuhn–Tucker residuals, recomputed from the data
-    assign       build, solve, judge: from targets to the optimal design
+    checks        refuses input that is not finite or has another shape
+    targets       wanted frequencies at the samples, weights in time, the distance to a target
+    program       build: the quadratic program of eqs. (13)–(14), and its dimensionless units
+    feasibility   which limits contradict each other
+    solver        solve: OSQP, then an active-set method that goes to round-off
+    optimality    judge: Karush–Kuhn–Tucker residuals, recomputed from the data
+    sequential    the exact optimum: programs in a row inside a trust region
+    requirements  targets, inequalities and quantities as the sequential method sees them
+    assign        build, solve, judge: from targets to the optimal design
 """
 
 from __future__ import annotations

@@ -265,10 +265,11 @@ class Scales:
 
 @dataclass(frozen=True)
 class ScaledProgram:
-    """min ½‖A x + b‖²  with  lower ≤ G x ≤ upper,  x = (y − y_start)/scale of the free parameters.
+    """min ½‖A x + b‖² + costᵀx  with  lower ≤ G x ≤ upper.
 
-    A (≤ n, n) is triangular: the rows of the program after a QR decomposition, which keeps AᵀA and
-    Aᵀb. The first n rows of G are the identity (the bounds), the others the constraints, of norm 1.
+    The first n rows of G are the identity (the bounds), the others the constraints, of norm 1. Of
+    a `QuadraticProgram`, x = (y − y_start)/scale of the free parameters, A (≤ n, n) is triangular,
+    its rows after a QR decomposition, which keeps AᵀA and Aᵀb, and there is no cost.
     """
 
     A: Floats
@@ -276,6 +277,7 @@ class ScaledProgram:
     G: Floats
     lower: Floats
     upper: Floats
+    cost: Floats
 
     @property
     def P(self) -> Floats:
@@ -284,8 +286,12 @@ class ScaledProgram:
 
     @property
     def c(self) -> Floats:
-        """The gradient Aᵀb (n,) at x = 0."""
-        return np.asarray(self.A.T @ self.b)
+        """The gradient Aᵀb + cost (n,) at x = 0."""
+        return self.gradient(np.zeros(self.cost.size))
+
+    def gradient(self, x: Floats) -> Floats:
+        """Aᵀ(A x + b) + cost (n,)."""
+        return np.asarray(self.A.T @ (self.A @ x + self.b) + self.cost)
 
 
 def choose_scales(
@@ -317,7 +323,8 @@ def scaled_program(program: QuadraticProgram) -> ScaledProgram:
     bounds = [(side[free] - start[free]) / unit for side in (program.lower, program.upper)]
     limits = [(side - at_start) / scales.rows for side in (program.c_lower, program.c_upper)]
     lower, upper = (np.concatenate(pair) for pair in zip(bounds, limits, strict=True))
-    return ScaledProgram(frozen(r), frozen(b), frozen(G), frozen(lower), frozen(upper))
+    cost = frozen(np.zeros(len(free)))
+    return ScaledProgram(frozen(r), frozen(b), frozen(G), frozen(lower), frozen(upper), cost)
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,10 @@ swallowed (raised again); its own polishing may worsen the answer, and prints to
 ``verbose=False`` (off; the active-set method below polishes, and `optimality` judges both). With a
 positive semidefinite P and ordered limits nothing is printed, so stdout needs no redirection.
 
-**Polish.** Least squares with limits by the primal active-set method, to round-off:
+**Polish.** Least squares with a linear cost and limits, by the primal active-set method, to
+round-off:
 
-    min ½‖A x + b‖²  with  lower ≤ G x ≤ upper
+    min ½‖A x + b‖² + costᵀx  with  lower ≤ G x ≤ upper
 
 (Nocedal, Wright, Numerical Optimization, 2nd ed., algorithm 16.3, in null-space form.) It works on
 A, not on AᵀA, so that digits are lost with cond(A) only, and starts at a point that is feasible but
@@ -72,6 +73,15 @@ def solve_program(program: QuadraticProgram) -> Solution:
         candidates.append(unscaled(program, scaled, raw.x, raw.mu))
         status = raw.status.words
     return Solution(tuple(candidates), status, raw.iterations, n - polished.rank)
+
+
+def solve_scaled(scaled: ScaledProgram) -> tuple[Floats, Floats] | None:
+    """x and multipliers mu (rows of G,) of a program in units of its own; None if none is found."""
+    raw = solve_osqp(scaled)
+    start = feasible_point(scaled) if raw.x is None else raw.x
+    if start is None:
+        return None
+    return minimise(scaled, start)
 
 
 def _start(program: QuadraticProgram, scaled: ScaledProgram, raw: RawSolution) -> Floats:
@@ -169,6 +179,7 @@ SIGN = 1e-11  # multipliers of the wrong sign below this are round-off; gradient
 INDEPENDENT = 1e-9  # sine of a unit row's angle to the span of the others
 PASSES = 4
 NEAR = 1e-6  # this near a limit, the first guess takes it as active
+FAR = 1e6  # beyond every limit, in units in which the program is O(1)
 
 
 @dataclass(frozen=True)
@@ -210,10 +221,12 @@ def polish(scaled: ScaledProgram, x: Floats) -> Polished:
 
 
 def _nearest(scaled: ScaledProgram, rows: Floats, x: Floats) -> ScaledProgram:
-    """min ½‖z‖² over the optima: those feasible z with the same A z as the optimum x.
+    """min ½‖z‖² over the optima: those feasible z with the same A z and costᵀz as the optimum x.
 
     The multipliers of the first problem belong to every one of its optima, so they stay.
     """
+    if scaled.cost.any():
+        rows = np.vstack([rows, scaled.cost / np.linalg.norm(scaled.cost)])
     fixed = rows @ x
     return ScaledProgram(
         A=np.eye(x.size),
@@ -221,6 +234,7 @@ def _nearest(scaled: ScaledProgram, rows: Floats, x: Floats) -> ScaledProgram:
         G=np.vstack([scaled.G, rows]),
         lower=np.append(scaled.lower, fixed),
         upper=np.append(scaled.upper, fixed),
+        cost=np.zeros(x.size),
     )
 
 
@@ -287,12 +301,21 @@ def _step(scaled: ScaledProgram, state: _State, cautious: bool) -> _State:
 
 
 def _direction(scaled: ScaledProgram, state: _State) -> Floats:
-    """The shortest step p with G_W p = 0 that minimises ‖A (x + p) + b‖."""
+    """The shortest step p with G_W p = 0 that minimises the objective.
+
+    Where the cost falls along a direction that A does not see, the step goes that way beyond all
+    limits: every direction of a falling cost has one.
+    """
     Z = _null_space(scaled.G[state.rows])
-    residual = scaled.A @ state.x + scaled.b
+    residual, cost = scaled.A @ state.x + scaled.b, Z.T @ scaled.cost
     U, s, Vt = np.linalg.svd(scaled.A @ Z, full_matrices=False)
     keep = s > RANK * np.linalg.norm(scaled.A, ord=2) if s.size else s > 0.0
-    return np.asarray(-Z @ (Vt[keep].T @ ((U[:, keep].T @ residual) / s[keep])))
+    U, s, V = U[:, keep], s[keep], Vt[keep].T
+    p = V @ ((U.T @ residual + (V.T @ cost) / s) / s)
+    unseen = cost - V @ (V.T @ cost)
+    if np.linalg.norm(unseen) > SIGN * (1.0 + np.linalg.norm(scaled.cost)):
+        p = FAR * unseen / np.linalg.norm(unseen)
+    return np.asarray(-Z @ p)
 
 
 def _longest(scaled: ScaledProgram, state: _State, p: Floats) -> tuple[float, int, int]:
@@ -311,7 +334,7 @@ def _longest(scaled: ScaledProgram, state: _State, p: Floats) -> tuple[float, in
 
 def _multipliers(scaled: ScaledProgram, state: _State) -> Floats:
     """mu (m,) with Aᵀ(A x + b) + Gᵀ mu = 0 on the working set, 0 elsewhere."""
-    gradient = scaled.A.T @ (scaled.A @ state.x + scaled.b)
+    gradient = scaled.gradient(state.x)
     mu = np.zeros(len(state.side))
     if state.rows:
         mu[state.rows] = np.linalg.lstsq(scaled.G[state.rows].T, -gradient, rcond=None)[0]

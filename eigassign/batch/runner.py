@@ -67,11 +67,11 @@ def _optimised(path: str, options: CaseOptions) -> Row:
     outcome = optimize(Path(path), how)
     error = outcome.results.error
     return {
-        "status": "ok" if outcome.within_tolerance else "tolerance",
-        "message": "" if outcome.within_tolerance else "the expansion is over the asked tolerance",
+        "status": "ok" if outcome.shortcoming is None else "tolerance",
+        "message": outcome.shortcoming or "",
         "run_folder": str(outcome.folder),
         "initial_max_relative": error and error.initial.max_relative,
-        "predicted_max_relative": error and error.predicted.max_relative,
+        "predicted_max_relative": error and error.predicted and error.predicted.max_relative,
         "exact_max_relative": error and error.exact.max_relative,
         "design": tuple((row.name, row.optimal) for row in outcome.results.design),
     }

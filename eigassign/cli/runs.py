@@ -62,9 +62,9 @@ def _finished(
         outcome = work(case, _options(how, reporter))
         reporter.warn(outcome.warnings)
         _show(outcome, as_json)
-        if not outcome.within_tolerance:
-            reporter.error("the expansion is further from exact than validation.max_error allows")
-    return 0 if outcome.within_tolerance else 1
+        if outcome.shortcoming is not None:
+            reporter.error(outcome.shortcoming)
+    return 0 if outcome.shortcoming is None else 1
 
 
 def _options(how: Mapping[str, Any], reporter: Reporter) -> Options:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from eigassign.errors import EigassignError
 from eigassign.mechanism.trajectory.csv import TIME, TIP_COLUMNS
 from eigassign.study.results import (
+    AssignmentRow,
     Comparison,
     ErrorSummary,
     ModeStudy,
@@ -62,6 +63,7 @@ def results_document(results: RunResults) -> dict[str, Any]:
         "error": _error(results.error) if results.error else None,
         "frequencies": _frequencies(results, first) if first else None,
         "targets": [_target(results, target) for target in results.targets],
+        "assignment": _assignment(results.assignment) if results.assignment else None,
         "other_modes": _other_modes(results.others),
         "approximation": [_study(study) for study in results.studies],
         "trajectory": {
@@ -78,8 +80,11 @@ def results_document(results: RunResults) -> dict[str, Any]:
 
 
 def _error(summary: ErrorSummary) -> dict[str, Any]:
-    predicted = {name: _finite(value) for name, value in asdict(summary.predicted).items()}
-    return {**asdict(summary), "predicted": predicted}
+    rows = {name: getattr(summary, name) for name in ("initial", "one_shot", "predicted", "exact")}
+    return {
+        name: None if row is None else {key: _finite(value) for key, value in asdict(row).items()}
+        for name, row in rows.items()
+    }
 
 
 def _finite(value: Any) -> Any:
@@ -95,7 +100,8 @@ def _frequencies(results: RunResults, target: TargetStudy) -> dict[str, Any]:
         **_named(results, target.rows),
         "target_hz": target.target_hz,
         "initial_hz": target.initial_hz,
-        "predicted_hz": _finite(target.predicted_hz),
+        "one_shot_hz": target.one_shot_hz,
+        "predicted_hz": None if target.predicted_hz is None else _finite(target.predicted_hz),
         "exact_hz": target.exact_hz,
     }
 
@@ -120,11 +126,20 @@ def _trajectory(results: RunResults, row: TrajectoryRow) -> dict[str, Any]:
 
 def _target(results: RunResults, target: TargetStudy) -> dict[str, Any]:
     return {
+        "kind": target.kind,
+        "label": target.label,
         "mode": target.mode,
+        "modes": target.modes,
+        "satisfied": target.satisfied,
+        "worst": target.error.exact.max_relative,
         **({"trajectory": target.trajectory} if target.trajectory is not None else {}),
         "error": _error(target.error),
         "frequencies": _frequencies(results, target),
     }
+
+
+def _assignment(row: AssignmentRow) -> dict[str, Any]:
+    return {**asdict(row), "finished": row.finished}
 
 
 def _other_modes(others: OtherModes | None) -> list[dict[str, Any]]:
@@ -264,14 +279,16 @@ def _assigned(results: RunResults) -> Iterator[Column]:
     """One group of columns a mode, whichever trajectories its targets hold on."""
     for mode in dict.fromkeys(target.mode for target in results.targets):
         own = [target for target in results.targets if target.mode == mode]
-        for kind in ("target", "initial", "predicted", "exact"):
-            yield f"mode {mode} {kind} [Hz]", _scattered(own, kind, results.time_s.size)
+        for kind in ("target", "initial", "one_shot", "predicted", "exact"):
+            heading = f"mode {mode} {kind.replace('_', ' ')} [Hz]"
+            yield heading, _scattered(own, kind, results.time_s.size)
 
 
 def _scattered(targets: Sequence[TargetStudy], kind: str, n: int) -> list[float]:
     values = np.full(n, np.nan)
     for target in targets:
-        values[target.rows] = getattr(target, f"{kind}_hz")
+        if (hz := getattr(target, f"{kind}_hz")) is not None:
+            values[target.rows] = hz
     return [float(value) for value in values]
 
 

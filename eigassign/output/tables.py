@@ -38,7 +38,7 @@ def design(results: RunResults) -> Table:
 
 def errors(results: RunResults) -> Table:
     """Distance to the target before, as predicted, and exact, side by side."""
-    kinds = ("initial", "predicted", "exact")
+    kinds = _stages(results)
     columns = ("target", *(f"{kind} {what}" for what in ("worst", "rms") for kind in kinds))
     summaries = [pair for target in results.targets for pair in _of_target(target)]
     if len(results.targets) > 1 and len(results.trajectories) > 1:
@@ -48,12 +48,20 @@ def errors(results: RunResults) -> Table:
         summaries.append(("all", results.error))
     rows = []
     for label, summary in summaries:
-        errors = (summary.initial, summary.predicted, summary.exact)
-        worst = (percent(error.max_relative) for error in errors)
-        rows.append((label, *worst, *(percent(error.rms_relative) for error in errors)))
+        errors = [getattr(summary, kind.replace(" ", "_")) for kind in kinds]
+        worst = ("" if error is None else percent(error.max_relative) for error in errors)
+        rms = ("" if error is None else percent(error.rms_relative) for error in errors)
+        rows.append((label, *worst, *rms))
     caption = "Frequency against its target in Hz, relative to the target, along "
     caption += f"{results.along}."
     return Table("Distance to the target", columns, tuple(rows), caption)
+
+
+def _stages(results: RunResults) -> tuple[str, ...]:
+    """The designs whose distance is shown; the one shot where it is not the answer itself."""
+    row = results.assignment
+    beside = row is not None and row.method != "one_shot" and row.one_shot is not None
+    return ("initial", *(("one shot",) if beside else ()), "predicted", "exact")
 
 
 def _of_target(target: TargetStudy) -> Iterator[tuple[str, ErrorSummary]]:

@@ -21,14 +21,11 @@ from eigassign.pipeline.expansions import expand_plan
 from eigassign.pipeline.run_files import RunFolder, new_run_folder
 from eigassign.pipeline.stages import Stages
 from eigassign.study.accuracy import accuracy_notes, truncation_notes
-from eigassign.study.assignment import (
-    assign_design,
-    require_assignable,
-    study_targets,
-)
+from eigassign.study.assignment import MAX_ERROR, Answer, find_answer, require_assignable
 from eigassign.study.built_case import Case, load_case
 from eigassign.study.collect import VerifiedAssignment, collect_results
 from eigassign.study.comparison import Validation, study_modes, validate_expansions
+from eigassign.study.judgement import SolvedDesigns, study_targets
 from eigassign.study.planning import plan_expansion
 from eigassign.study.results import RunResults
 from eigassign.study.scene import Expansions, Scene
@@ -66,12 +63,12 @@ class Result:
     time_s: Floats
     target_hz: Floats
     initial_hz: Floats
-    predicted_hz: Floats
+    predicted_hz: Floats | None  # None of a limit
     exact_hz: Floats
     results: RunResults
     expansion: Expansion  # full
     linearised: Expansion
-    assignment: Assignment
+    assignment: Assignment | None  # the paper's one shot, where the case has one
 
 
 @dataclass(frozen=True)
@@ -80,7 +77,7 @@ class Outcome:
 
     folder: Path | None
     results: RunResults
-    within_tolerance: bool
+    shortcoming: str | None  # why this is no answer to build on; None if it is
     seconds: float
     warnings: tuple[str, ...]
 
@@ -99,19 +96,30 @@ def solve_case(case: Case, options: Options = DEFAULT) -> Result:
     with case.located():
         scene = prepare(case, stages, _cache(options))
         wanted = target_frequencies(file, scene.path)
+        with stages("assignment", "assigning the frequencies"):
+            answer = find_answer(scene, wanted, options.progress)
+            scene = replace(scene, asked_modes=answer.modes)
         with stages("initial", "solving the initial design exactly"):
             initial_hz = scene.exact(scene.initial, stages.advance)
-        with stages("assignment", "assigning the frequencies"):
-            assignment = assign_design(scene, wanted)
         with stages("verification", "solving the optimal design exactly"):
-            exact_hz = scene.exact(assignment.y, stages.advance)
+            exact_hz = scene.exact(answer.y, stages.advance)
+            one_shot_hz = _one_shot(scene, answer, exact_hz)
         with stages("comparison", "comparing the expansion with exact frequencies"):
             studies = study_modes(scene, initial_hz)
-            scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene, assignment.y)))
-        targets = study_targets(scene, wanted, assignment, initial_hz, exact_hz)
-    found = VerifiedAssignment(assignment, targets, initial_hz, exact_hz)
+            scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene, answer.y)))
+        solved = SolvedDesigns(initial_hz, exact_hz, one_shot_hz)
+        accepted = file.assignment.max_error or MAX_ERROR
+        targets = study_targets(scene.path, wanted, solved, answer.predicted, accepted)
+    found = VerifiedAssignment(answer, targets, initial_hz, exact_hz)
     results = collect_results(scene, studies, found, stages.timing_s)
-    return _result(results, scene.expansions, assignment)
+    return _result(results, scene.expansions, answer.one_shot)
+
+
+def _one_shot(scene: Scene, answer: Answer, exact_hz: Floats) -> Floats | None:
+    """Exact frequencies of the paper's answer, where there is one."""
+    if answer.one_shot is None:
+        return None
+    return exact_hz if answer.found is None else scene.exact(answer.one_shot.y)
 
 
 def prepare(
@@ -141,7 +149,7 @@ def _accuracy(case: Case, scene: Scene, optimum: Floats | None = None) -> list[s
     return accuracy_notes(scene, case.discretisation_error, optimum)
 
 
-def _result(results: RunResults, expansions: Expansions, assignment: Assignment) -> Result:
+def _result(results: RunResults, expansions: Expansions, assignment: Assignment | None) -> Result:
     first = results.targets[0]
     return Result(
         design={row.name: row.optimal for row in results.design},
@@ -209,7 +217,7 @@ def validate(path: str | Path, options: Options = DEFAULT) -> Validation:
 
 
 def _outcome(folder: RunFolder, results: RunResults, stages: Stages) -> Outcome:
-    return Outcome(folder.path, results, results.within_tolerance, stages.total_s, results.warnings)
+    return Outcome(folder.path, results, results.shortcoming, stages.total_s, results.warnings)
 
 
 def _cache(options: Options) -> Cache | None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from eigassign.case import CaseFile
 from eigassign.output import report
 from eigassign.output.run_folder import run_folder
-from eigassign.study.results import ErrorSummary, RunResults
+from eigassign.study.results import AssignmentRow, ErrorSummary, RunResults
 
 RESULTS = Path("results")  # below the current folder
 
@@ -65,10 +65,12 @@ def log_text(results: RunResults) -> str:
 
 
 def _distances(error: ErrorSummary, along: str) -> Iterator[str]:
-    for when in ("initial", "predicted", "exact"):
+    for when in ("initial", "one_shot", "predicted", "exact"):
         row = getattr(error, when)
+        if row is None:
+            continue
         figures = f"max {100 * row.max_relative:.4g} %, rms {100 * row.rms_relative:.4g} %"
-        yield f"distance  {when}{along}: {figures} from the target"
+        yield f"distance  {when.replace('_', ' ')}{along}: {figures} from the target"
 
 
 def _outcome_lines(results: RunResults) -> Iterator[str]:
@@ -79,7 +81,21 @@ def _outcome_lines(results: RunResults) -> Iterator[str]:
     for own in results.trajectories if len(results.trajectories) > 1 else ():
         along = results.error_along(own.name)
         yield from _distances(along, f" along {own.name!r}") if along is not None else ()
+    if results.assignment is not None:
+        yield from _assignment_lines(results.assignment)
     if results.approximation_error is not None:
         within = "within" if results.within_tolerance else "OVER"
         error = f"{100 * results.approximation_error:.4g} %"
         yield f"accuracy  predicted against exact: {error}, {within} {100 * results.tolerance:g} %"
+
+
+def _assignment_lines(row: AssignmentRow) -> Iterator[str]:
+    yield f"verdict   {row.verdict}: {row.reason}"
+    yield f"method    {row.method}, {row.objective}: {row.optimality.words}"
+    for k, step in enumerate(row.steps, 1):
+        design = ", ".join(f"{value:.9g}" for value in step.design)
+        kept = "taken" if step.taken else "given up"
+        yield (
+            f"step      {k}: objective {step.objective:.9g}, violation {step.violation:.3g}, "
+            f"region {step.radius:.3g}, {kept}, at ({design})"
+        )

@@ -10,7 +10,11 @@ Reading order:
     scene       model, trajectory and expansions of a case in one object
     comparison  how good both expansions are: along the trajectory, over the boxes of q and y
     wanted      what the targets ask for, at the samples of the trajectories
-    assignment  from targets and bounds to the optimal design, and what it does to the frequencies
+    one_shot    the paper's answer: one quadratic program about one expansion point
+    response    frequencies along the trajectory and their slopes in the design
+    judgement   what a design does to the targets, and the verdict
+    optimum     the design that meets the targets best, by the sequential method
+    assignment  from the targets to the answer, by either method
     accuracy    errors of mesh, reduction, expansion and round-off; whether the motion is slow
     drawing     the mechanism as lines and symbols: in poses, and in its modes
     collect     all of it put together as the results of a run

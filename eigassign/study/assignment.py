@@ -1,42 +1,37 @@
-"""From a case's targets and bounds to the optimal design, and what it does to the frequencies.
+"""From a case's targets to its answer: the paper's one shot, and the optimum of the exact problem.
 
-The linear model of eq. (9) comes from the partially linearised expansion, the design from the
-quadratic program of eqs. (13)–(14) (`eigassign.assignment`).
+The one shot is always made where all that is asked is wanted frequencies within bounds and linear
+constraints; it is the answer of `method: one_shot`, and a start of the sequential method otherwise.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment import (
-    Assignment,
-    Bounds,
-    Goal,
-    LinearConstraint,
-    LinearModel,
-    hz_from_lam,
-    relative_error,
-    solve_assignment,
-)
+from eigassign.assignment import Assignment, hz_from_lam
+from eigassign.assignment.sequential import End
 from eigassign.case import CaseFile
 from eigassign.errors import AccuracyError, CaseError, Problem
-from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.study.judgement import verdict
+from eigassign.study.one_shot import assign_design
+from eigassign.study.optimum import Found, find_optimum
 from eigassign.study.results import (
-    DesignRow,
-    ErrorRow,
-    ErrorSummary,
-    SolverRow,
-    TargetAlong,
+    ActiveRow,
+    AssignmentRow,
+    LocalOptimum,
+    OptimalityRow,
+    StepRow,
     TargetStudy,
 )
 from eigassign.study.scene import Scene
-from eigassign.study.wanted import Wanted, time_weights
+from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
-_Curves = tuple[Floats, Floats, Floats, Floats]  # wanted, initial, predicted and exact, (n,) in Hz
+MAX_ERROR = 0.02  # of a wanted frequency, where the case says nothing
 
 
 def require_assignable(file: CaseFile) -> None:
@@ -44,7 +39,7 @@ def require_assignable(file: CaseFile) -> None:
     needs = {
         "trajectory": (file.trajectory is not None, "along which the frequencies are assigned"),
         "design": (bool(file.design.parameters), "at least one parameter that may change"),
-        "targets": (bool(file.targets), "at least one wanted frequency"),
+        "targets": (bool(file.targets), "at least one target"),
     }
     problems = tuple(
         file.problem(key, f"is missing, and optimize needs it: {why}")
@@ -56,202 +51,158 @@ def require_assignable(file: CaseFile) -> None:
 
 
 def _not_yet(file: CaseFile) -> Iterator[Problem]:
-    """What the quadratic program cannot take."""
-    why = "is not assigned yet: only wanted frequencies of numbered modes are"
+    """What is read but cannot be assigned so far."""
     for each in file.requirements:
-        if each.kind != "frequency" or each.followed is not None:
-            key = each.kind if each.followed is None else "mode"
-            yield file.problem(f"{each.place}.{key}", why)
+        if each.followed is not None:
+            yield file.problem(f"{each.place}.mode", "following a shape is not assigned yet")
     for catalogue in file.design.catalogues:
         yield file.problem(f"design.{catalogue.name}", "is not assigned yet: only bounds are")
     if file.design.mass is not None:
         yield file.problem("design.mass", "is not assigned yet: only linear constraints are")
 
 
-def assign_design(scene: Scene, targets: tuple[Wanted, ...]) -> Assignment:
-    """Build and solve the quadratic program of eqs. (13)–(14) on the linearised expansion.
+@dataclass(frozen=True)
+class Answer:
+    """The design to be verified, and how it was found.
 
-    Raises InfeasibleError with the names of the constraints that contradict each other.
+    ``predicted`` has for each target what the model said of it before the last step, (n,) in Hz;
+    None of limits. ``one_shot`` is the paper's answer where it could be had.
     """
-    file, path = scene.file, scene.path
-    l0, slope = scene.expansions.linear_in_design(path)
-    _require_near(scene, l0)
-    column = scene.expansions.column
-    goals = [
-        Goal(
-            LinearModel(l0[wanted.rows, k], slope[wanted.rows, k]),
-            wanted.hz,
-            wanted.weight,
-            wanted.rows,
-        )
-        for wanted in targets
-        for k in [column(wanted.mode)]
-    ]
-    return solve_assignment(
-        goals,
-        time_weights(path),
-        scene.expansions.linear.y0,
-        scene.initial,
-        Bounds(*scene.bounds),
-        linear_constraints(file),
-        _names(file),
-    )
+
+    y: Floats
+    predicted: tuple[Floats | None, ...]
+    one_shot: Assignment | None
+    found: Found | None
+    notes: tuple[str, ...]
+
+    @property
+    def modes(self) -> int:
+        """The highest mode that the targets need; 1 of the one shot, whose modes are expanded."""
+        return 1 if self.found is None else self.found.variant.requirements.modes
 
 
-def _require_near(scene: Scene, l0: Floats) -> None:
-    """Raise AccuracyError where the expansion is so far from a pose that it predicts λ ≤ 0."""
-    bad = np.argwhere(~(l0 > 0.0))
-    if len(bad):
-        k, column = (int(i) for i in bad[0])
-        problem = scene.file.problem(
-            "expansion.q",
-            f"too far from the motion: the expansion predicts a negative λ of mode "
-            f"{scene.expansions.modes[column]} at {scene.path.where(k)}; "
-            "give a pose of the trajectory, or auto",
-        )
-        raise AccuracyError(str(problem))
+def find_answer(scene: Scene, wanted: Sequence[Wanted], progress: Callable[[str], None]) -> Answer:
+    """The design asked for by the case's method.
 
-
-def _names(file: CaseFile) -> tuple[str, ...]:
-    return tuple(file.design.parameters)
-
-
-def linear_constraints(file: CaseFile) -> list[LinearConstraint]:
-    """The case's linear limits between design parameters."""
-    return [
-        LinearConstraint(
-            name,
-            np.array([constraint.terms.get(parameter, 0.0) for parameter in _names(file)]),
-            -np.inf if constraint.min is None else constraint.min,
-            np.inf if constraint.max is None else constraint.max,
-        )
-        for name, constraint in file.design.constraints.items()
-    ]
-
-
-def study_targets(
-    scene: Scene,
-    targets: tuple[Wanted, ...],
-    assignment: Assignment,
-    initial_hz: Floats,
-    exact_hz: Floats,
-) -> tuple[TargetStudy, ...]:
-    """Each target before, as predicted, and exactly; ``initial_hz``, ``exact_hz`` (n_t, modes)."""
-    weights = time_weights(scene.path)
-    studies = []
-    for k, wanted in enumerate(targets):
-        rows, column = wanted.rows, wanted.mode - 1
-        predicted = hz_from_lam(assignment.lam[k])
-        hz = (wanted.hz, initial_hz[rows, column], predicted, exact_hz[rows, column])
-        studies.append(_studied(scene.path, wanted, hz, weights[rows]))
-    return tuple(studies)
-
-
-def _studied(path: Trajectories, wanted: Wanted, hz: _Curves, weights: Floats) -> TargetStudy:
-    """``hz`` and ``weights`` are those at its rows of all samples."""
-    error = _errors(hz, weights)
-    return TargetStudy(
-        wanted.mode,
-        target_hz=hz[0],
-        initial_hz=hz[1],
-        predicted_hz=hz[2],
-        exact_hz=hz[3],
-        initial=error.initial,
-        predicted=error.predicted,
-        exact=error.exact,
-        trajectory=wanted.requirement.target.trajectory,
-        rows=wanted.rows,
-        weight_s=float(weights.sum()),
-        along=tuple(_along(path, wanted.rows, hz, weights)),
-    )
-
-
-def _along(
-    path: Trajectories, wanted: slice, hz: _Curves, weights: Floats
-) -> Iterator[TargetAlong]:
-    """The errors along each trajectory that the target holds on; ``hz`` and ``weights`` its own."""
-    for part, rows in zip(path.parts, path.rows, strict=True):
-        first, last = max(wanted.start, rows.start), min(wanted.stop, rows.stop)
-        if first < last:
-            own = slice(first - wanted.start, last - wanted.start)
-            target, initial, predicted, exact = (curve[own] for curve in hz)
-            error = _errors((target, initial, predicted, exact), weights[own])
-            yield TargetAlong(part.name, own, error)
-
-
-def _errors(hz: _Curves, weights: Floats) -> ErrorSummary:
-    wanted, *curves = hz
-    return ErrorSummary(*(_error(curve, wanted, weights) for curve in curves))
-
-
-def _error(frequency: Floats, wanted: Floats, weights: Floats) -> ErrorRow:
-    error = relative_error(frequency, wanted, weights)
-    return ErrorRow(error.max_relative, error.rms_relative)
-
-
-def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:
-    """One row for each design parameter, in the order of the file."""
-    parameters, units, initial = (
-        scene.file.design.parameters,
-        scene.file.design_units,
-        scene.initial,
-    )
-    return tuple(
-        DesignRow(name, p.parameter, units[k], float(initial[k]), float(optimal[k]), p.min, p.max)
-        for k, (name, p) in enumerate(parameters.items())
-    )
-
-
-def solver_row(assignment: Assignment) -> SolverRow:
-    """What the solver reached, as plain numbers."""
-    return SolverRow(
-        assignment.status,
-        assignment.iterations,
-        assignment.primal_residual,
-        assignment.dual_residual,
-        assignment.gap,
-    )
-
-
-def limit_notes(assignment: Assignment) -> list[str]:
-    """What holds the optimum back, and what no frequency depends on."""
-    grouped: dict[str, list[str]] = {}
-    for limit in assignment.active:
-        grouped.setdefault(f"{limit.side} {limit.kind}", []).append(limit.name)
-    notes = [f"on its {side} of {', '.join(names)}" for side, names in grouped.items()]
-    notes = [f"the optimum lies {note}" for note in notes]
-    if assignment.undetermined:
-        notes.append(
-            f"{assignment.undetermined} direction(s) of the design change no target: there the "
-            "initial design is kept as nearly as the limits allow"
-        )
-    return notes
-
-
-# --- Neighbouring frequencies that nearly meet, where two modes may swap their numbers
-
-NEAR = 0.01  # relative gap in Hz below which two modes may swap numbers between samples
-
-
-def crossing_warnings(
-    hz: Floats, modes: tuple[int, ...], where: Callable[[int], str], design: str
-) -> Iterator[str]:
-    """A warning for each of ``modes`` whose neighbour comes within 1 % along the trajectory.
-
-    ``hz`` (n_t, at least the highest mode) are exact frequencies at the design named ``design``;
-    ``where`` says in words which sample k is.
-    Modes are numbered by size at every sample: where two curves cross, their numbers swap.
+    Raises InfeasibleError where bounds and linear constraints contradict each other, AccuracyError
+    where `method: one_shot` cannot be vouched for.
     """
-    pairs = {(low, low + 1) for mode in modes for low in (mode - 1, mode) if low >= 1}
-    for low, high in sorted(pairs):
-        if high > hz.shape[1]:
-            continue
-        gap = hz[:, high - 1] / hz[:, low - 1] - 1.0
-        k = int(np.argmin(gap))
-        if gap[k] < NEAR:
-            yield (
-                f"modes {low} and {high} come within {100 * gap[k]:.2g} % of each other at "
-                f"{where(k)}, near {hz[k, low - 1]:.6g} Hz, with the {design} design; "
-                "modes are numbered by size, so if they cross there the curve of a mode changes "
-                "from one motion to the other"
-            )
+    sequential = scene.file.assignment.method == "sequential"
+    one_shot, notes = None, []
+    if _has_one_shot(scene.file):
+        try:
+            one_shot = assign_design(scene, wanted)
+        except AccuracyError as error:
+            if not sequential:
+                raise
+            notes.append(f"no one-shot design: {error}")
+    if not sequential:
+        if one_shot is None:
+            raise AccuracyError("the one-shot program has no answer")
+        lam = tuple(hz_from_lam(values) for values in one_shot.lam)
+        return Answer(one_shot.y, lam, one_shot, None, tuple(notes))
+    starts = [] if one_shot is None else [one_shot.y]
+    found = find_optimum(scene, wanted, starts, progress)
+    return Answer(found.best.y, tuple(_predicted(found, wanted)), one_shot, found, tuple(notes))
+
+
+def _has_one_shot(file: CaseFile) -> bool:
+    """Whether the quadratic program of eqs. (13)–(14) takes all that the case asks."""
+    plain = (one.kind == "frequency" and one.followed is None for one in file.requirements)
+    limited = file.design.catalogues or file.design.mass is not None
+    return bool(file.requirements) and all(plain) and not limited
+
+
+def _predicted(found: Found, wanted: Sequence[Wanted]) -> Iterator[Floats | None]:
+    """Frequencies that the last program promised; where no step was taken those of the design."""
+    best, asked = found.best, found.variant.requirements
+    residual = best.seen.residual if best.predicted is None else best.predicted
+    curves = iter(asked.promised(residual))
+    for one in wanted:
+        yield next(curves) if one.requirement.kind == "frequency" else None
+
+
+def assignment_row(scene: Scene, answer: Answer, targets: Sequence[TargetStudy]) -> AssignmentRow:
+    """How the answer was found and what it is worth, as plain numbers."""
+    keys, found = scene.file.assignment, answer.found
+    initial, optimal = _merits(answer, targets)
+    accepted = scene.file.validation.max_error
+    trusted = all(target.approximation_error <= accepted for target in targets)
+    word, reason = verdict(targets, (initial, optimal), trusted)
+    if found is not None and found.best.end in (End.SECONDS, End.STEPS, End.INTERRUPTED):
+        reason = f"{reason}; unfinished: {found.best.end.value}"
+    return AssignmentRow(
+        method=keys.method,
+        objective=keys.objective,
+        objective_initial=initial[1],
+        objective_optimal=optimal[1],
+        optimality=_optimality(found),
+        verdict=word,
+        reason=reason,
+        steps=() if found is None else tuple(_steps(found)),
+        starts=0 if found is None else found.starts,
+        local_optima=() if found is None else tuple(_local_optima(found)),
+        exact_solves=0 if found is None else found.exact_solves,
+        ended="one program" if found is None else found.best.end.value,
+        finished=found is None or found.best.end in (End.OPTIMAL, End.STALLED),
+        active=() if found is None else tuple(_active(scene, found)),
+        one_shot=None if answer.one_shot is None else answer.one_shot.y,
+        max_error=MAX_ERROR if keys.max_error is None else keys.max_error,
+        max_error_given=keys.max_error is not None,
+    )
+
+
+def _merits(
+    answer: Answer, targets: Sequence[TargetStudy]
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Violation and objective of the initial design and of the answer."""
+    if answer.found is not None:
+        best = answer.found.best
+        return answer.found.initial, (best.seen.violation, best.objective)
+    weights = np.array([target.weight * target.weight_s for target in targets])
+    weights = weights / weights.sum()
+    before, after = (
+        float(weights @ [getattr(t.error, when).rms_relative ** 2 for t in targets])
+        for when in ("initial", "exact")
+    )
+    return (0.0, before), (0.0, after)
+
+
+def _optimality(found: Found | None) -> OptimalityRow:
+    if found is None:
+        return OptimalityRow("local", None, None, "the optimum of the linearised problem only")
+    best = found.best
+    many = f"{found.starts} start{'s' if found.starts > 1 else ''}"
+    words = f"the best of {len(found.optima)} local optima from {many}"
+    if best.end is not End.OPTIMAL:
+        words = f"{words}; {best.end.value}"
+    return OptimalityRow("local", best.stationarity, None, words)
+
+
+def _steps(found: Found) -> Iterator[StepRow]:
+    for step in found.best.steps:
+        yield StepRow(step.y, step.objective, step.violation, step.radius, step.taken)
+
+
+def _local_optima(found: Found) -> Iterator[LocalOptimum]:
+    for optimum in found.optima:
+        yield LocalOptimum(optimum.y, optimum.objective, optimum.seen.violation)
+
+
+def _active(scene: Scene, found: Found) -> Iterator[ActiveRow]:
+    names = tuple(scene.file.design.parameters)
+    constraints = tuple(scene.file.design.constraints)
+    for limit in found.best.limits:
+        side = "upper" if limit.upper else "lower"
+        if limit.kind == "bound":
+            yield ActiveRow(names[limit.index], "bound", side, limit.multiplier)
+        elif limit.kind == "constraint":
+            yield ActiveRow(constraints[limit.index], "constraint", side, limit.multiplier)
+    asked = found.variant.requirements
+    shares: dict[str, float] = {}
+    for limit in found.best.limits:
+        if limit.kind == "excess":
+            name = asked.owner(limit.index)
+            shares[name] = shares.get(name, 0.0) + limit.multiplier
+    for name, multiplier in shares.items():
+        yield ActiveRow(name, "target", "upper", multiplier)

@@ -9,16 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign._version import __version__
-from eigassign.assignment import Assignment
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.accuracy import study_motion
-from eigassign.study.assignment import crossing_warnings, design_rows, limit_notes, solver_row
+from eigassign.study.assignment import Answer, assignment_row
 from eigassign.study.drawing import draw_poses, rest_pose
+from eigassign.study.judgement import crossing_warnings
+from eigassign.study.one_shot import design_rows, limit_notes, solver_row
 from eigassign.study.results import (
+    AssignmentRow,
     DrawnPoses,
     ModeStudy,
     OtherModes,
     RunResults,
+    SolverRow,
     TargetStudy,
     TrajectoryRow,
 )
@@ -29,9 +32,9 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class VerifiedAssignment:
-    """An assignment with exact frequencies (n_t, shown modes) before and after."""
+    """An answer with exact frequencies (n_t, shown modes) before and after."""
 
-    assignment: Assignment
+    answer: Answer
     targets: tuple[TargetStudy, ...]
     initial_hz: Floats
     exact_hz: Floats
@@ -61,15 +64,35 @@ def collect_results(
         trajectories=_trajectories(trajectory),
         poses=_poses(scene),
         studies=studies,
-        design=() if assigned is None else design_rows(scene, assigned.assignment.y),
+        design=() if assigned is None else design_rows(scene, assigned.answer.y),
         targets=() if assigned is None else assigned.targets,
         others=None if assigned is None else _others(scene, assigned),
-        solver=None if assigned is None else solver_row(assigned.assignment),
+        solver=_solver(assigned),
+        assignment=_assignment(scene, assigned),
         warnings=(*scene.warnings, *_warnings(scene, assigned), *motion[1]),
-        notes=(*scene.notes, *(limit_notes(assigned.assignment) if assigned else ()), *motion[0]),
+        notes=(*scene.notes, *_notes(assigned), *motion[0]),
         timing_s=dict(timing_s),
         tolerance=file.validation.max_error,
     )
+
+
+def _solver(assigned: VerifiedAssignment | None) -> SolverRow | None:
+    one_shot = None if assigned is None else assigned.answer.one_shot
+    return None if one_shot is None else solver_row(one_shot)
+
+
+def _assignment(scene: Scene, assigned: VerifiedAssignment | None) -> AssignmentRow | None:
+    return None if assigned is None else assignment_row(scene, assigned.answer, assigned.targets)
+
+
+def _notes(assigned: VerifiedAssignment | None) -> tuple[str, ...]:
+    """What was chosen, and what the one shot's program met where it is the answer."""
+    if assigned is None:
+        return ()
+    answer = assigned.answer
+    if answer.found is not None or answer.one_shot is None:
+        return answer.notes
+    return (*answer.notes, *limit_notes(answer.one_shot))
 
 
 def _trajectories(path: Trajectories | None) -> tuple[TrajectoryRow, ...]:
@@ -101,8 +124,8 @@ def _poses(scene: Scene) -> DrawnPoses:
 
 def _others(scene: Scene, assigned: VerifiedAssignment) -> OtherModes | None:
     """Up to three modes above the lowest assigned one that have no target themselves."""
-    targets = {target.mode for target in assigned.targets}
-    rest = [m for m in scene.shown_modes if m > min(targets) and m not in targets][:3]
+    targets = {mode for target in assigned.targets for mode in target.modes}
+    rest = [m for m in scene.shown_modes if m > min(targets, default=0) and m not in targets][:3]
     if not rest:
         return None
     columns = [mode - 1 for mode in rest]
@@ -114,16 +137,17 @@ def _warnings(scene: Scene, assigned: VerifiedAssignment | None) -> Iterator[str
     """Where the results may mislead: crossing modes, a poor prediction, a worse design."""
     if assigned is None:
         return
-    modes = tuple(sorted({target.mode for target in assigned.targets}))
+    modes = tuple(sorted({mode for target in assigned.targets for mode in target.modes}))
     for hz, design in ((assigned.initial_hz, "initial"), (assigned.exact_hz, "optimal")):
         yield from crossing_warnings(hz, modes, scene.path.where, design)
-    yield from _accuracy_warnings(scene, assigned)
-    yield from _worsening(scene, assigned)
+    if assigned.answer.found is None:
+        yield from _accuracy_warnings(scene, assigned)
+        yield from _worsening(scene, assigned)
 
 
 def _accuracy_warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
     """For each target whose predicted frequency is farther off than the case accepts."""
-    limit, y = scene.file.validation.max_error, assigned.assignment.y
+    limit, y = scene.file.validation.max_error, assigned.answer.y
     off = [t for t in assigned.targets if not t.approximation_error <= limit]
     for target in off:
         taylor = scene.expansions.taylor_hz(scene.path.at(y)[0][target.rows], y)
@@ -145,12 +169,10 @@ def _accuracy_warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[s
 
 def _worsening(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
     """A warning where, solved exactly, the initial design is nearer to the targets."""
-    weighed = list(zip(scene.file.requirements, assigned.targets, strict=True))
-    shares = [wanted.target.weight * target.weight_s for wanted, target in weighed]
     before, after = (
         sum(
-            share * getattr(target, when).rms_relative ** 2
-            for share, (_, target) in zip(shares, weighed, strict=True)
+            target.weight * target.weight_s * getattr(target.error, when).rms_relative ** 2
+            for target in assigned.targets
         )
         for when in ("initial", "exact")
     )

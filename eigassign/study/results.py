@@ -127,11 +127,16 @@ class ErrorRow:
 
 @dataclass(frozen=True)
 class ErrorSummary:
-    """The distance to the target before, as predicted by the expansion, and as it truly is."""
+    """The distance to the targets at the initial design, and at the answer: ``exact``.
+
+    ``one_shot`` is the exact distance of the paper's answer, ``predicted`` what the model said
+    before the last step to the answer; each None where there is none.
+    """
 
     initial: ErrorRow
-    predicted: ErrorRow
     exact: ErrorRow
+    predicted: ErrorRow | None = None
+    one_shot: ErrorRow | None = None
 
 
 @dataclass(frozen=True)
@@ -145,39 +150,47 @@ class TargetAlong:
 
 @dataclass(frozen=True)
 class TargetStudy:
-    """One assigned mode along the trajectory (the paper's Figure 4); arrays (n,) in Hz.
+    """One target along the trajectory (the paper's Figure 4); arrays (n,) in Hz.
 
-    They belong to the ``rows`` of all samples at which the target holds: all of them, unless the
-    case names one ``trajectory``. ``weight_s`` is the time that they stand for, weighted.
+    They belong to the ``rows`` of all samples at which the target holds. What is wanted lies from
+    ``lower_hz`` to ``upper_hz``: a frequency where both are equal, a limit where one is infinite; a
+    band to keep out of lies between them. The curves are of its mode, of a gap the distance of its
+    two, of a band the frequency nearest to its middle. Errors of limits and bands are relative
+    violations, 0 where they are met. ``weight_s`` is the time that it stands for, weighted.
     """
 
-    mode: int
-    target_hz: Floats
+    kind: str  # frequency | at_least | at_most | keep_out | gap
+    label: str  # "mode 1", "mode 2 at least 320 Hz"
+    modes: tuple[int, ...]
+    lower_hz: Floats
+    upper_hz: Floats
     initial_hz: Floats
-    predicted_hz: Floats
     exact_hz: Floats
-    initial: ErrorRow
-    predicted: ErrorRow
-    exact: ErrorRow
+    predicted_hz: Floats | None
+    one_shot_hz: Floats | None
+    error: ErrorSummary
+    satisfied: bool
     trajectory: str | None
     rows: slice
     weight_s: float
+    weight: float
     along: tuple[TargetAlong, ...]
 
     @property
-    def label(self) -> str:
-        """The target in words: its mode, and its trajectory where it holds on one only."""
-        along = f" along {self.trajectory!r}" if self.trajectory is not None else ""
-        return f"mode {self.mode}{along}"
+    def mode(self) -> int:
+        """Its mode, of several the lowest; 1 of a band for all modes."""
+        return min(self.modes, default=1)
 
     @property
-    def error(self) -> ErrorSummary:
-        """The three errors of this target together."""
-        return ErrorSummary(self.initial, self.predicted, self.exact)
+    def target_hz(self) -> Floats:
+        """The wanted frequency, or the limit (n,); the lower edge of a band."""
+        return self.upper_hz if self.kind == "at_most" else self.lower_hz
 
     @property
     def approximation_error(self) -> float:
-        """Largest |predicted / exact − 1| along the trajectory, at the optimum."""
+        """Largest |predicted / exact − 1| along the trajectory, at the optimum; 0 if not known."""
+        if self.predicted_hz is None:
+            return 0.0
         return _worst(np.asarray(self.predicted_hz / self.exact_hz - 1.0))
 
 
@@ -192,13 +205,84 @@ class OtherModes:
 
 @dataclass(frozen=True)
 class SolverRow:
-    """What the quadratic program's solver reached, residuals recomputed from the data."""
+    """What the one-shot program's solver reached, residuals recomputed from the data."""
 
     status: str
     iterations: int
     primal_residual: float
     dual_residual: float
     gap: float
+
+
+@dataclass(frozen=True)
+class OptimalityRow:
+    """How far the answer is known to be optimal.
+
+    ``kind``: proved, bounded (within ``gap``, relative) or local. ``stationarity``: what remains
+    of the first-order conditions of the exact problem, recomputed (0: met; None: not asked).
+    """
+
+    kind: str
+    stationarity: float | None
+    gap: float | None
+    words: str
+
+
+@dataclass(frozen=True)
+class StepRow:
+    """One step of the sequential method: design (n_y,), objective, violation, and whether taken."""
+
+    design: Floats
+    objective: float
+    violation: float
+    radius: float
+    taken: bool
+
+
+@dataclass(frozen=True)
+class LocalOptimum:
+    """One of the distinct local optima found; objective as `AssignmentRow.objective` is."""
+
+    design: Floats
+    objective: float
+    violation: float
+
+
+@dataclass(frozen=True)
+class ActiveRow:
+    """A limit that the answer lies on, and what relaxing it by one SI unit gains (≥ 0)."""
+
+    name: str
+    kind: str  # bound | constraint | target
+    side: str  # lower | upper
+    multiplier: float
+
+
+@dataclass(frozen=True)
+class AssignmentRow:
+    """How the answer was found and what it is worth.
+
+    ``objective_initial``, ``objective_optimal`` are of the exact problem: the weighted mean square
+    relative error in Hz, of the worst case the largest weighted error; prices included.
+    """
+
+    method: str
+    objective: str
+    objective_initial: float
+    objective_optimal: float
+    optimality: OptimalityRow
+    verdict: str  # reached | improved | unreachable | infeasible | do_not_use
+    reason: str  # the verdict in a sentence
+    steps: tuple[StepRow, ...]
+    starts: int
+    local_optima: tuple[LocalOptimum, ...]
+    exact_solves: int
+    ended: str
+    finished: bool
+    active: tuple[ActiveRow, ...]
+    one_shot: Floats | None  # the paper's design (n_y,)
+    max_error: float
+    max_error_given: bool
 
 
 # --- What there is to draw of a mechanism
@@ -305,6 +389,7 @@ class RunResults:
     targets: tuple[TargetStudy, ...]
     others: OtherModes | None
     solver: SolverRow | None
+    assignment: AssignmentRow | None
     warnings: tuple[str, ...]
     notes: tuple[str, ...]  # what was chosen and why, one line each
     timing_s: Mapping[str, float]
@@ -334,26 +419,55 @@ class RunResults:
         return error is None or error <= self.tolerance
 
     @property
+    def shortcoming(self) -> str | None:
+        """Why this is not an answer to build on, in a sentence; None if it is."""
+        row, error = self.assignment, self.error
+        if row is None or error is None:
+            return None
+        if row.method == "one_shot" and not self.within_tolerance:
+            return "the expansion is further from exact than validation.max_error allows"
+        if row.verdict not in ("reached", "improved"):
+            return f"{row.verdict.replace('_', ' ')}: {row.reason}"
+        if row.max_error_given and error.exact.max_relative > row.max_error:
+            worst, limit = 100.0 * error.exact.max_relative, 100.0 * row.max_error
+            return f"worst error {worst:.3g} %, over the {limit:g} % of assignment.max_error"
+        return None
+
+    @property
     def error(self) -> ErrorSummary | None:
-        """Over all targets: the largest maximum and the root of the mean square; None without."""
+        """Over all wanted frequencies: the largest maximum and the root of the mean square.
+
+        Where none is wanted, over the violations of all limits; None without targets.
+        """
         if not self.targets:
             return None
-        return over_all([(target.error, target.weight_s) for target in self.targets])
+        return over_all([(target.error, target.weight_s) for target in self.counted])
+
+    @property
+    def counted(self) -> tuple[TargetStudy, ...]:
+        """The targets that ``error`` is of: wanted frequencies, or all where there are none."""
+        wanted = tuple(target for target in self.targets if target.kind == "frequency")
+        return wanted or self.targets
 
     def error_along(self, name: str) -> ErrorSummary | None:
         """The same along one trajectory; None where no target holds on it."""
-        along = [one.error for target in self.targets for one in target.along if one.name == name]
+        along = [one.error for target in self.counted for one in target.along if one.name == name]
         return over_all([(error, 1.0) for error in along]) if along else None
 
 
 def over_all(errors: Sequence[tuple[ErrorSummary, float]]) -> ErrorSummary:
     """The largest of the maxima, and of the mean squares their mean by the time they stand for."""
     weights = np.array([weight for _, weight in errors])
+
+    def combined(kind: str) -> ErrorRow | None:
+        rows = [getattr(error, kind) for error, _ in errors]
+        return None if None in rows else _combined(rows, weights)
+
     return ErrorSummary(
-        *(
-            _combined([getattr(error, kind) for error, _ in errors], weights)
-            for kind in ("initial", "predicted", "exact")
-        )
+        initial=_combined([error.initial for error, _ in errors], weights),
+        exact=_combined([error.exact for error, _ in errors], weights),
+        predicted=combined("predicted"),
+        one_shot=combined("one_shot"),
     )
 
 
@@ -409,13 +523,13 @@ def _target(target: TargetStudy, name: str) -> TargetStudy | None:
     rows = along.rows
     return replace(
         target,
-        target_hz=target.target_hz[rows],
+        lower_hz=target.lower_hz[rows],
+        upper_hz=target.upper_hz[rows],
         initial_hz=target.initial_hz[rows],
-        predicted_hz=target.predicted_hz[rows],
         exact_hz=target.exact_hz[rows],
-        initial=along.error.initial,
-        predicted=along.error.predicted,
-        exact=along.error.exact,
+        predicted_hz=None if target.predicted_hz is None else target.predicted_hz[rows],
+        one_shot_hz=None if target.one_shot_hz is None else target.one_shot_hz[rows],
+        error=along.error,
         rows=slice(0, rows.stop - rows.start),
         along=(replace(along, rows=slice(0, rows.stop - rows.start)),),
     )

@@ -86,6 +86,7 @@ class Scene:
     trajectory: Trajectories | None
     expansions: Expansions
     notes: tuple[str, ...]  # what was chosen and why
+    asked_modes: int = 1  # the highest mode that a target needs
 
     @property
     def path(self) -> Trajectories:
@@ -113,9 +114,10 @@ class Scene:
 
     @property
     def shown_modes(self) -> tuple[int, ...]:
-        """Every mode solved along the trajectory: from 1 to three above the expanded ones."""
+        """Every mode solved along the trajectory: to three above the expanded and asked ones."""
         available = self.model.n_dof - self.model.n_rigid
-        return tuple(range(1, min(max(self.expansions.modes) + OTHERS, available) + 1))
+        highest = max(*self.expansions.modes, self.asked_modes)
+        return tuple(range(1, min(highest + OTHERS, available) + 1))
 
     def exact(
         self, y: Floats, progress: Callable[[int, int], None] = lambda _done, _of: None

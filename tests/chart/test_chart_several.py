@@ -11,7 +11,7 @@ from scenes import scene_of
 
 from eigassign.chart.designs import design_task
 from eigassign.chart.question import build_features
-from eigassign.study.assignment import assign_design
+from eigassign.study.one_shot import assign_design
 from eigassign.study.scene import Scene
 from eigassign.study.wanted import target_frequencies
 

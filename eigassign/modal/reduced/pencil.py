@@ -21,6 +21,7 @@ from eigassign.errors import UsageError
 from eigassign.modal.arguments import chunks
 from eigassign.modal.exact.condensation import condense_blocks
 from eigassign.modal.exact.dense import inverse_factor
+from eigassign.modal.slopes import theta_slopes
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import Program
 
@@ -78,6 +79,30 @@ class ReducedPencil:
         every = slice(None)
         return stiff.block(stiff(theta), every, every), heavy.block(heavy(theta), every, every)
 
+    def eigenvalue_slopes(
+        self, x: Floats, count: int, scales: Floats
+    ) -> tuple[Floats, Floats, Floats]:
+        """λ (n, count), ∂λ/∂x (n, count, n_x) and modes (n, k, count) at x (n, n_x).
+
+        ∂λ/∂x_i = Σ_j (φᵀK̂_jφ − λ φᵀM̂_jφ) ∂θ_j/∂x_i; ``scales`` as in `modal.slopes`.
+        """
+        rates = theta_slopes(self.theta, x, scales)
+        moving = np.abs(rates).max(axis=(0, 2), initial=0.0) > 0.0
+        stiff, heavy = (terms.chosen(moving[terms.terms]) for terms in self._terms)
+        theta = self.theta(x)
+        lam, slopes, modes = [], [], []
+        for part in chunks(np.arange(len(x)), self.mass[0].size):
+            K, M_c, coupling = self.at(theta[:, part])
+            mu, z = (a[..., :count] for a in ritz_pairs(K, M_c))
+            phi = z / np.sqrt(mu)[:, None, :]
+            whole = np.concatenate([phi, -coupling @ phi], axis=1)
+            forms = stiff.forms(phi, rates[:, :, part])
+            forms = forms - heavy.forms(whole, rates[:, :, part]) / mu[..., None]
+            lam.append(1.0 / mu)
+            slopes.append(forms)
+            modes.append(phi)
+        return np.concatenate(lam), np.concatenate(slopes), np.concatenate(modes)
+
     @cached_property
     def _terms(self) -> tuple[SymmetricTerms, SymmetricTerms]:
         """K̂'s and M̂'s terms."""
@@ -102,6 +127,18 @@ class SymmetricTerms:
     def __call__(self, theta: Floats) -> Floats:
         """Triangles (n, k(k + 1)/2) of the sums at θ (n_theta, n)."""
         return np.asarray(theta[self.terms].T @ self.triangles)
+
+    def chosen(self, terms: NDArray[np.bool_]) -> SymmetricTerms:
+        """Of the terms those marked alone."""
+        return SymmetricTerms(self.terms[terms], self.triangles[terms], self.place)
+
+    def forms(self, phi: Floats, rates: Floats) -> Floats:
+        """Σ_j (φᵀA_jφ) r_ij (n, m, n_x) of modes φ (n, k, m) with ``rates`` r (n_x, n_theta, n)."""
+        i, j = np.tril_indices(len(self.place))
+        twice = np.where(i == j, 1.0, 2.0)[None, :, None]
+        products = phi[:, i] * phi[:, j] * twice
+        each = np.einsum("npm,tp->nmt", products, self.triangles, optimize=True)
+        return np.asarray(np.einsum("nmt,xtn->nmx", each, rates[:, self.terms], optimize=True))
 
     def block(self, triangles: Floats, rows: slice, columns: slice) -> Floats:
         """Rows and columns of whole matrices, (n, …, …), from their triangles."""

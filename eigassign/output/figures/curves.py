@@ -191,9 +191,8 @@ def assignment(results: RunResults, target: TargetStudy) -> FigurePlan:
     return FigurePlan(
         f"assignment_mode_{target.mode}{_suffix(results)}",
         f"Mode {target.mode}: initial, optimal and target frequency{_where(results)}",
-        f"Worst distance to the target {percent(target.initial.max_relative)} before and "
-        f"{percent(target.exact.max_relative)} after, "
-        f"where the expansion predicted {percent(target.predicted.max_relative)}.",
+        f"Worst distance to the target {percent(target.error.initial.max_relative)} before and "
+        f"{percent(target.error.exact.max_relative)} after.",
         f"Frequency of mode {target.mode} over time before and after, with its target.",
         partial(draw_assignment, results, target),
     )
@@ -203,16 +202,18 @@ def draw_assignment(results: RunResults, target: TargetStudy) -> Figure:
     """Frequencies above, f/f_target − 1 below."""
     title = f"Mode {target.mode}: assigned frequency{_where(results)}"
     figure, (above, below) = stacked(title, "time [s]", (2.0, 1.35))
-    curves = [
-        (target.initial_hz, INITIAL, "initial", target.initial),
-        (target.exact_hz, OPTIMAL, "optimal, exact", target.exact),
-        (target.predicted_hz, PREDICTED, "optimal, predicted", target.predicted),
+    error = target.error
+    stages = [
+        (target.initial_hz, INITIAL, "initial", error.initial),
+        (target.exact_hz, OPTIMAL, "optimal, exact", error.exact),
+        (target.predicted_hz, PREDICTED, "optimal, predicted", error.predicted),
     ]
+    curves = [(hz, look, name, e) for hz, look, name, e in stages if hz is not None and e]
     frequencies: list[tuple[Floats, Look]] = [
         (target.target_hz, {**TARGET, "label": "target", "zorder": 3.0})
     ]
-    for hz, look, name, error in curves:
-        label = f"{name} (worst {percent(error.max_relative)})"
+    for hz, look, name, row in curves:
+        label = f"{name} (worst {percent(row.max_relative)})"
         frequencies.append((hz, {**look, "label": label}))
     plot(above, results.time_s, frequencies, "frequency [Hz]")
     off = [(100.0 * (hz / target.target_hz - 1.0), look) for hz, look, _, _ in curves]

@@ -1,0 +1,153 @@
+"""What is asked of the frequencies: targets to be near to, limits to keep, also of quantities.
+
+A response gives the lowest frequencies f at all samples in time and their slopes in the design; of
+it `appraise` makes what the sequential method works on:
+
+    residual of a target        √(w ω_k / Σ w ω) (f / f_d − 1)     least squares, ω in s
+                                w (f / f_d − 1)                    worst case
+    excess of "at least b"      (b − Σ c_i f_i) / b
+    excess of "at most b"       (Σ c_i f_i − b) / b
+
+with coefficients c that pick one mode, or the gap between two. A quantity of the design, such as
+the mass of the mechanism, is limited likewise. Where no frequency is wanted, the residuals are the
+changes of the design, (y − y_ref)/width.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from eigassign.assignment.checks import Floats
+from eigassign.assignment.sequential import Appraisal, Objective
+
+
+@dataclass(frozen=True)
+class Frequencies:
+    """The lowest frequencies ``hz`` (n_t, n_modes) of a design, ascending at every sample.
+
+    ``slopes`` (n_t, n_modes, n_y) in Hz per SI unit of y; where the trajectory follows the design,
+    they hold its part too.
+    """
+
+    hz: Floats
+    slopes: Floats
+
+
+Response = Callable[[Floats], Frequencies]
+
+
+@dataclass(frozen=True)
+class FrequencyTarget:
+    """Mode ``mode`` (from 1) is to be near ``hz`` (n,) at ``rows`` of all samples."""
+
+    mode: int
+    hz: Floats
+    rows: slice
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class FrequencyLimit:
+    """Σ c_i f_i ≥ ``hz`` (n,), or ≤, at ``rows`` of all samples; ``terms`` are (mode, c) pairs."""
+
+    name: str
+    terms: tuple[tuple[int, float], ...]
+    hz: Floats
+    rows: slice
+    at_least: bool
+
+
+@dataclass(frozen=True)
+class QuantityLimit:
+    """low ≤ quantity(y) ≤ high; ``quantity`` gives the value and its slope (n_y,)."""
+
+    name: str
+    quantity: Callable[[Floats], tuple[float, Floats]]
+    low: float = -np.inf
+    high: float = np.inf
+
+
+@dataclass(frozen=True)
+class Requirements:
+    """All that is asked, with the weights ω (n_t,) in s of the integral over time."""
+
+    targets: tuple[FrequencyTarget, ...]
+    limits: tuple[FrequencyLimit, ...]
+    quantities: tuple[QuantityLimit, ...]
+    time_weights: Floats
+    objective: Objective = Objective.LEAST_SQUARES
+    least_change: tuple[Floats, Floats] | None = None  # y_ref and width, where no target is
+
+    @property
+    def modes(self) -> int:
+        """The highest mode that anything is asked of; 1 if nothing is."""
+        asked = [target.mode for target in self.targets]
+        asked += [mode for limit in self.limits for mode, _ in limit.terms]
+        return max(asked, default=1)
+
+    def appraise(self, y: Floats, found: Frequencies) -> Appraisal:
+        """Residuals and excesses of a design whose frequencies are ``found``, with slopes."""
+        residuals = [self._residual(target, found) for target in self.targets]
+        if self.least_change is not None:
+            reference, width = self.least_change
+            residuals.append(((y - reference) / width, np.diag(1.0 / width)))
+        excesses = [_excess(limit, found) for limit in self.limits]
+        excesses += [part for limit in self.quantities for part in _of_quantity(limit, y)]
+        return Appraisal(*_stacked(residuals, len(y)), *_stacked(excesses, len(y)))
+
+    def promised(self, residual: Floats) -> Iterator[Floats]:
+        """The frequencies (n,) in Hz of every target that residuals (m,) stand for."""
+        start = 0
+        for target in self.targets:
+            own = residual[start : start + len(target.hz)]
+            start += len(target.hz)
+            yield (own / self._factor(target) + 1.0) * target.hz
+
+    def owner(self, index: int) -> str:
+        """The name of the limit that an excess (k,) belongs to."""
+        for limit in self.limits:
+            if index < len(limit.hz):
+                return limit.name
+            index -= len(limit.hz)
+        bounds = [q.name for q in self.quantities for b in (q.low, q.high) if np.isfinite(b)]
+        return bounds[index]
+
+    @property
+    def _total(self) -> float:
+        return float(sum(t.weight * self.time_weights[t.rows].sum() for t in self.targets))
+
+    def _factor(self, target: FrequencyTarget) -> Floats:
+        """What multiplies f / f_d − 1 (n,)."""
+        if self.objective is Objective.WORST_CASE:
+            return np.full(len(target.hz), target.weight)
+        return np.sqrt(target.weight * self.time_weights[target.rows] / self._total)
+
+    def _residual(self, target: FrequencyTarget, found: Frequencies) -> tuple[Floats, Floats]:
+        factor, column = self._factor(target), target.mode - 1
+        hz, slopes = found.hz[target.rows, column], found.slopes[target.rows, column]
+        return factor * (hz / target.hz - 1.0), (factor / target.hz)[:, None] * slopes
+
+
+def _excess(limit: FrequencyLimit, found: Frequencies) -> tuple[Floats, Floats]:
+    value = sum(c * found.hz[limit.rows, mode - 1] for mode, c in limit.terms)
+    slopes = sum(c * found.slopes[limit.rows, mode - 1] for mode, c in limit.terms)
+    sign = -1.0 if limit.at_least else 1.0
+    return sign * (value - limit.hz) / limit.hz, np.asarray(sign * slopes / limit.hz[:, None])
+
+
+def _of_quantity(limit: QuantityLimit, y: Floats) -> list[tuple[Floats, Floats]]:
+    value, slope = limit.quantity(y)
+    parts = []
+    for sign, bound in ((-1.0, limit.low), (1.0, limit.high)):
+        if np.isfinite(bound):
+            size = abs(bound) or 1.0
+            parts.append((np.array([sign * (value - bound) / size]), sign * slope[None] / size))
+    return parts
+
+
+def _stacked(parts: Sequence[tuple[Floats, Floats]], n_y: int) -> tuple[Floats, Floats]:
+    values = np.concatenate([np.zeros(0), *(value for value, _ in parts)])
+    return values, np.vstack([np.zeros((0, n_y)), *(slopes for _, slopes in parts)])

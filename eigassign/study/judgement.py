@@ -1,0 +1,233 @@
+"""What a design does to the targets: the distance to each, and the verdict over all.
+
+Of a wanted frequency the error is |f/f_d − 1|. Of a limit it is the relative violation, 0 where it
+is met: (b − f)/b below "at least b", (f − b)/b above "at most b", the same with a gap's f_j − f_i,
+and in a band from a to b the way out of it, relative to the edge that is passed. A band is not
+clear either where the number of modes below it changes along a trajectory; the error there is the
+way that the wrong modes have to the other edge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.study.results import ErrorRow, ErrorSummary, TargetAlong, TargetStudy
+from eigassign.study.wanted import Wanted, time_weights
+
+Floats = NDArray[np.float64]
+MET = 1e-8  # a violation below it is round-off
+
+
+@dataclass(frozen=True)
+class SolvedDesigns:
+    """Exact frequencies (n_t, n_modes) in Hz of the initial design, the answer and the one shot."""
+
+    initial: Floats
+    exact: Floats
+    one_shot: Floats | None = None
+
+
+def study_targets(
+    path: Trajectories,
+    wanted: Sequence[Wanted],
+    solved: SolvedDesigns,
+    predicted: Sequence[Floats | None],
+    max_error: float,
+) -> tuple[TargetStudy, ...]:
+    """Each target before and after; ``predicted`` are their curves (n,) or None.
+
+    A wanted frequency is satisfied within ``max_error``, a limit where nothing violates it.
+    """
+    weights = time_weights(path)
+    return tuple(
+        _studied(path, one, solved, curve, weights[one.rows], max_error)
+        for one, curve in zip(wanted, predicted, strict=True)
+    )
+
+
+def _studied(
+    path: Trajectories,
+    wanted: Wanted,
+    solved: SolvedDesigns,
+    predicted: Floats | None,
+    weights: Floats,
+    max_error: float,
+) -> TargetStudy:
+    one_shot, kind = solved.one_shot, wanted.requirement.kind
+    errors = _Errors(
+        initial=errors_of(wanted, solved.initial),
+        exact=errors_of(wanted, solved.exact),
+        predicted=None if predicted is None else np.asarray(predicted / wanted.hz - 1.0),
+        one_shot=None if one_shot is None else errors_of(wanted, one_shot),
+    )
+    summary = _summary(errors, weights)
+    allowed = max_error if kind == "frequency" else MET
+    return TargetStudy(
+        kind=kind,
+        label=wanted.requirement.label,
+        modes=wanted.requirement.modes,
+        lower_hz=wanted.lower_hz,
+        upper_hz=wanted.upper_hz,
+        initial_hz=_curve(wanted, solved.initial),
+        exact_hz=_curve(wanted, solved.exact),
+        predicted_hz=predicted,
+        one_shot_hz=None if one_shot is None else _curve(wanted, one_shot),
+        error=summary,
+        satisfied=summary.exact.max_relative <= allowed,
+        trajectory=wanted.requirement.target.trajectory,
+        rows=wanted.rows,
+        weight_s=float(weights.sum()),
+        weight=wanted.weight,
+        along=tuple(_along(path, wanted, errors, weights)),
+    )
+
+
+@dataclass(frozen=True)
+class _Errors:
+    """The errors (n,) of one target."""
+
+    initial: Floats
+    exact: Floats
+    predicted: Floats | None
+    one_shot: Floats | None
+
+    def part(self, own: slice) -> _Errors:
+        predicted, one_shot = (
+            None if e is None else e[own] for e in (self.predicted, self.one_shot)
+        )
+        return _Errors(self.initial[own], self.exact[own], predicted, one_shot)
+
+
+def errors_of(wanted: Wanted, hz: Floats) -> Floats:
+    """The errors (n,) of a target at its rows, for frequencies hz (n_t, n_modes)."""
+    kind, own = wanted.requirement.kind, hz[wanted.rows]
+    if kind == "keep_out":
+        return _inside(wanted, own)
+    f = _curve(wanted, hz)
+    if kind == "frequency":
+        return np.asarray(f / wanted.hz - 1.0)
+    if kind == "at_most":
+        return np.asarray(np.maximum(f / wanted.upper_hz - 1.0, 0.0))
+    return np.asarray(np.maximum(1.0 - f / wanted.lower_hz, 0.0))
+
+
+def _inside(wanted: Wanted, hz: Floats) -> Floats:
+    """How far the modes are from being clear, with the best constant number of them below."""
+    named = [m - 1 for m in sorted(wanted.requirement.modes)]
+    hz = hz[:, named] if named else hz
+    low, high = wanted.lower_hz[:, None], wanted.upper_hz[:, None]
+    down, up = np.maximum(hz / low - 1.0, 0.0), np.maximum(1.0 - hz / high, 0.0)
+    choices = [
+        np.maximum(down[:, :k].max(axis=1, initial=0.0), up[:, k:].max(axis=1, initial=0.0))
+        for k in range(hz.shape[1] + 1)
+    ]
+    return np.asarray(min(choices, key=lambda errors: float(errors.max())))
+
+
+def _curve(wanted: Wanted, hz: Floats) -> Floats:
+    """The curve (n,) that stands for a target."""
+    own, modes = hz[wanted.rows], wanted.requirement.modes
+    if wanted.requirement.kind == "gap":
+        low, high = modes
+        return np.asarray(own[:, high - 1] - own[:, low - 1])
+    if wanted.requirement.kind == "keep_out":
+        own = own[:, [m - 1 for m in modes]] if modes else own
+        middle = 0.5 * (wanted.lower_hz + wanted.upper_hz)
+        nearest = np.abs(own - middle[:, None]).argmin(axis=1)
+        return np.asarray(own[np.arange(len(own)), nearest])
+    return np.asarray(own[:, modes[0] - 1])
+
+
+def _summary(errors: _Errors, weights: Floats) -> ErrorSummary:
+    return ErrorSummary(
+        initial=_row(errors.initial, weights),
+        exact=_row(errors.exact, weights),
+        predicted=None if errors.predicted is None else _row(errors.predicted, weights),
+        one_shot=None if errors.one_shot is None else _row(errors.one_shot, weights),
+    )
+
+
+def _row(errors: Floats, weights: Floats) -> ErrorRow:
+    """Largest magnitude and root of the weighted mean square."""
+    rms = float(np.sqrt(weights @ errors**2 / weights.sum()))
+    return ErrorRow(float(np.abs(errors).max()), rms)
+
+
+def _along(
+    path: Trajectories, wanted: Wanted, errors: _Errors, weights: Floats
+) -> Iterator[TargetAlong]:
+    """The errors along each trajectory that the target holds on."""
+    for part, rows in zip(path.parts, path.rows, strict=True):
+        first, last = max(wanted.rows.start, rows.start), min(wanted.rows.stop, rows.stop)
+        if first < last:
+            own = slice(first - wanted.rows.start, last - wanted.rows.start)
+            yield TargetAlong(part.name, own, _summary(errors.part(own), weights[own]))
+
+
+# --- The verdict
+
+IMPROVED = 0.01  # of the merit of the start
+
+
+def verdict(
+    targets: Sequence[TargetStudy],
+    merits: tuple[tuple[float, float], tuple[float, float]],
+    trusted: bool,
+    unreachable: Sequence[str] = (),
+) -> tuple[str, str]:
+    """The verdict, and why in a sentence.
+
+    ``merits`` are (violation, objective) of the initial design and of the answer; ``unreachable``
+    names targets outside the range that their mode can take within the bounds.
+    """
+    if not trusted:
+        return "do_not_use", "the numbers that the answer rests on cannot be vouched for"
+    missed = [target for target in targets if not target.satisfied]
+    if not missed:
+        return "reached", "every target is met"
+    worst = max(missed, key=lambda target: target.error.exact.max_relative)
+    far = f"{worst.label}: {100 * worst.error.exact.max_relative:.3g} % off at worst"
+    if unreachable:
+        return "unreachable", f"{'; '.join(unreachable)} ({far})"
+    (before_violation, before), (violation, after) = merits
+    if violation > MET:
+        if violation < (1.0 - IMPROVED) * before_violation:
+            return "improved", f"nearer to what is asked, which is not met: {far}"
+        return "do_not_use", f"no design was found that meets what is asked: {far}"
+    if before_violation > MET or after < (1.0 - IMPROVED) * before:
+        return "improved", f"better than the initial design; {far}"
+    return "do_not_use", f"no better than the initial design: {far}"
+
+
+# --- Neighbouring frequencies that nearly meet, where two modes may swap their numbers
+
+NEAR = 0.01  # relative gap in Hz below which two modes may swap numbers between samples
+
+
+def crossing_warnings(
+    hz: Floats, modes: tuple[int, ...], where: Callable[[int], str], design: str
+) -> Iterator[str]:
+    """A warning for each of ``modes`` whose neighbour comes within 1 % along the trajectory.
+
+    ``hz`` (n_t, at least the highest mode) are exact frequencies at the design named ``design``;
+    ``where`` says in words which sample k is.
+    Modes are numbered by size at every sample: where two curves cross, their numbers swap.
+    """
+    pairs = {(low, low + 1) for mode in modes for low in (mode - 1, mode) if low >= 1}
+    for low, high in sorted(pairs):
+        if high > hz.shape[1]:
+            continue
+        gap = hz[:, high - 1] / hz[:, low - 1] - 1.0
+        k = int(np.argmin(gap))
+        if gap[k] < NEAR:
+            yield (
+                f"modes {low} and {high} come within {100 * gap[k]:.2g} % of each other at "
+                f"{where(k)}, near {hz[k, low - 1]:.6g} Hz, with the {design} design; "
+                "modes are numbered by size, so if they cross there the curve of a mode changes "
+                "from one motion to the other"
+            )

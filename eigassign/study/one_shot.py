@@ -1,0 +1,128 @@
+"""The paper's answer: one quadratic program about one expansion point.
+
+The linear model of eq. (9) comes from the partially linearised expansion, the design from the
+quadratic program of eqs. (13)–(14) (`eigassign.assignment`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.assignment import (
+    Assignment,
+    Bounds,
+    Goal,
+    LinearConstraint,
+    LinearModel,
+    solve_assignment,
+)
+from eigassign.case import CaseFile
+from eigassign.errors import AccuracyError
+from eigassign.study.results import DesignRow, SolverRow
+from eigassign.study.scene import Scene
+from eigassign.study.wanted import Wanted, time_weights
+
+Floats = NDArray[np.float64]
+
+
+def assign_design(scene: Scene, targets: Sequence[Wanted]) -> Assignment:
+    """Build and solve the quadratic program of eqs. (13)–(14) on the linearised expansion.
+
+    Raises InfeasibleError with the names of the constraints that contradict each other.
+    """
+    file, path = scene.file, scene.path
+    l0, slope = scene.expansions.linear_in_design(path)
+    _require_near(scene, l0)
+    column = scene.expansions.column
+    goals = [
+        Goal(
+            LinearModel(l0[wanted.rows, k], slope[wanted.rows, k]),
+            wanted.hz,
+            wanted.weight,
+            wanted.rows,
+        )
+        for wanted in targets
+        for k in [column(wanted.mode)]
+    ]
+    return solve_assignment(
+        goals,
+        time_weights(path),
+        scene.expansions.linear.y0,
+        scene.initial,
+        Bounds(*scene.bounds),
+        linear_constraints(file),
+        _names(file),
+    )
+
+
+def _require_near(scene: Scene, l0: Floats) -> None:
+    """Raise AccuracyError where the expansion is so far from a pose that it predicts λ ≤ 0."""
+    bad = np.argwhere(~(l0 > 0.0))
+    if len(bad):
+        k, column = (int(i) for i in bad[0])
+        problem = scene.file.problem(
+            "expansion.q",
+            f"too far from the motion: the expansion predicts a negative λ of mode "
+            f"{scene.expansions.modes[column]} at {scene.path.where(k)}; "
+            "give a pose of the trajectory, or auto",
+        )
+        raise AccuracyError(str(problem))
+
+
+def _names(file: CaseFile) -> tuple[str, ...]:
+    return tuple(file.design.parameters)
+
+
+def linear_constraints(file: CaseFile) -> list[LinearConstraint]:
+    """The case's linear limits between design parameters."""
+    return [
+        LinearConstraint(
+            name,
+            np.array([constraint.terms.get(parameter, 0.0) for parameter in _names(file)]),
+            -np.inf if constraint.min is None else constraint.min,
+            np.inf if constraint.max is None else constraint.max,
+        )
+        for name, constraint in file.design.constraints.items()
+    ]
+
+
+def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:
+    """One row for each design parameter, in the order of the file."""
+    parameters, units, initial = (
+        scene.file.design.parameters,
+        scene.file.design_units,
+        scene.initial,
+    )
+    return tuple(
+        DesignRow(name, p.parameter, units[k], float(initial[k]), float(optimal[k]), p.min, p.max)
+        for k, (name, p) in enumerate(parameters.items())
+    )
+
+
+def solver_row(assignment: Assignment) -> SolverRow:
+    """What the solver reached, as plain numbers."""
+    return SolverRow(
+        assignment.status,
+        assignment.iterations,
+        assignment.primal_residual,
+        assignment.dual_residual,
+        assignment.gap,
+    )
+
+
+def limit_notes(assignment: Assignment) -> list[str]:
+    """What holds the optimum back, and what no frequency depends on."""
+    grouped: dict[str, list[str]] = {}
+    for limit in assignment.active:
+        grouped.setdefault(f"{limit.side} {limit.kind}", []).append(limit.name)
+    notes = [f"on its {side} of {', '.join(names)}" for side, names in grouped.items()]
+    notes = [f"the optimum lies {note}" for note in notes]
+    if assignment.undetermined:
+        notes.append(
+            f"{assignment.undetermined} direction(s) of the design change no target: there the "
+            "initial design is kept as nearly as the limits allow"
+        )
+    return notes

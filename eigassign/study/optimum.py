@@ -1,0 +1,324 @@
+"""The design that meets a case's targets best, by the sequential method on exact frequencies.
+
+What the case file asks for becomes requirements (`eigassign.assignment.requirements`). A band to
+keep out of leaves a choice: on a connected trajectory it is clear if and only if the number k of
+modes below it is the same everywhere, so every k that the bounds may allow is tried, and the best
+kept.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from time import monotonic
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from eigassign.assignment.requirements import (
+    FrequencyLimit,
+    FrequencyTarget,
+    Requirements,
+)
+from eigassign.assignment.sequential import (
+    MET,
+    Appraisal,
+    DesignProblem,
+    End,
+    Objective,
+    Optimum,
+    distinct,
+    minimise,
+)
+from eigassign.errors import EigassignError
+from eigassign.study.one_shot import linear_constraints
+from eigassign.study.response import exact_response
+from eigassign.study.scene import Scene
+from eigassign.study.wanted import Wanted, time_weights
+
+Floats = NDArray[np.float64]
+MOST_BELOW = 24  # combinations of numbers of modes below the bands that are tried
+STARTS = 8  # with `starts: auto`, at most
+AGREED = 3  # starts that lead to the best optimum before no more are made
+SAME = 1e-4  # relative, in F: optima of the same worth
+PERCENT = {Objective.LEAST_SQUARES: 1e4, Objective.WORST_CASE: 1e2}  # of F: what prices count in
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One choice of the number of modes below each band, with the problem that it makes."""
+
+    below: tuple[tuple[str, int], ...]  # the band in words, and k
+    requirements: Requirements
+    problem: DesignProblem
+
+
+@dataclass(frozen=True)
+class Found:
+    """The best design, what it was chosen among, and how much work that was."""
+
+    variant: Variant
+    best: Optimum
+    optima: tuple[Optimum, ...]  # distinct local optima of the best variant, the best first
+    variants: tuple[tuple[Variant, Optimum], ...]  # the best of each
+    initial: tuple[float, float]  # violation and objective of the initial design
+    starts: int
+    exact_solves: int
+
+
+def find_optimum(
+    scene: Scene,
+    wanted: Sequence[Wanted],
+    starts: Sequence[Floats],
+    progress: Callable[[str], None],
+) -> Found:
+    """The best local optimum of the exact problem from the initial design and ``starts``.
+
+    Raises InfeasibleError where bounds and linear constraints contradict each other.
+    """
+    keys, begun = scene.file.assignment, monotonic()
+    deadline = np.inf if keys.seconds is None else begun + keys.seconds
+    solves = 0
+    best_of: list[tuple[Variant, tuple[Optimum, ...]]] = []
+    made = 0
+    for variant in variants(scene, wanted):
+        search = _Search(variant, keys.steps, deadline)
+        for start in _starts(scene, starts, keys.starts):
+            progress(f"start {made + 1}")
+            search.run(start)
+            made += 1
+            if search.ended or search.agreed(keys.starts):
+                break
+        if search.optima:
+            best_of.append((variant, distinct(search.optima, variant.problem)))
+        solves += search.appraisals * len(scene.path.q)
+        if search.ended:
+            break
+    best_of.sort(key=lambda pair: _worth(pair[1][0]))
+    variant, optima = best_of[0]
+    return Found(
+        variant=variant,
+        best=optima[0],
+        optima=optima,
+        variants=tuple((v, o[0]) for v, o in best_of),
+        initial=_initial(scene, variant),
+        starts=made,
+        exact_solves=solves + len(scene.path.q),
+    )
+
+
+def _initial(scene: Scene, variant: Variant) -> tuple[float, float]:
+    """Violation (of bounds and constraints too, relative to their ranges) and F at the start."""
+    y, problem = scene.initial, variant.problem
+    seen = problem.appraise(y)
+    width = np.where(problem.upper > problem.lower, problem.upper - problem.lower, 1.0)
+    outside = np.maximum(problem.lower - y, y - problem.upper) / width
+    worst = max(seen.violation, float(outside.max(initial=0.0)))
+    for row in problem.constraints:
+        value, size = row.coefficients @ y, np.abs(row.coefficients) @ width
+        worst = max(worst, float(max(row.lower - value, value - row.upper) / (size or 1.0)))
+    return worst, problem(y, seen)
+
+
+def _worth(optimum: Optimum) -> tuple[float, float]:
+    return max(optimum.seen.violation, MET), optimum.objective
+
+
+class _Search:
+    """The optima of one variant, start after start."""
+
+    def __init__(self, variant: Variant, steps: int, deadline: float) -> None:
+        self.variant, self.steps, self.deadline = variant, steps, deadline
+        self.optima: list[Optimum] = []
+        self.appraisals = 0
+        self.ended = False
+
+    def run(self, start: Floats) -> None:
+        try:
+            found = minimise(self.variant.problem, start, self.steps, self._stop)
+        except EigassignError:
+            if not self.optima and self.appraisals == 0:
+                raise
+            return
+        self.optima.append(found)
+        self.appraisals += found.appraisals
+        self.ended = found.end in (End.SECONDS, End.INTERRUPTED)
+
+    def _stop(self) -> End | None:
+        return End.SECONDS if monotonic() > self.deadline else None
+
+    def agreed(self, starts: int | str) -> bool:
+        """Whether enough starts led to the best optimum."""
+        if isinstance(starts, int) or not self.optima:
+            return False
+        best = min(_worth(o) for o in self.optima)
+        same = [
+            o
+            for o in self.optima
+            if _worth(o)[0] <= best[0] + MET and o.objective <= best[1] * (1.0 + SAME) + 1e-16
+        ]
+        return len(same) >= AGREED or best[1] <= 1e-14
+
+
+def _starts(scene: Scene, given: Sequence[Floats], count: int | str) -> Iterator[Floats]:
+    """The initial design, those given, the middle of the bounds, then evenly spread ones."""
+    lower, upper = scene.bounds
+    most = STARTS if isinstance(count, str) else count
+    first = [scene.initial, *given, 0.5 * (lower + upper)]
+    yield from first[:most]
+    if len(first) < most and len(lower):
+        points = qmc.Sobol(len(lower), seed=0).random(most - len(first))
+        yield from lower + points * (upper - lower)
+
+
+# --- From targets to requirements
+
+
+def variants(scene: Scene, wanted: Sequence[Wanted]) -> Iterator[Variant]:
+    """One for each combination of numbers of modes below the bands, the likeliest first."""
+    bands = [_band_choices(scene, band) for band in _bands(scene, wanted)]
+    combinations = itertools.islice(itertools.product(*bands), MOST_BELOW)
+    for combination in combinations:
+        limits = [limit for choice in combination for limit in choice.limits]
+        yield _variant(scene, wanted, tuple((c.label, c.below) for c in combination), limits)
+
+
+def _variant(
+    scene: Scene,
+    wanted: Sequence[Wanted],
+    below: tuple[tuple[str, int], ...],
+    of_bands: Sequence[FrequencyLimit],
+) -> Variant:
+    lower, upper = scene.bounds
+    width = np.where(upper > lower, upper - lower, 1.0)
+    targets = tuple(
+        FrequencyTarget(w.mode, w.hz, w.rows, w.weight)
+        for w in wanted
+        if w.requirement.kind == "frequency"
+    )
+    objective = Objective(scene.file.assignment.objective)
+    prices = _prices(scene, objective if targets else None)
+    asked = Requirements(
+        targets=targets,
+        limits=(*_limits(wanted), *of_bands),
+        quantities=(),
+        time_weights=time_weights(scene.path),
+        objective=objective,
+        least_change=(scene.initial, width) if not targets and not prices.any() else None,
+    )
+    response = exact_response(scene, asked.modes)
+
+    def appraise(y: Floats) -> Appraisal:
+        return asked.appraise(y, response(y))
+
+    problem = DesignProblem(
+        appraise=appraise,
+        lower=lower,
+        upper=upper,
+        constraints=tuple(linear_constraints(scene.file)),
+        prices=prices if prices.any() else None,
+        reference=scene.initial,
+        objective=objective if targets else Objective.LEAST_SQUARES,
+    )
+    return Variant(below, asked, problem)
+
+
+def _prices(scene: Scene, objective: Objective | None) -> Floats:
+    """Of F per SI unit; where F is errors, prices are in %² of them (worst case: %)."""
+    given = np.array([column.price or 0.0 for column in scene.file.design.parameters.values()])
+    return given if objective is None else given / PERCENT[objective]
+
+
+def _limits(wanted: Sequence[Wanted]) -> Iterator[FrequencyLimit]:
+    for w in wanted:
+        kind, label = w.requirement.kind, w.requirement.label
+        if kind == "at_least":
+            yield FrequencyLimit(label, ((w.mode, 1.0),), w.lower_hz, w.rows, True)
+        elif kind == "at_most":
+            yield FrequencyLimit(label, ((w.mode, 1.0),), w.upper_hz, w.rows, False)
+        elif kind == "gap":
+            low, high = w.requirement.modes
+            yield FrequencyLimit(label, ((high, 1.0), (low, -1.0)), w.lower_hz, w.rows, True)
+
+
+@dataclass(frozen=True)
+class _Band:
+    """A band to keep out of along one trajectory."""
+
+    wanted: Wanted
+    rows: slice  # of all samples
+    lower_hz: Floats
+    upper_hz: Floats
+
+
+@dataclass(frozen=True)
+class _BandChoice:
+    label: str
+    below: int
+    limits: tuple[FrequencyLimit, ...]
+
+
+def _bands(scene: Scene, wanted: Sequence[Wanted]) -> Iterator[_Band]:
+    """Every band along each trajectory for itself: only there the number below must not change."""
+    for w in wanted:
+        if w.requirement.kind != "keep_out":
+            continue
+        for rows in scene.path.rows:
+            first, last = max(rows.start, w.rows.start), min(rows.stop, w.rows.stop)
+            if first < last:
+                own = slice(first - w.rows.start, last - w.rows.start)
+                yield _Band(w, slice(first, last), w.lower_hz[own], w.upper_hz[own])
+
+
+def _band_choices(scene: Scene, band: _Band) -> list[_BandChoice]:
+    """What k may be: from the fewest modes below the band to the most, at designs all over."""
+    named = tuple(sorted(band.wanted.requirement.modes))
+    counts = _counts(scene, band, named)
+    first = int(np.median(counts[0]))
+    possible = range(int(counts.min()), int(counts.max()) + 1)
+    label = band.wanted.requirement.label
+    return [
+        _BandChoice(label, k, tuple(_beside(label, band, named, k)))
+        for k in sorted(possible, key=lambda k: (abs(k - first), k))
+    ]
+
+
+def _beside(label: str, band: _Band, named: tuple[int, ...], k: int) -> Iterator[FrequencyLimit]:
+    """The limits that say: k of the named modes (of all, if none is named) are below the band."""
+    below = named[k - 1] if named and k else k
+    above = named[k] if named and k < len(named) else k + 1
+    if k:
+        yield FrequencyLimit(label, ((below, 1.0),), band.lower_hz, band.rows, False)
+    if not named or k < len(named):
+        yield FrequencyLimit(label, ((above, 1.0),), band.upper_hz, band.rows, True)
+
+
+def _counts(scene: Scene, band: _Band, named: tuple[int, ...]) -> NDArray[np.intp]:
+    """How many of the modes are below the band's lower and upper edge, (designs, 2 · samples)."""
+    lower, upper = scene.bounds
+    designs = [scene.initial, lower, upper, 0.5 * (lower + upper)]
+    if len(lower):
+        designs += list(lower + qmc.Sobol(len(lower), seed=1).random(8) * (upper - lower))
+    found = []
+    for y in designs:
+        try:
+            hz = _all_below(scene, scene.path.q[band.rows], y, float(band.upper_hz.max()))
+        except EigassignError:
+            continue
+        columns = [m - 1 for m in named if m <= hz.shape[1]] if named else list(range(hz.shape[1]))
+        edges = (band.lower_hz, band.upper_hz)
+        found.append(np.concatenate([(hz[:, columns] < e[:, None]).sum(axis=1) for e in edges]))
+    return np.array(found)
+
+
+def _all_below(scene: Scene, q: Floats, y: Floats, hz: float) -> Floats:
+    """The lowest frequencies (n, count), as many as reach beyond ``hz`` everywhere."""
+    available = scene.model.n_dof - scene.model.n_rigid
+    count = min(4, available)
+    while True:
+        found = scene.model.frequencies(q, y, count)
+        if count == available or found[:, -1].min() > hz:
+            return found
+        count = min(2 * count, available)
