@@ -11,6 +11,8 @@ Reading order:
     sequential    the exact optimum: programs in a row inside a trust region
     requirements  targets, inequalities and quantities as the sequential method sees them
     assign        build, solve, judge: from targets to the optimal design
+    branching     branch and bound over catalogues, of any model whose relaxations can be solved
+    catalogue     the best combinations of catalogues on the linear model, proved
 """
 
 from __future__ import annotations

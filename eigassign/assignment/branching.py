@@ -1,0 +1,389 @@
+"""Branch and bound over catalogues: parameters that take listed values only.
+
+A catalogue lists rows; each row sets the columns of the design y that the catalogue owns (one for
+a list of values, several for a list of sections). The other columns stay continuous.
+
+A node of the tree holds the rows that every catalogue may still take. Its relaxation lets y be
+anywhere in the convex hull of those rows, so its optimum is below that of every combination. The
+node with the lowest one is split first: of the catalogue whose part of y lies furthest from every
+row, the rows on either side of that part, along the direction in which they differ most.
+Combinations are found by rounding to the nearest rows, and by looking at all those of a small node;
+a node is dropped when its bound is not below the worst of the combinations kept.
+
+The tree is searched over the linear model in `catalogue`, and here over any model whose relaxations
+the caller solves (`search_catalogue`).
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import prod
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.assignment.checks import Floats, finite, frozen, same_length
+from eigassign.assignment.program import Bounds, LinearConstraint
+from eigassign.errors import AccuracyError, InfeasibleError, UsageError
+
+Rows = tuple[int, ...]  # one row of every catalogue: a combination
+Node = tuple[Rows, ...]  # the rows that every catalogue may still take
+
+# Of the objective: bounds this near to a known one are not looked into. OSQP's tolerance.
+PROVED = 1e-9
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """Listed values of some columns of y: row r sets y[columns] = rows[r], (n_rows, n_columns)."""
+
+    name: str
+    columns: tuple[int, ...]
+    rows: Floats
+    labels: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        what = f"catalogue {self.name!r}"
+        object.__setattr__(self, "rows", finite(what, self.rows, 2))
+        if not self.rows.size:
+            raise UsageError(f"{what}: lists nothing to choose from")
+        same_length(f"{what}, values", self.rows.shape[1], len(self.columns), "parameters it sets")
+        if self.labels:
+            same_length(f"{what}, labels", len(self.labels), self.rows.shape[0], "rows")
+
+
+@dataclass(frozen=True)
+class Combination:
+    """The row of every catalogue, the design y (n_y,) in SI units, and its objective."""
+
+    rows: Rows
+    y: Floats
+    objective: float
+
+
+@dataclass(frozen=True)
+class CatalogueSearch:
+    """The best combinations found, and how far they can be from the best there is.
+
+    ``best``: distinct combinations, the best first. ``lower_bound``: no combination is below it.
+    ``exhausted``: the tree was searched to its end, so that ``best`` are the best there are; else
+    a limit ended the search, and ``gap`` says what may have been missed.
+    """
+
+    best: tuple[Combination, ...]
+    lower_bound: float
+    nodes: int
+    exhausted: bool
+
+    @property
+    def gap(self) -> float:
+        """Objective of the best combination − lower bound."""
+        return self.best[0].objective - self.lower_bound
+
+    @property
+    def relative_gap(self) -> float:
+        """``gap`` over the objective."""
+        return self.gap / abs(self.best[0].objective) if self.gap > 0.0 else 0.0
+
+    @property
+    def proved(self) -> bool:
+        """No combination is better than the first by more than 1e-9 of it."""
+        return self.relative_gap <= PROVED
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How many combinations to keep, and after how many nodes or seconds to stop."""
+
+    keep: int = 5
+    nodes: int = 100_000
+    seconds: float = 60.0
+
+
+# --- The tree
+
+
+@dataclass(frozen=True)
+class Relaxed:
+    """A node after its relaxation.
+
+    ``node``: the rows that may still be better. ``bound``: no combination of them is below it.
+    ``points``: the optimum's part in every catalogue, in the model's ``coordinates``. ``x`` and
+    ``mu``: the optimum and its multipliers, in the model's own units.
+    """
+
+    node: Node
+    bound: float
+    points: tuple[Floats, ...]
+    x: Floats
+    mu: Floats
+
+
+class Model(Protocol):
+    """What the tree searches.
+
+    ``coordinates``: of every catalogue, its rows (n_rows, any) where distances are measured.
+    ``small``: up to so many combinations of a node are looked at together.
+    """
+
+    coordinates: tuple[Floats, ...]
+    small: int
+
+    def relax(self, node: Node, above: Relaxed | None, cutoff: float) -> Relaxed | None:
+        """None if the node has no combination below the cutoff; ``above`` is the node split."""
+
+    def combinations(
+        self, node: Node, near: Relaxed, cutoff: Callable[[], float]
+    ) -> Iterable[Combination]:
+        """Those of a small node that can be below the cutoff; ``near`` is a node around it."""
+
+
+class _Found:
+    """The best combinations so far, distinct, the best first."""
+
+    def __init__(self, keep: int) -> None:
+        self.keep = keep
+        self.best: list[Combination] = []
+
+    def cutoff(self) -> float:
+        """What a combination must be below to be kept."""
+        return self.best[-1].objective if len(self.best) >= self.keep else np.inf
+
+    def add(self, combinations: Iterable[Combination]) -> None:
+        for one in combinations:
+            if one.objective < self.cutoff() and all(one.rows != other.rows for other in self.best):
+                self.best = sorted([*self.best, one], key=lambda c: (c.objective, c.rows))
+                self.best = self.best[: self.keep]
+
+
+def branch_and_bound(
+    model: Model, root: Node, effort: Effort, start: Iterable[Combination] = ()
+) -> CatalogueSearch:
+    """The lowest bound first, knowing some combinations at the start.
+
+    ``best`` is empty where there is no combination, or none was met before a limit.
+    """
+    found, nodes, end = _Found(effort.keep), 0, time.monotonic() + effort.seconds
+    found.add(start)
+    heap: list[tuple[float, int, Relaxed]] = []
+    pending: list[Node] = [root]
+    above: Relaxed | None = None
+    while True:
+        for node in pending:
+            nodes += 1
+            relaxed = model.relax(node, above, found.cutoff())
+            if relaxed is not None:
+                found.add(model.combinations(_rounded(model, relaxed), relaxed, found.cutoff))
+                heapq.heappush(heap, (relaxed.bound, nodes, relaxed))
+        exhausted = not heap or heap[0][0] >= found.cutoff() - PROVED * abs(found.cutoff())
+        if exhausted or nodes >= effort.nodes or time.monotonic() > end:
+            break
+        above = heapq.heappop(heap)[2]
+        pending = []
+        if prod(map(len, above.node)) <= model.small:
+            found.add(model.combinations(above.node, above, found.cutoff))
+        else:
+            pending = _split(model, above)
+    bounds = [bound for bound, *_ in heap[:1]] + [one.objective for one in found.best[:1]]
+    return CatalogueSearch(tuple(found.best), min(bounds, default=np.inf), nodes, exhausted)
+
+
+def _distances(model: Model, relaxed: Relaxed) -> list[Floats]:
+    """Of every catalogue, how far its rows in the node are from the relaxation's optimum."""
+    return [
+        np.linalg.norm(at[list(rows)] - point, axis=1)
+        for at, rows, point in zip(model.coordinates, relaxed.node, relaxed.points, strict=True)
+    ]
+
+
+def _rounded(model: Model, relaxed: Relaxed) -> Node:
+    """The node of one combination, the nearest row of every catalogue."""
+    away = _distances(model, relaxed)
+    return tuple((rows[np.argmin(d)],) for rows, d in zip(relaxed.node, away, strict=True))
+
+
+def _split(model: Model, relaxed: Relaxed) -> list[Node]:
+    """Two nodes that share out the rows of the catalogue furthest from being decided."""
+    away = [d.min() if d.size > 1 else -1.0 for d in _distances(model, relaxed)]
+    k = int(np.argmax(away))
+    rows = np.array(relaxed.node[k])
+    at = model.coordinates[k][rows]
+    direction = np.linalg.svd(at - at.mean(axis=0), full_matrices=False)[2][0]
+    along = at @ direction
+    low = along <= relaxed.points[k] @ direction
+    if low.all() or not low.any():
+        low = np.isin(np.arange(rows.size), np.argsort(along, kind="stable")[: rows.size // 2])
+    halves = (tuple(rows[side].tolist()) for side in (low, ~low))
+    return [(*relaxed.node[:k], half, *relaxed.node[k + 1 :]) for half in halves]
+
+
+def answered(found: CatalogueSearch) -> CatalogueSearch:
+    """What was found, or AccuracyError where a limit of the effort came first."""
+    if found.best:
+        return found
+    raise AccuracyError(
+        f"catalogues: no combination that meets all limits was found in {found.nodes} nodes; "
+        "allow more, shorten the lists or relax a limit"
+    )
+
+
+def distinct_rows(catalogue: Catalogue) -> NDArray[np.int_]:
+    """Of equal rows the first, in the order of the list."""
+    return np.sort(np.unique(catalogue.rows, axis=0, return_index=True)[1])
+
+
+def refuse_columns(catalogues: Sequence[Catalogue], n_y: int) -> None:
+    """UsageError unless every column is one of y (n_y,) and has one owner."""
+    owner: dict[int, str] = {}
+    for catalogue in catalogues:
+        for column in catalogue.columns:
+            if not 0 <= column < n_y:
+                raise UsageError(f"catalogue {catalogue.name!r}: there is no column {column} of y")
+            if column in owner:
+                raise UsageError(
+                    f"catalogues {owner[column]!r} and {catalogue.name!r} both set column {column}"
+                )
+            owner[column] = catalogue.name
+
+
+# --- Any model
+
+
+def search_catalogue(
+    catalogues: Sequence[Catalogue],
+    relax: Callable[[Node, Floats | None], tuple[Floats, float] | None],
+    fix: Callable[[Rows], tuple[Floats, float] | None],
+    effort: Effort | None = None,
+    start: Rows | None = None,
+) -> CatalogueSearch:
+    """Combinations of a model that need not be linear or convex, by the same tree.
+
+    ``relax(node, near)`` returns y (n_y,) and the objective at the optimum over the hull of a
+    node's rows (`hull`), or None where there is none; ``near`` is the optimum of the node around
+    it, to start from. ``fix(rows)`` does so for one combination. ``start``: a combination to begin
+    with. What rounding finds is improved by exchanging rows: of one catalogue while the tree is
+    searched, of two at its end.
+
+    Relaxations are dear, so the tree is for the best combination; the others in ``best`` are the
+    best of those met. The lower bound is as good as the optima of ``relax``: on a model that is
+    not convex it is proved as far as these are global.
+
+    Raises:
+        UsageError: columns that two catalogues own.
+        InfeasibleError: there is no combination.
+        AccuracyError: a limit of ``effort`` was reached before any combination was found.
+    """
+    effort = effort or Effort()
+    refuse_columns(catalogues, 1 + max(max(own.columns) for own in catalogues))
+    model = _AnyModel(catalogues, relax, fix, time.monotonic() + effort.seconds)
+    known = model.improved(start, 1) if start else ()
+    found = branch_and_bound(model, model.root, replace(effort, keep=1), known)
+    if not found.best and found.exhausted:
+        names = tuple(own.name for own in catalogues)
+        listed = ", ".join(map(repr, names))
+        raise InfeasibleError(f"no combination of the catalogues {listed} meets all limits", names)
+    list(model.improved(answered(found).best[0].rows, 2))
+    best = _Found(effort.keep)
+    best.add(one for one in model.known.values() if one is not None)
+    lower = min(found.lower_bound, best.best[0].objective)
+    return replace(found, best=tuple(best.best), lower_bound=lower)
+
+
+def hull(
+    catalogues: Sequence[Catalogue], node: Node, bounds: Bounds
+) -> tuple[Bounds, list[LinearConstraint]]:
+    """Limits of y around the rows of a node: of every column, and along their principal axes.
+
+    The hull of one row, of two, and of any rows of one column is met exactly; else what is around
+    it is larger, by the corners of a box.
+    """
+    lower, upper, rows = bounds.lower.copy(), bounds.upper.copy(), []
+    for catalogue, allowed in zip(catalogues, node, strict=True):
+        own, at = list(catalogue.columns), catalogue.rows[list(allowed)]
+        lower[own], upper[own] = at.min(axis=0), at.max(axis=0)
+        width = np.ptp(at, axis=0)
+        moving = np.flatnonzero(width > 0.0)
+        if moving.size < 2:
+            continue
+        unit = at[:, moving] / width[moving]
+        axes = np.linalg.svd(unit - unit.mean(axis=0))[2]
+        for i, axis in enumerate(axes):
+            along = unit @ axis
+            coefficients = np.zeros(lower.size)
+            coefficients[np.array(own)[moving]] = axis / width[moving]
+            name = f"{catalogue.name}, axis {i + 1}"
+            rows.append(LinearConstraint(name, coefficients, along.min(), along.max()))
+    return Bounds(lower, upper), rows
+
+
+class _AnyModel:
+    """The caller's relaxations and combinations; every combination is asked for once."""
+
+    small = 1
+
+    def __init__(
+        self,
+        catalogues: Sequence[Catalogue],
+        relax: Callable[[Node, Floats | None], tuple[Floats, float] | None],
+        fix: Callable[[Rows], tuple[Floats, float] | None],
+        end: float,
+    ) -> None:
+        self.catalogues, self._relax, self._fix, self.end = catalogues, relax, fix, end
+        ranges = [np.ptp(own.rows, axis=0) for own in catalogues]
+        self.widths = [np.where(width > 0.0, width, 1.0) for width in ranges]
+        pairs = zip(catalogues, self.widths, strict=True)
+        self.coordinates = tuple(own.rows / width for own, width in pairs)
+        self.root = tuple(tuple(distinct_rows(own).tolist()) for own in catalogues)
+        self.known: dict[Rows, Combination | None] = {}
+
+    def relax(self, node: Node, above: Relaxed | None, cutoff: float) -> Relaxed | None:
+        optimum = self._relax(node, None if above is None else above.x)
+        if optimum is None or optimum[1] >= cutoff:
+            return None
+        y, objective = optimum
+        pairs = zip(self.catalogues, self.widths, strict=True)
+        points = tuple(y[list(own.columns)] / width for own, width in pairs)
+        return Relaxed(node, objective, points, y, np.zeros(0))
+
+    def combinations(
+        self, node: Node, near: Relaxed, cutoff: Callable[[], float]
+    ) -> Iterator[Combination]:
+        for rows in itertools.product(*node):
+            yield from self.improved(rows, 1)
+
+    def _combination(self, rows: Rows) -> Combination | None:
+        if rows not in self.known:
+            fixed = self._fix(rows)
+            self.known[rows] = Combination(rows, frozen(fixed[0]), fixed[1]) if fixed else None
+        return self.known[rows]
+
+    def improved(self, rows: Rows, most: int) -> Iterator[Combination]:
+        """This combination; if it is the best so far, what exchanging ``most`` rows leads to."""
+        lowest = min((one.objective for one in self.known.values() if one), default=np.inf)
+        here = self._combination(rows)
+        if here is None:
+            return
+        yield here
+        while here.objective <= lowest and time.monotonic() < self.end:
+            lowest = here.objective
+            around = [one for one in map(self._combination, self._around(here.rows, most)) if one]
+            yield from around
+            here = min(around, key=lambda one: one.objective)
+            if here.objective >= lowest:
+                return
+
+    def _around(self, rows: Rows, most: int) -> Iterator[Rows]:
+        """Combinations that differ in the rows of at most ``most`` catalogues."""
+        every = range(len(rows))
+        for changed in itertools.combinations(every, min(most, len(rows))):
+            yield from itertools.product(
+                *(
+                    own if k in changed else (rows[k],)
+                    for k, own in zip(every, self.root, strict=True)
+                )
+            )
