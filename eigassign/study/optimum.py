@@ -304,7 +304,7 @@ def _counts(scene: Scene, band: _Band, named: tuple[int, ...]) -> NDArray[np.int
     found = []
     for y in designs:
         try:
-            hz = _all_below(scene, scene.path.q[band.rows], y, float(band.upper_hz.max()))
+            hz = _all_below(scene, scene.path.at(y)[0][band.rows], y, float(band.upper_hz.max()))
         except EigassignError:
             continue
         columns = [m - 1 for m in named if m <= hz.shape[1]] if named else list(range(hz.shape[1]))

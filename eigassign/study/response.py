@@ -18,6 +18,7 @@ from eigassign.modal.slopes import eigenvalue_slopes
 from eigassign.study.scene import BLOCK, Scene
 
 Floats = NDArray[np.float64]
+TRAVEL = (0.1, 1.0)  # rad or m: least and largest scale of a coordinate; steps are 5e-4 of it
 
 
 @dataclass(frozen=True)
@@ -49,5 +50,6 @@ def exact_response(scene: Scene, count: int) -> ExactResponse:
     """Of all samples of the scene's trajectory."""
     lower, upper = scene.bounds
     q = scene.path.q
-    travel = np.ptp(q, axis=0) if scene.path.follows_design else np.zeros(q.shape[1])
+    # A coordinate that rests at the initial design, but for round-off, may move with another.
+    travel = np.clip(np.ptp(q, axis=0), *TRAVEL) if scene.path.follows_design else 0.0 * q[0]
     return ExactResponse(scene.model, scene.path, np.append(travel, upper - lower), count)

@@ -122,19 +122,26 @@ def slider_crank() -> Case:
     )
 
 
-def cart(path: list[list[float]]) -> Case:
-    """A bar upright on a cart: the cart can bring back no change of the bar's length."""
+def cart(path: list[list[float]], leaning: bool = False) -> Case:
+    """A bar on a cart, upright for good, or leaning as its drive tells it.
+
+    The cart alone can bring back no change of the bar's length. Leaning, the bar keeps its angle
+    along a level path, and another one with another length.
+    """
     tree = bar(2, 0.5, 70e9, 2700.0, {"shape": "circle", "diameter": 0.02})
     tree["mechanism"]["links"]["cart"] = {"type": "rigid", "mass": 1.0}
+    kind = "revolute" if leaning else "fixed"
     tree["mechanism"]["joints"] = {
         "rail": {"type": "prismatic", "base": "ground", "follower": "cart.start", "axis": [1, 0]},
-        "root": {
-            "type": "fixed", "base": "cart.start", "follower": "bar.start", "angle": "90 deg"
-        },
-    }  # fmt: skip
+        "root": {"type": kind, "base": "cart.start", "follower": "bar.start", "angle": "90 deg"},
+    }
     tree["coordinates"] = {"q1": {"joint": "rail"}}
+    if leaning:
+        tree["coordinates"]["q2"] = {"joint": "root", "drive": {"stiffness": 3000.0}}
     tree["trajectory"] = {"tip": "bar.end", "waypoints": path, "path": "straight", "samples": 5}
-    return case_of(tree | {"design": lengths(h="bar")})
+    order = {"expansion": {"order": 2}}
+    design = {"h": {"parameter": "links.bar.length", "min": 0.45, "max": 0.55}}
+    return case_of(tree | order | {"design": design})
 
 
 def extrapolated(f: Callable[[np.ndarray], np.ndarray], y: np.ndarray, h: float) -> np.ndarray:
