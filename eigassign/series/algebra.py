@@ -1,4 +1,4 @@
-"""The two algebras a program runs in: ordinary samples, and truncated power series."""
+"""The algebras a program runs in: samples, samples with tangents, and truncated power series."""
 
 from __future__ import annotations
 
@@ -90,6 +90,71 @@ class Samples:
             return np.asarray(np.linalg.solve(left, right).reshape(A.shape[1], -1).T)
         except np.linalg.LinAlgError as error:
             raise SingularityError("the mechanism is at a dead point") from error
+
+
+@dataclass(frozen=True)
+class Tangents:
+    """Samples with their derivatives in some directions, exact: rows (k, (1 + n_directions) n).
+
+    The first n columns are the values at n ``samples``, the next n the derivatives in the first
+    direction, and so on.
+    """
+
+    samples: int
+    directions: int
+
+    def constant(self, values: Floats) -> Floats:
+        """Numbers as rows without derivatives."""
+        rows = np.zeros((len(values), (1 + self.directions) * self.samples))
+        rows[:, : self.samples] = values[:, None]
+        return rows
+
+    def linear(self, weights: Weights, constants: Floats, values: Floats) -> Floats:
+        """The sums of values and of derivatives; numbers have none."""
+        rows = np.asarray(weights @ values)
+        rows[:, : self.samples] += constants[:, None]
+        return rows
+
+    def product(self, a: Floats, b: Floats) -> Floats:
+        """(a b)' = a' b + a b'."""
+        a, b = self._apart(a), self._apart(b)
+        out = a * b[:, :1] + a[:, :1] * b
+        out[:, 0] = a[:, 0] * b[:, 0]
+        return out.reshape(len(out), -1)
+
+    def power(self, a: Floats, exponents: Floats) -> Floats:
+        """(aᵖ)' = p aᵖ⁻¹ a'; 0 of the zeroth power, NaN outside the domain."""
+        a, p = self._apart(a), exponents[:, None]
+        with np.errstate(all="ignore"):
+            value = np.power(a[:, 0], p)
+            slope = np.where(p == 0.0, 0.0, p * np.power(a[:, 0], p - 1.0))
+            return self._chained(value, slope, a)
+
+    def wave(self, a: Floats, quarters: Ints) -> Floats:
+        """sin' = cos."""
+        a = self._apart(a)
+        turned = a[:, 0] + 0.5 * np.pi * quarters[:, None]
+        return self._chained(Samples().wave(a[:, 0], quarters), np.cos(turned), a)
+
+    def solve(self, A: Floats, B: Floats, n: int) -> Floats:
+        """X' = A⁻¹ (B' − A' X)."""
+        A, B = self._apart(A), self._apart(B)
+        X = Samples().solve(A[:, 0], B[:, 0], n)
+        parts, m = [X], len(B) // n
+        by_sample = X.reshape(n, m, -1)
+        for k in range(1, A.shape[1]):
+            moved = np.einsum("ijs,jms->ims", A[:, k].reshape(n, n, -1), by_sample)
+            parts.append(Samples().solve(A[:, 0], B[:, k] - moved.reshape(n * m, -1), n))
+        return np.concatenate(parts, axis=1)
+
+    def _apart(self, rows: Floats) -> Floats:
+        """(k, 1 + n_directions, n)."""
+        return rows.reshape(len(rows), 1 + self.directions, self.samples)
+
+    def _chained(self, value: Floats, slope: Floats, a: Floats) -> Floats:
+        out = np.where(a == 0.0, 0.0, slope[:, None] * a)
+        out[:, 0] = value
+        return out.reshape(len(out), -1)
 
 
 @dataclass(frozen=True)

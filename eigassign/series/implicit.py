@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import SingularityError
-from eigassign.series.algebra import Algebra, Samples, Truncated
+from eigassign.series.algebra import Algebra, Samples, Tangents, Truncated
 from eigassign.series.compiler import Program
 
 Floats = NDArray[np.float64]
@@ -144,10 +144,24 @@ class ImplicitFunction:
             p = p - inverse @ F
         return p
 
+    def tangents(self, algebra: Tangents, a: Floats) -> Floats:
+        """p (size, …) with its derivatives −(∂F/∂p)⁺ ∂F/∂a a'."""
+        n = algebra.samples
+        p = self.samples(a[:, :n])
+        still = np.zeros((self.size, a.shape[1] - n))
+        held = np.concatenate([a, np.hstack([p, still])])
+        F = self.program.run(algebra, held)[: self.n_equations]
+        J = self.equations(a[:, :n], p)[2]
+        moved = F[:, n:].reshape(self.n_equations, -1, n).transpose(2, 0, 1)
+        slopes = -_solved(J, moved).transpose(1, 2, 0)
+        return np.hstack([p, slopes.reshape(self.size, -1)])
+
     def evaluate(self, algebra: Algebra, a: Floats) -> Floats:
-        """p in either algebra."""
+        """p in any algebra."""
         if isinstance(algebra, Truncated):
             return self.series(algebra, a)
+        if isinstance(algebra, Tangents):
+            return self.tangents(algebra, a)
         return self.samples(a)
 
     def _named(self, a: Floats) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,11 +18,13 @@ from redesigned_arms import (
 )
 from scenes import SHIPPED, scene_of
 
-from eigassign.api import Case
+from eigassign.api import Case, load_case
 from eigassign.modal.exact.solver import eigenvalues
-from eigassign.modal.slopes import eigenvalue_slopes, theta_slopes
+from eigassign.modal.slopes import eigenvalue_slopes
 from eigassign.series.multi_index import total_degree
 from eigassign.study.scene import Scene
+
+CASES = Path(__file__).parents[2] / "cases"
 
 
 @pytest.fixture(scope="module")
@@ -29,13 +32,17 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return scene_of(tmp_path_factory.mktemp("arm"), SHIPPED)
 
 
-def test_slopes_of_the_coefficient_functions_are_those_of_their_series(arm: Scene) -> None:
-    pencil, scales = arm.model.pencil, np.array([0.0, 0.0, 0.25, 0.25])
-    x = np.array([1.8, 5.2, 0.1, 0.2])
-    space = total_degree(2, 1)
-    series = pencil.theta_series(space, x, pencil.to_program[:, 2:])[:, space.units]
-    found = theta_slopes(pencil.theta, x[None], scales)[2:, :, 0].T
-    np.testing.assert_allclose(found, series, atol=1e-8 * np.abs(series).max())
+@pytest.mark.parametrize("name", ["two_link", "five_bar", "luffing_boom", "arm_6r", "ball_screw"])
+def test_slopes_of_the_coefficient_functions_are_those_of_their_series(name: str) -> None:
+    case = load_case(CASES / f"{name}.yaml")
+    pencil, q = case.model().pencil, case.trajectory.q[[0, len(case.trajectory.q) // 2]]
+    x = np.hstack([q, np.tile(case.initial_design, (2, 1))])
+    every = np.arange(x.shape[1])
+    found = pencil.theta_slopes(x, every)
+    space = total_degree(len(every), 1)
+    for k in range(2):
+        series = pencil.theta_series(space, x[k], pencil.to_program)[:, space.units]
+        np.testing.assert_allclose(found[:, :, k].T, series, atol=1e-12 * np.abs(series).max())
 
 
 def test_eigenvalue_slopes_are_those_of_finite_differences(arm: Scene) -> None:

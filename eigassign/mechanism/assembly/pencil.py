@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from eigassign.series.algebra import Samples, Truncated
+from eigassign.series.algebra import Samples, Tangents, Truncated
 from eigassign.series.compiler import Program
 from eigassign.series.multi_index import LowerSet, on_faces
 
@@ -35,6 +35,20 @@ class TravelRanges(Protocol):
 
     def require(self, z: Floats, x: Floats, label: Callable[[int], str] = ...) -> None:
         """Raise TravelError for the first sample at which one leaves its range."""
+
+
+def theta_slopes(
+    program: Program, to_program: Floats, shift: Floats, x: Floats, along: Ints
+) -> Floats:
+    """∂θ/∂x_i (len(along), 1 + n_outputs, n) of θ = (1, program(to_program x + shift)), exactly."""
+    algebra = Tangents(len(x), len(along))
+    z = algebra.constant(shift)
+    z[:, : len(x)] += to_program @ x.T
+    z[:, len(x) :] = np.repeat(to_program[:, along], len(x), axis=1)
+    rows = program.run(algebra, z)[:, len(x) :]
+    slopes = np.zeros((len(along), 1 + len(rows), len(x)))
+    slopes[:, 1:] = rows.reshape(len(rows), len(along), len(x)).swapaxes(0, 1)
+    return slopes
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,14 +131,14 @@ class Pencil:
         x = np.atleast_2d(x)
         if self.rails is not None:
             self.rails.require(self.to_program @ x.T + self.shift[:, None], x)
-        return self.theta_anywhere(x)
-
-    def theta_anywhere(self, x: Floats) -> Floats:
-        """The same on both sides of where a carriage's beam ends, as a difference needs it."""
         theta = np.empty((self.n_theta, len(x)))
         theta[0] = 1.0
         theta[1:] = self.program.run(Samples(), self.to_program @ x.T + self.shift[:, None])
         return theta
+
+    def theta_slopes(self, x: Floats, along: Ints) -> Floats:
+        """∂θ/∂x_i (len(along), n_theta, n_samples) in the variables ``along`` of x (n, n_x)."""
+        return theta_slopes(self.program, self.to_program, self.shift, x, along)
 
     def theta_series(self, space: LowerSet, x0: Floats, directions: Floats) -> Floats:
         """Coefficients of θ (n_theta, N) about x0 in w, where z = z0 + ``directions`` w."""

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import UsageError
+from eigassign.mechanism.assembly.pencil import theta_slopes
 from eigassign.modal.arguments import chunks
 from eigassign.modal.exact.condensation import condense_blocks
 from eigassign.modal.exact.dense import inverse_factor
-from eigassign.modal.slopes import theta_slopes
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import Program
 
@@ -80,13 +80,14 @@ class ReducedPencil:
         return stiff.block(stiff(theta), every, every), heavy.block(heavy(theta), every, every)
 
     def eigenvalue_slopes(
-        self, x: Floats, count: int, scales: Floats
+        self, x: Floats, count: int, wanted: ArrayLike
     ) -> tuple[Floats, Floats, Floats]:
         """λ (n, count), ∂λ/∂x (n, count, n_x) and modes (n, k, count) at x (n, n_x).
 
-        ∂λ/∂x_i = Σ_j (φᵀK̂_jφ − λ φᵀM̂_jφ) ∂θ_j/∂x_i; ``scales`` as in `modal.slopes`.
+        ∂λ/∂x_i = Σ_j (φᵀK̂_jφ − λ φᵀM̂_jφ) ∂θ_j/∂x_i; ``wanted`` as in `modal.slopes`.
         """
-        rates = theta_slopes(self.theta, x, scales)
+        along = np.flatnonzero(wanted)
+        rates = theta_slopes(self.program, self.to_program, self.shift, x, along)
         moving = np.abs(rates).max(axis=(0, 2), initial=0.0) > 0.0
         stiff, heavy = (terms.chosen(moving[terms.terms]) for terms in self._terms)
         theta = self.theta(x)
@@ -99,7 +100,9 @@ class ReducedPencil:
             forms = stiff.forms(phi, rates[:, :, part])
             forms = forms - heavy.forms(whole, rates[:, :, part]) / mu[..., None]
             lam.append(1.0 / mu)
-            slopes.append(forms)
+            whole_slopes = np.zeros((*forms.shape[:2], x.shape[1]))
+            whole_slopes[..., along] = forms
+            slopes.append(whole_slopes)
             modes.append(phi)
         return np.concatenate(lam), np.concatenate(slopes), np.concatenate(modes)
 
