@@ -16,6 +16,7 @@ from eigassign.modal.model import Model
 
 Floats = NDArray[np.float64]
 BLOCK = 2_000_000  # numbers of a batch of matrices: a second or so of dense solves
+AT_LEAST = 128  # samples of a batch: those of large models share most of their work
 OTHERS = 3  # modes shown above the highest assigned one
 
 
@@ -128,7 +129,7 @@ class Scene:
         samples done and of all, and signals are handled.
         """
         q, count = self.path.at(y)[0], len(self.shown_modes)
-        block = max(1, BLOCK // self.model.n_dof**2)
+        block = max(AT_LEAST, BLOCK // self.model.n_dof**2)
         parts = []
         for start in range(0, len(q), block):
             parts.append(self.model.frequencies(q[start : start + block], y, count))

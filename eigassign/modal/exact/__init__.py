@@ -6,8 +6,9 @@ In reading order:
     massless      counts the modes with mass, and solves nearly massless models to full precision
     dense         small pencils: many samples at once, or one through LAPACK
     sparse        large pencils: Lanczos with one sparse factorisation
-    solver        the dispatcher: dense or sparse, and as many modes as there are
     inertia       how many modes lie below a frequency, by pivots alone
+    substructure  many samples of a large pencil together, and proof that no mode was missed
+    solver        the dispatcher: dense or sparse, and as many modes as there are
     roundoff      how many digits of a frequency the matrices themselves hold
     clusters      neighbouring modes that are expanded together
     tracking      modes followed along a path by their shapes

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
 from scipy.linalg import lapack
 
 from eigassign.errors import MechanismError, UsageError
@@ -111,7 +112,12 @@ def _sparse(pencil: Pencil, theta: Floats, sigma: float) -> int:
     F = principal(pencil, M, pencil.rigid).toarray()
     _require_mass(F)
     data = (K - sigma * M) * scale[pencil.rows] * scale[pencil.columns]
-    A = principal(pencil, data, np.arange(pencil.n_dof))
+    negative = negative_pivots(principal(pencil, data, np.arange(pencil.n_dof)))
+    return negative if negative == UNCERTAIN else negative - len(pencil.rigid)
+
+
+def negative_pivots(A: sparse.csc_array) -> int:
+    """Number of negative eigenvalues of a symmetric A with entries of order one, or UNCERTAIN."""
     try:
         factor = factorise(A)
     except RuntimeError:  # a pivot is exactly zero
@@ -128,7 +134,7 @@ def _sparse(pencil: Pencil, theta: Floats, sigma: float) -> int:
     size = float(np.square(abs(factor.L).T @ permuted) @ np.abs(pivots))
     if not ROUND_OFF * size * inverse < 1.0:
         return UNCERTAIN
-    return int((pivots < 0.0).sum()) - len(pencil.rigid)
+    return int((pivots < 0.0).sum())
 
 
 def _scale(stiff: Floats, heavy: Floats) -> Floats:

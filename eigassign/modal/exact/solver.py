@@ -18,7 +18,7 @@ from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import DENSE_LIMIT, whole
 from eigassign.modal.exact.condensation import Modes
 from eigassign.modal.exact.dense import solve_dense
-from eigassign.modal.exact.sparse import solve_sparse
+from eigassign.modal.exact.substructure import solve_large
 
 Floats = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ def _solve(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
         raise UsageError("q or y is not finite, or outside the domain of a section or length")
     if pencil.n_dof <= DENSE_LIMIT or 2 * count > elastic:  # Lanczos is for few modes of many
         return solve_dense(pencil, theta, count, vectors)
-    return solve_sparse(pencil, theta, count, vectors)
+    return solve_large(pencil, theta, count, vectors)
 
 
 def lowest_modes(pencil: Pencil, theta: Floats, least: int, extra: int) -> Modes:

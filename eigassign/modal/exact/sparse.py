@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -32,7 +34,12 @@ def _one(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
     M_EE, M_F = principal(pencil, mass, E), block(pencil, mass, F)
     M_FE = M_F[:, E]
     coupling = rigid_coupling(M_F[:, F], M_FE)
-    mu, z = _lanczos(K_E, M_EE, M_FE, coupling, count)
+    try:
+        factor = factorise(K_E)
+    except RuntimeError as error:
+        raise MechanismError("mechanism", LIMP) from error
+    M_rows = M_EE.T  # symmetric: products run faster row by row
+    mu, z = lanczos(factor, K_E.T, lambda v: M_rows @ v - (coupling @ v) @ M_FE, count)
     noise = mass_sizes(pencil, theta[:, None], coupling[None])[0] @ (z * z)
     sure = ~may_be_roundoff(mu, noise, len(E), margin=1.0)  # dense algebra is dear here
     if sure.all():
@@ -43,28 +50,30 @@ def _one(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
         lam, phi = modes_with_mass(pencil, theta[:, None], count)
     else:
         raise MissingMassError(int(sure.argmin()))
-    at = np.abs(phi).argmax(axis=0)
-    phi *= np.where(phi[at, np.arange(count)] < 0.0, -1.0, 1.0)
-    return lam, phi
+    return lam, positive_at_top(phi)
 
 
-def _lanczos(
-    K_E: sparse.csc_array, M_EE: sparse.csc_array, M_FE: Floats, coupling: Floats, count: int
+def positive_at_top(phi: Floats) -> Floats:
+    """Modes (…, n_dof, count) whose entries of largest magnitude are positive."""
+    at = np.abs(phi).argmax(axis=-2, keepdims=True)
+    return np.asarray(phi * np.where(np.take_along_axis(phi, at, axis=-2) < 0.0, -1.0, 1.0))
+
+
+def lanczos(
+    factor: linalg.SuperLU,
+    K: sparse.csr_array,
+    mass: Callable[[Floats], Floats],
+    count: int,
 ) -> tuple[Floats, Floats]:
-    """Largest μ of M_c z = μ K_E z, descending, z with unit K_E-norm."""
-    n = K_E.shape[0]
-    try:
-        factor = factorise(K_E)
-    except RuntimeError as error:
-        raise MechanismError("mechanism", LIMP) from error
-    K_rows, M_rows = K_E.T, M_EE.T  # symmetric: products run faster row by row
-    M_c = linalg.LinearOperator((n, n), matvec=lambda v: M_rows @ v - (coupling @ v) @ M_FE)
+    """Largest μ of M z = μ K z, descending, z with unit K-norm, for M as a product."""
+    n = K.shape[0]
+    M = linalg.LinearOperator((n, n), matvec=mass)
     inverse = linalg.LinearOperator((n, n), matvec=factor.solve)
     start = np.random.default_rng(0).standard_normal(n)
     # Lanczos vectors before a restart: few modes converge in fewer than ARPACK's own 20
     krylov = min(max(20, 2 * count + 1), 10 + 2 * count)
     try:
-        mu, z = linalg.eigsh(M_c, count, M=K_rows, Minv=inverse, which="LM", v0=start, ncv=krylov)
+        mu, z = linalg.eigsh(M, count, M=K, Minv=inverse, which="LM", v0=start, ncv=krylov)
     except linalg.ArpackNoConvergence as error:
         raise AccuracyError(f"the exact modes did not converge: {error}") from error
     except linalg.ArpackError as error:
