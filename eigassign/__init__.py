@@ -43,6 +43,7 @@ if TYPE_CHECKING:
         load_reduced,
         reduce,
         save_reduced,
+        update,
     )
 
 __all__ = [
@@ -60,6 +61,7 @@ __all__ = [
     "load_reduced",
     "reduce",
     "save_reduced",
+    "update",
 ]
 
 

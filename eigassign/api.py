@@ -17,6 +17,7 @@ from eigassign.modal.reduced import reduce as modal_reduced
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.output import reduced_file
 from eigassign.pipeline.run import Result, solve_case
+from eigassign.pipeline.update import Updated, update_case
 from eigassign.series.multi_index import LowerSet
 from eigassign.study.built_case import Case, load_case
 
@@ -32,6 +33,7 @@ __all__ = [
     "load_reduced",
     "reduce",
     "save_reduced",
+    "update",
 ]
 
 
@@ -77,6 +79,15 @@ def reduce(
 def assign(case: Case) -> Result:
     """The whole job of ``eigassign optimize``, without writing anything."""
     return solve_case(case)
+
+
+def update(case: Case) -> Updated:
+    """The whole job of ``eigassign update``, without writing anything.
+
+    ``.design`` and ``.intervals`` by name, ``.results`` with all the rest, ``.case`` with the
+    values found. Raises CaseError for what the case lacks and for wrong measurements.
+    """
+    return update_case(case)
 
 
 def save_reduced(reduced: ReducedModel, path: str | Path) -> None:

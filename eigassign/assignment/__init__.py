@@ -10,6 +10,7 @@ Reading order:
     optimality    judge: Karush–Kuhn–Tucker residuals, recomputed from the data
     sequential    the exact optimum: programs in a row inside a trust region
     requirements  targets, inequalities and quantities as the sequential method sees them
+    identification  parameters from measured frequencies, their covariance and intervals
     assign        build, solve, judge: from targets to the optimal design
     branching     branch and bound over catalogues, of any model whose relaxations can be solved
     catalogue     the best combinations of catalogues on the linear model, proved

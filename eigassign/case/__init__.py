@@ -26,6 +26,7 @@ from eigassign.case.schema.joints import (
     UniversalJoint,
 )
 from eigassign.case.schema.links import FrameLink, RigidLink, SuperelementLink, Taper
+from eigassign.case.schema.measurements import Measurement, MeasurementFile
 from eigassign.case.schema.mechanism import Drive
 from eigassign.case.schema.sections import BareSection, CircleSection, IProfileSection, TubeSection
 from eigassign.case.schema.targets import (
@@ -71,6 +72,8 @@ __all__ = [
     "Harmonic",
     "IProfileSection",
     "KeepOutTarget",
+    "Measurement",
+    "MeasurementFile",
     "NutJoint",
     "PointTrajectory",
     "Requirement",

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from eigassign.case.canonical import plain, to_yaml
 from eigassign.case.reader import KeyPath, Mark, dotted
@@ -14,8 +15,9 @@ from eigassign.case.rules.properties import property_at
 from eigassign.case.schema.design import Design
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.joints import freedom_of
+from eigassign.case.schema.measurements import Measurements
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
-from eigassign.case.schema.parts import Quantity
+from eigassign.case.schema.parts import FrozenDict, Quantity
 from eigassign.case.schema.study import AssignmentKeys, ExpansionKeys, ValidationKeys
 from eigassign.case.schema.targets import Requirement, TargetForm, requirements
 from eigassign.case.schema.trajectory import TrajectoryForm, named_trajectories
@@ -41,6 +43,7 @@ class CaseFile:
     expansion: ExpansionKeys
     targets: tuple[TargetForm, ...]
     assignment: AssignmentKeys
+    measurements: Measurements | None
     validation: ValidationKeys
     path: Path = field(compare=False)
     sha256: str = field(compare=False)
@@ -92,6 +95,27 @@ class CaseFile:
         named = named_trajectories(self.trajectory)
         return tuple((dotted(path), name, trajectory) for path, name, trajectory in named)
 
+    def with_design(self, y: Iterable[float]) -> CaseFile:
+        """The case with these values (SI) of its design parameters written into the mechanism."""
+        mechanism, coordinates = self.mechanism, self.coordinates
+        for column, value in zip(self.design.parameters.values(), y, strict=True):
+            head, *rest = column.parameter.split(".")
+            if head == "coordinates":
+                coordinates = _with_value(coordinates, rest, float(value))
+            else:
+                mechanism = _with_value(mechanism, [head, *rest], float(value))
+        return replace(self, mechanism=mechanism, coordinates=coordinates)
+
     def resolved(self) -> str:
         """The case as canonical YAML: SI values, defaults filled in; reads back equal."""
         return to_yaml({name: getattr(self, name) for name in Document.model_fields})
+
+
+def _with_value(part: Any, path: Sequence[str], value: float) -> Any:
+    """A copy of a part, or of a mapping of parts, with one number below it replaced."""
+    if not path:
+        return value
+    key, *rest = path
+    if isinstance(part, Mapping):
+        return FrozenDict({**part, key: _with_value(part[key], rest, value)})
+    return part.model_copy(update={key: _with_value(getattr(part, key), rest, value)})

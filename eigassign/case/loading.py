@@ -22,6 +22,7 @@ from eigassign.case.rules.plausibility import implausible
 from eigassign.case.rules.properties import bounds_hold_no_impossible_section, starts_outside
 from eigassign.case.rules.values import completed
 from eigassign.case.schema.document import Document, validated
+from eigassign.case.schema.measurements import MeasurementFile
 from eigassign.case.schema.targets import FrequencyFile
 from eigassign.case.schema.trajectory import FileTrajectory, named_trajectories
 from eigassign.errors import CaseError, Problem, StorageError, UsageError
@@ -101,6 +102,8 @@ def attached(document: Document, folder: Path) -> dict[str, str]:
     named = [motion.file for motion in motions if isinstance(motion, FileTrajectory)]
     curves = [curve for target in document.targets for _, curve in target.frequencies]
     named += [curve.file for curve in curves if isinstance(curve, FrequencyFile)]
+    if isinstance(document.measurements, MeasurementFile):
+        named.append(document.measurements.file)
     for link in document.mechanism.links.values():
         if link.type == "superelement":
             named += [link.stiffness, link.mass]

@@ -7,7 +7,7 @@ Reading order:
 
     arguments  options that several commands share
     reporter   stages, warnings and the log on stderr; JSON on stdout
-    runs       optimize, expand, validate, chart
+    runs       optimize, expand, update, validate, chart
     inspect    check, modes, schema
     batch      batch
     cache      cache path, list, clear
@@ -26,7 +26,7 @@ from eigassign._version import __version__
 from eigassign.cli.batch import batch
 from eigassign.cli.cache import cache
 from eigassign.cli.inspect import check, modes, schema
-from eigassign.cli.runs import chart, expand, optimize, validate
+from eigassign.cli.runs import chart, expand, optimize, update, validate
 
 _CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
@@ -79,5 +79,5 @@ def cli() -> None:
     """
 
 
-for command in (check, modes, optimize, expand, validate, chart, batch, cache, schema):
+for command in (check, modes, optimize, expand, update, validate, chart, batch, cache, schema):
     cli.add_command(command)

@@ -1,4 +1,4 @@
-"""The work on cases: `optimize`, `expand`, `validate`, `chart`."""
+"""The work on cases: `optimize`, `expand`, `update`, `validate`, `chart`."""
 
 from __future__ import annotations
 
@@ -90,6 +90,41 @@ def _show(outcome: Outcome, as_json: bool) -> None:
 
         print_assignment(outcome.results)
         click.echo(f"{outcome.folder} written in {outcome.seconds:.2f} s")
+
+
+@click.command()
+@arguments.case
+@click.option("--out", type=arguments.PATH, help="Folder (default: results/<case>_update).")
+@arguments.force
+@arguments.figures
+@arguments.json
+@arguments.common
+def update(case: Path, as_json: bool, **how: Any) -> int:
+    """Find the design parameters that explain the case's measured frequencies.
+
+    Least squares on exact frequencies, with intervals, what cannot be told from the measurements,
+    and the residual of each; updated.yaml is the case with the values found. Exit code 1 where the
+    measurements are not explained, or do not identify the parameters.
+    """
+    from eigassign.pipeline import update as updating
+
+    out = how["out"] or Path("results", f"{case.stem}_update")
+    with reporting(how) as reporter:
+        given = _options({**how, "out": out, "cache_dir": None, "no_cache": True}, reporter)
+        done = updating.update(case, given)
+        reporter.warn(done.results.warnings)
+    if as_json:
+        from eigassign.output.update_report import document
+
+        print_json({"run_folder": str(done.folder), **document(done.results)})
+    else:
+        from eigassign.output.console import print_tables
+        from eigassign.output.update_report import console_tables, headline
+
+        click.echo(headline(done.results))
+        print_tables(console_tables(done.results))
+        click.echo(f"{done.folder} written in {sum(done.results.timing_s.values()):.2f} s")
+    return 0 if done.results.verdict == "fitted" else 1
 
 
 @click.command()

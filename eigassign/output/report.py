@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
     from eigassign.chart.results import Chart
+    from eigassign.study.updating import UpdateResults
 
 # --- The page
 
@@ -39,11 +40,12 @@ def to_html(results: RunResults, plans: Sequence[FigurePlan], files: Mapping[str
 
 
 def page(
-    f: RunResults | Chart,
+    f: RunResults | Chart | UpdateResults,
     error: ErrorSummary | None,
     shown: Sequence[Table],
     plans: Sequence[FigurePlan],
     files: Mapping[str, bytes],
+    headline: str = "",
 ) -> bytes:
     """Any page of ours: what ``f`` is about, then tables, warnings and notes, then figures.
 
@@ -60,7 +62,7 @@ def page(
             image = f"data:{_EMBEDDED[kind]};base64,{text}"
         if own:
             figures.append((plan, image, list(own.values())))
-    html = _template().render(f=f, error=error, tables=shown, figures=figures)
+    html = _template().render(f=f, error=error, headline=headline, tables=shown, figures=figures)
     return (html + "\n").encode("utf-8", "xmlcharrefreplace")
 
 

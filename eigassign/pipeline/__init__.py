@@ -8,5 +8,6 @@ Reading order:
     run_files          the run folder, and the log in it
     run                the paper's flowchart: case, model, expansion, assignment, verification
     queries            check a case; its frequencies at one point
+    update             measured frequencies to the parameters that explain them
     chart              time against accuracy of every method on one case
 """

@@ -17,5 +17,7 @@ Reading order:
     assignment  from the targets to the answer, by either method
     accuracy    errors of mesh, reduction, expansion and round-off; whether the motion is slow
     drawing     the mechanism as lines and symbols: in poses, and in its modes
+    measured    the measurements of a case, each at its pose
+    updating    parameters from measured frequencies, with intervals; what is not identified
     collect     all of it put together as the results of a run
 """

@@ -34,16 +34,26 @@ class ExactResponse:
         """Raises EigassignError where the mechanism has no modes, or no pose, at this design."""
         q, of_design = self.path.at(y)
         x, n_q = self.model.x(q, y), q.shape[1]
-        block = max(1, BLOCK // self.model.n_dof**2)
-        parts = [
-            eigenvalue_slopes(self.model.pencil, x[at : at + block], self.count, self.scales)
-            for at in range(0, len(x), block)
-        ]
-        lam, slopes = (np.concatenate(both) for both in zip(*parts, strict=True))
-        hz, by_y = np.sqrt(lam) / (2.0 * np.pi), slopes[..., n_q:]
+        hz, slopes = exact_slopes(self.model, x, self.count, self.scales)
+        by_y = slopes[..., n_q:]
         if self.path.follows_design:
             by_y = by_y + slopes[..., :n_q] @ of_design
-        return Frequencies(hz, by_y / (8.0 * np.pi**2 * hz[..., None]))
+        return Frequencies(hz, by_y)
+
+
+def exact_slopes(model: Model, x: Floats, count: int, scales: Floats) -> tuple[Floats, Floats]:
+    """The lowest frequencies (n, count) in Hz at x (n, n_x), and their slopes (n, count, n_x).
+
+    ``scales`` and what is raised are those of `eigenvalue_slopes`.
+    """
+    block = max(1, BLOCK // model.n_dof**2)
+    parts = [
+        eigenvalue_slopes(model.pencil, x[at : at + block], count, scales)
+        for at in range(0, len(x), block)
+    ]
+    lam, slopes = (np.concatenate(both) for both in zip(*parts, strict=True))
+    hz = np.sqrt(lam) / (2.0 * np.pi)
+    return hz, slopes / (8.0 * np.pi**2 * hz[..., None])
 
 
 def exact_response(scene: Scene, count: int) -> ExactResponse:

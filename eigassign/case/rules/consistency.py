@@ -79,6 +79,7 @@ RULES: tuple[Rule, ...] = (
     targets.targets_are_on_trajectories,
     targets.a_mode_has_one_frequency_at_a_time,
     targets.followed_modes_are_at_a_pose,
+    targets.measurements_are_at_poses,
     targets.one_shot_has_a_quadratic_program,
     targets.profiles_cover_their_trajectories,
 )

@@ -1,4 +1,4 @@
-"""What is asked of the frequencies: targets, where they hold, and the method that takes them."""
+"""What is asked of the frequencies, where, and by which method; and where they were measured."""
 
 from __future__ import annotations
 
@@ -74,27 +74,9 @@ def _meet(a: tuple[int, str, Span | None], b: tuple[int, str, Span | None]) -> b
 
 def followed_modes_are_at_a_pose(tree: Tree) -> Iterator[Finding]:
     """A mode named by its shape has a pose of the mechanism and a possible design."""
-    q, known = names(tree, "coordinates"), trajectory_names(tree)
-    motions = dict(zip(known, _motions(tree), strict=True))
     lists = {name: choices(body) for name, body in design_entries(tree)}
     for path, body in followed_modes(tree):
-        given, where = at(body, "at", "q"), text(body, "at", "trajectory")
-        time = number(at(body, "at", "time"), TIME)
-        if isinstance(given, tuple) and len(given) != len(q):
-            message = f"needs {len(q)} entries, one for each coordinate ({listed(q)}); got "
-            yield (*path, "at", "q"), f"{message}{len(given)}"
-        if where is not None and where not in known:
-            yield (*path, "at", "trajectory"), unknown("trajectory", where, known)
-        elif time is not None and not known:
-            yield (*path, "at", "time"), "there is no trajectory: give q"
-        elif time is not None and where is None and len(known) > 1:
-            message = f"is a time of one trajectory: name it as trajectory ({listed(known)})"
-            yield (*path, "at", "time"), message
-        elif time is not None:
-            motion = motions[where or known[0]] or (time, time)
-            if not motion[0] <= time <= motion[1]:
-                lasts = "the trajectory lasts from {:g} to {:g} s".format(*motion)
-                yield (*path, "at", "time"), f"{time:g} s is outside: {lasts}"
+        yield from _no_pose(tree, (*path, "at"), at(body, "at"))
         for name in names(body, "design"):
             place, value = (*path, "design", name), at(body, "design", name)
             if name not in lists:
@@ -105,6 +87,34 @@ def followed_modes_are_at_a_pose(tree: Tree) -> Iterator[Finding]:
                     yield place, f"expected one of the choices {listed(named)}, got {shown(value)}"
                 elif value not in named:
                     yield place, unknown("choice", value, named)
+
+
+def measurements_are_at_poses(tree: Tree) -> Iterator[Finding]:
+    """Each measurement of a list was made at a time of a trajectory, or with a value for each q."""
+    for k, body in enumerate(entries(tree, "measurements")):
+        yield from _no_pose(tree, ("measurements", k), body)
+
+
+def _no_pose(tree: Tree, path: KeyPath, body: object) -> Iterator[Finding]:
+    """What keeps `time`, `trajectory` and `q` of a part from being a pose of the mechanism."""
+    q, known = names(tree, "coordinates"), trajectory_names(tree)
+    given, where = at(body, "q"), text(body, "trajectory")
+    time = number(at(body, "time"), TIME)
+    if isinstance(given, tuple) and len(given) != len(q):
+        message = f"needs {len(q)} entries, one for each coordinate ({listed(q)}); got "
+        yield (*path, "q"), f"{message}{len(given)}"
+    if where is not None and where not in known:
+        yield (*path, "trajectory"), unknown("trajectory", where, known)
+    elif time is not None and not known:
+        yield (*path, "time"), "there is no trajectory: give q"
+    elif time is not None and where is None and len(known) > 1:
+        message = f"is a time of one trajectory: name it as trajectory ({listed(known)})"
+        yield (*path, "time"), message
+    elif time is not None:
+        motion = dict(zip(known, _motions(tree), strict=True))[where or known[0]] or (time, time)
+        if not motion[0] <= time <= motion[1]:
+            lasts = "the trajectory lasts from {:g} to {:g} s".format(*motion)
+            yield (*path, "time"), f"{time:g} s is outside: {lasts}"
 
 
 def one_shot_has_a_quadratic_program(tree: Tree) -> Iterator[Finding]:

@@ -35,6 +35,7 @@ from eigassign.case.rules.properties import (
     properties,
 )
 from eigassign.case.schema.parts import Quantity
+from eigassign.case.schema.targets import FREQUENCY
 from eigassign.case.suggestions import shown
 from eigassign.case.units import QuantityError, read, read_rate
 
@@ -124,6 +125,11 @@ def _undecided(tree: Tree) -> Iterator[Undecided]:
             if name in known:
                 prop = known[name]
                 yield (*path, "design", name), value, prop.quantity if prop else ANY
+    for k, body in enumerate(entries(tree, "measurements")):
+        yield from _in_list(at(body, "q"), kinds, ("measurements", k, "q"))
+        yield from _of_deviation(at(body, "deviation"), ("measurements", k, "deviation"))
+    path = ("measurements", "deviation")
+    yield from _of_deviation(at(tree, *path), path)
     span = at(tree, "validation", "q_span")
     alike = len({kind.dimension for kind in kinds}) <= 1
     common = (kinds[0] if kinds else ANY) if alike else None
@@ -162,6 +168,12 @@ def _of_design(tree: Tree, known: Mapping[str, Property | None]) -> Iterator[Und
             yield ("design", "constraints", name, key), at(body, key), one
 
 
+def _of_deviation(value: object, path: KeyPath) -> Iterator[Undecided]:
+    """A deviation that is no share of the frequency."""
+    if isinstance(value, str) and not value.rstrip().endswith("%"):
+        yield path, value, FREQUENCY
+
+
 def _of_assembly(tree: Tree) -> Iterator[Undecided]:
     """Where the loops are put together, and guesses of their passive joints."""
     path: KeyPath = ("mechanism", "assembly")
@@ -192,6 +204,7 @@ def _files(tree: Tree, folder: Path) -> Iterator[tuple[KeyPath, object]]:
     named = [(path, body, ("stiffness", "mass")) for _, path, body in links(tree, "superelement")]
     named += [(p, body, ("file",)) for p, body in trajectories(tree) if at(body, "tip") is None]
     named += [(path, body, ("file",)) for path, body in curves(tree)]
+    named.append((("measurements",), at(tree, "measurements"), ("file",)))
     for path, body, keys in named:
         for key in keys:
             file = text(body, key)

@@ -15,6 +15,7 @@ from eigassign.case.reader import Finding, KeyPath, Tree
 from eigassign.case.schema.design import ENTRIES, RESERVED, Design, Parameter, is_entry
 from eigassign.case.schema.joints import JOINTS
 from eigassign.case.schema.links import LINKS
+from eigassign.case.schema.measurements import Measurements
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.schema.parts import FrozenDict, Named, Part, Quantity, keys_of, wrong
 from eigassign.case.schema.sections import SHAPES
@@ -42,6 +43,7 @@ class Document(Part):
     expansion: ExpansionKeys = ExpansionKeys.model_construct()
     targets: tuple[TargetForm, ...] = ()
     assignment: AssignmentKeys = AssignmentKeys.model_construct()
+    measurements: Measurements | None = None
     validation: ValidationKeys = ValidationKeys.model_construct()
 
 

@@ -8,5 +8,6 @@ In reading order; each imports from those above it only:
     mechanism  links, joints, bodies and springs; poses along the trajectory
     modes      mode shapes
     run        which figures a run has
+    update     measured frequencies against the model, parameters with intervals
     front      time against error of a chart's methods
 """

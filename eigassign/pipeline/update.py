@@ -1,0 +1,65 @@
+"""`eigassign update`: from measured frequencies to parameters, and the folder of that."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from eigassign.output.update_report import write_update
+from eigassign.pipeline.run import DEFAULT, Options
+from eigassign.pipeline.run_files import new_run_folder
+from eigassign.pipeline.stages import Stages
+from eigassign.study.built_case import Case, load_case
+from eigassign.study.updating import UpdateResults, collect_update, solve_update, update_problem
+
+
+@dataclass(frozen=True)
+class Updated:
+    """A finished update: what it found, the case with the values found, and its folder if any."""
+
+    results: UpdateResults
+    case: Case
+    folder: Path | None = None
+
+    @property
+    def design(self) -> dict[str, float]:
+        """The updated parameters by name, SI."""
+        return self.results.design
+
+    @property
+    def intervals(self) -> dict[str, tuple[float, float]]:
+        """Their 95 % intervals, SI."""
+        return self.results.intervals
+
+
+def update(path: str | Path, options: Options) -> Updated:
+    """`update_case`, and its folder: results.json, report.html, figures, case and updated case.
+
+    Raises StorageError before anything is computed where the folder may not be replaced.
+    """
+    case = load_case(path)
+    with new_run_folder(case.file, options.out, options.force) as folder:
+        found = update_case(case, options)
+        options.progress("writing the report")
+        write_update(found.results, folder.hidden, options.figures)
+        for name, file in (("case.yaml", case.file), ("updated.yaml", found.case.file)):
+            (folder.hidden / name).write_text(file.resolved(), encoding="utf-8")
+    return replace(found, folder=folder.path)
+
+
+def update_case(case: Case, options: Options = DEFAULT) -> Updated:
+    """The parameters that explain the measurements, and the case with them; nothing written.
+
+    Raises CaseError for what the case lacks and for wrong measurements.
+    """
+    stages = Stages(options.progress)
+    with stages("model", "assembling K and M"):
+        case.model()
+    with stages("measurements", "reading the measurements"):
+        problem = update_problem(case)
+    with case.located():
+        with stages("fit", "fitting the parameters, and their intervals"):
+            found = solve_update(problem)
+        with stages("checks", "checking mesh and neighbouring modes"):
+            results = collect_update(problem, found, stages.timing_s)
+    return Updated(results, Case(case.file.with_design(found.y)))

@@ -1,0 +1,148 @@
+"""The measurements of a case, each at its pose, in SI units.
+
+A measurement is made at q, or at a time of a trajectory: there q is linear between samples. The
+trajectory is that of the design as the file writes it, for that is what the drives were told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.assignment.checks import frozen
+from eigassign.case.schema.design import Tolerance
+from eigassign.case.schema.measurements import MOST, Measurement, MeasurementFile
+from eigassign.case.suggestions import shown, unknown
+from eigassign.case.table import Column, Table, read_table
+from eigassign.case.units import DIMENSIONS
+from eigassign.errors import CaseError, MechanismError
+from eigassign.mechanism.trajectory.csv import TIME, coordinate_columns
+from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.study.built_case import Case
+
+Floats = NDArray[np.float64]
+_KEY = "measurements.file"
+_HIGHEST = 1000  # mode, as in a case file
+
+
+@dataclass(frozen=True)
+class PosedMeasurement:
+    """One measured frequency and where it was measured."""
+
+    label: str  # where it is written: "arm.csv:3", "measurements[2]"
+    time_s: float | None
+    trajectory: str | None
+    q: Floats  # (n_q,) in rad or m
+    mode: int
+    hz: float
+    deviation_hz: float
+
+
+def read_measurements(case: Case) -> tuple[tuple[PosedMeasurement, ...], tuple[str, ...]]:
+    """All measurements in the order given, and notes on what was ignored.
+
+    Raises CaseError for a file that cannot be read or holds what is no measurement (with its line),
+    for a time outside the trajectory, and for a trajectory that cannot be followed.
+    """
+    given = case.file.measurements
+    if given is None:
+        problem = case.file.problem("measurements", "is missing, and update needs it")
+        raise CaseError((problem,))
+    if isinstance(given, MeasurementFile):
+        with case.located():
+            return _from_file(case, given)
+    return tuple(_posed(case, f"measurements[{k}]", each) for k, each in enumerate(given)), ()
+
+
+def _posed(case: Case, label: str, given: Measurement) -> PosedMeasurement:
+    with case.located():
+        q = np.array(given.q, dtype=np.float64)
+        if given.time is not None:
+            q = _at_time(case.trajectory, given.time, given.trajectory, f"{label}.time", "")
+    deviation = given.deviation.deviation(given.frequency)
+    hz, where = float(given.frequency), given.trajectory
+    return PosedMeasurement(label, given.time, where, frozen(q), given.mode, hz, deviation)
+
+
+def _at_time(path: Trajectories, time: float, name: str | None, key: str, where: str) -> Floats:
+    rows = path.rows_of(name)
+    time_s, q = path.time_s[rows], path.q[rows]
+    slack = 1e-9 * float(np.ptp(time_s))
+    if not time_s[0] - slack <= time <= time_s[-1] + slack:
+        lasts = f"the trajectory lasts from {time_s[0]:g} to {time_s[-1]:g} s"
+        raise MechanismError(key, f"{where}{time:g} s is outside: {lasts}")
+    return np.array([np.interp(time, time_s, q[:, i]) for i in range(q.shape[1])])
+
+
+# --- From a CSV file
+
+
+def _from_file(
+    case: Case, given: MeasurementFile
+) -> tuple[tuple[PosedMeasurement, ...], tuple[str, ...]]:
+    file, hz = case.file, DIMENSIONS["frequency"]
+    names = list(file.coordinates)
+    columns = [
+        Column(TIME, (DIMENSIONS["time"],), optional=True),
+        Column("trajectory", optional=True),
+        Column("mode", (DIMENSIONS["fraction"],)),
+        Column("frequency", (hz,)),
+        Column("deviation", (hz, DIMENSIONS["fraction"]), optional=given.deviation is not None),
+        *(
+            Column(column.name, column.dimensions, optional=True)
+            for column in coordinate_columns(names, file.coordinate_units)
+        ),
+    ]
+    table = read_table(Path(given.file), _KEY, columns)
+    if not 0 < len(table.lines) <= MOST:
+        some = "no measurements" if not table.lines else f"more than {MOST} measurements"
+        raise MechanismError(_KEY, f"{table.file}: {some}")
+    with_q = [name for name in names if name in table.numbers]
+    if len(with_q) != (0 if TIME in table.numbers else len(names)):
+        expected = f"either the column {TIME}, or one for each coordinate ({', '.join(names)})"
+        raise MechanismError(_KEY, f"{table.file}: expected {expected}")
+    return tuple(_rows(case, table, given.deviation, names)), table.notes
+
+
+def _rows(
+    case: Case, table: Table, default: Tolerance | None, names: list[str]
+) -> Iterator[PosedMeasurement]:
+    known = [name for _, name, _ in case.file.trajectories]
+    for k in range(len(table.lines)):
+        where = f"{table.where(k)}: "
+        mode, hz = table.numbers["mode"][k], table.numbers["frequency"][k]
+        if not (mode.is_integer() and 1 <= mode <= _HIGHEST):
+            raise MechanismError(_KEY, f"{where}column mode: {mode:g} is not a mode (1, 2, …)")
+        if not hz > 0.0:
+            raise MechanismError(_KEY, f"{where}column frequency: must be > 0 Hz, got {hz:g}")
+        named = table.words["trajectory"][k] if "trajectory" in table.words else ""
+        if named and named not in known:
+            raise MechanismError(_KEY, where + unknown("trajectory", named, known))
+        if TIME in table.numbers:
+            time: float | None = table.numbers[TIME][k]
+            if not known:
+                raise MechanismError(_KEY, f"{where}there is no trajectory: give q")
+            if not named and len(known) > 1:
+                message = f"which trajectory? Give a column trajectory ({', '.join(known)})"
+                raise MechanismError(_KEY, where + message)
+            q = _at_time(case.trajectory, time or 0.0, named or None, _KEY, where)
+        else:
+            time, q = None, np.array([table.numbers[name][k] for name in names])
+        deviation = _deviation(table, k, hz, default)
+        label = table.where(k)
+        yield PosedMeasurement(label, time, named or None, frozen(q), int(mode), hz, deviation)
+
+
+def _deviation(table: Table, k: int, hz: float, default: Tolerance | None) -> float:
+    """In Hz."""
+    if "deviation" not in table.numbers:
+        return default.deviation(hz) if default is not None else 0.0
+    value = table.numbers["deviation"][k]
+    if not value > 0.0:
+        message = f"{table.where(k)}: column deviation: must be > 0, got {shown(value)}"
+        raise MechanismError(_KEY, message)
+    return value if table.dimensions["deviation"].si else value * hz

@@ -1,0 +1,379 @@
+"""Parameters of a case from measured frequencies, and what the measurements say of them.
+
+The unknowns are the design parameters between their bounds, starting from the values in the file.
+Modes are numbered by size, as measured. Linear constraints, the limit on the mass, targets and
+prices are about what shall be, not about what is: they are left aside, and lists of values count as
+ranges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign._version import __version__
+from eigassign.assignment.identification import Identified, MeasuredFrequencies, identify
+from eigassign.assignment.sequential import End
+from eigassign.case import CaseFile
+from eigassign.errors import CaseError
+from eigassign.modal.model import Model
+from eigassign.study.built_case import Case
+from eigassign.study.judgement import NEAR
+from eigassign.study.measured import PosedMeasurement, read_measurements
+from eigassign.study.response import exact_slopes
+
+Floats = NDArray[np.float64]
+POOR = 0.01  # p-value below which the model does not explain the measurements
+OUTLIER = 3.0  # standard deviations
+FINE = 0.5  # standard deviations that the mesh's own error may make up
+NAMED = 1e-2  # share in a direction below which a parameter is not named
+
+# --- Results
+
+
+@dataclass(frozen=True)
+class UpdatedParameter:
+    """One parameter before and after, in SI units; its interval holds it with 95 %."""
+
+    name: str
+    parameter: str
+    unit: str
+    initial: float
+    value: float
+    deviation: float | None  # standard; None where a bound holds it or nothing identifies it
+    low: float
+    high: float
+    low_is_bound: bool  # the interval ends there at the bound, which measurements do not exclude
+    high_is_bound: bool
+    lower: float
+    upper: float
+    held: str  # the bound that holds it, lower or upper; or ""
+
+
+@dataclass(frozen=True)
+class ExplainedMeasurement:
+    """One measurement, and the model's frequency before and after, in Hz."""
+
+    label: str
+    trajectory: str | None
+    time_s: float | None
+    q: tuple[float, ...]
+    mode: int
+    measured_hz: float
+    deviation_hz: float
+    initial_hz: float
+    updated_hz: float
+
+    @property
+    def initial_residual(self) -> float:
+        """(model − measured)/σ before."""
+        return (self.initial_hz - self.measured_hz) / self.deviation_hz
+
+    @property
+    def residual(self) -> float:
+        """(model − measured)/σ after."""
+        return (self.updated_hz - self.measured_hz) / self.deviation_hz
+
+    @property
+    def is_outlier(self) -> bool:
+        """Whether it is further off than three standard deviations."""
+        return abs(self.residual) > OUTLIER
+
+
+@dataclass(frozen=True)
+class UnidentifiedDirection:
+    """A common change of parameters (SI, by name) that the measurements do not notice."""
+
+    change: Mapping[str, float]
+    words: str
+
+
+@dataclass(frozen=True)
+class UpdateResults:
+    """What updating a case found."""
+
+    title: str
+    reference: str | None
+    case_name: str
+    case_sha256: str
+    case_files: Mapping[str, str]
+    version: str
+    q_names: tuple[str, ...]
+    q_units: tuple[str, ...]
+    parameters: tuple[UpdatedParameter, ...]
+    covariance: Floats  # (n_y, n_y) in SI units; inf and NaN where not identified
+    measurements: tuple[ExplainedMeasurement, ...]
+    unidentified: tuple[UnidentifiedDirection, ...]
+    initial_chi_squared: float
+    chi_squared: float
+    degrees: int  # of freedom
+    p_value: float | None  # chance of so large a χ² if model and deviations are right
+    steps: int
+    ended: str  # how the steps did
+    verdict: str  # fitted, poor_fit, not_identified, unfinished
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+    timing_s: Mapping[str, float]
+
+    @property
+    def design(self) -> dict[str, float]:
+        """The updated parameters by name, SI."""
+        return {row.name: row.value for row in self.parameters}
+
+    @property
+    def intervals(self) -> dict[str, tuple[float, float]]:
+        """Their 95 % intervals."""
+        return {row.name: (row.low, row.high) for row in self.parameters}
+
+    @property
+    def outliers(self) -> tuple[ExplainedMeasurement, ...]:
+        """Measurements more than three standard deviations off."""
+        return tuple(row for row in self.measurements if row.is_outlier)
+
+    @cached_property
+    def correlation(self) -> Floats:
+        """(n_y, n_y); NaN of parameters that are held or not identified."""
+        deviation = np.array([row.deviation or np.nan for row in self.parameters])
+        return np.asarray(self.covariance / np.outer(deviation, deviation))
+
+
+# --- Updating
+
+
+def require_updatable(file: CaseFile) -> None:
+    """Raise CaseError naming every key that updating needs and the case lacks."""
+    needs = {
+        "design": (bool(file.design.parameters), "at least one parameter that is not known"),
+        "measurements": (file.measurements is not None, "frequencies that were measured"),
+    }
+    problems = tuple(
+        file.problem(key, f"is missing, and update needs it: {why}")
+        for key, (given, why) in needs.items()
+        if not given
+    )
+    if problems:
+        raise CaseError(problems)
+
+
+@dataclass(frozen=True)
+class UpdateProblem:
+    """A case with its measurements, each pose once: what is solved."""
+
+    case: Case
+    measured: tuple[PosedMeasurement, ...]
+    notes: tuple[str, ...]
+    q: Floats  # (n_p, n_q) poses
+    rows: NDArray[np.intp]  # (m,) which pose each measurement has
+    columns: NDArray[np.intp]  # (m,) its mode, from 0
+    lower: Floats
+    upper: Floats
+
+    @property
+    def model(self) -> Model:
+        """The model of the case."""
+        return self.case.model()
+
+    @property
+    def frequencies(self) -> MeasuredFrequencies:
+        """The measured values alone."""
+        hz = np.array([each.hz for each in self.measured])
+        return MeasuredFrequencies(hz, np.array([each.deviation_hz for each in self.measured]))
+
+    def response(self, y: Floats) -> tuple[Floats, Floats]:
+        """Exact frequencies (m,) in Hz of what was measured, and their slopes (m, n_y)."""
+        n_q, count = self.q.shape[1], int(self.columns.max()) + 1
+        scales = np.append(np.zeros(n_q), self.upper - self.lower)
+        hz, slopes = exact_slopes(self.model, self.model.x(self.q, y), count, scales)
+        return hz[self.rows, self.columns], slopes[self.rows, self.columns, n_q:]
+
+
+def update_problem(case: Case) -> UpdateProblem:
+    """What is to be solved; raises CaseError for wrong measurements."""
+    require_updatable(case.file)
+    measured, notes = read_measurements(case)
+    q, rows = np.unique(np.array([each.q for each in measured]), axis=0, return_inverse=True)
+    parameters = case.file.design.parameters.values()
+    problem = UpdateProblem(
+        case=case,
+        measured=measured,
+        notes=notes,
+        q=q,
+        rows=rows.ravel(),
+        columns=np.array([each.mode - 1 for each in measured]),
+        lower=np.array([p.min for p in parameters]),
+        upper=np.array([p.max for p in parameters]),
+    )
+    with case.located():
+        labels = {int(row): each.label for row, each in zip(problem.rows, measured, strict=True)}
+        problem.model.require_on_rails(q, case.initial_design, lambda k: labels[k])
+    return problem
+
+
+def solve_update(problem: UpdateProblem) -> Identified:
+    """The most likely parameters; raises EigassignError where the start has no answer."""
+    start, limits = problem.case.initial_design, (problem.lower, problem.upper)
+    return identify(problem.response, problem.frequencies, *limits, start)
+
+
+def collect_update(
+    problem: UpdateProblem, found: Identified, timing_s: Mapping[str, float]
+) -> UpdateResults:
+    """Everything that was found, as plain numbers and words."""
+    case = problem.case
+    names, unidentified = problem.model.y_names, found.unidentified
+    directions = tuple(_direction(names, row, problem) for row in unidentified)
+    return UpdateResults(
+        title=case.file.title,
+        reference=case.file.reference,
+        case_name=case.file.path.stem.encode("utf-8", "replace").decode("utf-8"),
+        case_sha256=case.file.sha256,
+        case_files=case.file.files,
+        version=__version__,
+        q_names=problem.model.q_names,
+        q_units=case.file.coordinate_units,
+        parameters=tuple(_parameters(problem, found)),
+        covariance=found.covariance,
+        measurements=tuple(
+            ExplainedMeasurement(
+                each.label,
+                each.trajectory,
+                each.time_s,
+                tuple(each.q.tolist()),
+                each.mode,
+                each.hz,
+                each.deviation_hz,
+                float(found.initial_hz[k]),
+                float(found.hz[k]),
+            )
+            for k, each in enumerate(problem.measured)
+        ),
+        unidentified=directions,
+        initial_chi_squared=found.initial_chi_squared,
+        chi_squared=found.chi_squared,
+        degrees=found.degrees,
+        p_value=found.p_value,
+        steps=len(found.fit.steps),
+        ended=str(found.fit.end),
+        verdict=_verdict(found),
+        notes=(*problem.notes, *_notes(problem, found)),
+        warnings=(*map(str, case.file.warnings), *_warnings(problem, found)),
+        timing_s=dict(timing_s),
+    )
+
+
+def _verdict(found: Identified) -> str:
+    if found.fit.end is End.STEPS:
+        return "unfinished"
+    if found.p_value is not None and found.p_value < POOR:
+        return "poor_fit"
+    return "not_identified" if len(found.unidentified) else "fitted"
+
+
+def _parameters(problem: UpdateProblem, found: Identified) -> Iterator[UpdatedParameter]:
+    file, initial, deviation = problem.case.file, problem.case.initial_design, found.deviation
+    for k, (name, column) in enumerate(file.design.parameters.items()):
+        interval = found.intervals[k]
+        yield UpdatedParameter(
+            name=name,
+            parameter=column.parameter,
+            unit=file.design_units[k],
+            initial=float(initial[k]),
+            value=float(found.y[k]),
+            deviation=float(deviation[k]) if 0.0 < deviation[k] < np.inf else None,
+            low=interval.low,
+            high=interval.high,
+            low_is_bound=interval.at_lower,
+            high_is_bound=interval.at_upper,
+            lower=column.min,
+            upper=column.max,
+            held=found.held[k],
+        )
+
+
+# --- What is not identified, in words
+
+
+def _direction(
+    names: Sequence[str], change: Floats, problem: UpdateProblem
+) -> UnidentifiedDirection:
+    width = problem.upper - problem.lower
+    share = np.abs(change) / np.where(width > 0.0, width, 1.0)
+    taking = [int(k) for k in np.flatnonzero(share > NAMED * share.max())]
+    by_name = {names[k]: float(change[k]) for k in taking}
+    return UnidentifiedDirection(by_name, _in_words(by_name))
+
+
+def _in_words(change: Mapping[str, float]) -> str:
+    """ "E has no effect"; "m1 and m2 only as m1 + 0.5 m2"; of more, how they change together."""
+    if len(change) == 1:
+        return f"{next(iter(change))} has no effect on what was measured"
+    if len(change) == 2:
+        (a, along_a), (b, along_b) = change.items()
+        factor = -along_a / along_b  # a + factor · b stays
+        sign = "+" if factor > 0.0 else "−"
+        size = f"{abs(factor):.3g} " if abs(abs(factor) - 1.0) > 5e-4 else ""
+        return f"{a} and {b} are told only together, as {a} {sign} {size}{b}"
+    first = next(iter(change.values()))
+    together = ", ".join(f"{name} by {value / first:.3g}" for name, value in change.items())
+    return f"{', '.join(change)} can change together unnoticed: {together}"
+
+
+# --- Notes and warnings
+
+
+def _notes(problem: UpdateProblem, found: Identified) -> Iterator[str]:
+    several = len(problem.measured) != len(problem.q)
+    poses = f" at {len(problem.q)} poses" if several else ""
+    yield f"{len(problem.measured)} measured frequencies{poses}, {len(found.y)} parameters"
+    if found.rounds > 1:
+        yield (
+            "the first fit was a local minimum: a profile came upon a better explanation, from "
+            "which the fit was made anew"
+        )
+    if not np.array_equal(
+        start := problem.case.initial_design, np.clip(start, problem.lower, problem.upper)
+    ):
+        yield "the values in the file lie outside their bounds: the fit started from the bounds"
+    if problem.case.file.design.catalogues:
+        yield "lists of values and choices count as ranges from their smallest to largest value"
+
+
+def _warnings(problem: UpdateProblem, found: Identified) -> Iterator[str]:
+    yield from _neighbours(problem, found)
+    x = problem.model.x(problem.q, found.y)
+    modes = sorted({each.mode for each in problem.measured})
+    error = problem.case.discretisation_error(x, modes)
+    if error is None:
+        return
+    at = [modes.index(each.mode) for each in problem.measured]
+    share = error[problem.rows, at] * found.hz / problem.frequencies.deviation
+    worst = int(np.argmax(share))
+    if share[worst] > FINE:
+        yield (
+            f"the mesh makes the frequency of {problem.measured[worst].label} wrong by about "
+            f"{share[worst]:.2g} of its standard deviations, and the parameters take that up: "
+            "give the links more elements, or auto"
+        )
+
+
+def _neighbours(problem: UpdateProblem, found: Identified) -> Iterator[str]:
+    """A warning where a measured mode may be its neighbour: they are within 1 % at ŷ."""
+    most = problem.model.n_dof - problem.model.n_rigid
+    count = min(int(problem.columns.max()) + 2, most)
+    hz = problem.model.frequencies(problem.q, found.y, count)
+    close = np.diff(hz, axis=1) < NEAR * hz[:, :-1]
+    doubtful = [
+        each.label
+        for each, row, column in zip(problem.measured, problem.rows, problem.columns, strict=True)
+        if close[row, max(column - 1, 0) : column + 1].any()
+    ]
+    if doubtful:
+        more = f" and {len(doubtful) - 3} more" if len(doubtful) > 3 else ""
+        yield (
+            f"{', '.join(doubtful[:3])}{more}: a neighbouring mode is within 1 %, and modes are "
+            "numbered by size: make sure that the number is that of the mode measured"
+        )

@@ -1,0 +1,95 @@
+"""The update command: its folder, its JSON, its exit codes, the case it leaves."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from eigassign.cli import main
+
+CASES = Path(__file__).parents[2] / "cases"
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Path:
+    for name in ("arm_update.yaml", "arm_update.csv"):
+        shutil.copy(CASES / name, tmp_path)
+    return tmp_path / "arm_update.yaml"
+
+
+def run(case: Path, *options: str) -> int:
+    return main(["update", str(case), "--quiet", "--out", str(case.parent / "out"), *options])
+
+
+def test_an_update_leaves_a_whole_folder_and_a_case_that_can_be_used(
+    case: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(case) == 0
+    shown = capsys.readouterr().out
+    assert shown.splitlines()[0].startswith("k1 = ")
+    assert "this explains the measurements" in shown.splitlines()[0]
+    folder = case.parent / "out"
+    names = {path.name for path in folder.iterdir()}
+    assert names == {"case.yaml", "figures", "report.html", "results.json", "run.json",
+                     "updated.yaml"}  # fmt: skip
+    assert {p.name for p in (folder / "figures").iterdir()} == {
+        "measurements.png",
+        "parameters.png",
+    }
+    kept = json.loads((folder / "results.json").read_text())
+    page = (folder / "report.html").read_text()
+    assert kept["headline"].replace("χ", "&#967;")[:20] in page
+    assert (kept["verdict"], len(kept["measurements"])) == ("fitted", 12)
+
+    assert main(["update", str(folder / "updated.yaml"), "--quiet", "--json", "--figures", "none",
+                 "--out", str(case.parent / "again")]) == 0  # fmt: skip
+    again = json.loads(capsys.readouterr().out)
+    for name, row in kept["parameters"].items():
+        assert again["parameters"][name]["initial"] == row["value"]
+        assert again["parameters"][name]["value"] == pytest.approx(row["value"], rel=1e-6)
+
+
+def test_measurements_that_are_not_explained_set_the_exit_code(
+    case: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = case.with_suffix(".csv")
+    table.write_text(table.read_text().replace("0,60,3,", "0,60,3,9"))
+    assert run(case, "--json", "--figures", "none") == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"] == "poor_fit"
+    assert found["fit"]["p_value"] < 0.01
+    assert [row["label"] for row in found["measurements"] if row["outlier"]]
+    assert "NOT EXPLAINED" in found["headline"]
+
+
+def test_parameters_that_are_not_identified_set_the_exit_code_and_are_null(
+    case: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = case.read_text().replace(
+        "\nmeasurements:",
+        "  hub: {parameter: bodies.hub.mass, min: 0, max: 5}\n\nmeasurements:",
+    )
+    text = text.replace("  bodies:", "  bodies:\n    hub: {at: upper_arm.start, mass: 2}")
+    case.write_text(text.replace("rad, 2]", "rad, 2, 2]"))
+    assert run(case, "--json") == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"] == "not_identified"
+    assert found["not_identified"][0]["words"] == "hub has no effect on what was measured"
+    assert found["parameters"]["hub"]["high_is_bound"]
+    report = (case.parent / "out" / "report.html").read_text()
+    assert "the whole range of its bounds is possible" in report
+
+
+def test_wrong_measurements_are_named_by_line_and_leave_nothing(
+    case: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = case.with_suffix(".csv")
+    table.write_text(table.read_text().replace("0,60,2,", "0,60,0,"))
+    assert run(case) == 2
+    error = capsys.readouterr().err
+    assert "arm_update.yaml:39:" in error
+    assert "arm_update.csv:8: column mode: 0 is not a mode" in error
+    assert not (case.parent / "out").exists()
