@@ -3,8 +3,8 @@
     J(y) = Σ_g w_g Σ_k ω_k (f(t_k, y) / f_d(t_k) − 1)² / Σ_g w_g Σ_k ω_k
 
 over the bounds and linear constraints of a case, with g its targets and ω_k trapezoidal weights,
-each trajectory for itself; and the worst case, min max_k,g |f / f_d − 1|. Only the exact modes are
-the package's. Slopes follow from the modes: ∂f/∂y = φᵀ (K_y − λ M_y) φ / (8 π² f).
+each trajectory for itself; and the worst case, min max_k,g w_g |f / f_d − 1|. Only the exact modes
+are the package's. Slopes follow from the modes: ∂f/∂y = φᵀ (K_y − λ M_y) φ / (8 π² f).
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ class ExactAssignment:
 
     model: Any
     q: Floats
-    targets: list[tuple[slice, int, Floats, Floats]]  # rows, column of the mode, f_d, weights
+    targets: list[tuple[slice, int, Floats, Floats]]  # rows, column of the mode, f_d, share of J
+    weights: list[float]  # of the targets
     initial: Floats
     lower: Floats
     upper: Floats
@@ -91,6 +92,12 @@ class ExactAssignment:
         """√ of the weight of each error in J."""
         return np.sqrt(np.concatenate([weights for *_, weights in self.targets]))
 
+    @property
+    def scales(self) -> Floats:
+        """w of each error, for the worst case."""
+        sizes = [len(wanted) for _, _, wanted, _ in self.targets]
+        return np.repeat(self.weights, sizes)
+
     def gradient(self, y: Floats) -> Floats:
         """∂J/∂y."""
         return 2.0 * (self.roots**2 * self.errors(y)) @ self.error_slopes(y)
@@ -100,8 +107,8 @@ class ExactAssignment:
         return float(np.linalg.norm(self.roots * self.errors(y)))
 
     def worst(self, y: Floats) -> float:
-        """max |f/f_d − 1|."""
-        return float(np.abs(self.errors(y)).max())
+        """max w |f/f_d − 1|."""
+        return float(np.abs(self.scales * self.errors(y)).max())
 
     def violation(self, y: Floats) -> float:
         """The largest violation of a bound or constraint, relative to its range in the box."""
@@ -155,6 +162,7 @@ def of_case(case: Any) -> ExactAssignment:
             (rows, target.mode - 1, wanted, target.weight * omega[rows] / total)
             for target, rows, wanted in goals
         ],
+        weights=[target.weight for target, *_ in goals],
         initial=case.initial_design,
         lower=np.array([p.min for p in file.design.parameters.values()], dtype=float),
         upper=np.array([p.max for p in file.design.parameters.values()], dtype=float),
@@ -171,7 +179,7 @@ def best_least_squares(problem: ExactAssignment, starts: int = STARTS) -> Found:
 
 
 def best_worst_case(problem: ExactAssignment, starts: int = STARTS) -> Found:
-    """max |f/f_d − 1| by SLSQP on the epigraph: z ≥ ± e_k, z feasible at the start."""
+    """max w |f/f_d − 1| by SLSQP on the epigraph: z ≥ ± e_k, z feasible at the start."""
     return _best(problem, problem.worst, _epigraph, starts)
 
 
@@ -279,12 +287,14 @@ def _epigraph(problem: ExactAssignment, start: Floats) -> Floats:
 
 
 def _epigraph_from(unit: _Unit, v: Floats, size: float) -> Floats:
+    scales = unit.problem.scales
+
     def above(x: Floats) -> Floats:
-        e = unit.errors(x[:-1]) / size
+        e = scales * unit.errors(x[:-1]) / size
         return np.concatenate([x[-1] - e, x[-1] + e])
 
     def slope(x: Floats) -> Floats:
-        d = unit.slopes(x[:-1]) / size
+        d = scales[:, None] * unit.slopes(x[:-1]) / size
         one = np.ones((len(d), 1))
         return np.vstack([np.hstack([-d, one]), np.hstack([d, one])])
 
