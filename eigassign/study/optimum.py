@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from time import monotonic
 
 import numpy as np
@@ -29,18 +30,21 @@ from eigassign.assignment.sequential import (
     End,
     Objective,
     Optimum,
+    Step,
     distinct,
     minimise,
 )
-from eigassign.errors import EigassignError
+from eigassign.errors import CaseError, EigassignError
 from eigassign.study.one_shot import linear_constraints
 from eigassign.study.response import exact_response
 from eigassign.study.scene import Scene
-from eigassign.study.wanted import Wanted, time_weights
+from eigassign.study.wanted import Wanted, target_frequencies, time_weights
 
 Floats = NDArray[np.float64]
 MOST_BELOW = 24  # combinations of numbers of modes below the bands that are tried
 STARTS = 8  # with `starts: auto`, at most
+FEW = 24  # samples on which starts are followed, of more than twice as many
+REFINED = 3  # optima on few samples that are followed on all
 AGREED = 3  # starts that lead to the best optimum before no more are made
 SAME = 1e-4  # relative, in F: optima of the same worth
 PERCENT = {Objective.LEAST_SQUARES: 1e4, Objective.WORST_CASE: 1e2}  # of F: what prices count in
@@ -76,25 +80,30 @@ def find_optimum(
 ) -> Found:
     """The best local optimum of the exact problem from the initial design and ``starts``.
 
-    Raises InfeasibleError where bounds and linear constraints contradict each other.
+    Starts are followed on few samples of a long trajectory; what they lead to is then optimised on
+    all. No design is returned that is worse than the initial one.
     """
     keys, begun = scene.file.assignment, monotonic()
     deadline = np.inf if keys.seconds is None else begun + keys.seconds
-    solves = 0
+    whole, few = Task(scene, tuple(wanted)), _thinned(scene, wanted)
     best_of: list[tuple[Variant, tuple[Optimum, ...]]] = []
-    made = 0
-    for variant in variants(scene, wanted):
-        search = _Search(variant, keys.steps, deadline)
+    made, solves = 0, 0
+    for below in _below(whole):
+        variant = _variant(whole, below)
+        coarse = _Search(variant if few is None else _variant(few, below), keys.steps, deadline)
         for start in _starts(scene, starts, keys.starts):
-            progress(f"start {made + 1}")
-            search.run(start)
             made += 1
-            if search.ended or search.agreed(keys.starts):
+            progress(f"start {made}")
+            coarse.run(start)
+            if coarse.ended or coarse.agreed(keys.starts):
                 break
-        if search.optima:
-            best_of.append((variant, distinct(search.optima, variant.problem)))
-        solves += search.appraisals * len(scene.path.q)
-        if search.ended:
+        fine = coarse if few is None else _refined(variant, coarse, scene.initial)
+        if fine.optima:
+            best_of.append((variant, distinct(fine.optima, variant.problem)))
+        solves += fine.appraisals * len(scene.path.q)
+        if few is not None:
+            solves += coarse.appraisals * len(few.scene.path.q)
+        if fine.ended:
             break
     best_of.sort(key=lambda pair: _worth(pair[1][0]))
     variant, optima = best_of[0]
@@ -107,6 +116,24 @@ def find_optimum(
         starts=made,
         exact_solves=solves + len(scene.path.q),
     )
+
+
+def _refined(variant: Variant, coarse: _Search, initial: Floats) -> _Search:
+    """What the optima on few samples lead to on all; from the initial design too if it is better.
+
+    An optimum keeps the steps that led to it.
+    """
+    fine = _Search(variant, coarse.steps, coarse.deadline)
+    for optimum in distinct(coarse.optima, variant.problem)[:REFINED]:
+        fine.run(optimum.y, optimum.steps)
+        if fine.ended:
+            break
+    seen = variant.problem.appraise(initial)
+    inside = np.all((initial >= variant.problem.lower) & (initial <= variant.problem.upper))
+    merit = max(seen.violation, MET), variant.problem(initial, seen)
+    if inside and (not fine.optima or merit < min(map(_worth, fine.optima))):
+        fine.run(initial)
+    return fine
 
 
 def _initial(scene: Scene, variant: Variant) -> tuple[float, float]:
@@ -135,14 +162,15 @@ class _Search:
         self.appraisals = 0
         self.ended = False
 
-    def run(self, start: Floats) -> None:
+    def run(self, start: Floats, before: tuple[Step, ...] = ()) -> None:
+        """Follow the steps from ``start``, to which the steps ``before`` have led."""
         try:
             found = minimise(self.variant.problem, start, self.steps, self._stop)
         except EigassignError:
             if not self.optima and self.appraisals == 0:
                 raise
             return
-        self.optima.append(found)
+        self.optima.append(replace(found, steps=(*before, *found.steps)))
         self.appraisals += found.appraisals
         self.ended = found.end in (End.SECONDS, End.INTERRUPTED)
 
@@ -176,21 +204,40 @@ def _starts(scene: Scene, given: Sequence[Floats], count: int | str) -> Iterator
 # --- From targets to requirements
 
 
-def variants(scene: Scene, wanted: Sequence[Wanted]) -> Iterator[Variant]:
-    """One for each combination of numbers of modes below the bands, the likeliest first."""
-    bands = [_band_choices(scene, band) for band in _bands(scene, wanted)]
-    combinations = itertools.islice(itertools.product(*bands), MOST_BELOW)
-    for combination in combinations:
-        limits = [limit for choice in combination for limit in choice.limits]
-        yield _variant(scene, wanted, tuple((c.label, c.below) for c in combination), limits)
+@dataclass(frozen=True)
+class Task:
+    """Targets on the samples of a scene."""
+
+    scene: Scene
+    wanted: tuple[Wanted, ...]
+
+    @cached_property
+    def bands(self) -> tuple[_Band, ...]:
+        """Every band along each trajectory for itself: only there k must not change."""
+        return tuple(_bands(self.scene, self.wanted))
 
 
-def _variant(
-    scene: Scene,
-    wanted: Sequence[Wanted],
-    below: tuple[tuple[str, int], ...],
-    of_bands: Sequence[FrequencyLimit],
-) -> Variant:
+def _thinned(scene: Scene, wanted: Sequence[Wanted]) -> Task | None:
+    """The same on few samples; None where there are few, or a target would have none of them."""
+    path = scene.path
+    if len(path.q) < 2 * FEW:
+        return None
+    scene = replace(scene, trajectory=path.chosen(path.spread(FEW)))
+    try:
+        task = Task(scene, target_frequencies(scene.file, scene.path))
+    except CaseError:
+        return None
+    return task if len(task.bands) == len(tuple(_bands(scene, wanted))) else None
+
+
+def _below(task: Task) -> Iterator[tuple[int, ...]]:
+    """How many modes are below each band: every combination, the likeliest first."""
+    possible = [_possible(task.scene, band) for band in task.bands]
+    yield from itertools.islice(itertools.product(*possible), MOST_BELOW)
+
+
+def _variant(task: Task, below: tuple[int, ...]) -> Variant:
+    scene, wanted = task.scene, task.wanted
     lower, upper = scene.bounds
     width = np.where(upper > lower, upper - lower, 1.0)
     targets = tuple(
@@ -200,6 +247,9 @@ def _variant(
     )
     objective = Objective(scene.file.assignment.objective)
     prices = _prices(scene, objective if targets else None)
+    of_bands = [
+        limit for band, k in zip(task.bands, below, strict=True) for limit in _beside(band, k)
+    ]
     asked = Requirements(
         targets=targets,
         limits=(*_limits(wanted), *of_bands),
@@ -222,7 +272,8 @@ def _variant(
         reference=scene.initial,
         objective=objective if targets else Objective.LEAST_SQUARES,
     )
-    return Variant(below, asked, problem)
+    labels = (band.wanted.requirement.label for band in task.bands)
+    return Variant(tuple(zip(labels, below, strict=True)), asked, problem)
 
 
 def _prices(scene: Scene, objective: Objective | None) -> Floats:
@@ -253,13 +304,6 @@ class _Band:
     upper_hz: Floats
 
 
-@dataclass(frozen=True)
-class _BandChoice:
-    label: str
-    below: int
-    limits: tuple[FrequencyLimit, ...]
-
-
 def _bands(scene: Scene, wanted: Sequence[Wanted]) -> Iterator[_Band]:
     """Every band along each trajectory for itself: only there the number below must not change."""
     for w in wanted:
@@ -272,21 +316,17 @@ def _bands(scene: Scene, wanted: Sequence[Wanted]) -> Iterator[_Band]:
                 yield _Band(w, slice(first, last), w.lower_hz[own], w.upper_hz[own])
 
 
-def _band_choices(scene: Scene, band: _Band) -> list[_BandChoice]:
+def _possible(scene: Scene, band: _Band) -> list[int]:
     """What k may be: from the fewest modes below the band to the most, at designs all over."""
-    named = tuple(sorted(band.wanted.requirement.modes))
-    counts = _counts(scene, band, named)
+    counts = _counts(scene, band, tuple(sorted(band.wanted.requirement.modes)))
     first = int(np.median(counts[0]))
     possible = range(int(counts.min()), int(counts.max()) + 1)
-    label = band.wanted.requirement.label
-    return [
-        _BandChoice(label, k, tuple(_beside(label, band, named, k)))
-        for k in sorted(possible, key=lambda k: (abs(k - first), k))
-    ]
+    return sorted(possible, key=lambda k: (abs(k - first), k))
 
 
-def _beside(label: str, band: _Band, named: tuple[int, ...], k: int) -> Iterator[FrequencyLimit]:
+def _beside(band: _Band, k: int) -> Iterator[FrequencyLimit]:
     """The limits that say: k of the named modes (of all, if none is named) are below the band."""
+    label, named = band.wanted.requirement.label, tuple(sorted(band.wanted.requirement.modes))
     below = named[k - 1] if named and k else k
     above = named[k] if named and k < len(named) else k + 1
     if k:
