@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 import eigassign as ea
 from eigassign.output.figures import style
 from eigassign.output.figures.modes import thumbnail
 from eigassign.study.drawing import draw_modes
+from eigassign.study.planning import with_middle_loads
 
 HERE = Path(__file__).parent
 
@@ -18,7 +17,7 @@ def main() -> None:
     """One PNG a case, beside this file."""
     for path in sorted(HERE.parent.glob("*.yaml")):
         case = ea.load_case(path)
-        q = np.array(case.file.expansion.q, dtype=float)
+        q = with_middle_loads(case.file, case.file.expansion.q)
         pictures = draw_modes(case.file, case.model(), q, case.initial_design, 1)
         with style.applied():
             (HERE / f"{path.stem}.png").write_bytes(style.encoded(thumbnail(pictures), "png"))

@@ -10,7 +10,7 @@ from eigassign.case.schema.design import Design, Tolerance
 from eigassign.case.schema.joints import JointBase
 from eigassign.case.schema.mechanism import Spring
 from eigassign.case.schema.parts import Part
-from eigassign.case.schema.trajectory import Timed
+from eigassign.case.schema.trajectory import AnyTrajectory, Timed
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
 _WIDTH = 90
@@ -42,7 +42,7 @@ def plain(value: object) -> object:
 
 def _superfluous(value: Part) -> set[str]:
     """Keys that say nothing: zero offsets from a link's node, the other space's turn, a share of
-    time for a timing law that has none."""
+    time for a timing law that has none, a trajectory that sets nothing."""
     keys = set()
     if isinstance(value, (JointBase, Spring)) and value.orientation is not None:
         keys.add("angle")
@@ -50,6 +50,8 @@ def _superfluous(value: Part) -> set[str]:
         keys.add("position")
     if isinstance(value, Timed) and value.timing != "trapezoidal":
         keys.add("acceleration_share")
+    if isinstance(value, AnyTrajectory) and not value.set:
+        keys.add("set")
     return keys
 
 

@@ -27,6 +27,20 @@ _STEP = re.compile(r"\[(\d+)\]|([^.\[\]]+)")  # of a key path: targets[0].mode
 
 
 @dataclass(frozen=True)
+class Load:
+    """A property that trajectories set, in SI: as the file writes it, and along each of them."""
+
+    written: float
+    along: tuple[float, ...]  # one for each trajectory, in the order of the file
+    unit: str
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Its least and its largest value along any trajectory."""
+        return min(self.along), max(self.along)
+
+
+@dataclass(frozen=True)
 class CaseFile:
     """One validated case. Two are equal when their content is, wherever they were read from.
 
@@ -74,15 +88,57 @@ class CaseFile:
     @cached_property
     def design_quantities(self) -> tuple[Quantity, ...]:
         """Dimension and limits of each design parameter, in the order of y."""
+        return self._quantities([p.parameter for p in self.design.parameters.values()])
+
+    def _quantities(self, paths: Iterable[str]) -> tuple[Quantity, ...]:
         tree = {"mechanism": plain(self.mechanism), "coordinates": plain(self.coordinates)}
-        found = (property_at(tree, p.parameter) for p in self.design.parameters.values())
+        found = (property_at(tree, path) for path in paths)
         return tuple(each.quantity if each else Quantity() for each in found)
 
     @property
     def design_units(self) -> tuple[str, ...]:
         """SI unit of each design parameter, in the order of y; empty for a plain number."""
-        dimensions = (quantity.dimension for quantity in self.design_quantities)
-        return tuple(each.si.replace("·", " ") if each else "" for each in dimensions)
+        return _units(self.design_quantities)
+
+    @cached_property
+    def loads(self) -> Mapping[str, Load]:
+        """Properties that trajectories `set`, by path: what q holds beside the coordinates."""
+        forms = [form for *_, form in self.trajectories]
+        paths = tuple(dict.fromkeys(path for form in forms for path in form.set))
+        if not paths:
+            return {}
+        written = {path: self.value_at(path) for path in paths}
+        return {
+            path: Load(own, tuple(form.set.get(path, own) for form in forms), unit)
+            for (path, own), unit in zip(
+                written.items(), _units(self._quantities(paths)), strict=True
+            )
+        }
+
+    @property
+    def load_quantities(self) -> tuple[Quantity, ...]:
+        """Dimension and limits of each of the loads, in their order."""
+        return self._quantities(self.loads)
+
+    @property
+    def q_units(self) -> tuple[str, ...]:
+        """SI unit of each entry of q: of the coordinates, then of the loads."""
+        return (*self.coordinate_units, *(load.unit for load in self.loads.values()))
+
+    @property
+    def ranges(self) -> Mapping[str, tuple[float, float]]:
+        """Between which values each property that varies may be: loads, then design parameters."""
+        of_design = {p.parameter: (p.min, p.max) for p in self.design.parameters.values()}
+        return {path: load.range for path, load in self.loads.items()} | of_design
+
+    def value_at(self, path: str) -> float:
+        """The number that the file gives to the property at ``path``, in SI."""
+        head, name, *keys = path.split(".")
+        group = self.coordinates if head == "coordinates" else getattr(self.mechanism, head)
+        value: Any = group[name]
+        for key in keys:
+            value = getattr(value, key)
+        return float(value)
 
     @cached_property
     def requirements(self) -> tuple[Requirement, ...]:
@@ -119,3 +175,9 @@ def _with_value(part: Any, path: Sequence[str], value: float) -> Any:
     if isinstance(part, Mapping):
         return FrozenDict({**part, key: _with_value(part[key], rest, value)})
     return part.model_copy(update={key: _with_value(getattr(part, key), rest, value)})
+
+
+def _units(quantities: Iterable[Quantity]) -> tuple[str, ...]:
+    """SI units; empty for a plain number."""
+    dimensions = (quantity.dimension for quantity in quantities)
+    return tuple(each.si.replace("·", " ") if each else "" for each in dimensions)

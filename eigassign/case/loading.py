@@ -19,7 +19,11 @@ from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import MAX_BYTES, Source, read_yaml
 from eigassign.case.rules.consistency import inconsistent, too_many
 from eigassign.case.rules.plausibility import implausible
-from eigassign.case.rules.properties import bounds_hold_no_impossible_section, starts_outside
+from eigassign.case.rules.properties import (
+    bounds_hold_no_impossible_section,
+    load_cases_have_possible_sections,
+    starts_outside,
+)
 from eigassign.case.rules.values import completed
 from eigassign.case.schema.document import Document, validated
 from eigassign.case.schema.measurements import MeasurementFile
@@ -62,7 +66,9 @@ def parse(data: bytes, path: str | Path) -> CaseFile:
     document, schema_findings = validated(completed(source.tree, path.parent))
     findings = [*islice(inconsistent(source.tree), 2 * MOST_PROBLEMS), *schema_findings]
     if document is not None:
-        findings += bounds_hold_no_impossible_section(document.mechanism, document.design)
+        parts, motions = (document.mechanism, document.design), document.trajectory
+        findings += bounds_hold_no_impossible_section(*parts)
+        findings += load_cases_have_possible_sections(*parts, named_trajectories(motions))
     problems = [*source.problems, *(source.problem(*finding) for finding in findings)]
     if problems or document is None:
         raise CaseError(_first(list(dict.fromkeys(problems))))

@@ -88,6 +88,7 @@ def _nothing_varies(scene: Scene) -> str:
     """Why there is nothing to chart, and what to do."""
     pencil, driven = scene.model.pencil, list(scene.file.coordinates.values())
     which = np.flatnonzero(pencil.active[: pencil.n_q])
+    which = which[which < len(driven)]
     joints = ", ".join(dict.fromkeys(driven[k].joint for k in which))  # in the order of q
     fixed, room = "no design parameter may change", "a design parameter a `max` above its `min`"
     if not joints:

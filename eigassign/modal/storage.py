@@ -28,7 +28,7 @@ from eigassign.series.multi_index import LowerSet
 
 Array = NDArray[Any]
 ALGORITHM = "expansion 3"  # raise it whenever the numbers an expansion is made of may change
-FORMAT = "reduced model 3"  # raise it whenever what the arrays of a reduced model mean changes
+FORMAT = "reduced model 4"  # raise it whenever what the arrays of a reduced model mean changes
 STORED = (
     Expansion,
     Cluster,
@@ -205,7 +205,8 @@ def pencil_parts(pencil: Pencil) -> list[Any]:
     Two pencils with equal parts have bit for bit equal K and M everywhere, and their expansions
     agree: this is what a stored expansion is filed under.
     """
-    numbers = [pencil.n_dof, pencil.n_u, pencil.n_q, pencil.rigid, pencil.rows, pencil.columns]
+    numbers = [pencil.n_dof, pencil.n_u, pencil.n_q, pencil.n_loads, pencil.rigid]
+    numbers += [pencil.rows, pencil.columns]
     matrices = [pencil.stiffness, pencil.mass, pencil.to_program, pencil.shift]
     return [*numbers, *map(_parts, [*matrices, pencil.program])]
 

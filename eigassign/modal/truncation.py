@@ -59,7 +59,7 @@ def truncation_error(parts: ReducedLinks, x: Floats, modes: Sequence[int]) -> Fl
     pencil = parts.pencil
     out = np.empty((len(x), len(modes)))
     pick = np.array(modes) - 1
-    designs, which = np.unique(x[:, pencil.n_q :], axis=0, return_inverse=True)
+    designs, which = np.unique(x[:, pencil.n_joints :], axis=0, return_inverse=True)
     for k in range(len(designs)):
         (samples,) = np.nonzero(which.ravel() == k)
         values = parts.values(x[samples[0]])

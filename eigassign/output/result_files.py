@@ -120,6 +120,7 @@ def _trajectory(results: RunResults, row: TrajectoryRow) -> dict[str, Any]:
         "samples": row.rows.stop - row.rows.start,
         "duration_s": row.duration_s,
         "weight": row.weight,
+        **({"set": dict(row.loads)} if row.loads else {}),
         "error": _error(error) if error else None,
     }
 

@@ -16,6 +16,7 @@ from eigassign.case.schema.parts import Quantity, quantity
 from eigassign.case.units import QuantityError
 from eigassign.errors import CaseError, Problem, UsageError
 from eigassign.mechanism.elements.superelement import weights
+from eigassign.mechanism.kinematics.parameters import written_loads
 from eigassign.mechanism.kinematics.travel_limits import resting_pose
 from eigassign.output import report
 from eigassign.pipeline.run_files import RESULTS, new_run_folder
@@ -65,8 +66,9 @@ def modes(
     """Exact modes of the case at q (rad) and y (SI units), given as numbers or as text with units.
 
     Without ``q`` at the expansion point that the case gives, else where its trajectory starts;
-    without ``y`` with the design as it is written in the file. Raises UsageError for wrong lengths
-    or counts, and where there is no pose to take.
+    without ``y`` with the design as it is written in the file. Loads that trajectories set may
+    stand behind the coordinates in ``q``; without them they are as written in the file. Raises
+    UsageError for wrong lengths or counts, and where there is no pose to take.
     """
     case = load_case(path)
     at_q, at_y = _point(case, q, y)
@@ -108,6 +110,8 @@ def _point(
     y = design(case.file, y) if isinstance(y, str) else y
     with case.located():
         at_q = np.asarray(_default_q(case) if q is None else q, dtype=np.float64)
+    if at_q.shape == (len(case.file.coordinates),):
+        at_q = np.append(at_q, written_loads(case.file))
     return at_q, np.asarray(case.initial_design if y is None else y, dtype=np.float64)
 
 
@@ -164,7 +168,7 @@ def check(path: str | Path) -> CheckAnswer:
         title=file.title,
         n_dof=model.n_dof,
         n_rigid=model.n_rigid,
-        q_names=model.q_names,
+        q_names=tuple(file.coordinates),
         y_names=model.y_names,
         samples=sum(samples for _, samples, _ in each),
         duration_s=float(sum(duration for *_, duration in each)),
@@ -179,7 +183,8 @@ def _require_regular(case: Case, q: Floats | None) -> None:
     """One exact solve: a mechanism without mass or stiffness is found here, at its line."""
     if q is None:
         given = case.file.expansion.q
-        q = np.array([given if given != "auto" else resting_pose(case.file)])
+        pose = resting_pose(case.file) if given == "auto" else given
+        q = np.append(np.asarray(pose, dtype=np.float64), written_loads(case.file))[None]
     with case.located():
         try:
             case.model().frequencies(q, case.initial_design, 1)
@@ -201,10 +206,17 @@ def point(case: Path, q: str | None, y: str | None) -> tuple[Numbers, Numbers]:
 
 
 def coordinates(case: CaseFile, text: str | None) -> Numbers:
-    """q in rad or m, one value per coordinate of the case; raises UsageError."""
+    """q in rad or m, one value per coordinate of the case, and none or all of its loads behind.
+
+    Raises UsageError.
+    """
+    if text is None:
+        return None
     kinds = {"rad": quantity("angle"), "m": quantity("length")}
-    quantities = [kinds[unit] for unit in case.coordinate_units]
-    return None if text is None else _read(text, "--q", list(case.coordinates), quantities)
+    names, quantities = list(case.coordinates), [kinds[unit] for unit in case.coordinate_units]
+    if len(split(text)) > len(names):
+        names, quantities = [*names, *case.loads], [*quantities, *case.load_quantities]
+    return _read(text, "--q", names, quantities)
 
 
 def design(case: CaseFile, text: str | None) -> Numbers:

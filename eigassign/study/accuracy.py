@@ -185,7 +185,7 @@ def _neglected_terms(trajectory: Trajectory, gap: float) -> float:
 def _change(scene: Scene, part: NamedTrajectory) -> float:
     """The largest relative change of a frequency along one trajectory, velocity terms included."""
     model = scene.model
-    terms = velocity_terms(scene.file, model.poses.parameters, model.motion)
+    terms = velocity_terms(model.poses.case, model.poses.parameters, model.motion)
     modes = tuple(scene.expansions.modes)
     return motion_effect(model.pencil, terms, rates(part.trajectory), scene.initial, modes).worst
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +69,8 @@ def build_model(file: CaseFile, links: WholeLinks | None = None) -> Model:
         pencil = build_pencil(file, parameters, motion, local)
         poses = build_link_frames(file, parameters, motion)
         reduced = reduced_links(parameters, local[0], pencil)
-    return Model(pencil, poses, motion, parameters.coordinates, parameters.design, reduced)
+    q_names = (*parameters.coordinates, *parameters.loads)
+    return Model(pencil, poses, motion, q_names, parameters.design, reduced)
 
 
 def build_trajectories(file: CaseFile, model: Model) -> Trajectories:
@@ -80,8 +82,8 @@ def build_trajectories(file: CaseFile, model: Model) -> Trajectories:
         raise CaseError((file.problem("trajectory", "is needed here and missing"),))
     found = Trajectories(
         tuple(
-            NamedTrajectory(name, _followed(file, model, keys, path), keys.weight)
-            for path, name, keys in file.trajectories
+            NamedTrajectory(name, _loaded(file, model, k), keys.weight)
+            for k, (_, name, keys) in enumerate(file.trajectories)
         )
     )
     with located(file):
@@ -89,14 +91,28 @@ def build_trajectories(file: CaseFile, model: Model) -> Trajectories:
     return found
 
 
-def _followed(file: CaseFile, model: Model, keys: TrajectoryForm, path: str) -> Trajectory:
-    """One trajectory, which stands at ``path`` of the case file."""
+def _loaded(file: CaseFile, model: Model, k: int) -> Trajectory:
+    """Trajectory k of the case file, its loads behind the coordinates in q."""
+    path, _, keys = file.trajectories[k]
+    loads = np.array([load.along[k] for load in file.loads.values()])
+    found = _followed(file, model, keys, path, loads)
+    if not len(loads):
+        return found
+    said = [f"{name} = {load.along[k]:.6g} {load.unit}" for name, load in file.loads.items()]
+    return replace(found.joined(loads), notes=(*said, *found.notes))
+
+
+def _followed(
+    file: CaseFile, model: Model, keys: TrajectoryForm, path: str, loads: Floats
+) -> Trajectory:
+    """One trajectory of the coordinates, which stands at ``path`` of the case file."""
+    parameters, y = model.poses.parameters, initial_design(file)
     with located(file, path):
         return build_trajectory(
             keys,
-            model.q_names,
+            parameters.coordinates,
             lambda tip, oriented: tip_chain(
-                file, model.poses.parameters, model.motion, tip, initial_design(file), oriented
+                file, parameters, model.motion, tip, y, oriented, loads
             ),
             file.coordinate_units,
             lambda tip, oriented: bool(design_dependence(model.poses, tip, oriented).any()),

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign._version import __version__
+from eigassign.case import CaseFile
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.accuracy import study_motion
 from eigassign.study.assignment import Answer, assignment_row
@@ -49,7 +50,7 @@ def collect_results(
     """The results of a run; without ``assigned`` those of an expansion only."""
     file, trajectory = scene.file, scene.trajectory
     motion = _motion(scene, assigned)
-    n_q = len(scene.model.q_names)
+    n = len(file.coordinates)
     return RunResults(
         title=file.title,
         reference=file.reference,
@@ -57,11 +58,11 @@ def collect_results(
         case_sha256=file.sha256,
         case_files=file.files,
         version=__version__,
-        q_names=scene.model.q_names,
+        q_names=tuple(file.coordinates),
         q_units=file.coordinate_units,
         time_s=np.zeros(0) if trajectory is None else trajectory.time_s,
-        q=np.zeros((0, n_q)) if trajectory is None else trajectory.q,
-        trajectories=_trajectories(trajectory),
+        q=np.zeros((0, n)) if trajectory is None else trajectory.q[:, :n],
+        trajectories=_trajectories(file, trajectory),
         poses=_poses(scene),
         studies=studies,
         design=() if assigned is None else design_rows(scene, assigned.answer.y),
@@ -95,14 +96,19 @@ def _notes(assigned: VerifiedAssignment | None) -> tuple[str, ...]:
     return (*answer.notes, *limit_notes(answer.one_shot))
 
 
-def _trajectories(path: Trajectories | None) -> tuple[TrajectoryRow, ...]:
+def _trajectories(file: CaseFile, path: Trajectories | None) -> tuple[TrajectoryRow, ...]:
     if path is None:
         return ()
     return tuple(
         TrajectoryRow(
-            part.name, rows, float(np.ptp(part.trajectory.time_s)), part.weight, part.trajectory.tip
+            name=part.name,
+            rows=rows,
+            duration_s=float(np.ptp(part.trajectory.time_s)),
+            weight=part.weight,
+            tip=part.trajectory.tip,
+            loads={path: load.along[k] for path, load in file.loads.items()},
         )
-        for part, rows in zip(path.parts, path.rows, strict=True)
+        for k, (part, rows) in enumerate(zip(path.parts, path.rows, strict=True))
     )
 
 

@@ -195,7 +195,7 @@ def q_grid(scene: Scene) -> Grid | None:
     ends = np.array([s.min(axis=0), s.max(axis=0)]) - s0
     ends = np.array([np.minimum(ends[0], 0.0), np.maximum(ends[1], 0.0)])  # q0 is always inside
     lower, upper = np.sort(ends / S[range(len(S)), moved], axis=0) + q0[moved]
-    names, units = scene.model.q_names, scene.file.coordinate_units
+    names, units = scene.model.q_names, scene.file.q_units
     return grid_over(
         moved,
         [names[k] for k in moved],
@@ -285,7 +285,7 @@ def random_q(scene: Scene, random: np.random.Generator) -> Floats | None:
     """Random poses (n, n_q) of the box in q; None if the box is a point or unknown."""
     n, q0 = scene.file.validation.samples, scene.q0
     if scene.file.validation.q_span is not None:
-        span = _spans(scene.file, len(q0))
+        span = _spans(scene.file)
         return q0 + random.uniform(-1.0, 1.0, (n, len(q0))) * span if span.any() else None
     S = joint_map(scene.model)
     if scene.trajectory is None or not len(S):
@@ -295,13 +295,15 @@ def random_q(scene: Scene, random: np.random.Generator) -> Floats | None:
     return np.asarray(q0 + (s - S @ q0) @ np.linalg.pinv(S).T)
 
 
-def _spans(file: CaseFile, n_q: int) -> Floats:
-    """Half-widths (n_q,) of the box in q."""
+def _spans(file: CaseFile) -> Floats:
+    """Half-widths (n_q,) of the box in q; of a load half the range of its values."""
     span = np.atleast_1d(np.array(file.validation.q_span, dtype=np.float64))
-    if len(span) not in (1, n_q):
-        message = f"{len(span)} values for {n_q} coordinates; give one, or one for each"
+    n = len(file.coordinates)
+    if len(span) not in (1, n):
+        message = f"{len(span)} values for {n} coordinates; give one, or one for each"
         raise CaseError((file.problem("validation.q_span", message),))
-    return np.broadcast_to(span, (n_q,))
+    of_loads = [0.5 * float(np.ptp(load.range)) for load in file.loads.values()]
+    return np.append(np.broadcast_to(span, (n,)), of_loads)
 
 
 def _row(scene: Scene, k: int, where: str, values: Comparison) -> ValidationRow:

@@ -41,7 +41,7 @@ AMPLITUDE = 0.1  # a mode's largest displacement, relative to the mechanism's ex
 def draw_poses(file: CaseFile, model: Model, trajectory: Trajectories, y: Floats) -> DrawnPoses:
     """Poses at samples evenly spread over the trajectory's length in q, at design y."""
     crowded = sum(map(len, model.poses.drawn)) > CROWDED
-    chosen = spread_samples(trajectory.q, 3 if crowded else POSES)
+    chosen = spread_samples(trajectory.q[:, : len(file.coordinates)], 3 if crowded else POSES)
     seams = [rows.stop for rows in trajectory.rows[:-1]]
     if trajectory.tip is None:
         tip = _farthest_travelled(file, model, model.x(trajectory.q, y), seams)
@@ -76,7 +76,7 @@ def draw_modes(file: CaseFile, model: Model, q: Floats, y: Floats, count: int) -
     shapes, x = model.shapes(q, y, count), model.one(q, y)
     n_q = len(model.q_names)
     scales = AMPLITUDE * _extent(shapes) / _largest(shapes) * _phase(shapes)
-    coordinates = zip(model.q_names, x[0, :n_q], file.coordinate_units, strict=True)
+    coordinates = zip(model.q_names, x[0, :n_q], file.q_units, strict=True)
     design = zip(model.y_names, x[0, n_q:], file.design_units, strict=True)
     return ModePictures(
         title=file.title,

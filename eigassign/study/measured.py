@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from eigassign.assignment.checks import frozen
+from eigassign.case import CaseFile
 from eigassign.case.schema.design import Tolerance
 from eigassign.case.schema.measurements import MOST, Measurement, MeasurementFile
 from eigassign.case.suggestions import shown, unknown
@@ -60,9 +61,10 @@ def read_measurements(case: Case) -> tuple[tuple[PosedMeasurement, ...], tuple[s
 
 def _posed(case: Case, label: str, given: Measurement) -> PosedMeasurement:
     with case.located():
-        q = np.array(given.q, dtype=np.float64)
         if given.time is not None:
             q = _at_time(case.trajectory, given.time, given.trajectory, f"{label}.time", "")
+        else:
+            q = _with_loads(case.file, given.q or (), given.trajectory)
     deviation = given.deviation.deviation(given.frequency)
     hz, where = float(given.frequency), given.trajectory
     return PosedMeasurement(label, given.time, where, frozen(q), given.mode, hz, deviation)
@@ -76,6 +78,16 @@ def _at_time(path: Trajectories, time: float, name: str | None, key: str, where:
         lasts = f"the trajectory lasts from {time_s[0]:g} to {time_s[-1]:g} s"
         raise MechanismError(key, f"{where}{time:g} s is outside: {lasts}")
     return np.array([np.interp(time, time_s, q[:, i]) for i in range(q.shape[1])])
+
+
+def _with_loads(file: CaseFile, coordinates: ArrayLike, name: str | None) -> Floats:
+    """q of a pose: loads as the trajectory of that name sets them, without one as written."""
+    names = [each for _, each, _ in file.trajectories]
+    loads = [
+        load.written if name is None else load.along[names.index(name)]
+        for load in file.loads.values()
+    ]
+    return np.append(np.asarray(coordinates, dtype=np.float64), loads)
 
 
 # --- From a CSV file
@@ -131,7 +143,8 @@ def _rows(
                 raise MechanismError(_KEY, where + message)
             q = _at_time(case.trajectory, time or 0.0, named or None, _KEY, where)
         else:
-            time, q = None, np.array([table.numbers[name][k] for name in names])
+            pose = [table.numbers[name][k] for name in names]
+            time, q = None, _with_loads(case.file, pose, named or None)
         deviation = _deviation(table, k, hz, default)
         label = table.where(k)
         yield PosedMeasurement(label, time, named or None, frozen(q), int(mode), hz, deviation)

@@ -76,25 +76,36 @@ def plan_expansion(
 
 
 def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[Floats, str]:
-    n_q, given = len(model.q_names), file.expansion.q
+    n, given = len(file.coordinates), file.expansion.q
+    of_loads = ", loads in the middle of their ranges" if file.loads else ""
     if given != "auto":
-        q0 = np.array(given, dtype=np.float64)
-        if len(q0) != n_q:
-            raise _wrong(file, "expansion.q", f"{len(q0)} values for {n_q} coordinates")
-        return q0, f"expansion point: {shown_point(model.q_names, q0)}, from the case file"
+        if len(given) != n:
+            raise _wrong(file, "expansion.q", f"{len(given)} values for {n} coordinates")
+        q0 = with_middle_loads(file, given)
+        why = f"from the case file{of_loads}"
+        return q0, f"expansion point: {shown_point(model.q_names, q0)}, {why}"
     if trajectory is None:
-        if n_q == 0:
+        if n == 0:
             return np.zeros(0), ""
         message = "auto needs a trajectory to be central in, and the case has none: give values"
         raise _wrong(file, "expansion.q", message)
-    k = central_sample(trajectory.q @ joint_map(model).T)
-    point = shown_point(model.q_names, trajectory.q[k])
-    why = "the most central: its farthest other sample is nearer than any other's"
-    return trajectory.q[k], f"expansion point: {point}, {trajectory.where(k)}, {why}"
+    poses = trajectory.q.copy()
+    poses[:, n:] = 0.0
+    k = central_sample(poses @ joint_map(model).T)
+    q0 = with_middle_loads(file, trajectory.q[k, :n])
+    point = shown_point(model.q_names, q0)
+    why = f"the most central: its farthest other sample is nearer than any other's{of_loads}"
+    return q0, f"expansion point: {point}, {trajectory.where(k)}, {why}"
+
+
+def with_middle_loads(file: CaseFile, coordinates: ArrayLike) -> Floats:
+    """q of a pose of the coordinates, each load in the middle of its values along trajectories."""
+    middle = [0.5 * sum(load.range) for load in file.loads.values()]
+    return np.append(np.asarray(coordinates, dtype=np.float64), middle)
 
 
 def joint_map(model: Model) -> Floats:
-    """From q to the relative joint coordinates on which a frequency depends, (n_s, n_q)."""
+    """From q to the relative joint coordinates and loads on which a frequency depends."""
     n_q = len(model.q_names)
     return np.asarray(model.pencil.to_program[:n_q, :n_q][model.pencil.active[:n_q]])
 

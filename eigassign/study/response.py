@@ -60,4 +60,5 @@ def exact_response(scene: Scene, count: int) -> ExactResponse:
     """Of all samples of the scene's trajectory."""
     lower, upper = scene.bounds
     moving = np.full(scene.path.q.shape[1], scene.path.follows_design)
+    moving[scene.model.pencil.n_joints :] = False  # loads do not follow the design
     return ExactResponse(scene.model, scene.path, np.append(moving, upper > lower), count)

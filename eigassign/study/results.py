@@ -367,6 +367,7 @@ class TrajectoryRow:
     duration_s: float
     weight: float
     tip: Floats | None  # (n, 2 or 3) in m, where the case gives a path of the tip
+    loads: Mapping[str, float] = field(default_factory=dict)  # properties that it sets, SI
 
 
 @dataclass(frozen=True)

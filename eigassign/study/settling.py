@@ -28,6 +28,7 @@ from eigassign.study.planning import (
     automatic_reduction,
     settle_mesh,
     settle_reduction,
+    with_middle_loads,
 )
 
 Floats = NDArray[np.float64]
@@ -85,5 +86,5 @@ def _judged_at(file: CaseFile, trial: Model) -> Floats:
     """x (n, n_x): poses and designs at which choices are judged."""
     path = build_trajectories(file, trial) if file.trajectories else None
     given = file.expansion.q
-    q0 = resting_pose(file) if given == "auto" else np.array(given, dtype=float)
+    q0 = with_middle_loads(file, resting_pose(file) if given == "auto" else given)
     return at_corners(file, path, q0, initial_design(file)).x

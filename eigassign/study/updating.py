@@ -234,7 +234,7 @@ def collect_update(
         case_files=case.file.files,
         version=__version__,
         q_names=problem.model.q_names,
-        q_units=case.file.coordinate_units,
+        q_units=case.file.q_units,
         parameters=tuple(_parameters(problem, found)),
         covariance=found.covariance,
         measurements=tuple(

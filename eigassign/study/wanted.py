@@ -30,7 +30,7 @@ from eigassign.case import (
 from eigassign.case.table import Column, read_table
 from eigassign.case.units import DIMENSIONS
 from eigassign.errors import CaseError, UsageError
-from eigassign.mechanism.kinematics.parameters import initial_design
+from eigassign.mechanism.kinematics.parameters import initial_design, written_loads
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.build import located
 
@@ -150,11 +150,11 @@ def named_pose(file: CaseFile, followed: FollowedMode, path: Trajectories) -> tu
     """q (n_q,) and y (n_y,) at which mode `like` has the shape to follow.
 
     Between samples of a trajectory q is linear in time. What `design` does not name is as in the
-    file.
+    file, and so is what trajectories set where the pose is given by its coordinates.
     """
     pose, y = followed.at, initial_design(file)
     if pose.time is None:
-        q = np.array(pose.q)
+        q = np.append(np.array(pose.q), written_loads(file))
     else:
         rows = path.rows_of(pose.trajectory)
         time_s, own = path.time_s[rows], path.q[rows]

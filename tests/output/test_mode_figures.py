@@ -28,6 +28,7 @@ from eigassign.output.figures.mechanism import (
 from eigassign.output.figures.modes import mode_figures, thumbnail
 from eigassign.output.report import write_modes
 from eigassign.study.drawing import draw_modes
+from eigassign.study.planning import with_middle_loads
 from eigassign.study.results import DrawnBody, DrawnPoses, ModePictures
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -37,7 +38,7 @@ ALL = sorted(path.stem for path in CASES.glob("*.yaml"))
 
 def pictures(name: str, count: int = 2) -> ModePictures:
     case = ea.load_case(CASES / f"{name}.yaml")
-    q = np.array(case.file.expansion.q, dtype=float)
+    q = with_middle_loads(case.file, case.file.expansion.q)
     return draw_modes(case.file, case.model(), q, case.initial_design, count)
 
 

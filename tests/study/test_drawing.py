@@ -11,6 +11,7 @@ from scenes import HEAD, SHIPPED, changed, scene_of
 import eigassign as ea
 from eigassign.case import parse
 from eigassign.study.drawing import AMPLITUDE, draw_modes, draw_poses, rest_pose, spread_samples
+from eigassign.study.planning import with_middle_loads
 from eigassign.study.results import ModePictures
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -48,7 +49,7 @@ def test_poses_are_spread_over_the_way_and_include_both_ends() -> None:
 
 def pictures(name: str, count: int = 2) -> tuple[ea.Case, ModePictures]:
     case = ea.load_case(CASES / f"{name}.yaml")
-    q = np.array(case.file.expansion.q, dtype=float)
+    q = with_middle_loads(case.file, case.file.expansion.q)
     return case, draw_modes(case.file, case.model(), q, case.initial_design, count)
 
 

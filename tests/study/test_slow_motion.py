@@ -77,3 +77,11 @@ def test_near_modes_are_not_settled_by_the_simple_estimate() -> None:
     assert least_gap(hz, (3,)) == 1.0
     assert least_gap(hz[:, :1], (1,)) == 1.0
     assert least_gap(np.array([[100.0, 100.0]]), (2,)) == pytest.approx(1e-6)
+
+
+def test_the_speed_is_judged_on_the_elements_that_auto_chose(tmp_path: Path) -> None:
+    text = (CASE.parent / "pick_and_place.yaml").read_text(encoding="utf-8")
+    path = tmp_path / "automatic.yaml"
+    path.write_text(text.replace("elements: 3", "elements: auto"), encoding="utf-8")
+    results = solve_case(load_case(path)).results
+    assert any("velocity terms" in line for line in (*results.notes, *results.warnings))

@@ -70,6 +70,7 @@ RULES: tuple[Rule, ...] = (
     joints.assembly_names_coordinates_and_joints,
     joints.assembly_is_for_loops,
     properties.parameters_name_properties,
+    properties.load_cases_set_properties,
     study.lists_have_an_entry_for_each_coordinate,
     study.expansion_point_has_an_entry_for_each_parameter,
     study.trajectories_have_names_of_their_own,

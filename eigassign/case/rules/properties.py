@@ -13,8 +13,16 @@ from typing import Annotated, Any, get_args, get_origin
 
 from pydantic_core import PydanticUndefined
 
-from eigassign.case.reader import Finding, Tree, at, names
-from eigassign.case.rules.lookups import ANY, columns, driven, is_spatial, number, type_of
+from eigassign.case.reader import Finding, KeyPath, Tree, at, names
+from eigassign.case.rules.lookups import (
+    ANY,
+    columns,
+    driven,
+    is_spatial,
+    number,
+    trajectories,
+    type_of,
+)
 from eigassign.case.schema.design import Choices, Design, Entry
 from eigassign.case.schema.links import LINKS
 from eigassign.case.schema.mechanism import Body, Spring
@@ -177,6 +185,20 @@ def parameters_name_properties(tree: Tree) -> Iterator[Finding]:
             yield place, str(error)
 
 
+def load_cases_set_properties(tree: Tree) -> Iterator[Finding]:
+    """What a trajectory sets is a number that can vary, and no design parameter."""
+    owner = {column.parameter: column.name for column in columns(tree)}
+    for place, body in trajectories(tree):
+        for path in names(body, "set"):
+            try:
+                property_at(tree, path)
+            except NoPropertyError as error:
+                yield (*place, "set", path), str(error)
+            if path in owner:
+                message = f"is the design parameter {owner[path]!r}: one of them can have it"
+                yield (*place, "set", path), message
+
+
 def starts_outside(tree: Tree, design: Design) -> Iterator[Finding]:
     """Warnings where what the file has as design is outside its bounds, or none of those listed.
 
@@ -221,6 +243,18 @@ def bounds_hold_no_impossible_section(mechanism: Any, design: Design) -> Iterato
 
 def _paths(entry: Entry) -> tuple[str, ...]:
     return entry.properties if isinstance(entry, Choices) else (entry.parameter,)
+
+
+def load_cases_have_possible_sections(
+    mechanism: Any, design: Any, motions: Sequence[tuple[KeyPath, str, Any]]
+) -> Iterator[Finding]:
+    """Every section exists along each trajectory that sets one of its dimensions."""
+    ranges = {p.parameter: (p.min, p.max) for p in design.parameters.values()}
+    for place, _, motion in motions:
+        own = {path: (value, value) for path, value in motion.set.items()}
+        for path, _, message in impossible(mechanism.sections, ranges | own):
+            if path in own:
+                yield (*place, "set", path), message
 
 
 def impossible(sections: Mapping[str, Section], ranges: Ranges) -> Iterator[tuple[str, str, str]]:

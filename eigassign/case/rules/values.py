@@ -115,6 +115,9 @@ def _undecided(tree: Tree) -> Iterator[Undecided]:
     for path, body in trajectories(tree):
         for key in ("q", "points", "start"):
             yield from _in_list(at(body, key), kinds, (*path, key))
+        for name, value in items(body, "set"):
+            prop = known_property(tree, name)
+            yield (*path, "set", name), value, prop.quantity if prop else ANY
         for joint, limits in items(body, "branch"):
             freedom = freedoms(tree, joint) or ()
             both = [of_freedom(freedom[0] if len(freedom) == 1 else None)] * 2

@@ -42,6 +42,9 @@ Times: TypeAlias = Annotated[
     tuple[Annotated[float, TIME], ...], Field(min_length=2), AfterValidator(_increasing)
 ]
 Coordinates: TypeAlias = tuple[QValue, ...]
+PropertyValue: TypeAlias = Annotated[
+    float, Quantity(elsewhere="quantity of the property's dimension (SI when bare)")
+]
 Samples: TypeAlias = Annotated[int, Field(ge=2, le=100_000)]
 
 
@@ -54,11 +57,13 @@ def _nested_tag(value: object) -> str:
 class AnyTrajectory(Part):
     """What every trajectory may have: a `name`, and what each of its seconds weighs beside others.
 
-    Without a name it is called by its place: "1", "2", …
+    Without a name it is called by its place: "1", "2", … `set` gives properties of the mechanism
+    other values along it, by their paths.
     """
 
     name: Name | None = None
     weight: Annotated[float, Quantity(above=0)] = 1.0
+    set: ByReference[PropertyValue] = FrozenDict()
 
 
 class SampledTrajectory(AnyTrajectory):

@@ -199,9 +199,6 @@ def _compile(
     place, atoms = np.cumsum(used) - 1, np.flatnonzero(used)[1:] - 1
     theta = [(r, c, place[a + 1], v) for r, c, a, v in entries]
     rows, columns, weights = pattern(theta, n_dof, len(atoms) + 1)
-    n_y, n_q = len(parameters.design), len(parameters.coordinates)
-    to_program = np.eye(n_q + n_y)
-    to_program[:n_q, :n_q] = motion.relative
     return Pencil(
         n_dof=n_dof,
         n_u=n_u,
@@ -210,9 +207,10 @@ def _compile(
         columns=columns,
         stiffness=weights[0],
         mass=weights[1],
-        program=compile_program(parameters.recorder, atoms.tolist(), n_q + n_y),
-        to_program=to_program,
-        shift=np.concatenate([motion.offset, np.zeros(n_y)]),
-        n_q=n_q,
+        program=compile_program(parameters.recorder, atoms.tolist(), parameters.count),
+        to_program=parameters.to_z,
+        shift=parameters.shift,
+        n_q=len(parameters.coordinates) + len(parameters.loads),
+        n_loads=len(parameters.loads),
         rails=rails(case, parameters.with_passive(motion.passive), motion.tree),
     )

@@ -56,7 +56,8 @@ class Pencil:
     """K and M of eq. (1) in the unknowns [u; q̇], order n_dof = n_u + n_columns.
 
     x = (q, y) are the case's variables, z = ``to_program`` x + ``shift`` those of the program
-    (relative joint coordinates and design parameters).
+    (relative joint coordinates, loads and design parameters). The last ``n_loads`` entries of q are
+    properties that change from one trajectory to the next.
     """
 
     n_dof: int
@@ -70,7 +71,13 @@ class Pencil:
     to_program: Floats  # (n_z, n_x)
     shift: Floats  # (n_z,)
     n_q: int
+    n_loads: int = 0
     rails: TravelRanges | None = None  # where carriages and nuts may stand
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joint coordinates: the first entries of q and of z."""
+        return self.n_q - self.n_loads
 
     @property
     def n_theta(self) -> int:

@@ -64,8 +64,9 @@ def _rows(
     entries = [row.get(k, 0.0) for _, *pair in springs for row in pair for k in free]
     z = reference(case, parameters)
     table = compile_table(parameters.recorder, entries, len(z))
-    ranges = [0.5 * (p.max - p.min) for p in case.design.parameters.values()]
-    span = np.concatenate([np.ones(len(parameters.coordinates)), ranges])  # rad or m; half of y's
+    n = len(parameters.coordinates)
+    half = [0.5 * (high - low) for low, high in case.ranges.values()]
+    span = np.append(np.ones(n), parameters.to_z[n:, n:] @ half)  # rad or m; half of a property's
     values = _at_poses(table, z, span)
     ends = values.reshape(-1, 3, 2, len(free), values.shape[1])  # three axes of v or ω together
     size = np.abs(ends).max(axis=(1, 2, 3, 4), initial=0.0)[:, None, None, None]

@@ -67,17 +67,19 @@ class VelocityTerms:
 
     stack: StackedLinks
     table: CompiledTable
-    relative: Floats
-    offset: Floats
+    parameters: ModelParameters
 
     def at(
         self, q: Floats, y: Floats, rate: Floats, acceleration: Floats
     ) -> tuple[sparse.csr_array, sparse.csr_array]:
-        """C [N s/m] and K_v [N/m] (n_dof, n_dof) for q, q̇, q̈ (n_q,) of one instant."""
+        """C [N s/m] and K_v [N/m] (n_dof, n_dof) for q, q̇, q̈ (n_q,) of one instant.
+
+        The loads in q rest.
+        """
         h = self._step(q, y, rate, acceleration)
         t = h * np.arange(-2.0, 3.0)[:, None]
         z = self.values(q + rate * t + acceleration * (t * t / 2.0), y)
-        B, W = [self.stack.motion(each) for each in z], rate + acceleration * t
+        B, W = [self.stack.motion(each) for each in z], self._joints(rate + acceleration * t)
         m = [self.stack.mass(z[k]) for k in (1, 2, 3)]
         P = [
             (B[k + 1] - B[k - 1]) * (0.5 / h) + self.stack.spin(z[k], W[k]) @ B[k]
@@ -95,7 +97,7 @@ class VelocityTerms:
         """Interval of the differences, s: a screw turns much faster than its nut travels."""
         (z,) = self.values(q[None], y)
         spins = self.stack.spins.at(z)
-        turned = (spins @ rate, spins @ acceleration)
+        turned = (spins @ self._joints(rate), spins @ self._joints(acceleration))
         fastest, hardest = (
             np.abs(np.concatenate(both)).max()
             for both in zip((rate, acceleration), turned, strict=True)
@@ -105,8 +107,12 @@ class VelocityTerms:
 
     def values(self, q: Floats, y: Floats) -> Floats:
         """All scalars at each of several poses q (n, n_q), and a 1: (n, n_scalars + 1)."""
-        z = np.vstack([self.relative @ q.T + self.offset[:, None], np.tile(y[:, None], len(q))])
+        z = self.parameters.z(np.hstack([q, np.tile(y, (len(q), 1))]))
         return np.column_stack([self.table.evaluate(Samples(), z).T, np.ones(len(q))])
+
+    def _joints(self, rates: Floats) -> Floats:
+        """Those of the coordinates alone, of rates (…, n_q)."""
+        return rates[..., : len(self.parameters.coordinates)]
 
 
 def placeless(case: CaseFile) -> tuple[str, ...]:
@@ -138,13 +144,11 @@ def velocity_terms(
         rows.append(ScalarRows(*(slice(a, b) for a, b in itertools.pairwise(cuts))))
         scalars += [s for part in parts for s in part]
         ridings.append(riding(mesh) if rides else None)
-    n = len(parameters.coordinates) + len(parameters.design)
     n_dof = nodes.count + len(motion.columns)
     return VelocityTerms(
         stack=stack(links, rows, ridings, case.mechanism.space, nodes.count, n_dof),
-        table=compile_table(parameters.recorder, scalars, n),
-        relative=motion.relative,
-        offset=motion.offset,
+        table=compile_table(parameters.recorder, scalars, parameters.count),
+        parameters=parameters,
     )
 
 

@@ -287,9 +287,7 @@ def _refuse_square(case: CaseFile, section: str) -> None:
     data = case.mechanism.sections[section]
     if data.shape != "rectangle" or case.mechanism.space == "planar":
         return
-    ranges = {
-        p.parameter: (p.min, p.max) for p in case.design.parameters.values() if hasattr(p, "min")
-    }
+    ranges = case.ranges
     low_w, high_w = ranges.get(f"sections.{section}.width", (data.width, data.width))
     low_h, high_h = ranges.get(f"sections.{section}.height", (data.height, data.height))
     if low_w < high_h and low_h < high_w and (low_w, low_h) != (high_w, high_h):

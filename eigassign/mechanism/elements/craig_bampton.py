@@ -133,18 +133,16 @@ def _matrices(
 
 
 def _designs(case: CaseFile) -> Floats:
-    """The middle, the lower and the upper bounds of y, (3, n_y)."""
-    bounds = np.array([[p.min, p.max] for p in case.design.parameters.values()], dtype=np.float64)
-    low, high = bounds.reshape(-1, 2).T
+    """The middle, the lower and the upper bounds of loads and design, (3, n_p)."""
+    low, high = np.array([*case.ranges.values()], dtype=np.float64).reshape(-1, 2).T
     return np.array([0.5 * (low + high), low, high])
 
 
-def coefficients(parameters: ModelParameters, terms: Sequence[Term], y: Floats) -> Floats:
-    """The coefficients of a link's terms at designs y (n, n_y), (n_terms, n)."""
-    n_q = len(parameters.coordinates)
-    table = compile_table(parameters.recorder, [t.coefficient for t in terms], n_q + y.shape[1])
-    z = np.vstack([np.zeros((n_q, len(y))), y.T])
-    return np.asarray(np.broadcast_to(table.evaluate(Samples(), z), (len(terms), len(y))))
+def coefficients(parameters: ModelParameters, terms: Sequence[Term], p: Floats) -> Floats:
+    """The coefficients of a link's terms at properties p (n, n_p), (n_terms, n), in any pose."""
+    table = compile_table(parameters.recorder, [t.coefficient for t in terms], parameters.count)
+    z = parameters.z(np.hstack([np.zeros((len(p), len(parameters.coordinates))), p]))
+    return np.asarray(np.broadcast_to(table.evaluate(Samples(), z), (len(terms), len(p))))
 
 
 def _span(

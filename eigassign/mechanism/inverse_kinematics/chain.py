@@ -133,11 +133,16 @@ def tip_chain(
     tip: str,
     y: Floats,
     oriented: bool = False,
+    loads: Floats | None = None,
 ) -> TipChain:
-    """The chain that carries the node ``tip`` ("link.node") at design y, turned if oriented."""
+    """The chain that carries the node ``tip`` ("link.node") at design y, turned if oriented.
+
+    ``loads`` (n_loads,) are what the trajectory sets, where there are any.
+    """
     points, turns = (2, (2,)) if case.mechanism.space == "planar" else (3, (0, 1, 2))
-    tables = _TipTables(case, parameters, motion, tip, points, turns if oriented else ())
-    passive = _passive_table(parameters, motion, len(y))
+    set_ = np.zeros(0) if loads is None else loads / parameters.scales
+    tables = _TipTables(case, parameters, motion, tip, points, turns if oriented else (), set_)
+    passive = _passive_table(parameters, motion)
 
     def at(y: Floats) -> TipChain:
         return TipChain(
@@ -146,7 +151,7 @@ def tip_chain(
             relative_map=(motion.relative, motion.offset),
             kinds=_kinds(case, motion.tree),
             turned_by=tables.turns,
-            assembly=_assembly(case, passive, motion, y),
+            assembly=_assembly(case, passive, motion, tables.properties(y)),
             design=ChainDesign(parameters.design, y, at, tables.evaluate_with_design),
         )
 
@@ -167,6 +172,11 @@ class _TipTables:
     tip: str
     d: int
     turns: tuple[int, ...]
+    loads: Floats  # (n_loads,) as variables of the program: see ModelParameters
+
+    def properties(self, y: Floats) -> Floats:
+        """The loads and the design y as variables of the program, behind s."""
+        return np.append(self.loads, y)
 
     @cached_property
     def _recorded(self) -> tuple[Recorder, list[Objects]]:
@@ -185,7 +195,7 @@ class _TipTables:
         twist = shifted(moving.placement(link).twist, X)
         velocity, spin = multiply(rotation, twist[:3]), multiply(rotation, twist[3:])
         J = _per_coordinate(np.concatenate([velocity[: self.d], spin[list(self.turns)]]), A)
-        F, dF = _closure(moving, self.d == 2, self._n_y, A)
+        F, dF = _closure(moving, self.d == 2, len(self.parameters.varied), A)
         turned = rotation.ravel() if self.turns else rotation[:0].ravel()
         return recorder, [place[: self.d], turned, J, F, dF]
 
@@ -193,22 +203,27 @@ class _TipTables:
     def _n_y(self) -> int:
         return len(self.parameters.design)
 
+    @property
+    def _n_variables(self) -> int:
+        return len(self.motion.tree.freedoms) + len(self.parameters.varied)
+
     @cached_property
     def _state_table(self) -> _Table:
         recorder, parts = self._recorded
-        return _Table.of(recorder, parts, len(self.motion.tree.freedoms) + self._n_y)
+        return _Table.of(recorder, parts, self._n_variables)
 
     @cached_property
     def _design_table(self) -> _Table:
         """∂(place)/∂y (d, n_y) and ∂F/∂y (n_e, n_y)."""
         recorder, (place, _, _, F, _) = self._recorded
-        n_q, n_z = len(self.motion.offset), len(self.motion.tree.freedoms)
+        first = len(self.motion.offset) + len(self.loads)
+        columns = range(first, first + self._n_y)
         parts = [
-            np.array([[derivative(f, n_q + k) for k in range(self._n_y)] for f in of], dtype=object)
+            np.array([[derivative(f, k) for k in columns] for f in of], dtype=object)
             for of in (place, F)
         ]
         shaped = [part.reshape(-1, self._n_y) for part in parts]
-        return _Table.of(recorder, shaped, n_z + self._n_y)
+        return _Table.of(recorder, shaped, self._n_variables)
 
     def evaluate(self, z: Floats, y: Floats) -> TipEvaluation:
         """What a chain's ``evaluate`` gives, z (n, n_z), at design y."""
@@ -231,13 +246,13 @@ class _TipTables:
         return seen._replace(jacobian=tip, closure=closure)
 
     def _variables(self, z: Floats, y: Floats) -> Floats:
-        """(s, y, p) as rows, s = A q + b."""
-        A, b = self.motion.relative, self.motion.offset
+        """s = A q + b, loads, y and p as rows."""
+        A, b, given = self.motion.relative, self.motion.offset, self.properties(y)
         n_q = len(b)
-        at = np.empty((z.shape[1] + len(y), len(z)))
+        at = np.empty((z.shape[1] + len(given), len(z)))
         at[:n_q] = (z[:, :n_q] @ A.T + b).T
-        at[n_q : n_q + len(y)] = y[:, None]
-        at[n_q + len(y) :] = z[:, n_q:].T
+        at[n_q : n_q + len(given)] = given[:, None]
+        at[n_q + len(given) :] = z[:, n_q:].T
         return at
 
 
@@ -274,13 +289,16 @@ def _per_coordinate(rates: Objects, A: Floats) -> Objects:
     return np.concatenate([multiply(rates[:, :n_q], A), rates[:, n_q:]], axis=1)
 
 
-def _closure(motion: Kinematics, planar: bool, n_y: int, A: Floats) -> tuple[Objects, Objects]:
-    """F (n_e,) and ∂F/∂(q, p) (n_e, n_z) of loops that passive freedoms close."""
+def _closure(motion: Kinematics, planar: bool, n: int, A: Floats) -> tuple[Objects, Objects]:
+    """F (n_e,) and ∂F/∂(q, p) (n_e, n_z) of loops that passive freedoms close.
+
+    Between the variables of q and of p are those of ``n`` properties.
+    """
     n_q, n_z = len(A), len(motion.tree.freedoms)
     if not motion.tree.passive:
         return np.zeros(0, dtype=object), np.zeros((0, n_z), dtype=object)
     F, _ = closure_rows(motion, planar)
-    variables = [*range(n_q), *range(n_q + n_y, n_z + n_y)]
+    variables = [*range(n_q), *range(n_q + n, n_z + n)]
     dF = np.array([[derivative(f, k) for k in variables] for f in F], dtype=object)
     return np.array(F, dtype=object), _per_coordinate(dF, A)
 
@@ -297,17 +315,15 @@ def _kinds(case: CaseFile, tree: Topology) -> tuple[str, ...]:
     return tuple(kinds)
 
 
-def _passive_table(
-    parameters: ModelParameters, motion: Kinematics, n_y: int
-) -> CompiledTable | None:
+def _passive_table(parameters: ModelParameters, motion: Kinematics) -> CompiledTable | None:
     """The passive freedoms of the model itself; None without any."""
     if not motion.passive:
         return None
-    return compile_table(parameters.recorder, motion.passive, len(motion.offset) + n_y)
+    return compile_table(parameters.recorder, motion.passive, parameters.count)
 
 
 def _assembly(
-    case: CaseFile, table: CompiledTable | None, motion: Kinematics, y: Floats
+    case: CaseFile, table: CompiledTable | None, motion: Kinematics, properties: Floats
 ) -> LoopAssembly | None:
     """The branch of the model itself: where it was chosen, and its passive freedoms."""
     if table is None:
@@ -315,7 +331,7 @@ def _assembly(
 
     def passive(q: Floats) -> Floats:
         s = q @ motion.relative.T + motion.offset
-        z = np.hstack([s, np.broadcast_to(y, (len(q), len(y)))]).T
+        z = np.hstack([s, np.broadcast_to(properties, (len(q), len(properties)))]).T
         values = table.evaluate(Samples(), z)
         return np.broadcast_to(values, (len(values), len(q))).T
 

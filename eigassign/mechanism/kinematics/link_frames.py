@@ -35,13 +35,11 @@ class LinkFrames:
     drawn: tuple[tuple[tuple[str, str], ...], ...]  # per link: the node pairs of its lines
 
     def _compile(self, scalars: Sequence[Scalar]) -> CompiledTable:
-        n = len(self.parameters.coordinates) + len(self.parameters.design)
-        return compile_table(self.parameters.recorder, scalars, n)
+        return compile_table(self.parameters.recorder, scalars, self.parameters.count)
 
     def _evaluate(self, table: CompiledTable, x: Floats) -> Floats:
         """(n_samples, n_scalars)."""
-        q, y = np.split(np.atleast_2d(x), [len(self.parameters.coordinates)], axis=1)
-        z = np.hstack([q @ self.motion.relative.T + self.motion.offset, y]).T
+        z = self.parameters.z(np.atleast_2d(x))
         rows = table.evaluate(Samples(), z)
         return np.broadcast_to(rows, (len(rows), z.shape[1])).T
 
@@ -118,4 +116,4 @@ def design_dependence(poses: LinkFrames, tip: str, oriented: bool = False) -> ND
         scalars += list(poses.motion.placement(link).world_rotation.ravel())
     table = poses._compile(scalars)
     depends = np.asarray(table.program.dependence.any(axis=0))
-    return depends[len(poses.parameters.coordinates) :]
+    return depends[len(depends) - len(poses.parameters.design) :]

@@ -19,7 +19,11 @@ from eigassign.case.schema.joints import FREEDOMS
 from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics.coordinates import CoordinateMap
 from eigassign.mechanism.kinematics.forward import Kinematics, walk
-from eigassign.mechanism.kinematics.parameters import ModelParameters, initial_design
+from eigassign.mechanism.kinematics.parameters import (
+    ModelParameters,
+    initial_design,
+    written_loads,
+)
 from eigassign.mechanism.kinematics.rotations import DOFS, Floats, Objects, multiply
 from eigassign.mechanism.kinematics.topology import Topology
 from eigassign.series.compiler import Program, compile_program
@@ -85,14 +89,14 @@ def _bind_passive(
         _check_rigid_loops(case, parameters, tree, coords)
         return parameters
     recorder = Recorder()
-    n_q, n_y, n_p = len(coords.relative), len(parameters.design), len(tree.passive)
+    n_q, n_y, n_p = len(coords.relative), len(parameters.varied), len(tree.passive)
     trial = parameters.rerecorded(recorder, n_p)
     F, check = _equations(case, trial, tree, coords)
     J = [[derivative(f, n_q + n_y + k) for k in range(n_p)] for f in F]
     used = _used_variables(recorder, [*F, *check], n_q + n_y, n_p)
     scalars = [*F, *check, *(entry for row in J for entry in row)]
     program = _reordered(recorder, scalars, used, n_q + n_y, n_p)
-    names = (*_joint_names(case, coords), *parameters.design)
+    names = (*_joint_names(case, coords), *parameters.varied)
     function = ImplicitFunction(
         program,
         n_p,
@@ -224,9 +228,9 @@ def choose_branch(
 
 
 def reference(case: CaseFile, parameters: ModelParameters) -> Floats:
-    """z = (s, y) where the branch is chosen, y as written."""
-    s = parameters.relative @ reference_coordinates(case) + parameters.offset
-    return np.concatenate([s, initial_design(case)])
+    """z where the branch is chosen, properties as written."""
+    written = (written_loads(case), initial_design(case))
+    return parameters.z(np.concatenate([reference_coordinates(case), *written])[None])[:, 0]
 
 
 def reference_coordinates(case: CaseFile) -> Floats:

@@ -24,7 +24,12 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ModelParameters:
-    """Variables z = (s, y): joint coordinates s in the order of the case's q, then design y."""
+    """Variables z = (s, p): joint coordinates s in the order of the case's coordinates, then the
+    properties p that vary, those that trajectories set (loads) before the design y.
+
+    A load is ``scales`` times its variable: a power of two near half its range, so that distances
+    between poses and loads say something whatever the units; lengths stay in m, as strokes do.
+    """
 
     recorder: Recorder
     coordinates: tuple[str, ...]
@@ -33,9 +38,39 @@ class ModelParameters:
     offset: Floats
     by_path: dict[str, Expression] = field(default_factory=dict)
     passive: tuple[Scalar, ...] = ()
+    loads: tuple[str, ...] = ()
+    scales: Floats = field(default_factory=lambda: np.zeros(0))  # (n_loads,)
+
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """Names of the properties p."""
+        return (*self.loads, *self.design)
+
+    @property
+    def count(self) -> int:
+        """Number of variables z."""
+        return len(self.coordinates) + len(self.varied)
+
+    @property
+    def to_z(self) -> Floats:
+        """dz/dx with x = (q, y), q the coordinates and the loads, (n_z, n_x)."""
+        n, matrix = len(self.coordinates), np.eye(self.count)
+        matrix[:n, :n] = self.relative
+        loads = range(n, n + len(self.loads))
+        matrix[loads, loads] = 1.0 / self.scales
+        return matrix
+
+    @property
+    def shift(self) -> Floats:
+        """z of x = 0."""
+        return np.concatenate([self.offset, np.zeros(len(self.varied))])
+
+    def z(self, x: Floats) -> Floats:
+        """z (n_z, n) of samples x (n, n_x)."""
+        return np.asarray(self.to_z @ x.T + self.shift[:, None])
 
     def number(self, path: str, value: float) -> Scalar:
-        """The value at a key path of the case: the variable if it is a design parameter."""
+        """The value at a key path of the case, as an expression if it varies."""
         return self.by_path.get(path, value)
 
     def freedom(self, k: int) -> Scalar:
@@ -49,40 +84,52 @@ class ModelParameters:
 
     def rerecorded(self, recorder: Recorder, n_passive: int) -> ModelParameters:
         """The same on another recorder, the passive freedoms being its last variables."""
-        n = len(self.coordinates) + len(self.design)
-        moved = {
-            path: recorder.variable(len(self.coordinates) + k)
-            for k, path in enumerate(self.by_path)
-        }
-        passive = tuple(recorder.variable(n + k) for k in range(n_passive))
+        moved = _properties(recorder, len(self.coordinates), tuple(self.by_path), self.scales)
+        passive = tuple(recorder.variable(self.count + k) for k in range(n_passive))
         return replace(self, recorder=recorder, by_path=moved, passive=passive)
 
 
 def parameters(case: CaseFile) -> ModelParameters:
     """The variables of a case."""
-    recorder = Recorder()
-    names, design = tuple(case.coordinates), tuple(case.design.parameters)
-    by_path = {
-        parameter.parameter: recorder.variable(len(names) + k)
-        for k, parameter in enumerate(case.design.parameters.values())
-    }
-    maps = coordinates(case, build_tree(case))
-    return ModelParameters(recorder, names, design, maps.relative, maps.offset, by_path)
+    recorder, maps = Recorder(), coordinates(case, build_tree(case))
+    scales = np.array([_scale(path, *load.range) for path, load in case.loads.items()])
+    return ModelParameters(
+        recorder=recorder,
+        coordinates=tuple(case.coordinates),
+        loads=tuple(case.loads),
+        design=tuple(case.design.parameters),
+        relative=maps.relative,
+        offset=maps.offset,
+        scales=scales,
+        by_path=_properties(recorder, len(case.coordinates), tuple(case.ranges), scales),
+    )
+
+
+def _properties(
+    recorder: Recorder, first: int, paths: Sequence[str], scales: Floats
+) -> dict[str, Expression]:
+    """Properties by path, their variables numbered from ``first``; the loads are scaled."""
+    found = {path: recorder.variable(first + k) for k, path in enumerate(paths)}
+    for path, scale in zip(paths, scales.tolist(), strict=False):
+        found[path] = found[path] * scale
+    return found
+
+
+def _scale(path: str, low: float, high: float) -> float:
+    """A power of two near half the range, or near the value where there is none."""
+    size = 0.5 * (high - low) or abs(high)
+    return 2.0 ** round(np.log2(size)) if size and not path.startswith("links.") else 1.0
 
 
 def initial_design(case: CaseFile) -> Floats:
     """y as the mechanism is written in the file, (n_y,) in SI units."""
     paths = [p.parameter for p in case.design.parameters.values()]
-    return np.array([_value(case, path) for path in paths], dtype=np.float64)
+    return np.array([case.value_at(path) for path in paths], dtype=np.float64)
 
 
-def _value(case: CaseFile, path: str) -> float:
-    head, name, *fields = path.split(".")
-    group = case.coordinates if head == "coordinates" else getattr(case.mechanism, head)
-    value: Any = group[name]
-    for field_name in fields:
-        value = getattr(value, field_name)
-    return float(value)
+def written_loads(case: CaseFile) -> Floats:
+    """The loads as the mechanism is written in the file, (n_loads,) in SI units."""
+    return np.array([load.written for load in case.loads.values()], dtype=np.float64)
 
 
 def link_type(case: CaseFile, link: str) -> str:

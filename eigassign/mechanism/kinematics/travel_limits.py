@@ -76,12 +76,11 @@ def rails(case: CaseFile, parameters: ModelParameters, tree: Topology) -> Rails 
     scalars: list[Scalar] = []
     for joint, link in riders:
         scalars += [station(parameters, tree, joint), length(case, parameters, link)]
-    n = len(parameters.coordinates) + len(parameters.design)
     return Rails(
         tuple(joint for joint, _ in riders),
         tuple(link for _, link in riders),
         np.array([_margins(case, link) for _, link in riders]),
-        compile_table(parameters.recorder, scalars, n),
+        compile_table(parameters.recorder, scalars, parameters.count),
         parameters.coordinates,
     )
 

@@ -72,6 +72,20 @@ class Trajectory:
             return self.q, np.zeros((*self.q.shape, len(y)))
         return self.of_design(y)
 
+    def joined(self, loads: Floats) -> Trajectory:
+        """The same with ``loads`` (n_loads,), which neither time nor design change, behind q."""
+        whole = self.of_design
+
+        def own(y: Floats) -> tuple[Floats, Floats]:
+            q, slopes = self.at(y)
+            still = np.zeros((len(q), len(loads), len(y)))
+            return behind(q), np.concatenate([slopes, still], axis=1)
+
+        def behind(q: Floats) -> Floats:
+            return np.hstack([q, np.tile(loads, (len(q), 1))])
+
+        return replace(self, q=behind(self.q), of_design=None if whole is None else own)
+
     def chosen(self, samples: Ints) -> Trajectory:
         """Some of the samples only, given by ascending numbers."""
         tip, whole = None if self.tip is None else self.tip[samples], self.of_design
@@ -397,6 +411,8 @@ def rates(trajectory: Trajectory) -> Rates:
     found = [_differences(time_s[part], q[part]) for part in parts]
     nothing = np.zeros((0, q.shape[1]))
     rate, acceleration = (np.concatenate([nothing, *(f[k] for f in found)]) for k in (0, 1))
+    resting = np.ptp(q, axis=0) == 0.0  # loads among them: no round-off of their differences
+    rate[:, resting] = acceleration[:, resting] = 0.0
     return Rates(samples, q[samples], rate, acceleration)
 
 

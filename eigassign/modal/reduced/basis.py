@@ -170,9 +170,10 @@ def mean_theta(pencil: Pencil, points: Floats) -> Floats:
     if pencil.program.is_implicit:
         return np.asarray(pencil.theta(points).mean(axis=1))
     z = points @ pencil.to_program.T + pencil.shift
-    z[:, pencil.n_q :] = z[0, pencil.n_q :]
+    n = pencil.n_joints
+    z[:, n:] = z[0, n:]
     turns = np.zeros(len(pencil.shift))
-    turns[: pencil.n_q] = [_is_angle(pencil, z[0], k) for k in range(pencil.n_q)]
+    turns[:n] = [_is_angle(pencil, z[0], k) for k in range(n)]
     turned = np.concatenate([z + k * turns * (np.pi / 2.0) for k in range(4)])
     theta = _theta_at(pencil, turned)
     return np.asarray(theta[:, np.isfinite(theta).all(axis=0)].mean(axis=1))

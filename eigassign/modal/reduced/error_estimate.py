@@ -201,10 +201,10 @@ def _scaling(terms: ErrorTerms, theta: Floats) -> tuple[Floats, Floats]:
 def _at_first_design(reduced: ReducedPencil, x: Floats) -> tuple[Floats, Flags]:
     """θ(q, y0) (n_theta, n), and where there is one: a loop may not close with other lengths.
 
-    θ(x0) stands where there is none.
+    The loads in q are those of x0 too. θ(x0) stands where there is none.
     """
-    turned = x.copy()
-    turned[:, reduced.n_q :] = reduced.points[0, reduced.n_q :]
+    turned, n = x.copy(), reduced.n_q - reduced.n_loads
+    turned[:, n:] = reduced.points[0, n:]
     try:
         return reduced.theta(turned), np.ones(len(x), dtype=bool)
     except SingularityError:
@@ -260,8 +260,8 @@ def error_terms(basis: RitzBasis) -> ErrorTerms:
     following = 1.0 / basis.lam[:, count : count + 1]
     if not following.size:
         following = np.zeros((len(basis.lam), 1))
-    # Stiffness terms that design parameters scale and no joint enters
-    jointless = ~np.asarray(pencil.program.dependence[:, : pencil.n_q].any(axis=1))
+    # Stiffness terms that loads or design parameters scale and no joint enters
+    jointless = ~np.asarray(pencil.program.dependence[:, : pencil.n_joints].any(axis=1))
     stiff = np.flatnonzero(np.diff(pencil.by_term[0].indptr)).tolist()
     material = np.array([t for t in stiff if t and jointless[t - 1] and theta0[t]], dtype=np.intp)
     return ErrorTerms(

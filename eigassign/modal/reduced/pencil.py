@@ -34,6 +34,7 @@ class ReducedPencil:
     """K̂ and M̂ as functions of x; needs neither mesh nor mechanism. Immutable."""
 
     n_q: int
+    n_loads: int  # of q: its last entries
     n_y: int
     points: Floats  # (n_points, n_x): the expansion points
     program: Program

@@ -59,6 +59,7 @@ def _projected(basis: RitzBasis, half_order: int) -> ReducedModel:
     return ReducedModel(
         modes=basis.modes,
         n_q=pencil.n_q,
+        n_loads=pencil.n_loads,
         n_y=basis.points.shape[1] - pencil.n_q,
         half_order=half_order,
         points=basis.points,

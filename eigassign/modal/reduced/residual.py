@@ -226,7 +226,7 @@ def joint_correction(
 
     ``factor`` is that of K0, ``theta0`` (n_theta,) are its θ, ``wide`` is [V 0; 0 I_F].
     """
-    of_joints = np.flatnonzero(pencil.program.dependence[:, : pencil.n_q].any(axis=1)) + 1
+    of_joints = np.flatnonzero(pencil.program.dependence[:, : pencil.n_joints].any(axis=1)) + 1
     columns, k = pencil.by_term[0], wide.shape[1] - len(pencil.rigid)
     terms = np.array([t for t in of_joints if columns.indptr[t + 1] > columns.indptr[t]], np.intp)
     entries = np.unique(columns[:, terms].tocoo().coords[0]) if len(terms) else terms

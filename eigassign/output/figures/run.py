@@ -24,7 +24,9 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
             comparison = one.studies[k].over_time
             if comparison is not None and comparison.exact_hz.size:
                 yield curves.over_time(one, study, comparison)
-        yield from maps.approximation(study, study.over_q, study.q0, results.q_names, "q")
+        loads = results.trajectories[0].loads if results.trajectories else ()
+        point = (*results.q_names, *loads)
+        yield from maps.approximation(study, study.over_q, study.q0, point, "q")
         names = tuple(row.name for row in results.design)
         yield from maps.approximation(study, study.over_design, study.y0, names, "design")
     for mode in dict.fromkeys(target.mode for target in results.targets):

@@ -19,6 +19,7 @@ from eigassign.mechanism.elements.beam import bending_mass, bending_shapes
 from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.mechanism.kinematics.parameters import node_position
 from eigassign.mechanism.kinematics.rotations import cross, multiply
+from eigassign.study.planning import with_middle_loads
 
 CASES = Path(__file__).parents[3] / "cases"
 ALL = sorted(path.stem for path in CASES.glob("*.yaml"))
@@ -28,7 +29,7 @@ SLIDING = {"prismatic", "carriage", "nut", "cylindrical", "screw"}
 def posed(name: str) -> tuple[ea.Case, Any, Any]:
     """A shipped case, and q, y at its expansion point with its initial design."""
     case = ea.load_case(CASES / f"{name}.yaml")
-    return case, np.array(case.file.expansion.q, dtype=float), case.initial_design
+    return case, with_middle_loads(case.file, case.file.expansion.q), case.initial_design
 
 
 def every_shape(case: ea.Case, q: Any, y: Any, vectors: Any) -> Any:
