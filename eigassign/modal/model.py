@@ -12,6 +12,7 @@ from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.local_motion import ReducedLinks
 from eigassign.mechanism.assembly.mode_shapes import NodeShape, StrandShape, shapes
 from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism.assembly.total_mass import TotalMass
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.link_frames import LinkFrames
 from eigassign.mechanism.kinematics.travel_limits import Label
@@ -39,6 +40,7 @@ class Model:
     pencil: Pencil
     poses: LinkFrames
     motion: Kinematics
+    total_mass: TotalMass
     q_names: tuple[str, ...]
     y_names: tuple[str, ...]
     reduced: ReducedLinks | None = None  # the links that Craig-Bampton made smaller
@@ -81,6 +83,20 @@ class Model:
         """Frequencies (n_samples, count) in Hz and mass-normalised modes (…, n_dof, count)."""
         found = modes(self.pencil, self.x(q, y), count)
         return np.sqrt(found.lam) / (2.0 * np.pi), found.phi
+
+    def mass(self, y: ArrayLike) -> float:
+        """Mass of all links and bodies in kg, those that never move included, at a design (n_y,).
+
+        Raises UsageError for a wrong shape.
+        """
+        return self.total_mass(self._design(y))[0]
+
+    def mass_slopes(self, y: ArrayLike) -> Floats:
+        """∂mass/∂y (n_y,) in kg per SI unit of y."""
+        return self.total_mass(self._design(y))[1]
+
+    def _design(self, y: ArrayLike) -> Floats:
+        return self.one(np.zeros(len(self.q_names)), y)[0, len(self.q_names) :]
 
     def truncation_error(self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)) -> Floats:
         """By how much reduced links raise frequencies at most, relative, (n_samples, n_modes).

@@ -21,6 +21,7 @@ from eigassign.mechanism.assembly.build import (
     whole_links,
 )
 from eigassign.mechanism.assembly.local_motion import reduced_links
+from eigassign.mechanism.assembly.total_mass import total_mass
 from eigassign.mechanism.inverse_kinematics.chain import tip_chain
 from eigassign.mechanism.kinematics.link_frames import build_link_frames, design_dependence
 from eigassign.mechanism.kinematics.parameters import initial_design
@@ -69,8 +70,9 @@ def build_model(file: CaseFile, links: WholeLinks | None = None) -> Model:
         pencil = build_pencil(file, parameters, motion, local)
         poses = build_link_frames(file, parameters, motion)
         reduced = reduced_links(parameters, local[0], pencil)
+        mass = total_mass(file, parameters, links.meshes.values())
     q_names = (*parameters.coordinates, *parameters.loads)
-    return Model(pencil, poses, motion, q_names, parameters.design, reduced)
+    return Model(pencil, poses, motion, mass, q_names, parameters.design, reduced)
 
 
 def build_trajectories(file: CaseFile, model: Model) -> Trajectories:

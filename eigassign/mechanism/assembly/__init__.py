@@ -10,6 +10,7 @@ Read in this order; each imports only from those above it:
     rigid_loops       loops between rigid links: passive joints follow elastically
     springs           springs between nodes
     rigid_body_modes  free motions that no spring resists, made columns of their own
+    total_mass        the mass of all links and bodies as a function of the design
     build             from a case to its pencil
     mode_shapes       displacements of nodes and beams in a vector [u; q̇]
     velocity_terms    the velocity terms of eq. (1) that the method neglects
