@@ -305,7 +305,7 @@ def _fall(problem: DesignProblem, place: _Place, reached: _Place, progress: _Pro
 def _kept(
     problem: DesignProblem, place: _Place, reached: _Place, move: _Move, progress: _Progress
 ) -> bool:
-    return _fall(problem, place, reached, progress) > TAKEN * move.promised
+    return bool(_fall(problem, place, reached, progress) > TAKEN * move.promised)
 
 
 def _record(progress: _Progress, box: _Box, reached: _Place, move: _Move, taken: bool) -> None:
@@ -580,8 +580,9 @@ def _balance(problem: DesignProblem, y: Floats, seen: Appraisal) -> tuple[float,
         size += float(np.abs(box.prices).max())
         if np.linalg.norm(r) <= TINY and not box.prices.any():
             size = 0.0
+    violated = seen.violation > ON
     if size == 0.0:
-        return 0.0, ()
+        return (_unbalanced_violation(box, z, C, seen.excess) if violated else 0.0), ()
     mu = nnls(system, -slope, maxiter=50 * max(system.shape))[0] if system.size else np.zeros(0)
     left = slope + (system @ mu if system.size else 0.0)
     found = tuple(
@@ -589,7 +590,7 @@ def _balance(problem: DesignProblem, y: Floats, seen: Appraisal) -> tuple[float,
         for (kind, index, upper), unit, m in zip(owners, units, mu, strict=False)
     )
     rest = float(np.abs(left).max()) / size
-    if seen.violation > ON:
+    if violated:
         rest = max(rest, _unbalanced_violation(box, z, C, seen.excess))
     return rest, found
 

@@ -13,6 +13,7 @@ Reading order:
     one_shot    the paper's answer: one quadratic program about one expansion point
     response    frequencies along the trajectory and their slopes in the design
     judgement   what a design does to the targets, and the verdict
+    clearance   proof that a band stays clear of modes all along a trajectory
     optimum     the design that meets the targets best, by the sequential method
     assignment  from the targets to the answer, by either method
     accuracy    errors of mesh, reduction, expansion and round-off; whether the motion is slow

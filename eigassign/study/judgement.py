@@ -78,7 +78,7 @@ def _studied(
         predicted_hz=predicted,
         one_shot_hz=None if one_shot is None else _curve(wanted, one_shot),
         error=summary,
-        satisfied=summary.exact.max_relative <= allowed,
+        satisfied=bool(summary.exact.max_relative <= allowed),
         trajectory=wanted.requirement.target.trajectory,
         rows=wanted.rows,
         weight_s=float(weights.sum()),

@@ -35,6 +35,7 @@ from eigassign.assignment.sequential import (
     minimise,
 )
 from eigassign.errors import CaseError, EigassignError
+from eigassign.study.clearance import Band, Clearance, prove_clear, wanting
 from eigassign.study.one_shot import linear_constraints
 from eigassign.study.response import exact_response
 from eigassign.study.scene import Scene
@@ -43,6 +44,8 @@ from eigassign.study.wanted import Wanted, target_frequencies, time_weights
 Floats = NDArray[np.float64]
 MOST_BELOW = 24  # combinations of numbers of modes below the bands that are tried
 STARTS = 8  # with `starts: auto`, at most
+MARGIN = 1e-5  # relative, by which modes keep off a band at the samples at least
+WIDENED = 5  # times that the margin is widened at most
 FEW = 24  # samples on which starts are followed, of more than twice as many
 REFINED = 3  # optima on few samples that are followed on all
 AGREED = 3  # starts that lead to the best optimum before no more are made
@@ -68,6 +71,7 @@ class Found:
     optima: tuple[Optimum, ...]  # distinct local optima of the best variant, the best first
     variants: tuple[tuple[Variant, Optimum], ...]  # the best of each
     initial: tuple[float, float]  # violation and objective of the initial design
+    clearances: tuple[Clearance, ...]  # of every band along every trajectory
     starts: int
     exact_solves: int
 
@@ -80,12 +84,36 @@ def find_optimum(
 ) -> Found:
     """The best local optimum of the exact problem from the initial design and ``starts``.
 
+    Bands to keep out of are proved clear (`clearance`): where modes come too near between the
+    samples, the limits at the samples are drawn in by what is lacking, and the answer is sought
+    anew from where it was.
+    """
+    margin = MARGIN
+    for _ in range(WIDENED):
+        found = _search_all(scene, wanted, starts, margin, progress)
+        lacking = wanting(found.clearances)
+        met = found.best.seen.violation <= MET
+        if lacking == 0.0 or not met or found.best.end in (End.SECONDS, End.INTERRUPTED):
+            break
+        starts, margin = [found.best.y], margin + 2.0 * lacking + MARGIN
+    return found
+
+
+def _search_all(
+    scene: Scene,
+    wanted: Sequence[Wanted],
+    starts: Sequence[Floats],
+    margin: float,
+    progress: Callable[[str], None],
+) -> Found:
+    """The best local optimum, the limits of bands drawn in by ``margin`` (relative).
+
     Starts are followed on few samples of a long trajectory; what they lead to is then optimised on
     all. No design is returned that is worse than the initial one.
     """
     keys, begun = scene.file.assignment, monotonic()
     deadline = np.inf if keys.seconds is None else begun + keys.seconds
-    whole, few = Task(scene, tuple(wanted)), _thinned(scene, wanted)
+    whole, few = Task(scene, tuple(wanted), margin), _thinned(scene, wanted, margin)
     best_of: list[tuple[Variant, tuple[Optimum, ...]]] = []
     made, solves = 0, 0
     for below in _below(whole):
@@ -113,9 +141,18 @@ def find_optimum(
         optima=optima,
         variants=tuple((v, o[0]) for v, o in best_of),
         initial=_initial(scene, variant),
+        clearances=tuple(_clearances(whole, variant, optima[0].y)),
         starts=made,
         exact_solves=solves + len(scene.path.q),
     )
+
+
+def _clearances(task: Task, variant: Variant, y: Floats) -> Iterator[Clearance]:
+    q = task.scene.path.at(y)[0]
+    for band, (label, below) in zip(task.bands, variant.below, strict=True):
+        named = tuple(sorted(band.wanted.requirement.modes))
+        own = Band(label, q[band.rows], band.lower_hz, band.upper_hz, below, named)
+        yield prove_clear(task.scene.model, own, y)
 
 
 def _refined(variant: Variant, coarse: _Search, initial: Floats) -> _Search:
@@ -187,18 +224,29 @@ class _Search:
             for o in self.optima
             if _worth(o)[0] <= best[0] + MET and o.objective <= best[1] * (1.0 + SAME) + 1e-16
         ]
-        return len(same) >= AGREED or best[1] <= 1e-14
+        return len(same) >= AGREED or (best[0] <= MET and best[1] <= 1e-14)
 
 
 def _starts(scene: Scene, given: Sequence[Floats], count: int | str) -> Iterator[Floats]:
-    """The initial design, those given, the middle of the bounds, then evenly spread ones."""
-    lower, upper = scene.bounds
+    """The initial design, those given, then designs spread evenly over the bounds.
+
+    Where bounds are positive and more than a decade apart, evenly in the logarithm.
+    """
     most = STARTS if isinstance(count, str) else count
-    first = [scene.initial, *given, 0.5 * (lower + upper)]
+    first = [scene.initial, *given]
     yield from first[:most]
-    if len(first) < most and len(lower):
-        points = qmc.Sobol(len(lower), seed=0).random(most - len(first))
-        yield from lower + points * (upper - lower)
+    if len(first) < most:
+        yield from _spread_designs(scene, most - len(first), 0)
+
+
+def _spread_designs(scene: Scene, count: int, seed: int) -> Floats:
+    """Designs (count, n_y) of a Halton sequence over the bounds."""
+    lower, upper = scene.bounds
+    share = qmc.Halton(len(lower), seed=seed).random(count)
+    wide = (lower > 0.0) & (upper > 10.0 * lower)
+    low = np.where(wide, lower, 1.0)
+    ratio = np.where(wide, upper, 1.0) / low
+    return np.where(wide, low * ratio**share, lower + share * (upper - lower))
 
 
 # --- From targets to requirements
@@ -210,6 +258,7 @@ class Task:
 
     scene: Scene
     wanted: tuple[Wanted, ...]
+    margin: float  # by which the limits of bands are drawn in, relative
 
     @cached_property
     def bands(self) -> tuple[_Band, ...]:
@@ -217,14 +266,14 @@ class Task:
         return tuple(_bands(self.scene, self.wanted))
 
 
-def _thinned(scene: Scene, wanted: Sequence[Wanted]) -> Task | None:
+def _thinned(scene: Scene, wanted: Sequence[Wanted], margin: float) -> Task | None:
     """The same on few samples; None where there are few, or a target would have none of them."""
     path = scene.path
     if len(path.q) < 2 * FEW:
         return None
     scene = replace(scene, trajectory=path.chosen(path.spread(FEW)))
     try:
-        task = Task(scene, target_frequencies(scene.file, scene.path))
+        task = Task(scene, target_frequencies(scene.file, scene.path), margin)
     except CaseError:
         return None
     return task if len(task.bands) == len(tuple(_bands(scene, wanted))) else None
@@ -248,7 +297,9 @@ def _variant(task: Task, below: tuple[int, ...]) -> Variant:
     objective = Objective(scene.file.assignment.objective)
     prices = _prices(scene, objective if targets else None)
     of_bands = [
-        limit for band, k in zip(task.bands, below, strict=True) for limit in _beside(band, k)
+        limit
+        for band, k in zip(task.bands, below, strict=True)
+        for limit in _beside(band, k, task.margin)
     ]
     asked = Requirements(
         targets=targets,
@@ -324,15 +375,16 @@ def _possible(scene: Scene, band: _Band) -> list[int]:
     return sorted(possible, key=lambda k: (abs(k - first), k))
 
 
-def _beside(band: _Band, k: int) -> Iterator[FrequencyLimit]:
+def _beside(band: _Band, k: int, margin: float) -> Iterator[FrequencyLimit]:
     """The limits that say: k of the named modes (of all, if none is named) are below the band."""
+    lower, upper = band.lower_hz * (1.0 - margin), band.upper_hz * (1.0 + margin)
     label, named = band.wanted.requirement.label, tuple(sorted(band.wanted.requirement.modes))
     below = named[k - 1] if named and k else k
     above = named[k] if named and k < len(named) else k + 1
     if k:
-        yield FrequencyLimit(label, ((below, 1.0),), band.lower_hz, band.rows, False)
+        yield FrequencyLimit(label, ((below, 1.0),), lower, band.rows, False)
     if not named or k < len(named):
-        yield FrequencyLimit(label, ((above, 1.0),), band.upper_hz, band.rows, True)
+        yield FrequencyLimit(label, ((above, 1.0),), upper, band.rows, True)
 
 
 def _counts(scene: Scene, band: _Band, named: tuple[int, ...]) -> NDArray[np.intp]:
@@ -340,7 +392,7 @@ def _counts(scene: Scene, band: _Band, named: tuple[int, ...]) -> NDArray[np.int
     lower, upper = scene.bounds
     designs = [scene.initial, lower, upper, 0.5 * (lower + upper)]
     if len(lower):
-        designs += list(lower + qmc.Sobol(len(lower), seed=1).random(8) * (upper - lower))
+        designs += list(_spread_designs(scene, 8, 1))
     found = []
     for y in designs:
         try:
