@@ -16,12 +16,14 @@ from eigassign.assignment import Assignment, hz_from_lam
 from eigassign.assignment.sequential import End
 from eigassign.case import CaseFile
 from eigassign.errors import AccuracyError, CaseError, Problem
+from eigassign.study.clearance import Clearance
 from eigassign.study.judgement import verdict
 from eigassign.study.one_shot import assign_design
 from eigassign.study.optimum import Found, find_optimum
 from eigassign.study.results import (
     ActiveRow,
     AssignmentRow,
+    ClearanceRow,
     LocalOptimum,
     OptimalityRow,
     StepRow,
@@ -129,7 +131,11 @@ def assignment_row(scene: Scene, answer: Answer, targets: Sequence[TargetStudy])
     accepted = scene.file.validation.max_error
     # The exact optimum rests on exact frequencies, the one shot on its prediction.
     trusted = found is not None or all(t.approximation_error <= accepted for t in targets)
+    clearances = () if found is None else tuple(map(_clearance, found.clearances))
     word, reason = verdict(targets, (initial, optimal), trusted)
+    unproved = [row.label for row in clearances if not row.clear]
+    if word == "reached" and unproved:
+        word, reason = "do_not_use", f"not proved clear along the motion: {'; '.join(unproved)}"
     if found is not None and found.best.end in (End.SECONDS, End.STEPS, End.INTERRUPTED):
         reason = f"{reason}; unfinished: {found.best.end.value}"
     return AssignmentRow(
@@ -150,7 +156,12 @@ def assignment_row(scene: Scene, answer: Answer, targets: Sequence[TargetStudy])
         one_shot=None if answer.one_shot is None else answer.one_shot.y,
         max_error=MAX_ERROR if keys.max_error is None else keys.max_error,
         max_error_given=keys.max_error is not None,
+        clearances=clearances,
     )
+
+
+def _clearance(found: Clearance) -> ClearanceRow:
+    return ClearanceRow(found.label, found.below, found.clear, found.room, found.counted)
 
 
 def _merits(

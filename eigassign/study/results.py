@@ -259,6 +259,21 @@ class ActiveRow:
 
 
 @dataclass(frozen=True)
+class ClearanceRow:
+    """Whether a band is proved clear along a trajectory with ``below`` modes under it.
+
+    ``room`` is the least distance of a mode relative to the edge, less what it may deviate between
+    the points looked at.
+    """
+
+    label: str
+    below: int
+    clear: bool
+    room: float
+    counted: bool
+
+
+@dataclass(frozen=True)
 class AssignmentRow:
     """How the answer was found and what it is worth.
 
@@ -283,6 +298,7 @@ class AssignmentRow:
     one_shot: Floats | None  # the paper's design (n_y,)
     max_error: float
     max_error_given: bool
+    clearances: tuple[ClearanceRow, ...]
 
 
 # --- What there is to draw of a mechanism
