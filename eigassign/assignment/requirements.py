@@ -106,6 +106,23 @@ class Requirements:
             start += len(target.hz)
             yield (own / self._factor(target) + 1.0) * target.hz
 
+    def curves(self, seen: Appraisal) -> Iterator[tuple[Floats, Floats]]:
+        """Σ c_i f_i (n,) in Hz and its slopes (n, n_y) of every target, then of every limit.
+
+        They are what ``seen`` was made from: nothing is solved.
+        """
+        start = 0
+        for target in self.targets:
+            rows = slice(start, start := start + len(target.hz))
+            scale = target.hz / self._factor(target)
+            yield scale * seen.residual[rows] + target.hz, scale[:, None] * seen.slopes[rows]
+        start = 0
+        for limit in self.limits:
+            rows = slice(start, start := start + len(limit.hz))
+            scale = limit.hz * (-1.0 if limit.at_least else 1.0)
+            slopes = scale[:, None] * seen.excess_slopes[rows]
+            yield scale * seen.excess[rows] + limit.hz, slopes
+
     def owner(self, index: int) -> str:
         """The name of the limit that an excess (k,) belongs to."""
         for limit in self.limits:

@@ -20,6 +20,13 @@ if TYPE_CHECKING:
 
 @click.command()
 @arguments.case
+@click.option(
+    "--study",
+    type=click.Choice(["none", "cheap", "all"]),
+    default="cheap",
+    show_default=True,
+    help="How much to study of what the answer means; changes no answer.",
+)
 @arguments.running
 @arguments.json
 @arguments.common
@@ -76,6 +83,7 @@ def _options(how: Mapping[str, Any], reporter: Reporter) -> Options:
         use_cache=not how["no_cache"],
         force=how.get("force", False),
         figures=how.get("figures", ()),
+        study=how.get("study", "none"),
         progress=reporter.stage,
     )
 

@@ -64,6 +64,7 @@ def results_document(results: RunResults) -> dict[str, Any]:
         "frequencies": _frequencies(results, first) if first else None,
         "targets": [_target(results, target) for target in results.targets],
         "assignment": _assignment(results.assignment) if results.assignment else None,
+        **_meaning(results),
         "other_modes": _other_modes(results.others),
         "approximation": [_study(study) for study in results.studies],
         "trajectory": {
@@ -141,6 +142,27 @@ def _target(results: RunResults, target: TargetStudy) -> dict[str, Any]:
 
 def _assignment(row: AssignmentRow) -> dict[str, Any]:
     return {**asdict(row), "finished": row.finished}
+
+
+def _meaning(results: RunResults) -> dict[str, Any]:
+    """What the answer means; what was not studied is empty or null."""
+    found = results.meaning
+    sensitivity: dict[str, Any] = {}
+    for row in found.sensitivity:
+        own = sensitivity.setdefault(row.parameter, {"unit": row.unit, "targets": []})
+        own["targets"].append(_without(row, "parameter", "unit"))
+    tolerance = found.tolerance
+    return {
+        "sensitivity": sensitivity,
+        "relaxed": [asdict(row) for row in found.relaxed],
+        "reach": [asdict(row) for row in found.reach],
+        "unreachable": found.unreachable,
+        "tolerance": None if tolerance is None else asdict(tolerance),
+    }
+
+
+def _without(row: Any, *names: str) -> dict[str, Any]:
+    return {name: value for name, value in asdict(row).items() if name not in names}
 
 
 def _other_modes(others: OtherModes | None) -> list[dict[str, Any]]:

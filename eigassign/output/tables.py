@@ -6,7 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from eigassign.output.formats import number, percent, residual, seconds
-from eigassign.study.results import Comparison, ErrorSummary, RunResults, TargetStudy, ValidationRow
+from eigassign.study.results import (
+    Comparison,
+    ErrorSummary,
+    RangeRow,
+    RunResults,
+    TargetStudy,
+    ValidationRow,
+)
 
 
 @dataclass(frozen=True)
@@ -20,8 +27,20 @@ class Table:
 
 
 def tables(results: RunResults) -> tuple[Table, ...]:
-    """Design, distance to the targets, approximation, solver and timing: those there are."""
-    made = (design(results), errors(results), approximation(results), solver(results))
+    """Design, distance to the targets, what the answer means, approximation, solver, timing.
+
+    Those that there is something to show in.
+    """
+    made = (
+        design(results),
+        errors(results),
+        sensitivity(results),
+        limits(results),
+        reach(results),
+        tolerance(results),
+        approximation(results),
+        solver(results),
+    )
     return tuple(table for table in (*made, timing(results)) if table.rows)
 
 
@@ -70,6 +89,45 @@ def _of_target(target: TargetStudy) -> Iterator[tuple[str, ErrorSummary]]:
         for one in target.along:
             yield f"{target.label} along {one.name!r}", one.error
     yield target.label, target.error
+
+
+def sensitivity(results: RunResults) -> Table:
+    """What the targeted frequencies hang on, at the answer."""
+    columns = ("parameter", "target", "Hz per unit", "unit", "% per %", "% per % at most")
+    rows = tuple(
+        (row.parameter, row.label, number(row.hz_per_unit), row.unit,
+         number(row.percent_per_percent), number(row.percent_per_percent_largest))
+        for row in results.meaning.sensitivity
+    )  # fmt: skip
+    caption = "Slopes of exact frequencies at the optimum, as means over the samples."
+    return Table("Sensitivity", columns, rows, caption)
+
+
+def limits(results: RunResults) -> Table:
+    """What a little more room at each limit that the answer lies on gains, to first order."""
+    rows = tuple((row.name, row.side, row.words) for row in results.meaning.relaxed)
+    return Table("Limits", ("limit", "side", "relaxed, to first order"), rows)
+
+
+def reach(results: RunResults) -> Table:
+    """What each target's curve can be within the bounds, over all samples."""
+    caption = "Over all designs within the bounds, at any sample; proved."
+    return _ranges("Reach", "least error", results.meaning.reach, caption)
+
+
+def tolerance(results: RunResults) -> Table:
+    """Where each target's curve lies while the parameters deviate within their tolerances."""
+    found = results.meaning.tolerance
+    title, rows = "Tolerance", () if found is None else found.targets
+    return _ranges(title, "worst error", rows, "" if found is None else f"{found.words}.")
+
+
+def _ranges(title: str, error: str, found: tuple[RangeRow, ...], caption: str) -> Table:
+    rows = tuple(
+        (row.label, number(row.lowest_hz.min()), number(row.highest_hz.max()), percent(row.error))
+        for row in found
+    )
+    return Table(title, ("target", "lowest Hz", "highest Hz", error), rows, caption)
 
 
 def approximation(results: RunResults) -> Table:

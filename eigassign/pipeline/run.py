@@ -26,6 +26,7 @@ from eigassign.study.built_case import Case, load_case
 from eigassign.study.collect import VerifiedAssignment, collect_results
 from eigassign.study.comparison import Validation, study_modes, validate_expansions
 from eigassign.study.judgement import SolvedDesigns, study_targets
+from eigassign.study.meaning import Studies, study_meaning
 from eigassign.study.planning import plan_expansion
 from eigassign.study.results import RunResults
 from eigassign.study.scene import Expansions, Scene
@@ -47,6 +48,7 @@ class Options:
     use_cache: bool = True
     force: bool = False  # a folder that another case wrote is moved aside
     figures: tuple[str, ...] = ("png",)  # of png, svg and pdf; none are drawn if empty
+    study: str = "cheap"  # of what the answer means: none, cheap or all
     progress: Callable[[str], None] = field(
         default=_silent
     )  # called with a line as each stage begins
@@ -110,7 +112,10 @@ def solve_case(case: Case, options: Options = DEFAULT) -> Result:
         solved = SolvedDesigns(initial_hz, exact_hz, one_shot_hz)
         accepted = file.assignment.max_error or MAX_ERROR
         targets = study_targets(scene.path, wanted, solved, answer.predicted, accepted)
-    found = VerifiedAssignment(answer, targets, initial_hz, exact_hz)
+        with stages("meaning", "studying what the answer means"):
+            asked = Studies(options.study)
+            meaning = study_meaning(scene, answer, wanted, exact_hz, accepted, asked)
+    found = VerifiedAssignment(answer, targets, initial_hz, exact_hz, meaning)
     results = collect_results(scene, studies, found, stages.timing_s)
     return _result(results, scene.expansions, answer.one_shot)
 

@@ -16,6 +16,11 @@ Reading order:
     clearance   proof that a band stays clear of modes all along a trajectory
     optimum     the design that meets the targets best, by the sequential method
     assignment  from the targets to the answer, by either method
+    sensitivity  slopes of the targeted frequencies at the answer, and what its limits cost
+    monotone    parameters in which every frequency is monotone, so that corners bound it
+    reach       what each target can reach within the bounds, and which cannot be reached
+    tolerance   what deviations of the parameters do to an answer
+    meaning     what the answer means, as far as the user asks for it
     accuracy    errors of mesh, reduction, expansion and round-off; whether the motion is slow
     drawing     the mechanism as lines and symbols: in poses, and in its modes
     measured    the measurements of a case, each at its pose

@@ -124,15 +124,23 @@ def _predicted(found: Found, wanted: Sequence[Wanted]) -> Iterator[Floats | None
         yield next(curves) if one.requirement.kind == "frequency" else None
 
 
-def assignment_row(scene: Scene, answer: Answer, targets: Sequence[TargetStudy]) -> AssignmentRow:
-    """How the answer was found and what it is worth, as plain numbers."""
+def assignment_row(
+    scene: Scene,
+    answer: Answer,
+    targets: Sequence[TargetStudy],
+    unreachable: Sequence[str] = (),
+) -> AssignmentRow:
+    """How the answer was found and what it is worth, as plain numbers.
+
+    ``unreachable`` says in words which targets are out of reach within the bounds.
+    """
     keys, found = scene.file.assignment, answer.found
     initial, optimal = _merits(answer, targets)
     accepted = scene.file.validation.max_error
     # The exact optimum rests on exact frequencies, the one shot on its prediction.
     trusted = found is not None or all(t.approximation_error <= accepted for t in targets)
     clearances = () if found is None else tuple(map(_clearance, found.clearances))
-    word, reason = verdict(targets, (initial, optimal), trusted)
+    word, reason = verdict(targets, (initial, optimal), trusted, unreachable)
     unproved = [row.label for row in clearances if not row.clear]
     if word == "reached" and unproved:
         word, reason = "do_not_use", f"not proved clear along the motion: {'; '.join(unproved)}"
@@ -152,7 +160,7 @@ def assignment_row(scene: Scene, answer: Answer, targets: Sequence[TargetStudy])
         exact_solves=0 if found is None else found.exact_solves,
         ended="one program" if found is None else found.best.end.value,
         finished=found is None or found.best.end in (End.OPTIMAL, End.STALLED),
-        active=() if found is None else tuple(_active(scene, found)),
+        active=tuple(active_rows(scene, answer)),
         one_shot=None if answer.one_shot is None else answer.one_shot.y,
         max_error=MAX_ERROR if keys.max_error is None else keys.max_error,
         max_error_given=keys.max_error is not None,
@@ -201,7 +209,11 @@ def _local_optima(found: Found) -> Iterator[LocalOptimum]:
         yield LocalOptimum(optimum.y, optimum.objective, optimum.seen.violation)
 
 
-def _active(scene: Scene, found: Found) -> Iterator[ActiveRow]:
+def active_rows(scene: Scene, answer: Answer) -> Iterator[ActiveRow]:
+    """The limits that the answer lies on; none of the one shot."""
+    found = answer.found
+    if found is None:
+        return
     names = tuple(scene.file.design.parameters)
     constraints = tuple(scene.file.design.constraints)
     for limit in found.best.limits:

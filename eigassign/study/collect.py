@@ -19,6 +19,7 @@ from eigassign.study.one_shot import design_rows, limit_notes, solver_row
 from eigassign.study.results import (
     AssignmentRow,
     DrawnPoses,
+    Meaning,
     ModeStudy,
     OtherModes,
     RunResults,
@@ -39,6 +40,7 @@ class VerifiedAssignment:
     targets: tuple[TargetStudy, ...]
     initial_hz: Floats
     exact_hz: Floats
+    meaning: Meaning
 
 
 def collect_results(
@@ -51,6 +53,7 @@ def collect_results(
     file, trajectory = scene.file, scene.trajectory
     motion = _motion(scene, assigned)
     n = len(file.coordinates)
+    meaning = Meaning() if assigned is None else assigned.meaning
     return RunResults(
         title=file.title,
         reference=file.reference,
@@ -71,9 +74,10 @@ def collect_results(
         solver=_solver(assigned),
         assignment=_assignment(scene, assigned),
         warnings=(*scene.warnings, *_warnings(scene, assigned), *motion[1]),
-        notes=(*scene.notes, *_notes(assigned), *motion[0]),
+        notes=(*scene.notes, *_notes(assigned), *motion[0], *meaning.notes),
         timing_s=dict(timing_s),
         tolerance=file.validation.max_error,
+        meaning=meaning,
     )
 
 
@@ -83,7 +87,10 @@ def _solver(assigned: VerifiedAssignment | None) -> SolverRow | None:
 
 
 def _assignment(scene: Scene, assigned: VerifiedAssignment | None) -> AssignmentRow | None:
-    return None if assigned is None else assignment_row(scene, assigned.answer, assigned.targets)
+    if assigned is None:
+        return None
+    beyond = assigned.meaning.unreachable
+    return assignment_row(scene, assigned.answer, assigned.targets, beyond)
 
 
 def _notes(assigned: VerifiedAssignment | None) -> tuple[str, ...]:

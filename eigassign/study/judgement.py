@@ -105,26 +105,52 @@ class _Errors:
 
 def errors_of(wanted: Wanted, hz: Floats) -> Floats:
     """The errors (n,) of a target at its rows, for frequencies hz (n_t, n_modes)."""
-    kind, own = wanted.requirement.kind, hz[wanted.rows]
+    if wanted.requirement.kind == "frequency":
+        return np.asarray(_curve(wanted, hz) / wanted.hz - 1.0)
+    return worst_errors(wanted, hz, hz)
+
+
+def worst_errors(wanted: Wanted, lowest: Floats, highest: Floats) -> Floats:
+    """The largest errors (n,), in magnitude, of frequencies between two (n_t, n_modes) each."""
+    kind = wanted.requirement.kind
     if kind == "keep_out":
-        return _inside(wanted, own)
-    f = _curve(wanted, hz)
+        return _inside(wanted, lowest[wanted.rows], highest[wanted.rows])
+    low, high = curve_range(wanted, lowest, highest)
     if kind == "frequency":
-        return np.asarray(f / wanted.hz - 1.0)
+        return np.maximum(np.abs(low / wanted.hz - 1.0), np.abs(high / wanted.hz - 1.0))
     if kind == "at_most":
-        return np.asarray(np.maximum(f / wanted.upper_hz - 1.0, 0.0))
-    return np.asarray(np.maximum(1.0 - f / wanted.lower_hz, 0.0))
+        return np.asarray(np.maximum(high / wanted.upper_hz - 1.0, 0.0))
+    return np.asarray(np.maximum(1.0 - low / wanted.lower_hz, 0.0))
 
 
-def _inside(wanted: Wanted, hz: Floats) -> Floats:
+def least_errors(wanted: Wanted, lowest: Floats, highest: Floats) -> Floats:
+    """The errors (n,) that no frequency between two (n_t, n_modes) avoids; 0 of a band."""
+    kind = wanted.requirement.kind
+    if kind == "keep_out":
+        return np.zeros(len(wanted.lower_hz))
+    low, high = curve_range(wanted, lowest, highest)
+    above = np.maximum(low / wanted.upper_hz - 1.0, 0.0)
+    return np.asarray(np.maximum(above, 1.0 - high / wanted.lower_hz if kind != "at_most" else 0.0))
+
+
+def curve_range(wanted: Wanted, lowest: Floats, highest: Floats) -> tuple[Floats, Floats]:
+    """Between what the curve (n,) of a target lies where each mode is between two frequencies."""
+    if wanted.requirement.kind == "gap":
+        low, high = (m - 1 for m in wanted.requirement.modes)
+        least, most = lowest[wanted.rows], highest[wanted.rows]
+        return least[:, high] - most[:, low], most[:, high] - least[:, low]
+    return _curve(wanted, lowest), _curve(wanted, highest)
+
+
+def _inside(wanted: Wanted, lowest: Floats, highest: Floats) -> Floats:
     """How far the modes are from being clear, with the best constant number of them below."""
     named = [m - 1 for m in sorted(wanted.requirement.modes)]
-    hz = hz[:, named] if named else hz
+    lowest, highest = (hz[:, named] if named else hz for hz in (lowest, highest))
     low, high = wanted.lower_hz[:, None], wanted.upper_hz[:, None]
-    down, up = np.maximum(hz / low - 1.0, 0.0), np.maximum(1.0 - hz / high, 0.0)
+    down, up = np.maximum(highest / low - 1.0, 0.0), np.maximum(1.0 - lowest / high, 0.0)
     choices = [
         np.maximum(down[:, :k].max(axis=1, initial=0.0), up[:, k:].max(axis=1, initial=0.0))
-        for k in range(hz.shape[1] + 1)
+        for k in range(lowest.shape[1] + 1)
     ]
     return np.asarray(min(choices, key=lambda errors: float(errors.max())))
 

@@ -117,8 +117,8 @@ def _search_all(
     best_of: list[tuple[Variant, tuple[Optimum, ...]]] = []
     made, solves = 0, 0
     for below in _below(whole):
-        variant = _variant(whole, below)
-        coarse = _Search(variant if few is None else _variant(few, below), keys.steps, deadline)
+        variant = variant_of(whole, below)
+        coarse = _Search(variant if few is None else variant_of(few, below), keys.steps, deadline)
         for start in _starts(scene, starts, keys.starts):
             made += 1
             progress(f"start {made}")
@@ -285,7 +285,8 @@ def _below(task: Task) -> Iterator[tuple[int, ...]]:
     yield from itertools.islice(itertools.product(*possible), MOST_BELOW)
 
 
-def _variant(task: Task, below: tuple[int, ...]) -> Variant:
+def variant_of(task: Task, below: tuple[int, ...]) -> Variant:
+    """The problem of a task with so many modes below each of its bands."""
     scene, wanted = task.scene, task.wanted
     lower, upper = scene.bounds
     width = np.where(upper > lower, upper - lower, 1.0)

@@ -301,6 +301,84 @@ class AssignmentRow:
     clearances: tuple[ClearanceRow, ...]
 
 
+# --- What the answer means
+
+
+@dataclass(frozen=True)
+class SensitivityRow:
+    """How a frequency along the trajectory changes with one parameter, at the answer.
+
+    ``hz_per_unit`` is ∂f/∂y in Hz per SI ``unit``, ``percent_per_percent`` (y/f) ∂f/∂y: each the
+    mean over the samples, and with ``_largest`` the one of largest magnitude.
+    """
+
+    parameter: str
+    unit: str
+    label: str
+    hz_per_unit: float
+    hz_per_unit_largest: float
+    percent_per_percent: float
+    percent_per_percent_largest: float
+
+
+@dataclass(frozen=True)
+class RelaxedRow:
+    """A limit that the answer lies on, relaxed by ``amount``: what that gains to first order.
+
+    ``quantity`` is rms error, worst error (fractions) or objective; ``words`` say it all.
+    """
+
+    name: str
+    kind: str  # bound | constraint | target
+    side: str
+    amount: float  # of ``unit``; of a target the share of its limit
+    unit: str
+    quantity: str
+    before: float
+    after: float
+    words: str
+
+
+@dataclass(frozen=True)
+class RangeRow:
+    """Between what values (n,) in Hz a target's curve lies over some designs; ``error`` over them.
+
+    ``how``: proved (nothing lies outside) or sampled.
+    """
+
+    label: str
+    lowest_hz: Floats
+    highest_hz: Floats
+    how: str
+    error: float
+
+
+@dataclass(frozen=True)
+class ToleranceRows:
+    """What deviations of the parameters within their tolerances do to the targets.
+
+    The error of each is its largest; ``before`` and ``after`` are the largest of those that the
+    headline counts, at the answer and with every tolerance at its worst.
+    """
+
+    targets: tuple[RangeRow, ...]
+    before: float
+    after: float
+    words: str
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What the answer means: what it hangs on, what holds it back, how sure it is."""
+
+    sensitivity: tuple[SensitivityRow, ...] = ()
+    relaxed: tuple[RelaxedRow, ...] = ()
+    reach: tuple[RangeRow, ...] = ()  # over all designs within the bounds; the least error
+    tolerance: ToleranceRows | None = None
+    unreachable: tuple[str, ...] = ()  # in words, with numbers
+    notes: tuple[str, ...] = ()
+
+
 # --- What there is to draw of a mechanism
 
 
@@ -413,6 +491,7 @@ class RunResults:
     case_files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of what the case names
     tolerance: float = 0.02  # the largest approximation error the case accepts, a fraction
     only: str | None = None  # of several trajectories the one that these are results of
+    meaning: Meaning = field(default_factory=Meaning)
 
     @property
     def along(self) -> str:

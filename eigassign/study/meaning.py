@@ -1,0 +1,101 @@
+"""What the answer means: what it hangs on, what its limits cost, what can be reached at all.
+
+How much is studied is the user's choice and changes no answer. What follows from slopes already
+known, or from two exact solves a pose, is cheap; `all` adds what designs have to be searched for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.assignment.requirements import Requirements
+from eigassign.assignment.sequential import Appraisal
+from eigassign.errors import EigassignError
+from eigassign.study.assignment import Answer, active_rows
+from eigassign.study.optimum import Found, Task, variant_of
+from eigassign.study.reach import misses, proved_ranges, reach_rows, unreachable
+from eigassign.study.results import Meaning, RelaxedRow, ToleranceRows
+from eigassign.study.scene import Scene
+from eigassign.study.sensitivity import error_kind, relaxed_limits, sensitivities
+from eigassign.study.tolerance import study_tolerance
+from eigassign.study.wanted import Wanted
+
+Floats = NDArray[np.float64]
+
+
+class Studies(StrEnum):
+    """How much is asked of what the answer means."""
+
+    NONE = "none"
+    CHEAP = "cheap"
+    ALL = "all"
+
+
+SMALL = 220  # unknowns: up to here two exact solves a pose are cheap even where nothing is missed
+
+
+def study_meaning(
+    scene: Scene,
+    answer: Answer,
+    wanted: Sequence[Wanted],
+    exact_hz: Floats,
+    max_error: float,
+    studies: Studies,
+) -> Meaning:
+    """What the answer, of frequencies (n_t, n_modes), means; as far as ``studies`` asks for it.
+
+    Whether a target that is missed by more than ``max_error`` can be reached is always studied.
+    """
+    missed = any(misses(w, exact_hz, max_error) for w in wanted)
+    asked_for = studies is Studies.ALL or (studies is Studies.CHEAP and scene.model.n_dof <= SMALL)
+    ranges = proved_ranges(scene) if missed or asked_for else None
+    beyond = tuple(unreachable(scene, wanted, answer.y, exact_hz, max_error, ranges))
+    reach = () if ranges is None else tuple(reach_rows(wanted, ranges))
+    if studies is Studies.NONE:
+        return Meaning(unreachable=beyond)
+    asked, seen = _judged(scene, answer, wanted)
+    notes: list[str] = []
+    return Meaning(
+        sensitivity=tuple(sensitivities(scene.file, wanted, asked, answer.y, seen)),
+        relaxed=() if answer.found is None else tuple(_relaxed(scene, answer, answer.found)),
+        reach=reach,
+        tolerance=_tolerance(scene, answer, wanted, exact_hz, notes),
+        unreachable=beyond,
+        notes=tuple(notes),
+    )
+
+
+def _tolerance(
+    scene: Scene, answer: Answer, wanted: Sequence[Wanted], exact_hz: Floats, notes: list[str]
+) -> ToleranceRows | None:
+    """The spread within the tolerances; where it cannot be had, why not among the notes."""
+    try:
+        found = study_tolerance(scene, wanted, answer.y, exact_hz)
+    except EigassignError as error:
+        notes.append(f"tolerances not studied: {error}")
+        return None
+    if found is not None:
+        notes.append(found.words)
+    return found
+
+
+def _relaxed(scene: Scene, answer: Answer, found: Found) -> Iterator[RelaxedRow]:
+    variant = found.variant
+    kind = error_kind(variant.problem, variant.requirements)
+    active = tuple(active_rows(scene, answer))
+    yield from relaxed_limits(scene.file, variant.problem, kind, found.best.objective, active)
+
+
+def _judged(
+    scene: Scene, answer: Answer, wanted: Sequence[Wanted]
+) -> tuple[Requirements, Appraisal]:
+    """What is asked, and what it says of the answer; solved only where it was not before."""
+    if answer.found is not None:
+        variant = answer.found.variant
+        return variant.requirements, answer.found.best.seen
+    variant = variant_of(Task(scene, tuple(wanted), 0.0), ())
+    return variant.requirements, variant.problem.appraise(answer.y)

@@ -1,0 +1,42 @@
+"""Parameters in which every frequency is monotone: added masses lower it, springs raise it.
+
+K and M are K_0 + Σ k_i A_i and M_0 + Σ m_j B_j in stiffnesses k of springs and drives, and masses
+and inertias m of bodies and drives, A_i and B_j positive semidefinite at every pose. By the
+min-max principle every λ grows with each k and falls with each m, so that over a box of them the
+least and largest frequency are those of two corners: two exact solves a pose.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.case import CaseFile
+
+Floats = NDArray[np.float64]
+
+
+def effects(file: CaseFile) -> Floats:
+    """+1 for each parameter (n_y,) that raises every frequency, −1 that lowers it, 0 unknown."""
+    return np.array([_effect(column.parameter) for column in file.design.parameters.values()])
+
+
+def _effect(path: str) -> float:
+    group, _, *rest = path.split(".")
+    match group, ".".join(rest):
+        case ("bodies", "mass" | "inertia") | ("coordinates", "drive.inertia"):
+            return -1.0
+        case ("springs", "translational" | "rotational") | ("coordinates", "drive.stiffness"):
+            return 1.0
+    return 0.0
+
+
+def corners(file: CaseFile, y: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
+    """The designs of lowest and of highest frequencies in the box, each (n_y,).
+
+    Parameters in which the frequencies are not known to be monotone stay as in ``y``.
+    """
+    effect = effects(file)
+    softest = np.where(effect > 0.0, lower, np.where(effect < 0.0, upper, y))
+    stiffest = np.where(effect > 0.0, upper, np.where(effect < 0.0, lower, y))
+    return softest, stiffest

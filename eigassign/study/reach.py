@@ -1,0 +1,138 @@
+"""What each target can reach within the bounds, and which cannot be reached.
+
+Where all frequencies are monotone in every parameter (`monotone`), two corners of the bounds prove
+between what values each mode stays at every sample. Otherwise the target is searched for at the
+samples where it is missed most, each by itself: a sample at which no design comes near enough, from
+several starts, is out of reach. A target that is missed somewhere but within reach at every sample
+is not called unreachable: there, one design cannot serve all samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.assignment.requirements import FrequencyTarget, Requirements
+from eigassign.assignment.sequential import Appraisal, DesignProblem, minimise
+from eigassign.errors import EigassignError
+from eigassign.study.judgement import curve_range, errors_of, least_errors
+from eigassign.study.monotone import corners, effects
+from eigassign.study.one_shot import linear_constraints
+from eigassign.study.response import exact_response
+from eigassign.study.results import RangeRow
+from eigassign.study.scene import Scene
+from eigassign.study.wanted import Wanted
+
+Floats = NDArray[np.float64]
+LIMIT = 1e-4  # of a limit: by so much it must be missed to be called out of reach
+STEPS = 30  # of a search at one sample
+
+
+def proved_ranges(scene: Scene) -> tuple[Floats, Floats] | None:
+    """Lowest and highest frequencies (n_t, n_modes) of all designs within the bounds.
+
+    None where that is not known of every parameter, or a corner of the bounds has no frequencies.
+    """
+    lower, upper = scene.bounds
+    if not np.all((effects(scene.file) != 0.0) | (lower == upper)):
+        return None
+    softest, stiffest = corners(scene.file, lower, lower, upper)
+    try:
+        return scene.exact(softest), scene.exact(stiffest)
+    except EigassignError:
+        return None
+
+
+def reach_rows(wanted: Sequence[Wanted], ranges: tuple[Floats, Floats]) -> Iterator[RangeRow]:
+    """What each target's curve can take at every sample, and the least error that is left."""
+    for w in wanted:
+        if w.requirement.kind != "keep_out":
+            error = float(least_errors(w, *ranges).max())
+            yield RangeRow(w.requirement.label, *curve_range(w, *ranges), "proved", error)
+
+
+def misses(wanted: Wanted, exact_hz: Floats, max_error: float) -> bool:
+    """Whether a target is missed by more than is allowed, ``max_error`` of a wanted frequency."""
+    return bool(np.abs(errors_of(wanted, exact_hz)).max() > _allowed(wanted, max_error))
+
+
+def _allowed(wanted: Wanted, max_error: float) -> float:
+    return max_error if wanted.requirement.kind == "frequency" else LIMIT
+
+
+def unreachable(
+    scene: Scene,
+    wanted: Sequence[Wanted],
+    y: Floats,
+    exact_hz: Floats,
+    max_error: float,
+    ranges: tuple[Floats, Floats] | None,
+) -> Iterator[str]:
+    """In words, each target that is out of reach at some sample; only those that y misses."""
+    for w in wanted:
+        if not misses(w, exact_hz, max_error):
+            continue
+        allowed, errors = _allowed(w, max_error), errors_of(w, exact_hz)
+        if ranges is not None:
+            left = least_errors(w, *ranges)
+            k = int(left.argmax())
+            if left[k] > allowed:
+                low, high = (values[k] for values in curve_range(w, *ranges))
+                yield (
+                    f"{w.requirement.label} is out of reach at "
+                    f"{scene.path.where(w.rows.start + k)}: within the bounds it lies between "
+                    f"{low:.4g} and {high:.4g} Hz there (proved)"
+                )
+        elif w.requirement.kind in ("frequency", "at_least", "at_most"):
+            yield from _searched(scene, w, y, errors, allowed)
+
+
+def _searched(
+    scene: Scene, wanted: Wanted, y: Floats, errors: Floats, allowed: float
+) -> Iterator[str]:
+    """The first of the samples missed most, above and below, at which no design is near enough."""
+    if wanted.requirement.kind == "frequency":
+        missed = [int(errors.argmax()), int(errors.argmin())]
+    else:
+        missed = [int(errors.argmax())]
+    for k in dict.fromkeys(k for k in missed if abs(errors[k]) > allowed):
+        nearest = _nearest(scene, wanted, k, y)
+        if nearest is not None and abs(nearest / _goal(wanted, k) - 1.0) > allowed:
+            yield (
+                f"{wanted.requirement.label} is out of reach at "
+                f"{scene.path.where(wanted.rows.start + k)}: no design found within the limits "
+                f"comes nearer than {nearest:.4g} Hz there"
+            )
+            return
+
+
+def _goal(wanted: Wanted, k: int) -> float:
+    upper = wanted.requirement.kind == "at_most"
+    return float((wanted.upper_hz if upper else wanted.lower_hz)[k])
+
+
+def _nearest(scene: Scene, wanted: Wanted, k: int, y: Floats) -> float | None:
+    """The frequency nearest to the one wanted at sample k of the target, by a search of its own."""
+    at, goal = wanted.rows.start + k, _goal(wanted, k)
+    target = FrequencyTarget(wanted.mode, np.array([goal]), slice(0, 1))
+    asked = Requirements((target,), (), (), np.ones(1))
+    alone = replace(scene, trajectory=scene.path.chosen([at]))
+    response = exact_response(alone, wanted.mode)
+
+    def appraise(y: Floats) -> Appraisal:
+        return asked.appraise(y, response(y))
+
+    lower, upper = scene.bounds
+    constraints = tuple(linear_constraints(scene.file))
+    problem = DesignProblem(appraise, lower, upper, constraints)
+    found = []
+    for start in (y, 0.5 * (lower + upper), scene.initial):
+        try:
+            best = minimise(problem, start, STEPS)
+        except EigassignError:
+            continue
+        found.append((abs(best.seen.residual[0]), (best.seen.residual[0] + 1.0) * goal))
+    return float(min(found)[1]) if found else None

@@ -1,0 +1,128 @@
+"""What an answer hangs on: slopes of the targeted frequencies, and what its limits cost.
+
+Both are read off the exact slopes that the answer was judged by; nothing is solved. A limit with
+multiplier μ = −dF/db, relaxed by δ, lowers F to F − μδ to first order; F is the mean square of the
+relative errors, or the largest of them, so that the rms error falls from √F to √(F − μδ).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.assignment.requirements import FrequencyLimit, Requirements
+from eigassign.assignment.sequential import Appraisal, DesignProblem, Objective
+from eigassign.case import CaseFile
+from eigassign.study.results import ActiveRow, RelaxedRow, SensitivityRow
+from eigassign.study.wanted import Wanted
+
+Floats = NDArray[np.float64]
+STEP = 0.04  # of the range of a bound, or of a limit: how far it is relaxed, to one digit
+MOST = 0.3  # of F: a larger fall is beyond what first order can tell
+
+
+def sensitivities(
+    file: CaseFile, wanted: Sequence[Wanted], asked: Requirements, y: Floats, seen: Appraisal
+) -> Iterator[SensitivityRow]:
+    """One row for each parameter and curve that a target or limit is about."""
+    curves = list(zip(_labels(wanted, asked), asked.curves(seen), strict=True))
+    for k, name in enumerate(file.design.parameters):
+        for label, (hz, slopes) in curves:
+            of_f = slopes[:, k]
+            share = y[k] * of_f / np.where(hz == 0.0, np.inf, hz)
+            yield SensitivityRow(
+                parameter=name,
+                unit=file.design_units[k],
+                label=label,
+                hz_per_unit=float(of_f.mean()),
+                hz_per_unit_largest=_largest(of_f),
+                percent_per_percent=float(share.mean()),
+                percent_per_percent_largest=_largest(share),
+            )
+
+
+def _largest(values: Floats) -> float:
+    return float(values[np.abs(values).argmax()])
+
+
+def _labels(wanted: Sequence[Wanted], asked: Requirements) -> Iterator[str]:
+    """What each curve is called: as its target, and at the edge of a band by its mode."""
+    yield from (w.requirement.label for w in wanted if w.requirement.kind == "frequency")
+    bands = {w.requirement.label for w in wanted if w.requirement.kind == "keep_out"}
+    for limit in asked.limits:
+        yield f"{limit.name}: mode {_mode(limit)}" if limit.name in bands else limit.name
+
+
+def _mode(limit: FrequencyLimit) -> int:
+    return limit.terms[0][0]
+
+
+# --- Limits
+
+
+def error_kind(problem: DesignProblem, asked: Requirements) -> str:
+    """What F is in words: an error only where frequencies are wanted and nothing has a price."""
+    if not asked.targets or problem.prices is not None:
+        return "objective"
+    return "worst error" if problem.objective is Objective.WORST_CASE else "rms error"
+
+
+def as_error(kind: str, F: float) -> float:
+    """F as the quantity of `error_kind`."""
+    return float(np.sqrt(max(F, 0.0))) if kind == "rms error" else F
+
+
+def relaxed_limits(
+    file: CaseFile, problem: DesignProblem, kind: str, F: float, active: Sequence[ActiveRow]
+) -> Iterator[RelaxedRow]:
+    """What a little more room at each active limit gains, if anything."""
+    for row in active:
+        if row.multiplier <= 0.0:
+            continue
+        amount, unit = _amount(file, problem, row)
+        while row.multiplier * amount > MOST * abs(F) > 0.0:
+            amount = _rounded(0.5 * amount)
+        before, after = as_error(kind, F), as_error(kind, F - row.multiplier * amount)
+        yield RelaxedRow(
+            row.name, row.kind, row.side, amount, unit, kind, before, after,
+            f"{_room(row, amount, unit)}: {kind} {_from_to(kind, before, after)}",
+        )  # fmt: skip
+
+
+def _amount(file: CaseFile, problem: DesignProblem, row: ActiveRow) -> tuple[float, str]:
+    names = list(file.design.parameters)
+    if row.kind == "bound":
+        k = names.index(row.name)
+        return _rounded(STEP * float(problem.upper[k] - problem.lower[k])), file.design_units[k]
+    if row.kind == "constraint":
+        terms = file.design.constraints[row.name].terms
+        own = [k for k, name in enumerate(names) if terms.get(name)]
+        widths = (problem.upper - problem.lower)[own]
+        span = float(np.abs([terms[names[k]] for k in own]) @ widths)
+        units = {file.design_units[k] for k in own}
+        return _rounded(STEP * span), units.pop() if len(units) == 1 else "(SI)"
+    return 0.01, ""
+
+
+def _rounded(value: float) -> float:
+    """To one digit; 1 where there is nothing to round."""
+    return float(f"{value:.0e}") if value > 0.0 else 1.0
+
+
+def _room(row: ActiveRow, amount: float, unit: str) -> str:
+    if row.kind == "target":
+        return f"{row.name}, relaxed by {100 * amount:g} %"
+    more = "more" if row.side == "upper" else "less"
+    return f"{amount:g} {unit} {more} at the {row.side} {_limit(row)}"
+
+
+def _limit(row: ActiveRow) -> str:
+    return f"bound of {row.name}" if row.kind == "bound" else f"limit of {row.name}"
+
+
+def _from_to(kind: str, before: float, after: float) -> str:
+    if kind == "objective":
+        return f"{before:.4g} → {after:.4g}"
+    return f"{100 * before:.3g} → {100 * after:.3g} %"

@@ -1,0 +1,116 @@
+"""What deviations of the parameters do to an answer: each within its tolerance, independently.
+
+Where all frequencies are monotone in every parameter that has a tolerance (`monotone`), two
+corners bound them exactly. The other parameters are drawn from their ranges by a Sobol sequence,
+each draw with the monotone ones at both corners. Models of many unknowns are evaluated by a reduced
+model about the answer then, and its own estimate of its error widens the ranges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from eigassign.errors import AccuracyError
+from eigassign.modal.reduced.reduce import reduce
+from eigassign.study.judgement import curve_range, errors_of, worst_errors
+from eigassign.study.monotone import corners, effects
+from eigassign.study.results import RangeRow, ToleranceRows
+from eigassign.study.scene import Scene
+from eigassign.study.wanted import Wanted
+
+Floats = NDArray[np.float64]
+DRAWS = 64  # a power of two, as Sobol's points want
+LARGE = 220  # unknowns: a reduced model answers from here on
+POINTS = 5  # poses along the trajectory about which it is made
+DOUBTFUL = 0.01  # estimate of its error, relative, with which nothing can be said
+
+Ranges = Callable[[Floats], tuple[Floats, Floats]]  # of a design: between what each mode is
+
+
+def study_tolerance(
+    scene: Scene, wanted: Sequence[Wanted], y: Floats, exact_hz: Floats
+) -> ToleranceRows | None:
+    """The spread of every target about the answer ``y``; None where no tolerance is stated.
+
+    Raises EigassignError where a design within the tolerances has no frequencies, AccuracyError
+    where the reduced model cannot be trusted.
+    """
+    columns = scene.file.design.parameters.values()
+    given = [column.tolerance for column in columns]
+    spread = np.array([0.0 if t is None else t.deviation(v) for t, v in zip(given, y, strict=True)])
+    if not spread.any():
+        return None
+    effect = effects(scene.file)
+    lower, upper = y - spread, y + spread
+    lower = np.where(effect != 0.0, np.maximum(lower, np.minimum(y, 0.0)), lower)
+    drawn = np.flatnonzero((spread > 0.0) & (effect == 0.0))
+    designs, how, ranges = y[None], "proved", _exact(scene)
+    if len(drawn):
+        designs, how = np.repeat(y[None], DRAWS, axis=0), "sampled"
+        points = qmc.Sobol(len(drawn), seed=0).random_base2(DRAWS.bit_length() - 1)
+        designs[:, drawn] = lower[drawn] + points * (upper - lower)[drawn]
+        if scene.model.n_dof > LARGE:
+            ranges = reduced_ranges(scene, y, exact_hz.shape[1])
+    lowest, highest = np.array(exact_hz), np.array(exact_hz)
+    for design in designs:
+        softest, stiffest = corners(scene.file, design, lower, upper)
+        lowest = np.minimum(lowest, ranges(softest)[0])
+        highest = np.maximum(highest, ranges(stiffest)[1])
+    return _rows(wanted, exact_hz, lowest, highest, how)
+
+
+def _rows(
+    wanted: Sequence[Wanted], exact_hz: Floats, lowest: Floats, highest: Floats, how: str
+) -> ToleranceRows:
+    errors = [float(worst_errors(w, lowest, highest).max()) for w in wanted]
+    rows = tuple(
+        RangeRow(w.requirement.label, *curve_range(w, lowest, highest), how, error)
+        for w, error in zip(wanted, errors, strict=True)
+    )
+    counted = [w.requirement.kind == "frequency" for w in wanted]
+    counted = counted if any(counted) else [True] * len(counted)
+    own = [
+        pair
+        for pair, counts in zip(zip(wanted, errors, strict=True), counted, strict=True)
+        if counts
+    ]
+    before = max(float(np.abs(errors_of(w, exact_hz)).max()) for w, _ in own)
+    after = max(error for _, error in own)
+    tried = "proved" if how == "proved" else f"the worst of {DRAWS} draws"
+    words = (
+        f"with every tolerance at its worst: worst error {100 * before:.3g} → "
+        f"{100 * after:.3g} % ({tried})"
+    )
+    return ToleranceRows(rows, before, after, words)
+
+
+def _exact(scene: Scene) -> Ranges:
+    def ranges(y: Floats) -> tuple[Floats, Floats]:
+        hz = scene.exact(y)
+        return hz, hz
+
+    return ranges
+
+
+def reduced_ranges(scene: Scene, y: Floats, count: int) -> Ranges:
+    """Frequencies less and plus their estimated error, from a reduced model about a design."""
+    q = scene.path.at(y)[0]
+    points = np.unique(np.linspace(0, len(q) - 1, POINTS).round().astype(int))
+    about = np.repeat(y[None], len(points), axis=0)
+    reduced = reduce(scene.model.pencil, q[points], about, tuple(range(1, count + 1)))
+
+    def ranges(y: Floats) -> tuple[Floats, Floats]:
+        q = scene.path.at(y)[0]
+        hz, error = reduced.frequencies(q, y), reduced.error_estimate(q, y)
+        if not error.max() <= DOUBTFUL:
+            raise AccuracyError(
+                "the tolerances are too wide for the reduced model that they are judged by: its "
+                f"error may be {100 * error.max():.3g} %; state smaller ones"
+            )
+        return hz * (1.0 - error), hz * (1.0 + error)
+
+    return ranges

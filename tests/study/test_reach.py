@@ -1,0 +1,135 @@
+"""What can be reached within the bounds, and what deviations do: against brute force."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenes import changed, scene_of
+
+from eigassign.api import load_case
+from eigassign.pipeline.run import Options, solve_case
+from eigassign.study.reach import proved_ranges, unreachable
+from eigassign.study.scene import Scene
+from eigassign.study.tolerance import reduced_ranges, study_tolerance
+from eigassign.study.wanted import target_frequencies
+
+SHORT = ("samples: 152", "samples: 8")
+
+
+def grid(lower: np.ndarray, upper: np.ndarray, n: int = 4) -> list[np.ndarray]:
+    axes = [np.linspace(a, b, n) for a, b in zip(lower, upper, strict=True)]
+    return [np.array(y) for y in itertools.product(*axes)]
+
+
+def said(scene: Scene, y: np.ndarray) -> list[str]:
+    wanted = target_frequencies(scene.file, scene.path)
+    return list(unreachable(scene, wanted, y, scene.exact(y), 0.02, proved_ranges(scene)))
+
+
+def test_two_corners_bound_every_design_of_added_masses(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, changed(SHORT))
+    ranges = proved_ranges(scene)
+    assert ranges is not None
+    all_hz = np.array([scene.exact(y) for y in grid(*scene.bounds)])
+    np.testing.assert_allclose(ranges[0], all_hz.min(axis=0), rtol=1e-10)
+    np.testing.assert_allclose(ranges[1], all_hz.max(axis=0), rtol=1e-10)
+
+
+SECTION = ("bodies.tool_mass.mass, min: 0, max: 250 g", "sections.rod.area, min: 7e-4, max: 7.1e-4")
+
+
+@pytest.mark.parametrize(("changes", "words"), [((), "(proved)"), ((SECTION,), "no design found")])
+def test_a_target_that_no_design_reaches_is_named_with_what_can_be(
+    tmp_path: Path, changes: tuple[tuple[str, str], ...], words: str
+) -> None:
+    text = changed(SHORT, ("190 Hz}", "400 Hz}"), *changes)
+    scene = scene_of(tmp_path, text)
+    (line,) = said(scene, scene.bounds[0])
+    assert line.startswith("mode 1 at 400 Hz is out of reach at ")
+    assert words in line
+
+
+@pytest.mark.parametrize("changes", [(), (SECTION,)])
+def test_a_target_that_is_missed_for_want_of_one_design_is_not_out_of_reach(
+    tmp_path: Path, changes: tuple[tuple[str, str], ...]
+) -> None:
+    scene = scene_of(tmp_path, changed(SHORT, *changes))
+    assert said(scene, scene.bounds[1]) == []
+
+
+def test_out_of_reach_is_the_verdict_of_the_run(tmp_path: Path) -> None:
+    path = tmp_path / "case.yaml"
+    path.write_text(changed(SHORT, ("190 Hz}", "400 Hz}")))
+    results = solve_case(load_case(path), Options(use_cache=False, study="none")).results
+    assert results.assignment is not None
+    assert results.assignment.verdict == "unreachable"
+    assert "within the bounds it lies between" in results.assignment.reason
+
+
+M1, M2 = "max: 250 g}\n  m2", "max: 250 g}\n\nexp"
+TOLERANT = (
+    (M1, "max: 250 g, tolerance: 20 g}\n  m2"),
+    (M2, "max: 250 g, tolerance: 10 %}\n\nexp"),
+)
+
+
+def test_tolerances_of_masses_are_bounded_by_two_corners(tmp_path: Path) -> None:
+    scene, y = scene_of(tmp_path, changed(SHORT, *TOLERANT)), np.array([0.2, 0.1])
+    found = study_tolerance(scene, target_frequencies(scene.file, scene.path), y, scene.exact(y))
+    assert found is not None
+    (row,) = found.targets
+    spread = np.array([0.02, 0.01])
+    hz = np.array([scene.exact(d)[:, 0] for d in grid(y - spread, y + spread)])
+    assert row.how == "proved"
+    np.testing.assert_allclose(row.lowest_hz, hz.min(axis=0), rtol=1e-10)
+    np.testing.assert_allclose(row.highest_hz, hz.max(axis=0), rtol=1e-10)
+    assert row.error == found.after == pytest.approx(np.abs(hz / 190.0 - 1.0).max(), rel=1e-9)
+    assert found.before == pytest.approx(np.abs(scene.exact(y)[:, 0] / 190.0 - 1.0).max())
+
+
+def test_no_mass_deviates_below_nothing(tmp_path: Path) -> None:
+    scene, y = scene_of(tmp_path, changed(SHORT, *TOLERANT)), np.array([0.0, 0.1])
+    found = study_tolerance(scene, target_frequencies(scene.file, scene.path), y, scene.exact(y))
+    assert found is not None
+    np.testing.assert_allclose(found.targets[0].highest_hz, scene.exact([0.0, 0.09])[:, 0])
+
+
+SECTION_TOLERANT = (
+    "bodies.tool_mass.mass, min: 0, max: 250 g}\n\nexp",
+    "sections.rod.area, min: 7e-4, max: 7.1e-4, tolerance: 2 %}\n\nexp",
+)
+
+
+def test_other_tolerances_are_drawn_beside_the_corners_of_the_masses(tmp_path: Path) -> None:
+    scene, y = (
+        scene_of(tmp_path, changed(SHORT, TOLERANT[0], SECTION_TOLERANT)),
+        np.array([0.2, 7e-4]),
+    )
+    found = study_tolerance(scene, target_frequencies(scene.file, scene.path), y, scene.exact(y))
+    assert found is not None
+    (row,) = found.targets
+    spread = np.array([0.02, 0.02 * 7e-4])
+    hz = np.array([scene.exact(d)[:, 0] for d in grid(y - spread, y + spread)])
+    assert row.how == "sampled"
+    width = np.ptp(hz, axis=0)
+    assert np.all(np.abs(row.lowest_hz - hz.min(axis=0)) <= 0.02 * width)
+    assert np.all(np.abs(row.highest_hz - hz.max(axis=0)) <= 0.02 * width)
+
+
+def test_ranges_of_a_reduced_model_hold_the_exact_frequencies(tmp_path: Path) -> None:
+    scene, y = scene_of(tmp_path, changed(SHORT)), np.array([0.2, 0.1])
+    ranges = reduced_ranges(scene, y, 3)
+    for design in (y, y * 1.05):
+        (low, high), exact = ranges(design), scene.exact(design)[:, :3]
+        assert np.all(low <= exact * (1.0 + 1e-12))
+        assert np.all(exact * (1.0 - 1e-12) <= high)
+        assert np.all(high / low - 1.0 < 1e-3)
+
+
+def test_without_tolerances_there_is_nothing_to_say(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, changed(SHORT))
+    wanted, y = target_frequencies(scene.file, scene.path), scene.initial
+    assert study_tolerance(scene, wanted, y, scene.exact(y)) is None

@@ -1,0 +1,95 @@
+"""What the answer hangs on, against differences of exact frequencies and of answers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenes import changed, scene_of
+
+from eigassign.study.assignment import Answer, find_answer
+from eigassign.study.meaning import Studies, study_meaning
+from eigassign.study.results import Meaning
+from eigassign.study.scene import Scene
+from eigassign.study.wanted import target_frequencies
+
+
+def answered(
+    folder: Path, text: str, studies: Studies = Studies.CHEAP
+) -> tuple[Scene, Answer, Meaning]:
+    scene = scene_of(folder, text)
+    wanted = target_frequencies(scene.file, scene.path)
+    answer = find_answer(scene, wanted, lambda line: None)
+    return scene, answer, study_meaning(scene, answer, wanted, scene.exact(answer.y), 0.02, studies)
+
+
+LIMITS = """
+  - {mode: 2, at_least: 100 Hz}
+  - {gap: {between: [1, 2], at_least: 10 Hz}}
+  - {keep_out: [240 Hz, 250 Hz]}
+"""
+
+
+@pytest.mark.parametrize("method", ["sequential", "one_shot"])
+def test_sensitivities_are_the_slopes_of_exact_frequencies(tmp_path: Path, method: str) -> None:
+    text = changed(("samples: 152", "samples: 12"))
+    if method == "sequential":
+        text = changed(("190 Hz}\n", f"190 Hz}}{LIMITS}"), text=text)
+    scene, answer, found = answered(tmp_path, f"{text}\nassignment: {{method: {method}}}\n")
+    rows = {(row.parameter, row.label): row for row in found.sensitivity}
+    modes = {"mode 1 at 190 Hz": (0,)}
+    if method == "sequential":
+        modes |= {"mode 2 at least 100 Hz": (1,)}
+        assert len({label for _, label in rows}) == 5  # the gap, and modes beside the band
+    step = 1e-4
+    for k, name in enumerate(scene.file.design.parameters):
+        beside = [scene.exact(answer.y + s * step * np.eye(2)[k]) for s in (1.0, -1.0)]
+        slopes = (beside[0] - beside[1]) / (2.0 * step)
+        here = scene.exact(answer.y)
+        for label, (mode,) in modes.items():
+            row, of_f = rows[name, label], slopes[:, mode]
+            assert row.unit == "kg"
+            assert row.hz_per_unit == pytest.approx(of_f.mean(), rel=1e-5)
+            assert abs(row.hz_per_unit_largest) == pytest.approx(np.abs(of_f).max(), rel=1e-5)
+            share = answer.y[k] / here[:, mode] * of_f
+            assert row.percent_per_percent == pytest.approx(share.mean(), rel=1e-5, abs=1e-12)
+
+
+def test_a_little_more_room_gains_what_the_multiplier_says(tmp_path: Path) -> None:
+    text = changed(
+        ("samples: 152", "samples: 12"), ("min: 0, max: 250 g}\n  m2", "min: 0, max: 150 g}\n  m2")
+    )
+    _, before, found = answered(tmp_path, text)
+    (row,) = [row for row in found.relaxed if row.name == "m1"]
+    assert (row.kind, row.side, row.unit, row.quantity) == ("bound", "upper", "kg", "rms error")
+    assert row.words.startswith(f"{row.amount:g} kg more at the upper bound of m1: rms error ")
+    small = 0.01 * row.amount
+    _, after, _ = answered(tmp_path, changed(("max: 150 g", f"max: {0.15 + small}"), text=text))
+    assert before.found is not None
+    assert after.found is not None
+    gained = before.found.best.objective - after.found.best.objective
+    promised = (row.before**2 - row.after**2) * small / row.amount
+    assert gained == pytest.approx(promised, rel=1e-2)
+
+
+def test_of_the_worst_case_a_constraint_counts_in_its_own_error(tmp_path: Path) -> None:
+    text = changed(
+        ("samples: 152", "samples: 12"),
+        (
+            "max: 250 g}\n\nexp",
+            "max: 250 g}\n  constraints:\n    both: {terms: {m1: 1, m2: 1}, max: 150 g}\n\nexp",
+        ),
+    )
+    text += "\nassignment: {objective: worst_case}\n"
+    _, answer, found = answered(tmp_path, text)
+    (row,) = [row for row in found.relaxed if row.kind == "constraint"]
+    assert (row.name, row.unit, row.quantity) == ("both", "kg", "worst error")
+    assert answer.found is not None
+    assert row.before == answer.found.best.objective
+    assert row.after < row.before
+
+
+def test_nothing_is_studied_that_is_not_asked_for(tmp_path: Path) -> None:
+    text = changed(("samples: 152", "samples: 12"))
+    assert answered(tmp_path, text, Studies.NONE)[2] == Meaning()
