@@ -39,6 +39,7 @@ TAKEN, GOOD = 0.1, 0.7  # of the promised fall: a step is taken, the region doub
 OPTIMAL = 1e-7  # stationarity that is accepted
 MET = 1e-9  # excess, relative to the inequality's limit, that is round-off
 TINY = 1e-11  # rms relative error that is round-off of exact frequencies
+HEAVIER = 6  # tenfold rises of ν in one step, while v falls
 FLAT = 1e-13  # of the merit: a promised fall below it is round-off
 
 
@@ -352,16 +353,16 @@ def _program(
         there, move = spoilt
         r = there.seen.residual - place.J @ move.d
         c = there.seen.excess - place.C @ move.d
-    _weigh_first(problem, place, progress)
+    _weigh_first(problem, box, place, progress)
     solved = _solved(problem, box, place, progress, r, c)
-    for _ in range(6):  # raise ν until v falls no further
+    heavier = progress
+    for _ in range(HEAVIER):
         if solved is None or solved[1] <= MET:
             break
-        heavier = replace(progress, weight=10.0 * progress.weight)
+        heavier = replace(heavier, weight=10.0 * heavier.weight)
         again = _solved(problem, box, place, heavier, r, c)
-        if again is None or again[1] > 0.9 * solved[1]:
-            break
-        progress.weight, solved = heavier.weight, again
+        if again is not None and again[1] < 0.99 * solved[1]:
+            progress.weight, solved = heavier.weight, again
     if solved is None:
         return None
     d, v, on_residual, on_excess = solved
@@ -374,13 +375,14 @@ def _program(
     return _Move(d, promised, linear, on_residual, on_excess)
 
 
-def _weigh_first(problem: DesignProblem, place: _Place, progress: _Progress) -> None:
+def _weigh_first(problem: DesignProblem, box: _Box, place: _Place, progress: _Progress) -> None:
     """ν, at first ten times what balances the steepest objective with the flattest excess."""
     if progress.weight == 0.0 and len(place.C):
         half = place.J.T @ place.seen.residual
         steep = np.abs(half).max(initial=0.0)
         if problem.objective is Objective.WORST_CASE:
             steep = np.abs(place.J).max(initial=0.0)
+        steep += np.abs(box.prices).max(initial=0.0)
         flat = np.abs(place.C).max(initial=0.0)
         progress.weight = 10.0 * max(steep, 1e-3) / max(flat, 1e-3)
 

@@ -71,6 +71,8 @@ def _finished(
         _show(outcome, as_json)
         if outcome.shortcoming is not None:
             reporter.error(outcome.shortcoming)
+    if outcome.interrupted:
+        return process.INTERRUPTED
     return 0 if outcome.shortcoming is None else 1
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment import Assignment
+from eigassign.assignment.sequential import End
 from eigassign.modal.expansion import Expansion
 from eigassign.output.cache import Cache, default_directory
 from eigassign.pipeline.coefficient_files import coefficient_files
@@ -80,6 +81,7 @@ class Outcome:
     folder: Path | None
     results: RunResults
     shortcoming: str | None  # why this is no answer to build on; None if it is
+    interrupted: bool  # by Ctrl-C, and what was found until then is the answer
     seconds: float
     warnings: tuple[str, ...]
 
@@ -222,7 +224,15 @@ def validate(path: str | Path, options: Options = DEFAULT) -> Validation:
 
 
 def _outcome(folder: RunFolder, results: RunResults, stages: Stages) -> Outcome:
-    return Outcome(folder.path, results, results.shortcoming, stages.total_s, results.warnings)
+    row = results.assignment
+    return Outcome(
+        folder.path,
+        results,
+        results.shortcoming,
+        row is not None and row.ended == End.INTERRUPTED,
+        stages.total_s,
+        results.warnings,
+    )
 
 
 def _cache(options: Options) -> Cache | None:
