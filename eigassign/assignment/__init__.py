@@ -13,6 +13,7 @@ Reading order:
     identification  parameters from measured frequencies, their covariance and intervals
     assign        build, solve, judge: from targets to the optimal design
     branching     branch and bound over catalogues, of any model whose relaxations can be solved
+    choosing      the best combinations of catalogues on the exact problem
     catalogue     the best combinations of catalogues on the linear model, proved
 """
 

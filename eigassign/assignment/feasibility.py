@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from eigassign.assignment.checks import Floats
-from eigassign.assignment.program import QuadraticProgram, ScaledProgram
+from eigassign.assignment.program import (
+    Bounds,
+    LinearConstraint,
+    QuadraticProgram,
+    ScaledProgram,
+)
 from eigassign.errors import InfeasibleError
 
 TOUCH = 1e-9  # in units of `Scales`: a tenth of the violation that `optimality` accepts
@@ -69,6 +76,25 @@ def feasible_point(scaled: ScaledProgram, rows: list[int] | None = None) -> Floa
         options={"primal_feasibility_tolerance": TOUCH},
     )
     return np.asarray(found.x) if found.status == 0 else None
+
+
+def constraints_agree(rows: Sequence[LinearConstraint], bounds: Bounds) -> bool:
+    """Whether some design within the bounds meets all linear limits, to 1e-9 of their terms."""
+    if not rows:
+        return True
+    from scipy.optimize import linprog  # heavy, and few cases have linear limits
+
+    C = np.array([row.coefficients for row in rows])
+    low, high = np.array([(row.lower, row.upper) for row in rows]).T
+    width = bounds.upper - bounds.lower
+    size = np.abs(C) @ np.maximum(np.abs(bounds.lower), np.abs(bounds.upper))
+    size = np.where(size > 0.0, size, 1.0)[:, None]
+    fixed = C @ bounds.lower
+    G = np.vstack([C * width / size, -C * width / size])
+    h = np.concatenate([high - fixed, fixed - low]) / np.tile(size[:, 0], 2) + TOUCH
+    finite = np.isfinite(h)
+    found = linprog(np.zeros(len(width)), G[finite], h[finite], bounds=(0.0, 1.0), method="highs")
+    return bool(found.status != 2)
 
 
 def contradiction(program: QuadraticProgram, scaled: ScaledProgram) -> InfeasibleError:

@@ -15,8 +15,8 @@ changes of the design, (y − y_ref)/width.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -87,6 +87,18 @@ class Requirements:
         asked = [target.mode for target in self.targets]
         asked += [mode for limit in self.limits for mode, _ in limit.terms]
         return max(asked, default=1)
+
+    @property
+    def limit_names(self) -> tuple[str, ...]:
+        """The names of all limits, each once, in their order."""
+        names = [limit.name for limit in self.limits] + [own.name for own in self.quantities]
+        return tuple(dict.fromkeys(names))
+
+    def with_limits(self, names: Collection[str]) -> Requirements:
+        """The same with those limits only that are named."""
+        limits = tuple(one for one in self.limits if one.name in names)
+        quantities = tuple(one for one in self.quantities if one.name in names)
+        return replace(self, limits=limits, quantities=quantities)
 
     def appraise(self, y: Floats, found: Frequencies) -> Appraisal:
         """Residuals and excesses of a design whose frequencies are ``found``, with slopes."""

@@ -60,6 +60,7 @@ def results_document(results: RunResults) -> dict[str, Any]:
             row.name: {k: v for k, v in asdict(row).items() if k != "name"}
             for row in results.design
         },
+        "mass": asdict(results.mass) if results.mass else None,
         "error": _error(results.error) if results.error else None,
         "frequencies": _frequencies(results, first) if first else None,
         "targets": [_target(results, target) for target in results.targets],

@@ -45,14 +45,19 @@ def tables(results: RunResults) -> tuple[Table, ...]:
 
 
 def design(results: RunResults) -> Table:
-    """Each design parameter before and after."""
+    """Each design parameter before and after, what was chosen of catalogues, and the mass."""
+    chosen = any(row.choice is not None for row in results.design)
     columns = ("name", "parameter", "unit", "initial", "optimal", "lower", "upper")
-    rows = tuple(
+    rows = [
         (row.name, row.parameter, row.unit, *map(number, (row.initial, row.optimal)),
-         *map(number, (row.lower, row.upper)))
+         *map(number, (row.lower, row.upper)), *((row.choice or "",) if chosen else ()))
         for row in results.design
-    )  # fmt: skip
-    return Table("Design", columns, rows)
+    ]  # fmt: skip
+    if (mass := results.mass) is not None:
+        limits = ("" if limit is None else number(limit) for limit in (mass.lower, mass.upper))
+        values = (number(mass.initial), number(mass.optimal), *limits)
+        rows.append(("mass", "of all links and bodies", "kg", *values, *(("",) if chosen else ())))
+    return Table("Design", (*columns, *(("choice",) if chosen else ())), tuple(rows))
 
 
 def errors(results: RunResults) -> Table:

@@ -117,7 +117,7 @@ def solve_case(case: Case, options: Options = DEFAULT) -> Result:
         with stages("meaning", "studying what the answer means"):
             asked = Studies(options.study)
             meaning = study_meaning(scene, answer, wanted, exact_hz, accepted, asked)
-    found = VerifiedAssignment(answer, targets, initial_hz, exact_hz, meaning)
+    found = VerifiedAssignment(answer, tuple(wanted), targets, initial_hz, exact_hz, meaning)
     results = collect_results(scene, studies, found, stages.timing_s)
     return _result(results, scene.expansions, answer.one_shot)
 

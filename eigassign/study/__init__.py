@@ -15,6 +15,7 @@ Reading order:
     judgement   what a design does to the targets, and the verdict
     clearance   proof that a band stays clear of modes all along a trajectory
     optimum     the design that meets the targets best, by the sequential method
+    conclusions  what may be said of an optimum: proved, conflicting limits, what changes nothing
     assignment  from the targets to the answer, by either method
     sensitivity  slopes of the targeted frequencies at the answer, and what its limits cost
     monotone    parameters in which every frequency is monotone, so that corners bound it

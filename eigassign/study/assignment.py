@@ -13,17 +13,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment import Assignment, hz_from_lam
-from eigassign.assignment.sequential import End
+from eigassign.assignment.sequential import MET, End
 from eigassign.case import CaseFile
-from eigassign.errors import AccuracyError, CaseError, Problem
+from eigassign.errors import AccuracyError, CaseError, InfeasibleError, Problem
 from eigassign.study.clearance import Clearance
+from eigassign.study.conclusions import (
+    Conflict,
+    conflict,
+    idle_notes,
+    is_proved,
+    least_changed,
+)
 from eigassign.study.judgement import verdict
 from eigassign.study.one_shot import assign_design
-from eigassign.study.optimum import Found, find_optimum
+from eigassign.study.optimum import MASS, Found, find_optimum
 from eigassign.study.results import (
     ActiveRow,
     AssignmentRow,
+    CatalogueRow,
     ClearanceRow,
+    CombinationRow,
     LocalOptimum,
     OptimalityRow,
     StepRow,
@@ -53,14 +62,16 @@ def require_assignable(file: CaseFile) -> None:
 
 
 def _not_yet(file: CaseFile) -> Iterator[Problem]:
-    """What is read but cannot be assigned so far."""
+    """What is read but cannot be assigned so far, or not by the method asked for."""
     for each in file.requirements:
         if each.followed is not None:
             yield file.problem(f"{each.place}.mode", "following a shape is not assigned yet")
-    for catalogue in file.design.catalogues:
-        yield file.problem(f"design.{catalogue.name}", "is not assigned yet: only bounds are")
-    if file.design.mass is not None:
-        yield file.problem("design.mass", "is not assigned yet: only linear constraints are")
+    if file.assignment.method == "one_shot" and not _has_one_shot(file):
+        yield file.problem(
+            "assignment.method",
+            "one_shot takes wanted frequencies within bounds and linear constraints only; "
+            "use sequential",
+        )
 
 
 @dataclass(frozen=True)
@@ -76,6 +87,7 @@ class Answer:
     one_shot: Assignment | None
     found: Found | None
     notes: tuple[str, ...]
+    conflict: Conflict | None = None
 
     @property
     def modes(self) -> int:
@@ -86,15 +98,16 @@ class Answer:
 def find_answer(scene: Scene, wanted: Sequence[Wanted], progress: Callable[[str], None]) -> Answer:
     """The design asked for by the case's method.
 
-    Raises InfeasibleError where bounds and linear constraints contradict each other, AccuracyError
-    where `method: one_shot` cannot be vouched for.
+    Raises InfeasibleError where bounds and linear constraints contradict each other under `method:
+    one_shot`, or no combination of catalogues meets linear constraints; AccuracyError where
+    `method: one_shot` cannot be vouched for.
     """
     sequential = scene.file.assignment.method == "sequential"
     one_shot, notes = None, []
     if _has_one_shot(scene.file):
         try:
             one_shot = assign_design(scene, wanted)
-        except AccuracyError as error:
+        except (AccuracyError, InfeasibleError) as error:
             if not sequential:
                 raise
             notes.append(f"no one-shot design: {error}")
@@ -104,8 +117,29 @@ def find_answer(scene: Scene, wanted: Sequence[Wanted], progress: Callable[[str]
         lam = tuple(hz_from_lam(values) for values in one_shot.lam)
         return Answer(one_shot.y, lam, one_shot, None, tuple(notes))
     starts = [] if one_shot is None else [one_shot.y]
-    found = find_optimum(scene, wanted, starts, progress)
-    return Answer(found.best.y, tuple(_predicted(found, wanted)), one_shot, found, tuple(notes))
+    found = least_changed(find_optimum(scene, wanted, starts, progress), scene.initial)
+    contradiction = conflict(found, scene.file.assignment.steps)
+    notes += idle_notes(scene.model.y_names, found.variant, found.best.seen)
+    predicted = tuple(_predicted(found, wanted))
+    return Answer(found.best.y, predicted, one_shot, found, tuple(notes), contradiction)
+
+
+def _in_words(scene: Scene, wanted: Sequence[Wanted], contradiction: Conflict | None) -> str:
+    """Which limits contradict, with their lines in the case file; empty where none do."""
+    if contradiction is None:
+        return ""
+    file = scene.file
+    places = {w.requirement.label: w.requirement.place for w in wanted} | {MASS: MASS}
+    places |= {name: f"design.constraints.{name}" for name in file.design.constraints}
+    lines = (file.problem(places[name], "").line for name in contradiction.names)
+    listed = " and ".join(
+        f"{'the limit of the mass' if name == MASS else name} (line {line})"
+        for name, line in zip(contradiction.names, lines, strict=True)
+    )
+    if not contradiction.smallest:
+        return f"no design was found that meets all limits; the nearest one misses {listed}"
+    together = " together" if len(contradiction.names) > 1 else ""
+    return f"no design within the bounds was found that meets {listed}{together}"
 
 
 def _has_one_shot(file: CaseFile) -> bool:
@@ -127,6 +161,7 @@ def _predicted(found: Found, wanted: Sequence[Wanted]) -> Iterator[Floats | None
 def assignment_row(
     scene: Scene,
     answer: Answer,
+    wanted: Sequence[Wanted],
     targets: Sequence[TargetStudy],
     unreachable: Sequence[str] = (),
 ) -> AssignmentRow:
@@ -140,7 +175,9 @@ def assignment_row(
     # The exact optimum rests on exact frequencies, the one shot on its prediction.
     trusted = found is not None or all(t.approximation_error <= accepted for t in targets)
     clearances = () if found is None else tuple(map(_clearance, found.clearances))
-    word, reason = verdict(targets, (initial, optimal), trusted, unreachable)
+    contradiction = _in_words(scene, wanted, answer.conflict)
+    merits = initial, optimal
+    word, reason = verdict(targets, merits, trusted, unreachable, contradiction)
     unproved = [row.label for row in clearances if not row.clear]
     if word == "reached" and unproved:
         word, reason = "do_not_use", f"not proved clear along the motion: {'; '.join(unproved)}"
@@ -151,7 +188,7 @@ def assignment_row(
         objective=keys.objective,
         objective_initial=initial[1],
         objective_optimal=optimal[1],
-        optimality=_optimality(found),
+        optimality=_optimality(scene, found),
         verdict=word,
         reason=reason,
         steps=() if found is None else tuple(_steps(found)),
@@ -165,11 +202,31 @@ def assignment_row(
         max_error=MAX_ERROR if keys.max_error is None else keys.max_error,
         max_error_given=keys.max_error is not None,
         clearances=clearances,
+        conflict=() if answer.conflict is None else answer.conflict.names,
+        catalogue=None if found is None else _catalogue(scene, found),
     )
 
 
 def _clearance(found: Clearance) -> ClearanceRow:
     return ClearanceRow(found.label, found.below, found.clear, found.room, found.counted)
+
+
+def _catalogue(scene: Scene, found: Found) -> CatalogueRow | None:
+    if found.chosen is None:
+        return None
+    own, search = scene.file.design.catalogues, found.chosen.search
+    best = tuple(
+        CombinationRow(
+            {c.name: c.choices[row] for c, row in zip(own, rows, strict=True)},
+            optimum.y,
+            optimum.objective,
+            optimum.seen.violation,
+        )
+        for rows, optimum in zip(found.chosen.rows, found.chosen.optima, strict=True)
+    )
+    if search is None:
+        return CatalogueRow(None, None, best)
+    return CatalogueRow(search.nodes, search.relative_gap, best)
 
 
 def _merits(
@@ -188,11 +245,25 @@ def _merits(
     return (0.0, before), (0.0, after)
 
 
-def _optimality(found: Found | None) -> OptimalityRow:
+def _optimality(scene: Scene, found: Found | None) -> OptimalityRow:
     if found is None:
         return OptimalityRow("local", None, None, "the optimum of the linearised problem only")
-    best = found.best
+    best, chosen = found.best, found.chosen
     many = f"{found.starts} start{'s' if found.starts > 1 else ''}"
+    if chosen is not None and chosen.search is not None:
+        gap = chosen.search.relative_gap
+        words = (
+            f"the best of the catalogues to {100 * gap:.2g} % of the objective by branch and "
+            f"bound in {chosen.search.nodes} nodes, as far as the optima of the relaxed problems, "
+            f"the first from {many}, are global"
+        )
+        return OptimalityRow("bounded", best.stationarity, gap, words)
+    if chosen is None and is_proved(scene, found):
+        met = best.seen.violation <= MET
+        words = "the problem is convex: " + (
+            "no design is better" if met else "no design meets all limits, or misses them by less"
+        )
+        return OptimalityRow("proved", best.stationarity, None, words)
     words = f"the best of {len(found.optima)} local optima from {many}"
     if best.end is not End.OPTIMAL:
         words = f"{words}; {best.end.value}"

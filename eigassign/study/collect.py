@@ -19,6 +19,7 @@ from eigassign.study.one_shot import design_rows, limit_notes, solver_row
 from eigassign.study.results import (
     AssignmentRow,
     DrawnPoses,
+    MassRow,
     Meaning,
     ModeStudy,
     OtherModes,
@@ -28,6 +29,7 @@ from eigassign.study.results import (
     TrajectoryRow,
 )
 from eigassign.study.scene import Scene
+from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 
@@ -37,6 +39,7 @@ class VerifiedAssignment:
     """An answer with exact frequencies (n_t, shown modes) before and after."""
 
     answer: Answer
+    wanted: tuple[Wanted, ...]
     targets: tuple[TargetStudy, ...]
     initial_hz: Floats
     exact_hz: Floats
@@ -78,7 +81,14 @@ def collect_results(
         timing_s=dict(timing_s),
         tolerance=file.validation.max_error,
         meaning=meaning,
+        mass=None if assigned is None else _mass(scene, assigned.answer.y),
     )
+
+
+def _mass(scene: Scene, y: Floats) -> MassRow:
+    limits, mass = scene.file.design.mass, scene.model.mass
+    low, high = (None, None) if limits is None else (limits.min, limits.max)
+    return MassRow(mass(scene.initial), mass(y), low, high)
 
 
 def _solver(assigned: VerifiedAssignment | None) -> SolverRow | None:
@@ -89,8 +99,8 @@ def _solver(assigned: VerifiedAssignment | None) -> SolverRow | None:
 def _assignment(scene: Scene, assigned: VerifiedAssignment | None) -> AssignmentRow | None:
     if assigned is None:
         return None
-    beyond = assigned.meaning.unreachable
-    return assignment_row(scene, assigned.answer, assigned.targets, beyond)
+    answer, beyond = assigned.answer, assigned.meaning.unreachable
+    return assignment_row(scene, answer, assigned.wanted, assigned.targets, beyond)
 
 
 def _notes(assigned: VerifiedAssignment | None) -> tuple[str, ...]:

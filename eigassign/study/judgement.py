@@ -205,21 +205,25 @@ def verdict(
     merits: tuple[tuple[float, float], tuple[float, float]],
     trusted: bool,
     unreachable: Sequence[str] = (),
+    conflict: str = "",
 ) -> tuple[str, str]:
     """The verdict, and why in a sentence.
 
     ``merits`` are (violation, objective) of the initial design and of the answer; ``unreachable``
-    names targets outside the range that their mode can take within the bounds.
+    names targets outside the range that their mode can take within the bounds; ``conflict`` says
+    which limits contradict each other.
     """
     if not trusted:
         return "do_not_use", "the numbers that the answer rests on cannot be vouched for"
     missed = [target for target in targets if not target.satisfied]
     if not missed:
-        return "reached", "every target is met"
+        return ("infeasible", conflict) if conflict else ("reached", "every target is met")
     worst = max(missed, key=lambda target: target.error.exact.max_relative)
     far = f"{worst.label}: {100 * worst.error.exact.max_relative:.3g} % off at worst"
     if unreachable:
         return "unreachable", f"{'; '.join(unreachable)} ({far})"
+    if conflict:
+        return "infeasible", f"{conflict} ({far})"
     (before_violation, before), (violation, after) = merits
     if violation > MET:
         if violation < (1.0 - IMPROVED) * before_violation:

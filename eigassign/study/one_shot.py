@@ -6,7 +6,7 @@ quadratic program of eqs. (13)–(14) (`eigassign.assignment`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from eigassign.assignment import (
     LinearModel,
     solve_assignment,
 )
-from eigassign.case import CaseFile
+from eigassign.case import CaseFile, Catalogue
 from eigassign.errors import AccuracyError
 from eigassign.study.results import DesignRow, SolverRow
 from eigassign.study.scene import Scene
@@ -96,10 +96,31 @@ def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:
         scene.file.design_units,
         scene.initial,
     )
+    chosen = {
+        k: choice for own in scene.file.design.catalogues for k, choice in _chosen(own, optimal)
+    }
     return tuple(
-        DesignRow(name, p.parameter, units[k], float(initial[k]), float(optimal[k]), p.min, p.max)
+        DesignRow(
+            name,
+            p.parameter,
+            units[k],
+            float(initial[k]),
+            float(optimal[k]),
+            p.min,
+            p.max,
+            chosen.get(k),
+        )
         for k, (name, p) in enumerate(parameters.items())
     )
+
+
+def _chosen(catalogue: Catalogue, y: Floats) -> Iterator[tuple[int, str]]:
+    """Each column of a catalogue with the name of the choice that y holds."""
+    own = y[list(catalogue.columns)]
+    row = next((k for k, row in enumerate(catalogue.rows) if np.array_equal(row, own)), None)
+    if row is not None:
+        for column in catalogue.columns:
+            yield column, catalogue.choices[row]
 
 
 def solver_row(assignment: Assignment) -> SolverRow:

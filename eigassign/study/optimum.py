@@ -9,23 +9,27 @@ kept.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from time import monotonic
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from eigassign.assignment import Bounds, LinearConstraint
+from eigassign.assignment.branching import Catalogue
+from eigassign.assignment.choosing import Chosen, choose
+from eigassign.assignment.feasibility import constraints_agree
 from eigassign.assignment.requirements import (
     FrequencyLimit,
     FrequencyTarget,
+    QuantityLimit,
     Requirements,
 )
 from eigassign.assignment.sequential import (
     MET,
-    Appraisal,
     DesignProblem,
     End,
     Objective,
@@ -34,6 +38,7 @@ from eigassign.assignment.sequential import (
     distinct,
     minimise,
 )
+from eigassign.case import CaseFile
 from eigassign.errors import CaseError, EigassignError
 from eigassign.study.clearance import Band, Clearance, prove_clear, wanting
 from eigassign.study.one_shot import linear_constraints
@@ -43,6 +48,8 @@ from eigassign.study.wanted import Wanted, target_frequencies, time_weights
 
 Floats = NDArray[np.float64]
 MOST_BELOW = 24  # combinations of numbers of modes below the bands that are tried
+RELAXED = 3  # starts of the relaxation of all combinations
+MASS = "design.mass"  # what the limit of the whole mechanism's mass is called
 STARTS = 8  # with `starts: auto`, at most
 MARGIN = 1e-5  # relative, by which modes keep off a band at the samples at least
 WIDENED = 5  # times that the margin is widened at most
@@ -60,6 +67,7 @@ class Variant:
     below: tuple[tuple[str, int], ...]  # the band in words, and k
     requirements: Requirements
     problem: DesignProblem
+    asks: Callable[[Collection[str]], DesignProblem]  # the problem with these limits only
 
 
 @dataclass(frozen=True)
@@ -74,6 +82,7 @@ class Found:
     clearances: tuple[Clearance, ...]  # of every band along every trajectory
     starts: int
     exact_solves: int
+    chosen: Chosen | None = None  # from the catalogues, where there are any; then of `optima`
 
 
 def find_optimum(
@@ -109,15 +118,27 @@ def _search_all(
     """The best local optimum, the limits of bands drawn in by ``margin`` (relative).
 
     Starts are followed on few samples of a long trajectory; what they lead to is then optimised on
-    all. No design is returned that is worse than the initial one.
+    all. No design is returned that is worse than the initial one. Where none meets all limits, it
+    is the one that misses them least, relative to the limits.
     """
     keys, begun = scene.file.assignment, monotonic()
     deadline = np.inf if keys.seconds is None else begun + keys.seconds
-    whole, few = Task(scene, tuple(wanted), margin), _thinned(scene, wanted, margin)
-    best_of: list[tuple[Variant, tuple[Optimum, ...]]] = []
+    catalogues = listed(scene.file)
+    whole = Task(scene, tuple(wanted), margin)
+    few = None if catalogues else _thinned(scene, wanted, margin)
+    best_of: list[tuple[Variant, tuple[Optimum, ...], Chosen | None]] = []
     made, solves = 0, 0
     for below in _below(whole):
         variant = variant_of(whole, below)
+        if catalogues:
+            near = list(_starts(scene, starts, RELAXED))
+            chosen = choose(variant.problem, catalogues, near, keys.steps, deadline, progress)
+            best_of.append((variant, chosen.optima, chosen))
+            solves += chosen.appraisals * len(scene.path.q)
+            made += len(near)
+            if chosen.search is None:
+                break
+            continue
         coarse = _Search(variant if few is None else variant_of(few, below), keys.steps, deadline)
         for start in _starts(scene, starts, keys.starts):
             made += 1
@@ -127,23 +148,32 @@ def _search_all(
                 break
         fine = coarse if few is None else _refined(variant, coarse, scene.initial)
         if fine.optima:
-            best_of.append((variant, distinct(fine.optima, variant.problem)))
+            best_of.append((variant, distinct(fine.optima, variant.problem), None))
         solves += fine.appraisals * len(scene.path.q)
         if few is not None:
             solves += coarse.appraisals * len(few.scene.path.q)
         if fine.ended:
             break
-    best_of.sort(key=lambda pair: _worth(pair[1][0]))
-    variant, optima = best_of[0]
+    best_of.sort(key=lambda found: _worth(found[1][0]))
+    variant, optima, chosen_of = best_of[0]
     return Found(
         variant=variant,
         best=optima[0],
         optima=optima,
-        variants=tuple((v, o[0]) for v, o in best_of),
+        variants=tuple((v, o[0]) for v, o, _ in best_of),
         initial=_initial(scene, variant),
         clearances=tuple(_clearances(whole, variant, optima[0].y)),
         starts=made,
         exact_solves=solves + len(scene.path.q),
+        chosen=chosen_of,
+    )
+
+
+def listed(file: CaseFile) -> tuple[Catalogue, ...]:
+    """The case's catalogues, as the search takes them."""
+    return tuple(
+        Catalogue(own.name, own.columns, np.array(own.rows), own.choices)
+        for own in file.design.catalogues
     )
 
 
@@ -302,30 +332,55 @@ def variant_of(task: Task, below: tuple[int, ...]) -> Variant:
         for band, k in zip(task.bands, below, strict=True)
         for limit in _beside(band, k, task.margin)
     ]
+    constraints, elastic = _linear(scene)
     asked = Requirements(
         targets=targets,
         limits=(*_limits(wanted), *of_bands),
-        quantities=(),
+        quantities=(*_mass(scene), *elastic),
         time_weights=time_weights(scene.path),
         objective=objective,
         least_change=(scene.initial, width) if not targets and not prices.any() else None,
     )
     response = exact_response(scene, asked.modes)
 
-    def appraise(y: Floats) -> Appraisal:
-        return asked.appraise(y, response(y))
+    def asks(names: Collection[str]) -> DesignProblem:
+        some = asked.with_limits(names)
+        return DesignProblem(
+            appraise=lambda y: some.appraise(y, response(y)),
+            lower=lower,
+            upper=upper,
+            constraints=constraints,
+            prices=prices if prices.any() else None,
+            reference=scene.initial,
+            objective=objective if targets else Objective.LEAST_SQUARES,
+        )
 
-    problem = DesignProblem(
-        appraise=appraise,
-        lower=lower,
-        upper=upper,
-        constraints=tuple(linear_constraints(scene.file)),
-        prices=prices if prices.any() else None,
-        reference=scene.initial,
-        objective=objective if targets else Objective.LEAST_SQUARES,
-    )
     labels = (band.wanted.requirement.label for band in task.bands)
-    return Variant(tuple(zip(labels, below, strict=True)), asked, problem)
+    named = tuple(zip(labels, below, strict=True))
+    return Variant(named, asked, asks(asked.limit_names), asks)
+
+
+def _mass(scene: Scene) -> Iterator[QuantityLimit]:
+    given = scene.file.design.mass
+    if given is not None:
+        low = -np.inf if given.min is None else given.min
+        high = np.inf if given.max is None else given.max
+        yield QuantityLimit(MASS, scene.model.total_mass, low, high)
+
+
+def _linear(scene: Scene) -> tuple[tuple[LinearConstraint, ...], tuple[QuantityLimit, ...]]:
+    """Linear limits that every step keeps; where they contradict, limits to be missed least."""
+    rows = tuple(linear_constraints(scene.file))
+    if constraints_agree(rows, Bounds(*scene.bounds)):
+        return rows, ()
+    return (), tuple(
+        QuantityLimit(row.name, partial(_linear_value, row.coefficients), row.lower, row.upper)
+        for row in rows
+    )
+
+
+def _linear_value(coefficients: Floats, y: Floats) -> tuple[float, Floats]:
+    return float(coefficients @ y), coefficients
 
 
 def _prices(scene: Scene, objective: Objective | None) -> Floats:

@@ -106,7 +106,7 @@ class ValidationRow:
 
 @dataclass(frozen=True)
 class DesignRow:
-    """One design parameter before and after, in SI ``unit``."""
+    """One design parameter before and after, in SI ``unit``; what was chosen of its catalogue."""
 
     name: str
     parameter: str
@@ -115,6 +115,17 @@ class DesignRow:
     optimal: float
     lower: float
     upper: float
+    choice: str | None = None
+
+
+@dataclass(frozen=True)
+class MassRow:
+    """Mass of all links and bodies before and after, and its limits if any, in kg."""
+
+    initial: float
+    optimal: float
+    lower: float | None
+    upper: float | None
 
 
 @dataclass(frozen=True)
@@ -274,6 +285,28 @@ class ClearanceRow:
 
 
 @dataclass(frozen=True)
+class CombinationRow:
+    """One choice of every catalogue: ``choices`` by the catalogues' names; objective as above."""
+
+    choices: Mapping[str, str]
+    design: Floats
+    objective: float
+    violation: float
+
+
+@dataclass(frozen=True)
+class CatalogueRow:
+    """The search of the catalogues: nodes of its tree, relative gap, the best few, best first.
+
+    ``nodes`` and ``gap`` are None where the search was ended before it could tell.
+    """
+
+    nodes: int | None
+    gap: float | None
+    best: tuple[CombinationRow, ...]
+
+
+@dataclass(frozen=True)
 class AssignmentRow:
     """How the answer was found and what it is worth.
 
@@ -299,6 +332,8 @@ class AssignmentRow:
     max_error: float
     max_error_given: bool
     clearances: tuple[ClearanceRow, ...]
+    conflict: tuple[str, ...] = ()  # limits that contradict each other
+    catalogue: CatalogueRow | None = None
 
 
 # --- What the answer means
@@ -490,6 +525,7 @@ class RunResults:
     timing_s: Mapping[str, float]
     case_files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of what the case names
     tolerance: float = 0.02  # the largest approximation error the case accepts, a fraction
+    mass: MassRow | None = None
     only: str | None = None  # of several trajectories the one that these are results of
     meaning: Meaning = field(default_factory=Meaning)
 

@@ -12,7 +12,7 @@ import pytest
 from run_cases import SHIPPED, UNCACHED, chain, shipped, without, written
 
 from eigassign.api import load_case
-from eigassign.errors import InfeasibleError, StorageError
+from eigassign.errors import StorageError
 from eigassign.pipeline.run import Options, Outcome, expand_case, optimize, solve_case
 
 
@@ -76,12 +76,13 @@ def test_the_log_tells_choices_outcome_and_times(outcome: Outcome) -> None:
         assert line in log
 
 
-def test_an_infeasible_case_leaves_no_folder(tmp_path: Path) -> None:
+def test_an_infeasible_case_leaves_the_nearest_compromise(tmp_path: Path) -> None:
     limits = "    total: {terms: {m1: 1, m2: 1}, min: 450 g}\n    m: {terms: {m1: 1}, max: 100 g}\n"
     text = shipped(("\nexpansion:", "  constraints:\n" + limits + "\nexpansion:"))
-    with pytest.raises(InfeasibleError):
-        optimize(written(tmp_path, text), in_folder(tmp_path / "out"))
-    assert [path.name for path in tmp_path.iterdir()] == ["case.yaml"]
+    outcome = optimize(written(tmp_path, text), in_folder(tmp_path / "out"))
+    assert outcome.shortcoming is not None
+    assert outcome.shortcoming.startswith("infeasible")
+    assert (tmp_path / "out" / "results.json").exists()
 
 
 def test_the_folder_of_another_case_is_refused_before_anything_is_computed(tmp_path: Path) -> None:

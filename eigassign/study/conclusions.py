@@ -1,0 +1,198 @@
+"""What may be said of an optimum: proved or not, which limits conflict, what changes nothing.
+
+**Proved.** "Mode 1 at least b" is K(y) − (2πb)² M(y) ⪰ 0 where every coordinate is held. With K and
+M affine in y that is a convex set, and so are bounds, linear limits and a mass that is affine in y;
+price and least change are convex. A local optimum is then the best there is. Where nothing meets
+the limits, λ₁ falls short most at a design from which no direction raises it: with K and M at a
+better design, φᵀ(K − λ₁M)φ > 0 for all modes φ of λ₁ here, which is the slope towards it. So a
+stationary violation proves that the limits contradict.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.assignment.sequential import (
+    MET,
+    OPTIMAL,
+    Appraisal,
+    DesignProblem,
+    End,
+    Optimum,
+    active_limits,
+    minimise,
+    stationarity,
+)
+from eigassign.errors import EigassignError
+from eigassign.study.optimum import Found, Variant
+from eigassign.study.scene import Scene
+
+Floats = NDArray[np.float64]
+MOST = 12  # limits of which the smallest contradiction is looked for
+AFFINE = 1e-10  # relative change of a slope over the bounds that is round-off
+WITHOUT = 1e-9  # of the largest: a singular value of the slopes that is none
+SAME = 1e-9  # of the merit: a design this little worse is as good
+
+
+# --- Convexity
+
+
+def is_proved(scene: Scene, found: Found) -> bool:
+    """Whether no design is better, or none misses the limits by less where they are missed."""
+    best, problem = found.best, found.variant.problem
+    if best.seen.violation <= MET:
+        left = best.stationarity
+    else:
+        only = replace(best.seen, residual=np.zeros(0), slopes=best.seen.slopes[:0])
+        left = stationarity(replace(problem, prices=None), best.y, only)
+    return left <= OPTIMAL and _is_convex(scene, found.variant)
+
+
+def _is_convex(scene: Scene, variant: Variant) -> bool:
+    asked = variant.requirements
+    if asked.targets or scene.file.design.catalogues or scene.path.follows_design:
+        return False
+    lowest = all(one.at_least and one.terms == ((1, 1.0),) for one in asked.limits)
+    return lowest and scene.model.n_rigid == 0 and _is_affine(scene)
+
+
+def _is_affine(scene: Scene) -> bool:
+    """Whether K, M and the total mass have the same slopes in y at designs all over the bounds."""
+    lower, upper = scene.bounds
+    pencil, n_q = scene.model.pencil, scene.path.q.shape[1]
+    along = n_q + np.arange(len(lower))
+    designs = lower + np.random.default_rng(0).random((6, len(lower))) * (upper - lower)
+    for q in scene.path.q[:: max(1, len(scene.path.q) // 4)]:
+        found = pencil.theta_slopes(scene.model.x(np.tile(q, (6, 1)), designs), along)
+        size = np.abs(found).max(axis=2, keepdims=True)
+        if (np.abs(found - found[..., :1]) > AFFINE * size).any():
+            return False
+    if scene.file.design.mass is None:
+        return True
+    slopes = np.array([scene.model.mass_slopes(y) for y in designs])
+    return bool((np.ptp(slopes, axis=0) <= AFFINE * np.abs(slopes).max(axis=0)).all())
+
+
+# --- Contradictions
+
+
+@dataclass(frozen=True)
+class Conflict:
+    """Limits that no design was found to meet together; without any one of them there is one.
+
+    ``smallest`` is False where there are so many that only those missed here are named.
+    """
+
+    names: tuple[str, ...]
+    smallest: bool
+
+
+def conflict(found: Found, steps: int) -> Conflict | None:
+    """What contradicts where the best design misses limits; None where it meets them.
+
+    Deletion filter: a limit without which the rest still cannot be met is left out. Each trial
+    starts at the compromise.
+    """
+    best, asked = found.best, found.variant.requirements
+    if best.seen.violation <= MET or best.end in (End.SECONDS, End.STEPS, End.INTERRUPTED):
+        return None
+    owners = [asked.owner(int(k)) for k in np.flatnonzero(best.seen.excess > MET)]
+    missed = tuple(dict.fromkeys(owners))
+    if found.chosen is not None or len(asked.limit_names) > MOST:
+        return Conflict(missed, len(asked.limit_names) == 1 and found.chosen is None)
+    needed = list(asked.limit_names)
+    for name in asked.limit_names:
+        rest = [other for other in needed if other != name]
+        if rest and not _can_be_met(found.variant.asks(rest), best.y, steps):
+            needed = rest
+    return Conflict(tuple(needed), True)
+
+
+def _can_be_met(problem: DesignProblem, start: Floats, steps: int) -> bool:
+    try:
+        return minimise(problem, start, steps).seen.violation <= MET
+    except EigassignError:
+        return True
+
+
+# --- What changes nothing
+
+
+def _effects(problem: DesignProblem, seen: Appraisal) -> Floats:
+    """Slopes of all that is asked per width of the bounds, columns for the parameters with room."""
+    width = problem.upper - problem.lower
+    prices = np.zeros((0, len(width))) if problem.prices is None else problem.prices[None]
+    return np.vstack([seen.slopes, seen.excess_slopes, prices]) * width
+
+
+def idle_notes(names: Sequence[str], variant: Variant, seen: Appraisal) -> Iterator[str]:
+    """Parameters without effect, and those that only together have one, in words."""
+    free = np.flatnonzero(variant.problem.upper > variant.problem.lower)
+    J = _effects(variant.problem, seen)[:, free]
+    size = np.linalg.norm(J, axis=0)
+    idle = size <= WITHOUT * size.max(initial=0.0)
+    if idle.any():
+        listed = ", ".join(names[k] for k in free[idle])
+        yield f"nothing that is asked depends on {listed}: left as they are where limits allow"
+    moving = free[~idle]
+    alike = np.abs(_null_space(J[:, ~idle] / size[~idle])).max(axis=1, initial=0.0) > 1e-3
+    if alike.any():
+        listed = ", ".join(names[k] for k in moving[alike])
+        yield f"{listed} have the same effect on what is asked: their smallest change is taken"
+
+
+def _null_space(J: Floats) -> Floats:
+    """Orthonormal directions (n, k) that change nothing."""
+    if not J.size:
+        return np.zeros((J.shape[1], 0))
+    _, s, V = np.linalg.svd(J, full_matrices=True)
+    rank = int((s > WITHOUT * s[0]).sum())
+    return np.asarray(V[rank:].T)
+
+
+def least_changed(found: Found, initial: Floats) -> Found:
+    """The same answer with undetermined directions pulled back to the initial design.
+
+    Only where the merit is not worse than 1e-9 of itself.
+    """
+    problem, best = found.variant.problem, found.best
+    settled = found.chosen is not None or found.variant.requirements.least_change is not None
+    if settled or found.clearances:  # a band is proved clear at this very design
+        return found
+    free = np.flatnonzero(problem.upper > problem.lower)
+    width = (problem.upper - problem.lower)[free]
+    N = _null_space(_effects(problem, best.seen)[:, free])
+    d = np.zeros(len(best.y))
+    d[free] = width * (N @ (N.T @ ((initial - best.y)[free] / width)))
+    if np.abs(d[free] / width).max(initial=0.0) <= SAME:
+        return found
+    y = np.clip(best.y + d, problem.lower, problem.upper)
+    for row in problem.constraints:
+        if not row.lower - 1e-12 <= row.coefficients @ y <= row.upper + 1e-12:
+            return found
+    try:
+        seen = problem.appraise(y)
+    except EigassignError:
+        return found
+    value = problem(y, seen)
+    limit = best.objective + SAME * abs(best.objective) + 1e-20
+    if value > limit or seen.violation > max(best.seen.violation * (1.0 + SAME), MET):
+        return found
+    moved = _at(problem, best, y, seen)
+    return replace(found, best=moved, optima=(moved, *found.optima[1:]))
+
+
+def _at(problem: DesignProblem, optimum: Optimum, y: Floats, seen: Appraisal) -> Optimum:
+    """An optimum moved to a design of the same worth."""
+    return replace(
+        optimum,
+        y=y,
+        seen=seen,
+        objective=problem(y, seen),
+        stationarity=stationarity(problem, y, seen),
+        limits=tuple(active_limits(problem, y, seen)),
+    )
