@@ -85,7 +85,9 @@ def _is_number(text: str) -> bool:
 
 
 def print_assignment(results: RunResults, *, stream: TextIO | None = None) -> None:
-    """Design, distances to the targets, approximation errors and the solver's certificate."""
+    """The verdict, then design, distances, limits, approximation and the solver's certificate."""
+    if (line := summary.headline(results)) is not None:
+        write_text(sys.stdout if stream is None else stream, _printable(line) + "\n\n")
     print_tables((t for t in summary.tables(results) if t.title != "Timing"), stream=stream)
 
 

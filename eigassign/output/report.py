@@ -19,8 +19,8 @@ from eigassign.output.figures.run import run_figures
 from eigassign.output.figures.style import FigurePlan, render
 from eigassign.output.formats import percent
 from eigassign.output.result_files import sample_files, to_json
-from eigassign.output.tables import Table, tables
-from eigassign.study.results import ErrorSummary, ModePictures, RunResults
+from eigassign.output.tables import Table, headline, tables
+from eigassign.study.results import ModePictures, RunResults
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -36,18 +36,17 @@ _EMBEDDED = {".png": "image/png", ".svg": "image/svg+xml"}  # the first that the
 
 def to_html(results: RunResults, plans: Sequence[FigurePlan], files: Mapping[str, bytes]) -> bytes:
     """The report of a run as UTF-8; ``files`` holds what `render` made of ``plans``."""
-    return page(results, results.error, tables(results), plans, files)
+    return page(results, headline(results), tables(results), plans, files)
 
 
 def page(
     f: RunResults | Chart | UpdateResults,
-    error: ErrorSummary | None,
+    line: str | None,
     shown: Sequence[Table],
     plans: Sequence[FigurePlan],
     files: Mapping[str, bytes],
-    headline: str = "",
 ) -> bytes:
-    """Any page of ours: what ``f`` is about, then tables, warnings and notes, then figures.
+    """Any page of ours: what ``f`` is about, its headline ``line``, tables, notes, figures.
 
     A figure that was written as PDF only is named in its place; of one that was not written
     nothing is said.
@@ -62,7 +61,7 @@ def page(
             image = f"data:{_EMBEDDED[kind]};base64,{text}"
         if own:
             figures.append((plan, image, list(own.values())))
-    html = _template().render(f=f, error=error, headline=headline, tables=shown, figures=figures)
+    html = _template().render(f=f, headline=line, tables=shown, figures=figures)
     return (html + "\n").encode("utf-8", "xmlcharrefreplace")
 
 

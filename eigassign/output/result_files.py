@@ -82,11 +82,14 @@ def results_document(results: RunResults) -> dict[str, Any]:
 
 
 def _error(summary: ErrorSummary) -> dict[str, Any]:
-    rows = {name: getattr(summary, name) for name in ("initial", "one_shot", "predicted", "exact")}
-    return {
-        name: None if row is None else {key: _finite(value) for key, value in asdict(row).items()}
-        for name, row in rows.items()
+    found: dict[str, Any] = {
+        name: None if row is None else asdict(row)
+        for name in ("initial", "one_shot", "predicted", "exact")
+        for row in [getattr(summary, name)]
     }
+    if found["predicted"] is not None:
+        found["predicted"] = {key: _finite(value) for key, value in found["predicted"].items()}
+    return found
 
 
 def _finite(value: Any) -> Any:
@@ -101,11 +104,18 @@ def _frequencies(results: RunResults, target: TargetStudy) -> dict[str, Any]:
         "time_s": results.time_s[target.rows],
         **_named(results, target.rows),
         "target_hz": target.target_hz,
+        **(_limits(target) if target.kind != "frequency" else {}),
         "initial_hz": target.initial_hz,
         "one_shot_hz": target.one_shot_hz,
         "predicted_hz": None if target.predicted_hz is None else _finite(target.predicted_hz),
         "exact_hz": target.exact_hz,
     }
+
+
+def _limits(target: TargetStudy) -> dict[str, Any]:
+    """The edges of what is wanted, or of the band to keep out of; null where there is none."""
+    edges = {"lower_hz": target.lower_hz, "upper_hz": target.upper_hz}
+    return {name: hz if np.isfinite(hz).all() else None for name, hz in edges.items()}
 
 
 def _named(results: RunResults, rows: slice) -> dict[str, Any]:

@@ -27,13 +27,15 @@ class Table:
 
 
 def tables(results: RunResults) -> tuple[Table, ...]:
-    """Design, distance to the targets, what the answer means, approximation, solver, timing.
+    """Design, distances, limits, local optima, what the answer means, approximation, solver, time.
 
     Those that there is something to show in.
     """
     made = (
         design(results),
         errors(results),
+        required(results),
+        optima(results),
         sensitivity(results),
         limits(results),
         reach(results),
@@ -44,31 +46,62 @@ def tables(results: RunResults) -> tuple[Table, ...]:
     return tuple(table for table in (*made, timing(results)) if table.rows)
 
 
+def headline(results: RunResults) -> str | None:
+    """The verdict with its reason, and the worst distance before and after, in a sentence or two.
+
+    Without targets None.
+    """
+    error, row = results.error, results.assignment
+    if error is None:
+        return None
+    what = "Worst distance to the target"
+    if not any(target.kind == "frequency" for target in results.targets):
+        what = "Worst violation of a limit"
+    beside = ""
+    if "one shot" in _stages(results) and error.one_shot is not None:
+        beside = f" (one shot: {percent(error.one_shot.max_relative)})"
+    before, after = percent(error.initial.max_relative), percent(error.exact.max_relative)
+    distance = f"{what}: {before} before, {after} after{beside}, by exact eigenvalues."
+    if row is None:
+        return distance
+    word = row.verdict.replace("_", " ")
+    return f"{word[0].upper()}{word[1:]}: {row.reason}. {distance}"
+
+
 def design(results: RunResults) -> Table:
-    """Each design parameter before and after, what was chosen of catalogues, and the mass."""
+    """Each design parameter before and after, what it lies on or was chosen, and the mass."""
+    active = results.assignment.active if results.assignment else ()
+    on = {limit.name: limit.side for limit in active if limit.kind == "bound"}
     chosen = any(row.choice is not None for row in results.design)
     columns = ("name", "parameter", "unit", "initial", "optimal", "lower", "upper")
+    more = (*(("lies on",) if on else ()), *(("choice",) if chosen else ()))
     rows = [
         (row.name, row.parameter, row.unit, *map(number, (row.initial, row.optimal)),
-         *map(number, (row.lower, row.upper)), *((row.choice or "",) if chosen else ()))
+         *map(number, (row.lower, row.upper)), *((on.get(row.name, ""),) if on else ()),
+         *((row.choice or "",) if chosen else ()))
         for row in results.design
     ]  # fmt: skip
     if (mass := results.mass) is not None:
-        limits = ("" if limit is None else number(limit) for limit in (mass.lower, mass.upper))
-        values = (number(mass.initial), number(mass.optimal), *limits)
-        rows.append(("mass", "of all links and bodies", "kg", *values, *(("",) if chosen else ())))
-    return Table("Design", (*columns, *(("choice",) if chosen else ())), tuple(rows))
+        edges = ("" if limit is None else number(limit) for limit in (mass.lower, mass.upper))
+        values = (number(mass.initial), number(mass.optimal), *edges)
+        rows.append(("mass", "of all links and bodies", "kg", *values, *("" for _ in more)))
+    constraints = [limit.name for limit in active if limit.kind == "constraint"]
+    caption = f"The constraint {', '.join(constraints)} is active." if constraints else ""
+    return Table("Design", (*columns, *more), tuple(rows), caption)
 
 
 def errors(results: RunResults) -> Table:
-    """Distance to the target before, as predicted, and exact, side by side."""
+    """Distance to the wanted frequencies before, as predicted, and exact, side by side."""
     kinds = _stages(results)
     columns = ("target", *(f"{kind} {what}" for what in ("worst", "rms") for kind in kinds))
-    summaries = [pair for target in results.targets for pair in _of_target(target)]
-    if len(results.targets) > 1 and len(results.trajectories) > 1:
+    wanted = [target for target in results.targets if target.kind == "frequency"]
+    if not wanted:
+        return Table("Distance to the target", columns, ())
+    summaries = [pair for target in wanted for pair in _of_target(target)]
+    if len(wanted) > 1 and len(results.trajectories) > 1:
         along = ((row.name, results.error_along(row.name)) for row in results.trajectories)
         summaries += [(f"all along {name!r}", error) for name, error in along if error is not None]
-    if len(results.targets) > 1 and results.error is not None:
+    if len(wanted) > 1 and results.error is not None:
         summaries.append(("all", results.error))
     rows = []
     for label, summary in summaries:
@@ -79,6 +112,39 @@ def errors(results: RunResults) -> Table:
     caption = "Frequency against its target in Hz, relative to the target, along "
     caption += f"{results.along}."
     return Table("Distance to the target", columns, tuple(rows), caption)
+
+
+def required(results: RunResults) -> Table:
+    """Every limit and band: met, or violated by how much at worst, before and after."""
+    kinds = tuple(kind for kind in _stages(results) if kind != "predicted")
+    rows = []
+    for target in results.targets:
+        if target.kind != "frequency":
+            cells = (getattr(target.error, kind.replace(" ", "_")) for kind in kinds)
+            said = ("" if e is None else _violated(e.max_relative) for e in cells)
+            rows.append((target.label, *said, "met" if target.satisfied else "VIOLATED"))
+    caption = f"Relative to the limit, along {results.along}."
+    return Table("Limits and bands", ("limit", *kinds, "verdict"), tuple(rows), caption)
+
+
+def _violated(worst: float) -> str:
+    return f"violated by {percent(worst)}" if worst > 0.0 else "met"
+
+
+def optima(results: RunResults) -> Table:
+    """The distinct local optima, the best first; none of a single one."""
+    row = results.assignment
+    names = tuple(each.name for each in results.design)
+    columns = ("optimum", "objective", "violation", *names)
+    if row is None or len(row.local_optima) < 2:
+        return Table("Local optima", columns, ())
+    rows = tuple(
+        (str(k), number(each.objective), percent(each.violation), *map(number, each.design))
+        for k, each in enumerate(row.local_optima, 1)
+    )
+    return Table(
+        "Local optima", columns, rows, f"From {row.starts} starts; the first is the answer."
+    )
 
 
 def _stages(results: RunResults) -> tuple[str, ...]:

@@ -137,7 +137,7 @@ def write_update(results: UpdateResults, folder: Path, formats: Sequence[str] = 
     (folder / "results.json").write_text(dumps(document(results)) + "\n", encoding="utf-8")
     plans = update_figures(results)
     files = report.write_figures(plans, folder, formats)
-    page = report.page(results, None, tables(results), plans, files, headline(results))
+    page = report.page(results, headline(results), tables(results), plans, files)
     (folder / "report.html").write_bytes(page)
 
 

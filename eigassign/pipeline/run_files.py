@@ -83,7 +83,8 @@ def _outcome_lines(results: RunResults) -> Iterator[str]:
         yield from _distances(along, f" along {own.name!r}") if along is not None else ()
     if results.assignment is not None:
         yield from _assignment_lines(results.assignment)
-    if results.approximation_error is not None:
+    found = results.assignment
+    if results.approximation_error is not None and found and found.method == "one_shot":
         within = "within" if results.within_tolerance else "OVER"
         error = f"{100 * results.approximation_error:.4g} %"
         yield f"accuracy  predicted against exact: {error}, {within} {100 * results.tolerance:g} %"

@@ -197,7 +197,7 @@ def assignment_row(
         exact_solves=0 if found is None else found.exact_solves,
         ended="one program" if found is None else found.best.end.value,
         finished=found is None or found.best.end in (End.OPTIMAL, End.STALLED),
-        active=tuple(active_rows(scene, answer)),
+        active=tuple(_of_program(answer) if found is None else active_rows(scene, answer)),
         one_shot=None if answer.one_shot is None else answer.one_shot.y,
         max_error=MAX_ERROR if keys.max_error is None else keys.max_error,
         max_error_given=keys.max_error is not None,
@@ -272,7 +272,7 @@ def _optimality(scene: Scene, found: Found | None) -> OptimalityRow:
 
 def _steps(found: Found) -> Iterator[StepRow]:
     for step in found.best.steps:
-        yield StepRow(step.y, step.objective, step.violation, step.radius, step.taken)
+        yield StepRow(step.y, step.objective, step.violation, step.radius, bool(step.taken))
 
 
 def _local_optima(found: Found) -> Iterator[LocalOptimum]:
@@ -301,3 +301,24 @@ def active_rows(scene: Scene, answer: Answer) -> Iterator[ActiveRow]:
             shares[name] = shares.get(name, 0.0) + limit.multiplier
     for name, multiplier in shares.items():
         yield ActiveRow(name, "target", "upper", multiplier)
+
+
+def _of_program(answer: Answer) -> Iterator[ActiveRow]:
+    """The limits that the one shot lies on, in the multipliers of its program."""
+    for one in () if answer.one_shot is None else answer.one_shot.active:
+        yield ActiveRow(one.name, one.kind, one.side, one.multiplier)
+
+
+def limit_notes(answer: Answer, row: AssignmentRow) -> list[str]:
+    """What holds the answer back, and what the one shot's program does not depend on."""
+    grouped: dict[str, list[str]] = {}
+    for limit in row.active:
+        on = "just meets" if limit.kind == "target" else f"lies on its {limit.side} {limit.kind} of"
+        grouped.setdefault(on, []).append(limit.name)
+    notes = [f"the optimum {on} {', '.join(names)}" for on, names in grouped.items()]
+    if answer.found is None and answer.one_shot is not None and answer.one_shot.undetermined:
+        notes.append(
+            f"{answer.one_shot.undetermined} direction(s) of the design change no target: there "
+            "the initial design is kept as nearly as the limits allow"
+        )
+    return notes

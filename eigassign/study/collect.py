@@ -12,10 +12,10 @@ from eigassign._version import __version__
 from eigassign.case import CaseFile
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.accuracy import study_motion
-from eigassign.study.assignment import Answer, assignment_row
+from eigassign.study.assignment import Answer, assignment_row, limit_notes
 from eigassign.study.drawing import draw_poses, rest_pose
 from eigassign.study.judgement import crossing_warnings
-from eigassign.study.one_shot import design_rows, limit_notes, solver_row
+from eigassign.study.one_shot import design_rows, solver_row
 from eigassign.study.results import (
     AssignmentRow,
     DrawnPoses,
@@ -54,7 +54,7 @@ def collect_results(
 ) -> RunResults:
     """The results of a run; without ``assigned`` those of an expansion only."""
     file, trajectory = scene.file, scene.trajectory
-    motion = _motion(scene, assigned)
+    motion, row = _motion(scene, assigned), _assignment(scene, assigned)
     n = len(file.coordinates)
     meaning = Meaning() if assigned is None else assigned.meaning
     return RunResults(
@@ -75,9 +75,9 @@ def collect_results(
         targets=() if assigned is None else assigned.targets,
         others=None if assigned is None else _others(scene, assigned),
         solver=_solver(assigned),
-        assignment=_assignment(scene, assigned),
+        assignment=row,
         warnings=(*scene.warnings, *_warnings(scene, assigned), *motion[1]),
-        notes=(*scene.notes, *_notes(assigned), *motion[0], *meaning.notes),
+        notes=(*scene.notes, *_notes(assigned, row), *motion[0], *meaning.notes),
         timing_s=dict(timing_s),
         tolerance=file.validation.max_error,
         meaning=meaning,
@@ -103,14 +103,11 @@ def _assignment(scene: Scene, assigned: VerifiedAssignment | None) -> Assignment
     return assignment_row(scene, answer, assigned.wanted, assigned.targets, beyond)
 
 
-def _notes(assigned: VerifiedAssignment | None) -> tuple[str, ...]:
-    """What was chosen, and what the one shot's program met where it is the answer."""
-    if assigned is None:
+def _notes(assigned: VerifiedAssignment | None, row: AssignmentRow | None) -> tuple[str, ...]:
+    """What was chosen on the way to the answer, and what holds it back."""
+    if assigned is None or row is None:
         return ()
-    answer = assigned.answer
-    if answer.found is not None or answer.one_shot is None:
-        return answer.notes
-    return (*answer.notes, *limit_notes(answer.one_shot))
+    return (*assigned.answer.notes, *limit_notes(assigned.answer, row))
 
 
 def _trajectories(file: CaseFile, path: Trajectories | None) -> tuple[TrajectoryRow, ...]:

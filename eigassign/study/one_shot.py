@@ -132,18 +132,3 @@ def solver_row(assignment: Assignment) -> SolverRow:
         assignment.dual_residual,
         assignment.gap,
     )
-
-
-def limit_notes(assignment: Assignment) -> list[str]:
-    """What holds the optimum back, and what no frequency depends on."""
-    grouped: dict[str, list[str]] = {}
-    for limit in assignment.active:
-        grouped.setdefault(f"{limit.side} {limit.kind}", []).append(limit.name)
-    notes = [f"on its {side} of {', '.join(names)}" for side, names in grouped.items()]
-    notes = [f"the optimum lies {note}" for note in notes]
-    if assignment.undetermined:
-        notes.append(
-            f"{assignment.undetermined} direction(s) of the design change no target: there the "
-            "initial design is kept as nearly as the limits allow"
-        )
-    return notes

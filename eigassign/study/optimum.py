@@ -142,7 +142,7 @@ def _search_all(
         coarse = _Search(variant if few is None else variant_of(few, below), keys.steps, deadline)
         for start in _starts(scene, starts, keys.starts):
             made += 1
-            progress(f"start {made}")
+            progress(f"  from start {made}")
             coarse.run(start)
             if coarse.ended or coarse.agreed(keys.starts):
                 break

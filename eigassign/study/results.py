@@ -624,7 +624,7 @@ def along_each(results: RunResults) -> tuple[RunResults, ...]:
 
 def _along(results: RunResults, row: TrajectoryRow) -> RunResults:
     rows, others = row.rows, results.others
-    targets = (_target(target, row.name) for target in results.targets)
+    targets = (_target(target, row) for target in results.targets)
     return replace(
         results,
         only=row.name,
@@ -647,12 +647,13 @@ def _study(study: ModeStudy, rows: slice) -> ModeStudy:
     return replace(study, over_time=Comparison(*(part[rows] for part in parts)))
 
 
-def _target(target: TargetStudy, name: str) -> TargetStudy | None:
-    """The target along the trajectory of that name; None where it does not hold there."""
-    along = next((one for one in target.along if one.name == name), None)
+def _target(target: TargetStudy, row: TrajectoryRow) -> TargetStudy | None:
+    """The target along one trajectory; None where it does not hold there."""
+    along = next((one for one in target.along if one.name == row.name), None)
     if along is None:
         return None
-    rows = along.rows
+    rows, first = along.rows, target.rows.start + along.rows.start - row.rows.start
+    length = rows.stop - rows.start
     return replace(
         target,
         lower_hz=target.lower_hz[rows],
@@ -662,6 +663,6 @@ def _target(target: TargetStudy, name: str) -> TargetStudy | None:
         predicted_hz=None if target.predicted_hz is None else target.predicted_hz[rows],
         one_shot_hz=None if target.one_shot_hz is None else target.one_shot_hz[rows],
         error=along.error,
-        rows=slice(0, rows.stop - rows.start),
-        along=(replace(along, rows=slice(0, rows.stop - rows.start)),),
+        rows=slice(first, first + length),
+        along=(replace(along, rows=slice(0, length)),),
     )

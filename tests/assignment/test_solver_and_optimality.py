@@ -204,6 +204,7 @@ def test_an_equality_is_held_whichever_way_it_is_pulled(sign):
         G=np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]]),
         lower=np.array([-1.0, -1.0, 0.0]),
         upper=np.array([1.0, 1.0, 0.0]),
+        cost=np.zeros(2),
     )
     x, mu = minimise(scaled, np.zeros(2))
     np.testing.assert_array_equal(x, np.zeros(2))

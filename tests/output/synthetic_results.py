@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.study.results import (
+    ActiveRow,
+    AssignmentRow,
     Comparison,
     DesignMap,
     DesignRow,
@@ -17,10 +20,13 @@ from eigassign.study.results import (
     DrawnSpring,
     ErrorRow,
     ErrorSummary,
+    LocalOptimum,
     ModeStudy,
+    OptimalityRow,
     OtherModes,
     RunResults,
     SolverRow,
+    StepRow,
     TargetAlong,
     TargetStudy,
     TrajectoryRow,
@@ -67,6 +73,7 @@ def make_results(
         targets=targets,
         others=_others(time, n_targets, scale_hz) if n_t else None,
         solver=SolverRow("solved", 25, 3.1e-17, 2.2e-14, 1.5e-16) if n_y else None,
+        assignment=_assignment(n_y, prefix) if targets else None,
         warnings=("section 'rod': <area> & inertia look odd",),
         notes=("order 4: asked for", "q1 dropped: no frequency depends on it"),
         timing_s={"model": 0.004, "expansion": 0.0061, "assignment": 0.0123, "exact": 0.05},
@@ -184,21 +191,82 @@ def _map(
 def _target(mode: int, time: Floats, scale: float, parts: tuple[int, ...]) -> TargetStudy:
     wave = np.sin(3.0 * time)
     target = np.full(time.size, 190.0 * scale * mode)
-    initial = target * (1.06 - 0.05 * wave)
     exact = target * (1.01 - 0.02 * wave)
-    predicted = exact * (1.0 + 1e-3 * wave)
-    curves = (initial, predicted, exact)
+    curves = {
+        "initial": target * (1.06 - 0.05 * wave),
+        "one_shot": target * (1.02 - 0.03 * wave),
+        "predicted": exact * (1.0 + 1e-3 * wave),
+        "exact": exact,
+    }
+
+    def errors(rows: slice) -> ErrorSummary:
+        found = {k: _error(hz[rows] / target[rows] - 1.0) for k, hz in curves.items()}
+        return ErrorSummary(**found)
+
+    whole = slice(0, time.size)
     along = tuple(
-        TargetAlong(
-            f"part{k}" if len(parts) > 1 else "1",
-            rows,
-            ErrorSummary(*(_error(hz[rows] / target[rows] - 1.0) for hz in curves)),
-        )
+        TargetAlong(f"part{k}" if len(parts) > 1 else "1", rows, errors(rows))
         for k, rows in enumerate(_slices(parts))
     )
-    errors = (_error(hz / target - 1.0) for hz in curves)
     return TargetStudy(
-        mode, target, *curves, *errors, None, slice(0, time.size), max(1.0, time.size), along
+        kind="frequency",
+        label=f"mode {mode} at {190.0 * scale * mode:g} Hz",
+        modes=(mode,),
+        lower_hz=target,
+        upper_hz=target,
+        **{f"{name}_hz": hz for name, hz in curves.items()},
+        error=errors(whole),
+        satisfied=True,
+        trajectory=None,
+        rows=whole,
+        weight_s=max(1.0, time.size),
+        weight=1.0,
+        along=along,
+    )
+
+
+def as_limit(target: TargetStudy, kind: str, lower_hz: Floats, upper_hz: Floats) -> TargetStudy:
+    """The target of mode 1 as a limit: at_least, at_most, keep_out, gap."""
+    below = np.maximum(1.0 - target.exact_hz / lower_hz, 0.0)
+    above = np.maximum(target.exact_hz / upper_hz - 1.0, 0.0)
+    violated = np.minimum(below, above) if kind == "keep_out" else np.maximum(below, above)
+    error = ErrorSummary(target.error.initial, _error(violated), one_shot=target.error.one_shot)
+    along = tuple(replace(one, error=error) for one in target.along)
+    return replace(
+        target, kind=kind, label=f"mode 1 {kind}", lower_hz=lower_hz, upper_hz=upper_hz,
+        predicted_hz=None, error=error, satisfied=False, along=along,
+    )  # fmt: skip
+
+
+def _assignment(n_y: int, prefix: str) -> AssignmentRow:
+    designs = [np.full(n_y, at) for at in (0.1, 0.2, 0.21)]
+    values = (4e-3, 1e-4, 9e-5)
+    steps = tuple(
+        StepRow(y, value, 0.0, 0.3, taken)
+        for y, value, taken in zip(designs, values, (True, False, True), strict=True)
+    )
+    return AssignmentRow(
+        method="sequential",
+        objective="least_squares",
+        objective_initial=3e-3,
+        objective_optimal=9e-5,
+        optimality=OptimalityRow("local", 3e-9, None, "the best of 2 local optima from 3 starts"),
+        verdict="reached",
+        reason="every target is met",
+        steps=steps,
+        starts=3,
+        local_optima=(
+            LocalOptimum(designs[2], 9e-5, 0.0),
+            LocalOptimum(designs[0], 4e-4, 0.0),
+        ),
+        exact_solves=608,
+        ended="first-order optimal",
+        finished=True,
+        active=(ActiveRow(f"{prefix}m2", "bound", "lower", 0.01),) if n_y > 1 else (),
+        one_shot=np.full(n_y, 0.2),
+        max_error=0.02,
+        max_error_given=False,
+        clearances=(),
     )
 
 

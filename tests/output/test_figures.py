@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from PIL import Image
-from synthetic_results import make_results
+from synthetic_results import as_limit, make_results
 
 from eigassign.output.figures import curves, style
 from eigassign.output.figures.run import run_figures
@@ -69,6 +69,7 @@ def test_the_paper_s_case_has_all_of_its_figures(files):
         "approximation_mode_1_time.png",
         "approximation_mode_1_q.png",
         "approximation_mode_1_design.png",
+        "progress.png",
         "assignment_mode_1.png",
         "other_modes.png",
     ]
@@ -93,7 +94,8 @@ def test_the_assignment_shows_target_frequencies_and_distances(paper):
     assert title(figure) == "Mode 1: assigned frequency"
     above, below = figure.axes
     shown = [line.get_ydata() for line in above.get_lines()]
-    wanted = (target.target_hz, target.initial_hz, target.exact_hz, target.predicted_hz)
+    curves = (target.initial_hz, target.exact_hz, target.predicted_hz, target.one_shot_hz)
+    wanted = (target.target_hz, *curves)
     for line, hz in zip(shown, wanted, strict=True):
         np.testing.assert_array_equal(line, hz)
     np.testing.assert_array_equal(above.get_lines()[0].get_xdata(), paper.time_s)
@@ -106,7 +108,44 @@ def test_the_assignment_shows_target_frequencies_and_distances(paper):
         "initial (worst 6.00 %)",
         "optimal, exact (worst 1.00 %)",
         "optimal, predicted (worst 1.00 %)",
+        "one shot (worst 2.00 %)",
     ]
+
+
+def test_a_limit_is_drawn_with_what_it_forbids_and_equal_names_are_numbered(paper):
+    (target,) = paper.targets
+    endless = np.full(target.lower_hz.size, np.inf)
+    limits = (
+        as_limit(target, "at_least", target.lower_hz, endless),
+        as_limit(target, "at_most", -endless, target.upper_hz),
+        as_limit(target, "keep_out", target.lower_hz, 1.02 * target.lower_hz),
+        as_limit(target, "keep_out", 0.9 * target.lower_hz, 0.95 * target.lower_hz),
+        as_limit(target, "gap", target.lower_hz, endless),
+    )
+    found = drawn(dataclasses.replace(paper, targets=limits))
+    names = [f"{t.kind}_mode_1" for t in limits]
+    names[3] += "_2"
+    assert [name for name in found if name in names] == names
+    for name, limit in zip(names, limits, strict=True):
+        (axes,) = found[name].axes
+        (shade,) = axes.collections
+        heights = shade.get_paths()[0].get_extents()
+        edges = [hz[0] for hz in (limit.lower_hz, limit.upper_hz) if np.isfinite(hz).all()]
+        for edge in edges:
+            assert min(abs(edge - heights.y0), abs(edge - heights.y1)) < 1e-9
+        assert legend(found[name])[0] == "forbidden"
+
+
+def test_the_progress_shows_every_step_and_the_one_shot(paper):
+    (axes,) = drawn(paper)["progress"].axes
+    assert legend(drawn(paper)["progress"]) == ["taken", "given up", "one shot"]
+    steps = paper.assignment.steps
+    taken = [100.0 * np.sqrt(step.objective) for step in steps if step.taken]
+    shown = next(line for line in axes.get_lines() if line.get_label() == "taken")
+    np.testing.assert_allclose(shown.get_ydata(), taken)
+    limit = as_limit(paper.targets[0], "at_least", paper.targets[0].lower_hz, np.full(152, np.inf))
+    (axes,) = drawn(dataclasses.replace(paper, targets=(limit,)))["progress"].axes
+    assert axes.get_ylabel() == "objective"
 
 
 def test_the_comparison_shows_both_expansions_and_their_errors(paper):
@@ -237,7 +276,7 @@ def test_an_expansion_that_fails_somewhere_is_still_drawn(paper):
     target = dataclasses.replace(paper.targets[0], predicted_hz=np.full(paper.time_s.size, np.nan))
     studies = (dataclasses.replace(study, over_design=over),)
     found = dataclasses.replace(paper, studies=studies, targets=(target,))
-    assert len(style.render(run_figures(found))) == 7
+    assert len(style.render(run_figures(found))) == 8
 
 
 def test_a_map_on_which_nothing_varies_is_filled_and_not_left_blank():

@@ -7,11 +7,11 @@ import json
 
 import numpy as np
 import pytest
-from synthetic_results import make_results
+from synthetic_results import as_limit, make_results
 
 from eigassign.errors import EigassignError
 from eigassign.output.result_files import dumps, to_json
-from eigassign.study.results import ErrorRow
+from eigassign.study.results import ErrorRow, TargetStudy
 
 
 def read(results) -> dict:
@@ -28,20 +28,31 @@ def test_the_promised_fields_are_there():
     assert list(found["design"]) == ["m1", "m2"]
     limits = {k: found["design"]["m1"][k] for k in ("initial", "optimal", "lower", "upper")}
     assert limits == {"initial": 0.0, "optimal": 0.2287, "lower": 0.0, "upper": 0.25}
-    for kind in ("initial", "predicted", "exact"):
-        assert found["error"][kind] == dataclasses.asdict(getattr(target, kind))
+    for kind in ("initial", "one_shot", "predicted", "exact"):
+        assert found["error"][kind] == dataclasses.asdict(getattr(target.error, kind))
         assert found["frequencies"][f"{kind}_hz"] == getattr(target, f"{kind}_hz").tolist()
     assert found["frequencies"]["time_s"] == results.time_s.tolist()
     assert found["frequencies"]["target_hz"] == target.target_hz.tolist()
+    assert found["assignment"]["verdict"] == "reached"
+    assert found["assignment"]["optimality"]["kind"] == "local"
+    assert [step["taken"] for step in found["assignment"]["steps"]] == [True, False, True]
+    assert found["assignment"]["starts"] == 3
+    (kept,) = found["targets"]
+    assert (kept["kind"], kept["satisfied"]) == ("frequency", True)
+    assert kept["worst"] == target.error.exact.max_relative
     solver = ("status", "iterations", "primal_residual", "dual_residual")
     assert [found["solver"][name] for name in solver] == ["solved", 25, 3.1e-17, 2.2e-14]
     assert found["timing_s"] == dict(results.timing_s)
 
 
+def with_exact(target: TargetStudy, row: ErrorRow) -> TargetStudy:
+    return dataclasses.replace(target, error=dataclasses.replace(target.error, exact=row))
+
+
 def test_with_several_targets_the_error_is_over_all_of_them():
     results = make_results(n_targets=2)
-    worse = dataclasses.replace(results.targets[1], exact=ErrorRow(0.5, 0.3))
-    better = dataclasses.replace(results.targets[0], exact=ErrorRow(0.1, 0.4))
+    worse = with_exact(results.targets[1], ErrorRow(0.5, 0.3))
+    better = with_exact(results.targets[0], ErrorRow(0.1, 0.4))
     found = read(dataclasses.replace(results, targets=(better, worse)))
     assert found["error"]["exact"]["max_relative"] == 0.5
     assert found["error"]["exact"]["rms_relative"] == pytest.approx(np.sqrt(0.125))
@@ -72,7 +83,7 @@ def test_the_same_results_give_the_same_bytes_and_end_with_a_newline():
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_a_number_that_is_not_finite_is_refused_by_name(bad):
     results = make_results()
-    target = dataclasses.replace(results.targets[0], exact=ErrorRow(bad, 0.1))
+    target = with_exact(results.targets[0], ErrorRow(bad, 0.1))
     broken = dataclasses.replace(results, targets=(target,))
     with pytest.raises(EigassignError, match=r"error\.exact\.max_relative"):
         to_json(broken)
@@ -87,9 +98,8 @@ def test_what_an_expansion_cannot_say_is_null():
     results = make_results()
     predicted = results.targets[0].predicted_hz.copy()
     predicted[3] = np.nan
-    target = dataclasses.replace(
-        results.targets[0], predicted_hz=predicted, predicted=ErrorRow(np.inf, np.inf)
-    )
+    error = dataclasses.replace(results.targets[0].error, predicted=ErrorRow(np.inf, np.inf))
+    target = dataclasses.replace(results.targets[0], predicted_hz=predicted, error=error)
     study = results.studies[0]
     values = dataclasses.replace(study.over_time, linearised_hz=predicted)
     studies = (dataclasses.replace(study, over_time=values),)
@@ -97,6 +107,25 @@ def test_what_an_expansion_cannot_say_is_null():
     assert found["error"]["predicted"] == {"max_relative": None, "rms_relative": None}
     assert found["frequencies"]["predicted_hz"][2:4] == [predicted[2], None]
     assert found["approximation"][0]["max_relative"]["over_time"]["linearised"] is None
+
+
+def test_a_limit_has_its_edges_and_null_for_what_it_lacks():
+    results = make_results()
+    (target,) = results.targets
+    endless = np.full(target.lower_hz.size, np.inf)
+    for kind, edges, lacking in (
+        ("at_least", (target.lower_hz, endless), "upper_hz"),
+        ("at_most", (-endless, target.upper_hz), "lower_hz"),
+        ("keep_out", (target.lower_hz, 1.1 * target.lower_hz), None),
+    ):
+        limit = as_limit(target, kind, *edges)
+        found = read(dataclasses.replace(results, targets=(limit,)))
+        curves = found["targets"][0]["frequencies"]
+        assert found["targets"][0]["kind"] == kind
+        assert found["error"]["predicted"] is curves["predicted_hz"] is None
+        assert [name for name in ("lower_hz", "upper_hz") if curves[name] is None] == (
+            [lacking] if lacking else []
+        )
 
 
 def test_json_text_is_what_the_standard_library_reads_back():

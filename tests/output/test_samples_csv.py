@@ -72,8 +72,8 @@ def test_a_target_on_one_trajectory_leaves_the_others_empty() -> None:
     results = make_results(parts=(100, 52))
     (target,) = results.targets
     rows = slice(100, 152)
-    curves = {f"{k}_hz": getattr(target, f"{k}_hz")[rows] for k in ("target", "initial", "exact")}
-    narrow = replace(target, rows=rows, predicted_hz=target.predicted_hz[rows], **curves)
+    names = [f"{k}_hz" for k in ("lower", "upper", "initial", "one_shot", "predicted", "exact")]
+    narrow = replace(target, rows=rows, **{name: getattr(target, name)[rows] for name in names})
     lines = rows_of(sample_files(replace(results, targets=(narrow,)))["frequencies.csv"])
     assert [line["mode 1 exact [Hz]"] for line in lines[:100]] == [""] * 100
     assert float(lines[100]["mode 1 exact [Hz]"]) == target.exact_hz[100]

@@ -11,6 +11,7 @@ SHIPPED = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 UNCACHED = Options(use_cache=False)
 TOOL_MASS = "m2: {parameter: bodies.tool_mass.mass, min: 0, max: 250 g}"
 TARGET = "{mode: 1, frequency: 190 Hz}"
+ONE_SHOT = "\nassignment: {method: one_shot}\n"
 
 
 def shipped(*changes: tuple[str, str]) -> str:

@@ -17,8 +17,10 @@ from eigassign.output.figures import style
 from eigassign.output.figures.style import FigurePlan, labelled, legend_above, short
 from eigassign.output.formats import percent
 from eigassign.study.results import (
+    AssignmentRow,
     Comparison,
     DesignMap,
+    ErrorRow,
     ModeStudy,
     OtherModes,
     RunResults,
@@ -37,6 +39,7 @@ TAYLOR: Look = {"color": style.VERMILLION, "linewidth": 1.4}
 LINEARISED: Look = {"color": style.BLUE, "linewidth": 1.4, "linestyle": style.DASHED}
 TARGET: Look = {"color": style.BLACK, "linewidth": 1.6, "linestyle": style.DOTTED}
 INITIAL: Look = {"color": style.ORANGE, "linewidth": 1.8, "linestyle": style.DASH_DOTTED}
+ONE_SHOT: Look = {"color": style.PURPLE, "linewidth": 0.9}
 OPTIMAL: Look = {"color": style.SKY, "linewidth": 3.2}
 PREDICTED: Look = {"color": style.BLUE, "linewidth": 1.3, "linestyle": style.DASHED}
 _POINT: Look = {"color": style.GREY, "linewidth": 0.9, "linestyle": (0, (3.0, 3.0))}
@@ -187,40 +190,141 @@ def draw_comparison(
 
 
 def assignment(results: RunResults, target: TargetStudy) -> FigurePlan:
-    """Target, initial and optimal frequency in time, and their distance to the target."""
+    """A target in time: frequencies before and after, and their distance or what is forbidden."""
+    wanted = target.kind == "frequency"
+    modes = "_".join(map(str, target.modes)) or "all"
+    kind = "assignment" if wanted else target.kind
+    heading = f"Mode {target.mode}: initial, optimal and target frequency{_where(results)}"
+    what = "distance to the target" if wanted else "violation"
+    alt = f"Frequency of mode {target.mode} over time before and after, with its target."
     return FigurePlan(
-        f"assignment_mode_{target.mode}{_suffix(results)}",
-        f"Mode {target.mode}: initial, optimal and target frequency{_where(results)}",
-        f"Worst distance to the target {percent(target.error.initial.max_relative)} before and "
+        f"{kind}_mode_{modes}{_suffix(results)}",
+        heading if wanted else f"{_capital(target.label)}{_where(results)}",
+        f"Worst {what} {percent(target.error.initial.max_relative)} before and "
         f"{percent(target.error.exact.max_relative)} after.",
-        f"Frequency of mode {target.mode} over time before and after, with its target.",
-        partial(draw_assignment, results, target),
+        alt if wanted else f"{_capital(target.label)}: frequencies over time before and after.",
+        partial(draw_assignment if wanted else draw_limit, results, target),
     )
 
 
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
 def draw_assignment(results: RunResults, target: TargetStudy) -> Figure:
-    """Frequencies above, f/f_target − 1 below."""
+    """Frequencies above, f/f_target − 1 below; the one shot where it is not the answer itself."""
     title = f"Mode {target.mode}: assigned frequency{_where(results)}"
     figure, (above, below) = stacked(title, "time [s]", (2.0, 1.35))
-    error = target.error
+    curves = _curves(results, target)
+    time_s = results.time_s[target.rows]
+    frequencies: list[tuple[Floats, Look]] = [
+        (target.target_hz, {**TARGET, "label": "target", "zorder": 3.0})
+    ]
+    plot(above, time_s, [*frequencies, *curves], "frequency [Hz]")
+    off = [
+        (100.0 * (hz / target.target_hz - 1.0), {k: v for k, v in look.items() if k != "label"})
+        for hz, look in curves
+    ]
+    zero = np.zeros(time_s.size)
+    zero_line: Look = {"color": style.BLACK, "linewidth": 0.8}
+    plot(below, time_s, [(zero, zero_line), *off], "off target [%]")
+    legend_above(above, above.get_lines())
+    return figure
+
+
+def _curves(results: RunResults, target: TargetStudy) -> list[tuple[Floats, Look]]:
+    """The frequencies of a target before and after, each named with its worst error."""
+    row, error = results.assignment, target.error
+    beside = row is not None and row.method != "one_shot"
     stages = [
         (target.initial_hz, INITIAL, "initial", error.initial),
         (target.exact_hz, OPTIMAL, "optimal, exact", error.exact),
         (target.predicted_hz, PREDICTED, "optimal, predicted", error.predicted),
+        (target.one_shot_hz if beside else None, ONE_SHOT, "one shot", error.one_shot),
     ]
-    curves = [(hz, look, name, e) for hz, look, name, e in stages if hz is not None and e]
-    frequencies: list[tuple[Floats, Look]] = [
-        (target.target_hz, {**TARGET, "label": "target", "zorder": 3.0})
+    return [
+        (hz, {**look, "label": f"{name} ({_reached(target, e)})"})
+        for hz, look, name, e in stages
+        if hz is not None and e
     ]
-    for hz, look, name, row in curves:
-        label = f"{name} (worst {percent(row.max_relative)})"
-        frequencies.append((hz, {**look, "label": label}))
-    plot(above, results.time_s, frequencies, "frequency [Hz]")
-    off = [(100.0 * (hz / target.target_hz - 1.0), look) for hz, look, _, _ in curves]
-    zero = np.zeros(results.time_s.size)
-    zero_line: Look = {"color": style.BLACK, "linewidth": 0.8}
-    plot(below, results.time_s, [(zero, zero_line), *off], "off target [%]")
-    legend_above(above, above.get_lines())
+
+
+def _reached(target: TargetStudy, error: ErrorRow) -> str:
+    if target.kind != "frequency" and error.max_relative == 0.0:
+        return "met"
+    return f"worst {percent(error.max_relative)}"
+
+
+def draw_limit(results: RunResults, target: TargetStudy) -> Figure:
+    """What is forbidden, shaded, and the frequencies of a limit, a band or a gap."""
+    title = f"{_capital(target.label)}{_where(results)}"
+    figure, (axes,) = stacked(title, "time [s]", (2.9,))
+    time_s = results.time_s[target.rows]
+    curves = _curves(results, target)
+    edges = [hz for hz in (target.lower_hz, target.upper_hz) if np.isfinite(hz).all()]
+    label = "distance of the modes [Hz]" if target.kind == "gap" else "frequency [Hz]"
+    edge: Look = {"color": style.VERMILLION, "linewidth": 1.0}
+    plot(axes, time_s, [*((hz, edge) for hz in edges), *curves], label)
+    low, high = axes.get_ylim()
+    if target.kind == "keep_out":
+        bottom, top = target.lower_hz, target.upper_hz
+    elif target.kind == "at_most":
+        bottom, top = target.upper_hz, np.full(time_s.size, high)
+    else:
+        bottom, top = np.full(time_s.size, low), target.lower_hz
+    shade = axes.fill_between(
+        time_s, bottom, top, color=style.VERMILLION, alpha=0.15, linewidth=0.0, label="forbidden"
+    )
+    legend_above(axes, [shade, *axes.get_lines()[len(edges) :]])
+    return figure
+
+
+# --- The steps of the sequential method
+
+
+def progress(results: RunResults, row: AssignmentRow) -> FigurePlan:
+    """The objective after every step, with the one shot's beside it."""
+    taken = sum(step.taken for step in row.steps)
+    return FigurePlan(
+        "progress",
+        "Progress of the sequential method",
+        f"Exact objective of every design tried from the best start: {len(row.steps)} steps, "
+        f"{taken} of them taken; {row.optimality.words}.",
+        "The objective against the number of the step.",
+        partial(draw_progress, results, row),
+    )
+
+
+def draw_progress(results: RunResults, row: AssignmentRow) -> Figure:
+    """√F of least squares, F of the worst case, in %; steps that were given up are hollow.
+
+    Without a wanted frequency F is no error, and is drawn as it is.
+    """
+    values = np.array([step.objective for step in row.steps])
+    number, taken = np.arange(1.0, values.size + 1.0), np.array([step.taken for step in row.steps])
+    figure, (axes,) = stacked("Progress of the sequential method", "step", (2.4,))
+    kind = "rms" if row.objective == "least_squares" else "worst"
+    hidden: Look = {"linestyle": "none"}
+    error = results.error if any(t.kind == "frequency" for t in results.targets) else None
+    if error is None:
+        plot(axes, number, [(values, hidden)], "objective")
+    else:
+        values = 100.0 * (np.sqrt(np.maximum(values, 0.0)) if kind == "rms" else np.abs(values))
+        plot_logarithmic(axes, number, [(values, hidden)], f"{kind} error [%]")
+    low = axes.get_ylim()[0]
+    handles = []
+    for own, fill, label in ((taken, style.BLUE, "taken"), (~taken, "none", "given up")):
+        if own.any():
+            handles += axes.plot(
+                number[own], np.maximum(values[own], low), linestyle="none", marker="o",
+                markerfacecolor=fill, color=style.BLUE, label=label,
+            )  # fmt: skip
+    if error is not None and error.one_shot is not None:
+        at = error.one_shot.rms_relative if kind == "rms" else error.one_shot.max_relative
+        handles.append(axes.axhline(100.0 * at, **ONE_SHOT, label="one shot"))
+    axes.set_xlim(0.5, values.size + 0.5)
+    axes.set_xticks(range(1, values.size + 1, max(1, values.size // 10)))
+    legend_above(axes, handles)
     return figure
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from itertools import count
 
 from eigassign.output.figures import curves, maps, mechanism
 from eigassign.output.figures.style import FigurePlan
@@ -10,7 +12,7 @@ from eigassign.study.results import RunResults, along_each
 
 
 def run_figures(results: RunResults) -> tuple[FigurePlan, ...]:
-    """Mechanism, coordinates, approximation of each mode, assignments, next modes."""
+    """Mechanism, coordinates, approximation of each mode, progress, targets, next modes."""
     return tuple(_figures(results))
 
 
@@ -29,10 +31,21 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
         yield from maps.approximation(study, study.over_q, study.q0, point, "q")
         names = tuple(row.name for row in results.design)
         yield from maps.approximation(study, study.over_design, study.y0, names, "design")
-    for mode in dict.fromkeys(target.mode for target in results.targets):
-        for one in each:
-            own = (target for target in one.targets if target.mode == mode)
-            yield from (curves.assignment(one, target) for target in own if target.target_hz.size)
+    if results.assignment is not None and results.assignment.steps:
+        yield curves.progress(results, results.assignment)
+    yield from _targets(results)
     for one in each:
         if one.others is not None and one.others.initial_hz.size:
             yield curves.other_modes(one, one.others)
+
+
+def _targets(results: RunResults) -> Iterator[FigurePlan]:
+    """Each target along each trajectory, mode by mode; equal file names get a number."""
+    taken: set[str] = set()
+    for target in sorted(results.targets, key=lambda target: target.mode):
+        for one in along_each(replace(results, targets=(target,))):
+            for plan in (curves.assignment(one, own) for own in one.targets if own.exact_hz.size):
+                names = (f"{plan.name}_{k}" if k > 1 else plan.name for k in count(1))
+                name = next(name for name in names if name not in taken)
+                taken.add(name)
+                yield replace(plan, name=name)
