@@ -19,6 +19,7 @@ from scipy import sparse
 from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.expansion import Cluster, Expansion
+from eigassign.modal.reduced.added_mass import AddedMass
 from eigassign.modal.reduced.error_estimate import ErrorTerms
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.residual import JointCorrection, ResidualTerms
@@ -28,13 +29,14 @@ from eigassign.series.multi_index import LowerSet
 
 Array = NDArray[Any]
 ALGORITHM = "expansion 3"  # raise it whenever the numbers an expansion is made of may change
-FORMAT = "reduced model 4"  # raise it whenever what the arrays of a reduced model mean changes
+FORMAT = "reduced model 5"  # raise it whenever what the arrays of a reduced model mean changes
 STORED = (
     Expansion,
     Cluster,
     LowerSet,
     ReducedModel,
     ErrorTerms,
+    AddedMass,
     ResidualTerms,
     JointCorrection,
     Program,

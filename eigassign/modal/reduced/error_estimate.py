@@ -12,7 +12,8 @@ i-th largest of all μ̂_j + ε_j bounds μ_i, so that a pair that might overtak
 f ∝ μ^{−1/2}, the relative error in frequency is √((μ̂ + ε)/μ̂) − 1, and the round-off on top.
 
 The residual is known in K_E(q, y0)⁻¹ (see `residual`). Where design parameters soften links to α of
-their stiffness at y0, α K_E(q, y0) ≤ K_E(q, y), and ‖ρ‖²/α is a bound.
+their stiffness at y0, α K_E(q, y0) ≤ K_E(q, y), and ‖ρ‖²/α is a bound. Where they add mass, ν grows
+by what that mass adds to the modes beside the basis (see `added_mass`).
 
 The estimate is infinite, that is, the answer is refused, where a pair stands for no mode any more,
 or where a mode that the basis does not hold may lie below it.
@@ -28,6 +29,7 @@ from numpy.typing import NDArray
 from eigassign.errors import SingularityError
 from eigassign.mechanism.elements.sparse_factor import factorise
 from eigassign.modal.exact.roundoff import rounding_weights
+from eigassign.modal.reduced.added_mass import AddedMass, added_mass
 from eigassign.modal.reduced.basis import RitzBasis
 from eigassign.modal.reduced.pencil import ReducedPencil, ritz_pairs
 from eigassign.modal.reduced.residual import (
@@ -60,7 +62,9 @@ class ErrorTerms:
     joints: JointCorrection
     material_terms: Ints  # indices of θ with a stiffness term that no joint coordinate enters
     material: Floats  # their values at the first expansion point
+    added: AddedMass
     anchors: Floats  # (n_points, c + 1): the largest μ at each point, one more than are represented
+    first_design: Flags  # (n_points,): those of the first point's y, which growth is relative to
     shapes: Floats  # (n_points, k, c): those c modes in the basis
     stiffness_rounding: Floats  # Vᵀ d_K V (k, k), round-off weights of `roundoff` at x0
     mass_rounding: Floats  # (k + f, k + f)
@@ -75,13 +79,19 @@ def relative_error(reduced: ReducedPencil, terms: ErrorTerms, x: Floats) -> Floa
     mu, z = all_mu[:, :count], all_z[:, :, :count]
     wide = np.concatenate([z, -coupling @ z], axis=1)
     softest, hardest = _scaling(terms, theta)
-    turned, closes = _at_first_design(reduced, x)
+    n = reduced.n_q - reduced.n_loads  # loads belong to the design
+    y0 = reduced.points[0, n:]
+    turned, closes = _with_design(reduced, x, np.broadcast_to(y0, (len(x), len(y0))))
     gram = residual_gram(terms.residual, terms.joints, theta, turned, mu, wide)
     gram = gram / softest[:, None, None]
-    error = frequency_error(mu, gram, largest_outside(terms, mu, softest), terms.anchors)
-    error[~closes] = np.inf
+    heavy, posed = _with_design(reduced, x, terms.added.heaviest(x[:, n:], y0), theta)
+    outside = largest_outside(terms, mu, softest / terms.added.factor(theta))
+    outside += terms.added.lifted(heavy, turned) / softest
+    error = frequency_error(mu, gram, outside, terms.anchors)
+    error[~(closes & posed)] = np.inf
     shares = _mass_shares(terms, M_c, all_mu, all_z)
-    error[mode_missing(all_mu, gram, shares, terms.anchors)] = np.inf
+    heavier = terms.added.heavier_shapes(theta, turned) / softest[:, None]
+    error[mode_missing(all_mu, gram, shares, terms.anchors, heavier)] = np.inf
     return np.asarray(error + _rounding(reduced, terms, theta, mu, wide, hardest))
 
 
@@ -140,21 +150,25 @@ def largest_outside(terms: ErrorTerms, mu: Floats, softest: Floats) -> Floats:
     """How large μ of the modes without a vector in the basis may have become, (n,).
 
     Their largest μ at an expansion point, grown as the represented modes did or as the links
-    softened, whichever is more; the expansion point that says least counts.
+    softened, whichever is more; of those points of whose design that is known the one that says
+    least counts.
     """
-    known = terms.anchors[:, : mu.shape[1]]
-    growth = np.max(mu[:, None, :] / known, axis=2)
-    grown = terms.anchors[:, -1] * np.maximum(growth, 1.0 / softest[:, None])
+    anchors = terms.anchors[terms.first_design]
+    growth = np.max(mu[:, None, :] / anchors[:, : mu.shape[1]], axis=2)
+    grown = anchors[:, -1] * np.maximum(growth, 1.0 / softest[:, None])
     return np.asarray(grown.min(axis=1))
 
 
-def mode_missing(mu: Floats, gram: Floats, shares: Floats, anchors: Floats) -> Flags:
+def mode_missing(
+    mu: Floats, gram: Floats, shares: Floats, anchors: Floats, heavier: Floats | float = 1.0
+) -> Flags:
     """Pairs (n, c) beside or below which a mode of every expansion point is missing.
 
     μ̂ (n, k) and ``shares`` (n_points, n, c, k) of all Ritz pairs in the mass of each shape of a
     point. A shape with less than half of it in pairs that may stand for a mode has changed or left:
     it has left where there are also fewer pairs within RANGE than there were modes. Beyond the
     first c the residuals are not known: such a pair may stand for a shape only within RANGE.
+    ``heavier`` (n_points, n, c) is by how much designs made the shapes heavier and links softer.
     """
     c = gram.shape[1]
     sure = np.ones(mu.shape, dtype=bool)
@@ -164,7 +178,8 @@ def mode_missing(mu: Floats, gram: Floats, shares: Floats, anchors: Floats) -> F
     like = sure[None, :, None, :] & ((mu * reach)[None, :, None, :] >= was)
     weak = (shares * like).sum(axis=3) < HELD
     pair = mu[:, :c]
-    within = was * RANGE >= pair[None, :, None, :]
+    grown = np.maximum(np.atleast_1d(heavier) / MARGIN, 1.0)  # RANGE allows for the rest
+    within = was * RANGE * grown[..., None] >= pair[None, :, None, :]
     found = (sure[:, None, :] & (mu[:, None, :] * RANGE >= pair[:, :, None])).sum(axis=2)
     fewer = within.sum(axis=2) > found
     return np.asarray((fewer & (weak[..., None] & within).any(axis=2)).all(axis=0))
@@ -198,13 +213,18 @@ def _scaling(terms: ErrorTerms, theta: Floats) -> tuple[Floats, Floats]:
     return np.clip(ratio.min(axis=0), 1e-300, 1.0), np.maximum(ratio.max(axis=0), 1.0)
 
 
-def _at_first_design(reduced: ReducedPencil, x: Floats) -> tuple[Floats, Flags]:
-    """θ(q, y0) (n_theta, n), and where there is one: a loop may not close with other lengths.
+def _with_design(
+    reduced: ReducedPencil, x: Floats, y: Floats, theta: Floats | None = None
+) -> tuple[Floats, Flags]:
+    """θ (n_theta, n) at (q, y), and where there is one: a loop may not close with other lengths.
 
-    The loads in q are those of x0 too. θ(x0) stands where there is none.
+    Loads in q are of the design. θ(x0) stands where there is none. ``theta`` are those at x, where
+    that is the same.
     """
-    turned, n = x.copy(), reduced.n_q - reduced.n_loads
-    turned[:, n:] = reduced.points[0, n:]
+    turned = x.copy()
+    turned[:, reduced.n_q - reduced.n_loads :] = y
+    if theta is not None and (turned == x).all():
+        return theta, np.ones(len(x), dtype=bool)
     try:
         return reduced.theta(turned), np.ones(len(x), dtype=bool)
     except SingularityError:
@@ -269,7 +289,9 @@ def error_terms(basis: RitzBasis) -> ErrorTerms:
         joints=joint_correction(pencil, factor, basis.theta_mean, wide),
         material_terms=material,
         material=theta0[material],
+        added=added_mass(pencil, factor, basis.points[0], basis.V, basis.represented),
         anchors=np.hstack([1.0 / basis.lam[:, :count], following]),
+        first_design=(basis.points == basis.points[0])[:, pencil.n_joints :].all(axis=1),
         shapes=basis.shapes,
         stiffness_rounding=(wide[:, :k].T * d_K) @ wide[:, :k],
         mass_rounding=(wide.T * d_M) @ wide,

@@ -180,6 +180,17 @@ def test_a_mode_is_gone_when_its_shape_and_one_frequency_are_missing():
     assert not mode_missing(whole, gram, shares, anchors).any()
 
 
+def test_a_shape_that_grew_heavy_is_looked_for_further_down():
+    """Modes at 1 and 4; the second shape is gone, and now it moves 30 times its mass."""
+    anchors = 1.0 / np.array([[1.0, 4.0, 35.0]]) ** 2
+    present = 1.0 / np.array([[1.0, 30.0, 90.0]]) ** 2
+    shares = np.zeros((1, 1, 2, 3))
+    shares[0, 0, 0, 0] = 1.0
+    gram, light, heavy = np.zeros((1, 2, 2)), np.ones((1, 1, 2)), np.array([[[1.0, 30.0]]])
+    assert mode_missing(present, gram, shares, anchors, light).tolist() == [[False, False]]
+    assert mode_missing(present, gram, shares, anchors, heavy).tolist() == [[True, False]]
+
+
 def test_a_pair_whose_residual_is_not_known_stands_for_a_shape_only_nearby():
     """The third shape, at 9, is found in a pair at 27; nothing but that pair's residual says
     whether it became faster or is no mode any more."""
