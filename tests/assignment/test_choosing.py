@@ -16,9 +16,7 @@ from eigassign.assignment.program import LinearConstraint
 from eigassign.assignment.sequential import MET, Appraisal, DesignProblem, minimise
 from eigassign.errors import InfeasibleError
 
-pytestmark = (
-    pytest.mark.slow
-)  # half a minute each; pipeline/test_limits_and_catalogues has a short one
+pytestmark = pytest.mark.slow  # half a minute each; the pipeline has a short one
 
 Floats = NDArray[np.float64]
 
