@@ -21,7 +21,7 @@ from eigassign.batch.workers import cores, process_pool
 from eigassign.errors import StorageError, UsageError
 from eigassign.output.batch_summary import CaseOutcome, write_junit, write_summary
 from eigassign.output.run_folder import MARKER
-from eigassign.pipeline.run import Options, optimize
+from eigassign.pipeline.run import Options, Outcome, optimize
 from eigassign.process import failure_of
 
 Row = dict[str, Any]  # what a worker sends back: plain text and numbers only
@@ -67,7 +67,7 @@ def _optimised(path: str, options: CaseOptions) -> Row:
     outcome = optimize(Path(path), how)
     error = outcome.results.error
     return {
-        "status": "ok" if outcome.shortcoming is None else "tolerance",
+        "status": _status(outcome),
         "message": outcome.shortcoming or "",
         "run_folder": str(outcome.folder),
         "initial_max_relative": error and error.initial.max_relative,
@@ -75,6 +75,15 @@ def _optimised(path: str, options: CaseOptions) -> Row:
         "exact_max_relative": error and error.exact.max_relative,
         "design": tuple((row.name, row.optimal) for row in outcome.results.design),
     }
+
+
+def _status(outcome: Outcome) -> str:
+    """Failed where there is no answer at all, tolerance where there is one that is not enough."""
+    found = outcome.results.assignment
+    if outcome.shortcoming is None:
+        return "ok"
+    no_answer = found is not None and found.verdict in ("unreachable", "infeasible")
+    return "failed" if no_answer else "tolerance"
 
 
 def _failure(error: Exception) -> Row:

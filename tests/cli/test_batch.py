@@ -23,7 +23,7 @@ from eigassign.batch.workers import process_pool
 from eigassign.cli import main
 from eigassign.process import Terminated
 
-STRICT = GOOD.replace("50 %", "1e-9")
+STRICT = GOOD.replace("50 %", "1e-9") + "assignment: {method: one_shot}\n"
 BOUND = "max: 1}\n  constraints: {heavy: {terms: {m: 1}, min: 3}}"
 INFEASIBLE = GOOD.replace("max: 1}", BOUND)
 
@@ -91,7 +91,7 @@ def test_a_batch_keeps_going_past_every_kind_of_failure(
     assert "mechanism: required key is missing" in rows["wrong"]["message"]
     assert rows["good"]["design"].startswith("m=")
     written = {path.name for path in Path("results").iterdir()}
-    assert written == {"good", "strict", "summary.csv", "junit.xml"}
+    assert written == {"good", "strict", "infeasible", "summary.csv", "junit.xml"}
     assert "eigassign: 3 of 4 cases failed" in err
     assert err.count("case ") >= 4
     assert "tolerance" in out

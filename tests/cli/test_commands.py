@@ -193,13 +193,44 @@ def test_optimize_ends_with_1_when_the_expansion_is_over_the_asked_tolerance(
 def test_optimize_ends_with_1_and_names_the_constraint_that_cannot_be_met(
     capsys: Captured,
 ) -> None:
+    """The run is kept, with the nearest compromise, and says first that it is none."""
     bound = "max: 1}\n  constraints: {heavy: {terms: {m: 1}, min: 3}}"
     Path("infeasible.yaml").write_text(GOOD.replace("max: 1}", bound))
     assert main(["optimize", "infeasible.yaml"]) == 1
     out, err = capsys.readouterr()
-    assert out == ""
+    assert out.startswith("Infeasible: ")
+    assert "eigassign: infeasible: " in err
     assert "heavy" in err
-    assert not list(Path().glob("results/*"))
+    kept = json.loads(Path("results/infeasible/results.json").read_text())["assignment"]
+    assert kept["verdict"] == "infeasible"
+    assert "heavy" in " ".join(kept["conflict"])
+
+
+def test_a_target_out_of_reach_ends_with_1_and_says_what_can_be_reached(capsys: Captured) -> None:
+    Path("far.yaml").write_text(GOOD.replace("180 Hz", "100 Hz"))
+    assert main(["optimize", "far.yaml", "--figures", "none"]) == 1
+    out, err = capsys.readouterr()
+    assert out.startswith("Unreachable: mode 1 at 100 Hz")
+    assert re.search(r"eigassign: unreachable: mode 1 .* between 1\d\d.\d and 1\d\d.\d Hz", err)
+
+
+LIMITS_ONLY = (
+    "targets:\n  - {mode: 1, at_most: 175 Hz}\n  - {modes: all, keep_out: [177 Hz, 179 Hz]}\n"
+)
+
+
+@pytest.mark.parametrize("command", ["optimize", "expand", "validate", "batch"])
+def test_a_case_of_limits_alone_is_worked_on_by_every_command(
+    command: str, capsys: Captured
+) -> None:
+    target = "targets:\n  - {mode: 1, frequency: 180 Hz}\n"
+    assert target in GOOD
+    Path("limits.yaml").write_text(GOOD.replace(target, LIMITS_ONLY))
+    assert main([command, "limits.yaml"]) == 0
+    out, _ = capsys.readouterr()
+    if command == "optimize":
+        assert out.startswith("Reached: every target is met. Worst violation of a limit")
+        assert "Limits and bands" in out
 
 
 def test_optimize_leaves_a_foreign_folder_alone_unless_forced(capsys: Captured) -> None:

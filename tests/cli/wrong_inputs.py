@@ -33,7 +33,7 @@ design:
   m: {parameter: bodies.tool.mass, min: 0, max: 1}
 expansion: {order: 3, q: auto, y: auto, modes: [1]}
 targets:
-  - {mode: 1, frequency: 100 Hz}
+  - {mode: 1, frequency: 180 Hz}
 validation: {max_error: 50 %}
 """
 
@@ -170,7 +170,7 @@ def wrong_inputs() -> Iterator[Wrong]:
     yield Wrong(
         "an unknown unit", _edited((UPPER, "upper: {length: 2 cubits,")), "unknown unit 'cubits'"
     )
-    yield Wrong("rpm for hertz", _edited(("100 Hz", "100 rpm")), "targets[0].frequency: rpm")
+    yield Wrong("rpm for hertz", _edited(("180 Hz", "180 rpm")), "targets[0].frequency: rpm")
     yield Wrong(
         "a zero area",
         _edited(("{shape: circle, diameter: 20 mm}", "{area: 0, bending_inertia: 1e-8}")),
@@ -321,12 +321,12 @@ def wrong_inputs() -> Iterator[Wrong]:
     )
     yield Wrong(
         "a negative frequency",
-        _edited(("100 Hz", "-100 Hz")),
-        "targets[0].frequency: must be > 0 Hz, got '-100 Hz'",
+        _edited(("180 Hz", "-180 Hz")),
+        "targets[0].frequency: must be > 0 Hz, got '-180 Hz'",
     )
     yield Wrong(
         "a target that ends early",
-        _edited(("100 Hz", "{time: [0, 0.5], frequency: [90, 95]}")),
+        _edited(("180 Hz", "{time: [0, 0.5], frequency: [90, 95]}")),
         "targets[0].frequency.time: covers 0 … 0.5 s only",
     )
     yield Wrong(

@@ -296,7 +296,7 @@ def test_stages_are_announced_in_order_and_timed(tmp_path: Path) -> None:
         case_of(tmp_path, shipped()), Options(use_cache=False, progress=told.append)
     )
     stages = [line for line in told if not line.startswith("  ")]
-    assert len(stages) == len(result.results.timing_s) == 7
+    assert len(stages) == len(result.results.timing_s) == 8
     assert list(result.results.timing_s) == [
         "model",
         "trajectory",
@@ -305,6 +305,7 @@ def test_stages_are_announced_in_order_and_timed(tmp_path: Path) -> None:
         "initial",
         "verification",
         "comparison",
+        "meaning",
     ]
 
 
