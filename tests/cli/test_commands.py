@@ -184,7 +184,8 @@ def test_quiet_leaves_stderr_empty(capsys: Captured) -> None:
 def test_optimize_ends_with_1_when_the_expansion_is_over_the_asked_tolerance(
     capsys: Captured,
 ) -> None:
-    Path("strict.yaml").write_text(GOOD.replace("50 %", "1e-9"))
+    text = GOOD.replace("50 %", "1e-9") + "assignment: {method: one_shot}\n"
+    Path("strict.yaml").write_text(text)
     assert main(["optimize", "strict.yaml"]) == 1
     assert "validation.max_error" in capsys.readouterr().err
     assert Path("results/strict/results.json").exists()
