@@ -120,8 +120,18 @@ def find_answer(scene: Scene, wanted: Sequence[Wanted], progress: Callable[[str]
     found = least_changed(find_optimum(scene, wanted, starts, progress), scene.initial)
     contradiction = conflict(found, scene.file.assignment.steps)
     notes += idle_notes(scene.model.y_names, found.variant, found.best.seen)
+    notes += _band_notes(found)
     predicted = tuple(_predicted(found, wanted))
     return Answer(found.best.y, predicted, one_shot, found, tuple(notes), contradiction)
+
+
+def _band_notes(found: Found) -> Iterator[str]:
+    """What came of each number of modes below the bands, where there was a choice."""
+    for variant, best in found.variants if len(found.variants) > 1 else ():
+        choice = ", ".join(f"{band} with {k} below it" for band, k in variant.below)
+        missed = best.seen.violation
+        how = f"missed by {100 * missed:.2g} %" if missed > MET else f"met at {best.objective:.6g}"
+        yield f"{choice}: {how}"
 
 
 def _in_words(scene: Scene, wanted: Sequence[Wanted], contradiction: Conflict | None) -> str:

@@ -88,8 +88,9 @@ def _least_room(model: Model, band: Band, y: Floats) -> float:
         open_ = bound <= 0.0
         if least <= 0.0:
             return least
+        least = min(least, float(bound[~open_].min(initial=np.inf)))
         if not open_.any():
-            return min(least, float(bound.min()))
+            return least
         halves = ((start, middle, g_start, g_middle), (middle, end, g_middle, g_end))
         start, end, g_start, g_end = (
             np.concatenate([half[k][open_] for half in halves]) for k in range(4)

@@ -97,14 +97,16 @@ def find_optimum(
     samples, the limits at the samples are drawn in by what is lacking, and the answer is sought
     anew from where it was.
     """
-    margin = MARGIN
+    keys, margin = scene.file.assignment, MARGIN
+    deadline = np.inf if keys.seconds is None else monotonic() + keys.seconds
+    designs = list(_starts(scene, starts, keys.starts))
     for _ in range(WIDENED):
-        found = _search_all(scene, wanted, starts, margin, progress)
+        found = _search_all(scene, wanted, designs, margin, deadline, progress)
         lacking = wanting(found.clearances)
         met = found.best.seen.violation <= MET
         if lacking == 0.0 or not met or found.best.end in (End.SECONDS, End.INTERRUPTED):
             break
-        starts, margin = [found.best.y], margin + 2.0 * lacking + MARGIN
+        designs, margin = [found.best.y], margin + 2.0 * lacking + MARGIN
     return found
 
 
@@ -113,6 +115,7 @@ def _search_all(
     wanted: Sequence[Wanted],
     starts: Sequence[Floats],
     margin: float,
+    deadline: float,
     progress: Callable[[str], None],
 ) -> Found:
     """The best local optimum, the limits of bands drawn in by ``margin`` (relative).
@@ -121,17 +124,17 @@ def _search_all(
     all. No design is returned that is worse than the initial one. Where none meets all limits, it
     is the one that misses them least, relative to the limits.
     """
-    keys, begun = scene.file.assignment, monotonic()
-    deadline = np.inf if keys.seconds is None else begun + keys.seconds
+    keys = scene.file.assignment
     catalogues = listed(scene.file)
     whole = Task(scene, tuple(wanted), margin)
     few = None if catalogues else _thinned(scene, wanted, margin)
     best_of: list[tuple[Variant, tuple[Optimum, ...], Chosen | None]] = []
     made, solves = 0, 0
+    ended: End | None = None
     for below in _below(whole):
         variant = variant_of(whole, below)
         if catalogues:
-            near = list(_starts(scene, starts, RELAXED))
+            near = list(starts[:RELAXED])
             chosen = choose(variant.problem, catalogues, near, keys.steps, deadline, progress)
             best_of.append((variant, chosen.optima, chosen))
             solves += chosen.appraisals * len(scene.path.q)
@@ -140,7 +143,7 @@ def _search_all(
                 break
             continue
         coarse = _Search(variant if few is None else variant_of(few, below), keys.steps, deadline)
-        for start in _starts(scene, starts, keys.starts):
+        for start in starts:
             made += 1
             progress(f"  from start {made}")
             coarse.run(start)
@@ -152,13 +155,13 @@ def _search_all(
         solves += fine.appraisals * len(scene.path.q)
         if few is not None:
             solves += coarse.appraisals * len(few.scene.path.q)
-        if fine.ended:
+        if ended := fine.ended:
             break
     best_of.sort(key=lambda found: _worth(found[1][0]))
     variant, optima, chosen_of = best_of[0]
     return Found(
         variant=variant,
-        best=optima[0],
+        best=optima[0] if ended is None else replace(optima[0], end=ended),
         optima=optima,
         variants=tuple((v, o[0]) for v, o, _ in best_of),
         initial=_initial(scene, variant),
@@ -190,7 +193,7 @@ def _refined(variant: Variant, coarse: _Search, initial: Floats) -> _Search:
 
     An optimum keeps the steps that led to it.
     """
-    fine = _Search(variant, coarse.steps, coarse.deadline)
+    fine = _Search(variant, coarse.steps, coarse.deadline, coarse.ended)
     for optimum in distinct(coarse.optima, variant.problem)[:REFINED]:
         fine.run(optimum.y, optimum.steps)
         if fine.ended:
@@ -223,26 +226,42 @@ def _worth(optimum: Optimum) -> tuple[float, float]:
 class _Search:
     """The optima of one variant, start after start."""
 
-    def __init__(self, variant: Variant, steps: int, deadline: float) -> None:
+    def __init__(
+        self, variant: Variant, steps: int, deadline: float, ended: End | None = None
+    ) -> None:
         self.variant, self.steps, self.deadline = variant, steps, deadline
         self.optima: list[Optimum] = []
         self.appraisals = 0
-        self.ended = False
+        self.ended = ended  # by the clock or by Ctrl-C, here or in the search before
 
     def run(self, start: Floats, before: tuple[Step, ...] = ()) -> None:
-        """Follow the steps from ``start``, to which the steps ``before`` have led."""
+        """Follow the steps from ``start``, to which the steps ``before`` have led.
+
+        Where Ctrl-C hits before the start itself is judged, it is judged only if nothing is known.
+        """
         try:
-            found = minimise(self.variant.problem, start, self.steps, self._stop)
+            found = self._follow(start)
+        except KeyboardInterrupt:
+            if self.ended:  # pressed again
+                raise
+            self.ended = End.INTERRUPTED
+            if self.optima:
+                return
+            found = self._follow(start)
         except EigassignError:
             if not self.optima and self.appraisals == 0:
                 raise
             return
         self.optima.append(replace(found, steps=(*before, *found.steps)))
         self.appraisals += found.appraisals
-        self.ended = found.end in (End.SECONDS, End.INTERRUPTED)
+        if found.end in (End.SECONDS, End.INTERRUPTED):
+            self.ended = found.end
+
+    def _follow(self, start: Floats) -> Optimum:
+        return minimise(self.variant.problem, start, self.steps, self._stop)
 
     def _stop(self) -> End | None:
-        return End.SECONDS if monotonic() > self.deadline else None
+        return self.ended or (End.SECONDS if monotonic() > self.deadline else None)
 
     def agreed(self, starts: int | str) -> bool:
         """Whether enough starts led to the best optimum."""

@@ -1,7 +1,6 @@
 """Frequencies along the trajectory and their slopes in the design, as the assignment asks for them.
 
-Exact ones come from the model at every sample. For models of many unknowns a reduced model does the
-work between, and says how far it is to be trusted.
+All come from exact solves at every sample: ∂f/∂y = (∂λ/∂y + ∂λ/∂q dq/dy) / (8π² f).
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ from eigassign.modal.slopes import eigenvalue_slopes
 from eigassign.study.scene import AT_LEAST, BLOCK, Scene
 
 Floats = NDArray[np.float64]
-TRAVEL = (0.1, 1.0)  # rad or m: least and largest scale of a coordinate; steps are 5e-4 of it
 
 
 @dataclass(frozen=True)
