@@ -31,6 +31,7 @@ from eigassign.study.results import (
     TargetStudy,
     TrajectoryRow,
 )
+from eigassign.study.updating import UpdateResults
 
 # --- results.json
 
@@ -47,15 +48,7 @@ def results_document(results: RunResults) -> dict[str, Any]:
     """
     first = results.targets[0] if results.targets else None
     return {
-        "schema": SCHEMA,
-        "eigassign_version": results.version,
-        "case": {
-            "name": results.case_name,
-            "title": results.title,
-            "reference": results.reference,
-            "sha256": results.case_sha256,
-            "files": dict(results.case_files),
-        },
+        **origin(results),
         "design": {
             row.name: {k: v for k, v in asdict(row).items() if k != "name"}
             for row in results.design
@@ -78,6 +71,21 @@ def results_document(results: RunResults) -> dict[str, Any]:
         "warnings": results.warnings,
         "notes": results.notes,
         "timing_s": dict(results.timing_s),
+    }
+
+
+def origin(results: RunResults | UpdateResults) -> dict[str, Any]:
+    """Which case, by its hash, and which version the numbers are of."""
+    return {
+        "schema": SCHEMA,
+        "eigassign_version": results.version,
+        "case": {
+            "name": results.case_name,
+            "title": results.title,
+            "reference": results.reference,
+            "sha256": results.case_sha256,
+            "files": dict(results.case_files),
+        },
     }
 
 

@@ -12,11 +12,10 @@ import numpy as np
 from eigassign.output import report
 from eigassign.output.figures.update import update_figures
 from eigassign.output.formats import number
-from eigassign.output.result_files import dumps
+from eigassign.output.result_files import dumps, origin
 from eigassign.output.tables import Table
 from eigassign.study.updating import POOR, UpdatedParameter, UpdateResults
 
-SCHEMA = 1
 _SHOWN = 30  # measurements in a table on the console
 
 # --- The verdict and the tables
@@ -144,15 +143,7 @@ def write_update(results: UpdateResults, folder: Path, formats: Sequence[str] = 
 def document(results: UpdateResults) -> dict[str, Any]:
     """Plain values in a fixed order; what is not identified has no deviation (null)."""
     return {
-        "schema": SCHEMA,
-        "eigassign_version": results.version,
-        "case": {
-            "name": results.case_name,
-            "title": results.title,
-            "reference": results.reference,
-            "sha256": results.case_sha256,
-            "files": dict(results.case_files),
-        },
+        **origin(results),
         "verdict": results.verdict,
         "headline": headline(results),
         "parameters": {
