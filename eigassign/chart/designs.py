@@ -41,9 +41,9 @@ from eigassign.errors import EigassignError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.expansion import expand
 from eigassign.modal.slopes import eigenvalue_slopes
-from eigassign.study.one_shot import assign_design, linear_constraints
+from eigassign.study.design.one_shot import assign_design, linear_constraints
+from eigassign.study.design.wanted import Wanted, target_frequencies, time_weights
 from eigassign.study.scene import Expansions, Scene
-from eigassign.study.wanted import Wanted, target_frequencies, time_weights
 
 Floats = NDArray[np.float64]
 ROUNDS = 12  # programs in a row at most

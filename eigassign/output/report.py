@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
     from eigassign.chart.results import Chart
-    from eigassign.study.updating import UpdateResults
+    from eigassign.study.updating.fit import UpdateResults
 
 # --- The page
 

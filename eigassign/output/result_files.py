@@ -31,7 +31,7 @@ from eigassign.study.results import (
     TargetStudy,
     TrajectoryRow,
 )
-from eigassign.study.updating import UpdateResults
+from eigassign.study.updating.fit import UpdateResults
 
 # --- results.json
 

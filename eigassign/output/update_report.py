@@ -14,7 +14,7 @@ from eigassign.output.figures.update import update_figures
 from eigassign.output.formats import number
 from eigassign.output.result_files import dumps, origin
 from eigassign.output.tables import Table
-from eigassign.study.updating import POOR, UpdatedParameter, UpdateResults
+from eigassign.study.updating.fit import POOR, UpdatedParameter, UpdateResults
 
 _SHOWN = 30  # measurements in a table on the console
 

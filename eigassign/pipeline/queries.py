@@ -23,8 +23,8 @@ from eigassign.pipeline.run_files import RESULTS, new_run_folder
 from eigassign.study import drawing
 from eigassign.study.accuracy import truncation_lines
 from eigassign.study.built_case import Case, load_case
+from eigassign.study.design.wanted import target_frequencies
 from eigassign.study.planning import plan_expansion
-from eigassign.study.wanted import target_frequencies
 
 Floats = NDArray[np.float64]
 

@@ -22,16 +22,16 @@ from eigassign.pipeline.expansions import expand_plan
 from eigassign.pipeline.run_files import RunFolder, new_run_folder
 from eigassign.pipeline.stages import Stages
 from eigassign.study.accuracy import accuracy_notes, truncation_notes
-from eigassign.study.assignment import MAX_ERROR, Answer, find_answer, require_assignable
 from eigassign.study.built_case import Case, load_case
 from eigassign.study.collect import VerifiedAssignment, collect_results
 from eigassign.study.comparison import Validation, study_modes, validate_expansions
-from eigassign.study.judgement import SolvedDesigns, study_targets
-from eigassign.study.meaning import Studies, study_meaning
+from eigassign.study.design.answer import MAX_ERROR, Answer, find_answer, require_assignable
+from eigassign.study.design.judgement import SolvedDesigns, study_targets
+from eigassign.study.design.wanted import target_frequencies
+from eigassign.study.meaning.overall import Studies, study_meaning
 from eigassign.study.planning import plan_expansion
 from eigassign.study.results import RunResults
 from eigassign.study.scene import Expansions, Scene
-from eigassign.study.wanted import target_frequencies
 
 Floats = NDArray[np.float64]
 

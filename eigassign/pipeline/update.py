@@ -10,7 +10,7 @@ from eigassign.pipeline.run import DEFAULT, Options
 from eigassign.pipeline.run_files import new_run_folder
 from eigassign.pipeline.stages import Stages
 from eigassign.study.built_case import Case, load_case
-from eigassign.study.updating import UpdateResults, collect_update, solve_update, update_problem
+from eigassign.study.updating.fit import UpdateResults, collect_update, solve_update, update_problem
 
 
 @dataclass(frozen=True)

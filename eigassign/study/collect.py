@@ -12,10 +12,11 @@ from eigassign._version import __version__
 from eigassign.case import CaseFile
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.accuracy import study_motion
-from eigassign.study.assignment import Answer, assignment_row, limit_notes
+from eigassign.study.design.answer import Answer, assignment_row, limit_notes
+from eigassign.study.design.judgement import crossing_warnings
+from eigassign.study.design.one_shot import design_rows, solver_row
+from eigassign.study.design.wanted import Wanted
 from eigassign.study.drawing import draw_poses, rest_pose
-from eigassign.study.judgement import crossing_warnings
-from eigassign.study.one_shot import design_rows, solver_row
 from eigassign.study.results import (
     AssignmentRow,
     DrawnPoses,
@@ -29,7 +30,6 @@ from eigassign.study.results import (
     TrajectoryRow,
 )
 from eigassign.study.scene import Scene
-from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 

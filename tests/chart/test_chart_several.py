@@ -11,9 +11,9 @@ from scenes import scene_of
 
 from eigassign.chart.designs import design_task
 from eigassign.chart.question import build_features
-from eigassign.study.one_shot import assign_design
+from eigassign.study.design.one_shot import assign_design
+from eigassign.study.design.wanted import target_frequencies
 from eigassign.study.scene import Scene
-from eigassign.study.wanted import target_frequencies
 
 CASES = Path(__file__).parents[2] / "cases"
 

@@ -15,7 +15,7 @@ from eigassign.errors import CaseError, UsageError
 from eigassign.output.result_files import results_document, sample_files
 from eigassign.pipeline.queries import check, modes
 from eigassign.pipeline.run import Options, Result, optimize, validate
-from eigassign.study.measured import read_measurements
+from eigassign.study.updating.measured import read_measurements
 
 TARGET = [{"mode": 1, "frequency": 13.0}]
 

@@ -11,7 +11,7 @@ from eigassign.output.figures import style
 from eigassign.output.figures.curves import INITIAL, stacked
 from eigassign.output.figures.style import FigurePlan, legend_above, short
 from eigassign.output.formats import number
-from eigassign.study.updating import OUTLIER, UpdateResults
+from eigassign.study.updating.fit import OUTLIER, UpdateResults
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

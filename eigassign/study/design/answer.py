@@ -16,17 +16,18 @@ from eigassign.assignment import Assignment, hz_from_lam
 from eigassign.assignment.sequential import MET, End
 from eigassign.case import CaseFile
 from eigassign.errors import AccuracyError, CaseError, InfeasibleError, Problem
-from eigassign.study.clearance import Clearance
-from eigassign.study.conclusions import (
+from eigassign.study.design.clearance import Clearance
+from eigassign.study.design.conclusions import (
     Conflict,
     conflict,
     idle_notes,
     is_proved,
     least_changed,
 )
-from eigassign.study.judgement import verdict
-from eigassign.study.one_shot import assign_design
-from eigassign.study.optimum import MASS, Found, find_optimum
+from eigassign.study.design.judgement import verdict
+from eigassign.study.design.one_shot import assign_design
+from eigassign.study.design.optimum import MASS, Found, find_optimum
+from eigassign.study.design.wanted import Wanted
 from eigassign.study.results import (
     ActiveRow,
     AssignmentRow,
@@ -39,7 +40,6 @@ from eigassign.study.results import (
     TargetStudy,
 )
 from eigassign.study.scene import Scene
-from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 MAX_ERROR = 0.02  # of a wanted frequency, where the case says nothing

@@ -12,10 +12,10 @@ from eigassign.case import Measurement, MeasurementFile
 from eigassign.errors import CaseError
 from eigassign.pipeline.update import update_case
 from eigassign.study.built_case import Case, load_case
-from eigassign.study.measured import read_measurements
-from eigassign.study.updating import UpdateResults, solve_update, update_problem
+from eigassign.study.updating.fit import UpdateResults, solve_update, update_problem
+from eigassign.study.updating.measured import read_measurements
 
-CASES = Path(__file__).parents[2] / "cases"
+CASES = Path(__file__).parents[3] / "cases"
 NOISE = 0.005
 
 

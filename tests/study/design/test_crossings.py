@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectories, Trajectory
-from eigassign.study.judgement import crossing_warnings
+from eigassign.study.design.judgement import crossing_warnings
 
 TIME = np.linspace(0.0, 1.0, 11)
 

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from eigassign.assignment.requirements import Requirements
 from eigassign.assignment.sequential import Appraisal
 from eigassign.errors import EigassignError
-from eigassign.study.assignment import Answer, active_rows
-from eigassign.study.optimum import Found, Task, variant_of
-from eigassign.study.reach import misses, proved_ranges, reach_rows, unreachable
+from eigassign.study.design.answer import Answer, active_rows
+from eigassign.study.design.optimum import Found, Task, variant_of
+from eigassign.study.design.wanted import Wanted
+from eigassign.study.meaning.reach import misses, proved_ranges, reach_rows, unreachable
+from eigassign.study.meaning.sensitivity import error_kind, relaxed_limits, sensitivities
+from eigassign.study.meaning.tolerance import study_tolerance
 from eigassign.study.results import Meaning, RelaxedRow, ToleranceRows
 from eigassign.study.scene import Scene
-from eigassign.study.sensitivity import error_kind, relaxed_limits, sensitivities
-from eigassign.study.tolerance import study_tolerance
-from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 

@@ -22,9 +22,9 @@ from eigassign.case import CaseFile
 from eigassign.errors import CaseError
 from eigassign.modal.model import Model
 from eigassign.study.built_case import Case
-from eigassign.study.judgement import NEAR
-from eigassign.study.measured import PosedMeasurement, read_measurements
-from eigassign.study.response import exact_slopes
+from eigassign.study.design.judgement import NEAR
+from eigassign.study.design.response import exact_slopes
+from eigassign.study.updating.measured import PosedMeasurement, read_measurements
 
 Floats = NDArray[np.float64]
 POOR = 0.01  # p-value below which the model does not explain the measurements

@@ -10,7 +10,7 @@ from scenes import SHIPPED, changed, scene_of
 
 from eigassign.pipeline.run import solve_case
 from eigassign.study.built_case import load_case
-from eigassign.study.clearance import Band, prove_clear
+from eigassign.study.design.clearance import Band, prove_clear
 from eigassign.study.scene import Scene
 
 

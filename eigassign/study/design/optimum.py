@@ -40,11 +40,11 @@ from eigassign.assignment.sequential import (
 )
 from eigassign.case import CaseFile
 from eigassign.errors import CaseError, EigassignError
-from eigassign.study.clearance import Band, Clearance, prove_clear, wanting
-from eigassign.study.one_shot import linear_constraints
-from eigassign.study.response import exact_response
+from eigassign.study.design.clearance import Band, Clearance, prove_clear, wanting
+from eigassign.study.design.one_shot import linear_constraints
+from eigassign.study.design.response import exact_response
+from eigassign.study.design.wanted import Wanted, target_frequencies, time_weights
 from eigassign.study.scene import Scene
-from eigassign.study.wanted import Wanted, target_frequencies, time_weights
 
 Floats = NDArray[np.float64]
 MOST_BELOW = 24  # combinations of numbers of modes below the bands that are tried

@@ -10,9 +10,9 @@ from scenes import SHIPPED, scene_of
 
 from eigassign.assignment.requirements import Frequencies
 from eigassign.assignment.sequential import End
-from eigassign.study.optimum import Found, find_optimum
-from eigassign.study.response import ExactResponse
-from eigassign.study.wanted import target_frequencies
+from eigassign.study.design.optimum import Found, find_optimum
+from eigassign.study.design.response import ExactResponse
+from eigassign.study.design.wanted import target_frequencies
 
 
 def found_of(folder: Path, text: str, starts: list[str]) -> Found:

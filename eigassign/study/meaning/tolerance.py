@@ -16,11 +16,11 @@ from scipy.stats import qmc
 
 from eigassign.errors import AccuracyError
 from eigassign.modal.reduced.reduce import reduce
-from eigassign.study.judgement import curve_range, errors_of, worst_errors
-from eigassign.study.monotone import corners, effects
+from eigassign.study.design.judgement import curve_range, errors_of, worst_errors
+from eigassign.study.design.wanted import Wanted
+from eigassign.study.meaning.monotone import corners, effects
 from eigassign.study.results import RangeRow, ToleranceRows
 from eigassign.study.scene import Scene
-from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 DRAWS = 64  # a power of two, as Sobol's points want

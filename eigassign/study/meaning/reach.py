@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from eigassign.assignment.requirements import FrequencyTarget, Requirements
 from eigassign.assignment.sequential import Appraisal, DesignProblem, minimise
 from eigassign.errors import EigassignError
-from eigassign.study.judgement import curve_range, errors_of, least_errors
-from eigassign.study.monotone import corners, effects
-from eigassign.study.one_shot import linear_constraints
-from eigassign.study.response import exact_response
+from eigassign.study.design.judgement import curve_range, errors_of, least_errors
+from eigassign.study.design.one_shot import linear_constraints
+from eigassign.study.design.response import exact_response
+from eigassign.study.design.wanted import Wanted
+from eigassign.study.meaning.monotone import corners, effects
 from eigassign.study.results import RangeRow
 from eigassign.study.scene import Scene
-from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 LIMIT = 1e-4  # of a limit: by so much it must be missed to be called out of reach

@@ -28,7 +28,7 @@ from eigassign.assignment.sequential import (
     stationarity,
 )
 from eigassign.errors import EigassignError
-from eigassign.study.optimum import Found, Variant
+from eigassign.study.design.optimum import Found, Variant
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]

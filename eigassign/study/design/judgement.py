@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.study.design.wanted import Wanted, time_weights
 from eigassign.study.results import ErrorRow, ErrorSummary, TargetAlong, TargetStudy
-from eigassign.study.wanted import Wanted, time_weights
 
 Floats = NDArray[np.float64]
 MET = 1e-8  # a violation below it is round-off

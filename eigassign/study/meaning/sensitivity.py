@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from eigassign.assignment.requirements import FrequencyLimit, Requirements
 from eigassign.assignment.sequential import Appraisal, DesignProblem, Objective
 from eigassign.case import CaseFile
+from eigassign.study.design.wanted import Wanted
 from eigassign.study.results import ActiveRow, RelaxedRow, SensitivityRow
-from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 STEP = 0.04  # of the range of a bound, or of a limit: how far it is relaxed, to one digit

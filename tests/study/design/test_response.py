@@ -7,7 +7,7 @@ from redesigned_arms import cart, extrapolated
 
 from eigassign.pipeline.run import prepare
 from eigassign.pipeline.stages import Stages
-from eigassign.study.response import exact_response
+from eigassign.study.design.response import exact_response
 
 
 def test_a_coordinate_that_rests_may_follow_the_design_all_the_same() -> None:

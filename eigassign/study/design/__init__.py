@@ -1,0 +1,13 @@
+"""From the targets of a case to its answer, and the verdict.
+
+Reading order:
+
+    wanted       what the targets ask for, at the samples of the trajectories
+    one_shot     the paper's answer: one quadratic program about one expansion point
+    response     frequencies along the trajectory and their slopes in the design
+    judgement    what a design does to the targets, and the verdict
+    clearance    proof that a band stays clear of modes all along a trajectory
+    optimum      the design that meets the targets best, by the sequential method
+    conclusions  what may be said of an optimum: proved, conflicting limits, what changes nothing
+    answer       the answer by either method, and what it rests on
+"""

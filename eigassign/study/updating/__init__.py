@@ -1,0 +1,7 @@
+"""Parameters from measured frequencies.
+
+Reading order:
+
+    measured  the measurements of a case, each at its pose
+    fit       the parameters that explain them, with intervals; what is not identified
+"""
