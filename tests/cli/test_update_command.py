@@ -73,7 +73,7 @@ def test_parameters_that_are_not_identified_set_the_exit_code_and_are_null(
         "  hub: {parameter: bodies.hub.mass, min: 0, max: 5}\n\nmeasurements:",
     )
     text = text.replace("  bodies:", "  bodies:\n    hub: {at: upper_arm.start, mass: 2}")
-    case.write_text(text.replace("rad, 2]", "rad, 2, 2]"))
+    case.write_text(text.replace("rad, 1.85]", "rad, 1.85, 2]"))
     assert run(case, "--json") == 1
     found = json.loads(capsys.readouterr().out)
     assert found["verdict"] == "not_identified"
