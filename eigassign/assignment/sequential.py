@@ -30,7 +30,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from eigassign.assignment.checks import Floats, frozen
-from eigassign.assignment.program import LinearConstraint, ScaledProgram
+from eigassign.assignment.program import SNAP, LinearConstraint, ScaledProgram
 from eigassign.assignment.solver import solve_scaled
 from eigassign.errors import EigassignError
 
@@ -290,8 +290,10 @@ def _go(
     problem: DesignProblem, box: _Box, place: _Place, move: _Move, progress: _Progress
 ) -> _Place | None:
     """Where a move leads, None where no design is."""
+    z = place.z + move.d
+    z = np.where(z <= SNAP, 0.0, np.where(z >= 1.0 - SNAP, 1.0, z))
     try:
-        return _placed(problem, box, np.clip(place.z + move.d, 0.0, 1.0), progress)
+        return _placed(problem, box, z, progress)
     except EigassignError:
         return None
 

@@ -196,3 +196,12 @@ def test_a_limit_of_steps_is_said() -> None:
     found = minimise(problem(), np.array([2.0, 0.0, 5.0]), steps=1)
     assert found.end is End.STEPS
     assert len(found.steps) == 1
+
+
+def test_a_parameter_on_its_bound_is_exactly_there() -> None:
+    found = minimise(problem(5.0), np.array([1.0, 0.5, 2.0]))
+    bounds = [limit for limit in found.limits if limit.kind == "bound"]
+    assert bounds
+    for limit in bounds:
+        side = problem().upper if limit.upper else problem().lower
+        assert found.y[limit.index] == side[limit.index]
