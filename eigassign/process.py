@@ -144,12 +144,15 @@ ONE_THREAD: Mapping[str, str] = {f"{library}_NUM_THREADS": "1" for library in _T
 _ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
-class Terminated(BaseException):
-    """The process was told to end: unwinds like KeyboardInterrupt, so that cleanup happens."""
+class Terminated(SystemExit):
+    """The process was told to end: unwinds like KeyboardInterrupt, so that cleanup happens.
+
+    As a SystemExit it ends a worker that waits for a task without a traceback.
+    """
 
     def __init__(self, number: int) -> None:
-        self.exit_code = 128 + number
         super().__init__(number)
+        self.code = self.exit_code = 128 + number
 
     def __str__(self) -> str:
         return f"ended by {signal.Signals(self.exit_code - 128).name}"

@@ -24,8 +24,8 @@ def to_yaml(content: Mapping[str, object]) -> str:
 def plain(value: object) -> object:
     """Objects → mappings, lists, numbers and text, in the shape of the file."""
     if isinstance(value, Design):
-        constraints = value.constraints or None
-        return plain({**value.entries, "constraints": constraints, "mass": value.mass})
+        limits = {"constraints": value.constraints or None, "mass": value.mass}
+        return plain({**value.entries, **{k: v for k, v in limits.items() if v is not None}})
     if isinstance(value, Tolerance):
         return value.written()
     if isinstance(value, Part):

@@ -47,6 +47,8 @@ VARIANTS = {
     "strange title": edited("title: Arm", r'title: "no: \"#{[ \\ ä 😀 1e3"'),
     "title like a number": edited("title: Arm", "title: '1e3'"),
     "names like words": NAMED_LIKE_WORDS,
+    "parameter called mass": edited("  m:", "  mass:").replace("{m: 1}", "{mass: 1}"),
+    "limit of the mass": edited("  constraints:", "  mass: {max: 12 kg}\n  constraints:"),
     "reference": edited("title: Arm", "title: Arm\nreference: 'Belotti et al.: 2021'"),
 }
 

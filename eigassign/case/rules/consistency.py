@@ -10,9 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
-from eigassign.case.reader import Finding, KeyPath, Tree, at, items, names
+from eigassign.case.reader import Finding, KeyPath, Tree, items, names
 from eigassign.case.rules import joints, links, properties, space, study, targets
-from eigassign.case.schema.design import is_entry
 from eigassign.case.schema.mechanism import Mechanism
 
 Rule = Callable[[Tree], Iterator[Finding]]
@@ -36,10 +35,7 @@ def _empty(node: object, path: KeyPath) -> Iterator[Finding]:
 
 
 def reserved_names_are_not_used(tree: Tree) -> Iterator[Finding]:
-    """`ground` is no link, `time` heads every table over time, `mass` limits the whole."""
-    if is_entry(at(tree, "design", "mass")):
-        message = "'mass' is for limits of the total mass: name the design parameter otherwise"
-        yield ("design", "mass"), message
+    """`ground` is no link, `time` heads every table over time."""
     if "time" in names(tree, "coordinates"):
         yield ("coordinates", "time"), "'time' heads a column of its own: name it otherwise"
     if "ground" in names(tree, "mechanism", "links"):

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from eigassign.case.reader import KeyPath, Tree, at, entries, items, lacks, names, text
-from eigassign.case.schema.design import RESERVED, column_names
+from eigassign.case.schema.design import RESERVED, column_names, is_entry
 from eigassign.case.schema.joints import FREEDOMS
 from eigassign.case.schema.links import LINKS
 from eigassign.case.schema.parts import Quantity
@@ -156,7 +156,8 @@ def trajectory_names(tree: Tree) -> list[str]:
 
 def design_entries(tree: Tree) -> list[tuple[str, object]]:
     """Parameters and lists of choices: what stands under `design` but its reserved names."""
-    return [(name, body) for name, body in items(tree, "design") if name not in RESERVED]
+    entries = items(tree, "design")
+    return [(name, body) for name, body in entries if name not in RESERVED or is_entry(body)]
 
 
 def choices(entry: object) -> list[tuple[str, object]] | None:

@@ -14,6 +14,7 @@ from eigassign.case.rules.lookups import (
     trajectories,
     trajectory_names,
 )
+from eigassign.case.schema.design import is_entry
 from eigassign.case.schema.targets import TARGETS
 from eigassign.case.schema.trajectory import DURATION, TIME, TipTrajectory
 from eigassign.case.suggestions import listed, shown, unknown
@@ -135,7 +136,8 @@ def one_shot_has_a_quadratic_program(tree: Tree) -> Iterator[Finding]:
         for key in ("values", "choices"):
             if at(body, key) is not None:
                 yield ("design", name, key), f"is a catalogue; {instead}"
-    if at(tree, "design", "mass") is not None:
+    mass = at(tree, "design", "mass")
+    if mass is not None and not is_entry(mass):
         yield ("design", "mass"), f"limits the mass; {instead}"
 
 

@@ -77,7 +77,7 @@ def validated(tree: Tree) -> tuple[Document | None, list[Finding]]:
 def _with_entries_apart(tree: Tree) -> Tree:
     """In the file the entries stand directly under `design`, beside the reserved names.
 
-    An entry by a reserved name is an error, which a rule finds.
+    A parameter may be called by a reserved name too: it was possible before the name was reserved.
     """
     design = tree.get("design")
     if not isinstance(design, Mapping):

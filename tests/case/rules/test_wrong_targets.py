@@ -76,7 +76,6 @@ ENTRIES = {
     "choice in kg": ("b: {choices: {x: {¦sections.rod.diameter: 3 kg}}}", "b.choices.x.sections.rod.diameter", "which is mass"),
     "choice of a parameter": ("b: {choices: {x: {¦bodies.tool.mass: 3 kg}}}", "b.choices.x.bodies.tool.mass", "is a design parameter already: 'm'"),
     "choices between which no section is": ("b: {¦choices: {x: {sections.pipe.outer_diameter: 20 mm, sections.pipe.thickness: 1 mm}, y: {sections.pipe.outer_diameter: 60 mm, sections.pipe.thickness: 15 mm}}}", "b.choices", "between these choices section 'pipe' cannot exist"),
-    "parameter called mass": ("¦mass: {parameter: bodies.hand.mass, min: 0, max: 3}", "mass", "is for limits of the total mass"),
     "mass without limits": ("¦mass: {}", "mass", "needs min, max or both"),
     "mass upside down": ("mass: {¦min: 3, max: 1}", "mass.min", "min 3 is above max 1"),
     "mass in m": ("mass: {¦max: 1 m}", "mass.max", "which is length"),
