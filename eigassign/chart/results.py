@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Any
 
-SCHEMA = 3  # of chart.json
+SCHEMA = 4  # of chart.json
 NEARLY_NOTHING = 1e-12  # of an objective: a rms relative error of 1e-6
 
 
@@ -149,8 +149,8 @@ class MeshRow:
 class DesignRun:
     """One way to a design: time against the exact objective reached.
 
-    ``objective`` is the mean square relative error in λ by exact solves; ``trace`` the best one so
-    far against seconds, for methods that solve exactly as they go.
+    ``objective`` is F, the mean square of f/f_d − 1 by exact solves; ``trace`` the best one so far
+    against seconds, for searches.
     """
 
     method: str
@@ -168,7 +168,7 @@ class DesignRun:
 
 
 def excess_over(best: float, objective: float) -> float:
-    """(J − J_best) / J_best; where J_best is next to nothing, relative to `NEARLY_NOTHING`."""
+    """(F − F_best) / F_best; where F_best is next to nothing, relative to `NEARLY_NOTHING`."""
     return (objective - best) / max(best, NEARLY_NOTHING)
 
 

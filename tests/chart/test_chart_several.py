@@ -11,8 +11,7 @@ from scenes import scene_of
 
 from eigassign.chart.designs import design_task
 from eigassign.chart.question import build_features
-from eigassign.study.design.one_shot import assign_design
-from eigassign.study.design.wanted import target_frequencies
+from eigassign.study.design.wanted import time_weights
 from eigassign.study.scene import Scene
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -30,31 +29,20 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return scene_of(tmp_path_factory.mktemp("bars"), text.replace(target, more))
 
 
-def test_the_charted_objective_is_the_program_s(scene: Scene) -> None:
-    task = design_task(scene, TINY, 1e-6)
-    assert len(task.rows) == len(scene.path.time_s)
-    found = assign_design(scene, target_frequencies(scene.file, scene.path))
-    lam = np.full((len(task.q), 1), np.nan)
-    for goal, wanted in zip(found.lam, task.wanted, strict=True):
-        lam[wanted.rows, 0] = goal
-    assert task.objective(lam) == pytest.approx(found.objective_optimal, rel=1e-12)
-
-
-def test_its_slope_is_its_finite_difference(scene: Scene) -> None:
-    task = design_task(scene, TINY, 1e-6)
-    rng = np.random.default_rng(3)
-    lam, slopes = 27e3 * (1 + 0.1 * rng.random((14, 1))), 1e3 * rng.normal(size=(14, 1, 2))
-    for k, direction in enumerate(np.eye(2)):
-        ahead, behind = (task.objective(lam + h * slopes @ direction) for h in (1e-4, -1e-4))
-        assert task.slope(lam, slopes)[k] == pytest.approx((ahead - behind) / 2e-4, rel=1e-6)
+def test_the_charted_objective_weighs_targets_by_weight_and_time(scene: Scene) -> None:
+    task, y = design_task(scene, TINY, 1e-6), scene.initial
+    hz = scene.model.frequencies(scene.path.q, y, 1)[:, 0]
+    w = np.concatenate([np.full(7, 1.0), np.full(7, 3.0)]) * time_weights(scene.path)
+    off = hz / np.repeat([27.0, 26.0], 7) - 1.0
+    assert task.objective(y) == pytest.approx(w @ off**2 / w.sum(), rel=1e-9)
 
 
 def test_few_affordable_samples_still_hold_both_ends_of_each(scene: Scene) -> None:
     dear = design_task(scene, TINY, TINY.searched_s)
-    assert {0, 6, 7, 13} <= set(dear.rows.tolist())
-    assert len(dear.rows) < 14
+    assert {0, 6, 7, 13} <= set(scene.path.spread(5).tolist())
+    assert len(dear.scene.path.q) < 14
     assert [own.rows.stop - own.rows.start for own in dear.wanted] == [
-        len(part.trajectory.q) for part in dear.path.parts
+        len(part.trajectory.q) for part in dear.scene.path.parts
     ]
 
 

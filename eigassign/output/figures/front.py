@@ -169,7 +169,7 @@ def _designs(chart: Chart) -> FigurePlan:
     return FigurePlan(
         "designs",
         "Time to a design against the objective it reaches",
-        "Exact objective (mean square relative error in λ) above the best one that any method "
+        "Exact objective (mean square of f/f_d − 1) above the best one that any method "
         f"found ({best.objective:.6g}, by {best.method}), relative to it; searches with all their "
         f"steps. What is nearer than {LEAST_EXCESS:.0e} is drawn there.",
         "Scatter of excess objective over seconds for every way to a design.",
