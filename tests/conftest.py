@@ -7,6 +7,9 @@ from pathlib import Path
 
 from hypothesis import settings
 
+from eigassign.process import prefer_one_thread
+
+prefer_one_thread()  # before NumPy is imported: threads of small dense algebra wait for each other
 for folder in ("oracles", "case", "mechanism", "modal", "stability", "study"):
     sys.path.insert(0, str(Path(__file__).parent / folder))
 
