@@ -193,7 +193,9 @@ def minimise(
     end = End.STEPS
     try:
         while len(progress.steps) < steps:
-            if stationarity(problem, box.y(place.z), place.seen) <= OPTIMAL:
+            # beyond a limit by a little, where one more program ends on it
+            beyond = place is not best or MET < place.seen.violation <= ON
+            if not beyond and stationarity(problem, box.y(place.z), place.seen) <= OPTIMAL:
                 end = End.OPTIMAL
                 break
             if (asked := stop()) is not None:

@@ -205,3 +205,17 @@ def test_a_parameter_on_its_bound_is_exactly_there() -> None:
     for limit in bounds:
         side = problem().upper if limit.upper else problem().lower
         assert found.y[limit.index] == side[limit.index]
+
+
+def test_steps_go_on_until_the_limit_is_met_to_round_off() -> None:
+    """Steps may land a little beyond a curved limit: f = 1/√(1 + y) ≤ 0.6."""
+
+    def appraise(y: np.ndarray) -> Appraisal:
+        f, slope = 1.0 / np.sqrt(1.0 + y), -0.5 * (1.0 + y) ** -1.5
+        return Appraisal(y, np.eye(1), f / 0.6 - 1.0, slope[:, None] / 0.6)
+
+    asked = DesignProblem(appraise, np.zeros(1), np.array([5.0]))
+    for start in np.linspace(0.0, 5.0, 26):
+        found = minimise(asked, np.array([start]))
+        # 1e-9 of excess, where it falls by 0.18 per unit of y
+        assert found.y[0] == pytest.approx(1.0 / 0.36 - 1.0, abs=1e-8)
