@@ -81,15 +81,18 @@ def _numbers(tree: Tree) -> Iterator[tuple[KeyPath, object]]:
 
 
 def _prices(tree: Tree) -> Iterator[tuple[KeyPath, object]]:
-    """Prices for one SI unit of their parameter."""
+    """Prices for one SI unit of their property."""
     for name, body in design_entries(tree):
-        price, prop = at(body, "price"), known_property(tree, text(body, "parameter"))
-        if isinstance(price, str):
-            try:
-                unit = prop.quantity.dimension if prop else None
-                yield ("design", name, "price"), read_rate(price, unit)
-            except QuantityError as error:
-                yield ("design", name, "price"), error
+        given = [((), text(body, "parameter"), at(body, "price"))]
+        given += [((path,), path, price) for path, price in items(body, "price")]
+        for place, path, price in given:
+            if isinstance(price, str):
+                prop = known_property(tree, path)
+                try:
+                    unit = prop.quantity.dimension if prop else None
+                    yield ("design", name, "price", *place), read_rate(price, unit)
+                except QuantityError as error:
+                    yield ("design", name, "price", *place), error
 
 
 def _in_si(value: object, quantity: Quantity | None) -> float:

@@ -134,7 +134,7 @@ class Parameter(Part):
 class Choices(Part):
     """Properties that are set together: one of the named choices (a list of sections, of motors).
 
-    All choices set the same properties.
+    All choices set the same properties. `price` is for one unit of a property, by its path.
     """
 
     choices: Annotated[
@@ -142,6 +142,7 @@ class Choices(Part):
         Field(min_length=1, max_length=MOST_CHOICES),
         Frozen,
     ]
+    price: Annotated[Mapping[str, Price], Frozen] = FrozenDict()
 
     @model_validator(mode="after")
     def _are_alike_and_differ(self) -> Self:
@@ -158,6 +159,9 @@ class Choices(Part):
             if same := seen.get(self._row(choice)):
                 raise wrong(f"has the same values as {same!r}", "choices", name)
             seen[self._row(choice)] = name
+        for path in self.price:
+            if path not in model:
+                raise wrong(f"the choices do not set it; they set {listed(model)}", "price", path)
         return self
 
     @property
@@ -276,7 +280,8 @@ class Design(Part):
                 columns = zip(*entry.rows, strict=True)
                 names = column_names(name, entry.properties)
                 for column, path, values in zip(names, entry.properties, columns, strict=True):
-                    found[column] = DesignColumn(path, min(values), max(values))
+                    price = entry.price.get(path)
+                    found[column] = DesignColumn(path, min(values), max(values), price)
             else:
                 found[name] = DesignColumn(
                     entry.parameter, *entry.range, entry.price, entry.tolerance

@@ -50,6 +50,12 @@ def test_choices_make_a_column_of_each_property_and_say_which_belong_together() 
     assert d.columns == (3,)
 
 
+def test_a_property_that_choices_set_has_a_price_for_each_unit_of_it() -> None:
+    design = with_entries(BOOM + "    price: {sections.bar.area: 30 / cm2}\n").design
+    assert design.parameters["boom.area"].price == pytest.approx(3e5, rel=1e-15)
+    assert design.parameters["boom.bending_inertia"].price is None
+
+
 def test_properties_that_end_alike_keep_their_whole_path() -> None:
     assert column_names("arm", ["sections.a.area", "sections.b.area", "links.c.length"]) == [
         "arm.sections.a.area",
@@ -111,6 +117,7 @@ def test_a_price_is_for_one_si_unit() -> None:
     "text",
     [
         BOOM + LISTED + "  mass: {max: 12 kg}\n",
+        BOOM + "    price: {sections.bar.area: 30 / cm2}\n",
         D.replace("}", ", price: 3 / kg, tolerance: 2.5 %}").replace("/ kg", "/ cm"),
         D.replace("}", ", tolerance: 1 mm}"),
     ],
