@@ -264,8 +264,7 @@ def _try(
 ) -> _Place | None:
     """The place that a move leads to if it keeps a tenth of its promise, corrected once if not."""
     reached = _go(problem, box, place, move, progress)
-    curved = len(place.seen.excess) > 0 or problem.objective is Objective.WORST_CASE
-    if reached is not None and not _kept(problem, place, reached, move, progress) and curved:
+    if reached is not None and not _kept(problem, place, reached, move, progress):
         corrected = _program(problem, box, place, progress, (reached, move))
         if corrected is not None:
             again = _go(problem, box, place, corrected, progress)
@@ -452,7 +451,8 @@ def _solved(
         upper=np.concatenate([reach[1], beyond[1], upper / norms]),
         cost=cost / scale,
     )
-    found = solve_scaled(scaled)
+    # Bounds are walked along in half the time that OSQP takes to be set up and polished.
+    found = solve_scaled(scaled, None if extra else np.zeros(n))
     if found is None:
         return None
     x, mu = found

@@ -75,8 +75,15 @@ def solve_program(program: QuadraticProgram) -> Solution:
     return Solution(tuple(candidates), status, raw.iterations, n - polished.rank)
 
 
-def solve_scaled(scaled: ScaledProgram) -> tuple[Floats, Floats] | None:
-    """x and multipliers mu (rows of G,) of a program in units of its own; None if none is found."""
+def solve_scaled(
+    scaled: ScaledProgram, start: Floats | None = None
+) -> tuple[Floats, Floats] | None:
+    """x and multipliers mu (rows of G,) of a program in units of its own; None if none is found.
+
+    From a ``start`` (n,) that is feasible the active-set method goes alone, without OSQP.
+    """
+    if start is not None:
+        return minimise(scaled, start)
     raw = solve_osqp(scaled)
     start = feasible_point(scaled) if raw.x is None else raw.x
     if start is None:
