@@ -80,10 +80,8 @@ class ReducedPencil:
         every = slice(None)
         return stiff.block(stiff(theta), every, every), heavy.block(heavy(theta), every, every)
 
-    def eigenvalue_slopes(
-        self, x: Floats, count: int, wanted: ArrayLike
-    ) -> tuple[Floats, Floats, Floats]:
-        """λ (n, count), ∂λ/∂x (n, count, n_x) and modes (n, k, count) at x (n, n_x).
+    def eigenvalue_slopes(self, x: Floats, count: int, wanted: ArrayLike) -> tuple[Floats, Floats]:
+        """λ (n, count) and ∂λ/∂x (n, count, n_x) at x (n, n_x).
 
         ∂λ/∂x_i = Σ_j (φᵀK̂_jφ − λ φᵀM̂_jφ) ∂θ_j/∂x_i; ``wanted`` as in `modal.slopes`.
         """
@@ -92,7 +90,7 @@ class ReducedPencil:
         moving = np.abs(rates).max(axis=(0, 2), initial=0.0) > 0.0
         stiff, heavy = (terms.chosen(moving[terms.terms]) for terms in self._terms)
         theta = self.theta(x)
-        lam, slopes, modes = [], [], []
+        lam, slopes = [], []
         for part in chunks(np.arange(len(x)), self.mass[0].size):
             K, M_c, coupling = self.at(theta[:, part])
             mu, z = (a[..., :count] for a in ritz_pairs(K, M_c))
@@ -104,8 +102,7 @@ class ReducedPencil:
             whole_slopes = np.zeros((*forms.shape[:2], x.shape[1]))
             whole_slopes[..., along] = forms
             slopes.append(whole_slopes)
-            modes.append(phi)
-        return np.concatenate(lam), np.concatenate(slopes), np.concatenate(modes)
+        return np.concatenate(lam), np.concatenate(slopes)
 
     @cached_property
     def _terms(self) -> tuple[SymmetricTerms, SymmetricTerms]:

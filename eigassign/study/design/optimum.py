@@ -34,7 +34,6 @@ from eigassign.assignment.sequential import (
     End,
     Objective,
     Optimum,
-    Step,
     distinct,
     minimise,
 )
@@ -42,7 +41,13 @@ from eigassign.case import CaseFile
 from eigassign.errors import CaseError, EigassignError
 from eigassign.study.design.clearance import Band, Clearance, prove_clear, wanting
 from eigassign.study.design.one_shot import linear_constraints
-from eigassign.study.design.response import exact_response
+from eigassign.study.design.response import (
+    ExactResponse,
+    ReducedModels,
+    ReducedResponse,
+    exact_response,
+    reduced_models,
+)
 from eigassign.study.design.wanted import Wanted, target_frequencies, time_weights
 from eigassign.study.scene import Scene
 
@@ -67,6 +72,7 @@ class Variant:
     below: tuple[tuple[str, int], ...]  # the band in words, and k
     requirements: Requirements
     problem: DesignProblem
+    response: ExactResponse | ReducedResponse
     asks: Callable[[Collection[str]], DesignProblem]  # the problem with these limits only
 
 
@@ -100,8 +106,9 @@ def find_optimum(
     keys, margin = scene.file.assignment, MARGIN
     deadline = np.inf if keys.seconds is None else monotonic() + keys.seconds
     designs = list(_starts(scene, starts, keys.starts))
+    models = reduced_models(scene)
     for _ in range(WIDENED):
-        found = _search_all(scene, wanted, designs, margin, deadline, progress)
+        found = _search_all(scene, wanted, designs, margin, models, deadline, progress)
         lacking = wanting(found.clearances)
         met = found.best.seen.violation <= MET
         if lacking == 0.0 or not met or found.best.end in (End.SECONDS, End.INTERRUPTED):
@@ -115,25 +122,27 @@ def _search_all(
     wanted: Sequence[Wanted],
     starts: Sequence[Floats],
     margin: float,
+    models: ReducedModels | None,
     deadline: float,
     progress: Callable[[str], None],
 ) -> Found:
     """The best local optimum, the limits of bands drawn in by ``margin`` (relative).
 
-    Starts are followed on few samples of a long trajectory; what they lead to is then optimised on
-    all. No design is returned that is worse than the initial one. Where none meets all limits, it
-    is the one that misses them least, relative to the limits.
+    Starts are followed on few samples of a long trajectory, of large models by reduced ones; what
+    they lead to is then optimised on all samples, and by exact solves last. No design is returned
+    that is worse than the initial one. Where none meets all limits, it is the one that misses them
+    least, relative to the limits.
     """
     keys = scene.file.assignment
     catalogues = listed(scene.file)
     whole = Task(scene, tuple(wanted), margin)
-    few = None if catalogues else _thinned(scene, wanted, margin)
+    tasks = [whole] if catalogues else _rougher(whole, models)
     best_of: list[tuple[Variant, tuple[Optimum, ...], Chosen | None]] = []
     made, solves = 0, 0
     ended: End | None = None
     for below in _below(whole):
-        variant = variant_of(whole, below)
         if catalogues:
+            variant = variant_of(whole, below)
             near = list(starts[:RELAXED])
             chosen = choose(variant.problem, catalogues, near, keys.steps, deadline, progress)
             best_of.append((variant, chosen.optima, chosen))
@@ -142,20 +151,21 @@ def _search_all(
             if chosen.search is None:
                 break
             continue
-        coarse = _Search(variant if few is None else variant_of(few, below), keys.steps, deadline)
+        search = _Search(variant_of(tasks[0], below), keys.steps, deadline)
         for start in starts:
             made += 1
             progress(f"  from start {made}")
-            coarse.run(start)
-            if coarse.ended or coarse.agreed(keys.starts):
+            search.run(start)
+            if search.ended or search.agreed(keys.starts):
                 break
-        fine = coarse if few is None else _refined(variant, coarse, scene.initial)
-        if fine.optima:
-            best_of.append((variant, distinct(fine.optima, variant.problem), None))
-        solves += fine.appraisals * len(scene.path.q)
-        if few is not None:
-            solves += coarse.appraisals * len(few.scene.path.q)
-        if ended := fine.ended:
+        solves += search.variant.response.exact_solves
+        for task in tasks[1:]:
+            search = _refined(variant_of(task, below), search, scene.initial)
+            solves += search.variant.response.exact_solves
+        if search.optima:
+            found = search.variant, distinct(search.optima, search.variant.problem), None
+            best_of.append(found)
+        if ended := search.ended:
             break
     best_of.sort(key=lambda found: _worth(found[1][0]))
     variant, optima, chosen_of = best_of[0]
@@ -195,7 +205,7 @@ def _refined(variant: Variant, coarse: _Search, initial: Floats) -> _Search:
     """
     fine = _Search(variant, coarse.steps, coarse.deadline, coarse.ended)
     for optimum in distinct(coarse.optima, variant.problem)[:REFINED]:
-        fine.run(optimum.y, optimum.steps)
+        fine.run(optimum.y, optimum)
         if fine.ended:
             break
     seen = variant.problem.appraise(initial)
@@ -234,8 +244,8 @@ class _Search:
         self.appraisals = 0
         self.ended = ended  # by the clock or by Ctrl-C, here or in the search before
 
-    def run(self, start: Floats, before: tuple[Step, ...] = ()) -> None:
-        """Follow the steps from ``start``, to which the steps ``before`` have led.
+    def run(self, start: Floats, before: Optimum | None = None) -> None:
+        """Follow the steps from ``start``, the optimum ``before`` of a rougher problem, if any.
 
         Where Ctrl-C hits before the start itself is judged, it is judged only if nothing is known.
         """
@@ -252,7 +262,7 @@ class _Search:
             if not self.optima and self.appraisals == 0:
                 raise
             return
-        self.optima.append(replace(found, steps=(*before, *found.steps)))
+        self.optima.append(found if before is None else _continued(before, found))
         self.appraisals += found.appraisals
         if found.end in (End.SECONDS, End.INTERRUPTED):
             self.ended = found.end
@@ -274,6 +284,14 @@ class _Search:
             if _worth(o)[0] <= best[0] + MET and o.objective <= best[1] * (1.0 + SAME) + 1e-16
         ]
         return len(same) >= AGREED or (best[0] <= MET and best[1] <= 1e-14)
+
+
+def _continued(before: Optimum, found: Optimum) -> Optimum:
+    """An optimum with the steps that led to its start; what was said there is its prediction."""
+    said = before.seen.residual
+    if found.predicted is None and said.shape == found.seen.residual.shape:
+        found = replace(found, predicted=said)
+    return replace(found, steps=(*before.steps, *found.steps))
 
 
 def _starts(scene: Scene, given: Sequence[Floats], count: int | str) -> Iterator[Floats]:
@@ -308,6 +326,7 @@ class Task:
     scene: Scene
     wanted: tuple[Wanted, ...]
     margin: float  # by which the limits of bands are drawn in, relative
+    models: ReducedModels | None = None  # that stand for exact solves
 
     @cached_property
     def bands(self) -> tuple[_Band, ...]:
@@ -315,17 +334,24 @@ class Task:
         return tuple(_bands(self.scene, self.wanted))
 
 
-def _thinned(scene: Scene, wanted: Sequence[Wanted], margin: float) -> Task | None:
+def _rougher(whole: Task, models: ReducedModels | None) -> list[Task]:
+    """The task on few samples, if it has many; by reduced models, if there are; and as it is."""
+    few = _thinned(whole)
+    tasks = [] if few is None else [replace(few, models=models)]
+    return [*tasks, *([] if models is None else [replace(whole, models=models)]), whole]
+
+
+def _thinned(whole: Task) -> Task | None:
     """The same on few samples; None where there are few, or a target would have none of them."""
-    path = scene.path
+    path = whole.scene.path
     if len(path.q) < 2 * FEW:
         return None
-    scene = replace(scene, trajectory=path.chosen(path.spread(FEW)))
+    scene = replace(whole.scene, trajectory=path.chosen(path.spread(FEW)))
     try:
-        task = Task(scene, target_frequencies(scene.file, scene.path), margin)
+        task = replace(whole, scene=scene, wanted=target_frequencies(scene.file, scene.path))
     except CaseError:
         return None
-    return task if len(task.bands) == len(tuple(_bands(scene, wanted))) else None
+    return task if len(task.bands) == len(tuple(_bands(scene, whole.wanted))) else None
 
 
 def _below(task: Task) -> Iterator[tuple[int, ...]]:
@@ -360,7 +386,8 @@ def variant_of(task: Task, below: tuple[int, ...]) -> Variant:
         objective=objective,
         least_change=(scene.initial, width) if not targets and not prices.any() else None,
     )
-    response = exact_response(scene, asked.modes)
+    exact = exact_response(scene, asked.modes)
+    response = exact if task.models is None else ReducedResponse(exact, task.models)
 
     def asks(names: Collection[str]) -> DesignProblem:
         some = asked.with_limits(names)
@@ -376,7 +403,7 @@ def variant_of(task: Task, below: tuple[int, ...]) -> Variant:
 
     labels = (band.wanted.requirement.label for band in task.bands)
     named = tuple(zip(labels, below, strict=True))
-    return Variant(named, asked, asks(asked.limit_names), asks)
+    return Variant(named, asked, asks(asked.limit_names), response, asks)
 
 
 def _mass(scene: Scene) -> Iterator[QuantityLimit]:

@@ -1,42 +1,63 @@
 """Frequencies along the trajectory and their slopes in the design, as the assignment asks for them.
 
-All come from exact solves at every sample: ∂f/∂y = (∂λ/∂y + ∂λ/∂q dq/dy) / (8π² f).
+    ∂f/∂y = (∂λ/∂y + ∂λ/∂q dq/dy) / (8π² f)
+
+Exactly, from a solve at every sample; or, of large models, from reduced models, each made about one
+design at a few poses and used as far as its own error estimate allows. Where it allows no more, one
+is made about the design that is asked for. Answers are judged by exact solves alone.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.assignment.requirements import Frequencies
+from eigassign.errors import AccuracyError, EigassignError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.modal.model import Model
+from eigassign.modal.reduced.model import ReducedModel
+from eigassign.modal.reduced.reduce import reduce
 from eigassign.modal.slopes import eigenvalue_slopes
 from eigassign.study.scene import AT_LEAST, BLOCK, Scene
 
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass
 class ExactResponse:
-    """The lowest ``count`` frequencies at every sample, each by an exact solve."""
+    """The lowest ``count`` frequencies at every sample, each by an exact solve.
+
+    Of a design that it was asked for before it knows them.
+    """
 
     model: Model
     path: Trajectories
     wanted: NDArray[np.bool_]  # (n_x,): where slopes are wanted
     count: int
+    exact_solves: int = 0  # so far
+    known: dict[bytes, Frequencies] = field(default_factory=dict)
 
     def __call__(self, y: Floats) -> Frequencies:
         """Raises EigassignError where the mechanism has no modes, or no pose, at this design."""
-        q, of_design = self.path.at(y)
-        x, n_q = self.model.x(q, y), q.shape[1]
-        hz, slopes = exact_slopes(self.model, x, self.count, self.wanted)
-        by_y = slopes[..., n_q:]
-        if self.path.follows_design:
-            by_y = by_y + slopes[..., :n_q] @ of_design
-        return Frequencies(hz, by_y)
+        key = y.tobytes()
+        if key not in self.known:
+            q, of_design = self.path.at(y)
+            self.exact_solves += len(q)
+            found = exact_slopes(self.model, self.model.x(q, y), self.count, self.wanted)
+            self.known[key] = _in_design(*found, of_design, self.path.follows_design)
+        return self.known[key]
+
+
+def _in_design(hz: Floats, slopes: Floats, of_design: Floats, follows: bool) -> Frequencies:
+    """From slopes in (q, y) to those in y alone; dq/dy is ``of_design`` where q follows y."""
+    n_q = slopes.shape[2] - of_design.shape[2]
+    by_y = slopes[..., n_q:]
+    return Frequencies(hz, by_y + slopes[..., :n_q] @ of_design if follows else by_y)
 
 
 def exact_slopes(model: Model, x: Floats, count: int, wanted: ArrayLike) -> tuple[Floats, Floats]:
@@ -50,6 +71,10 @@ def exact_slopes(model: Model, x: Floats, count: int, wanted: ArrayLike) -> tupl
         for at in range(0, len(x), block)
     ]
     lam, slopes = (np.concatenate(both) for both in zip(*parts, strict=True))
+    return _in_hz(lam, slopes)
+
+
+def _in_hz(lam: Floats, slopes: Floats) -> tuple[Floats, Floats]:
     hz = np.sqrt(lam) / (2.0 * np.pi)
     return hz, slopes / (8.0 * np.pi**2 * hz[..., None])
 
@@ -60,3 +85,86 @@ def exact_response(scene: Scene, count: int) -> ExactResponse:
     moving = np.full(scene.path.q.shape[1], scene.path.follows_design)
     moving[scene.model.pencil.n_joints :] = False  # loads do not follow the design
     return ExactResponse(scene.model, scene.path, np.append(moving, upper > lower), count)
+
+
+# --- Reduced models
+
+POSES = 3  # at which modes and their derivatives make a reduced model
+WATCHED = 5  # samples at which its error is estimated
+TRUSTED = 1e-3  # relative, of the estimate; the errors themselves were below 1e-5
+MOST = 8  # reduced models of one search
+
+
+@dataclass
+class ReducedModels:
+    """Reduced models about designs that a search came by, made as they are needed."""
+
+    model: Model
+    path: Trajectories
+    made: list[ReducedModel] = field(default_factory=list)  # the last used one last
+    tries: int = 0
+
+    def at(self, y: Floats, count: int) -> ReducedModel | None:
+        """One whose lowest ``count`` modes hold at y (n_y,); None where no more shall be made."""
+        watched = self._watched.at(y)[0]
+        for k in range(len(self.made) - 1, -1, -1):
+            if len(self.made[k].modes) >= count and self._holds(self.made[k], watched, y):
+                self.made.append(self.made.pop(k))
+                return self.made[-1]
+        if self.tries >= MOST:
+            return None
+        self.tries += 1
+        poses = self._poses.at(y)[0]
+        modes = tuple(range(1, count + 1))
+        try:
+            one = reduce(self.model.pencil, poses, np.tile(y, (len(poses), 1)), modes, 1)
+        except AccuracyError:
+            return None
+        if not self._holds(one, watched, y):
+            return None
+        self.made.append(one)
+        return one
+
+    @cached_property
+    def _watched(self) -> Trajectories:
+        return self.path.chosen(self.path.spread(WATCHED))
+
+    @cached_property
+    def _poses(self) -> Trajectories:
+        return self.path.chosen(self.path.spread(POSES))
+
+    @staticmethod
+    def _holds(reduced: ReducedModel, q: Floats, y: Floats) -> bool:
+        try:
+            return bool(reduced.error_estimate(q, y).max() <= TRUSTED)
+        except EigassignError:
+            return False
+
+
+@dataclass
+class ReducedResponse:
+    """The lowest frequencies by reduced models, by exact solves where none can be trusted."""
+
+    exact: ExactResponse
+    models: ReducedModels
+
+    @property
+    def exact_solves(self) -> int:
+        """Those that were needed so far."""
+        return self.exact.exact_solves
+
+    def __call__(self, y: Floats) -> Frequencies:
+        """Raises what `ExactResponse` raises."""
+        own = self.exact
+        reduced = self.models.at(y, own.count)
+        if reduced is None:
+            return own(y)
+        q, of_design = own.path.at(y)
+        found = reduced.eigenvalue_slopes(own.model.x(q, y), own.count, own.wanted)
+        return _in_design(*_in_hz(*found), of_design, own.path.follows_design)
+
+
+def reduced_models(scene: Scene) -> ReducedModels | None:
+    """For models of which exact solves are dear; None for others."""
+    large = scene.model.n_dof > DENSE_LIMIT
+    return ReducedModels(scene.model, scene.path) if large else None

@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
+import pytest
+import yaml
 from redesigned_arms import cart, extrapolated
 
+import eigassign as ea
 from eigassign.pipeline.run import prepare
 from eigassign.pipeline.stages import Stages
-from eigassign.study.design.response import exact_response
+from eigassign.study.design.response import (
+    MOST,
+    ReducedModels,
+    ReducedResponse,
+    exact_response,
+    reduced_models,
+)
+from eigassign.study.scene import Scene
 
 
 def test_a_coordinate_that_rests_may_follow_the_design_all_the_same() -> None:
@@ -17,3 +29,41 @@ def test_a_coordinate_that_rests_may_follow_the_design_all_the_same() -> None:
     slopes = response(y).slopes
     beside = extrapolated(lambda v: response(v).hz, y, 1e-3)
     np.testing.assert_allclose(slopes, beside, rtol=1e-7)
+
+
+@pytest.fixture(scope="module")
+def fine(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    """The paper's arm with a mesh of 363 unknowns."""
+    data = yaml.safe_load(Path("cases/two_link.yaml").read_text(encoding="utf-8"))
+    for link in data["mechanism"]["links"].values():
+        link["elements"] = 60
+    path = tmp_path_factory.mktemp("fine") / "fine.yaml"
+    path.write_text(yaml.safe_dump(data), encoding="utf-8")
+    return prepare(ea.load_case(path), Stages(lambda line: None), None)
+
+
+def test_reduced_models_stand_for_exact_solves_of_large_models(fine: Scene) -> None:
+    """At the initial design and far from it, where a second one may be made."""
+    models, exact = reduced_models(fine), exact_response(fine, 2)
+    assert models is not None
+    reduced = ReducedResponse(exact_response(fine, 2), models)
+    lower, upper = fine.bounds
+    for y in (fine.initial, 0.05 * lower + 0.95 * upper):
+        said, right = reduced(y), exact(y)
+        np.testing.assert_allclose(said.hz, right.hz, rtol=1e-5)
+        size = np.abs(right.slopes).max(axis=0)
+        assert (np.abs(said.slopes - right.slopes) <= 1e-3 * size).all()
+    assert reduced.exact_solves == 0
+
+
+def test_exact_solves_stand_in_where_no_reduced_model_may_be_made(fine: Scene) -> None:
+    models = ReducedModels(fine.model, fine.path, tries=MOST)
+    reduced = ReducedResponse(exact_response(fine, 1), models)
+    right = exact_response(fine, 1)(fine.initial)
+    np.testing.assert_array_equal(reduced(fine.initial).hz, right.hz)
+    assert reduced.exact_solves == len(fine.path.q)
+
+
+def test_small_models_need_no_reduced_ones() -> None:
+    scene = prepare(ea.load_case("cases/two_link.yaml"), Stages(lambda line: None), None)
+    assert reduced_models(scene) is None
