@@ -11,15 +11,16 @@ Reading order:
     sequential    the exact optimum: programs in a row inside a trust region
     requirements  targets, inequalities and quantities as the sequential method sees them
     identification  parameters from measured frequencies, their covariance and intervals
-    assign        build, solve, judge: from targets to the optimal design
     branching     branch and bound over catalogues, of any model whose relaxations can be solved
-    choosing      the best combinations of catalogues on the exact problem
     catalogue     the best combinations of catalogues on the linear model, proved
+    assign        build, solve, judge: from targets to the optimal design
+    choosing      the best combinations of catalogues on the exact problem
 """
 
 from __future__ import annotations
 
 from eigassign.assignment.assign import ActiveLimit, Assignment, solve_assignment
+from eigassign.assignment.branching import Catalogue
 from eigassign.assignment.program import (
     Bounds,
     Goal,
@@ -42,6 +43,7 @@ __all__ = [
     "ActiveLimit",
     "Assignment",
     "Bounds",
+    "Catalogue",
     "Goal",
     "LinearConstraint",
     "LinearModel",

@@ -259,13 +259,13 @@ def search_catalogue(
     relax: Callable[[Node, Floats | None], tuple[Floats, float] | None],
     fix: Callable[[Rows], tuple[Floats, float] | None],
     effort: Effort | None = None,
-    start: Rows | None = None,
+    starts: Iterable[Rows] = (),
 ) -> CatalogueSearch:
     """Combinations of a model that need not be linear or convex, by the same tree.
 
     ``relax(node, near)`` returns y (n_y,) and the objective at the optimum over the hull of a
     node's rows (`hull`), or None where there is none; ``near`` is the optimum of the node around
-    it, to start from. ``fix(rows)`` does so for one combination. ``start``: a combination to begin
+    it, to start from. ``fix(rows)`` does so for one combination. ``starts``: combinations to begin
     with. What rounding finds is improved by exchanging rows: of one catalogue while the tree is
     searched, of two at its end.
 
@@ -281,7 +281,7 @@ def search_catalogue(
     effort = effort or Effort()
     refuse_columns(catalogues, 1 + max(max(own.columns) for own in catalogues))
     model = _AnyModel(catalogues, relax, fix, time.monotonic() + effort.seconds)
-    known = model.improved(start, 1) if start else ()
+    known = (one for rows in starts for one in model.improved(rows, 1))
     found = branch_and_bound(model, model.root, replace(effort, keep=1), known)
     if not found.best and found.exhausted:
         names = tuple(own.name for own in catalogues)

@@ -1,7 +1,6 @@
 """The best combinations of the linear model: catalogues in the program of `program`.
 
-`solve_catalogue` minimises J(y) by the tree of `branching`; `solve_worst_case_catalogue` minimises
-max |A (y − y0) + b| as a mixed-integer linear program.
+`solve_catalogue` minimises J(y) by the tree of `branching`.
 
 **A bound that does not trust the solver.** J is convex. With any point x̂, the gradient g there, any
 multipliers μ of the constraints C x, and h = g + Cᵀμ, every admissible x has
@@ -18,8 +17,6 @@ small node are bounded all at once, by array operations; without continuous colu
 
 from __future__ import annotations
 
-import itertools
-import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -46,8 +43,6 @@ from eigassign.assignment.optimality import best_candidate
 from eigassign.assignment.program import QuadraticProgram, choose_scales, scaled_program
 from eigassign.assignment.solver import SETTINGS, Status, solve_program
 from eigassign.errors import InfeasibleError
-
-# --- The linear model
 
 
 def solve_catalogue(
@@ -108,6 +103,21 @@ def _within(program: QuadraticProgram, lower: Floats, upper: Floats) -> Quadrati
         upper=frozen(upper),
         scales=choose_scales(program.A, b, lower, upper, program.C, program.y0),
     )
+
+
+def held(
+    program: QuadraticProgram, catalogues: Sequence[Catalogue], rows: Rows
+) -> QuadraticProgram:
+    """The program of a combination's continuous columns, the others held at its rows.
+
+    Constraints of held columns alone are left out: the combination meets them.
+    """
+    lower, upper = program.lower.copy(), program.upper.copy()
+    for catalogue, row in zip(catalogues, rows, strict=True):
+        own = list(catalogue.columns)
+        lower[own] = upper[own] = catalogue.rows[row]
+    kept = np.flatnonzero(program.C[:, lower < upper].any(axis=1))
+    return _within(_constrained(program, kept), lower, upper)
 
 
 def _constrained(program: QuadraticProgram, kept: Iterable[int]) -> QuadraticProgram:
@@ -335,12 +345,7 @@ class _LinearModel:
         if self.continuous.size:
             if self.relax(tuple((row,) for row in rows), near, cutoff) is None:
                 return
-            free = [self.program.scales.free[i] for i in self.continuous]
-            lower, upper = y.copy(), y.copy()
-            lower[free], upper[free] = self.program.lower[free], self.program.upper[free]
-            # constraints of listed columns alone are met, in units of those columns
-            kept = np.flatnonzero(self.program.C[:, free].any(axis=1))
-            only = _within(_constrained(self.program, kept), lower, upper)
+            only = held(self.program, self.catalogues, rows)
             try:
                 y = best_candidate(only, solve_program(only).candidates)[0].y
             except InfeasibleError:
@@ -353,136 +358,3 @@ def _projected(A: Floats, columns: NDArray[np.int_]) -> Floats:
     U, s, _ = np.linalg.svd(A[:, columns], full_matrices=False)
     U = U[:, s > NOTHING * np.max(s, initial=0.0)]
     return np.asarray(A - U @ (U.T @ A))
-
-
-# --- The largest error of the linear model
-
-
-def solve_worst_case_catalogue(
-    program: QuadraticProgram, catalogues: Sequence[Catalogue], effort: Effort | None = None
-) -> CatalogueSearch:
-    """The combinations of least max |A (y − y0) + b|, by HiGHS as a mixed-integer linear program.
-
-    Every further combination of ``effort.keep`` is another run in which those before are excluded.
-    Arguments and errors are those of `solve_catalogue`.
-    """
-    effort = effort or Effort()
-    program, root = _listed(program, catalogues)
-    refuse_impossible(program)
-    mixed, end = _MixedInteger(program, catalogues, root), time.monotonic() + effort.seconds
-    best: list[Combination] = []
-    lower, nodes, exhausted = np.inf, 0, True
-    while len(best) < effort.keep:
-        left = max(end - time.monotonic(), 0.0)
-        answer = mixed.solve(time_limit=left, node_limit=effort.nodes - nodes)
-        nodes += max(int(answer.mip_node_count or 0), 1)
-        exhausted = answer.status in (0, 2)  # optimal, infeasible
-        if answer.mip_dual_bound is not None:
-            lower = min(lower, mixed.unit * answer.mip_dual_bound)
-        if answer.x is None:
-            break
-        rows = mixed.rows(answer.x)
-        best += mixed.fixed(rows)
-        mixed.exclude(rows)
-        if not exhausted or nodes >= effort.nodes:
-            break
-    if not best and exhausted:
-        raise _contradiction(program, catalogues, root, effort)
-    best = sorted(best, key=lambda one: (one.objective, one.rows))
-    bounds = [one.objective for one in best[:1]]
-    return answered(CatalogueSearch(tuple(best), min([lower, *bounds]), nodes, exhausted))
-
-
-class _MixedInteger:
-    """min t, |A x + b| ≤ t: x as in `scaled_program`, a 0–1 weight for each row of a catalogue."""
-
-    def __init__(
-        self, program: QuadraticProgram, catalogues: Sequence[Catalogue], root: Node
-    ) -> None:
-        self.program, self.catalogues, self.root = program, catalogues, root
-        self.free = list(program.scales.free)
-        scaled, scale, start = scaled_program(program), program.scales.y, program.y_start
-        n, sizes = len(self.free), [len(rows) for rows in root]
-        self.splits = n + np.cumsum([0, *sizes])
-        total = int(self.splits[-1]) + 1
-        b = program.A @ (start - program.y0) + program.b
-        error = float(np.max(np.abs(b))) or 1.0
-        self.unit = error * 1e-4  # HiGHS ends at a gap of 1e-6: 1e-10 of the error at the start
-        A = np.zeros((b.size, total))
-        A[:, :n] = program.A[:, self.free] * scale[self.free] / error
-        A[:, -1] = -1.0
-        above = A.copy()
-        above[:, :n] *= -1.0
-        self.parts: list[tuple[Floats, Any, Any]] = [
-            (above, -np.inf, b / error),
-            (A, -np.inf, -b / error),
-        ]
-        C = np.zeros((scaled.G.shape[0] - n, total))
-        C[:, :n] = scaled.G[n:]
-        self.parts.append((C, scaled.lower[n:], scaled.upper[n:]))
-        for k, (catalogue, allowed) in enumerate(zip(catalogues, root, strict=True)):
-            weights = slice(self.splits[k], self.splits[k + 1])
-            tie, one = np.zeros((len(catalogue.columns), total)), np.zeros((1, total))
-            for i, column in enumerate(catalogue.columns):
-                if column in self.free:
-                    away = catalogue.rows[list(allowed), i] - start[column]
-                    tie[i, self.free.index(column)] = 1.0
-                    tie[i, weights] = -away / scale[column]
-            one[0, weights] = 1.0
-            self.parts += [(tie, 0.0, 0.0), (one, 1.0, 1.0)]
-        self.lower = np.concatenate([scaled.lower[:n], np.zeros(total - n)])
-        self.upper = np.concatenate([scaled.upper[:n], np.ones(total - n)])
-        self.upper[-1] = np.inf
-
-    def solve(self, lower: Floats | None = None, **options: Any) -> Any:
-        """HiGHS's answer, over all combinations not excluded."""
-        from scipy.optimize import Bounds as Box
-        from scipy.optimize import LinearConstraint as Limits
-        from scipy.optimize import milp
-
-        cost, whole = np.zeros(self.lower.size), np.zeros(self.lower.size, dtype=np.int_)
-        cost[-1] = 1e4
-        whole[self.splits[0] : self.splits[-1]] = 1
-        limits: Any = {"mip_rel_gap": 0.0, **options}
-        return milp(
-            cost,
-            integrality=whole,
-            bounds=Box(self.lower if lower is None else lower, self.upper),
-            constraints=[Limits(*part) for part in self.parts if part[0].size],
-            options=limits,
-        )
-
-    def _places(self, x: Floats) -> list[int]:
-        """Of each catalogue, the place of the row with the largest weight."""
-        weights = itertools.pairwise(self.splits)
-        return [int(np.argmax(x[first:last])) for first, last in weights]
-
-    def rows(self, x: Floats) -> Rows:
-        return tuple(rows[i] for rows, i in zip(self.root, self._places(x), strict=True))
-
-    def _weights(self, rows: Rows) -> NDArray[np.int_]:
-        """Where the weights of these rows are among the variables."""
-        first = self.splits[:-1]
-        return first + [own.index(row) for own, row in zip(self.root, rows, strict=True)]
-
-    def exclude(self, rows: Rows) -> None:
-        cut = np.zeros((1, self.lower.size))
-        cut[0, self._weights(rows)] = 1.0
-        self.parts.append((cut, -np.inf, len(rows) - 1.0))
-
-    def fixed(self, rows: Rows) -> list[Combination]:
-        """The combination with its rows exact and the rest at its optimum; none if impossible."""
-        lower = self.lower.copy()
-        lower[self._weights(rows)] = 1.0
-        answer = self.solve(lower)
-        if answer.x is None:
-            return []
-        y = self.program.y_start.copy()
-        step = self.program.scales.y[self.free] * answer.x[: len(self.free)]
-        y[self.free] = np.clip(
-            y[self.free] + step, self.program.lower[self.free], self.program.upper[self.free]
-        )
-        for catalogue, row in zip(self.catalogues, rows, strict=True):
-            y[list(catalogue.columns)] = catalogue.rows[row]
-        errors = self.program.A @ (y - self.program.y0) + self.program.b
-        return [Combination(rows, frozen(y), float(np.max(np.abs(errors))))]

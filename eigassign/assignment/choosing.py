@@ -28,6 +28,7 @@ from eigassign.assignment.program import Bounds
 from eigassign.assignment.sequential import MET, DesignProblem, End, Optimum, minimise
 from eigassign.errors import AccuracyError, EigassignError, InfeasibleError
 
+RELAXED = 3  # starts of the relaxation of all combinations
 KEPT = 5  # combinations that are told of
 TOUCH = 1e-7  # of a constraint's terms: what the programs leave of a limit
 SECONDS = 600.0  # where the case gives none
@@ -59,9 +60,9 @@ def choose(
     deadline: float = np.inf,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Chosen:
-    """The combination with the least violation, then the least F; begun near ``starts[0]``.
+    """The combination with the least violation, then the least F; begun near ``starts``.
 
-    Each start is tried at the root of the tree. If no combination meets all limits, the tree is
+    The first few are tried at the root of the tree. If no combination meets all limits, the tree is
     searched anew for the one that misses them least. ``deadline`` is a time of `time.monotonic`.
     Raises AccuracyError where no combination has an answer.
     """
@@ -132,8 +133,8 @@ class _Tree:
 
         left = min(self.deadline - time.monotonic(), SECONDS)
         effort = Effort(keep=KEPT, seconds=max(left, 0.0))
-        start = self.nearest(self.starts[0])
-        return search_catalogue(self.catalogues, relax, fix, effort, start)
+        starts = dict.fromkeys(map(self.nearest, self.starts))
+        return search_catalogue(self.catalogues, relax, fix, effort, starts)
 
     def _relaxed(self, node: Node, near: Floats | None) -> Iterator[Optimum]:
         self.nodes += 1
@@ -145,7 +146,7 @@ class _Tree:
             upper=bounds.upper,
             constraints=(*self.problem.constraints, *rows),
         )
-        for start in self.starts if near is None else (near,):
+        for start in self.starts[:RELAXED] if near is None else (near,):
             optimum = self._minimised(problem, start)
             if optimum is not None:
                 if optimum.end in STOPPED:

@@ -151,7 +151,7 @@ def test_a_start_that_nothing_beats_is_the_answer_even_if_no_relaxation_is_solve
     arm, catalogues = Arm(9), lists(9, 7, 1)
     best = search_catalogue(catalogues, arm.relax(catalogues), arm.fix(catalogues)).best[0]
     search = search_catalogue(
-        catalogues, lambda node, near: None, arm.fix(catalogues), start=best.rows
+        catalogues, lambda node, near: None, arm.fix(catalogues), starts=[best.rows]
     )
     assert search.best[0].rows == best.rows
 

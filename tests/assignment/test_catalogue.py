@@ -8,7 +8,7 @@ from assignment_problems import goal
 
 from eigassign.assignment import Bounds, LinearConstraint, build_program
 from eigassign.assignment.branching import Catalogue, Effort
-from eigassign.assignment.catalogue import solve_catalogue, solve_worst_case_catalogue
+from eigassign.assignment.catalogue import solve_catalogue
 from eigassign.errors import AccuracyError, InfeasibleError, UsageError
 
 
@@ -102,7 +102,7 @@ def least(p, Y, free):
     return best
 
 
-def brute_force(p, catalogues, judge=objectives):
+def brute_force(p, catalogues):
     """Objectives of all distinct feasible combinations, in increasing order."""
     lists = [np.unique(c.rows, axis=0) for c in catalogues]
     places = np.indices([rows.shape[0] for rows in lists]).reshape(len(lists), -1)
@@ -110,14 +110,14 @@ def brute_force(p, catalogues, judge=objectives):
     for catalogue, rows, place in zip(catalogues, lists, places, strict=True):
         Y[:, list(catalogue.columns)] = rows[place]
     free = sorted(set(range(p.y0.size)) - {j for c in catalogues for j in c.columns})
-    found = least(p, Y, free) if free else np.where(feasible(p, Y), judge(p, Y), np.inf)
+    found = least(p, Y, free) if free else np.where(feasible(p, Y), objectives(p, Y), np.inf)
     return np.sort(found[np.isfinite(found)])
 
 
-def found(solve, p, catalogues, effort=None):
+def found(p, catalogues):
     """Objectives of what is found; none where it is proved that there is nothing."""
     try:
-        search = solve(p, catalogues, effort)
+        search = solve_catalogue(p, catalogues)
     except InfeasibleError:
         return np.zeros(0)
     assert search.exhausted
@@ -134,14 +134,14 @@ def found(solve, p, catalogues, effort=None):
 def test_the_best_five_of_up_to_1e5_combinations_are_those_of_brute_force(seed):
     p, catalogues = random_case(seed, 100_000, n_constraints=seed % 3)
     want = brute_force(p, catalogues)[:5]
-    np.testing.assert_allclose(found(solve_catalogue, p, catalogues), want, rtol=1e-9)
+    np.testing.assert_allclose(found(p, catalogues), want, rtol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(100, 108))
 def test_so_are_they_beside_continuous_parameters(seed):
     p, catalogues = random_case(seed, 1_000, n_continuous=1 + seed % 2, n_constraints=seed % 3)
     want = brute_force(p, catalogues)[:5]
-    got = found(solve_catalogue, p, catalogues)
+    got = found(p, catalogues)
     np.testing.assert_allclose(got, want, rtol=1e-7, atol=1e-13)
 
 
@@ -152,7 +152,7 @@ def test_so_are_they_on_many_cases(seed):
     most = (100_000, 10_000, 1_000)[n_continuous]
     p, catalogues = random_case(seed, most, n_continuous, n_constraints=seed % 3)
     want = brute_force(p, catalogues)[:5]
-    got = found(solve_catalogue, p, catalogues)
+    got = found(p, catalogues)
     np.testing.assert_allclose(got, want, rtol=1e-7, atol=1e-13)
 
 
@@ -165,31 +165,6 @@ def test_the_random_cases_are_of_all_kinds():
         kinds["impossible"] += count == 0
         kinds["few"] += 0 < count < 5
     assert min(kinds.values()) >= 1, kinds
-
-
-def worst(p, Y):
-    return np.abs((Y - p.y0) @ p.A.T + p.b).max(axis=1)
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_the_least_worst_case_is_that_of_brute_force(seed):
-    p, catalogues = random_case(seed, 3_000, n_constraints=seed % 3)
-    want = brute_force(p, catalogues, worst)[:5]
-    # HiGHS ends at a gap of 1e-10 of the error at the start
-    np.testing.assert_allclose(found(solve_worst_case_catalogue, p, catalogues), want, rtol=1e-8)
-
-
-def test_the_worst_case_beside_a_continuous_parameter_is_that_of_a_fine_grid():
-    l0, slope = smooth(3, 4, n_t=30)
-    p = program(l0, slope, -np.ones(4), np.ones(4))
-    values = np.array([[-0.4], [0.1], [0.3]])
-    catalogues = [Catalogue(f"v{j}", (j,), values) for j in range(3)]
-    Y = np.array(list(itertools.product(*[values[:, 0]] * 3, np.linspace(-1, 1, 2001))))
-    best = solve_worst_case_catalogue(p, catalogues).best[0]
-    grid = worst(p, Y)
-    np.testing.assert_array_equal(best.y[:3], Y[np.argmin(grid), :3])
-    assert best.objective <= grid.min()
-    assert best.objective == pytest.approx(grid.min(), abs=1e-3 * np.abs(p.A[:, 3]).max())
 
 
 def three_valued(seed, decay):
@@ -234,15 +209,14 @@ BASE = ([1.2, 1.1, 0.9], [[-0.1, 0.02], [0.03, -0.1], [0.05, 0.05]])
 PAIR = [Catalogue("rod", (0,), [[0.0], [1.0]]), Catalogue("hub", (1,), [[0.0], [1.0]])]
 
 
-@pytest.mark.parametrize("solve", [solve_catalogue, solve_worst_case_catalogue])
-def test_constraints_that_only_the_relaxation_meets_are_named(solve):
+def test_constraints_that_only_the_relaxation_meets_are_named():
     constraints = [
         LinearConstraint("fine", np.array([1.0, 0.0]), upper=2.0),
         LinearConstraint("half", np.array([1.0, 1.0]), 0.4, 0.6),
     ]
     p = program(*BASE, [0, 0], [1, 1], constraints)
     with pytest.raises(InfeasibleError, match="'rod', 'hub' meets 'half'") as e:
-        solve(p, PAIR)
+        solve_catalogue(p, PAIR)
     assert e.value.constraints == ("half",)
 
 

@@ -11,7 +11,7 @@ import pytest
 from eigassign.case import parse
 from eigassign.pipeline.run import Result, solve_case
 from eigassign.study.built_case import Case
-from eigassign.study.results import AssignmentRow
+from eigassign.study.results import AssignmentRow, CatalogueRow
 
 TEXT = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
 HEAD, REST = TEXT.replace("samples: 152", "samples: 11").split("design: #")
@@ -70,50 +70,100 @@ def test_linear_limits_that_contradict_leave_a_compromise() -> None:
     assert sum(result.design.values()) == pytest.approx(0.24, rel=1e-6)  # 20 % off both
 
 
-def test_catalogues_give_the_combination_that_brute_force_gives() -> None:
+SECTIONS = {
+    "light": (6e-4, 2.9e-8),
+    "normal": (7.06317856e-4, 3.97e-8),
+    "heavy": (9e-4, 6.4e-8),
+}
+
+
+def with_lists(masses: str, diameters: str, more: str = "", hz: float = 190.0) -> Case:
+    """The arm with lists of one mass, one diameter and three sections."""
     head = HEAD.replace(
         "rod: {area: 7.06317856e-4, bending_inertia: 3.97e-8}",
         "rod: {shape: circle, diameter: 30 mm}\n"
         "    fore: {area: 7.06317856e-4, bending_inertia: 3.97e-8}",
     ).replace("section: rod, elements: 3", "section: fore, elements: 3")
-    design = """\
-design:
-  m1: {parameter: bodies.elbow_mass.mass, values: [0, 80 g, 160 g, 250 g]}
-  d: {parameter: sections.rod.diameter, values: [28 mm, 30 mm, 32 mm]}
-  fore:
-    choices:
-      light: {sections.fore.area: 6e-4, sections.fore.bending_inertia: 2.9e-8}
-      normal: {sections.fore.area: 7.06317856e-4, sections.fore.bending_inertia: 3.97e-8}
-      heavy: {sections.fore.area: 9e-4, sections.fore.bending_inertia: 6.4e-8}
-"""
-    case = Case(parse((head + design + TAIL + "  - {mode: 1, frequency: 190 Hz}\n").encode(), "c"))
-    result = solve_case(case)
+    choices = "".join(
+        f"      {name}: {{sections.fore.area: {area}, sections.fore.bending_inertia: {inertia}}}\n"
+        for name, (area, inertia) in SECTIONS.items()
+    )
+    design = (
+        f"design:\n  m1: {{parameter: bodies.elbow_mass.mass, values: [{masses}]}}\n"
+        f"  d: {{parameter: sections.rod.diameter, values: [{diameters}]}}\n"
+        f"  fore:\n    choices:\n{choices}"
+    )
+    targets = f"  - {{mode: 1, frequency: {hz} Hz}}\n"
+    return Case(parse((head + design + TAIL + targets + more).encode(), "case.yaml"))
+
+
+def exact_objectives(case: Case, hz: float = 190.0) -> dict[tuple[str, ...], float]:
+    """The weighted mean square error of every combination, by its labels."""
     model, q = case.model(), case.trajectory.q
     weights = np.convolve(np.diff(case.trajectory.time_s), [0.5, 0.5])
-    sections = {
-        "light": (6e-4, 2.9e-8),
-        "normal": (7.06317856e-4, 3.97e-8),
-        "heavy": (9e-4, 6.4e-8),
-    }
     found = {}
-    for m, d, name in itertools.product((0, 0.08, 0.16, 0.25), (0.028, 0.03, 0.032), sections):
-        error = model.frequencies(q, [m, d, *sections[name]], 1)[:, 0] / 190.0 - 1.0
-        found[m, d, name] = float(weights @ error**2 / weights.sum())
-    best = min(found, key=lambda key: found[key])
+    for rows in itertools.product(*(range(len(c.rows)) for c in case.file.design.catalogues)):
+        pairs = list(zip(case.file.design.catalogues, rows, strict=True))
+        y = [value for own, row in pairs for value in own.rows[row]]
+        error = model.frequencies(q, y, 1)[:, 0] / hz - 1.0
+        label = tuple(own.choices[row] for own, row in pairs)
+        found[label] = float(weights @ error**2 / weights.sum())
+    return found
+
+
+def searched(case: Case) -> tuple[Result, CatalogueRow]:
+    result = solve_case(case)
     row = result.results.assignment
     assert row is not None
     assert row.catalogue is not None
-    assert row.objective_optimal == pytest.approx(found[best], rel=1e-9)
-    assert [r.choice for r in result.results.design] == [
-        f"{best[0]:g}",
-        f"{best[1]:g}",
-        *[best[2]] * 2,
-    ]
     assert row.optimality.kind == "bounded"
-    assert row.catalogue.gap == 0.0
-    listed = [one.objective for one in row.catalogue.best]
+    return result, row.catalogue
+
+
+def test_catalogues_give_the_combination_that_brute_force_gives() -> None:
+    case = with_lists("0, 80 g, 160 g, 250 g", "28 mm, 30 mm, 32 mm")
+    result, search = searched(case)
+    found = exact_objectives(case)
+    best = min(found, key=lambda key: found[key])
+    assert search.best[0].objective == pytest.approx(found[best], rel=1e-9)
+    assert [row.choice for row in result.results.design] == [best[0], best[1], best[2], best[2]]
+    assert search.gap == 0.0
+    assert search.best[0].choices["fore"] == best[2]
+    listed = [one.objective for one in search.best]
     assert listed == sorted(listed)
-    assert row.catalogue.best[0].choices["fore"] == best[2]
+    for one in search.best:
+        assert one.objective == pytest.approx(found[tuple(one.choices.values())], rel=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hz", [170.0, 185.0, 200.0, 230.0])
+def test_so_they_do_of_hundreds_whatever_is_wanted(hz: float) -> None:
+    masses = ", ".join(f"{20 * k} g" for k in range(12))
+    case = with_lists(masses, ", ".join(f"{26 + 0.5 * k} mm" for k in range(13)), hz=hz)
+    _, search = searched(case)
+    least = min(exact_objectives(case, hz).values())  # of 468
+    assert search.best[0].objective == pytest.approx(least, rel=1e-9)
+
+
+def test_the_one_shot_of_catalogues_is_the_best_of_the_linear_model() -> None:
+    """Rejected or confirmed by the whole list of J of eqs. (13)–(14), from the expansion itself."""
+    case = with_lists(
+        "0, 80 g, 160 g, 250 g", "28 mm, 30 mm, 32 mm", "assignment: {method: one_shot}\n"
+    )
+    result, search = searched(case)
+    weights = np.convolve(np.diff(case.trajectory.time_s), [0.5, 0.5])
+    wanted, J = (2.0 * np.pi * 190.0) ** 2, {}
+    for label in exact_objectives(case):
+        named = zip(case.file.design.catalogues, label, strict=True)
+        y = np.array([v for own, name in named for v in own.rows[own.choices.index(name)]])
+        hz = result.linearised.frequencies(case.trajectory.q, y)[:, 0]
+        J[label] = float(weights @ ((2.0 * np.pi * hz) ** 2 / wanted - 1.0) ** 2)
+    best = sorted(J, key=lambda key: J[key])[:5]
+    assert [tuple(one.choices.values()) for one in search.best] == best
+    assert search.gap == 0.0
+    assert search.nodes is not None
+    assert result.results.error is not None
+    assert result.results.error.one_shot == result.results.error.exact
 
 
 def test_mode_1_at_least_f_of_held_joints_is_proved() -> None:

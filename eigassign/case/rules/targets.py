@@ -119,11 +119,11 @@ def _no_pose(tree: Tree, path: KeyPath, body: object) -> Iterator[Finding]:
 
 
 def one_shot_has_a_quadratic_program(tree: Tree) -> Iterator[Finding]:
-    """The paper's program has wanted frequencies, bounds and linear constraints, nothing else."""
+    """The paper's program has wanted frequencies, bounds, lists, linear constraints, no more."""
     if text(tree, "assignment", "method") != "one_shot":
         return
-    instead = "method: one_shot takes frequency targets of numbered modes, bounds and linear "
-    instead += "constraints only; take method: sequential"
+    instead = "method: one_shot takes frequency targets of numbered modes, bounds, lists and "
+    instead += "linear constraints only; take method: sequential"
     if text(tree, "assignment", "objective") == "worst_case":
         yield ("assignment", "objective"), f"is not least_squares; {instead}"
     for k, target in enumerate(entries(tree, "targets")):
@@ -132,10 +132,6 @@ def one_shot_has_a_quadratic_program(tree: Tree) -> Iterator[Finding]:
             yield ("targets", k, kind), f"is no wanted frequency; {instead}"
     for path, _ in followed_modes(tree):
         yield path, f"is followed by its shape; {instead}"
-    for name, body in design_entries(tree):
-        for key in ("values", "choices"):
-            if at(body, key) is not None:
-                yield ("design", name, key), f"is a catalogue; {instead}"
     mass = at(tree, "design", "mass")
     if mass is not None and not is_entry(mass):
         yield ("design", "mass"), f"limits the mass; {instead}"

@@ -83,9 +83,8 @@ def _numbers(tree: Tree) -> Iterator[tuple[KeyPath, object]]:
 def _prices(tree: Tree) -> Iterator[tuple[KeyPath, object]]:
     """Prices for one SI unit of their property."""
     for name, body in design_entries(tree):
-        given = [((), text(body, "parameter"), at(body, "price"))]
-        given += [((path,), path, price) for path, price in items(body, "price")]
-        for place, path, price in given:
+        of_choices = (((path,), path, price) for path, price in items(body, "price"))
+        for place, path, price in (((), text(body, "parameter"), at(body, "price")), *of_choices):
             if isinstance(price, str):
                 prop = known_property(tree, path)
                 try:

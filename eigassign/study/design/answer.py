@@ -1,7 +1,8 @@
 """From a case's targets to its answer: the paper's one shot, and the optimum of the exact problem.
 
-The one shot is always made where all that is asked is wanted frequencies within bounds and linear
-constraints; it is the answer of `method: one_shot`, and a start of the sequential method otherwise.
+The one shot is always made where all that is asked is wanted frequencies within bounds, lists and
+linear constraints; it is the answer of `method: one_shot`, and a start of the sequential method
+otherwise.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from eigassign.study.design.conclusions import (
 )
 from eigassign.study.design.judgement import verdict
 from eigassign.study.design.one_shot import assign_design
-from eigassign.study.design.optimum import MASS, Found, find_optimum
+from eigassign.study.design.optimum import MASS, Found, Task, find_optimum, variant_of
 from eigassign.study.design.wanted import Wanted
 from eigassign.study.results import (
     ActiveRow,
@@ -62,16 +63,10 @@ def require_assignable(file: CaseFile) -> None:
 
 
 def _not_yet(file: CaseFile) -> Iterator[Problem]:
-    """What is read but cannot be assigned so far, or not by the method asked for."""
+    """What is read but cannot be assigned so far."""
     for each in file.requirements:
         if each.followed is not None:
             yield file.problem(f"{each.place}.mode", "following a shape is not assigned yet")
-    if file.assignment.method == "one_shot" and not _has_one_shot(file):
-        yield file.problem(
-            "assignment.method",
-            "one_shot takes wanted frequencies within bounds and linear constraints only; "
-            "use sequential",
-        )
 
 
 @dataclass(frozen=True)
@@ -98,9 +93,9 @@ class Answer:
 def find_answer(scene: Scene, wanted: Sequence[Wanted], progress: Callable[[str], None]) -> Answer:
     """The design asked for by the case's method.
 
-    Raises InfeasibleError where bounds and linear constraints contradict each other under `method:
-    one_shot`, or no combination of catalogues meets linear constraints; AccuracyError where
-    `method: one_shot` cannot be vouched for.
+    Raises InfeasibleError where bounds, lists and linear constraints contradict each other under
+    `method: one_shot`, or no combination of catalogues meets linear constraints; AccuracyError
+    where `method: one_shot` cannot be vouched for.
     """
     sequential = scene.file.assignment.method == "sequential"
     one_shot, notes = None, []
@@ -116,13 +111,19 @@ def find_answer(scene: Scene, wanted: Sequence[Wanted], progress: Callable[[str]
             raise AccuracyError("the one-shot program has no answer")
         lam = tuple(hz_from_lam(values) for values in one_shot.lam)
         return Answer(one_shot.y, lam, one_shot, None, tuple(notes))
-    starts = [] if one_shot is None else [one_shot.y]
-    found = least_changed(find_optimum(scene, wanted, starts, progress), scene.initial)
+    found = least_changed(find_optimum(scene, wanted, _designs(one_shot), progress), scene.initial)
     contradiction = conflict(found, scene.file.assignment.steps)
     notes += idle_notes(scene.model.y_names, found.variant, found.best.seen)
     notes += _band_notes(found)
     predicted = tuple(_predicted(found, wanted))
     return Answer(found.best.y, predicted, one_shot, found, tuple(notes), contradiction)
+
+
+def _designs(one_shot: Assignment | None) -> list[Floats]:
+    """The one shot, of catalogues the best few combinations."""
+    if one_shot is None:
+        return []
+    return [one_shot.y] if one_shot.search is None else [one.y for one in one_shot.search.best]
 
 
 def _band_notes(found: Found) -> Iterator[str]:
@@ -155,8 +156,7 @@ def _in_words(scene: Scene, wanted: Sequence[Wanted], contradiction: Conflict | 
 def _has_one_shot(file: CaseFile) -> bool:
     """Whether the quadratic program of eqs. (13)–(14) takes all that the case asks."""
     plain = (one.kind == "frequency" and one.followed is None for one in file.requirements)
-    limited = file.design.catalogues or file.design.mass is not None
-    return bool(file.requirements) and all(plain) and not limited
+    return bool(file.requirements) and all(plain) and file.design.mass is None
 
 
 def _predicted(found: Found, wanted: Sequence[Wanted]) -> Iterator[Floats | None]:
@@ -198,7 +198,7 @@ def assignment_row(
         objective=keys.objective,
         objective_initial=initial[1],
         objective_optimal=optimal[1],
-        optimality=_optimality(scene, found),
+        optimality=_optimality(scene, answer),
         verdict=word,
         reason=reason,
         steps=() if found is None else tuple(_steps(found)),
@@ -213,7 +213,7 @@ def assignment_row(
         max_error_given=keys.max_error is not None,
         clearances=clearances,
         conflict=() if answer.conflict is None else answer.conflict.names,
-        catalogue=None if found is None else _catalogue(scene, found),
+        catalogue=_catalogue(scene, answer, wanted),
     )
 
 
@@ -221,18 +221,23 @@ def _clearance(found: Clearance) -> ClearanceRow:
     return ClearanceRow(found.label, found.below, found.clear, found.room, found.counted)
 
 
-def _catalogue(scene: Scene, found: Found) -> CatalogueRow | None:
-    if found.chosen is None:
+def _catalogue(scene: Scene, answer: Answer, wanted: Sequence[Wanted]) -> CatalogueRow | None:
+    """The search of the catalogues; of the one shot's best few what they are exactly worth."""
+    own, found, one_shot = scene.file.design.catalogues, answer.found, answer.one_shot
+    if found is not None and found.chosen is not None:
+        search = found.chosen.search
+        of_rows = found.chosen.rows
+        worth = [(o.y, o.objective, o.seen.violation) for o in found.chosen.optima]
+    elif found is None and one_shot is not None and one_shot.search is not None:
+        search = one_shot.search
+        of_rows = tuple(one.rows for one in search.best)
+        exact = variant_of(Task(scene, tuple(wanted), 0.0), ()).problem
+        worth = [(one.y, exact(one.y, exact.appraise(one.y)), 0.0) for one in search.best]
+    else:
         return None
-    own, search = scene.file.design.catalogues, found.chosen.search
     best = tuple(
-        CombinationRow(
-            {c.name: c.choices[row] for c, row in zip(own, rows, strict=True)},
-            optimum.y,
-            optimum.objective,
-            optimum.seen.violation,
-        )
-        for rows, optimum in zip(found.chosen.rows, found.chosen.optima, strict=True)
+        CombinationRow({c.name: c.choices[k] for c, k in zip(own, rows, strict=True)}, *each)
+        for rows, each in zip(of_rows, worth, strict=True)
     )
     if search is None:
         return CatalogueRow(None, None, best)
@@ -255,9 +260,18 @@ def _merits(
     return (0.0, before), (0.0, after)
 
 
-def _optimality(scene: Scene, found: Found | None) -> OptimalityRow:
+def _optimality(scene: Scene, answer: Answer) -> OptimalityRow:
+    found, one_shot = answer.found, answer.one_shot
     if found is None:
-        return OptimalityRow("local", None, None, "the optimum of the linearised problem only")
+        search = one_shot and one_shot.search
+        if not search:
+            return OptimalityRow("local", None, None, "the optimum of the linearised problem only")
+        gap = search.relative_gap
+        words = (
+            f"the best of the catalogues to {100 * gap:.2g} % of the objective of the linearised "
+            f"problem only, by branch and bound in {search.nodes} nodes"
+        )
+        return OptimalityRow("bounded", None, gap, words)
     best, chosen = found.best, found.chosen
     many = f"{found.starts} start{'s' if found.starts > 1 else ''}"
     if chosen is not None and chosen.search is not None:

@@ -1,7 +1,7 @@
 """The paper's answer: one quadratic program about one expansion point.
 
 The linear model of eq. (9) comes from the partially linearised expansion, the design from the
-quadratic program of eqs. (13)–(14) (`eigassign.assignment`).
+quadratic program of eqs. (13)–(14) (`eigassign.assignment`), over catalogues by branch and bound.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 from eigassign.assignment import (
     Assignment,
     Bounds,
+    Catalogue,
     Goal,
     LinearConstraint,
     LinearModel,
     solve_assignment,
 )
-from eigassign.case import CaseFile, Catalogue
+from eigassign.case import CaseFile
 from eigassign.errors import AccuracyError
 from eigassign.study.design.wanted import Wanted, time_weights
 from eigassign.study.results import DesignRow, SolverRow
@@ -55,6 +56,15 @@ def assign_design(scene: Scene, targets: Sequence[Wanted]) -> Assignment:
         Bounds(*scene.bounds),
         linear_constraints(file),
         _names(file),
+        catalogues(file),
+    )
+
+
+def catalogues(file: CaseFile) -> tuple[Catalogue, ...]:
+    """The case's catalogues, as the assignment takes them."""
+    return tuple(
+        Catalogue(own.name, own.columns, np.array(own.rows), own.choices)
+        for own in file.design.catalogues
     )
 
 
@@ -96,9 +106,7 @@ def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:
         scene.file.design_units,
         scene.initial,
     )
-    chosen = {
-        k: choice for own in scene.file.design.catalogues for k, choice in _chosen(own, optimal)
-    }
+    chosen = {k: choice for own in catalogues(scene.file) for k, choice in _chosen(own, optimal)}
     return tuple(
         DesignRow(
             name,
@@ -120,7 +128,7 @@ def _chosen(catalogue: Catalogue, y: Floats) -> Iterator[tuple[int, str]]:
     row = next((k for k, row in enumerate(catalogue.rows) if np.array_equal(row, own)), None)
     if row is not None:
         for column in catalogue.columns:
-            yield column, catalogue.choices[row]
+            yield column, catalogue.labels[row]
 
 
 def solver_row(assignment: Assignment) -> SolverRow:

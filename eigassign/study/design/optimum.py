@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from eigassign.assignment import Bounds, LinearConstraint
-from eigassign.assignment.branching import Catalogue
-from eigassign.assignment.choosing import Chosen, choose
+from eigassign.assignment.choosing import KEPT, RELAXED, Chosen, choose
 from eigassign.assignment.feasibility import constraints_agree
 from eigassign.assignment.requirements import (
     FrequencyLimit,
@@ -37,10 +36,9 @@ from eigassign.assignment.sequential import (
     distinct,
     minimise,
 )
-from eigassign.case import CaseFile
 from eigassign.errors import CaseError, EigassignError
 from eigassign.study.design.clearance import Band, Clearance, prove_clear, wanting
-from eigassign.study.design.one_shot import linear_constraints
+from eigassign.study.design.one_shot import catalogues, linear_constraints
 from eigassign.study.design.response import (
     ExactResponse,
     ReducedModels,
@@ -53,7 +51,6 @@ from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 MOST_BELOW = 24  # combinations of numbers of modes below the bands that are tried
-RELAXED = 3  # starts of the relaxation of all combinations
 MASS = "design.mass"  # what the limit of the whole mechanism's mass is called
 STARTS = 8  # with `starts: auto`, at most
 MARGIN = 1e-5  # relative, by which modes keep off a band at the samples at least
@@ -134,20 +131,20 @@ def _search_all(
     least, relative to the limits.
     """
     keys = scene.file.assignment
-    catalogues = listed(scene.file)
+    listed = catalogues(scene.file)
     whole = Task(scene, tuple(wanted), margin)
-    tasks = [whole] if catalogues else _rougher(whole, models)
+    tasks = [whole] if listed else _rougher(whole, models)
     best_of: list[tuple[Variant, tuple[Optimum, ...], Chosen | None]] = []
     made, solves = 0, 0
     ended: End | None = None
     for below in _below(whole):
-        if catalogues:
+        if listed:
             variant = variant_of(whole, below)
-            near = list(starts[:RELAXED])
-            chosen = choose(variant.problem, catalogues, near, keys.steps, deadline, progress)
+            near = list(starts[: KEPT + 1])
+            chosen = choose(variant.problem, listed, near, keys.steps, deadline, progress)
             best_of.append((variant, chosen.optima, chosen))
             solves += chosen.appraisals * len(scene.path.q)
-            made += len(near)
+            made += min(len(near), RELAXED)
             if chosen.search is None:
                 break
             continue
@@ -179,14 +176,6 @@ def _search_all(
         starts=made,
         exact_solves=solves + len(scene.path.q),
         chosen=chosen_of,
-    )
-
-
-def listed(file: CaseFile) -> tuple[Catalogue, ...]:
-    """The case's catalogues, as the search takes them."""
-    return tuple(
-        Catalogue(own.name, own.columns, np.array(own.rows), own.choices)
-        for own in file.design.catalogues
     )
 
 

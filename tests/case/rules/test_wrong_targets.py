@@ -96,8 +96,6 @@ ASSIGNMENT = {
 NOT_IN_ONE_SHOT = {
     "limit": (T, "  - {mode: 1, ¦at_least: 3}\n", "targets[0].at_least"),
     "followed mode": (T, "  - {¦mode: {like: 1, at: {time: 0}}, frequency: 3}\n", "targets[0].mode"),
-    "values": (D, f"  d: {{{ROD}, ¦values: [30 mm]}}\n", "design.d.values"),
-    "choices": (D, f"  d: {{¦choices: {{x: {{{ONE}}}}}}}\n", "design.d.choices"),
     "mass": (D, "  ¦mass: {max: 3}\n", "design.mass"),
 }
 # fmt: on
