@@ -42,6 +42,7 @@ from eigassign.modal.taylor.recursion import expand_subspace
 from eigassign.series.multi_index import lower_set, total_degree
 
 Floats = NDArray[np.float64]
+INSTANTS = 9  # in the shipped cases their worst is within 7 % of that of 45, in one within 21 %
 MIXED = 0.05  # Σ_j |η_j|² from which on a mode is followed together with its near neighbours
 
 
@@ -64,7 +65,7 @@ def motion_effect(
     motion: Rates,
     y: Floats,
     wanted: tuple[int, ...],
-    instants: int = 15,
+    instants: int = INSTANTS,
 ) -> MotionEffect:
     """Effect at the fastest instants of a motion at design y."""
     chosen = _fastest(motion, instants)

@@ -39,19 +39,28 @@ def accuracy_notes(
 ) -> list[str]:
     """Lines on discretisation, truncation, estimated approximation error and round-off, per mode.
 
-    ``optimum`` (n_y,) is one more design at which the truncation is looked at.
+    ``optimum`` (n_y,) is one more design at which the truncation is looked at; where there is one,
+    the expansion is compared with exact solves at every sample, and its error not estimated too.
     """
     modes = scene.expansions.modes
     q = scene.q0[None] if scene.trajectory is None else scene.path.q
     x = scene.model.x(_spread(q, POSES), scene.initial)
     lines = _mesh_lines(discretisation(x, modes), modes)
-    few = _spread(q, SAMPLES)
     lines += truncation_notes(scene, optimum)
-    estimate = scene.expansions.estimate(few, scene.initial).max(axis=0)
+    if optimum is None:
+        lines += _estimated_lines(scene, _spread(q, SAMPLES))
+    lost = rounding_error(scene.model.pencil, x[0], max(modes))
+    lines.append(f"round-off of the exact frequencies: below {lost:.1g} relative")
+    return lines
+
+
+def _estimated_lines(scene: Scene, q: Floats) -> list[str]:
+    estimate = scene.expansions.estimate(q, scene.initial).max(axis=0)
     several = scene.trajectory is not None and scene.trajectory.several
     where = "at the expansion point" if scene.trajectory is None else "along the trajectory"
     where = "along all trajectories" if several else where
-    for mode, error in zip(modes, estimate, strict=True):
+    lines = []
+    for mode, error in zip(scene.expansions.modes, estimate, strict=True):
         stated = (
             "cannot be vouched for" if not np.isfinite(error) else f"{100 * error:.2g} % at most"
         )
@@ -59,8 +68,6 @@ def accuracy_notes(
             f"mode {mode}: approximation error of the full expansion {where}, initial design, "
             f"estimated without exact solves: {stated}"
         )
-    lost = rounding_error(scene.model.pencil, x[0], max(modes))
-    lines.append(f"round-off of the exact frequencies: below {lost:.1g} relative")
     return lines
 
 

@@ -16,7 +16,6 @@ from time import monotonic
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from eigassign.assignment import Bounds, LinearConstraint
 from eigassign.assignment.choosing import KEPT, RELAXED, Chosen, choose
@@ -296,9 +295,10 @@ def _starts(scene: Scene, given: Sequence[Floats], count: int | str) -> Iterator
 
 
 def _spread_designs(scene: Scene, count: int, seed: int) -> Floats:
-    """Designs (count, n_y) of a Halton sequence over the bounds."""
+    """Designs (count, n_y) of a Latin hypercube over the bounds."""
     lower, upper = scene.bounds
-    share = qmc.Halton(len(lower), seed=seed).random(count)
+    cells = np.tile(np.arange(count), (len(lower), 1))
+    share = (np.random.default_rng(seed).permuted(cells, axis=1).T + 0.5) / count
     wide = (lower > 0.0) & (upper > 10.0 * lower)
     low = np.where(wide, lower, 1.0)
     ratio = np.where(wide, upper, 1.0) / low

@@ -99,7 +99,7 @@ def _searched(
     else:
         missed = [int(errors.argmax())]
     for k in dict.fromkeys(k for k in missed if abs(errors[k]) > allowed):
-        nearest = _nearest(scene, wanted, k, y)
+        nearest = _nearest(scene, wanted, k, y, allowed)
         if nearest is not None and abs(nearest / _goal(wanted, k) - 1.0) > allowed:
             yield (
                 f"{wanted.requirement.label} is out of reach at "
@@ -114,8 +114,11 @@ def _goal(wanted: Wanted, k: int) -> float:
     return float((wanted.upper_hz if upper else wanted.lower_hz)[k])
 
 
-def _nearest(scene: Scene, wanted: Wanted, k: int, y: Floats) -> float | None:
-    """The frequency nearest to the one wanted at sample k of the target, by a search of its own."""
+def _nearest(scene: Scene, wanted: Wanted, k: int, y: Floats, allowed: float) -> float | None:
+    """The frequency nearest to the one wanted at sample k of the target, by a search of its own.
+
+    The search ends with the first start that leads within ``allowed`` of it.
+    """
     at, goal = wanted.rows.start + k, _goal(wanted, k)
     target = FrequencyTarget(wanted.mode, np.array([goal]), slice(0, 1))
     asked = Requirements((target,), (), (), np.ones(1))
@@ -135,4 +138,6 @@ def _nearest(scene: Scene, wanted: Wanted, k: int, y: Floats) -> float | None:
         except EigassignError:
             continue
         found.append((abs(best.seen.residual[0]), (best.seen.residual[0] + 1.0) * goal))
+        if found[-1][0] <= allowed:
+            break
     return float(min(found)[1]) if found else None

@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from eigassign.errors import AccuracyError
 from eigassign.modal.reduced.reduce import reduce
@@ -51,6 +50,8 @@ def study_tolerance(
     designs, how, ranges = y[None], "proved", _exact(scene)
     if len(drawn):
         designs, how = np.repeat(y[None], DRAWS, axis=0), "sampled"
+        from scipy.stats import qmc  # half a second, and most runs draw nothing
+
         points = qmc.Sobol(len(drawn), seed=0).random_base2(DRAWS.bit_length() - 1)
         designs[:, drawn] = lower[drawn] + points * (upper - lower)[drawn]
         if scene.model.n_dof > LARGE:
