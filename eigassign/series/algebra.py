@@ -13,6 +13,7 @@ from eigassign.errors import SingularityError
 from eigassign.series.multi_index import LowerSet
 from eigassign.series.power_series import (
     compose,
+    exponential_taylor,
     matrix_product,
     multiply,
     power_taylor,
@@ -41,6 +42,9 @@ class Algebra(Protocol):
 
     def wave(self, a: Floats, quarters: Ints) -> Floats:
         """Row by row sin(a + quarters π/2): the sine for 0, the cosine for 1."""
+
+    def exponential(self, a: Floats) -> Floats:
+        """Row by row eᵃ."""
 
     def solve(self, A: Floats, B: Floats, n: int) -> Floats:
         """X as rows (n m, …) of A X = B, entries as rows (n², …) and (n m, …)."""
@@ -82,6 +86,11 @@ class Samples:
         out = np.sin(a)
         out[quarters == 1] = np.cos(a[quarters == 1])
         return out
+
+    def exponential(self, a: Floats) -> Floats:
+        """Elementwise; what overflows is infinite, which callers refuse."""
+        with np.errstate(over="ignore"):
+            return np.exp(a)
 
     def solve(self, A: Floats, B: Floats, n: int) -> Floats:
         """Sample by sample; raises SingularityError where A is singular."""
@@ -135,6 +144,12 @@ class Tangents:
         a = self._apart(a)
         turned = a[:, 0] + 0.5 * np.pi * quarters[:, None]
         return self._chained(Samples().wave(a[:, 0], quarters), np.cos(turned), a)
+
+    def exponential(self, a: Floats) -> Floats:
+        """exp' = exp."""
+        a = self._apart(a)
+        value = Samples().exponential(a[:, 0])
+        return self._chained(value, value, a)
 
     def solve(self, A: Floats, B: Floats, n: int) -> Floats:
         """X' = A⁻¹ (B' − A' X)."""
@@ -191,6 +206,10 @@ class Truncated:
     def wave(self, a: Floats, quarters: Ints) -> Floats:
         """Sine or cosine of each series."""
         return compose(self.space, wave_taylor(a[:, 0], quarters, self.space.order), a)
+
+    def exponential(self, a: Floats) -> Floats:
+        """Exponential of each series."""
+        return compose(self.space, exponential_taylor(a[:, 0], self.space.order), a)
 
     def solve(self, A: Floats, B: Floats, n: int) -> Floats:
         """Each chord step X ← X + A_0⁻¹ (B − A X) gains one degree."""

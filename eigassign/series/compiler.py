@@ -35,7 +35,7 @@ DENSE_FORMS = 2_000  # entries up to which the matrix of a linear step is kept d
 class Step:
     """Atoms of one kind and one level: computed together from atoms of lower levels.
 
-    Kinds are "linear", "product", "power" and "wave": sines and cosines together.
+    Kinds are "linear", "product", "power", "exponential" and "wave": sines and cosines together.
     """
 
     kind: str
@@ -97,6 +97,8 @@ def _take(step: Step, algebra: Algebra, values: Floats) -> Floats:
     if step.kind == "solve":
         right = values.take(step.right, axis=0)
         return algebra.solve(a, right, int(step.numbers[0]))[step.components]
+    if step.kind == "exponential":
+        return algebra.exponential(a)
     if step.function is not None:
         return step.function.evaluate(algebra, a)[step.components]
     return algebra.wave(a, step.right)

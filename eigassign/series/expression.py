@@ -1,9 +1,9 @@
 """Scalar expressions written once and evaluated on numbers, on samples and on power series alike.
 
 An :class:`Expression` is a linear form  c + Σ c_k a_k  in *atoms* a_k: variables, products, powers,
-sines and cosines, each stored once by the :class:`Recorder` however often it is written. Plain
-floats mix freely with expressions, and what is constant folds away as it is written, so that code
-for a formula reads the same whether its inputs vary or not.
+sines, cosines and exponentials, each stored once by the :class:`Recorder` however often it is
+written. Plain floats mix freely with expressions, and what is constant folds away as it is written,
+so that code for a formula reads the same whether its inputs vary or not.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, TypeAlias, overload
+
+import numpy as np
 
 from eigassign.errors import UsageError
 from eigassign.series.algebra import Function
@@ -26,9 +28,10 @@ class Recorder:
     """Collects the atoms of a set of expressions; ``nodes[k]`` is the definition of atom k.
 
     ``("variable", i)``, ``("linear", c, ((k, c_k), ...))``, ``("product", j, k)``,
-    ``("power", j, e)``, ``("sine", j)``, ``("cosine", j)``; entry i of the solution of A X = B is
-    ``("solve", atoms of A, atoms of B, n, i)``, component i of an implicit function of its
-    arguments ``("implicit", atoms, function, i)``. Arguments come before their users.
+    ``("power", j, e)``, ``("sine", j)``, ``("cosine", j)``, ``("exponential", j)``; entry i of the
+    solution of A X = B is ``("solve", atoms of A, atoms of B, n, i)``, component i of an implicit
+    function of its arguments ``("implicit", atoms, function, i)``. Arguments come before their
+    users.
     """
 
     def __init__(self) -> None:
@@ -184,6 +187,14 @@ def cos(x: Scalar) -> Scalar:
     return x.recorder._atom(("cosine", x.recorder.atom(x)))
 
 
+def exp(x: Scalar) -> Scalar:
+    """Exponential of a number, or of each of an array of numbers."""
+    if not isinstance(x, Expression):
+        value: float = np.exp(x)
+        return value
+    return x.recorder._atom(("exponential", x.recorder.atom(x)))
+
+
 def derivative(x: Scalar, variable: int) -> Scalar:
     """∂x/∂(variable number ``variable``), an expression again; solved atoms are not supported."""
     if not isinstance(x, Expression):
@@ -230,6 +241,8 @@ def _rule(
             return inner(a) * cos(value(a))
         case ("cosine", int(a)):
             return inner(a) * sin(value(a)) * -1.0
+        case ("exponential", int(a)):
+            return inner(a) * exp(value(a))
     raise UsageError(f"no derivative of {node[0]}")
 
 

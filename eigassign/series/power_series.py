@@ -115,6 +115,11 @@ def wave_taylor(at: Floats, quarters: Ints, order: int) -> Floats:
     return np.asarray(values / _factorials(order))
 
 
+def exponential_taylor(at: Floats, order: int) -> Floats:
+    """eᵃ over k!, k = 0…p: shape (p + 1, n)."""
+    return np.asarray(np.exp(at) / _factorials(order))
+
+
 @lru_cache(maxsize=64)
 def _factorials(order: int) -> Floats:
     """k! for k = 0…p as a column."""

@@ -293,8 +293,9 @@ def section(s: Tree) -> tuple[float, float, float, float, float, float]:
         return np.pi / 4 * (D**2 - d**2), I, I, 2 * I, 2 * I, kappa
     if shape == "rectangle":
         b, h = s["width"], s["height"]
-        r = min(b, h) / max(b, h)
-        J = max(b, h) * min(b, h) ** 3 * (1 / 3 - 0.21 * r * (1 - r**4 / 12))
+        n = np.arange(1, 4001, 2)
+        waves = np.tanh(n * np.pi * max(b, h) / (2 * min(b, h))) / n**5.0
+        J = max(b, h) * min(b, h) ** 3 / 3 - 64 / np.pi**5 * min(b, h) ** 4 * waves.sum()
         I_z, I_y = b * h**3 / 12, h * b**3 / 12
         return b * h, I_z, I_y, J, I_z + I_y, kappa
     if shape == "i_profile":

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from series_operators import PowerSeries
 
 from eigassign.errors import UsageError
-from eigassign.series.algebra import Samples, Truncated
+from eigassign.series.algebra import Samples, Tangents, Truncated
 from eigassign.series.compiler import compile_program, compile_table
-from eigassign.series.expression import Expression, Recorder, cos, sin
+from eigassign.series.expression import Expression, Recorder, cos, derivative, exp, sin
 from eigassign.series.multi_index import on_faces, total_degree
 
 N = 3
@@ -245,3 +245,26 @@ def test_an_unknown_kind_of_node_is_refused() -> None:
     recorder.nodes.append(("nonsense",))
     with pytest.raises(UsageError, match="unknown expression"):
         compile_program(recorder, [0], 1)
+
+
+def test_exponentials_in_every_algebra() -> None:
+    recorder = Recorder()
+    x, y = recorder.variable(0), recorder.variable(1)
+    table = compile_table(recorder, [exp(x * y) * 2.0, exp(0.5)], 2)
+    at = np.array([[0.3], [-0.7]])
+    value = 2.0 * math.exp(-0.21)
+    np.testing.assert_allclose(table.evaluate(Samples(), at)[0], value, rtol=1e-15)
+    assert exp(0.5) == pytest.approx(math.exp(0.5), rel=1e-15)
+    directions = np.array([[0.3, 1.0, 0.0], [-0.7, 0.0, 1.0]])
+    slopes = table.evaluate(Tangents(1, 2), directions)[0]
+    np.testing.assert_allclose(slopes, [value, -0.7 * value, 0.3 * value], rtol=1e-15)
+    space = total_degree(2, 6)
+    rows = np.zeros((2, len(space)))
+    rows[:, space.units] = np.eye(2)
+    found = table.evaluate(Truncated(space), rows)[0]
+    for k, (i, j) in enumerate(space.indices):
+        expected = 2.0 / math.factorial(i) if i == j else 0.0
+        assert found[k] == pytest.approx(expected, abs=1e-15)
+    slope = derivative(exp(x * y), 0)
+    (found_slope,) = compile_table(recorder, [slope], 2).evaluate(Samples(), at)
+    np.testing.assert_allclose(found_slope, -0.7 * math.exp(-0.21), rtol=1e-15)

@@ -278,24 +278,7 @@ def beam_values(case: CaseFile, parameters: ModelParameters, beam: Any, section:
     def number(key: str, value: float) -> Scalar:
         return parameters.number(f"sections.{section}.{key}", value)
 
-    _refuse_square(case, section)
     return _values(case, parameters, beam, section_values(case.mechanism.sections[section], number))
-
-
-def _refuse_square(case: CaseFile, section: str) -> None:
-    """The torsion constant of a rectangle knows its longer side: a design must not swap them."""
-    data = case.mechanism.sections[section]
-    if data.shape != "rectangle" or case.mechanism.space == "planar":
-        return
-    ranges = case.ranges
-    low_w, high_w = ranges.get(f"sections.{section}.width", (data.width, data.width))
-    low_h, high_h = ranges.get(f"sections.{section}.height", (data.height, data.height))
-    if low_w < high_h and low_h < high_w and (low_w, low_h) != (high_w, high_h):
-        raise MechanismError(
-            f"mechanism.sections.{section}",
-            "the bounds of its design let width and height change places, which the torsion "
-            "constant does not follow: keep one side the longer",
-        )
 
 
 def _values(

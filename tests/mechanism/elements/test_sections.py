@@ -9,8 +9,8 @@ import pytest
 from spatial_cases import ALLOY, built
 from spatial_oracle import Tree
 
-from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.sections import section_values
+from eigassign.modal.exact.solver import eigenvalues
 
 
 def as_written(key: str, value: float) -> float:
@@ -47,20 +47,33 @@ def test_the_papers_rod_of_30_mm_weighs_what_the_paper_says() -> None:
     np.testing.assert_allclose(area * 2690.0, 1.9, rtol=2e-3)
 
 
-def test_a_design_that_swaps_the_sides_of_a_rectangle_is_refused() -> None:
-    def arm(low: float, high: float) -> Tree:
+@pytest.mark.parametrize(
+    ("width", "height", "factor"),  # of Timoshenko, Goodier, Theory of Elasticity, table in § 109
+    [(1.0, 1.0, 0.1406), (1.0, 2.0, 0.229), (3.0, 1.0, 0.263), (1.0, 10.0, 0.312)],
+)
+def test_the_torsion_constant_of_a_rectangle_is_saint_venant_s(
+    width: float, height: float, factor: float
+) -> None:
+    section = Shape(shape="rectangle", width=width, height=height)
+    J = section_values(section, as_written).torsion_constant
+    assert pytest.approx(factor * max(width, height) * min(width, height) ** 3, rel=2e-3) == J
+
+
+def test_a_design_may_swap_the_sides_of_a_rectangle() -> None:
+    def arm(height: float) -> Tree:
         return {
             "mechanism": {
                 "space": "spatial",
                 "materials": {"m": ALLOY},
-                "sections": {"s": {"shape": "rectangle", "width": 0.02, "height": 0.03}},
+                "sections": {"s": {"shape": "rectangle", "width": 0.02, "height": height}},
                 "links": {"b": {"length": 1.0, "elements": 1, "material": "m", "section": "s"}},
                 "joints": {"r": {"type": "revolute", "base": "ground", "follower": "b.start"}},
             },
-            "coordinates": {"q": {"joint": "r"}},
-            "design": {"h": {"parameter": "sections.s.height", "min": low, "max": high}},
+            "coordinates": {"q": {"joint": "r", "drive": {"stiffness": 1e5}}},
+            "design": {"h": {"parameter": "sections.s.height", "min": 0.005, "max": 0.08}},
         }
 
-    assert built(arm(0.021, 0.05)).pencil.n_dof
-    with pytest.raises(MechanismError, match="change places"):
-        assert built(arm(0.015, 0.05)).pencil.n_dof
+    designed = built(arm(0.03))
+    for height, rel in ((0.08, 1e-12), (0.02, 1e-12), (0.01, 1e-12), (0.005, 1e-10)):
+        found = eigenvalues(designed.pencil, np.array([[0.1, height]]), 6)[0]
+        np.testing.assert_allclose(found, built(arm(height)).lam([0.1], 6), rtol=rel)
