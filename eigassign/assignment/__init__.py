@@ -8,6 +8,7 @@ Reading order:
     feasibility   which limits contradict each other
     solver        solve: OSQP, then an active-set method that goes to round-off
     optimality    judge: Karush–Kuhn–Tucker residuals, recomputed from the data
+    crossing      two modes that meet: the matrix of both, which is smooth where each has a kink
     sequential    the exact optimum: programs in a row inside a trust region
     requirements  targets, inequalities and quantities as the sequential method sees them
     identification  parameters from measured frequencies, their covariance and intervals

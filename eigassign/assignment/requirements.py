@@ -19,8 +19,10 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eigassign.assignment.checks import Floats
+from eigassign.assignment.crossing import Pairs, joined
 from eigassign.assignment.sequential import Appraisal, Objective
 
 
@@ -29,11 +31,13 @@ class Frequencies:
     """The lowest frequencies ``hz`` (n_t, n_modes) of a design, ascending at every sample.
 
     ``slopes`` (n_t, n_modes, n_y) in Hz per SI unit of y; where the trajectory follows the design,
-    they hold its part too.
+    they hold its part too. ``mixed`` (n_t, n_modes − 1, n_y) are the slopes off the diagonal of the
+    matrices that neighbours make (`crossing`), if known.
     """
 
     hz: Floats
     slopes: Floats
+    mixed: Floats | None = None
 
 
 Response = Callable[[Floats], Frequencies]
@@ -103,12 +107,38 @@ class Requirements:
     def appraise(self, y: Floats, found: Frequencies) -> Appraisal:
         """Residuals and excesses of a design whose frequencies are ``found``, with slopes."""
         residuals = [self._residual(target, found) for target in self.targets]
+        pairs = self._pairs(found)
         if self.least_change is not None:
             reference, width = self.least_change
             residuals.append(((y - reference) / width, np.diag(1.0 / width)))
         excesses = [_excess(limit, found) for limit in self.limits]
         excesses += [part for limit in self.quantities for part in _of_quantity(limit, y)]
-        return Appraisal(*_stacked(residuals, len(y)), *_stacked(excesses, len(y)))
+        return Appraisal(*_stacked(residuals, len(y)), *_stacked(excesses, len(y)), pairs)
+
+    def _pairs(self, found: Frequencies) -> Pairs | None:
+        """Rows of one mode beside its neighbours; None where nothing is known of these.
+
+        Squares of errors of neighbours that are both wanted are smooth together where they meet at
+        the frequency that is wanted of both: they make no pair.
+        """
+        if found.mixed is None:
+            return None
+        parts: list[Pairs] = []
+        start = 0
+        for target in self.targets:
+            scale, at = self._factor(target) / target.hz, np.arange(start, start + len(target.hz))
+            start += len(target.hz)
+            both = {other.mode for other in self.targets if _overlap(other.rows, target.rows)}
+            asked = both if self.objective is Objective.LEAST_SQUARES else set()
+            parts += _beside(found, target.mode, asked, target.rows, at, scale, target.hz)
+        start += 0 if self.least_change is None else len(self.least_change[0])
+        for limit in self.limits:
+            scale, at = 1.0 / limit.hz, np.arange(start, start + len(limit.hz))
+            start += len(limit.hz)
+            if len(limit.terms) == 1:
+                scale = -scale if limit.at_least else scale
+                parts += _beside(found, limit.terms[0][0], set(), limit.rows, at, scale, limit.hz)
+        return joined(parts)
 
     def promised(self, residual: Floats) -> Iterator[Floats]:
         """The frequencies (n,) in Hz of every target that residuals (m,) stand for."""
@@ -158,6 +188,36 @@ class Requirements:
         factor, column = self._factor(target), target.mode - 1
         hz, slopes = found.hz[target.rows, column], found.slopes[target.rows, column]
         return factor * (hz / target.hz - 1.0), (factor / target.hz)[:, None] * slopes
+
+
+def _overlap(one: slice, other: slice) -> bool:
+    return bool(max(one.start, other.start) < min(one.stop, other.stop))
+
+
+def _beside(
+    found: Frequencies,
+    mode: int,
+    asked: Collection[int],
+    rows: slice,
+    at: NDArray[np.intp],
+    scale: Floats,
+    wanted: Floats,
+) -> Iterator[Pairs]:
+    """Rows ``at``, scale (f − wanted), each with the modes below and above that are not asked."""
+    assert found.mixed is not None
+    own = found.hz[rows, mode - 1]
+    for neighbour in (mode - 1, mode + 1):
+        if neighbour in asked or not 1 <= neighbour <= found.hz.shape[1]:
+            continue
+        hz = found.hz[rows, neighbour - 1]
+        yield Pairs(
+            row=at,
+            other=scale * (hz - wanted),
+            others=scale[:, None] * found.slopes[rows, neighbour - 1],
+            mixed=scale[:, None] * found.mixed[rows, min(mode, neighbour) - 1],
+            gap=np.abs(hz / own - 1.0),
+            larger=np.equal(neighbour < mode, scale > 0.0),
+        )
 
 
 def _excess(limit: FrequencyLimit, found: Frequencies) -> tuple[Floats, Floats]:

@@ -15,7 +15,8 @@ its norm is the largest entry, so that it only tightens bounds, and the program 
 `solver` solves. v keeps it feasible, ν is raised until v falls no further. S is the part of the
 Hessian that J does not hold, gathered from the slopes met (symmetric rank-one updates), made
 convex. A step is taken only if the exact merit, F plus ν times the largest excess, falls by a tenth
-of what the program promised; a step spoilt by the curvature of c is corrected once.
+of what the program promised; a step spoilt by curvature is corrected once. Where a step passes a
+kink, at which two modes meet (`crossing`), what is expected behind it is one more row.
 
 The answer is judged by first-order optimality of the exact problem (`stationarity`).
 """
@@ -27,9 +28,11 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from eigassign.assignment.checks import Floats, frozen
+from eigassign.assignment.crossing import Pairs
 from eigassign.assignment.program import SNAP, LinearConstraint, ScaledProgram
 from eigassign.assignment.solver import solve_scaled
 from eigassign.errors import EigassignError
@@ -40,6 +43,8 @@ OPTIMAL = 1e-7  # stationarity that is accepted
 MET = 1e-9  # excess, relative to the inequality's limit, that is round-off
 TINY = 1e-11  # rms relative error that is round-off of exact frequencies
 HEAVIER = 6  # tenfold rises of ν in one step, while v falls
+CUTS = 12  # programs in one step, while they miss a kink
+MISSED = 0.1  # of the promised fall that may be lost at kinks
 FLAT = 1e-13  # of the merit: a promised fall below it is round-off
 
 
@@ -55,13 +60,14 @@ class Appraisal:
     """A design seen from the targets: residuals (m,) and excesses (k,), with slopes in y.
 
     ``slopes`` (m, n_y) and ``excess_slopes`` (k, n_y) are per SI unit of y. An excess is relative
-    to its limit, and negative where there is room.
+    to its limit, and negative where there is room. ``pairs`` are rows that may have a kink.
     """
 
     residual: Floats
     slopes: Floats
     excess: Floats
     excess_slopes: Floats
+    pairs: Pairs | None = None
 
     @property
     def violation(self) -> float:
@@ -162,6 +168,22 @@ class _Place:
     J: Floats
     C: Floats
     value: float  # F
+    pairs: Pairs | None
+
+    def smooth_slopes(self, kinked: NDArray[np.bool_]) -> Floats:
+        """Of all rows (m + k, n); of those at kinks the mean of both branches."""
+        slopes = np.vstack([self.J, self.C])
+        if self.pairs is not None:
+            on = kinked[self.pairs.row]
+            rows = self.pairs.row[on]
+            slopes[rows] = 0.5 * (slopes[rows] + self.pairs.others[on])
+        return slopes
+
+    @classmethod
+    def of(cls, problem: DesignProblem, box: _Box, z: Floats, seen: Appraisal) -> _Place:
+        J, C = (slopes[:, box.free] * box.width for slopes in (seen.slopes, seen.excess_slopes))
+        pairs = None if seen.pairs is None else seen.pairs.scaled(box.free, box.width)
+        return cls(z, seen, J, C, problem(box.y(z), seen), pairs)
 
 
 @dataclass
@@ -207,7 +229,7 @@ def minimise(
                 break
             reached = _try(problem, box, place, move, progress)
             if reached is not None:
-                place, predicted = reached, move.residual
+                place, predicted = reached, move.model.residual
                 best = _better(best, place)
     except KeyboardInterrupt:
         end = End.INTERRUPTED
@@ -229,11 +251,8 @@ def minimise(
 
 
 def _placed(problem: DesignProblem, box: _Box, z: Floats, progress: _Progress) -> _Place:
-    y = box.y(z)
     progress.appraisals += 1
-    seen = problem.appraise(y)
-    J, C = (slopes[:, box.free] * box.width for slopes in (seen.slopes, seen.excess_slopes))
-    return _Place(z, seen, J, C, problem(y, seen))
+    return _Place.of(problem, box, z, problem.appraise(box.y(z)))
 
 
 def _better(best: _Place, place: _Place) -> _Place:
@@ -248,7 +267,7 @@ class _Move:
 
     d: Floats
     promised: float  # fall of the merit
-    residual: Floats  # (m,) by the linear model
+    model: _Model  # of residuals and excesses there
     on_residual: Floats  # (m,) weights of the residuals' Hessians in that of the merit
     on_excess: Floats  # (k,)
 
@@ -326,15 +345,111 @@ def _record(progress: _Progress, box: _Box, reached: _Place, move: _Move, taken:
 
 
 def _updated(S: Floats, place: _Place, reached: _Place, move: _Move) -> Floats:
-    """S with S d = (J⁺ − J)ᵀ w + (C⁺ − C)ᵀ μ, by a symmetric rank-one update."""
+    """S with S d = (J⁺ − J)ᵀ w + (C⁺ − C)ᵀ μ, by a symmetric rank-one update.
+
+    Of rows at kinks the mean of both branches is taken, which is smooth.
+    """
     d = reached.z - place.z
     w = reached.seen.residual if move.on_residual.size == 0 else move.on_residual
-    rest = (reached.J - place.J).T @ w + (reached.C - place.C).T @ move.on_excess
-    rest = rest - S @ d
+    before, after = (p.smooth_slopes(move.model.kinked) for p in (place, reached))
+    rest = (after - before).T @ np.append(w, move.on_excess) - S @ d
     along = float(rest @ d)
     if abs(along) <= 1e-8 * np.linalg.norm(rest) * np.linalg.norm(d):
         return S
     return np.asarray(S + np.outer(rest, rest) / along)
+
+
+# --- What is expected of a step
+
+
+@dataclass(frozen=True)
+class _Model:
+    """Residuals (m,) and excesses (k,) expected of a step d, with their slopes there.
+
+    Linear, but where a mode is expected to meet its neighbour: there the worse of that and of the
+    eigenvalue of both modes' matrix. ``kinked`` (m + k,) are those rows.
+    """
+
+    residual: Floats
+    J: Floats
+    excess: Floats
+    C: Floats
+    kinked: NDArray[np.bool_]
+
+
+def _modelled(place: _Place, r: Floats, c: Floats, d: Floats) -> _Model:
+    """Of a step from values r and c, which are those at the place but after a spoilt step."""
+    m = len(r)
+    values, slopes = np.append(r, c), np.vstack([place.J, place.C])
+    expected, kinked = values + slopes @ d, np.zeros(len(values), dtype=bool)
+    if place.pairs is not None:
+        slopes = slopes.copy()
+        shift = values - np.append(place.seen.residual, place.seen.excess)
+        found, turning, turned = place.pairs.along(values, np.vstack([place.J, place.C]), shift, d)
+        for k, value, slope in zip(
+            place.pairs.row[turned], found[turned], turning[turned], strict=True
+        ):
+            if value > expected[k] if k >= m else abs(value) > abs(expected[k]):
+                expected[k], slopes[k], kinked[k] = value, slope, True
+    return _Model(expected[:m], slopes[:m], expected[m:], slopes[m:], kinked)
+
+
+@dataclass(frozen=True)
+class _Cuts:
+    """Rows value + slope·d ≤ v or t; ``owners`` (q, rows) say of which rows they are, with sign."""
+
+    value: Floats  # (q,)
+    slopes: Floats  # (q, n)
+    owners: Floats
+
+    @classmethod
+    def none(cls, n: int, rows: int) -> _Cuts:
+        return cls(np.zeros(0), np.zeros((0, n)), np.zeros((0, rows)))
+
+    def __len__(self) -> int:
+        return len(self.value)
+
+    def at(self, d: Floats) -> float:
+        """The least v or t, 0 at least."""
+        return float(np.max(self.value + self.slopes @ d, initial=0.0))
+
+    def and_through(self, d: Floats, value: Floats, slopes: Floats, owners: Floats) -> _Cuts:
+        """Those too that have a value and slope at d."""
+        return _Cuts(
+            np.append(self.value, value - slopes @ d),
+            np.vstack([self.slopes, slopes]),
+            np.vstack([self.owners, owners]),
+        )
+
+
+@dataclass(frozen=True)
+class _Kinks:
+    """What was met behind kinks: of excesses, for v; of the objective, for t.
+
+    In the worst case t is the largest error, in least squares what is to be added to ½‖r + Jd‖².
+    """
+
+    excess: _Cuts
+    objective: _Cuts
+
+    def with_model(
+        self, problem: DesignProblem, place: _Place, r: Floats, d: Floats, model: _Model
+    ) -> _Kinks:
+        """With what is expected at d."""
+        m = len(r)
+        own, on = model.kinked[:m], model.kinked[m:]
+        excess = self.excess.and_through(d, model.excess[on], model.C[on], np.eye(len(on))[on])
+        objective = self.objective
+        if problem.objective is Objective.WORST_CASE:
+            sign = np.sign(model.residual[own])[:, None]
+            there = sign[:, 0] * model.residual[own], sign * model.J[own], sign * np.eye(m)[own]
+            objective = objective.and_through(d, *there)
+        elif own.any():
+            linear = r + place.J @ d
+            rise = 0.5 * float(model.residual @ model.residual - linear @ linear)
+            steep = model.J.T @ model.residual - place.J.T @ linear
+            objective = objective.and_through(d, np.array([rise]), steep[None], np.zeros((1, m)))
+        return _Kinks(excess, objective)
 
 
 # --- One program
@@ -350,32 +465,57 @@ def _program(
     """The step of the program at a place; None where it promises nothing.
 
     After a ``spoilt`` step the model passes through what was found there, not only through here.
+    Where the step passes a kink, what is expected behind it is one more row, and it is sought anew.
     """
     r, c = place.seen.residual, place.seen.excess
     if spoilt is not None:
         there, move = spoilt
-        r = there.seen.residual - place.J @ move.d
-        c = there.seen.excess - place.C @ move.d
+        r = r + there.seen.residual - move.model.residual
+        c = c + there.seen.excess - move.model.excess
     _weigh_first(problem, box, place, progress)
-    solved = _solved(problem, box, place, progress, r, c)
+    cuts = _Kinks(_Cuts.none(box.n, len(c)), _Cuts.none(box.n, len(r)))
+    solved = _solved(problem, box, place, progress, r, c, cuts)
     heavier = progress
     for _ in range(HEAVIER):
         if solved is None or solved[1] <= MET:
             break
         heavier = replace(heavier, weight=10.0 * heavier.weight)
-        again = _solved(problem, box, place, heavier, r, c)
+        again = _solved(problem, box, place, heavier, r, c, cuts)
         if again is not None and again[1] < 0.99 * solved[1]:
             progress.weight, solved = heavier.weight, again
-    if solved is None:
-        return None
-    d, v, on_residual, on_excess = solved
-    linear = place.seen.residual + place.J @ d
     before = _merit(problem, place.value, place.seen.violation, progress.weight)
-    after = _merit(problem, _linear_value(problem, box, place, d), v, progress.weight)
-    promised = before - after - 0.5 * float(d @ _convex(progress.S, place.J, problem)[0] @ d)
-    if spoilt is None and promised <= FLAT * max(abs(before), TINY**2):
+    curved = _convex(progress.S, place.J, problem)[0]
+    best: _Move | None = None
+    for _ in range(CUTS):
+        if solved is None:
+            break
+        d, v, on_residual, on_excess = solved
+        model = _modelled(place, r, c, d)
+        here = 0.5 * float(d @ curved @ d)
+        behind = max(float(np.max(model.excess, initial=0.0)), 0.0)
+        after = here + _merit(
+            problem, _value(problem, box, place, d, model.residual), behind, progress.weight
+        )
+        if best is None or before - after > best.promised:
+            best = _Move(d, before - after, model, on_residual, on_excess)
+        linear = r + place.J @ d
+        value = _value(problem, box, place, d, linear)
+        t = cuts.objective.at(d)
+        if problem.objective is Objective.WORST_CASE:
+            value += max(t - float(np.max(np.abs(linear), initial=0.0)), 0.0)
+        else:
+            value += 2.0 * t
+        hoped = before - here - _merit(problem, value, v, progress.weight)
+        if not model.kinked.any() or hoped <= 0.0 or best.promised >= (1.0 - MISSED) * hoped:
+            break
+        cuts = cuts.with_model(problem, place, r, d, model)
+        solved = _solved(problem, box, place, progress, r, c, cuts)
+    if best is None or spoilt is not None or best.promised > FLAT * max(abs(before), TINY**2):
+        return best
+    if not len(cuts.objective) + len(cuts.excess) or progress.radius < SMALLEST:
         return None
-    return _Move(d, promised, linear, on_residual, on_excess)
+    progress.radius *= 0.1  # nearer to the kink, where the rows behind it hold
+    return _program(problem, box, place, progress)
 
 
 def _weigh_first(problem: DesignProblem, box: _Box, place: _Place, progress: _Progress) -> None:
@@ -390,8 +530,8 @@ def _weigh_first(problem: DesignProblem, box: _Box, place: _Place, progress: _Pr
         progress.weight = 10.0 * max(steep, 1e-3) / max(flat, 1e-3)
 
 
-def _linear_value(problem: DesignProblem, box: _Box, place: _Place, d: Floats) -> float:
-    r = place.seen.residual + place.J @ d
+def _value(problem: DesignProblem, box: _Box, place: _Place, d: Floats, r: Floats) -> float:
+    """F of residuals r after a step."""
     price = problem.price(box.y(place.z + d))
     if problem.objective is Objective.WORST_CASE:
         return float(np.max(np.abs(r), initial=0.0)) + price
@@ -410,11 +550,18 @@ def _convex(S: Floats, J: Floats, problem: DesignProblem) -> tuple[Floats, Float
 
 
 def _solved(
-    problem: DesignProblem, box: _Box, place: _Place, progress: _Progress, r: Floats, c: Floats
+    problem: DesignProblem,
+    box: _Box,
+    place: _Place,
+    progress: _Progress,
+    r: Floats,
+    c: Floats,
+    cuts: _Kinks,
 ) -> tuple[Floats, float, Floats, Floats] | None:
     """d (n,), v, and the multipliers of residuals and excesses; None where nothing is found."""
     n, worst = box.n, problem.objective is Objective.WORST_CASE
-    extra = int(len(c) > 0) + int(worst)  # v, then the epigraph's variable
+    last = worst or len(cuts.objective) > 0
+    extra = int(len(c) > 0) + int(last)  # v, then t
     _, root = _convex(progress.S, place.J, problem)
     A = np.hstack([root, np.zeros((len(root), extra))])
     cost = np.zeros(n + extra)
@@ -422,19 +569,22 @@ def _solved(
     cost[:n] = half * box.prices
     if not worst:
         cost[:n] += place.J.T @ r
-    rows: list[Floats] = [np.hstack([box.rows, np.zeros((len(box.rows), extra))])]
-    low, high = [box.row_lower - box.rows @ place.z], [box.row_upper - box.rows @ place.z]
+    v, t = (np.eye(extra)[[k]] for k in (0, -1)) if extra else (np.zeros((1, 0)), np.zeros((1, 0)))
+    # each: slopes in d, what multiplies v and t, and the upper limit
+    upper_rows: list[tuple[Floats, Floats, Floats]] = []
     if len(c):
         cost[n] = progress.weight
-        rows.append(np.hstack([place.C, -np.ones((len(c), 1)), np.zeros((len(c), extra - 1))]))
-        low.append(np.full(len(c), -np.inf))
-        high.append(-c - MET)
+        upper_rows += [(place.C, -v, -c - MET), (cuts.excess.slopes, -v, -cuts.excess.value - MET)]
     if worst:
+        upper_rows += [(place.J, -t, -r), (-place.J, -t, r)]
+    if last:
         cost[-1] = 1.0
-        J = np.hstack([place.J, np.zeros((len(r), extra - 1)), -np.ones((len(r), 1))])
-        rows += [J, J * np.append(-np.ones(n), np.ones(extra))]
-        low += [np.full(len(r), -np.inf)] * 2
-        high += [-r, r]
+        upper_rows.append((cuts.objective.slopes, -t, -cuts.objective.value))
+    rows = [np.hstack([box.rows, np.zeros((len(box.rows), extra))])]
+    rows += [np.hstack([a, np.repeat(b, len(a), axis=0)]) for a, b, _ in upper_rows]
+    offset = box.rows @ place.z
+    low = [box.row_lower - offset, *(np.full(len(a), -np.inf) for a, *_ in upper_rows)]
+    high = [box.row_upper - offset, *(limit for *_, limit in upper_rows)]
     reach = [np.maximum(-place.z, -progress.radius), np.minimum(1.0 - place.z, progress.radius)]
     beyond = (np.zeros(extra), np.full(extra, np.inf))
     G, lower, upper = np.vstack(rows), np.concatenate(low), np.concatenate(high)
@@ -451,26 +601,28 @@ def _solved(
         upper=np.concatenate([reach[1], beyond[1], upper / norms]),
         cost=cost / scale,
     )
-    # No step, with v and the epigraph as they are, is feasible: from there limits are walked along
-    # in a fraction of the time that OSQP takes, above all where they cannot all be met.
+    # No step, with v and t as they are, is feasible: from there limits are walked along in a
+    # fraction of the time that OSQP takes, above all where they cannot all be met.
     stay = np.zeros(n + extra)
     if len(c):
-        stay[n] = float(np.max(c + MET, initial=0.0))
-    if worst:
-        stay[-1] = float(np.max(np.abs(r), initial=0.0))
+        stay[n] = max(float(np.max(c, initial=0.0)), cuts.excess.at(stay[:n])) + MET
+    if last:
+        largest = float(np.max(np.abs(r), initial=0.0)) if worst else 0.0
+        stay[-1] = max(largest, cuts.objective.at(stay[:n]))
     found = solve_scaled(scaled, stay)
     if found is None:
         return None
     x, mu = found
     d = np.clip(x[:n], reach[0], reach[1])
     mu = scale * mu[n + extra :] / norms
-    first = len(box.rows)
-    on_excess = mu[first : first + len(c)]
-    m = len(r)
-    both = mu[first + len(c) :]
-    on_residual = both[:m] - both[m:] if worst else np.zeros(0)
-    v = float(np.max(c + place.C @ d, initial=0.0)) if len(c) else 0.0
-    return d, v, on_residual, on_excess
+    sizes = [len(box.rows), *(len(a) for a, *_ in upper_rows)]
+    parts = iter(np.split(mu, np.cumsum(sizes)[:-1])[1:])
+    on_excess = next(parts) + cuts.excess.owners.T @ next(parts) if len(c) else np.zeros(0)
+    on_residual = np.zeros(0)
+    if worst:
+        on_residual = next(parts) - next(parts) + cuts.objective.owners.T @ next(parts)
+    missed = max(float(np.max(c + place.C @ d, initial=0.0)), cuts.excess.at(d))
+    return d, missed, on_residual, on_excess
 
 
 # --- The bounds as units
@@ -568,33 +720,42 @@ def _balance(problem: DesignProblem, y: Floats, seen: Appraisal) -> tuple[float,
     box = _Box.of(problem)
     if box.n == 0:
         return 0.0, ()
-    z = box.z(y)
-    J, C = (slopes[:, box.free] * box.width for slopes in (seen.slopes, seen.excess_slopes))
-    normals, owners, units = _normals(box, z, C, seen.excess)
-    r = seen.residual
+    place = _Place.of(problem, box, box.z(y), seen)
+    J, r, m = place.J, seen.residual, len(seen.residual)
+    rows, branches = _branches(place)
+    own = rows < m
+    kinks, meeting = rows[own], branches[own]
+    normals, owners, units = _normals(box, place, seen.excess)
     worst = problem.objective is Objective.WORST_CASE
-    if worst and len(r):
+    size = float(np.abs(box.prices).max())
+    if worst and m:
         top = np.abs(r).max()
         on = np.abs(r) >= top - ON * max(top, TINY)
-        epigraph = J[on] * np.sign(r[on])[:, None]
+        epigraph = np.vstack([J[on], meeting[on[kinks]]])
+        epigraph = epigraph * np.sign(np.append(r[on], r[kinks[on[kinks]]]))[:, None]
         slope = np.append(box.prices, 1.0)
-        system = np.hstack(
-            [
-                np.vstack([normals.T, np.zeros((1, len(normals)))]),
-                np.vstack([epigraph.T, -np.ones((1, on.sum()))]),
-            ]
-        )
-        size = float(np.abs(epigraph).max(initial=0.0)) + float(np.abs(box.prices).max())
+        system = _columns((normals, 0.0), (epigraph, -1.0))
+        size += float(np.abs(epigraph).max(initial=0.0))
     else:
         slope = 2.0 * J.T @ r + box.prices
-        system = normals.T
-        size = 2.0 * float(np.linalg.norm(J, axis=0).max(initial=0.0)) * float(np.linalg.norm(r))
-        size += float(np.abs(box.prices).max())
-        if np.linalg.norm(r) <= TINY and not box.prices.any():
-            size = 0.0
+        largest = float(np.linalg.norm(r)) if np.linalg.norm(r) > TINY else 0.0
+        size += 2.0 * float(np.linalg.norm(J, axis=0).max(initial=0.0)) * largest
+        # shares of the other branches at each kink, ≤ 1 together
+        turns = 2.0 * r[kinks, None] * (meeting - J[kinks])
+        at, group = np.unique(kinks, return_inverse=True)
+        shares = size * np.eye(len(at))
+        slope = np.append(slope, -np.full(len(at), size))
+        left_over = np.hstack([np.zeros((len(at), box.n)), shares])
+        system = np.hstack(
+            [
+                _columns((normals, np.zeros(len(at)))),
+                np.hstack([turns, shares[group]]).T,
+                left_over.T,
+            ]
+        )
     violated = seen.violation > ON
     if size == 0.0:
-        return (_unbalanced_violation(box, z, C, seen.excess) if violated else 0.0), ()
+        return (_unbalanced_violation(box, place) if violated else 0.0), ()
     mu = nnls(system, -slope, maxiter=50 * max(system.shape))[0] if system.size else np.zeros(0)
     left = slope + (system @ mu if system.size else 0.0)
     found = tuple(
@@ -603,15 +764,32 @@ def _balance(problem: DesignProblem, y: Floats, seen: Appraisal) -> tuple[float,
     )
     rest = float(np.abs(left).max()) / size
     if violated:
-        rest = max(rest, _unbalanced_violation(box, z, C, seen.excess))
+        rest = max(rest, _unbalanced_violation(box, place))
     return rest, found
 
 
+def _columns(*parts: tuple[Floats, float | Floats]) -> Floats:
+    """Slopes (k, n), each with more rows below, as the columns of one matrix."""
+    return np.hstack([np.hstack([a, np.tile(np.atleast_1d(b), (len(a), 1))]).T for a, b in parts])
+
+
+def _branches(place: _Place) -> tuple[NDArray[np.intp], Floats]:
+    """Where a row has a kink that the design may lie in: its rows, and slopes of other branches.
+
+    Behind other kinks the row is better than its own branch says: no optimum lies there.
+    """
+    if place.pairs is None:
+        return np.zeros(0, dtype=np.intp), np.zeros((0, place.J.shape[1]))
+    worse = np.append(np.sign(place.seen.residual), np.ones(len(place.C)))[place.pairs.row]
+    worse_larger = np.where(place.pairs.larger, worse > 0.0, worse < 0.0)
+    return place.pairs.chosen(worse_larger).branches(np.vstack([place.J, place.C]))
+
+
 def _normals(
-    box: _Box, z: Floats, C: Floats, excess: Floats
+    box: _Box, place: _Place, excess: Floats
 ) -> tuple[Floats, list[tuple[str, int, bool]], list[float]]:
     """Outward normals of the limits that z lies on, which they are, and their units."""
-    normals, owners, units = [], [], []
+    z, normals, owners, units = place.z, [], [], []
     for i, j in enumerate(box.free):
         for upper, on in ((False, z[i] <= ON), (True, z[i] >= 1.0 - ON)):
             if on:
@@ -625,26 +803,27 @@ def _normals(
                 normals.append((1.0 if upper else -1.0) * box.rows[k])
                 owners.append(("constraint", k, upper))
                 units.append(1.0)
+    rows, branches = _branches(place)
     for at in np.flatnonzero(excess >= -ON):
-        normals.append(C[at])
-        owners.append(("excess", int(at), True))
-        units.append(1.0)
+        for normal in (place.C[at], *branches[rows == len(place.J) + at]):
+            normals.append(normal)
+            owners.append(("excess", int(at), True))
+            units.append(1.0)
     return np.array(normals).reshape(-1, box.n), owners, units
 
 
-def _unbalanced_violation(box: _Box, z: Floats, C: Floats, excess: Floats) -> float:
+def _unbalanced_violation(box: _Box, place: _Place) -> float:
     """The same of the largest excess: 0 where no direction within the limits lowers it."""
-    normals = _normals(box, z, C, np.full(len(excess), -np.inf))[0]
+    excess = place.seen.excess
+    normals = _normals(box, place, np.full(len(excess), -np.inf))[0]
     on = excess >= excess.max() - ON
+    rows, branches = _branches(place)
+    own = rows >= len(place.J)
+    steepest = np.vstack([place.C[on], branches[own][on[rows[own] - len(place.J)]]])
     slope = np.append(np.zeros(box.n), 1.0)
-    system = np.hstack(
-        [
-            np.vstack([normals.T, np.zeros((1, len(normals)))]),
-            np.vstack([C[on].T, -np.ones((1, on.sum()))]),
-        ]
-    )
+    system = _columns((normals, 0.0), (steepest, -1.0))
     mu = nnls(system, -slope, maxiter=50 * max(system.shape))[0]
-    size = max(float(np.abs(C[on]).max()), 1e-300)
+    size = max(float(np.abs(steepest).max()), 1e-300)
     return float(np.abs(slope + system @ mu).max()) / max(size, 1.0)
 
 

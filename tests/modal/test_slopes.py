@@ -20,7 +20,7 @@ from scenes import SHIPPED, scene_of
 
 from eigassign.api import Case, load_case
 from eigassign.modal.exact.solver import eigenvalues
-from eigassign.modal.slopes import eigenvalue_slopes
+from eigassign.modal.slopes import eigenvalue_slopes, mixed_slopes
 from eigassign.series.multi_index import total_degree
 from eigassign.study.scene import Scene
 
@@ -55,6 +55,25 @@ def test_eigenvalue_slopes_are_those_of_finite_differences(arm: Scene) -> None:
         step[j] = 1e-5
         off = (eigenvalues(pencil, x + step, 2) - eigenvalues(pencil, x - step, 2)) / 2e-5
         np.testing.assert_allclose(slopes[:, :, j], off, rtol=1e-5, atol=1e-3)
+
+
+def test_slopes_of_neighbours_mixture_are_those_of_the_matrices(arm: Scene) -> None:
+    """φ_iᵀ (K' − ½ (λ_i + λ_j) M') φ_j by differences of the dense matrices; of a mode more."""
+    q, y = np.array([1.8, 5.2]), np.array([0.1, 0.2])
+    lam, slopes, mixed = mixed_slopes(arm.model.pencil, arm.model.x(q, y), 2, np.ones(4))
+    assert lam.shape == (1, 3)
+    assert mixed.shape == (1, 2, 4)
+    phi = arm.model.modes(q, y, 3)[1][0]
+    for j in range(4):
+        step = 1e-5 * np.eye(4)[j]
+        ends = (arm.model.matrices(q + s * step[:2], y + s * step[2:]) for s in (1.0, -1.0))
+        dM, dK = ((a - b) / 2e-5 for a, b in zip(*ends, strict=True))
+        for k in range(3):
+            slope = phi[:, k] @ (dK - lam[0, k] * dM) @ phi[:, k]
+            assert slopes[0, k, j] == pytest.approx(slope, rel=1e-6, abs=1e-3)
+        for k in range(2):
+            slope = phi[:, k] @ (dK - lam[0, k : k + 2].mean() * dM) @ phi[:, k + 1]
+            assert abs(mixed[0, k, j]) == pytest.approx(abs(slope), rel=1e-6, abs=1e-3)
 
 
 def test_a_parameter_without_room_has_no_slope_and_spoils_none(arm: Scene) -> None:

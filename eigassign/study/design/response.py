@@ -9,6 +9,7 @@ is made about the design that is asked for. Answers are judged by exact solves a
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -22,7 +23,7 @@ from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.modal.model import Model
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.reduce import reduce
-from eigassign.modal.slopes import eigenvalue_slopes
+from eigassign.modal.slopes import eigenvalue_slopes, mixed_slopes
 from eigassign.study.scene import AT_LEAST, BLOCK, Scene
 
 Floats = NDArray[np.float64]
@@ -30,7 +31,7 @@ Floats = NDArray[np.float64]
 
 @dataclass
 class ExactResponse:
-    """The lowest ``count`` frequencies at every sample, each by an exact solve.
+    """The lowest ``count`` frequencies at every sample and the one above, each by an exact solve.
 
     Of a design that it was asked for before it knows them.
     """
@@ -48,16 +49,20 @@ class ExactResponse:
         if key not in self.known:
             q, of_design = self.path.at(y)
             self.exact_solves += len(q)
-            found = exact_slopes(self.model, self.model.x(q, y), self.count, self.wanted)
-            self.known[key] = _in_design(*found, of_design, self.path.follows_design)
+            x, follows = self.model.x(q, y), self.path.follows_design
+            lam, slopes, mixed = _in_blocks(mixed_slopes, self.model, x, self.count, self.wanted)
+            hz, slopes = _in_hz(lam, slopes)
+            mixed = mixed / (4.0 * np.pi**2 * (hz[:, :-1] + hz[:, 1:]))[..., None]
+            both = (_in_design(part, of_design, follows) for part in (slopes, mixed))
+            self.known[key] = Frequencies(hz, *both)
         return self.known[key]
 
 
-def _in_design(hz: Floats, slopes: Floats, of_design: Floats, follows: bool) -> Frequencies:
+def _in_design(slopes: Floats, of_design: Floats, follows: bool) -> Floats:
     """From slopes in (q, y) to those in y alone; dq/dy is ``of_design`` where q follows y."""
     n_q = slopes.shape[2] - of_design.shape[2]
     by_y = slopes[..., n_q:]
-    return Frequencies(hz, by_y + slopes[..., :n_q] @ of_design if follows else by_y)
+    return by_y + slopes[..., :n_q] @ of_design if follows else by_y
 
 
 def exact_slopes(model: Model, x: Floats, count: int, wanted: ArrayLike) -> tuple[Floats, Floats]:
@@ -65,13 +70,24 @@ def exact_slopes(model: Model, x: Floats, count: int, wanted: ArrayLike) -> tupl
 
     ``wanted`` and what is raised are those of `eigenvalue_slopes`.
     """
+    return _in_hz(*_in_blocks(eigenvalue_slopes, model, x, count, wanted))
+
+
+def _in_blocks(
+    solve: Callable[..., tuple[Floats, ...]],
+    model: Model,
+    x: Floats,
+    count: int,
+    wanted: ArrayLike,
+) -> Iterator[Floats]:
+    """What ``solve`` finds, some samples at a time; as many modes as there are at all of them."""
     block = max(AT_LEAST, BLOCK // model.n_dof**2)
     parts = [
-        eigenvalue_slopes(model.pencil, x[at : at + block], count, wanted)
-        for at in range(0, len(x), block)
+        solve(model.pencil, x[at : at + block], count, wanted) for at in range(0, len(x), block)
     ]
-    lam, slopes = (np.concatenate(both) for both in zip(*parts, strict=True))
-    return _in_hz(lam, slopes)
+    for found in zip(*parts, strict=True):
+        there = min(part.shape[1] for part in found)
+        yield np.concatenate([part[:, :there] for part in found])
 
 
 def _in_hz(lam: Floats, slopes: Floats) -> tuple[Floats, Floats]:
@@ -161,7 +177,8 @@ class ReducedResponse:
             return own(y)
         q, of_design = own.path.at(y)
         found = reduced.eigenvalue_slopes(own.model.x(q, y), own.count, own.wanted)
-        return _in_design(*_in_hz(*found), of_design, own.path.follows_design)
+        hz, slopes = _in_hz(*found)
+        return Frequencies(hz, _in_design(slopes, of_design, own.path.follows_design))
 
 
 def reduced_models(scene: Scene) -> ReducedModels | None:

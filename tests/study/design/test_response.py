@@ -50,9 +50,9 @@ def test_reduced_models_stand_for_exact_solves_of_large_models(fine: Scene) -> N
     lower, upper = fine.bounds
     for y in (fine.initial, 0.05 * lower + 0.95 * upper):
         said, right = reduced(y), exact(y)
-        np.testing.assert_allclose(said.hz, right.hz, rtol=1e-5)
-        size = np.abs(right.slopes).max(axis=0)
-        assert (np.abs(said.slopes - right.slopes) <= 1e-3 * size).all()
+        np.testing.assert_allclose(said.hz, right.hz[:, :2], rtol=1e-5)
+        slopes = right.slopes[:, :2]
+        assert (np.abs(said.slopes - slopes) <= 1e-3 * np.abs(slopes).max(axis=0)).all()
     assert reduced.exact_solves == 0
 
 
