@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     type=click.Choice(["none", "cheap", "all"]),
     default="cheap",
     show_default=True,
-    help="How much to study of what the answer means; changes no answer.",
+    help="What the answer means, in how much depth: all adds error against mass or price.",
 )
 @arguments.running
 @arguments.json

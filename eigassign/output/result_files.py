@@ -177,6 +177,7 @@ def _meaning(results: RunResults) -> dict[str, Any]:
         "reach": [asdict(row) for row in found.reach],
         "unreachable": found.unreachable,
         "tolerance": None if tolerance is None else asdict(tolerance),
+        "trade_off": None if found.trade_off is None else asdict(found.trade_off),
     }
 
 

@@ -40,6 +40,7 @@ def tables(results: RunResults) -> tuple[Table, ...]:
         limits(results),
         reach(results),
         tolerance(results),
+        trade_off(results),
         approximation(results),
         solver(results),
     )
@@ -191,6 +192,22 @@ def tolerance(results: RunResults) -> Table:
     found = results.meaning.tolerance
     title, rows = "Tolerance", () if found is None else found.targets
     return _ranges(title, "worst error", rows, "" if found is None else f"{found.words}.")
+
+
+def trade_off(results: RunResults) -> Table:
+    """Error against mass or price."""
+    found = results.meaning.trade_off
+    if found is None:
+        return Table("Trade-off", (), ())
+    unit = f" [{found.unit}]" if found.unit else ""
+    columns = (f"{found.quantity}{unit}", "added", found.error, *(r.name for r in results.design))
+    rows = []
+    for point in found.points:
+        added = round(point.amount - found.initial, 12) + 0.0  # not −0
+        cells = (number(point.amount), number(added), percent(point.error))
+        rows.append((*cells, *map(number, point.design)))
+    caption = "The best design found for each; the last is the answer."
+    return Table("Trade-off", columns, tuple(rows), caption)
 
 
 def _ranges(title: str, error: str, found: tuple[RangeRow, ...], caption: str) -> Table:

@@ -403,6 +403,30 @@ class ToleranceRows:
 
 
 @dataclass(frozen=True)
+class TradeOffPoint:
+    """The least error found for this ``amount`` of mass or price, and its design (n_y,)."""
+
+    amount: float
+    error: float
+    design: Floats
+
+
+@dataclass(frozen=True)
+class TradeOff:
+    """Error against mass (kg) or price: ascending amounts, falling errors, the answer last.
+
+    ``initial`` is the amount of the initial design; a price counts from there. ``error`` says which
+    it is, rms or worst, weighted.
+    """
+
+    quantity: str  # mass | price
+    unit: str
+    initial: float
+    error: str
+    points: tuple[TradeOffPoint, ...]
+
+
+@dataclass(frozen=True)
 class Meaning:
     """What the answer means: what it hangs on, what holds it back, how sure it is."""
 
@@ -410,6 +434,7 @@ class Meaning:
     relaxed: tuple[RelaxedRow, ...] = ()
     reach: tuple[RangeRow, ...] = ()  # over all designs within the bounds; the least error
     tolerance: ToleranceRows | None = None
+    trade_off: TradeOff | None = None
     unreachable: tuple[str, ...] = ()  # in words, with numbers
     notes: tuple[str, ...] = ()
 

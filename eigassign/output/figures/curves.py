@@ -25,6 +25,7 @@ from eigassign.study.results import (
     OtherModes,
     RunResults,
     TargetStudy,
+    TradeOff,
 )
 
 if TYPE_CHECKING:
@@ -325,6 +326,42 @@ def draw_progress(results: RunResults, row: AssignmentRow) -> Figure:
     axes.set_xlim(0.5, values.size + 0.5)
     axes.set_xticks(range(1, values.size + 1, max(1, values.size // 10)))
     legend_above(axes, handles)
+    return figure
+
+
+# --- Error against mass or price
+
+
+def trade_off(found: TradeOff) -> FigurePlan:
+    """What each kilogram, or each unit of the price, gains."""
+    first, last = found.points[0], found.points[-1]
+    return FigurePlan(
+        "trade_off",
+        f"{_capital(found.error)} against {found.quantity}",
+        f"The least {found.error} found for each {found.quantity}: from {percent(first.error)} to "
+        f"{percent(last.error)}, the answer.",
+        f"A falling curve of the {found.error} over the {found.quantity}.",
+        partial(draw_trade_off, found),
+    )
+
+
+def draw_trade_off(found: TradeOff) -> Figure:
+    """Error in % over mass or price, the initial design's upright, the answer at the end."""
+    figure, (axes,) = stacked(
+        f"{_capital(found.error)} against {found.quantity}",
+        labelled(found.quantity, found.unit),
+        (2.4,),
+    )
+    amount = np.array([point.amount for point in found.points])
+    error = np.array([100.0 * point.error for point in found.points])
+    look: Look = {"color": style.BLUE, "linewidth": 1.4, "marker": "o", "label": "best found"}
+    (curve,) = axes.plot(amount, error, **look)
+    axes.set(ylabel=f"{found.error} [%]", ylim=(0.0, 1.08 * error.max()))
+    axes.margins(x=0.04)
+    answer: Look = {"color": style.SKY, "marker": "o", "markersize": 10.0, "linestyle": "none"}
+    (end,) = axes.plot(amount[-1:], error[-1:], **answer, label="answer", zorder=1.5)
+    initial = axes.axvline(found.initial, **_POINT, label=f"{found.quantity} of the initial design")
+    legend_above(axes, [curve, end, initial])
     return figure
 
 

@@ -34,6 +34,8 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
     if results.assignment is not None and results.assignment.steps:
         yield curves.progress(results, results.assignment)
     yield from _targets(results)
+    if (found := results.meaning.trade_off) is not None and len(found.points) > 1:
+        yield curves.trade_off(found)
     for one in each:
         if one.others is not None and one.others.initial_hz.size:
             yield curves.other_modes(one, one.others)

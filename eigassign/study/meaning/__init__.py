@@ -6,5 +6,6 @@ Reading order:
     monotone     parameters in which every frequency is monotone, so that corners bound it
     reach        what each target can reach within the bounds, and which cannot be reached
     tolerance    what deviations of the parameters do to an answer
+    tradeoff     the least error that each limit of the mass, or of the price, leaves
     overall      all of it, as far as the user asks for it
 """

@@ -21,7 +21,8 @@ from eigassign.study.design.wanted import Wanted
 from eigassign.study.meaning.reach import misses, proved_ranges, reach_rows, unreachable
 from eigassign.study.meaning.sensitivity import error_kind, relaxed_limits, sensitivities
 from eigassign.study.meaning.tolerance import study_tolerance
-from eigassign.study.results import Meaning, RelaxedRow, ToleranceRows
+from eigassign.study.meaning.tradeoff import trade_off
+from eigassign.study.results import Meaning, RelaxedRow, ToleranceRows, TradeOff
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -64,6 +65,7 @@ def study_meaning(
         relaxed=() if answer.found is None else tuple(_relaxed(scene, answer, answer.found)),
         reach=reach,
         tolerance=_tolerance(scene, answer, wanted, exact_hz, notes),
+        trade_off=_trade_off(scene, answer) if studies is Studies.ALL else None,
         unreachable=beyond,
         notes=tuple(notes),
     )
@@ -81,6 +83,10 @@ def _tolerance(
     if found is not None:
         notes.append(found.words)
     return found
+
+
+def _trade_off(scene: Scene, answer: Answer) -> TradeOff | None:
+    return None if answer.found is None else trade_off(scene, answer.found)
 
 
 def _relaxed(scene: Scene, answer: Answer, found: Found) -> Iterator[RelaxedRow]:

@@ -1,0 +1,114 @@
+"""What less mass, or a lower price, costs: the least error that each limit of it leaves.
+
+Where an answer adds mass, limits of the mass of the whole mechanism are stepped from the answer's
+down to the initial design's; where it adds none, down to the lightest design. Where parameters have
+prices, the price takes the place of the mass. Each problem starts at the optimum of the limit
+before it, so that the curve is one of local optima, at the samples; no limit does worse than a
+lower one, whose optimum it admits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.assignment.sequential import MET, Appraisal, DesignProblem, Optimum, minimise
+from eigassign.errors import EigassignError
+from eigassign.study.design.optimum import Found
+from eigassign.study.meaning.sensitivity import as_error, error_kind
+from eigassign.study.results import TradeOff, TradeOffPoint
+from eigassign.study.scene import Scene
+
+Floats = NDArray[np.float64]
+Quantity = Callable[[Floats], tuple[float, Floats]]  # of a design: its value and slope (n_y,)
+LIMITS = 8
+STEPS = 30  # from one optimum to the next
+SAME = 1e-6  # of the mass: a range too small to trade in
+
+
+def trade_off(scene: Scene, found: Found) -> TradeOff | None:
+    """Errors over limits of mass or price, the lowest limit first.
+
+    None without wanted frequencies, with catalogues, or where the design does not change the mass.
+    """
+    variant, best = found.variant, found.best
+    if not variant.requirements.targets or found.chosen or best.seen.violation > MET:
+        return None
+    priced = variant.problem.prices is not None
+    problem = replace(variant.problem, prices=None)
+    quantity: Quantity = _price(scene) if priced else scene.model.total_mass
+    high, first = quantity(best.y)[0], quantity(scene.initial)[0]
+    low = min(first, high)
+    if high - low <= SAME * abs(high):
+        lightest = _limited(_nothing(problem), quantity, 0.0, 1.0)
+        low = quantity(minimise(lightest, best.y, STEPS).y)[0]
+    if high - low <= SAME * abs(high):
+        return None
+    kind = error_kind(problem, variant.requirements)
+    points = [_point(best.y, high, problem(best.y, best.seen), kind)]
+    y = best.y
+    for limit in np.linspace(low, high, LIMITS)[-2::-1]:
+        optimum = _optimum(_limited(problem, quantity, float(limit), high - low), y)
+        if optimum is None or optimum.seen.violation > MET:
+            break
+        y = optimum.y
+        points.append(_point(y, quantity(y)[0], optimum.objective, kind))
+    return TradeOff(
+        "price" if priced else "mass",
+        "" if priced else "kg",
+        first,
+        kind,
+        tuple(_kept(points)),
+    )
+
+
+def _price(scene: Scene) -> Quantity:
+    """p·(y − y_initial), in the units of the case file's prices."""
+    prices = np.array([column.price or 0.0 for column in scene.file.design.parameters.values()])
+    return lambda y: (float(prices @ (y - scene.initial)), prices)
+
+
+def _nothing(problem: DesignProblem) -> DesignProblem:
+    """The limits of the design alone."""
+    n = len(problem.lower)
+    empty = Appraisal(np.zeros(0), np.zeros((0, n)), np.zeros(0), np.zeros((0, n)))
+    return replace(problem, appraise=lambda y: empty)
+
+
+def _limited(
+    problem: DesignProblem, quantity: Quantity, limit: float, unit: float
+) -> DesignProblem:
+    """The problem with quantity ≤ limit beside its other limits."""
+
+    def appraise(y: Floats) -> Appraisal:
+        seen, (value, slope) = problem.appraise(y), quantity(y)
+        return replace(
+            seen,
+            excess=np.append(seen.excess, (value - limit) / unit),
+            excess_slopes=np.vstack([seen.excess_slopes, slope / unit]),
+        )
+
+    return replace(problem, appraise=appraise)
+
+
+def _optimum(problem: DesignProblem, start: Floats) -> Optimum | None:
+    try:
+        return minimise(problem, start, STEPS)
+    except EigassignError:
+        return None
+
+
+def _point(y: Floats, amount: float, F: float, kind: str) -> TradeOffPoint:
+    return TradeOffPoint(amount, as_error(kind, F), y)
+
+
+def _kept(points: list[TradeOffPoint]) -> list[TradeOffPoint]:
+    """Ascending, without those that cost more and are no better."""
+    kept: list[TradeOffPoint] = []
+    for point in sorted(points, key=lambda one: (one.amount, one.error)):
+        if not kept or point.error < kept[-1].error:
+            kept.append(point)
+    return kept
