@@ -67,6 +67,7 @@ def _described(name: str, answer: CheckAnswer) -> str:
 @arguments.case
 @click.option("--q", metavar="VALUES", help="Pose, as '1.817, 5.312' or '104 deg 304 deg'.")
 @click.option("--y", metavar="VALUES", help="Design, as '0.125 0.125' or '125 g, 0'.")
+@click.option("--beyond-bounds", is_flag=True, help="Also a design outside its bounds.")
 @click.option("--count", type=click.IntRange(1), default=4, show_default=True, help="Modes.")
 @click.option("--draw", is_flag=True, help="Draw their shapes, in results/<case>_modes.")
 @click.option("--out", type=arguments.PATH, help="Draw their shapes, in this folder.")
@@ -75,7 +76,14 @@ def _described(name: str, answer: CheckAnswer) -> str:
 @arguments.json
 @arguments.common
 def modes(
-    case: Path, q: str | None, y: str | None, count: int, as_json: bool, draw: bool, **how: Any
+    case: Path,
+    q: str | None,
+    y: str | None,
+    beyond_bounds: bool,
+    count: int,
+    as_json: bool,
+    draw: bool,
+    **how: Any,
 ) -> int:
     """Exact natural frequencies of the elastic modes at one pose and design, and their shapes.
 
@@ -92,10 +100,10 @@ def modes(
         at = point(case, q, y)
         if draw:
             answer, folder = queries.draw_modes(
-                case, *at, count, how["out"], how["force"], how["figures"]
+                case, *at, count, beyond_bounds, how["out"], how["force"], how["figures"]
             )
         else:
-            answer = queries.modes(case, *at, count)
+            answer = queries.modes(case, *at, count, beyond_bounds)
         if as_json and folder is not None:
             reporter.stage(f"{folder} written")
     if as_json:

@@ -27,6 +27,7 @@ from eigassign.study.design.wanted import target_frequencies
 from eigassign.study.planning import plan_expansion
 
 Floats = NDArray[np.float64]
+ROUND_OFF = 1e-9  # of a bound: a design this far beyond it is on it
 
 
 @dataclass(frozen=True)
@@ -62,16 +63,18 @@ def modes(
     q: Sequence[float] | str | None = None,
     y: Sequence[float] | str | None = None,
     count: int = 3,
+    beyond_bounds: bool = False,
 ) -> ModesAnswer:
     """Exact modes of the case at q (rad) and y (SI units), given as numbers or as text with units.
 
     Without ``q`` at the expansion point that the case gives, else where its trajectory starts;
     without ``y`` with the design as it is written in the file. Loads that trajectories set may
     stand behind the coordinates in ``q``; without them they are as written in the file. Raises
-    UsageError for wrong lengths or counts, and where there is no pose to take.
+    UsageError for wrong lengths or counts, where there is no pose to take, and for a design that
+    is neither within its bounds nor the initial one, unless ``beyond_bounds``.
     """
     case = load_case(path)
-    at_q, at_y = _point(case, q, y)
+    at_q, at_y = _point(case, q, y, beyond_bounds)
     with case.located():
         model = case.model()
         hz = model.frequencies(at_q, at_y, count)[0]
@@ -83,6 +86,7 @@ def draw_modes(
     q: Sequence[float] | str | None = None,
     y: Sequence[float] | str | None = None,
     count: int = 3,
+    beyond_bounds: bool = False,
     out: Path | None = None,
     force: bool = False,
     formats: Sequence[str] = ("png",),
@@ -92,7 +96,7 @@ def draw_modes(
     Raises what `modes` does, and StorageError where the folder may not be replaced.
     """
     case = load_case(path)
-    at_q, at_y = _point(case, q, y)
+    at_q, at_y = _point(case, q, y, beyond_bounds)
     target = RESULTS / f"{case.file.path.stem}_modes" if out is None else out
     with new_run_folder(case.file, target, force) as folder:
         with case.located():
@@ -103,7 +107,7 @@ def draw_modes(
 
 
 def _point(
-    case: Case, q: Sequence[float] | str | None, y: Sequence[float] | str | None
+    case: Case, q: Sequence[float] | str | None, y: Sequence[float] | str | None, beyond: bool
 ) -> tuple[Floats, Floats]:
     """Where modes are asked for, in SI; raises UsageError."""
     q = coordinates(case.file, q) if isinstance(q, str) else q
@@ -112,7 +116,24 @@ def _point(
         at_q = np.asarray(_default_q(case) if q is None else q, dtype=np.float64)
     if at_q.shape == (len(case.file.coordinates),):
         at_q = np.append(at_q, written_loads(case.file))
-    return at_q, np.asarray(case.initial_design if y is None else y, dtype=np.float64)
+    at_y = np.asarray(case.initial_design if y is None else y, dtype=np.float64)
+    if not beyond and at_y.shape == case.initial_design.shape:
+        _refuse_beyond_bounds(case, at_y)
+    return at_q, at_y
+
+
+def _refuse_beyond_bounds(case: Case, y: Floats) -> None:
+    columns, units = case.file.design.parameters.items(), case.file.design_units
+    for (name, column), unit, value, initial in zip(
+        columns, units, y, case.initial_design, strict=True
+    ):
+        slack = ROUND_OFF * max(abs(column.min), abs(column.max))
+        if not column.min - slack <= value <= column.max + slack and value != initial:
+            raise UsageError(
+                f"{name} = {value:g} {unit} is outside its bounds, {column.min:g} to "
+                f"{column.max:g} {unit}: for a design there ask with --beyond-bounds "
+                "(in Python beyond_bounds=True)"
+            )
 
 
 def _answer(case: Case, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
