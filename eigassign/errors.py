@@ -93,6 +93,33 @@ class AccuracyError(EigassignError):
     exit_code = 1
 
 
+@dataclass(frozen=True)
+class Candidate:
+    """A mode that may be the one looked for: its share of the shape is ``mac``, 0 to 1."""
+
+    number: int
+    hz: float
+    mac: float
+
+    def __str__(self) -> str:
+        return f"mode {self.number} ({self.hz:.5g} Hz, MAC {self.mac:.2f})"
+
+
+class LostModeError(EigassignError):
+    """No mode has the shape that is followed; ``candidates`` are the nearest, the best first.
+
+    ``step`` is the place on the way (0-based) at which it is lost.
+    """
+
+    exit_code = 1
+
+    def __init__(self, candidates: tuple[Candidate, ...], step: int, message: str = "") -> None:
+        self.candidates = candidates
+        self.step = step
+        nearest = " and ".join(map(str, candidates)) or "none of the modes"
+        super().__init__(message or f"no mode has the shape followed; nearest: {nearest}")
+
+
 class InfeasibleError(EigassignError):
     """No design meets all constraints; ``constraints`` names those that contradict each other."""
 

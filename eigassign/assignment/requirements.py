@@ -8,9 +8,10 @@ it `appraise` makes what the sequential method works on:
     excess of "at least b"      (b − Σ c_i f_i) / b
     excess of "at most b"       (Σ c_i f_i − b) / b
 
-with coefficients c that pick one mode, or the gap between two. A quantity of the design, such as
-the mass of the mechanism, is limited likewise. Where no frequency is wanted, the residuals are the
-changes of the design, (y − y_ref)/width.
+with coefficients c that pick one mode, or the gap between two. Modes are numbered from 1, and those
+followed by their shape −1, −2, …, from the last column. A quantity of the design, such as the mass
+of the mechanism, is limited likewise. Where no frequency is wanted, the residuals are the changes
+of the design, (y − y_ref)/width.
 """
 
 from __future__ import annotations
@@ -28,11 +29,11 @@ from eigassign.assignment.sequential import Appraisal, Objective
 
 @dataclass(frozen=True)
 class Frequencies:
-    """The lowest frequencies ``hz`` (n_t, n_modes) of a design, ascending at every sample.
+    """Frequencies ``hz`` (n_t, n_modes) of a design: the lowest, ascending, then followed ones.
 
     ``slopes`` (n_t, n_modes, n_y) in Hz per SI unit of y; where the trajectory follows the design,
-    they hold its part too. ``mixed`` (n_t, n_modes − 1, n_y) are the slopes off the diagonal of the
-    matrices that neighbours make (`crossing`), if known.
+    they hold its part too. ``mixed`` (n_t, n_lowest − 1, n_y) are the slopes off the diagonal of
+    the matrices that neighbours among the lowest make (`crossing`), if known.
     """
 
     hz: Floats
@@ -45,7 +46,7 @@ Response = Callable[[Floats], Frequencies]
 
 @dataclass(frozen=True)
 class FrequencyTarget:
-    """Mode ``mode`` (from 1) is to be near ``hz`` (n,) at ``rows`` of all samples."""
+    """A mode is to be near ``hz`` (n,) at ``rows`` of all samples."""
 
     mode: int
     hz: Floats
@@ -87,10 +88,10 @@ class Requirements:
 
     @property
     def modes(self) -> int:
-        """The highest mode that anything is asked of; 1 if nothing is."""
+        """The highest numbered mode that anything is asked of; 1 if nothing is."""
         asked = [target.mode for target in self.targets]
         asked += [mode for limit in self.limits for mode, _ in limit.terms]
-        return max(asked, default=1)
+        return max(1, *asked)
 
     @property
     def limit_names(self) -> tuple[str, ...]:
@@ -185,9 +186,13 @@ class Requirements:
         return np.sqrt(target.weight * self.time_weights[target.rows] / self._total)
 
     def _residual(self, target: FrequencyTarget, found: Frequencies) -> tuple[Floats, Floats]:
-        factor, column = self._factor(target), target.mode - 1
+        factor, column = self._factor(target), _column(target.mode)
         hz, slopes = found.hz[target.rows, column], found.slopes[target.rows, column]
         return factor * (hz / target.hz - 1.0), (factor / target.hz)[:, None] * slopes
+
+
+def _column(mode: int) -> int:
+    return mode - 1 if mode > 0 else mode
 
 
 def _overlap(one: slice, other: slice) -> bool:
@@ -205,9 +210,10 @@ def _beside(
 ) -> Iterator[Pairs]:
     """Rows ``at``, scale (f − wanted), each with the modes below and above that are not asked."""
     assert found.mixed is not None
-    own = found.hz[rows, mode - 1]
-    for neighbour in (mode - 1, mode + 1):
-        if neighbour in asked or not 1 <= neighbour <= found.hz.shape[1]:
+    lowest = found.mixed.shape[1] + 1
+    own = found.hz[rows, _column(mode)]
+    for neighbour in (mode - 1, mode + 1) if mode > 0 else ():
+        if neighbour in asked or not 1 <= neighbour <= lowest:
             continue
         hz = found.hz[rows, neighbour - 1]
         yield Pairs(
@@ -221,8 +227,8 @@ def _beside(
 
 
 def _excess(limit: FrequencyLimit, found: Frequencies) -> tuple[Floats, Floats]:
-    value = sum(c * found.hz[limit.rows, mode - 1] for mode, c in limit.terms)
-    slopes = sum(c * found.slopes[limit.rows, mode - 1] for mode, c in limit.terms)
+    value = sum(c * found.hz[limit.rows, _column(mode)] for mode, c in limit.terms)
+    slopes = sum(c * found.slopes[limit.rows, _column(mode)] for mode, c in limit.terms)
     sign = -1.0 if limit.at_least else 1.0
     return sign * (value - limit.hz) / limit.hz, np.asarray(sign * slopes / limit.hz[:, None])
 

@@ -36,10 +36,14 @@ def eigenvalue_slopes(
     Raises UsageError for more modes than there are or x outside the domain of a section or length,
     MissingMassError for more modes than have mass, MechanismError where K_E or M_FF is singular.
     """
-    theta = pencil.theta(x)
-    found = modes_at(pencil, theta, count)
-    pairs = [(mode, mode) for mode in range(count)]
-    return found.lam, _slopes(pencil, x, theta, found, pairs, wanted)
+    found = modes_at(pencil, pencil.theta(x), count)
+    return found.lam, mode_slopes(pencil, x, found, wanted)
+
+
+def mode_slopes(pencil: Pencil, x: Floats, found: Modes, wanted: ArrayLike) -> Floats:
+    """∂λ/∂x (n, count, n_x) of modes found at x, in the same variables."""
+    pairs = [(mode, mode) for mode in range(found.lam.shape[1])]
+    return _slopes(pencil, x, found, pairs, wanted)
 
 
 def mixed_slopes(
@@ -50,18 +54,23 @@ def mixed_slopes(
     λ (n, count + 1), slopes (n, count + 1, n_x), those off the diagonal (n, count, n_x); one less
     where no more modes have mass.
     """
-    theta = pencil.theta(x)
-    found = lowest_modes(pencil, theta, count, 1)
+    found = lowest_modes(pencil, pencil.theta(x), count, 1)
+    return found.lam, *neighbour_slopes(pencil, x, found, wanted)
+
+
+def neighbour_slopes(
+    pencil: Pencil, x: Floats, found: Modes, wanted: ArrayLike
+) -> tuple[Floats, Floats]:
+    """Slopes (n, count, n_x) of modes found at x, and off the diagonal (n, count − 1, n_x)."""
     there = found.lam.shape[1]
     pairs = [(k, k) for k in range(there)] + [(k, k + 1) for k in range(there - 1)]
-    slopes = _slopes(pencil, x, theta, found, pairs, wanted)
-    return found.lam, slopes[:, :there], slopes[:, there:]
+    slopes = _slopes(pencil, x, found, pairs, wanted)
+    return slopes[:, :there], slopes[:, there:]
 
 
 def _slopes(
     pencil: Pencil,
     x: Floats,
-    theta: Floats,
     found: Modes,
     pairs: Sequence[tuple[int, int]],
     wanted: ArrayLike,

@@ -25,6 +25,7 @@ from eigassign.study.results import (
     AssignmentRow,
     Comparison,
     ErrorSummary,
+    FollowedRow,
     ModeStudy,
     OtherModes,
     RunResults,
@@ -149,14 +150,21 @@ def _target(results: RunResults, target: TargetStudy) -> dict[str, Any]:
     return {
         "kind": target.kind,
         "label": target.label,
-        "mode": target.mode,
+        "mode": None if target.followed else target.mode,
         "modes": target.modes,
+        **({"followed": _followed(target.followed)} if target.followed else {}),
         "satisfied": target.satisfied,
         "worst": target.error.exact.max_relative,
         **({"trajectory": target.trajectory} if target.trajectory is not None else {}),
         "error": _error(target.error),
         "frequencies": _frequencies(results, target),
     }
+
+
+def _followed(row: FollowedRow) -> dict[str, Any]:
+    """A mode that is followed by its shape, and which mode it is at each sample."""
+    numbers = {"initial_modes": row.initial_numbers, "exact_modes": row.exact_numbers}
+    return {"name": row.name, "like": row.like, **numbers}
 
 
 def _assignment(row: AssignmentRow) -> dict[str, Any]:
@@ -320,10 +328,10 @@ def _motion(results: RunResults, rows: slice) -> Iterator[Column]:
 
 def _assigned(results: RunResults) -> Iterator[Column]:
     """One group of columns a mode, whichever trajectories its targets hold on."""
-    for mode in dict.fromkeys(target.mode for target in results.targets):
-        own = [target for target in results.targets if target.mode == mode]
+    for name in dict.fromkeys(target.curve_name for target in results.targets):
+        own = [target for target in results.targets if target.curve_name == name]
         for kind in ("target", "initial", "one_shot", "predicted", "exact"):
-            heading = f"mode {mode} {kind.replace('_', ' ')} [Hz]"
+            heading = f"{name} {kind.replace('_', ' ')} [Hz]"
             yield heading, _scattered(own, kind, results.time_s.size)
 
 

@@ -26,6 +26,12 @@ from eigassign.study.built_case import Case, load_case
 from eigassign.study.collect import VerifiedAssignment, collect_results
 from eigassign.study.comparison import Validation, study_modes, validate_expansions
 from eigassign.study.design.answer import MAX_ERROR, Answer, find_answer, require_assignable
+from eigassign.study.design.followed import (
+    Solved,
+    followers,
+    require_one_shape,
+    solve_design,
+)
 from eigassign.study.design.judgement import SolvedDesigns, study_targets
 from eigassign.study.design.wanted import target_frequencies
 from eigassign.study.meaning.overall import Studies, study_meaning
@@ -101,32 +107,34 @@ def solve_case(case: Case, options: Options = DEFAULT) -> Result:
         scene = prepare(case, stages, _cache(options))
         wanted = target_frequencies(file, scene.path)
         with stages("assignment", "assigning the frequencies"):
+            require_one_shape(scene, wanted)
             answer = find_answer(scene, wanted, options.progress)
             scene = replace(scene, asked_modes=answer.modes)
+        own = followers(scene, wanted)
         with stages("initial", "solving the initial design exactly"):
-            initial_hz = scene.exact(scene.initial, stages.advance)
+            initial = solve_design(scene, own, scene.initial, stages.advance)
         with stages("verification", "solving the optimal design exactly"):
-            exact_hz = scene.exact(answer.y, stages.advance)
-            one_shot_hz = _one_shot(scene, answer, exact_hz)
+            exact = solve_design(scene, own, answer.y, stages.advance)
+            one_shot = _one_shot(scene, answer, exact)
         with stages("comparison", "comparing the expansion with exact frequencies"):
-            studies = study_modes(scene, initial_hz)
+            studies = study_modes(scene, initial.hz)
             scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene, answer.y)))
-        solved = SolvedDesigns(initial_hz, exact_hz, one_shot_hz)
+        solved = SolvedDesigns(initial, exact, one_shot)
         accepted = file.assignment.max_error or MAX_ERROR
         targets = study_targets(scene.path, wanted, solved, answer.predicted, accepted)
         with stages("meaning", "studying what the answer means"):
             asked = Studies(options.study)
-            meaning = study_meaning(scene, answer, wanted, exact_hz, accepted, asked)
-    found = VerifiedAssignment(answer, tuple(wanted), targets, initial_hz, exact_hz, meaning)
+            meaning = study_meaning(scene, answer, wanted, exact, accepted, asked)
+    found = VerifiedAssignment(answer, tuple(wanted), targets, initial, exact, meaning)
     results = collect_results(scene, studies, found, stages.timing_s)
     return _result(results, scene.expansions, answer.one_shot)
 
 
-def _one_shot(scene: Scene, answer: Answer, exact_hz: Floats) -> Floats | None:
+def _one_shot(scene: Scene, answer: Answer, exact: Solved) -> Solved | None:
     """Exact frequencies of the paper's answer, where there is one."""
     if answer.one_shot is None:
         return None
-    return exact_hz if answer.found is None else scene.exact(answer.one_shot.y)
+    return exact if answer.found is None else solve_design(scene, (), answer.one_shot.y)
 
 
 def prepare(

@@ -13,7 +13,8 @@ from eigassign.case import CaseFile
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.accuracy import study_motion
 from eigassign.study.design.answer import Answer, assignment_row, limit_notes
-from eigassign.study.design.judgement import crossing_warnings
+from eigassign.study.design.followed import Solved
+from eigassign.study.design.judgement import crossing_warnings, swap_notes
 from eigassign.study.design.one_shot import design_rows, solver_row
 from eigassign.study.design.wanted import Wanted
 from eigassign.study.drawing import draw_poses, rest_pose
@@ -36,13 +37,13 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class VerifiedAssignment:
-    """An answer with exact frequencies (n_t, shown modes) before and after."""
+    """An answer with exact frequencies before and after."""
 
     answer: Answer
     wanted: tuple[Wanted, ...]
     targets: tuple[TargetStudy, ...]
-    initial_hz: Floats
-    exact_hz: Floats
+    initial: Solved
+    exact: Solved
     meaning: Meaning
 
 
@@ -77,7 +78,7 @@ def collect_results(
         solver=_solver(assigned),
         assignment=row,
         warnings=(*scene.warnings, *_warnings(scene, assigned), *motion[1]),
-        notes=(*scene.notes, *_notes(assigned, row), *motion[0], *meaning.notes),
+        notes=(*scene.notes, *_notes(scene, assigned, row), *motion[0], *meaning.notes),
         timing_s=dict(timing_s),
         tolerance=file.validation.max_error,
         meaning=meaning,
@@ -103,11 +104,14 @@ def _assignment(scene: Scene, assigned: VerifiedAssignment | None) -> Assignment
     return assignment_row(scene, answer, assigned.wanted, assigned.targets, beyond)
 
 
-def _notes(assigned: VerifiedAssignment | None, row: AssignmentRow | None) -> tuple[str, ...]:
+def _notes(
+    scene: Scene, assigned: VerifiedAssignment | None, row: AssignmentRow | None
+) -> tuple[str, ...]:
     """What was chosen on the way to the answer, and what holds it back."""
     if assigned is None or row is None:
         return ()
-    return (*assigned.answer.notes, *limit_notes(assigned.answer, row))
+    swaps = swap_notes(scene.path, assigned.targets)
+    return (*assigned.answer.notes, *limit_notes(assigned.answer, row), *swaps)
 
 
 def _trajectories(file: CaseFile, path: Trajectories | None) -> tuple[TrajectoryRow, ...]:
@@ -130,7 +134,7 @@ def _motion(scene: Scene, assigned: VerifiedAssignment | None) -> tuple[list[str
     """Notes and warnings on the speed of the motion."""
     if assigned is None:
         return [], []
-    study = study_motion(scene, assigned.initial_hz)
+    study = study_motion(scene, assigned.initial.hz)
     if study is None:
         return [], []
     return [study.note] if study.note else [], [study.warning] if study.warning else []
@@ -144,13 +148,18 @@ def _poses(scene: Scene) -> DrawnPoses:
 
 def _others(scene: Scene, assigned: VerifiedAssignment) -> OtherModes | None:
     """Up to three modes above the lowest assigned one that have no target themselves."""
-    targets = {mode for target in assigned.targets for mode in target.modes}
+    targets = {mode for target in assigned.targets for mode in _modes(target)}
     rest = [m for m in scene.shown_modes if m > min(targets, default=0) and m not in targets][:3]
     if not rest:
         return None
     columns = [mode - 1 for mode in rest]
-    before, after = assigned.initial_hz[:, columns], assigned.exact_hz[:, columns]
+    before, after = assigned.initial.hz[:, columns], assigned.exact.hz[:, columns]
     return OtherModes(tuple(rest), before, after)
+
+
+def _modes(target: TargetStudy) -> set[int]:
+    """The modes that it names, and those that a followed one is."""
+    return set(target.modes if target.followed is None else target.followed.exact_numbers.tolist())
 
 
 def _warnings(scene: Scene, assigned: VerifiedAssignment | None) -> Iterator[str]:
@@ -158,8 +167,8 @@ def _warnings(scene: Scene, assigned: VerifiedAssignment | None) -> Iterator[str
     if assigned is None:
         return
     modes = tuple(sorted({mode for target in assigned.targets for mode in target.modes}))
-    for hz, design in ((assigned.initial_hz, "initial"), (assigned.exact_hz, "optimal")):
-        yield from crossing_warnings(hz, modes, scene.path.where, design)
+    for solved, design in ((assigned.initial, "initial"), (assigned.exact, "optimal")):
+        yield from crossing_warnings(solved.hz, modes, scene.path.where, design)
     if assigned.answer.found is None:
         yield from _accuracy_warnings(scene, assigned)
         yield from _worsening(scene, assigned)

@@ -160,14 +160,33 @@ class TargetAlong:
 
 
 @dataclass(frozen=True)
+class FollowedRow:
+    """A mode followed by its shape: its ``name``, and which modes (n,) it is, from the lowest."""
+
+    name: str
+    like: int  # its number where it is named
+    initial_numbers: NDArray[np.intp]
+    exact_numbers: NDArray[np.intp]
+
+    def part(self, rows: slice) -> FollowedRow:
+        """The same at some of the samples."""
+        return replace(
+            self,
+            initial_numbers=self.initial_numbers[rows],
+            exact_numbers=self.exact_numbers[rows],
+        )
+
+
+@dataclass(frozen=True)
 class TargetStudy:
     """One target along the trajectory (the paper's Figure 4); arrays (n,) in Hz.
 
     They belong to the ``rows`` of all samples at which the target holds. What is wanted lies from
     ``lower_hz`` to ``upper_hz``: a frequency where both are equal, a limit where one is infinite; a
     band to keep out of lies between them. The curves are of its mode, of a gap the distance of its
-    two, of a band the frequency nearest to its middle. Errors of limits and bands are relative
-    violations, 0 where they are met. ``weight_s`` is the time that it stands for, weighted.
+    two, of a band the frequency nearest to its middle; a ``followed`` mode is none of ``modes``.
+    Errors of limits and bands are relative violations, 0 where they are met. ``weight_s`` is the
+    time that it stands for, weighted.
     """
 
     kind: str  # frequency | at_least | at_most | keep_out | gap
@@ -186,11 +205,20 @@ class TargetStudy:
     weight_s: float
     weight: float
     along: tuple[TargetAlong, ...]
+    followed: FollowedRow | None = None
+
+    @property
+    def curve_name(self) -> str:
+        """Whose frequency its curves are, to tell columns and files apart."""
+        return f"mode {self.mode}" if self.followed is None else self.followed.name
 
     @property
     def mode(self) -> int:
-        """Its mode, of several the lowest; 1 of a band for all modes."""
-        return min(self.modes, default=1)
+        """Its mode, of several the lowest; 1 of a band for all modes.
+
+        Of a followed one the number that it is named by.
+        """
+        return min(self.modes, default=1) if self.followed is None else self.followed.like
 
     @property
     def target_hz(self) -> Floats:
@@ -378,7 +406,7 @@ class RelaxedRow:
 class RangeRow:
     """Between what values (n,) in Hz a target's curve lies over some designs; ``error`` over them.
 
-    ``how``: proved (nothing lies outside) or sampled.
+    ``how``: proved (nothing lies outside), sampled, or followed (a followed mode at the corners).
     """
 
     label: str
@@ -689,5 +717,6 @@ def _target(target: TargetStudy, row: TrajectoryRow) -> TargetStudy | None:
         one_shot_hz=None if target.one_shot_hz is None else target.one_shot_hz[rows],
         error=along.error,
         rows=slice(first, first + length),
+        followed=None if target.followed is None else target.followed.part(rows),
         along=(replace(along, rows=slice(0, length)),),
     )

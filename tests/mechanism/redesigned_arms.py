@@ -122,7 +122,7 @@ def slider_crank() -> Case:
     )
 
 
-def cart(path: list[list[float]], leaning: bool = False) -> Case:
+def cart(path: list[list[float]], leaning: bool = False, **more: Any) -> Case:
     """A bar on a cart, upright for good, or leaning as its drive tells it.
 
     The cart alone can bring back no change of the bar's length. Leaning, the bar keeps its angle
@@ -141,7 +141,7 @@ def cart(path: list[list[float]], leaning: bool = False) -> Case:
     tree["trajectory"] = {"tip": "bar.end", "waypoints": path, "path": "straight", "samples": 5}
     order = {"expansion": {"order": 2}}
     design = {"h": {"parameter": "links.bar.length", "min": 0.45, "max": 0.55}}
-    return case_of(tree | order | {"design": design})
+    return case_of(tree | order | {"design": design} | more)
 
 
 def extrapolated(f: Callable[[np.ndarray], np.ndarray], y: np.ndarray, h: float) -> np.ndarray:

@@ -121,6 +121,19 @@ class FollowedMode(Part):
     at: Pose
     design: ByReference[NumberOr[YValue, str]] = FrozenDict()
 
+    @property
+    def name(self) -> str:
+        """The mode in words, and where it is named, in SI units."""
+        where = [f"t = {self.at.time:g} s" if self.at.q is None else _listed("q", self.at.q)]
+        where[0] += f" of {self.at.trajectory!r}" if self.at.trajectory else ""
+        for key, value in self.design.items():
+            where.append(f"{key} = {value}" if isinstance(value, str) else f"{key} = {value:g}")
+        return f"the mode like mode {self.like} ({', '.join(where)})"
+
+
+def _listed(name: str, values: Iterable[float]) -> str:
+    return f"{name} = {' '.join(f'{value:.6g}' for value in values)}"
+
 
 # --- Targets
 
@@ -305,7 +318,7 @@ class Requirement:
         """The requirement in words: "mode 2 at least 320 Hz"."""
         who = f"mode {self.modes[0]}" if self.modes else "every mode"
         if self.followed is not None:
-            who = f"the mode like {who}"
+            who = self.followed.name
         if len(self.modes) > 1:
             who = f"modes {', '.join(map(str, self.modes[:-1]))} and {self.modes[-1]}"
         where = f" along {self.target.trajectory!r}" if self.target.trajectory else ""

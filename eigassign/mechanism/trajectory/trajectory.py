@@ -259,10 +259,11 @@ class Trajectories:
     """At least one trajectory; n samples in all, those of the first one first.
 
     The time of each begins where its own does, so ``time_s`` need not increase from one to the
-    next; ``rows`` says which samples are whose.
+    next; ``rows`` says which samples are whose. ``origin`` is what some samples were chosen from.
     """
 
     parts: tuple[NamedTrajectory, ...]
+    origin: Trajectories | None = None
 
     def __post_init__(self) -> None:
         if not self.parts:
@@ -277,6 +278,11 @@ class Trajectories:
     def q(self) -> Floats:
         """(n, n_q) in rad or m, at the initial design."""
         return _stacked([part.trajectory.q for part in self.parts])
+
+    @property
+    def whole(self) -> Trajectories:
+        """All samples, where these are some of them."""
+        return self if self.origin is None else self.origin
 
     @property
     def follows_design(self) -> bool:
@@ -381,7 +387,7 @@ class Trajectories:
             own = kept[(kept >= rows.start) & (kept < rows.stop)] - rows.start
             if len(own):
                 parts.append(part._replace(trajectory=part.trajectory.chosen(own)))
-        return Trajectories(tuple(parts))
+        return Trajectories(tuple(parts), self.whole)
 
 
 def _stacked(arrays: Sequence[Floats]) -> Floats:

@@ -12,4 +12,5 @@ In reading order:
     roundoff      how many digits of a frequency the matrices themselves hold
     clusters      neighbouring modes that are expanded together
     tracking      modes followed along a path by their shapes
+    following     one mode by its shape from where it is named, or the modes nearest to it
 """

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.arguments import mode_numbers
-from eigassign.modal.exact.condensation import Modes
+from eigassign.modal.arguments import DENSE_LIMIT, chunks, mode_numbers
+from eigassign.modal.exact.condensation import Modes, block
 from eigassign.modal.exact.solver import eigenvalues, lowest_modes
 
 Floats = NDArray[np.float64]
@@ -132,21 +132,33 @@ def _advance(pencil: Pencil, here: _Here, x: Floats, there: Modes, depth: int) -
 
 def overlaps(pencil: Pencil, shapes: Floats, x: Floats, modes: Floats) -> Floats:
     """O (m, c): share of each shape (n_dof, m) that is each mode (n_dof, c); rows sum to ≤ 1."""
-    M = pencil.sparse(pencil.mass @ pencil.theta(x[None])[:, 0])
-    across = shapes.T @ (M @ modes)
-    return np.asarray(across**2 / _elastic_size(pencil, M, shapes)[:, None])
+    across, sizes = links(pencil, x[None], shapes[None], modes[None])
+    return np.asarray(across[0].T ** 2 / np.diag(sizes[0])[:, None])
 
 
-def _elastic_size(pencil: Pencil, M: object, shapes: Floats) -> Floats:
-    """φ_EᵀM_cφ_E for every shape: its mass without the rigid motion it contains at x."""
-    rigid = pencil.rigid
-    product = M @ shapes  # type: ignore[operator]
-    size = np.einsum("nm,nm->m", shapes, product)
-    if not len(rigid):
-        return np.asarray(size)
-    M_FF = (M[rigid][:, rigid]).toarray()  # type: ignore[index]
-    motion = np.linalg.solve(M_FF, product[rigid])
-    return np.asarray(size - np.einsum("fm,fm->m", product[rigid], motion))
+def links(pencil: Pencil, x: Floats, before: Floats, after: Floats) -> tuple[Floats, Floats]:
+    """φᵀMψ (n, c, m) and ψᵀM_cψ (n, m, m) of shapes ψ ``before`` and modes φ ``after``.
+
+    M is that at x (n, n_x), M_c the same without the rigid motion that shapes contain there.
+    """
+    theta = pencil.theta(x)
+    dense = pencil.n_dof <= DENSE_LIMIT
+    across = np.empty((len(x), after.shape[2], before.shape[2]))
+    sizes = np.empty((len(x), before.shape[2], before.shape[2]))
+    for at in chunks(np.arange(len(x)), pencil.n_dof**2) if dense else np.arange(len(x))[:, None]:
+        if dense:
+            M = pencil.mass_matrices(theta[:, at])
+            product, M_FF = M @ before[at], block(M, pencil.rigid, pencil.rigid)
+        else:
+            whole = pencil.sparse(pencil.mass @ theta[:, at[0]])
+            product = np.asarray(whole @ before[at[0]])[None]
+            M_FF = whole[pencil.rigid][:, pencil.rigid].toarray()[None]
+        on_rigid = product[:, pencil.rigid]
+        across[at] = np.swapaxes(after[at], 1, 2) @ product
+        sizes[at] = np.swapaxes(before[at], 1, 2) @ product
+        if len(pencil.rigid):
+            sizes[at] -= np.swapaxes(on_rigid, 1, 2) @ np.linalg.solve(M_FF, on_rigid)
+    return across, sizes
 
 
 def turn_coincident(pencil: Pencil, before: Floats, x: Floats, there: Modes) -> Floats:

@@ -194,10 +194,14 @@ def assignment(results: RunResults, target: TargetStudy) -> FigurePlan:
     """A target in time: frequencies before and after, and their distance or what is forbidden."""
     wanted = target.kind == "frequency"
     modes = "_".join(map(str, target.modes)) or "all"
+    if target.followed is not None:
+        modes = f"like_{target.mode}"
     kind = "assignment" if wanted else target.kind
-    heading = f"Mode {target.mode}: initial, optimal and target frequency{_where(results)}"
+    heading = (
+        f"{_capital(target.curve_name)}: initial, optimal and target frequency{_where(results)}"
+    )
     what = "distance to the target" if wanted else "violation"
-    alt = f"Frequency of mode {target.mode} over time before and after, with its target."
+    alt = f"Frequency of {target.curve_name} over time before and after, with its target."
     return FigurePlan(
         f"{kind}_mode_{modes}{_suffix(results)}",
         heading if wanted else f"{_capital(target.label)}{_where(results)}",
@@ -214,7 +218,7 @@ def _capital(text: str) -> str:
 
 def draw_assignment(results: RunResults, target: TargetStudy) -> Figure:
     """Frequencies above, f/f_target − 1 below; the one shot where it is not the answer itself."""
-    title = f"Mode {target.mode}: assigned frequency{_where(results)}"
+    title = f"{_capital(target.curve_name)}: assigned frequency{_where(results)}"
     figure, (above, below) = stacked(title, "time [s]", (2.0, 1.35))
     curves = _curves(results, target)
     time_s = results.time_s[target.rows]

@@ -3,6 +3,7 @@
 Reading order:
 
     wanted       what the targets ask for, at the samples of the trajectories
+    followed     modes that targets follow by their shape, at any design
     one_shot     the paper's answer: one quadratic program about one expansion point
     response     frequencies along the trajectory and their slopes in the design
     judgement    what a design does to the targets, and the verdict

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from eigassign.assignment import Assignment, hz_from_lam
 from eigassign.assignment.sequential import MET, End
 from eigassign.case import CaseFile
-from eigassign.errors import AccuracyError, CaseError, InfeasibleError, Problem
+from eigassign.errors import AccuracyError, CaseError, InfeasibleError
 from eigassign.study.design.clearance import Clearance
 from eigassign.study.design.conclusions import (
     Conflict,
@@ -58,15 +58,8 @@ def require_assignable(file: CaseFile) -> None:
         for key, (given, why) in needs.items()
         if not given
     )
-    if problems := (*problems, *_not_yet(file)):
+    if problems:
         raise CaseError(problems)
-
-
-def _not_yet(file: CaseFile) -> Iterator[Problem]:
-    """What is read but cannot be assigned so far."""
-    for each in file.requirements:
-        if each.followed is not None:
-            yield file.problem(f"{each.place}.mode", "following a shape is not assigned yet")
 
 
 @dataclass(frozen=True)
@@ -115,6 +108,8 @@ def find_answer(scene: Scene, wanted: Sequence[Wanted], progress: Callable[[str]
     contradiction = conflict(found, scene.file.assignment.steps)
     notes += idle_notes(scene.model.y_names, found.variant, found.best.seen)
     notes += _band_notes(found)
+    if found.lost:
+        notes.append(f"{len(found.lost)} designs were passed over, for {found.lost[-1]}")
     predicted = tuple(_predicted(found, wanted))
     return Answer(found.best.y, predicted, one_shot, found, tuple(notes), contradiction)
 

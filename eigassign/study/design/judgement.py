@@ -16,8 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.study.design.followed import Solved
 from eigassign.study.design.wanted import Wanted, time_weights
-from eigassign.study.results import ErrorRow, ErrorSummary, TargetAlong, TargetStudy
+from eigassign.study.results import (
+    ErrorRow,
+    ErrorSummary,
+    FollowedRow,
+    TargetAlong,
+    TargetStudy,
+)
 
 Floats = NDArray[np.float64]
 MET = 1e-8  # a violation below it is round-off
@@ -25,11 +32,11 @@ MET = 1e-8  # a violation below it is round-off
 
 @dataclass(frozen=True)
 class SolvedDesigns:
-    """Exact frequencies (n_t, n_modes) in Hz of the initial design, the answer and the one shot."""
+    """Exact frequencies of the initial design, the answer and the one shot."""
 
-    initial: Floats
-    exact: Floats
-    one_shot: Floats | None = None
+    initial: Solved
+    exact: Solved
+    one_shot: Solved | None = None
 
 
 def study_targets(
@@ -70,7 +77,7 @@ def _studied(
     return TargetStudy(
         kind=kind,
         label=wanted.requirement.label,
-        modes=wanted.requirement.modes,
+        modes=() if wanted.mode < 0 else wanted.requirement.modes,
         lower_hz=wanted.lower_hz,
         upper_hz=wanted.upper_hz,
         initial_hz=_curve(wanted, solved.initial),
@@ -84,7 +91,16 @@ def _studied(
         weight_s=float(weights.sum()),
         weight=wanted.weight,
         along=tuple(_along(path, wanted, errors, weights)),
+        followed=_followed(wanted, solved),
     )
+
+
+def _followed(wanted: Wanted, solved: SolvedDesigns) -> FollowedRow | None:
+    mode, rows = wanted.requirement.followed, wanted.rows
+    if mode is None:
+        return None
+    before, after = (s.numbers[rows, wanted.mode] for s in (solved.initial, solved.exact))
+    return FollowedRow(mode.name, mode.like, before, after)
 
 
 @dataclass(frozen=True)
@@ -103,18 +119,18 @@ class _Errors:
         return _Errors(self.initial[own], self.exact[own], predicted, one_shot)
 
 
-def errors_of(wanted: Wanted, hz: Floats) -> Floats:
-    """The errors (n,) of a target at its rows, for frequencies hz (n_t, n_modes)."""
+def errors_of(wanted: Wanted, solved: Solved) -> Floats:
+    """The errors (n,) of a target at its rows."""
     if wanted.requirement.kind == "frequency":
-        return np.asarray(_curve(wanted, hz) / wanted.hz - 1.0)
-    return worst_errors(wanted, hz, hz)
+        return np.asarray(_curve(wanted, solved) / wanted.hz - 1.0)
+    return worst_errors(wanted, solved, solved)
 
 
-def worst_errors(wanted: Wanted, lowest: Floats, highest: Floats) -> Floats:
-    """The largest errors (n,), in magnitude, of frequencies between two (n_t, n_modes) each."""
+def worst_errors(wanted: Wanted, lowest: Solved, highest: Solved) -> Floats:
+    """The largest errors (n,), in magnitude, of frequencies between two."""
     kind = wanted.requirement.kind
     if kind == "keep_out":
-        return _inside(wanted, lowest[wanted.rows], highest[wanted.rows])
+        return _inside(wanted, lowest.hz[wanted.rows], highest.hz[wanted.rows])
     low, high = curve_range(wanted, lowest, highest)
     if kind == "frequency":
         return np.maximum(np.abs(low / wanted.hz - 1.0), np.abs(high / wanted.hz - 1.0))
@@ -123,8 +139,8 @@ def worst_errors(wanted: Wanted, lowest: Floats, highest: Floats) -> Floats:
     return np.asarray(np.maximum(1.0 - low / wanted.lower_hz, 0.0))
 
 
-def least_errors(wanted: Wanted, lowest: Floats, highest: Floats) -> Floats:
-    """The errors (n,) that no frequency between two (n_t, n_modes) avoids; 0 of a band."""
+def least_errors(wanted: Wanted, lowest: Solved, highest: Solved) -> Floats:
+    """The errors (n,) that no frequency between two avoids; 0 of a band."""
     kind = wanted.requirement.kind
     if kind == "keep_out":
         return np.zeros(len(wanted.lower_hz))
@@ -133,11 +149,11 @@ def least_errors(wanted: Wanted, lowest: Floats, highest: Floats) -> Floats:
     return np.asarray(np.maximum(above, 1.0 - high / wanted.lower_hz if kind != "at_most" else 0.0))
 
 
-def curve_range(wanted: Wanted, lowest: Floats, highest: Floats) -> tuple[Floats, Floats]:
+def curve_range(wanted: Wanted, lowest: Solved, highest: Solved) -> tuple[Floats, Floats]:
     """Between what the curve (n,) of a target lies where each mode is between two frequencies."""
     if wanted.requirement.kind == "gap":
         low, high = (m - 1 for m in wanted.requirement.modes)
-        least, most = lowest[wanted.rows], highest[wanted.rows]
+        least, most = lowest.hz[wanted.rows], highest.hz[wanted.rows]
         return least[:, high] - most[:, low], most[:, high] - least[:, low]
     return _curve(wanted, lowest), _curve(wanted, highest)
 
@@ -155,9 +171,9 @@ def _inside(wanted: Wanted, lowest: Floats, highest: Floats) -> Floats:
     return np.asarray(min(choices, key=lambda errors: float(errors.max())))
 
 
-def _curve(wanted: Wanted, hz: Floats) -> Floats:
+def _curve(wanted: Wanted, solved: Solved) -> Floats:
     """The curve (n,) that stands for a target."""
-    own, modes = hz[wanted.rows], wanted.requirement.modes
+    own, modes = solved.hz[wanted.rows], wanted.requirement.modes
     if wanted.requirement.kind == "gap":
         low, high = modes
         return np.asarray(own[:, high - 1] - own[:, low - 1])
@@ -166,7 +182,7 @@ def _curve(wanted: Wanted, hz: Floats) -> Floats:
         middle = 0.5 * (wanted.lower_hz + wanted.upper_hz)
         nearest = np.abs(own - middle[:, None]).argmin(axis=1)
         return np.asarray(own[np.arange(len(own)), nearest])
-    return np.asarray(own[:, modes[0] - 1])
+    return solved.curve(wanted.mode)[wanted.rows]
 
 
 def _summary(errors: _Errors, weights: Floats) -> ErrorSummary:
@@ -232,6 +248,42 @@ def verdict(
     if before_violation > MET or after < (1.0 - IMPROVED) * before:
         return "improved", f"better than the initial design; {far}"
     return "do_not_use", f"no better than the initial design: {far}"
+
+
+# --- Followed modes that change their numbers
+
+SHOWN = 8  # changes that a note lists
+
+
+def swap_notes(path: Trajectories, targets: Sequence[TargetStudy]) -> tuple[str, ...]:
+    """Which mode each followed one is, and where it swaps; only if it is not always the named."""
+    return tuple(
+        dict.fromkeys(
+            f"with the {design} design {target.followed.name} {_runs(path, target, numbers)}"
+            for target in targets
+            if target.followed is not None
+            for design, numbers in (
+                ("initial", target.followed.initial_numbers),
+                ("optimal", target.followed.exact_numbers),
+            )
+            if (numbers != target.followed.like).any()
+        )
+    )
+
+
+def _runs(path: Trajectories, target: TargetStudy, numbers: NDArray[np.intp]) -> str:
+    """In words: "swaps its number: mode 2 from sample 0 (t = 0 s), mode 3 from sample 4 …"."""
+    if (numbers == numbers[0]).all():
+        return f"is mode {numbers[0]} throughout"
+    first = {rows.start for rows in path.rows} | {target.rows.start}
+    changes = [
+        k
+        for k, number in enumerate(numbers)
+        if k == 0 or number != numbers[k - 1] or target.rows.start + k in first
+    ]
+    listed = [f"mode {numbers[k]} from {path.where(target.rows.start + k)}" for k in changes]
+    more = f" and {len(changes) - SHOWN} more changes" if len(changes) > SHOWN else ""
+    return f"swaps its number: {', '.join(listed[:SHOWN])}{more}"
 
 
 # --- Neighbouring frequencies that nearly meet, where two modes may swap their numbers

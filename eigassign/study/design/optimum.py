@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from time import monotonic
 
@@ -21,6 +22,7 @@ from eigassign.assignment import Bounds, LinearConstraint
 from eigassign.assignment.choosing import KEPT, RELAXED, Chosen, choose
 from eigassign.assignment.feasibility import constraints_agree
 from eigassign.assignment.requirements import (
+    Frequencies,
     FrequencyLimit,
     FrequencyTarget,
     QuantityLimit,
@@ -35,8 +37,9 @@ from eigassign.assignment.sequential import (
     distinct,
     minimise,
 )
-from eigassign.errors import CaseError, EigassignError
+from eigassign.errors import CaseError, EigassignError, LostModeError
 from eigassign.study.design.clearance import Band, Clearance, prove_clear, wanting
+from eigassign.study.design.followed import Follower, followers
 from eigassign.study.design.one_shot import catalogues, linear_constraints
 from eigassign.study.design.response import (
     ExactResponse,
@@ -45,7 +48,7 @@ from eigassign.study.design.response import (
     exact_response,
     reduced_models,
 )
-from eigassign.study.design.wanted import Wanted, target_frequencies, time_weights
+from eigassign.study.design.wanted import Wanted, followed_modes, target_frequencies, time_weights
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -85,6 +88,7 @@ class Found:
     starts: int
     exact_solves: int
     chosen: Chosen | None = None  # from the catalogues, where there are any; then of `optima`
+    lost: tuple[str, ...] = ()  # designs passed over because a followed mode is lost there
 
 
 def find_optimum(
@@ -102,7 +106,7 @@ def find_optimum(
     keys, margin = scene.file.assignment, MARGIN
     deadline = np.inf if keys.seconds is None else monotonic() + keys.seconds
     designs = list(_starts(scene, starts, keys.starts))
-    models = reduced_models(scene)
+    models = None if followed_modes(scene.file) else reduced_models(scene)
     for _ in range(WIDENED):
         found = _search_all(scene, wanted, designs, margin, models, deadline, progress)
         lacking = wanting(found.clearances)
@@ -175,6 +179,7 @@ def _search_all(
         starts=made,
         exact_solves=solves + len(scene.path.q),
         chosen=chosen_of,
+        lost=tuple(dict.fromkeys(whole.lost)),
     )
 
 
@@ -189,17 +194,19 @@ def _clearances(task: Task, variant: Variant, y: Floats) -> Iterator[Clearance]:
 def _refined(variant: Variant, coarse: _Search, initial: Floats) -> _Search:
     """What the optima on few samples lead to on all; from the initial design too if it is better.
 
-    An optimum keeps the steps that led to it.
+    An optimum keeps the steps that led to it. One that has no frequencies on all samples leads
+    nowhere.
     """
     fine = _Search(variant, coarse.steps, coarse.deadline, coarse.ended)
     for optimum in distinct(coarse.optima, variant.problem)[:REFINED]:
-        fine.run(optimum.y, optimum)
+        with suppress(EigassignError):
+            fine.run(optimum.y, optimum)
         if fine.ended:
             break
     seen = variant.problem.appraise(initial)
     inside = np.all((initial >= variant.problem.lower) & (initial <= variant.problem.upper))
     merit = max(seen.violation, MET), variant.problem(initial, seen)
-    if inside and (not fine.optima or merit < min(map(_worth, fine.optima))):
+    if not fine.optima or (inside and merit < min(map(_worth, fine.optima))):
         fine.run(initial)
     return fine
 
@@ -316,11 +323,17 @@ class Task:
     wanted: tuple[Wanted, ...]
     margin: float  # by which the limits of bands are drawn in, relative
     models: ReducedModels | None = None  # that stand for exact solves
+    lost: list[str] = field(default_factory=list)  # where followed modes were lost
 
     @cached_property
     def bands(self) -> tuple[_Band, ...]:
         """Every band along each trajectory for itself: only there k must not change."""
         return tuple(_bands(self.scene, self.wanted))
+
+    @cached_property
+    def followers(self) -> tuple[Follower, ...]:
+        """Of every mode that targets follow by its shape."""
+        return followers(self.scene, self.wanted)
 
 
 def _rougher(whole: Task, models: ReducedModels | None) -> list[Task]:
@@ -375,13 +388,20 @@ def variant_of(task: Task, below: tuple[int, ...]) -> Variant:
         objective=objective,
         least_change=(scene.initial, width) if not targets and not prices.any() else None,
     )
-    exact = exact_response(scene, asked.modes)
+    exact = exact_response(scene, asked.modes, task.followers)
     response = exact if task.models is None else ReducedResponse(exact, task.models)
+
+    def frequencies(y: Floats) -> Frequencies:
+        try:
+            return response(y)
+        except LostModeError as error:
+            task.lost.append(str(error))
+            raise
 
     def asks(names: Collection[str]) -> DesignProblem:
         some = asked.with_limits(names)
         return DesignProblem(
-            appraise=lambda y: some.appraise(y, response(y)),
+            appraise=lambda y: some.appraise(y, frequencies(y)),
             lower=lower,
             upper=upper,
             constraints=constraints,

@@ -20,10 +20,12 @@ from eigassign.assignment.requirements import Frequencies
 from eigassign.errors import AccuracyError, EigassignError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.arguments import DENSE_LIMIT
+from eigassign.modal.exact.condensation import Modes
 from eigassign.modal.model import Model
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.reduce import reduce
-from eigassign.modal.slopes import eigenvalue_slopes, mixed_slopes
+from eigassign.modal.slopes import eigenvalue_slopes, mixed_slopes, mode_slopes, neighbour_slopes
+from eigassign.study.design.followed import Follower, follow_all
 from eigassign.study.scene import AT_LEAST, BLOCK, Scene
 
 Floats = NDArray[np.float64]
@@ -31,31 +33,49 @@ Floats = NDArray[np.float64]
 
 @dataclass
 class ExactResponse:
-    """The lowest ``count`` frequencies at every sample and the one above, each by an exact solve.
+    """The lowest ``count`` frequencies at every sample and the one above, then those followed.
 
-    Of a design that it was asked for before it knows them.
+    By exact solves; of a design that it was asked for before it knows them.
     """
 
     model: Model
     path: Trajectories
     wanted: NDArray[np.bool_]  # (n_x,): where slopes are wanted
     count: int
+    followers: tuple[Follower, ...] = ()
     exact_solves: int = 0  # so far
     known: dict[bytes, Frequencies] = field(default_factory=dict)
 
     def __call__(self, y: Floats) -> Frequencies:
-        """Raises EigassignError where the mechanism has no modes, or no pose, at this design."""
+        """Raises EigassignError where the mechanism has no modes, or no pose, at this design.
+
+        LostModeError where a followed mode is lost.
+        """
         key = y.tobytes()
         if key not in self.known:
             q, of_design = self.path.at(y)
             self.exact_solves += len(q)
             x, follows = self.model.x(q, y), self.path.follows_design
-            lam, slopes, mixed = _in_blocks(mixed_slopes, self.model, x, self.count, self.wanted)
+            if self.followers:
+                lam, slopes, mixed = self._with_followed(y)
+            else:
+                solve = mixed_slopes, self.model, x, self.count, self.wanted
+                lam, slopes, mixed = _in_blocks(*solve)
             hz, slopes = _in_hz(lam, slopes)
-            mixed = mixed / (4.0 * np.pi**2 * (hz[:, :-1] + hz[:, 1:]))[..., None]
+            lower, upper = (hz[:, k : k + mixed.shape[1]] for k in (0, 1))
+            mixed = mixed / (4.0 * np.pi**2 * (lower + upper))[..., None]
             both = (_in_design(part, of_design, follows) for part in (slopes, mixed))
             self.known[key] = Frequencies(hz, *both)
         return self.known[key]
+
+    def _with_followed(self, y: Floats) -> tuple[Floats, Floats, Floats]:
+        """λ, its slopes in (q, y), and those off the diagonal of numbered modes alone."""
+        found = follow_all(self.model, self.path, self.followers, y, self.count)
+        own = Modes(found.modes.lam[:, : self.count + 1], found.modes.phi[..., : self.count + 1])
+        slopes, mixed = neighbour_slopes(self.model.pencil, found.x, own, self.wanted)
+        of_followed = mode_slopes(self.model.pencil, found.x, found.followed, self.wanted)
+        lam = np.hstack([own.lam, found.followed.lam])
+        return lam, np.concatenate([slopes, of_followed], axis=1), mixed
 
 
 def _in_design(slopes: Floats, of_design: Floats, follows: bool) -> Floats:
@@ -95,12 +115,13 @@ def _in_hz(lam: Floats, slopes: Floats) -> tuple[Floats, Floats]:
     return hz, slopes / (8.0 * np.pi**2 * hz[..., None])
 
 
-def exact_response(scene: Scene, count: int) -> ExactResponse:
+def exact_response(scene: Scene, count: int, followers: tuple[Follower, ...] = ()) -> ExactResponse:
     """Of all samples of the scene's trajectory."""
     lower, upper = scene.bounds
     moving = np.full(scene.path.q.shape[1], scene.path.follows_design)
     moving[scene.model.pencil.n_joints :] = False  # loads do not follow the design
-    return ExactResponse(scene.model, scene.path, np.append(moving, upper > lower), count)
+    wanted = np.append(moving, upper > lower)
+    return ExactResponse(scene.model, scene.path, wanted, count, followers)
 
 
 # --- Reduced models

@@ -4,6 +4,8 @@ A requirement is at all samples, those of one trajectory, or a part of it (`Want
 frequency of its mode shall be between ``lower_hz`` and ``upper_hz``: both are the same where a
 frequency is wanted, and one is missing (infinite) for a limit. A band to keep out of is between
 them; a gap is ``lower_hz`` wide at least.
+
+Modes are numbered from 1; those followed by their shape −1, −2, …: the last of them named is −1.
 """
 
 from __future__ import annotations
@@ -46,16 +48,12 @@ class Wanted:
     rows: slice
     lower_hz: Floats
     upper_hz: Floats
+    mode: int  # the lower one of a gap, the first named one of a band
 
     @property
     def hz(self) -> Floats:
         """The wanted frequency (n,)."""
         return self.lower_hz
-
-    @property
-    def mode(self) -> int:
-        """The mode, the lower one of a gap."""
-        return self.requirement.modes[0]
 
     @property
     def weight(self) -> float:
@@ -72,6 +70,12 @@ def target_frequencies(file: CaseFile, path: Trajectories) -> tuple[Wanted, ...]
     return tuple(_wanted(file, each, path) for each in file.requirements)
 
 
+def followed_modes(file: CaseFile) -> tuple[FollowedMode, ...]:
+    """The modes that targets follow by their shape, each once, in the order of the file."""
+    named = (each.followed for each in file.requirements if each.followed is not None)
+    return tuple(dict.fromkeys(named))
+
+
 def time_weights(path: Trajectories) -> Floats:
     """ω (n_t,) in s of the integral over every trajectory for itself, by the trapezoidal rule."""
     return path.weights(trapezoidal_weights)
@@ -79,26 +83,31 @@ def time_weights(path: Trajectories) -> Floats:
 
 def _wanted(file: CaseFile, requirement: Requirement, path: Trajectories) -> Wanted:
     rows = _rows(file, requirement, path)
+    lower, upper = _edges(file, requirement, rows, path)
+    mode = requirement.modes[0] if requirement.modes else 1
+    if requirement.followed is not None:
+        followed = followed_modes(file)
+        mode = followed.index(requirement.followed) - len(followed)
+    return Wanted(requirement, rows, frozen(lower), frozen(upper), mode)
+
+
+def _edges(
+    file: CaseFile, requirement: Requirement, rows: slice, path: Trajectories
+) -> tuple[Floats, Floats]:
+    """`Wanted.lower_hz` and `Wanted.upper_hz`."""
     n, target, place = rows.stop - rows.start, requirement.target, requirement.place
-    lowest, highest = frozen(np.full(n, -np.inf)), frozen(np.full(n, np.inf))
+    lowest, highest = np.full(n, -np.inf), np.full(n, np.inf)
     if isinstance(target, GapTarget):
-        lower = np.full(n, target.gap.at_least)
-        return Wanted(requirement, rows, frozen(lower), highest)
+        return np.full(n, target.gap.at_least), highest
     if isinstance(target, KeepOutTarget):
         if not isinstance(target.keep_out, Harmonic):
             low, high = target.keep_out
-            return Wanted(requirement, rows, frozen(np.full(n, low)), frozen(np.full(n, high)))
+            return np.full(n, low), np.full(n, high)
         band = target.keep_out
         middle = band.harmonic * _sampled(file, band.of, f"{place}.keep_out.of", rows, path)
-        below, above = (frozen(middle * (1.0 + side)) for side in (-band.margin, band.margin))
-        return Wanted(requirement, rows, below, above)
+        return middle * (1.0 - band.margin), middle * (1.0 + band.margin)
     hz = _sampled(file, target.curve, f"{place}.{target.kind}", rows, path)
-    return Wanted(
-        requirement,
-        rows,
-        lowest if target.kind == "at_most" else hz,
-        highest if target.kind == "at_least" else hz,
-    )
+    return lowest if target.kind == "at_most" else hz, highest if target.kind == "at_least" else hz
 
 
 def _rows(file: CaseFile, requirement: Requirement, path: Trajectories) -> slice:
@@ -146,19 +155,9 @@ def _knots(file: CaseFile, curve: _Curve, key: str) -> tuple[ArrayLike, ArrayLik
 # --- Modes that are named by their shape
 
 
-def named_pose(file: CaseFile, followed: FollowedMode, path: Trajectories) -> tuple[Floats, Floats]:
-    """q (n_q,) and y (n_y,) at which mode `like` has the shape to follow.
-
-    Between samples of a trajectory q is linear in time. What `design` does not name is as in the
-    file, and so is what trajectories set where the pose is given by its coordinates.
-    """
-    pose, y = followed.at, initial_design(file)
-    if pose.time is None:
-        q = np.append(np.array(pose.q), written_loads(file))
-    else:
-        rows = path.rows_of(pose.trajectory)
-        time_s, own = path.time_s[rows], path.q[rows]
-        q = np.array([np.interp(pose.time, time_s, own[:, i]) for i in range(own.shape[1])])
+def named_design(file: CaseFile, followed: FollowedMode) -> Floats:
+    """y (n_y,) at which mode `like` has the shape to follow; what it leaves out as in the file."""
+    y = initial_design(file)
     start = 0
     for name, entry in file.design.entries.items():
         given = followed.design.get(name)
@@ -169,4 +168,18 @@ def named_pose(file: CaseFile, followed: FollowedMode, path: Trajectories) -> tu
         elif given is not None:
             y[columns] = given
         start = columns.stop
-    return frozen(q), frozen(y)
+    return frozen(y)
+
+
+def named_pose(file: CaseFile, followed: FollowedMode, path: Trajectories, y: Floats) -> Floats:
+    """q (n_q,) at which it has that shape, of design y where coordinates follow the design.
+
+    Between samples of the whole trajectory q is linear in time. What trajectories set is as in the
+    file where the pose is given by its coordinates.
+    """
+    pose = followed.at
+    if pose.time is None:
+        return frozen(np.append(np.array(pose.q), written_loads(file)))
+    rows = path.whole.rows_of(pose.trajectory)
+    time_s, own = path.whole.time_s[rows], path.whole.at(y)[0][rows]
+    return frozen(np.array([np.interp(pose.time, time_s, column) for column in own.T]))

@@ -16,6 +16,7 @@ from eigassign.assignment.requirements import Requirements
 from eigassign.assignment.sequential import Appraisal
 from eigassign.errors import EigassignError
 from eigassign.study.design.answer import Answer, active_rows
+from eigassign.study.design.followed import Solved
 from eigassign.study.design.optimum import Found, Task, variant_of
 from eigassign.study.design.wanted import Wanted
 from eigassign.study.meaning.reach import misses, proved_ranges, reach_rows, unreachable
@@ -43,18 +44,18 @@ def study_meaning(
     scene: Scene,
     answer: Answer,
     wanted: Sequence[Wanted],
-    exact_hz: Floats,
+    exact: Solved,
     max_error: float,
     studies: Studies,
 ) -> Meaning:
-    """What the answer, of frequencies (n_t, n_modes), means; as far as ``studies`` asks for it.
+    """What the answer, of frequencies ``exact``, means; as far as ``studies`` asks for it.
 
     Whether a target that is missed by more than ``max_error`` can be reached is always studied.
     """
-    missed = any(misses(w, exact_hz, max_error) for w in wanted)
+    missed = any(misses(w, exact, max_error) for w in wanted)
     asked_for = studies is Studies.ALL or (studies is Studies.CHEAP and scene.model.n_dof <= SMALL)
     ranges = proved_ranges(scene) if missed or asked_for else None
-    beyond = tuple(unreachable(scene, wanted, answer.y, exact_hz, max_error, ranges))
+    beyond = tuple(unreachable(scene, wanted, answer.y, exact, max_error, ranges))
     reach = () if ranges is None else tuple(reach_rows(wanted, ranges))
     if studies is Studies.NONE:
         return Meaning(unreachable=beyond)
@@ -64,7 +65,7 @@ def study_meaning(
         sensitivity=tuple(sensitivities(scene.file, wanted, asked, answer.y, seen)),
         relaxed=() if answer.found is None else tuple(_relaxed(scene, answer, answer.found)),
         reach=reach,
-        tolerance=_tolerance(scene, answer, wanted, exact_hz, notes),
+        tolerance=_tolerance(scene, answer, wanted, exact, notes),
         trade_off=_trade_off(scene, answer) if studies is Studies.ALL else None,
         unreachable=beyond,
         notes=tuple(notes),
@@ -72,11 +73,11 @@ def study_meaning(
 
 
 def _tolerance(
-    scene: Scene, answer: Answer, wanted: Sequence[Wanted], exact_hz: Floats, notes: list[str]
+    scene: Scene, answer: Answer, wanted: Sequence[Wanted], exact: Solved, notes: list[str]
 ) -> ToleranceRows | None:
     """The spread within the tolerances; where it cannot be had, why not among the notes."""
     try:
-        found = study_tolerance(scene, wanted, answer.y, exact_hz)
+        found = study_tolerance(scene, wanted, answer.y, exact)
     except EigassignError as error:
         notes.append(f"tolerances not studied: {error}")
         return None

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from eigassign.assignment.requirements import FrequencyTarget, Requirements
 from eigassign.assignment.sequential import Appraisal, DesignProblem, minimise
 from eigassign.errors import EigassignError
+from eigassign.study.design.followed import Solved, followers, solve_design
 from eigassign.study.design.judgement import curve_range, errors_of, least_errors
 from eigassign.study.design.one_shot import linear_constraints
 from eigassign.study.design.response import exact_response
@@ -31,8 +32,8 @@ LIMIT = 1e-4  # of a limit: by so much it must be missed to be called out of rea
 STEPS = 30  # of a search at one sample
 
 
-def proved_ranges(scene: Scene) -> tuple[Floats, Floats] | None:
-    """Lowest and highest frequencies (n_t, n_modes) of all designs within the bounds.
+def proved_ranges(scene: Scene) -> tuple[Solved, Solved] | None:
+    """Lowest and highest frequencies of all designs within the bounds, of numbered modes only.
 
     None where that is not known of every parameter, or a corner of the bounds has no frequencies.
     """
@@ -41,22 +42,22 @@ def proved_ranges(scene: Scene) -> tuple[Floats, Floats] | None:
         return None
     softest, stiffest = corners(scene.file, lower, lower, upper)
     try:
-        return scene.exact(softest), scene.exact(stiffest)
+        return solve_design(scene, (), softest), solve_design(scene, (), stiffest)
     except EigassignError:
         return None
 
 
-def reach_rows(wanted: Sequence[Wanted], ranges: tuple[Floats, Floats]) -> Iterator[RangeRow]:
+def reach_rows(wanted: Sequence[Wanted], ranges: tuple[Solved, Solved]) -> Iterator[RangeRow]:
     """What each target's curve can take at every sample, and the least error that is left."""
     for w in wanted:
-        if w.requirement.kind != "keep_out":
+        if w.requirement.kind != "keep_out" and w.requirement.followed is None:
             error = float(least_errors(w, *ranges).max())
             yield RangeRow(w.requirement.label, *curve_range(w, *ranges), "proved", error)
 
 
-def misses(wanted: Wanted, exact_hz: Floats, max_error: float) -> bool:
+def misses(wanted: Wanted, exact: Solved, max_error: float) -> bool:
     """Whether a target is missed by more than is allowed, ``max_error`` of a wanted frequency."""
-    return bool(np.abs(errors_of(wanted, exact_hz)).max() > _allowed(wanted, max_error))
+    return bool(np.abs(errors_of(wanted, exact)).max() > _allowed(wanted, max_error))
 
 
 def _allowed(wanted: Wanted, max_error: float) -> float:
@@ -67,16 +68,16 @@ def unreachable(
     scene: Scene,
     wanted: Sequence[Wanted],
     y: Floats,
-    exact_hz: Floats,
+    exact: Solved,
     max_error: float,
-    ranges: tuple[Floats, Floats] | None,
+    ranges: tuple[Solved, Solved] | None,
 ) -> Iterator[str]:
     """In words, each target that is out of reach at some sample; only those that y misses."""
     for w in wanted:
-        if not misses(w, exact_hz, max_error):
+        if not misses(w, exact, max_error):
             continue
-        allowed, errors = _allowed(w, max_error), errors_of(w, exact_hz)
-        if ranges is not None:
+        allowed, errors = _allowed(w, max_error), errors_of(w, exact)
+        if ranges is not None and w.requirement.followed is None:
             left = least_errors(w, *ranges)
             k = int(left.argmax())
             if left[k] > allowed:
@@ -123,7 +124,8 @@ def _nearest(scene: Scene, wanted: Wanted, k: int, y: Floats, allowed: float) ->
     target = FrequencyTarget(wanted.mode, np.array([goal]), slice(0, 1))
     asked = Requirements((target,), (), (), np.ones(1))
     alone = replace(scene, trajectory=scene.path.chosen([at]))
-    response = exact_response(alone, wanted.mode)
+    own = followers(alone, [replace(wanted, rows=slice(0, 1))])
+    response = exact_response(alone, asked.modes, own)
 
     def appraise(y: Floats) -> Appraisal:
         return asked.appraise(y, response(y))

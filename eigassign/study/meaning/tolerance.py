@@ -3,7 +3,8 @@
 Where all frequencies are monotone in every parameter that has a tolerance (`monotone`), two
 corners bound them exactly. The other parameters are drawn from their ranges by a Sobol sequence,
 each draw with the monotone ones at both corners. Models of many unknowns are evaluated by a reduced
-model about the answer then, and its own estimate of its error widens the ranges.
+model about the answer then, and its own estimate of its error widens the ranges. Modes followed by
+their shape are monotone too as long as they only cross others, which is not proved.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from eigassign.errors import AccuracyError
 from eigassign.modal.reduced.reduce import reduce
+from eigassign.study.design.followed import Follower, Solved, followers, solve_design
 from eigassign.study.design.judgement import curve_range, errors_of, worst_errors
 from eigassign.study.design.wanted import Wanted
 from eigassign.study.meaning.monotone import corners, effects
@@ -27,11 +29,11 @@ LARGE = 220  # unknowns: a reduced model answers from here on
 POINTS = 5  # poses along the trajectory about which it is made
 DOUBTFUL = 0.01  # estimate of its error, relative, with which nothing can be said
 
-Ranges = Callable[[Floats], tuple[Floats, Floats]]  # of a design: between what each mode is
+Ranges = Callable[[Floats], tuple[Solved, Solved]]  # of a design: between what each mode is
 
 
 def study_tolerance(
-    scene: Scene, wanted: Sequence[Wanted], y: Floats, exact_hz: Floats
+    scene: Scene, wanted: Sequence[Wanted], y: Floats, exact: Solved
 ) -> ToleranceRows | None:
     """The spread of every target about the answer ``y``; None where no tolerance is stated.
 
@@ -43,11 +45,13 @@ def study_tolerance(
     spread = np.array([0.0 if t is None else t.deviation(v) for t, v in zip(given, y, strict=True)])
     if not spread.any():
         return None
+    own = followers(scene, wanted)
     effect = effects(scene.file)
     lower, upper = y - spread, y + spread
     lower = np.where(effect != 0.0, np.maximum(lower, np.minimum(y, 0.0)), lower)
     drawn = np.flatnonzero((spread > 0.0) & (effect == 0.0))
-    designs, how, ranges = y[None], "proved", _exact(scene)
+    designs, ranges = y[None], _exact(scene, own)
+    how = "followed" if own else "proved"
     if len(drawn):
         designs, how = np.repeat(y[None], DRAWS, axis=0), "sampled"
         from scipy.stats import qmc  # half a second, and most runs draw nothing
@@ -55,17 +59,25 @@ def study_tolerance(
         points = qmc.Sobol(len(drawn), seed=0).random_base2(DRAWS.bit_length() - 1)
         designs[:, drawn] = lower[drawn] + points * (upper - lower)[drawn]
         if scene.model.n_dof > LARGE:
-            ranges = reduced_ranges(scene, y, exact_hz.shape[1])
-    lowest, highest = np.array(exact_hz), np.array(exact_hz)
+            if own:
+                raise AccuracyError(
+                    f"modes of more than {LARGE} unknowns are not followed through tolerances"
+                )
+            ranges = reduced_ranges(scene, y, exact.hz.shape[1])
+    lowest, highest = exact, exact
     for design in designs:
         softest, stiffest = corners(scene.file, design, lower, upper)
-        lowest = np.minimum(lowest, ranges(softest)[0])
-        highest = np.maximum(highest, ranges(stiffest)[1])
-    return _rows(wanted, exact_hz, lowest, highest, how)
+        lowest = _combined(np.minimum, lowest, ranges(softest)[0])
+        highest = _combined(np.maximum, highest, ranges(stiffest)[1])
+    return _rows(wanted, exact, lowest, highest, how)
+
+
+def _combined(pick: Callable[[Floats, Floats], Floats], a: Solved, b: Solved) -> Solved:
+    return Solved(pick(a.hz, b.hz), pick(a.followed, b.followed), a.numbers)
 
 
 def _rows(
-    wanted: Sequence[Wanted], exact_hz: Floats, lowest: Floats, highest: Floats, how: str
+    wanted: Sequence[Wanted], exact: Solved, lowest: Solved, highest: Solved, how: str
 ) -> ToleranceRows:
     errors = [float(worst_errors(w, lowest, highest).max()) for w in wanted]
     rows = tuple(
@@ -79,9 +91,11 @@ def _rows(
         for pair, counts in zip(zip(wanted, errors, strict=True), counted, strict=True)
         if counts
     ]
-    before = max(float(np.abs(errors_of(w, exact_hz)).max()) for w, _ in own)
+    before = max(float(np.abs(errors_of(w, exact)).max()) for w, _ in own)
     after = max(error for _, error in own)
-    tried = "proved" if how == "proved" else f"the worst of {DRAWS} draws"
+    tried = {"proved": "proved", "followed": "the worst of both corners"}.get(
+        how, f"the worst of {DRAWS} draws"
+    )
     words = (
         f"with every tolerance at its worst: worst error {100 * before:.3g} → "
         f"{100 * after:.3g} % ({tried})"
@@ -89,10 +103,10 @@ def _rows(
     return ToleranceRows(rows, before, after, words)
 
 
-def _exact(scene: Scene) -> Ranges:
-    def ranges(y: Floats) -> tuple[Floats, Floats]:
-        hz = scene.exact(y)
-        return hz, hz
+def _exact(scene: Scene, own: Sequence[Follower]) -> Ranges:
+    def ranges(y: Floats) -> tuple[Solved, Solved]:
+        found = solve_design(scene, own, y)
+        return found, found
 
     return ranges
 
@@ -104,7 +118,9 @@ def reduced_ranges(scene: Scene, y: Floats, count: int) -> Ranges:
     about = np.repeat(y[None], len(points), axis=0)
     reduced = reduce(scene.model.pencil, q[points], about, tuple(range(1, count + 1)))
 
-    def ranges(y: Floats) -> tuple[Floats, Floats]:
+    nothing, numbers = np.zeros((len(q), 0)), np.zeros((len(q), 0), dtype=np.intp)
+
+    def ranges(y: Floats) -> tuple[Solved, Solved]:
         q = scene.path.at(y)[0]
         hz, error = reduced.frequencies(q, y), reduced.error_estimate(q, y)
         if not error.max() <= DOUBTFUL:
@@ -112,6 +128,7 @@ def reduced_ranges(scene: Scene, y: Floats, count: int) -> Ranges:
                 "the tolerances are too wide for the reduced model that they are judged by: its "
                 f"error may be {100 * error.max():.3g} %; state smaller ones"
             )
-        return hz * (1.0 - error), hz * (1.0 + error)
+        low, high = hz * (1.0 - error), hz * (1.0 + error)
+        return Solved(low, nothing, numbers), Solved(high, nothing, numbers)
 
     return ranges

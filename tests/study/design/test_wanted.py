@@ -12,7 +12,7 @@ from small_case import TEXT
 from eigassign.case import load
 from eigassign.errors import CaseError
 from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectories, Trajectory
-from eigassign.study.design.wanted import Wanted, named_pose, target_frequencies
+from eigassign.study.design.wanted import Wanted, named_design, named_pose, target_frequencies
 
 MOTION = TEXT[TEXT.index("trajectory:\n") : TEXT.index("design:\n")]
 SEVERAL = "trajectory:\n  - {name: a, file: a.csv}\n  - {name: b, file: b.csv}\n"
@@ -143,6 +143,9 @@ def test_a_followed_mode_is_named_at_a_pose_and_design(
     file = load(folder / "case.yaml")
     (requirement,) = file.requirements
     assert requirement.followed is not None
-    found = named_pose(file, requirement.followed, path)
-    np.testing.assert_allclose(found[0], q, rtol=1e-14)
-    np.testing.assert_allclose(found[1], y, rtol=1e-14)
+    named = named_design(file, requirement.followed)
+    np.testing.assert_allclose(named, y, rtol=1e-14)
+    for some in (path, path.chosen([0, 10, 11])):  # the pose is one of the whole trajectory
+        found = named_pose(file, requirement.followed, some, named)
+        np.testing.assert_allclose(found, q, rtol=1e-14)
+    assert target_frequencies(file, path)[0].mode == -1

@@ -9,6 +9,7 @@ import pytest
 from scenes import changed, scene_of
 
 from eigassign.study.design.answer import Answer, find_answer
+from eigassign.study.design.followed import solve_design
 from eigassign.study.design.wanted import target_frequencies
 from eigassign.study.meaning.overall import Studies, study_meaning
 from eigassign.study.results import Meaning
@@ -21,7 +22,8 @@ def answered(
     scene = scene_of(folder, text)
     wanted = target_frequencies(scene.file, scene.path)
     answer = find_answer(scene, wanted, lambda line: None)
-    return scene, answer, study_meaning(scene, answer, wanted, scene.exact(answer.y), 0.02, studies)
+    exact = solve_design(scene, (), answer.y)
+    return scene, answer, study_meaning(scene, answer, wanted, exact, 0.02, studies)
 
 
 LIMITS = """

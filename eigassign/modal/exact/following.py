@@ -1,0 +1,178 @@
+"""One mode followed by its shape from place to place x = (q, y), through crossings and veerings.
+
+A shape ψ, ψᵀMψ = 1, is carried from a place to the next. Its shares in the modes φ_j there are
+
+    s_j = (φ_jᵀ M ψ)² / (ψᵀ M_c ψ),   M_c the mass M of that place without rigid motion.
+
+The mode of the largest share and those within `NEAR` of its frequency are kept,
+
+    ψ ← Σ_j φ_j (φ_jᵀ M ψ) / √Σ_j (φ_jᵀ M ψ)²,
+
+so that a mode far from all others is ψ itself, however its shape changes, and ψ does not turn with
+modes that meet: it goes straight through a crossing. In a veering it is a mixture of both, and
+comes out as one of them again, the closer the veering the more nearly as the one that has its
+shape. Where the modes kept hold less than `CLEAR` of ψ, or the number changes while no other mode
+was seen near, the step is halved; what stays unclear is lost.
+
+`tracking` keeps to the branch instead, and says how much of its shape a curve gave away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.errors import Candidate, LostModeError
+from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.modal.exact.solver import lowest_modes
+from eigassign.modal.exact.tracking import CLEAR, COINCIDENT, HALVINGS, NEAR, links
+
+Floats = NDArray[np.float64]
+ALIKE = 1e-3  # of the frequency: modes that share a shape and differ by less may both stand for it
+LEAST = 0.01  # share of a mode that is named as a candidate
+
+
+class MoreModesError(Exception):
+    """The mode may be among those above the modes that were solved."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """The lowest modes at x (n_x,); ``complete`` where there are no more."""
+
+    x: Floats
+    lam: Floats  # (count,)
+    phi: Floats  # (n_dof, count)
+    complete: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A shape ψ = Φ a at a place, |a| = 1; ``a`` (count,) is 0 of modes far from it."""
+
+    at: Place
+    a: Floats
+
+    @property
+    def number(self) -> int:
+        """The mode, from 1, that has the largest share."""
+        return int(np.argmax(self.a**2)) + 1
+
+    @property
+    def lam(self) -> float:
+        """Its eigenvalue in rad²/s²."""
+        return float(self.at.lam[self.number - 1])
+
+    @property
+    def phi(self) -> Floats:
+        """The mode itself (n_dof,); of modes that coincide the mixture that has the shape."""
+        part = np.where(self._same, self.a, 0.0)
+        return np.asarray(self.at.phi @ (part / np.linalg.norm(part)))
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether it is too much of other modes, whose frequencies are not the same either."""
+        away = np.abs(np.sqrt(self.at.lam / self.lam) - 1.0)
+        return bool((self.a**2)[self._same].sum() < CLEAR and self.a**2 @ away > ALIKE)
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """The modes that have a part of it."""
+        return candidates(self.at, self.a**2)
+
+    @property
+    def _same(self) -> NDArray[np.bool_]:
+        return np.asarray(np.abs(self.at.lam / self.lam - 1.0) <= COINCIDENT)
+
+
+def candidates(at: Place, shares: Floats, most: int = 3) -> tuple[Candidate, ...]:
+    """The modes of the largest shares, the largest first; none that have hardly any."""
+    order = np.argsort(-shares, kind="stable")[:most]
+    hz = np.sqrt(at.lam) / (2.0 * np.pi)
+    kept = (int(j) for j in order if shares[j] > LEAST)
+    return tuple(Candidate(j + 1, float(hz[j]), float(shares[j])) for j in kept)
+
+
+def places(
+    pencil: Pencil, x: Floats, least: int, extra: int, block: int | None = None
+) -> list[Place]:
+    """The lowest modes at x (n, n_x), at all as many: ``least``, and up to ``extra`` more.
+
+    They are solved in blocks of so many samples. Raises what `lowest_modes` raises.
+    """
+    size = block or len(x)
+    found = [
+        lowest_modes(pencil, pencil.theta(x[at : at + size]), least, extra)
+        for at in range(0, len(x), size)
+    ]
+    count = min(part.lam.shape[1] for part in found)
+    lam, phi = (
+        np.concatenate([getattr(part, name)[..., :count] for part in found])
+        for name in ("lam", "phi")
+    )
+    complete = count < least + extra or count == len(pencil.elastic)
+    return [Place(*each, complete) for each in zip(x, lam, phi, strict=True)]
+
+
+def follow(pencil: Pencil, start: Shape, path: Sequence[Place]) -> list[Shape]:
+    """``start`` carried to the first place of a path, from there to the next, and so on.
+
+    Raises LostModeError, whose ``step`` is the place that the shape was not carried to;
+    MoreModesError where the places may hold too few modes.
+    """
+    if len(path) > 1:
+        phi, x = (np.array([getattr(each, name) for each in path]) for name in ("phi", "x"))
+        across, sizes = links(pencil, x[1:], phi[:-1], phi[1:])
+    found = [start]
+    for k, there in enumerate(path):
+        link = (across[k - 1], sizes[k - 1]) if k else _link(pencil, start.at, there)
+        try:
+            found.append(_carried(pencil, found[-1], there, link, 0))
+        except LostModeError as lost:
+            raise LostModeError(lost.candidates, k) from None
+    return found[1:]
+
+
+def _link(pencil: Pencil, here: Place, there: Place) -> tuple[Floats, Floats]:
+    across, sizes = links(pencil, there.x[None], here.phi[None], there.phi[None])
+    return across[0], sizes[0]
+
+
+def _carried(
+    pencil: Pencil, here: Shape, there: Place, link: tuple[Floats, Floats], depth: int
+) -> Shape:
+    """The shape at the next place, by way of the midpoint where the step is unclear."""
+    across, sizes = link
+    c = across @ here.a
+    shares = c**2 / (here.a @ sizes @ here.a)
+    best = int(np.argmax(shares))
+    near = _near(there, best)
+    if near[-1] and not there.complete:
+        raise MoreModesError
+    is_clear = shares[near].sum() >= CLEAR
+    if is_clear and (depth == HALVINGS or _is_met(here, best, near)):
+        a = np.where(near, c, 0.0)
+        return Shape(there, a / np.linalg.norm(a))
+    if depth == HALVINGS:
+        if shares.sum() < CLEAR and not there.complete:
+            raise MoreModesError
+        raise LostModeError(candidates(there, shares), 0)
+    x = 0.5 * (here.at.x + there.x)
+    (middle,) = places(pencil, x[None], len(there.lam), 0)
+    middle = replace(middle, complete=there.complete)
+    half = _carried(pencil, here, middle, _link(pencil, here.at, middle), depth + 1)
+    return _carried(pencil, half, there, _link(pencil, middle, there), depth + 1)
+
+
+def _near(at: Place, best: int) -> NDArray[np.bool_]:
+    return np.asarray(np.abs(np.sqrt(at.lam / at.lam[best]) - 1.0) < NEAR)
+
+
+def _is_met(here: Shape, best: int, near: NDArray[np.bool_]) -> bool:
+    """Whether all modes passed on the way to number ``best`` are near it at either end."""
+    before = here.number - 1
+    passed = slice(min(before, best), max(before, best) + 1)
+    return bool(near[passed].all() or _near(here.at, before)[passed].all())

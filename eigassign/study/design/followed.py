@@ -1,0 +1,241 @@
+"""Modes that targets follow by their shape, at the samples of the trajectories and any design.
+
+From the pose and design that name a mode, the design changes first, in a straight line and at that
+pose. Then the shape goes from sample to sample: from the pose's time to both ends of its own
+trajectory, of others from their samples nearest to the pose. The way depends on nothing but the
+design, so that frequencies and slopes do not either; where modes only cross, the way is all the
+same. How a shape is carried, and when it is lost, is for `eigassign.modal.exact.following` to say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.case import FollowedMode
+from eigassign.errors import CaseError, LostModeError
+from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.modal.exact.condensation import Modes
+from eigassign.modal.exact.following import MoreModesError, Place, Shape, follow, places
+from eigassign.modal.exact.tracking import COINCIDENT, EXTRA
+from eigassign.modal.model import Model
+from eigassign.study.design.wanted import Wanted, followed_modes, named_design, named_pose
+from eigassign.study.planning import shown_point
+from eigassign.study.scene import AT_LEAST, BLOCK, Scene
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Route:
+    """Samples in the order in which a shape is carried to them, from the pose or a sample."""
+
+    samples: tuple[int, ...]
+    origin: int | None = None  # None: the pose that names the mode
+
+
+@dataclass(frozen=True, eq=False)
+class Follower:
+    """One followed mode: where it is named, and at which samples of the path it is needed."""
+
+    mode: FollowedMode
+    model: Model
+    path: Trajectories
+    named_y: Floats
+    pose: Callable[[Floats], Floats]  # of a design: q where the mode is named
+    needed: NDArray[np.bool_]  # (n_t,)
+
+    def along(self, y: Floats, samples: Sequence[Place]) -> dict[int, Shape]:
+        """The shape at design y and the samples needed, by their numbers.
+
+        ``samples`` are the modes there. Raises LostModeError, saying where; MoreModesError where
+        the samples hold too few modes.
+        """
+        if not self.needed.any():
+            return {}
+        found: dict[int | None, Shape] = {None: self._at_pose(y)}
+        for route in self.routes:
+            way = [samples[k] for k in route.samples]
+            try:
+                shapes = follow(self.model.pencil, found[route.origin], way)
+            except LostModeError as lost:
+                at = self.path.where(route.samples[lost.step])
+                raise self._lost(lost, f"on the way to {at}", y) from None
+            found |= dict(zip(route.samples, shapes, strict=True))
+        needed = {int(k): found[int(k)] for k in np.flatnonzero(self.needed)}
+        for k, shape in needed.items():
+            if shape.is_shared:
+                raise self._lost(LostModeError(shape.candidates, k), f"at {self.path.where(k)}", y)
+        return needed
+
+    @cached_property
+    def start(self) -> Shape:
+        """The mode where it is named."""
+        like, x = self.mode.like, self.model.x(self.pose(self.named_y), self.named_y)
+        (at,) = places(self.model.pencil, x, like, EXTRA)
+        return Shape(at, np.where(np.arange(len(at.lam)) == like - 1, 1.0, 0.0))
+
+    def _at_pose(self, y: Floats) -> Shape:
+        """The shape where it is named, at another design."""
+        if np.array_equal(y, self.named_y):
+            return self.start
+        x, count = self.model.x(self.pose(y), y), len(self.start.a)
+        while True:
+            there = places(self.model.pencil, x, self.mode.like, count - self.mode.like)
+            try:
+                return follow(self.model.pencil, self.start, there)[0]
+            except MoreModesError:
+                count *= 2
+            except LostModeError as lost:
+                raise self._lost(lost, "on the way from the design that names it", y) from None
+
+    def _lost(self, lost: LostModeError, where: str, y: Floats) -> LostModeError:
+        nearest = " and ".join(map(str, lost.candidates)) or "none of the modes"
+        message = (
+            f"{self.mode.name} is lost {where} with {shown_point(self.model.y_names, y)}: no mode "
+            f"has its shape there; nearest are {nearest}. Leave out that part of the trajectory "
+            "(during), narrow the bounds, or give the target to a numbered mode"
+        )
+        return LostModeError(lost.candidates, lost.step, message)
+
+    @cached_property
+    def routes(self) -> tuple[Route, ...]:
+        """From the pose to all samples needed."""
+        return tuple(
+            route
+            for part, rows in zip(self.path.parts, self.path.rows, strict=True)
+            if self.needed[rows].any()
+            for route in self._routes(part.name, rows)
+        )
+
+    def _routes(self, name: str, rows: slice) -> Iterator[Route]:
+        needed = rows.start + np.flatnonzero(self.needed[rows])
+        first, last = int(needed[0]), int(needed[-1])
+        pose, only = self.mode.at, len(self.path.whole.parts) == 1
+        if pose.time is not None and (only or pose.trajectory == name):
+            after = rows.start + int(np.searchsorted(self.path.time_s[rows], pose.time, "right"))
+            yield Route(tuple(range(after - 1, first - 1, -1)))
+            yield Route(tuple(range(max(after, rows.start), last + 1)))
+            return
+        q = self.path.q
+        width = np.ptp(q, axis=0)
+        away = (q[needed] - self.pose(self.named_y)) / np.where(width > 0.0, width, 1.0)
+        nearest = int(needed[np.argmin(np.linalg.norm(away, axis=1))])
+        yield Route(tuple(range(nearest, first - 1, -1)))
+        yield Route(tuple(range(nearest + 1, last + 1)), nearest)
+
+
+def followers(scene: Scene, wanted: Sequence[Wanted]) -> tuple[Follower, ...]:
+    """One for each mode that the case's targets follow, needed where ``wanted`` ask for it.
+
+    Raises CaseError where a mode coincides with another at the pose that names it.
+    """
+    return tuple(_followers(scene, wanted))
+
+
+def _followers(scene: Scene, wanted: Sequence[Wanted]) -> Iterator[Follower]:
+    file, path = scene.file, scene.path
+    for mode in followed_modes(file):
+        needed = np.zeros(len(path.q), dtype=np.bool_)
+        for one in wanted:
+            if one.requirement.followed == mode:
+                needed[one.rows] = True
+        y = named_design(file, mode)
+        pose = partial(named_pose, file, mode, path)
+        yield Follower(mode, scene.model, path, y, pose, needed)
+
+
+def require_one_shape(scene: Scene, wanted: Sequence[Wanted]) -> None:
+    """Raise CaseError where a mode coincides with another at the pose that names it."""
+    for follower in followers(scene, wanted):
+        like, lam = follower.mode.like, follower.start.at.lam
+        twins = np.flatnonzero(np.abs(lam / lam[like - 1] - 1.0) <= COINCIDENT) + 1
+        if len(twins) > 1:
+            places = (
+                f"{one.requirement.place}.mode"
+                for one in wanted
+                if one.requirement.followed == follower.mode
+            )
+            message = (
+                f"modes {' and '.join(map(str, twins))} coincide there, so that mode {like} has "
+                "no shape of its own: name it at another pose or design"
+            )
+            raise CaseError(tuple(scene.file.problem(key, message) for key in places))
+
+
+# --- All of them, with the modes that they are found among
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Modes at samples x (n, n_x): the lowest, and those followed."""
+
+    x: Floats
+    modes: Modes  # (n, count)
+    followed: Modes  # (n, n_followed); NaN, and 0 for φ, where they are not needed
+    numbers: Ints  # (n, n_followed): which mode from the lowest each is; 0 where not needed
+
+
+def follow_all(
+    model: Model, path: Trajectories, own: Sequence[Follower], y: Floats, least: int
+) -> Spectrum:
+    """At least ``least`` modes at all samples of design y, and the followed ones among them.
+
+    Raises what exact solves raise, TrajectoryError where the design has no pose, LostModeError.
+    """
+    x, block = model.x(path.at(y)[0], y), max(AT_LEAST, BLOCK // model.n_dof**2)
+    extra = EXTRA + max(0, *(each.mode.like - least for each in own))
+    while True:
+        samples = places(model.pencil, x, least, extra, block)
+        try:
+            shapes = [each.along(y, samples) for each in own]
+            break
+        except MoreModesError:
+            extra += len(samples[0].lam)
+    found = Modes(*(np.array([getattr(each, of) for each in samples]) for of in ("lam", "phi")))
+    lam, phi = np.full((len(x), len(own)), np.nan), np.zeros((len(x), model.n_dof, len(own)))
+    numbers = np.zeros((len(x), len(own)), dtype=np.intp)
+    for column, each in enumerate(shapes):
+        for k, shape in each.items():
+            lam[k, column], phi[k, :, column] = shape.lam, shape.phi
+            numbers[k, column] = shape.number
+    return Spectrum(x, found, Modes(lam, phi), numbers)
+
+
+# --- Exact frequencies of a design
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """Exact frequencies of a design at all samples, in Hz.
+
+    ``hz`` (n_t, n_modes) are the lowest; ``followed`` (n_t, n_followed) those of followed modes,
+    NaN where no target needs them, and ``numbers`` say which modes these are.
+    """
+
+    hz: Floats
+    followed: Floats
+    numbers: Ints
+
+    def curve(self, mode: int) -> Floats:
+        """Of one mode (n_t,), numbered as in `wanted`."""
+        return np.asarray(self.hz[:, mode - 1] if mode > 0 else self.followed[:, mode])
+
+
+def solve_design(
+    scene: Scene,
+    own: Sequence[Follower],
+    y: Floats,
+    progress: Callable[[int, int], None] = lambda _done, _of: None,
+) -> Solved:
+    """All shown modes and those followed; raises what exact solves raise, and LostModeError."""
+    hz, n = scene.exact(y, progress), len(scene.path.q)
+    if not own:
+        return Solved(hz, np.zeros((n, 0)), np.zeros((n, 0), dtype=np.intp))
+    found = follow_all(scene.model, scene.path, own, y, 1)
+    return Solved(hz, np.sqrt(found.followed.lam) / (2.0 * np.pi), found.numbers)

@@ -1,0 +1,155 @@
+"""Followed modes at any design and sample, against each decoupled half by itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rail_and_mast import HEIGHT, LAMP, OUT, alone, case
+from redesigned_arms import cart, extrapolated
+from scipy.optimize import brentq
+
+from eigassign.api import Case
+from eigassign.errors import CaseError, LostModeError
+from eigassign.pipeline.run import prepare
+from eigassign.pipeline.stages import Stages
+from eigassign.study.design.followed import (
+    Solved,
+    followers,
+    require_one_shape,
+    solve_design,
+)
+from eigassign.study.design.response import exact_response
+from eigassign.study.design.wanted import Wanted, target_frequencies
+from eigassign.study.scene import Scene
+
+RAIL_LIKE = {"like": 1, "at": {"time": 0.0}}
+MAST_LIKE = {"like": 2, "at": {"time": 0.0}}
+BOTH = [{"mode": RAIL_LIKE, "frequency": 25.0}, {"mode": MAST_LIKE, "at_least": 20.0}]
+RAIL, MAST = alone("rail").model(), alone("mast").model()
+DESIGNS = ((0.03, 0.9), (0.038, 2.09), (0.05, 3.0), (0.02, 0.2), (0.05, 0.2))
+
+
+def scene_of(given: Case) -> Scene:
+    return prepare(given, Stages(lambda line: None), None)
+
+
+def asked(scene: Scene) -> tuple[Wanted, ...]:
+    return target_frequencies(scene.file, scene.path)
+
+
+def solved(scene: Scene, y: tuple[float, ...] | np.ndarray) -> Solved:
+    return solve_design(scene, followers(scene, asked(scene)), np.array(y))
+
+
+def halves(q: np.ndarray, y: tuple[float, ...] | np.ndarray) -> np.ndarray:
+    """First frequencies of the rail and of the mast, (n, 2)."""
+    rail = RAIL.frequencies(q, [y[0]], 1)
+    return np.column_stack([rail, np.full(len(q), MAST.frequencies([], [y[1]], 1)[0, 0])])
+
+
+@pytest.mark.parametrize("y", DESIGNS)
+def test_each_curve_is_that_of_its_half_whatever_its_number(y: tuple[float, float]) -> None:
+    scene = scene_of(case(BOTH))
+    found = solved(scene, y)
+    np.testing.assert_allclose(found.followed, halves(scene.path.q, y), rtol=1e-9)
+    rows = np.arange(len(scene.path.q))
+    for column in (0, 1):
+        own = found.hz[rows, found.numbers[:, column] - 1]
+        np.testing.assert_allclose(found.followed[:, column], own, rtol=1e-9)
+
+
+def test_it_does_not_matter_on_how_many_samples_or_trajectories_or_from_where() -> None:
+    two = [{"name": "out", **OUT}, {"name": "back", **OUT, "points": [[0.9], [0.5]]}]
+    design = {"height": 0.045, "lamp": 2.5}  # the mast is the lower one there
+    targets = [
+        {"mode": {"like": 2, "at": {"time": 0.31, "trajectory": "back"}, "design": design},
+         "frequency": 25.0},
+        {"mode": {"like": 1, "at": {"q": [0.4]}, "design": design}, "frequency": 25.0},
+    ]  # fmt: skip
+    scene = scene_of(case(targets, trajectory=two))
+    some = replace(scene, trajectory=scene.path.chosen([0, 30, 33, 61]))
+    for each in (scene, some):
+        found = solved(each, (0.036, 1.9))
+        np.testing.assert_allclose(found.followed, halves(each.path.q, (0.036, 1.9)), rtol=1e-9)
+        assert len(np.unique(found.numbers[:, 0])) == 2
+
+
+def test_a_mode_is_found_however_high_its_number_becomes() -> None:
+    sections = {"design": {"mast": {"parameter": "sections.mast.height", "min": 0.01, "max": 0.4}}}
+    scene = scene_of(case([{"mode": MAST_LIKE, "frequency": 25.0}], **sections))
+    found = solved(scene, (0.4,))
+    assert found.numbers.min() >= 4
+    low, high = solved(scene, (0.03,)).followed, found.followed
+    assert np.all(high / low > 10.0)
+
+
+def test_slopes_are_those_of_the_shape_even_where_modes_cross() -> None:
+    """The lamp is such that both frequencies are the same at sample 12, to the last digit."""
+    scene = scene_of(case(BOTH))
+    k, height = 12, 0.037
+    rail = RAIL.frequencies(scene.path.q[[k]], [height], 1)[0, 0]
+    lamp = brentq(lambda m: MAST.frequencies([], [m], 1)[0, 0] - rail, 0.2, 3.0, xtol=1e-15)
+    y = np.array([height, lamp])
+    response = exact_response(scene, 1, followers(scene, asked(scene)))
+    found = response(y)
+    beside = extrapolated(lambda v: halves(scene.path.q, v), y, 1e-3)
+    np.testing.assert_allclose(found.slopes[:, -2:], beside, rtol=1e-7, atol=1e-7)
+    np.testing.assert_allclose(found.hz[k, -2], found.hz[k, -1], rtol=1e-12)
+
+
+def test_slopes_hold_the_part_of_coordinates_that_follow_the_design() -> None:
+    target = {"mode": {"like": 2, "at": {"time": 0.4}}, "frequency": 50.0}
+    scene = scene_of(cart([[0.2, 0.3], [0.6, 0.3]], leaning=True, targets=[target]))
+    response = exact_response(scene, 2, followers(scene, asked(scene)))
+    y = np.array([0.52])
+    found = response(y)
+    np.testing.assert_allclose(found.hz[:, -1], found.hz[:, 1], rtol=1e-10)
+    np.testing.assert_allclose(found.slopes[:, -1], found.slopes[:, 1], rtol=1e-9)
+    beside = extrapolated(lambda v: response(v).hz, y, 1e-3)
+    np.testing.assert_allclose(found.slopes, beside, rtol=1e-7)
+
+
+def test_a_lost_mode_is_named_with_place_design_and_nearest_candidates() -> None:
+    """An elastic foot couples both: where they meet, neither is the rail's or the mast's."""
+    scene = scene_of(case(BOTH, coupled=0.1))
+    assert (solved(scene, (0.03, 0.9)).numbers == [1, 2]).all()
+    with pytest.raises(LostModeError) as caught:
+        solved(scene, (0.038, 2.09))
+    said, nearest = str(caught.value), caught.value.candidates
+    assert "the mode like mode 1 (t = 0 s) is lost" in said
+    assert "height = 0.038, lamp = 2.09" in said
+    assert "sample " in said
+    assert all(f"mode {c.number} ({c.hz:.5g} Hz, MAC {c.mac:.2f})" in said for c in nearest)
+    assert {c.number for c in nearest} == {1, 2}
+    hz = scene.exact(np.array([0.038, 2.09]))
+    assert any(
+        np.allclose([row[c.number - 1] for c in nearest], [c.hz for c in nearest]) for row in hz
+    )
+    # beyond the meeting each has its shape again
+    beyond = solved(scene, (0.05, 3.0))
+    assert (beyond.numbers == [2, 1]).all()
+
+
+def test_where_a_target_does_not_hold_its_mode_need_not_be_known() -> None:
+    early = [dict(one, during=[0.0, 0.3]) for one in BOTH]
+    scene = scene_of(case(early, coupled=0.1))
+    found = solved(scene, (0.038, 2.09))
+    known = np.isfinite(found.followed).all(axis=1)
+    np.testing.assert_array_equal(known, scene.path.time_s <= 0.3 + 1e-9)
+    assert (found.numbers[known] == [2, 1]).all()
+
+
+def test_a_mode_that_coincides_with_another_has_no_shape_to_name() -> None:
+    lamp = brentq(
+        lambda m: MAST.frequencies([], [m], 1)[0, 0] - RAIL.frequencies([0.5], [0.035], 1)[0, 0],
+        0.2, 3.0, xtol=1e-15,
+    )  # fmt: skip
+    mode = {"like": 1, "at": {"q": [0.5]}, "design": {"height": 0.035, "lamp": lamp}}
+    scene = scene_of(
+        case([{"mode": mode, "frequency": 25.0}], design={"height": HEIGHT, "lamp": LAMP})
+    )
+    with pytest.raises(CaseError, match="modes 1 and 2 coincide there") as caught:
+        require_one_shape(scene, asked(scene))
+    assert caught.value.problems[0].path == "targets[0].mode"
