@@ -679,7 +679,7 @@ class _Box:
         """The nearest z within bounds and constraints."""
         z = np.clip(z, 0.0, 1.0)
         row = self.rows @ z
-        if np.all((row >= self.row_lower) & (row <= self.row_upper)):
+        if self.n == 0 or np.all((row >= self.row_lower) & (row <= self.row_upper)):
             return z
         norms = np.linalg.norm(self.rows, axis=1)
         norms = np.where(norms > 0.0, norms, 1.0)

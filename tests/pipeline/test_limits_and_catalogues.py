@@ -77,7 +77,9 @@ SECTIONS = {
 }
 
 
-def with_lists(masses: str, diameters: str, more: str = "", hz: float = 190.0) -> Case:
+def with_lists(
+    masses: str, diameters: str, more: str = "", hz: float = 190.0, limits: str = ""
+) -> Case:
     """The arm with lists of one mass, one diameter and three sections."""
     head = HEAD.replace(
         "rod: {area: 7.06317856e-4, bending_inertia: 3.97e-8}",
@@ -91,7 +93,7 @@ def with_lists(masses: str, diameters: str, more: str = "", hz: float = 190.0) -
     design = (
         f"design:\n  m1: {{parameter: bodies.elbow_mass.mass, values: [{masses}]}}\n"
         f"  d: {{parameter: sections.rod.diameter, values: [{diameters}]}}\n"
-        f"  fore:\n    choices:\n{choices}"
+        f"  fore:\n    choices:\n{choices}{limits}"
     )
     targets = f"  - {{mode: 1, frequency: {hz} Hz}}\n"
     return Case(parse((head + design + TAIL + targets + more).encode(), "case.yaml"))
@@ -164,6 +166,34 @@ def test_the_one_shot_of_catalogues_is_the_best_of_the_linear_model() -> None:
     assert search.nodes is not None
     assert result.results.error is not None
     assert result.results.error.one_shot == result.results.error.exact
+
+
+def test_lists_that_contradict_linear_limits_leave_a_compromise() -> None:
+    limits = (
+        "  constraints:\n"
+        "    more: {terms: {m1: 1, d: 4}, min: 0.3}\n"
+        "    less: {terms: {m1: 1}, max: 0.2}\n"
+        "    idle: {terms: {d: 1}, min: 20 mm}\n"
+    )
+    case = with_lists("160 g, 250 g", "28 mm, 32 mm", limits=limits)
+    row = solve_case(case).results.assignment
+    assert row is not None
+    assert row.catalogue is not None
+    assert row.verdict == "infeasible"
+    assert sorted(row.conflict) == ["less", "more"]
+    # 0.16 + 4 · 0.032 = 0.288 misses the first by 4 %, 0.25 the second by 25 %
+    assert row.catalogue.best[0].violation == pytest.approx(0.04)
+
+
+def test_limits_that_contradict_are_proved_where_the_problem_is_convex() -> None:
+    """Whatever is wanted besides: mode 1 at most 10 Hz is no convex limit, a frequency is none."""
+    stiff = "  - {mode: 1, at_least: 900 Hz}\n"
+    for more in ("", "  - {mode: 2, frequency: 40 Hz}\n"):
+        _, row = solved(DESIGN, stiff + more, HELD)
+        assert row.verdict in ("unreachable", "infeasible")
+        assert row.optimality.kind == "proved"
+    _, row = solved(DESIGN, stiff + "  - {mode: 1, at_most: 10 Hz}\n", HELD)
+    assert row.optimality.kind == "local"
 
 
 def test_mode_1_at_least_f_of_held_joints_is_proved() -> None:

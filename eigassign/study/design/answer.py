@@ -26,7 +26,7 @@ from eigassign.study.design.conclusions import (
     least_changed,
 )
 from eigassign.study.design.judgement import verdict
-from eigassign.study.design.one_shot import assign_design
+from eigassign.study.design.one_shot import assign_design, catalogues
 from eigassign.study.design.optimum import MASS, Found, Task, find_optimum, variant_of
 from eigassign.study.design.wanted import Wanted
 from eigassign.study.results import (
@@ -86,9 +86,8 @@ class Answer:
 def find_answer(scene: Scene, wanted: Sequence[Wanted], progress: Callable[[str], None]) -> Answer:
     """The design asked for by the case's method.
 
-    Raises InfeasibleError where bounds, lists and linear constraints contradict each other under
-    `method: one_shot`, or no combination of catalogues meets linear constraints; AccuracyError
-    where `method: one_shot` cannot be vouched for.
+    Under `method: one_shot` raises InfeasibleError where bounds, lists and linear constraints
+    contradict each other, AccuracyError where it cannot be vouched for.
     """
     sequential = scene.file.assignment.method == "sequential"
     one_shot, notes = None, []
@@ -105,7 +104,7 @@ def find_answer(scene: Scene, wanted: Sequence[Wanted], progress: Callable[[str]
         lam = tuple(hz_from_lam(values) for values in one_shot.lam)
         return Answer(one_shot.y, lam, one_shot, None, tuple(notes))
     found = least_changed(find_optimum(scene, wanted, _designs(one_shot), progress), scene.initial)
-    contradiction = conflict(found, scene.file.assignment.steps)
+    contradiction = conflict(found, catalogues(scene.file), scene.file.assignment.steps)
     notes += idle_notes(scene.model.y_names, found.variant, found.best.seen)
     notes += _band_notes(found)
     if found.lost:

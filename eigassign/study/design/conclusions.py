@@ -12,10 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from time import monotonic
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment import Catalogue
+from eigassign.assignment.choosing import choose
+from eigassign.assignment.requirements import Requirements
 from eigassign.assignment.sequential import (
     MET,
     OPTIMAL,
@@ -32,6 +36,7 @@ from eigassign.study.design.optimum import Found, Variant
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
+LONGEST = 10.0  # s that catalogues are searched for each of these limits
 MOST = 12  # limits of which the smallest contradiction is looked for
 AFFINE = 1e-10  # relative change of a slope over the bounds that is round-off
 WITHOUT = 1e-9  # of the largest: a singular value of the slopes that is none
@@ -42,20 +47,33 @@ SAME = 1e-9  # of the merit: a design this little worse is as good
 
 
 def is_proved(scene: Scene, found: Found) -> bool:
-    """Whether no design is better, or none misses the limits by less where they are missed."""
-    best, problem = found.best, found.variant.problem
+    """Whether no design is better, or none meets the limits where they are missed.
+
+    Whether these can be met does not depend on what is wanted besides: the violation alone is
+    minimised then, from the answer.
+    """
+    best, asked = found.best, found.variant.requirements
     if best.seen.violation <= MET:
-        left = best.stationarity
-    else:
-        only = replace(best.seen, residual=np.zeros(0), slopes=best.seen.slopes[:0])
-        left = stationarity(replace(problem, prices=None), best.y, only)
-    return left <= OPTIMAL and _is_convex(scene, found.variant)
-
-
-def _is_convex(scene: Scene, variant: Variant) -> bool:
-    asked = variant.requirements
-    if asked.targets or scene.file.design.catalogues or scene.path.follows_design:
+        return best.stationarity <= OPTIMAL and not asked.targets and _are_convex(scene, asked)
+    if not _are_convex(scene, asked):
         return False
+    problem = found.variant.problem
+
+    def limits(y: Floats) -> Appraisal:
+        seen = problem.appraise(y)
+        return replace(seen, residual=np.zeros(0), slopes=seen.slopes[:0], pairs=None)
+
+    alone = replace(problem, appraise=limits, prices=None)
+    least = minimise(alone, best.y, scene.file.assignment.steps)
+    return least.seen.violation > MET and least.stationarity <= OPTIMAL
+
+
+def _are_convex(scene: Scene, asked: Requirements) -> bool:
+    """Whether the limits allow a convex set of designs, and price and least change are convex."""
+    if scene.file.design.catalogues or scene.path.follows_design:
+        return False
+    if not asked.limits and scene.file.design.mass is None:
+        return True  # linear limits alone
     lowest = all(one.at_least and one.terms == ((1, 1.0),) for one in asked.limits)
     return lowest and scene.model.n_rigid == 0 and _is_affine(scene)
 
@@ -91,32 +109,42 @@ class Conflict:
     smallest: bool
 
 
-def conflict(found: Found, steps: int) -> Conflict | None:
+def conflict(found: Found, listed: Sequence[Catalogue], steps: int) -> Conflict | None:
     """What contradicts where the best design misses limits; None where it meets them.
 
     Deletion filter: a limit without which the rest still cannot be met is left out. Each trial
-    starts at the compromise.
+    starts at the compromise, and searches the catalogues ``listed``.
     """
     best, asked = found.best, found.variant.requirements
     if best.seen.violation <= MET or best.end in (End.SECONDS, End.STEPS, End.INTERRUPTED):
         return None
     owners = [asked.owner(int(k)) for k in np.flatnonzero(best.seen.excess > MET)]
     missed = tuple(dict.fromkeys(owners))
-    if found.chosen is not None or len(asked.limit_names) > MOST:
-        return Conflict(missed, len(asked.limit_names) == 1 and found.chosen is None)
-    needed = list(asked.limit_names)
+    if len(asked.limit_names) > MOST:
+        return Conflict(missed, False)
+    needed, smallest = list(asked.limit_names), True
     for name in asked.limit_names:
         rest = [other for other in needed if other != name]
-        if rest and not _can_be_met(found.variant.asks(rest), best.y, steps):
+        met = _can_be_met(found.variant.asks(rest), listed, best.y, steps) if rest else True
+        smallest = smallest and met is not None
+        if met is False:
             needed = rest
-    return Conflict(tuple(needed), True)
+    return Conflict(tuple(needed), smallest) if smallest else Conflict(missed, False)
 
 
-def _can_be_met(problem: DesignProblem, start: Floats, steps: int) -> bool:
+def _can_be_met(
+    problem: DesignProblem, listed: Sequence[Catalogue], start: Floats, steps: int
+) -> bool | None:
+    """None where the catalogues are too long to say."""
     try:
-        return minimise(problem, start, steps).seen.violation <= MET
+        if not listed:
+            return minimise(problem, start, steps).seen.violation <= MET
+        chosen = choose(problem, listed, [start], steps, monotonic() + LONGEST)
     except EigassignError:
         return True
+    if chosen.search is None and chosen.optima[0].seen.violation > MET:
+        return None
+    return chosen.optima[0].seen.violation <= MET
 
 
 # --- What changes nothing

@@ -37,7 +37,7 @@ from eigassign.assignment.sequential import (
     distinct,
     minimise,
 )
-from eigassign.errors import CaseError, EigassignError, LostModeError
+from eigassign.errors import CaseError, EigassignError, InfeasibleError, LostModeError
 from eigassign.study.design.clearance import Band, Clearance, prove_clear, wanting
 from eigassign.study.design.followed import Follower, followers
 from eigassign.study.design.one_shot import catalogues, linear_constraints
@@ -142,9 +142,15 @@ def _search_all(
     ended: End | None = None
     for below in _below(whole):
         if listed:
-            variant = variant_of(whole, below)
             near = list(starts[: KEPT + 1])
-            chosen = choose(variant.problem, listed, near, keys.steps, deadline, progress)
+            for missed in (False, True):
+                variant = variant_of(whole, below, missed)
+                try:
+                    chosen = choose(variant.problem, listed, near, keys.steps, deadline, progress)
+                    break
+                except InfeasibleError:  # no combination meets the linear limits
+                    if missed:
+                        raise
             best_of.append((variant, chosen.optima, chosen))
             solves += chosen.appraisals * len(scene.path.q)
             made += min(len(near), RELAXED)
@@ -362,8 +368,11 @@ def _below(task: Task) -> Iterator[tuple[int, ...]]:
     yield from itertools.islice(itertools.product(*possible), MOST_BELOW)
 
 
-def variant_of(task: Task, below: tuple[int, ...]) -> Variant:
-    """The problem of a task with so many modes below each of its bands."""
+def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Variant:
+    """The problem of a task with so many modes below each of its bands.
+
+    Linear limits may be ``missed`` as others may, and are where they contradict each other.
+    """
     scene, wanted = task.scene, task.wanted
     lower, upper = scene.bounds
     width = np.where(upper > lower, upper - lower, 1.0)
@@ -379,7 +388,7 @@ def variant_of(task: Task, below: tuple[int, ...]) -> Variant:
         for band, k in zip(task.bands, below, strict=True)
         for limit in _beside(band, k, task.margin)
     ]
-    constraints, elastic = _linear(scene)
+    constraints, elastic = _linear(scene, missed)
     asked = Requirements(
         targets=targets,
         limits=(*_limits(wanted), *of_bands),
@@ -423,10 +432,12 @@ def _mass(scene: Scene) -> Iterator[QuantityLimit]:
         yield QuantityLimit(MASS, scene.model.total_mass, low, high)
 
 
-def _linear(scene: Scene) -> tuple[tuple[LinearConstraint, ...], tuple[QuantityLimit, ...]]:
+def _linear(
+    scene: Scene, missed: bool
+) -> tuple[tuple[LinearConstraint, ...], tuple[QuantityLimit, ...]]:
     """Linear limits that every step keeps; where they contradict, limits to be missed least."""
     rows = tuple(linear_constraints(scene.file))
-    if constraints_agree(rows, Bounds(*scene.bounds)):
+    if not missed and constraints_agree(rows, Bounds(*scene.bounds)):
         return rows, ()
     return (), tuple(
         QuantityLimit(row.name, partial(_linear_value, row.coefficients), row.lower, row.upper)
