@@ -14,6 +14,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,7 @@ def results_document(results: RunResults) -> dict[str, Any]:
             for row in results.design
         },
         "mass": asdict(results.mass) if results.mass else None,
+        "price": results.price,
         "error": _error(results.error) if results.error else None,
         "frequencies": _frequencies(results, first) if first else None,
         "targets": [_target(results, target) for target in results.targets],
@@ -158,6 +160,7 @@ def _target(results: RunResults, target: TargetStudy) -> dict[str, Any]:
         **({"trajectory": target.trajectory} if target.trajectory is not None else {}),
         "error": _error(target.error),
         "frequencies": _frequencies(results, target),
+        **({} if target.near is None else {"near": _other_modes(target.near)}),
     }
 
 
@@ -327,18 +330,51 @@ def _motion(results: RunResults, rows: slice) -> Iterator[Column]:
 
 
 def _assigned(results: RunResults) -> Iterator[Column]:
-    """One group of columns a mode, whichever trajectories its targets hold on."""
-    for name in dict.fromkeys(target.curve_name for target in results.targets):
-        own = [target for target in results.targets if target.curve_name == name]
-        for kind in ("target", "initial", "one_shot", "predicted", "exact"):
-            heading = f"{name} {kind.replace('_', ' ')} [Hz]"
-            yield heading, _scattered(own, kind, results.time_s.size)
+    """One group of columns a wanted mode, limit or band, whichever trajectories it holds on.
+
+    A group has each sample once: of what is asked twice of a mode, the second has its own group.
+    """
+    groups: dict[str, list[TargetStudy]] = {}
+    for target in results.targets:
+        name = target.curve_name if target.kind == "frequency" else target.label
+        names = (f"{name} ({k})" if k > 1 else name for k in count(1))
+        free = (n for n in names if not any(_share(target, own) for own in groups.get(n, ())))
+        groups.setdefault(next(free), []).append(target)
+    for name, own in groups.items():
+        for kind, curves in _curves(own).items():
+            yield f"{name} {kind} [Hz]", _scattered(own, curves, results.time_s.size)
 
 
-def _scattered(targets: Sequence[TargetStudy], kind: str, n: int) -> list[float]:
+def _share(one: TargetStudy, other: TargetStudy) -> bool:
+    """Whether both hold at some sample."""
+    return bool(max(one.rows.start, other.rows.start) < min(one.rows.stop, other.rows.stop))
+
+
+def _curves(targets: Sequence[TargetStudy]) -> dict[str, list[Floats | None]]:
+    """By what they are called, of each target: the edges, and the modes before and after."""
+    kinds = ["target", "initial", "one shot", "predicted", "exact"]
+    if (kind := targets[0].kind) == "keep_out":
+        kinds = ["lower", "upper"]
+    elif kind != "frequency":
+        kinds = ["target", "initial", "one shot", "exact"]
+    found = {k: [getattr(t, f"{k.replace(' ', '_')}_hz") for t in targets] for k in kinds}
+    for mode in sorted({mode for t in targets if t.near for mode in t.near.modes}):
+        for when in ("initial", "optimal"):
+            found[f"mode {mode} {'exact' if when == 'optimal' else when}"] = [
+                getattr(t.near, f"{when}_hz")[:, t.near.modes.index(mode)]
+                if t.near and mode in t.near.modes
+                else None
+                for t in targets
+            ]
+    return found
+
+
+def _scattered(
+    targets: Sequence[TargetStudy], curves: Sequence[Floats | None], n: int
+) -> list[float]:
     values = np.full(n, np.nan)
-    for target in targets:
-        if (hz := getattr(target, f"{kind}_hz")) is not None:
+    for target, hz in zip(targets, curves, strict=True):
+        if hz is not None:
             values[target.rows] = hz
     return [float(value) for value in values]
 

@@ -35,6 +35,8 @@ def tables(results: RunResults) -> tuple[Table, ...]:
         design(results),
         errors(results),
         required(results),
+        clearances(results),
+        combinations(results),
         optima(results),
         sensitivity(results),
         limits(results),
@@ -70,16 +72,22 @@ def headline(results: RunResults) -> str | None:
 
 
 def design(results: RunResults) -> Table:
-    """Each design parameter before and after, what it lies on or was chosen, and the mass."""
+    """Each design parameter before and after, what it lies on, was chosen or costs; the mass."""
     active = results.assignment.active if results.assignment else ()
     on = {limit.name: limit.side for limit in active if limit.kind == "bound"}
     chosen = any(row.choice is not None for row in results.design)
     columns = ("name", "parameter", "unit", "initial", "optimal", "lower", "upper")
-    more = (*(("lies on",) if on else ()), *(("choice",) if chosen else ()))
+    priced = results.price is not None
+    more = [
+        name
+        for name, shown in (("lies on", on), ("choice", chosen), ("change costs", priced))
+        if shown
+    ]
     rows = [
         (row.name, row.parameter, row.unit, *map(number, (row.initial, row.optimal)),
          *map(number, (row.lower, row.upper)), *((on.get(row.name, ""),) if on else ()),
-         *((row.choice or "",) if chosen else ()))
+         *((row.choice or "",) if chosen else ()),
+         *((number(row.cost),) if priced else ()))
         for row in results.design
     ]  # fmt: skip
     if (mass := results.mass) is not None:
@@ -88,6 +96,8 @@ def design(results: RunResults) -> Table:
         rows.append(("mass", "of all links and bodies", "kg", *values, *("" for _ in more)))
     constraints = [limit.name for limit in active if limit.kind == "constraint"]
     caption = f"The constraint {', '.join(constraints)} is active." if constraints else ""
+    if results.price is not None:
+        caption = f"The change costs {number(results.price)} in all. {caption}".strip()
     return Table("Design", (*columns, *more), tuple(rows), caption)
 
 
@@ -132,12 +142,47 @@ def _violated(worst: float) -> str:
     return f"violated by {percent(worst)}" if worst > 0.0 else "met"
 
 
+def clearances(results: RunResults) -> Table:
+    """Each band to keep out of: how many modes are below it, and whether that is proved."""
+    rows = tuple(
+        (row.label, str(row.below), percent(max(row.room, 0.0)), "proved" if row.clear else "NO")
+        for row in (results.assignment.clearances if results.assignment else ())
+    )
+    columns = ("band", "modes below", "room at least", "clear")
+    caption = "Of all modes at every sample, and between the samples; room relative to the edge."
+    return Table("Clearance", columns, rows, caption)
+
+
+def combinations(results: RunResults) -> Table:
+    """The best combinations of the catalogues, solved exactly."""
+    row = results.assignment
+    if row is None or row.catalogue is None:
+        return Table("Combinations", (), ())
+    best, price = row.catalogue.best, "price" if _by_price(results) else "objective"
+    rows = tuple(
+        (str(k), *one.choices.values(), number(one.objective), _violated(one.violation))
+        for k, one in enumerate(best, 1)
+    )
+    columns = ("combination", *best[0].choices, price, "limits")
+    return Table("Combinations", columns, rows, f"{_sentence(row.optimality.words)}.")
+
+
+def _by_price(results: RunResults) -> bool:
+    """Whether the objective is the price alone."""
+    wanted = any(target.kind == "frequency" for target in results.targets)
+    return results.price is not None and not wanted
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
 def optima(results: RunResults) -> Table:
     """The distinct local optima, the best first; none of a single one."""
     row = results.assignment
     names = tuple(each.name for each in results.design)
     columns = ("optimum", "objective", "violation", *names)
-    if row is None or len(row.local_optima) < 2:
+    if row is None or row.catalogue is not None or len(row.local_optima) < 2:
         return Table("Local optima", columns, ())
     rows = tuple(
         (str(k), number(each.objective), percent(each.violation), *map(number, each.design))

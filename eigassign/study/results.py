@@ -106,7 +106,10 @@ class ValidationRow:
 
 @dataclass(frozen=True)
 class DesignRow:
-    """One design parameter before and after, in SI ``unit``; what was chosen of its catalogue."""
+    """One design parameter before and after, in SI ``unit``; what was chosen of its catalogue.
+
+    ``price`` is for one unit.
+    """
 
     name: str
     parameter: str
@@ -116,6 +119,12 @@ class DesignRow:
     lower: float
     upper: float
     choice: str | None = None
+    price: float | None = None
+
+    @property
+    def cost(self) -> float:
+        """Price of the change; 0 without a price."""
+        return (self.price or 0.0) * (self.optimal - self.initial)
 
 
 @dataclass(frozen=True)
@@ -178,6 +187,19 @@ class FollowedRow:
 
 
 @dataclass(frozen=True)
+class OtherModes:
+    """Exact frequencies (n_t, n_modes) of some modes before and after (Figure 5)."""
+
+    modes: tuple[int, ...]
+    initial_hz: Floats
+    optimal_hz: Floats
+
+    def part(self, rows: slice) -> OtherModes:
+        """At these rows only."""
+        return OtherModes(self.modes, self.initial_hz[rows], self.optimal_hz[rows])
+
+
+@dataclass(frozen=True)
 class TargetStudy:
     """One target along the trajectory (the paper's Figure 4); arrays (n,) in Hz.
 
@@ -186,7 +208,7 @@ class TargetStudy:
     band to keep out of lies between them. The curves are of its mode, of a gap the distance of its
     two, of a band the frequency nearest to its middle; a ``followed`` mode is none of ``modes``.
     Errors of limits and bands are relative violations, 0 where they are met. ``weight_s`` is the
-    time that it stands for, weighted.
+    time that it stands for, weighted. ``near`` are the modes about a band; None of other kinds.
     """
 
     kind: str  # frequency | at_least | at_most | keep_out | gap
@@ -206,6 +228,7 @@ class TargetStudy:
     weight: float
     along: tuple[TargetAlong, ...]
     followed: FollowedRow | None = None
+    near: OtherModes | None = None
 
     @property
     def curve_name(self) -> str:
@@ -231,15 +254,6 @@ class TargetStudy:
         if self.predicted_hz is None:
             return 0.0
         return _worst(np.asarray(self.predicted_hz / self.exact_hz - 1.0))
-
-
-@dataclass(frozen=True)
-class OtherModes:
-    """Exact frequencies (n_t, n_modes) of the modes above the assigned one (Figure 5)."""
-
-    modes: tuple[int, ...]
-    initial_hz: Floats
-    optimal_hz: Floats
 
 
 @dataclass(frozen=True)
@@ -388,7 +402,7 @@ class SensitivityRow:
 class RelaxedRow:
     """A limit that the answer lies on, relaxed by ``amount``: what that gains to first order.
 
-    ``quantity`` is rms error, worst error (fractions) or objective; ``words`` say it all.
+    ``quantity`` is rms error, worst error (fractions), price or objective; ``words`` say it all.
     """
 
     name: str
@@ -629,6 +643,12 @@ class RunResults:
         return over_all([(target.error, target.weight_s) for target in self.counted])
 
     @property
+    def price(self) -> float | None:
+        """What the change of the design costs; None where nothing has a price."""
+        priced = [row.cost for row in self.design if row.price is not None]
+        return sum(priced) if priced else None
+
+    @property
     def counted(self) -> tuple[TargetStudy, ...]:
         """The targets that ``error`` is of: wanted frequencies, or all where there are none."""
         wanted = tuple(target for target in self.targets if target.kind == "frequency")
@@ -686,9 +706,7 @@ def _along(results: RunResults, row: TrajectoryRow) -> RunResults:
         trajectories=(replace(row, rows=slice(0, rows.stop - rows.start)),),
         studies=tuple(_study(study, rows) for study in results.studies),
         targets=tuple(target for target in targets if target is not None),
-        others=None
-        if others is None
-        else OtherModes(others.modes, others.initial_hz[rows], others.optimal_hz[rows]),
+        others=None if others is None else others.part(rows),
     )
 
 
@@ -719,4 +737,5 @@ def _target(target: TargetStudy, row: TrajectoryRow) -> TargetStudy | None:
         rows=slice(first, first + length),
         followed=None if target.followed is None else target.followed.part(rows),
         along=(replace(along, rows=slice(0, length)),),
+        near=None if target.near is None else target.near.part(rows),
     )

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from synthetic_results import make_results
+from synthetic_results import as_limit, make_results
 
 from eigassign.mechanism.trajectory.csv import read_samples
 from eigassign.output.result_files import sample_files
-from eigassign.study.results import Comparison, RunResults
+from eigassign.study.results import Comparison, OtherModes, RunResults
 
 
 def rows_of(data: bytes) -> list[dict[str, str]]:
@@ -77,6 +77,30 @@ def test_a_target_on_one_trajectory_leaves_the_others_empty() -> None:
     lines = rows_of(sample_files(replace(results, targets=(narrow,)))["frequencies.csv"])
     assert [line["mode 1 exact [Hz]"] for line in lines[:100]] == [""] * 100
     assert float(lines[100]["mode 1 exact [Hz]"]) == target.exact_hz[100]
+
+
+def test_a_limit_beside_a_target_of_the_same_mode_overwrites_nothing() -> None:
+    results = make_results()
+    (target,) = results.targets
+    limit = as_limit(target, "at_most", np.full(152, -np.inf), np.full(152, 205.0))
+    twice = replace(target, lower_hz=np.full(152, 180.0), upper_hz=np.full(152, 180.0))
+    band = as_limit(target, "keep_out", np.full(152, 150.0), np.full(152, 160.0))
+    near = OtherModes((1, 2), np.full((152, 2), 140.0), np.full((152, 2), 170.0))
+    band = replace(band, near=near)
+    rows = rows_of(
+        sample_files(replace(results, targets=(target, limit, twice, band)))["frequencies.csv"]
+    )
+
+    def column(heading: str) -> list[float]:
+        return [float(row[f"{heading} [Hz]"]) for row in rows]
+
+    np.testing.assert_array_equal(column("mode 1 target"), target.target_hz)
+    np.testing.assert_array_equal(column("mode 1 (2) target"), np.full(152, 180.0))
+    np.testing.assert_array_equal(column("mode 1 at_most target"), np.full(152, 205.0))
+    np.testing.assert_array_equal(column("mode 1 at_most exact"), limit.exact_hz)
+    assert column("mode 1 keep_out upper") == [160.0] * 152
+    assert column("mode 1 keep_out mode 2 exact") == [170.0] * 152
+    assert "mode 1 at_most predicted [Hz]" not in rows[0]
 
 
 def test_without_targets_the_expansions_are_written_with_their_gaps() -> None:

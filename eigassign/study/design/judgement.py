@@ -22,6 +22,7 @@ from eigassign.study.results import (
     ErrorRow,
     ErrorSummary,
     FollowedRow,
+    OtherModes,
     TargetAlong,
     TargetStudy,
 )
@@ -92,6 +93,7 @@ def _studied(
         weight=wanted.weight,
         along=tuple(_along(path, wanted, errors, weights)),
         followed=_followed(wanted, solved),
+        near=_near(wanted, solved) if kind == "keep_out" else None,
     )
 
 
@@ -101,6 +103,21 @@ def _followed(wanted: Wanted, solved: SolvedDesigns) -> FollowedRow | None:
         return None
     before, after = (s.numbers[rows, wanted.mode] for s in (solved.initial, solved.exact))
     return FollowedRow(mode.name, mode.like, before, after)
+
+
+NEAR_BAND = 0.5  # of an edge: modes this near to a band are shown with it
+
+
+def _near(wanted: Wanted, solved: SolvedDesigns) -> OtherModes:
+    """The modes near a band before or after, and at least those on either side of it."""
+    both = np.stack([solved.initial.hz[wanted.rows], solved.exact.hz[wanted.rows]])
+    low, high = wanted.lower_hz.min(), wanted.upper_hz.max()
+    inside = (both > low * (1.0 - NEAR_BAND)) & (both < high * (1.0 + NEAR_BAND))
+    shown = inside.any(axis=(0, 1))
+    below = int((both[1].max(axis=0) < high).sum())  # as many modes are below
+    shown[max(below - 1, 0) : below + 1] = True
+    columns = np.flatnonzero(shown)
+    return OtherModes(tuple((columns + 1).tolist()), *(hz[:, columns] for hz in both))
 
 
 @dataclass(frozen=True)

@@ -117,6 +117,7 @@ def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:
             p.min,
             p.max,
             chosen.get(k),
+            p.price,
         )
         for k, (name, p) in enumerate(parameters.items())
     )

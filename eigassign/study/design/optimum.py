@@ -419,7 +419,7 @@ def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Vari
             objective=objective if targets else Objective.LEAST_SQUARES,
         )
 
-    labels = (band.wanted.requirement.label for band in task.bands)
+    labels = (band.label for band in task.bands)
     named = tuple(zip(labels, below, strict=True))
     return Variant(named, asked, asks(asked.limit_names), response, asks)
 
@@ -472,6 +472,7 @@ class _Band:
     """A band to keep out of along one trajectory."""
 
     wanted: Wanted
+    label: str  # with the trajectory, of several
     rows: slice  # of all samples
     lower_hz: Floats
     upper_hz: Floats
@@ -482,11 +483,13 @@ def _bands(scene: Scene, wanted: Sequence[Wanted]) -> Iterator[_Band]:
     for w in wanted:
         if w.requirement.kind != "keep_out":
             continue
-        for rows in scene.path.rows:
+        for part, rows in zip(scene.path.parts, scene.path.rows, strict=True):
+            label = w.requirement.label
+            label = f"{label} along {part.name!r}" if scene.path.several else label
             first, last = max(rows.start, w.rows.start), min(rows.stop, w.rows.stop)
             if first < last:
                 own = slice(first - w.rows.start, last - w.rows.start)
-                yield _Band(w, slice(first, last), w.lower_hz[own], w.upper_hz[own])
+                yield _Band(w, label, slice(first, last), w.lower_hz[own], w.upper_hz[own])
 
 
 def _possible(scene: Scene, band: _Band) -> list[int]:

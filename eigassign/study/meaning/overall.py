@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.requirements import Requirements
-from eigassign.assignment.sequential import Appraisal
+from eigassign.assignment.sequential import MET, Appraisal
 from eigassign.errors import EigassignError
 from eigassign.study.design.answer import Answer, active_rows
 from eigassign.study.design.followed import Solved
@@ -92,6 +92,8 @@ def _trade_off(scene: Scene, answer: Answer) -> TradeOff | None:
 
 def _relaxed(scene: Scene, answer: Answer, found: Found) -> Iterator[RelaxedRow]:
     variant = found.variant
+    if found.best.seen.violation > MET:  # a limit that is missed is no price of the objective
+        return
     kind = error_kind(variant.problem, variant.requirements)
     active = tuple(active_rows(scene, answer))
     yield from relaxed_limits(scene.file, variant.problem, kind, found.best.objective, active)

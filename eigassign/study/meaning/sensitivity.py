@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from eigassign.assignment.requirements import FrequencyLimit, Requirements
 from eigassign.assignment.sequential import Appraisal, DesignProblem, Objective
 from eigassign.case import CaseFile
+from eigassign.study.design.optimum import MASS
 from eigassign.study.design.wanted import Wanted
 from eigassign.study.results import ActiveRow, RelaxedRow, SensitivityRow
 
@@ -64,6 +65,8 @@ def _mode(limit: FrequencyLimit) -> int:
 
 def error_kind(problem: DesignProblem, asked: Requirements) -> str:
     """What F is in words: an error only where frequencies are wanted and nothing has a price."""
+    if not asked.targets and problem.prices is not None:
+        return "price"
     if not asked.targets or problem.prices is not None:
         return "objective"
     return "worst error" if problem.objective is Objective.WORST_CASE else "rms error"
@@ -87,7 +90,7 @@ def relaxed_limits(
         before, after = as_error(kind, F), as_error(kind, F - row.multiplier * amount)
         yield RelaxedRow(
             row.name, row.kind, row.side, amount, unit, kind, before, after,
-            f"{_room(row, amount, unit)}: {kind} {_from_to(kind, before, after)}",
+            f"{_room(file, row, amount, unit)}: {kind} {_from_to(kind, before, after)}",
         )  # fmt: skip
 
 
@@ -111,11 +114,35 @@ def _rounded(value: float) -> float:
     return float(f"{value:.0e}") if value > 0.0 else 1.0
 
 
-def _room(row: ActiveRow, amount: float, unit: str) -> str:
-    if row.kind == "target":
+def _room(file: CaseFile, row: ActiveRow, amount: float, unit: str) -> str:
+    if row.kind != "target":
+        more = "more" if row.side == "upper" else "less"
+        return f"{_handy(amount, unit)} {more} at the {row.side} {_limit(row)}"
+    if row.name != MASS or (mass := file.design.mass) is None:
         return f"{row.name}, relaxed by {100 * amount:g} %"
-    more = "more" if row.side == "upper" else "less"
-    return f"{amount:g} {unit} {more} at the {row.side} {_limit(row)}"
+    limit, more = (mass.min, "less") if mass.max is None else (mass.max, "more")
+    if limit is None or None not in (mass.min, mass.max):
+        return f"the limit of the mass, relaxed by {100 * amount:g} %"
+    return f"{_handy(amount * limit, 'kg')} {more} mass"
+
+
+_HANDY = {  # units that people read, the largest first
+    "kg": {"kg": 1.0, "g": 1e-3},
+    "m": {"m": 1.0, "mm": 1e-3},
+    "m2": {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6},
+    "m4": {"m4": 1.0, "cm4": 1e-8, "mm4": 1e-12},
+    "Pa": {"GPa": 1e9, "MPa": 1e6, "Pa": 1.0},
+    "N/m": {"MN/m": 1e6, "kN/m": 1e3, "N/m": 1.0},
+    "N m/rad": {"MN m/rad": 1e6, "kN m/rad": 1e3, "N m/rad": 1.0},
+    "kg m2": {"kg m2": 1.0, "kg cm2": 1e-4},
+}
+
+
+def _handy(amount: float, unit: str) -> str:
+    """An amount in SI with a unit that makes it at least 1, or the smallest."""
+    units = _HANDY.get(unit, {unit: 1.0})
+    name = next((name for name, size in units.items() if amount >= size), list(units)[-1])
+    return f"{amount / units[name]:.3g} {name}".rstrip()
 
 
 def _limit(row: ActiveRow) -> str:
@@ -123,6 +150,6 @@ def _limit(row: ActiveRow) -> str:
 
 
 def _from_to(kind: str, before: float, after: float) -> str:
-    if kind == "objective":
+    if not kind.endswith("error"):
         return f"{before:.4g} → {after:.4g}"
-    return f"{100 * before:.3g} → {100 * after:.3g} %"
+    return f"{100 * before:#.3g} → {100 * after:#.3g} %"

@@ -65,7 +65,7 @@ def test_a_little_more_room_gains_what_the_multiplier_says(tmp_path: Path) -> No
     _, before, found = answered(tmp_path, text)
     (row,) = [row for row in found.relaxed if row.name == "m1"]
     assert (row.kind, row.side, row.unit, row.quantity) == ("bound", "upper", "kg", "rms error")
-    assert row.words.startswith(f"{row.amount:g} kg more at the upper bound of m1: rms error ")
+    assert row.words.startswith(f"{1e3 * row.amount:g} g more at the upper bound of m1: rms error ")
     small = 0.01 * row.amount
     _, after, _ = answered(tmp_path, changed(("max: 150 g", f"max: {0.15 + small}"), text=text))
     assert before.found is not None
@@ -95,3 +95,12 @@ def test_of_the_worst_case_a_constraint_counts_in_its_own_error(tmp_path: Path) 
 def test_nothing_is_studied_that_is_not_asked_for(tmp_path: Path) -> None:
     text = changed(("samples: 152", "samples: 12"))
     assert answered(tmp_path, text, Studies.NONE)[2] == Meaning()
+
+
+def test_a_limit_of_the_mass_is_relaxed_in_grams(tmp_path: Path) -> None:
+    text = changed(
+        ("samples: 152", "samples: 12"), ("\nexpansion:", "  mass: {max: 2.1 kg}\n\nexpansion:")
+    )
+    _, _, found = answered(tmp_path, text)
+    (row,) = [row for row in found.relaxed if row.name == "design.mass"]
+    assert row.words.startswith(f"{2100.0 * row.amount:.3g} g more mass: rms error ")

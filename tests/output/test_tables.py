@@ -1,0 +1,81 @@
+"""Tables of what only some runs have: bands, catalogues, prices, error against mass."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from synthetic_results import as_limit, make_results
+
+from eigassign.output.tables import Table, tables
+from eigassign.study.results import (
+    CatalogueRow,
+    ClearanceRow,
+    CombinationRow,
+    Meaning,
+    RunResults,
+    TradeOff,
+    TradeOffPoint,
+)
+
+
+def table(results: RunResults, title: str) -> Table | None:
+    return next((one for one in tables(results) if one.title == title), None)
+
+
+def searched() -> RunResults:
+    """Limits alone, a catalogue and prices."""
+    results = make_results()
+    (target,) = results.targets
+    limit = as_limit(target, "at_most", np.full(152, -np.inf), np.full(152, 205.0))
+    y = np.full(2, 0.1)
+    best = tuple(
+        CombinationRow({"rod": rod, "hub": "20"}, y, cost, missed)
+        for rod, cost, missed in (("light", 3.5, 0.0), ("heavy", 4.0, 0.02))
+    )
+    assert results.assignment is not None
+    row = replace(results.assignment, catalogue=CatalogueRow(7, 0.0, best))
+    design = (replace(results.design[0], price=10.0), results.design[1])
+    return replace(results, assignment=row, targets=(limit,), design=design)
+
+
+def test_bands_say_how_many_modes_are_below_and_whether_that_is_proved() -> None:
+    results = make_results()
+    assert table(results, "Clearance") is None
+    assert results.assignment is not None
+    rows = (ClearanceRow("a band", 2, True, 0.013, True), ClearanceRow("b", 0, False, -0.1, True))
+    found = table(
+        replace(results, assignment=replace(results.assignment, clearances=rows)), "Clearance"
+    )
+    assert found is not None
+    assert found.rows == (("a band", "2", "1.30 %", "proved"), ("b", "0", "0.00 %", "NO"))
+
+
+def test_combinations_take_the_place_of_local_optima_and_have_prices() -> None:
+    assert table(make_results(), "Combinations") is None
+    results = searched()
+    found = table(results, "Combinations")
+    assert found is not None
+    assert found.columns == ("combination", "rod", "hub", "price", "limits")
+    assert found.rows[1] == ("2", "heavy", "20", "4", "violated by 2.00 %")
+    assert table(results, "Local optima") is None
+
+
+def test_what_a_change_costs_stands_beside_it() -> None:
+    design = table(searched(), "Design")
+    assert design is not None
+    assert design.columns[-1] == "change costs"
+    assert [row[-1] for row in design.rows[:2]] == ["2.287", "0"]  # 0.2287 kg at 10 / kg
+    assert design.caption.startswith("The change costs 2.287 in all.")
+    plain = table(make_results(), "Design")
+    assert plain is not None
+    assert "change costs" not in plain.columns
+
+
+def test_error_stands_against_mass_and_what_is_added() -> None:
+    points = tuple(TradeOffPoint(a, e, np.array([a, 0.0])) for a, e in ((2.0, 0.05), (2.25, 0.01)))
+    meaning = Meaning(trade_off=TradeOff("mass", "kg", 2.0, "rms error", points))
+    found = table(replace(make_results(), meaning=meaning), "Trade-off")
+    assert found is not None
+    assert found.columns[:3] == ("mass [kg]", "added", "rms error")
+    assert found.rows[1] == ("2.25", "0.25", "1.00 %", "2.25", "0")
