@@ -1,10 +1,24 @@
-"""``python -m eigassign``: the same as the ``eigassign`` command."""
+"""``python -m eigassign``, and the ``eigassign`` command."""
 
 from __future__ import annotations
 
 import sys
 
-from eigassign.cli import main
+
+def main() -> int:
+    """Run the command line; Ctrl-C while it is still being imported ends it as later."""
+    try:
+        from eigassign.cli import main as run
+
+        code = run()
+    except KeyboardInterrupt:
+        sys.stderr.write("eigassign: interrupted\n")
+        code = 130
+    # CPython dies of SIGINT at its end, whatever the code, if an interrupt has passed through code
+    # made from text, such as that of dataclasses; to run any such code makes it forget.
+    exec("")
+    return code
+
 
 if __name__ == "__main__":  # worker processes import this module under another name
     sys.exit(main())
