@@ -154,6 +154,28 @@ def test_any_character_set_is_enough(locale: dict[str, str], tmp_path: Path) -> 
     assert "Traceback" not in wrong.stderr
 
 
+INTERRUPTED_IMPORT = """
+import sys
+class Stop:
+    def find_spec(self, name, *_):
+        if name == {name!r}:
+            raise KeyboardInterrupt
+sys.meta_path.insert(0, Stop())
+sys.argv = ["eigassign", "check", "good.yaml"]
+from eigassign.__main__ import main
+sys.exit(main())
+"""
+
+
+@pytest.mark.parametrize("name", ["click", "eigassign.cli.runs", "pydantic", "numpy"])
+def test_ctrl_c_while_packages_are_imported_ends_with_130(name: str) -> None:
+    code = INTERRUPTED_IMPORT.format(name=name)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 130
+    assert done.stderr == "eigassign: interrupted\n"
+    assert done.stdout == ""
+
+
 @pytest.mark.parametrize("out", ["good.yaml/run", "good.yaml", "/dev/null/run"])
 def test_a_run_folder_that_cannot_be_is_an_io_error(
     out: str, capsys: pytest.CaptureFixture[str]
