@@ -320,15 +320,17 @@ def numbers(folder: Path) -> dict[str, object]:
 
 
 def test_the_run_folder_reruns_from_its_case_and_from_its_csv_files(tmp_path: Path) -> None:
-    first = optimize(written(tmp_path, PAIR), Options(out=tmp_path / "one", use_cache=False))
+    first = optimize(
+        written(tmp_path, PAIR), Options(out=tmp_path / "one", use_cache=False, figures=())
+    )
     assert first.folder is not None
-    second = Options(out=tmp_path / "two", use_cache=False)
+    second = Options(out=tmp_path / "two", use_cache=False, figures=())
     optimize(tmp_path / "one" / "case.yaml", second)
     assert numbers(tmp_path / "two") == numbers(tmp_path / "one")
     files = [f"{{name: {n}, file: one/trajectory_{n}.csv}}" for n in ("pick", "return")]
     optimize(
         written(tmp_path, several(*files), "files.yaml"),
-        Options(out=tmp_path / "three", use_cache=False),
+        Options(out=tmp_path / "three", use_cache=False, figures=()),
     )
     assert numbers(tmp_path / "three") == numbers(tmp_path / "one")
 
