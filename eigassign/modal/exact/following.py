@@ -58,13 +58,13 @@ class Shape:
 
     @property
     def number(self) -> int:
-        """The mode, from 1, that has the largest share."""
-        return int(np.argmax(self.a**2)) + 1
+        """The mode, from 1, that has the largest share; of modes that coincide the first."""
+        return int(np.argmax(self._same)) + 1
 
     @property
     def lam(self) -> float:
         """Its eigenvalue in rad²/s²."""
-        return float(self.at.lam[self.number - 1])
+        return float(self.at.lam[np.argmax(self.a**2)])
 
     @property
     def phi(self) -> Floats:

@@ -131,10 +131,7 @@ class Follower:
 
 
 def followers(scene: Scene, wanted: Sequence[Wanted]) -> tuple[Follower, ...]:
-    """One for each mode that the case's targets follow, needed where ``wanted`` ask for it.
-
-    Raises CaseError where a mode coincides with another at the pose that names it.
-    """
+    """One for each mode that the case's targets follow, needed where ``wanted`` ask for it."""
     return tuple(_followers(scene, wanted))
 
 
@@ -151,11 +148,14 @@ def _followers(scene: Scene, wanted: Sequence[Wanted]) -> Iterator[Follower]:
 
 
 def require_one_shape(scene: Scene, wanted: Sequence[Wanted]) -> None:
-    """Raise CaseError where a mode coincides with another at the pose that names it."""
+    """Raise CaseError where a mode coincides with another at the pose that names it by chance.
+
+    Modes that coincide everywhere, by symmetry, have a common frequency that can be followed.
+    """
     for follower in followers(scene, wanted):
         like, lam = follower.mode.like, follower.start.at.lam
-        twins = np.flatnonzero(np.abs(lam / lam[like - 1] - 1.0) <= COINCIDENT) + 1
-        if len(twins) > 1:
+        twins = np.flatnonzero(_alike(lam, lam[like - 1])) + 1
+        if len(twins) > 1 and not _always(scene, follower, len(twins)):
             places = (
                 f"{one.requirement.place}.mode"
                 for one in wanted
@@ -166,6 +166,21 @@ def require_one_shape(scene: Scene, wanted: Sequence[Wanted]) -> None:
                 "no shape of its own: name it at another pose or design"
             )
             raise CaseError(tuple(scene.file.problem(key, message) for key in places))
+
+
+def _alike(lam: Floats, own: Floats | float) -> NDArray[np.bool_]:
+    return np.asarray(np.abs(lam / own - 1.0) <= COINCIDENT)
+
+
+def _always(scene: Scene, follower: Follower, twins: int) -> bool:
+    """Whether so many modes coincide at all samples needed, at the initial design."""
+    try:
+        found = follow_all(scene.model, scene.path, [follower], scene.initial, 1)
+    except LostModeError:
+        return False
+    needed = follower.needed
+    alike = _alike(found.modes.lam[needed], found.followed.lam[needed])
+    return bool((alike.sum(axis=1) >= twins).all())
 
 
 # --- All of them, with the modes that they are found among
