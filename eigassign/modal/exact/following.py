@@ -12,7 +12,7 @@ so that a mode far from all others is ψ itself, however its shape changes, and 
 modes that meet: it goes straight through a crossing. In a veering it is a mixture of both, and
 comes out as one of them again, the closer the veering the more nearly as the one that has its
 shape. Where the modes kept hold less than `CLEAR` of ψ, or the number changes while no other mode
-was seen near, the step is halved; what stays unclear is lost.
+is near, the step is halved; what stays unclear is lost.
 
 `tracking` keeps to the branch instead, and says how much of its shape a curve gave away.
 """
@@ -168,11 +168,12 @@ def _carried(
 
 
 def _near(at: Place, best: int) -> NDArray[np.bool_]:
-    return np.asarray(np.abs(np.sqrt(at.lam / at.lam[best]) - 1.0) < NEAR)
+    """Which modes are near one, in the logarithm of the frequency: then it is near them too."""
+    return np.asarray(np.abs(np.log(at.lam / at.lam[best])) < 2.0 * NEAR)
 
 
 def _is_met(here: Shape, best: int, near: NDArray[np.bool_]) -> bool:
-    """Whether all modes passed on the way to number ``best`` are near it at either end."""
+    """Whether all modes passed on the way to number ``best`` are near it at both ends."""
     before = here.number - 1
     passed = slice(min(before, best), max(before, best) + 1)
-    return bool(near[passed].all() or _near(here.at, before)[passed].all())
+    return bool(near[passed].all() and _near(here.at, before)[passed].all())

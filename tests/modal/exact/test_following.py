@@ -82,3 +82,11 @@ def test_too_few_modes_are_said_so() -> None:
     along = places(model.pencil, x, 1, 0)
     with pytest.raises(MoreModesError):
         follow(model.pencil, start(along[0], 1), along)
+
+
+@pytest.mark.parametrize("count", [2, 3, 5, 50])
+def test_one_long_step_does_not_jump_over_what_many_short_ones_meet(count: int) -> None:
+    """At both ends of the step the shape is clear; in between no mode has it."""
+    x = np.linspace(30e9, 160e9, count)[:, None]
+    with pytest.raises(LostModeError):
+        followed(two_bars(stub=0.95), x)
