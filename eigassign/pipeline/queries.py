@@ -23,6 +23,7 @@ from eigassign.pipeline.run_files import RESULTS, new_run_folder
 from eigassign.study import drawing
 from eigassign.study.accuracy import truncation_lines
 from eigassign.study.built_case import Case, load_case
+from eigassign.study.design.followed import named_notes
 from eigassign.study.design.wanted import target_frequencies
 from eigassign.study.planning import plan_expansion
 
@@ -185,6 +186,7 @@ def check(path: str | Path) -> CheckAnswer:
         q = plan.q0[None] if trajectory is None else trajectory.q
         notes += (*plan.notes, *truncation_lines(model, plan.modes, q, case.initial_design[None]))
     _require_regular(case, trajectory.q[:1] if trajectory is not None else None)
+    notes += () if trajectory is None else tuple(named_notes(file, model, trajectory))
     return CheckAnswer(
         title=file.title,
         n_dof=model.n_dof,

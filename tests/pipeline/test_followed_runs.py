@@ -159,8 +159,11 @@ def test_an_answer_at_the_edge_of_where_a_mode_is_lost_says_so() -> None:
 
 
 def test_a_case_that_follows_modes_can_be_checked(tmp_path: Path) -> None:
-    file = written(tmp_path)
-    assert check(file).targets == 2
+    answer = check(written(tmp_path))
+    assert answer.targets == 2
+    for like, half in ((1, rail_hz(0.03)[0]), (2, MAST.frequencies([], [0.9], 1)[0, 0])):
+        said = f"the mode like mode {like} (t = 0 s) has {half:.6g} Hz there, and is followed"
+        assert any(note.startswith(said) for note in answer.notes)
 
 
 def test_the_one_shot_refuses_to_follow_modes() -> None:

@@ -16,7 +16,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import FollowedMode
+from eigassign.case import CaseFile, FollowedMode
 from eigassign.errors import CaseError, LostModeError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.condensation import Modes
@@ -145,6 +145,14 @@ def _followers(scene: Scene, wanted: Sequence[Wanted]) -> Iterator[Follower]:
         y = named_design(file, mode)
         pose = partial(named_pose, file, mode, path)
         yield Follower(mode, scene.model, path, y, pose, needed)
+
+
+def named_notes(file: CaseFile, model: Model, path: Trajectories) -> Iterator[str]:
+    """What each followed mode is where it is named."""
+    for mode in followed_modes(file):
+        y = named_design(file, mode)
+        hz = model.frequencies(named_pose(file, mode, path, y), y, mode.like)[0, -1]
+        yield f"{mode.name} has {hz:.6g} Hz there, and is followed from there by its shape"
 
 
 def require_one_shape(scene: Scene, wanted: Sequence[Wanted]) -> None:
