@@ -163,7 +163,7 @@ def test_the_json_holds_every_point_and_no_numbers_that_json_has_not(tmp_path: P
     assert [p["method"] for p in data["points"]] == [p.method for p in CHART.points]
     assert data["points"][3]["everywhere"]["worst_hz"] is None
     assert data["points"][1]["parameters"] == {"order": 4, "q0": [0.0, 0.0]}
-    assert data["schema"] == 3
+    assert data["schema"] == 4
 
 
 def test_the_page_shows_tables_and_figures_and_escapes_titles(tmp_path: Path) -> None:
