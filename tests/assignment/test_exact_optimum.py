@@ -1,0 +1,99 @@
+"""Every answer is within its limits, its gradient balanced as stated, and nothing near it better.
+
+Frequencies are recomputed exactly; objective, slopes and limits are those of the oracle.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from assignment_oracle import of_case
+from random_assignments import DEVELOPMENT, load_text, random_case
+
+import eigassign as ea
+
+QUICK = (4, 9)
+SHIPPED = ("two_link", "gantry", "arm_3r", "five_bar", "luffing_boom")
+CASES = [
+    pytest.param(name, marks=() if name in QUICK else pytest.mark.slow)
+    for name in (*SHIPPED, *DEVELOPMENT)
+]
+MET = 1e-8  # of a limit's range: what the program's solver may miss it by
+
+
+@pytest.fixture(scope="module", params=CASES)
+def answered(request):
+    """The oracle's problem, the answer's design, the answer, and the names of constraints."""
+    name = request.param
+    if isinstance(name, str):
+        case = ea.load_case(f"cases/{name}.yaml")
+    else:
+        case = load_text(random_case(name))
+    result = ea.assign(case)
+    limits = list(case.file.design.constraints)
+    return of_case(case), np.array(list(result.design.values())), result.results, limits
+
+
+def test_the_answer_keeps_its_limits_and_is_not_worse_than_the_start(answered):
+    problem, y, _, _ = answered
+    assert problem.violation(y) <= MET
+    assert problem.rms(y) <= problem.rms(problem.initial) * (1.0 + 1e-12)
+
+
+def test_the_errors_stated_are_those_of_the_answer(answered):
+    """Both are exact solves: they differ by round-off of eigenvalues, about 1e-11 relative."""
+    problem, y, results, _ = answered
+    stated = results.assignment
+    assert stated.objective_optimal == pytest.approx(problem.rms(y) ** 2, rel=1e-7, abs=1e-18)
+    initial = problem.rms(np.asarray(problem.initial)) ** 2
+    assert stated.objective_initial == pytest.approx(initial, rel=1e-7)
+
+
+def test_the_exact_gradient_is_balanced_by_the_multipliers_stated(answered):
+    """∂J/∂y = −Σ μ n over the active limits with normals n; J differentiated numerically.
+
+    Differences err by about 1e-6 of the largest slope of J in the box.
+    """
+    problem, y, results, limits = answered
+    if results.assignment.optimality.stationarity > 1e-6:
+        pytest.skip("stated to be unfinished")
+    left = differentiated(problem, y)
+    names = [row.name for row in results.design]
+    for limit in results.assignment.active:
+        sign = 1.0 if limit.side == "upper" else -1.0
+        if limit.kind == "bound":
+            left[names.index(limit.name)] += sign * limit.multiplier
+        else:
+            left += sign * limit.multiplier * problem.C[limits.index(limit.name)]
+    steepest = max(problem.rms(y), 1e-4) * np.abs(problem.error_slopes(y) * problem.width).max()
+    assert np.abs(left * problem.width).max() < 1e-5 * steepest
+
+
+def test_no_random_design_is_better(answered):
+    """Around the answer, and anywhere within the limits."""
+    problem, y, results, _ = answered
+    if not results.assignment.finished:
+        pytest.skip("stated to be unfinished")
+    rng, best = np.random.default_rng(5), problem.rms(y)
+    tried = 0
+    for share in (1e-4, 1e-3, 1e-2, 1e-1, 1.0):
+        for _ in range(12):
+            at = y + share * problem.width * rng.uniform(-1.0, 1.0, len(y))
+            at = np.clip(at, problem.lower, problem.upper)
+            if problem.violation(at) == 0.0:
+                tried += 1
+                assert problem.rms(at) >= best * (1.0 - 1e-6) - 1e-9
+    assert tried >= 12
+
+
+def differentiated(problem, y):
+    """∂J/∂y by central differences, extrapolated once; designs may lie outside their bounds."""
+    gradient = np.zeros(len(y))
+    for j in range(len(y)):
+        found = []
+        for share in (2e-4, 1e-4):
+            h = share * min(problem.width[j], max(abs(y[j]), 1e-2 * problem.width[j]))
+            step = h * np.eye(len(y))[j]
+            found.append((problem.rms(y + step) ** 2 - problem.rms(y - step) ** 2) / (2.0 * h))
+        gradient[j] = (4.0 * found[1] - found[0]) / 3.0
+    return gradient
