@@ -21,14 +21,20 @@ from eigassign.study.results import (
     ErrorRow,
     ErrorSummary,
     LocalOptimum,
+    Meaning,
     ModeStudy,
     OptimalityRow,
     OtherModes,
+    RangeRow,
     RunResults,
+    SensitivityRow,
     SolverRow,
     StepRow,
     TargetAlong,
     TargetStudy,
+    ToleranceRows,
+    TradeOff,
+    TradeOffPoint,
     TrajectoryRow,
 )
 
@@ -236,6 +242,37 @@ def as_limit(target: TargetStudy, kind: str, lower_hz: Floats, upper_hz: Floats)
         target, kind=kind, label=f"mode 1 {kind}", lower_hz=lower_hz, upper_hz=upper_hz,
         predicted_hz=None, error=error, satisfied=False, along=along,
     )  # fmt: skip
+
+
+def studied(results: RunResults) -> RunResults:
+    """The same with all that can be said of what its answer means."""
+    names = [row.name for row in results.design]
+    sensitivity = tuple(
+        SensitivityRow(name, "kg", target.label, -30.0, -35.0, share, 1.3 * share)
+        for k, name in enumerate(names)
+        for target in results.targets
+        for share in [0.3 - 0.4 * (k / len(names)) - 0.05 * target.mode]
+    )
+
+    def around(share: float) -> tuple[RangeRow, ...]:
+        return tuple(
+            RangeRow(
+                t.label, t.exact_hz * (1 - share * wide), t.exact_hz * (1 + share), "proved", share
+            )
+            for t in results.targets
+            for wide in [np.linspace(1.0, 0.05, t.exact_hz.size)]
+        )
+
+    points = tuple(
+        TradeOffPoint(2.0 + 0.05 * k, 0.05 / (1 + k), np.full(len(names), 0.1)) for k in range(5)
+    )
+    meaning = Meaning(
+        sensitivity=sensitivity,
+        reach=around(0.2),
+        tolerance=ToleranceRows(around(0.01), 0.01, 0.02, "worst error 1 → 2 %"),
+        trade_off=TradeOff("mass", "kg", 2.0, "rms error", points),
+    )
+    return replace(results, meaning=meaning)
 
 
 def _assignment(n_y: int, prefix: str) -> AssignmentRow:

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from PIL import Image
-from synthetic_results import as_limit, make_results
+from synthetic_results import as_limit, make_results, studied
 
 from eigassign.output.figures import curves, style
 from eigassign.output.figures.run import run_figures
-from eigassign.study.results import RunResults
+from eigassign.study.results import OtherModes, RunResults
 
 LONG = "ein_sehr_langer_Name_für_$x_1^2$_中_\x1b[31m_"
 EVERY = {
@@ -77,8 +77,8 @@ def test_the_paper_s_case_has_all_of_its_figures(files):
 
 @pytest.mark.parametrize("options", EVERY.values(), ids=EVERY)
 def test_every_kind_of_results_gives_figures_with_nothing_over_their_edge(options):
-    files = style.render(run_figures(make_results(**options)))
-    assert len(files) >= 7
+    files = style.render(run_figures(studied(make_results(**options))))
+    assert len(files) >= 10
     for name, data in files.items():
         image = pixels(data)
         assert image.shape[1] == 880, name
@@ -146,6 +146,69 @@ def test_the_progress_shows_every_step_and_the_one_shot(paper):
     limit = as_limit(paper.targets[0], "at_least", paper.targets[0].lower_hz, np.full(152, np.inf))
     (axes,) = drawn(dataclasses.replace(paper, targets=(limit,)))["progress"].axes
     assert axes.get_ylabel() == "objective"
+
+
+def test_steps_that_miss_limits_say_by_how_much(paper):
+    steps = [dataclasses.replace(s, violation=v) for s, v in zip(
+        paper.assignment.steps, (0.03, 0.001, 0.0), strict=True)]  # fmt: skip
+    row = dataclasses.replace(paper.assignment, steps=tuple(steps))
+    above, below = drawn(dataclasses.replace(paper, assignment=row))["progress"].axes
+    assert below.get_ylabel() == "limits missed [%]"
+    taken = next(line for line in below.get_lines() if line.get_label() == "taken")
+    assert taken.get_ydata()[0] == pytest.approx(3.0)
+    assert above.get_ylabel() == "rms error [%]"
+
+
+def test_a_band_is_drawn_with_all_modes_near_it(paper):
+    (target,) = paper.targets
+    near = OtherModes((2, 3), np.full((152, 2), [160.0, 230.0]), np.full((152, 2), [170.0, 240.0]))
+    band = as_limit(target, "keep_out", np.full(152, 180.0), np.full(152, 220.0))
+    figure = drawn(dataclasses.replace(paper, targets=(dataclasses.replace(band, near=near),)))[
+        "keep_out_mode_1"
+    ]
+    (axes,) = figure.axes
+    shown = {line.get_ydata()[0] for line in axes.get_lines()}
+    assert shown == {180.0, 220.0, 160.0, 170.0, 230.0, 240.0}
+    assert {text.get_text() for text in axes.texts} >= {"mode 2", "mode 3"}
+    assert legend(figure) == ["forbidden", "initial design", "optimal design"]
+
+
+def test_sensitivities_are_bars_of_the_largest(paper):
+    results = studied(make_results(n_y=12, n_targets=2))
+    (axes,) = drawn(results)["sensitivity"].axes
+    names = [text.get_text() for text in axes.get_yticklabels()]
+    assert len(names) == 10
+    rows = [r for r in results.meaning.sensitivity if r.parameter in names]
+    assert sorted(bar.get_width() for bar in axes.patches) == pytest.approx(
+        sorted(r.percent_per_percent for r in rows)
+    )
+    assert legend(drawn(results)["sensitivity"]) == ["mode 1 at 190 Hz", "mode 2 at 380 Hz"]
+    assert (
+        "10 largest of 12"
+        in next(p for p in run_figures(results) if p.name == "sensitivity").caption
+    )
+
+
+def test_ranges_enclose_the_answer_along_each_trajectory():
+    results = studied(make_results(parts=(100, 52)))
+    found = drawn(results)
+    assert {"range_1", "range_2"} <= set(found)
+    (axes,) = found["range_2"].axes
+    reach, spread = (shade.get_paths()[0].get_extents() for shade in axes.collections[:2])
+    answer = results.targets[0].exact_hz[100:]
+    assert reach.y0 == pytest.approx(results.meaning.reach[0].lowest_hz[100:].min())
+    assert spread.y1 == pytest.approx(1.01 * answer.max())
+    np.testing.assert_array_equal(axes.get_lines()[0].get_ydata(), answer)
+
+
+def test_error_falls_over_mass_to_the_answer(paper):
+    results = studied(paper)
+    (axes,) = drawn(results)["trade_off"].axes
+    curve, end = axes.get_lines()[:2]
+    points = results.meaning.trade_off.points
+    np.testing.assert_allclose(curve.get_ydata(), [100.0 * p.error for p in points])
+    np.testing.assert_allclose(end.get_xdata(), [points[-1].amount])
+    assert axes.get_xlabel() == "mass [kg]"
 
 
 def test_the_comparison_shows_both_expansions_and_their_errors(paper):

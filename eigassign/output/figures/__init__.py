@@ -5,6 +5,7 @@ In reading order; each imports from those above it only:
     style      the style sheet, an empty figure, limits of axes, file formats
     curves     curves over time or one parameter: coordinates, approximation, assignment
     maps       expansion errors over two parameters
+    meaning    sensitivities, reach and tolerance, error against mass
     mechanism  links, joints, bodies and springs; poses along the trajectory
     modes      mode shapes
     run        which figures a run has

@@ -25,7 +25,6 @@ from eigassign.study.results import (
     OtherModes,
     RunResults,
     TargetStudy,
-    TradeOff,
 )
 
 if TYPE_CHECKING:
@@ -43,7 +42,9 @@ INITIAL: Look = {"color": style.ORANGE, "linewidth": 1.8, "linestyle": style.DAS
 ONE_SHOT: Look = {"color": style.PURPLE, "linewidth": 0.9}
 OPTIMAL: Look = {"color": style.SKY, "linewidth": 3.2}
 PREDICTED: Look = {"color": style.BLUE, "linewidth": 1.3, "linestyle": style.DASHED}
-_POINT: Look = {"color": style.GREY, "linewidth": 0.9, "linestyle": (0, (3.0, 3.0))}
+POINT: Look = {"color": style.GREY, "linewidth": 0.9, "linestyle": (0, (3.0, 3.0))}
+SEEN = 1e-6  # % by which limits are missed: less is round-off
+_TALL = 2.9  # inches of a panel that stands alone
 _ERROR_DECADES = 5  # of an error axis: what is smaller is as good as nothing
 
 # --- Panels
@@ -181,8 +182,8 @@ def draw_comparison(
     plot_logarithmic(below, x, errors, "|error| [%]")
     handles = list(above.get_lines())
     for at in (float(at) for at in points if x.min() <= at <= x.max()):
-        below.axvline(at, **_POINT)
-        handles.append(above.axvline(at, **_POINT, label="expansion point"))
+        below.axvline(at, **POINT)
+        handles.append(above.axvline(at, **POINT, label="expansion point"))
     legend_above(above, handles)
     return figure
 
@@ -261,11 +262,12 @@ def _reached(target: TargetStudy, error: ErrorRow) -> str:
 
 
 def draw_limit(results: RunResults, target: TargetStudy) -> Figure:
-    """What is forbidden, shaded, and the frequencies of a limit, a band or a gap."""
+    """What is forbidden, shaded, and the frequencies of a limit, a gap, or all modes by a band."""
     title = f"{_capital(target.label)}{_where(results)}"
-    figure, (axes,) = stacked(title, "time [s]", (2.9,))
+    figure, (axes,) = stacked(title, "time [s]", (_TALL,))
     time_s = results.time_s[target.rows]
-    curves = _curves(results, target)
+    near = target.near
+    curves = _curves(results, target) if near is None else _before_and_after(near)
     edges = [hz for hz in (target.lower_hz, target.upper_hz) if np.isfinite(hz).all()]
     label = "distance of the modes [Hz]" if target.kind == "gap" else "frequency [Hz]"
     edge: Look = {"color": style.VERMILLION, "linewidth": 1.0}
@@ -280,7 +282,11 @@ def draw_limit(results: RunResults, target: TargetStudy) -> Figure:
     shade = axes.fill_between(
         time_s, bottom, top, color=style.VERMILLION, alpha=0.15, linewidth=0.0, label="forbidden"
     )
-    legend_above(axes, [shade, *axes.get_lines()[len(edges) :]])
+    if near is None:
+        legend_above(axes, [shade, *axes.get_lines()[len(edges) :]])
+    else:
+        _name_modes(axes, near)
+        legend_above(axes, [shade, *_legend_of_modes()])
     return figure
 
 
@@ -303,11 +309,15 @@ def progress(results: RunResults, row: AssignmentRow) -> FigurePlan:
 def draw_progress(results: RunResults, row: AssignmentRow) -> Figure:
     """√F of least squares, F of the worst case, in %; steps that were given up are hollow.
 
-    Without a wanted frequency F is no error, and is drawn as it is.
+    Without a wanted frequency F is no error, and is drawn as it is. Where limits were missed on the
+    way, what is left of that stands below: it comes first, so that F may rise while it falls.
     """
     values = np.array([step.objective for step in row.steps])
     number, taken = np.arange(1.0, values.size + 1.0), np.array([step.taken for step in row.steps])
-    figure, (axes,) = stacked("Progress of the sequential method", "step", (2.4,))
+    missed = 100.0 * np.array([step.violation for step in row.steps])
+    heights = (2.2, 1.2) if (missed > SEEN).any() else (2.4,)
+    figure, panels = stacked("Progress of the sequential method", "step", heights)
+    axes = panels[0]
     kind = "rms" if row.objective == "least_squares" else "worst"
     hidden: Look = {"linestyle": "none"}
     error = results.error if any(t.kind == "frequency" for t in results.targets) else None
@@ -316,57 +326,29 @@ def draw_progress(results: RunResults, row: AssignmentRow) -> Figure:
     else:
         values = 100.0 * (np.sqrt(np.maximum(values, 0.0)) if kind == "rms" else np.abs(values))
         plot_logarithmic(axes, number, [(values, hidden)], f"{kind} error [%]")
-    low = axes.get_ylim()[0]
-    handles = []
-    for own, fill, label in ((taken, style.BLUE, "taken"), (~taken, "none", "given up")):
-        if own.any():
-            handles += axes.plot(
-                number[own], np.maximum(values[own], low), linestyle="none", marker="o",
-                markerfacecolor=fill, color=style.BLUE, label=label,
-            )  # fmt: skip
+    handles = _steps(axes, number, values, taken)
     if error is not None and error.one_shot is not None:
         at = error.one_shot.rms_relative if kind == "rms" else error.one_shot.max_relative
         handles.append(axes.axhline(100.0 * at, **ONE_SHOT, label="one shot"))
     axes.set_xlim(0.5, values.size + 0.5)
     axes.set_xticks(range(1, values.size + 1, max(1, values.size // 10)))
+    for below in panels[1:]:
+        plot_logarithmic(below, number, [(missed, hidden)], "limits missed [%]")
+        _steps(below, number, missed, taken)
     legend_above(axes, handles)
     return figure
 
 
-# --- Error against mass or price
-
-
-def trade_off(found: TradeOff) -> FigurePlan:
-    """What each kilogram, or each unit of the price, gains."""
-    first, last = found.points[0], found.points[-1]
-    return FigurePlan(
-        "trade_off",
-        f"{_capital(found.error)} against {found.quantity}",
-        f"The least {found.error} found for each {found.quantity}: from {percent(first.error)} to "
-        f"{percent(last.error)}, the answer.",
-        f"A falling curve of the {found.error} over the {found.quantity}.",
-        partial(draw_trade_off, found),
-    )
-
-
-def draw_trade_off(found: TradeOff) -> Figure:
-    """Error in % over mass or price, the initial design's upright, the answer at the end."""
-    figure, (axes,) = stacked(
-        f"{_capital(found.error)} against {found.quantity}",
-        labelled(found.quantity, found.unit),
-        (2.4,),
-    )
-    amount = np.array([point.amount for point in found.points])
-    error = np.array([100.0 * point.error for point in found.points])
-    look: Look = {"color": style.BLUE, "linewidth": 1.4, "marker": "o", "label": "best found"}
-    (curve,) = axes.plot(amount, error, **look)
-    axes.set(ylabel=f"{found.error} [%]", ylim=(0.0, 1.08 * error.max()))
-    axes.margins(x=0.04)
-    answer: Look = {"color": style.SKY, "marker": "o", "markersize": 10.0, "linestyle": "none"}
-    (end,) = axes.plot(amount[-1:], error[-1:], **answer, label="answer", zorder=1.5)
-    initial = axes.axvline(found.initial, **_POINT, label=f"{found.quantity} of the initial design")
-    legend_above(axes, [curve, end, initial])
-    return figure
+def _steps(axes: Axes, number: Floats, values: Floats, taken: NDArray[np.bool_]) -> list[Any]:
+    """A dot a step, hollow where it was given up; what is below the axis stands on its edge."""
+    handles, low = [], axes.get_ylim()[0]
+    for own, fill, label in ((taken, style.BLUE, "taken"), (~taken, "none", "given up")):
+        if own.any():
+            handles += axes.plot(
+                number[own], np.maximum(values[own], low), linestyle="none", marker="o",
+                markerfacecolor=fill, color=style.BLUE, label=label, clip_on=False,
+            )  # fmt: skip
+    return handles
 
 
 def other_modes(results: RunResults, others: OtherModes) -> FigurePlan:
@@ -383,34 +365,48 @@ def other_modes(results: RunResults, others: OtherModes) -> FigurePlan:
 
 def draw_other_modes(results: RunResults, others: OtherModes) -> Figure:
     """One colour a mode: dashed before, solid after, its number at the end of its curve."""
-    title, height = f"Next modes before and after, exact{_where(results)}", 2.9
-    figure, (axes,) = stacked(title, "time [s]", (height,))
-    before: Look = {"linewidth": 1.3, "linestyle": style.DASHED}
-    after: Look = {"linewidth": 1.8}
-    colours = [style.SERIES[k % len(style.SERIES)] for k in range(len(others.modes))]
-    curves = []
-    for k, colour in enumerate(colours):
-        curves.append((others.initial_hz[:, k], {**before, "color": colour}))
-        curves.append((others.optimal_hz[:, k], {**after, "color": colour}))
-    plot(axes, results.time_s, curves, "frequency [Hz]")
+    title = f"Next modes before and after, exact{_where(results)}"
+    figure, (axes,) = stacked(title, "time [s]", (_TALL,))
+    plot(axes, results.time_s, _before_and_after(others), "frequency [Hz]")
+    _name_modes(axes, others)
+    legend_above(axes, _legend_of_modes())
+    return figure
+
+
+_BEFORE: Look = {"linewidth": 1.3, "linestyle": style.DASHED}
+_AFTER: Look = {"linewidth": 1.8}
+
+
+def _colour(k: int) -> str:
+    colours = [one for one in style.SERIES if one != style.VERMILLION]  # what is forbidden
+    return colours[k % len(colours)]
+
+
+def _before_and_after(shown: OtherModes) -> list[tuple[Floats, Look]]:
+    both = ((shown.initial_hz, _BEFORE), (shown.optimal_hz, _AFTER))
+    modes = range(len(shown.modes))
+    return [(hz[:, k], {**look, "color": _colour(k)}) for k in modes for hz, look in both]
+
+
+def _name_modes(axes: Axes, shown: OtherModes) -> None:
+    """The number of each mode at the end of its curve."""
     low, high = axes.get_ylim()
-    ends, apart = others.optimal_hz[-1], 0.15 * (high - low) / height
+    ends, apart = shown.optimal_hz[-1], 0.15 * (high - low) / _TALL
     order = np.argsort(ends)
     for k, place in zip(order, spread(ends[order], apart), strict=True):
         axes.annotate(
-            f"mode {others.modes[k]}", (1.0, place), (6.0, 0.0), color=colours[k], va="center",
+            f"mode {shown.modes[k]}", (1.0, place), (6.0, 0.0), color=_colour(k), va="center",
             xycoords=("axes fraction", "data"), textcoords="offset points",
         )  # fmt: skip
+
+
+def _legend_of_modes() -> list[Any]:
     from matplotlib.lines import Line2D
 
-    legend_above(
-        axes,
-        [
-            Line2D([], [], color=style.BLACK, **before, label="initial design"),
-            Line2D([], [], color=style.BLACK, **after, label="optimal design"),
-        ],
-    )
-    return figure
+    return [
+        Line2D([], [], color=style.BLACK, **_BEFORE, label="initial design"),
+        Line2D([], [], color=style.BLACK, **_AFTER, label="optimal design"),
+    ]
 
 
 def spread(wanted: Floats | Sequence[float], gap: float) -> list[float]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import count
 
 from eigassign.output.figures import curves, maps, mechanism
+from eigassign.output.figures.meaning import meaning_figures
 from eigassign.output.figures.style import FigurePlan
 from eigassign.study.results import RunResults, along_each
 
@@ -34,8 +35,7 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
     if results.assignment is not None and results.assignment.steps:
         yield curves.progress(results, results.assignment)
     yield from _targets(results)
-    if (found := results.meaning.trade_off) is not None and len(found.points) > 1:
-        yield curves.trade_off(found)
+    yield from meaning_figures(results)
     for one in each:
         if one.others is not None and one.others.initial_hz.size:
             yield curves.other_modes(one, one.others)
