@@ -65,7 +65,8 @@ def test_a_shipped_case_can_be_followed_and_its_targets_reached(name: str) -> No
             "at_least": lambda target: target.at_least,
             "keep_out": lambda target: target.keep_out.harmonic * target.keep_out.of,
         }[one.kind](one.target)
-        assert 0.7 < wanted / found.mean() < 1.4
+        near = found.max() if one.kind == "keep_out" else found.mean()
+        assert 0.8 < wanted / near < 1.25
 
 
 def test_a_carriage_in_the_middle_of_a_symmetric_portal_sees_the_same_on_both_sides() -> None:
