@@ -257,7 +257,7 @@ def processes(before: Path) -> None:
             own = path if path == arm else common.CASES / path.name
             times: dict[str, list[float]] = {"before": [], "now": []}
             for _ in range(3):
-                times["before"].append(_process(before, path, Path(folder)))
+                times["before"].append(_process(before.resolve(), path.resolve(), Path(folder)))
                 times["now"].append(_process(common.CASES.parent, own, Path(folder)))
             then, now = (min(times[k]) for k in ("before", "now"))
             rows.append(
@@ -285,7 +285,11 @@ def _process(package: Path, case: Path, folder: Path) -> float:
     command += ["--no-cache", "--force", "--out", str(folder / "run")]
     start = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(
-        command, env={**os.environ, "PYTHONPATH": str(package)}, capture_output=True, check=False
+        command,
+        env={**os.environ, "PYTHONPATH": str(package)},
+        capture_output=True,
+        check=False,
+        cwd=folder,
     )
     if done.returncode not in (0, 1):
         raise RuntimeError(done.stderr.decode())
