@@ -9,7 +9,10 @@ Reading order:
     solver        solve: OSQP, then an active-set method that goes to round-off
     optimality    judge: Karush–Kuhn–Tucker residuals, recomputed from the data
     crossing      two modes that meet: the matrix of both, which is smooth where each has a kink
-    sequential    the exact optimum: programs in a row inside a trust region
+    design_problem  objective and limits as the sequential method sees them, in units of the bounds
+    stationarity  first-order optimality of the exact problem, also where modes meet
+    step          one program in a trust region, and what is expected of its step
+    sequential    the exact optimum: programs in a row, judged exactly
     requirements  targets, inequalities and quantities as the sequential method sees them
     identification  parameters from measured frequencies, their covariance and intervals
     branching     branch and bound over catalogues, of any model whose relaxations can be solved

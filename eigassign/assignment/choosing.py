@@ -24,8 +24,9 @@ from eigassign.assignment.branching import (
     search_catalogue,
 )
 from eigassign.assignment.checks import Floats
+from eigassign.assignment.design_problem import MET, DesignProblem
 from eigassign.assignment.program import Bounds
-from eigassign.assignment.sequential import MET, DesignProblem, End, Optimum, minimise
+from eigassign.assignment.sequential import End, Optimum, minimise
 from eigassign.errors import AccuracyError, EigassignError, InfeasibleError
 
 RELAXED = 3  # starts of the relaxation of all combinations

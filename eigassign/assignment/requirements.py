@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.checks import Floats
 from eigassign.assignment.crossing import Pairs, joined
-from eigassign.assignment.sequential import Appraisal, Objective
+from eigassign.assignment.design_problem import Appraisal, Objective
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, differential_evolution, minimize
 
 from eigassign.assignment import Assignment
+from eigassign.assignment.design_problem import DesignProblem
 from eigassign.assignment.requirements import Frequencies
-from eigassign.assignment.sequential import DesignProblem, minimise
+from eigassign.assignment.sequential import minimise
 from eigassign.case import CaseFile
 from eigassign.chart.effort import Effort, suited
 from eigassign.chart.question import SEED

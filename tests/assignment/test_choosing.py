@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.branching import Catalogue
 from eigassign.assignment.choosing import choose
+from eigassign.assignment.design_problem import MET, Appraisal, DesignProblem
 from eigassign.assignment.program import LinearConstraint
-from eigassign.assignment.sequential import MET, Appraisal, DesignProblem, minimise
+from eigassign.assignment.sequential import minimise
 from eigassign.errors import InfeasibleError
 
 pytestmark = pytest.mark.slow  # half a minute each; the pipeline has a short one

@@ -11,14 +11,9 @@ import pytest
 from scipy.optimize import least_squares, minimize
 
 from eigassign.assignment import LinearConstraint
-from eigassign.assignment.sequential import (
-    Appraisal,
-    DesignProblem,
-    End,
-    Objective,
-    minimise,
-    stationarity,
-)
+from eigassign.assignment.design_problem import Appraisal, DesignProblem, Objective
+from eigassign.assignment.sequential import End, minimise
+from eigassign.assignment.stationarity import stationarity
 from eigassign.errors import AccuracyError
 
 TIME = np.linspace(0.0, 1.0, 40)

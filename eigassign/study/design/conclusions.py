@@ -19,18 +19,10 @@ from numpy.typing import NDArray
 
 from eigassign.assignment import Catalogue
 from eigassign.assignment.choosing import choose
+from eigassign.assignment.design_problem import MET, Appraisal, DesignProblem
 from eigassign.assignment.requirements import Requirements
-from eigassign.assignment.sequential import (
-    MET,
-    OPTIMAL,
-    Appraisal,
-    DesignProblem,
-    End,
-    Optimum,
-    active_limits,
-    minimise,
-    stationarity,
-)
+from eigassign.assignment.sequential import OPTIMAL, End, Optimum, minimise
+from eigassign.assignment.stationarity import active_limits, stationarity
 from eigassign.errors import EigassignError
 from eigassign.study.design.optimum import Found, Variant
 from eigassign.study.scene import Scene

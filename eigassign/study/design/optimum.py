@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment import Bounds, LinearConstraint
 from eigassign.assignment.choosing import KEPT, RELAXED, Chosen, choose
+from eigassign.assignment.design_problem import MET, DesignProblem, Objective
 from eigassign.assignment.feasibility import constraints_agree
 from eigassign.assignment.requirements import (
     Frequencies,
@@ -28,15 +29,7 @@ from eigassign.assignment.requirements import (
     QuantityLimit,
     Requirements,
 )
-from eigassign.assignment.sequential import (
-    MET,
-    DesignProblem,
-    End,
-    Objective,
-    Optimum,
-    distinct,
-    minimise,
-)
+from eigassign.assignment.sequential import End, Optimum, distinct, minimise
 from eigassign.errors import CaseError, EigassignError, InfeasibleError, LostModeError
 from eigassign.study.design.clearance import Band, Clearance, prove_clear, wanting
 from eigassign.study.design.followed import Follower, followers

@@ -1,0 +1,190 @@
+"""The design problem that the sequential method works on: objective, limits, and its units.
+
+What is minimised over the design y is
+
+    F(y) = Σ_k r_k(y)² + p·(y − y_ref)      least squares,      r_k = √ω_k (f_k / f_d,k − 1), or
+    F(y) = max_k |r_k(y)| + p·(y − y_ref)   worst case,
+
+with prices p, bounds, linear constraints, and excesses c(y) ≤ 0 (how far inequalities are missed).
+Steps and slopes are in units z ∈ [0, 1] of the bounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.assignment.checks import Floats
+from eigassign.assignment.crossing import Pairs
+from eigassign.assignment.program import LinearConstraint, ScaledProgram
+from eigassign.assignment.solver import solve_scaled
+
+MET = 1e-9  # excess, relative to the inequality's limit, that is round-off
+TINY = 1e-11  # rms relative error that is round-off of exact frequencies
+ON = 1e-7  # of the bounds or of the limit: this near to a limit is on it
+
+
+class Objective(StrEnum):
+    """What is made small: the mean square of the residuals, or the largest of them."""
+
+    LEAST_SQUARES = "least_squares"
+    WORST_CASE = "worst_case"
+
+
+@dataclass(frozen=True)
+class Appraisal:
+    """A design seen from the targets: residuals (m,) and excesses (k,), with slopes in y.
+
+    ``slopes`` (m, n_y) and ``excess_slopes`` (k, n_y) are per SI unit of y. An excess is relative
+    to its limit, and negative where there is room. ``pairs`` are rows that may have a kink.
+    """
+
+    residual: Floats
+    slopes: Floats
+    excess: Floats
+    excess_slopes: Floats
+    pairs: Pairs | None = None
+
+    @property
+    def violation(self) -> float:
+        """The largest excess, 0 if all inequalities hold."""
+        return float(np.max(self.excess, initial=0.0))
+
+
+@dataclass(frozen=True)
+class DesignProblem:
+    """F and its limits; ``appraise`` may raise EigassignError where a design has no answer."""
+
+    appraise: Callable[[Floats], Appraisal]
+    lower: Floats  # (n_y,), finite
+    upper: Floats
+    constraints: tuple[LinearConstraint, ...] = ()
+    prices: Floats | None = None  # (n_y,), of F per SI unit of y
+    reference: Floats | None = None  # (n_y,), y that costs nothing
+    objective: Objective = Objective.LEAST_SQUARES
+
+    def __call__(self, y: Floats, seen: Appraisal) -> float:
+        """F of a design and what `appraise` found of it."""
+        r = seen.residual
+        if self.objective is Objective.WORST_CASE:
+            return float(np.max(np.abs(r), initial=0.0)) + self.price(y)
+        return float(r @ r) + self.price(y)
+
+    def price(self, y: Floats) -> float:
+        """p·(y − y_ref)."""
+        if self.prices is None:
+            return 0.0
+        return float(self.prices @ (y - (0.0 if self.reference is None else self.reference)))
+
+
+# --- The bounds as units
+
+
+@dataclass(frozen=True)
+class Box:
+    """z = (y − lower)/width of the parameters with room, and the linear constraints over z."""
+
+    lower: Floats
+    all_width: Floats
+    free: list[int]
+    width: Floats  # of the free ones
+    rows: Floats
+    row_lower: Floats
+    row_upper: Floats
+    prices: Floats
+
+    @classmethod
+    def of(cls, problem: DesignProblem) -> Box:
+        """The units of a problem."""
+        width = problem.upper - problem.lower
+        free = [int(j) for j in np.flatnonzero(width > 0.0)]
+        C = np.array([row.coefficients for row in problem.constraints])
+        C = C.reshape(len(problem.constraints), len(width))
+        fixed = C @ problem.lower
+        rows = C[:, free] * width[free]
+        prices = np.zeros(len(width)) if problem.prices is None else problem.prices
+        return cls(
+            lower=problem.lower,
+            all_width=width,
+            free=free,
+            width=width[free],
+            rows=rows,
+            row_lower=np.array([row.lower for row in problem.constraints]) - fixed,
+            row_upper=np.array([row.upper for row in problem.constraints]) - fixed,
+            prices=prices[free] * width[free],
+        )
+
+    @property
+    def n(self) -> int:
+        """How many parameters have room."""
+        return len(self.free)
+
+    def z(self, y: Floats) -> Floats:
+        """(n,) of a design (n_y,)."""
+        return np.asarray((y[self.free] - self.lower[self.free]) / self.width)
+
+    def y(self, z: Floats) -> Floats:
+        """(n_y,) of z (n,); at a bound exactly the bound."""
+        y = self.lower.copy()
+        y[self.free] = self.lower[self.free] + z * self.width
+        top = self.lower + self.all_width
+        y[self.free] = np.where(z >= 1.0, top[self.free], y[self.free])
+        return y
+
+    def inside(self, z: Floats) -> Floats:
+        """The nearest z within bounds and constraints."""
+        z = np.clip(z, 0.0, 1.0)
+        row = self.rows @ z
+        if self.n == 0 or np.all((row >= self.row_lower) & (row <= self.row_upper)):
+            return z
+        norms = np.linalg.norm(self.rows, axis=1)
+        norms = np.where(norms > 0.0, norms, 1.0)
+        found = solve_scaled(
+            ScaledProgram(
+                A=np.eye(self.n),
+                b=-z,
+                G=np.vstack([np.eye(self.n), self.rows / norms[:, None]]),
+                lower=np.append(np.zeros(self.n), self.row_lower / norms),
+                upper=np.append(np.ones(self.n), self.row_upper / norms),
+                cost=np.zeros(self.n),
+            )
+        )
+        return z if found is None else np.clip(found[0], 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Place:
+    """A design in units of the bounds, with its slopes in these units."""
+
+    z: Floats
+    seen: Appraisal
+    J: Floats
+    C: Floats
+    value: float  # F
+    pairs: Pairs | None
+
+    def smooth_slopes(self, kinked: NDArray[np.bool_]) -> Floats:
+        """Of all rows (m + k, n); of those at kinks the mean of both branches."""
+        slopes = np.vstack([self.J, self.C])
+        if self.pairs is not None:
+            on = kinked[self.pairs.row]
+            rows = self.pairs.row[on]
+            slopes[rows] = 0.5 * (slopes[rows] + self.pairs.others[on])
+        return slopes
+
+    @classmethod
+    def of(cls, problem: DesignProblem, box: Box, z: Floats, seen: Appraisal) -> Place:
+        """What was ``seen`` of the design at z."""
+        J, C = (slopes[:, box.free] * box.width for slopes in (seen.slopes, seen.excess_slopes))
+        pairs = None if seen.pairs is None else seen.pairs.scaled(box.free, box.width)
+        return cls(z, seen, J, C, problem(box.y(z), seen), pairs)
+
+
+def merit(problem: DesignProblem, value: float, violation: float, weight: float) -> float:
+    """Half of F for least squares, as in the program, and the weighted violation."""
+    half = 0.5 if problem.objective is Objective.LEAST_SQUARES else 1.0
+    return half * value + weight * violation
