@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment import Assignment
 from eigassign.assignment.sequential import End
+from eigassign.errors import EigassignError
 from eigassign.modal.expansion import Expansion
 from eigassign.output.cache import Cache, default_directory
 from eigassign.pipeline.coefficient_files import coefficient_files
@@ -115,7 +116,8 @@ def solve_case(case: Case, options: Options = DEFAULT) -> Result:
             initial = solve_design(scene, own, scene.initial, stages.advance)
         with stages("verification", "solving the optimal design exactly"):
             exact = solve_design(scene, own, answer.y, stages.advance)
-            one_shot = _one_shot(scene, answer, exact)
+            one_shot, notes = _one_shot(scene, answer, exact)
+            scene = replace(scene, notes=(*scene.notes, *notes))
         with stages("comparison", "comparing the expansion with exact frequencies"):
             studies = study_modes(scene, initial.hz)
             scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene, answer.y)))
@@ -130,11 +132,16 @@ def solve_case(case: Case, options: Options = DEFAULT) -> Result:
     return _result(results, scene.expansions, answer.one_shot)
 
 
-def _one_shot(scene: Scene, answer: Answer, exact: Solved) -> Solved | None:
-    """Exact frequencies of the paper's answer, where there is one."""
+def _one_shot(scene: Scene, answer: Answer, exact: Solved) -> tuple[Solved | None, tuple[str, ...]]:
+    """Exact frequencies of the paper's answer; None, and why, where there are none."""
     if answer.one_shot is None:
-        return None
-    return exact if answer.found is None else solve_design(scene, (), answer.one_shot.y)
+        return None, ()
+    if answer.found is None:
+        return exact, ()
+    try:
+        return solve_design(scene, (), answer.one_shot.y), ()
+    except EigassignError as error:  # a pose that its lengths cannot reach, say
+        return None, (f"no errors of the one-shot design: {error}",)
 
 
 def prepare(

@@ -78,9 +78,9 @@ def test_the_readme_is_short() -> None:
 def test_two_commands_do_all_set_up_and_the_ci_runs_the_same() -> None:
     main_job, tests = blocks(README, "bash")
     assert main_job.endswith("eigassign optimize cases/two_link.yaml\n")
-    assert tests.endswith("python -m pytest\n")
+    assert tests.endswith("python -m pytest -n 2\n")
     ci = (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()
-    assert "python -m pytest" in ci
+    assert "python -m pytest -n 2" in ci
 
 
 def test_the_case_shown_is_the_case_shipped() -> None:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment import Bounds, LinearConstraint
 from eigassign.assignment.choosing import KEPT, RELAXED, Chosen, choose
-from eigassign.assignment.design_problem import MET, DesignProblem, Objective
+from eigassign.assignment.design_problem import MET, Box, DesignProblem, Objective
 from eigassign.assignment.feasibility import constraints_agree
 from eigassign.assignment.requirements import (
     Frequencies,
@@ -47,12 +47,15 @@ from eigassign.study.scene import Scene
 Floats = NDArray[np.float64]
 MOST_BELOW = 24  # combinations of numbers of modes below the bands that are tried
 MASS = "design.mass"  # what the limit of the whole mechanism's mass is called
-STARTS = 8  # with `starts: auto`, at most
+STARTS = 12  # with `starts: auto`, at most
 MARGIN = 1e-5  # relative, by which modes keep off a band at the samples at least
 WIDENED = 5  # times that the margin is widened at most
 FEW = 24  # samples on which starts are followed, of more than twice as many
+FEWEST = 8  # samples at which designs are screened, of more than twice as many
+SCREENED, MOST_SCREENED = 7, 48  # designs for each parameter of which the best are starts
+APART = 0.2  # of the bounds: two starts differ by more in some parameter
 REFINED = 3  # optima on few samples that are followed on all
-AGREED = 3  # starts that lead to the best optimum before no more are made
+AGREED = 3  # starts, and half the parameters more, for each optimum seen that lead to the best
 SAME = 1e-4  # relative, in F: optima of the same worth
 PERCENT = {Objective.LEAST_SQUARES: 1e4, Objective.WORST_CASE: 1e2}  # of F: what prices count in
 
@@ -98,7 +101,8 @@ def find_optimum(
     """
     keys, margin = scene.file.assignment, MARGIN
     deadline = np.inf if keys.seconds is None else monotonic() + keys.seconds
-    designs = list(_starts(scene, starts, keys.starts))
+    most = STARTS if isinstance(keys.starts, str) else keys.starts
+    designs = [scene.initial, *starts][:most]
     models = None if followed_modes(scene.file) else reduced_models(scene)
     for _ in range(WIDENED):
         found = _search_all(scene, wanted, designs, margin, models, deadline, progress)
@@ -151,7 +155,7 @@ def _search_all(
                 break
             continue
         search = _Search(variant_of(tasks[0], below), keys.steps, deadline)
-        for start in starts:
+        for start in _in_turn(tasks[0], search.variant, starts, keys.starts):
             made += 1
             progress(f"  from start {made}")
             search.run(start)
@@ -268,7 +272,7 @@ class _Search:
         return self.ended or (End.SECONDS if monotonic() > self.deadline else None)
 
     def agreed(self, starts: int | str) -> bool:
-        """Whether enough starts led to the best optimum."""
+        """Whether enough starts led to the best optimum: more where others were seen."""
         if isinstance(starts, int) or not self.optima:
             return False
         best = min(_worth(o) for o in self.optima)
@@ -277,7 +281,9 @@ class _Search:
             for o in self.optima
             if _worth(o)[0] <= best[0] + MET and o.objective <= best[1] * (1.0 + SAME) + 1e-16
         ]
-        return len(same) >= AGREED or (best[0] <= MET and best[1] <= 1e-14)
+        seen = len(distinct(self.optima, self.variant.problem))
+        enough = (AGREED + len(self.variant.problem.lower) // 2) * seen
+        return len(same) >= enough or (best[0] <= MET and best[1] <= 1e-14)
 
 
 def _continued(before: Optimum, found: Optimum) -> Optimum:
@@ -288,16 +294,41 @@ def _continued(before: Optimum, found: Optimum) -> Optimum:
     return replace(found, steps=(*before.steps, *found.steps))
 
 
-def _starts(scene: Scene, given: Sequence[Floats], count: int | str) -> Iterator[Floats]:
-    """The initial design, those given, then designs spread evenly over the bounds.
+def _in_turn(
+    task: Task, variant: Variant, starts: Sequence[Floats], count: int | str
+) -> Iterator[Floats]:
+    """The first starts, then the most promising of some designs, apart from each other.
 
-    Where bounds are positive and more than a decade apart, evenly in the logarithm.
+    Of a screened design only frequencies at fewest samples are solved: all of them are less work
+    than a start.
     """
-    most = STARTS if isinstance(count, str) else count
-    first = [scene.initial, *given]
-    yield from first[:most]
-    if len(first) < most:
-        yield from _spread_designs(scene, most - len(first), 0)
+    yield from starts
+    most = (STARTS if isinstance(count, str) else count) - len(starts)
+    if most <= 0:
+        return
+    box, scene, ranked = Box.of(variant.problem), task.scene, []
+    fewest = _thinned(task, FEWEST) or task
+    asked = variant_of(fewest, tuple(k for _, k in variant.below))
+    for y in _spread_designs(scene, min(SCREENED * box.n, MOST_SCREENED), 0):
+        z = box.inside(box.z(y))
+        try:
+            merit = _merit(fewest, asked, box.y(z))
+        except EigassignError:
+            continue
+        ranked.append((merit, z))
+    kept: list[Floats] = []
+    for _, z in sorted(ranked, key=lambda one: one[0]):
+        if len(kept) < most and all(np.abs(z - other).max() > APART for other in kept):
+            kept.append(z)
+            yield box.y(z)
+
+
+def _merit(task: Task, variant: Variant, y: Floats) -> tuple[float, float]:
+    """Violation and F of a design, by its frequencies alone."""
+    asked, scene = variant.requirements, task.scene
+    hz = scene.model.frequencies(scene.path.at(y)[0], y, asked.modes)
+    seen = asked.appraise(y, Frequencies(hz, np.zeros((*hz.shape, len(y)))))
+    return max(seen.violation, MET), variant.problem(y, seen)
 
 
 def _spread_designs(scene: Scene, count: int, seed: int) -> Floats:
@@ -337,17 +368,17 @@ class Task:
 
 def _rougher(whole: Task, models: ReducedModels | None) -> list[Task]:
     """The task on few samples, if it has many; by reduced models, if there are; and as it is."""
-    few = _thinned(whole)
+    few = _thinned(whole, FEW)
     tasks = [] if few is None else [replace(few, models=models)]
     return [*tasks, *([] if models is None else [replace(whole, models=models)]), whole]
 
 
-def _thinned(whole: Task) -> Task | None:
+def _thinned(whole: Task, few: int) -> Task | None:
     """The same on few samples; None where there are few, or a target would have none of them."""
     path = whole.scene.path
-    if len(path.q) < 2 * FEW:
+    if len(path.q) < 2 * few:
         return None
-    scene = replace(whole.scene, trajectory=path.chosen(path.spread(FEW)))
+    scene = replace(whole.scene, trajectory=path.chosen(path.spread(few)))
     try:
         task = replace(whole, scene=scene, wanted=target_frequencies(scene.file, scene.path))
     except CaseError:
