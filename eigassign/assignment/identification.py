@@ -10,8 +10,9 @@ exact frequencies in a trust region). With J = ∂r/∂y at ŷ of the parameters
 
     C = (JᵀJ)⁻¹
 
-is their covariance as far as f is linear in y. The interval of y_j does not assume that: it holds
-every value at which the *others*, fitted anew, explain the measurements nearly as well,
+is their covariance as far as f is linear in y and those bounds hold. The interval
+of y_j assumes neither: it holds every value at which the *others*, fitted anew, explain the
+measurements nearly as well,
 
     min_{y_j = t} χ² − χ²(ŷ) ≤ 3.84,
 
@@ -19,7 +20,8 @@ the 95 % quantile of χ² with one degree of freedom (profile likelihood; Seber,
 Regression, 1989, ch. 5). An interval that reaches a bound ends there, and says so.
 
 A direction v of y is not identified where the measurements hardly change along it: where moving
-from bound to bound changes all standardised residuals together by less than 1.96.
+from bound to bound changes all standardised residuals together by less than 1.96. Parameters that
+a bound holds take part in it where v leads away from all these bounds.
 """
 
 from __future__ import annotations
@@ -41,6 +43,8 @@ NOTICED = 1.959963984540054  # standard deviations: 95 % of a normal distributio
 SINGULAR = 1e-8  # of the largest singular value: what is below it is round-off of slopes
 PRECISION = 1e-3  # of the distance from ŷ to the end of an interval
 STEPS = 40  # to the end of an interval; three or four suffice but for wild models
+SECANTS = 6  # of these by secants, once the end is enclosed; then by halves
+SLIGHT = 1e-2  # entry of a direction, of its largest, that no bound need stop
 FAR = 100.0  # standard deviations: what is further, or has no answer, is only known to be outside
 BETTER = 1e-3  # of χ²: so much lower is another minimum, not round-off
 ROUNDS = 5  # of fitting anew from a better minimum that a profile has come upon
@@ -92,7 +96,7 @@ class Identified:
 
     @property
     def deviation(self) -> Floats:
-        """Standard deviations (n_y,), the roots of the covariance's diagonal."""
+        """Standard deviations (n_y,), roots of the diagonal, while bounds in ``held`` hold."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
 
@@ -113,12 +117,13 @@ def identify(
     initial_hz = response(start)[0]
     fit = _fitted(problem, start)
     for rounds in range(1, ROUNDS + 1):
-        profile = _Profile(problem, fit, *_covariance(problem, fit)[:2])
-        intervals = tuple(profile.interval(j) for j in range(len(start)))
+        profile = _Profile(problem, fit)
+        intervals = profile.intervals()
         if profile.best is fit or rounds == ROUNDS:
             break
         fit = _fitted(problem, profile.best.y)
-    covariance, held, unidentified, rank = _covariance(problem, fit)
+    held = _held(fit, len(start))
+    covariance, rank = _covariance(problem, fit, held)
     hz, chi_squared = response(fit.y)[0], fit.objective
     degrees = len(hz) - rank
     return Identified(
@@ -134,7 +139,7 @@ def identify(
         covariance=frozen(covariance),
         intervals=intervals,
         held=held,
-        unidentified=frozen(unidentified),
+        unidentified=frozen(_unidentified(problem, fit, held)),
         rounds=rounds,
     )
 
@@ -171,34 +176,64 @@ def _p_value(chi_squared: float, degrees: int) -> float | None:
 # --- Covariance, and what cannot be told
 
 
-def _covariance(
-    problem: DesignProblem, fit: Optimum
-) -> tuple[Floats, tuple[str, ...], Floats, int]:
-    """C (n_y, n_y), bounds that hold parameters, unidentified directions, and the rank of J.
+def _covariance(problem: DesignProblem, fit: Optimum, held: tuple[str, ...]) -> tuple[Floats, int]:
+    """C (n_y, n_y) while the bounds in ``held`` hold, and the rank of J.
 
     In units of the bounds: J = U diag(s) Vᵀ, C = V diag(s)⁻² Vᵀ, without directions of round-off
     size, which make infinite the parameters that take part in them.
     """
     width = problem.upper - problem.lower
-    held = _held(fit, len(width))
     free = np.flatnonzero([w > 0.0 and not side for w, side in zip(width, held, strict=True)])
-    n = len(width)
-    covariance, directions = np.zeros((n, n)), np.zeros((0, n))
+    covariance = np.zeros((len(width), len(width)))
     if not len(free):
-        return covariance, held, directions, 0
-    _, sizes, V = np.linalg.svd(fit.seen.slopes[:, free] * width[free])
-    s = np.zeros(len(free))
-    s[: len(sizes)] = sizes
+        return covariance, 0
+    s, V = _directions(fit.seen.slopes[:, free] * width[free])
     known = s > SINGULAR * max(s.max(), NOTICED)
     scaled = (V[known].T / s[known] ** 2) @ V[known]
     lost = np.abs(V[~known]).max(axis=0, initial=0.0) > SINGULAR**0.5
     scaled[lost], scaled[:, lost] = np.nan, np.nan
     scaled[lost, lost] = np.inf
     covariance[np.ix_(free, free)] = scaled * np.outer(width[free], width[free])
-    vague = s < NOTICED * np.abs(V).max(axis=1)
-    directions = np.zeros((int(vague.sum()), n))
-    directions[:, free] = _apart(V[vague]) * width[free]
-    return covariance, held, directions, int(known.sum())
+    return covariance, int(known.sum())
+
+
+def _directions(slopes: Floats) -> tuple[Floats, Floats]:
+    """All n singular values, 0 where there are fewer rows, and Vᵀ (n, n)."""
+    _, sizes, V = np.linalg.svd(slopes)
+    s = np.zeros(slopes.shape[1])
+    s[: len(sizes)] = sizes
+    return s, V
+
+
+def _unidentified(problem: DesignProblem, fit: Optimum, held: tuple[str, ...]) -> Floats:
+    """Directions (k, n_y) that the measurements do not notice, away from bounds that hold.
+
+    A held parameter takes no part where the direction would lead another out of its bound, or
+    where its own bound holds it by more than the measurements' noise.
+    """
+    width = problem.upper - problem.lower
+    inwards = np.array([{"lower": 1.0, "upper": -1.0, "": 0.0}[side] for side in held])
+    slopes = fit.seen.slopes * width
+    pull = 2.0 * fit.seen.residual @ slopes  # ∂χ²/∂y, 0 of free parameters
+    moving = width > 0.0
+    while moving.any():
+        s, V = _directions(slopes[:, moving])
+        basis = np.zeros((len(s), len(width)))
+        basis[:, moving] = V
+        basis = _apart(basis[s < NOTICED * np.abs(V).max(axis=1)], inwards != 0.0)
+        stopped = None
+        for k, v in enumerate(basis):
+            along = np.where(np.abs(v) > SLIGHT, v * inwards, 0.0)
+            if along.min() < 0.0 < along.max():
+                stopped = int(np.where(along == 0.0, np.inf, np.abs(v)).argmin())
+            elif np.abs(along * pull).sum() > NOTICED**2:
+                stopped = int(np.abs(along * pull).argmax())
+            elif along.min() < 0.0:
+                basis[k] = -v
+        if stopped is None:
+            return basis * width
+        moving[stopped] = False
+    return np.zeros((0, len(width)))
 
 
 def _held(fit: Optimum, n: int) -> tuple[str, ...]:
@@ -209,14 +244,17 @@ def _held(fit: Optimum, n: int) -> tuple[str, ...]:
     return tuple(sides)
 
 
-def _apart(directions: Floats) -> Floats:
+def _apart(directions: Floats, first: Bools) -> Floats:
     """A basis (k, n) of the same space whose vectors share as few parameters as can be.
 
-    Each vector has a parameter, its entry 1, that no other has (Gauss–Jordan, largest pivots).
+    Each vector has a parameter, its entry 1, that no other has (Gauss–Jordan, largest pivots, of
+    parameters in ``first`` before others).
     """
     basis = directions.copy()
     for row in range(len(basis)):
-        pivot = int(np.abs(basis[row:]).max(axis=0).argmax())
+        sizes = np.abs(basis[row:]).max(axis=0)
+        preferred = np.where(first & (sizes > SLIGHT), sizes + 1.0 + sizes.max(), sizes)
+        pivot = int(preferred.argmax())
         best = row + int(np.abs(basis[row:, pivot]).argmax())
         basis[[row, best]] = basis[[best, row]]
         basis[row] /= basis[row, pivot]
@@ -229,67 +267,134 @@ def _apart(directions: Floats) -> Floats:
 
 
 class _Profile:
-    """χ² along one parameter, the others fitted anew; remembers the best fit that it meets."""
+    """χ² along each parameter, the others fitted anew; remembers the best fit that it meets.
 
-    def __init__(
-        self, problem: DesignProblem, fit: Optimum, covariance: Floats, held: tuple[str, ...]
-    ) -> None:
+    And every fit that χ² allows: each lies within the intervals of all parameters, so that what one
+    profile comes upon widens the others'.
+    """
+
+    def __init__(self, problem: DesignProblem, fit: Optimum) -> None:
         self.problem, self.fit, self.best = problem, fit, fit
-        self.covariance, self.held = covariance, held
+        self.allowed = [fit]
+        self.width = problem.upper - problem.lower
 
-    def interval(self, j: int) -> Interval:
-        """From the last value below ŷ_j that χ² allows to the last above it."""
-        low, at_lower = self._end(j, float(self.problem.lower[j]))
-        high, at_upper = self._end(j, float(self.problem.upper[j]))
-        return Interval(low, high, at_lower, at_upper)
+    def intervals(self) -> tuple[Interval, ...]:
+        """From the last value below ŷ_j that χ² allows to the last above it, of each parameter."""
+        sides = (self.problem.lower, self.problem.upper)
+        ends: dict[tuple[int, int], tuple[float, bool]] = {}
+        for _ in range(ROUNDS):
+            open_ends = [
+                (j, side)
+                for j in range(len(self.width))
+                for side in range(2)
+                if (j, side) not in ends or self._is_passed(j, side, ends[j, side][0])
+            ]
+            if not open_ends:
+                break
+            for j, side in open_ends:
+                ends[j, side] = self._end(j, float(sides[side][j]))
+        pairs = [(ends[j, 0], ends[j, 1]) for j in range(len(self.width))]
+        return tuple(Interval(low, high, a, b) for (low, a), (high, b) in pairs)
+
+    def _is_passed(self, j: int, side: int, end: float) -> bool:
+        """Whether a fit that χ² allows lies beyond the end."""
+        sign, margin = 2 * side - 1, PRECISION * abs(end - float(self.fit.y[j]))
+        return any(sign * (found.y[j] - end) > margin for found in self.allowed)
 
     def _end(self, j: int, bound: float) -> tuple[float, bool]:
         """The end of the interval towards ``bound``, and whether it is the bound.
 
         √(χ² − χ²(ŷ)) − 1.96 is nearly linear in y_j: secants from the linear model's end on, kept
-        between the last value inside and the first one outside.
+        between the last value inside and the first one outside. Where these meet at a jump, the one
+        outside may be another minimum of χ²: the one inside is followed across.
         """
         centre = float(self.fit.y[j])
-        room, y = bound - centre, self.fit.y
+        room = bound - centre
         if room == 0.0:
             return bound, True
-        deviation = float(np.sqrt(self.covariance[j, j])) or np.inf  # 0 where a bound holds it
-        share, last = min(1.0, NOTICED * deviation / abs(room)), (0.0, -NOTICED)
-        inside, outside = 0.0, np.inf
-        for _ in range(STEPS):
-            found = self._refitted(j, bound if share == 1.0 else centre + share * room, y)
-            rise = np.inf if found is None else max(found.objective - self.fit.objective, 0.0)
-            y = y if found is None else found.y
-            over = min(float(np.sqrt(rise)) - NOTICED, FAR)
-            if over <= 0.0 and share == 1.0:
+        near = max(self.allowed, key=lambda found: float(found.y[j] - centre) / room)
+        inside, outside = float(near.y[j] - centre) / room, np.inf
+        last = (inside, self._over(near))
+        share = min(1.0, max(self._first(j) / abs(room), 1.1 * inside))
+        for step in range(STEPS):
+            if inside >= 1.0:
                 return bound, True
-            if abs(over) <= PRECISION * NOTICED:
+            found = self._refitted(j, bound if share == 1.0 else centre + share * room, near)
+            over = self._over(found)
+            if found is not None and over <= 0.0:
+                near, inside = found, share
+                outside = outside if share < outside else np.inf
+            else:
+                outside = share
+            if abs(over) <= PRECISION * NOTICED and share < 1.0:
+                return centre + share * room, False
+            if share == last[0]:
                 break
-            inside, outside = (share, outside) if over < 0.0 else (inside, share)
             slope = (over - last[1]) / (share - last[0])
             last, share = (share, over), share - over / slope if slope > 0.0 else np.inf
             if np.isinf(outside):
                 share = min(1.0, max(1.1 * inside, min(share, 4.0 * inside)))
-            elif not inside < share < outside:
+            elif outside - inside <= PRECISION * outside:
+                share = outside
+            elif step >= SECANTS or not inside < share < outside:
                 share = 0.5 * (inside + outside)
-        return centre + share * room, False
+        return (bound, True) if inside >= 1.0 else (centre + inside * room, False)
 
-    def _refitted(self, j: int, at: float, last: Floats) -> Optimum | None:
+    def _over(self, found: Optimum | None) -> float:
+        rise = np.inf if found is None else max(found.objective - self.fit.objective, 0.0)
+        return min(float(np.sqrt(rise)) - NOTICED, FAR)
+
+    def _first(self, j: int) -> float:
+        """How far from ŷ_j the interval reaches by the linear model without bounds."""
+        slopes = self.fit.seen.slopes * self.width
+        others = np.delete(slopes, j, axis=1)
+        rest = slopes[:, j] - others @ np.linalg.lstsq(others, slopes[:, j], rcond=SINGULAR)[0]
+        return NOTICED * float(self.width[j] / max(float(np.linalg.norm(rest)), 1e-300))
+
+    def _refitted(self, j: int, at: float, near: Optimum) -> Optimum | None:
         """The best fit with y_j ``at`` a value; None where the model has no answer there.
 
-        It starts where the linear model of the measurements sends the others, else at the ``last``.
+        It starts where the linear model sends the others within their bounds; where χ² does not
+        allow what that leads to, on the line from ŷ through ``near``, too.
         """
-        start, own = last.copy(), self.covariance[j, j]
-        if 0.0 < own < np.inf and np.isfinite(self.covariance[:, j]).all():
-            start += self.covariance[:, j] / own * (at - last[j])
+        found = self._held_at(j, at, self._linear(j, at))
+        if self._over(found) > 0.0:
+            centre = self.fit.y
+            along = near.y - centre
+            line = centre + along * ((at - centre[j]) / along[j] if along[j] else 1.0)
+            again = self._held_at(j, at, line)
+            if again is not None and (found is None or again.objective < found.objective):
+                found = again
+        if found is None:
+            return None
+        if self._over(found) <= 0.0:
+            self.allowed.append(found)
+        if found.objective < self.best.objective - BETTER * max(self.fit.objective, 1.0):
+            self.best = found
+        return found
+
+    def _linear(self, j: int, at: float) -> Floats:
+        """Where χ² of the linear model is least within the bounds, y_j ``at`` a value."""
+        from scipy.optimize import lsq_linear
+
+        start, width = self.fit.y.copy(), self.width
+        slopes = self.fit.seen.slopes
+        others = np.flatnonzero((width > 0.0) & (np.arange(len(width)) != j))
+        if len(others):
+            wanted = -self.fit.seen.residual - slopes[:, j] * (at - start[j])
+            low = (self.problem.lower - start)[others] / width[others]
+            high = (self.problem.upper - start)[others] / width[others]
+            scaled = slopes[:, others] * width[others]
+            move = lsq_linear(scaled, wanted, (low, high), method="bvls").x
+            start[others] += move * width[others]
         start[j] = at
+        return np.asarray(start)
+
+    def _held_at(self, j: int, at: float, start: Floats) -> Optimum | None:
         lower, upper = self.problem.lower.copy(), self.problem.upper.copy()
         lower[j] = upper[j] = at
         held = replace(self.problem, lower=lower, upper=upper)
         try:
-            found = _fitted(held, np.clip(start, lower, upper))
+            return _fitted(held, np.clip(start, lower, upper))
         except EigassignError:
             return None
-        if found.objective < self.best.objective - BETTER * max(self.fit.objective, 1.0):
-            self.best = found
-        return found

@@ -68,6 +68,9 @@ def parameters(results: UpdateResults) -> Table:
         "The deviation is the standard deviation by the linear model; the interval is that of the "
         "profile likelihood, the other parameters fitted anew at each of its values."
     )
+    held = [row.name for row in results.parameters if row.held]
+    if held and any(row.deviation is not None for row in results.parameters):
+        caption += f" The deviations hold only with {' and '.join(held)} at the bound."
     return Table("Parameters", columns, rows, caption)
 
 

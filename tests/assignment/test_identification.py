@@ -120,6 +120,65 @@ def test_an_interval_that_the_bounds_cut_ends_at_them() -> None:
     assert found.held == ("", "", "")
 
 
+def scaled(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ratios of all three, which alone tell, and of ``y_1`` to a fixed part, which hardly does."""
+    k, e, m = y
+    f = 50.0 * np.sqrt(np.array([k / m, e / m, (k + e) / (m + k), (k + 2.0 * e) / m]))
+    f[0] *= 1.0 + 1e-5 * k
+    slopes = np.empty((4, 3))
+    slopes[0] = f[0] / 2.0 * np.array([1.0 / k, 0.0, -1.0 / m])
+    slopes[0, 0] += 1e-5 * f[0] / (1.0 + 1e-5 * k)
+    slopes[1] = f[1] / 2.0 * np.array([0.0, 1.0 / e, -1.0 / m])
+    slopes[2] = (
+        f[2] / 2.0 * np.array([1.0 / (k + e) - 1.0 / (m + k), 1.0 / (k + e), -1.0 / (m + k)])
+    )
+    slopes[3] = f[3] / 2.0 * np.array([1.0 / (k + 2 * e), 2.0 / (k + 2 * e), -1.0 / m])
+    return f, slopes
+
+
+def test_a_direction_away_from_a_bound_that_holds_is_named_and_followed() -> None:
+    """All three scale together, 40 % down at hardly any cost; noise holds m at its bound."""
+    truth = np.array([2.0, 3.0, 4.0])
+    lower, upper = np.array([0.1, 0.1, 2.5]), np.array([20.0, 20.0, 5.0])
+    clean = scaled(truth)[0]
+    data = MeasuredFrequencies(clean * np.array([0.999, 1.001, 1.0, 0.9995]), 2e-3 * clean)
+    found = identify(scaled, data, lower, upper, np.array([5.0, 2.0, 3.0]))
+    assert found.held == ("", "", "upper")
+    (direction,) = found.unidentified
+    np.testing.assert_allclose(direction / found.y, direction[2] / found.y[2], rtol=1e-2)
+    assert direction[2] == pytest.approx(-2.5)  # from bound to bound, inwards
+    for interval, true in zip(found.intervals, truth, strict=True):
+        assert interval.low < true < interval.high
+    assert (found.intervals[2].low, found.intervals[2].at_lower) == (2.5, True)
+
+
+def test_a_bound_that_the_measurements_press_against_is_no_direction() -> None:
+    """What the bound keeps from the measurements far exceeds their noise: nothing is unknown."""
+    K = np.column_stack([J[:, 0], J[:, 0] + 2e-3 * J[:, 1]])
+    data = MeasuredFrequencies(50.0 + K @ np.array([0.0, 1.0]) + 5.0 * J[:, 1], DEVIATION)
+    found = identify(lambda y: (50.0 + K @ y, K), data, -WIDE[:2], WIDE[:2], np.zeros(2))
+    assert any(found.held)
+    assert len(found.unidentified) == 0
+
+
+def test_an_end_is_not_another_minimum_s() -> None:
+    """y_2 = sin(2 y_1) explains all, but χ² has worse minima about it; y_1 is held by its bound."""
+
+    def wound(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        rest = y[1] - np.sin(2.0 * y[0])
+        hz = np.array([50.0 + rest, 50.0 + 4.0 * np.sin(3.0 * rest), 60.0 + 0.1 * y[0]])
+        by_rest = np.array([1.0, 12.0 * np.cos(3.0 * rest), 0.0])
+        slopes = np.outer(by_rest, [-2.0 * np.cos(2.0 * y[0]), 1.0])
+        slopes[2, 0] = 0.1
+        return hz, slopes
+
+    data = MeasuredFrequencies(np.array([50.0, 50.0, 60.001]), 0.1 * np.ones(3))
+    ends = np.array([0.0, 4.0])
+    found = identify(wound, data, np.array([-4.0, -4.0]), ends, np.array([-0.1, -0.1]))
+    assert found.held == ("upper", "")
+    assert found.intervals[0].low == pytest.approx(-1.95, abs=5e-3)
+
+
 def test_two_parameters_that_act_alike_are_named() -> None:
     """f depends on y_1 + 2 y_2 and y_3: the direction (2, −1, 0) is not identified."""
 

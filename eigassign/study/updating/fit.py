@@ -31,6 +31,8 @@ POOR = 0.01  # p-value below which the model does not explain the measurements
 OUTLIER = 3.0  # standard deviations
 FINE = 0.5  # standard deviations that the mesh's own error may make up
 NAMED = 1e-2  # share in a direction below which a parameter is not named
+SHOWN = 10.0  # per cent: the largest change of a direction, in words
+ALIKE = 1e-2  # of each other: changes in per cent that are called the same
 
 # --- Results
 
@@ -44,7 +46,7 @@ class UpdatedParameter:
     unit: str
     initial: float
     value: float
-    deviation: float | None  # standard; None where a bound holds it or nothing identifies it
+    deviation: float | None  # standard, while bounds hold; None if one holds it or none is known
     low: float
     high: float
     low_is_bound: bool  # the interval ends there at the bound, which measurements do not exclude
@@ -224,8 +226,7 @@ def collect_update(
 ) -> UpdateResults:
     """Everything that was found, as plain numbers and words."""
     case = problem.case
-    names, unidentified = problem.model.y_names, found.unidentified
-    directions = tuple(_direction(names, row, problem) for row in unidentified)
+    directions = tuple(_direction(row, found.y, problem) for row in found.unidentified)
     return UpdateResults(
         title=case.file.title,
         reference=case.file.reference,
@@ -235,7 +236,7 @@ def collect_update(
         version=__version__,
         q_names=problem.model.q_names,
         q_units=case.file.q_units,
-        parameters=tuple(_parameters(problem, found)),
+        parameters=tuple(_parameters(problem, found, directions)),
         covariance=found.covariance,
         measurements=tuple(
             ExplainedMeasurement(
@@ -273,8 +274,13 @@ def _verdict(found: Identified) -> str:
     return "not_identified" if len(found.unidentified) else "fitted"
 
 
-def _parameters(problem: UpdateProblem, found: Identified) -> Iterator[UpdatedParameter]:
+def _parameters(
+    problem: UpdateProblem, found: Identified, directions: Sequence[UnidentifiedDirection]
+) -> Iterator[UpdatedParameter]:
     file, initial, deviation = problem.case.file, problem.case.initial_design, found.deviation
+    held = {name for name, side in zip(problem.model.y_names, found.held, strict=True) if side}
+    # their deviation while the bounds hold says nothing
+    moving = {name for each in directions if held & set(each.change) for name in each.change}
     for k, (name, column) in enumerate(file.design.parameters.items()):
         interval = found.intervals[k]
         yield UpdatedParameter(
@@ -283,7 +289,9 @@ def _parameters(problem: UpdateProblem, found: Identified) -> Iterator[UpdatedPa
             unit=file.design_units[k],
             initial=float(initial[k]),
             value=float(found.y[k]),
-            deviation=float(deviation[k]) if 0.0 < deviation[k] < np.inf else None,
+            deviation=float(deviation[k])
+            if 0.0 < deviation[k] < np.inf and name not in moving
+            else None,
             low=interval.low,
             high=interval.high,
             low_is_bound=interval.at_lower,
@@ -297,29 +305,40 @@ def _parameters(problem: UpdateProblem, found: Identified) -> Iterator[UpdatedPa
 # --- What is not identified, in words
 
 
-def _direction(
-    names: Sequence[str], change: Floats, problem: UpdateProblem
-) -> UnidentifiedDirection:
+def _direction(change: Floats, y: Floats, problem: UpdateProblem) -> UnidentifiedDirection:
     width = problem.upper - problem.lower
     share = np.abs(change) / np.where(width > 0.0, width, 1.0)
     taking = [int(k) for k in np.flatnonzero(share > NAMED * share.max())]
+    names = problem.model.y_names
     by_name = {names[k]: float(change[k]) for k in taking}
-    return UnidentifiedDirection(by_name, _in_words(by_name))
+    units = {problem.case.file.design_units[k] for k in taking}
+    relative = change[taking] / y[taking] if np.all(y[taking] != 0.0) else None
+    return UnidentifiedDirection(by_name, _in_words(by_name, relative, len(units) == 1))
 
 
-def _in_words(change: Mapping[str, float]) -> str:
-    """ "E has no effect"; "m1 and m2 only as m1 + 0.5 m2"; of more, how they change together."""
+def _in_words(change: Mapping[str, float], relative: Floats | None, one_unit: bool) -> str:
+    """ "E has no effect"; "m1 and m2 only as m1 + 0.5 m2"; or how they change, in per cent.
+
+    ``relative`` is the change by the values, None where one of these is 0.
+    """
     if len(change) == 1:
         return f"{next(iter(change))} has no effect on what was measured"
-    if len(change) == 2:
+    *most, last = change
+    together = f"{', '.join(most)} and {last} can change together unnoticed"
+    if relative is not None and np.ptp(relative) <= ALIKE * np.abs(relative).max():
+        return f"{together}, all by the same per cent"
+    if len(change) == 2 and (one_unit or relative is None):
         (a, along_a), (b, along_b) = change.items()
         factor = -along_a / along_b  # a + factor · b stays
         sign = "+" if factor > 0.0 else "−"
         size = f"{abs(factor):.3g} " if abs(abs(factor) - 1.0) > 5e-4 else ""
         return f"{a} and {b} are told only together, as {a} {sign} {size}{b}"
-    first = next(iter(change.values()))
-    together = ", ".join(f"{name} by {value / first:.3g}" for name, value in change.items())
-    return f"{', '.join(change)} can change together unnoticed: {together}"
+    if relative is None:
+        sizes = [f"{value:.3g} (SI)" for value in change.values()]
+    else:
+        sizes = [f"{v:.3g} %" for v in SHOWN * relative / np.abs(relative).max()]
+    each = (f"{name} by {s.replace('-', '−')}" for name, s in zip(change, sizes, strict=True))
+    return f"{together}: {', '.join(each)}"
 
 
 # --- Notes and warnings
@@ -338,6 +357,10 @@ def _notes(problem: UpdateProblem, found: Identified) -> Iterator[str]:
         start := problem.case.initial_design, np.clip(start, problem.lower, problem.upper)
     ):
         yield "the values in the file lie outside their bounds: the fit started from the bounds"
+    names = problem.model.y_names
+    held = [f"{n} at its {side} bound" for n, side in zip(names, found.held, strict=True) if side]
+    if held:
+        yield f"deviations and covariance hold only with {' and '.join(held)}; intervals do not"
     if problem.case.file.design.catalogues:
         yield "lists of values and choices count as ranges from their smallest to largest value"
 

@@ -125,6 +125,33 @@ def test_two_masses_on_one_node_are_told_only_together() -> None:
     assert rows["m2"].high == pytest.approx(results.design["m2"] + results.design["m3"], abs=0.02)
 
 
+def test_what_scales_together_is_told_in_per_cent_though_a_bound_holds() -> None:
+    """Of E, ρ and a mass the frequencies tell ratios; 2 g that are not there hold ρ at a bound."""
+    text = (CASES / "two_link.yaml").read_text()
+    design = """design:
+  E: {parameter: materials.aluminium.youngs_modulus, min: 40 GPa, max: 200 GPa}
+  rho: {parameter: materials.aluminium.density, min: 2000, max: 3500}
+  m2: {parameter: bodies.tool_mass.mass, min: 0.05, max: 2}
+
+"""
+    text = text[: text.index("design:")] + design + text[text.index("targets:") :]
+    true, truth = case_of(text), {"E": 69e9, "rho": 2700.0, "m2": 0.2}
+    q = true.trajectory.q[::50]
+    hz = true.model().frequencies(q, np.tile(list(truth.values()), (len(q), 1)), 2)
+    text = text.replace("upper_arm.end, mass: 0}", "upper_arm.end, mass: 0.002}")
+    results = updated(measuring(case_of(text), q, hz))
+    assert [row.held for row in results.parameters] == ["", "upper", ""]
+    for name, (low, high) in results.intervals.items():
+        assert low < truth[name] < high
+    assert results.intervals["rho"] == (2000.0, 3500.0)
+    assert results.verdict == "not_identified"
+    (direction,) = results.unidentified
+    same = "E, rho and m2 can change together unnoticed, all by the same per cent"
+    assert direction.words == same
+    assert [row.deviation for row in results.parameters] == [None] * 3
+    assert any("hold only with rho at its upper bound" in note for note in results.notes)
+
+
 def test_a_wrong_measurement_is_an_outlier_and_the_fit_poor() -> None:
     truth = np.array([0.13, 0.09])
     case = shipped("two_link", 6, 2, truth)
