@@ -24,9 +24,9 @@ from eigassign.assignment.branching import (
     search_catalogue,
 )
 from eigassign.assignment.checks import Floats
-from eigassign.assignment.design_problem import MET, DesignProblem
+from eigassign.assignment.design_problem import MET, DesignProblem, best_first
 from eigassign.assignment.program import Bounds
-from eigassign.assignment.sequential import End, Optimum, minimise
+from eigassign.assignment.sequential import End, Optimum, minimise, worth
 from eigassign.errors import AccuracyError, EigassignError, InfeasibleError
 
 RELAXED = 3  # starts of the relaxation of all combinations
@@ -76,12 +76,8 @@ def choose(
         raise AccuracyError(
             "catalogues: no combination was met that the mechanism can be solved at"
         )
-    best = sorted(tree.fixed, key=lambda rows: (_worth(tree.fixed[rows]), rows))[:KEPT]
+    best = best_first(sorted(tree.fixed), lambda rows: worth(tree.fixed[rows]))[:KEPT]
     return Chosen(tuple(best), tuple(tree.fixed[r] for r in best), search, tree.appraisals)
-
-
-def _worth(optimum: Optimum) -> tuple[float, float]:
-    return max(optimum.seen.violation, MET), optimum.objective
 
 
 def _admissible(problem: DesignProblem, y: Floats) -> bool:

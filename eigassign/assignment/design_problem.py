@@ -11,9 +11,10 @@ Steps and slopes are in units z ∈ [0, 1] of the bounds.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from eigassign.assignment.solver import solve_scaled
 MET = 1e-9  # excess, relative to the inequality's limit, that is round-off
 TINY = 1e-11  # rms relative error that is round-off of exact frequencies
 ON = 1e-7  # of the bounds or of the limit: this near to a limit is on it
+T = TypeVar("T")
 
 
 class Objective(StrEnum):
@@ -182,6 +184,25 @@ class Place:
         J, C = (slopes[:, box.free] * box.width for slopes in (seen.slopes, seen.excess_slopes))
         pairs = None if seen.pairs is None else seen.pairs.scaled(box.free, box.width)
         return cls(z, seen, J, C, problem(box.y(z), seen), pairs)
+
+
+def best_first(found: Iterable[T], worth: Callable[[T], tuple[float, float]]) -> list[T]:
+    """By violation, then by F; ``worth`` gives both. Violations apart by `MET` at most are equal.
+
+    So are all up to `MET`. Of equals the first stays first.
+    """
+    worths = sorted(
+        ((max(v, MET), value, one) for one in found for v, value in [worth(one)]),
+        key=lambda each: each[0],
+    )
+    ordered: list[T] = []
+    while worths:
+        least = worths[0][0]
+        limit = least if least <= MET else least + MET
+        equal = [each for each in worths if each[0] <= limit]
+        ordered += [one for *_, one in sorted(equal, key=lambda each: each[1])]
+        worths = worths[len(equal) :]
+    return ordered
 
 
 def merit(problem: DesignProblem, value: float, violation: float, weight: float) -> float:

@@ -168,11 +168,23 @@ class Requirements:
 
     def owner(self, index: int) -> str:
         """The name of the limit that an excess (k,) belongs to."""
+        return self._owner(index)[0]
+
+    def side(self, index: int) -> str:
+        """Whether that is a lower or an upper limit."""
+        return self._owner(index)[1]
+
+    def _owner(self, index: int) -> tuple[str, str]:
         for limit in self.limits:
             if index < len(limit.hz):
-                return limit.name
+                return limit.name, "lower" if limit.at_least else "upper"
             index -= len(limit.hz)
-        bounds = [q.name for q in self.quantities for b in (q.low, q.high) if np.isfinite(b)]
+        bounds = [
+            (q.name, side)
+            for q in self.quantities
+            for bound, side in ((q.low, "lower"), (q.high, "upper"))
+            if np.isfinite(bound)
+        ]
         return bounds[index]
 
     @property

@@ -1,7 +1,9 @@
 """The exact optimum: quadratic programs in a row, each inside a trust region, judged exactly.
 
 A step (`step`) is taken only if the exact merit, F plus ν times the largest excess, falls by a
-tenth of what its program promised; a step spoilt by curvature is corrected once. The trust region
+tenth of what its program promised; a step spoilt by curvature is corrected once. Near an optimum
+the fall, of second order, drowns in round-off before the slopes balance: there a step is taken if
+it halves the stationarity and costs no more than round-off. The trust region
 grows and shrinks with how well promises are kept. The answer is judged by first-order optimality of
 the exact problem (`stationarity`).
 """
@@ -22,6 +24,7 @@ from eigassign.assignment.design_problem import (
     Box,
     DesignProblem,
     Place,
+    best_first,
     merit,
 )
 from eigassign.assignment.program import SNAP
@@ -32,6 +35,8 @@ from eigassign.errors import EigassignError
 FIRST, LARGEST = 0.3, 1.0  # trust region, of the bounds
 TAKEN, GOOD = 0.1, 0.7  # of the promised fall: a step is taken, the region doubled
 OPTIMAL = 1e-7  # stationarity that is accepted
+ROUND_OFF = 1e-12  # of F
+NEAR = 1e-4  # of the bounds: a step longer than this that promises nothing teaches curvature
 
 
 class End(StrEnum):
@@ -115,8 +120,12 @@ def minimise(
                 break
             reached = _try(problem, box, place, move, progress)
             if reached is not None:
+                last = place is best and move.promised == 0.0
                 place, predicted = reached, move.model.residual
-                best = _better(best, place)
+                best = place if last else _better(best, place)
+            elif move.promised == 0.0 and np.abs(move.d).max() < NEAR:
+                end = End.STALLED
+                break
     except KeyboardInterrupt:
         end = End.INTERRUPTED
     y = box.y(best.z)
@@ -143,8 +152,7 @@ def _placed(problem: DesignProblem, box: Box, z: Floats, progress: _Progress) ->
 
 def _better(best: Place, place: Place) -> Place:
     """By violation first, then by F."""
-    missed, reached = (max(p.seen.violation, MET) for p in (best, place))
-    return place if (reached, place.value) < (missed, best.value) else best
+    return best_first([best, place], lambda p: (p.seen.violation, p.value))[0]
 
 
 def _try(
@@ -152,14 +160,14 @@ def _try(
 ) -> Place | None:
     """The place that a move leads to if it keeps a tenth of its promise, corrected once if not."""
     reached = _go(problem, box, place, move, progress)
-    if reached is not None and not _kept(problem, place, reached, move, progress):
+    if reached is not None and not _kept(problem, box, place, reached, move, progress):
         corrected = step_program(problem, box, place, progress, (reached, move))
         if corrected is not None:
             again = _go(problem, box, place, corrected, progress)
-            if again is not None and _kept(problem, place, again, move, progress):
+            if again is not None and _kept(problem, box, place, again, move, progress):
                 reached, move = again, replace(corrected, promised=move.promised)
     length = float(np.abs(move.d).max(initial=0.0))
-    taken = reached is not None and _kept(problem, place, reached, move, progress)
+    taken = reached is not None and _kept(problem, box, place, reached, move, progress)
     _record(progress, box, place if reached is None else reached, move, taken)
     if reached is None or not taken:
         progress.radius = 0.25 * min(length, progress.radius)
@@ -195,9 +203,17 @@ def _fall(problem: DesignProblem, place: Place, reached: Place, progress: _Progr
 
 
 def _kept(
-    problem: DesignProblem, place: Place, reached: Place, move: Move, progress: _Progress
+    problem: DesignProblem, box: Box, place: Place, reached: Place, move: Move, progress: _Progress
 ) -> bool:
-    return bool(_fall(problem, place, reached, progress) > TAKEN * move.promised)
+    fall = _fall(problem, place, reached, progress)
+    if move.promised > 0.0:
+        return bool(fall > TAKEN * move.promised)
+    if reached.seen.violation > max(place.seen.violation, MET):
+        return False
+    # the program keeps off limits by `MET`, which may cost this much
+    paid = ROUND_OFF * abs(place.value) + MET * float(np.abs(move.on_excess).sum())
+    before, after = (stationarity(problem, box.y(p.z), p.seen) for p in (place, reached))
+    return fall >= -paid and after <= 0.5 * before
 
 
 def _record(progress: _Progress, box: Box, reached: Place, move: Move, taken: bool) -> None:
@@ -231,12 +247,16 @@ def _updated(S: Floats, place: Place, reached: Place, move: Move) -> Floats:
 # --- Several starts
 
 
+def worth(optimum: Optimum) -> tuple[float, float]:
+    """Violation and F, by which `best_first` orders."""
+    return optimum.seen.violation, optimum.objective
+
+
 def distinct(optima: Sequence[Optimum], problem: DesignProblem) -> tuple[Optimum, ...]:
     """Optima by violation, then F, those of the same design (to 1e-3 of the bounds) once."""
     width = np.where(problem.upper > problem.lower, problem.upper - problem.lower, 1.0)
-    ordered = sorted(optima, key=lambda o: (max(o.seen.violation, MET), o.objective))
     kept: list[Optimum] = []
-    for found in ordered:
+    for found in best_first(optima, worth):
         if all(np.abs((found.y - other.y) / width).max(initial=0.0) > 1e-3 for other in kept):
             kept.append(found)
     return tuple(kept)

@@ -53,7 +53,7 @@ class Move:
     """A program's step d, what it promises, and its multipliers for the Hessian."""
 
     d: Floats
-    promised: float  # fall of the merit
+    promised: float  # fall of the merit, 0 where it is round-off
     model: Expected  # of residuals and excesses there
     on_residual: Floats  # (m,) weights of the residuals' Hessians in that of the merit
     on_excess: Floats  # (k,)
@@ -162,7 +162,7 @@ def step_program(
     region: TrustRegion,
     spoilt: tuple[Place, Move] | None = None,
 ) -> Move | None:
-    """The step of the program at a place; None where it promises nothing.
+    """The step of the program at a place; None where there is none.
 
     After a ``spoilt`` step the model passes through what was found there, not only through here.
     Where the step passes a kink, what is expected behind it is one more row, and it is sought anew.
@@ -213,7 +213,7 @@ def step_program(
     if best is None or spoilt is not None or best.promised > FLAT * max(abs(before), TINY**2):
         return best
     if not len(cuts.objective) + len(cuts.excess) or region.radius < SMALLEST:
-        return None
+        return replace(best, promised=0.0) if best.d.any() else None
     region.radius *= 0.1  # nearer to the kink, where the rows behind it hold
     return step_program(problem, box, place, region)
 

@@ -8,10 +8,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 from scipy.optimize import least_squares, minimize
 
 from eigassign.assignment import LinearConstraint
-from eigassign.assignment.design_problem import Appraisal, DesignProblem, Objective
+from eigassign.assignment.design_problem import Appraisal, DesignProblem, Objective, best_first
+from eigassign.assignment.requirements import FrequencyLimit, QuantityLimit, Requirements
 from eigassign.assignment.sequential import End, minimise
 from eigassign.assignment.stationarity import stationarity
 from eigassign.errors import AccuracyError
@@ -141,6 +143,49 @@ def test_prices_alone_go_to_the_cheapest_design_that_meets_the_limits() -> None:
     for y in random.uniform(0.0, [2.0, 2.0, 5.0], (5000, 3)):
         if frequencies(y)[0].min() >= 2.2:
             assert prices @ y >= found.objective - 1e-7
+
+
+@pytest.mark.parametrize(("limit", "dear"), [(0.7, 1.0), (0.7, 3.0), (1.5, 3.0), (1.5, 0.3)])
+def test_slopes_balance_where_the_fall_of_the_price_is_round_off(limit: float, dear: float) -> None:
+    """The cheapest springs of a chain: first-order optimal, not nearly so."""
+
+    def appraise(y: np.ndarray) -> Appraisal:
+        values, slopes = [], []
+        for c in np.linspace(-0.5, 1.0, 9):
+            mass = np.array([[2.0 + c, 1.0 + c / 2], [1.0 + c / 2, 1.0]])
+            lam, modes = eigh(np.diag(y), mass)
+            values.append(np.sqrt(lam[0]))
+            slopes.append(modes[:, 0] ** 2 / (2.0 * values[-1]))
+        f = np.array(values)
+        return Appraisal(
+            np.zeros(0), np.zeros((0, 2)), (limit - f) / limit, -np.array(slopes) / limit
+        )
+
+    start, bounds = np.array([6.0, 3.0]), (np.array([0.5, 0.25]), np.array([50.0, 20.0]))
+    prices = np.array([1.0, dear])
+    found = minimise(DesignProblem(appraise, *bounds, prices=prices, reference=start), start)
+    assert found.end is End.OPTIMAL
+    assert found.stationarity <= 1e-7
+    assert found.seen.violation <= 1e-9
+
+
+def test_equal_violations_are_told_apart_by_the_objective() -> None:
+    missed = [(0.09090909090909097, 6e-3), (0.091, 1e-4), (0.09090909090909100, 7e-4)]
+    met = [(1e-10, 3.0), (0.0, 4.0), (5e-10, 2.0)]
+    ordered = best_first([*missed, *met], lambda each: each)
+    assert [value for _, value in ordered] == [2.0, 3.0, 4.0, 7e-4, 6e-3, 1e-4]
+
+
+def test_limits_of_frequencies_and_quantities_have_a_side() -> None:
+    hz, rows = np.ones(2), slice(0, 2)
+    limits = (
+        FrequencyLimit("stiff", ((1, 1.0),), hz, rows, True),
+        FrequencyLimit("soft", ((2, 1.0),), hz, rows, False),
+    )
+    mass = QuantityLimit("mass", lambda y: (1.0, y), 1.0, 2.0)
+    asked = Requirements((), limits, (mass,), np.ones(2))
+    sides = [(asked.owner(k), asked.side(k)) for k in (1, 2, 4, 5)]
+    assert sides == [("stiff", "lower"), ("soft", "upper"), ("mass", "lower"), ("mass", "upper")]
 
 
 def test_what_cannot_be_met_is_missed_as_little_as_possible() -> None:

@@ -40,7 +40,7 @@ def test_a_limit_of_the_mass_holds_and_is_named_where_it_binds() -> None:
     assert mass.optimal == pytest.approx(2.1, rel=1e-8)
     assert mass.upper == 2.1
     assert sum(result.design.values()) == pytest.approx(mass.optimal - mass.initial, abs=1e-9)
-    assert "design.mass" in [limit.name for limit in row.active]
+    assert ("design.mass", "upper") in [(limit.name, limit.side) for limit in row.active]
     assert row.verdict == "improved"
 
 
@@ -168,6 +168,19 @@ def test_the_one_shot_of_catalogues_is_the_best_of_the_linear_model() -> None:
     assert result.results.error.one_shot == result.results.error.exact
 
 
+def test_of_compromises_that_miss_alike_the_one_with_the_least_objective_is_the_answer() -> None:
+    limits = (
+        "  constraints:\n"
+        "    less: {terms: {m1: 1}, max: 50 g}\n"
+        "    more: {terms: {m1: 1}, min: 60 g}\n"
+    )
+    _, row = solved(DESIGN + limits, "  - {mode: 1, frequency: 190 Hz}\n")
+    assert row.verdict == "infeasible"
+    assert row.optimality.kind == "proved"
+    assert "no design within the bounds meets less" in row.reason
+    assert row.objective_optimal == min(one.objective for one in row.local_optima)
+
+
 def test_lists_that_contradict_linear_limits_leave_a_compromise() -> None:
     limits = (
         "  constraints:\n"
@@ -192,6 +205,7 @@ def test_limits_that_contradict_are_proved_where_the_problem_is_convex() -> None
         _, row = solved(DESIGN, stiff + more, HELD)
         assert row.verdict in ("unreachable", "infeasible")
         assert row.optimality.kind == "proved"
+        assert "was found" not in row.reason
     _, row = solved(DESIGN, stiff + "  - {mode: 1, at_most: 10 Hz}\n", HELD)
     assert row.optimality.kind == "local"
 

@@ -130,7 +130,9 @@ def _band_notes(found: Found) -> Iterator[str]:
         yield f"{choice}: {how}"
 
 
-def _in_words(scene: Scene, wanted: Sequence[Wanted], contradiction: Conflict | None) -> str:
+def _in_words(
+    scene: Scene, wanted: Sequence[Wanted], contradiction: Conflict | None, proved: bool
+) -> str:
     """Which limits contradict, with their lines in the case file; empty where none do."""
     if contradiction is None:
         return ""
@@ -142,10 +144,11 @@ def _in_words(scene: Scene, wanted: Sequence[Wanted], contradiction: Conflict | 
         f"{'the limit of the mass' if name == MASS else name} (line {line})"
         for name, line in zip(contradiction.names, lines, strict=True)
     )
+    meets = "meets" if proved else "was found that meets"
     if not contradiction.smallest:
-        return f"no design was found that meets all limits; the nearest one misses {listed}"
+        return f"no design {meets} all limits; the nearest one misses {listed}"
     together = " together" if len(contradiction.names) > 1 else ""
-    return f"no design within the bounds was found that meets {listed}{together}"
+    return f"no design within the bounds {meets} {listed}{together}"
 
 
 def _has_one_shot(file: CaseFile) -> bool:
@@ -180,7 +183,9 @@ def assignment_row(
     # The exact optimum rests on exact frequencies, the one shot on its prediction.
     trusted = found is not None or all(t.approximation_error <= accepted for t in targets)
     clearances = () if found is None else tuple(map(_clearance, found.clearances))
-    contradiction = _in_words(scene, wanted, answer.conflict)
+    optimality = _optimality(scene, answer)
+    proved = optimality.kind == "proved"
+    contradiction = _in_words(scene, wanted, answer.conflict, proved)
     merits = initial, optimal
     word, reason = verdict(targets, merits, trusted, unreachable, contradiction)
     unproved = [row.label for row in clearances if not row.clear]
@@ -193,7 +198,7 @@ def assignment_row(
         objective=keys.objective,
         objective_initial=initial[1],
         objective_optimal=optimal[1],
-        optimality=_optimality(scene, answer),
+        optimality=optimality,
         verdict=word,
         reason=reason,
         steps=() if found is None else tuple(_steps(found)),
@@ -313,13 +318,13 @@ def active_rows(scene: Scene, answer: Answer) -> Iterator[ActiveRow]:
         elif limit.kind == "constraint":
             yield ActiveRow(constraints[limit.index], "constraint", side, limit.multiplier)
     asked = found.variant.requirements
-    shares: dict[str, float] = {}
+    shares: dict[tuple[str, str], float] = {}
     for limit in found.best.limits:
         if limit.kind == "excess":
-            name = asked.owner(limit.index)
-            shares[name] = shares.get(name, 0.0) + limit.multiplier
-    for name, multiplier in shares.items():
-        yield ActiveRow(name, "target", "upper", multiplier)
+            own = asked.owner(limit.index), asked.side(limit.index)
+            shares[own] = shares.get(own, 0.0) + limit.multiplier
+    for (name, side), multiplier in shares.items():
+        yield ActiveRow(name, "target", side, multiplier)
 
 
 def _of_program(answer: Answer) -> Iterator[ActiveRow]:
@@ -334,7 +339,7 @@ def limit_notes(answer: Answer, row: AssignmentRow) -> list[str]:
     for limit in row.active:
         on = "just meets" if limit.kind == "target" else f"lies on its {limit.side} {limit.kind} of"
         grouped.setdefault(on, []).append(limit.name)
-    notes = [f"the optimum {on} {', '.join(names)}" for on, names in grouped.items()]
+    notes = [f"the optimum {on} {', '.join(dict.fromkeys(n))}" for on, n in grouped.items()]
     if answer.found is None and answer.one_shot is not None and answer.one_shot.undetermined:
         notes.append(
             f"{answer.one_shot.undetermined} direction(s) of the design change no target: there "

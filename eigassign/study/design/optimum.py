@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment import Bounds, LinearConstraint
 from eigassign.assignment.choosing import KEPT, RELAXED, Chosen, choose
-from eigassign.assignment.design_problem import MET, Box, DesignProblem, Objective
+from eigassign.assignment.design_problem import MET, Box, DesignProblem, Objective, best_first
 from eigassign.assignment.feasibility import constraints_agree
 from eigassign.assignment.requirements import (
     Frequencies,
@@ -29,7 +29,7 @@ from eigassign.assignment.requirements import (
     QuantityLimit,
     Requirements,
 )
-from eigassign.assignment.sequential import End, Optimum, distinct, minimise
+from eigassign.assignment.sequential import End, Optimum, distinct, minimise, worth
 from eigassign.errors import CaseError, EigassignError, InfeasibleError, LostModeError
 from eigassign.study.design.clearance import Band, Clearance, prove_clear, wanting
 from eigassign.study.design.followed import Follower, followers
@@ -170,7 +170,7 @@ def _search_all(
             best_of.append(found)
         if ended := search.ended:
             break
-    best_of.sort(key=lambda found: _worth(found[1][0]))
+    best_of = best_first(best_of, lambda found: worth(found[1][0]))
     variant, optima, chosen_of = best_of[0]
     return Found(
         variant=variant,
@@ -208,8 +208,9 @@ def _refined(variant: Variant, coarse: _Search, initial: Floats) -> _Search:
             break
     seen = variant.problem.appraise(initial)
     inside = np.all((initial >= variant.problem.lower) & (initial <= variant.problem.upper))
-    merit = max(seen.violation, MET), variant.problem(initial, seen)
-    if not fine.optima or (inside and merit < min(map(_worth, fine.optima))):
+    known = list(map(worth, fine.optima))
+    own = seen.violation, variant.problem(initial, seen)
+    if not fine.optima or (inside and best_first([*known, own], lambda each: each)[0] is own):
         fine.run(initial)
     return fine
 
@@ -225,10 +226,6 @@ def _initial(scene: Scene, variant: Variant) -> tuple[float, float]:
         value, size = row.coefficients @ y, np.abs(row.coefficients) @ width
         worst = max(worst, float(max(row.lower - value, value - row.upper) / (size or 1.0)))
     return worst, problem(y, seen)
-
-
-def _worth(optimum: Optimum) -> tuple[float, float]:
-    return max(optimum.seen.violation, MET), optimum.objective
 
 
 class _Search:
@@ -275,11 +272,11 @@ class _Search:
         """Whether enough starts led to the best optimum: more where others were seen."""
         if isinstance(starts, int) or not self.optima:
             return False
-        best = min(_worth(o) for o in self.optima)
+        best = worth(best_first(self.optima, worth)[0])
         same = [
             o
             for o in self.optima
-            if _worth(o)[0] <= best[0] + MET and o.objective <= best[1] * (1.0 + SAME) + 1e-16
+            if o.seen.violation <= best[0] + MET and o.objective <= best[1] * (1.0 + SAME) + 1e-16
         ]
         seen = len(distinct(self.optima, self.variant.problem))
         enough = (AGREED + len(self.variant.problem.lower) // 2) * seen

@@ -120,8 +120,8 @@ def _room(file: CaseFile, row: ActiveRow, amount: float, unit: str) -> str:
         return f"{_handy(amount, unit)} {more} at the {row.side} {_limit(row)}"
     if row.name != MASS or (mass := file.design.mass) is None:
         return f"{row.name}, relaxed by {100 * amount:g} %"
-    limit, more = (mass.min, "less") if mass.max is None else (mass.max, "more")
-    if limit is None or None not in (mass.min, mass.max):
+    limit, more = (mass.max, "more") if row.side == "upper" else (mass.min, "less")
+    if limit is None:
         return f"the limit of the mass, relaxed by {100 * amount:g} %"
     return f"{_handy(amount * limit, 'kg')} {more} mass"
 
