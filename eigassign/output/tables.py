@@ -15,6 +15,8 @@ from eigassign.study.results import (
     ValidationRow,
 )
 
+ROUND_OFF = 1e-8  # relative violation of a limit that is met
+
 
 @dataclass(frozen=True)
 class Table:
@@ -57,14 +59,19 @@ def headline(results: RunResults) -> str | None:
     error, row = results.error, results.assignment
     if error is None:
         return None
-    what = "Worst distance to the target"
-    if not any(target.kind == "frequency" for target in results.targets):
-        what = "Worst violation of a limit"
+    limits = [target.error for target in results.targets if target.kind != "frequency"]
+    alone = len(limits) == len(results.targets)
+    what = "Worst violation of a limit" if alone else "Worst distance to the target"
+    said = _violation if alone else percent
     beside = ""
     if "one shot" in _stages(results) and error.one_shot is not None:
-        beside = f" (one shot: {percent(error.one_shot.max_relative)})"
-    before, after = percent(error.initial.max_relative), percent(error.exact.max_relative)
+        beside = f" (one shot: {said(error.one_shot.max_relative)})"
+    before, after = said(error.initial.max_relative), said(error.exact.max_relative)
     distance = f"{what}: {before} before, {after} after{beside}, by exact eigenvalues."
+    worst = max((each.initial.max_relative for each in limits), default=0.0)
+    if not alone and worst > ROUND_OFF:
+        left = _violation(max(each.exact.max_relative for each in limits))
+        distance += f" Worst violation of a limit: {percent(worst)} before, {left} after."
     if row is None:
         return distance
     word = row.verdict.replace("_", " ")
@@ -122,6 +129,8 @@ def errors(results: RunResults) -> Table:
         rows.append((label, *worst, *rms))
     caption = "Frequency against its target in Hz, relative to the target, along "
     caption += f"{results.along}."
+    if len({target.weight for target in wanted}) > 1:
+        caption += " All: every target alike, without the weights."
     return Table("Distance to the target", columns, tuple(rows), caption)
 
 
@@ -139,7 +148,11 @@ def required(results: RunResults) -> Table:
 
 
 def _violated(worst: float) -> str:
-    return f"violated by {percent(worst)}" if worst > 0.0 else "met"
+    return f"violated by {percent(worst)}" if worst > ROUND_OFF else "met"
+
+
+def _violation(worst: float) -> str:
+    return percent(worst if worst > ROUND_OFF else 0.0)
 
 
 def clearances(results: RunResults) -> Table:
@@ -185,7 +198,7 @@ def optima(results: RunResults) -> Table:
     if row is None or row.catalogue is not None or len(row.local_optima) < 2:
         return Table("Local optima", columns, ())
     rows = tuple(
-        (str(k), number(each.objective), percent(each.violation), *map(number, each.design))
+        (str(k), number(each.objective), _violation(each.violation), *map(number, each.design))
         for k, each in enumerate(row.local_optima, 1)
     )
     return Table(

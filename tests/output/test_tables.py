@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 from synthetic_results import as_limit, make_results
 
-from eigassign.output.tables import Table, tables
+from eigassign.output.tables import Table, headline, tables
 from eigassign.study.results import (
     CatalogueRow,
     ClearanceRow,
     CombinationRow,
+    ErrorRow,
     Meaning,
     RunResults,
     TradeOff,
@@ -79,3 +80,19 @@ def test_error_stands_against_mass_and_what_is_added() -> None:
     assert found is not None
     assert found.columns[:3] == ("mass [kg]", "added", "rms error")
     assert found.rows[1] == ("2.25", "0.25", "1.00 %", "2.25", "0")
+
+
+def test_the_headline_says_what_the_initial_design_violated_and_round_off_is_met() -> None:
+    results = make_results()
+    (target,) = results.targets
+    limit = as_limit(target, "at_least", np.full(152, 205.0), np.full(152, np.inf))
+    error = replace(
+        limit.error, initial=ErrorRow(0.681, 0.5), exact=ErrorRow(6e-11, 1e-11), one_shot=None
+    )
+    both = replace(results, targets=(target, replace(limit, error=error)))
+    said = headline(both)
+    assert said is not None
+    assert said.endswith("Worst violation of a limit: 68.1 % before, 0.00 % after.")
+    found = table(both, "Limits and bands")
+    assert found is not None
+    assert found.rows[0][-2] == "met"

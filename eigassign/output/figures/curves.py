@@ -325,10 +325,12 @@ def draw_progress(results: RunResults, row: AssignmentRow) -> Figure:
         plot(axes, number, [(values, hidden)], "objective")
     else:
         values = 100.0 * (np.sqrt(np.maximum(values, 0.0)) if kind == "rms" else np.abs(values))
-        plot_logarithmic(axes, number, [(values, hidden)], f"{kind} error [%]")
+        uneven = any(t.weight != 1.0 for t in results.targets if t.kind == "frequency")
+        weighted = "weighted " if uneven else ""
+        plot_logarithmic(axes, number, [(values, hidden)], f"{weighted}{kind} error [%]")
     handles = _steps(axes, number, values, taken)
     if error is not None and error.one_shot is not None:
-        at = error.one_shot.rms_relative if kind == "rms" else error.one_shot.max_relative
+        at = _one_shot(results, kind)
         handles.append(axes.axhline(100.0 * at, **ONE_SHOT, label="one shot"))
     axes.set_xlim(0.5, values.size + 0.5)
     axes.set_xticks(range(1, values.size + 1, max(1, values.size // 10)))
@@ -337,6 +339,19 @@ def draw_progress(results: RunResults, row: AssignmentRow) -> Figure:
         _steps(below, number, missed, taken)
     legend_above(axes, handles)
     return figure
+
+
+def _one_shot(results: RunResults, kind: str) -> float:
+    """Its rms or worst error, weighted as the objective is."""
+    own = [
+        (t.weight, t.weight * t.weight_s, t.error.one_shot)
+        for t in results.targets
+        if t.kind == "frequency" and t.error.one_shot is not None
+    ]
+    if kind == "worst":
+        return max(weight * error.max_relative for weight, _, error in own)
+    total = sum(share for _, share, _ in own)
+    return float(np.sqrt(sum(share * e.rms_relative**2 for _, share, e in own) / total))
 
 
 def _steps(axes: Axes, number: Floats, values: Floats, taken: NDArray[np.bool_]) -> list[Any]:
