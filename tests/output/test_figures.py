@@ -138,7 +138,7 @@ def test_a_limit_is_drawn_with_what_it_forbids_and_equal_names_are_numbered(pape
 
 def test_the_progress_shows_every_step_and_the_one_shot(paper):
     (axes,) = drawn(paper)["progress"].axes
-    assert legend(drawn(paper)["progress"]) == ["taken", "given up", "one shot"]
+    assert legend(drawn(paper)["progress"]) == ["initial", "taken", "given up", "one shot"]
     steps = paper.assignment.steps
     taken = [100.0 * np.sqrt(step.objective) for step in steps if step.taken]
     shown = next(line for line in axes.get_lines() if line.get_label() == "taken")

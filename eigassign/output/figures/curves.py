@@ -307,35 +307,38 @@ def progress(results: RunResults, row: AssignmentRow) -> FigurePlan:
 
 
 def draw_progress(results: RunResults, row: AssignmentRow) -> Figure:
-    """√F of least squares, F of the worst case, in %; steps that were given up are hollow.
+    """√F of least squares, F of the worst case, in %, from the initial design on.
 
+    Steps that were given up are hollow.
     Without a wanted frequency F is no error, and is drawn as it is. Where limits were missed on the
     way, what is left of that stands below: it comes first, so that F may rise while it falls.
     """
-    values = np.array([step.objective for step in row.steps])
-    number, taken = np.arange(1.0, values.size + 1.0), np.array([step.taken for step in row.steps])
-    missed = 100.0 * np.array([step.violation for step in row.steps])
+    values = np.array([row.objective_initial, *(step.objective for step in row.steps)])
+    number, taken = np.arange(1.0, values.size), np.array([step.taken for step in row.steps])
+    limits = [t.error.initial.max_relative for t in results.targets if t.kind != "frequency"]
+    violations = [max(limits, default=0.0), *(step.violation for step in row.steps)]
+    missed = 100.0 * np.array(violations)
     heights = (2.2, 1.2) if (missed > SEEN).any() else (2.4,)
     figure, panels = stacked("Progress of the sequential method", "step", heights)
     axes = panels[0]
     kind = "rms" if row.objective == "least_squares" else "worst"
     hidden: Look = {"linestyle": "none"}
+    at = np.append(0.0, number)
     error = results.error if any(t.kind == "frequency" for t in results.targets) else None
     if error is None:
-        plot(axes, number, [(values, hidden)], "objective")
+        plot(axes, at, [(values, hidden)], "objective")
     else:
         values = 100.0 * (np.sqrt(np.maximum(values, 0.0)) if kind == "rms" else np.abs(values))
         uneven = any(t.weight != 1.0 for t in results.targets if t.kind == "frequency")
         weighted = "weighted " if uneven else ""
-        plot_logarithmic(axes, number, [(values, hidden)], f"{weighted}{kind} error [%]")
+        plot_logarithmic(axes, at, [(values, hidden)], f"{weighted}{kind} error [%]")
     handles = _steps(axes, number, values, taken)
     if error is not None and error.one_shot is not None:
-        at = _one_shot(results, kind)
-        handles.append(axes.axhline(100.0 * at, **ONE_SHOT, label="one shot"))
-    axes.set_xlim(0.5, values.size + 0.5)
-    axes.set_xticks(range(1, values.size + 1, max(1, values.size // 10)))
+        handles.append(axes.axhline(100.0 * _one_shot(results, kind), **ONE_SHOT, label="one shot"))
+    axes.set_xlim(-0.5, values.size - 0.5)
+    axes.set_xticks(range(0, values.size, max(1, values.size // 10)))
     for below in panels[1:]:
-        plot_logarithmic(below, number, [(missed, hidden)], "limits missed [%]")
+        plot_logarithmic(below, at, [(missed, hidden)], "limits missed [%]")
         _steps(below, number, missed, taken)
     legend_above(axes, handles)
     return figure
@@ -355,8 +358,16 @@ def _one_shot(results: RunResults, kind: str) -> float:
 
 
 def _steps(axes: Axes, number: Floats, values: Floats, taken: NDArray[np.bool_]) -> list[Any]:
-    """A dot a step, hollow where it was given up; what is below the axis stands on its edge."""
-    handles, low = [], axes.get_ylim()[0]
+    """The initial design, then a dot a step, hollow where it was given up.
+
+    What is below the axis stands on its edge.
+    """
+    low = axes.get_ylim()[0]
+    handles: list[Any] = axes.plot(
+        0.0, max(values[0], low), linestyle="none", marker="s", color=style.BLACK, label="initial",
+        clip_on=False,
+    )  # fmt: skip
+    values = values[1:]
     for own, fill, label in ((taken, style.BLUE, "taken"), (~taken, "none", "given up")):
         if own.any():
             handles += axes.plot(
