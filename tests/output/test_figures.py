@@ -144,8 +144,9 @@ def test_the_progress_shows_every_step_and_the_one_shot(paper):
     shown = next(line for line in axes.get_lines() if line.get_label() == "taken")
     np.testing.assert_allclose(shown.get_ydata(), taken)
     limit = as_limit(paper.targets[0], "at_least", paper.targets[0].lower_hz, np.full(152, np.inf))
-    (axes,) = drawn(dataclasses.replace(paper, targets=(limit,)))["progress"].axes
+    axes, below = drawn(dataclasses.replace(paper, targets=(limit,)))["progress"].axes
     assert axes.get_ylabel() == "objective"
+    assert below.get_ylabel() == "limits missed [%]"  # by the initial design
 
 
 def test_steps_that_miss_limits_say_by_how_much(paper):
