@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from functools import cached_property
 
 import numpy as np
 
@@ -207,7 +208,7 @@ class _State:
     mu: Floats
     done: bool = False
 
-    @property
+    @cached_property
     def rows(self) -> list[int]:
         return [i for i, side in enumerate(self.side) if side]
 

@@ -54,6 +54,7 @@ FEW = 24  # samples on which starts are followed, of more than twice as many
 FEWEST = 8  # samples at which designs are screened, of more than twice as many
 SCREENED, MOST_SCREENED = 7, 48  # designs for each parameter of which the best are starts
 APART = 0.2  # of the bounds: two starts differ by more in some parameter
+BEHIND, FAR_BEHIND = 3, 2.0  # starts of a variant, and how much worse than the best it may be then
 REFINED = 3  # optima on few samples that are followed on all
 AGREED = 3  # starts, and half the parameters more, for each optimum seen that lead to the best
 SAME = 1e-4  # relative, in F: optima of the same worth
@@ -161,6 +162,8 @@ def _search_all(
             search.run(start)
             if search.ended or search.agreed(keys.starts):
                 break
+            if best_of and search.falls_behind(min(worth(optima[0]) for _, optima, _ in best_of)):
+                break
         solves += search.variant.response.exact_solves
         for task in tasks[1:]:
             search = _refined(variant_of(task, below), search, scene.initial)
@@ -267,6 +270,13 @@ class _Search:
 
     def _stop(self) -> End | None:
         return self.ended or (End.SECONDS if monotonic() > self.deadline else None)
+
+    def falls_behind(self, best: tuple[float, float]) -> bool:
+        """Whether some starts came nowhere near what another variant has: more would not either."""
+        if len(self.optima) < BEHIND:
+            return False
+        violation, objective = min(map(worth, self.optima))
+        return (violation, objective) > (FAR_BEHIND * best[0], FAR_BEHIND * best[1])
 
     def agreed(self, starts: int | str) -> bool:
         """Whether enough starts led to the best optimum: more where others were seen."""
