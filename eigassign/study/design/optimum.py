@@ -304,30 +304,33 @@ def _continued(before: Optimum, found: Optimum) -> Optimum:
 def _in_turn(
     task: Task, variant: Variant, starts: Sequence[Floats], count: int | str
 ) -> Iterator[Floats]:
-    """The first starts, then the most promising of some designs, apart from each other.
+    """The first starts, then spread designs, those that promise most first.
 
-    Of a screened design only frequencies at fewest samples are solved: all of them are less work
-    than a start.
+    Of a design only frequencies at fewest samples are solved to judge it: all of them are less work
+    than a start. Where modes are followed or reduced models lead, it is more: there none is judged.
     """
     yield from starts
     most = (STARTS if isinstance(count, str) else count) - len(starts)
     if most <= 0:
         return
-    box, scene, ranked = Box.of(variant.problem), task.scene, []
-    fewest = _thinned(task, FEWEST) or task
+    if task.models is not None or task.followers:
+        yield from _spread_designs(task.scene, most, 0)
+        return
+    box, fewest = Box.of(variant.problem), _thinned(task, FEWEST) or task
     asked = variant_of(fewest, tuple(k for _, k in variant.below))
-    for y in _spread_designs(scene, min(SCREENED * box.n, MOST_SCREENED), 0):
+    ranked: list[tuple[tuple[float, float], Floats]] = []
+    for y in _spread_designs(task.scene, max(most, min(SCREENED * box.n, MOST_SCREENED)), 0):
         z = box.inside(box.z(y))
         try:
-            merit = _merit(fewest, asked, box.y(z))
+            ranked.append((_merit(fewest, asked, box.y(z)), z))
         except EigassignError:
-            continue
-        ranked.append((merit, z))
-    kept: list[Floats] = []
+            ranked.append(((np.inf, np.inf), z))
+    apart: list[Floats] = []
+    near: list[Floats] = []
     for _, z in sorted(ranked, key=lambda one: one[0]):
-        if len(kept) < most and all(np.abs(z - other).max() > APART for other in kept):
-            kept.append(z)
-            yield box.y(z)
+        alone = all(np.abs(z - other).max(initial=0.0) > APART for other in apart)
+        (apart if alone else near).append(z)
+    yield from (box.y(z) for z in [*apart, *near][:most])
 
 
 def _merit(task: Task, variant: Variant, y: Floats) -> tuple[float, float]:
