@@ -117,21 +117,26 @@ def test_a_common_factor_of_all_weights_changes_nothing(pair: Result, tmp_path: 
     assert two.exact.rms_relative == pytest.approx(one.exact.rms_relative, rel=1e-9)
 
 
-@pytest.mark.parametrize("method", ["one_shot", "sequential"])
-def test_a_trajectory_cut_in_two_is_still_the_same_problem(tmp_path: Path, method: str) -> None:
-    """The trapezoidal rule over both halves adds up to the one over the whole."""
+@pytest.mark.parametrize(("method", "rtol"), [("one_shot", 1e-9), ("sequential", 1e-7)])
+def test_a_trajectory_cut_in_two_is_still_the_same_problem(
+    tmp_path: Path, method: str, rtol: float
+) -> None:
+    """The trapezoidal rule over both halves adds up to the one over the whole.
+
+    Steps end where slopes are balanced to 1e-7, wherever they started.
+    """
     texts = alone(part(PICK)), several(part(PICK[:9], 0.4), part(PICK[8:], 0.6))
     whole, halves = (solved(tmp_path, text.replace("one_shot", method)) for text in texts)
     np.testing.assert_allclose(
-        list(halves.design.values()), list(whole.design.values()), rtol=1e-9, atol=1e-12
+        list(halves.design.values()), list(whole.design.values()), rtol=rtol, atol=1e-12
     )
     one, two = (r.results.error for r in (whole, halves))
     assert one is not None
     assert two is not None
     for kind in ("initial", "predicted", "exact"):
         a, b = getattr(one, kind), getattr(two, kind)
-        assert b.rms_relative == pytest.approx(a.rms_relative, rel=1e-9)
-        assert b.max_relative == pytest.approx(a.max_relative, rel=1e-9)
+        assert b.rms_relative == pytest.approx(a.rms_relative, rel=rtol)
+        assert b.max_relative == pytest.approx(a.max_relative, rel=rtol)
 
 
 def test_the_errors_of_each_trajectory_are_those_of_its_own_samples(pair: Result) -> None:
