@@ -3,9 +3,9 @@
 A step (`step`) is taken only if the exact merit, F plus ν times the largest excess, falls by a
 tenth of what its program promised; a step spoilt by curvature is corrected once. Near an optimum
 the fall, of second order, drowns in round-off before the slopes balance: there a step is taken if
-it halves the stationarity and costs no more than round-off. The trust region
-grows and shrinks with how well promises are kept. The answer is judged by first-order optimality of
-the exact problem (`stationarity`).
+it halves the stationarity and costs no more than round-off. The trust region grows and shrinks with
+how well promises are kept. The answer is judged by first-order optimality of the exact problem
+(`stationarity`).
 """
 
 from __future__ import annotations

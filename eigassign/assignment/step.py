@@ -77,7 +77,7 @@ class Expected:
     kinked: NDArray[np.bool_]
 
 
-def expected(place: Place, r: Floats, c: Floats, d: Floats) -> Expected:
+def _expected_at(place: Place, r: Floats, c: Floats, d: Floats) -> Expected:
     """Of a step from values r and c, which are those at the place but after a spoilt step."""
     m = len(r)
     values, slopes = np.append(r, c), np.vstack([place.J, place.C])
@@ -190,16 +190,16 @@ def step_program(
         if solved is None:
             break
         d, v, on_residual, on_excess = solved
-        model = expected(place, r, c, d)
+        model = _expected_at(place, r, c, d)
         here = 0.5 * float(d @ curved @ d)
         behind = max(float(np.max(model.excess, initial=0.0)), 0.0)
         after = here + merit(
-            problem, value_of(problem, box, place, d, model.residual), behind, region.weight
+            problem, _value(problem, box, place, d, model.residual), behind, region.weight
         )
         if best is None or before - after > best.promised:
             best = Move(d, before - after, model, on_residual, on_excess)
         linear = r + place.J @ d
-        value = value_of(problem, box, place, d, linear)
+        value = _value(problem, box, place, d, linear)
         t = cuts.objective.at(d)
         if problem.objective is Objective.WORST_CASE:
             value += max(t - float(np.max(np.abs(linear), initial=0.0)), 0.0)
@@ -230,7 +230,7 @@ def _weigh_first(problem: DesignProblem, box: Box, place: Place, region: TrustRe
         region.weight = 10.0 * max(steep, 1e-3) / max(flat, 1e-3)
 
 
-def value_of(problem: DesignProblem, box: Box, place: Place, d: Floats, r: Floats) -> float:
+def _value(problem: DesignProblem, box: Box, place: Place, d: Floats, r: Floats) -> float:
     """F of residuals r after a step."""
     price = problem.price(box.y(place.z + d))
     if problem.objective is Objective.WORST_CASE:

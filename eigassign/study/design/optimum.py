@@ -58,6 +58,7 @@ BEHIND, FAR_BEHIND = 3, 2.0  # starts of a variant, and how much worse than the 
 REFINED = 3  # optima on few samples that are followed on all
 AGREED = 3  # starts, and half the parameters more, for each optimum seen that lead to the best
 SAME = 1e-4  # relative, in F: optima of the same worth
+NOTHING = 1e-14  # of F: no error
 PERCENT = {Objective.LEAST_SQUARES: 1e4, Objective.WORST_CASE: 1e2}  # of F: what prices count in
 
 
@@ -162,7 +163,7 @@ def _search_all(
             search.run(start)
             if search.ended or search.agreed(keys.starts):
                 break
-            if best_of and search.falls_behind(min(worth(optima[0]) for _, optima, _ in best_of)):
+            if keys.starts == "auto" and search.falls_behind([o[0] for _, o, _ in best_of]):
                 break
         solves += search.variant.response.exact_solves
         for task in tasks[1:]:
@@ -271,26 +272,31 @@ class _Search:
     def _stop(self) -> End | None:
         return self.ended or (End.SECONDS if monotonic() > self.deadline else None)
 
-    def falls_behind(self, best: tuple[float, float]) -> bool:
-        """Whether some starts came nowhere near what another variant has: more would not either."""
-        if len(self.optima) < BEHIND:
+    def falls_behind(self, others: Sequence[Optimum]) -> bool:
+        """Whether some starts came nowhere near what ``others`` have: more would not either."""
+        if len(self.optima) < BEHIND or not others:
             return False
-        violation, objective = min(map(worth, self.optima))
-        return (violation, objective) > (FAR_BEHIND * best[0], FAR_BEHIND * best[1])
+        own, best = (worth(best_first(optima, worth)[0]) for optima in (self.optima, others))
+        if own[0] > FAR_BEHIND * max(best[0], MET):
+            return True
+        return own[0] >= best[0] - MET and own[1] > best[1] + (FAR_BEHIND - 1.0) * abs(best[1])
 
     def agreed(self, starts: int | str) -> bool:
-        """Whether enough starts led to the best optimum: more where others were seen."""
+        """Whether enough starts led to the best optimum: more where others were seen.
+
+        No errors at all cannot be improved; a price, which may be negative, can.
+        """
         if isinstance(starts, int) or not self.optima:
             return False
-        best = worth(best_first(self.optima, worth)[0])
+        problem, best = self.variant.problem, worth(best_first(self.optima, worth)[0])
+        if problem.prices is None and best[0] <= MET and best[1] <= NOTHING:
+            return True
+        least = best[1] + SAME * abs(best[1]) + NOTHING
         same = [
-            o
-            for o in self.optima
-            if o.seen.violation <= best[0] + MET and o.objective <= best[1] * (1.0 + SAME) + 1e-16
+            o for o in self.optima if o.seen.violation <= best[0] + MET and o.objective <= least
         ]
-        seen = len(distinct(self.optima, self.variant.problem))
-        enough = (AGREED + len(self.variant.problem.lower) // 2) * seen
-        return len(same) >= enough or (best[0] <= MET and best[1] <= 1e-14)
+        enough = AGREED + len(problem.lower) // 2
+        return len(same) >= enough * len(distinct(self.optima, problem))
 
 
 def _continued(before: Optimum, found: Optimum) -> Optimum:

@@ -89,3 +89,11 @@ def test_starts_that_agree_on_a_poor_optimum_are_not_enough(tmp_path: Path) -> N
     found = found_of(tmp_path, MANY_OPTIMA, [])
     assert found.best.objective == pytest.approx(0.04689, rel=1e-3)
     assert len(found.optima) > 1
+
+
+def test_a_price_below_that_of_the_initial_design_is_no_reason_to_stop(tmp_path: Path) -> None:
+    """F is negative there, and may well be lower elsewhere."""
+    priced = MANY_OPTIMA[: MANY_OPTIMA.index("targets:")].replace("12 mm}", "12 mm, price: 2 / mm}")
+    found = found_of(tmp_path, priced + "targets: [{mode: 1, at_least: 10 Hz}]\n", [])
+    assert found.best.objective < 0.0
+    assert found.starts >= 3
