@@ -21,7 +21,7 @@ from eigassign.case.schema.parts import FrozenDict, Quantity
 from eigassign.case.schema.study import AssignmentKeys, ExpansionKeys, ValidationKeys
 from eigassign.case.schema.targets import Requirement, TargetForm, requirements
 from eigassign.case.schema.trajectory import TrajectoryForm, named_trajectories
-from eigassign.errors import Problem
+from eigassign.errors import CaseError, Problem
 
 _STEP = re.compile(r"\[(\d+)\]|([^.\[\]]+)")  # of a key path: targets[0].mode
 
@@ -77,6 +77,16 @@ class CaseFile:
             path = ("mechanism", *path)  # paths of properties start below `mechanism`
         mark = self.marks.find(path)
         return Problem(str(self.path), mark.line, mark.column, dotted(path), message)
+
+    def require(self, command: str, needs: Mapping[str, tuple[bool, str]]) -> None:
+        """Raise CaseError naming every key of ``needs`` (whether it is given, what for) missing."""
+        problems = tuple(
+            self.problem(key, f"is missing, and {command} needs it: {why}")
+            for key, (given, why) in needs.items()
+            if not given
+        )
+        if problems:
+            raise CaseError(problems)
 
     @property
     def coordinate_units(self) -> tuple[str, ...]:

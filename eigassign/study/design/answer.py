@@ -17,7 +17,7 @@ from eigassign.assignment import Assignment, hz_from_lam
 from eigassign.assignment.design_problem import MET
 from eigassign.assignment.sequential import End
 from eigassign.case import CaseFile
-from eigassign.errors import AccuracyError, CaseError, InfeasibleError
+from eigassign.errors import AccuracyError, InfeasibleError
 from eigassign.study.design.clearance import Clearance
 from eigassign.study.design.conclusions import (
     Conflict,
@@ -54,13 +54,7 @@ def require_assignable(file: CaseFile) -> None:
         "design": (bool(file.design.parameters), "at least one parameter that may change"),
         "targets": (bool(file.targets), "at least one target"),
     }
-    problems = tuple(
-        file.problem(key, f"is missing, and optimize needs it: {why}")
-        for key, (given, why) in needs.items()
-        if not given
-    )
-    if problems:
-        raise CaseError(problems)
+    file.require("optimize", needs)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,6 @@ from eigassign._version import __version__
 from eigassign.assignment.identification import Identified, MeasuredFrequencies, identify
 from eigassign.assignment.sequential import End
 from eigassign.case import CaseFile
-from eigassign.errors import CaseError
 from eigassign.modal.model import Model
 from eigassign.study.built_case import Case
 from eigassign.study.design.judgement import NEAR
@@ -152,13 +151,7 @@ def require_updatable(file: CaseFile) -> None:
         "design": (bool(file.design.parameters), "at least one parameter that is not known"),
         "measurements": (file.measurements is not None, "frequencies that were measured"),
     }
-    problems = tuple(
-        file.problem(key, f"is missing, and update needs it: {why}")
-        for key, (given, why) in needs.items()
-        if not given
-    )
-    if problems:
-        raise CaseError(problems)
+    file.require("update", needs)
 
 
 @dataclass(frozen=True)
