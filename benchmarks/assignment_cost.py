@@ -31,7 +31,7 @@ from references import oracle
 from scipy.sparse import linalg
 
 import eigassign as ea
-from eigassign.assignment.sequential import Optimum, minimise
+from eigassign.assignment.exact.sequential import Optimum, minimise
 from eigassign.pipeline.run import prepare
 from eigassign.pipeline.stages import Stages
 from eigassign.study.design.optimum import Task, find_optimum, variant_of

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.assignment.branching import Catalogue, CatalogueSearch
-from eigassign.assignment.catalogue import held, solve_catalogue
+from eigassign.assignment.catalogues.branching import Catalogue, CatalogueSearch
+from eigassign.assignment.catalogues.linear import held, solve_catalogue
 from eigassign.assignment.checks import Floats, finite, frozen
 from eigassign.assignment.optimality import ACCEPT, best_candidate
 from eigassign.assignment.program import (

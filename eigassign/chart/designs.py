@@ -5,7 +5,7 @@
     sequential, several starts     all that `optimize` does to find the optimum
     SLSQP, differential evolution  SciPy's searches on exact eigenvalues
 
-The objective is the one that `optimize` makes small, F of `eigassign.assignment.sequential`: the
+The objective is the one that `optimize` makes small, F of `assignment.exact.design_problem`: the
 mean square of f/f_d − 1 with the weights of targets and time.
 """
 
@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, differential_evolution, minimize
 
 from eigassign.assignment import Assignment
-from eigassign.assignment.design_problem import DesignProblem
-from eigassign.assignment.requirements import Frequencies
-from eigassign.assignment.sequential import minimise
+from eigassign.assignment.exact.design_problem import DesignProblem
+from eigassign.assignment.exact.requirements import Frequencies
+from eigassign.assignment.exact.sequential import minimise
 from eigassign.case import CaseFile
 from eigassign.chart.effort import Effort, suited
 from eigassign.chart.question import SEED

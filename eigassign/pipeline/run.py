@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment import Assignment
-from eigassign.assignment.sequential import End
+from eigassign.assignment.exact.sequential import End
 from eigassign.errors import EigassignError
 from eigassign.modal.expansion import Expansion
 from eigassign.output.cache import Cache, default_directory

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment import Assignment, hz_from_lam
-from eigassign.assignment.design_problem import MET
-from eigassign.assignment.sequential import End
+from eigassign.assignment.exact.design_problem import MET
+from eigassign.assignment.exact.sequential import End
 from eigassign.case import CaseFile
 from eigassign.errors import AccuracyError, InfeasibleError
 from eigassign.study.design.clearance import Clearance

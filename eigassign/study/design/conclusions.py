@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment import Catalogue
-from eigassign.assignment.choosing import choose
-from eigassign.assignment.design_problem import MET, Appraisal, DesignProblem
-from eigassign.assignment.requirements import Requirements
-from eigassign.assignment.sequential import OPTIMAL, End, Optimum, minimise
-from eigassign.assignment.stationarity import active_limits, stationarity
+from eigassign.assignment.catalogues.choosing import choose
+from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
+from eigassign.assignment.exact.requirements import Requirements
+from eigassign.assignment.exact.sequential import OPTIMAL, End, Optimum, minimise
+from eigassign.assignment.exact.stationarity import active_limits, stationarity
 from eigassign.errors import EigassignError
 from eigassign.study.design.optimum import Found, Variant
 from eigassign.study.scene import Scene

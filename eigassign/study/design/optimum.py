@@ -1,7 +1,7 @@
 """The design that meets a case's targets best, by the sequential method on exact frequencies.
 
-What the case file asks for becomes requirements (`eigassign.assignment.requirements`). A band to
-keep out of leaves a choice: on a connected trajectory it is clear if and only if the number k of
+What the case file asks for becomes requirements (`assignment.exact.requirements`). A band to keep
+out of leaves a choice: on a connected trajectory it is clear if and only if the number k of
 modes below it is the same everywhere, so every k that the bounds may allow is tried, and the best
 kept.
 """
@@ -19,17 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment import Bounds, LinearConstraint
-from eigassign.assignment.choosing import KEPT, RELAXED, Chosen, choose
-from eigassign.assignment.design_problem import MET, Box, DesignProblem, Objective, best_first
-from eigassign.assignment.feasibility import constraints_agree
-from eigassign.assignment.requirements import (
+from eigassign.assignment.catalogues.choosing import KEPT, RELAXED, Chosen, choose
+from eigassign.assignment.exact.design_problem import MET, Box, DesignProblem, Objective, best_first
+from eigassign.assignment.exact.requirements import (
     Frequencies,
     FrequencyLimit,
     FrequencyTarget,
     QuantityLimit,
     Requirements,
 )
-from eigassign.assignment.sequential import End, Optimum, distinct, minimise, worth
+from eigassign.assignment.exact.sequential import End, Optimum, distinct, minimise, worth
+from eigassign.assignment.feasibility import constraints_agree
 from eigassign.errors import CaseError, EigassignError, InfeasibleError, LostModeError
 from eigassign.study.design.clearance import Band, Clearance, prove_clear, wanting
 from eigassign.study.design.followed import Follower, followers

@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.assignment.requirements import Frequencies
+from eigassign.assignment.exact.requirements import Frequencies
 from eigassign.errors import AccuracyError, EigassignError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.arguments import DENSE_LIMIT

@@ -12,8 +12,8 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.design_problem import MET, Appraisal
-from eigassign.assignment.requirements import Requirements
+from eigassign.assignment.exact.design_problem import MET, Appraisal
+from eigassign.assignment.exact.requirements import Requirements
 from eigassign.errors import EigassignError
 from eigassign.study.design.answer import Answer, active_rows
 from eigassign.study.design.followed import Solved

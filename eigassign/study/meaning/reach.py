@@ -15,9 +15,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.design_problem import Appraisal, DesignProblem
-from eigassign.assignment.requirements import FrequencyTarget, Requirements
-from eigassign.assignment.sequential import minimise
+from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem
+from eigassign.assignment.exact.requirements import FrequencyTarget, Requirements
+from eigassign.assignment.exact.sequential import minimise
 from eigassign.errors import EigassignError
 from eigassign.study.design.followed import Solved, followers, solve_design
 from eigassign.study.design.judgement import curve_range, errors_of, least_errors

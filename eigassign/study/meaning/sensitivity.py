@@ -12,8 +12,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.design_problem import Appraisal, DesignProblem, Objective
-from eigassign.assignment.requirements import FrequencyLimit, Requirements
+from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, Objective
+from eigassign.assignment.exact.requirements import FrequencyLimit, Requirements
 from eigassign.case import CaseFile
 from eigassign.study.design.optimum import MASS
 from eigassign.study.design.wanted import Wanted

@@ -15,8 +15,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.design_problem import MET, Appraisal, DesignProblem
-from eigassign.assignment.sequential import Optimum, minimise
+from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
+from eigassign.assignment.exact.sequential import Optimum, minimise
 from eigassign.errors import EigassignError
 from eigassign.study.design.optimum import Found
 from eigassign.study.meaning.sensitivity import as_error, error_kind

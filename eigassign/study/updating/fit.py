@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign._version import __version__
-from eigassign.assignment.identification import Identified, MeasuredFrequencies, identify
-from eigassign.assignment.sequential import End
+from eigassign.assignment.exact.identification import Identified, MeasuredFrequencies, identify
+from eigassign.assignment.exact.sequential import End
 from eigassign.case import CaseFile
 from eigassign.modal.model import Model
 from eigassign.study.built_case import Case

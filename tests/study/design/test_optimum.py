@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scenes import SHIPPED, scene_of
 
-from eigassign.assignment.requirements import Frequencies
-from eigassign.assignment.sequential import End
+from eigassign.assignment.exact.requirements import Frequencies
+from eigassign.assignment.exact.sequential import End
 from eigassign.study.design.optimum import Found, find_optimum
 from eigassign.study.design.response import ExactResponse
 from eigassign.study.design.wanted import target_frequencies

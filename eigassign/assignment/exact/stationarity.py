@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from eigassign.assignment.checks import Floats
-from eigassign.assignment.design_problem import (
+from eigassign.assignment.exact.design_problem import (
     ON,
     TINY,
     Appraisal,

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from eigassign.assignment.branching import (
+from eigassign.assignment.catalogues.branching import (
     Catalogue,
     CatalogueSearch,
     Effort,
@@ -24,9 +24,9 @@ from eigassign.assignment.branching import (
     search_catalogue,
 )
 from eigassign.assignment.checks import Floats
-from eigassign.assignment.design_problem import MET, DesignProblem, best_first
+from eigassign.assignment.exact.design_problem import MET, DesignProblem, best_first
+from eigassign.assignment.exact.sequential import End, Optimum, minimise, worth
 from eigassign.assignment.program import Bounds
-from eigassign.assignment.sequential import End, Optimum, minimise, worth
 from eigassign.errors import AccuracyError, EigassignError, InfeasibleError
 
 RELAXED = 3  # starts of the relaxation of all combinations

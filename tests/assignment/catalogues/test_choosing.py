@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from eigassign.assignment.branching import Catalogue
-from eigassign.assignment.choosing import choose
-from eigassign.assignment.design_problem import MET, Appraisal, DesignProblem
+from eigassign.assignment.catalogues.branching import Catalogue
+from eigassign.assignment.catalogues.choosing import choose
+from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
+from eigassign.assignment.exact.sequential import minimise
 from eigassign.assignment.program import LinearConstraint
-from eigassign.assignment.sequential import minimise
 from eigassign.errors import InfeasibleError
 
 pytestmark = pytest.mark.slow  # half a minute each; the pipeline has a short one

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.checks import Floats
-from eigassign.assignment.crossing import Pairs
+from eigassign.assignment.exact.crossing import Pairs
 from eigassign.assignment.program import LinearConstraint, ScaledProgram
 from eigassign.assignment.solver import solve_scaled
 

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.branching import (
+from eigassign.assignment.catalogues.branching import (
     Catalogue,
     CatalogueSearch,
     Combination,

@@ -7,8 +7,8 @@ import pytest
 from assignment_problems import goal
 
 from eigassign.assignment import Bounds, LinearConstraint, build_program
-from eigassign.assignment.branching import Catalogue, Effort
-from eigassign.assignment.catalogue import solve_catalogue
+from eigassign.assignment.catalogues.branching import Catalogue, Effort
+from eigassign.assignment.catalogues.linear import solve_catalogue
 from eigassign.errors import AccuracyError, InfeasibleError, UsageError
 
 

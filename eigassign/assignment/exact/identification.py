@@ -32,8 +32,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from eigassign.assignment.checks import Floats, frozen
-from eigassign.assignment.design_problem import Appraisal, DesignProblem
-from eigassign.assignment.sequential import End, Optimum, minimise
+from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem
+from eigassign.assignment.exact.sequential import End, Optimum, minimise
 from eigassign.errors import EigassignError
 
 Bools = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import least_squares, linprog, minimize
 
 from eigassign.assignment import Bounds
-from eigassign.assignment.branching import Catalogue, Effort, hull, search_catalogue
+from eigassign.assignment.catalogues.branching import Catalogue, Effort, hull, search_catalogue
 from eigassign.errors import AccuracyError, InfeasibleError, UsageError
 
 

@@ -17,7 +17,7 @@ from enum import StrEnum
 import numpy as np
 
 from eigassign.assignment.checks import Floats, frozen
-from eigassign.assignment.design_problem import (
+from eigassign.assignment.exact.design_problem import (
     MET,
     ON,
     Appraisal,
@@ -27,9 +27,9 @@ from eigassign.assignment.design_problem import (
     best_first,
     merit,
 )
+from eigassign.assignment.exact.stationarity import Limit, active_limits, stationarity
+from eigassign.assignment.exact.step import SMALLEST, Move, TrustRegion, step_program
 from eigassign.assignment.program import SNAP
-from eigassign.assignment.stationarity import Limit, active_limits, stationarity
-from eigassign.assignment.step import SMALLEST, Move, TrustRegion, step_program
 from eigassign.errors import EigassignError
 
 FIRST, LARGEST = 0.3, 1.0  # trust region, of the bounds

@@ -12,10 +12,15 @@ from scipy.linalg import eigh
 from scipy.optimize import least_squares, minimize
 
 from eigassign.assignment import LinearConstraint
-from eigassign.assignment.design_problem import Appraisal, DesignProblem, Objective, best_first
-from eigassign.assignment.requirements import FrequencyLimit, QuantityLimit, Requirements
-from eigassign.assignment.sequential import End, minimise
-from eigassign.assignment.stationarity import stationarity
+from eigassign.assignment.exact.design_problem import (
+    Appraisal,
+    DesignProblem,
+    Objective,
+    best_first,
+)
+from eigassign.assignment.exact.requirements import FrequencyLimit, QuantityLimit, Requirements
+from eigassign.assignment.exact.sequential import End, minimise
+from eigassign.assignment.exact.stationarity import stationarity
 from eigassign.errors import AccuracyError
 
 TIME = np.linspace(0.0, 1.0, 40)

@@ -9,15 +9,15 @@ import pytest
 from scipy.optimize import minimize
 
 from eigassign.assignment import LinearConstraint
-from eigassign.assignment.design_problem import DesignProblem, Objective
-from eigassign.assignment.requirements import (
+from eigassign.assignment.exact.design_problem import DesignProblem, Objective
+from eigassign.assignment.exact.requirements import (
     Frequencies,
     FrequencyLimit,
     FrequencyTarget,
     Requirements,
 )
-from eigassign.assignment.sequential import End, Optimum, minimise
-from eigassign.assignment.stationarity import stationarity
+from eigassign.assignment.exact.sequential import End, Optimum, minimise
+from eigassign.assignment.exact.stationarity import stationarity
 
 N = 12
 TIME = np.linspace(0.0, 1.0, N)

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.checks import Floats
-from eigassign.assignment.design_problem import (
+from eigassign.assignment.exact.design_problem import (
     MET,
     TINY,
     Box,

@@ -10,7 +10,7 @@ row, the rows on either side of that part, along the direction in which they dif
 Combinations are found by rounding to the nearest rows, and by looking at all those of a small node;
 a node is dropped when its bound is not below the worst of the combinations kept.
 
-The tree is searched over the linear model in `catalogue`, and here over any model whose relaxations
+The tree is searched over the linear model in `linear`, and here over any model whose relaxations
 the caller solves (`search_catalogue`).
 """
 

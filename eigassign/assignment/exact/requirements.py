@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.checks import Floats
-from eigassign.assignment.crossing import Pairs, joined
-from eigassign.assignment.design_problem import Appraisal, Objective
+from eigassign.assignment.exact.crossing import Pairs, joined
+from eigassign.assignment.exact.design_problem import Appraisal, Objective
 
 
 @dataclass(frozen=True)
