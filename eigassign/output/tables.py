@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from eigassign.output.formats import number, percent, residual, seconds
+from eigassign.study.design.judgement import MET
 from eigassign.study.results import (
     Comparison,
     ErrorSummary,
@@ -14,8 +15,6 @@ from eigassign.study.results import (
     TargetStudy,
     ValidationRow,
 )
-
-ROUND_OFF = 1e-8  # relative violation of a limit that is met
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ def headline(results: RunResults) -> str | None:
     before, after = said(error.initial.max_relative), said(error.exact.max_relative)
     distance = f"{what}: {before} before, {after} after{beside}, by exact eigenvalues."
     worst = max((each.initial.max_relative for each in limits), default=0.0)
-    if not alone and worst > ROUND_OFF:
+    if not alone and worst > MET:
         left = _violation(max(each.exact.max_relative for each in limits))
         distance += f" Worst violation of a limit: {percent(worst)} before, {left} after."
     if row is None:
@@ -148,11 +147,11 @@ def required(results: RunResults) -> Table:
 
 
 def _violated(worst: float) -> str:
-    return f"violated by {percent(worst)}" if worst > ROUND_OFF else "met"
+    return f"violated by {percent(worst)}" if worst > MET else "met"
 
 
 def _violation(worst: float) -> str:
-    return percent(worst if worst > ROUND_OFF else 0.0)
+    return percent(worst if worst > MET else 0.0)
 
 
 def clearances(results: RunResults) -> Table:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from eigassign.assignment.exact.design_problem import MET, Appraisal
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.errors import EigassignError
+from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.study.design.answer import Answer, active_rows
 from eigassign.study.design.followed import Solved
 from eigassign.study.design.optimum import Found, Task, variant_of
@@ -37,9 +38,6 @@ class Studies(StrEnum):
     ALL = "all"
 
 
-SMALL = 220  # unknowns: up to here two exact solves a pose are cheap even where nothing is missed
-
-
 def study_meaning(
     scene: Scene,
     answer: Answer,
@@ -53,7 +51,9 @@ def study_meaning(
     Whether a target that is missed by more than ``max_error`` can be reached is always studied.
     """
     missed = any(misses(w, exact, max_error) for w in wanted)
-    asked_for = studies is Studies.ALL or (studies is Studies.CHEAP and scene.model.n_dof <= SMALL)
+    # two exact solves a pose are cheap for small models, even where nothing is missed
+    small = scene.model.n_dof <= DENSE_LIMIT
+    asked_for = studies is Studies.ALL or (studies is Studies.CHEAP and small)
     ranges = proved_ranges(scene) if missed or asked_for else None
     beyond = tuple(unreachable(scene, wanted, answer.y, exact, max_error, ranges))
     reach = () if ranges is None else tuple(reach_rows(wanted, ranges))

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import AccuracyError
+from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.modal.reduced.reduce import reduce
 from eigassign.study.design.followed import Follower, Solved, followers, solve_design
 from eigassign.study.design.judgement import curve_range, errors_of, worst_errors
@@ -25,7 +26,6 @@ from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 DRAWS = 64  # a power of two, as Sobol's points want
-LARGE = 220  # unknowns: a reduced model answers from here on
 POINTS = 5  # poses along the trajectory about which it is made
 DOUBTFUL = 0.01  # estimate of its error, relative, with which nothing can be said
 
@@ -58,10 +58,10 @@ def study_tolerance(
 
         points = qmc.Sobol(len(drawn), seed=0).random_base2(DRAWS.bit_length() - 1)
         designs[:, drawn] = lower[drawn] + points * (upper - lower)[drawn]
-        if scene.model.n_dof > LARGE:
+        if scene.model.n_dof > DENSE_LIMIT:
             if own:
                 raise AccuracyError(
-                    f"modes of more than {LARGE} unknowns are not followed through tolerances"
+                    f"modes of more than {DENSE_LIMIT} unknowns are not followed through tolerances"
                 )
             ranges = reduced_ranges(scene, y, exact.hz.shape[1])
     lowest, highest = exact, exact
