@@ -334,7 +334,8 @@ def _asked(target: TargetForm) -> str:
         if isinstance(target.keep_out, tuple):
             return "clear of {:g} … {:g} Hz".format(*target.keep_out)
         band = target.keep_out
-        return f"clear of {band.harmonic:g} times {_in_hz(band.of)} ± {100 * band.margin:g} %"
+        times = "" if band.harmonic == 1.0 else f"{band.harmonic:g} times "
+        return f"clear of {times}{_in_hz(band.of)} ± {100 * band.margin:g} %"
     words = {"frequency": "at", "at_least": "at least", "at_most": "at most"}
     return f"{words[target.kind]} {_in_hz(target.curve)}"
 

@@ -83,6 +83,11 @@ def test_a_target_comes_to_one_requirement_for_each_mode(
     ]
 
 
+def test_the_first_harmonic_is_called_by_its_frequency() -> None:
+    target = "{keep_out: {harmonic: 1, of: 48 Hz, margin: 10 %}}"
+    assert with_target(target).requirements[0].label == "every mode clear of 48 Hz ± 10 %"
+
+
 def test_requirements_are_called_by_what_they_ask_for() -> None:
     assert [each.label for each in with_target(*KINDS.values()).requirements] == [
         "mode 1 at 190 Hz",
