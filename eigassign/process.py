@@ -8,6 +8,7 @@ import errno
 import gc
 import io
 import os
+import re
 import signal
 import sys
 import threading
@@ -77,8 +78,28 @@ def report(error: BaseException, debug: bool = False) -> int:
 def say(lines: Iterable[str]) -> None:
     """Write lines to stderr; if that is closed only the exit code is left."""
     with suppress(OSError, AttributeError, ValueError):
+        colours = shows_colours(sys.stderr)
         for line in lines:
-            sys.stderr.write(f"{line}\n")
+            sys.stderr.write(f"{_coloured(line) if colours else line}\n")
+
+
+def shows_colours(stream: TextIO) -> bool:
+    """Whether it is a terminal that shows them, and nobody set NO_COLOR (no-color.org)."""
+    dull = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
+    return stream.isatty() and not dull
+
+
+_BEGINNING = re.compile(r"(.+?:\d+:\d+: )?(eigassign: |warning: )?")
+_SHADES = {"eigassign: ": "31", "warning: ": "33"}  # red, yellow
+
+
+def _coloured(line: str) -> str:
+    """The place in a file in bold, and the word that says what kind of line it is in colour."""
+    found = _BEGINNING.match(line)
+    place, word = found.groups("") if found else ("", "")
+    bold = f"\x1b[1m{place}\x1b[0m" if place else ""
+    kind = f"\x1b[1;{_SHADES[word]}m{word}\x1b[0m" if word else ""
+    return f"{bold}{kind}{line[len(place + word) :]}"
 
 
 def problem_lines(problems: Sequence[Problem]) -> list[str]:

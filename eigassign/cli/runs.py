@@ -128,10 +128,10 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
 
         print_json({"run_folder": str(done.folder), **document(done.results)})
     else:
-        from eigassign.output.console import print_tables
+        from eigassign.output.console import print_tables, print_verdict
         from eigassign.output.update_report import console_tables, headline
 
-        click.echo(headline(done.results))
+        print_verdict(headline(done.results))
         print_tables(console_tables(done.results))
         click.echo(f"{done.folder} written in {sum(done.results.timing_s.values()):.2f} s")
     return 0 if done.results.verdict == "fitted" else 1

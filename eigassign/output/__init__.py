@@ -9,6 +9,7 @@ In reading order; each imports from those above it only:
     reduced_file   a reduced model in one file
     result_files   results.json and the CSV files
     tables         the tables of a run as text
+    terminal       the widths of tables that fit a terminal
     console        results on stdout, progress on stderr
     batch_summary  summary.csv and junit.xml of a batch
     figures        the figures of runs, modes and charts, through matplotlib

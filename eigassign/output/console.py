@@ -6,6 +6,7 @@ import contextlib
 import io
 import math
 import sys
+import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TextIO
 
@@ -14,11 +15,17 @@ from rich.console import Console
 from rich.table import Table as RichTable
 from rich.text import Text
 
+from eigassign import process
 from eigassign.output import tables as summary
+from eigassign.output import terminal
 from eigassign.output.formats import number
 from eigassign.study.results import RunResults, ValidationRow
 
-_ENDLESS = 100_000  # columns: off a terminal nothing is wrapped or cut
+_COLOURS = {
+    "green": {"reached", "met", "ok", "proved", "fitted"},
+    "yellow": {"improved", "unfinished"},
+    "red": {"unreachable", "infeasible", "do not use", "violated", "failed", "no", "error"},
+}
 
 
 def print_table(
@@ -29,36 +36,67 @@ def print_table(
     caption: str = "",
     stream: TextIO | None = None,
 ) -> None:
-    """A table of finished text; none of it is read as markup, and no cell is cut."""
+    """A table of finished text; none of it is read as markup.
+
+    Where it is wider than the terminal, lines end between words, long words (paths) are shortened
+    in the middle, and columns that still find no room follow in a table below, behind the first.
+    """
     out = sys.stdout if stream is None else stream
-    table = RichTable(box=box.SIMPLE_HEAD if _speaks_unicode(out) else box.ASCII2, pad_edge=False)
-    for at, column in enumerate(columns):
-        right = at > 0 and all(_is_number(row[at]) for row in rows)
-        table.add_column(Text(column), justify="right" if right else "left", overflow="fold")
-    for row in rows:
-        table.add_row(*(Text(_printable(cell)) for cell in row))
-    _print(out, [Text(_printable(title), style="bold")] if title else [], table, caption)
+    width, unicode = terminal.width(out), _speaks_unicode(out)
+    cells = [[_printable(cell) for cell in row] for row in rows]
+    every = [[row[k] for row in cells] for k in range(len(columns))]
+    console, text = _console(out, width)
+    if title:
+        console.print(Text(_printable(title), style="bold"), soft_wrap=True)
+    for group in terminal.groups(columns, every, width):
+        table = RichTable(
+            box=box.SIMPLE_HEAD if unicode else box.ASCII2,
+            show_edge=False,
+            pad_edge=False,
+            collapse_padding=True,
+        )
+        for k, room in group:
+            justify = "right" if k > 0 and terminal.are_numbers(every[k]) else "left"
+            header = terminal.fitted(columns[k], room, unicode)
+            table.add_column(Text(header), justify=justify, width=room)
+        for row in cells:
+            fitted = (terminal.fitted(row[k], room, unicode) for k, room in group)
+            table.add_row(*(Text(cell, style=_colour(cell)) for cell in fitted))
+        console.print(table)
+    _write_paragraph(console, caption)
+    lines = [line.rstrip() for line in text.getvalue().splitlines()]
+    write_text(out, "\n".join(line for line in lines if line) + "\n\n")
 
 
-def _print(out: TextIO, heading: list[Text], table: RichTable, caption: str) -> None:
-    terminal = out.isatty()
-    text = io.StringIO()
+def _console(out: TextIO, width: int) -> tuple[Console, io.StringIO]:
+    """A console of rich that writes into a text, in colours where ``out`` shows them."""
+    text, colours = io.StringIO(), process.shows_colours(out)
     console = Console(
         file=text,
-        force_terminal=terminal,
-        width=None if terminal else _ENDLESS,
-        color_system="auto" if terminal else None,
+        force_terminal=colours,
+        width=width,
+        color_system="standard" if colours else None,
         markup=False,
         highlight=False,
         emoji=False,
     )
-    for line in heading:
-        console.print(line, soft_wrap=True)
-    console.print(table)
-    if caption:
-        console.print(Text(_printable(caption)), soft_wrap=True)
-    lines = [line.rstrip() for line in text.getvalue().splitlines()]
-    write_text(out, "\n".join(line for line in lines if line) + "\n\n")
+    return console, text
+
+
+def _write_paragraph(console: Console, text: str, style: str = "") -> None:
+    """Lines that end between words only; a word longer than the line is left to the terminal."""
+    for line in textwrap.wrap(
+        _printable(text), console.width, break_long_words=False, break_on_hyphens=False
+    ):
+        console.print(Text(line, style=style), soft_wrap=True)
+
+
+def _colour(cell: str) -> str:
+    """Of a verdict; nothing else has one."""
+    word = cell.lower()
+    if word.startswith("violated by"):
+        return "red"
+    return next((colour for colour, words in _COLOURS.items() if word in words), "")
 
 
 def write_text(out: TextIO, text: str) -> None:
@@ -76,19 +114,19 @@ def _printable(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text.removesuffix("ms").rstrip("s% "))
-    except ValueError:
-        return False
-    return True
-
-
 def print_assignment(results: RunResults, *, stream: TextIO | None = None) -> None:
     """The verdict, then design, distances, limits, approximation and the solver's certificate."""
     if (line := summary.headline(results)) is not None:
-        write_text(sys.stdout if stream is None else stream, _printable(line) + "\n\n")
+        print_verdict(line, stream=stream)
     print_tables((t for t in summary.tables(results) if t.title != "Timing"), stream=stream)
+
+
+def print_verdict(line: str, *, stream: TextIO | None = None) -> None:
+    """The first sentence of a result, in the colour of its verdict."""
+    out = sys.stdout if stream is None else stream
+    console, text = _console(out, terminal.width(out))
+    _write_paragraph(console, line, _colour(line.partition(":")[0]))
+    write_text(out, text.getvalue() + "\n")
 
 
 def print_validation(rows: Sequence[ValidationRow], *, stream: TextIO | None = None) -> None:
@@ -142,18 +180,18 @@ def progress(
     On a terminal one line is rewritten; elsewhere every piece gets a line of its own.
     """
     out = sys.stderr if stream is None else stream
-    terminal, done = out.isatty(), 0
+    rewrites, done = out.isatty(), 0
 
     def advance(what: str = "") -> None:
         nonlocal done
         done += 1
         line = _printable(f"{label} {done}/{total} {what}".rstrip())
-        write_text(out, f"\r\x1b[2K{line[:78]}" if terminal else f"{line}\n")
+        write_text(out, f"\r\x1b[2K{line[:78]}" if rewrites else f"{line}\n")
         out.flush()
 
     try:
         yield advance
     finally:
-        if terminal and done:
+        if rewrites and done:
             write_text(out, "\r\x1b[2K")
             out.flush()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import io
 import os
 import signal
 import subprocess
@@ -17,7 +18,7 @@ from wrong_inputs import GOOD
 from eigassign.cli import main
 from eigassign.errors import AccuracyError, EigassignError, InfeasibleError, StorageError
 from eigassign.pipeline import queries, run
-from eigassign.process import Terminated, failure_of
+from eigassign.process import Terminated, failure_of, say
 
 ERRORS: list[tuple[BaseException, int, str]] = [
     (InfeasibleError("limits contradict each other", ("a", "b")), 1, "limits contradict"),
@@ -74,6 +75,32 @@ def test_a_bug_is_told_with_its_place_and_with_a_traceback_only_when_asked(
 def test_a_case_error_is_no_bug_even_where_it_wraps_another() -> None:
     assert failure_of(StorageError("x")).exit_code == 3
     assert failure_of(BrokenPipeError(errno.EPIPE, "Broken pipe")).summary == ""
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_errors_and_warnings_have_colours_on_a_terminal_only(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("TERM", "xterm-256color")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    lines = ["eigassign: error: no", "a.yaml:3:1: warning: thin", "a.yaml:4:2: title: missing"]
+
+    def said(stream: io.StringIO) -> list[str]:
+        monkeypatch.setattr(sys, "stderr", stream)
+        say(lines)
+        return stream.getvalue().splitlines()
+
+    error, warning, problem = said(Terminal())
+    assert error == "\x1b[1;31meigassign: \x1b[0merror: no"
+    assert warning == "\x1b[1ma.yaml:3:1: \x1b[0m\x1b[1;33mwarning: \x1b[0mthin"
+    assert problem == "\x1b[1ma.yaml:4:2: \x1b[0mtitle: missing"
+    assert said(io.StringIO()) == lines
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert said(Terminal()) == lines
 
 
 def test_help_imports_click_and_nothing_heavy() -> None:

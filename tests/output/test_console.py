@@ -53,19 +53,71 @@ def test_brackets_are_text_and_not_markup():
         assert words in text
 
 
-def test_long_cells_are_neither_wrapped_nor_cut_off_terminal(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "40")
+def test_long_cells_are_neither_wrapped_nor_cut_off_terminal():
     out, path = piped(), "/a/very/long/path" * 30
     console.print_table("paths", ("name", "path"), [("x", path)], stream=out)
     assert f" {path}" in read(out)
 
 
-def test_a_terminal_gets_whole_cells_too(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "30")
+@pytest.mark.parametrize("columns", [40, 60, 80, 120])
+def test_all_tables_of_a_run_fit_the_width_and_break_no_word(columns, monkeypatch):
+    wide, narrow = piped(), piped()
+    console.print_assignment(make_results(), stream=wide)
+    monkeypatch.setenv("COLUMNS", str(columns))
+    console.print_assignment(make_results(), stream=narrow)
+    lines = read(narrow).splitlines()
+    assert max(map(len, lines)) <= columns
+    known = set(read(wide).split())
+    new = {word for line in lines for word in line.split()} - known
+    assert {word for word in new if set(word) != {"─"} and "…" not in word} == set()
+    if columns >= 60:
+        assert not any("…" in word for word in new)
+
+
+def test_long_paths_are_shortened_in_the_middle_on_a_narrow_terminal(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    out, path = Terminal(), "coordinates.shoulder_of_the_arm.drive.stiffness"
+    console.print_table("", ("name", "path", "value"), [("k", path, "1.5e+05")], stream=out)
+    (shown,) = [word for word in out.getvalue().split() if "…" in word]
+    head, tail = shown.split("…")
+    assert path.startswith(head)
+    assert path.endswith(tail)
+    assert min(len(head), len(tail)) > 10
+    assert "1.5e+05" in out.getvalue()
+    text = piped("ascii")
+    console.print_table("", ("name", "path"), [("k", path)], stream=text)
+    assert "..." in read(text)
+
+
+def test_rows_that_share_their_first_cell_are_named_by_two_in_every_part(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    out = piped()
+    rows = [("mode 1", "over q", "1" * 12, "2" * 12), ("mode 1", "over y", "3" * 12, "4" * 12)]
+    console.print_table("", ("mode", "where", "Taylor", "linear"), rows, stream=out)
+    found = [line.split() for line in read(out).splitlines()]
+    assert ["mode", "1", "over", "y", "3" * 12] in found
+    assert ["mode", "1", "over", "y", "4" * 12] in found
+
+
+def test_verdicts_have_colours_on_a_terminal_unless_nobody_wants_them(monkeypatch):
     monkeypatch.setenv("TERM", "xterm-256color")
-    out = Terminal()
-    console.print_table("paths", ("name", "path"), [("x", "y" * 100)], stream=out)
-    assert out.getvalue().count("y") == 100
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    rows = [("a", "met"), ("b", "VIOLATED"), ("c", "methane")]
+
+    def shown() -> str:
+        out = Terminal()
+        console.print_table("", ("limit", "verdict"), rows, stream=out)
+        console.print_verdict("Unreachable: mode 1 at 9 Hz", stream=out)
+        return out.getvalue()
+
+    text = shown()
+    for coloured in ("\x1b[32mmet", "\x1b[31mVIOLATED", "\x1b[31mUnreachable: mode 1"):
+        assert coloured in text
+    assert " methane" in text
+    for name, value in (("NO_COLOR", "1"), ("TERM", "dumb")):
+        with monkeypatch.context() as changed:
+            changed.setenv(name, value)
+            assert "\x1b" not in shown()
 
 
 def test_control_characters_do_not_reach_the_terminal():
