@@ -84,12 +84,12 @@ def test_where_no_combination_meets_the_limits_the_one_that_misses_them_least_is
 def test_combinations_keep_linear_limits() -> None:
     rng = np.random.default_rng(2)
     catalogues = lists(rng)
-    row = LinearConstraint("sum", np.array([1.0, 0.0, 1.0, 0.0, 0.0]), -np.inf, -0.2)
+    row = LinearConstraint("sum", np.array([1.0, 0.0, 1.0, 0.0, 0.0]), -np.inf, -1.2)
     problem = replace(curved(rng, 5, 7, 100.0), constraints=(row,))
     free = choose(replace(problem, constraints=()), catalogues, [np.zeros(5)])
     kept = choose(problem, catalogues, [np.zeros(5)])
-    assert free.optima[0].y[[0, 2]].sum() > -0.2  # the limit matters
-    assert all(optimum.y[[0, 2]].sum() <= -0.2 for optimum in kept.optima)
+    assert free.optima[0].y[[0, 2]].sum() > -1.2  # the limit matters
+    assert all(optimum.y[[0, 2]].sum() <= -1.2 for optimum in kept.optima)
     impossible = replace(row, upper=-3.0)
     with pytest.raises(InfeasibleError):
         choose(replace(problem, constraints=(impossible,)), catalogues, [np.zeros(5)])
