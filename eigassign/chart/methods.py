@@ -25,7 +25,7 @@ from eigassign.errors import AccuracyError
 from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.modal.exact.clusters import CLUSTER_GAP
 from eigassign.modal.exact.sparse import solve_sparse
-from eigassign.modal.expansion import expand, nearest
+from eigassign.modal.expansion import NearestExpansion, expand
 from eigassign.modal.fit.fit import MOST, Fit, PathFit, fit
 from eigassign.modal.fit.region import Box
 from eigassign.modal.model import Model
@@ -175,9 +175,10 @@ def _nearest_expansion(
     """Expansions about q (k, n_q) at the design y0, the nearest one evaluated."""
     pencil, modes = scene.model.pencil, scene.expansions.full.modes
     made = [expand(pencil, each, y0, modes, order, cluster_gap=cluster_gap) for each in q]
+    at = NearestExpansion(tuple(made))
 
     def evaluate(points: EvaluationPoints) -> Floats:
-        owner = nearest(made, points.q)
+        owner = at.owner(points.q)
         hz = np.empty((len(owner), len(modes)))
         for k in np.unique(owner):
             mine = owner == k

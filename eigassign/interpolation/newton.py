@@ -35,11 +35,11 @@ Ints = NDArray[np.intp]
 CANDIDATES = 129  # of an interval, as dense at its ends as Chebyshev points
 
 
-@lru_cache(maxsize=1)
-def interval() -> Floats:
-    """Candidates on [−1, 1], (`CANDIDATES`,)."""
-    nodes = -np.cos(np.pi * np.arange(CANDIDATES) / (CANDIDATES - 1))
-    nodes[CANDIDATES // 2] = 0.0
+@lru_cache(maxsize=4)
+def interval(count: int = CANDIDATES) -> Floats:
+    """So many places on [−1, 1], an odd number, as dense at the ends as Chebyshev points."""
+    nodes = -np.cos(np.pi * np.arange(count) / (count - 1))
+    nodes[count // 2] = 0.0
     nodes.setflags(write=False)
     return nodes
 
@@ -79,13 +79,15 @@ class Nodes:
     """At most ``most`` Leja points among candidates v (K,), with Newton's basis.
 
     They are ``whole`` if they are all that will be asked for. ``checks`` are further points, which
-    are never nodes and come after them where points are counted.
+    are never nodes and come after them where points are counted. ``domain`` is where the
+    interpolant will be used, all candidates unless given.
     """
 
     places: Floats
     most: int
     whole: bool = False
     checks: tuple[float, ...] = ()
+    domain: Floats | None = None
 
     @cached_property
     def chosen(self) -> Ints:
@@ -106,6 +108,11 @@ class Nodes:
     def table(self) -> Floats:
         """Newton's basis at all ``points``, (n_points, n_nodes)."""
         return basis(self.v, self.points)
+
+    @cached_property
+    def all_over(self) -> Floats:
+        """Newton's basis all over the ``domain``, (n_domain, n_nodes)."""
+        return basis(self.v, self.places if self.domain is None else self.domain)
 
     @cached_property
     def inverse(self) -> Floats:

@@ -371,19 +371,53 @@ class InverseExpansion:
 # --- Several expansions about points along a trajectory: each pose belongs to the nearest one
 
 
-def nearest(parts: Sequence[Expansion], q: Floats) -> NDArray[np.intp]:
-    """Which of ``parts`` each of q (n, n_q) is nearest to, in the variables of the series.
+@dataclass(frozen=True, eq=False)
+class NearestExpansion:
+    """Expansions of the same modes at the same design, of which the nearest one is evaluated.
 
-    Distances are |V (q − q0_k)|, so that coordinates on which nothing depends do not count.
+    Distances are |V (q − q0_k)| in the variables of the series, so that coordinates on which
+    nothing depends do not count.
     """
-    V = parts[0].directions[:, : len(parts[0].q0)]
-    away = [np.square((q - part.q0) @ V.T).sum(axis=1) for part in parts]
-    return np.asarray(np.argmin(away, axis=0), dtype=np.intp)
 
+    parts: tuple[Expansion, ...]
 
-def nearest_values(parts: Sequence[Expansion], q: Floats, values: Sequence[Floats]) -> Floats:
-    """Of ``values``, one array (n, …) for each of ``parts``, the nearest one's at each sample."""
-    if len(values) == 1:
-        return values[0]
-    owner = nearest(parts, q)
-    return np.asarray(np.array(values)[owner, np.arange(len(owner))])
+    @property
+    def modes(self) -> tuple[int, ...]:
+        """The modes expanded, in the order of the columns."""
+        return self.parts[0].modes
+
+    def owner(self, q: ArrayLike) -> NDArray[np.intp]:
+        """Which of ``parts`` each of q (n_samples, n_q) or (n_q,) is nearest to, (n_samples,)."""
+        rows = np.atleast_2d(np.asarray(q, dtype=np.float64))
+        V = self.parts[0].directions[:, : len(self.parts[0].q0)]
+        away = [np.square((rows - part.q0) @ V.T).sum(axis=1) for part in self.parts]
+        return np.asarray(np.argmin(away, axis=0), dtype=np.intp)
+
+    def eigenvalues(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """As `Expansion.eigenvalues`."""
+        return self.pick(q, [part.eigenvalues(q, y) for part in self.parts])
+
+    def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """As `Expansion.frequencies`."""
+        return self.pick(q, [part.frequencies(q, y) for part in self.parts])
+
+    def error_estimate(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """As `Expansion.error_estimate`."""
+        return self.pick(q, [part.error_estimate(q, y) for part in self.parts])
+
+    def linear_in_design(self, q: ArrayLike) -> tuple[Floats, Floats]:
+        """As `Expansion.linear_in_design`."""
+        l0, slopes = self.gradient(q)
+        return l0, slopes[:, :, len(self.parts[0].q0) :]
+
+    def gradient(self, q: ArrayLike) -> tuple[Floats, Floats]:
+        """As `Expansion.gradient`."""
+        values, slopes = zip(*(part.gradient(q) for part in self.parts), strict=True)
+        return self.pick(q, values), self.pick(q, slopes)
+
+    def pick(self, q: ArrayLike, values: Sequence[Floats]) -> Floats:
+        """Of values (n_samples, …) for each of ``parts``, the nearest one's at each sample."""
+        if len(values) == 1:
+            return values[0]
+        owner = np.broadcast_to(self.owner(q), len(values[0]))  # one pose and many designs
+        return np.asarray(np.array(values)[owner, np.arange(len(owner))])

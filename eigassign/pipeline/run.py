@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from eigassign.assignment import Assignment
 from eigassign.assignment.exact.sequential import End
 from eigassign.errors import EigassignError
-from eigassign.modal.expansion import Expansion
+from eigassign.modal.expansion import Expansion, NearestExpansion
 from eigassign.output.cache import Cache, default_directory
 from eigassign.pipeline.coefficient_files import coefficient_files
 from eigassign.pipeline.expansions import expand_plan
@@ -76,8 +76,9 @@ class Result:
     predicted_hz: Floats | None  # None of a limit
     exact_hz: Floats
     results: RunResults
-    expansion: Expansion  # full
-    linearised: Expansion
+    # about one point; or about several that `auto` took, the nearest of which is evaluated
+    expansion: Expansion | NearestExpansion  # full
+    linearised: Expansion | NearestExpansion
     assignment: Assignment | None  # the paper's one shot, where the case has one
 
 
@@ -181,8 +182,8 @@ def _result(results: RunResults, expansions: Expansions, assignment: Assignment 
         predicted_hz=first.predicted_hz,
         exact_hz=first.exact_hz,
         results=results,
-        expansion=expansions.full,
-        linearised=expansions.linear,
+        expansion=expansions.fulls if expansions.others else expansions.full,
+        linearised=expansions.linears if expansions.others else expansions.linear,
         assignment=assignment,
     )
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from eigassign.case import CaseFile
 from eigassign.errors import CaseError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.modal.expansion import Expansion, nearest_values
+from eigassign.modal.expansion import Expansion, NearestExpansion
 from eigassign.modal.model import Model
 
 Floats = NDArray[np.float64]
@@ -45,13 +45,23 @@ class Expansions:
         """One for each expansion point, the first being this one."""
         return (self, *self.others)
 
+    @property
+    def fulls(self) -> NearestExpansion:
+        """The full expansions about all points, the nearest one evaluated."""
+        return NearestExpansion(tuple(part.full for part in self.all))
+
+    @property
+    def linears(self) -> NearestExpansion:
+        """The partially linearised ones."""
+        return NearestExpansion(tuple(part.linear for part in self.all))
+
     def taylor_hz(self, q: Floats, y: Floats) -> Floats:
         """Full expansion at samples, (n, n_modes) in Hz; each by the nearest point."""
-        return self._nearest(q, [part.full.frequencies(q, y) for part in self.all])
+        return self.fulls.frequencies(q, y)
 
     def linearised_hz(self, q: Floats, y: Floats) -> Floats:
         """Partially linearised expansion at samples, (n, n_modes) in Hz."""
-        return self._nearest(q, [part.linear.frequencies(q, y) for part in self.all])
+        return self.linears.frequencies(q, y)
 
     def linear_in_design(self, path: Trajectories) -> tuple[Floats, Floats]:
         """l_0 (n, n_modes) and l (n, n_modes, n_y) of eq. (9) along a path; all points share y0.
@@ -60,17 +70,13 @@ class Expansions:
         Raises TrajectoryError where the design y0 cannot follow the path.
         """
         q, of_design = path.at(self.full.y0)
-        found = [part.linear.gradient(q) for part in self.all]
-        l0, slopes = (self._nearest(q, [f[k] for f in found]) for k in (0, 1))
+        l0, slopes = self.linears.gradient(q)
         by_q, by_y = np.split(slopes, [q.shape[1]], axis=2)
         return l0, by_y + by_q @ of_design if path.follows_design else by_y
 
     def estimate(self, q: Floats, y: Floats) -> Floats:
         """Error estimate of the full expansion, relative in Hz, (n, n_modes)."""
-        return self._nearest(q, [part.full.error_estimate(q, y) for part in self.all])
-
-    def _nearest(self, q: Floats, values: list[Floats]) -> Floats:
-        return nearest_values([part.full for part in self.all], np.atleast_2d(q), values)
+        return self.fulls.error_estimate(q, y)
 
     def column(self, mode: int) -> int:
         """Column of ``mode`` in what the expansions evaluate to."""

@@ -18,7 +18,7 @@ from eigassign.chart.comparison import exact_frequencies
 from eigassign.chart.methods import fit_methods
 from eigassign.chart.question import EvaluationPoints, build_features, build_points
 from eigassign.modal.exact import solver
-from eigassign.modal.expansion import nearest
+from eigassign.modal.expansion import NearestExpansion
 from eigassign.modal.fit.source import FINE
 from eigassign.study.scene import Scene
 
@@ -133,10 +133,8 @@ def test_calls_give_what_was_charted(tmp_path: Path) -> None:
         call = method.use.removeprefix("no argument of ea.reduce: ").partition(", at a pose")[0]
         found = _asked(call, scene, dict(method.parameters), y)
         if isinstance(found, list):
-            owner = nearest(found, scene.path.q)
-            each = np.array([one.frequencies(scene.path.q, y) for one in found])
-            found = each[owner, np.arange(len(owner))]
-        elif not isinstance(found, np.ndarray):
+            found = NearestExpansion(tuple(found))
+        if not isinstance(found, np.ndarray):
             found = found.frequencies(scene.path.q, y)
         np.testing.assert_allclose(found.reshape(wanted.shape), wanted, rtol=1e-9)
 

@@ -104,20 +104,21 @@ def outcomes(
             exact = setting.model.frequencies(setting.q, setting.y, max(map(max, MODES)))
             for modes in MODES:
                 for accuracy in accuracies:
-                    found = _outcome(setting, modes, {"accuracy": accuracy}, exact)
+                    found = outcome(setting, modes, {"accuracy": accuracy}, exact)
                     if found is None:  # what is refused to 1e-3 is refused to 1e-4
                         break
                     yield found
                 line = not isinstance(setting.over[1], ea.Box)
                 for count in (k for k in solves if k <= MOST_ON_LINE or not line):
-                    found = _outcome(setting, modes, {"solves": count}, exact)
+                    found = outcome(setting, modes, {"solves": count}, exact)
                     if found is not None:
                         yield found
 
 
-def _outcome(
+def outcome(
     setting: Setting, modes: tuple[int, ...], asked: dict[str, Any], exact: Floats
 ) -> Outcome | None:
+    """One fit beside the exact frequencies (n, ≥ the last mode); None where it is refused."""
     try:
         fit = ea.fit(setting.model, *setting.over, modes, most=MOST, **asked)
         got = fit.frequencies(setting.q, setting.y)

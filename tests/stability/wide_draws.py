@@ -42,6 +42,11 @@ def spatial_loop(seed: int, samples: int) -> Drawn | None:
 
 def equal_bending(seed: int, samples: int) -> Drawn | None:
     """An arm of one to four links with sections (nearly) alike in both directions of bending."""
+    return _drawn(*hanging_arm(seed), seed, samples, SPAN, 0.5)
+
+
+def hanging_arm(seed: int) -> tuple[Tree, Floats]:
+    """The tree of such an arm, and a pose."""
     rng = np.random.default_rng([seed, 7])
     tree: Tree = {
         "mechanism": {
@@ -59,7 +64,7 @@ def equal_bending(seed: int, samples: int) -> Drawn | None:
     }
     n = int(rng.integers(1, 5))
     q0 = [_hang(tree, k, rng) for k in range(n)]
-    return _drawn(tree, np.array(q0), seed, samples, SPAN, 0.5)
+    return tree, np.array(q0)
 
 
 FAMILIES: dict[str, Callable[[int, int], Drawn | None]] = {

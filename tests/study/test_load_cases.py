@@ -13,7 +13,7 @@ import eigassign as ea
 from eigassign.case.loading import parse
 from eigassign.mechanism.assembly.velocity_terms import velocity_terms
 from eigassign.mechanism.trajectory.trajectory import rates
-from eigassign.modal.expansion import nearest
+from eigassign.modal.expansion import NearestExpansion
 from eigassign.modal.slopes import eigenvalue_slopes
 from eigassign.modal.slow_motion import motion_effect
 from eigassign.study.comparison import random_q
@@ -191,7 +191,7 @@ def test_several_units_of_loads_do_not_move_the_nearest_expansion_point() -> Non
     pose, other = [0.5, 1.6], [0.5, 2.3]
     parts = [ea.expand(model, [*at, 70e9], Y, (1,), 2) for at in (pose, other)]
     q = np.array([[0.5, 1.7, 80e9], [0.5, 2.2, 60e9]])
-    assert nearest(parts, q).tolist() == [0, 1]
+    assert NearestExpansion(tuple(parts)).owner(q).tolist() == [0, 1]
 
 
 def test_a_single_trajectory_may_set_properties_too() -> None:

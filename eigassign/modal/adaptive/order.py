@@ -36,8 +36,8 @@ from eigassign.modal.exact.clusters import CLUSTER_GAP
 from eigassign.modal.exact.solver import eigenvalues
 from eigassign.modal.expansion import (
     Expansion,
+    NearestExpansion,
     expand,
-    nearest_values,
     polynomial_error,
     radius_share,
 )
@@ -82,10 +82,7 @@ class ExpansionChoice:
 
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """(n, n_modes) in Hz, each sample by the nearest expansion."""
-        values = [part.frequencies(q, y) for part in self.expansions]
-        return nearest_values(
-            self.expansions, np.atleast_2d(np.asarray(q, dtype=np.float64)), values
-        )
+        return NearestExpansion(self.expansions).frequencies(q, y)
 
     def error_estimate(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """Relative error of ``frequencies``, (n, n_modes); infinite where refused."""
@@ -188,7 +185,7 @@ class _Judge:
         own = part.frequencies(*self._split(self.x))
         parts = (*(before.parts if before else ()), part)
         hz = (*(before.hz if before else ()), own)
-        chosen = nearest_values(parts, self._split(self.x)[0], hz)
+        chosen = NearestExpansion(parts).pick(self._split(self.x)[0], hz)
         estimate = polynomial_error(chosen, self.reduced_hz, self.beside.estimate)
         return _Candidate(parts, gap, hz, estimate)
 

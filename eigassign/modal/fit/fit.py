@@ -14,21 +14,22 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import AccuracyError, UsageError
-from eigassign.interpolation.adaptive import adaptive
-from eigassign.interpolation.given import fewest, given
+from eigassign.interpolation.adaptive import MISSED, adaptive
+from eigassign.interpolation.given import WORTHLESS, fewest, given
+from eigassign.interpolation.margin import keys
 from eigassign.interpolation.newton import Asking, Interpolant, newton_polynomials
 from eigassign.modal.arguments import whole_within
+from eigassign.modal.fit.meeting import cause, missed_between
 from eigassign.modal.fit.path import Path, Stretch, stretches
 from eigassign.modal.fit.region import Box, Region, build_region, require_path_followed
 from eigassign.modal.fit.source import (
     SHARE,
-    cause,
     dependence,
     floor_of,
     known_error,
@@ -250,10 +251,12 @@ def fit(
     else:
         count = whole_within(solves, "solves", 1, MOST)
         regions, floors, runs = _by_solves(source, path, parts, y, wanted, count)
-    found, seen = _run(source, wanted, regions, runs)
+    ended = list(zip(regions, _run(source, wanted, regions, runs), strict=True))
     if not isinstance(source, Model):
-        each_ = zip(floors, seen, strict=True)
+        xs = (region.x(each.asked) for region, each in ended)
+        each_ = zip(floors, xs, strict=True)
         floors = [max(floor, known_error(source, x, wanted, accuracy)) for floor, x in each_]
+    found = [_with_meetings(wanted, region, each, accuracy) for region, each in ended]
     fits = tuple(
         Fit(wanted, region, accuracy, made, partial(own_error, source, region, wanted, made, floor))
         for region, made, floor in zip(regions, found, floors, strict=True)
@@ -344,29 +347,67 @@ def _best_nodes(
 
 def _run(
     source: Any, modes: tuple[int, ...], regions: Sequence[Region], runs: Sequence[Asking]
-) -> tuple[list[Interpolant], list[Floats]]:
-    """What all runs end with, and the x (n, n_x) that each asked for.
+) -> list[_Found]:
+    """What all runs end with.
 
     What they ask for in one round is one batch of frequencies.
     """
-    ask = question(source, modes)
+    ask, own = question(source, modes), [mode - 1 for mode in modes]
     found: dict[int, Interpolant] = {}
-    seen: list[list[Floats]] = [[] for _ in runs]
+    asked: list[list[Ints]] = [[] for _ in runs]
+    answers: list[list[Floats]] = [[] for _ in runs]
     hz: dict[int, Floats | None] = dict.fromkeys(range(len(runs)))
     while hz:
         wanted: dict[int, Floats] = {}
         for k, values in hz.items():
             try:
-                wanted[k] = regions[k].x(runs[k].send(values))  # type: ignore[arg-type]
-                seen[k].append(wanted[k])
+                members = runs[k].send(values)  # type: ignore[arg-type]
+                asked[k].append(members)
+                wanted[k] = regions[k].x(members)
             except StopIteration as end:
                 found[k] = end.value
             except AccuracyError as error:
-                raise AccuracyError(f"{error}{cause(source, regions[k], modes)}") from None
-        if len(wanted) < 2:
-            hz = {k: ask(x) for k, x in wanted.items()}
-        else:
-            ends = np.cumsum([len(x) for x in wanted.values()])[:-1]
-            all_ = ask(np.vstack(list(wanted.values())))
-            hz = dict(zip(wanted, np.split(all_, ends), strict=True))
-    return [found[k] for k in range(len(runs))], [np.vstack(each) for each in seen]
+                raise AccuracyError(f"{error}{cause(answers[k], modes)}") from None
+        if not wanted:
+            break
+        ends = np.cumsum([len(x) for x in wanted.values()])[:-1]
+        every = np.split(ask(np.vstack(list(wanted.values()))), ends)
+        for k, values in zip(wanted, every, strict=True):
+            answers[k].append(values)
+        hz = {k: values[:, own] for k, values in zip(wanted, every, strict=True)}
+    return [_Found(found[k], np.vstack(asked[k]), np.vstack(answers[k])) for k in range(len(runs))]
+
+
+class _Found(NamedTuple):
+    """An interpolant, all members that its run asked for, and f in Hz there."""
+
+    interpolant: Interpolant
+    asked: Ints  # (n, d)
+    hz: Floats  # (n, modes[-1] + 1): of all modes up to those fitted, and of one more
+
+    def missed(self, region: Region, modes: tuple[int, ...]) -> float:
+        """|δf/f| that modes may cost which meet between the nodes, with a margin."""
+        at, members = keys(self.asked), self.interpolant.members
+        order = np.argsort(at, kind="stable")
+        rows = order[np.searchsorted(at, keys(members), sorter=order)]
+        own = [mode - 1 for mode in modes]
+        missed = missed_between(region.nodes, members, self.hz[rows], own, self.interpolant.power)
+        return MISSED * missed
+
+
+def _with_meetings(
+    modes: tuple[int, ...],
+    region: Region,
+    each: _Found,
+    accuracy: float | None,
+) -> Interpolant:
+    """The interpolant, its error that where modes meet, if more; AccuracyError if too large."""
+    missed = each.missed(region, modes)
+    if missed <= each.interpolant.error:
+        return each.interpolant
+    if missed > (WORTHLESS if accuracy is None else accuracy):
+        raise AccuracyError(
+            f"{each.interpolant.asked} values may miss {missed:.1e} between them"
+            f"{cause([each.hz], modes)}"
+        )
+    return each.interpolant._replace(error=missed)

@@ -60,7 +60,7 @@ def interval_nodes(most: int) -> Nodes:
 def chosen_nodes(count: int) -> Nodes:
     """The best ``count`` nodes of [−1, 1], nearly; `MOST_GIVEN` of them at most."""
     count = min(count, MOST_GIVEN)
-    return Nodes(_best(count), count)
+    return Nodes(_best(count), count, domain=interval(4 * MOST_GIVEN + 1))
 
 
 def _sampled(places: Floats, of: int, count: int | None) -> Nodes:
@@ -74,7 +74,7 @@ def _sampled(places: Floats, of: int, count: int | None) -> Nodes:
         return nodes if nodes.whole else replace(nodes, checks=_others(places, nodes.v))
     count = min(count, MOST_GIVEN)
     nearest = np.unique(np.abs(places[:, None] - _best(count)).argmin(axis=0))
-    return Nodes(places[nearest] if len(nearest) == count else places, count)
+    return Nodes(places[nearest] if len(nearest) == count else places, count, domain=places)
 
 
 def _others(places: Floats, nodes: Floats) -> tuple[float, ...]:

@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.errors import AccuracyError, UsageError
+from eigassign.errors import AccuracyError, MissingMassError, UsageError
 from eigassign.interpolation.newton import Interpolant
+from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import DENSE_LIMIT, mode_numbers, shown_numbers
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.exact.solver import eigenvalues
@@ -28,7 +31,6 @@ HZ = 0.5 / np.pi  # in a rad/s
 FINE, FINE_LARGE = 1e-8, 1e-6  # accuracies below which round-off is looked at
 SHARE = 0.5  # of the accuracy that the source itself may use
 FEW_AXES = 3  # up to which all corners are looked at
-CLOSE = 1e-2  # relative gap in Hz below which neighbouring modes are named as a cause
 
 
 def own_error(
@@ -68,21 +70,44 @@ def modes_of(source: Any, modes: Sequence[int] | None) -> tuple[int, ...]:
 
 
 def question(source: Any, modes: tuple[int, ...]) -> Callable[[Floats], Floats]:
-    """x (n, n_x) → f (n, n_modes) in Hz. AccuracyError where the source gives no number."""
+    """x (n, n_x) → f (n, modes[-1] + 1) in Hz of all modes up to those, and of one more.
+
+    Where that one has no mass its f is infinite. AccuracyError where the source gives no number.
+    """
     if isinstance(source, Model):
-        pencil = source.pencil
-        own: Any = slice(None) if modes[-1] == len(modes) else [m - 1 for m in modes]
-        return lambda x: np.sqrt(eigenvalues(pencil, x, modes[-1])[:, own]) * HZ
+        return partial(_solved, source.pencil, modes[-1])
     columns, n_q = [source.modes.index(m) for m in modes], dependence(source)[1]
+    beside = _ritz(source, modes[-1] + 1)
 
     def ask(x: Floats) -> Floats:
-        hz = np.asarray(source.frequencies(x[:, :n_q], x[:, n_q:]))[:, columns]
+        q, y = x[:, :n_q], x[:, n_q:]
+        hz = np.asarray(source.frequencies(q, y))[:, columns]
         if not np.isfinite(hz).all():
             k = int(np.argmin(np.isfinite(hz).all(axis=1)))
             raise AccuracyError(f"the source has no frequency at (q, y) = {shown_numbers(x[k])}")
-        return hz
+        every = np.asarray(beside.frequencies(q, y))
+        every[:, [m - 1 for m in modes]] = hz
+        return every
 
     return ask
+
+
+def _solved(pencil: Pencil, last: int, x: Floats) -> Floats:
+    """Exact f (n, last + 1) in Hz."""
+    try:
+        count = min(last + 1, len(pencil.elastic))
+        hz = np.sqrt(eigenvalues(pencil, x, count)) * HZ
+    except MissingMassError:
+        hz = np.sqrt(eigenvalues(pencil, x, last)) * HZ
+    return np.pad(hz, ((0, 0), (0, last + 1 - hz.shape[1])), constant_values=np.inf)
+
+
+def _ritz(source: Any, count: int) -> ReducedModel:
+    """All modes up to ``count`` as a reduced model has them, that of an expansion beside it."""
+    if isinstance(source, InverseExpansion):
+        source = source.expansion
+    reduced: ReducedModel = source.reduced if isinstance(source, Expansion) else source
+    return replace(reduced, modes=tuple(range(1, min(count, reduced.size) + 1)))
 
 
 def floor_of(source: Any, region: Region, modes: tuple[int, ...], accuracy: float | None) -> float:
@@ -126,15 +151,3 @@ def _ends(region: Region) -> Ints:
         signs = 1 + np.vstack([np.zeros((1, d)), np.eye(d), 1 - np.eye(d), np.ones((1, d))])
     tops = [len(axis.nodes) - 1 for axis in region.axes]
     return np.asarray(np.minimum(np.vstack([np.zeros((1, d)), signs]), tops), dtype=np.intp)
-
-
-def cause(source: Any, region: Region, modes: tuple[int, ...]) -> str:
-    """Neighbouring modes that come close, the usual cause, as the end of a message."""
-    if not isinstance(source, Model):
-        return ""
-    count = min(modes[-1] + 1, len(source.pencil.elastic))
-    lam = eigenvalues(source.pencil, region.x(_ends(region)), count)
-    gap = 0.5 * (1.0 - lam[:, :-1] / lam[:, 1:]).min(axis=0)
-    near = [k + 1 for k in np.flatnonzero(gap < CLOSE) if {k + 1, k + 2} & set(modes)]
-    named = ", ".join(f"{k} and {k + 1}" for k in near)
-    return f"; modes {named} come close, and where they meet none is smooth" if near else ""
