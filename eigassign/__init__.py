@@ -6,6 +6,7 @@ one function, `eigassign.pipeline.run.solve_case`.
 
     _version       the version
     errors         every error raised on purpose, and its exit code
+    files          reading files that anybody may have put there, within limits
     process        the process around a command: errors on stderr, signals, streams, threads
     series         truncated power series and expressions that are evaluated on them
     interpolation  polynomial interpolation in several variables

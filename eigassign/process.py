@@ -20,6 +20,7 @@ from types import FrameType
 from typing import Any, TextIO
 
 from eigassign.errors import CaseError, EigassignError, Problem, StorageError
+from eigassign.files import CASE, read_bytes
 
 # --- Errors as people read them on stderr, and the exit code of each
 
@@ -121,8 +122,8 @@ def _snippet(problem: Problem) -> Iterator[str]:
 
 def _line(problem: Problem) -> str:
     try:
-        with open(problem.file, encoding="utf-8") as file:
-            return next((t.rstrip("\r\n") for k, t in enumerate(file, 1) if k == problem.line), "")
+        lines = io.StringIO(read_bytes(problem.file, CASE).decode(), newline=None)
+        return next((t.rstrip("\n") for k, t in enumerate(lines, 1) if k == problem.line), "")
     except (OSError, ValueError):
         return ""
 

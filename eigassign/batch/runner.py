@@ -37,6 +37,7 @@ class CaseOptions:
     use_cache: bool = True
     force: bool = False
     figures: tuple[str, ...] = ("png",)
+    allow_outside: bool = False
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,14 @@ def _row(path: str, options: CaseOptions, **fields: object) -> Row:
 
 def _optimised(path: str, options: CaseOptions) -> Row:
     cache_dir = Path(options.cache_dir) if options.cache_dir else None
-    how = Options(Path(options.out), cache_dir, options.use_cache, options.force, options.figures)
+    how = Options(
+        Path(options.out),
+        cache_dir,
+        options.use_cache,
+        options.force,
+        options.figures,
+        allow_outside=options.allow_outside,
+    )
     outcome = optimize(Path(path), how)
     error = outcome.results.error
     return {

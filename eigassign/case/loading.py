@@ -8,16 +8,17 @@ The schema and the rules both look at the whole file, so that nobody mends a fil
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
-import stat
 from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
 
 from eigassign.case.case_file import CaseFile
-from eigassign.case.reader import MAX_BYTES, Source, read_yaml
+from eigassign.case.reader import Source, read_yaml
 from eigassign.case.rules.consistency import inconsistent, too_many
+from eigassign.case.rules.files import NamedFile, named_files, not_allowed, unreadable
 from eigassign.case.rules.plausibility import implausible
 from eigassign.case.rules.properties import (
     bounds_hold_no_impossible_section,
@@ -26,35 +27,32 @@ from eigassign.case.rules.properties import (
 )
 from eigassign.case.rules.values import completed
 from eigassign.case.schema.document import Document, validated
-from eigassign.case.schema.measurements import MeasurementFile
-from eigassign.case.schema.targets import FrequencyFile
-from eigassign.case.schema.trajectory import FileTrajectory, named_trajectories
+from eigassign.case.schema.trajectory import named_trajectories
 from eigassign.errors import CaseError, Problem, StorageError, UsageError
+from eigassign.files import CASE, pieces, read_bytes
 
 MOST_PROBLEMS = 100  # shown; of each kind of check twice as many are looked at
 
 
-def load(path: str | Path) -> CaseFile:
-    """The case file at ``path``.
+def load(path: str | Path, allow_outside: bool = False) -> CaseFile:
+    """The case file at ``path``; ``allow_outside``: it may name files outside its folder.
 
-    Raises CaseError with every problem of the file, UsageError if ``path`` is not a file, and
-    StorageError if it cannot be read.
+    Raises CaseError with every problem of the file, UsageError if ``path`` is not a file or one too
+    large, and StorageError if it cannot be read.
     """
     path = Path(path)
     try:
-        if not stat.S_ISREG(os.stat(path).st_mode):
-            what = "a folder" if path.is_dir() else "not a regular file"
-            raise UsageError(f"{path}: expected a case file, but it is {what}")
-        with open(path, "rb") as file:
-            data = file.read(MAX_BYTES + 1)
+        data = read_bytes(path, CASE)
     except (FileNotFoundError, NotADirectoryError, ValueError):
         raise UsageError(f"{path}: no such case file") from None
     except OSError as error:
+        if error.errno in (errno.EINVAL, errno.EFBIG):
+            raise UsageError(f"{path}: expected a case file: {error.strerror}") from None
         raise StorageError(f"{path}: cannot be read: {error.strerror}") from error
-    return parse(data, path)
+    return parse(data, path, allow_outside)
 
 
-def parse(data: bytes, path: str | Path) -> CaseFile:
+def parse(data: bytes, path: str | Path, allow_outside: bool = False) -> CaseFile:
     """The case file with content ``data``; ``path`` names it and anchors relative paths in it."""
     path = Path(path)
     try:
@@ -65,6 +63,9 @@ def parse(data: bytes, path: str | Path) -> CaseFile:
         raise CaseError(tuple(crowded))
     document, schema_findings = validated(completed(source.tree, path.parent))
     findings = [*islice(inconsistent(source.tree), 2 * MOST_PROBLEMS), *schema_findings]
+    named = named_files(source.tree, path.parent)
+    forbidden = [] if allow_outside else [*not_allowed(named, path.parent)]
+    findings += forbidden or unreadable([each for each in named if not each.spare])
     if document is not None:
         parts, motions = (document.mechanism, document.design), document.trajectory
         findings += bounds_hold_no_impossible_section(*parts)
@@ -72,7 +73,7 @@ def parse(data: bytes, path: str | Path) -> CaseFile:
     problems = [*source.problems, *(source.problem(*finding) for finding in findings)]
     if problems or document is None:
         raise CaseError(_first(list(dict.fromkeys(problems))))
-    return _case_file(document, source, data, path)
+    return _case_file(document, source, data, path, named)
 
 
 def _first(problems: Sequence[Problem]) -> tuple[Problem, ...]:
@@ -85,9 +86,12 @@ def _first(problems: Sequence[Problem]) -> tuple[Problem, ...]:
     return (*first, Problem(last.file, last.line, last.column + 1, "", more))
 
 
-def _case_file(document: Document, source: Source, data: bytes, path: Path) -> CaseFile:
+def _case_file(
+    document: Document, source: Source, data: bytes, path: Path, named: Sequence[NamedFile]
+) -> CaseFile:
     content = {name: getattr(document, name) for name in Document.model_fields}
     doubts = [*implausible(document), *starts_outside(source.tree, document.design)]
+    doubts += unreadable([each for each in named if each.spare])
     warnings = [source.problem(*finding) for finding in doubts]
     return CaseFile(
         **content,
@@ -95,25 +99,14 @@ def _case_file(document: Document, source: Source, data: bytes, path: Path) -> C
         sha256=hashlib.sha256(data).hexdigest(),
         warnings=tuple(sorted(warnings, key=lambda p: (p.line, p.column, p.path))),
         marks=source.marks,
-        files=attached(document, path.parent),
+        files=_digests(named, path.parent),
     )
 
 
-def attached(document: Document, folder: Path) -> dict[str, str]:
-    """SHA-256 of each file that the case names, by its name as seen from the case's folder.
-
-    Raises StorageError for a file that cannot be read.
-    """
-    motions = [motion for _, _, motion in named_trajectories(document.trajectory)]
-    named = [motion.file for motion in motions if isinstance(motion, FileTrajectory)]
-    curves = [curve for target in document.targets for _, curve in target.frequencies]
-    named += [curve.file for curve in curves if isinstance(curve, FrequencyFile)]
-    if isinstance(document.measurements, MeasurementFile):
-        named.append(document.measurements.file)
-    for link in document.mechanism.links.values():
-        if link.type == "superelement":
-            named += [link.stiffness, link.mass]
-    return {_seen_from(folder, file): _digest(file) for file in named}
+def _digests(named: Sequence[NamedFile], folder: Path) -> dict[str, str]:
+    """SHA-256 of each file, by its name as seen from ``folder``; of none that cannot be read."""
+    digests = {each.file: _digest(each.file, each.limit) for each in named}
+    return {_seen_from(folder, file): sha for file, sha in digests.items() if sha is not None}
 
 
 def _seen_from(folder: Path, file: str) -> str:
@@ -123,9 +116,11 @@ def _seen_from(folder: Path, file: str) -> str:
         return Path(file).as_posix()
 
 
-def _digest(file: str) -> str:
+def _digest(file: str, limit: int) -> str | None:
+    digest = hashlib.sha256()
     try:
-        with open(file, "rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError as error:
-        raise StorageError(f"{file}: cannot be read: {error.strerror}") from error
+        for piece in pieces(file, limit):
+            digest.update(piece)
+    except (OSError, ValueError):
+        return None
+    return digest.hexdigest()

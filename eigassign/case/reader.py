@@ -17,8 +17,8 @@ import yaml
 
 from eigassign.case.suggestions import shown
 from eigassign.errors import CaseError, Problem
+from eigassign.files import CASE, raised
 
-MAX_BYTES = 10_000_000
 MAX_DEPTH = 50
 KeyPath = tuple[str | int, ...]
 Tree = Mapping[str, object]
@@ -112,8 +112,8 @@ def read_yaml(data: bytes, file: str) -> Source:
 
 
 def _decoded(data: bytes, file: str) -> str:
-    if len(data) > MAX_BYTES:
-        message = f"larger than {MAX_BYTES // 10**6} MB: put long trajectories into a CSV file"
+    if len(data) > raised(CASE):
+        message = f"larger than {raised(CASE) / 1e6:g} MB: put long trajectories into a CSV file"
         raise CaseError((Problem(file, 1, 1, "", message),))
     try:
         text = data.decode("utf-8-sig")

@@ -18,10 +18,10 @@ from pathlib import Path
 from eigassign.case.suggestions import listed, shown, suggestion
 from eigassign.case.units import Dimension, QuantityError, Unit, parse_unit
 from eigassign.errors import MechanismError
+from eigassign.files import TABLE, read_bytes
 
 _HEADER_CELL = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
-_LARGEST = 100_000_000  # bytes: far more than anybody's table, less than memory
 _MOST = 1_000_000  # rows
 _PLAIN = Unit(Fraction(1), (0, 0, 0, 0, 0))
 
@@ -115,9 +115,7 @@ def read_table(
 
 def _text(file: Path, key: str) -> str:
     try:
-        if file.stat().st_size > _LARGEST:
-            raise MechanismError(key, f"{file.name}: larger than {_LARGEST // 10**6} MB")
-        text = file.read_bytes().decode("utf-8-sig")
+        text = read_bytes(file, TABLE).decode("utf-8-sig")
     except OSError as error:
         raise MechanismError(key, f"{file}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:

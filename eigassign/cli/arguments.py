@@ -64,6 +64,11 @@ common = several(
     click.option("--quiet", is_flag=True, help="Only errors on stderr."),
     click.option("-v", "--verbose", count=True, help="More on stderr; -vv for all."),
     click.option("--debug", is_flag=True, help="Show the traceback of an error."),
+    click.option(
+        "--allow-outside",
+        is_flag=True,
+        help="Cases may name files outside their own folder.",
+    ),
 )
 cache_dir = click.option(
     "--cache-dir",

@@ -32,7 +32,14 @@ def batch(paths: tuple[Path, ...], jobs: int | None, **how: Any) -> int:
 
     out = how["out"] or Path("results")
     cache_dir = how["cache_dir"] and str(how["cache_dir"])
-    each = many.CaseOptions(str(out), cache_dir, not how["no_cache"], how["force"], how["figures"])
+    each = many.CaseOptions(
+        str(out),
+        cache_dir,
+        not how["no_cache"],
+        how["force"],
+        how["figures"],
+        how["allow_outside"],
+    )
     with reporting(how) as reporter:
         outcomes = _watched(many.plan(cases_in(paths), each), jobs, out, reporter)
         bad = sum(outcome.status != "ok" for outcome in outcomes)

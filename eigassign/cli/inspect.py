@@ -29,7 +29,7 @@ def check(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
     with reporting(how) as reporter:
         for case in cases:
             try:
-                answers[str(case)] = answer = checked(case)
+                answers[str(case)] = answer = checked(case, how["allow_outside"])
                 reporter.warn(answer.warnings)
             except EigassignError as error:
                 codes.append(process.report(error))
@@ -63,6 +63,9 @@ def _described(name: str, answer: CheckAnswer) -> str:
     return "\n".join([*lines, *(f"  {note}" for note in answer.notes)])
 
 
+_DRAWING = ("out", "force", "figures", "allow_outside")
+
+
 @click.command()
 @arguments.case
 @click.option("--q", metavar="VALUES", help="Pose, as '1.817, 5.312' or '104 deg 304 deg'.")
@@ -91,19 +94,17 @@ def modes(
     design written in the file.
     """
     from eigassign.pipeline import queries
-    from eigassign.pipeline.queries import point
 
     folder = None
     given = click.get_current_context().get_parameter_source("figures")
     draw = draw or how["out"] is not None or given is ParameterSource.COMMANDLINE
     with reporting(how) as reporter:
-        at = point(case, q, y)
         if draw:
             answer, folder = queries.draw_modes(
-                case, *at, count, beyond_bounds, how["out"], how["force"], how["figures"]
+                case, q, y, count, beyond_bounds, *(how[key] for key in _DRAWING)
             )
         else:
-            answer = queries.modes(case, *at, count, beyond_bounds)
+            answer = queries.modes(case, q, y, count, beyond_bounds, how["allow_outside"])
         if as_json and folder is not None:
             reporter.stage(f"{folder} written")
     if as_json:

@@ -86,6 +86,7 @@ def _options(how: Mapping[str, Any], reporter: Reporter) -> Options:
         force=how.get("force", False),
         figures=how.get("figures", ()),
         study=how.get("study", "none"),
+        allow_outside=how["allow_outside"],
         progress=reporter.stage,
     )
 

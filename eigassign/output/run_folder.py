@@ -25,6 +25,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from eigassign.errors import StorageError
+from eigassign.files import CASE, read_bytes
 from eigassign.output.storage import (
     put_in_place,
     sync_path,
@@ -156,11 +157,11 @@ class _Marker:
 
 def _read_marker(folder: Path) -> _Marker | None:
     try:
-        found = json.loads((folder / MARKER).read_bytes())
+        found = json.loads(read_bytes(folder / MARKER, CASE))
         named = {str(k): str(v) for k, v in found.get("case_files", {}).items()}
         run = RunOf(str(found["case_path"]), str(found["case_sha256"]), named)
         return _Marker(run, frozenset(found["files"]))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
 
 

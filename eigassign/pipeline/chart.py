@@ -35,7 +35,7 @@ class Charted:
 
 def chart(path: str | Path, options: Options, effort: Effort, request: Request) -> Charted:
     """`chart_case`, and its folder: chart.json, report.html, figures, case.yaml."""
-    case = load_case(path)
+    case = load_case(path, options.allow_outside)
     with new_run_folder(case.file, options.out, options.force) as folder:
         made = chart_case(case, options, effort, request)
         options.progress("writing the chart")

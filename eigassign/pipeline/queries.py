@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile, load
+from eigassign.case import CaseFile
 from eigassign.case.rules.properties import impossible
 from eigassign.case.schema.parts import Quantity, quantity
 from eigassign.case.units import QuantityError
@@ -26,6 +26,7 @@ from eigassign.study.built_case import Case, load_case
 from eigassign.study.design.followed import named_notes
 from eigassign.study.design.wanted import target_frequencies
 from eigassign.study.planning import plan_expansion
+from eigassign.study.updating.measured import read_measurements
 
 Floats = NDArray[np.float64]
 ROUND_OFF = 1e-9  # of a bound: a design this far beyond it is on it
@@ -65,6 +66,7 @@ def modes(
     y: Sequence[float] | str | None = None,
     count: int = 3,
     beyond_bounds: bool = False,
+    allow_outside: bool = False,
 ) -> ModesAnswer:
     """Exact modes of the case at q (rad) and y (SI units), given as numbers or as text with units.
 
@@ -74,7 +76,7 @@ def modes(
     UsageError for wrong lengths or counts, where there is no pose to take, and for a design that
     is neither within its bounds nor the initial one, unless ``beyond_bounds``.
     """
-    case = load_case(path)
+    case = load_case(path, allow_outside)
     at_q, at_y = _point(case, q, y, beyond_bounds)
     with case.located():
         model = case.model()
@@ -91,12 +93,13 @@ def draw_modes(
     out: Path | None = None,
     force: bool = False,
     formats: Sequence[str] = ("png",),
+    allow_outside: bool = False,
 ) -> tuple[ModesAnswer, Path]:
     """`modes`, and a folder with a figure of each: ``out``, or results/<case>_modes.
 
     Raises what `modes` does, and StorageError where the folder may not be replaced.
     """
-    case = load_case(path)
+    case = load_case(path, allow_outside)
     at_q, at_y = _point(case, q, y, beyond_bounds)
     target = RESULTS / f"{case.file.path.stem}_modes" if out is None else out
     with new_run_folder(case.file, target, force) as folder:
@@ -166,12 +169,14 @@ def _default_q(case: Case) -> Sequence[float]:
     return []
 
 
-def check(path: str | Path) -> CheckAnswer:
+def check(path: str | Path, allow_outside: bool = False) -> CheckAnswer:
     """Validate the file, build its model, follow its trajectory, and settle its expansion point.
+
+    The files that it names are read, measurements as well.
 
     Raises CaseError with every problem found by the first of these steps that finds any.
     """
-    case = load_case(path)
+    case = load_case(path, allow_outside)
     file, model = case.file, case.model()
     trajectory = case.trajectory if file.trajectory is not None else None
     notes = weights(file)
@@ -181,6 +186,7 @@ def check(path: str | Path) -> CheckAnswer:
     each = tuple((p.name, len(p.trajectory.q), float(np.ptp(p.trajectory.time_s))) for p in parts)
     if trajectory is not None:
         target_frequencies(file, trajectory)
+    notes += read_measurements(case)[1]
     if trajectory is not None or file.expansion.q != "auto":
         plan = plan_expansion(file, model, trajectory)
         q = plan.q0[None] if trajectory is None else trajectory.q
@@ -217,24 +223,12 @@ def _require_regular(case: Case, q: Floats | None) -> None:
 
 # --- ``--q`` and ``--y`` of the command line: text → SI numbers of the case's dimensions
 
-Numbers = list[float] | None
 
-
-def point(case: Path, q: str | None, y: str | None) -> tuple[Numbers, Numbers]:
-    """--q and --y in the units of the case; None where not given. Raises UsageError."""
-    if q is None and y is None:
-        return None, None
-    file = load(case)
-    return coordinates(file, q), design(file, y)
-
-
-def coordinates(case: CaseFile, text: str | None) -> Numbers:
+def coordinates(case: CaseFile, text: str) -> list[float]:
     """q in rad or m, one value per coordinate of the case, and none or all of its loads behind.
 
     Raises UsageError.
     """
-    if text is None:
-        return None
     kinds = {"rad": quantity("angle"), "m": quantity("length")}
     names, quantities = list(case.coordinates), [kinds[unit] for unit in case.coordinate_units]
     if len(split(text)) > len(names):
@@ -242,10 +236,8 @@ def coordinates(case: CaseFile, text: str | None) -> Numbers:
     return _read(text, "--q", names, quantities)
 
 
-def design(case: CaseFile, text: str | None) -> Numbers:
+def design(case: CaseFile, text: str) -> list[float]:
     """y in SI units, one value per design parameter of the case; raises UsageError."""
-    if text is None:
-        return None
     values = _read(text, "--y", list(case.design.parameters), case.design_quantities)
     paths = [p.parameter for p in case.design.parameters.values()]
     point = {path: (value, value) for path, value in zip(paths, values, strict=True)}

@@ -57,6 +57,7 @@ class Options:
     force: bool = False  # a folder that another case wrote is moved aside
     figures: tuple[str, ...] = ("png",)  # of png, svg and pdf; none are drawn if empty
     study: str = "cheap"  # of what the answer means: none, cheap or all
+    allow_outside: bool = False  # the case may name files outside its own folder
     progress: Callable[[str], None] = field(
         default=_silent
     )  # called with a line as each stage begins
@@ -194,7 +195,7 @@ def optimize(path: str | Path, options: Options = DEFAULT) -> Outcome:
     Raises StorageError before anything is computed where the folder may not be replaced.
     """
     stages = Stages(options.progress)
-    case = load_case(path)
+    case = load_case(path, options.allow_outside)
     with new_run_folder(case.file, options.out, options.force) as folder:
         results = solve_case(case, options).results
         options.progress("writing the report")
@@ -215,7 +216,7 @@ def expand_case(
     of the files. The case needs neither design nor targets, and no trajectory if it gives q.
     """
     stages = Stages(options.progress)
-    case = load_case(path)
+    case = load_case(path, options.allow_outside)
     with new_run_folder(case.file, options.out, options.force) as folder, case.located():
         scene = prepare(case, stages, _cache(options), order, modes)
         with stages("comparison", "comparing the expansion with exact frequencies"):
@@ -230,7 +231,7 @@ def expand_case(
 def validate(path: str | Path, options: Options = DEFAULT) -> Validation:
     """Both expansions of a case against exact; see `eigassign.study.comparison` for where."""
     stages = Stages(options.progress)
-    case = load_case(path)
+    case = load_case(path, options.allow_outside)
     with case.located():
         scene = prepare(case, stages, _cache(options))
         with stages("validation", "comparing both expansions with exact frequencies"):

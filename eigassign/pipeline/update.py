@@ -37,7 +37,7 @@ def update(path: str | Path, options: Options) -> Updated:
 
     Raises StorageError before anything is computed where the folder may not be replaced.
     """
-    case = load_case(path)
+    case = load_case(path, options.allow_outside)
     with new_run_folder(case.file, options.out, options.force) as folder:
         found = update_case(case, options)
         options.progress("writing the report")

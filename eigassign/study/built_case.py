@@ -99,6 +99,9 @@ class Case:
         return located(self.file)
 
 
-def load_case(path: str | Path) -> Case:
-    """Read and validate a case file; raises CaseError with every problem found."""
-    return Case(load(Path(path)))
+def load_case(path: str | Path, allow_outside: bool = False) -> Case:
+    """Read and validate a case file; raises CaseError with every problem found.
+
+    ``allow_outside``: the case may name files that do not lie below its own folder.
+    """
+    return Case(load(Path(path), allow_outside))

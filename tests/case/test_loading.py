@@ -10,8 +10,8 @@ import pytest
 from small_case import TEXT, unmarked
 
 from eigassign.case import load, parse
-from eigassign.case.reader import MAX_BYTES
 from eigassign.errors import CaseError, StorageError, UsageError
+from eigassign.files import CASE
 
 
 class Unreadable(NamedTuple):
@@ -80,7 +80,7 @@ def test_utf_16_is_refused() -> None:
 
 
 def test_a_file_over_the_size_limit_is_refused() -> None:
-    assert "larger than 10 MB" in message_for(b"#" * (MAX_BYTES + 1))
+    assert "larger than 10 MB" in message_for(b"#" * (CASE + 1))
 
 
 def test_a_group_of_more_names_than_any_mechanism_has_is_refused() -> None:
@@ -140,7 +140,7 @@ def test_a_path_through_a_file_is_wrong_usage(tmp_path: Path) -> None:
 
 def test_a_pipe_is_wrong_usage_and_does_not_block(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(UsageError, match="not a regular file"):
+    with pytest.raises(UsageError, match="it is a pipe, not a file"):
         load(tmp_path / "pipe")
 
 
@@ -159,6 +159,6 @@ def test_a_file_that_may_not_be_read_is_a_storage_error(
     def denied(*_args: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("builtins.open", denied)  # root may read anything, so chmod is no test
+    monkeypatch.setattr("os.open", denied)  # root may read anything, so chmod is no test
     with pytest.raises(StorageError, match="cannot be read: Permission denied"):
         load(path)

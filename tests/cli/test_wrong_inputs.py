@@ -69,7 +69,7 @@ def test_every_problem_has_a_line_and_the_first_ones_a_caret(
     ("args", "says"),
     [
         (["check", "gone.yaml"], "gone.yaml: no such case file"),
-        (["check", "."], "expected a case file, but it is a folder"),
+        (["check", "."], "expected a case file: it is a folder"),
         (["optimize", "gone.yaml"], "gone.yaml: no such case file"),
         (["validate", "gone.yaml"], "gone.yaml: no such file or folder"),
         (["validate"], "cases: no such file or folder"),

@@ -83,3 +83,12 @@ def test_check_passes_warnings_on(tmp_path: Path) -> None:
     text = shipped(("bending_inertia: 3.97e-8", "bending_inertia: 3.97e-4"))
     warned = [warning.path for warning in check(written(tmp_path, text)).warnings]
     assert "mechanism.sections.rod.bending_inertia" in warned
+
+
+def test_modes_need_no_measurements_and_check_misses_them_at_their_line(tmp_path: Path) -> None:
+    path = written(tmp_path, shipped() + "\nmeasurements: {file: lost.csv}\n")
+    assert modes(path) == modes(SHIPPED)
+    with pytest.raises(
+        CaseError, match=r"measurements\.file: .*lost\.csv: cannot be read: No such"
+    ):
+        check(path)

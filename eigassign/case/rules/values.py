@@ -7,23 +7,21 @@ that cannot be read is replaced by its QuantityError, which the schema reports a
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from eigassign.case.reader import KeyPath, Tree, at, entries, items, text
+from eigassign.case.rules.files import named_files
 from eigassign.case.rules.lookups import (
     ANY,
     choices,
     coordinate_quantities,
-    curves,
     design_entries,
     driven,
     followed_modes,
     freedoms,
     is_spatial,
-    links,
     of_freedom,
     trajectories,
 )
@@ -205,16 +203,8 @@ def _in_list(value: object, kinds: Sequence[Quantity], path: KeyPath) -> Iterato
 
 def _files(tree: Tree, folder: Path) -> Iterator[tuple[KeyPath, object]]:
     """Files that the case names as absolute paths."""
-    named: list[tuple[KeyPath, object, tuple[str, ...]]]
-    named = [(path, body, ("stiffness", "mass")) for _, path, body in links(tree, "superelement")]
-    named += [(p, body, ("file",)) for p, body in trajectories(tree) if at(body, "tip") is None]
-    named += [(path, body, ("file",)) for path, body in curves(tree)]
-    named.append((("measurements",), at(tree, "measurements"), ("file",)))
-    for path, body, keys in named:
-        for key in keys:
-            file = text(body, key)
-            if file is not None:
-                yield (*path, key), os.path.abspath(folder / file)
+    for each in named_files(tree, folder):
+        yield each.path, each.file
 
 
 def _defaults(tree: Tree) -> Iterator[tuple[KeyPath, object]]:

@@ -7,7 +7,6 @@ told from the others by its looks, so that only the errors of the kind that was 
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -134,12 +133,6 @@ def _usable(name: str) -> str:
     return name
 
 
-def _is_there(file: str) -> str:
-    if not os.path.isfile(file):
-        raise wrong(f"no such file: {file if file.isprintable() else ascii(file)}")
-    return file
-
-
 class FrozenDict(Mapping[str, V]):
     """An immutable, hashable, picklable mapping that keeps the order of the file."""
 
@@ -181,7 +174,7 @@ class FrozenDict(Mapping[str, V]):
 
 Frozen = AfterValidator(FrozenDict)
 Name: TypeAlias = Annotated[str, AfterValidator(_usable)]
-File: TypeAlias = Annotated[str, AfterValidator(_is_there)]  # absolute
+File: TypeAlias = str  # absolute; `rules.files` looks at it
 Named: TypeAlias = Annotated[Mapping[Name, T], Frozen]  # parts by the names that a file gives them
 OneOrMoreNamed: TypeAlias = Annotated[Mapping[Name, T], Field(min_length=1), Frozen]
 ByReference: TypeAlias = Annotated[Mapping[str, T], Frozen]  # values by the names of other parts

@@ -8,6 +8,7 @@ Read in this order; each imports only from those above it:
     bodies         rigid links, point masses and rigid bodies at nodes
     sparse_factor  factors of symmetric definite sparse matrices
     craig_bampton  fixed-interface modes instead of a link's interior dofs
+    matrix_file    a matrix from a file of another program, within limits
     superelement   links from another finite-element program
     links          the mesh of any link: beam, frame, rigid or superelement
 """

@@ -6,8 +6,6 @@ of the interior follows from the interface, N_i = −K_ii⁻¹ K_ib N_b, so that
 
 from __future__ import annotations
 
-import zipfile
-from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +17,7 @@ from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.bodies import add_bodies
 from eigassign.mechanism.elements.craig_bampton import held_factor
+from eigassign.mechanism.elements.matrix_file import read_matrix
 from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Term, rigid_motion
 from eigassign.mechanism.elements.sparse_factor import is_semidefinite
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type, parameters
@@ -121,11 +120,10 @@ def _boundary(link: Any, n: int, path: str) -> Ints:
     return np.array(dofs, dtype=np.intp)
 
 
-# --- K and M from files
+# --- K and M: what they must be
 
 SYMMETRY = 1e-8  # relative asymmetry of K or M that is taken for round-off
 ROUNDED = 1e-6  # of the diagonal: files of six digits make eigenvalues that small negative
-MOST = 2_000_000  # dofs
 
 
 def read_pair(stiffness: Path, mass: Path, path: str) -> tuple[sparse.csr_array, sparse.csr_array]:
@@ -135,48 +133,6 @@ def read_pair(stiffness: Path, mass: Path, path: str) -> tuple[sparse.csr_array,
     if K.shape != M.shape:
         raise MechanismError(f"{path}.mass", f"is {M.shape}, the stiffness is {K.shape}")
     return K, M
-
-
-def read_matrix(file: Path, key: str) -> sparse.csr_array:
-    """A real square matrix from Matrix Market (.mtx) or NumPy (.npy, .npz of scipy.sparse)."""
-    try:
-        matrix = _read(file, key)
-    except (OSError, ValueError, TypeError, KeyError, EOFError, OverflowError) as error:
-        raise MechanismError(key, f"cannot read {file.name}: {error}") from error
-    except (zipfile.BadZipFile, MemoryError) as error:
-        raise MechanismError(key, f"cannot read {file.name}: {error or 'too large'}") from error
-    if matrix.dtype.kind == "c":
-        message = "has complex entries: damping is not modelled, export the real stiffness and mass"
-        raise MechanismError(key, f"{file.name} {message}")
-    if matrix.dtype.kind not in "fiu":
-        raise MechanismError(key, f"{file.name} holds {matrix.dtype}, expected real numbers")
-    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
-        raise MechanismError(key, f"{file.name} is not a square matrix: {matrix.shape}")
-    out = sparse.csr_array(matrix, dtype=np.float64)
-    if not np.isfinite(out.data).all():
-        raise MechanismError(key, f"{file.name} has entries that are not finite")
-    return out
-
-
-def _read(file: Path, key: str) -> Any:
-    """Whatever the file holds, as an array, dense or sparse."""
-    suffix = file.suffix.lower()
-    if suffix in (".npy", ".npz"):
-        with open(file, "rb") as stream:
-            if suffix == ".npz":
-                return sparse.load_npz(stream)
-            return np.load(stream, allow_pickle=False)
-    from scipy.io import mminfo, mmread
-
-    rows, columns, _, _, field, symmetry = mminfo(file)
-    if field == "pattern":
-        raise MechanismError(key, f"{file.name} is a pattern: it has places but no values")
-    if symmetry == "skew-symmetric":
-        raise MechanismError(key, f"{file.name} is skew-symmetric, expected a symmetric matrix")
-    if max(rows, columns) > MOST:
-        raise MechanismError(key, f"{file.name} has {rows} rows; up to {MOST} are supported")
-    explicit = "spmatrix" in signature(mmread).parameters  # from SciPy 1.15 on, where False is new
-    return mmread(file, spmatrix=False) if explicit else mmread(file)
 
 
 def _checked(A: sparse.csr_array, key: str, name: str) -> sparse.csr_array:

@@ -20,7 +20,7 @@ from eigassign.case.schema.measurements import MOST, Measurement, MeasurementFil
 from eigassign.case.suggestions import shown, unknown
 from eigassign.case.table import Column, Table, read_table
 from eigassign.case.units import DIMENSIONS
-from eigassign.errors import CaseError, MechanismError
+from eigassign.errors import MechanismError
 from eigassign.mechanism.trajectory.csv import TIME, coordinate_columns
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.built_case import Case
@@ -49,10 +49,7 @@ def read_measurements(case: Case) -> tuple[tuple[PosedMeasurement, ...], tuple[s
     Raises CaseError for a file that cannot be read or holds what is no measurement (with its line),
     for a time outside the trajectory, and for a trajectory that cannot be followed.
     """
-    given = case.file.measurements
-    if given is None:
-        problem = case.file.problem("measurements", "is missing, and update needs it")
-        raise CaseError((problem,))
+    given = case.file.measurements or ()
     if isinstance(given, MeasurementFile):
         with case.located():
             return _from_file(case, given)

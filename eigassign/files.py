@@ -1,0 +1,102 @@
+"""Reading files that anybody may have put there: what one is and how large, before a byte counts.
+
+A path may be a pipe that nobody writes to, a device without an end, a link to itself, or a file of
+a terabyte without a block on the disk. Everything that opens a file named by the user, by a case or
+found on disk does it here. What is too large is refused with the limit and the way to raise it: all
+limits are multiplied by the environment variable ``EIGASSIGN_LIMITS``.
+"""
+
+from __future__ import annotations
+
+import errno
+import math
+import os
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+from eigassign.errors import UsageError
+
+VARIABLE = "EIGASSIGN_LIMITS"
+CASE = 10_000_000  # bytes of a case file
+TABLE = 100_000_000  # of a CSV file: far more than anybody's table, less than memory
+MATRIX = 1_000_000_000  # of a matrix of a superelement
+STORED = 1_000_000_000  # of what this program wrote: cache, reduced models
+_PIECE = 1 << 20
+_KINDS = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+
+
+def raised(limit: float) -> float:
+    """``limit``, times EIGASSIGN_LIMITS where that is set. Raises UsageError if it is no number."""
+    given = os.environ.get(VARIABLE, "1")
+    try:
+        factor = float(given)
+    except ValueError:
+        factor = math.nan
+    if not 0.0 < factor < math.inf:
+        raise UsageError(f"{VARIABLE} = {given!r}: expected a number > 0 that multiplies limits")
+    return limit * factor
+
+
+def how_to_raise(size: float, limit: float) -> str:
+    """``EIGASSIGN_LIMITS=20 allows it``: what lets ``size`` pass where ``limit`` is the rule."""
+    return f"the environment variable {VARIABLE}={math.ceil(size / limit)} allows it"
+
+
+def read_bytes(path: str | Path, limit: int) -> bytes:
+    """The content of a regular file of at most ``limit`` bytes; raises as `pieces` does."""
+    return b"".join(pieces(path, limit))
+
+
+def objection(path: str | Path, limit: int) -> str | None:
+    """Why `read_bytes` would refuse, as far as can be told without opening; None if nothing."""
+    try:
+        status = os.stat(path)
+        _require_regular(status)
+        _require_small(status.st_size, limit)
+    except (OSError, ValueError) as error:
+        return getattr(error, "strerror", None) or str(error)
+    return None
+
+
+def printable(text: str) -> str:
+    """``text`` with control characters written out, so that no name can move a cursor."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def pieces(path: str | Path, limit: int) -> Iterator[bytes]:
+    """The content of a regular file of at most ``limit`` bytes, a megabyte at a time.
+
+    Raises OSError, whose ``strerror`` says what is wrong, for everything else. Opening waits for
+    nobody, and a file that grows while it is read is refused as well.
+    """
+    _require_regular(os.stat(path))  # opening a device may already do something
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0)
+    descriptor = os.open(path, flags | getattr(os, "O_BINARY", 0))
+    with open(descriptor, "rb", buffering=0) as file:
+        status = os.fstat(descriptor)
+        _require_regular(status)
+        _require_small(status.st_size, limit)
+        size = 0
+        while part := file.read(_PIECE):
+            size += len(part)
+            _require_small(size, limit)
+            yield part
+
+
+def _require_regular(status: os.stat_result) -> None:
+    if not stat.S_ISREG(status.st_mode):
+        kind = _KINDS.get(stat.S_IFMT(status.st_mode), "something else")
+        raise OSError(errno.EINVAL, f"it is {kind}, not a file")
+
+
+def _require_small(size: int, limit: int) -> None:
+    if size > raised(limit):
+        most = f"{raised(limit) / 1e6:g} MB at most"
+        raise OSError(errno.EFBIG, f"too large, {most}; {how_to_raise(size, limit)}")
