@@ -16,7 +16,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from eigassign.case.suggestions import listed, shown, suggestion
-from eigassign.case.units import Dimension, QuantityError, Unit, parse_unit
+from eigassign.case.units import Dimension, QuantityError, Unit, parse_unit, require_size
 from eigassign.errors import MechanismError
 from eigassign.files import TABLE, read_bytes
 
@@ -190,4 +190,9 @@ def _values(row: list[str], columns: Sequence[_Found], n: int, k: int) -> Iterat
         value = float(cell) if _NUMBER.fullmatch(cell) else math.nan
         if not math.isfinite(value):
             raise ValueError(f"column {column.name}: {shown(cell)} is not a finite number")
-        yield column.unit.to_si(value)
+        si = column.unit.to_si(value)
+        try:
+            require_size(si, column.dimension, shown(cell))
+        except QuantityError as error:
+            raise ValueError(f"column {column.name}: {error}") from None
+        yield si

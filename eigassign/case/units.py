@@ -22,12 +22,23 @@ class QuantityError(ValueError):
 
 @dataclass(frozen=True)
 class Dimension:
-    """A physical dimension: its name, its SI unit, and other units worth mentioning."""
+    """A physical dimension: its name, its SI unit, and other units worth mentioning.
+
+    ``smallest`` and ``largest`` (SI) enclose every mechanism, from nanotubes to bridges, and keep
+    products of a dozen quantities far from where floating-point numbers end.
+    """
 
     name: str
     exponents: Exponents
     si: str
     examples: str
+    smallest: float = 1e-30
+    largest: float = 1e30
+
+    @property
+    def limits(self) -> str:
+        """``1e-12 to 1e+06 m``."""
+        return f"{self.smallest:g} to {self.largest:g} {self.si}".rstrip()
 
     def __str__(self) -> str:
         unit = f"in {self.si}" if self.si else "a plain number"
@@ -73,18 +84,20 @@ class Unit:
 
 
 _DIMENSIONS = (
-    Dimension("length", (0, 1, 0, 0, 0), "m", "mm, cm, km"),
-    Dimension("area", (0, 2, 0, 0, 0), "m2", "mm2, cm2"),
-    Dimension("second moment of area", (0, 4, 0, 0, 0), "m4", "mm4, cm4"),
-    Dimension("mass", (1, 0, 0, 0, 0), "kg", "g, t"),
-    Dimension("density", (1, -3, 0, 0, 0), "kg/m3", "g/cm3"),
-    Dimension("rotary inertia", (1, 2, 0, 0, 0), "kg m2", "g cm2, kg mm2"),
-    Dimension("pressure or modulus", (1, -1, -2, 0, 0), "Pa", "MPa, GPa, N/mm2"),
-    Dimension("angle", (0, 0, 0, 1, 0), "rad", "deg, mrad"),
-    Dimension("rotational stiffness", (1, 2, -2, -1, 0), "N m/rad", "kN m/rad, N m/deg"),
-    Dimension("stiffness", (1, 0, -2, 0, 0), "N/m", "kN/m, N/mm"),
-    Dimension("time", (0, 0, 1, 0, 0), "s", "ms, min"),
-    Dimension("frequency", (0, 0, -1, 0, 1), "Hz", "kHz"),
+    Dimension("length", (0, 1, 0, 0, 0), "m", "mm, cm, km", 1e-12, 1e6),
+    Dimension("area", (0, 2, 0, 0, 0), "m2", "mm2, cm2", 1e-24, 1e12),
+    Dimension("second moment of area", (0, 4, 0, 0, 0), "m4", "mm4, cm4", 1e-48, 1e24),
+    Dimension("mass", (1, 0, 0, 0, 0), "kg", "g, t", 1e-30, 1e15),
+    Dimension("density", (1, -3, 0, 0, 0), "kg/m3", "g/cm3", 1e-30, 1e12),
+    Dimension("rotary inertia", (1, 2, 0, 0, 0), "kg m2", "g cm2, kg mm2", 1e-30, 1e24),
+    Dimension("pressure or modulus", (1, -1, -2, 0, 0), "Pa", "MPa, GPa, N/mm2", 1e-6, 1e24),
+    Dimension("angle", (0, 0, 0, 1, 0), "rad", "deg, mrad", 1e-12, 1e6),
+    Dimension(
+        "rotational stiffness", (1, 2, -2, -1, 0), "N m/rad", "kN m/rad, N m/deg", 1e-24, 1e24
+    ),
+    Dimension("stiffness", (1, 0, -2, 0, 0), "N/m", "kN/m, N/mm", 1e-24, 1e24),
+    Dimension("time", (0, 0, 1, 0, 0), "s", "ms, min", 1e-12, 1e12),
+    Dimension("frequency", (0, 0, -1, 0, 1), "Hz", "kHz", 1e-12, 1e15),
     Dimension("fraction", (0, 0, 0, 0, 0), "", "%"),
     # never asked for; known so that a mistake can be called by its name
     Dimension("angular rate", (0, 0, -1, 1, 0), "rad/s", "deg/s"),
@@ -95,6 +108,7 @@ _DIMENSIONS = (
     Dimension("mass per length", (1, -1, 0, 0, 0), "kg/m", "g/mm"),
 )
 DIMENSIONS = {d.name: d for d in _DIMENSIONS}
+PLAIN = DIMENSIONS["fraction"]
 _BY_EXPONENTS = {d.exponents: d for d in _DIMENSIONS}
 
 _PREFIXES = {"n": -9, "u": -6, "µ": -6, "μ": -6, "m": -3, "c": -2, "k": 3, "M": 6, "G": 9, "T": 12}
@@ -133,6 +147,7 @@ _NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?
 _FACTOR = re.compile(r"([^\W\d_]+|[%°])(?:(?:\^|\*\*)?([-+]?[1-9]))?")
 _SUPERSCRIPTS = str.maketrans("⁻¹²³⁴⁵⁶⁷⁸⁹", "-123456789")
 _LARGEST_EXPONENT = 1000  # of ten
+_NOTHING = 1e-60  # in any unit; round-off of coordinates near 0 is 1e-17
 _LONGEST = 60  # characters of a quantity; keeps the integers of a nonsense unit small
 
 
@@ -140,7 +155,8 @@ def read(value: object, dimension: Dimension | None) -> float:
     """``value`` (number, or text with a unit) in SI units of ``dimension``.
 
     ``None`` as dimension: whatever unit is written is accepted (used where an error elsewhere has
-    left the dimension unknown). Raises QuantityError for anything that is not a finite quantity.
+    left the dimension unknown). Raises QuantityError for anything that is not a finite quantity,
+    or too large or too small to calculate with.
     """
     if isinstance(value, str):
         number, unit = _split(value, dimension)
@@ -149,9 +165,19 @@ def read(value: object, dimension: Dimension | None) -> float:
         raise QuantityError(f"{_expected(dimension)}, got {shown(value)}")
     else:
         si = _to_float(value)
-    if not math.isfinite(si):
-        raise QuantityError(f"must be a finite number, got {shown(value)}")
+    require_size(si, dimension, shown(value))
     return si
+
+
+def require_size(si: float, dimension: Dimension | None, given: str) -> None:
+    """Raises QuantityError for a number that is not finite, or of no size to calculate with."""
+    if not math.isfinite(si):
+        raise QuantityError(f"must be a finite number, got {given}")
+    known = dimension or PLAIN
+    if abs(si) > known.largest:
+        raise QuantityError(f"too large to calculate with, got {given}; allowed: {known.limits}")
+    if 0.0 < abs(si) < _NOTHING:
+        raise QuantityError(f"too small to calculate with, got {given}: write 0 where it is meant")
 
 
 def read_rate(value: object, dimension: Dimension | None) -> float:

@@ -177,6 +177,11 @@ def check(path: str | Path, allow_outside: bool = False) -> CheckAnswer:
     Raises CaseError with every problem found by the first of these steps that finds any.
     """
     case = load_case(path, allow_outside)
+    with case.located():
+        return _checked(case)
+
+
+def _checked(case: Case) -> CheckAnswer:
     file, model = case.file, case.model()
     trajectory = case.trajectory if file.trajectory is not None else None
     notes = weights(file)
@@ -214,11 +219,10 @@ def _require_regular(case: Case, q: Floats | None) -> None:
         given = case.file.expansion.q
         pose = resting_pose(case.file) if given == "auto" else given
         q = np.append(np.asarray(pose, dtype=np.float64), written_loads(case.file))[None]
-    with case.located():
-        try:
-            case.model().frequencies(q, case.initial_design, 1)
-        except UsageError as error:
-            raise CaseError((case.file.problem("mechanism", str(error)),)) from error
+    try:
+        case.model().frequencies(q, case.initial_design, 1)
+    except UsageError as error:
+        raise CaseError((case.file.problem("mechanism", str(error)),)) from error
 
 
 # --- ``--q`` and ``--y`` of the command line: text → SI numbers of the case's dimensions

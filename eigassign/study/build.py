@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile, TrajectoryForm
-from eigassign.errors import CaseError, MechanismError
+from eigassign.errors import CaseError, MechanismError, SingularityError
 from eigassign.mechanism.assembly.build import (
     WholeLinks,
     build_pencil,
@@ -40,10 +40,14 @@ Floats = NDArray[np.float64]
 def located(file: CaseFile, trajectory: str = "trajectory") -> Iterator[None]:
     """Raise a MechanismError from inside as a CaseError at its line of the case file.
 
-    ``trajectory`` is the key of the one that errors below `trajectory` are about.
+    ``trajectory`` is the key of the one that errors below `trajectory` are about. Loops that cannot
+    be closed are a SingularityError, which names the pose, and have the place of the joints.
     """
     try:
         yield
+    except SingularityError as error:
+        message = f"{error}: keep the poses away from there, or choose mechanism.assembly otherwise"
+        raise CaseError((file.problem("mechanism.joints", message),)) from error
     except MechanismError as error:
         path = error.path
         if path.split(".")[0] == "trajectory":

@@ -22,8 +22,14 @@ from eigassign.case.schema.parts import (
 )
 from eigassign.case.schema.sections import Material, Section
 from eigassign.case.schema.vectors import Angle, Inertia, Orientation, Vector
+from eigassign.case.units import DIMENSIONS
 
-Q_VALUE = Quantity(elsewhere="angle (in rad when bare; or deg), or length, as its coordinate")
+_FAR = DIMENSIONS["angle"].largest  # rad, and m where the joint slides
+Q_VALUE = Quantity(
+    at_least=-_FAR,
+    at_most=_FAR,
+    elsewhere="angle (in rad when bare; or deg), or length, as its coordinate",
+)
 QValue: TypeAlias = Annotated[float, Q_VALUE]
 Stiffness: TypeAlias = Annotated[float, quantity("stiffness", at_least=0)]
 TurningStiffness: TypeAlias = Annotated[float, quantity("rotational stiffness", at_least=0)]

@@ -17,7 +17,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from eigassign.case.suggestions import shown
-from eigassign.case.units import DIMENSIONS, Dimension, QuantityError, read
+from eigassign.case.units import DIMENSIONS, PLAIN, Dimension, QuantityError, read
 
 T = TypeVar("T")
 L = TypeVar("L")
@@ -75,7 +75,10 @@ class Quantity:
         return self.checked(read(value, self.dimension), shown(value))
 
     def checked(self, si: float, given: str) -> float:
-        """``si`` if it is within the limits. Raises QuantityError."""
+        """``si`` if it is within the limits. Raises QuantityError.
+
+        What cannot be negative may not be too small to calculate with either, unless it may be 0.
+        """
         unit = f" {self.dimension.si}" if self.dimension and self.dimension.si else ""
         for sign, limit, holds in (
             (">", self.above, self.above is None or si > self.above),
@@ -85,6 +88,11 @@ class Quantity:
         ):
             if not holds:
                 raise QuantityError(f"must be {sign} {limit:g}{unit}, got {given}")
+        known = self.dimension or PLAIN
+        if 0 < si < known.smallest and 0 in (self.above, self.at_least):
+            zero = "0, or " if self.at_least == 0 else ""
+            message = f"too small to calculate with, got {given}; allowed: {zero}{known.limits}"
+            raise QuantityError(message)
         return si
 
     def _validate(self, value: object) -> float:
@@ -105,7 +113,7 @@ class Quantity:
             "exclusiveMinimum": self.above,
             "minimum": self.at_least,
             "exclusiveMaximum": self.below,
-            "maximum": self.at_most,
+            "maximum": self.at_most or (self.dimension or PLAIN).largest,
         }
         number = {"type": "number", **{k: v for k, v in limits.items() if v is not None}}
         if self.dimension is None and not self.elsewhere:

@@ -12,6 +12,7 @@ from eigassign.case.schema.parts import OneOrList, Quantity, quantity, wrong
 LENGTH = quantity("length", above=0)
 ANGLE = quantity("angle")
 PLACE = quantity("length")
+_SHORTEST = 1e-30  # component of a direction; squares of less end in 0
 _ROUND_OFF = 1e-12  # of the trace: a thin rod's zero inertia computed elsewhere
 
 
@@ -28,7 +29,7 @@ Orientation: TypeAlias = tuple[Angle, Angle, Angle]  # rad, about x, y, z: R = R
 
 
 def _points_somewhere(direction: tuple[float, ...]) -> tuple[float, ...]:
-    if not any(direction):
+    if not any(abs(v) >= _SHORTEST for v in direction):
         raise wrong("has no direction: all components are zero")
     return direction
 
