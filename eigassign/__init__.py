@@ -7,6 +7,7 @@ one function, `eigassign.pipeline.run.solve_case`.
     _version       the version
     errors         every error raised on purpose, and its exit code
     files          reading files that anybody may have put there, within limits
+    brief          short reprs of objects that hold arrays
     process        the process around a command: errors on stderr, signals, streams, threads
     series         truncated power series and expressions that are evaluated on them
     interpolation  polynomial interpolation in several variables
@@ -76,5 +77,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Names for completion: also those of `__getattr__`, which are not loaded yet."""
-    return sorted({*globals(), *__all__})
+    """The public names for completion, whether `__getattr__` has loaded them yet or not."""
+    return sorted(__all__)

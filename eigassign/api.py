@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
+from eigassign.errors import EigassignError, UsageError
 from eigassign.modal import expansion as modal_expansion
 from eigassign.modal.expansion import Expansion
 from eigassign.modal.fit.fit import Fit, PathFit, fit
@@ -16,10 +19,20 @@ from eigassign.modal.reduced import compression
 from eigassign.modal.reduced import reduce as modal_reduced
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.output import reduced_file
+from eigassign.output.figures import motion
+from eigassign.output.figures.modes import mode_figures
+from eigassign.output.figures.style import FigurePlan
+from eigassign.output.notebook import drawn, html
+from eigassign.pipeline import queries
+from eigassign.pipeline.animation import animate
 from eigassign.pipeline.run import Result, solve_case
 from eigassign.pipeline.update import Updated, update_case
 from eigassign.series.multi_index import LowerSet
-from eigassign.study.built_case import Case, load_case
+from eigassign.study import built_case, drawing
+from eigassign.study.results import ModePictures
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = [
     "Box",
@@ -37,6 +50,83 @@ __all__ = [
 ]
 
 
+class Case(built_case.Case):
+    """A validated case with what is built from it, each part once and when it is asked for.
+
+    ``model()`` is the mechanism, ``trajectory`` q(t), ``initial_design`` y (n_y,) in SI units as
+    written, ``file`` what the file says; ``plot()``, ``plot_mode()`` and ``animate()`` draw it.
+    """
+
+    def _repr_html_(self) -> str:
+        try:
+            return html([repr(self)], plan=self._plan())
+        except EigassignError as error:
+            return html([repr(self), str(error)])
+
+    def plot(self) -> Figure:
+        """The mechanism in poses along its trajectory, the first in colour.
+
+        A matplotlib figure, which a notebook shows; ``.savefig("arm.pdf")`` keeps it. Raises
+        CaseError for a mechanism that cannot be modelled or follow its trajectory.
+        """
+        return drawn(self._plan())
+
+    def _plan(self) -> FigurePlan:
+        with self.located():
+            model, y = self.model(), self.initial_design
+            if self.file.trajectory is not None:
+                poses = drawing.draw_poses(self.file, model, self.trajectory, y)
+            else:
+                q, y = queries.pose_and_design(self)
+                poses = drawing.rest_pose(self.file, model, q, y)
+        return motion.mechanism_plan(self.file.title, poses)
+
+    def plot_mode(
+        self, mode: int = 1, q: Sequence[float] | None = None, y: Sequence[float] | None = None
+    ) -> Figure:
+        """The shape of the ``mode``-th elastic mode, from 1, over the mechanism at rest.
+
+        At q (n_q,) in rad or m and y (n_y,) in SI units; without them at the expansion point or
+        where the trajectory starts, and for the design as written. Raises UsageError for wrong
+        lengths and for more modes than there are.
+        """
+        return drawn(mode_figures(self._pictures(mode, q, y))[mode - 1])
+
+    def animate(
+        self,
+        path: str | Path,
+        mode: int | None = None,
+        q: Sequence[float] | None = None,
+        y: Sequence[float] | None = None,
+    ) -> None:
+        """Write ``path``, a GIF or animated PNG by its ending: the motion along the trajectory.
+
+        With ``mode`` one period of that mode instead, at q and y as in `plot_mode`. Raises
+        UsageError for another ending, StorageError where it cannot be written.
+        """
+        animate(self, path, mode, q, y)
+
+    def _pictures(
+        self, mode: int, q: Sequence[float] | None, y: Sequence[float] | None
+    ) -> ModePictures:
+        if mode < 1:
+            raise UsageError(f"modes are numbered from 1, got {mode}")
+        at = queries.pose_and_design(self, q, y, beyond=True)
+        with self.located():
+            return drawing.draw_modes(self.file, self.model(), *at, mode)
+
+
+def load_case(given: str | Path | Mapping[str, Any], allow_outside: bool = False) -> Case:
+    """Read and validate a case file, or a mapping with the same keys and values.
+
+    Values are numbers in SI units or text with a unit, ``0.03`` or ``"30 mm"``; arrays count as
+    lists. ``allow_outside``: the case may name files that do not lie below its own folder (of a
+    mapping the current one). Raises CaseError with every problem found, UsageError where there is
+    no such file.
+    """
+    return Case(built_case.load_case(given, allow_outside).file)
+
+
 def expand(
     model: Model,
     q0: ArrayLike,
@@ -47,9 +137,16 @@ def expand(
     space: LowerSet | None = None,
     vector_order: int | None = None,
 ) -> Expansion:
-    """Taylor expansion of the eigenvalues of ``modes`` about (q0, y0), eqs. (4)-(9).
+    """Taylor expansion of the eigenvalues of ``modes`` about (q0, y0), eqs. (4)-(9) of the paper.
 
-    See :func:`eigassign.modal.expansion.expand`.
+        λ(q, y) ≈ Σ_γ λ_γ (x − x0)^γ,  x = (q, y),  over all |γ| ≤ ``order``
+
+    q0 (n_q,) in rad or m, y0 (n_y,) in SI units; ``modes`` counts elastic modes from 1.
+    ``linear_in_y`` keeps the terms of at most first order in y, eq. (9); ``space`` chooses the set
+    of γ itself; ``vector_order`` is how far the eigenvectors are expanded (what λ needs if None).
+    ``.frequencies(q, y)`` (n, n_modes) are in Hz, ``.error_estimate(q, y)`` is relative, and
+    ``.indices``, ``.coefficients`` are γ and λ_γ in rad²/s². Raises UsageError for wrong shapes,
+    orders and modes.
     """
     return modal_expansion.expand(
         as_model(model).pencil, q0, y0, modes, order, linear_in_y, space, vector_order
@@ -67,31 +164,53 @@ def reduce(
 ) -> ReducedModel:
     """Reduced model on the Taylor vectors at one or several expansion points, with its own error.
 
-    ``span``, half-widths of q (n_q,) and y (n_y,) about the points, makes it as small as changes
-    no frequency in there by more than ``accuracy`` (relative). See
-    :func:`eigassign.modal.reduced.reduce.reduce`.
+        K̂(q, y) = Vᵀ K(q, y) V,  M̂ likewise,  V = [φ_γ : |γ| ≤ ``half_order``]
+
+    q0 (n_q,) or (n_points, n_q) in rad or m, y0 likewise in SI units; ``modes`` counts elastic
+    modes from 1. ``span``, half-widths of q (n_q,) and y (n_y,) about the points, makes it as small
+    as changes no frequency in there by more than ``accuracy`` (relative). ``.frequencies(q, y)``
+    (n, n_modes) are in Hz, ``.error_estimate(q, y)`` is relative and infinite where the model does
+    not vouch for the mode. Raises UsageError for impossible arguments, AccuracyError where no basis
+    can be made.
     """
     return modal_reduced.reduce(
         as_model(model).pencil, q0, y0, modes, half_order, span=span, accuracy=accuracy
     )
 
 
-def assign(case: Case) -> Result:
-    """The whole job of ``eigassign optimize``, without writing anything."""
+def assign(case: built_case.Case) -> Result:
+    """The whole job of ``eigassign optimize``, without writing anything.
+
+        min over y of Σ w (f(t)/f_d(t) − 1)² / Σ w  within the bounds, limits and bands of the case
+
+    (or its largest term: ``assignment.objective``), judged by exact eigenvalues; the paper's one
+    shot, the quadratic program of eqs. (13)-(14), is where it starts or all there is of it.
+    ``.design`` by name in SI units, ``.exact_hz`` (n_t,), ``.results`` with all the rest;
+    ``.results.shortcoming`` says why this is no answer to build on, None if it is. Raises
+    CaseError for what the case lacks, InfeasibleError for limits that contradict each other,
+    AccuracyError for numbers that cannot be vouched for.
+    """
     return solve_case(case)
 
 
-def update(case: Case) -> Updated:
+def update(case: built_case.Case) -> Updated:
     """The whole job of ``eigassign update``, without writing anything.
 
-    ``.design`` and ``.intervals`` by name, ``.results`` with all the rest, ``.case`` with the
-    values found. Raises CaseError for what the case lacks and for wrong measurements.
+        min over y of Σ ((f(q, y) − f_measured) / σ)²
+
+    ``.design`` and its 95 % ``.intervals`` by name in SI units, ``.results`` with all the rest,
+    ``.case`` with the values found. Raises CaseError for what the case lacks and for wrong
+    measurements.
     """
-    return update_case(case)
+    found = update_case(case)
+    return replace(found, case=Case(found.case.file))
 
 
 def save_reduced(reduced: ReducedModel, path: str | Path) -> None:
-    """Keep a reduced model in an HDF5 file, for use without its mechanism."""
+    """Keep a reduced model in an HDF5 file, for use without its mechanism.
+
+    Raises StorageError where it cannot be written.
+    """
     reduced_file.save_reduced(reduced, path)
 
 

@@ -18,7 +18,10 @@ class EigassignError(Exception):
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing wrong with a case file: where, what, and what is allowed (1-based line, column)."""
+    """One thing wrong with a case file: where, what, and what is allowed (1-based line, column).
+
+    Of a case that was given as a mapping, line and column are 0.
+    """
 
     file: str
     line: int
@@ -27,7 +30,7 @@ class Problem:
     message: str
 
     def __str__(self) -> str:
-        where = f"{self.file}:{self.line}:{self.column}: "
+        where = f"{self.file}:{self.line}:{self.column}: " if self.line else f"{self.file}: "
         return where + (f"{self.path}: " if self.path else "") + self.message
 
 

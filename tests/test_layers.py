@@ -26,7 +26,7 @@ OWNERS = {
     "sklearn": {"chart"},
 }
 EVERYWHERE = {"numpy", "scipy"}
-PRINTING = {"cli.cache", "cli.inspect", "cli.runs", "cli.reporter", "output.console"}
+PRINTING = {"cli.cache", "cli.export", "cli.inspect", "cli.runs", "cli.reporter", "output.console"}
 MODULES = sorted(ROOT.rglob("*.py"))
 PACKAGES = sorted(path.parent for path in ROOT.rglob("__init__.py"))
 
@@ -144,7 +144,8 @@ def test_the_command_line_imports_only_click_and_light_modules_at_its_top(path: 
 
 
 TESTS = sorted(Path(__file__).parent.rglob("*.py"))
-STANDARD = {"_replace", "_asdict", "_fields", "_exit"}  # of named tuples and of os: no secrets
+# of named tuples, of os and of notebooks: no secrets
+STANDARD = {"_replace", "_asdict", "_fields", "_exit", "_repr_html_", "_repr_png_"}
 
 
 def private_names(tree: ast.Module) -> Iterator[str]:

@@ -27,6 +27,7 @@ from eigassign.assignment.program import (
     build_program,
 )
 from eigassign.assignment.solver import solve_program
+from eigassign.brief import Brief
 
 
 @dataclass(frozen=True)
@@ -43,8 +44,8 @@ class ActiveLimit:
     multiplier: float
 
 
-@dataclass(frozen=True)
-class Assignment:
+@dataclass(frozen=True, repr=False)
+class Assignment(Brief):
     """The optimal design and the proof that it is.
 
     ``y`` and ``dy = y − y0`` (n_y,) in SI units; ``lam`` one array for each goal, (its n_t,) in

@@ -10,11 +10,11 @@ In reading order, each importing only from those above it:
     rules        what keys must have in common, over the plain data; what looks like a slip
     canonical    content of a case → canonical YAML text that reads back equal
     case_file    the validated case as the rest of the program sees it
-    loading      path → CaseFile, or all problems of the file at once
+    loading      path or mapping → CaseFile, or all problems of the file at once
 """
 
 from eigassign.case.case_file import CaseFile
-from eigassign.case.loading import load, parse
+from eigassign.case.loading import from_mapping, load, parse
 from eigassign.case.schema.design import Catalogue, Choices, DesignColumn, Tolerance
 from eigassign.case.schema.document import json_schema
 from eigassign.case.schema.joints import (
@@ -89,6 +89,7 @@ __all__ = [
     "TrajectoryForm",
     "TubeSection",
     "UniversalJoint",
+    "from_mapping",
     "json_schema",
     "load",
     "parse",

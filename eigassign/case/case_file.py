@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from eigassign.brief import cut, named
 from eigassign.case.canonical import plain, to_yaml
 from eigassign.case.reader import KeyPath, Mark, dotted
 from eigassign.case.rules.properties import property_at
@@ -64,6 +65,13 @@ class CaseFile:
     warnings: tuple[Problem, ...] = field(compare=False)
     marks: Mark = field(compare=False, repr=False)
     files: Mapping[str, str] = field(compare=False, default_factory=dict)  # SHA-256 by name
+
+    def __repr__(self) -> str:
+        q, y = named(tuple(self.coordinates)), named(tuple(self.design.parameters))
+        targets = f"{len(self.targets)} target{'s' if len(self.targets) != 1 else ''}"
+        return cut(
+            f"<CaseFile {str(self.path)!r}: {cut(self.title, 80)}; q = {q}, y = {y}, {targets}>"
+        )
 
     def problem(self, key_path: str, message: str) -> Problem:
         """Problem at the line and column of ``key_path`` (``mechanism.links.forearm.length``,

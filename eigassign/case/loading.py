@@ -1,6 +1,6 @@
 """Path → CaseFile, or all problems of the file at once.
 
-    bytes → reader → tree → values in SI → schema → document → CaseFile
+    bytes or mapping → reader → tree → values in SI → schema → document → CaseFile
                        └→ rules
 
 The schema and the rules both look at the whole file, so that nobody mends a file twice.
@@ -10,13 +10,15 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from eigassign.case.case_file import CaseFile
-from eigassign.case.reader import Source, read_yaml
+from eigassign.case.reader import Source, read_mapping, read_yaml
 from eigassign.case.rules.consistency import inconsistent, too_many
 from eigassign.case.rules.files import NamedFile, named_files, not_allowed, unreadable
 from eigassign.case.rules.plausibility import implausible
@@ -59,6 +61,22 @@ def parse(data: bytes, path: str | Path, allow_outside: bool = False) -> CaseFil
         source = read_yaml(data, str(path))
     except CaseError as error:
         raise CaseError(_first(error.problems)) from None
+    return _checked(source, data, path, allow_outside)
+
+
+def from_mapping(
+    given: Mapping[str, Any], path: str | Path = "case", allow_outside: bool = False
+) -> CaseFile:
+    """The case with the content ``given`` in place of a file.
+
+    Values are as in a file, ``"30 mm"`` or 0.03; ``path`` names it and anchors relative paths.
+    Raises CaseError with every problem, by its key.
+    """
+    source = read_mapping(given, str(path))
+    return _checked(source, json.dumps(source.tree).encode(), Path(path), allow_outside)
+
+
+def _checked(source: Source, data: bytes, path: Path, allow_outside: bool) -> CaseFile:
     if crowded := [source.problem(*finding) for finding in too_many(source.tree)]:
         raise CaseError(tuple(crowded))
     document, schema_findings = validated(completed(source.tree, path.parent))

@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import PurePath
 from typing import Any, NamedTuple
 
 import yaml
@@ -34,7 +35,9 @@ _WORDS: dict[str, bool | None] = {
     **dict.fromkeys(("true", "True", "TRUE"), True),
     **dict.fromkeys(("false", "False", "FALSE"), False),
 }
-_UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\ufeff\ufffe\uffff]")
+_UNPRINTABLE = re.compile(
+    r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\ud800-\udfff\ufeff\ufffe\uffff]"
+)
 
 
 class Mark(NamedTuple):
@@ -242,6 +245,50 @@ class _Builder:
 
 def _mark(event: Any) -> Mark:
     return Mark(event.start_mark.line + 1, event.start_mark.column + 1)
+
+
+# --- A mapping in memory instead of a file
+
+
+def read_mapping(given: Mapping[Any, Any], name: str) -> Source:
+    """A case given as nested mappings, sequences, text and numbers; arrays count as sequences.
+
+    Its marks have no lines. Raises CaseError naming everything that no file could hold.
+    """
+    found: list[Finding] = []
+    tree, marks = _plain(given, (), found)
+    if found:
+        raise CaseError(tuple(Problem(name, 0, 0, dotted(path), why) for path, why in found))
+    return Source(name, tree, marks)
+
+
+def _plain(value: Any, path: KeyPath, found: list[Finding]) -> tuple[Any, Mark]:
+    """``value`` as the reader of files would give it; what cannot be in a file is ``found``."""
+    if len(path) > MAX_DEPTH:
+        found.append((path, f"nested more than {MAX_DEPTH} levels deep"))
+        return None, Mark(0, 0)
+    if hasattr(value, "tolist"):  # an array, or a number out of one
+        value = value.tolist()
+    entries: dict[Any, tuple[Any, Mark]] = {}
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            if isinstance(key, str) and not _UNPRINTABLE.search(key):
+                entries[key] = _plain(inner, (*path, key), found)
+            else:
+                found.append((path, f"keys must be printable text, got {shown(key)}"))
+        tree: Any = {key: inner for key, (inner, _) in entries.items()}
+    elif isinstance(value, (list, tuple)):
+        entries = {k: _plain(v, (*path, k), found) for k, v in enumerate(value)}
+        tree = tuple(inner for inner, _ in entries.values())
+    elif value is None or isinstance(value, (bool, int, float)):
+        tree = value
+    elif isinstance(value, (str, PurePath)) and not _UNPRINTABLE.search(str(value)):
+        tree = str(value)
+    else:
+        tree, what = None, type(value).__name__
+        text = "printable text, a number, a mapping or a sequence"
+        found.append((path, f"expected {text}, got {'other' if what == 'str' else f'a {what}'}"))
+    return tree, Mark(0, 0, {key: mark for key, (_, mark) in entries.items()})
 
 
 # --- Looking into a tree: what is missing, or of another kind, is None or empty

@@ -9,6 +9,7 @@ Reading order:
     reporter   stages, warnings and the log on stderr; JSON on stdout
     runs       optimize, expand, update, validate, chart
     inspect    check, modes, schema
+    export     animate
     batch      batch
     cache      cache path, list, clear
 """
@@ -25,6 +26,7 @@ from eigassign import process
 from eigassign._version import __version__
 from eigassign.cli.batch import batch
 from eigassign.cli.cache import cache
+from eigassign.cli.export import animate
 from eigassign.cli.inspect import check, modes, schema
 from eigassign.cli.runs import chart, expand, optimize, update, validate
 
@@ -79,5 +81,6 @@ def cli() -> None:
     """
 
 
-for command in (check, modes, optimize, expand, update, validate, chart, batch, cache, schema):
+for command in (check, modes, optimize, expand, update, validate, chart, batch, animate, cache):
     cli.add_command(command)
+cli.add_command(schema)

@@ -19,6 +19,7 @@ from math import comb
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from eigassign.brief import Brief, cut
 from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import mode_numbers, point, relative_gap, samples, whole_within
@@ -36,8 +37,8 @@ MAX_ORDER = 20
 MOST_VECTORS = 150  # Taylor vectors of one mode in the reduced model beside an expansion
 
 
-@dataclass(frozen=True, eq=False)
-class Cluster:
+@dataclass(frozen=True, eq=False, repr=False)
+class Cluster(Brief):
     """Λ(w) (r, r, N) of the neighbouring ``modes``; r = 1 is a single eigenvalue."""
 
     modes: tuple[int, ...]
@@ -59,6 +60,13 @@ class Expansion:
     vector_space: LowerSet
     notes: tuple[str, ...]
     pencil: Pencil | None = None  # what was expanded; not stored, needed by ``error_estimate``
+
+    def __repr__(self) -> str:
+        at = ", ".join(f"{value:.6g}" for value in self.x0)
+        return cut(
+            f"<Expansion of λ of modes {self.modes}: order {self.order}, {len(self.space)} "
+            f"coefficients in {self.space.n_variables} variables, about (q, y) = ({at})>"
+        )
 
     def eigenvalues(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """λ (n_samples, n_modes) in rad²/s²; q (n_samples, n_q) or (n_q,), y likewise."""
@@ -342,6 +350,9 @@ class InverseExpansion:
     expansion: Expansion
     coefficients: Floats  # (n_modes, N) over w, s² over units of w
 
+    def __repr__(self) -> str:
+        return repr(self.expansion).replace("Expansion of λ", "InverseExpansion of 1/λ")
+
     @property
     def modes(self) -> tuple[int, ...]:
         """The modes expanded, in the order of the columns."""
@@ -380,6 +391,9 @@ class NearestExpansion:
     """
 
     parts: tuple[Expansion, ...]
+
+    def __repr__(self) -> str:
+        return f"<NearestExpansion of modes {self.modes}: {len(self.parts)} expansion points>"
 
     @property
     def modes(self) -> tuple[int, ...]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from eigassign.brief import cut, named
 from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.local_motion import ReducedLinks
 from eigassign.mechanism.assembly.mode_shapes import NodeShape, StrandShape, shapes
@@ -32,6 +33,10 @@ class ModeShapes:
     strands: tuple[StrandShape, ...]
     nodes: Mapping[tuple[str, str], NodeShape]
 
+    def __repr__(self) -> str:
+        hz = ", ".join(f"{each:.6g}" for each in self.frequencies)
+        return cut(f"<ModeShapes: {hz} Hz; {len(self.strands)} strands, {len(self.nodes)} nodes>")
+
 
 @dataclass(frozen=True, eq=False)
 class Model:
@@ -44,6 +49,12 @@ class Model:
     q_names: tuple[str, ...]
     y_names: tuple[str, ...]
     reduced: ReducedLinks | None = None  # the links that Craig-Bampton made smaller
+
+    def __repr__(self) -> str:
+        return (
+            f"<Model: {self.n_dof} degrees of freedom, {self.n_rigid} of them rigid; "
+            f"q = {named(self.q_names)}, y = {named(self.y_names)}>"
+        )
 
     @property
     def n_rigid(self) -> int:

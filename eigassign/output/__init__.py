@@ -14,6 +14,7 @@ In reading order; each imports from those above it only:
     batch_summary  summary.csv and junit.xml of a batch
     figures        the figures of runs, modes and charts, through matplotlib
     report         report.html, and what a run or modes leave in a folder
+    notebook       figures and tables of a case or result in a notebook
     update_report  the tables and the folder of an update
     chart_report   the tables and the folder of a chart
 """

@@ -303,6 +303,11 @@ def trajectory_csv(results: RunResults, row: TrajectoryRow) -> bytes:
 
 
 def frequencies_csv(results: RunResults) -> bytes:
+    """`frequency_columns` as text."""
+    return _number_text(frequency_columns(results))
+
+
+def frequency_columns(results: RunResults) -> list[Column]:
     """Every sample with its frequencies in Hz: of targets, or without any of the expanded modes.
 
     Of several trajectories one below the other, the first column naming them.
@@ -312,9 +317,7 @@ def frequencies_csv(results: RunResults) -> bytes:
     if len(results.trajectories) > 1:
         columns.append(("trajectory", trajectory_names(results)))
     columns += _motion(results, everything)
-    return _number_text(
-        [*columns, *(_assigned(results) if results.targets else _expanded(results))]
-    )
+    return [*columns, *(_assigned(results) if results.targets else _expanded(results))]
 
 
 def trajectory_names(results: RunResults, rows: slice = slice(None)) -> list[str]:

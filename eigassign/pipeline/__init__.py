@@ -8,6 +8,7 @@ Reading order:
     run_files          the run folder, and the log in it
     run                the paper's flowchart: case, model, expansion, assignment, verification
     queries            check a case; its frequencies at one point
+    animation          a GIF or animated PNG of the motion or a mode
     update             measured frequencies to the parameters that explain them
     chart              time against accuracy of every method on one case
 """

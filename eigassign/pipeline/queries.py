@@ -77,7 +77,7 @@ def modes(
     is neither within its bounds nor the initial one, unless ``beyond_bounds``.
     """
     case = load_case(path, allow_outside)
-    at_q, at_y = _point(case, q, y, beyond_bounds)
+    at_q, at_y = pose_and_design(case, q, y, beyond_bounds)
     with case.located():
         model = case.model()
         hz = model.frequencies(at_q, at_y, count)[0]
@@ -100,7 +100,7 @@ def draw_modes(
     Raises what `modes` does, and StorageError where the folder may not be replaced.
     """
     case = load_case(path, allow_outside)
-    at_q, at_y = _point(case, q, y, beyond_bounds)
+    at_q, at_y = pose_and_design(case, q, y, beyond_bounds)
     target = RESULTS / f"{case.file.path.stem}_modes" if out is None else out
     with new_run_folder(case.file, target, force) as folder:
         with case.located():
@@ -110,10 +110,13 @@ def draw_modes(
     return _answer(case, at_q, at_y, np.array(pictures.frequencies_hz)), target
 
 
-def _point(
-    case: Case, q: Sequence[float] | str | None, y: Sequence[float] | str | None, beyond: bool
+def pose_and_design(
+    case: Case,
+    q: Sequence[float] | str | None = None,
+    y: Sequence[float] | str | None = None,
+    beyond: bool = False,
 ) -> tuple[Floats, Floats]:
-    """Where modes are asked for, in SI; raises UsageError."""
+    """Where modes are asked for, in SI; see `modes`. Raises UsageError."""
     q = coordinates(case.file, q) if isinstance(q, str) else q
     y = design(case.file, y) if isinstance(y, str) else y
     with case.located():

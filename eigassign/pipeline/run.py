@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,13 @@ from eigassign.assignment import Assignment
 from eigassign.assignment.exact.sequential import End
 from eigassign.errors import EigassignError
 from eigassign.modal.expansion import Expansion, NearestExpansion
+from eigassign.output import tables
 from eigassign.output.cache import Cache, default_directory
+from eigassign.output.figures.run import run_figures
+from eigassign.output.figures.style import FigurePlan
+from eigassign.output.formats import number
+from eigassign.output.notebook import Pictured, html
+from eigassign.output.result_files import frequency_columns
 from eigassign.pipeline.coefficient_files import coefficient_files
 from eigassign.pipeline.expansions import expand_plan
 from eigassign.pipeline.run_files import RunFolder, new_run_folder
@@ -37,7 +44,7 @@ from eigassign.study.design.judgement import SolvedDesigns, study_targets
 from eigassign.study.design.wanted import target_frequencies
 from eigassign.study.meaning.overall import Studies, study_meaning
 from eigassign.study.planning import plan_expansion
-from eigassign.study.results import RunResults
+from eigassign.study.results import DesignRow, RunResults
 from eigassign.study.scene import Expansions, Scene
 
 Floats = NDArray[np.float64]
@@ -63,11 +70,13 @@ class Options:
     )  # called with a line as each stage begins
 
 
-@dataclass(frozen=True)
-class Result:
+@dataclass(frozen=True, repr=False)
+class Result(Pictured):
     """The whole answer, in memory. Frequencies (n_t,) in Hz of the first target's mode.
 
-    At all samples, or those of the trajectory that the first target names; `results` has the rest.
+    At all samples, or those of the trajectory that the first target names; ``results`` has the
+    rest: ``.results.targets``, ``.design``, ``.error``, ``.shortcoming`` (None if this is an answer
+    to build on) and more. ``plot()`` draws it, ``to_dict()`` gives its columns to pandas.
     """
 
     design: Mapping[str, float]  # the optimum, SI
@@ -81,6 +90,33 @@ class Result:
     expansion: Expansion | NearestExpansion  # full
     linearised: Expansion | NearestExpansion
     assignment: Assignment | None  # the paper's one shot, where the case has one
+
+    def __repr__(self) -> str:
+        design = ", ".join(f"{row.name} = {_with_unit(row)}" for row in self.results.design)
+        return f"<Result: {design}. {tables.headline(self.results)}>"
+
+    def _repr_html_(self) -> str:
+        shown = (tables.design, tables.errors, tables.required)
+        lines = [tables.headline(self.results) or ""]
+        return html(lines, [made(self.results) for made in shown], self.plan())
+
+    def plans(self) -> dict[str, FigurePlan]:
+        """The figures of the report; that of the first target along the trajectory is the first."""
+        plans = {plan.name: plan for plan in run_figures(self.results)}
+        first = next((name for name in plans if name.startswith("assignment")), None)
+        return plans if first is None else {first: plans[first], **plans}
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """The columns of frequencies.csv as arrays (n_t,): ``pandas.DataFrame(result.to_dict())``.
+
+        Time in s, coordinates in rad or m, and of every target the frequency in Hz that is wanted,
+        at the initial design, as predicted, and exact; NaN where a target does not hold.
+        """
+        return {name: np.array(values) for name, values in frequency_columns(self.results)}
+
+
+def _with_unit(row: DesignRow) -> str:
+    return f"{number(row.optimal)} {row.unit}".rstrip()
 
 
 @dataclass(frozen=True)

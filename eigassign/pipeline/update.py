@@ -5,7 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from eigassign.output.update_report import write_update
+from eigassign.brief import cut
+from eigassign.output.figures.style import FigurePlan
+from eigassign.output.figures.update import update_figures
+from eigassign.output.notebook import Pictured, html
+from eigassign.output.update_report import console_tables, headline, write_update
 from eigassign.pipeline.run import DEFAULT, Options
 from eigassign.pipeline.run_files import new_run_folder
 from eigassign.pipeline.stages import Stages
@@ -13,13 +17,23 @@ from eigassign.study.built_case import Case, load_case
 from eigassign.study.updating.fit import UpdateResults, collect_update, solve_update, update_problem
 
 
-@dataclass(frozen=True)
-class Updated:
+@dataclass(frozen=True, repr=False)
+class Updated(Pictured):
     """A finished update: what it found, the case with the values found, and its folder if any."""
 
     results: UpdateResults
     case: Case
     folder: Path | None = None
+
+    def __repr__(self) -> str:
+        return cut(f"<Updated: {headline(self.results)}>")
+
+    def _repr_html_(self) -> str:
+        return html([headline(self.results)], console_tables(self.results), self.plan())
+
+    def plans(self) -> dict[str, FigurePlan]:
+        """The figures of the report: measurements, parameters."""
+        return {plan.name: plan for plan in update_figures(self.results)}
 
     @property
     def design(self) -> dict[str, float]:

@@ -15,6 +15,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.brief import Brief
 from eigassign.errors import UsageError
 
 Ints = NDArray[np.intp]
@@ -43,8 +44,8 @@ class DegreePairs:
     target: Ints
 
 
-@dataclass(frozen=True, eq=False)
-class LowerSet:
+@dataclass(frozen=True, eq=False, repr=False)
+class LowerSet(Brief):
     """A lower set Λ of N multi-indices over n variables."""
 
     indices: NDArray[np.int64]  # (N, n)

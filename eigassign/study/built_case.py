@@ -7,11 +7,12 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile, load
+from eigassign.case import CaseFile, from_mapping, load
 from eigassign.mechanism.assembly.build import with_elements
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectories
@@ -31,6 +32,9 @@ class Case:
     """A validated case file with what is built from it; frozen."""
 
     file: CaseFile
+
+    def __repr__(self) -> str:
+        return repr(self.file).replace("CaseFile", type(self).__name__, 1)
 
     def model(self) -> Model:
         """The affine ERLS pencil of the mechanism, with exact frequencies.
@@ -99,9 +103,12 @@ class Case:
         return located(self.file)
 
 
-def load_case(path: str | Path, allow_outside: bool = False) -> Case:
-    """Read and validate a case file; raises CaseError with every problem found.
+def load_case(given: str | Path | Mapping[str, Any], allow_outside: bool = False) -> Case:
+    """Read and validate a case file, or a mapping like one; CaseError with every problem found.
 
-    ``allow_outside``: the case may name files that do not lie below its own folder.
+    ``allow_outside``: the case may name files that do not lie below its own folder, or below the
+    current one where it is a mapping.
     """
-    return Case(load(Path(path), allow_outside))
+    if isinstance(given, Mapping):
+        return Case(from_mapping(given, allow_outside=allow_outside))
+    return Case(load(given, allow_outside))

@@ -13,6 +13,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.brief import Brief
+
 Floats = NDArray[np.float64]
 
 
@@ -26,8 +28,8 @@ def frozen(array: Floats) -> Floats:
 # --- How good an expansion is
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Brief):
     """Exact, full Taylor and linearised frequency of one mode at the same points, in Hz."""
 
     exact_hz: Floats
@@ -61,8 +63,8 @@ def _worst(errors: Floats) -> float:
     return worst if worst == worst else float("inf")
 
 
-@dataclass(frozen=True)
-class DesignMap:
+@dataclass(frozen=True, repr=False)
+class DesignMap(Brief):
     """A comparison over one or two entries of x = (q, y), the others at the expansion point."""
 
     names: tuple[str, ...]  # one or two
@@ -71,8 +73,8 @@ class DesignMap:
     values: Comparison  # (n_1,) or (n_1, n_2)
 
 
-@dataclass(frozen=True)
-class ModeStudy:
+@dataclass(frozen=True, repr=False)
+class ModeStudy(Brief):
     """How good the expansion of one mode is (the paper's Figure 3)."""
 
     mode: int
@@ -168,8 +170,8 @@ class TargetAlong:
     error: ErrorSummary
 
 
-@dataclass(frozen=True)
-class FollowedRow:
+@dataclass(frozen=True, repr=False)
+class FollowedRow(Brief):
     """A mode followed by its shape: its ``name``, and which modes (n,) it is, from the lowest."""
 
     name: str
@@ -186,8 +188,8 @@ class FollowedRow:
         )
 
 
-@dataclass(frozen=True)
-class OtherModes:
+@dataclass(frozen=True, repr=False)
+class OtherModes(Brief):
     """Exact frequencies (n_t, n_modes) of some modes before and after (Figure 5)."""
 
     modes: tuple[int, ...]
@@ -199,8 +201,8 @@ class OtherModes:
         return OtherModes(self.modes, self.initial_hz[rows], self.optimal_hz[rows])
 
 
-@dataclass(frozen=True)
-class TargetStudy:
+@dataclass(frozen=True, repr=False)
+class TargetStudy(Brief):
     """One target along the trajectory (the paper's Figure 4); arrays (n,) in Hz.
 
     They belong to the ``rows`` of all samples at which the target holds. What is wanted lies from
@@ -348,8 +350,8 @@ class CatalogueRow:
     best: tuple[CombinationRow, ...]
 
 
-@dataclass(frozen=True)
-class AssignmentRow:
+@dataclass(frozen=True, repr=False)
+class AssignmentRow(Brief):
     """How the answer was found and what it is worth.
 
     ``objective_initial``, ``objective_optimal`` are of the exact problem: the weighted mean square
@@ -453,8 +455,8 @@ class TradeOffPoint:
     design: Floats
 
 
-@dataclass(frozen=True)
-class TradeOff:
+@dataclass(frozen=True, repr=False)
+class TradeOff(Brief):
     """Error against mass (kg) or price: ascending amounts, falling errors, the answer last.
 
     ``initial`` is the amount of the initial design; a price counts from there. ``error`` says which
@@ -468,8 +470,8 @@ class TradeOff:
     points: tuple[TradeOffPoint, ...]
 
 
-@dataclass(frozen=True)
-class Meaning:
+@dataclass(frozen=True, repr=False)
+class Meaning(Brief):
     """What the answer means: what it hangs on, what holds it back, how sure it is."""
 
     sensitivity: tuple[SensitivityRow, ...] = ()
@@ -484,8 +486,8 @@ class Meaning:
 # --- What there is to draw of a mechanism
 
 
-@dataclass(frozen=True)
-class DrawnJoint:
+@dataclass(frozen=True, repr=False)
+class DrawnJoint(Brief):
     """One joint: ``kind`` is "turning", "sliding" or "fixed"."""
 
     name: str
@@ -496,8 +498,8 @@ class DrawnJoint:
     axes: Floats  # (n, d): unit vector along which it slides; along its follower if fixed
 
 
-@dataclass(frozen=True)
-class DrawnBody:
+@dataclass(frozen=True, repr=False)
+class DrawnBody(Brief):
     """One body, or rigid link without extent."""
 
     name: str
@@ -505,8 +507,8 @@ class DrawnBody:
     places: Floats  # (n, d)
 
 
-@dataclass(frozen=True)
-class DrawnSpring:
+@dataclass(frozen=True, repr=False)
+class DrawnSpring(Brief):
     """One spring, between two places or from one to the ground."""
 
     name: str
@@ -516,8 +518,8 @@ class DrawnSpring:
     ends: Floats  # (n, d): the starts again if grounded
 
 
-@dataclass(frozen=True)
-class DrawnPoses:
+@dataclass(frozen=True, repr=False)
+class DrawnPoses(Brief):
     """The mechanism in n poses: ``lines[pose][line]`` is a polyline (n_points, d)."""
 
     time_s: Floats  # (n,)
@@ -533,8 +535,8 @@ class DrawnPoses:
     sizes: tuple[tuple[float, float], ...] = ()
 
 
-@dataclass(frozen=True)
-class ModePictures:
+@dataclass(frozen=True, repr=False)
+class ModePictures(Brief):
     """Elastic modes at one pose and design: the rigid links at rest, and one deformed pose a mode.
 
     The largest displacement of each mode is ``amplitude`` times the mechanism's extent at rest;
@@ -554,8 +556,8 @@ class ModePictures:
 # --- Everything together
 
 
-@dataclass(frozen=True)
-class TrajectoryRow:
+@dataclass(frozen=True, repr=False)
+class TrajectoryRow(Brief):
     """One trajectory: the ``rows`` of all samples that are its own, and what it counts."""
 
     name: str
@@ -566,8 +568,8 @@ class TrajectoryRow:
     loads: Mapping[str, float] = field(default_factory=dict)  # properties that it sets, SI
 
 
-@dataclass(frozen=True)
-class RunResults:
+@dataclass(frozen=True, repr=False)
+class RunResults(Brief):
     """Everything a run folder shows."""
 
     title: str

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.brief import Brief
 from eigassign.case import CaseFile
 from eigassign.errors import CaseError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
@@ -20,8 +21,8 @@ AT_LEAST = 128  # samples of a batch: those of large models share most of their 
 OTHERS = 3  # modes shown above the highest assigned one
 
 
-@dataclass(frozen=True)
-class Expansions:
+@dataclass(frozen=True, repr=False)
+class Expansions(Brief):
     """The full and the partially linearised expansion of the same modes about the same point.
 
     ``order`` is that of the linearised one, as asked for; ``full_order`` may be lower, where the

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.brief import Brief
 from eigassign.mechanism.assembly.build import local_links
 from eigassign.mechanism.assembly.congruence import LocalLink
 from eigassign.mechanism.assembly.local_motion import motion_matrix, motion_scalars
@@ -29,16 +30,16 @@ Ints = NDArray[np.intp]
 POINTS = 24  # intervals drawn of a beam, at least; an element has one or more
 
 
-@dataclass(frozen=True)
-class NodeShape:
+@dataclass(frozen=True, repr=False)
+class NodeShape(Brief):
     """One node: ``place`` (3,) m, ``motion`` (count, 6): v and ω in world axes per vector."""
 
     place: Floats
     motion: Floats
 
 
-@dataclass(frozen=True)
-class StrandShape:
+@dataclass(frozen=True, repr=False)
+class StrandShape(Brief):
     """One beam, or one straight connection of a link without beams: points along it.
 
     ``places`` (n_points, d) in m where the equivalent rigid link has them, ``motions``

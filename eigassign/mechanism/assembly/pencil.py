@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.brief import Brief
 from eigassign.series.algebra import Samples, Tangents, Truncated
 from eigassign.series.compiler import Program
 from eigassign.series.multi_index import LowerSet, on_faces
@@ -51,8 +52,8 @@ def theta_slopes(
     return slopes
 
 
-@dataclass(frozen=True, eq=False)
-class Pencil:
+@dataclass(frozen=True, eq=False, repr=False)
+class Pencil(Brief):
     """K and M of eq. (1) in the unknowns [u; q̇], order n_dof = n_u + n_columns.
 
     x = (q, y) are the case's variables, z = ``to_program`` x + ``shift`` those of the program

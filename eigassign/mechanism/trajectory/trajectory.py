@@ -21,6 +21,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from eigassign.brief import Brief, cut
 from eigassign.case import FileTrajectory, PointTrajectory, SampledTrajectory, TipTrajectory
 from eigassign.errors import MechanismError, TrajectoryError, UsageError
 from eigassign.mechanism.inverse_kinematics.chain import TipChain
@@ -47,8 +48,8 @@ Ints = NDArray[np.intp]
 OfDesign = Callable[[Floats], tuple[Floats, Floats]]  # y (n_y,) -> q (n, n_q), dq/dy (n, n_q, n_y)
 
 
-@dataclass(frozen=True)
-class Trajectory:
+@dataclass(frozen=True, repr=False)
+class Trajectory(Brief):
     """Where the mechanism is when, at the initial design.
 
     ``tip`` is None unless the case gives a path of the tip, which is the same for every design.
@@ -268,6 +269,13 @@ class Trajectories:
     def __post_init__(self) -> None:
         if not self.parts:
             raise UsageError("trajectories: none given")
+
+    def __repr__(self) -> str:
+        each = (
+            f"{p.name!r}: {len(p.trajectory.q)} samples in {np.ptp(p.trajectory.time_s):.6g} s"
+            for p in self.parts
+        )
+        return cut(f"<Trajectories of {self.q.shape[1]} coordinates: {', '.join(each)}>")
 
     @cached_property
     def time_s(self) -> Floats:

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.brief import Brief
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import DENSE_LIMIT, chunks, mode_numbers
 from eigassign.modal.exact.condensation import Modes, block
@@ -34,8 +35,8 @@ COINCIDENT = 1e-9  # relative distance in λ below which shapes are arbitrary
 EXTRA = 4  # modes above the highest tracked one that it may turn out to be
 
 
-@dataclass(frozen=True, eq=False)
-class Tracked:
+@dataclass(frozen=True, eq=False, repr=False)
+class Tracked(Brief):
     """``modes`` as numbered at the first sample, followed along x (n, n_x); immutable.
 
     ``lam`` (n, n_modes) in rad²/s²; ``ordinals`` (n, n_modes): which mode, counted from the lowest

@@ -58,6 +58,12 @@ class Fit:
     interpolant: Interpolant
     own_error: Callable[[], float]  # of the source, part of the estimate; found when asked for
 
+    def __repr__(self) -> str:
+        return (
+            f"<Fit of {self.quantity} of modes {self.modes}: {len(self.indices)} terms in "
+            f"{self.region.d} variables from {self.solves} solves>"
+        )
+
     @cached_property
     def floor(self) -> float:
         """Part of the estimate that is the source's own."""
@@ -161,6 +167,10 @@ class PathFit:
 
     parts: tuple[Fit, ...]
     rows: tuple[slice, ...]  # which of all samples are whose
+
+    def __repr__(self) -> str:
+        pieces = f"{len(self.parts)} stretches from {self.solves} solves"
+        return f"<PathFit of modes {self.modes}: {pieces}>"
 
     @property
     def modes(self) -> tuple[int, ...]:

@@ -28,6 +28,13 @@ class ReducedModel(ReducedPencil):
     half_order: int
     certified: ErrorTerms | Callable[[], ErrorTerms]  # as they are, or how to make them
 
+    def __repr__(self) -> str:
+        return (
+            f"<ReducedModel of modes {self.modes}: {self.size} elastic unknowns, Taylor vectors "
+            f"to order {self.half_order} at {len(self.points)} point(s); "
+            f"{self.n_q} q, {self.n_y} y>"
+        )
+
     @cached_property
     def error_terms(self) -> ErrorTerms:
         """What the error estimate needs, made when it is first asked for."""

@@ -8,6 +8,7 @@ In reading order; each imports from those above it only:
     meaning    sensitivities, reach and tolerance, error against mass
     mechanism  links, joints, bodies and springs; poses along the trajectory
     modes      mode shapes
+    motion     the mechanism by itself; animations of its motion and of its modes
     run        which figures a run has
     update     measured frequencies against the model, parameters with intervals
     front      time against error of a chart's methods

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from eigassign._version import __version__
 from eigassign.assignment.exact.identification import Identified, MeasuredFrequencies, identify
 from eigassign.assignment.exact.sequential import End
+from eigassign.brief import Brief
 from eigassign.case import CaseFile
 from eigassign.modal.model import Model
 from eigassign.study.built_case import Case
@@ -93,8 +94,8 @@ class UnidentifiedDirection:
     words: str
 
 
-@dataclass(frozen=True)
-class UpdateResults:
+@dataclass(frozen=True, repr=False)
+class UpdateResults(Brief):
     """What updating a case found."""
 
     title: str
