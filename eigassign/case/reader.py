@@ -35,6 +35,7 @@ _WORDS: dict[str, bool | None] = {
     **dict.fromkeys(("true", "True", "TRUE"), True),
     **dict.fromkeys(("false", "False", "FALSE"), False),
 }
+_UNSPACED = re.compile(r"([A-Za-z_]\w*):([^\s/:].*)")  # length:300; no https://, no a::b
 _UNPRINTABLE = re.compile(
     r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\ud800-\udfff\ufeff\ufffe\uffff]"
 )
@@ -109,7 +110,7 @@ def read_yaml(data: bytes, file: str) -> Source:
         raise CaseError(tuple(builder.fatal))
     if not isinstance(tree, dict):
         what = "the file is empty" if tree is None else f"the file holds {shown(tree)}"
-        message = f"{what}: expected keys such as title, mechanism, coordinates"
+        message = f"{what}: expected keys such as title, mechanism, coordinates{unspaced(tree)}"
         raise CaseError((Problem(file, 1, 1, "", message),))
     return Source(file, tree, marks, tuple(builder.problems))
 
@@ -149,11 +150,23 @@ def _hint(reason: str, text: str, line: int) -> str:
     nearby = lines[max(line - 2, 0) : line]
     if any("\t" in row[: len(row) - len(row.lstrip())] for row in nearby) or r"\t" in reason:
         return "; a tab cannot indent YAML: use spaces"
+    if hint := next(filter(None, map(unspaced, nearby)), ""):
+        return hint
     if "mapping values are not allowed" in reason:
         return "; check the indentation, and quote text that contains ': '"
     if "could not find expected ':'" in reason:
         return "; a key needs ': ' behind it"
     return "; check brackets, quotes and indentation"
+
+
+def unspaced(value: object) -> str:
+    """A hint, where text such as ``length:300`` was meant as a key and its value; else nothing."""
+    match = _UNSPACED.match(value.lstrip(" -{")) if isinstance(value, str) else None
+    if match is None:
+        return ""
+    key, rest = match.groups()
+    meant = f"{key}: {rest.partition(',')[0].rstrip('}] ')}"
+    return f"; a blank is missing behind the colon: write {shown(meant)}"
 
 
 class _Builder:
@@ -219,6 +232,11 @@ class _Builder:
             key, _ = self.node(event, events, (*path, "?"), place)
             usable = self._usable(key, values, marks, path, place)
             value, mark = self.node(next(events), events, (*path, str(key)[:80]), place)
+            if usable and value is None and (hint := unspaced(key)):
+                key, _, rest = key.partition(":")
+                value, where = resolve(rest), dotted((*path, key))
+                found = Problem(self.file, place.line, place.column, where, hint.removeprefix("; "))
+                self.problems.append(found)
             if usable:
                 values[key], marks[key] = value, mark
         return values, Mark(at.line, at.column, marks)

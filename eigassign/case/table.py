@@ -1,13 +1,16 @@
 """A table in a CSV file: a header `time [ms], q1 [deg], mode`, then one line a row.
 
 Columns may stand in any order; SI units are meant where none is written. Columns with other names
-are ignored with a note. Blank lines and lines that begin with `#` are skipped.
+are ignored with a note. Blank lines and lines that begin with `#` are skipped. Semicolons or tabs
+may stand between the cells instead of commas; decimals then take a point or, in the whole file, a
+comma, as spreadsheets of many countries write them.
 """
 
 from __future__ import annotations
 
 import csv
 import io
+import itertools
 import math
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -16,12 +19,22 @@ from fractions import Fraction
 from pathlib import Path
 
 from eigassign.case.suggestions import listed, shown, suggestion
-from eigassign.case.units import Dimension, QuantityError, Unit, parse_unit, require_size
+from eigassign.case.units import (
+    DIMENSIONS,
+    TWO_TURNS,
+    Dimension,
+    QuantityError,
+    Unit,
+    parse_unit,
+    require_size,
+)
 from eigassign.errors import MechanismError
 from eigassign.files import TABLE, read_bytes
 
 _HEADER_CELL = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+_SEPARATOR_LINE = re.compile(r"sep=([;,\t])", re.IGNORECASE)  # a spreadsheet's hint to itself
+_POINT = re.compile(r"\d\.\d")
 _MOST = 1_000_000  # rows
 _PLAIN = Unit(Fraction(1), (0, 0, 0, 0, 0))
 
@@ -62,6 +75,7 @@ class _Found:
     index: int
     unit: Unit | None
     dimension: Dimension | None
+    bare: bool = False  # the header gives no unit
 
 
 def read_table(
@@ -79,7 +93,9 @@ def read_table(
     or has a wrong header, and ``row_error(key, message, row)`` for a row that does not hold what
     the header promises; both name the line.
     """
-    rows = _rows(_text(file, key), file.name, key)
+    text = _text(file, key)
+    dialect = _dialect(text)
+    rows = _rows(text, dialect, file.name, key)
     line, header = next(rows, (1, []))
     if not header:
         raise MechanismError(key, f"{file.name}: is empty; a header and rows are expected")
@@ -94,7 +110,8 @@ def read_table(
     lines, values = [], list[list[float | str]]([] for _ in found)
     for k, (number, row) in enumerate(rows):
         try:
-            for column, value in zip(values, _values(row, found, len(header), k), strict=True):
+            read = _values(row, found, len(header), k, dialect)
+            for column, value in zip(values, read, strict=True):
                 column.append(value)
         except ValueError as error:
             raise row_error(key, f"{file.name}:{number}: {error}", k) from error
@@ -125,16 +142,44 @@ def _text(file: Path, key: str) -> str:
     return text
 
 
-def _rows(text: str, name: str, key: str) -> Iterator[tuple[int, list[str]]]:
+@dataclass(frozen=True)
+class _Dialect:
+    """What stands between cells, lines before any cell, whether decimals take a comma."""
+
+    between: str
+    skipped: int
+    comma: bool
+
+
+def _dialect(text: str) -> _Dialect:
+    """As the first line that says something has it.
+
+    Decimals may take a comma where it does not separate, and no number of the file has a point.
+    """
+    between, skipped = ",", 0
+    for k, line in enumerate(io.StringIO(text, newline="")):
+        if named := _SEPARATOR_LINE.fullmatch(line.strip()):
+            between, skipped = named.group(1), k + 1
+            break
+        if line.strip() and not line.lstrip().startswith("#"):
+            between = next((c for c in ",;\t" if c in line), ",")
+            break
+    return _Dialect(between, skipped, between != "," and not _POINT.search(text))
+
+
+def _rows(text: str, dialect: _Dialect, name: str, key: str) -> Iterator[tuple[int, list[str]]]:
     """Line number and cells of every line that says something."""
-    reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
+    lines = itertools.islice(io.StringIO(text, newline=""), dialect.skipped, None)
+    blanks = dialect.between != "\t"
+    reader = csv.reader(lines, delimiter=dialect.between, skipinitialspace=blanks, strict=True)
     try:
         for row in reader:
             cells = [cell.strip() for cell in row]
             if any(cells) and not cells[0].startswith("#"):
-                yield reader.line_num, cells
+                yield dialect.skipped + reader.line_num, cells
     except csv.Error as error:
-        raise MechanismError(key, f"{name}:{reader.line_num}: {error}") from error
+        line = dialect.skipped + reader.line_num
+        raise MechanismError(key, f"{name}:{line}: {error}") from error
 
 
 def _split(cell: str, where: str, key: str) -> tuple[str, str]:
@@ -151,7 +196,7 @@ def _found(column: Column, names: Sequence[tuple[str, str]], where: str, key: st
     """The one column of that name, with its unit."""
     name, known = column.name, [other for other, _ in names]
     if known.count(name) != 1:
-        raise MechanismError(key, f"{where}: {_miscounted(name, known)}")
+        raise MechanismError(key, f"{where}: {_miscounted(column, known)}")
     index = known.index(name)
     if not column.dimensions:
         return _Found(name, index, None, None)
@@ -162,37 +207,55 @@ def _found(column: Column, names: Sequence[tuple[str, str]], where: str, key: st
         raise MechanismError(key, f"{where}: column {name}: {error}") from error
     for dimension in column.dimensions:
         if unit.exponents == dimension.exponents:
-            return _Found(name, index, unit, dimension)
+            return _Found(name, index, unit, dimension, bare=not written)
     kinds = " or ".join(map(str, column.dimensions))
     raise MechanismError(key, f"{where}: column {name}: [{written}] is no unit of {kinds}")
 
 
-def _miscounted(name: str, known: Sequence[str]) -> str:
+def _miscounted(column: Column, known: Sequence[str]) -> str:
+    name = column.name
     if name in known:
         return f"column {name} appears {known.count(name)} times"
-    hint = suggestion(name, known)
-    if len(known) == 1 and re.search(r"[;\t ]", known[0]):
-        hint = "; columns are separated by commas"
-    return f"no column {name}; the columns are {listed(known)}{hint}"
+    message = f"no column {name}; the columns are {listed(known)}"
+    if all(_NUMBER.fullmatch(other) for other in known):
+        return f"{message}; the first line must be a header, such as time [s],q1 [deg]"
+    if len(known) == 1 and " " in known[0]:
+        return f"{message}; columns are separated by commas, semicolons or tabs"
+    begins = re.compile(rf"{re.escape(name)}(?![^\W_])", re.IGNORECASE)  # time (s), time_s, TIME
+    near = next(filter(begins.match, known), None)
+    if near is None:
+        return f"{message}{suggestion(name, known)}"
+    unit = f" [{column.dimensions[0].si}]" if column.dimensions and column.dimensions[0].si else ""
+    return f"{message}; if it is {shown(near)}, call it {name + unit}"
 
 
-def _values(row: list[str], columns: Sequence[_Found], n: int, k: int) -> Iterator[float | str]:
+def _values(
+    row: list[str], columns: Sequence[_Found], n: int, k: int, dialect: _Dialect
+) -> Iterator[float | str]:
     """One row in SI units; raises ValueError with what is wrong with it."""
     if k >= _MOST:
         raise ValueError(f"more than {_MOST} rows")
     if len(row) != n:
-        raise ValueError(f"{len(row)} values for {n} columns")
+        comma = " (decimals take a point)" if len(row) > n and dialect.between == "," else ""
+        raise ValueError(f"{len(row)} values for {n} columns{comma}")
     for column in columns:
         cell = row[column.index]
         if column.unit is None:
             yield cell
             continue
-        value = float(cell) if _NUMBER.fullmatch(cell) else math.nan
+        number = cell.replace(",", ".", 1) if dialect.comma else cell
+        value = float(number) if _NUMBER.fullmatch(number) else math.nan
         if not math.isfinite(value):
-            raise ValueError(f"column {column.name}: {shown(cell)} is not a finite number")
+            mixed = "; decimals take a comma or a point, not both" if "," in cell else ""
+            raise ValueError(f"column {column.name}: {shown(cell)} is not a finite number{mixed}")
         si = column.unit.to_si(value)
         try:
             require_size(si, column.dimension, shown(cell))
         except QuantityError as error:
             raise ValueError(f"column {column.name}: {error}") from None
+        if column.bare and column.dimension == DIMENSIONS["angle"] and abs(si) > TWO_TURNS:
+            raise ValueError(
+                f"column {column.name}: {cell} rad is more than two turns, and the header gives no "
+                f"unit: write {column.name} [deg], or {column.name} [rad] if that is meant"
+            )
         yield si

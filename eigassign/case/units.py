@@ -143,6 +143,8 @@ _TURNS = (
     "an angle in deg or rad"
 )
 
+TWO_TURNS = 4 * math.pi  # rad: a bare number beyond was probably meant in degrees
+
 _NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _FACTOR = re.compile(r"([^\W\d_]+|[%°])(?:(?:\^|\*\*)?([-+]?[1-9]))?")
 _SUPERSCRIPTS = str.maketrans("⁻¹²³⁴⁵⁶⁷⁸⁹", "-123456789")
@@ -178,6 +180,11 @@ def require_size(si: float, dimension: Dimension | None, given: str) -> None:
         raise QuantityError(f"too large to calculate with, got {given}; allowed: {known.limits}")
     if 0.0 < abs(si) < _NOTHING:
         raise QuantityError(f"too small to calculate with, got {given}: write 0 where it is meant")
+
+
+def is_bare(text: str) -> bool:
+    """Whether ``text`` is a number without a unit."""
+    return _NUMBER.fullmatch(text.strip()) is not None
 
 
 def read_rate(value: object, dimension: Dimension | None) -> float:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from eigassign.case import CaseFile
 from eigassign.case.rules.properties import impossible
 from eigassign.case.schema.parts import Quantity, quantity
-from eigassign.case.units import QuantityError
+from eigassign.case.units import DIMENSIONS, TWO_TURNS, QuantityError, is_bare
 from eigassign.errors import CaseError, Problem, UsageError
 from eigassign.mechanism.elements.superelement import weights
 from eigassign.mechanism.kinematics.parameters import written_loads
@@ -258,24 +258,32 @@ def _read(
 ) -> list[float]:
     parts = split(text)
     if len(parts) != len(names):
-        wanted = f"{len(names)} ({', '.join(names)})" if names else "none"
-        raise UsageError(f"{option}: expected {wanted} values, got {len(parts)} in {text!r}")
+        wanted = f"{len(names)} values, {', '.join(names)}" if names else "no values"
+        comma = "; decimals take a point" if len(parts) > len(names) and "," in text else ""
+        raise UsageError(f"{option}: expected {wanted}; got {len(parts)} in {text!r}{comma}")
     values = []
     for name, part, each in zip(names, parts, quantities, strict=True):
         try:
             values.append(each.read(part))
         except QuantityError as error:
             raise UsageError(f"{option}: {name}: {error}") from None
+        if each.dimension == DIMENSIONS["angle"] and abs(values[-1]) > TWO_TURNS and is_bare(part):
+            raise UsageError(
+                f"{option}: {name}: {part} rad is more than two turns: write {part} deg, or "
+                f"{part} rad if that is meant"
+            )
     return values
 
 
 def split(text: str) -> list[str]:
     """``"104 deg, 5.3"`` → ``["104 deg", "5.3"]``; spaces, commas or semicolons in between.
 
+    Brackets around all of them, as results print them, are passed over.
+
     A word behind a space that does not begin like a number is the unit of the number before it.
     """
     values: list[str] = []
-    for part in re.split("[,;]", text):
+    for part in re.split("[,;]", re.sub(r"^\s*\[(.*)\]\s*$", r"\1", text)):
         for k, word in enumerate(part.split()):
             if k and word[0] not in "+-.0123456789":
                 values[-1] += f" {word}"

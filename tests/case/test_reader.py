@@ -7,6 +7,7 @@ import math
 import pytest
 
 from eigassign.case.reader import dotted, read_yaml, resolve
+from eigassign.errors import CaseError
 
 
 @pytest.mark.parametrize(
@@ -86,3 +87,37 @@ def test_columns_count_characters_not_bytes() -> None:
 
 def test_a_key_that_cannot_be_printed_is_shown_escaped() -> None:
     assert dotted(("a\nb", 2)) == "'a\\nb'[2]"
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "meant"),
+    [
+        ("a: {b: 1, length:300}\n", 1, "length: 300"),
+        ("a: {b: 1, diameter:10 mm}\n", 1, "diameter: 10 mm"),
+        ("a:\n  length:300\n  b: 1\n", 3, "length: 300"),
+        ("a:\n  b: 1\n  length:300\nc: 1\n", 4, "length: 300"),
+        ("title:An arm\n", 1, "title: An arm"),
+        ("title:An arm\nmechanism:\n", 2, "title: An arm"),
+    ],
+)
+def test_a_key_without_a_blank_behind_its_colon_is_recognised(
+    text: str, line: int, meant: str
+) -> None:
+    try:
+        problems = read_yaml(text.encode(), "f").problems
+    except CaseError as error:
+        problems = error.problems
+    (problem,) = problems
+    assert problem.line == line
+    assert problem.message.endswith(f"a blank is missing behind the colon: write {meant!r}")
+
+
+def test_what_was_meant_by_a_key_without_a_blank_is_read_on() -> None:
+    assert read_yaml(b"{a: {length:300, b:10 mm, 'c:d': 1}}", "f").tree == {
+        "a": {"length": 300, "b": "10 mm", "c:d": 1}
+    }
+
+
+@pytest.mark.parametrize("text", ["a: https://x.org\n", "a: 'b:c'\n", "a: b:c\n", "{'b:c': x}\n"])
+def test_a_colon_inside_text_is_none_of_this(text: str) -> None:
+    assert read_yaml(text.encode(), "f").problems == ()

@@ -56,6 +56,7 @@ def test_modes_takes_units_negative_numbers_and_either_separator(capsys: Capture
         ("1.817 -0.971185307179586", "0.125;0"),
         ("1.817,-0.971185307179586", "125 g, 0"),
         ("1817 mrad 5.312", "125 g 0 kg"),
+        ("[1.817, 5.312]", " [125 g, 0] "),
     ]
     found = [
         json.loads(answer(capsys, "modes", TWO_LINK, "--q", q, "--y", y, "--json")) for q, y in ways
@@ -111,16 +112,22 @@ def test_modes_as_text_lists_the_modes_from_one(capsys: Captured) -> None:
 @pytest.mark.parametrize(
     ("option", "value", "says"),
     [
-        ("--q", "1.8", "--q: expected 2 (q1, q2) values, got 1 in '1.8'"),
-        ("--q", "1,817 5,312", "expected 2 (q1, q2) values, got 4"),
+        ("--q", "1.8", "--q: expected 2 values, q1, q2; got 1 in '1.8'"),
+        (
+            "--q",
+            "1,817 5,312",
+            "expected 2 values, q1, q2; got 4 in '1,817 5,312'; decimals take a point",
+        ),
+        ("--q", "90, 30", "--q: q1: 90 rad is more than two turns: write 90 deg, or 90 rad if"),
+        ("--q", "1.8 -30", "--q: q2: -30 rad is more than two turns: write -30 deg, or"),
         ("--q", "1.8 m, 2", "--q: q1: expected an angle"),
         ("--q", "1.8, nan", "--q: q2: expected an angle"),
         ("--q", "nan 1.8", "--q: q1: expected an angle"),
-        ("--y", "1", "--y: expected 2 (m1, m2) values, got 1"),
+        ("--y", "1", "--y: expected 2 values, m1, m2; got 1"),
         ("--y", "0 -1", "--y: m2: must be >= 0 kg"),
         ("--y", "0 1e999", "--y: m2: must be a finite number"),
         ("--y", "1 deg, 1", "--y: m1: expected a mass"),
-        ("--y", "", "expected 2 (m1, m2) values, got 0"),
+        ("--y", "", "expected 2 values, m1, m2; got 0"),
     ],
 )
 def test_a_wrong_point_is_refused_by_its_name(

@@ -96,9 +96,7 @@ def test_modes_take_the_coordinates_alone_or_with_the_loads(tmp_path: Path) -> N
     loaded = modes(path, "30 deg, 90 deg, 3 kg, 50 kg cm2")
     assert dict(loaded.q)[MASS] == 3.0
     assert loaded.frequencies_hz[0] < as_written.frequencies_hz[0]
-    with pytest.raises(
-        UsageError, match=rf"expected 4 \(q1, q2, {MASS}, {INERTIA}\) values, got 3"
-    ):
+    with pytest.raises(UsageError, match=rf"expected 4 values, q1, q2, {MASS}, {INERTIA}; got 3"):
         modes(path, "30 deg 90 deg 3 kg")
     with pytest.raises(UsageError, match=f"{MASS}.*expected a mass"):
         modes(path, "30 deg, 90 deg, 3 m, 50 kg cm2")

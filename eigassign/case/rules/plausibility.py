@@ -23,14 +23,20 @@ from eigassign.case.schema.trajectory import (
     named_trajectories,
 )
 from eigassign.case.schema.vectors import semidefinite, spread
+from eigassign.case.suggestions import listed
+from eigassign.case.units import TWO_TURNS
 
 MODULUS = (1e6, 1.5e12)  # Pa: soft rubber … above diamond (1.2e12)
 DENSITY = (1.0, 25_000.0)  # kg/m3: aerogel … above osmium (22 590)
-LENGTH = (1e-3, 100.0)  # m: a link of 30 bare "mm" or of 1e-4 m is a slip
+LENGTH = (1e-3, 100.0)  # m: a link of 300 bare "mm" or of 1e-4 m is a slip
+DEPTH = (1e-5, 5.0)  # m: a wire of 10 µm … the girder of a bridge
 FREQUENCY = (1e-3, 1e6)  # Hz
-LARGEST_ANGLE = 4 * math.pi  # rad: two turns; a bare 30 was meant in degrees
+ROUND_OFF = 1e-9  # of the terms of a sum
 LARGEST_ERROR = 0.5  # a tolerance of 2 was meant as 2 %
 SLENDER = 10.0  # length / depth below which shear deformation moves the first modes by percents
+SLENDEREST = (
+    2500.0  # the same ratio of a wire; a link of 30 bare "mm" with a depth of 10 mm is 3000
+)
 SHEAR = (0.05, 1.2)  # κ: thin-walled profiles … solid ones (5/6, 9/10), with a margin
 # I / A² has no dimension: 1/12 for a square, a/12 and 1/(12 a) for a flat bar of aspect a on edge
 # and on its flat, D/(8π t) for a thin tube. The limits are a bar of aspect 1200 (or a tube of
@@ -51,7 +57,9 @@ def _outside(
 ) -> Iterator[Finding]:
     low, high = limits
     if not low <= value <= high:
-        yield path, f"{value:g} {what} is outside {low:g} … {high:g}: is the unit right?"
+        bare = what == "m" and value > high
+        meant = f" A bare number is in m: write {value:g} mm if that was meant" if bare else ""
+        yield path, f"{value:g} {what} is outside {low:g} … {high:g}: is the unit right?{meant}"
 
 
 # --- Materials and sections
@@ -99,6 +107,19 @@ def bare_sections_can_exist(document: Document) -> Iterator[Finding]:
             yield from _outside(section.shear_coefficient, SHEAR, (*path, "shear_coefficient"), "")
 
 
+def sections_have_the_size_of_beams(document: Document) -> Iterator[Finding]:
+    """Sections of a shape are from a wire's to a girder's; those of a bare area are as deep."""
+    spatial = document.mechanism.space == "spatial"
+    for name, section in document.mechanism.sections.items():
+        path: KeyPath = ("mechanism", "sections", name)
+        if isinstance(section, BareSection):
+            if section.area > DEPTH[1] ** 2:
+                message = f"{section.area:g} m2 is more than {DEPTH[1] ** 2:g}: is the unit right?"
+                yield (*path, "area"), f"{message} A bare number is in m2"
+        else:
+            yield from _outside(section.depth(spatial), DEPTH, path, "m")
+
+
 def materials_and_sections_are_used(document: Document) -> Iterator[Finding]:
     """Beams use every material and section, and so those that the design varies."""
     beams: list[BeamLink | FrameBeam] = []
@@ -138,7 +159,7 @@ def links_have_the_size_of_machines(document: Document) -> Iterator[Finding]:
 
 
 def beams_without_shear_are_slender(document: Document) -> Iterator[Finding]:
-    """Euler–Bernoulli beams are much longer than deep."""
+    """Euler–Bernoulli beams are much longer than deep, but no beam is a thread."""
     spatial = document.mechanism.space == "spatial"
     sections = document.mechanism.sections
     for name, link in document.mechanism.links.items():
@@ -146,6 +167,12 @@ def beams_without_shear_are_slender(document: Document) -> Iterator[Finding]:
             continue
         thick = max(_ends(link.section), key=lambda n: sections[n].depth(spatial))
         slenderness = link.length / sections[thick].depth(spatial)
+        if slenderness > SLENDEREST and 1.0 < link.length <= LENGTH[1]:
+            yield (
+                ("mechanism", "links", name, "length"),
+                f"length {link.length:g} m is {slenderness:.0f} times the depth of section "
+                f"{thick!r}: a bare number is in m; was {link.length:g} mm meant?",
+            )
         if slenderness < SLENDER:
             at_most = "at most " if isinstance(sections[thick], BareSection) else ""
             yield (
@@ -168,14 +195,32 @@ def inertias_are_those_of_bodies(document: Document) -> Iterator[Finding]:
                 yield ("mechanism", group, name, "inertia"), message
 
 
-# --- Joints
+# --- Joints and places
+
+
+def places_are_in_metres(document: Document) -> Iterator[Finding]:
+    """Joints, nodes of rigid links and waypoints are no farther apart than a machine is large."""
+    for name, joint in document.mechanism.joints.items():
+        place = max(map(abs, joint.position or ()), default=0.0)
+        yield from _far(place, ("mechanism", "joints", name, "position"))
+    for name, link in document.mechanism.links.items():
+        for node, at in link.nodes.items() if isinstance(link, RigidLink) else ():
+            place = max(map(abs, at), default=0.0)
+            yield from _far(place, ("mechanism", "links", name, "nodes", node))
+    for path, _, motion in named_trajectories(document.trajectory):
+        if isinstance(motion, TipTrajectory):
+            yield from _far(max(map(abs, _flat(motion.waypoints))), (*path, "waypoints"))
+
+
+def _far(place: float, path: KeyPath) -> Iterator[Finding]:
+    yield from _outside(place, (0.0, LENGTH[1]), path, "m")
 
 
 def angles_are_in_radians(document: Document) -> Iterator[Finding]:
     """No angle is larger than two turns."""
     for path, angles in _angles(document):
         worst = max((abs(angle) for angle in _flat(angles)), default=0.0)
-        if worst > LARGEST_ANGLE:
+        if worst > TWO_TURNS:
             yield path, f"{worst:g} rad is more than two turns: was it meant in deg?"
 
 
@@ -294,15 +339,41 @@ def goals_can_be_meant(document: Document) -> Iterator[Finding]:
                 yield ("expansion", "y", k), message
 
 
+def constraints_can_be_met(document: Document) -> Iterator[Finding]:
+    """Somewhere within the bounds each constraint is met."""
+    columns = document.design.parameters
+    for name, constraint in document.design.constraints.items():
+        ends = [
+            sorted((factor * columns[term].min, factor * columns[term].max))
+            for term, factor in constraint.terms.items()
+        ]
+        low, high = (math.fsum(end[k] for end in ends) for k in (0, 1))
+        slack = ROUND_OFF * math.fsum(max(map(abs, end)) for end in ends)
+        for key, beyond in (
+            ("min", constraint.min is not None and constraint.min > high + slack),
+            ("max", constraint.max is not None and constraint.max < low - slack),
+        ):
+            if beyond:
+                limit = getattr(constraint, key)
+                message = (
+                    f"no design meets this: within the bounds of {listed(constraint.terms)} the "
+                    f"sum is from {low:g} to {high:g}, and {limit:g} is its {key}"
+                )
+                yield ("design", "constraints", name, key), message
+
+
 WARNINGS: tuple[Callable[[Document], Iterator[Finding]], ...] = (
     materials_are_of_this_world,
     bare_sections_can_exist,
+    sections_have_the_size_of_beams,
     materials_and_sections_are_used,
     links_have_the_size_of_machines,
     beams_without_shear_are_slender,
     inertias_are_those_of_bodies,
+    places_are_in_metres,
     angles_are_in_radians,
     angles_of_joints_have_an_effect,
     joints_hold_something_new,
     goals_can_be_meant,
+    constraints_can_be_met,
 )

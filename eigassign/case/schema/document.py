@@ -11,7 +11,7 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import AfterValidator, BaseModel, Field, ValidationError
 from pydantic.json_schema import GenerateJsonSchema
 
-from eigassign.case.reader import Finding, KeyPath, Tree
+from eigassign.case.reader import Finding, KeyPath, Tree, unspaced
 from eigassign.case.schema.design import ENTRIES, RESERVED, Design, Parameter, is_entry
 from eigassign.case.schema.joints import JOINTS
 from eigassign.case.schema.links import LINKS
@@ -149,7 +149,8 @@ def _no_kind(key: str, known: Mapping[str, object]) -> Any:
 
     def explain(error: Any) -> _Explained:
         if not isinstance(error["input"], Mapping):
-            return (), f"expected a mapping, got {shown(error['input'])}"
+            given = error["input"]
+            return (), f"expected a mapping, got {shown(given)}{unspaced(given)}"
         if key not in error["input"]:
             return (key,), f"required key is missing: one of {listed(known)}"
         value = error["input"][key]
@@ -185,7 +186,8 @@ def _mapping(error: Any) -> _Explained:
     what = "a mapping (key: value)"
     if error["loc"][-2:] == ("keep_out", "<one>"):
         what = "[low, high] or {harmonic: ..., of: ..., margin: ...}"
-    return (), f"expected {what}, got {shown(error['input'])}"
+    given = error["input"]
+    return (), f"expected {what}, got {shown(given)}{unspaced(given)}"
 
 
 def _expected(what: str) -> Any:

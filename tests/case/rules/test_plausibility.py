@@ -26,6 +26,14 @@ SLIPS = {
     "density times 1000": ("density: 2700", "¦density: 2.7e6", "is the unit right?"),
     "no density": ("density: 2700", "¦density: 0", "massless"),
     "length in mm": ("length: 0.45", "¦length: 450", "is the unit right?"),
+    "length in mm, as mm": ("length: 0.45", "¦length: 450", "write 450 mm if that was meant"),
+    "short length in mm": ("length: 0.6", "¦length: 90", "90 m is 3000 times the depth of section 'rod': a bare number is in m; was 90 mm meant?"),
+    "diameter in mm": ("rod: {shape: circle, diameter: 30 mm}", "¦rod: {shape: circle, diameter: 30}", "write 30 mm if that was meant"),
+    "section in mm": ("area: 7.0632e-4, bending_inertia: 3.97e-8", "¦area: 706.32, bending_inertia: 39700", "A bare number is in m2"),
+    "position in mm": ("follower: fore.start}", "follower: fore.start, ¦position: [300, 0]}", "write 300 mm if that was meant"),
+    "waypoints in mm": ("waypoints: [[0.3, 0.1], [0.2, 0.2]]", "¦waypoints: [[300, 100], [200, -200]]", "write 300 mm if that was meant"),
+    "constraint above the bounds": ("max: 200 g", "¦min: 300 g", "no design meets this: within the bounds of m the sum is from 0 to 0.25, and 0.3 is its min"),
+    "constraint below the bounds": ("{m: 1}, max: 200 g", "{m: -2}, ¦max: -0.6", "the sum is from -0.5 to 0, and -0.6 is its max"),
     "stubby": ("length: 0.45", "¦length: 0.3", "7.5 times the depth of section 'pipe'"),
     "angle in degrees": ("angle: 10 deg", "¦angle: 30", "was it meant in deg?"),
     "mounting under an absolute angle": ("follower: fore.start}", "follower: fore.start, ¦angle: 10 deg}", "has no effect: coordinate 'q2' is absolute"),
@@ -67,6 +75,9 @@ def test_an_ordinary_arm_gives_no_warning() -> None:
         ("frequency: 190 Hz", "frequency: 0.01"),
         ("frequency: 190 Hz", "frequency: 900 kHz"),
         ("max_error: 2 %", "max_error: 50 %"),
+        ("max: 200 g", "min: 250 g"),  # just within the bounds
+        ("waypoints: [[0.3, 0.1]", "waypoints: [[-90, 0.1]"),
+        ("length: 0.6", "length: 70"),
     ],
 )
 def test_an_unusual_but_possible_value_gives_no_warning(old: str, new: str) -> None:

@@ -29,6 +29,10 @@ def written(folder: Path, content: str | bytes) -> Path:
         "time [ms],q1,q2 [mrad]\n0,1,2000\n500,3,4e3\n",
         "\ufefftime,q1,q2\r\n0,1,2\r\n0.5,3,4\r\n",  # as spreadsheets write it
         '# measured\n\n"time","q1","q2"\n# run 7\n0,1,"2"\n\n+.5,3.,4\n',
+        "time;q1;q2\n0;1;2\n0.5;3;4\n",
+        "time;q1;q2\n0;1;2\n0,5;3,0;4\n",  # as spreadsheets of half of Europe write them
+        "\ufeffsep=;\r\ntime;q1;q2 [mrad]\r\n0;1;2000\r\n0,5;3;4e3\r\n",
+        "# by hand\ntime\tq1\tq2\n0\t1\t2\n0,5\t3\t4\n",
     ],
 )
 def test_files_are_read_in_any_order_unit_and_dress(tmp_path, content):
@@ -69,8 +73,14 @@ GOOD = "time,q1,q2\n0,1,2\n"
         ("time,q1\n0,1\n1,2\n", "arm.csv:1: no column q2; the columns are time, q1"),
         ("# x\ntimes,q1,q2\n0,1,2\n", "arm.csv:2: no column time; .* did you mean 'times'"),
         ("time,Q1,q2\n0,1,2\n", "arm.csv:1: no column q1; the columns are time, Q1, q2"),
-        ("time;q1;q2\n0;1;2\n", "arm.csv:1: no column time; .* separated by commas"),
-        ("time\tq1\tq2\n0\t1\t2\n", "arm.csv:1: no column time; .* separated by commas"),
+        ("time;q1\n0;1\n1;2\n", "arm.csv:1: no column q2; the columns are time, q1"),
+        ("time q1 q2\n0 1 2\n", "arm.csv:1: no column time; .* separated by commas, semi"),
+        ("0,1,2\n1,1,2\n", r"the first line must be a header, such as time \[s\],q1"),
+        (
+            "time (s),q1 (deg)\n0,1\n",
+            r"no column time; .* if it is 'time \(s\)', call it time \[s\]",
+        ),
+        ("time,Q1,q2\n0,1,2\n", r"no column q1; .* if it is 'Q1', call it q1 \[rad\]"),
         ("time,q1,q2,q1 [deg]\n0,1,2,3\n", "arm.csv:1: column q1 appears 2 times"),
         ("time,q1 [degrees],q2\n0,1,2\n", "arm.csv:1: column q1: unknown unit 'degrees'"),
         ("time,q1 [mm],q2\n0,1,2\n", r"arm.csv:1: column q1: \[mm\] is no unit of angle"),
@@ -139,3 +149,31 @@ def test_strokes_are_lengths(tmp_path: Path) -> None:
     np.testing.assert_allclose(table.q, [[np.pi, 1e-3], [-np.pi / 2, 2e-3]])
     with pytest.raises(MechanismError, match=r"\[deg\] is no unit of length"):
         read_samples(file, Q, ("m", "m"))
+
+
+@pytest.mark.parametrize(
+    ("content", "line", "says"),
+    [
+        ("time;q1;q2\n0;0.5;0\n1;0,5;0\n", 3, "'0,5' is not a finite number; .* not both"),
+        ("time;q1;q2\n0;1.234,5;0\n1;0,5;0\n", 2, "'1.234,5' is not a finite number"),
+        ("time,q1,q2\n0,0,5,0,1\n", 2, r"5 values for 3 columns \(decimals take a point\)"),
+    ],
+)
+def test_decimals_that_can_be_read_in_two_ways_are_refused(tmp_path, content, line, says):
+    with pytest.raises(TrajectoryError, match=f"arm.csv:{line}: .*{says}"):
+        read_samples(written(tmp_path, content), Q)
+
+
+def test_degrees_without_their_unit_are_refused_where_they_cannot_be_radians(tmp_path):
+    says = r"arm.csv:3: column q2: -91.7 rad is more than two turns.* write q2 \[deg\], or q2 \[rad"
+    with pytest.raises(TrajectoryError, match=says) as error:
+        read_samples(written(tmp_path, "time,q1 [deg],q2\n0,0,0\n1,45,-91.7\n"), Q)
+    assert error.value.sample == 1
+
+
+@pytest.mark.parametrize(
+    ("header", "units"), [("q1 [rad],q2 [rad]", ()), ("q1 [deg],q2 [deg]", ()), ("q1,q2", "mm")]
+)
+def test_many_turns_and_long_strokes_are_read_where_the_unit_is_clear(tmp_path, header, units):
+    file = written(tmp_path, f"time,{header}\n0,0,-720.5\n1,91.7,0\n")
+    assert len(read_samples(file, Q, units).q) == 2
