@@ -139,7 +139,7 @@ def test_files_that_are_no_table_of_text(tmp_path, content, message):
 def test_a_file_that_cannot_be_read_is_named_with_the_reason(tmp_path):
     with pytest.raises(MechanismError, match=r"none\.csv: cannot be read: No such file"):
         read_samples(tmp_path / "none.csv", Q)
-    with pytest.raises(MechanismError, match="cannot be read: Is a directory"):
+    with pytest.raises(MechanismError, match="cannot be read: it is a folder"):
         read_samples(tmp_path, Q)
 
 
