@@ -2,8 +2,9 @@
 
 Nothing of the code under test is used. It reads the tree of a case file. Every node has six
 displacements in world axes (planar mechanisms keep x, y and the turn about z); element matrices are
-integrated from Timoshenko's interdependent shape functions (Friedman and Kosmatka, Computers &
-Structures 47 (1993) 473; cubic Hermite without shear); every joint is six rows
+integrated from cubic deflections with a shear strain that is constant over the element and does no
+work on it (of one section those of Friedman and Kosmatka, Computers & Structures 47 (1993) 473;
+cubic Hermite without shear); every joint is six rows
 "follower − carried base − Σ a_j c_j = 0" with one unknown c_j per freedom that is not locked, and
 the pencil is projected on the null space of all rows. Closed loops are posed by a Newton method of
 its own with differenced rotation vectors.
@@ -11,6 +12,7 @@ its own with differenced rotation vectors.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -319,54 +321,48 @@ def section(s: Tree) -> tuple[float, float, float, float, float, float]:
 
 
 def element(
-    material: Tree, values: tuple[float, ...], h: float, sheared: bool
+    material: Tree, values: Callable[[float], tuple[float, ...]], h: float, sheared: bool
 ) -> tuple[Array, Array]:
-    """(12, 12) stiffness and mass in the element's axes, by Gauss quadrature."""
+    """(12, 12) stiffness and mass in the element's axes, by Gauss quadrature.
+
+    ``values`` are those of `section` at a share of the element. The shear strain is constant: an
+    inner unknown of its own, eliminated statically.
+    """
     E, rho = material["youngs_modulus"], material["density"]
     G = material.get("shear_modulus", E / (2 + 2 * material.get("poissons_ratio", 0.3)))
-    A, I_z, I_y, J, I_p, kappa = values
-    k, m = np.zeros((12, 12)), np.zeros((12, 12))
-    points, weights = np.polynomial.legendre.leggauss(5)
+    k, m = np.zeros((14, 14)), np.zeros((14, 14))  # two shear strains behind the twelve
+    points, weights = np.polynomial.legendre.leggauss(7)
     for s, w in zip(0.5 * (points + 1), 0.5 * h * weights, strict=True):
+        A, I_z, I_y, J, I_p, kappa = values(s)
         for dof, stiff, mass in ((0, E * A, rho * A), (3, G * J, rho * I_p)):
-            n, dn = np.zeros(12), np.zeros(12)
+            n, dn = np.zeros(14), np.zeros(14)
             n[[dof, dof + 6]], dn[[dof, dof + 6]] = [1 - s, s], [-1 / h, 1 / h]
             k += w * stiff * np.outer(dn, dn)
             m += w * mass * np.outer(n, n)
-        for I, dofs, sign in ((I_z, [1, 5, 7, 11], 1.0), (I_y, [2, 4, 8, 10], -1.0)):  # noqa: E741
-            phi = 12 * E * I / (kappa * G * A * h**2) if sheared else 0.0
-            v, slope, theta, bend = (np.zeros(12) for _ in range(4))
-            flip = np.array([1, sign, 1, sign]) / (1 + phi)
-            v[dofs] = flip * [
-                2 * s**3 - 3 * s**2 - phi * s + 1 + phi,
-                h * (s**3 - (2 + phi / 2) * s**2 + (1 + phi / 2) * s),
-                -(2 * s**3 - 3 * s**2 - phi * s),
-                h * (s**3 - (1 - phi / 2) * s**2 - phi / 2 * s),
-            ]
-            slope[dofs] = flip * [
-                (6 * s**2 - 6 * s - phi) / h,
-                3 * s**2 - (4 + phi) * s + 1 + phi / 2,
-                -(6 * s**2 - 6 * s - phi) / h,
-                3 * s**2 - (2 - phi) * s - phi / 2,
-            ]
-            theta[dofs] = flip * [
-                6 / h * (s**2 - s),
-                3 * s**2 - (4 + phi) * s + 1 + phi,
-                -6 / h * (s**2 - s),
-                3 * s**2 - (2 - phi) * s,
-            ]
-            bend[dofs] = (
-                flip
-                * [12 * s - 6, h * (6 * s - 4 - phi), -(12 * s - 6), h * (6 * s - 2 + phi)]
-                / np.array([h**2] * 4)
-            )
+        planes = ((I_z, [1, 5, 7, 11, 12], 1.0), (I_y, [2, 4, 8, 10, 13], -1.0))
+        for I, dofs, sign in planes:  # noqa: E741
+            flip = np.array([1, sign, 1, sign])
+            cubic = flip * [1 - 3 * s**2 + 2 * s**3, h * (s - 2 * s**2 + s**3),
+                            3 * s**2 - 2 * s**3, h * (s**3 - s**2)]  # fmt: skip
+            first = flip * [(6 * s**2 - 6 * s) / h, 1 - 4 * s + 3 * s**2,
+                            (6 * s - 6 * s**2) / h, 3 * s**2 - 2 * s]  # fmt: skip
+            second = flip * [(12 * s - 6) / h**2, (6 * s - 4) / h,
+                             (6 - 12 * s) / h**2, (6 * s - 2) / h]  # fmt: skip
+            v, theta, bend, strain = (np.zeros(14) for _ in range(4))
+            slopes = flip * [0, 1, 0, 1]  # the deflection's slopes are θ + γ
+            v[dofs] = [*cubic, cubic @ slopes]
+            theta[dofs] = [*first, first @ slopes - 1]
+            bend[dofs] = [*second, second @ slopes]
+            strain[dofs[-1]] = 1
             k += w * E * I * np.outer(bend, bend)
             m += w * rho * A * np.outer(v, v)
             if sheared:
-                strain = slope - theta
                 k += w * kappa * G * A * np.outer(strain, strain)
                 m += w * rho * I * np.outer(theta, theta)
-    return k, m
+    T = np.eye(14)[:, :12]
+    if sheared:
+        T[12:] = -np.linalg.solve(k[12:, 12:], k[12:, :12])
+    return T.T @ k @ T, T.T @ m @ T
 
 
 # Assembly
@@ -473,11 +469,16 @@ class Builder:
             out.append(full)
         return out[0], out[1]
 
-    def beam(self, R: Array, data: Tree, section_at: Any, h: float, a: int, b: int) -> None:
+    def beam(
+        self, R: Array, data: Tree, shares: tuple[float, float], h: float, a: int, b: int
+    ) -> None:
+        def values(s: float) -> tuple[float, ...]:
+            share = shares[0] + (shares[1] - shares[0]) * s
+            return section(dimensions(self.m, data["section"], share))
+
         R = R @ turn(X, data.get("roll", 0.0))
-        k, m = element(
-            self.m["materials"][data["material"]], section(section_at), h, data.get("shear", False)
-        )
+        material = self.m["materials"][data["material"]]
+        k, m = element(material, values, h, data.get("shear", False))
         T = np.kron(np.eye(4), R.T)
         dofs = np.r_[a : a + 6, b : b + 6]
         self.K.append((dofs, T.T @ k @ T))
@@ -518,9 +519,9 @@ class Builder:
         stations, named = chain(link, riders)
         at = [self.new() for _ in stations]
         for k in range(len(at) - 1):
-            share = 0.5 * (stations[k] + stations[k + 1]) / link["length"]
-            dims = dimensions(self.m, link["section"], share)
-            self.beam(R, link, dims, stations[k + 1] - stations[k], at[k], at[k + 1])
+            x, y = stations[k], stations[k + 1]
+            shares = x / link["length"], y / link["length"]
+            self.beam(R, link, shares, y - x, at[k], at[k + 1])
         for node, k in named.items():
             self.where[f"{name}.{node}"] = at[k]
 
@@ -536,8 +537,9 @@ class Builder:
             ends = [self.where[f"{name}.{data['from']}"]]
             ends += [self.new() for _ in range(n - 1)] + [self.where[f"{name}.{data['to']}"]]
             for k in range(n):
-                dims = self.m["sections"][data["section"]]
-                self.beam(R @ axes, data, dims, np.linalg.norm(b - a) / n, ends[k], ends[k + 1])
+                self.beam(
+                    R @ axes, data, (0.0, 1.0), np.linalg.norm(b - a) / n, ends[k], ends[k + 1]
+                )
 
     def add_body(self, data: Tree) -> None:
         at, R = self.where[data["at"]], self.pose.R[data["at"].split(".")[0]]

@@ -17,13 +17,12 @@ from eigassign.brief import Brief
 from eigassign.mechanism.assembly.build import local_links
 from eigassign.mechanism.assembly.congruence import LocalLink
 from eigassign.mechanism.assembly.local_motion import motion_matrix, motion_scalars
-from eigassign.mechanism.elements.beam import PLANES, bending_shapes
+from eigassign.mechanism.elements.beam import PLANES, Shear, bending_shapes
 from eigassign.mechanism.elements.links import axes
 from eigassign.mechanism.elements.mesh import LinkMesh, Strand
 from eigassign.mechanism.kinematics.forward import Placement
 from eigassign.mechanism.kinematics.link_frames import LinkFrames
 from eigassign.mechanism.kinematics.rotations import Objects
-from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -99,7 +98,7 @@ def _symbols(local: LocalLink, placement: Placement, mesh: LinkMesh, poses: Link
         *(np.array(group, dtype=object) for group in motion_scalars(local)),
     ]
     for strand in strands:
-        shear = np.array(strand.shear, dtype=object).reshape(-1, 2)
+        shear = np.array(strand.shear, dtype=object).reshape(-1, 2, 2)
         arrays += [np.array(list(strand.points), dtype=object), shear]
     return _Symbols(placement.link, local, mesh, strands, tuple(arrays))
 
@@ -110,13 +109,13 @@ def _spokes(link: str, mesh: LinkMesh, poses: LinkFrames) -> tuple[Strand, ...]:
     That is straight for a rigid link; between the nodes of a superelement, of which nothing else
     is known, it has the nodes' displacements and slopes.
     """
-    none: tuple[Scalar, Scalar] = (0.0, 0.0)
+    none = Shear(0.0, 0.0)
     return tuple(
         Strand(
             [_slots(mesh, name) for name in pair],
             [mesh.positions[name] for name in pair],
             None,
-            [none],
+            [(none, none)],
         )
         for pair in poses.drawn[poses.links.index(link)]
     )
@@ -175,8 +174,9 @@ class _LinkMotion:
 def along(X: Floats, motion: Floats, shear: Floats, turn: Floats | None) -> tuple[Floats, Floats]:
     """Places (n_points, 3) and displacements (count, n_points, 3) along a row of beam elements.
 
-    ``X`` (n + 1, 3) are its nodes, ``motion`` (n + 1, 6, count) their motion, ``shear`` (n, 2) the
-    elements' Φ; ``turn`` has the elements' axes as rows, in the axes of all these.
+    ``X`` (n + 1, 3) are its nodes, ``motion`` (n + 1, 6, count) their motion, ``shear`` (n, 2, 2)
+    Φ and Φ r of each element in both planes; ``turn`` has the elements' axes as rows, in the axes
+    of all these.
     """
     step = np.diff(X, axis=0)
     h = np.linalg.norm(step, axis=1)
@@ -207,7 +207,7 @@ def _bent(
     first: Floats,
     second: Floats,
     h: Floats,
-    phi: Floats,
+    shear: Floats,
     xi: Floats,
     plane: tuple[int, int, float],
 ) -> Floats:
@@ -217,5 +217,5 @@ def _bent(
     dofs = np.stack(
         [first[:, w], turned * first[:, slope], second[:, w], turned * second[:, slope]]
     )
-    N = bending_shapes(xi[None, :], phi[:, None])  # (n, n_xi, 4)
+    N = bending_shapes(xi[None, :], *shear.T[..., None])  # (n, n_xi, 4)
     return np.asarray(np.einsum("nxj,jnc->cnx", N, dofs))

@@ -42,6 +42,7 @@ from eigassign.mechanism.assembly.congruence import LocalLink
 from eigassign.mechanism.assembly.local_motion import motion_scalars
 from eigassign.mechanism.elements.beam import PLANES, RealOrComplex, bending_shapes, bending_slopes
 from eigassign.mechanism.elements.mesh import LinkMesh, Term
+from eigassign.mechanism.elements.profiles import field_inertia
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type
@@ -181,7 +182,8 @@ class Riding:
         moved = 1j * IMAGINARY
         shapes = fields(xi + moved * xi_rate, now.h + moved * h_rate, now.phi + moved * phi_rate)
         N, N_rate = shapes.real, shapes.imag / IMAGINARY
-        matter = now.h[..., None] * weights[:, None] * now.inertia  # (n, n_xi, 6)
+        legendre = np.polynomial.legendre.legvander(2.0 * xi[0] - 1.0, now.inertia.shape[1] - 1)
+        matter = now.h[..., None] * weights[:, None] * (legendre @ now.inertia)  # (n, n_xi, 6)
         G = np.einsum("epri,epr,eprj->eij", N, matter, N_rate)
         H = np.einsum("epri,epr,eprj->eij", N_rate, matter, N_rate)
         return self.assembled(G), self.assembled(H)
@@ -197,14 +199,14 @@ class Riding:
 
 
 class _Elements:
-    """First node, length, Φ (n, 1, 2) and inertia (n, 1, 6) of all elements at one instant."""
+    """Nodes, length, Φ and Φ r (n, 1, 2, 2), inertia (n, n_legendre, 6) of all at one instant."""
 
     def __init__(self, values: Floats, n: int) -> None:
-        nodes, phi, inertia = np.split(values, [n + 1, 3 * n + 1])
+        nodes, phi, inertia = np.split(values, [n + 1, 5 * n + 1])
         self.x = nodes[:-1, None]
         self.h = np.diff(nodes)[:, None]
-        self.phi = phi.reshape(n, 1, 2)
-        self.inertia = inertia.reshape(n, 1, 6)
+        self.phi = phi.reshape(n, 1, 2, 2)
+        self.inertia = inertia.reshape(n, -1, 6)
 
 
 def riding(mesh: LinkMesh) -> Riding:
@@ -217,18 +219,19 @@ def riding(mesh: LinkMesh) -> Riding:
 
 
 def mesh_scalars(mesh: LinkMesh) -> list[Scalar]:
-    """What varies in a `Riding`: its nodes' places along the beam, Φ and inertia per element."""
+    """What varies in a `Riding`: its nodes' places, and shear and inertia of its elements."""
     (strand,) = mesh.strands
     places = [X[0] for X in strand.points]
-    shear = [phi for pair in strand.shear for phi in pair]
-    return [*places, *shear, *(rho for each in strand.inertia for rho in each)]
+    shear = [value for pair in strand.shear for bent in pair for value in bent]
+    inertia = [rho for each in strand.profiles for beam in each for rho in field_inertia(beam)]
+    return [*places, *shear, *inertia]
 
 
 def fields(xi: RealOrComplex, h: RealOrComplex, phi: RealOrComplex) -> RealOrComplex:
     """N (n, n_xi, 6, 12): displacements and rotations at ξ per dof of an element, section's axes.
 
-    xi (n, n_xi), h (n, 1) in m, phi (n, 1, 2). Stretch and twist are linear, bending is that of
-    `bending_shapes` and `bending_slopes`.
+    xi (n, n_xi), h (n, 1) in m, phi (n, 1, 2, 2): `Shear` of each plane. Stretch and twist are
+    linear, bending is that of `bending_shapes` and `bending_slopes`.
     """
     N = np.zeros((*xi.shape, 6, 12), dtype=np.result_type(xi, h, phi))
     for row in (0, 3):
@@ -236,8 +239,9 @@ def fields(xi: RealOrComplex, h: RealOrComplex, phi: RealOrComplex) -> RealOrCom
     one = np.ones_like(h)
     for k, (w, slope, sign) in enumerate(PLANES):
         scale = np.stack([one, sign * h, one, sign * h], axis=-1)
-        deflection = bending_shapes(xi, phi[..., k]) * scale
-        rotation = bending_slopes(xi, phi[..., k]) * scale * (sign / h)[..., None]
+        bent = phi[..., k, 0], phi[..., k, 1]
+        deflection = bending_shapes(xi, *bent) * scale
+        rotation = bending_slopes(xi, *bent) * scale * (sign / h)[..., None]
         for j, dof in enumerate((w, slope, w + 6, slope + 6)):
             N[..., w, dof], N[..., slope, dof] = deflection[..., j], rotation[..., j]
     return N

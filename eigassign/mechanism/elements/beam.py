@@ -9,24 +9,29 @@ An element of length h has matrices that are affine in few scalars; per plane of
 (cubic Hermite bending; Przemieniecki, Theory of Matrix Structural Analysis, §5.6 and §11.7 with
 shear and rotary inertia). Dofs of an element: (u_x, u_y, u_z, θ_x, θ_y, θ_z) at both nodes; a
 planar mechanism keeps (u_x, u_y, θ_z).
+
+Where the section varies, the energies are integrated over the element. Each value is its mean and
+further Legendre polynomials, EI(ξ) = Σ_l EI_l P_l(2ξ − 1). Strains are linear at most, so P_2 is
+the last in k; areas are quadratic at most, so it is in m too, but for the rotary inertia. Stretch,
+twist and shear strain are constant, so that of EA, GJ and κGA only the mean counts. The shear
+strain is that of least energy, see `Shear`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile
-from eigassign.errors import MechanismError
-from eigassign.mechanism.elements.sections import SectionValues, section_values
-from eigassign.mechanism.kinematics.parameters import ModelParameters
+from eigassign.mechanism.elements.profiles import Profile
 from eigassign.series.expression import Scalar, is_constant
 
 Floats = NDArray[np.float64]
 RealOrComplex = NDArray[Any]  # real or complex: polynomials do not mind
+QUADRATIC = 2  # degree of an area along a taper, and of products of linear shapes
 PLANES = ((1, 5, 1.0), (2, 4, -1.0))  # deflection, rotation: θ_z = dv/dx, θ_y = −dw/dx
 
 
@@ -37,48 +42,87 @@ class ElementTerm(NamedTuple):
     matrix: Floats
 
 
-class BeamValues(NamedTuple):
-    """Stiffnesses EA [N], EI_z, EI_y, GJ [N m²], shear κGA [N] or None; ρA, ρI_p, ρI_z, ρI_y.
+class Shear(NamedTuple):
+    """Shapes of bending in one plane: Φ, and Φ r where the section varies; 0 without shear.
 
-    Numbers, expressions, or arrays of numbers (n,): one for each of n elements.
+    Cubic deflections with a constant shear strain γ have the curvature
+
+        h² κ = bᵀ d + (tᵀ d + 6 h γ) τ,   τ = 2ξ − 1,   d = (w1, h θ1, w2, h θ2),
+
+    b = (0, −1, 0, 1), t = (6, 3, −6, 3). The γ of least energy ∫ EI κ² + κGA γ² is
+
+        −6 h γ = Φ/(1+Φ) (t + r b)ᵀ d,   Φ = 12 EI_s/(κGA h²),   r = EI_1/EI_s
+
+    with EI_s = 3 ∫ EI τ² dξ.
     """
 
-    EA: Scalar
-    EI_z: Scalar
-    EI_y: Scalar
-    GJ: Scalar
-    shear: Scalar | None
-    mass: Scalar
-    polar: Scalar
-    rotary_z: Scalar
-    rotary_y: Scalar
+    phi: Scalar
+    skew: Scalar
 
 
-def element_stiffness(beam: BeamValues, h: Scalar) -> list[ElementTerm]:
-    """Affine terms of k; h in m."""
+def shear(profile: Profile, h: Scalar) -> tuple[Shear, Shear]:
+    """Of bending in the element's x-y and x-z plane."""
+    kGA = profile[0].shear
+    if kGA is None:
+        return Shear(0.0, 0.0), Shear(0.0, 0.0)
+    found = []
+    for key in ("EI_z", "EI_y"):
+        EI = _antisymmetric([getattr(beam, key) for beam in profile])
+        phi = EI * 12.0 / (kGA * h**2.0)
+        skew = getattr(profile[1], key) / EI * phi if len(profile) > 1 else 0.0
+        found.append(Shear(phi, skew))
+    return found[0], found[1]
+
+
+def _antisymmetric(EI: Sequence[Scalar]) -> Scalar:
+    """EI_s = 3 ∫ EI (2ξ − 1)² dξ."""
+    return EI[0] if len(EI) == 1 else EI[0] + EI[2] * 0.4
+
+
+def element_stiffness(profile: Profile, h: Scalar) -> list[ElementTerm]:
+    """Affine terms of k; h in m.
+
+    Where EI varies, its antisymmetric mean EI_s takes its place, and there come in addition, with
+    the symbols of `Shear`,
+
+        h⁻³ [ EI_1/(1+Φ) (b tᵀ + t bᵀ)/3 − (2 EI_2/5 + Φ r EI_1/(3 (1+Φ))) b bᵀ ] .
+    """
+    beam = profile[0]
     terms = [ElementTerm(beam.EA / h, _pair(0)), ElementTerm(beam.GJ / h, _pair(3))]
-    for EI, plane in ((beam.EI_z, "z"), (beam.EI_y, "y")):
-        phi = _phi(beam, EI, h)
+    for key, plane, (phi, skew) in zip(("EI_z", "EI_y"), "zy", shear(profile, h), strict=True):
+        each = [getattr(beam, key) for beam in profile]
+        EI = _antisymmetric(each)
         stiff = EI if _is_zero(phi) else EI / (phi + 1.0)
+        matrices = bending_stiffness(plane)
         coefficients = (stiff / h**3.0, stiff / h**2.0, stiff / h, stiff * phi / h)
-        terms += [
-            ElementTerm(c, m) for c, m in zip(coefficients, bending_stiffness(plane), strict=True)
-        ]
+        terms += [ElementTerm(c, m) for c, m in zip(coefficients, matrices, strict=True)]
+        if len(each) > 1:
+            lean = each[1] if _is_zero(phi) else each[1] / (phi + 1.0)
+            terms += [
+                ElementTerm(c, m)
+                for c, m in zip((lean / h**2.0, lean / h), leaning_stiffness(plane), strict=True)
+            ]
+            bent = each[2] * 0.4 + lean * skew * (1.0 / 3.0)
+            terms.append(ElementTerm(bent / h * -1.0, matrices[3]))
     return _folded(terms)
 
 
-def element_mass(beam: BeamValues, h: Scalar) -> list[ElementTerm]:
+def element_mass(profile: Profile, h: Scalar) -> list[ElementTerm]:
     """Affine terms of the consistent m."""
-    terms = [
-        ElementTerm(beam.mass * h, _spread(0)),
-        ElementTerm(beam.polar * h, _spread(3)),
-    ]
-    for EI, rotary, plane in ((beam.EI_z, beam.rotary_z, "z"), (beam.EI_y, beam.rotary_y, "y")):
-        phi = _phi(beam, EI, h)
-        scale = 1.0 if _is_zero(phi) else (phi + 1.0) ** -2.0
-        terms += _polynomial(beam.mass * scale, phi, bending_mass(plane), (h, h**2.0, h**3.0))
-        if beam.shear is not None:
-            terms += _polynomial(rotary * scale, phi, rotary_mass(plane), (h**-1.0, 1.0, h))
+    bent = shear(profile, h)
+    terms: list[ElementTerm] = []
+    for degree, beam in enumerate(profile):
+        if degree <= QUADRATIC:
+            terms.append(ElementTerm(beam.mass * h, _spread(0, degree)))
+            terms.append(ElementTerm(beam.polar * h, _spread(3, degree)))
+        for rotary, plane, each in zip((beam.rotary_z, beam.rotary_y), "zy", bent, strict=True):
+            scale = 1.0 if _is_zero(each.phi) else (each.phi + 1.0) ** -2.0
+            if degree <= QUADRATIC:
+                lengths = (h, h**2.0, h**3.0)
+                terms += _polynomial(beam.mass * scale, each, bending_mass(plane, degree), lengths)
+            if beam.shear is not None:
+                lengths = (h**-1.0, 1.0, h)
+                terms += _polynomial(rotary * scale, each, rotary_mass(plane, degree), lengths)
     return _folded(terms)
 
 
@@ -94,90 +138,99 @@ def _folded(terms: list[ElementTerm]) -> list[ElementTerm]:
     return [*varying, ElementTerm(1.0, total)] if total.any() else varying
 
 
-def shear_ratios(beam: BeamValues, h: Scalar) -> tuple[Scalar, Scalar]:
-    """Φ of bending in the element's x-y and x-z plane; 0 without shear."""
-    return _phi(beam, beam.EI_z, h), _phi(beam, beam.EI_y, h)
-
-
-def repeated(values: tuple[Scalar, ...], n: int) -> list[tuple[Scalar, ...]]:
-    """Those of n elements, from values of all or arrays of each one's own."""
-    if not any(isinstance(value, np.ndarray) for value in values):
-        return [values] * n
-    each = (np.broadcast_to(np.asarray(value), n).tolist() for value in values)
-    return list(zip(*each, strict=True))
-
-
-def field_inertia(beam: BeamValues) -> tuple[Scalar, ...]:
-    """Per unit of length what the mass matrix gives to u_x, u_y, u_z, θ_x, θ_y, θ_z.
-
-    ρA three times [kg/m], ρI_p, ρI_y, ρI_z [kg m]; without shear the rotary ones are neglected.
-    """
-    rotary = (0.0, 0.0) if beam.shear is None else (beam.rotary_y, beam.rotary_z)
-    return (beam.mass, beam.mass, beam.mass, beam.polar, *rotary)
-
-
-def bending_shapes(xi: RealOrComplex, phi: RealOrComplex) -> RealOrComplex:
-    """Deflection per (w1, h θ1, w2, h θ2) at ξ = x/h in an element with shear ratio Φ, (…, 4).
+def bending_shapes(
+    xi: RealOrComplex, phi: RealOrComplex, skew: RealOrComplex | float = 0.0
+) -> RealOrComplex:
+    """Deflection per (w1, h θ1, w2, h θ2) at ξ = x/h in an element with `Shear` Φ, Φ r, (…, 4).
 
     (1+Φ) w = (1−3ξ²+2ξ³ + Φ(1−ξ)) w1 + (ξ−2ξ²+ξ³ + Φ(ξ−ξ²)/2) h θ1
-            + (3ξ²−2ξ³ + Φξ) w2 + (−ξ²+ξ³ − Φ(ξ−ξ²)/2) h θ2,   θ = dw/dx less the shear angle
-    (Przemieniecki, Theory of Matrix Structural Analysis, §11.7); cubic Hermite for Φ = 0. These are
-    the shapes whose products integrate to the consistent mass.
+            + (3ξ²−2ξ³ + Φξ) w2 + (−ξ²+ξ³ − Φ(ξ−ξ²)/2) h θ2
+            + Φ r (ξ−3ξ²+2ξ³)/6 (h θ1 − h θ2),   θ = dw/dx less the shear angle
+    (Przemieniecki, Theory of Matrix Structural Analysis, §11.7, for r = 0), cubic Hermite for
+    Φ = 0. These are the shapes whose products integrate to the consistent mass.
     """
-    bubble = 0.5 * phi * (xi - xi**2)
-    second = xi**2 * (3.0 - 2.0 * xi)
-    shapes = (
-        1.0 - second + phi * (1.0 - xi),
-        xi * (1.0 - xi) ** 2 + bubble,
-        second + phi * xi,
-        xi**2 * (xi - 1.0) - bubble,
-    )
-    return np.stack(shapes, axis=-1) / (1.0 + phi)[..., None]
+    return _shapes(DEFLECTION, xi, phi, skew)
 
 
-def bending_slopes(xi: RealOrComplex, phi: RealOrComplex) -> RealOrComplex:
+def bending_slopes(
+    xi: RealOrComplex, phi: RealOrComplex, skew: RealOrComplex | float = 0.0
+) -> RealOrComplex:
     """h × rotation of the section per (w1, h θ1, w2, h θ2) at ξ, of `bending_shapes`, (…, 4).
 
     (1+Φ) h θ = −6(ξ−ξ²) w1 + (1−4ξ+3ξ² + Φ(1−ξ)) h θ1
-              + 6(ξ−ξ²) w2 + (−2ξ+3ξ² + Φξ) h θ2 .
+              + 6(ξ−ξ²) w2 + (−2ξ+3ξ² + Φξ) h θ2 − Φ r (ξ−ξ²) (h θ1 − h θ2) .
     These are the shapes whose products integrate to the rotary inertia.
     """
-    bow = 6.0 * xi * (1.0 - xi)
-    slopes = (
-        -bow,
-        (1.0 - xi) * (1.0 - 3.0 * xi + phi),
-        bow,
-        xi * (3.0 * xi - 2.0 + phi),
-    )
-    return np.stack(slopes, axis=-1) / (1.0 + phi)[..., None]
+    return _shapes(ROTATION, xi, phi, skew)
 
 
-def _phi(beam: BeamValues, EI: Scalar, h: Scalar) -> Scalar:
-    """Φ = 12EI/(κGA h²)."""
-    return 0.0 if beam.shear is None else EI * 12.0 / (beam.shear * h**2.0)
+def _shapes(
+    parts: tuple[Floats, Floats, Floats],
+    xi: RealOrComplex,
+    phi: RealOrComplex,
+    skew: RealOrComplex | float,
+) -> RealOrComplex:
+    powers = np.stack([xi**k for k in range(parts[0].shape[1])], axis=-1)
+    plain, sheared, skewed = (powers @ part.T for part in parts)
+    whole = plain + sheared * np.asarray(phi)[..., None] + skewed * np.asarray(skew)[..., None]
+    return np.asarray(whole / (1.0 + phi)[..., None])
 
 
 def _polynomial(
     scale: Scalar,
-    phi: Scalar,
+    bent: Shear,
     matrices: tuple[tuple[Floats, ...], ...],
     lengths: tuple[Scalar, ...],
 ) -> list[ElementTerm]:
-    """Σ_i Φ^i Σ_j length_j matrix_ij."""
-    terms: list[ElementTerm] = []
-    power: Scalar = 1.0
-    for row in matrices:
-        terms += [
-            ElementTerm(scale * power * length, m) for length, m in zip(lengths, row, strict=True)
-        ]
-        power = power * phi
-        if _is_zero(power):
-            break
-    return terms
+    """Σ over 1, Φ, Φ², s, Φ s, s² with s = Φ r, Σ_j length_j matrix_ij."""
+    phi, skew = bent
+    powers: list[Scalar] = [1.0]
+    if not _is_zero(phi):
+        powers += [phi, phi * phi]
+    if not _is_zero(skew):
+        powers += [skew, phi * skew, skew * skew]
+    return [
+        ElementTerm(scale * power * length, m)
+        for power, row in zip(powers, matrices, strict=False)
+        for length, m in zip(lengths, row, strict=True)
+    ]
 
 
 def _is_zero(x: Scalar) -> bool:
     return isinstance(x, float | int) and x == 0.0
+
+
+# --- constant matrices: integrals of products of shapes
+
+# Coefficients of 1, ξ, ξ², … of `bending_shapes` and `bending_slopes`, times 1 + Φ: of 1, Φ and Φ r
+DEFLECTION = (
+    np.array([[1.0, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]]),
+    np.array([[1.0, -1, 0, 0], [0, 0.5, -0.5, 0], [0, 1, 0, 0], [0, -0.5, 0.5, 0]]),
+    np.array([[0.0, 0, 0, 0], [0, 1, -3, 2], [0, 0, 0, 0], [0, -1, 3, -2]]) / 6.0,
+)
+ROTATION = (
+    np.array([[0.0, -6, 6], [1, -4, 3], [0, 6, -6], [0, -2, 3]]),
+    np.array([[0.0, 0, 0], [1, -1, 0], [0, 0, 0], [0, 1, 0]]),
+    np.array([[0.0, 0, 0], [0, -1, 1], [0, 0, 0], [0, 1, -1]]),
+)
+LINEAR = np.array([[1.0, -1], [0, 1]])
+LEGENDRE = (  # P_l(2ξ − 1) in powers of ξ
+    (1.0,),
+    (-1.0, 2.0),
+    (1.0, -6.0, 6.0),
+    (-1.0, 12.0, -30.0, 20.0),
+    (1.0, -20.0, 90.0, -140.0, 70.0),
+)
+MULTIPLE = 27720.0  # of 1 … 12: what is divided by it at the end is rounded only once
+
+
+def _integrals(first: Floats, second: Floats, degree: int) -> Floats:
+    """∫ P_l a_i b_j dξ of polynomials a, b, rows of coefficients, over 0 … 1."""
+    out = np.empty((len(first), len(second)))
+    for i, j in np.ndindex(out.shape):
+        product = np.convolve(np.convolve(first[i], second[j]), LEGENDRE[degree])
+        out[i, j] = product @ (MULTIPLE / np.arange(1.0, len(product) + 1.0)) / MULTIPLE
+    return out
 
 
 @cache
@@ -189,10 +242,10 @@ def _pair(dof: int) -> Floats:
 
 
 @cache
-def _spread(dof: int) -> Floats:
-    """Consistent mass of a linear field: [[1/3, 1/6], [1/6, 1/3]]."""
+def _spread(dof: int, degree: int) -> Floats:
+    """Consistent mass of a linear field: [[1/3, 1/6], [1/6, 1/3]] of the mean."""
     out = np.zeros((12, 12))
-    out[np.ix_([dof, dof + 6], [dof, dof + 6])] = [[1 / 3, 1 / 6], [1 / 6, 1 / 3]]
+    out[np.ix_([dof, dof + 6], [dof, dof + 6])] = _integrals(LINEAR, LINEAR, degree)
     return out
 
 
@@ -208,140 +261,47 @@ def _embed(small: Floats, plane: str) -> Floats:
     return out
 
 
-def _blocks(ww: Floats, wt: Floats, tt: Floats) -> tuple[Floats, Floats, Floats]:
-    """Split a bending matrix by its powers of h: deflections, mixed, slopes."""
-    a, b, c = (np.zeros((4, 4)) for _ in range(3))
-    a[np.ix_([0, 2], [0, 2])] = ww
-    b[np.ix_([0, 2], [1, 3])] = wt
-    b[np.ix_([1, 3], [0, 2])] = wt.T
-    c[np.ix_([1, 3], [1, 3])] = tt
-    return a, b, c
+def _by_length(bending: Floats, plane: str) -> tuple[Floats, ...]:
+    """A matrix per (w1, h θ1, w2, h θ2) split by its powers of h: deflections, mixed, slopes."""
+    slopes = np.array([0, 1, 0, 1])
+    power = slopes[:, None] + slopes
+    return tuple(_embed(np.where(power == k, bending, 0.0), plane) for k in range(3))
 
 
 @cache
 def bending_stiffness(plane: str) -> tuple[Floats, ...]:
     """k_0, k_1, k_2, k_3 of one plane."""
-    a, b, c = _blocks(
-        np.array([[12.0, -12.0], [-12.0, 12.0]]),
-        np.array([[6.0, 6.0], [-6.0, -6.0]]),
-        np.array([[4.0, 2.0], [2.0, 4.0]]),
-    )
-    d = np.zeros((4, 4))
-    d[np.ix_([1, 3], [1, 3])] = [[1.0, -1.0], [-1.0, 1.0]]
-    return tuple(_embed(m, plane) for m in (a, b, c, d))
+    k = [[12.0, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]]
+    turned = np.outer([0.0, 1, 0, -1], [0, 1, 0, -1])
+    return (*_by_length(np.array(k), plane), _embed(turned, plane))
 
 
 @cache
-def bending_mass(plane: str) -> tuple[tuple[Floats, ...], ...]:
-    """m_ij of one plane: rows i the powers of Φ, columns j those of h."""
-    rows = (
-        ((13 / 35, 9 / 70), (11 / 210, -13 / 420), (1 / 105, -1 / 140)),
-        ((7 / 10, 3 / 10), (11 / 120, -3 / 40), (1 / 60, -1 / 60)),
-        ((1 / 3, 1 / 6), (1 / 24, -1 / 24), (1 / 120, -1 / 120)),
-    )
-    out = []
-    for (ww, ww_across), (wt, wt_across), (tt, tt_across) in rows:  # alike from both ends
-        blocks = _blocks(
-            np.array([[ww, ww_across], [ww_across, ww]]),
-            np.array([[wt, wt_across], [-wt_across, -wt]]),
-            np.array([[tt, tt_across], [tt_across, tt]]),
-        )
-        out.append(tuple(_embed(m, plane) for m in blocks))
-    return tuple(out)
+def leaning_stiffness(plane: str) -> tuple[Floats, ...]:
+    """(b tᵀ + t bᵀ)/3 of one plane, see `element_stiffness`: what goes with h⁻² and with h⁻¹."""
+    b, t = np.array([0.0, -1, 0, 1]), np.array([6.0, 3, -6, 3])
+    return _by_length((np.outer(b, t) + np.outer(t, b)) / 3.0, plane)[1:]
 
 
 @cache
-def rotary_mass(plane: str) -> tuple[tuple[Floats, ...], ...]:
-    """Rotary inertia ρI of one plane: powers of Φ by powers 1/h, 1, h."""
-    rows = (
-        (6 / 5, 1 / 10, 2 / 15, -1 / 30),
-        (0.0, -1 / 2, 1 / 6, -1 / 6),
-        (0.0, 0.0, 1 / 3, 1 / 6),
-    )
-    out = []
-    for ww, wt, tt, cross in rows:
-        blocks = _blocks(
-            np.array([[ww, -ww], [-ww, ww]]),
-            np.array([[wt, wt], [-wt, -wt]]),
-            np.array([[tt, cross], [cross, tt]]),
-        )
-        out.append(tuple(_embed(m, plane) for m in blocks))
-    return tuple(out)
+def bending_mass(plane: str, degree: int = 0) -> tuple[tuple[Floats, ...], ...]:
+    """m_ij of one plane: rows i for 1, Φ, Φ², Φr, Φ²r, Φ²r², columns j powers of h; with P_l."""
+    return _mass(DEFLECTION, plane, degree)
 
 
-# --- values of the beams of a case: its sections and materials put together
+@cache
+def rotary_mass(plane: str, degree: int = 0) -> tuple[tuple[Floats, ...], ...]:
+    """Rotary inertia ρI of one plane: powers of Φ by powers 1/h, 1, h; P_l along the element."""
+    return _mass(ROTATION, plane, degree)
 
 
-def beam_values(case: CaseFile, parameters: ModelParameters, beam: Any, section: str) -> BeamValues:
-    """Stiffness and mass values of a beam of the case with one section."""
-
-    def number(key: str, value: float) -> Scalar:
-        return parameters.number(f"sections.{section}.{key}", value)
-
-    return _values(case, parameters, beam, section_values(case.mechanism.sections[section], number))
-
-
-def _values(
-    case: CaseFile, parameters: ModelParameters, beam: Any, section: SectionValues
-) -> BeamValues:
-    data = case.mechanism.materials[beam.material]
-    path = f"materials.{beam.material}."
-    E = parameters.number(path + "youngs_modulus", data.youngs_modulus)
-    rho = parameters.number(path + "density", data.density)
-    sheared = bool(getattr(beam, "shear", False))
-    G = _shear_modulus(case, parameters, beam, E, sheared)
-    return BeamValues(
-        EA=E * section.area,
-        EI_z=E * section.inertia_z,
-        EI_y=E * section.inertia_y,
-        GJ=G * section.torsion_constant,
-        shear=G * section.area * section.shear_coefficient if sheared else None,
-        mass=rho * section.area,
-        polar=rho * section.polar_inertia,
-        rotary_z=rho * section.inertia_z,
-        rotary_y=rho * section.inertia_y,
-    )
-
-
-def _shear_modulus(
-    case: CaseFile, parameters: ModelParameters, beam: Any, E: Scalar, sheared: bool
-) -> Scalar:
-    """G = E/(2(1 + ν)), or as given; not needed by planar beams without shear."""
-    data: Any = case.mechanism.materials[beam.material]
-    path = f"materials.{beam.material}."
-    if getattr(data, "shear_modulus", None) is not None:
-        return parameters.number(path + "shear_modulus", data.shear_modulus)
-    if getattr(data, "poissons_ratio", None) is not None:
-        nu = parameters.number(path + "poissons_ratio", data.poissons_ratio)
-        return E / ((nu + 1.0) * 2.0)
-    if case.mechanism.space == "planar" and not sheared:
-        return 0.0
-    message = "needs poissons_ratio or shear_modulus for torsion or shear"
-    raise MechanismError(f"mechanism.materials.{beam.material}", message)
-
-
-def tapered_values(
-    case: CaseFile, parameters: ModelParameters, link: Any, share: Scalar | Floats
-) -> BeamValues:
-    """Values at a share of the length, the sections' dimensions running linearly.
-
-    At many shares at once, arrays, where no design parameter is in them: see `is_settled`.
-    """
-    a, b = case.mechanism.sections[link.section.start], case.mechanism.sections[link.section.end]
-
-    def number(key: str, value: float) -> Scalar:
-        low = parameters.number(f"sections.{link.section.start}.{key}", value)
-        high = parameters.number(f"sections.{link.section.end}.{key}", getattr(b, key))
-        return low + (high - low) * share  # type: ignore[operator, return-value]
-
-    return _values(case, parameters, link, section_values(a, number))
-
-
-def is_settled(parameters: ModelParameters, link: Any) -> bool:
-    """Whether no design parameter touches the sections and the material of a tapered beam."""
-    owners = (
-        f"sections.{link.section.start}.",
-        f"sections.{link.section.end}.",
-        f"materials.{link.material}.",
-    )
-    return not any(path.startswith(owners) for path in parameters.by_path)
+def _mass(shapes: tuple[Floats, ...], plane: str, degree: int) -> tuple[tuple[Floats, ...], ...]:
+    """Of the products that go with 1, Φ, Φ², s, Φ s, s²."""
+    plain, sheared, skewed = shapes
+    pairs = ((plain, plain), (plain, sheared), (sheared, sheared), (plain, skewed),
+             (sheared, skewed), (skewed, skewed))  # fmt: skip
+    rows = []
+    for a, b in pairs:
+        product = _integrals(a, b, degree)
+        rows.append(product if a is b else product + product.T)
+    return tuple(_by_length(row, plane) for row in rows)

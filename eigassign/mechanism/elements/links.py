@@ -13,16 +13,11 @@ from eigassign.case import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.beam import (
     PLANES,
-    BeamValues,
     ElementTerm,
-    beam_values,
+    Shear,
     element_mass,
     element_stiffness,
-    field_inertia,
-    is_settled,
-    repeated,
-    shear_ratios,
-    tapered_values,
+    shear,
 )
 from eigassign.mechanism.elements.bodies import add_bodies, rigid_link
 from eigassign.mechanism.elements.mesh import (
@@ -33,11 +28,17 @@ from eigassign.mechanism.elements.mesh import (
     node_dofs,
     rigid_motion,
 )
+from eigassign.mechanism.elements.profiles import (
+    Profile,
+    beam_profiles,
+    beam_values,
+    each_element,
+)
 from eigassign.mechanism.elements.superelement import superelement_mesh
 from eigassign.mechanism.kinematics.parameters import ModelParameters, length, link_type, station
 from eigassign.mechanism.kinematics.rotations import DOFS, Objects, rotation, vector
 from eigassign.mechanism.kinematics.topology import Topology
-from eigassign.series.expression import Scalar, is_constant
+from eigassign.series.expression import Expression, Scalar, is_constant
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -92,15 +93,14 @@ def _beam(case: CaseFile, parameters: ModelParameters, tree: Topology, name: str
     count = sum(n for _, _, n in pieces) + 1
     stiffness, mass = Entries((width * count,) * 2), Entries((width * count,) * 2)
     positions: list[Objects] = [vector([0.0])]
-    shear: list[tuple[Scalar, Scalar]] = []
-    inertia: list[Sequence[Scalar]] = []
+    bent: list[tuple[Shear, Shear]] = []
+    profiles: list[Profile] = []
     for start, span, n in pieces:
         first = len(positions) - 1
         positions += [vector([start + span * (k / n)]) for k in range(1, n + 1)]
-        beams = _segment(case, parameters, name, stiffness, mass, first, (start, span), n)
-        for beam, number in beams:
-            shear += [(z, y) for z, y in repeated(shear_ratios(beam, span * (1.0 / n)), number)]
-            inertia += repeated(field_inertia(beam), number)
+        found = _segment(case, parameters, name, stiffness, mass, first, (start, span), n)
+        bent += [shear(each, span * (1.0 / n)) for each in found]
+        profiles += found
     slots = list(chain_dofs(count, space))
     nodes = {"start": slots[0], "end": slots[-1]}
     places = {"start": positions[0], "end": positions[-1]}
@@ -108,7 +108,7 @@ def _beam(case: CaseFile, parameters: ModelParameters, tree: Topology, name: str
         nodes[f"@{rider}"], places[f"@{rider}"] = slots[pieces[0][2]], positions[pieces[0][2]]
     add_bodies(case, parameters, name, mass, nodes)
     rigid = _chain_rigid(pieces, space)
-    strand = Strand(slots, positions, _rolled(link)[:3, :3], shear, inertia)
+    strand = Strand(slots, positions, _rolled(link)[:3, :3], bent, profiles)
     terms = stiffness.terms(), mass.terms(), rigid
     return LinkMesh(width * count, nodes, places, *terms, (strand,))
 
@@ -142,31 +142,40 @@ def _segment(
     first: int,
     piece: tuple[Scalar, Scalar],
     n: int,
-) -> list[tuple[BeamValues, int]]:
-    """n elements of equal length from node ``first`` on; their values, and how many have them.
-
-    A taper gives each element its own section; where these are plain numbers, as arrays over all.
-    """
+) -> list[Profile]:
+    """n elements of equal length from node ``first`` on; the values of each."""
     start, span = piece
     space = case.mechanism.space
     link: Any = case.mechanism.links[name]
+    total = length(case, parameters, name)
+    shares = (0.0, 1.0) if span is total else (start / total, (start + span) / total)
     h = span * (1.0 / n)
     turn = _rolled(link)
+    profiles = beam_profiles(case, parameters, link, shares, n, together=is_constant(h))
+    count = n // len(profiles)
+    for k, profile in enumerate(profiles):
+        for target, terms in (
+            (stiffness, element_stiffness(profile, h)),
+            (mass, element_mass(profile, h)),
+        ):
+            parts = terms if len(profile) == 1 else _atom_by_atom(terms)
+            _tile(target, parts, turn, first + k * count, count, space)
+    return [each for profile in profiles for each in each_element(profile, count)]
 
-    def add(beam: BeamValues, first: int, count: int) -> tuple[BeamValues, int]:
-        _tile(stiffness, element_stiffness(beam, h), turn, first, count, space)
-        _tile(mass, element_mass(beam, h), turn, first, count, space)
-        return beam, count
 
-    if isinstance(link.section, str):
-        return [add(beam_values(case, parameters, link, link.section), first, n)]
-    shares = (np.arange(n) + 0.5) / n
-    total = length(case, parameters, name)
-    if is_constant(total) and span is total and is_settled(parameters, link):
-        return [add(tapered_values(case, parameters, link, shares), first, n)]
-    of_whole = [k if span is total else (start + span * k) / total for k in shares.tolist()]
-    beams = (tapered_values(case, parameters, link, share) for share in of_whole)
-    return [add(beam, first + k, 1) for k, beam in enumerate(beams)]
+def _atom_by_atom(terms: Sequence[ElementTerm]) -> list[ElementTerm]:
+    """The same sum without sums in its coefficients: those of a taper's elements are alike."""
+    out = []
+    for coefficient, matrix in terms:
+        if is_constant(coefficient):
+            out.append(ElementTerm(coefficient, matrix))
+            continue
+        for atom, factor in coefficient.terms.items():
+            one = Expression(coefficient.recorder, 0.0, {atom: factor})
+            out.append(ElementTerm(one, matrix))
+        if coefficient.constant:
+            out.append(ElementTerm(coefficient.constant, matrix))
+    return out
 
 
 def _tile(
@@ -213,9 +222,12 @@ def frame_mesh(case: CaseFile, parameters: ModelParameters, name: str) -> LinkMe
         ends = [a, *inner, b]
         for k in range(1, beam.elements):
             points.append(points[a] + (points[b] - points[a]) * (k / beam.elements))
-        turn, shear = _add_beam(case, parameters, beam, stiffness, mass, points, ends, space)
+        turn, bent, profile = _add_beam(
+            case, parameters, beam, stiffness, mass, points, ends, space
+        )
         row = [vector(points[k].tolist()) for k in ends]
-        strands.append(Strand([slots[k] for k in ends], row, turn, [shear] * beam.elements))
+        each = [bent] * beam.elements, [profile] * beam.elements
+        strands.append(Strand([slots[k] for k in ends], row, turn, *each))
     nodes = {key: slots[k] for key, k in at.items()}
     places = {key: vector(points[k].tolist()) for key, k in at.items()}
     add_bodies(case, parameters, name, mass, nodes)
@@ -233,16 +245,16 @@ def _add_beam(
     points: list[Floats],
     ends: list[int],
     space: str,
-) -> tuple[Floats, tuple[Scalar, Scalar]]:
-    """Add the elements of one beam; its axes, and Φ of each element."""
+) -> tuple[Floats, tuple[Shear, Shear], Profile]:
+    """Add the elements of one beam; its axes, and shear and values of each element."""
     along = points[ends[-1]] - points[ends[0]]
     h = float(np.linalg.norm(along)) / (len(ends) - 1)
-    values = beam_values(case, parameters, beam, beam.section)
+    profile = [beam_values(case, parameters, beam, beam.section)]
     turn = _rolled(beam) @ np.kron(np.eye(4), axes(along))
     width = len(DOFS[space])
     for terms, target in (
-        (element_stiffness(values, h), stiffness),
-        (element_mass(values, h), mass),
+        (element_stiffness(profile, h), stiffness),
+        (element_mass(profile, h), mass),
     ):
         for coefficient, matrix in terms:
             turned = turn.T @ matrix @ turn
@@ -250,7 +262,7 @@ def _add_beam(
             for a, b in itertools.pairwise(ends):
                 dofs = np.concatenate([node_dofs(width * a, space), node_dofs(width * b, space)])
                 target.add_block(coefficient, dofs, turned)
-    return turn[:3, :3], shear_ratios(values, h)
+    return turn[:3, :3], shear(profile, h), profile
 
 
 def axes(along: Floats) -> Floats:

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.mechanism.elements.beam import Shear
+from eigassign.mechanism.elements.profiles import Profile
 from eigassign.mechanism.kinematics.rotations import DOFS, Objects, skew, some
 from eigassign.series.expression import Expression, Scalar
 
@@ -46,8 +48,8 @@ class Strand(NamedTuple):
     slots: Sequence[Ints]  # per node its six slots
     points: Sequence[Objects]  # per node its place, m
     axes: Floats | None  # rows: x, y, z of the elements in the link's axes; None where no matter
-    shear: Sequence[tuple[Scalar, Scalar]]  # per element Φ of bending in its x-y and x-z plane
-    inertia: Sequence[Sequence[Scalar]] = ()  # per element of a straight link `field_inertia`
+    shear: Sequence[tuple[Shear, Shear]]  # per element, of bending in its x-y and x-z plane
+    profiles: Sequence[Profile] = ()  # per element its values
 
 
 @dataclass(frozen=True)

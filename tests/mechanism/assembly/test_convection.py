@@ -149,18 +149,29 @@ def test_a_rolled_beam_carries_its_fields_in_turned_axes() -> None:
         np.testing.assert_allclose(A.toarray(), B.toarray(), atol=1e-10 * np.abs(B).max())
 
 
-def test_the_fields_integrate_to_the_consistent_mass() -> None:
+@pytest.mark.parametrize("tapered", [False, True])
+def test_the_fields_integrate_to_the_consistent_mass(tapered: bool) -> None:
     """∫ ρ Nᵀ N with the inertia the convection uses is the mass matrix, with shear and without."""
     for shear in (False, True):
-        model = built(cantilever("spatial", shear, roll=0.4))
+        tree = cantilever("spatial", shear, roll=0.4)
+        if tapered:
+            (link,) = (each for each in tree["mechanism"]["links"].values() if "section" in each)
+            tree["mechanism"]["sections"]["t"] = {
+                **tree["mechanism"]["sections"]["s"],
+                "width": 0.2,
+            }
+            link["section"] = {"start": "s", "end": "t"}
+        model = built(tree)
         found = terms(model)
         (one,), (values,) = found.stack.riders, found.values(np.array([[0.47]]), np.zeros(0))
         n = ELEMENTS
-        x, phi, rho = np.split(values[one.rows], [n + 1, 3 * n + 1])
+        x, phi, rho = np.split(values[one.rows], [n + 1, 5 * n + 1])
         xi, g = np.polynomial.legendre.leggauss(5)
         h = np.diff(x)[:, None]
-        N = fields(np.tile((1 + xi) / 2, (n, 1)), h, phi.reshape(n, 1, 2))
-        matter = h[..., None] * (g / 2)[:, None] * rho.reshape(n, 1, 6)
+        N = fields(np.tile((1 + xi) / 2, (n, 1)), h, phi.reshape(n, 1, 2, 2))
+        terms_of_rho = rho.reshape(n, -1, 6)
+        along = np.polynomial.legendre.legvander(xi, terms_of_rho.shape[1] - 1) @ terms_of_rho
+        matter = h[..., None] * (g / 2)[:, None] * along
         blocks = np.einsum("epri,epr,eprj->eij", N, matter, N)
         assembled = one.riding.assembled(blocks).toarray()
         own = slice(one.first, one.first + len(assembled))
@@ -241,30 +252,31 @@ class Energy:
         """(6, 6) of every row of `parts`, in the link's axes."""
         mass, out = self.terms.stack.mass(self.values(t)), []
         mesh = self.mesh(t)
-        _, g = np.polynomial.legendre.leggauss(5)
+        xi, g = np.polynomial.legendre.leggauss(5)
         share = (np.diff(mesh)[:, None] * g / 2).ravel()
+        x = (mesh[:-1, None] + np.diff(mesh)[:, None] * (1 + xi) / 2).ravel()
         kept = [0, 1, 5] if self.model.case.mechanism.space == "planar" else list(range(6))
         for name, own in zip(self.names, self.rows, strict=True):
             if name == self.beam:
-                area, polar = self.section(mesh)
+                area, polar = self.section(x)
                 each = np.stack([area, area, area, polar, 0 * area, 0 * area], axis=1)
-                out.append((np.repeat(each, 5, axis=0) * share[:, None])[:, :, None] * np.eye(6))
+                out.append((each * share[:, None])[:, :, None] * np.eye(6))
                 out.append(self.rotor()[None])
             else:
                 out.append((mass[own, own], kept))
         return out
 
-    def section(self, mesh: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """ρA and ρI_p of each element, of a tapered beam those in its middle."""
+    def section(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """ρA and ρI_p at the places x."""
         m = self.model.case.mechanism
-        rho, n = m.materials[self.data.material].density, len(mesh) - 1
+        rho = m.materials[self.data.material].density
         if not isinstance(self.data.section, str):
             low, high = (m.sections[s] for s in (self.data.section.start, self.data.section.end))
-            share = (mesh[1:] + mesh[:-1]) / 2 / self.data.length
+            share = x / self.data.length
             b = low.width + share * (high.width - low.width)
             d = low.height + share * (high.height - low.height)
             return rho * b * d, rho * b * d * (b**2 + d**2) / 12
-        section, one = m.sections[self.data.section], np.ones(n)
+        section, one = m.sections[self.data.section], np.ones(len(x))
         if section.shape == "circle":
             r = section.diameter / 2
             return rho * np.pi * r**2 * one, rho * np.pi * r**4 / 2 * one

@@ -23,7 +23,7 @@ def exported(space: str) -> tuple[np.ndarray, np.ndarray]:
     """Free-free K, M of a beam as another program would write them."""
     n = 6 * (ELEMENTS + 1)
     K, M = np.zeros((n, n)), np.zeros((n, n))
-    k, m = element(ALLOY, section(FLAT), LENGTH / ELEMENTS, False)
+    k, m = element(ALLOY, lambda _: section(FLAT), LENGTH / ELEMENTS, False)
     for e in range(ELEMENTS):
         at = slice(6 * e, 6 * e + 12)
         K[at, at] += k
@@ -147,7 +147,9 @@ def bent() -> tuple[np.ndarray, np.ndarray]:
     for e in range(2 * ELEMENTS):
         turn = np.kron(np.eye(4), R if e >= ELEMENTS else np.eye(3))
         at = slice(6 * e, 6 * e + 12)
-        for A, a in zip((K, M), element(ALLOY, section(FLAT), 0.0375, False), strict=True):
+        for A, a in zip(
+            (K, M), element(ALLOY, lambda _: section(FLAT), 0.0375, False), strict=True
+        ):
             A[at, at] += turn.T @ a @ turn
     return (K + K.T) / 2.0, (M + M.T) / 2.0
 

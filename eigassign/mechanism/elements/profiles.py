@@ -1,0 +1,219 @@
+"""The values of beams, their sections and materials put together, over each of their elements.
+
+Along a taper the dimensions of the section run linearly. Areas and moments of inertia are then
+polynomials of degree 4 at most, given by five of their values, but for the torsion constant of a
+rectangle. Over an element each value is a sum of Legendre polynomials, Σ_l c_l P_l(2ξ − 1), of
+which those up to P_4 count: see `beam`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.case import CaseFile
+from eigassign.errors import MechanismError
+from eigassign.mechanism.elements.sections import SectionValues, section_values
+from eigassign.mechanism.kinematics.parameters import ModelParameters
+from eigassign.series.expression import Expression, Scalar, is_constant
+
+Floats = NDArray[np.float64]
+TERMS = 5  # Legendre polynomials over an element of a taper
+STATIONS, _ = np.polynomial.legendre.leggauss(
+    5
+)  # places from −1 to 1 at which a taper is evaluated
+
+
+class BeamValues(NamedTuple):
+    """Stiffnesses EA [N], EI_z, EI_y, GJ [N m²], shear κGA [N] or None; ρA, ρI_p, ρI_z, ρI_y.
+
+    Numbers, expressions, or arrays of numbers (n,): one for each of n elements.
+    """
+
+    EA: Scalar
+    EI_z: Scalar
+    EI_y: Scalar
+    GJ: Scalar
+    shear: Scalar | None
+    mass: Scalar
+    polar: Scalar
+    rotary_z: Scalar
+    rotary_y: Scalar
+
+
+Profile: TypeAlias = Sequence[BeamValues]  # over an element: the mean, then P_1 … P_4 if it varies
+
+
+def field_inertia(beam: BeamValues) -> tuple[Scalar, ...]:
+    """Per unit of length what the mass matrix gives to u_x, u_y, u_z, θ_x, θ_y, θ_z.
+
+    ρA three times [kg/m], ρI_p, ρI_y, ρI_z [kg m]; without shear the rotary ones are neglected.
+    """
+    rotary = (0.0, 0.0) if beam.shear is None else (beam.rotary_y, beam.rotary_z)
+    return (beam.mass, beam.mass, beam.mass, beam.polar, *rotary)
+
+
+def beam_values(case: CaseFile, parameters: ModelParameters, beam: Any, section: str) -> BeamValues:
+    """Stiffness and mass values of a beam of the case with one section."""
+
+    def number(key: str, value: float) -> Scalar:
+        return parameters.number(f"sections.{section}.{key}", value)
+
+    return _values(case, parameters, beam, section_values(case.mechanism.sections[section], number))
+
+
+def _values(
+    case: CaseFile, parameters: ModelParameters, beam: Any, section: SectionValues
+) -> BeamValues:
+    data = case.mechanism.materials[beam.material]
+    path = f"materials.{beam.material}."
+    E = parameters.number(path + "youngs_modulus", data.youngs_modulus)
+    rho = parameters.number(path + "density", data.density)
+    sheared = bool(getattr(beam, "shear", False))
+    G = _shear_modulus(case, parameters, beam, E, sheared)
+    return BeamValues(
+        EA=E * section.area,
+        EI_z=E * section.inertia_z,
+        EI_y=E * section.inertia_y,
+        GJ=G * section.torsion_constant,
+        shear=G * section.area * section.shear_coefficient if sheared else None,
+        mass=rho * section.area,
+        polar=rho * section.polar_inertia,
+        rotary_z=rho * section.inertia_z,
+        rotary_y=rho * section.inertia_y,
+    )
+
+
+def _shear_modulus(
+    case: CaseFile, parameters: ModelParameters, beam: Any, E: Scalar, sheared: bool
+) -> Scalar:
+    """G = E/(2(1 + ν)), or as given; not needed by planar beams without shear."""
+    data: Any = case.mechanism.materials[beam.material]
+    path = f"materials.{beam.material}."
+    if getattr(data, "shear_modulus", None) is not None:
+        return parameters.number(path + "shear_modulus", data.shear_modulus)
+    if getattr(data, "poissons_ratio", None) is not None:
+        nu = parameters.number(path + "poissons_ratio", data.poissons_ratio)
+        return E / ((nu + 1.0) * 2.0)
+    if case.mechanism.space == "planar" and not sheared:
+        return 0.0
+    message = "needs poissons_ratio or shear_modulus for torsion or shear"
+    raise MechanismError(f"mechanism.materials.{beam.material}", message)
+
+
+# --- tapers
+
+
+def beam_profiles(
+    case: CaseFile,
+    parameters: ModelParameters,
+    beam: Any,
+    piece: tuple[Scalar, Scalar],
+    n: int,
+    together: bool,
+) -> list[Profile]:
+    """Values of n elements over a ``piece`` of a beam, from share to share of its length.
+
+    One profile for all, of arrays (n,) for a taper of numbers if ``together``; or one for each.
+    """
+    if isinstance(beam.section, str):
+        return [[beam_values(case, parameters, beam, beam.section)]]
+    start, end = piece
+
+    def at(place: float) -> BeamValues:
+        share = start + (end - start) * (0.5 * (1.0 + place))
+        return _tapered_values(case, parameters, beam, share)
+
+    weights = _legendre_weights(n)
+    table = [_combined(v, weights) for v in zip(*map(at, STATIONS.tolist()), strict=True)]
+    if _has_series(case, beam):
+        table[BeamValues._fields.index("GJ")] = _mean_torsion(at, n)
+    if together and all(each is None or isinstance(each, np.ndarray) for each in table):
+        rows: Any = [[None if each is None else each.T for each in table]]
+    else:
+        rows = zip(*([None] * n if each is None else each for each in table), strict=True)
+    return [[_at(row, k) for k in range(TERMS)] for row in rows]
+
+
+def _at(row: Sequence[Any], k: int) -> BeamValues:
+    values: Any = (None if each is None else each[k] for each in row)
+    return BeamValues(*values)
+
+
+def _legendre_weights(n: int) -> Floats:
+    """(n, 5, 5): by what a polynomial's values at `STATIONS` give its P_0 … P_4 over n elements."""
+    legendre = np.polynomial.legendre
+    xi, g = legendre.leggauss(5)
+    places = (2.0 * np.arange(n)[:, None] + 1.0 + xi) / n - 1.0
+    lagrange = legendre.legvander(places, 4) @ np.linalg.inv(legendre.legvander(STATIONS, 4))
+    projected = legendre.legvander(xi, TERMS - 1) * (np.arange(TERMS) + 0.5)
+    return np.asarray(np.einsum("g,gl,ngj->nlj", g, projected, lagrange))
+
+
+def _combined(values: tuple[Scalar | None, ...], weights: Floats) -> Any:
+    """Σ_j weights_nlj value_j, (n, 5): an array of numbers, or rows of expressions."""
+    given = [value for value in values if value is not None]
+    if not given:
+        return None
+    if all(is_constant(value) for value in given):
+        return weights @ np.array(given)
+    atoms = [_one_atom(value) for value in given]
+    return [
+        [sum((v * w for v, w in zip(atoms, row, strict=True)), 0.0) for row in rows]
+        for rows in weights.tolist()
+    ]
+
+
+def _one_atom(x: Scalar) -> Scalar:
+    """x as factor × atom, so that combinations of several are combinations of as few atoms."""
+    if is_constant(x):
+        return x
+    factor, atom = x.single()
+    return Expression(x.recorder, 0.0, {atom: factor})
+
+
+def _has_series(case: CaseFile, beam: Any) -> bool:
+    """Whether the torsion constant counts and is no polynomial along a taper."""
+    shape = case.mechanism.sections[beam.section.start].shape
+    return case.mechanism.space == "spatial" and shape == "rectangle"
+
+
+def _mean_torsion(at: Callable[[float], BeamValues], n: int) -> Any:
+    """GJ averaged over each of n elements, (n, 5) as of `_combined`."""
+    xi, g = np.polynomial.legendre.leggauss(3)
+    places = (2.0 * np.arange(n)[:, None] + 1.0 + xi) / n - 1.0
+    mean = [
+        sum((_one_atom(at(t).GJ) * w for t, w in zip(row, 0.5 * g, strict=True)), 0.0)
+        for row in places.tolist()
+    ]
+    rows = [[each, *[0.0] * (TERMS - 1)] for each in mean]
+    return np.array(rows) if all(is_constant(each) for each in mean) else rows
+
+
+def _tapered_values(
+    case: CaseFile, parameters: ModelParameters, link: Any, share: Scalar
+) -> BeamValues:
+    """Values at a share of the length, the sections' dimensions running linearly."""
+    a, b = case.mechanism.sections[link.section.start], case.mechanism.sections[link.section.end]
+
+    def number(key: str, value: float) -> Scalar:
+        low = parameters.number(f"sections.{link.section.start}.{key}", value)
+        high = parameters.number(f"sections.{link.section.end}.{key}", getattr(b, key))
+        return low + (high - low) * share
+
+    return _values(case, parameters, link, section_values(a, number))
+
+
+def each_element(profile: Profile, n: int) -> list[Profile]:
+    """Those of n elements, from one of all whose values may be arrays (n,)."""
+
+    def of(values: BeamValues, k: int) -> BeamValues:
+        rows: Any = values
+        return BeamValues(*(v[k] if isinstance(v, np.ndarray) else v for v in rows))
+
+    if not any(isinstance(value, np.ndarray) for value in profile[0]):
+        return [profile] * n
+    return [[of(values, k) for values in profile] for k in range(n)]
