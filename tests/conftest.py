@@ -11,7 +11,16 @@ from hypothesis import settings
 from eigassign.process import prefer_one_thread
 
 prefer_one_thread()  # before NumPy is imported: threads of small dense algebra wait for each other
-for folder in ("oracles", "assignment", "case", "mechanism", "modal", "stability", "study"):
+for folder in (
+    "oracles",
+    "assignment",
+    "case",
+    "faults",
+    "mechanism",
+    "modal",
+    "stability",
+    "study",
+):
     sys.path.insert(0, str(Path(__file__).parent / folder))
 
 os.environ.pop("COLUMNS", None)  # tables are as wide as they like, wherever tests run

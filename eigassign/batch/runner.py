@@ -20,7 +20,7 @@ from typing import Any
 from eigassign.batch.workers import cores, process_pool
 from eigassign.errors import StorageError, UsageError
 from eigassign.output.batch_summary import CaseOutcome, write_junit, write_summary
-from eigassign.output.run_folder import MARKER
+from eigassign.output.run_record import MARKER
 from eigassign.pipeline.run import Options, Outcome, optimize
 from eigassign.process import failure_of
 

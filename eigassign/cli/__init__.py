@@ -8,7 +8,7 @@ Reading order:
     arguments  options that several commands share
     reporter   stages, warnings and the log on stderr; JSON on stdout
     runs       optimize, expand, update, validate, chart
-    inspect    check, modes, schema
+    inspect    check, modes, status, schema
     export     animate
     batch      batch
     cache      cache path, list, clear
@@ -27,7 +27,7 @@ from eigassign._version import __version__
 from eigassign.cli.batch import batch
 from eigassign.cli.cache import cache
 from eigassign.cli.export import animate
-from eigassign.cli.inspect import check, modes, schema
+from eigassign.cli.inspect import check, modes, schema, status
 from eigassign.cli.runs import chart, expand, optimize, update, validate
 
 _CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
@@ -81,6 +81,8 @@ def cli() -> None:
     """
 
 
-for command in (check, modes, optimize, expand, update, validate, chart, batch, animate, cache):
+for command in (
+    check, modes, optimize, expand, update, validate, chart, batch, status, animate, cache
+):  # fmt: skip
     cli.add_command(command)
 cli.add_command(schema)

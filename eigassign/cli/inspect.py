@@ -1,4 +1,4 @@
-"""Quick questions about a case: `check`, `modes`, `schema`."""
+"""Quick questions about a case or a run: `check`, `modes`, `status`, `schema`."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from eigassign.cli.reporter import print_json, reporting
 from eigassign.errors import EigassignError
 
 if TYPE_CHECKING:
+    from eigassign.output.run_record import RunStatus
     from eigassign.pipeline.queries import CheckAnswer, ModesAnswer
 
 
@@ -128,6 +129,55 @@ def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
     )
     if folder is not None:
         click.echo(f"{folder} written")
+
+
+@click.command()
+@click.argument("runs", nargs=-1, required=True, type=arguments.PATH)
+@arguments.json
+@arguments.common
+def status(runs: tuple[Path, ...], as_json: bool, **how: Any) -> int:
+    """Verify run folders: is every file as it was written, and is the case still the same?
+
+    The hashes in run.json are compared with the files of the folder, the case file and the files
+    that it names, and the version with the one installed. Exit code 0 where all agree; 1 where
+    something was changed, or is missing; 2 where there is no finished run.
+    """
+    from eigassign.output.run_record import run_status
+
+    codes, answers = [0], dict[str, Any]()
+    with reporting(how):
+        for run in runs:
+            try:
+                found = run_status(run)
+            except EigassignError as error:
+                codes.append(process.report(error))
+                answers[str(run)] = {"problems": process.problems(error)}
+                continue
+            codes.append(0 if found.intact and found.current else 1)
+            judged = {"intact": found.intact, "current": found.current}
+            answers[str(run)] = {**judged, **vars(found)}
+            if not as_json:
+                click.echo(_state_of(str(run), found))
+    if as_json:
+        print_json(answers)
+    return max(codes)
+
+
+def _state_of(name: str, found: RunStatus) -> str:
+    from eigassign.files import printable
+
+    changes = found.changes
+    verdict = "intact" if found.intact else "damaged or edited"
+    lines = [f"{name}: {verdict}; {'up to date' if found.current else 'out of date'}"]
+    for what in ("changed", "missing", "added"):
+        lines += [f"  {what}: {file}" for file in getattr(changes, what)]
+    lines.append(f"  case {found.case}: {_SINCE[found.case_state]}")
+    lines += [f"  its file {file}: {_SINCE[state]}" for file, state in found.case_files.items()]
+    lines.append(f"  version {found.version}; {found.installed} is installed")
+    return "\n".join(map(printable, lines))
+
+
+_SINCE = {"same": "as it was", "changed": "changed since", "missing": "not there any more"}
 
 
 @click.command()

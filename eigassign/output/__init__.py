@@ -4,6 +4,7 @@ In reading order; each imports from those above it only:
 
     formats        numbers as people read them
     storage        files and folders that are written whole or not at all
+    run_record     run.json: the case, version and files of a run, and what has changed since
     run_folder     the folder of a run: hidden until finished; replaces only runs of the same case
     cache          arrays by content key, checked by their hash
     reduced_file   a reduced model in one file

@@ -19,7 +19,6 @@ import logging
 import os
 import re
 import struct
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import EigassignError, StorageError, UsageError
-from eigassign.output.storage import replace_synced
+from eigassign.output.storage import replace_synced, sweep_files
 
 # --- A file: its key, its bytes, and how they are checked
 
@@ -164,7 +163,6 @@ def _read(data: bytes) -> tuple[dict[str, Array], dict[str, str]]:
 _log = logging.getLogger(__name__)
 _SUFFIX = ".h5"
 _DAMAGED = ".damaged"
-_STALE_S = 3600.0  # a temporary file this old belongs to a writer that was killed
 
 
 @dataclass(frozen=True)
@@ -197,11 +195,15 @@ class Cache:
     def __init__(self, directory: Path | None) -> None:
         self.directory = directory
         self._warned = False
+        self._swept = False
 
     def load(self, entry_key: str) -> dict[str, Array] | None:
         """The arrays stored under ``entry_key``, read-only; None if missing or damaged."""
         if self.directory is None:
             return None
+        if not self._swept:
+            self._swept = True
+            sweep_files(self.directory, _is_ours)
         path = self.directory / f"{entry_key}{_SUFFIX}"
         try:
             return unpack(entry_key, path.read_bytes())[0]
@@ -237,15 +239,14 @@ class Cache:
 
         Raises StorageError when one cannot be deleted.
         """
-        leftovers = [path for path in self._files(f".*{_SUFFIX}.*.tmp") if _is_stale(path)]
-        damaged = self._files(f"*{_SUFFIX}{_DAMAGED}")
-        files = [*self._files(f"*{_SUFFIX}"), *damaged, *leftovers]
+        swept = 0 if self.directory is None else sweep_files(self.directory, _is_ours)
+        files = [*self._files(f"*{_SUFFIX}"), *self._files(f"*{_SUFFIX}{_DAMAGED}")]
         for path in files:
             try:
                 path.unlink(missing_ok=True)
             except OSError as error:
                 raise StorageError(f"cannot delete {path}: {error.strerror}") from error
-        return len(files)
+        return len(files) + swept
 
     def _files(self, pattern: str) -> list[Path]:
         if self.directory is None:
@@ -267,15 +268,8 @@ class Cache:
 
 
 def _is_ours(name: str) -> bool:
-    stem = name.lstrip(".").split(".")[0]
+    stem = name.split(".")[0]
     return len(stem) == 64 and set(stem) <= set("0123456789abcdef")
-
-
-def _is_stale(path: Path) -> bool:
-    try:
-        return time.time() - path.stat().st_mtime > _STALE_S
-    except OSError:
-        return False
 
 
 def _read_entry(path: Path) -> Iterator[CacheEntry]:

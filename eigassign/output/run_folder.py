@@ -1,62 +1,47 @@
 """A run folder is written whole or not at all, and never at the cost of something else.
 
-A run is written into a hidden sibling folder, synced, and exchanged with the earlier one in a
-single rename. What may give way to it:
+A run is written into a hidden folder beside its target, synced, and exchanged with what is there in
+a single step. What may give way to it:
 
 - nothing there, or an empty folder;
-- a finished run of the same case file: it is replaced, and if somebody added files of their own
-  to it, it is kept beside the new one as ``<name>.1``;
+- a finished run of the same case file, of which no file was edited or added: it is deleted;
+- a finished run of the same case file that somebody edited or added files to: it is kept beside
+  the new one as ``<name>.1``;
 - anything else only with ``force``, and then it is kept as ``<name>.1`` too: nothing that a run
   did not write is ever deleted.
+
+The hidden names, of a writer with the token ``<pid>-<8 hex digits>``:
+
+    .<name>.<token>.tmp    being written, or being deleted: nobody misses it
+    .<name>.<token>.new    the finished run, until it is exchanged; then what was at the target
+    .<name>.<token>.old0   what was at the target, where two renames take the place of the exchange
+
+`_settle` deletes them, keeps them aside or puts them back: at the end of a run, or after a kill at
+the start of the next run in the same parent folder.
 """
 
 from __future__ import annotations
 
 import contextlib
-import json
 import logging
 import os
-import re
-import shutil
-import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
 from eigassign.errors import StorageError
-from eigassign.files import CASE, read_bytes
+from eigassign.output.run_record import RunOf, changes, read_record, write_record
 from eigassign.output.storage import (
+    abandoned,
     put_in_place,
+    remove,
     sync_path,
     sync_tree,
-    temporary_name,
-    try_lock,
-    write_synced,
+    temporary,
+    token_of,
 )
 
 _log = logging.getLogger(__name__)
-MARKER = "run.json"  # written last: a folder that has it was finished
-_MARKER_SCHEMA = 1
-_YOUNG_S = 60.0  # a temporary folder this fresh may not have been locked yet by its owner
-
-
-@dataclass(frozen=True)
-class RunOf:
-    """The case of a run; ``case_path`` is relative to the folder, so that both may move."""
-
-    case_path: str
-    case_sha256: str
-    case_files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of what the case names
-
-    def is_same_case(self, other: RunOf) -> bool:
-        """Same file (perhaps edited since), or same content (perhaps moved since).
-
-        The content is that of the case file and of every file it names.
-        """
-        if self.case_path == other.case_path:
-            return True
-        return (self.case_sha256, self.case_files) == (other.case_sha256, other.case_files)
 
 
 @contextlib.contextmanager
@@ -77,17 +62,14 @@ def run_folder(
     target = Path(os.path.realpath(target))
     run = RunOf(_relative(case_path, target), case_sha256, dict(case_files))
     with _storage_errors(target):
+        _sweep(target.parent)
         require_replaceable(target, run, force=force, case_path=case_path)
         made = _make_parents(target.parent)
-        _remove_leftovers(target)
-        folder = target.with_name(temporary_name(target.name))
-        folder.mkdir()
         try:
-            with try_lock(folder):
+            with temporary(target, Path.mkdir) as folder:
                 yield folder
                 _publish(folder, target, run, force=force)
         finally:
-            shutil.rmtree(folder, ignore_errors=True)
             _remove_empty(made)
 
 
@@ -142,39 +124,27 @@ def _objection(target: Path, run: RunOf) -> str | None:
         return None
     if not target.is_dir():
         return "is a file, not a folder"
-    if (marker := _read_marker(target)) is None:
+    if (record := read_record(target)) is None:
         return "is not a run folder of eigassign" if any(target.iterdir()) else None
-    if not marker.run.is_same_case(run):
-        return f"holds a run of another case ({marker.run.case_path})"
+    if not record.run.is_same_case(run):
+        return f"holds a run of another case ({record.run.case_path})"
     return None
 
 
-@dataclass(frozen=True)
-class _Marker:
-    run: RunOf
-    files: frozenset[str]
-
-
-def _read_marker(folder: Path) -> _Marker | None:
-    try:
-        found = json.loads(read_bytes(folder / MARKER, CASE))
-        named = {str(k): str(v) for k, v in found.get("case_files", {}).items()}
-        run = RunOf(str(found["case_path"]), str(found["case_sha256"]), named)
-        return _Marker(run, frozenset(found["files"]))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        return None
-
-
 def _publish(folder: Path, target: Path, run: RunOf, *, force: bool) -> None:
-    """Mark ``folder`` finished and swap it with ``target``."""
-    _write_marker(folder, run)
+    """Mark ``folder`` finished and exchange it with ``target``."""
+    write_record(folder, run, token_of(folder))
     sync_tree(folder)
     _require_still_ours(target, run, force=force)
-    with _kept_aside(target, run):
-        old = put_in_place(folder, target)
-    if old is not None:
-        _dispose(old, target, run, force=force)
-    sync_path(target.parent)
+    new = folder.with_suffix(".new")
+    try:
+        os.rename(folder, new)
+        put_in_place(new, target)
+        sync_path(target.parent)
+    finally:
+        with contextlib.ExitStack() as rest:  # whatever becomes of one of them
+            for hidden in sorted(target.parent.glob(f".*.{token_of(folder)}.*")):
+                rest.callback(_settle, hidden, target)
 
 
 def _require_still_ours(target: Path, run: RunOf, *, force: bool) -> None:
@@ -183,58 +153,42 @@ def _require_still_ours(target: Path, run: RunOf, *, force: bool) -> None:
         raise StorageError(f"{target} {reason}: it appeared during this run and was left alone")
 
 
-@contextlib.contextmanager
-def _kept_aside(target: Path, run: RunOf) -> Iterator[None]:
-    """Move files that no run wrote out of the way first, so that no step can delete them."""
-    if not _is_worth_keeping(target, run):
-        yield
-        return
-    aside = _free_sibling(target)
-    os.rename(target, aside)
-    try:
-        yield
-    except BaseException:
-        if not os.path.lexists(target):
-            os.rename(aside, target)
-        raise
-    _log.warning("kept what was in %s before as %s", target, aside)
+def _settle(hidden: Path, target: Path) -> None:
+    """Delete a run that was never published or has been replaced; else put back or keep aside.
+
+    Two processes may settle the same at once: each step is a rename, which one of them makes.
+    """
+    with contextlib.suppress(FileNotFoundError):
+        if hidden.suffix != ".tmp":
+            record = read_record(hidden)
+            published = record is None or record.token != token_of(hidden)
+            if published and not os.path.lexists(target):
+                os.rename(hidden, target)
+                return
+            if published and not _is_replaced(hidden, target):
+                aside = _free_sibling(target)
+                os.rename(hidden, aside)
+                _log.warning("kept what was in %s before as %s", target, aside)
+                return
+            doomed = hidden.with_name(f"{hidden.name}.tmp")
+            os.rename(hidden, doomed)
+            hidden = doomed
+        remove(hidden)
 
 
-def _is_worth_keeping(path: Path, run: RunOf) -> bool:
-    """Foreign, of another case, or with files that its run did not list."""
-    if _objection(path, run):
-        return True
-    marker = _read_marker(path)
-    return marker is not None and bool(_files(path) - marker.files)
+def _is_replaced(old: Path, target: Path) -> bool:
+    """Whether ``target`` has a run of the case of ``old``, and nobody changed anything in ``old``.
 
-
-def _write_marker(folder: Path, run: RunOf) -> None:
-    content = {
-        "eigassign_run": _MARKER_SCHEMA,
-        "case_path": run.case_path,
-        "case_sha256": run.case_sha256,
-        "case_files": dict(run.case_files),
-        "files": sorted(_files(folder) | {MARKER}),
-    }
-    write_synced(folder / MARKER, (json.dumps(content, indent=2) + "\n").encode())
-
-
-def _files(folder: Path) -> set[str]:
-    return {p.relative_to(folder).as_posix() for p in folder.rglob("*") if not p.is_dir()}
-
-
-def _dispose(old: Path, target: Path, run: RunOf, *, force: bool) -> None:
-    """Delete the earlier run just swapped out; put back what came there a moment ago."""
-    reason = _objection(old, run)
-    if reason and not force:
-        newest = put_in_place(old, target)
-        if newest is not None:
-            shutil.rmtree(newest, ignore_errors=True)
-        _require_still_ours(target, run, force=force)
-    if reason:
-        os.rename(old, _free_sibling(target))
-    else:
-        shutil.rmtree(old, ignore_errors=True)
+    An empty folder can always be replaced.
+    """
+    if not old.is_dir():
+        return False
+    record, new = read_record(old), read_record(target)
+    if record is None:
+        return not any(old.iterdir())
+    found = changes(old, record)
+    of_same_case = new is not None and new.run.is_same_case(record.run)
+    return of_same_case and not found.changed and not found.added
 
 
 def _free_sibling(target: Path) -> Path:
@@ -244,21 +198,11 @@ def _free_sibling(target: Path) -> Path:
     return target.with_name(f"{target.name}.{number}")
 
 
-def _remove_leftovers(target: Path) -> None:
-    """Remove temporary folders of killed runs: nobody holds their lock any more.
-
-    What `put_in_place` had moved away to make room (``-old``) comes back if its place is empty.
-    """
-    pattern = re.compile(rf"\.{re.escape(target.name)}\.\d+-[0-9a-f]{{8}}(-old)?\.tmp")
-    for leftover in filter(lambda path: pattern.fullmatch(path.name), target.parent.iterdir()):
-        with contextlib.suppress(OSError):
-            if not leftover.is_dir() or time.time() - leftover.stat().st_mtime < _YOUNG_S:
-                continue
-            with try_lock(leftover) as ours:
-                if leftover.name.endswith("-old.tmp") and not os.path.lexists(target):
-                    os.rename(leftover, target)
-                elif ours:
-                    shutil.rmtree(leftover, ignore_errors=True)
+def _sweep(folder: Path) -> None:
+    """Settle what killed runs left in ``folder``."""
+    for hidden, target in abandoned(folder):
+        if hidden.is_dir() or hidden.suffix != ".tmp":
+            _settle(hidden, target)
 
 
 def _relative(case_path: Path, target: Path) -> str:

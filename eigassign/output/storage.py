@@ -1,7 +1,8 @@
 """Files and folders that are written whole or not at all, whatever happens in between.
 
 Bytes are on disk before anything points at them; one folder takes another's place in a single
-step; the lock on a folder is held while its writer lives, and needs no file.
+step. What is being written has a hidden name beside its target and is locked: once its writer is
+dead, however it died, the lock is free, and the next start sweeps it. No lock needs a file.
 """
 
 from __future__ import annotations
@@ -10,9 +11,12 @@ import contextlib
 import ctypes
 import errno
 import os
+import re
 import secrets
+import shutil
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from eigassign.errors import StorageError
@@ -21,10 +25,8 @@ from eigassign.errors import StorageError
 
 
 def write_synced(path: Path, data: bytes) -> None:
-    """Create ``path`` (which must not exist) with ``data`` and wait until it is on disk."""
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
-    descriptor = os.open(path, flags, 0o666)  # 0o666 and not mkstemp's 0o600: umask decides
-    with os.fdopen(descriptor, "wb") as file:
+    """Write ``data`` to ``path`` and wait until it is on disk."""
+    with open(path, "wb") as file:
         file.write(data)
         file.flush()
         os.fsync(file.fileno())
@@ -54,21 +56,103 @@ def sync_tree(folder: Path) -> None:
 def replace_synced(path: Path, data: bytes) -> None:
     """Replace the content of ``path`` by ``data`` in one step, whoever else writes it.
 
-    A temporary file in the same folder is filled, synced and renamed over ``path``.
+    A temporary file in the same folder is filled, synced and renamed over ``path``; what killed
+    writers of the same ``path`` left there goes.
     """
-    temporary = path.with_name(temporary_name(path.name))
-    try:
-        write_synced(temporary, data)
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+    sweep_files(path.parent, path.name.__eq__)
+    with temporary(path, lambda made: made.touch(exist_ok=False)) as made:
+        write_synced(made, data)
+        os.replace(made, path)
     sync_path(path.parent)
 
 
-def temporary_name(name: str) -> str:
-    """Hidden sibling name that no other writer uses."""
-    return f".{name}.{os.getpid()}-{secrets.token_hex(4)}.tmp"
+# --- What is being written, and what killed writers left
+
+_HIDDEN = re.compile(r"\.(?P<name>.+)\.(?P<token>\d+-[0-9a-f]{8})(\.[a-z0-9]+)+", re.DOTALL)
+_LONG_DEAD_S = 7 * 86400.0  # where nothing can be locked, a writer this old is taken for dead
+
+
+@contextlib.contextmanager
+def temporary(target: Path, make: Callable[[Path], None]) -> Iterator[Path]:
+    """A file or folder that ``make`` makes beside ``target``, locked; what is left of it goes."""
+    while True:
+        made = target.with_name(f".{target.name}.{os.getpid()}-{secrets.token_hex(4)}.tmp")
+        try:
+            make(made)
+            with lock(made, wait=True):
+                if os.path.lexists(made):  # else a sweep came between its making and its lock
+                    yield made
+                    return
+        finally:
+            remove(made)
+
+
+def token_of(hidden: Path) -> str:
+    """What tells the names that one writer uses from all others."""
+    found = _HIDDEN.fullmatch(hidden.name)
+    return found["token"] if found else ""
+
+
+def remove(path: Path) -> None:
+    """Delete a file or a folder with all that is in it, as far as that is possible."""
+    with contextlib.suppress(OSError):
+        path.unlink()
+    shutil.rmtree(path, ignore_errors=True)
+
+
+def abandoned(folder: Path) -> Iterator[tuple[Path, Path]]:
+    """What dead writers left in ``folder``, locked while it is looked at, and its target."""
+    with contextlib.suppress(OSError):
+        names = [name for name in os.listdir(folder) if name.startswith(".")]
+        for path, found in ((folder / name, _HIDDEN.fullmatch(name)) for name in sorted(names)):
+            if found:
+                with lock(path) as held:
+                    if held or (held is None and _is_long_dead(path)):
+                        yield path, folder / found["name"]
+
+
+def sweep_files(folder: Path, names: Callable[[str], bool]) -> int:
+    """Delete what dead writers of files with such names left in ``folder``; how many."""
+    count = 0
+    for path, target in abandoned(folder):
+        if names(target.name) and not path.is_dir():
+            remove(path)
+            count += 1
+    return count
+
+
+def _is_long_dead(path: Path) -> bool:
+    try:
+        return time.time() - path.lstat().st_mtime > _LONG_DEAD_S
+    except OSError:
+        return False
+
+
+@contextlib.contextmanager
+def lock(path: Path, wait: bool = False) -> Iterator[bool | None]:
+    """Hold the lock of a file or folder: yields whether it is held, None if it cannot be locked.
+
+    The system lets go of it when its holder dies. Windows and some network file systems have no
+    such locks.
+    """
+    try:
+        import fcntl
+
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # waits for no pipe
+    except (ImportError, OSError):
+        yield None
+        return
+    try:
+        held: bool | None = True
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        except BlockingIOError:
+            held = False
+        except OSError:
+            held = None
+        yield held
+    finally:
+        os.close(descriptor)
 
 
 # --- Folders
@@ -78,20 +162,21 @@ _AT_FDCWD = -100
 _ATTEMPTS = 20
 
 
-def put_in_place(new: Path, target: Path) -> Path | None:
-    """Move ``new`` to ``target``; returns where what was there is now, None if nothing was.
+def put_in_place(new: Path, target: Path) -> None:
+    """Move ``new`` to ``target``; what was there has a hidden name with its token then.
 
-    One atomic exchange where the system has it (Linux); else two renames, undone if the second
-    fails. Raises StorageError when other writers keep getting in between, OSError otherwise.
+    One atomic exchange where the system has it (Linux); else two renames, and who finds nothing at
+    ``target`` puts back what was there. Raises StorageError when other writers keep getting in
+    between, OSError otherwise.
     """
-    for _ in range(_ATTEMPTS):
+    for attempt in range(_ATTEMPTS):
         try:
             if not os.path.lexists(target):
                 os.rename(new, target)
-                return None
-            if exchange(new, target):
-                return new
-            return _rename_twice(new, target)
+            elif not exchange(new, target):
+                os.rename(target, new.with_suffix(f".old{attempt}"))
+                os.rename(new, target)
+            return
         except OSError as error:
             if error.errno not in (errno.ENOENT, errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR):
                 raise
@@ -114,39 +199,3 @@ def exchange(first: Path, second: Path) -> bool:
     if code in (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP, errno.EPERM):
         return False
     raise OSError(code, os.strerror(code), str(second))
-
-
-def _rename_twice(new: Path, target: Path) -> Path:
-    old = new.with_name(new.name.removesuffix(".tmp") + "-old.tmp")
-    os.rename(target, old)
-    try:
-        os.rename(new, target)
-    except BaseException:
-        os.rename(old, target)
-        raise
-    return old
-
-
-@contextlib.contextmanager
-def try_lock(folder: Path) -> Iterator[bool]:
-    """Hold the lock of ``folder`` if nobody else does; yields whether it is held.
-
-    The system lets go of it when its holder dies, however it dies. Where folders cannot be
-    locked (Windows, some network file systems) it is never held.
-    """
-    try:
-        import fcntl
-
-        descriptor = os.open(folder, os.O_RDONLY)
-    except (ImportError, OSError):
-        yield False
-        return
-    try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            held = True
-        except OSError:
-            held = False
-        yield held
-    finally:
-        os.close(descriptor)

@@ -15,6 +15,7 @@ import pytest
 from eigassign.errors import StorageError, UsageError
 from eigassign.output import cache as module
 from eigassign.output.cache import HEADER_BYTES, Cache, default_directory, key, pack, unpack
+from eigassign.output.storage import lock, replace_synced
 
 ARRAYS = {
     "coefficients": np.array([1.0, -0.0, 5e-324, np.nan, np.inf, 1.7e308]).reshape(2, 3),
@@ -291,14 +292,22 @@ def test_clear_removes_what_is_ours_and_nothing_else(cache, stored):
     cache.store(key("other"), {"a": np.ones(2)}, {})
     stored.write_bytes(b"")
     assert cache.load(KEY) is None
-    stale = cache.directory / f".{KEY}.h5.1-deadbeef.tmp"
-    fresh = cache.directory / f".{KEY}.h5.2-deadbeef.tmp"
+    dead = cache.directory / f".{KEY}.h5.1-deadbeef.tmp"
+    alive = cache.directory / f".{KEY}.h5.2-deadbeef.tmp"
     foreign = cache.directory / "measurements.h5"
-    for path in (stale, fresh, foreign):
+    for path in (dead, alive, foreign):
         path.write_bytes(b"")
-    os.utime(stale, (0, 0))
-    assert cache.clear() == 3
-    assert sorted(cache.directory.iterdir()) == sorted([fresh, foreign])
+    with lock(alive):
+        assert cache.clear() == 3
+    assert sorted(cache.directory.iterdir()) == sorted([alive, foreign])
+
+
+def test_what_a_killed_writer_left_is_swept_by_the_next_reader_and_nothing_else(cache, stored):
+    ours, theirs = (cache.directory / f".{name}.1-deadbeef.tmp" for name in (f"{KEY}.h5", "notes"))
+    for path in (ours, theirs):
+        path.write_bytes(b"half")
+    assert Cache(cache.directory).load(KEY) is not None
+    assert sorted(cache.directory.iterdir()) == sorted([theirs, stored])
 
 
 def test_clear_says_what_it_cannot_delete(cache, stored, monkeypatch):
@@ -343,3 +352,12 @@ def test_concurrent_processes_always_read_a_whole_file(tmp_path):
     assert outcomes == [(b"", 0)] * 3
     (path,) = (tmp_path / "cache").iterdir()
     assert path.suffix == ".h5"
+
+
+def test_what_a_killed_writer_of_a_file_left_is_swept_by_the_next_writer_of_it(tmp_path):
+    names = (".a.json.1-deadbeef.tmp", ".b.json.1-deadbeef.tmp", ".a.json.tmp")
+    for name in names:
+        (tmp_path / name).write_bytes(b"half")
+    replace_synced(tmp_path / "a.json", b"whole")
+    assert {path.name for path in tmp_path.iterdir()} == {"a.json", *names[1:]}
+    assert (tmp_path / "a.json").read_bytes() == b"whole"

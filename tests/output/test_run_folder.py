@@ -6,7 +6,6 @@ import errno
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,7 +14,8 @@ import pytest
 from eigassign.errors import StorageError
 from eigassign.output import run_folder as module
 from eigassign.output import storage
-from eigassign.output.run_folder import MARKER, run_folder
+from eigassign.output.run_folder import run_folder
+from eigassign.output.run_record import MARKER
 
 
 @pytest.fixture
@@ -179,7 +179,7 @@ def test_a_full_disk_is_a_storage_error_and_leaves_the_earlier_run(target, case)
     assert hidden(target) == []
 
 
-@pytest.mark.parametrize("step", ["sync_tree", "put_in_place", "write_synced"])
+@pytest.mark.parametrize("step", ["sync_tree", "put_in_place", "write_record"])
 def test_a_failure_while_publishing_leaves_the_earlier_run(target, case, step, monkeypatch):
     write(target, case, "one")
     (target / "notes.md").write_text("mine")
@@ -200,7 +200,7 @@ def test_a_second_rename_that_fails_brings_the_earlier_run_back(target, case, mo
     real = os.rename
 
     def rename(source: Path, destination: Path) -> None:
-        if str(source).endswith(".tmp") and "-old" not in str(source):
+        if str(source).endswith(".new"):
             raise OSError(errno.EIO, "input/output error")
         real(source, destination)
 
@@ -235,22 +235,29 @@ def test_a_linked_folder_stays_linked(tmp_path, case):
 
 
 def test_the_folder_of_a_killed_run_is_removed_by_the_next_but_not_that_of_a_live_one(target, case):
-    old = time.time() - 1000.0
-    dead, alive = (target.parent / f".arm.1-{name}.tmp" for name in ("deaddead", "0a11fe00"))
-    for folder in (dead, alive):
+    dead, other, alive = (
+        target.parent / name
+        for name in (".arm.1-deaddead.tmp", ".rail.1-deaddead.tmp", ".arm.1-0a11fe00.tmp")
+    )
+    for folder in (dead, other, alive):
         (folder / "figures").mkdir(parents=True)
-        os.utime(folder, (old, old))
-    with storage.try_lock(alive) as held:
+    with storage.lock(alive) as held:
         assert held
         write(target, case)
     assert hidden(target) == [alive.name]
 
 
+def test_hidden_folders_of_others_are_left_alone(target, case):
+    names = (".git", ".arm.tmp", ".arm.1-DEADDEAD.tmp", ".1-deaddead.tmp", "arm.1-deaddead.tmp")
+    for name in names:
+        (target.parent / name).mkdir(parents=True)
+    write(target, case)
+    assert {path.name for path in target.parent.iterdir()} == {"arm", *names}
+
+
 def test_what_a_killed_swap_had_moved_away_comes_back(target, case):
     write(target, case, "one")
-    old = target.with_name(".arm.1-deadbeef-old.tmp")
-    os.rename(target, old)
-    os.utime(old, (0, 0))
+    os.rename(target, target.with_name(".arm.1-deadbeef.old0"))
 
     def stop(folder: Path) -> None:
         raise KeyboardInterrupt
@@ -258,6 +265,7 @@ def test_what_a_killed_swap_had_moved_away_comes_back(target, case):
     with pytest.raises(KeyboardInterrupt):
         fill(target, case, stop)
     assert (target / "results.json").read_text() == "one"
+    assert hidden(target) == []
 
 
 WRITER = """

@@ -1,0 +1,217 @@
+"""run.json: of which case and version a run is, and the hash of every file that it wrote.
+
+It is written last, so a folder that has it was finished; and by it anybody can tell later what was
+changed in the folder, and whether the run is still one of the case as it is now (`run_status`).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import Literal
+
+from eigassign._version import __version__
+from eigassign.errors import StorageError, UsageError
+from eigassign.files import CASE, MATRIX, pieces, read_bytes
+from eigassign.output.storage import write_synced
+
+MARKER = "run.json"
+_SCHEMA = 2
+
+
+@dataclass(frozen=True)
+class RunOf:
+    """The case of a run; ``case_path`` is relative to the folder, so that both may move."""
+
+    case_path: str
+    case_sha256: str
+    case_files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of what the case names
+
+    def is_same_case(self, other: RunOf) -> bool:
+        """Same file (perhaps edited since), or same content (perhaps moved since).
+
+        The content is that of the case file and of every file it names.
+        """
+        if self.case_path == other.case_path:
+            return True
+        return (self.case_sha256, self.case_files) == (other.case_sha256, other.case_files)
+
+
+@dataclass(frozen=True)
+class FileMark:
+    """What a file was when its run wrote it."""
+
+    bytes: int
+    sha256: str
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """The content of run.json, with its own hash. ``token`` tells this run from every other one."""
+
+    run: RunOf
+    version: str
+    token: str
+    files: Mapping[str, FileMark]  # by path in the folder, of all but run.json
+
+    def encoded(self) -> bytes:
+        """The bytes of run.json; other bytes that read as this record were edited."""
+        content = {
+            "eigassign_run": _SCHEMA,
+            "eigassign_version": self.version,
+            "token": self.token,
+            **asdict(self.run),
+            "files": {name: asdict(mark) for name, mark in self.files.items()},
+        }
+        own = hashlib.sha256(json.dumps(content).encode()).hexdigest()
+        return (json.dumps({**content, "sha256": own}, indent=2) + "\n").encode()
+
+
+def write_record(folder: Path, run: RunOf, token: str) -> None:
+    """Mark ``folder`` finished, with all that is in it."""
+    files = {name: _marked(folder / name) for name in sorted(_contents(folder))}
+    write_synced(folder / MARKER, RunRecord(run, __version__, token, files).encoded())
+
+
+def _marked(path: Path) -> FileMark:
+    data = path.read_bytes()
+    return FileMark(len(data), hashlib.sha256(data).hexdigest())
+
+
+def read_record(folder: Path) -> RunRecord | None:
+    """The record of a finished run; None where there is none that can be read.
+
+    Earlier versions listed the files without their hashes: none of them is vouched for then.
+    """
+    try:
+        found = json.loads(read_bytes(folder / MARKER, CASE))
+        named = {str(name): str(digest) for name, digest in found["case_files"].items()}
+        run = RunOf(str(found["case_path"]), str(found["case_sha256"]), named)
+        listed = found["files"] if found["eigassign_run"] == _SCHEMA else {}
+        files = {str(name): FileMark(m["bytes"], m["sha256"]) for name, m in listed.items()}
+        version, token = str(found.get("eigassign_version")), str(found.get("token"))
+        return RunRecord(run, version, token, files)
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+# --- What has changed since
+
+
+@dataclass(frozen=True)
+class Changes:
+    """What differs in a folder from what its run wrote, by path in the folder."""
+
+    changed: tuple[str, ...]
+    missing: tuple[str, ...]
+    added: tuple[str, ...]
+
+
+def changes(folder: Path, record: RunRecord) -> Changes:
+    """By size and hash of every file; a link or device in the place of one is a change."""
+    data = record.encoded()
+    marks = {**record.files, MARKER: FileMark(len(data), hashlib.sha256(data).hexdigest())}
+    found, known = _contents(folder), set(marks)
+    changed = {name for name in found & known if not _is_as_marked(folder / name, marks[name])}
+    emptied = {above.as_posix() for name in known for above in PurePosixPath(name).parents}
+    lists = (changed, known - found, found - known - emptied)
+    return Changes(*(tuple(sorted(names)) for names in lists))
+
+
+def _contents(folder: Path) -> set[str]:
+    """Every file, link and empty folder below ``folder``."""
+    found = set()
+    for root, folders, files in os.walk(folder):
+        below = Path(root).relative_to(folder)
+        links = [name for name in folders if Path(root, name).is_symlink()]
+        found |= {(below / name).as_posix() for name in (*files, *links)}
+        if not folders and not files and below.parts:
+            found.add(below.as_posix())
+    return found
+
+
+def _is_as_marked(path: Path, mark: FileMark) -> bool:
+    try:
+        if path.is_symlink() or path.stat().st_size != mark.bytes:
+            return False
+        return _digest(path, max(1, mark.bytes)) == mark.sha256
+    except OSError:
+        return False
+
+
+def _digest(path: Path, limit: int) -> str | None:
+    """SHA-256 of a regular file of at most so many bytes; None where there is none."""
+    digest = hashlib.sha256()
+    try:
+        for piece in pieces(path, limit):
+            digest.update(piece)
+    except (OSError, ValueError):
+        return None
+    return digest.hexdigest()
+
+
+# --- A run folder, long after
+
+
+State = Literal["same", "changed", "missing"]
+
+
+@dataclass(frozen=True)
+class RunStatus:
+    """Whether a run folder is as it was written, and still of its case, by this version."""
+
+    case: str  # path of the case file
+    case_state: State
+    case_files: Mapping[str, State]  # that the case names, by name as seen from its folder
+    version: str
+    installed: str
+    files: int  # that the run wrote
+    changes: Changes
+
+    @property
+    def intact(self) -> bool:
+        """Every file of the run is there and as it was written."""
+        return not self.changes.changed and not self.changes.missing
+
+    @property
+    def current(self) -> bool:
+        """The case, what it names and the version are those of the run."""
+        states = {self.case_state, *self.case_files.values()}
+        return states == {"same"} and self.version == self.installed
+
+
+def run_status(folder: str | Path) -> RunStatus:
+    """What is left of the run in ``folder``, and whether it still is one of its case.
+
+    Raises UsageError where there is no finished run, StorageError where it cannot be read.
+    """
+    folder = Path(os.path.realpath(folder))
+    try:
+        os.stat(folder / MARKER)
+    except (FileNotFoundError, NotADirectoryError):
+        raise UsageError(f"{folder} is not a run folder: it has no {MARKER}") from None
+    except OSError as error:
+        raise StorageError(f"{folder} cannot be read: {error.strerror}") from error
+    record = read_record(folder)
+    if record is None:
+        raise UsageError(f"{folder / MARKER} is damaged, or not of eigassign")
+    case = Path(os.path.normpath(folder / record.run.case_path))
+    named = record.run.case_files.items()
+    return RunStatus(
+        case=os.path.relpath(case),
+        case_state=_state(case, record.run.case_sha256, CASE),
+        case_files={name: _state(case.parent / name, digest, MATRIX) for name, digest in named},
+        version=record.version,
+        installed=__version__,
+        files=len(record.files) + 1,
+        changes=changes(folder, record),
+    )
+
+
+def _state(path: Path, digest: str, limit: int) -> State:
+    found = _digest(path, limit)
+    return "missing" if found is None else "same" if found == digest else "changed"
