@@ -21,6 +21,7 @@ from eigassign.errors import CaseError, Problem
 from eigassign.files import CASE, raised
 
 MAX_DEPTH = 50
+ENTRIES = 200_000  # of all lists and mappings: some seconds and 400 MB, whatever is wrong with them
 KeyPath = tuple[str | int, ...]
 Tree = Mapping[str, object]
 Finding = tuple[KeyPath, str]  # where, and what is wrong there
@@ -174,6 +175,7 @@ class _Builder:
 
     def __init__(self, file: str) -> None:
         self.file = file
+        self.room = raised(ENTRIES)
         self.fatal: list[Problem] = []  # the data are not what the author meant: stop after reading
         self.problems: list[Problem] = []
 
@@ -194,6 +196,10 @@ class _Builder:
 
     def node(self, event: Any, events: Iterator[Any], path: KeyPath, at: Mark) -> tuple[Any, Mark]:
         """One node, found at ``at``; ``event`` is its first event."""
+        self.room -= 1
+        if self.room < 0:
+            message = f"more than {raised(ENTRIES):g} entries: put long tables into CSV files"
+            raise CaseError((Problem(self.file, at.line, at.column, "", message),))
         if len(path) > MAX_DEPTH:
             message = f"nested more than {MAX_DEPTH} levels deep"
             raise CaseError((Problem(self.file, at.line, at.column, "", message),))

@@ -9,6 +9,7 @@ In reading order:
     taylor       Taylor coefficients of eigenvalues and eigenvectors (eqs. (4)-(6))
     reduced      Ritz on the Taylor vectors, with an error estimate
     expansion    the Taylor polynomial of eigenvalues (eqs. (7)-(9)), judged by a reduced model
+    confirmation  whether stored coefficients are those of a model
     storage      expansions and reduced models as plain arrays
     truncation   what the reduction of links leaves out, bounded
     model        the model of a case, as notebooks meet it

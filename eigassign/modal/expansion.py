@@ -262,12 +262,13 @@ def expand(
         n_linear=local.n_linear,
         vectors=found.vectors,
         vector_space=found.space,
-        notes=_notes(found.groups, local, pencil),
+        notes=notes(found.groups, local, pencil),
         pencil=pencil,
     )
 
 
-def _notes(groups: Sequence[tuple[int, ...]], local: LocalSpace, pencil: Pencil) -> tuple[str, ...]:
+def notes(groups: Sequence[tuple[int, ...]], local: LocalSpace, pencil: Pencil) -> tuple[str, ...]:
+    """What an expansion has to say of modes expanded together and of variables dropped."""
     lines = [
         f"modes {g[0]}-{g[-1]} lie close together and are expanded as one cluster"
         for g in groups

@@ -10,7 +10,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from math import prod
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from eigassign.modal.expansion import Cluster, Expansion
 from eigassign.modal.reduced.added_mass import AddedMass
 from eigassign.modal.reduced.error_estimate import ErrorTerms
 from eigassign.modal.reduced.model import ReducedModel
+from eigassign.modal.reduced.rehearsal import answers, same_answers
 from eigassign.modal.reduced.residual import JointCorrection, ResidualTerms
 from eigassign.series.compiler import Program, Step
 from eigassign.series.implicit import ImplicitFunction
@@ -29,7 +30,7 @@ from eigassign.series.multi_index import LowerSet
 
 Array = NDArray[Any]
 ALGORITHM = "expansion 3"  # raise it whenever the numbers an expansion is made of may change
-FORMAT = "reduced model 5"  # raise it whenever what the arrays of a reduced model mean changes
+FORMAT = "reduced model 6"  # raise it whenever what the arrays of a reduced model mean changes
 STORED = (
     Expansion,
     Cluster,
@@ -44,6 +45,7 @@ STORED = (
     ImplicitFunction,
 )
 CLASSES: dict[str, type] = {c.__name__: c for c in STORED}
+_DAMAGE = (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError)
 _KINDS: dict[str, Any] = {"f": np.float64, "i": np.int64, "u": np.uint8}
 
 
@@ -71,19 +73,27 @@ def expansions_from_arrays(arrays: Mapping[str, Array], count: int) -> tuple[Exp
 
 
 def reduced_arrays(reduced: ReducedModel) -> dict[str, Array]:
-    """Everything a reduced model consists of, as int64, float64 and byte arrays."""
-    return _arrays(replace(reduced, certified=reduced.error_terms), FORMAT)
+    """A reduced model and its answers at some points, as int64, float64 and byte arrays."""
+    return _arrays((replace(reduced, certified=reduced.error_terms), answers(reduced)), FORMAT)
 
 
 def reduced_from_arrays(arrays: Mapping[str, Array]) -> ReducedModel:
     """The reduced model that `reduced_arrays` took apart, equal to it bit for bit.
 
-    Raises UsageError for arrays that are something else or of another version.
+    Raises UsageError for arrays that are something else, of another version, or of a model that
+    does not answer as it did when it was stored.
     """
-    model = _object(arrays, FORMAT, "a reduced model")
-    if not isinstance(model, ReducedModel):
-        raise UsageError("these arrays are not a reduced model")
-    return model
+    try:
+        model, given = _object(arrays, FORMAT, "a reduced model")
+        same = same_answers(answers(model), given, len(model.modes))
+    except UsageError:
+        raise
+    except Exception as error:  # of what is no model, anything may come
+        name = type(error).__name__
+        raise UsageError(f"these arrays are not a reduced model ({name})") from error
+    if not same:
+        raise UsageError("it does not answer as it did when it was stored")
+    return cast(ReducedModel, model)
 
 
 def _shapes_fit(expansion: Expansion) -> bool:
@@ -115,8 +125,8 @@ def _object(arrays: Mapping[str, Array], version: str, what: str) -> Any:
         if tree["format"] != version:
             raise UsageError(f"these arrays are a {tree['format']!r}, not a {version!r}")
         return _built(tree["content"], unflatten(arrays))
-    except (KeyError, ValueError, TypeError) as error:
-        raise UsageError(f"these arrays are not {what}: {error}") from error
+    except _DAMAGE as error:
+        raise UsageError(f"these arrays are not {what} ({type(error).__name__})") from error
 
 
 def _tree(thing: Any, arrays: dict[str, Array]) -> Any:
@@ -147,7 +157,9 @@ def _built(tree: Any, arrays: Mapping[str, Array]) -> Any:
         return tuple(_built(part, arrays) for part in tree["tuple"])
     if "csr" in tree:
         data, indices, indptr = (_built(part, arrays) for part in tree["parts"])
-        return sparse.csr_array((data, indices, indptr), shape=tuple(tree["csr"]))
+        matrix = sparse.csr_array((data, indices, indptr), shape=tuple(tree["csr"]))
+        matrix.check_format(full_check=True)
+        return matrix
     if "array" in tree:
         kind: Any = {"f": np.float64, "i": np.intp, "b": np.bool_}[tree["kind"]]
         array: Array = np.array(arrays[tree["array"]], dtype=kind)
@@ -193,8 +205,9 @@ def unflatten(flat: Mapping[str, Array]) -> dict[str, Array]:
             piece = flat["numbers" if store == "f" else "integers"][taken[store] : end]
             found[name] = piece.reshape(shape).astype(_KINDS[kind], copy=False)
             taken[store] = end
-    except (KeyError, ValueError, TypeError) as error:
-        raise UsageError(f"these arrays are not what was stored: {error}") from error
+    except _DAMAGE as error:
+        name = type(error).__name__
+        raise UsageError(f"these arrays are not what was stored ({name})") from error
     return found
 
 

@@ -13,6 +13,7 @@ read or written costs one warning, never the run.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import io
 import logging
@@ -21,6 +22,7 @@ import re
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import EigassignError, StorageError, UsageError
+from eigassign.files import STORED, read_bytes
 from eigassign.output.storage import replace_synced, sweep_files
 
 # --- A file: its key, its bytes, and how they are checked
@@ -140,8 +143,10 @@ def unpack(entry_key: str, data: bytes) -> tuple[dict[str, Array], dict[str, str
         raise DamagedError("its content does not have the hash that its header promises")
     try:
         return _read(data)
-    except (OSError, KeyError, RuntimeError, ValueError) as error:
-        raise DamagedError(f"HDF5 cannot read it ({error})") from error
+    except DamagedError:
+        raise
+    except Exception as error:  # anything may come of HDF5 that somebody else made
+        raise DamagedError(f"HDF5 cannot read it ({type(error).__name__})") from error
 
 
 def _read(data: bytes) -> tuple[dict[str, Array], dict[str, str]]:
@@ -151,11 +156,30 @@ def _read(data: bytes) -> tuple[dict[str, Array], dict[str, str]]:
         names = [name for name in file if name != "meta"]
         if not file.attrs.get(MARKER, False) or file.attrs["datasets"] != len(names):
             raise DamagedError("it was never completed")
-        arrays = {name: np.asarray(file[name][()]) for name in names}
-        meta = {name: str(text) for name, text in file["meta"].attrs.items()}
+        arrays = {name: _array(file, name, len(data)) for name in names}
+        notes = file["meta"].attrs.items()
+        meta = {name: text for name, text in notes if isinstance(text, str)}
     for array in arrays.values():
         array.setflags(write=False)
     return arrays, meta
+
+
+def _array(file: Any, name: str, size: int) -> Array:
+    """A dataset whose bytes are all in the file of ``size`` bytes, as `pack` writes them: HDF5 can
+    also point to other files, and claim any shape without a byte behind it."""
+    import h5py
+
+    link = file.get(name, getlink=True)
+    found = file[name] if isinstance(link, h5py.HardLink) else None
+    if (
+        not isinstance(found, h5py.Dataset)
+        or found.external
+        or found.is_virtual
+        or found.dtype.itemsize not in _KINDS.get(found.dtype.kind, ())
+        or prod(found.shape) * found.dtype.itemsize > size
+    ):
+        raise DamagedError("it holds something that was never stored")
+    return np.asarray(found[()])
 
 
 # --- The folder
@@ -206,12 +230,15 @@ class Cache:
             sweep_files(self.directory, _is_ours)
         path = self.directory / f"{entry_key}{_SUFFIX}"
         try:
-            return unpack(entry_key, path.read_bytes())[0]
+            return unpack(entry_key, read_bytes(path, STORED))[0]
         except FileNotFoundError:
             return None
         except DamagedError as error:
-            self._set_aside(path, error)
+            self._set_aside(path, str(error))
         except OSError as error:
+            if error.errno in (errno.EINVAL, errno.EFBIG, errno.ELOOP):
+                self._set_aside(path, str(error.strerror))
+                return None
             self._warn(f"the cache cannot be read ({error}); computing without it")
         return None
 
@@ -253,13 +280,14 @@ class Cache:
             return []
         return [p for p in sorted(self.directory.glob(pattern)) if _is_ours(p.name)]
 
-    def _set_aside(self, path: Path, error: DamagedError) -> None:
+    def _set_aside(self, path: Path, error: str) -> None:
         aside = path.with_name(path.name + _DAMAGED)
-        _log.warning("damaged cache file %s: %s; set aside and computed anew", path, error)
         try:
             os.replace(path, aside)
+            done = "set aside and computed anew"
         except OSError as problem:
-            self._warn(f"the damaged cache file cannot be set aside ({problem})")
+            done = f"it cannot be set aside ({problem.strerror}); computed anew"
+        _log.warning("damaged cache file %s: %s; %s", path, error, done)
 
     def _warn(self, message: str) -> None:
         if not self._warned:
@@ -274,12 +302,10 @@ def _is_ours(name: str) -> bool:
 
 def _read_entry(path: Path) -> Iterator[CacheEntry]:
     try:
-        status = path.stat()
-        data = path.read_bytes()
-    except OSError:  # gone since it was listed, or not ours to read
+        status = path.lstat()
+        meta, intact = unpack(path.stem, read_bytes(path, STORED))[1], True
+    except FileNotFoundError:  # gone since it was listed
         return
-    try:
-        meta, intact = unpack(path.stem, data)[1], True
-    except DamagedError:
+    except (DamagedError, OSError):
         meta, intact = {}, False
     yield CacheEntry(path.stem, path, status.st_size, status.st_mtime, meta, intact)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from eigassign.errors import StorageError, UsageError
+from eigassign.files import STORED, read_bytes
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.storage import FORMAT, reduced_arrays, reduced_from_arrays
 from eigassign.output.cache import DamagedError, key, pack, unpack
@@ -31,7 +32,7 @@ def load_reduced(path: str | Path) -> ReducedModel:
     """Read what `save_reduced` wrote; StorageError for a missing, damaged or other file."""
     path = Path(path)
     try:
-        return reduced_from_arrays(unpack(_key(), path.read_bytes())[0])
+        return reduced_from_arrays(unpack(_key(), read_bytes(path, STORED))[0])
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror}") from error
     except (DamagedError, UsageError) as error:

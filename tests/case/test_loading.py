@@ -83,6 +83,16 @@ def test_a_file_over_the_size_limit_is_refused() -> None:
     assert "larger than 10 MB" in message_for(b"#" * (CASE + 1))
 
 
+def test_a_file_of_more_entries_than_any_case_has_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("EIGASSIGN_LIMITS", "0.01")
+    long = f"{TEXT}x: [{'1,' * 2_500}]\n".encode()
+    assert "more than 2000 entries: put long tables into CSV files" in message_for(long)
+    monkeypatch.setenv("EIGASSIGN_LIMITS", "0.02")
+    assert "more than" not in message_for(long)
+
+
 def test_a_group_of_more_names_than_any_mechanism_has_is_refused() -> None:
     bodies = "".join(f"    b{k}: {{at: x}}\n" for k in range(1001))
     text = TEXT.replace("  bodies:\n", "  bodies:\n" + bodies)

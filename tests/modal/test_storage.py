@@ -84,7 +84,7 @@ def test_arrays_of_another_version_are_refused(reduced):
 def test_only_known_classes_are_made(reduced):
     arrays = reduced_arrays(reduced)
     tree = json.loads(arrays["tree"].tobytes())
-    tree["content"]["class"] = "Path"
+    tree["content"]["tuple"][0]["class"] = "Path"
     arrays["tree"] = np.frombuffer(json.dumps(tree).encode(), dtype=np.uint8)
     with pytest.raises(UsageError, match="not a reduced model"):
         reduced_from_arrays(arrays)
