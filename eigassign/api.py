@@ -19,12 +19,11 @@ from eigassign.modal.reduced import compression
 from eigassign.modal.reduced import reduce as modal_reduced
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.output import reduced_file
-from eigassign.output.figures import motion
 from eigassign.output.figures.modes import mode_figures
-from eigassign.output.figures.style import FigurePlan
 from eigassign.output.notebook import drawn, html
 from eigassign.pipeline import queries
 from eigassign.pipeline.animation import animate
+from eigassign.pipeline.outlook import picture
 from eigassign.pipeline.run import Result, solve_case
 from eigassign.pipeline.update import Updated, update_case
 from eigassign.series.multi_index import LowerSet
@@ -59,7 +58,7 @@ class Case(built_case.Case):
 
     def _repr_html_(self) -> str:
         try:
-            return html([repr(self)], plan=self._plan())
+            return html([repr(self)], plan=picture(self))
         except EigassignError as error:
             return html([repr(self), str(error)])
 
@@ -69,17 +68,7 @@ class Case(built_case.Case):
         A matplotlib figure, which a notebook shows; ``.savefig("arm.pdf")`` keeps it. Raises
         CaseError for a mechanism that cannot be modelled or follow its trajectory.
         """
-        return drawn(self._plan())
-
-    def _plan(self) -> FigurePlan:
-        with self.located():
-            model, y = self.model(), self.initial_design
-            if self.file.trajectory is not None:
-                poses = drawing.draw_poses(self.file, model, self.trajectory, y)
-            else:
-                q, y = queries.pose_and_design(self)
-                poses = drawing.rest_pose(self.file, model, q, y)
-        return motion.mechanism_plan(self.file.title, poses)
+        return drawn(picture(self))
 
     def plot_mode(
         self, mode: int = 1, q: Sequence[float] | None = None, y: Sequence[float] | None = None

@@ -27,6 +27,7 @@ from eigassign.files import CASE, read_bytes
 BUG, STORAGE, INTERRUPTED = EigassignError.exit_code, StorageError.exit_code, 130
 _SNIPPETS = 3  # problems shown with their line of the file
 _WIDEST = 120
+_NARROWEST = 58  # columns of a line that is written over: wrapped, it could not be
 
 
 @dataclass(frozen=True)
@@ -76,12 +77,23 @@ def report(error: BaseException, debug: bool = False) -> int:
     return failure.exit_code
 
 
-def say(lines: Iterable[str]) -> None:
-    """Write lines to stderr; if that is closed only the exit code is left."""
+def say(lines: Iterable[str], passing: bool = False) -> None:
+    """Write lines to stderr; if that is closed only the exit code is left.
+
+    On a terminal the next line is written over those that are ``passing``.
+    """
     with suppress(OSError, AttributeError, ValueError):
-        colours = shows_colours(sys.stderr)
+        colours, clears = shows_colours(sys.stderr), _rewrites(sys.stderr)
         for line in lines:
-            sys.stderr.write(f"{_coloured(line) if colours else line}\n")
+            shown = _coloured(line) if colours else line
+            if clears:
+                shown = f"\r{line[:_NARROWEST]}\x1b[K\r" if passing else f"{shown}\x1b[K\n"
+            sys.stderr.write(shown if clears else f"{shown}\n")
+        sys.stderr.flush()
+
+
+def _rewrites(stream: TextIO) -> bool:
+    return stream.isatty() and os.environ.get("TERM", "dumb") != "dumb"
 
 
 def shows_colours(stream: TextIO) -> bool:
@@ -153,10 +165,19 @@ def _internal(error: BaseException) -> str:
     )
 
 
-def problems(error: BaseException) -> list[Problem]:
-    """What is wrong, for programs: the problems with their lines, or the message without a line."""
+def document(error: BaseException) -> dict[str, object]:
+    """A failure for programs, the same of every command: ``problems`` with their lines.
+
+    An error that has no line in a file is its own problem, without a place.
+    """
     failure = failure_of(error)
-    return list(failure.problems) or [Problem("", 0, 0, "", str(error))]
+    message = failure.summary.removeprefix("error: ")
+    return {
+        "error": type(error).__name__,
+        "exit_code": failure.exit_code,
+        "message": message,
+        "problems": failure.problems or (Problem("", 0, 0, "", message),),
+    }
 
 
 # --- Signals, streams, threads of the linear algebra, garbage collection

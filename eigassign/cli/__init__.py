@@ -10,6 +10,7 @@ Reading order:
     runs       optimize, expand, update, validate, chart
     inspect    check, modes, status, schema
     export     animate
+    start      init, docs, completion
     batch      batch
     cache      cache path, list, clear
 """
@@ -22,13 +23,17 @@ from contextlib import suppress
 
 import click
 
+import eigassign.cli.arguments as arguments
 from eigassign import process
 from eigassign._version import __version__
 from eigassign.cli.batch import batch
 from eigassign.cli.cache import cache
 from eigassign.cli.export import animate
 from eigassign.cli.inspect import check, modes, schema, status
+from eigassign.cli.reporter import print_json
 from eigassign.cli.runs import chart, expand, optimize, update, validate
+from eigassign.cli.start import complete, completion, docs, init
+from eigassign.errors import UsageError
 
 _CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
@@ -43,16 +48,20 @@ def main(args: Sequence[str] | None = None) -> int:
     process.replace_what_cannot_be_encoded()
     try:
         with process.terminable():
-            code = _invoke(arguments)
+            completed = complete(cli)
+            code = _invoke(arguments) if completed is None else completed
             process.flush_streams()
             return code
     except BaseException as error:
-        return _reported(error, debug="--debug" in arguments)
+        return _reported(error, arguments)
 
 
-def _reported(error: BaseException, debug: bool) -> int:
-    code = process.report(error, debug)
+def _reported(error: BaseException, arguments: list[str]) -> int:
+    """Say what went wrong on stderr, and with --json on stdout too; the exit code."""
+    code = process.report(error, debug="--debug" in arguments)
     with suppress(OSError):  # the streams are silenced then, and the code is that of the error
+        if "--json" in arguments:
+            print_json(process.document(error))
         process.flush_streams()
     return code
 
@@ -66,10 +75,33 @@ def _invoke(arguments: list[str]) -> int:
         return done.exit_code
     except click.ClickException as error:
         error.show()
+        if "--json" in arguments:
+            print_json(process.document(UsageError(error.format_message())))
         return error.exit_code
 
 
-@click.group(context_settings=_CONTEXT)
+class _InOrder(click.Group):
+    """Lists its commands in the order in which they are needed, each with a whole sentence."""
+
+    def list_commands(self, _context: click.Context) -> list[str]:
+        return list(self.commands)
+
+    def format_commands(self, _context: click.Context, formatter: click.HelpFormatter) -> None:
+        rows = [(name, each.get_short_help_str(200)) for name, each in self.commands.items()]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
+
+@click.group(
+    cls=_InOrder,
+    context_settings=_CONTEXT,
+    epilog=arguments.examples(
+        "eigassign init",
+        "eigassign check planar_arm.yaml --draw",
+        "eigassign optimize planar_arm.yaml",
+        "eigassign docs case-file",
+    ),
+)
 @click.version_option(__version__, prog_name="eigassign")
 def cli() -> None:
     """Assign the natural frequencies of moving, flexible mechanisms along their trajectory.
@@ -82,7 +114,8 @@ def cli() -> None:
 
 
 for command in (
-    check, modes, optimize, expand, update, validate, chart, batch, status, animate, cache
-):  # fmt: skip
+    *(init, check, modes, optimize, expand, update, validate, chart, batch),
+    *(status, animate),
+    *(cache, schema, docs, completion),
+):
     cli.add_command(command)
-cli.add_command(schema)

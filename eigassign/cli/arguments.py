@@ -23,6 +23,12 @@ def several(*options: Callable[[F], F]) -> Callable[[F], F]:
     return decorate
 
 
+def examples(*commands: str, after: str = "") -> str:
+    """The end of a command's help: how it is used; the tests run each of them."""
+    parts = ["\n".join(["\b", "Examples:", *(f"  {command}" for command in commands)])]
+    return "\n\n".join([*parts, *([f"\b\n{after}"] if after else [])])
+
+
 class Number(click.FloatRange):
     """A number of a range: `nan` compares as inside any, and `inf` is no amount of anything."""
 
@@ -59,10 +65,23 @@ POSITIVE = Number(0.0, min_open=True)
 COUNT = Number(1.0)
 ACCURACY = Number(1e-15, 1.0, max_open=True)  # relative; double precision ends at 2e-16
 case = click.argument("case", type=PATH)
+pose = several(
+    click.option(
+        "--q",
+        metavar="VALUES",
+        help="Pose, as '1.817, 5.312' or '104 deg, 304 deg' (default: the case's expansion point, "
+        "or where its trajectory starts).",
+    ),
+    click.option(
+        "--y",
+        metavar="VALUES",
+        help="Design, as '0.125, 0.125' or '125 g, 0' (default: as written in the case).",
+    ),
+)
 json = click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 common = several(
     click.option("--quiet", is_flag=True, help="Only errors on stderr."),
-    click.option("-v", "--verbose", count=True, help="More on stderr; -vv for all."),
+    click.option("-v", "--verbose", count=True, help="More on stderr (-vv: all)."),
     click.option("--debug", is_flag=True, help="Show the traceback of an error."),
     click.option(
         "--allow-outside",
@@ -87,9 +106,9 @@ figures = click.option(
     show_default=True,
     help="Formats of the figures: png, svg, pdf, a comma between; or none.",
 )
-running = several(
-    click.option("--out", type=PATH, help="Run folder (default: results/<case>)."),
-    caching,
-    force,
-    figures,
-)
+
+
+def running(folder: str = "results/<case>") -> Callable[[F], F]:
+    """The options of a command that leaves a run folder, ``folder`` by default."""
+    out = click.option("--out", type=PATH, help=f"Folder of the run (default: {folder}).")
+    return several(out, caching, force, figures)

@@ -16,16 +16,21 @@ if TYPE_CHECKING:
     from eigassign.output.batch_summary import CaseOutcome
 
 
-@click.command()
+@click.command(
+    epilog=arguments.examples(
+        "eigassign batch cases --jobs 2",
+        "eigassign batch planar_arm.yaml four_bar.yaml --out night --figures none",
+    )
+)
 @click.argument("paths", nargs=-1, required=True, type=arguments.PATH)
 @click.option("--jobs", type=click.IntRange(1), help="Processes (default: one per core).")
-@arguments.running
+@arguments.running("results, with a folder for each case")
 @arguments.common
 def batch(paths: tuple[Path, ...], jobs: int | None, **how: Any) -> int:
     """Optimize many cases in parallel: files, or folders searched for *.yaml and *.yml.
 
-    Every case gets its own folder below --out (default: results), beside summary.csv and
-    junit.xml. A failed case does not stop the others; exit code 1 if any failed.
+    Every case gets its own folder below --out, beside summary.csv and junit.xml. A
+    failed case does not stop the others; exit code 1 if any failed.
     """
     from eigassign.batch import runner as many
     from eigassign.batch.runner import cases_in

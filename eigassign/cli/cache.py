@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from eigassign.output.cache import Cache
 
 
-@click.group()
+@click.group(epilog=arguments.examples("eigassign cache list", "eigassign cache clear"))
 def cache() -> None:
     """The expansions kept from earlier runs."""
 
 
-@cache.command("path")
+@cache.command("path", epilog=arguments.examples("eigassign cache path"))
 @arguments.cache_dir
 def cache_path(cache_dir: Path | None) -> int:
     """Print the cache folder."""
@@ -27,7 +27,7 @@ def cache_path(cache_dir: Path | None) -> int:
     return 0
 
 
-@cache.command("clear")
+@cache.command("clear", epilog=arguments.examples("eigassign cache clear"))
 @arguments.cache_dir
 def cache_clear(cache_dir: Path | None) -> int:
     """Delete everything that is in the cache."""
@@ -36,7 +36,7 @@ def cache_clear(cache_dir: Path | None) -> int:
     return 0
 
 
-@cache.command("list")
+@cache.command("list", epilog=arguments.examples("eigassign cache list"))
 @arguments.cache_dir
 def cache_list(cache_dir: Path | None) -> int:
     """List what is in the cache, oldest first."""

@@ -11,13 +11,19 @@ import eigassign.cli.arguments as arguments
 from eigassign.cli.reporter import reporting
 
 
-@click.command()
+@click.command(
+    epilog=arguments.examples(
+        "eigassign animate planar_arm.yaml arm.gif",
+        'eigassign animate planar_arm.yaml second.png --mode 2 --q "30 deg, 90 deg"',
+    )
+)
 @arguments.case
 @click.argument("file", required=False, type=arguments.PATH)
-@click.option("--mode", type=click.IntRange(1), help="A mode's shape instead of the motion.")
-@click.option("--q", metavar="VALUES", help="Pose of the mode, as '104 deg 304 deg'.")
-@click.option("--y", metavar="VALUES", help="Design of the mode, as '125 g, 0'.")
-@click.option("--trajectory", metavar="NAME", help="Of several; the first if not given.")
+@click.option(
+    "--mode", type=click.IntRange(1), help="A mode's shape (default: the motion instead)."
+)
+@arguments.pose
+@click.option("--trajectory", metavar="NAME", help="One of several (default: the first).")
 @arguments.common
 def animate(
     case: Path,
@@ -29,11 +35,6 @@ def animate(
     **how: Any,
 ) -> int:
     """Animate the motion along the trajectory, or with --mode the shape of a mode.
-
-    \b
-    Examples:
-      eigassign animate arm.yaml arm.gif
-      eigassign animate arm.yaml second.png --mode 2 --q "104 deg 304 deg"
 
     FILE is a GIF, or an animated PNG by its ending; results/<case>_motion.gif or
     results/<case>_mode_1.gif without one. A file that is there is replaced.

@@ -15,15 +15,29 @@ from eigassign.errors import EigassignError
 
 if TYPE_CHECKING:
     from eigassign.output.run_record import RunStatus
+    from eigassign.pipeline.outlook import Outlook
     from eigassign.pipeline.queries import CheckAnswer, ModesAnswer
 
 
-@click.command()
+_DRAWING = ("out", "force", "figures", "allow_outside")
+
+
+@click.command(
+    epilog=arguments.examples(
+        "eigassign check planar_arm.yaml",
+        "eigassign check planar_arm.yaml --draw",
+        "eigassign check cases/*.yaml --json",
+    )
+)
 @click.argument("cases", nargs=-1, required=True, type=arguments.PATH)
+@click.option("--draw", is_flag=True, help="Draw the mechanism, in results/<case>_check.")
+@arguments.force
+@arguments.figures
 @arguments.json
 @arguments.common
-def check(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
-    """Check case files: every problem with its line, and what is implausible."""
+def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int:
+    """Check case files: every problem with its line, what a run will take, and what to do next."""
+    from eigassign.pipeline import outlook
     from eigassign.pipeline.queries import check as checked
 
     codes, answers = [0], dict[str, Any]()
@@ -32,10 +46,13 @@ def check(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
             try:
                 answers[str(case)] = answer = checked(case, how["allow_outside"])
                 reporter.warn(answer.warnings)
+                if draw:
+                    folder = outlook.draw(case, None, *(how[key] for key in _DRAWING[1:]))
+                    reporter.stage(f"{folder}/figures written")
             except EigassignError as error:
                 codes.append(process.report(error))
                 if as_json:
-                    answers[str(case)] = {"problems": process.problems(error)}
+                    answers[str(case)] = process.document(error)
     if as_json:
         print_json(answers)
     else:
@@ -45,6 +62,8 @@ def check(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
 
 
 def _trajectories(answer: CheckAnswer) -> list[str]:
+    if not answer.trajectories:
+        return ["  no trajectory"]
     if len(answer.trajectories) < 2:
         return [f"  trajectory: {answer.samples} samples in {answer.duration_s:g} s"]
     return [
@@ -61,20 +80,48 @@ def _described(name: str, answer: CheckAnswer) -> str:
         f"  coordinates {q}; design {y}; targets {answer.targets}",
         *_trajectories(answer),
     ]
-    return "\n".join([*lines, *(f"  {note}" for note in answer.notes)])
+    lines += [f"  {note}" for note in answer.notes]
+    lines += [f"  {line}" for line in _expected(answer.outlook)] if answer.outlook else []
+    return "\n".join([*lines, f"  next: {answer.next}"])
 
 
-_DRAWING = ("out", "force", "figures", "allow_outside")
+def _expected(of: Outlook) -> list[str]:
+    size = of.expansion
+    modes = f"mode{'s' if len(of.modes) > 1 else ''} {', '.join(map(str, of.modes))}"
+    mb = size.memory_mb
+    memory = "1 MB" if mb < 1.0 else f"{mb:.2g} MB" if mb < 1000.0 else f"{mb / 1000.0:.2g} GB"
+    lines = [
+        f"expansion of {modes} to order {size.order}: {size.coefficients} coefficients, "
+        f"{'less than' if mb < 1.0 else 'about'} {memory}, {_about(size.seconds)}"
+    ]
+    return lines if of.optimize_s is None else [*lines, f"optimize: {_about(of.optimize_s)}"]
 
 
-@click.command()
+def _about(seconds: float) -> str:
+    """In words that promise no more than an estimate can."""
+    if seconds < 1.0:
+        return "less than a second"
+    rough = float(f"{seconds:.1g}")
+    return f"some {rough:.0f} s" if rough < 100 else f"some {seconds / 60:.0f} min"
+
+
+@click.command(
+    epilog=arguments.examples(
+        "eigassign modes planar_arm.yaml",
+        'eigassign modes planar_arm.yaml --q "30 deg, 90 deg" --y "45 mm, 8 kN m/rad"',
+        "eigassign modes planar_arm.yaml --count 2 --draw",
+    )
+)
 @arguments.case
-@click.option("--q", metavar="VALUES", help="Pose, as '1.817, 5.312' or '104 deg 304 deg'.")
-@click.option("--y", metavar="VALUES", help="Design, as '0.125 0.125' or '125 g, 0'.")
+@arguments.pose
 @click.option("--beyond-bounds", is_flag=True, help="Also a design outside its bounds.")
 @click.option("--count", type=click.IntRange(1), default=4, show_default=True, help="Modes.")
 @click.option("--draw", is_flag=True, help="Draw their shapes, in results/<case>_modes.")
-@click.option("--out", type=arguments.PATH, help="Draw their shapes, in this folder.")
+@click.option(
+    "--out",
+    type=arguments.PATH,
+    help="Draw their shapes, in this folder (default: results/<case>_modes).",
+)
 @arguments.force
 @arguments.figures
 @arguments.json
@@ -89,11 +136,7 @@ def modes(
     draw: bool,
     **how: Any,
 ) -> int:
-    """Exact natural frequencies of the elastic modes at one pose and design, and their shapes.
-
-    Without --q at the case's expansion point, or where its trajectory starts; without --y for the
-    design written in the file.
-    """
+    """Exact natural frequencies of the elastic modes at one pose and design, and their shapes."""
     from eigassign.pipeline import queries
 
     folder = None
@@ -131,7 +174,7 @@ def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
         click.echo(f"{folder} written")
 
 
-@click.command()
+@click.command(epilog=arguments.examples("eigassign status results/planar_arm"))
 @click.argument("runs", nargs=-1, required=True, type=arguments.PATH)
 @arguments.json
 @arguments.common
@@ -151,7 +194,7 @@ def status(runs: tuple[Path, ...], as_json: bool, **how: Any) -> int:
                 found = run_status(run)
             except EigassignError as error:
                 codes.append(process.report(error))
-                answers[str(run)] = {"problems": process.problems(error)}
+                answers[str(run)] = process.document(error)
                 continue
             codes.append(0 if found.intact and found.current else 1)
             judged = {"intact": found.intact, "current": found.current}
@@ -180,7 +223,11 @@ def _state_of(name: str, found: RunStatus) -> str:
 _SINCE = {"same": "as it was", "changed": "changed since", "missing": "not there any more"}
 
 
-@click.command()
+@click.command(
+    epilog=arguments.examples(
+        "eigassign schema > case.schema.json",
+    )
+)
 def schema() -> int:
     """Print the JSON Schema of case files, for editors."""
 

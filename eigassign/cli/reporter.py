@@ -31,9 +31,9 @@ class Reporter:
     level: int = 1
 
     def stage(self, line: str) -> None:
-        """Progress of long work."""
+        """Progress of long work; of a line that begins with blanks a terminal shows the last."""
         if self.level > 0:
-            say([line])
+            say([line], passing=line.startswith(" "))
 
     def warn(self, warnings: Iterable[Problem | str]) -> None:
         """``file:line:column: warning: path: message``, or without a place."""

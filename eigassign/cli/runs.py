@@ -18,7 +18,13 @@ if TYPE_CHECKING:
     from eigassign.study.results import ValidationRow
 
 
-@click.command()
+@click.command(
+    epilog=arguments.examples(
+        "eigassign optimize planar_arm.yaml",
+        "eigassign optimize planar_arm.yaml --study none --figures none",
+        "eigassign optimize planar_arm.yaml --json --quiet",
+    )
+)
 @arguments.case
 @click.option(
     "--study",
@@ -27,7 +33,7 @@ if TYPE_CHECKING:
     show_default=True,
     help="What the answer means, in how much depth: all adds error against mass or price.",
 )
-@arguments.running
+@arguments.running()
 @arguments.json
 @arguments.common
 def optimize(case: Path, as_json: bool, **how: Any) -> int:
@@ -37,21 +43,29 @@ def optimize(case: Path, as_json: bool, **how: Any) -> int:
     return _finished(run.optimize, case, as_json, how)
 
 
-@click.command()
+@click.command(
+    epilog=arguments.examples(
+        "eigassign expand planar_arm.yaml",
+        "eigassign expand planar_arm.yaml --order 6 --mode 1 --mode 2 --out series",
+    )
+)
 @arguments.case
-@click.option("--order", type=click.IntRange(1, 20), help="Order, instead of the case's.")
+@click.option("--order", type=click.IntRange(1, 20), help="Order (default: the case's).")
 @click.option("--linear", is_flag=True, help="Keep the partially linearised set only.")
-@click.option("--mode", "modes", type=click.IntRange(1), multiple=True, help="Mode (repeatable).")
-@arguments.running
+@click.option(
+    "--mode",
+    "modes",
+    type=click.IntRange(1),
+    multiple=True,
+    help="Mode, repeatable (default: the case's).",
+)
+@arguments.running("results/<case>_expansion")
 @arguments.json
 @arguments.common
 def expand(
     case: Path, order: int | None, linear: bool, modes: tuple[int, ...], as_json: bool, **how: Any
 ) -> int:
-    """Expand eigenvalues in q and y: coefficients and their accuracy, in a run folder.
-
-    That is results/<case>_expansion unless --out says otherwise.
-    """
+    """Expand eigenvalues in q and y: coefficients and their accuracy, in a run folder."""
     from eigassign.pipeline import run
 
     def expanded(path: Path, options: Options) -> Outcome:
@@ -103,7 +117,12 @@ def _show(outcome: Outcome, as_json: bool) -> None:
         click.echo(f"{outcome.folder} written in {outcome.seconds:.2f} s")
 
 
-@click.command()
+@click.command(
+    epilog=arguments.examples(
+        "eigassign update arm_update.yaml",
+        "eigassign update arm_update.yaml --figures none --json",
+    )
+)
 @arguments.case
 @click.option("--out", type=arguments.PATH, help="Folder (default: results/<case>_update).")
 @arguments.force
@@ -138,7 +157,12 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
     return 0 if done.results.verdict == "fitted" else 1
 
 
-@click.command()
+@click.command(
+    epilog=arguments.examples(
+        "eigassign validate planar_arm.yaml",
+        "eigassign validate cases",
+    )
+)
 @click.argument("cases", nargs=-1, type=arguments.PATH)
 @arguments.caching
 @arguments.json
@@ -153,6 +177,7 @@ def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
     from eigassign.pipeline import run
 
     rows: list[ValidationRow] = []
+    failures: list[dict[str, object]] = []
     codes = [0]
     with reporting(how) as reporter:
         for case in cases_in(cases or default_cases()):
@@ -160,12 +185,13 @@ def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
                 answer = run.validate(case, _options(how, reporter))
             except EigassignError as error:
                 codes.append(process.report(error))
+                failures.append({"case": case.stem, **process.document(error)})
                 continue
             reporter.warn(answer.warnings)
             rows.extend(answer.rows)
             codes.append(0 if answer.passed else 1)
     if as_json:
-        print_json(rows)
+        print_json([*rows, *failures])
     elif rows:
         from eigassign.output.console import print_validation
 
@@ -173,12 +199,30 @@ def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
     return max(codes)
 
 
-@click.command()
+@click.command(
+    epilog=arguments.examples(
+        "eigassign chart planar_arm.yaml --quick",
+        "eigassign chart planar_arm.yaml --quick --accuracy 1e-4 --evaluations 1e6",
+    )
+)
 @arguments.case
 @click.option("--quick", is_flag=True, help="In seconds: fewer methods, points and repeats.")
-@click.option("--accuracy", type=arguments.ACCURACY, help="Advise for this worst relative error.")
-@click.option("--budget", "budget_s", type=arguments.POSITIVE, help="Advise for so many seconds.")
-@click.option("--evaluations", type=arguments.COUNT, help="How many evaluations are wanted.")
+@click.option(
+    "--accuracy",
+    type=arguments.ACCURACY,
+    help="Advise for this worst relative error (default: several).",
+)
+@click.option(
+    "--budget",
+    "budget_s",
+    type=arguments.POSITIVE,
+    help="Advise for so many seconds (default: any).",
+)
+@click.option(
+    "--evaluations",
+    type=arguments.COUNT,
+    help="Advise for so many evaluations (default: one trajectory, and many).",
+)
 @click.option("--out", type=arguments.PATH, help="Folder (default: results/<case>_chart).")
 @arguments.force
 @arguments.figures

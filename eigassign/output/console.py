@@ -12,6 +12,7 @@ from typing import TextIO
 
 from rich import box
 from rich.console import Console
+from rich.markdown import Markdown
 from rich.table import Table as RichTable
 from rich.text import Text
 
@@ -21,6 +22,7 @@ from eigassign.output import terminal
 from eigassign.output.formats import number
 from eigassign.study.results import RunResults, ValidationRow
 
+_PAGE = 100  # columns: longer lines are hard to read
 _COLOURS = {
     "green": {"reached", "met", "ok", "proved", "fitted"},
     "yellow": {"improved", "unfinished"},
@@ -56,9 +58,9 @@ def print_table(
             collapse_padding=True,
         )
         for k, room in group:
-            justify = "right" if k > 0 and terminal.are_numbers(every[k]) else "left"
+            right = k > 0 and terminal.are_numbers(every[k])
             header = terminal.fitted(columns[k], room, unicode)
-            table.add_column(Text(header), justify=justify, width=room)
+            table.add_column(Text(header), justify="right" if right else "left", width=room)
         for row in cells:
             fitted = (terminal.fitted(row[k], room, unicode) for k, room in group)
             table.add_row(*(Text(cell, style=_colour(cell)) for cell in fitted))
@@ -127,6 +129,13 @@ def print_verdict(line: str, *, stream: TextIO | None = None) -> None:
     console, text = _console(out, terminal.width(out))
     _write_paragraph(console, line, _colour(line.partition(":")[0]))
     write_text(out, text.getvalue() + "\n")
+
+
+def markdown(text: str, out: TextIO) -> str:
+    """A page of the manual as ``out`` shows it."""
+    console, made = _console(out, min(terminal.width(out), _PAGE))
+    console.print(Markdown(text, hyperlinks=False))
+    return made.getvalue()
 
 
 def print_validation(rows: Sequence[ValidationRow], *, stream: TextIO | None = None) -> None:

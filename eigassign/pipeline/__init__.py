@@ -7,6 +7,7 @@ Reading order:
     coefficient_files  expansion coefficients as files for other programs
     run_files          the run folder, and the log in it
     run                the paper's flowchart: case, model, expansion, assignment, verification
+    outlook            what a run will take, and a picture of the mechanism
     queries            check a case; its frequencies at one point
     animation          a GIF or animated PNG of the motion or a mode
     update             measured frequencies to the parameters that explain them

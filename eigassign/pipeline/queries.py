@@ -17,8 +17,8 @@ from eigassign.case.units import DIMENSIONS, TWO_TURNS, QuantityError, is_bare
 from eigassign.errors import CaseError, Problem, UsageError
 from eigassign.mechanism.elements.superelement import weights
 from eigassign.mechanism.kinematics.parameters import written_loads
-from eigassign.mechanism.kinematics.travel_limits import resting_pose
 from eigassign.output import report
+from eigassign.pipeline.outlook import Outlook, next_step, outlook, some_pose
 from eigassign.pipeline.run_files import RESULTS, new_run_folder
 from eigassign.study import drawing
 from eigassign.study.accuracy import truncation_lines
@@ -57,6 +57,8 @@ class CheckAnswer:
     trajectories: tuple[tuple[str, int, float], ...]  # of each its name, samples and duration
     targets: int
     notes: tuple[str, ...]
+    outlook: Outlook | None  # what a run takes; None of a case without a point to expand at
+    next: str  # what to do with it
     warnings: tuple[Problem, ...]
 
 
@@ -195,11 +197,13 @@ def _checked(case: Case) -> CheckAnswer:
     if trajectory is not None:
         target_frequencies(file, trajectory)
     notes += read_measurements(case)[1]
+    plan = None
     if trajectory is not None or file.expansion.q != "auto":
         plan = plan_expansion(file, model, trajectory)
         q = plan.q0[None] if trajectory is None else trajectory.q
         notes += (*plan.notes, *truncation_lines(model, plan.modes, q, case.initial_design[None]))
     _require_regular(case, trajectory.q[:1] if trajectory is not None else None)
+    takes = None if plan is None else outlook(case, plan, trajectory)
     notes += () if trajectory is None else tuple(named_notes(file, model, trajectory))
     return CheckAnswer(
         title=file.title,
@@ -212,6 +216,8 @@ def _checked(case: Case) -> CheckAnswer:
         trajectories=each,
         targets=len(file.targets),
         notes=tuple(notes),
+        outlook=takes,
+        next=next_step(file),
         warnings=file.warnings,
     )
 
@@ -219,9 +225,7 @@ def _checked(case: Case) -> CheckAnswer:
 def _require_regular(case: Case, q: Floats | None) -> None:
     """One exact solve: a mechanism without mass or stiffness is found here, at its line."""
     if q is None:
-        given = case.file.expansion.q
-        pose = resting_pose(case.file) if given == "auto" else given
-        q = np.append(np.asarray(pose, dtype=np.float64), written_loads(case.file))[None]
+        q = some_pose(case)[None]
     try:
         case.model().frequencies(q, case.initial_design, 1)
     except UsageError as error:

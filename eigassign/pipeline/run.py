@@ -26,9 +26,9 @@ from eigassign.output.formats import number
 from eigassign.output.notebook import Pictured, html
 from eigassign.output.result_files import frequency_columns
 from eigassign.pipeline.coefficient_files import coefficient_files
-from eigassign.pipeline.expansions import expand_plan
+from eigassign.pipeline.expansions import expand_plan, expansion_size
 from eigassign.pipeline.run_files import RunFolder, new_run_folder
-from eigassign.pipeline.stages import Stages
+from eigassign.pipeline.stages import Stages, silent
 from eigassign.study.accuracy import accuracy_notes, truncation_notes
 from eigassign.study.built_case import Case, load_case
 from eigassign.study.collect import VerifiedAssignment, collect_results
@@ -50,10 +50,6 @@ from eigassign.study.scene import Expansions, Scene
 Floats = NDArray[np.float64]
 
 
-def _silent(line: str) -> None:
-    """No progress is shown."""
-
-
 @dataclass(frozen=True)
 class Options:
     """How a case is run, never what: nothing in it changes a number."""
@@ -66,7 +62,7 @@ class Options:
     study: str = "cheap"  # of what the answer means: none, cheap or all
     allow_outside: bool = False  # the case may name files outside its own folder
     progress: Callable[[str], None] = field(
-        default=_silent
+        default=silent
     )  # called with a line as each stage begins
 
 
@@ -197,6 +193,7 @@ def prepare(
         trajectory = None if file.trajectory is None else case.trajectory
     with stages("expansion", "expanding the eigenvalues"):
         plan = plan_expansion(file, model, trajectory, order, modes)
+        stages.expect(expansion_size(model, plan).seconds)
         expansions, notes = expand_plan(model, plan, cache)
     moving = () if trajectory is None else trajectory.notes
     mesh = () if case.mesh is None else case.mesh.reasons

@@ -11,8 +11,9 @@ import pytest
 from commands import TWO_LINK, python
 from wrong_inputs import GOOD
 
+import eigassign.cli.arguments as arguments
 from eigassign import __version__
-from eigassign.cli import arguments, main
+from eigassign.cli import main
 from eigassign.cli.reporter import dumps
 from eigassign.errors import UsageError
 from eigassign.output.figures import style
@@ -337,7 +338,40 @@ def test_validate_ends_with_1_above_the_tolerance_and_still_shows_the_table(
 def test_validate_goes_on_after_a_wrong_case_and_ends_with_its_code(capsys: Captured) -> None:
     Path("wrong.yaml").write_text("title: x")
     rows = json.loads(answer(capsys, "validate", "wrong.yaml", "good.yaml", "--json", code=2))
-    assert {row["case"] for row in rows} == {"good"}
+    assert {row["case"] for row in rows if "error" not in row} == {"good"}
+    (failed,) = (row for row in rows if "error" in row)
+    assert (failed["case"], failed["error"], failed["exit_code"]) == ("wrong", "CaseError", 2)
+
+
+FAILURES = [
+    (["modes", "wrong.yaml"], 2, "CaseError"),
+    (["optimize", "wrong.yaml"], 2, "CaseError"),
+    (["modes", "good.yaml", "--q", "1 m"], 2, "UsageError"),
+    (["modes", "good.yaml", "--count", "many"], 2, "UsageError"),
+    (["expand"], 2, "UsageError"),
+    (["chart", "good.yaml", "--out", "good.yaml/x"], 3, "StorageError"),
+    (["update", "nowhere.yaml"], 2, "CaseError"),
+]
+
+
+@pytest.mark.parametrize(("args", "code", "kind"), FAILURES, ids=str)
+def test_failures_have_one_form_of_json_on_stdout_and_are_told_on_stderr_too(
+    args: list[str], code: int, kind: str, capsys: Captured
+) -> None:
+    Path("wrong.yaml").write_text("title: x")
+    assert main([*args, "--json"]) == code
+    out, err = capsys.readouterr()
+    said = json.loads(out)
+    assert list(said) == ["error", "exit_code", "message", "problems"]
+    assert said["exit_code"] == code
+    assert said["error"] == kind
+    assert said["message"]
+    for problem in said["problems"]:
+        assert list(problem) == ["file", "line", "column", "path", "message"]
+        assert problem["message"] in err
+    assert main(args) == code
+    out, again = capsys.readouterr()
+    assert (out, again) == ("", err)
 
 
 def test_schema_prints_a_json_schema(capsys: Captured) -> None:

@@ -63,7 +63,7 @@ def test_every_error_has_its_exit_code_and_one_line(
 def test_a_bug_is_told_with_its_place_and_with_a_traceback_only_when_asked(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(queries, "load_case", lambda _path: 1 / 0)
+    monkeypatch.setattr(queries, "load_case", lambda *_: 1 / 0)
     assert main(["modes", "good.yaml"]) == 4
     err = capsys.readouterr().err
     assert "ZeroDivisionError: division by zero (eigassign.pipeline.queries:" in err
@@ -95,11 +95,13 @@ def test_errors_and_warnings_have_colours_on_a_terminal_only(
         return stream.getvalue().splitlines()
 
     error, warning, problem = said(Terminal())
-    assert error == "\x1b[1;31meigassign: \x1b[0merror: no"
-    assert warning == "\x1b[1ma.yaml:3:1: \x1b[0m\x1b[1;33mwarning: \x1b[0mthin"
-    assert problem == "\x1b[1ma.yaml:4:2: \x1b[0mtitle: missing"
+    assert error == "\x1b[1;31meigassign: \x1b[0merror: no\x1b[K"
+    assert warning == "\x1b[1ma.yaml:3:1: \x1b[0m\x1b[1;33mwarning: \x1b[0mthin\x1b[K"
+    assert problem == "\x1b[1ma.yaml:4:2: \x1b[0mtitle: missing\x1b[K"
     assert said(io.StringIO()) == lines
     monkeypatch.setenv("NO_COLOR", "1")
+    assert said(Terminal()) == [f"{line}\x1b[K" for line in lines]
+    monkeypatch.setenv("TERM", "dumb")
     assert said(Terminal()) == lines
 
 

@@ -1,0 +1,204 @@
+"""The first minute: `init` writes a case to start from, `docs` shows the manual, `completion`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import click
+
+import eigassign.cli.arguments as arguments
+from eigassign.errors import StorageError, UsageError
+
+PACKAGE = Path(__file__).parents[1]
+STARTERS = PACKAGE / "starters"
+MANUAL = PACKAGE / "docs"
+
+TEMPLATES = {  # files in STARTERS: <name>.yaml, and the folder <name> if there is one
+    "planar_arm": "two links with elastic drives, along a path of the tip",
+    "spatial_arm": "three joints in space",
+    "four_bar": "a closed loop",
+    "gantry": "a carriage that travels along a girder",
+    "imported_part": "matrices from another finite-element program",
+}
+
+
+@click.command(
+    epilog=arguments.examples(
+        "eigassign init",
+        "eigassign init four_bar --out linkage.yaml",
+        after="\n".join(["Templates:", *(f"  {n:<14} {what}" for n, what in TEMPLATES.items())]),
+    )
+)
+@click.argument(
+    "template", type=click.Choice(list(TEMPLATES)), default="planar_arm", metavar="[TEMPLATE]"
+)
+@click.option("--out", type=arguments.PATH, help="The case file (default: <template>.yaml).")
+def init(template: str, out: Path | None) -> int:
+    """Write a commented case file that runs as it is, to start from.
+
+    TEMPLATE is planar_arm unless another is named. Files that exist are never overwritten.
+    """
+    case = out or Path(f"{template}.yaml")
+    files = {case: STARTERS / f"{template}.yaml"}
+    beside = sorted(path for path in STARTERS.glob(f"{template}/*"))
+    files |= {case.parent / template / path.name: path for path in beside}
+    for path in files:
+        if path.exists() or path.is_symlink():
+            raise StorageError(f"{path} exists and is left alone: choose another name with --out")
+    for path, source in files.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        text = source.read_text(encoding="utf-8").replace(f" {template}.yaml", f" {case}")
+        with open(path, "x", encoding="utf-8") as file:
+            file.write(text)
+        click.echo(f"{path} written")
+    others = ", ".join(name for name in TEMPLATES if name != template)
+    click.echo(f"next: eigassign check {case} --draw\nother templates: {others}")
+    return 0
+
+
+# --- The manual
+
+
+@click.command(
+    epilog=arguments.examples(
+        "eigassign docs", "eigassign docs case-file", "eigassign docs targets"
+    )
+)
+@click.argument("topic", nargs=-1)
+def docs(topic: tuple[str, ...]) -> int:
+    """Show the manual: a page, or the part of a page below a heading.
+
+    Without TOPIC the list of pages. In a pipe it is the text as it is written, in Markdown.
+    """
+    text = _part(" ".join(topic)) if topic else _contents()
+    if sys.stdout.isatty():
+        from eigassign.output.console import markdown
+
+        text = markdown(text, sys.stdout)
+    click.echo_via_pager(text)
+    return 0
+
+
+def _contents() -> str:
+    lines = []
+    for name, text in _pages().items():
+        headings = [title for level, title, _ in _headings(text) if level == 2]
+        lines.append(f"- **{name}**: {', '.join(headings) or _headings(text)[0][1]}")
+    return "\n".join(
+        ["# The manual of eigassign", *lines, "", "`eigassign docs TOPIC` shows a page or a part."]
+    )
+
+
+def _pages() -> dict[str, str]:
+    pages = sorted(MANUAL.glob("*.md"))
+    return {p.stem: p.read_text(encoding="utf-8") for p in pages if p.stem != "index"}
+
+
+def _part(topic: str) -> str:
+    """A page by its name, else the part below a heading of any page, by its beginning."""
+    pages, wanted = _pages(), _folded(topic)
+    if (
+        page := next((text for n, text in pages.items() if _folded(n) == wanted), None)
+    ) is not None:
+        return page
+    found = [
+        (_folded(title) != wanted, name, _below(text, level, start))
+        for name, text in pages.items()
+        for level, title, start in _headings(text)
+        if _folded(title).startswith(wanted)
+    ]
+    if not found:
+        raise UsageError(f"no page and no heading begins with {topic!r}: eigassign docs lists them")
+    return min(found)[2]
+
+
+def _folded(text: str) -> str:
+    return " ".join(text.lower().replace("-", " ").replace("`", "").split())
+
+
+def _headings(text: str) -> list[tuple[int, str, int]]:
+    """Level, title and line of each; lines of code blocks are none."""
+    found, code = [], False
+    for k, line in enumerate(text.splitlines()):
+        code ^= line.startswith("```")
+        marks, _, title = line.partition(" ")
+        if marks and set(marks) == {"#"} and not code:
+            found.append((len(marks), title, k))
+    return found
+
+
+def _below(text: str, level: int, start: int) -> str:
+    ends = [k for other, _, k in _headings(text) if k > start and other <= level]
+    return "\n".join(text.splitlines()[start : ends[0] if ends else None])
+
+
+# --- Shell completion
+
+VARIABLE = "_EIGASSIGN_COMPLETE"
+SHELLS = {"bash": ".bashrc", "zsh": ".zshrc", "fish": ""}  # and the file that each reads at start
+_ZSH = "(( $+functions[compdef] )) || { autoload -Uz compinit && compinit }\n"
+
+
+@click.command(
+    epilog=arguments.examples("eigassign completion bash", "eigassign completion bash --install")
+)
+@click.argument("shell", type=click.Choice(list(SHELLS)), required=False, metavar="[SHELL]")
+@click.option("--install", is_flag=True, help="Set it up for new terminals of this user.")
+def completion(shell: str | None, install: bool) -> int:
+    """Completion of commands, options and files in bash, zsh or fish (default: that of $SHELL).
+
+    Prints the script; with --install it is written where the shell finds it.
+    """
+    name = shell or Path(os.environ.get("SHELL", "")).name
+    if name not in SHELLS:
+        raise UsageError(f"the shell {name or 'of $SHELL'!r} is not known: name bash, zsh or fish")
+    script = _script(name)
+    if not install:
+        click.echo(script)
+        return 0
+    home = Path.home()
+    if name == "fish":
+        _write(home / ".config/fish/completions/eigassign.fish", script)
+    else:
+        place = home / f".local/share/eigassign/completion.{name}"
+        _write(place, script)
+        _add_line(home / SHELLS[name], f'[ ! -r "{place}" ] || . "{place}"')
+    click.echo("open a new terminal, and press tab behind eigassign")
+    return 0
+
+
+def complete(cli: click.Command) -> int | None:
+    """What the shell asks for behind a tab, on stdout; its exit code, None if it asks nothing."""
+    if (asked := os.environ.get(VARIABLE)) is None:
+        return None
+    from click.shell_completion import shell_complete
+
+    return shell_complete(cli, {}, "eigassign", VARIABLE, asked)
+
+
+def _script(shell: str) -> str:
+    from click.shell_completion import get_completion_class
+
+    made = get_completion_class(shell)
+    if made is None:
+        raise UsageError(f"this version of click knows no completion of {shell}")
+    source = made(click.Command("eigassign"), {}, "eigassign", VARIABLE).source()
+    return _ZSH + source if shell == "zsh" else source
+
+
+def _write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    click.echo(f"{path} written")
+
+
+def _add_line(path: Path, line: str) -> None:
+    """At the end of a file, unless it has that line."""
+    before = path.read_text(encoding="utf-8") if path.exists() else ""
+    if line not in before.splitlines():
+        apart = "" if before.endswith("\n") or not before else "\n"
+        with open(path, "a", encoding="utf-8") as file:
+            file.write(f"{apart}{line}\n")
+        click.echo(f"{path}: one line added")

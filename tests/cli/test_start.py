@@ -1,0 +1,191 @@
+"""The first minute: starters that run as they are, the manual, completion, and the examples."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import shutil
+from pathlib import Path
+
+import click
+import pytest
+from commands import TWO_LINK, eigassign_process, environment
+
+from eigassign.cli import cli, main
+from eigassign.cli.start import STARTERS, TEMPLATES
+
+CASES = TWO_LINK.parent
+Captured = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("EIGASSIGN_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setenv("HOME", str(tmp_path))
+
+
+def test_every_starter_is_listed_once_and_has_its_file() -> None:
+    assert sorted(path.stem for path in STARTERS.glob("*.yaml")) == sorted(TEMPLATES)
+
+
+@pytest.mark.parametrize("name", TEMPLATES)
+def test_a_starter_is_written_with_its_name_and_is_in_order(name: str, capsys: Captured) -> None:
+    assert main(["init", name, "--out", "new/mine.yaml"]) == 0
+    out = capsys.readouterr().out
+    assert "new/mine.yaml written\n" in out
+    assert "next: eigassign check new/mine.yaml --draw\n" in out
+    text = Path("new/mine.yaml").read_text(encoding="utf-8")
+    assert "eigassign optimize new/mine.yaml" in text
+    assert f"{name}.yaml" not in text
+    assert text.count("#") > 12
+    assert main(["check", "new/mine.yaml"]) == 0
+    assert "warning" not in capsys.readouterr().err
+    if name == "imported_part":
+        assert Path("new/imported_part/mass.mtx").exists()
+
+
+@pytest.mark.parametrize(
+    "name",
+    [n if n == "planar_arm" else pytest.param(n, marks=pytest.mark.slow) for n in TEMPLATES],
+)
+def test_a_starter_runs_as_it_is_and_reaches_its_targets(name: str, capsys: Captured) -> None:
+    assert main(["init", name]) == 0
+    capsys.readouterr()
+    args = ["--study", "none", "--figures", "none", "--json"]
+    assert main(["optimize", f"{name}.yaml", *args]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["assignment"]["verdict"] == "reached"
+
+
+def test_init_overwrites_nothing(capsys: Captured) -> None:
+    Path("imported_part").mkdir()
+    mine = Path("imported_part/mass.mtx")
+    mine.write_text("mine")
+    assert main(["init", "imported_part"]) == 3
+    assert "imported_part/mass.mtx exists and is left alone" in capsys.readouterr().err
+    assert mine.read_text() == "mine"
+    assert not Path("imported_part.yaml").exists()
+    Path("planar_arm.yaml").symlink_to("nowhere")
+    assert main(["init"]) == 3
+    assert not Path("nowhere").exists()
+
+
+def test_the_manual_is_found_by_page_and_by_heading(capsys: Captured) -> None:
+    def shown(*topic: str) -> str:
+        assert main(["docs", *topic]) == 0
+        return capsys.readouterr().out
+
+    assert "**case-file**: Mechanism, Coordinates" in shown()
+    assert shown("case-file").startswith("# The case file\n")
+    assert shown("Case", "file") == shown("case-file")
+    joints = shown("joints")
+    assert joints.startswith("### Joints\n")
+    assert "| `revolute` |" in joints
+    assert "## Coordinates" not in joints
+    assert shown("set-up").startswith("## Set-up")
+    assert main(["docs", "no such thing"]) == 2
+    assert "eigassign docs lists them" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_is_installed_by_one_command_once(shell: str, capsys: Captured) -> None:
+    rc = Path(f".{shell}rc")
+    if shell != "fish":
+        rc.write_text("export A=1")
+    for _ in range(2):
+        assert main(["completion", shell, "--install"]) == 0
+    scripts = [path for path in Path().rglob("*eigassign*/*") if path.is_file()]
+    scripts += Path().glob(".config/fish/completions/*")
+    assert len(scripts) == 1
+    assert "_EIGASSIGN_COMPLETE" in scripts[0].read_text()
+    if shell != "fish":
+        first, line = rc.read_text().splitlines()
+        assert first == "export A=1"
+        assert str(scripts[0].absolute()) in line
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("eigassign op", ["plain,optimize"]),
+        ("eigassign init f", ["plain,four_bar"]),
+        ("eigassign check --dr", ["plain,--draw"]),
+        ("eigassign check a", ["file,a"]),
+    ],
+)
+def test_tab_completes_commands_options_templates_and_files(words: str, offered: list[str]) -> None:
+    asked = {
+        "_EIGASSIGN_COMPLETE": "bash_complete",
+        "COMP_WORDS": words,
+        "COMP_CWORD": str(words.count(" ")),
+    }
+    done = eigassign_process(env=environment(**asked))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.splitlines() == offered
+
+
+# --- Help
+
+COMMANDS = {
+    " ".join(["eigassign", *path]): command
+    for name, each in cli.commands.items()
+    for path, command in [
+        ((name,), each),
+        *(((name, sub), c) for sub, c in getattr(each, "commands", {}).items()),
+    ]
+}
+
+
+def helped(name: str, capsys: Captured) -> str:
+    assert main([*name.split()[1:], "--help"]) == 0
+    return capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_option_with_a_value_states_its_default(name: str, capsys: Captured) -> None:
+    for option in COMMANDS[name].params:
+        if isinstance(option, click.Option) and not (option.is_flag or option.count):
+            stated = re.search(r"[(\[]default: ", option.help or "") or option.show_default
+            assert stated, option.name
+
+
+def examples(name: str, capsys: Captured) -> list[str]:
+    _, _, listed = helped(name, capsys).partition("Examples:\n")
+    return re.findall(r"^ +(eigassign .*)$", listed, re.MULTILINE)
+
+
+@pytest.mark.parametrize("name", ["eigassign", *COMMANDS])
+def test_the_help_of_every_command_has_examples_of_it(name: str, capsys: Captured) -> None:
+    found = examples(name, capsys)
+    assert found
+    assert all(f"{line} ".startswith(f"{name} ") for line in found)
+
+
+LONG = ("chart", "batch", "optimize", "expand", "update", "validate", "status")  # each over 3 s
+SLOW = {f"eigassign {name}": pytest.mark.slow for name in LONG} | {"eigassign": pytest.mark.slow}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=SLOW.get(name, ())) for name in ["eigassign", *COMMANDS]]
+)
+def test_the_examples_of_the_help_run(name: str, capsys: Captured) -> None:
+    lines = examples(name, capsys)
+    if "init" not in lines[0]:
+        for template in ("planar_arm", "four_bar"):
+            assert main(["init", template]) == 0
+        Path("cases").mkdir()
+        shutil.copy("planar_arm.yaml", "cases")
+        for path in CASES.glob("arm_update.*"):
+            shutil.copy(path, ".")
+        if name == "eigassign status":
+            assert main(["optimize", "planar_arm.yaml", "--figures", "none"]) == 0
+    for line in lines:
+        words = shlex.split(line.partition(" > ")[0])[1:]
+        expanded = [
+            name
+            for word in words
+            for name in (sorted(map(str, Path().glob(word))) if "*" in word else [word])
+        ]
+        assert main(expanded) == 0, line

@@ -1,0 +1,61 @@
+"""Stages are timed, and say how far they are while they last."""
+
+from __future__ import annotations
+
+import re
+import threading
+
+import pytest
+
+from eigassign.pipeline.stages import Stages, silent
+
+
+class Lines:
+    """Collects lines of progress; ``wait`` returns when there are so many of one stage."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self._changed = threading.Condition()
+
+    def __call__(self, line: str) -> None:
+        with self._changed:
+            self.lines.append(line)
+            self._changed.notify_all()
+
+    def wait(self, count: int) -> None:
+        with self._changed:
+            assert self._changed.wait_for(lambda: len(self.lines) >= count, timeout=30)
+
+
+def test_a_stage_that_lasts_says_how_far_it_is_and_how_much_time_is_left() -> None:
+    lines = Lines()
+    stages = Stages(lines, first_s=0.01)
+    with stages("expansion", "expanding"):
+        lines.wait(2)
+        stages.expect(3600.0)
+        lines.wait(len(lines.lines) + 2)
+        stages.advance(0, 8)  # no piece is done: nothing can be told from that
+        lines.wait(len(lines.lines) + 2)
+        stages.advance(7, 8)
+        lines.wait(len(lines.lines) + 2)
+    assert lines.lines[0] == "expanding"
+    assert lines.lines[1] == "  0 s"
+    assert any(re.fullmatch(r"  \d s, some 60 min left", line) for line in lines.lines)
+    assert re.fullmatch(r"  7 of 8, some \d s left", lines.lines[-1])
+    count = len(lines.lines)
+    with stages("expansion", "again"):
+        lines.wait(count + 2)
+    assert lines.lines[count + 1] == "  0 s"  # nothing is left of the stage before
+    assert list(stages.timing_s) == ["expansion"]
+
+
+def test_a_stage_ends_its_progress_with_an_error_too_and_silent_ones_start_no_thread() -> None:
+    before = threading.active_count()
+    with pytest.raises(ValueError, match="bad"), Stages(Lines(), first_s=60.0)("a", "b"):
+        raise ValueError("bad")
+    with Stages(silent)("a", "b"):
+        assert threading.active_count() <= before + 1
+    for thread in threading.enumerate():
+        if thread.daemon and thread is not threading.current_thread():
+            thread.join(timeout=5)
+    assert threading.active_count() <= before
