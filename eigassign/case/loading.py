@@ -46,7 +46,8 @@ def load(path: str | Path, allow_outside: bool = False) -> CaseFile:
     try:
         data = read_bytes(path, CASE)
     except (FileNotFoundError, NotADirectoryError, ValueError):
-        raise UsageError(f"{path}: no such case file") from None
+        meant = f"; did you mean {path}.yaml?" if os.path.isfile(f"{path}.yaml") else ""
+        raise UsageError(f"{path}: no such case file{meant}") from None
     except OSError as error:
         if error.errno in (errno.EINVAL, errno.EFBIG):
             raise UsageError(f"{path}: expected a case file: {error.strerror}") from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,8 +57,11 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
     if as_json:
         print_json(answers)
     else:
+        from eigassign.output import terminal
+
+        room = terminal.width(sys.stdout)
         for name, answer in answers.items():
-            click.echo(_described(name, answer))
+            click.echo(terminal.wrapped(_described(name, answer), room))
     return max(codes)
 
 
@@ -72,7 +76,7 @@ def _trajectories(answer: CheckAnswer) -> list[str]:
     ]
 
 
-def _described(name: str, answer: CheckAnswer) -> str:
+def _described(name: str, answer: CheckAnswer) -> list[str]:
     q, y = (", ".join(names) or "none" for names in (answer.q_names, answer.y_names))
     lines = [
         f"{name}: {answer.title}",
@@ -82,7 +86,7 @@ def _described(name: str, answer: CheckAnswer) -> str:
     ]
     lines += [f"  {note}" for note in answer.notes]
     lines += [f"  {line}" for line in _expected(answer.outlook)] if answer.outlook else []
-    return "\n".join([*lines, f"  next: {answer.next}"])
+    return [*lines, f"  next: {answer.next}"]
 
 
 def _expected(of: Outlook) -> list[str]:

@@ -1,15 +1,16 @@
 """Tables that fit a terminal: which columns stand side by side, and how wide each is.
 
 A column is at least as wide as the words of its header and its longest cell, text up to `NARROW`
-only; numbers are always whole. Columns of a table that do not fit side by side are divided into
-groups that do, each behind the columns that name the rows; what room is left goes to the columns
-that lack some.
+only; numbers are always whole. Columns of a table that do not fit side by side even so are divided
+into groups that do, each behind the columns that name the rows, and their text may be as wide as
+half of the room. What room is left goes to the columns that lack some.
 """
 
 from __future__ import annotations
 
 import os
 import shutil
+import textwrap
 from collections.abc import Sequence
 from typing import TextIO
 
@@ -31,13 +32,27 @@ def width(out: TextIO) -> int:
     return shutil.get_terminal_size().columns if out.isatty() else ENDLESS
 
 
+def wrapped(lines: Sequence[str], room: int) -> str:
+    """Lines that end between words; what is continued is indented further than its beginning."""
+    text = []
+    for line in lines:
+        indent = " " * (len(line) - len(line.lstrip()) + 2)
+        wrapper = textwrap.TextWrapper(
+            room, subsequent_indent=indent, break_on_hyphens=False, break_long_words=False
+        )
+        text += wrapper.wrap(line) if len(line) > room else [line]
+    return "\n".join(text)
+
+
 def groups(headers: Sequence[str], cells: Sequence[Sequence[str]], room: int) -> tuple[Group, ...]:
     """The columns of a table in groups that fit into ``room`` columns; ``cells`` are by column.
 
     The first column names the rows, or the first two where it alone does not tell them apart.
     """
-    narrow = min(NARROW, max(1, room // 3 - GAP))
-    spans = [_span(header, column, narrow) for header, column in zip(headers, cells, strict=True)]
+    for narrow in (min(NARROW, room // 3 - GAP), room // 2 - GAP):
+        spans = [_span(h, column, max(narrow, 1)) for h, column in zip(headers, cells, strict=True)]
+        if sum(least + GAP for least, _ in spans) - GAP <= room:
+            break
     rows = list(zip(*cells[:1], strict=True))
     names = [0] if len(set(rows)) == len(rows) else [0, 1][: len(spans)]
     found = [list(names)]

@@ -133,8 +133,11 @@ def test_a_duplicate_and_a_schema_error_and_an_unknown_name_are_told_together() 
 
 
 def test_a_missing_file_is_wrong_usage(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"nowhere\.yaml: no such case file"):
+    with pytest.raises(UsageError, match=r"nowhere\.yaml: no such case file$"):
         load(tmp_path / "nowhere.yaml")
+    (tmp_path / "arm.yaml").touch()
+    with pytest.raises(UsageError, match=r"no such case file; did you mean .*arm\.yaml\?"):
+        load(tmp_path / "arm")
 
 
 def test_a_folder_is_wrong_usage(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import io
 import pytest
 from synthetic_results import make_results
 
-from eigassign.output import console
+from eigassign.output import console, terminal
 from eigassign.output.batch_summary import CaseOutcome, batch_table
 from eigassign.output.formats import number, percent, residual, seconds
 from eigassign.study.results import ValidationRow
@@ -118,6 +118,28 @@ def test_verdicts_have_colours_on_a_terminal_unless_nobody_wants_them(monkeypatc
         with monkeypatch.context() as changed:
             changed.setenv(name, value)
             assert "\x1b" not in shown()
+
+
+def test_columns_that_need_a_second_part_are_not_shortened_for_nothing(monkeypatch):
+    path = "sections.upper_tube.outer_diameter"
+    monkeypatch.setenv("COLUMNS", "60")
+    out = piped()
+    columns = ("name", "parameter", "unit", "initial", "optimal", "lower", "upper", "lies on")
+    row = ("diameter", path, "m", "0.04", "0.0433304", "0.035", "0.06", "upper")
+    console.print_table("", columns, [row], stream=out)
+    assert path in read(out)
+
+
+def test_long_lines_end_between_words_and_go_on_indented():
+    lines = ["a short line", "  note: one two three /a/path/longer/than/the/line four"]
+    assert terminal.wrapped(lines, 20).splitlines() == [
+        "a short line",
+        "  note: one two",
+        "    three",
+        "    /a/path/longer/than/the/line",
+        "    four",
+    ]
+    assert terminal.wrapped(lines, terminal.ENDLESS) == "\n".join(lines)
 
 
 def test_control_characters_do_not_reach_the_terminal():
