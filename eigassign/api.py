@@ -196,9 +196,12 @@ def update(case: built_case.Case) -> Updated:
 
 
 def save_reduced(reduced: ReducedModel, path: str | Path) -> None:
-    """Keep a reduced model in an HDF5 file, for use without its mechanism.
+    """Keep a reduced model in a file, for use without its mechanism.
 
-    Raises StorageError where it cannot be written.
+    HDF5, which `load_reduced` reads; or for other programs, by the ending: .npz with a reader that
+    needs NumPy only, .mat with a MATLAB function, .c (C99) with its header. They give frequencies
+    in Hz at q (rad or m) and y (SI units), to 1e-12 as ``.frequencies`` does, without the error
+    estimate. Raises StorageError where they cannot be written.
     """
     reduced_file.save_reduced(reduced, path)
 

@@ -9,7 +9,7 @@ Reading order:
     reporter   stages, warnings and the log on stderr; JSON on stdout
     runs       optimize, expand, update, validate, chart
     inspect    check, modes, status, schema
-    export     animate
+    export     export, animate
     start      init, docs, completion
     batch      batch
     cache      cache path, list, clear
@@ -28,7 +28,7 @@ from eigassign import process
 from eigassign._version import __version__
 from eigassign.cli.batch import batch
 from eigassign.cli.cache import cache
-from eigassign.cli.export import animate
+from eigassign.cli.export import animate, export
 from eigassign.cli.inspect import check, modes, schema, status
 from eigassign.cli.reporter import print_json
 from eigassign.cli.runs import chart, expand, optimize, update, validate
@@ -115,7 +115,7 @@ def cli() -> None:
 
 for command in (
     *(init, check, modes, optimize, expand, update, validate, chart, batch),
-    *(status, animate),
+    *(status, export, animate),
     *(cache, schema, docs, completion),
 ):
     cli.add_command(command)

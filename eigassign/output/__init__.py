@@ -7,6 +7,7 @@ In reading order; each imports from those above it only:
     run_record     run.json: the case, version and files of a run, and what has changed since
     run_folder     the folder of a run: hidden until finished; replaces only runs of the same case
     cache          arrays by content key, checked by their hash
+    exchange       a reduced model for other programs: NumPy, MATLAB, C99
     reduced_file   a reduced model in one file
     result_files   results.json and the CSV files
     tables         the tables of a run as text

@@ -9,12 +9,19 @@ from eigassign.files import STORED, read_bytes
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.storage import FORMAT, reduced_arrays, reduced_from_arrays
 from eigassign.output.cache import DamagedError, key, pack, unpack
+from eigassign.output.exchange.files import ENDINGS, write_exchange
 from eigassign.output.storage import replace_synced
 
 
 def save_reduced(reduced: ReducedModel, path: str | Path) -> None:
-    """Write ``reduced`` to ``path``, whole or not at all; raises StorageError if that fails."""
+    """Write ``reduced`` to ``path``, whole or not at all; raises StorageError if that fails.
+
+    The ending .npz, .mat or .c asks for the `exchange` formats, any other for HDF5.
+    """
     path = Path(path)
+    if path.suffix in ENDINGS:
+        write_exchange(reduced, path)
+        return
     meta = {
         "what": "reduced model",
         "modes": ", ".join(map(str, reduced.modes)),

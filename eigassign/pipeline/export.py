@@ -1,0 +1,88 @@
+"""`eigassign export`: a reduced model for other programs, as accurate as is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.errors import TrajectoryError, UsageError
+from eigassign.modal.adaptive.reduced_model import reduce_adaptively
+from eigassign.output.exchange.files import ENDINGS, write_exchange
+from eigassign.output.reduced_file import save_reduced
+from eigassign.pipeline.queries import pose_and_design
+from eigassign.study.built_case import Case
+from eigassign.study.drawing import spread_samples
+
+Floats = NDArray[np.float64]
+POSES = 20  # of the trajectory, with every design but the initial one
+MOST_CORNERS = 6  # design parameters of which all corners of the bounds are taken
+DRAWN = 64  # designs drawn in the bounds of more parameters
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written, and how good it is where that was looked at."""
+
+    files: tuple[Path, ...]
+    modes: tuple[int, ...]
+    size: int
+    points: int
+    error_estimate: float  # the largest, relative in Hz
+    samples: int  # poses and designs at which it was estimated
+
+
+def export(
+    case: Case, path: str | Path, modes: Sequence[int] = (1,), accuracy: float = 1e-6
+) -> Exported:
+    """Write the smallest reduced model found whose error estimate is at most ``accuracy``.
+
+    That is at the poses of the trajectory (without one, at the expansion point), for the initial
+    design and the corners of the design's bounds; of many parameters, for designs drawn within
+    them. The ending of ``path`` is .npz, .mat, .c or .h5. Raises UsageError for another, CaseError
+    and AccuracyError where there is no such model, StorageError where it cannot be written.
+    """
+    path = Path(path)
+    if path.suffix not in (*ENDINGS, ".h5"):
+        raise UsageError(f"{path}: a reduced model is a file that ends in .npz, .mat, .c or .h5")
+    with case.located():
+        x = _samples(case)
+        made = reduce_adaptively(case.model().pencil, x, accuracy, modes)
+    reduced = made.reduced
+    if path.suffix == ".h5":
+        save_reduced(reduced, path)
+        files: tuple[Path, ...] = (path,)
+    else:
+        files = write_exchange(reduced, path, case.file.title)
+    return Exported(files, reduced.modes, reduced.size, len(reduced.points), made.error, len(x))
+
+
+def _samples(case: Case) -> Floats:
+    """(q, y) where the model is to be good, (n, n_x)."""
+    initial, designs = case.initial_design, _designs(case)
+    if case.file.trajectory is None:
+        q = pose_and_design(case)[0]
+        return case.model().x(np.tile(q, (1 + len(designs), 1)), np.vstack([initial, designs]))
+    path = case.trajectory
+    chosen = spread_samples(path.q, POSES)
+    parts = [case.model().x(path.q, initial)]
+    for y in designs:
+        try:
+            parts.append(case.model().x(path.at(y)[0][chosen], y))
+        except TrajectoryError:  # lengths with which the tip cannot follow its path
+            continue
+    return np.concatenate(parts)
+
+
+def _designs(case: Case) -> Floats:
+    """Corners of the bounds, or designs drawn within them, (n, n_y)."""
+    columns = case.file.design.parameters.values()
+    bounds = np.array([(column.min, column.max) for column in columns]).reshape(-1, 2)
+    if len(bounds) <= MOST_CORNERS:
+        return np.array(list(product(*bounds))).reshape(-1, len(bounds))
+    share = np.random.default_rng(0).random((DRAWN, len(bounds)))
+    return np.asarray(bounds[:, 0] + share * np.ptp(bounds, axis=1))
