@@ -137,6 +137,8 @@ def joint_of(space: str, kind: str, rng: Random) -> Tree:
             joint["orientation"] = rng.uniform(-2.5, 2.5, 3).tolist()
     if rng.random() < 0.5:
         joint["position"] = vector(space, rng, 0.2)
+        if kind == "nut":
+            joint["position"][1:] = [0.0, 0.0]  # on the axis of its shaft
     return joint
 
 

@@ -61,6 +61,8 @@ RULES: tuple[Rule, ...] = (
     links.bodies_and_tips_are_on_nodes,
     links.springs_join_two_nodes,
     joints.joints_connect_two_links,
+    joints.beams_carry_one_rider,
+    joints.nuts_are_on_their_shaft,
     joints.links_are_connected_to_the_ground,
     joints.coordinates_move_one_freedom_each,
     joints.assembly_names_coordinates_and_joints,

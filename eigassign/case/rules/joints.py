@@ -5,9 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from eigassign.case.reader import Finding, KeyPath, Tree, at, items, lacks, names, text
-from eigassign.case.rules.lookups import freedoms, is_planar, links, moving, node_problem, type_of
+from eigassign.case.reader import Finding, KeyPath, Tree, at, entries, items, lacks, names, text
+from eigassign.case.rules.lookups import (
+    freedoms,
+    guessed,
+    is_planar,
+    links,
+    moving,
+    node_problem,
+    number,
+    type_of,
+)
 from eigassign.case.schema.joints import RIDING
+from eigassign.case.schema.vectors import PLACE
 from eigassign.case.suggestions import listed, shown, suggestion, unknown
 
 _JOINTS = ("mechanism", "joints")
@@ -49,6 +59,35 @@ def walk_from_the_ground(tree: Tree) -> Walk | None:
         waiting.remove(step)
     loops = tuple(e for e in waiting if e.base in placed)
     return Walk(frozenset(placed), loops, tuple(e for e in waiting if e.base not in placed))
+
+
+def beams_carry_one_rider(tree: Tree) -> Iterator[Finding]:
+    """One carriage or nut travels along a beam: its mesh is divided where that stands."""
+    riders: dict[str, str] = {}
+    for joint, body in items(tree, *_JOINTS):
+        base = text(body, "base")
+        if text(body, "type") not in RIDING or base is None:
+            continue
+        if base in riders:
+            message = (
+                f"{riders[base]!r} travels along {base!r} already, and a beam carries one carriage "
+                "or nut: divide the beam into two with a fixed joint between them, one for each"
+            )
+            yield (*_JOINTS, joint, "base"), message
+        riders.setdefault(base, joint)
+
+
+def nuts_are_on_their_shaft(tree: Tree) -> Iterator[Finding]:
+    """A nut turns about its shaft: beside it there is none to turn about."""
+    for joint, body in items(tree, *_JOINTS):
+        if text(body, "type") == "nut" and any(
+            number(value, PLACE) for value in entries(body, "position")[1:]
+        ):
+            message = (
+                "a nut stands on the axis of its shaft: of its position only the first component "
+                "may differ from zero; place what it carries by the nodes of its follower"
+            )
+            yield (*_JOINTS, joint, "position"), message
 
 
 def joints_connect_two_links(tree: Tree) -> Iterator[Finding]:
@@ -186,8 +225,12 @@ def _guess_problem(tree: Tree, joint: str, value: object) -> str | None:
     known = freedoms(tree, joint)
     if known == ():
         return f"joint {joint!r} is fixed: there is nothing to guess"
-    if known and len(known) > 1 and (not isinstance(value, tuple) or len(value) != len(known)):
-        return f"needs a list of {len(known)}: {listed(known)}"
+    if known and len(known) > 1:
+        count = len(value) if isinstance(value, tuple) else 1
+        if guessed(tree, joint, count) is None:
+            return (
+                f"needs a list of {len(known)}: {listed(known)}; or of those without a coordinate"
+            )
     if known and len(known) == 1 and isinstance(value, tuple):
         return f"joint {joint!r} has one freedom: expected a number, got a list"
     return None

@@ -125,6 +125,20 @@ def driven(tree: Tree, coordinate: object) -> str | None:
     return str(component) if str(component) in known else None
 
 
+def guessed(tree: Tree, joint: str, count: int) -> tuple[str, ...] | None:
+    """The freedoms that a list of ``count`` guesses of a joint gives: all of them, or the passive.
+
+    None if the joint or its type is unknown, or no list of this length can be meant.
+    """
+    known = freedoms(tree, joint)
+    if known is None or count == len(known):
+        return known
+    own = [body for _, body in items(tree, "coordinates") if text(body, "joint") == joint]
+    taken = {driven(tree, body) for body in own}
+    passive = tuple(freedom for freedom in known if freedom not in taken)
+    return passive if count == len(passive) else None
+
+
 def of_freedom(freedom: str | None) -> Quantity:
     """Angle or length; anything where the freedom is unknown."""
     if freedom is None:

@@ -21,6 +21,7 @@ from eigassign.case.rules.lookups import (
     driven,
     followed_modes,
     freedoms,
+    guessed,
     is_spatial,
     of_freedom,
     trajectories,
@@ -184,7 +185,8 @@ def _of_assembly(tree: Tree) -> Iterator[Undecided]:
         quantity = of_freedom(driven(tree, at(tree, "coordinates", name)))
         yield (*path, "at", name), value, quantity
     for joint, value in items(tree, "mechanism", "assembly", "guess"):
-        kinds = [of_freedom(freedom) for freedom in freedoms(tree, joint) or ()]
+        count = len(value) if isinstance(value, tuple) else 1
+        kinds = [of_freedom(freedom) for freedom in guessed(tree, joint, count) or ()]
         yield (*path, "guess", joint), value, kinds[0] if len(kinds) == 1 else ANY
         yield from _in_list(value, kinds, (*path, "guess", joint))
 

@@ -38,9 +38,12 @@ def separated(
 ) -> Kinematics:
     """The motion with its rigid motions as columns ``rigid``.
 
-    Raises MechanismError where springs leave a motion whose direction changes with the pose.
+    Raises MechanismError where springs leave a motion whose direction changes with the pose, or
+    would leave one more where a stiffness that varies is zero.
     """
-    W, pivots = _unresisted(case, motion, free, _rows(case, parameters, motion, free))
+    rows, springs = _rows(case, parameters, motion, free)
+    W, pivots = _unresisted(case, motion, free, rows, springs)
+    _require_lasting(case, motion, free, rows, springs, W.shape[1])
     change = np.eye(len(motion.columns))
     change[np.ix_(free, [free[k] for k in pivots])] = W
     rigid = tuple(sorted(free[k] for k in pivots))
@@ -53,8 +56,10 @@ def separated(
 
 def _rows(
     case: CaseFile, parameters: ModelParameters, motion: Kinematics, free: Sequence[int]
-) -> Floats:
-    """r (n_rows, n_poses, n_free) over the free columns; zero where it is but round-off."""
+) -> tuple[Floats, tuple[str, ...]]:
+    """r (n_rows, n_poses, n_free) over the free columns, zero where it is but round-off; and the
+    path of the stiffness of each row.
+    """
 
     def stiff(_: NodeName) -> MotionRows:
         return [{} for _ in range(6)]
@@ -73,7 +78,13 @@ def _rows(
     apart = ends[:, :, 1] - ends[:, :, 0]
     noise = np.abs(apart).max(axis=3, keepdims=True) <= np.maximum(RESISTED * size, ROUND_OFF)
     rows = np.where(noise, 0.0, apart).reshape(len(springs), len(free), -1).swapaxes(1, 2)
-    return np.asarray(rows[[resists(k) for k, *_ in springs]])
+    held = [resists(k) for k, *_ in springs]
+    paths = [
+        f"springs.{name}.{key}"
+        for name in case.mechanism.springs
+        for key in 3 * ("translational",) + 3 * ("rotational",)
+    ]
+    return rows[held], tuple(path for path, holds in zip(paths, held, strict=True) if holds)
 
 
 def _at_poses(table: CompiledTable, z: Floats, span: Floats) -> Floats:
@@ -89,7 +100,11 @@ def _at_poses(table: CompiledTable, z: Floats, span: Floats) -> Floats:
 
 
 def _unresisted(
-    case: CaseFile, motion: Kinematics, free: Sequence[int], rows: Floats
+    case: CaseFile,
+    motion: Kinematics,
+    free: Sequence[int],
+    rows: Floats,
+    springs: Sequence[str],
 ) -> tuple[Floats, list[int]]:
     """W (n_free, n_rigid), and the coordinate of each column where it is 1 and the others are 0."""
     units = np.abs(rows).max(axis=(0, 1), initial=0.0)
@@ -99,7 +114,7 @@ def _unresisted(
     always = _null_space(scaled.reshape(-1, len(free)))
     least = min((_null_space(A) for A in scaled.swapaxes(0, 1)), key=lambda W: W.shape[1])
     if least.shape[1] > always.shape[1]:
-        _refuse(case, motion, free, least - always @ (always.T @ least))
+        _refuse(case, motion, free, least - always @ (always.T @ least), springs)
     return _echelon(always / units[:, None])
 
 
@@ -122,14 +137,55 @@ def _echelon(W: Floats) -> tuple[Floats, list[int]]:
     return np.where(np.abs(W - whole) < ROUND_OFF, whole, W), pivots
 
 
-def _refuse(case: CaseFile, motion: Kinematics, free: Sequence[int], left: Floats) -> None:
-    names = tuple(case.coordinates)
-    moving = np.abs(left).max(axis=1) > RESISTED
-    joint = [names[motion.columns[k]] for k, moves in zip(free, moving, strict=True) if moves]
-    listed = " and ".join([", ".join(joint[:-1]), joint[-1]] if len(joint) > 1 else joint)
+def _require_lasting(
+    case: CaseFile,
+    motion: Kinematics,
+    free: Sequence[int],
+    rows: Floats,
+    springs: Sequence[str],
+    n_rigid: int,
+) -> None:
+    """The motions that springs leave stay the same where stiffnesses that vary are least."""
+    ranges = case.ranges
+    lost = [path in ranges and ranges[path][0] == 0.0 for path in springs]
+    if not any(lost):
+        return
+    least = rows[~np.array(lost)]
+    left = _null_space(least.reshape(-1, len(free)))
+    if left.shape[1] == n_rigid:
+        return
+    moving = _names(case, motion, free, left)
+    paths = dict.fromkeys(path for path, zero in zip(springs, lost, strict=True) if zero)
+    named = {p.parameter: name for name, p in case.design.parameters.items()}
+    path = next(iter(paths))
+    place = f"design.{named[path]}.min" if path in named else f"mechanism.{path}"
+    what = " and ".join(named.get(path, path) for path in paths)
     raise MechanismError(
-        f"coordinates.{joint[0]}",
-        f"the springs let {listed} move together, in a ratio that changes with the pose, so that "
-        "this rigid motion is no coordinate: hold or lock one of them, or spring it to the ground "
-        "in another direction as well",
+        place,
+        f"with {what} = 0 nothing resists the motion of {moving}, which would be one more "
+        f"rigid-body motion: {'take a min' if path in named else 'set a value'} above 0, such as a "
+        "thousandth of the largest, or give the coordinate a drive",
+    )
+
+
+def _names(case: CaseFile, motion: Kinematics, free: Sequence[int], W: Floats) -> str:
+    """The coordinates that move in W (n_free, n), in words."""
+    names = tuple(case.coordinates)
+    moving = np.abs(W).max(axis=1) > RESISTED
+    moved = [names[motion.columns[k]] for k, moves in zip(free, moving, strict=True) if moves]
+    return " and ".join([", ".join(moved[:-1]), moved[-1]] if len(moved) > 1 else moved)
+
+
+def _refuse(
+    case: CaseFile, motion: Kinematics, free: Sequence[int], left: Floats, springs: Sequence[str]
+) -> None:
+    moving = _names(case, motion, free, left)
+    paths = tuple(dict.fromkeys(springs))
+    raise MechanismError(
+        "mechanism." + ".".join(paths[0].split(".")[:2]),
+        f"{' and '.join(paths)} resist some motions of {moving}, which no drive holds, and leave "
+        "others, in a direction that changes with the pose (a spring's axes turn with the link it "
+        "names first): what is left is a rigid-body motion, but no coordinate. Give the springs "
+        "stiffness in the other directions too, or lock one of these coordinates, or give it a "
+        "drive with a stiffness, a small one if it is to move",
     )

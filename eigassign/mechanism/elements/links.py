@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
-from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.beam import (
     PLANES,
     ElementTerm,
@@ -82,9 +81,6 @@ def _beam(case: CaseFile, parameters: ModelParameters, tree: Topology, name: str
     link: Any = case.mechanism.links[name]
     total, n = length(case, parameters, name), link.elements
     riders = tree.riders(name)
-    if len(riders) > 1:
-        message = "carries more than one carriage or nut; one is supported"
-        raise MechanismError(f"mechanism.links.{name}", message)
     pieces: list[tuple[Scalar, Scalar, int]] = [(0.0, total, n)]  # start, span, elements
     if riders:
         at, first = station(parameters, tree, riders[0]), max(1, n // 2)

@@ -210,21 +210,30 @@ def choose_branch(
     assembly = getattr(case.mechanism, "assembly", None)
     a0 = reference(case, parameters)[list(used)]
     guess = _guess(tree, assembly)
+    drawn = np.zeros(function.size)
+    if guess is None and _is_closed(function, a0, drawn):  # as the file places the joints
+        guess = drawn
     starts = guess[None] if guess is not None else _starts(function.size)
-    found = _solutions(function, a0, starts, _turning(case, tree))
+    angles = _turning(case, tree), _balls(case, tree)
+    found = _solutions(function, a0, starts, *angles)
     if not len(found):
-        others = _solutions(function, a0, _starts(function.size), _turning(case, tree))
+        others = _solutions(function, a0, _starts(function.size), *angles)
         message = _unclosable(tree, function, a0)
         if guess is not None and len(others):
             message = "the guess leads to no closed pose: " + _ambiguous(
-                tree, function.names, a0, others
+                case, tree, function.names, a0, others
             )
         raise MechanismError("mechanism.assembly" if assembly else "mechanism.joints", message)
     _check_determined(tree, function, a0, found[0])
     _check_movable(case, function, used, a0, found[0])
     if guess is None and len(found) > 1:
-        raise MechanismError("mechanism.joints", _ambiguous(tree, function.names, a0, found))
+        raise MechanismError("mechanism.joints", _ambiguous(case, tree, function.names, a0, found))
     return a0, found[0]
+
+
+def _is_closed(function: ImplicitFunction, a: Floats, p: Floats) -> bool:
+    F, check, _ = function.equations(a[:, None], p[:, None])
+    return bool(np.abs(np.concatenate([F, check])).max() < ACCEPT)
 
 
 def reference(case: CaseFile, parameters: ModelParameters) -> Floats:
@@ -252,7 +261,12 @@ def _guess(tree: Topology, assembly: object) -> Floats | None:
     out = np.zeros(len(tree.passive))
     for k, freedom in enumerate(tree.passive):
         value = given.get(freedom.joint, 0.0)
-        out[k] = value[freedom.component] if isinstance(value, (tuple, list)) else value
+        if isinstance(value, (tuple, list)):  # all freedoms of the joint, or the passive ones
+            passive = [f.component for f in tree.passive if f.joint == freedom.joint]
+            own = len(value) == len(passive)
+            out[k] = value[passive.index(freedom.component) if own else freedom.component]
+        else:
+            out[k] = value
     return out
 
 
@@ -278,10 +292,29 @@ def _turning(case: CaseFile, tree: Topology) -> NDArray[np.bool_]:
     return np.array([kind != "translation" for kind in kinds], dtype=bool)
 
 
+def _balls(case: CaseFile, tree: Topology) -> list[int]:
+    """Where the three angles of each spherical joint begin, if all of them are passive."""
+    found = [k for k, f in enumerate(tree.passive) if f.component == 0]
+    joints = case.mechanism.joints
+    return [
+        k
+        for k in found
+        if joints[tree.passive[k].joint].type == "spherical"
+        and sum(f.joint == tree.passive[k].joint for f in tree.passive) == 3
+    ]
+
+
 def _solutions(
-    function: ImplicitFunction, a0: Floats, starts: Floats, turning: NDArray[np.bool_]
+    function: ImplicitFunction,
+    a0: Floats,
+    starts: Floats,
+    turning: NDArray[np.bool_],
+    balls: Sequence[int] = (),
 ) -> Floats:
-    """Distinct solutions from many starting points, the nearest to the first start first."""
+    """Distinct solutions from many starting points, the nearest to the first start first.
+
+    Rx(α) Ry(β) Rz(γ) = Rx(α + π) Ry(π − β) Rz(γ + π): ``balls`` are given with |β| ≤ π/2.
+    """
     n = len(starts)
     a = np.repeat(a0[:, None], n, axis=1)
     p = starts.T
@@ -292,6 +325,14 @@ def _solutions(
     distinct: list[Floats] = []
     for candidate in p.T[good]:
         turned = np.mod(candidate + np.pi, 2.0 * np.pi) - np.pi
+        for k in balls if n > 1 else ():
+            if abs(turned[k + 1]) > np.pi / 2:
+                turned[k : k + 3] = [
+                    turned[k] + np.pi,
+                    np.pi - turned[k + 1],
+                    turned[k + 2] + np.pi,
+                ]
+                turned[k : k + 3] = np.mod(turned[k : k + 3] + np.pi, 2.0 * np.pi) - np.pi
         near = np.where(turning & (n > 1), turned, candidate)
         if all(_apart(near - d, turning) > SAME for d in distinct):
             distinct.append(near)
@@ -365,12 +406,18 @@ def _at(names: Sequence[str], a: Floats) -> str:
     return ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, a, strict=True)) or "its only pose"
 
 
-def _ambiguous(tree: Topology, names: Sequence[str], a0: Floats, found: Floats) -> str:
-    """All branches in words."""
-    listed = " | ".join(f"({_as_guess(tree, p)})" for p in found)
+def _ambiguous(
+    case: CaseFile, tree: Topology, names: Sequence[str], a0: Floats, found: Floats
+) -> str:
+    """All branches in words, each as it is to be given."""
+    listed = " | ".join(_as_guess(tree, p) for p in found)
+    at = ", ".join(
+        f"{name}: {value:.6g}"
+        for name, value in zip(case.coordinates, reference_coordinates(case), strict=True)
+    )
     return (
         f"the loops close in {len(found)} ways at {_at(names, a0)}: {listed}; choose one with "
-        "mechanism.assembly: {at: …, guess: {joint: value, …}} (rad, m)"
+        f"mechanism.assembly: {{at: {{{at}}}, guess: {_as_guess(tree, found[0])}}} (rad, m)"
     )
 
 
@@ -379,5 +426,5 @@ def _as_guess(tree: Topology, p: Floats) -> str:
     values: dict[str, list[str]] = {}
     for freedom, value in zip(tree.passive, p, strict=True):
         values.setdefault(freedom.joint, []).append(f"{value:.4g}")
-    listed = {j: v[0] if len(v) == 1 else f"[{', '.join(v)}]" for j, v in values.items()}
-    return "; ".join(f"{joint}: {value}" for joint, value in listed.items())
+    several = {j: v[0] if len(v) == 1 else f"[{', '.join(v)}]" for j, v in values.items()}
+    return "{" + ", ".join(f"{joint}: {value}" for joint, value in several.items()) + "}"

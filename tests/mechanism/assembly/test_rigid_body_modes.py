@@ -110,7 +110,7 @@ def test_the_stiffness_takes_no_part_in_what_is_rigid() -> None:
 
 def test_a_designed_stiffness_resists_whatever_it_starts_from() -> None:
     tree = chain(turning("l0.end", "l2.start", 0.0))
-    tree["design"] = {"k": {"parameter": "springs.x.rotational", "min": 0.0, "max": 900.0}}
+    tree["design"] = {"k": {"parameter": "springs.x.rotational", "min": 1.0, "max": 900.0}}
     model = built(tree)
     assert len(model.pencil.rigid) == 2
     q = [0.2, 0.4, -0.9]
@@ -120,9 +120,9 @@ def test_a_designed_stiffness_resists_whatever_it_starts_from() -> None:
 
 def test_a_rigid_motion_that_turns_with_the_pose_is_refused_with_its_coordinates() -> None:
     tree = chain({"x": {"between": ["l1.end", "ground"], "translational": [0.0, 3e4]}}, 2)
-    with pytest.raises(MechanismError, match="let q0 and q1 move together") as caught:
+    with pytest.raises(MechanismError, match="resist some motions of q0 and q1, which") as caught:
         built(tree)
-    assert caught.value.path == "coordinates.q0"
+    assert caught.value.path == "mechanism.springs.x"
     tree["coordinates"]["q1"]["drive"] = "locked"
     agrees(tree, [0.2, 0.4], 0)
 
@@ -163,7 +163,7 @@ def built_or_refused(tree: Tree) -> Built | None:
     try:
         return built(tree)
     except MechanismError as error:
-        if "move together" not in error.message:
+        if "resist some motions" not in error.message:
             raise
         return None
 
@@ -179,3 +179,38 @@ def sprung(seed: int, space: str) -> tuple[Tree, np.ndarray]:
         data["drive"] = "free" if rng.random() < 0.7 else data["drive"]
     add_random_springs(tree, rng)
     return tree, q
+
+
+def test_a_spring_of_one_direction_is_named_with_the_coordinates_it_leaves() -> None:
+    tree = chain({"x": {"between": ["l2.end", "ground"], "translational": [1000.0, 0.0]}})
+    with pytest.raises(
+        MechanismError, match=r"springs.x.translational resist some .* q0 and q1,"
+    ) as e:
+        built(tree)
+    assert e.value.path == "mechanism.springs.x"
+    for drive in ("locked", {"stiffness": 1.0}):
+        tree["coordinates"]["q0"]["drive"] = drive
+        tree["coordinates"]["q1"]["drive"] = drive
+        assert len(built(tree).motion.rigid) == 1
+
+
+def with_least(tree: Tree, least: float) -> Tree:
+    k = {"parameter": "springs.x.rotational", "min": least, "max": 900.0}
+    return {**tree, "design": {"k": k}}
+
+
+def test_a_stiffness_that_may_vanish_is_named_where_nothing_else_resists() -> None:
+    tree = chain(turning("l0.end", "ground"))
+    with pytest.raises(MechanismError, match=r"with k = 0 nothing resists the motion of q0,") as e:
+        built(with_least(tree, 0.0))
+    assert e.value.path == "design.k.min"
+    assert len(built(with_least(tree, 0.9)).motion.rigid) == 2
+
+
+def test_a_stiffness_may_vanish_where_something_else_resists() -> None:
+    tree = chain(turning("l0.end", "ground"))
+    tree["mechanism"]["springs"]["other"] = {"between": ["l0.end", "ground"], "rotational": 1.0}
+    assert len(built(with_least(tree, 0.0)).motion.rigid) == 2
+    held = chain(turning("l0.end", "ground"))
+    held["coordinates"]["q0"]["drive"] = {"stiffness": 1.0}
+    assert len(built(with_least(held, 0.0)).motion.rigid) == 2

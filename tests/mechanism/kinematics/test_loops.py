@@ -11,6 +11,7 @@ from spatial_cases import ALLOY, Built, built, changed
 from spatial_examples import arm3r, four_bar, gantry, slider_crank, slotted_lever, straight
 from spatial_oracle import Tree, world
 
+from eigassign.case.reader import read_yaml
 from eigassign.errors import CaseError, MechanismError, SingularityError
 
 
@@ -52,8 +53,9 @@ def test_both_branches_are_listed_where_none_is_chosen() -> None:
         built(tree)
     text = caught.value.message
     assert "close in 2 ways at th = 0" in text
-    assert "(B: 0.9926; D: 1.913; E: 0.92) | (B: -0.9926; D: -1.913; E: -0.92)" in text
-    assert "mechanism.assembly" in text
+    assert "{B: 0.9926, D: 1.913, E: 0.92} | {B: -0.9926, D: -1.913, E: -0.92}" in text
+    first = "mechanism.assembly: {at: {th: 0}, guess: {B: 0.9926, D: 1.913, E: 0.92}}"
+    assert first in text
 
 
 def test_the_listed_branches_close_the_loop_where_they_are_given_back() -> None:
@@ -62,6 +64,88 @@ def test_the_listed_branches_close_the_loop_where_they_are_given_back() -> None:
         tree["mechanism"]["assembly"] = {"at": {"th": 0.0}, "guess": {"B": B, "D": D, "E": E}}
         pin = ends(built(tree), [0.0], "rocker")[1, 0]
         np.testing.assert_allclose(pin, [0.5 + 0.4 * np.cos(D), 0.4 * np.sin(D), 0], atol=2e-4)
+
+
+def rssr(driven: int) -> Tree:
+    """Crank, coupler between two balls, rocker; one component of the first ball is driven."""
+    beams = {"crank": 0.1, "coupler": 0.5, "rocker": 0.25}
+    joints = {
+        "A": {"type": "revolute", "base": "ground", "follower": "crank.start"},
+        "S1": {"type": "spherical", "base": "crank.end", "follower": "coupler.start"},
+        "S2": {"type": "spherical", "base": "coupler.end", "follower": "rocker.end"},
+        "B": {"type": "revolute", "base": "ground", "follower": "rocker.start", "axis": [0, 1, 0]},
+    }
+    joints["B"]["position"] = [0.4, 0.1, 0.0]
+    return {
+        "mechanism": {
+            "space": "spatial",
+            "materials": {"m": ALLOY},
+            "sections": {"s": {"shape": "circle", "diameter": 0.02}},
+            "links": {name: straight(length, 2) for name, length in beams.items()},
+            "joints": joints,
+        },
+        "coordinates": {"th": {"joint": "A"}, "spin": {"joint": "S1", "component": driven}},
+    }
+
+
+@pytest.mark.parametrize("driven", [1, 3])
+def test_each_listed_branch_is_chosen_where_it_is_pasted_back(driven: int) -> None:
+    tree = rssr(driven)
+    with pytest.raises(MechanismError) as caught:
+        built(tree)
+    listed, _, choice = caught.value.message.partition("; choose one with mechanism.assembly: ")
+    branches = listed.partition(": ")[2].split(" | ")
+    assert len(branches) > 1
+    tips = []
+    for branch in branches:
+        text = choice.removesuffix(" (rad, m)").replace(branches[0], branch)
+        tree["mechanism"]["assembly"] = read_yaml(text.encode(), "pasted").tree
+        tips.append(ends(built(tree), np.zeros((1, 2)), "rocker")[1, 0])
+    assert np.ptp(tips, axis=0).max() > 0.1  # on either side
+    tree["mechanism"]["assembly"]["guess"]["S1"] = [0.0]
+    with pytest.raises(CaseError, match=r"needs a list of 3: 1, 2, 3; or of those without a coor"):
+        built(tree)
+
+
+def test_the_two_ways_to_write_one_orientation_of_a_ball_are_one_branch() -> None:
+    tree = rssr(1)
+    m = tree["mechanism"]
+    m["joints"]["S2"] = {**m["joints"]["S2"], "type": "universal", "axes": [[0, 1, 0], [0, 0, 1]]}
+    del tree["coordinates"]["spin"]
+    with pytest.raises(MechanismError) as caught:
+        built(tree)
+    branches = caught.value.message.partition("; choose")[0].split(" | ")
+    assert len(branches) == 4  # two places of the rocker, the coupler turned by half a turn
+    for branch in branches:
+        middle = float(branch.partition("S1: [")[2].split(",")[1])
+        assert abs(middle) <= np.pi / 2
+
+
+def test_loops_that_close_as_they_are_drawn_need_no_guess() -> None:
+    """A beam on a pin and a roller: mode n at β = nπ/L, within what six elements give."""
+    beam = straight(1.0, 6)
+    roller = {"type": "rigid", "nodes": {"start": [0.0, 0.0]}, "mass": 0.0}
+    joints = {
+        "left": {"type": "revolute", "base": "ground", "follower": "beam.start"},
+        "slide": {"type": "prismatic", "base": "ground", "follower": "roller.start"},
+        "right": {"type": "revolute", "base": "roller.start", "follower": "beam.end"},
+    }
+    joints["slide"]["position"] = [1.0, 0.0]
+    model = built(
+        {
+            "mechanism": {
+                "space": "planar",
+                "materials": {"m": ALLOY},
+                "sections": {"s": {"shape": "circle", "diameter": 0.02}},
+                "links": {"beam": beam, "roller": roller},
+                "joints": joints,
+            },
+            "coordinates": {},
+        }
+    )
+    d, E, rho = 0.02, ALLOY["youngs_modulus"], ALLOY["density"]
+    exact = np.array([(n * np.pi) ** 4 * E * d**2 / (16 * rho) for n in (1, 2)])
+    np.testing.assert_allclose(model.lam([[]], 2), exact, rtol=2e-3)
 
 
 def test_a_slide_longer_than_a_turn_is_not_taken_for_an_angle() -> None:
