@@ -52,8 +52,12 @@ __all__ = [
 class Case(built_case.Case):
     """A validated case with what is built from it, each part once and when it is asked for.
 
-    ``model()`` is the mechanism, ``trajectory`` q(t), ``initial_design`` y (n_y,) in SI units as
-    written, ``file`` what the file says; ``plot()``, ``plot_mode()`` and ``animate()`` draw it.
+    ``model()`` is the mechanism: ``.frequencies(q, y)`` in Hz at q (n, n_q) in rad or m and y
+    (n_y,) in SI units, by K φ = λ M φ, eq. (1). ``trajectory.q`` (n, n_q) at ``.time_s`` (n,) in s,
+    of several trajectories one after the other; ``trajectories`` each by itself;
+    ``initial_design`` y as written; ``file`` what the file says. ``plot()``, ``plot_mode()`` and
+    ``animate()`` draw it. These raise CaseError, with its lines, for a mechanism that cannot be
+    modelled or cannot follow its trajectory. Made by ``load_case``.
     """
 
     def _repr_html_(self) -> str:

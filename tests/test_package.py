@@ -64,6 +64,15 @@ def test_help_says_what_a_function_raises(name: str) -> None:
     assert "See :func:" not in text
 
 
+def test_help_says_what_objects_hold_and_in_which_units(case: ea.Case) -> None:
+    model, q, y = case.model(), case.trajectory.q, case.initial_design
+    objects = [case, model, ea.expand(model, q[0], y, order=1), ea.reduce(model, q[0], y)]
+    for each in [*objects, ea.fit(model, q, y, solves=3)]:
+        text = " ".join((inspect.getdoc(type(each)) or "").split())
+        assert "(n" in text, type(each)  # shapes
+        assert "Hz" in text or "f = √λ / 2π" in text, type(each)
+
+
 # --- Pictures and tables
 
 

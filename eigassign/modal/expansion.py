@@ -47,7 +47,15 @@ class Cluster(Brief):
 
 @dataclass(frozen=True, eq=False)
 class Expansion:
-    """Taylor expansion of the eigenvalues of ``modes`` about (q0, y0); immutable."""
+    """Taylor expansion of the eigenvalues of ``modes`` about (q0, y0), eqs. (4)-(9); immutable.
+
+        λ(x) ≈ Σ_γ λ_γ (x − x0)^γ,  x = (q, y), q in rad or m, y in SI units
+
+    ``frequencies(q, y)`` (n, n_modes) in Hz, ``eigenvalues(q, y)`` in rad²/s²; ``indices`` γ
+    (N, n_q + n_y), ``coefficients`` λ_γ (n_modes, N); ``error_estimate(q, y)`` relative in Hz,
+    without an exact solve; ``linear_in_design(q)`` is eq. (9), ``inverse`` the series of 1/λ.
+    Neighbouring modes are expanded together, as the matrices of ``clusters``.
+    """
 
     modes: tuple[int, ...]
     clusters: tuple[Cluster, ...]

@@ -40,7 +40,14 @@ class ModeShapes:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A mechanism as functions of its coordinates q (rad) and design parameters y (SI)."""
+    """A mechanism as functions of its coordinates q (rad or m) and design parameters y (SI).
+
+        K(q, y) φ = λ M(q, y) φ,  K = Σ_j θ_j(q, y) K_j,  M likewise, f = √λ / 2π      (eq. 1)
+
+    q is one sample (n_q,) or many (n, n_q) in the order of ``q_names``, y (n_y,) or (n, n_y) in
+    that of ``y_names``. Methods raise UsageError for wrong shapes, and MechanismError or
+    TravelError where the mechanism has no modes, or a carriage leaves its beam.
+    """
 
     pencil: Pencil
     poses: LinkFrames

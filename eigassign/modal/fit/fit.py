@@ -50,7 +50,12 @@ QUANTITIES = {1.0: "f", 2.0: "λ", -2.0: "1/λ"}
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Frequencies of ``modes`` over ``region`` from one polynomial each; immutable."""
+    """Frequencies of ``modes`` over ``region`` from one polynomial each; immutable.
+
+    ``along(y)`` (n_t, n_modes) and ``frequencies(q, y)`` (n, n_modes) are in Hz, inside the region
+    alone: they raise UsageError outside it. ``error_estimate`` holds anywhere in it, relative in
+    Hz; ``solves`` counts the exact solves it took, ``reasons`` says what was chosen and why.
+    """
 
     modes: tuple[int, ...]
     region: Region
@@ -163,7 +168,11 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class PathFit:
-    """One `Fit` for each stretch between corners, or for each of several trajectories."""
+    """One `Fit` for each stretch between corners, or for each of several trajectories.
+
+    ``along(y)`` (n_t, n_modes) in Hz over the samples of all; ``error_estimate`` and ``solves`` as
+    of a `Fit`, the largest and the sum; ``parts`` are the fits, ``rows`` whose samples are whose.
+    """
 
     parts: tuple[Fit, ...]
     rows: tuple[slice, ...]  # which of all samples are whose

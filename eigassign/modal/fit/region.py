@@ -37,7 +37,11 @@ MOST_MISSED = 0.03  # of its reach by which a path may be missed by its interpol
 
 @dataclass(frozen=True)
 class Box:
-    """Lower and upper bounds of q or of y, SI; equal ones for what is kept."""
+    """Lower and upper bounds of q (rad or m) or of y (SI), for `fit`; equal ones for what is kept.
+
+    ``Box([0, 0], [0.25, 0.25])``: as many numbers in both as q or y has. Raises UsageError for
+    bounds of different lengths, not finite, or in the wrong order.
+    """
 
     lower: tuple[float, ...]
     upper: tuple[float, ...]

@@ -22,7 +22,13 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ReducedModel(ReducedPencil):
-    """Frequencies of ``modes`` from k + f unknowns; needs neither mesh nor mechanism. Immutable."""
+    """Frequencies of ``modes`` from k + f unknowns; needs neither mesh nor mechanism. Immutable.
+
+        K̂(q, y) = Vᵀ K(q, y) V = Σ_j θ_j(q, y) Vᵀ K_j V,  M̂ likewise, V of Taylor vectors
+
+    ``frequencies(q, y)`` (n, n_modes) in Hz, ``error_estimate(q, y)`` relative and infinite where
+    it is refused; k is ``size``, ``points`` (n_points, n_q + n_y) are what V was expanded about.
+    """
 
     modes: tuple[int, ...]
     half_order: int
