@@ -70,6 +70,11 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
+def printable_lines(text: str) -> str:
+    """The same for several lines."""
+    return "\n".join(map(printable, text.split("\n")))
+
+
 def pieces(path: str | Path, limit: int) -> Iterator[bytes]:
     """The content of a regular file of at most ``limit`` bytes, a megabyte at a time.
 

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from itertools import islice
 
+from eigassign.files import printable
+
 _LONGEST = 60
 _MOST_NAMES = 20
 _MOST_CANDIDATES = 200  # names compared with a misspelt one: keeps hostile files cheap
@@ -39,7 +41,7 @@ def suggestion(name: str, known: Iterable[str]) -> str:
 
 def listed(names: Iterable[str]) -> str:
     """Names for a message, at most twenty of them."""
-    all_names = list(names)
+    all_names = [printable(name) for name in names]
     more = ", …" if len(all_names) > _MOST_NAMES else ""
     return ", ".join(all_names[:_MOST_NAMES]) + more if all_names else "none"
 

@@ -100,13 +100,20 @@ def read_table(
     if not header:
         raise MechanismError(key, f"{file.name}: is empty; a header and rows are expected")
     where = f"{file.name}:{line}"
-    names = [_split(cell, where, key) for cell in header]
-    present = {name for name, _ in names}
-    found = [
-        _found(column, names, where, key)
-        for column in columns
-        if column.name in present or not column.optional
-    ]
+    try:
+        names = [_split(cell, where, key) for cell in header]
+        present = {name for name, _ in names}
+        found = [
+            _found(column, names, where, key)
+            for column in columns
+            if column.name in present or not column.optional
+        ]
+    except MechanismError:
+        if _hold_numbers(header, next(rows, (0, []))[1]):
+            raise
+        wanted = ", ".join(column.name for column in columns if not column.optional)
+        message = f"{where}: expected a header with {wanted}, and numbers below it"
+        raise MechanismError(key, message) from None  # what the file says is not for a message
     lines, values = [], list[list[float | str]]([] for _ in found)
     for k, (number, row) in enumerate(rows):
         try:
@@ -180,6 +187,13 @@ def _rows(text: str, dialect: _Dialect, name: str, key: str) -> Iterator[tuple[i
     except csv.Error as error:
         line = dialect.skipped + reader.line_num
         raise MechanismError(key, f"{name}:{line}: {error}") from error
+
+
+def _hold_numbers(*rows: list[str]) -> bool:
+    """Whether at least half of the words of one of these rows are numbers."""
+    words = [" ".join(row).replace(",", ".").split() for row in rows]
+    shares = [[_NUMBER.fullmatch(word) is not None for word in row] for row in words]
+    return any(share and 2 * sum(share) >= len(share) for share in shares)
 
 
 def _split(cell: str, where: str, key: str) -> tuple[str, str]:

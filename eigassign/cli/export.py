@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 import eigassign.cli.arguments as arguments
-from eigassign.cli.reporter import print_json, reporting
+from eigassign.cli.reporter import print_json, reporting, show
 
 
 @click.command(
@@ -53,8 +53,8 @@ def export(
         print_json(vars(made))
         return 0
     numbers = ", ".join(map(str, made.modes))
-    click.echo(f"{' and '.join(map(str, made.files))} written")
-    click.echo(
+    show(f"{' and '.join(map(str, made.files))} written")
+    show(
         f"  modes {numbers}: {made.size} unknowns, expansion points {made.points}; error estimate "
         f"at most {made.error_estimate:.1e} at {made.samples} poses and designs"
     )
@@ -99,5 +99,5 @@ def animate(
         loaded = load_case(case, how["allow_outside"])
         reporter.stage("drawing the frames")
         animated(loaded, file, mode, q, y, trajectory)
-    click.echo(f"{file} written")
+    show(f"{file} written")
     return 0

@@ -11,7 +11,7 @@ from click.core import ParameterSource
 
 import eigassign.cli.arguments as arguments
 from eigassign import process
-from eigassign.cli.reporter import print_json, reporting
+from eigassign.cli.reporter import print_json, reporting, show
 from eigassign.errors import EigassignError
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
 
         room = terminal.width(sys.stdout)
         for name, answer in answers.items():
-            click.echo(terminal.wrapped(_described(name, answer), room))
+            show(terminal.wrapped(_described(name, answer), room))
     return max(codes)
 
 
@@ -175,7 +175,7 @@ def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
         truncation=answer.truncation_error,
     )
     if folder is not None:
-        click.echo(f"{folder} written")
+        show(f"{folder} written")
 
 
 @click.command(epilog=arguments.examples("eigassign status results/planar_arm"))
@@ -204,7 +204,7 @@ def status(runs: tuple[Path, ...], as_json: bool, **how: Any) -> int:
             judged = {"intact": found.intact, "current": found.current}
             answers[str(run)] = {**judged, **vars(found)}
             if not as_json:
-                click.echo(_state_of(str(run), found))
+                show(_state_of(str(run), found))
     if as_json:
         print_json(answers)
     return max(codes)

@@ -17,6 +17,7 @@ from typing import Any, TextIO
 import click
 
 from eigassign.errors import Problem
+from eigassign.files import printable_lines
 from eigassign.process import say
 
 # --- stderr while a command works
@@ -72,7 +73,15 @@ class _Formatter(logging.Formatter):
     """``warning: text``, as all else on stderr."""
 
     def format(self, record: logging.LogRecord) -> str:
-        return f"{record.levelname.lower()}: {super().format(record)}"
+        return printable_lines(f"{record.levelname.lower()}: {super().format(record)}")
+
+
+# --- stdout
+
+
+def show(text: str) -> None:
+    """``text`` on stdout, without raw escapes of a name in it."""
+    click.echo(printable_lines(text))
 
 
 # --- JSON on stdout, in ASCII, which every terminal shows

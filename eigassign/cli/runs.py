@@ -10,7 +10,7 @@ import click
 
 import eigassign.cli.arguments as arguments
 from eigassign import process
-from eigassign.cli.reporter import Reporter, print_json, reporting
+from eigassign.cli.reporter import Reporter, print_json, reporting, show
 from eigassign.errors import EigassignError
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def _show(outcome: Outcome, as_json: bool) -> None:
         from eigassign.output.console import print_assignment
 
         print_assignment(outcome.results)
-        click.echo(f"{outcome.folder} written in {outcome.seconds:.2f} s")
+        show(f"{outcome.folder} written in {outcome.seconds:.2f} s")
 
 
 @click.command(
@@ -153,7 +153,7 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
 
         print_verdict(headline(done.results))
         print_tables(console_tables(done.results))
-        click.echo(f"{done.folder} written in {sum(done.results.timing_s.values()):.2f} s")
+        show(f"{done.folder} written in {sum(done.results.timing_s.values()):.2f} s")
     return 0 if done.results.verdict == "fitted" else 1
 
 
@@ -252,5 +252,5 @@ def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
         from eigassign.output.console import print_tables
 
         print_tables(main_tables(made.chart))
-        click.echo(f"{made.folder} written in {made.chart.seconds:.1f} s")
+        show(f"{made.folder} written in {made.chart.seconds:.1f} s")
     return 0

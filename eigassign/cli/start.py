@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 import eigassign.cli.arguments as arguments
+from eigassign.cli.reporter import show
 from eigassign.errors import StorageError, UsageError
 
 PACKAGE = Path(__file__).parents[1]
@@ -52,9 +53,9 @@ def init(template: str, out: Path | None) -> int:
         text = source.read_text(encoding="utf-8").replace(f" {template}.yaml", f" {case}")
         with open(path, "x", encoding="utf-8") as file:
             file.write(text)
-        click.echo(f"{path} written")
+        show(f"{path} written")
     others = ", ".join(name for name in TEMPLATES if name != template)
-    click.echo(f"next: eigassign check {case} --draw\nother templates: {others}")
+    show(f"next: eigassign check {case} --draw\nother templates: {others}")
     return 0
 
 
@@ -191,7 +192,7 @@ def _script(shell: str) -> str:
 def _write(path: Path, text: str) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8")
-    click.echo(f"{path} written")
+    show(f"{path} written")
 
 
 def _add_line(path: Path, line: str) -> None:
@@ -201,4 +202,4 @@ def _add_line(path: Path, line: str) -> None:
         apart = "" if before.endswith("\n") or not before else "\n"
         with open(path, "a", encoding="utf-8") as file:
             file.write(f"{apart}{line}\n")
-        click.echo(f"{path}: one line added")
+        show(f"{path}: one line added")

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from eigassign.files import printable
 from eigassign.output.formats import percent
 from eigassign.output.storage import replace_synced
 from eigassign.output.tables import Table
@@ -83,7 +84,7 @@ def _cell(outcome: CaseOutcome, column: str) -> str:
         return ""
     if isinstance(value, float):
         return repr(value)
-    text = " ".join(str(value).split("\n"))
+    text = printable(" ".join(str(value).split("\n")))
     return "'" + text if text.startswith(_FORMULA) else text
 
 

@@ -17,6 +17,7 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from eigassign import process
+from eigassign.files import printable
 from eigassign.output import tables as summary
 from eigassign.output import terminal
 from eigassign.output.formats import number
@@ -45,11 +46,11 @@ def print_table(
     """
     out = sys.stdout if stream is None else stream
     width, unicode = terminal.width(out), _speaks_unicode(out)
-    cells = [[_printable(cell) for cell in row] for row in rows]
+    cells = [[printable(cell) for cell in row] for row in rows]
     every = [[row[k] for row in cells] for k in range(len(columns))]
     console, text = _console(out, width)
     if title:
-        console.print(Text(_printable(title), style="bold"), soft_wrap=True)
+        console.print(Text(printable(title), style="bold"), soft_wrap=True)
     for group in terminal.groups(columns, every, width):
         table = RichTable(
             box=box.SIMPLE_HEAD if unicode else box.ASCII2,
@@ -88,7 +89,7 @@ def _console(out: TextIO, width: int) -> tuple[Console, io.StringIO]:
 def _write_paragraph(console: Console, text: str, style: str = "") -> None:
     """Lines that end between words only; a word longer than the line is left to the terminal."""
     for line in textwrap.wrap(
-        _printable(text), console.width, break_long_words=False, break_on_hyphens=False
+        printable(text), console.width, break_long_words=False, break_on_hyphens=False
     ):
         console.print(Text(line, style=style), soft_wrap=True)
 
@@ -109,11 +110,6 @@ def write_text(out: TextIO, text: str) -> None:
 
 def _speaks_unicode(out: TextIO) -> bool:
     return (out.encoding or "utf-8").lower().replace("-", "").startswith("utf")
-
-
-def _printable(text: str) -> str:
-    """Without control characters, so that no file name can move the cursor."""
-    return "".join(c if c.isprintable() else " " for c in text)
 
 
 def print_assignment(results: RunResults, *, stream: TextIO | None = None) -> None:
@@ -194,7 +190,7 @@ def progress(
     def advance(what: str = "") -> None:
         nonlocal done
         done += 1
-        line = _printable(f"{label} {done}/{total} {what}".rstrip())
+        line = printable(f"{label} {done}/{total} {what}".rstrip())
         write_text(out, f"\r\x1b[2K{line[:78]}" if rewrites else f"{line}\n")
         out.flush()
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from eigassign.case import CaseFile
+from eigassign.files import printable_lines
 from eigassign.output import report
 from eigassign.output.run_folder import run_folder
 from eigassign.study.results import AssignmentRow, ErrorSummary, RunResults
@@ -61,7 +62,7 @@ def log_text(results: RunResults) -> str:
         *_outcome_lines(results),
         *(f"time      {stage}: {1e3 * spent:.2f} ms" for stage, spent in results.timing_s.items()),
     ]
-    return "\n".join(lines) + "\n"
+    return printable_lines("\n".join(lines) + "\n")
 
 
 def _distances(error: ErrorSummary, along: str) -> Iterator[str]:

@@ -1,0 +1,79 @@
+"""What a file says, or is called, neither moves a cursor nor finds its way into a message."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from wrong_inputs import GOOD
+
+from eigassign.cli import main
+
+ESCAPE = "\x1b[2Jevil\x1b]0;title\x07\u202e"
+
+
+def said(capsys: pytest.CaptureFixture[str]) -> str:
+    out, err = capsys.readouterr()
+    assert not any(not c.isprintable() and c != "\n" for c in out + err), repr(out + err)
+    return out + err
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize("content", [GOOD, GOOD.replace("steel", "stel", 1), "x: ["])
+def test_a_case_file_with_escapes_in_its_name_is_named_without_them(
+    content: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = Path(f"{ESCAPE}.yaml")
+    path.write_text(content)
+    main(["check", str(path)])
+    assert r"\x1b[2Jevil" in said(capsys)
+    main(["modes", str(path), "--debug"])
+    said(capsys)
+
+
+def test_columns_with_escapes_are_named_without_them(capsys: pytest.CaptureFixture[str]) -> None:
+    start, end = GOOD.index("trajectory:"), GOOD.index("design:")
+    name = ESCAPE.replace("[", "").replace("]", "")
+    Path("a.csv").write_text(f"time,q1,q2,{name}\n0,0.1,1,5\n1,0.2,1.1,5\n")
+    Path("a.yaml").write_text(f"{GOOD[:start]}trajectory: {{file: a.csv}}\n{GOOD[end:]}")
+    main(["check", "a.yaml"])
+    assert r"ignored the columns \x1b2Jevil" in said(capsys)
+
+
+def test_texts_with_escapes_of_a_case_file_stay_there(capsys: pytest.CaptureFixture[str]) -> None:
+    start, end = GOOD.index("trajectory:"), GOOD.index("design:")
+    file = GOOD[:start] + 'trajectory: {file: "a\\e[2Jb.csv"}\n' + GOOD[end:]
+    title = GOOD.replace("title: A small arm", r'title: "a\e[2Jb"')
+    for text in (file, title, GOOD.replace("steel", r'"s\e[2Jb"')):
+        Path("a.yaml").write_text(text)
+        assert main(["check", "a.yaml"]) == 2
+        assert "a.yaml:" in said(capsys)
+
+
+SECRETS = {
+    "passwords": "root:hunter2:0:0:root:/root:/bin/bash\ndaemon:hunter2:1:1:daemon:/:/bin/sh\n",
+    "environment": "PASSWORD=hunter2\nHOST=example\n",
+    "key": "-----BEGIN hunter2 KEY-----\nhunter2,hunter2\n",
+    "people": "user,password\nann,hunter2\nbob,hunter2\n",
+    "one line": "hunter2,hunter2\n",
+    "bracket": "hunter2 [[\nx\n",
+}
+
+
+@pytest.mark.parametrize("secret", SECRETS.values(), ids=SECRETS)
+def test_a_file_that_is_no_table_of_numbers_is_not_quoted(
+    secret: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    start, end = GOOD.index("trajectory:"), GOOD.index("design:")
+    Path("secret").write_text(secret)
+    with_path = f"{GOOD[:start]}trajectory: {{file: secret}}\n{GOOD[end:]}"
+    for text in (with_path, GOOD + "measurements: {file: secret}\n"):
+        Path("a.yaml").write_text(text)
+        assert main(["check", "a.yaml"]) == 2
+        told = said(capsys)
+        assert "secret:1: expected a header with" in told
+        assert "hunter2" not in told
