@@ -93,7 +93,7 @@ def _expected(of: Outlook) -> list[str]:
     size = of.expansion
     modes = f"mode{'s' if len(of.modes) > 1 else ''} {', '.join(map(str, of.modes))}"
     mb = size.memory_mb
-    memory = "1 MB" if mb < 1.0 else f"{mb:.2g} MB" if mb < 1000.0 else f"{mb / 1000.0:.2g} GB"
+    memory = "1 MB" if mb < 1.0 else f"{float(f'{mb:.1g}'):.0f} MB"
     lines = [
         f"expansion of {modes} to order {size.order}: {size.coefficients} coefficients, "
         f"{'less than' if mb < 1.0 else 'about'} {memory}, {_about(size.seconds)}"

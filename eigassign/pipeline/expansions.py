@@ -77,19 +77,20 @@ class ExpansionSize:
 
 
 def expansion_size(model: Model, plan: Plan) -> ExpansionSize:
-    """Estimated: one mode to order p in n variables takes about
+    """Estimated: one mode to order p in n variables takes, with the linearised one beside it, about
 
-        t = 2.3 μs · C(2n + p, p) + 25 ns · n_θ V,    V = C(n + ⌊(p−1)/2⌋, n) C(n + ⌊p/2⌋, n)
+        t = 1.2 μs · C(2n + p, p) + 20 ns · n_θ V,    V = C(n + ⌊(p−1)/2⌋, n) C(n + ⌊p/2⌋, n)
 
     for the C(2n + p, p) products of two coefficients, and the n_θ terms of the pencil between V
-    pairs of eigenvector coefficients, which of K and M are most of its memory. (The six-axis arm
-    takes 0.8 to 2 times as long from order 5 to 8; what is below 50 ms takes up to 20 times.)
+    pairs of eigenvector coefficients. (The six-axis arm takes 0.6 to 1.4 times as long from order 6
+    to 8, up to 3 times where others use the machine's memory; all of less than 50 ms takes longer.)
+    Each pair and each product holds about 24 bytes at the peak.
     """
     n, p = int(model.pencil.active.sum()), affordable_order(model, plan.order)
     products = comb(2 * n + p, p)
     met = model.pencil.n_theta * comb(n + (p - 1) // 2, n) * comb(n + p // 2, n)
-    seconds = 2.3e-6 * products + 25e-9 * met
-    memory_mb = (16.0 * met + 24.0 * products) / 1e6
+    seconds = 1.2e-6 * products + 20e-9 * met
+    memory_mb = 24.0 * (met + products) / 1e6
     times = len(plan.modes) * (1 + len(plan.more_q))
     return ExpansionSize(p, comb(n + p, p), memory_mb, times * seconds)
 
