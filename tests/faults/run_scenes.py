@@ -12,19 +12,20 @@ from pathlib import Path
 from eigassign.output.run_folder import run_folder
 from eigassign.output.run_record import changes, read_record
 
-Write = Callable[[Path, Path, bool], None]  # a whole run: case file, target, force
+Write = Callable[[Path, Path, bool], int]  # a whole run of a case file at a target; force
 
 CASE = Path("cases/arm.yaml")
 TARGET = Path("results/arm")
 NAMES = ("case.yaml", "results.json", "figures/modes.png")
 
 
-def write_a_few_files(case: Path, target: Path, force: bool) -> None:
+def write_a_few_files(case: Path, target: Path, force: bool) -> int:
     """A run that costs nothing but its files."""
     with run_folder(target, case_path=case, case_sha256="a" * 64, force=force) as folder:
         (folder / "figures").mkdir()
         for name in NAMES:
             (folder / name).write_text(f"{name} of {os.getpid()}")
+    return 0
 
 
 def untouched(root: Path) -> Mapping[str, str]:
@@ -77,8 +78,7 @@ class Scene:
 
     def run(self) -> int:
         """The run that is stopped, and after that the next start."""
-        self.write(self.root / CASE, self.target, self.earlier is foreign)
-        return 0
+        return self.write(self.root / CASE, self.target, self.earlier is foreign)
 
     def start_in_vain(self) -> None:
         """A start that leaves no run, but sweeps up."""
@@ -109,7 +109,8 @@ class Scene:
     def aside(self) -> bool:
         """Whether all that the user has is beside the target, under its own names."""
         folder = self.target.with_name(f"{TARGET.name}.1")
-        return all((folder / name).read_text() == text for name, text in self.mine.items())
+        found = snapshot(folder) or {}
+        return all(found.get(name) == text.encode() for name, text in self.mine.items())
 
 
 @dataclass(frozen=True)
@@ -139,3 +140,14 @@ def snapshot(folder: Path) -> dict[str, bytes] | None:
         return None
     files = (path for path in folder.rglob("*") if path.is_file())
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def faults(scene: Scene) -> list[str]:
+    """What is wrong after a run was stopped, and after the next one."""
+    found = [] if scene.whole() else ["neither the old run nor a new one is at the target"]
+    found += [f"{name} is nowhere" for name in scene.lost()]
+    if scene.run() != 0:
+        found.append("the next run fails")
+    found += [] if scene.whole() else ["the next run is not whole"]
+    found += [] if scene.aside() else ["what was mine is not beside the next run"]
+    return found + [f"{name} is left" for name in scene.left()]

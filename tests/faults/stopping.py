@@ -14,6 +14,7 @@ import platform
 import signal
 import struct
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -83,10 +84,23 @@ def _is_at_change(pid: int) -> bool:
     return call.changes_files()
 
 
+def stopped_after(job: Job, seconds: float, number: signal.Signals) -> int:
+    """Run ``job`` and send it ``number`` after so long; its exit code, negative for a signal."""
+    pid = _forked(job, lambda: None)
+    time.sleep(seconds)
+    os.kill(pid, number)  # to nobody else: it is not waited for yet
+    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+
+
 def _started(job: Job) -> int:
     """A process that is about to do the job, stopped."""
+    pid = _forked(job, _wait_for_tracer)
+    os.waitpid(pid, 0)
+    return pid
+
+
+def _forked(job: Job, prepare: Callable[[], None]) -> int:
     if pid := os.fork():
-        os.waitpid(pid, 0)
         return pid
     code = 70
     try:
@@ -94,12 +108,20 @@ def _started(job: Job) -> int:
         for stream in range(3):
             os.dup2(nowhere, stream)
         signal.signal(signal.SIGINT, signal.default_int_handler)
-        _ptrace(_TRACEME, 0, 0)
-        _stop_at_changes()
-        os.kill(os.getpid(), signal.SIGSTOP)
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, signal.SIG_DFL)
+        prepare()
         code = job()
+    except KeyboardInterrupt:
+        code = 130
     finally:
         os._exit(code)
+
+
+def _wait_for_tracer() -> None:
+    _ptrace(_TRACEME, 0, 0)
+    _stop_at_changes()
+    os.kill(os.getpid(), signal.SIGSTOP)
 
 
 def _stop_at_changes() -> None:

@@ -1,4 +1,7 @@
-"""Killed before any change that it makes to a file, a run loses nothing, and the next sweeps up."""
+"""Killed or told to end before any change that it makes to a file, a run loses nothing.
+
+What it leaves is swept by the next. Whole runs are killed by ``kill_runs.py``.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +11,11 @@ from itertools import count
 from pathlib import Path
 
 import pytest
-from run_scenes import EARLIER, Stage, added, write_a_few_files
+from run_scenes import EARLIER, Stage, added, faults, write_a_few_files
 from stopping import can_stop, stopped_at
 
 from eigassign.output import storage
+from eigassign.process import Terminated, failure_of, terminable
 
 pytestmark = pytest.mark.skipif(not can_stop(), reason="needs ptrace, on Linux")
 
@@ -40,12 +44,31 @@ def test_a_kill_before_any_change_of_a_file_loses_nothing_and_the_next_start_swe
         assert stopped.code == (-signal.SIGKILL if stopped.reached else 0), call
         if not exchange:
             scene.start_in_vain()
-        assert scene.whole(), call
-        assert not scene.lost(), call
-        scene.run()
-        assert scene.whole(), call
-        assert scene.aside(), call
-        assert scene.left() == [], call
+        assert not faults(scene), call
         if not stopped.reached:
             assert call > 20  # few files, but many changes
             return
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_before_any_change_of_a_file_loses_nothing_and_leaves_nothing(
+    tmp_path: Path, number: signal.Signals
+) -> None:
+    scenes = Stage(tmp_path, write_a_few_files).scenes(added)
+    for call, scene in zip(count(1), scenes, strict=False):
+        stopped = stopped_at(lambda: main_of(scene.run), call, number)  # noqa: B023
+        assert stopped.code == (128 + number if stopped.reached else 0), call
+        hidden = [path.name for path in scene.target.parent.iterdir() if path.name[0] == "."]
+        assert not hidden, call
+        assert not faults(scene), call
+        if not stopped.reached:
+            return
+
+
+def main_of(job: Callable[[], int]) -> int:
+    """As the command line does it."""
+    try:
+        with terminable():
+            return job()
+    except (KeyboardInterrupt, Terminated) as error:
+        return failure_of(error).exit_code

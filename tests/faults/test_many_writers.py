@@ -1,0 +1,79 @@
+"""Sixteen processes that write the same, some of them killed at work, never spoil it."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from run_scenes import CASE, TARGET, snapshot, write_a_few_files
+
+from eigassign.output.cache import Cache, key
+from eigassign.output.run_record import MARKER, run_status
+
+WRITERS, KILLED = 16, 6
+KEY = key("shared")
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    (tmp_path / CASE).parent.mkdir()
+    (tmp_path / CASE).write_text("title: arm\n")
+    return tmp_path
+
+
+def side_by_side(job: Callable[[int], None]) -> list[int]:
+    """The exit codes of the processes that do the job, without those killed at random instants."""
+    writers = [_forked(job, number) for number in range(WRITERS)]
+    draw = random.Random(1)
+    for pid in writers[:KILLED]:
+        time.sleep(draw.uniform(0.0, 0.05))
+        os.kill(pid, signal.SIGKILL)
+    codes = [os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) for pid in writers]
+    return [code for code in codes[:KILLED] if code != -signal.SIGKILL] + codes[KILLED:]
+
+
+def _forked(job: Callable[[int], None], number: int) -> int:
+    if pid := os.fork():
+        return pid
+    code = 1
+    try:
+        job(number)
+        code = 0
+    finally:
+        os._exit(code)
+
+
+def test_sixteen_writers_of_one_key_leave_one_whole_entry(root: Path) -> None:
+    def store(number: int) -> None:
+        for turn in range(10):
+            cache = Cache(root / "cache")
+            found = cache.load(KEY)
+            assert found is None or (found["a"] == found["a"][0]).all()
+            cache.store(KEY, {"a": np.full(2000, 100.0 * number + turn)}, {})
+
+    assert not any(side_by_side(store))
+    found = Cache(root / "cache").load(KEY)
+    assert found is not None
+    assert (found["a"] == found["a"][0]).all()
+    assert [path.name for path in (root / "cache").iterdir()] == [f"{KEY}.h5"]
+
+
+def test_sixteen_runs_of_one_case_leave_one_whole_run(root: Path) -> None:
+    def run(number: int) -> None:
+        for _ in range(5):
+            write_a_few_files(root / CASE, root / TARGET, False)
+
+    assert not any(side_by_side(run))
+    assert run_status(root / TARGET).intact
+    pids = {
+        text.split()[-1] for name, text in (snapshot(root / TARGET) or {}).items() if name != MARKER
+    }
+    assert len(pids) == 1
+    write_a_few_files(root / CASE, root / TARGET, False)
+    assert [path.name for path in (root / TARGET).parent.iterdir()] == [TARGET.name]
