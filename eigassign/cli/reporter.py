@@ -56,8 +56,7 @@ class Reporter:
 def reporting(how: Mapping[str, Any]) -> Iterator[Reporter]:
     """A reporter of the level that ``--quiet`` and ``-v`` ask for; the package's log on stderr."""
     level = 0 if how["quiet"] else 1 + how["verbose"]
-    handler = logging.StreamHandler(sys.stderr)
-    handler.setFormatter(_Formatter())
+    handler = _Handler()
     ours = logging.getLogger("eigassign")
     before = ours.level
     ours.addHandler(handler)
@@ -69,11 +68,11 @@ def reporting(how: Mapping[str, Any]) -> Iterator[Reporter]:
         ours.setLevel(before)
 
 
-class _Formatter(logging.Formatter):
+class _Handler(logging.Handler):
     """``warning: text``, as all else on stderr."""
 
-    def format(self, record: logging.LogRecord) -> str:
-        return printable_lines(f"{record.levelname.lower()}: {super().format(record)}")
+    def emit(self, record: logging.LogRecord) -> None:
+        say([f"{record.levelname.lower()}: {self.format(record)}"])
 
 
 # --- stdout

@@ -159,7 +159,7 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
 
 @click.command(
     epilog=arguments.examples(
-        "eigassign validate planar_arm.yaml",
+        "eigassign validate cases/two_link.yaml",
         "eigassign validate cases",
     )
 )

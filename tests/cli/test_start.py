@@ -163,7 +163,16 @@ def test_the_help_of_every_command_has_examples_of_it(name: str, capsys: Capture
     assert all(f"{line} ".startswith(f"{name} ") for line in found)
 
 
-LONG = ("chart", "batch", "optimize", "expand", "update", "validate", "status")  # each over 3 s
+LONG = (
+    "chart",
+    "batch",
+    "optimize",
+    "expand",
+    "update",
+    "validate",
+    "status",
+    "export",
+)  # each over 3 s
 SLOW = {f"eigassign {name}": pytest.mark.slow for name in LONG} | {"eigassign": pytest.mark.slow}
 
 
@@ -176,7 +185,7 @@ def test_the_examples_of_the_help_run(name: str, capsys: Captured) -> None:
         for template in ("planar_arm", "four_bar"):
             assert main(["init", template]) == 0
         Path("cases").mkdir()
-        shutil.copy("planar_arm.yaml", "cases")
+        shutil.copy(TWO_LINK, "cases")
         for path in CASES.glob("arm_update.*"):
             shutil.copy(path, ".")
         if name == "eigassign status":
