@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -156,12 +157,25 @@ def modes(
         if as_json and folder is not None:
             reporter.stage(f"{folder} written")
     if as_json:
-        document = {"rigid_modes": answer.rigid_modes, "frequencies_hz": answer.frequencies_hz}
-        lost = answer.truncation_error
-        print_json(document if lost is None else {**document, "truncation_error": lost})
+        stated = {
+            "discretisation_error": answer.discretisation_error,
+            "truncation_error": answer.truncation_error,
+        }
+        print_json(
+            {
+                "rigid_modes": answer.rigid_modes,
+                "frequencies_hz": answer.frequencies_hz,
+                **{k: list(map(_finite, v)) for k, v in stated.items() if v is not None},
+            }
+        )
     else:
         _show_modes(answer, folder)
     return 0
+
+
+def _finite(error: float) -> float | None:
+    """None for what cannot be bounded."""
+    return error if math.isfinite(error) else None
 
 
 def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
@@ -172,6 +186,7 @@ def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
         rigid_modes=answer.rigid_modes,
         q=answer.q,
         y=answer.y,
+        discretisation=answer.discretisation_error,
         truncation=answer.truncation_error,
     )
     if folder is not None:

@@ -12,6 +12,7 @@ In reading order:
     confirmation  whether stored coefficients are those of a model
     storage      expansions and reduced models as plain arrays
     truncation   what the reduction of links leaves out, bounded
+    discretisation  what a mesh leaves out, bounded
     model        the model of a case, as notebooks meet it
     slow_motion  how much the neglected velocity terms would move the frequencies
     adaptive     the least mesh, order and reduction that meet an accuracy

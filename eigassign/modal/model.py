@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from eigassign.brief import cut, named
 from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.local_motion import ReducedLinks
+from eigassign.mechanism.assembly.meshed_links import MeshedLinks
 from eigassign.mechanism.assembly.mode_shapes import NodeShape, StrandShape, shapes
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.assembly.total_mass import TotalMass
@@ -18,6 +19,7 @@ from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.link_frames import LinkFrames
 from eigassign.mechanism.kinematics.travel_limits import Label
 from eigassign.modal.arguments import samples
+from eigassign.modal.discretisation import discretisation_error
 from eigassign.modal.exact.solver import eigenvalues, modes
 from eigassign.modal.exact.tracking import Tracked, track
 from eigassign.modal.truncation import truncation_error
@@ -56,6 +58,7 @@ class Model:
     q_names: tuple[str, ...]
     y_names: tuple[str, ...]
     reduced: ReducedLinks | None = None  # the links that Craig-Bampton made smaller
+    meshed: MeshedLinks | None = None  # the links that consist of beams
 
     def __repr__(self) -> str:
         return (
@@ -125,6 +128,18 @@ class Model:
         if self.reduced is None:
             return np.zeros((len(x), len(modes)))
         return truncation_error(self.reduced, x, modes)
+
+    def discretisation_error(
+        self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)
+    ) -> Floats:
+        """By how much the mesh raises frequencies at most, relative, (n_samples, n_modes).
+
+        Zero without beams; infinite where the mesh is so coarse that nothing can be said.
+        """
+        x = self.x(q, y)
+        if self.meshed is None:
+            return np.zeros((len(x), len(modes)))
+        return discretisation_error(self.meshed, x, modes).total
 
     def shapes(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> ModeShapes:
         """The lowest elastic modes at one sample as motions of all nodes and beams, for drawing.

@@ -151,13 +151,14 @@ def print_modes(
     rigid_modes: int,
     q: Sequence[tuple[str, float]] = (),
     y: Sequence[tuple[str, float]] = (),
+    discretisation: Sequence[float] | None = None,
     truncation: Sequence[float] | None = None,
     stream: TextIO | None = None,
 ) -> None:
     """Elastic modes in Hz from 1 upwards, where they were evaluated, and the rigid modes left out.
 
-    ``q`` and ``y`` are (name, value) pairs in SI; ``truncation`` is how much reduced links raise
-    each frequency at most, relative.
+    ``q`` and ``y`` are (name, value) pairs in SI; ``discretisation`` and ``truncation`` are how
+    much mesh and reduced links raise each frequency at most, relative.
     """
     where = ", ".join(f"{name} = {number(value)}" for name, value in (*q, *y))
     caption = f"{rigid_modes} rigid-body mode{'s' if rigid_modes != 1 else ''} not counted."
@@ -165,9 +166,10 @@ def print_modes(
         (str(mode), f"{hz:.10g}") for mode, hz in enumerate(frequencies_hz, start=1)
     ]
     columns: tuple[str, ...] = ("mode", "frequency [Hz]")
-    if truncation is not None:
-        columns = (*columns, "too high by at most")
-        rows = [(*row, _bounded(e)) for row, e in zip(rows, truncation, strict=True)]
+    for cause, errors in (("mesh", discretisation), ("reduced links", truncation)):
+        if errors is not None:
+            columns = (*columns, f"{cause}: too high by at most")
+            rows = [(*row, _bounded(e)) for row, e in zip(rows, errors, strict=True)]
     title = f"Modes at {where}" if where else "Modes"
     print_table(title, columns, rows, caption=caption, stream=stream)
 

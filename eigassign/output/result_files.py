@@ -27,6 +27,7 @@ from eigassign.study.results import (
     Comparison,
     ErrorSummary,
     FollowedRow,
+    MeshError,
     ModeStudy,
     OtherModes,
     RunResults,
@@ -39,6 +40,13 @@ from eigassign.study.updating.fit import UpdateResults
 
 SCHEMA = 1
 _NESTED = (Mapping, list, tuple, str, np.ndarray)
+
+
+def _discretisation(found: MeshError | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    error = [e if np.isfinite(e) else None for e in found.error]
+    return {**asdict(found), "error": error}
 
 
 def results_document(results: RunResults) -> dict[str, Any]:
@@ -63,6 +71,7 @@ def results_document(results: RunResults) -> dict[str, Any]:
         "assignment": _assignment(results.assignment) if results.assignment else None,
         **_meaning(results),
         "other_modes": _other_modes(results.others),
+        "discretisation": _discretisation(results.discretisation),
         "approximation": [_study(study) for study in results.studies],
         "trajectory": {
             "time_s": results.time_s,

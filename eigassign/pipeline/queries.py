@@ -21,7 +21,7 @@ from eigassign.output import report
 from eigassign.pipeline.outlook import Outlook, next_step, outlook, some_pose
 from eigassign.pipeline.run_files import RESULTS, new_run_folder
 from eigassign.study import drawing
-from eigassign.study.accuracy import truncation_lines
+from eigassign.study.accuracy import judged_mesh, mesh_lines, truncation_lines
 from eigassign.study.built_case import Case, load_case
 from eigassign.study.design.followed import named_notes
 from eigassign.study.design.wanted import target_frequencies
@@ -41,6 +41,7 @@ class ModesAnswer:
     q: tuple[tuple[str, float], ...]  # where: name and value, SI
     y: tuple[tuple[str, float], ...]
     truncation_error: list[float] | None = None  # of reduced links: relative, too high by at most
+    discretisation_error: list[float] | None = None  # of the mesh: likewise; infinite: too coarse
 
 
 @dataclass(frozen=True)
@@ -149,12 +150,14 @@ def _answer(case: Case, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
     model = case.model()
     every = tuple(range(1, len(hz) + 1))
     lost = model.truncation_error(q, y, every)[0] if model.reduced else None
+    coarse = model.discretisation_error(q, y, every)[0] if model.meshed else None
     return ModesAnswer(
         model.n_rigid,
         [float(value) for value in hz],
         _pairs(model.q_names, q),
         _pairs(model.y_names, y),
         None if lost is None else [float(value) for value in lost],
+        None if coarse is None else [float(value) for value in coarse],
     )
 
 
@@ -190,6 +193,7 @@ def _checked(case: Case) -> CheckAnswer:
     file, model = case.file, case.model()
     trajectory = case.trajectory if file.trajectory is not None else None
     notes = weights(file)
+    notes += () if case.mesh is None else case.mesh.reasons
     notes += () if case.reduction is None else case.reduction.reasons
     notes += () if trajectory is None else trajectory.notes
     parts = () if trajectory is None else trajectory.parts
@@ -202,6 +206,10 @@ def _checked(case: Case) -> CheckAnswer:
         plan = plan_expansion(file, model, trajectory)
         q = plan.q0[None] if trajectory is None else trajectory.q
         notes += (*plan.notes, *truncation_lines(model, plan.modes, q, case.initial_design[None]))
+        y = case.initial_design
+        notes += tuple(
+            mesh_lines(judged_mesh(model, plan.modes, trajectory, plan.q0, y, "initial"))
+        )
     _require_regular(case, trajectory.q[:1] if trajectory is not None else None)
     takes = None if plan is None else outlook(case, plan, trajectory)
     notes += () if trajectory is None else tuple(named_notes(file, model, trajectory))

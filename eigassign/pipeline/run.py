@@ -29,7 +29,7 @@ from eigassign.pipeline.coefficient_files import coefficient_files
 from eigassign.pipeline.expansions import expand_plan, expansion_size
 from eigassign.pipeline.run_files import RunFolder, new_run_folder
 from eigassign.pipeline.stages import Stages, silent
-from eigassign.study.accuracy import accuracy_notes, truncation_notes
+from eigassign.study.accuracy import accuracy_notes, judged_mesh, truncation_notes
 from eigassign.study.built_case import Case, load_case
 from eigassign.study.collect import VerifiedAssignment, collect_results
 from eigassign.study.comparison import Validation, study_modes, validate_expansions
@@ -154,7 +154,7 @@ def solve_case(case: Case, options: Options = DEFAULT) -> Result:
             scene = replace(scene, notes=(*scene.notes, *notes))
         with stages("comparison", "comparing the expansion with exact frequencies"):
             studies = study_modes(scene, initial.hz)
-            scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene, answer.y)))
+            scene = _with_accuracy(scene, answer.y)
         solved = SolvedDesigns(initial, exact, one_shot)
         accepted = file.assignment.max_error or MAX_ERROR
         targets = study_targets(scene.path, wanted, solved, answer.predicted, accepted)
@@ -202,8 +202,13 @@ def prepare(
     return Scene(file, model, initial, trajectory, expansions, tuple(notes))
 
 
-def _accuracy(case: Case, scene: Scene, optimum: Floats | None = None) -> list[str]:
-    return accuracy_notes(scene, case.discretisation_error, optimum)
+def _with_accuracy(scene: Scene, optimum: Floats | None = None) -> Scene:
+    """With what mesh, reduction, expansion and round-off leave; at the optimum if there is one."""
+    y, design = (scene.initial, "initial") if optimum is None else (optimum, "optimal")
+    modes = scene.expansions.modes
+    mesh = judged_mesh(scene.model, modes, scene.trajectory, scene.q0, y, design)
+    scene = replace(scene, discretisation=mesh)
+    return replace(scene, notes=(*scene.notes, *accuracy_notes(scene, optimum)))
 
 
 def _result(results: RunResults, expansions: Expansions, assignment: Assignment | None) -> Result:
@@ -254,7 +259,7 @@ def expand_case(
         scene = prepare(case, stages, _cache(options), order, modes)
         with stages("comparison", "comparing the expansion with exact frequencies"):
             studies = study_modes(scene)
-            scene = replace(scene, notes=(*scene.notes, *_accuracy(case, scene)))
+            scene = _with_accuracy(scene)
         results = collect_results(scene, studies, None, stages.timing_s)
         options.progress("writing the report")
         folder.write(results, options.figures, coefficient_files(scene, linear))

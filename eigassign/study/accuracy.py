@@ -1,7 +1,7 @@
 """How far the numbers of a run can be trusted: errors stated side by side, and the motion's speed.
 
 `accuracy_notes` states the errors of mesh, reduced links, expansion and round-off. It needs no
-exact solves but those that compare the mesh with a finer one, at a few poses.
+exact solves but those at the few poses where mesh and reduced links are judged.
 
 `study_motion` estimates what the velocity terms of eq. (1) would change, which the method neglects.
 Where all joints turn, (5 Ω²/g³ + |Ω̇|/g)/λ_1 bounds the order of the relative change of λ: Ω is the
@@ -12,7 +12,7 @@ eigenproblem with these terms is solved (`modal.slow_motion`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,37 +21,73 @@ from numpy.typing import NDArray
 from eigassign.case.schema.joints import SLIDING
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.velocity_terms import placeless, velocity_terms
-from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectory, rates
+from eigassign.mechanism.trajectory.trajectory import (
+    NamedTrajectory,
+    Trajectories,
+    Trajectory,
+    rates,
+)
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.model import Model
 from eigassign.modal.slow_motion import motion_effect
-from eigassign.study.planning import travelled
+from eigassign.study.planning import poses_at, travelled
+from eigassign.study.results import MeshError
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
-POSES = 3  # at which the mesh is compared with one twice as fine
+POSES = 9  # at which the mesh is judged; each costs an exact solve
 SAMPLES = 20  # at which the expansion's own estimate is evaluated
-Discretisation = Callable[[Floats, tuple[int, ...]], Floats | None]
 
 
-def accuracy_notes(
-    scene: Scene, discretisation: Discretisation, optimum: Floats | None = None
-) -> list[str]:
+def accuracy_notes(scene: Scene, optimum: Floats | None = None) -> list[str]:
     """Lines on discretisation, truncation, estimated approximation error and round-off, per mode.
 
     ``optimum`` (n_y,) is one more design at which the truncation is looked at; where there is one,
     the expansion is compared with exact solves at every sample, and its error not estimated too.
     """
-    modes = scene.expansions.modes
     q = scene.q0[None] if scene.trajectory is None else scene.path.q
-    x = scene.model.x(_spread(q, POSES), scene.initial)
-    lines = _mesh_lines(discretisation(x, modes), modes)
+    lines = mesh_lines(scene.discretisation)
     lines += truncation_notes(scene, optimum)
     if optimum is None:
         lines += _estimated_lines(scene, _spread(q, SAMPLES))
-    lost = rounding_error(scene.model.pencil, x[0], max(modes))
+    first = scene.model.x(q[0], scene.initial)[0]
+    lost = rounding_error(scene.model.pencil, first, max(scene.expansions.modes))
     lines.append(f"round-off of the exact frequencies: below {lost:.1g} relative")
     return lines
+
+
+def judged_mesh(
+    model: Model,
+    modes: Sequence[int],
+    trajectory: Trajectories | None,
+    q0: Floats,
+    y: Floats,
+    design: str,
+) -> MeshError | None:
+    """What the mesh leaves out at poses of the trajectory, or at q0, for one design y (n_y,).
+
+    ``design`` is what it is called. None without beams.
+    """
+    if model.meshed is None:
+        return None
+    q = q0[None] if trajectory is None else _spread(poses_at(trajectory, y), POSES)
+    error = model.discretisation_error(q, y, modes).max(axis=0)
+    return MeshError(tuple(modes), tuple(float(e) for e in error), len(q), design)
+
+
+def mesh_lines(found: MeshError | None) -> list[str]:
+    """`judged_mesh` in words, one line a mode."""
+    if found is None:
+        return []
+    where = f"over {found.poses} poses" if found.poses > 1 else "at one pose"
+    return [
+        f"mode {mode}: discretisation error at most {100 * error:.2g} % (too high), {where} of "
+        f"the {found.design} design"
+        if np.isfinite(error)
+        else f"mode {mode}: discretisation error not known, {where} of the {found.design} design: "
+        "give the links more elements, or auto"
+        for mode, error in zip(found.modes, found.error, strict=True)
+    ]
 
 
 def _estimated_lines(scene: Scene, q: Floats) -> list[str]:
@@ -69,15 +105,6 @@ def _estimated_lines(scene: Scene, q: Floats) -> list[str]:
             f"estimated without exact solves: {stated}"
         )
     return lines
-
-
-def _mesh_lines(error: Floats | None, modes: tuple[int, ...]) -> list[str]:
-    if error is None:
-        return []
-    return [
-        f"mode {mode}: discretisation error about {100 * worst:.2g} %, from twice as many elements"
-        for mode, worst in zip(modes, error.max(axis=0), strict=True)
-    ]
 
 
 def truncation_notes(scene: Scene, optimum: Floats | None = None) -> list[str]:

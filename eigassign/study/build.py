@@ -21,6 +21,7 @@ from eigassign.mechanism.assembly.build import (
     whole_links,
 )
 from eigassign.mechanism.assembly.local_motion import reduced_links
+from eigassign.mechanism.assembly.meshed_links import meshed_links
 from eigassign.mechanism.assembly.total_mass import total_mass
 from eigassign.mechanism.inverse_kinematics.chain import tip_chain
 from eigassign.mechanism.kinematics.link_frames import build_link_frames, design_dependence
@@ -74,9 +75,14 @@ def build_model(file: CaseFile, links: WholeLinks | None = None) -> Model:
         pencil = build_pencil(file, parameters, motion, local)
         poses = build_link_frames(file, parameters, motion)
         reduced = reduced_links(parameters, local[0], pencil)
+        placed = [
+            (p.link, link, local[1].meshes[p.link])
+            for p, link in zip(motion.placements, local[0], strict=True)
+        ]
+        meshed = meshed_links(parameters, placed, file.mechanism.space, pencil)
         mass = total_mass(file, parameters, links.meshes.values())
     q_names = (*parameters.coordinates, *parameters.loads)
-    return Model(pencil, poses, motion, mass, q_names, parameters.design, reduced)
+    return Model(pencil, poses, motion, mass, q_names, parameters.design, reduced, meshed)
 
 
 def build_trajectories(file: CaseFile, model: Model) -> Trajectories:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,18 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile, from_mapping, load
-from eigassign.mechanism.assembly.build import with_elements
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectories
 from eigassign.modal.adaptive.link_reduction import ReductionChoice
-from eigassign.modal.adaptive.mesh import MeshChoice, mesh_error
+from eigassign.modal.adaptive.mesh import MeshChoice
 from eigassign.modal.model import Model
-from eigassign.study.build import build_model, build_trajectories, located
-from eigassign.study.planning import automatic_elements
+from eigassign.study.build import build_trajectories, located
 from eigassign.study.settling import SettledModel, settle_model
 
 Floats = NDArray[np.float64]
-LARGE = 1000  # dofs above which the mesh is not doubled to judge it
 
 
 @dataclass(frozen=True)
@@ -80,23 +77,6 @@ class Case:
     def trajectories(self) -> tuple[NamedTrajectory, ...]:
         """Each trajectory by itself: ``(name, trajectory, weight)``."""
         return self.trajectory.parts
-
-    def discretisation_error(self, x: Floats, modes: Sequence[int]) -> Floats | None:
-        """Estimated error (n_samples, n_modes) of the mesh, relative in Hz, from a twice finer one.
-
-        None for a mechanism without beam links, or one so large that twice its size is too costly.
-        """
-        model, settled = self.model(), self.settled
-        elements = {
-            name: int(n) for name, n in automatic_elements(settled).items() if n is not None
-        }
-        if not elements or model.n_dof > LARGE:
-            return None
-
-        def meshed(wanted: Mapping[str, int]) -> Model:
-            return model if wanted == elements else build_model(with_elements(settled, wanted))
-
-        return mesh_error(meshed, elements, x, modes)
 
     def located(self) -> AbstractContextManager[None]:
         """Raise a MechanismError from inside as a CaseError at its line of the case file."""

@@ -83,6 +83,7 @@ def collect_results(
         tolerance=file.validation.max_error,
         meaning=meaning,
         mass=None if assigned is None else _mass(scene, assigned.answer.y),
+        discretisation=scene.discretisation,
     )
 
 

@@ -191,6 +191,7 @@ def _wrong(file: CaseFile, key_path: str, message: str) -> CaseError:
 # --- The accuracy asked for, shared between mesh, reduced links and series
 
 ACCURACY = 1e-3  # where the case asks for auto and names none
+MESH_FEW, MESH_MANY = 20, 60  # poses that a mesh is chosen at, and confirmed at
 MESH = 0.5  # where a number of elements is left to auto
 TRUNCATION = 0.25  # where links are reduced, of the mesh's share if it has one
 
@@ -219,14 +220,47 @@ def automatic_elements(file: CaseFile) -> dict[str, int | None]:
 
 
 def settle_mesh(
-    file: CaseFile, build: Callable[[Mapping[str, int]], Model], x: Floats
+    file: CaseFile,
+    build: Callable[[Mapping[str, int]], Model],
+    trajectory: Trajectories | None,
+    q0: Floats,
 ) -> MeshChoice:
-    """The fewest elements that leave the mesh's share of the accuracy at the poses x (n, n_x).
+    """The fewest elements that leave the mesh's share of the accuracy all over the design's bounds.
 
-    Raises AccuracyError where no mesh will do.
+    They are chosen at few poses, at the initial design and the corners of the bounds, and confirmed
+    at more, at random designs and at those that are worse than the worst of these; where that
+    fails, chosen anew. Raises AccuracyError where no mesh will do.
     """
-    accuracy = mesh_share(file) - truncation_share(file)
-    return choose_mesh(build, automatic_elements(file), x, accuracy, wanted_modes(file))
+    accuracy, modes = mesh_share(file) - truncation_share(file), wanted_modes(file)
+    y, elements = initial_design(file), automatic_elements(file)
+    at_upper = corners(len(y))
+    seen, every = (
+        at_corners(file, trajectory, q0, y, at_upper, max(1, poses // (1 + len(at_upper))))
+        for poses in (MESH_FEW, MESH_MANY)
+    )
+    if len(y):
+        every = every.joined(at_random(file, trajectory, q0, y, MESH_FEW))
+    reasons: list[str] = []
+    for _ in range(1 + ATTEMPTS):
+        found = choose_mesh(build, elements, seen.x, accuracy, modes)
+        reasons += found.reasons
+        model = build(found.elements)
+        every, error = with_worse_designs(every, partial(_mesh_error, model, modes), file)
+        worst = float(error.max())
+        line = f"at {len(error)} poses and designs in all: at most {100.0 * worst:.2g} % too high"
+        if worst <= accuracy:
+            reasons.append(line)
+            return replace(found, error=np.full(len(modes), worst), reasons=tuple(reasons))
+        reasons.append(f"{line}, chosen anew")
+        top = np.argsort(-error, kind="stable")[:CLIMBERS]
+        seen = seen.joined(replace(every, x=every.x[top], samples=every.samples[top]))
+    raise AccuracyError(f"no mesh was found that leaves {accuracy:.1e}: {reasons[-1]}")
+
+
+def _mesh_error(model: Model, modes: Sequence[int], x: Floats) -> Floats:
+    """Of all modes at x (n, n_x), (n,)."""
+    n_q = len(model.q_names)
+    return np.asarray(model.discretisation_error(x[:, :n_q], x[:, n_q:], modes).max(axis=1))
 
 
 def mesh_share(file: CaseFile) -> float:
@@ -391,7 +425,7 @@ def at_corners(
     outer = np.where(np.asarray(at_upper, dtype=bool), upper, lower)
     designs = np.unique(np.vstack([y0, outer]), axis=0) if len(y0) else np.zeros((1, 0))
     rows = np.zeros(1, dtype=np.intp) if trajectory is None else trajectory.spread(samples)
-    q = [q0[None] if trajectory is None else _poses(trajectory, y)[rows] for y in designs]
+    q = [q0[None] if trajectory is None else poses_at(trajectory, y)[rows] for y in designs]
     x = np.hstack([np.concatenate(q), np.repeat(designs, len(rows), axis=0)])
     return DesignSamples(x, np.tile(rows, len(designs)), trajectory)
 
@@ -448,11 +482,11 @@ def travelled(file: CaseFile, trajectory: Trajectories) -> Floats:
     for at_upper in corners(len(moving)):
         corner = y.copy()
         corner[moving] = np.where(at_upper, upper[moving], lower[moving])
-        found.append(_poses(trajectory, corner))
+        found.append(poses_at(trajectory, corner))
     return np.concatenate(found)
 
 
-def _poses(trajectory: Trajectories, y: Floats) -> Floats:
+def poses_at(trajectory: Trajectories, y: Floats) -> Floats:
     """q (n, n_q) at design y; at the initial one where y cannot follow the path of its tip."""
     try:
         return trajectory.at(y)[0]

@@ -568,6 +568,16 @@ class TrajectoryRow(Brief):
     loads: Mapping[str, float] = field(default_factory=dict)  # properties that it sets, SI
 
 
+@dataclass(frozen=True)
+class MeshError:
+    """How much the mesh raises frequencies at most, relative; infinite where it is too coarse."""
+
+    modes: tuple[int, ...]
+    error: tuple[float, ...]
+    poses: int  # at which it was judged
+    design: str  # of which it is: initial or optimal
+
+
 @dataclass(frozen=True, repr=False)
 class RunResults(Brief):
     """Everything a run folder shows."""
@@ -595,6 +605,7 @@ class RunResults(Brief):
     case_files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of what the case names
     tolerance: float = 0.02  # the largest approximation error the case accepts, a fraction
     mass: MassRow | None = None
+    discretisation: MeshError | None = None
     only: str | None = None  # of several trajectories the one that these are results of
     meaning: Meaning = field(default_factory=Meaning)
 

@@ -14,6 +14,7 @@ from eigassign.errors import CaseError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.expansion import Expansion, NearestExpansion
 from eigassign.modal.model import Model
+from eigassign.study.results import MeshError
 
 Floats = NDArray[np.float64]
 BLOCK = 2_000_000  # numbers of a batch of matrices: a second or so of dense solves
@@ -95,6 +96,7 @@ class Scene:
     expansions: Expansions
     notes: tuple[str, ...]  # what was chosen and why
     asked_modes: int = 1  # the highest mode that a target needs
+    discretisation: MeshError | None = None
 
     @property
     def path(self) -> Trajectories:

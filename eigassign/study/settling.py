@@ -18,6 +18,7 @@ from eigassign.case import CaseFile
 from eigassign.mechanism.assembly.build import WholeLinks, with_elements, with_reduction
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.kinematics.travel_limits import resting_pose
+from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.adaptive.link_reduction import ReductionChoice
 from eigassign.modal.adaptive.mesh import MeshChoice
 from eigassign.modal.model import Model
@@ -68,7 +69,7 @@ def _chosen_elements(file: CaseFile) -> MeshChoice | None:
         return build_model(with_elements(file, elements))
 
     trial = meshed({name: TRIAL for name, given in wanted.items() if given is None})
-    return settle_mesh(file, meshed, _judged_at(file, trial))
+    return settle_mesh(file, meshed, *_path(file, trial))
 
 
 def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | None:
@@ -83,8 +84,12 @@ def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | No
 
 
 def _judged_at(file: CaseFile, trial: Model) -> Floats:
-    """x (n, n_x): poses and designs at which choices are judged."""
+    """x (n, n_x): poses and designs at which reductions are judged."""
+    return at_corners(file, *_path(file, trial), initial_design(file)).x
+
+
+def _path(file: CaseFile, trial: Model) -> tuple[Trajectories | None, Floats]:
+    """The trajectories, and a pose q where there are none."""
     path = build_trajectories(file, trial) if file.trajectories else None
     given = file.expansion.q
-    q0 = with_middle_loads(file, resting_pose(file) if given == "auto" else given)
-    return at_corners(file, path, q0, initial_design(file)).x
+    return path, with_middle_loads(file, resting_pose(file) if given == "auto" else given)

@@ -50,7 +50,7 @@ def test_the_choice_is_within_the_accuracy_of_a_fine_mesh(
 
 def test_the_reasons_are_among_the_notes(tmp_path: Path) -> None:
     notes = solve_case(load_case(automatic(tmp_path, "0.2 %"))).results.notes
-    assert any(note.startswith("2 elements: mode 1 moves") for note in notes)
+    assert any(note.startswith("2 elements: mode 1 at most") for note in notes)
     assert any(note.startswith("order 2: error at most") for note in notes)
 
 
@@ -117,3 +117,16 @@ def test_an_order_left_to_auto_holds_all_over_the_box_of_several_parameters(name
     y = np.tile(y, (len(scene.path.q), 1))
     exact = scene.model.frequencies(q, y, max(made.modes))[:, np.array(made.modes) - 1]
     assert np.abs(made.taylor_hz(q, y) / exact - 1.0).max() <= 1e-4
+
+
+def test_the_error_of_the_mesh_is_stated_at_the_optimum(tmp_path: Path) -> None:
+    case = load_case(automatic(tmp_path, "1 %"))
+    results = solve_case(case).results
+    stated, y = results.discretisation, [row.optimal for row in results.design]
+    assert stated is not None
+    assert (stated.design, stated.modes, stated.poses) == ("optimal", (1,), 9)
+    fine = build_model(with_elements(case.file, {"upper_arm": 16, "forearm": 16}))
+    q = case.trajectory.q
+    true = case.model().frequencies(q, y, 1) / fine.frequencies(q, y, 1) - 1.0
+    assert true.max() < stated.error[0] < 1.05 * true.max()
+    assert any("of the optimal design" in note for note in results.notes)

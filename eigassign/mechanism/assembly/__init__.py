@@ -6,6 +6,7 @@ Read in this order; each imports only from those above it:
     affine_entries    entries (scalar) × (number) on their way to the pencil
     congruence        Bᵀ k B and Bᵀ m B of every link: where eq. (1) is formed
     local_motion      B of a link as numbers
+    meshed_links      all beam elements in a row, their values and motion as numbers
     node_motion       Q: the elastic motion of every node from the independent unknowns u
     rigid_loops       loops between rigid links: passive joints follow elastically
     springs           springs between nodes

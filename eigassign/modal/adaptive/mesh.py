@@ -1,41 +1,23 @@
-"""Elements per link: as few as the accuracy needs, judged by a mesh twice as fine.
-
-Halving the elements changes a frequency by the factor 1 + Δ. With an error that falls at least as
-h² (axial; bending falls as h⁴) at most 4/3 |Δ| of it is left (Richardson).
-"""
+"""Elements per link: as few as the accuracy needs, judged by what the mesh leaves out."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import AccuracyError
-from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.arguments import spread
+from eigassign.modal.discretisation import discretisation_error
 from eigassign.modal.exact.roundoff import rounding_error
-from eigassign.modal.exact.solver import eigenvalues
+from eigassign.modal.model import Model
 
 Floats = NDArray[np.float64]
 START = 2  # elements of a link at first
 MAX_ELEMENTS = 256  # of a link; with more round-off, which grows as n⁴, is the larger error
 MAX_MESHES = 8  # tried at most; the paper's arm needs three at most, down to 1e-6
-POSES = 9  # samples at which meshes are compared; each costs exact solves of every mesh
-RICHARDSON = 4.0 / 3.0
-
-
-class HasPencil(Protocol):
-    """A model of which only the pencil counts."""
-
-    @property
-    def pencil(self) -> Pencil:
-        """The affine pencil."""
-
-
-Build = Callable[[Mapping[str, int]], HasPencil]
+Build = Callable[[Mapping[str, int]], Model]
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,16 +25,8 @@ class MeshChoice:
     """Elements per link, the discretisation error that they leave, and why these."""
 
     elements: Mapping[str, int]
-    error: Floats  # (n_modes,): estimated relative error in frequency, largest over the samples
+    error: Floats  # (n_modes,): the most that a frequency is too high, relative, of all samples
     reasons: tuple[str, ...]
-
-
-def mesh_error(
-    build: Build, elements: Mapping[str, int], x: Floats, modes: Sequence[int]
-) -> Floats:
-    """Estimated discretisation error (n_samples, n_modes), relative in frequency."""
-    f = _frequencies(build, elements, x, modes)
-    return RICHARDSON * _change(f, build, _doubled(elements), x, modes)
 
 
 def choose_mesh(
@@ -68,70 +42,58 @@ def choose_mesh(
     """
     free = [name for name, n in elements.items() if n is None]
     now = {name: START if n is None else n for name, n in elements.items()}
-    x = spread(x, POSES)
     reasons: list[str] = []
+    before: dict[str, tuple[int, float]] = {}
     for _ in range(MAX_MESHES):
-        f = _frequencies(build, now, x, modes)
-        change = _change(f, build, _doubled(now), x, modes)
-        error = RICHARDSON * change.max(axis=0)
-        reasons.append(_line(now, change, modes))
-        if error.max() <= accuracy:
-            return MeshChoice(dict(now), error, tuple(reasons))
-        if not free:
-            break
-        now = _refined(build, now, free, f, x, modes, accuracy)
-        lost = rounding_error(build(now).pencil, x[0], max(modes))
-        if lost > accuracy:
+        model = build(now)
+        if (lost := rounding_error(model.pencil, x[0], max(modes))) > accuracy:
             raise AccuracyError(
                 f"with {_shown(now)} elements round-off is {lost:.1e}, above the {accuracy:.1e} "
                 "that is asked for: a finer mesh makes it worse"
             )
+        if model.meshed is None:
+            return MeshChoice(now, np.zeros(len(modes)), ())
+        found = discretisation_error(model.meshed, x, modes)
+        error = found.total.max(axis=0)
+        reasons.append(f"{_shown(now)} elements: {_said(error, modes)}")
+        if error.max() <= accuracy:
+            return MeshChoice(dict(now), error, tuple(reasons))
+        if not free:
+            break
+        alone = {name: (now[name], float(found.links[name].max())) for name in free}
+        now, before = _refined(now, alone, before, accuracy), alone
+    worst = max(found.links, key=lambda name: float(found.links[name].max()))
     raise AccuracyError(
-        f"the mesh leaves {error.max():.1e} where {accuracy:.1e} is asked for: {reasons[-1]}"
+        f"the mesh leaves more than {accuracy:.1e} with {reasons[-1]}; most of it is in {worst}: "
+        "give it more elements"
     )
 
 
 def _refined(
-    build: Build,
     now: Mapping[str, int],
-    free: Sequence[str],
-    f: Floats,
-    x: Floats,
-    modes: Sequence[int],
+    alone: Mapping[str, tuple[int, float]],
+    before: Mapping[str, tuple[int, float]],
     accuracy: float,
 ) -> dict[str, int]:
-    """More elements where doubling them alone matters, as many as the fourth-order law predicts."""
-    share = accuracy / len(free)
+    """More elements where the links alone err most: of each their number and its error.
+
+    As many as the fourth-order law predicts, or, where the step from ``before`` gained less, as its
+    own order does: stretch and shear strain converge with the square.
+    """
+    share = accuracy / len(alone)
     after = dict(now)
-    for name in free:
-        alone = {**now, name: 2 * now[name]}
-        error = RICHARDSON * float(_change(f, build, alone, x, modes).max())
-        if error > share:
-            predicted = int(np.ceil(now[name] * (error / share) ** 0.25))
-            after[name] = min(max(predicted, now[name] + 1), MAX_ELEMENTS)
+    for name, (n, error) in alone.items():
+        if not np.isfinite(error):
+            after[name] = min(2 * n, MAX_ELEMENTS)
+        elif error > share:
+            order, (few, more) = 4.0, before.get(name, (n, error))
+            if few < n and np.isfinite(more):
+                order = float(np.clip(np.log(more / error) / np.log(n / few), 1.0, 4.0))
+            predicted = int(np.ceil(n * min((error / share) ** (1.0 / order), 8.0)))
+            after[name] = min(max(predicted, n + 1), MAX_ELEMENTS)
     if after == dict(now):
-        after = {name: n + (name in free) for name, n in now.items()}
+        after = {name: n + (name in alone) for name, n in now.items()}
     return after
-
-
-def _frequencies(
-    build: Build, elements: Mapping[str, int], x: Floats, modes: Sequence[int]
-) -> Floats:
-    pencil = build(elements).pencil
-    pick = np.array(modes) - 1
-    return np.asarray(np.sqrt(eigenvalues(pencil, x, max(modes))[:, pick]) / (2.0 * np.pi))
-
-
-def _doubled(elements: Mapping[str, int]) -> dict[str, int]:
-    return {name: 2 * n for name, n in elements.items()}
-
-
-def _change(
-    f: Floats, build: Build, elements: Mapping[str, int], x: Floats, modes: Sequence[int]
-) -> Floats:
-    """|f / f of ``elements`` − 1|, (n_samples, n_modes)."""
-    finer = _frequencies(build, elements, x, modes)
-    return np.asarray(np.abs(f / finer - 1.0))
 
 
 def _shown(elements: Mapping[str, int]) -> str:
@@ -141,11 +103,10 @@ def _shown(elements: Mapping[str, int]) -> str:
     return ", ".join(f"{name} {n}" for name, n in elements.items())
 
 
-def _line(elements: Mapping[str, int], change: Floats, modes: Sequence[int]) -> str:
-    each = ", ".join(
-        f"mode {mode} moves {percent:.2g} %"
-        for mode, percent in zip(modes, 100.0 * change.max(axis=0), strict=True)
+def _said(error: Floats, modes: Sequence[int]) -> str:
+    return ", ".join(
+        f"mode {mode} at most {100.0 * worst:.2g} % too high"
+        if np.isfinite(worst)
+        else f"mode {mode} beyond them"
+        for mode, worst in zip(modes, error, strict=True)
     )
-    counts = set(elements.values())
-    twice = f"with {2 * counts.pop()}" if len(counts) == 1 else "with twice as many"
-    return f"{_shown(elements)} elements: {each} {twice}"

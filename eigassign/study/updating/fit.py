@@ -361,11 +361,8 @@ def _notes(problem: UpdateProblem, found: Identified) -> Iterator[str]:
 
 def _warnings(problem: UpdateProblem, found: Identified) -> Iterator[str]:
     yield from _neighbours(problem, found)
-    x = problem.model.x(problem.q, found.y)
     modes = sorted({each.mode for each in problem.measured})
-    error = problem.case.discretisation_error(x, modes)
-    if error is None:
-        return
+    error = problem.model.discretisation_error(problem.q, found.y, modes)
     at = [modes.index(each.mode) for each in problem.measured]
     share = error[problem.rows, at] * found.hz / problem.frequencies.deviation
     worst = int(np.argmax(share))

@@ -1,0 +1,71 @@
+"""What a mesh leaves out, bounded without a finer one: above the true error, and close to it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from chains import Tree, case_of, model_of
+from paper_arm import build, exact, samples
+
+from eigassign.chart.mesh import refined
+from eigassign.study.build import build_model
+
+
+def test_the_bound_is_above_the_true_error_and_close_to_it() -> None:
+    x = samples()[::4]
+    true = exact(build({"upper": 40, "fore": 40}), x, (1, 2, 3))
+    for n, close in ((1, 1.5), (2, 1.2), (3, 1.1), (5, 1.05), (8, 1.05)):
+        model, modes = build({"upper": n, "fore": n}), (1, 2, 3) if n > 1 else (1,)
+        error = exact(model, x, modes) / true[:, : len(modes)] - 1.0
+        bound = model.discretisation_error(x[:, :2], x[:, 2:], modes)
+        assert (bound >= error).all()
+        assert np.median(bound / error) < close
+
+
+def cantilever(space: str, n: int, **beam: object) -> Tree:
+    ends = {"shape": "rectangle", "width": 0.03, "height": 0.05}
+    return {
+        "mechanism": {
+            "space": space,
+            "materials": {"m": {"youngs_modulus": 7e10, "density": 2.7e3, "poissons_ratio": 0.33}},
+            "sections": {"a": ends, "b": {**ends, "width": 0.02, "height": 0.02}},
+            "links": {"bar": {"length": 0.6, "material": "m", "elements": n, **beam}},
+            "joints": {"root": {"type": "fixed", "base": "ground", "follower": "bar.start"}},
+        },
+        "coordinates": {},
+    }
+
+
+@pytest.mark.parametrize("shear", [False, True])
+@pytest.mark.parametrize("section", ["a", {"start": "a", "end": "b"}])
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+def test_it_holds_for_stretch_twist_shear_and_tapers(
+    space: str, section: object, shear: bool
+) -> None:
+    modes = tuple(range(1, 8 if space == "spatial" else 5))
+    for n in (3, 6):
+        case = case_of(cantilever(space, n, section=section, shear=shear))
+        fine = build_model(refined(case.file, 12.0)[0]).frequencies([], [], modes[-1])[0]
+        model = case.model()
+        error = model.frequencies([], [], modes[-1])[0] / fine - 1.0
+        bound = model.discretisation_error([], [], modes)[0]
+        assert (bound >= 0.98 * error).all()  # the finer mesh is not exact, nor are tapers
+        assert np.median(bound / error) < 1.3
+
+
+def test_a_mode_beyond_the_mesh_is_not_vouched_for() -> None:
+    # one element between two clamped ends: all that it can do lies above what it leaves out
+    tree = cantilever("planar", 1, section="a")
+    tree["mechanism"]["joints"]["tip"] = {
+        "type": "revolute", "base": "ground", "follower": "bar.end", "position": [0.6, 0.0],
+    }  # fmt: skip
+    model = model_of(tree)
+    assert not np.isfinite(model.discretisation_error([], [], (1,))).any()
+
+
+def test_rigid_links_have_no_mesh() -> None:
+    tree = cantilever("planar", 1, section="a")
+    tree["mechanism"]["links"]["bar"] = {"type": "rigid", "mass": 1.0, "inertia": 0.1}
+    tree["mechanism"]["joints"]["root"]["type"] = "revolute"
+    tree["coordinates"] = {"q": {"joint": "root", "drive": {"stiffness": 100.0}}}
+    assert model_of(tree).discretisation_error([0.0], [], (1,)).tolist() == [[0.0]]

@@ -1,0 +1,37 @@
+"""Stated mesh errors of random mechanisms at all corners of their design boxes: none too small."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+from meshes import ROUND_OFF, mesh
+
+SEEDS = 230
+FACTOR = 1.05  # of tapers; see docs/accuracy.md
+
+
+@pytest.mark.slow
+def test_random_meshes_keep_what_they_state() -> None:
+    found = [each for each in map(mesh, range(SEEDS)) if each is not None]
+    answered = [each for each in found if each.refused is None]
+    assert len(found) >= 200
+    for each in answered:
+        assert (each.true <= FACTOR * each.stated + ROUND_OFF).all(), each.seed
+        if each.promised is not None:
+            assert (each.true <= FACTOR * each.promised).all(), each.seed
+    true, stated = (
+        np.concatenate([getattr(e, k).ravel() for e in answered]) for k in ("true", "stated")
+    )
+    known = np.isfinite(stated)
+    counts = known & (true > 10.0 * ROUND_OFF)
+    over = stated[counts] / true[counts]
+    assert np.median(over) < 1.1
+    below = known & (true > stated + ROUND_OFF)
+    sys.stdout.write(
+        f"{len(found)} meshes, {sum(e.promised is not None for e in found)} of them chosen, "
+        f"{len(found) - len(answered)} refused; {len(true)} numbers, {(~known).sum()} not stated, "
+        f"{below.sum()} below the true error, by {(true / stated)[below].max(initial=1.0):.3f} at "
+        f"most; overestimate {np.median(over):.3f}, {np.percentile(over, 90):.2f} in 90 %\n"
+    )
