@@ -108,7 +108,7 @@ class Model:
     def mass(self, y: ArrayLike) -> float:
         """Mass of all links and bodies in kg, those that never move included, at a design (n_y,).
 
-        Raises UsageError for a wrong shape.
+        Raises UsageError for a wrong shape, and for properties that no mechanism can have.
         """
         return self.total_mass(self._design(y))[0]
 
@@ -117,7 +117,10 @@ class Model:
         return self.total_mass(self._design(y))[1]
 
     def _design(self, y: ArrayLike) -> Floats:
-        return self.one(np.zeros(len(self.q_names)), y)[0, len(self.q_names) :]
+        x = self.one(np.zeros(len(self.q_names)), y)
+        if self.pencil.limits is not None:
+            self.pencil.limits.require(x)
+        return x[0, len(self.q_names) :]
 
     def truncation_error(self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)) -> Floats:
         """By how much reduced links raise frequencies at most, relative, (n_samples, n_modes).

@@ -25,6 +25,7 @@ from eigassign.mechanism.kinematics.forward import Kinematics, Placement
 from eigassign.mechanism.kinematics.loop_closure import closed_kinematics, reference
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.parameters import parameters as variables
+from eigassign.mechanism.kinematics.property_limits import property_limits
 from eigassign.mechanism.kinematics.rotations import DOFS
 from eigassign.mechanism.kinematics.topology import build_tree
 from eigassign.mechanism.kinematics.travel_limits import rails
@@ -212,5 +213,6 @@ def _compile(
         shift=parameters.shift,
         n_q=len(parameters.coordinates) + len(parameters.loads),
         n_loads=len(parameters.loads),
+        limits=property_limits(case),
         rails=rails(case, parameters.with_passive(motion.passive), motion.tree),
     )

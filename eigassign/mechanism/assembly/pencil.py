@@ -52,6 +52,13 @@ def theta_slopes(
     return slopes
 
 
+class PossibleValues(Protocol):
+    """What the properties that vary may be: see `kinematics.property_limits`."""
+
+    def require(self, x: Floats) -> None:
+        """Raise UsageError for the first sample that no mechanism can have."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Pencil(Brief):
     """K and M of eq. (1) in the unknowns [u; q̇], order n_dof = n_u + n_columns.
@@ -74,6 +81,7 @@ class Pencil(Brief):
     n_q: int
     n_loads: int = 0
     rails: TravelRanges | None = None  # where carriages and nuts may stand
+    limits: PossibleValues | None = None  # of the loads and design parameters
 
     @property
     def n_joints(self) -> int:
@@ -134,9 +142,12 @@ class Pencil(Brief):
     def theta(self, x: Floats) -> Floats:
         """θ at samples x (n_samples, n_x): shape (n_theta, n_samples).
 
-        Raises TravelError where a carriage or nut leaves its beam.
+        Raises TravelError where a carriage or nut leaves its beam, UsageError for properties that
+        no mechanism can have.
         """
         x = np.atleast_2d(x)
+        if self.limits is not None:
+            self.limits.require(x)
         if self.rails is not None:
             self.rails.require(self.to_program @ x.T + self.shift[:, None], x)
         theta = np.empty((self.n_theta, len(x)))
@@ -153,6 +164,8 @@ class Pencil(Brief):
         inner, where = self._needed(space, directions)
         z = np.zeros((len(self.shift), len(inner)))
         z[:, 0] = self.to_program @ x0 + self.shift
+        if self.limits is not None:
+            self.limits.require(x0[None])
         if self.rails is not None:
             self.rails.require(z[:, :1], x0[None])
         present = (inner.units >= 0).nonzero()[0]
