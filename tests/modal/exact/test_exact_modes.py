@@ -241,13 +241,6 @@ def test_a_mechanism_without_coordinates_and_design_has_modes() -> None:
     assert model.frequencies(np.zeros((3, 0)), np.zeros((3, 0)), 2).shape == (3, 2)
 
 
-def test_a_design_outside_the_domain_of_a_formula_is_refused() -> None:
-    design = {"a": {"parameter": "links.upper.length", "min": 0.1, "max": 2.0}}
-    model = model_of(two_link(design=design))
-    with pytest.raises(UsageError, match="outside the domain"):
-        model.frequencies([0.1, 0.2], [0.0], 1)
-
-
 def test_a_principal_part_is_what_slicing_gives() -> None:
     pencil = arm((HELD, "free")).pencil
     data = pencil.mass @ pencil.theta(np.concatenate([Q0, Y0])[None])[:, 0]
