@@ -389,11 +389,12 @@ def _run(
                 raise AccuracyError(f"{error}{cause(answers[k], modes)}") from None
         if not wanted:
             break
-        ends = np.cumsum([len(x) for x in wanted.values()])[:-1]
-        every = np.split(ask(np.vstack(list(wanted.values()))), ends)
-        for k, values in zip(wanted, every, strict=True):
-            answers[k].append(values)
-        hz = {k: values[:, own] for k, values in zip(wanted, every, strict=True)}
+        every, start = ask(np.vstack(list(wanted.values()))), 0
+        hz = {}
+        for k, x in wanted.items():
+            answers[k].append(every[start : start + len(x)])
+            hz[k] = answers[k][-1][:, own]
+            start += len(x)
     return [_Found(found[k], np.vstack(asked[k]), np.vstack(answers[k])) for k in range(len(runs))]
 
 

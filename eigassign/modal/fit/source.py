@@ -99,7 +99,9 @@ def _solved(pencil: Pencil, last: int, x: Floats) -> Floats:
         hz = np.sqrt(eigenvalues(pencil, x, count)) * HZ
     except MissingMassError:
         hz = np.sqrt(eigenvalues(pencil, x, last)) * HZ
-    return np.pad(hz, ((0, 0), (0, last + 1 - hz.shape[1])), constant_values=np.inf)
+    if hz.shape[1] > last:
+        return hz
+    return np.hstack([hz, np.full((len(x), 1), np.inf)])
 
 
 def _ritz(source: Any, count: int) -> ReducedModel:
