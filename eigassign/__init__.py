@@ -46,6 +46,7 @@ if TYPE_CHECKING:
         reduce,
         save_reduced,
         update,
+        urdf_mapping,
     )
 
 __all__ = [
@@ -64,6 +65,7 @@ __all__ = [
     "reduce",
     "save_reduced",
     "update",
+    "urdf_mapping",
 ]
 
 

@@ -26,6 +26,7 @@ from eigassign.pipeline.animation import animate
 from eigassign.pipeline.outlook import picture
 from eigassign.pipeline.run import Result, solve_case
 from eigassign.pipeline.update import Updated, update_case
+from eigassign.pipeline.urdf import urdf_mapping
 from eigassign.series.multi_index import LowerSet
 from eigassign.study import built_case, drawing
 from eigassign.study.results import ModePictures
@@ -46,6 +47,7 @@ __all__ = [
     "reduce",
     "save_reduced",
     "update",
+    "urdf_mapping",
 ]
 
 

@@ -24,6 +24,7 @@ OWNERS = {
     "platformdirs": {"output"},
     "click": {"cli"},
     "sklearn": {"chart"},
+    "yourdfpy": {"pipeline"},
 }
 EVERYWHERE = {"numpy", "scipy"}
 PRINTING = {

@@ -11,6 +11,7 @@ import numpy as np
 
 from eigassign._version import __version__
 from eigassign.errors import StorageError, UsageError
+from eigassign.files import CASE, read_bytes
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.output.exchange.c_source import c_source, identifier
 from eigassign.output.exchange.tape import reduced_tape
@@ -47,7 +48,7 @@ def write_exchange(reduced: ReducedModel, path: Path, title: str = "") -> tuple[
         text = text.replace("@FILE@", path.name).replace("@ABOUT@", about)
         data = _mat({**tape, "about": about, "format": FORMAT})
     try:
-        if reader.exists() and _OURS not in reader.read_bytes():
+        if reader.exists() and _OURS not in read_bytes(reader, CASE):
             raise StorageError(f"{reader} is in the way: it reads no reduced model")
         replace_synced(path, data)
         replace_synced(reader, text.encode())

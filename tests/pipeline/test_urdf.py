@@ -1,0 +1,219 @@
+"""A robot from URDF has the frequencies that its XML says, found here without eigassign."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+from scipy.spatial.transform import Rotation
+
+import eigassign as ea
+from eigassign.errors import CaseError, StorageError, UsageError
+
+Floats = NDArray[np.float64]
+pytest.importorskip("yourdfpy", reason="yourdfpy, the extra urdf, is not installed")
+
+ROBOT = """<?xml version="1.0"?>
+<robot name="crane">
+  <link name="base_link"/>
+  <link name="column">
+    <inertial>
+      <origin xyz="0.02 -0.01 0.3" rpy="0.3 0.2 -0.4"/>
+      <mass value="12"/>
+      <inertia ixx="0.5" ixy="0.03" ixz="-0.02" iyy="0.4" iyz="0.01" izz="0.2"/>
+    </inertial>
+  </link>
+  <link name="upper-arm">
+    <inertial>
+      <origin xyz="0.25 0.01 0"/>
+      <mass value="5"/>
+      <inertia ixx="0.02" ixy="0" ixz="0" iyy="0.12" iyz="0" izz="0.11"/>
+    </inertial>
+  </link>
+  <link name="slide">
+    <inertial>
+      <origin xyz="0 0 0.1" rpy="0 1.5707963267948966 0"/>
+      <mass value="2"/>
+      <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.03"/>
+    </inertial>
+  </link>
+  <link name="tool">
+    <inertial>
+      <origin xyz="0.05 0.02 0.03"/>
+      <mass value="1.5"/>
+      <inertia ixx="0.004" ixy="0" ixz="0" iyy="0.005" iyz="0" izz="0.006"/>
+    </inertial>
+  </link>
+  <joint name="yaw" type="continuous">
+    <parent link="base_link"/><child link="column"/>
+    <origin xyz="0 0 0.1" rpy="0 0 0.2"/><axis xyz="0 0 1"/>
+  </joint>
+  <joint name="pitch" type="revolute">
+    <parent link="column"/><child link="upper-arm"/>
+    <origin xyz="0.05 0 0.6" rpy="0 1.5707963267948966 0.3"/><axis xyz="0 0.6 0.8"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/>
+  </joint>
+  <joint name="lift" type="prismatic">
+    <parent link="upper-arm"/><child link="slide"/>
+    <origin xyz="0.5 0.1 -0.05" rpy="0.1 -0.2 0.3"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/>
+  </joint>
+  <joint name="flange" type="fixed">
+    <parent link="slide"/><child link="tool"/>
+    <origin xyz="0 0.03 0.2" rpy="0.5 0 0"/>
+  </joint>
+</robot>
+"""
+STIFFNESS = {"yaw": 2e4, "pitch": 9e3, "lift": 3e5}
+POSE = [0.4, -0.7, 0.06]
+
+
+@pytest.fixture
+def crane(tmp_path: Path) -> Path:
+    path = tmp_path / "crane.urdf"
+    path.write_text(ROBOT, encoding="utf-8")
+    return path
+
+
+# --- The oracle: poses from the XML, velocities by differences, M = Σ Jᵀ m J
+
+
+def transform(element: ET.Element | None) -> Floats:
+    T = np.eye(4)
+    if element is not None:
+        rpy = [float(v) for v in element.get("rpy", "0 0 0").split()]
+        T[:3, :3] = Rotation.from_euler("xyz", rpy).as_matrix()
+        T[:3, 3] = [float(v) for v in element.get("xyz", "0 0 0").split()]
+    return T
+
+
+def poses(root: ET.Element, q: Mapping[str, float]) -> dict[str, Floats]:
+    found = {"base_link": np.eye(4)}
+    for joint in root.iter("joint"):  # parents stand before children in this file
+        parent, child = (joint.find(tag).get("link") for tag in ("parent", "child"))  # type: ignore[union-attr]
+        element, motion = joint.find("axis"), np.eye(4)
+        axis = np.array([1.0, 0, 0] if element is None else element.get("xyz").split(), dtype=float)  # type: ignore[union-attr]
+        value = q.get(str(joint.get("name")), 0.0)
+        if joint.get("type") == "prismatic":
+            motion[:3, 3] = axis * value
+        else:
+            motion[:3, :3] = Rotation.from_rotvec(axis * value).as_matrix()
+        found[str(child)] = found[str(parent)] @ transform(joint.find("origin")) @ motion
+    return found
+
+
+def mass_matrix(names: list[str], q: Floats) -> Floats:
+    root, h = ET.fromstring(ROBOT), 1e-5
+
+    def at(step: Floats) -> dict[str, Floats]:
+        return poses(root, dict(zip(names, q + step, strict=True)))
+
+    M, here = np.zeros((len(q), len(q))), at(np.zeros(len(q)))
+    ends = [(at(h * e), at(-h * e)) for e in np.eye(len(q))]
+    for link in root.iter("link"):
+        inertial, name = link.find("inertial"), str(link.get("name"))
+        if inertial is None:
+            continue
+        mass = float(inertial.find("mass").get("value"))  # type: ignore[union-attr, arg-type]
+        i = {k: float(v) for k, v in inertial.find("inertia").attrib.items()}  # type: ignore[union-attr]
+        I = np.array(  # noqa: E741
+            [
+                [i["ixx"], i["ixy"], i["ixz"]],
+                [i["ixy"], i["iyy"], i["iyz"]],
+                [i["ixz"], i["iyz"], i["izz"]],
+            ]
+        )
+        own = transform(inertial.find("origin"))
+        R = (here[name] @ own)[:3, :3]
+        v, w = np.zeros((3, len(q))), np.zeros((3, len(q)))
+        for k, (ahead, behind) in enumerate(ends):
+            a, b = ahead[name] @ own, behind[name] @ own
+            v[:, k] = (a - b)[:3, 3] / (2 * h)
+            spin = (a - b)[:3, :3] @ R.T / (2 * h)
+            w[:, k] = [spin[2, 1], spin[0, 2], spin[1, 0]]
+        M += mass * v.T @ v + w.T @ R @ I @ R.T @ w
+    return M
+
+
+def test_frequencies_are_those_of_the_rigid_robot_on_its_drives(crane: Path) -> None:
+    case = ea.load_case(ea.urdf_mapping(crane, STIFFNESS))
+    assert list(case.file.coordinates) == ["yaw", "pitch", "lift"]
+    hz = case.model().frequencies(POSE, [], 3)[0]
+    M = mass_matrix(list(STIFFNESS), np.array(POSE))
+    lam = eigh(np.diag(list(STIFFNESS.values())), M, eigvals_only=True)
+    np.testing.assert_allclose(hz, np.sqrt(lam) / (2.0 * math.pi), rtol=1e-8)  # of differences
+
+
+def test_a_beam_that_hardly_bends_is_the_rigid_link(crane: Path) -> None:
+    """Of the upper arm, without mass of its own, to the joint that it carries."""
+    weightless = ROBOT.replace('<mass value="5"/>', '<mass value="0"/>').replace(
+        'ixx="0.02" ixy="0" ixz="0" iyy="0.12" iyz="0" izz="0.11"',
+        'ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"',
+    )
+    crane.write_text(weightless, encoding="utf-8")
+    rigid = ea.load_case(ea.urdf_mapping(crane, STIFFNESS)).model().frequencies(POSE, [], 3)
+    stiff: dict[str, Any] = {
+        "beams": {"upper-arm": {"material": "light", "section": "rod", "elements": 2}},
+        "sections": {"rod": {"shape": "circle", "diameter": "40 mm"}},
+    }
+    made = ea.urdf_mapping(
+        crane, STIFFNESS, **stiff,
+        materials={"light": {"youngs_modulus": 2e17, "density": 1e-6, "poissons_ratio": 0.3}},
+    )  # fmt: skip
+    bending = ea.load_case(made).model().frequencies(POSE, [], 3)
+    np.testing.assert_allclose(bending, rigid, rtol=1e-4)
+    made["mechanism"]["materials"]["light"]["youngs_modulus"] = 2e9
+    assert (ea.load_case(made).model().frequencies(POSE, [], 3)[0] < 0.95 * rigid[0]).any()
+
+
+def test_a_stiffness_is_a_parameter_and_the_case_can_be_kept(crane: Path, tmp_path: Path) -> None:
+    content = ea.urdf_mapping(crane, {"yaw": None, "pitch": "9 kN m/rad", "lift": 3e5})
+    wanted = {"parameter": "coordinates.pitch.drive.stiffness", "min": 5e3, "max": 2e4}
+    case = ea.load_case({**content, "design": {"k": wanted}})
+    assert case.initial_design == pytest.approx([9e3])
+    assert case.model().n_rigid == 1
+    (tmp_path / "crane.yaml").write_text(case.file.resolved(), encoding="utf-8")
+    again = ea.load_case(tmp_path / "crane.yaml")
+    first, second = (each.model().frequencies(POSE, [1e4], 2) for each in (case, again))
+    np.testing.assert_array_equal(first, second)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('type="prismatic"', 'type="floating"', "joint lift: type floating is not supported"),
+        ('<child link="tool"/>', '<child link="slide"/>', "do not connect all links to one tree"),
+        ('<parent link="slide"/>', "", "not a URDF file"),
+        ("</robot>", "", "not a URDF file"),
+        ("<robot", "<!DOCTYPE x [<!ENTITY a 'b'>]><robot", "no document type and no entities"),
+        ('<axis xyz="0 0 1"/>', '<mimic joint="pitch"/>', "joint yaw: mimic is not supported"),
+        ('name="slide"', 'name="sledge"', "do not connect all links to one tree"),
+        ('"slide"', '"upper_arm"', "two names of links or joints are alike"),
+        ('"yaw"', '"ground"', "or one is ground"),
+        ('<mass value="5"/>', "", "link upper-arm: inertial needs mass and inertia"),
+    ],
+)
+def test_what_is_no_such_robot_is_refused(crane: Path, old: str, new: str, said: str) -> None:
+    crane.write_text(ROBOT.replace(old, new), encoding="utf-8")
+    with pytest.raises(UsageError, match=said):
+        ea.urdf_mapping(crane, 1e4)
+
+
+def test_wrong_arguments_are_refused(crane: Path) -> None:
+    with pytest.raises(UsageError, match="no stiffness is given for joint pitch"):
+        ea.urdf_mapping(crane, {"yaw": 1.0})
+    with pytest.raises(UsageError, match="no link arm; there are base_link, column"):
+        ea.urdf_mapping(crane, 1e4, beams={"arm": {}})
+    with pytest.raises(UsageError, match="tool cannot be a beam"):
+        ea.urdf_mapping(crane, 1e4, beams={"tool": {}})
+    with pytest.raises(StorageError, match="cannot be read"):
+        ea.urdf_mapping(crane.with_name("none.urdf"), 1e4)
+    with pytest.raises(CaseError, match=r"case: coordinates\.yaw\.drive\.stiffness"):
+        ea.load_case(ea.urdf_mapping(crane, "4 kg"))
