@@ -30,7 +30,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from eigassign.errors import StorageError
-from eigassign.output.run_record import RunOf, changes, read_record, write_record
+from eigassign.output.run_record import RunOf, changes, read_record, relative_path, write_record
 from eigassign.output.storage import (
     abandoned,
     put_in_place,
@@ -60,7 +60,7 @@ def run_folder(
     (checked on entry already) or cannot be written.
     """
     target = Path(os.path.realpath(target))
-    run = RunOf(_relative(case_path, target), case_sha256, dict(case_files))
+    run = RunOf(relative_path(case_path, target), case_sha256, dict(case_files))
     with _storage_errors(target):
         _sweep(target.parent)
         require_replaceable(target, run, force=force, case_path=case_path)
@@ -203,11 +203,3 @@ def _sweep(folder: Path) -> None:
     for hidden, target in abandoned(folder):
         if hidden.is_dir() or hidden.suffix != ".tmp":
             _settle(hidden, target)
-
-
-def _relative(case_path: Path, target: Path) -> str:
-    case = os.path.realpath(case_path)
-    try:
-        return Path(os.path.relpath(case, target)).as_posix()
-    except ValueError:  # another drive
-        return Path(case).as_posix()

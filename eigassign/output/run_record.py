@@ -99,6 +99,15 @@ def read_record(folder: Path) -> RunRecord | None:
         return None
 
 
+def relative_path(path: Path, folder: Path) -> str:
+    """``path`` as seen from ``folder``, or from the root on another drive."""
+    real = os.path.realpath(path)
+    try:
+        return Path(os.path.relpath(real, folder)).as_posix()
+    except ValueError:
+        return Path(real).as_posix()
+
+
 # --- What has changed since
 
 
@@ -202,7 +211,7 @@ def run_status(folder: str | Path) -> RunStatus:
     case = Path(os.path.normpath(folder / record.run.case_path))
     named = record.run.case_files.items()
     return RunStatus(
-        case=os.path.relpath(case),
+        case=relative_path(case, Path.cwd()),
         case_state=_state(case, record.run.case_sha256, CASE),
         case_files={name: _state(case.parent / name, digest, MATRIX) for name, digest in named},
         version=record.version,
