@@ -35,13 +35,16 @@ TEMPLATES = {  # files in STARTERS: <name>.yaml, and the folder <name> if there 
 @click.argument(
     "template", type=click.Choice(list(TEMPLATES)), default="planar_arm", metavar="[TEMPLATE]"
 )
-@click.option("--out", type=arguments.PATH, help="The case file (default: <template>.yaml).")
+@click.option(
+    "--out", type=arguments.PATH, help="Case file, or its folder (default: <template>.yaml)."
+)
 def init(template: str, out: Path | None) -> int:
     """Write a commented case file that runs as it is, to start from.
 
     TEMPLATE is planar_arm unless another is named. Files that exist are never overwritten.
     """
-    case = out or Path(f"{template}.yaml")
+    case = Path(template) if out is None else out / template if out.is_dir() else out
+    case = case if case.suffix else case.with_name(f"{case.name}.yaml")
     files = {case: STARTERS / f"{template}.yaml"}
     beside = sorted(path for path in STARTERS.glob(f"{template}/*"))
     files |= {case.parent / template / path.name: path for path in beside}

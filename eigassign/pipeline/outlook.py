@@ -77,10 +77,10 @@ def next_step(case: CaseFile) -> str:
     if not missing:
         return f"eigassign optimize {name}"
     keys = " and ".join(filter(None, [", ".join(missing[:-1]), missing[-1]]))
-    pose = ""
+    pose, more = "", f"eigassign docs {missing[0]}"
     if case.trajectory is None and case.expansion.q == "auto" and case.coordinates:
         pose = f' --q "{", ".join(f"{value:g}" for value in resting_pose(case))}"'
-    return f"eigassign modes {name}{pose} --draw (to optimize it needs {keys}: eigassign docs)"
+    return f"eigassign modes {name}{pose} --draw (to optimize it needs {keys}: {more})"
 
 
 def _given(case: CaseFile, key: str) -> bool:

@@ -32,7 +32,7 @@ def test_every_starter_is_listed_once_and_has_its_file() -> None:
 
 @pytest.mark.parametrize("name", TEMPLATES)
 def test_a_starter_is_written_with_its_name_and_is_in_order(name: str, capsys: Captured) -> None:
-    assert main(["init", name, "--out", "new/mine.yaml"]) == 0
+    assert main(["init", name, "--out", "new/mine"]) == 0
     out = capsys.readouterr().out
     assert "new/mine.yaml written\n" in out
     assert "next: eigassign check new/mine.yaml --draw\n" in out
@@ -70,6 +70,9 @@ def test_init_overwrites_nothing(capsys: Captured) -> None:
     Path("planar_arm.yaml").symlink_to("nowhere")
     assert main(["init"]) == 3
     assert not Path("nowhere").exists()
+    Path("sub").mkdir()
+    assert main(["init", "gantry", "--out", "sub"]) == 0
+    assert "eigassign check sub/gantry.yaml" in Path("sub/gantry.yaml").read_text()
 
 
 def test_the_manual_is_found_by_page_and_by_heading(capsys: Captured) -> None:
