@@ -32,7 +32,13 @@ from eigassign.pipeline.stages import Stages, silent
 from eigassign.study.accuracy import accuracy_notes, judged_mesh, truncation_notes
 from eigassign.study.built_case import Case, load_case
 from eigassign.study.collect import VerifiedAssignment, collect_results
-from eigassign.study.comparison import Validation, study_modes, validate_expansions
+from eigassign.study.comparison import (
+    TRAJECTORY,
+    Validation,
+    reach_warnings,
+    study_modes,
+    validate_expansions,
+)
 from eigassign.study.design.answer import MAX_ERROR, Answer, find_answer, require_assignable
 from eigassign.study.design.followed import (
     Solved,
@@ -275,7 +281,9 @@ def validate(path: str | Path, options: Options = DEFAULT) -> Validation:
         with stages("validation", "comparing both expansions with exact frequencies"):
             rows = validate_expansions(scene)
             notes = (*scene.notes, *truncation_notes(scene))
-    return Validation(rows, notes, scene.warnings, stages.total_s)
+    along = [(row.worst_taylor, row.mode) for row in rows if row.where.startswith(TRAJECTORY)]
+    warnings = (*scene.warnings, *reach_warnings(scene, along))
+    return Validation(rows, notes, warnings, stages.total_s)
 
 
 def _outcome(folder: RunFolder, results: RunResults, stages: Stages) -> Outcome:

@@ -12,6 +12,7 @@ from eigassign._version import __version__
 from eigassign.case import CaseFile
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.accuracy import study_motion
+from eigassign.study.comparison import reach_warnings
 from eigassign.study.design.answer import Answer, assignment_row, limit_notes
 from eigassign.study.design.followed import Solved
 from eigassign.study.design.judgement import crossing_warnings, swap_notes
@@ -56,6 +57,9 @@ def collect_results(
     """The results of a run; without ``assigned`` those of an expansion only."""
     file, trajectory = scene.file, scene.trajectory
     motion, row = _motion(scene, assigned), _assignment(scene, assigned)
+    along = [(s.over_time.worst_taylor, s.mode) for s in studies if s.over_time is not None]
+    followed = assigned is not None and assigned.answer.found is not None  # by exact frequencies
+    reach = () if followed else reach_warnings(scene, along)
     n = len(file.coordinates)
     meaning = Meaning() if assigned is None else assigned.meaning
     return RunResults(
@@ -77,7 +81,7 @@ def collect_results(
         others=None if assigned is None else _others(scene, assigned),
         solver=_solver(assigned),
         assignment=row,
-        warnings=(*scene.warnings, *_warnings(scene, assigned), *motion[1]),
+        warnings=(*scene.warnings, *_warnings(scene, assigned), *reach, *motion[1]),
         notes=(*scene.notes, *_notes(scene, assigned, row), *motion[0], *meaning.notes),
         timing_s=dict(timing_s),
         tolerance=file.validation.max_error,

@@ -24,7 +24,7 @@ wrong. Where the full set was too large for the order asked for, only the linear
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product, zip_longest
 
@@ -322,6 +322,25 @@ def _row(scene: Scene, k: int, where: str, values: Comparison) -> ValidationRow:
         rms_linearised=_rms(values.linearised_error),
         limit=limit,
         passed=max(counted) <= limit,
+    )
+
+
+def reach_warnings(scene: Scene, along: Iterable[tuple[float, int]]) -> tuple[str, ...]:
+    """What to do where a given order is farther off than the case accepts along the trajectory.
+
+    ``along`` is the worst relative error of the full expansion there, and the mode that has it.
+    """
+    file, expansions = scene.file, scene.expansions
+    worst, mode = max(along, default=(0.0, 0))
+    limit = file.validation.max_error
+    if worst <= limit or file.expansion.order == "auto":
+        return ()
+    off = f"is {100 * worst:.3g} % off" if np.isfinite(worst) else "gives no frequency (λ < 0)"
+    return (
+        f"the expansion of order {expansions.full_order} {off} in mode {mode} along the "
+        f"trajectory, where {100 * limit:g} % are accepted (validation.max_error): the motion goes "
+        "beyond what one point reaches. Write expansion: {order: auto}, which takes the order, and "
+        "several points where need be; exact frequencies do not depend on it",
     )
 
 

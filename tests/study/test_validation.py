@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from eigassign.study.comparison import (
     TRAJECTORY,
     box_points,
     random_q,
+    reach_warnings,
     validate_expansions,
 )
 
@@ -144,3 +146,18 @@ def test_a_span_for_other_coordinates_is_refused(tmp_path: Path) -> None:
 
 def test_auto_is_within_tolerance_as_the_papers_point_is(tmp_path: Path) -> None:
     assert all(row.passed for row in validate_expansions(scene_of(tmp_path, automatic())))
+
+
+def test_an_order_that_does_not_reach_along_the_trajectory_is_answered_with_auto(
+    tmp_path: Path,
+) -> None:
+    scene = scene_of(tmp_path, SHIPPED)
+    (warning,) = reach_warnings(scene, [(0.01, 1), (0.03, 2)])
+    assert "order 4 is 3 % off in mode 2 along the trajectory, where 2 % are accepted" in warning
+    assert "Write expansion: {order: auto}" in warning
+    (warning,) = reach_warnings(scene, [(np.inf, 1), (0.03, 2)])
+    assert "gives no frequency (λ < 0) in mode 1" in warning
+    assert reach_warnings(scene, [(0.02, 1)]) == ()
+    auto = scene.file.expansion.model_copy(update={"order": "auto"})
+    chosen = replace(scene, file=replace(scene.file, expansion=auto))
+    assert reach_warnings(chosen, [(0.03, 1)]) == ()

@@ -148,14 +148,37 @@ def closure_rows(motion: Kinematics, planar: bool) -> tuple[list[Scalar], list[S
 def _check_rigid_loops(
     case: CaseFile, parameters: ModelParameters, tree: Topology, coords: CoordinateMap
 ) -> None:
-    """Loops without passive freedoms must close as they are drawn."""
+    """Loops without passive freedoms must close as they are drawn, up to rounded dimensions."""
     F, check = _equations(case, parameters, tree, coords)
-    for k, value in enumerate([*F, *check]):
-        if isinstance(value, Expression) or abs(value) > 1e-9:
-            loop = tree.loops[min(k // len(DOFS[case.mechanism.space]), len(tree.loops) - 1)]
+    n = len(F) // len(tree.loops)
+    for k, loop in enumerate(tree.loops):
+        rows = [*F[n * k : n * (k + 1)], check[k]]
+        path = f"mechanism.joints.{loop.joint}"
+        if any(isinstance(value, Expression) for value in rows):
+            message = "closes a loop that has no passive joint to follow the coordinates or the "
+            raise MechanismError(path, message + "design: leave a joint of it without coordinate")
+        values = np.array(rows, dtype=np.float64)
+        gap = _gap(values[:n, None], n)
+        if max(gap) > MEETS or abs(values[n]) > MEETS:
+            half = " and half a turn" if values[n] < -2.0 else ""
             raise MechanismError(
-                f"mechanism.joints.{loop.joint}", "closes a loop whose two sides do not meet"
+                path,
+                f"closes a loop whose two sides do not meet: {_spelt(gap)}{half} apart, where "
+                f"{MEETS:g} m and rad are taken for rounded digits. Correct the positions, lengths "
+                "and angles of the loop, or give one of its joints a freedom",
             )
+
+
+def _gap(F: Floats, n: int) -> tuple[float, float]:
+    """The largest distance (m) and turn (rad) between two sides, of rows F (k n, 1)."""
+    rows = F.reshape(-1, n)
+    m = 2 if n == 3 else 3
+    turn = np.arcsin(np.minimum(np.linalg.norm(rows[:, m:], axis=1), 1.0))
+    return float(np.linalg.norm(rows[:, :m], axis=1).max()), float(turn.max())
+
+
+def _spelt(gap: tuple[float, float]) -> str:
+    return f"{gap[0]:.2g} m and {gap[1]:.2g} rad"
 
 
 def _used_variables(recorder: Recorder, scalars: Sequence[Scalar], n: int, n_p: int) -> list[int]:
@@ -190,6 +213,8 @@ def passive_motion(recorder: Recorder, J: Objects, right: Objects) -> Objects:
 
 TRIES = 64  # starting points where no guess is given
 SAME = 1e-6  # rad or m
+MEETS = 1e-5  # m and rad: a loop without passive joints closes, its dimensions have six digits
+ROUNDED = 1e-3  # m and rad: what rounded dimensions of a loop with passive joints may leave
 CHANGE = 1e-5  # rad or m, for central differences of F
 IMMOBILE = 1e-5  # share of ∂F/∂a beyond what ∂F/∂p can meet; differences leave some 1e-9 of it
 RANK = 1e-7  # of the largest singular value of ∂F/∂p: those below do not count
@@ -218,7 +243,8 @@ def choose_branch(
     found = _solutions(function, a0, starts, *angles)
     if not len(found):
         others = _solutions(function, a0, _starts(function.size), *angles)
-        message = _unclosable(tree, function, a0)
+        n = len(DOFS[case.mechanism.space])
+        message = _unclosable(tree, function, a0, n)
         if guess is not None and len(others):
             message = "the guess leads to no closed pose: " + _ambiguous(
                 case, tree, function.names, a0, others
@@ -383,7 +409,7 @@ def _check_movable(
             )
 
 
-def _unclosable(tree: Topology, function: ImplicitFunction, a0: Floats) -> str:
+def _unclosable(tree: Topology, function: ImplicitFunction, a0: Floats, n: int) -> str:
     """Where the loops do not close, and whether there are too many conditions or too little length.
 
     Conditions beyond the rank of ∂F/∂p at general places are no passive freedom's to meet.
@@ -395,11 +421,31 @@ def _unclosable(tree: Topology, function: ImplicitFunction, a0: Floats) -> str:
     if not beyond:
         return f"{message}: links do not reach, or lie beyond a dead point"
     joints = ", ".join(dict.fromkeys(f.joint for f in tree.passive))
+    gap = _nearest(function, a0, n)
+    if max(gap) < ROUNDED:
+        return (
+            f"{message}, but nearly: {_spelt(gap)} are left, where {ACCEPT:g} are accepted. They "
+            f"pose {function.n_equations} conditions, of which {joints} can meet "
+            f"{function.n_equations - beyond}, so that the others must agree in their dimensions: "
+            "give positions, lengths and angles with twelve digits, or give joints more freedoms, "
+            "such as spherical for universal, or cylindrical for revolute"
+        )
     return (
         f"{message}: they pose {function.n_equations} conditions, of which {joints} can meet "
         f"{function.n_equations - beyond}: {beyond} coordinate(s) too many, or joints with too few "
-        "freedoms for dimensions that do not agree"
+        f"freedoms for dimensions that do not agree. The nearest they come is {_spelt(gap)}"
     )
+
+
+def _nearest(function: ImplicitFunction, a0: Floats, n: int) -> tuple[float, float]:
+    """The smallest gap of the loops, m and rad, that Newton's steps find in least squares."""
+    starts = _starts(function.size)
+    a, p = np.repeat(a0[:, None], len(starts), axis=1), starts.T
+    for _ in range(6):
+        p, _ = function.newton(a, p)
+    F, check, _ = function.equations(a, p)
+    missed = np.abs(np.concatenate([F, check])).max(axis=0)
+    return _gap(F[:, [int(np.nanargmin(missed))]], n)
 
 
 def _at(names: Sequence[str], a: Floats) -> str:

@@ -148,6 +148,81 @@ def test_loops_that_close_as_they_are_drawn_need_no_guess() -> None:
     np.testing.assert_allclose(model.lam([[]], 2), exact, rtol=2e-3)
 
 
+def clamped_triangle(side: float, turn: float = -np.pi / 2) -> Tree:
+    """Three beams, clamped to each other all round: hypotenuse 1 m."""
+    beams = {"a": 1.0, "b": side, "c": side}
+    ends = {"j0": ("ground", "a.start"), "j1": ("a.start", "b.start"), "j2": ("b.end", "c.start")}
+    angles = {"j0": 0.0, "j1": np.pi / 4, "j2": turn, "j3": np.pi / 4}
+    return {
+        "mechanism": {
+            "space": "planar",
+            "materials": {"m": ALLOY},
+            "sections": {"s": {"shape": "circle", "diameter": 0.02}},
+            "links": {name: straight(length, 3) for name, length in beams.items()},
+            "joints": {
+                name: {"type": "fixed", "base": base, "follower": follower, "angle": angles[name]}
+                for name, (base, follower) in {**ends, "j3": ("c.end", "a.end")}.items()
+            },
+        },
+        "coordinates": {},
+    }
+
+
+def test_a_clamped_loop_of_rounded_dimensions_is_closed_as_if_it_met() -> None:
+    exact = built(clamped_triangle(np.sqrt(0.5))).lam([[]], 4)
+    np.testing.assert_allclose(built(clamped_triangle(0.707107)).lam([[]], 4), exact, rtol=3e-6)
+
+
+@pytest.mark.parametrize(
+    ("tree", "gap"),
+    [
+        (clamped_triangle(0.71), "0.0041 m and .*e-1. rad apart"),
+        (clamped_triangle(np.sqrt(0.5), np.radians(-85.0)), "0.062 m and 0.087 rad apart"),
+        (clamped_triangle(np.sqrt(0.5), np.pi / 2), "1.4 m and .* rad and half a turn apart"),
+    ],
+)
+def test_a_clamped_loop_that_does_not_meet_is_refused_with_its_gap(tree: Tree, gap: str) -> None:
+    with pytest.raises(MechanismError, match=f"two sides do not meet: {gap}, where 1e-05 m"):
+        built(tree)
+
+
+def cardan_shaft(place: list[float]) -> Tree:
+    """Two parallel shafts joined by a third with a universal joint at either end."""
+    beams = {"driver": 0.3, "middle": 0.5, "driven": 0.3}
+    turning = {"type": "revolute", "base": "ground", "axis": [1, 0, 0]}
+    cross = {"type": "universal"}
+    y, z = [0, 1, 0], [0, 0, 1]
+    joints = {
+        "A": {**turning, "follower": "driver.start"},
+        "U": {**cross, "base": "driver.end", "follower": "middle.start", "axes": [y, z]},
+        "V": {**cross, "base": "middle.end", "follower": "driven.start", "axes": [z, y]},
+        "B": {**turning, "follower": "driven.end", "position": [*place, 0.0]},
+    }
+    return {
+        "mechanism": {
+            "space": "spatial",
+            "materials": {"m": ALLOY},
+            "sections": {"s": {"shape": "circle", "diameter": 0.02}},
+            "links": {name: straight(length, 2) for name, length in beams.items()},
+            "joints": joints,
+            "assembly": {"at": {"th": 0.4}, "guess": {"U": [0.18, 0.4], "V": [-0.4, -0.18]}},
+        },
+        "coordinates": {"th": {"joint": "A"}},
+    }
+
+
+def test_a_cardan_shaft_of_rounded_dimensions_is_told_its_gap_and_what_to_do() -> None:
+    exact = [0.6 + 0.5 * np.cos(np.radians(25)), 0.5 * np.sin(np.radians(25))]
+    twelve = [round(value, 12) for value in exact]
+    assert len(built(cardan_shaft(twelve)).motion.tree.passive) == 5
+    with pytest.raises(MechanismError, match=r"but nearly: 4.*e-08 m .* 1e-09 are accepted") as e:
+        built(cardan_shaft([round(value, 6) for value in exact]))
+    assert "give positions, lengths and angles with twelve digits" in e.value.message
+    assert "too many" not in e.value.message
+    with pytest.raises(MechanismError, match=r"1 coordinate.s. too many.* The nearest .* is 0.0"):
+        built(cardan_shaft([1.1, 0.3]))
+
+
 def test_a_slide_longer_than_a_turn_is_not_taken_for_an_angle() -> None:
     tree = slider_crank("locked")
     tree["mechanism"]["links"]["crank"]["length"] = 1.5
