@@ -1,5 +1,12 @@
 """Assign the natural frequencies of moving, flexible mechanisms along their trajectory.
 
+In a session, with ``dir(ea)`` for what else there is (docs/python.md):
+
+>>> import eigassign as ea
+>>> case = ea.load_case("cases/two_link.yaml")  # or a mapping; case.plot() draws it
+>>> case.model().frequencies(case.trajectory.q, case.initial_design)  # exact, Hz, (n, 3)
+>>> result = ea.assign(case)  # .design, .exact_hz, .plot(), .to_dict() for pandas
+
 Data flows one way: a module imports only from those above it in this list, which is also the order
 in which to read. The way of a case is `case`, `mechanism`, `modal`, `assignment`, `study`; it is
 one function, `eigassign.pipeline.run.solve_case`.
