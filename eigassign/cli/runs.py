@@ -151,7 +151,7 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
         from eigassign.output.console import print_tables, print_verdict
         from eigassign.output.update_report import console_tables, headline
 
-        print_verdict(headline(done.results))
+        print_verdict(headline(done.results), done.results.verdict)
         print_tables(console_tables(done.results))
         show(f"{done.folder} written in {sum(done.results.timing_s.values()):.2f} s")
     return 0 if done.results.verdict == "fitted" else 1

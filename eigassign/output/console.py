@@ -27,7 +27,17 @@ _PAGE = 100  # columns: longer lines are hard to read
 _COLOURS = {
     "green": {"reached", "met", "ok", "proved", "fitted"},
     "yellow": {"improved", "unfinished"},
-    "red": {"unreachable", "infeasible", "do not use", "violated", "failed", "no", "error"},
+    "red": {
+        "unreachable",
+        "infeasible",
+        "do not use",
+        "violated",
+        "failed",
+        "no",
+        "error",
+        "poor_fit",
+        "not_identified",
+    },
 }
 
 
@@ -119,11 +129,11 @@ def print_assignment(results: RunResults, *, stream: TextIO | None = None) -> No
     print_tables((t for t in summary.tables(results) if t.title != "Timing"), stream=stream)
 
 
-def print_verdict(line: str, *, stream: TextIO | None = None) -> None:
-    """The first sentence of a result, in the colour of its verdict."""
+def print_verdict(line: str, verdict: str = "", *, stream: TextIO | None = None) -> None:
+    """The first sentence of a result, in the colour of its verdict, or of what it begins with."""
     out = sys.stdout if stream is None else stream
     console, text = _console(out, terminal.width(out))
-    _write_paragraph(console, line, _colour(line.partition(":")[0]))
+    _write_paragraph(console, line, _colour(verdict or line.partition(":")[0]))
     write_text(out, text.getvalue() + "\n")
 
 
@@ -193,7 +203,9 @@ def progress(
         nonlocal done
         done += 1
         line = printable(f"{label} {done}/{total} {what}".rstrip())
-        write_text(out, f"\r\x1b[2K{line[:78]}" if rewrites else f"{line}\n")
+        write_text(
+            out, f"\r\x1b[2K{line[: min(terminal.width(out), 80) - 1]}" if rewrites else f"{line}\n"
+        )
         out.flush()
 
     try:

@@ -108,10 +108,16 @@ def test_verdicts_have_colours_on_a_terminal_unless_nobody_wants_them(monkeypatc
         out = Terminal()
         console.print_table("", ("limit", "verdict"), rows, stream=out)
         console.print_verdict("Unreachable: mode 1 at 9 Hz", stream=out)
+        console.print_verdict("k = 3: this explains it", "fitted", stream=out)
         return out.getvalue()
 
     text = shown()
-    for coloured in ("\x1b[32mmet", "\x1b[31mVIOLATED", "\x1b[31mUnreachable: mode 1"):
+    for coloured in (
+        "\x1b[32mmet",
+        "\x1b[31mVIOLATED",
+        "\x1b[31mUnreachable: mode 1",
+        "\x1b[32mk = 3",
+    ):
         assert coloured in text
     assert " methane" in text
     for name, value in (("NO_COLOR", "1"), ("TERM", "dumb")):
