@@ -10,6 +10,21 @@ from itertools import islice
 from eigassign.files import printable
 
 _LONGEST = 60
+_SYNONYMS = {  # what others call it
+    **dict.fromkeys(("hinge", "pin", "pivot", "rotary", "rotation", "rotational"), "revolute"),
+    **dict.fromkeys(("slider", "linear", "translation", "translational", "sliding"), "prismatic"),
+    **dict.fromkeys(("ball", "sphere"), "spherical"),
+    **dict.fromkeys(("cardan", "hooke"), "universal"),
+    **dict.fromkeys(("weld", "welded", "clamp", "clamped", "rigid"), "fixed"),
+    **dict.fromkeys(("helical", "lead_screw", "leadscrew"), "screw"),
+    **dict.fromkeys(("world", "base", "fixed", "gnd"), "ground"),
+    **dict.fromkeys(("round", "rod", "cylinder", "solid_circle"), "circle"),
+    **dict.fromkeys(("pipe", "hollow", "ring"), "tube"),
+    **dict.fromkeys(("square", "box", "rect"), "rectangle"),
+    **dict.fromkeys(("e", "e_modulus", "modulus", "young", "youngs"), "youngs_modulus"),
+    "rho": "density",
+    **dict.fromkeys(("nu", "poisson", "poissons"), "poissons_ratio"),
+}
 _MOST_NAMES = 20
 _MOST_CANDIDATES = 200  # names compared with a misspelt one: keeps hostile files cheap
 
@@ -34,8 +49,10 @@ def shown(value: object) -> str:
 
 def suggestion(name: str, known: Iterable[str]) -> str:
     """``"; did you mean 'x'?"`` when something known is close, else nothing."""
-    candidates = islice(known, _MOST_CANDIDATES)
-    close = get_close_matches(name[:_LONGEST], list(candidates), n=1, cutoff=0.6)
+    candidates = list(islice(known, _MOST_CANDIDATES))
+    close = get_close_matches(name[:_LONGEST], candidates, n=1, cutoff=0.6)
+    if _SYNONYMS.get(name.lower()) in candidates:
+        close = [_SYNONYMS[name.lower()]]
     return f"; did you mean {close[0]!r}?" if close else ""
 
 

@@ -214,7 +214,15 @@ def starts_outside(tree: Tree, design: Design) -> Iterator[Finding]:
         if k in catalogued or value is None or column.min <= value <= column.max:
             continue
         message = f"initial value {value:g} {unit} of {column.parameter} is outside "
-        yield ("design", name), f"{message}[{column.min:g}, {column.max:g}] {unit}{why}"
+        bounds = f"[{column.min:g}, {column.max:g}] {unit}"
+        small = {"m": "mm", "kg": "g"}.get(unit)
+        if small and column.min <= 1e3 * value <= column.max:
+            bare = (
+                f"; a bare number is in {unit}: was [{column.min:g}, {column.max:g}] {small} meant?"
+            )
+            yield ("design", name), message + bounds + bare
+        else:
+            yield ("design", name), message + bounds + why
     for catalogue in design.catalogues:
         own = tuple(start[k] for k in catalogue.columns)
         if own not in catalogue.rows:

@@ -212,7 +212,12 @@ def _literal(error: Any) -> _Explained:
     return (), f"expected {expected}{also}, got {shown(value)}{hint}"
 
 
-_LIST = _expected("a list")
+def _list(error: Any) -> _Explained:
+    given = error["input"]
+    meant = "[{...}]" if isinstance(given, Mapping) else f"[{shown(given)}]"
+    return (), f"expected a list, got {shown(given)}; of one entry it is {meant}"
+
+
 _EXPLAIN: dict[str, Any] = {
     "at_key": lambda e: (e["ctx"]["keys"], e["ctx"]["text"]),
     "missing": _missing,
@@ -228,7 +233,7 @@ _EXPLAIN: dict[str, Any] = {
     "dict_type": _mapping,
     "mapping_type": _mapping,
     "is_instance_of": _mapping,
-    "tuple_type": _LIST,
+    "tuple_type": _list,
     "bool_type": _expected("true or false"),
     "int_type": _expected("a whole number"),
     "int_from_float": _expected("a whole number"),

@@ -43,6 +43,8 @@ SLIPS = {
     "tolerance of 200 %": ("max_error: 2 %", "¦max_error: 2", "this is 200 %"),
     "point outside the bounds": ("order: 4", "order: 4, y: [0.1, ¦50 mm]", "outside the bounds of 'd'"),
     "start outside the bounds": ("d: {parameter: sections.rod.diameter, min: 20 mm", "¦d: {parameter: sections.rod.diameter, min: 31 mm", "initial value 0.03 m of sections.rod.diameter is outside [0.031, 0.04] m"),
+    "bounds in mm": ("d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm", "¦d: {parameter: sections.rod.diameter, min: 20, max: 40", "[20, 40] m; a bare number is in m: was [20, 40] mm meant?"),
+    "bounds in g": ("m: {parameter: bodies.tool.mass, min: 0, max: 250 g", "¦m: {parameter: bodies.tool.mass, min: 50, max: 250", "[50, 250] kg; a bare number is in kg: was [50, 250] g meant?"),
     "unused section": ("sections:\n", "sections:\n    ¦x: {shape: circle, diameter: 1 cm}\n", "no link uses"),
     "unused material": ("materials:\n", "materials:\n    ¦x: {youngs_modulus: 1e9, density: 1e3}\n", "no link uses"),
 }

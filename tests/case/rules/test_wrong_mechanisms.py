@@ -12,6 +12,8 @@ from wide_cases import PLANAR, SPATIAL, changed, write
 
 # fmt: off
 LINKS = [
+    Wrong("hinge", "A: {type: revolute, base: ground", "A: {¦type: hinge, base: ground", "mechanism.joints.A.type", "unknown type 'hinge'; did you mean 'revolute'?"),
+    Wrong("world", "A: {type: revolute, base: ground", "A: {type: revolute, ¦base: world", "mechanism.joints.A.base", "unknown link 'world'; did you mean 'ground'?"),
     Wrong("unknown link type", "{type: rigid, length: 0.2, mass: 5}", "{¦type: rigit, length: 0.2, mass: 5}", "mechanism.links.cart.type", "did you mean 'rigid'"),
     Wrong("link type is a number", "{type: rigid, length: 0.2, mass: 5}", "{¦type: 5, length: 0.2, mass: 5}", "mechanism.links.cart.type", "expected one of beam, rigid, frame, superelement"),
     Wrong("elements of a rigid link", "{type: rigid, length: 0.2, mass: 5}", "{type: rigid, length: 0.2, mass: 5, ¦elements: 3}", "mechanism.links.cart.elements", "allowed: type, nodes, length, mass, inertia, center"),
