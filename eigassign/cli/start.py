@@ -11,6 +11,7 @@ import click
 import eigassign.cli.arguments as arguments
 from eigassign.cli.reporter import show
 from eigassign.errors import StorageError, UsageError
+from eigassign.files import CASE, read_bytes
 
 PACKAGE = Path(__file__).parents[1]
 STARTERS = PACKAGE / "starters"
@@ -200,7 +201,7 @@ def _write(path: Path, text: str) -> None:
 
 def _add_line(path: Path, line: str) -> None:
     """At the end of a file, unless it has that line."""
-    before = path.read_text(encoding="utf-8") if path.exists() else ""
+    before = read_bytes(path, CASE).decode() if path.exists() else ""
     if line not in before.splitlines():
         apart = "" if before.endswith("\n") or not before else "\n"
         with open(path, "a", encoding="utf-8") as file:

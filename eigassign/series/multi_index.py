@@ -17,9 +17,12 @@ from numpy.typing import NDArray
 
 from eigassign.brief import Brief
 from eigassign.errors import UsageError
+from eigassign.files import how_to_raise, raised
 
 Ints = NDArray[np.intp]
 MAX_SIZE = 200_000
+MOST_PAIRS = 10_000_000  # of coefficients that meet in a product
+PAIR_BYTES = 90  # measured for 5 to 9 variables
 
 
 @dataclass(frozen=True)
@@ -153,7 +156,14 @@ def _weights(n: int) -> NDArray[np.uint64]:
 
 
 def _product_table(space: LowerSet) -> ProductTable:
-    starts = space.degree_starts
+    starts, order = space.degree_starts, space.order
+    count = sum(int((starts[d + 1] - starts[d]) * starts[order - d + 1]) for d in range(order + 1))
+    if count > raised(MOST_PAIRS):
+        raise UsageError(
+            f"order {order} in {space.n_variables} variables: {len(space)} coefficients have "
+            f"{count:.3g} products of two, which takes about {count * PAIR_BYTES / 1e9:.2g} GB: "
+            f"lower the order, or {how_to_raise(count, MOST_PAIRS)}"
+        )
     parts = [
         space.pairs(
             np.arange(starts[degree], starts[degree + 1]),

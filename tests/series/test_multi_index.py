@@ -133,3 +133,16 @@ def test_restricting_to_a_lower_part_works_and_to_another_part_does_not() -> Non
 def test_members_cannot_be_changed() -> None:
     with pytest.raises(ValueError, match="read-only"):
         total_degree(2, 2).indices[0, 0] = 5
+
+
+def test_a_set_whose_products_would_fill_the_memory_is_refused_before_they_are_made(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    large = total_degree(5, 20)
+    with pytest.raises(UsageError, match=r"order 20 in 5 variables: .* about 2\.7 GB.*LIMITS=4"):
+        _ = large.table
+    monkeypatch.setenv("EIGASSIGN_LIMITS", "1e-6")
+    with pytest.raises(UsageError, match="lower the order"):
+        _ = LowerSet(total_degree(2, 3).indices).table
+    monkeypatch.setenv("EIGASSIGN_LIMITS", "1")
+    assert len(LowerSet(total_degree(2, 3).indices).table.left) == 35

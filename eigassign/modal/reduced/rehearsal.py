@@ -2,8 +2,8 @@
 
 A stored model has no mechanism to be checked against. So it takes its answers along: frequencies,
 error estimates, and uᵀK̂(x)u and uᵀM̂(x)u of one vector u without zeros, in which every entry of
-every term counts, at points x from its expansion points out to a radian and half of each design
-parameter. A model whose arrays were changed answers otherwise, and is refused.
+every term counts, at points x from its expansion points out to 0.3 rad and a sixth of each
+design parameter. A model whose arrays were changed answers otherwise, and is refused.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from eigassign.errors import EigassignError
 from eigassign.modal.reduced.model import ReducedModel
 
 Floats = NDArray[np.float64]
-STEPS = (0.0, 0.02, 0.1, 0.3, 1.0)  # from the point: rad or m, and shares of a parameter
-DRAWS = 6  # points at each step but the first
+STEPS = (0.0, 0.02, 0.1, 0.3)  # from the point: rad or m, and shares of a parameter
+DRAWS = 3  # points at each step but the first
 POINTS = 3  # of several expansion points: the first and last, and one between
 CLOSE = 1e-9  # of answers: other processors round otherwise
 ESTIMATES = (1e-9, 1e-5)  # absolute and relative: an estimate is a difference
