@@ -55,6 +55,7 @@ RULES: tuple[Rule, ...] = (
     links.bare_sections_have_the_moments_of_their_space,
     links.rigid_links_have_one_end,
     links.frames_hang_together,
+    links.beams_have_no_more_elements_than_can_be_meant,
     links.superelements_have_rows_of_their_own_for_each_node,
     links.superelements_have_matrix_files,
     links.links_that_a_joint_travels_along_are_not_reduced,

@@ -17,6 +17,9 @@ from eigassign.case.rules.lookups import (
 from eigassign.case.schema.joints import RIDING
 from eigassign.case.schema.vectors import PLACE
 from eigassign.case.suggestions import listed, shown, unknown
+from eigassign.files import how_to_raise, raised
+
+MOST_ELEMENTS = 20_000  # `check` takes 10 to 30 s and 230 MB, in proportion
 
 # --- Materials and sections
 
@@ -137,6 +140,22 @@ def _loose_nodes(path: KeyPath, joined: Mapping[str, list[str]]) -> Iterator[Fin
     if loose := [node for node in joined if node not in reached]:
         message = f"no beams connect {listed(loose)} with {first!r}"
         yield (*path, "nodes", loose[0]), message
+
+
+def beams_have_no_more_elements_than_can_be_meant(tree: Tree) -> Iterator[Finding]:
+    """All beams together have MOST_ELEMENTS at most."""
+    given = [(path, at(body, "elements")) for path, body in beams(tree)]
+    allowed = range(100_000 + 1)  # the schema finds the others
+    known = [(n, path) for path, n in given if type(n) is int and n in allowed]
+    total = sum(n for n, _ in known)
+    if total > raised(MOST_ELEMENTS):
+        n, path = max(known, key=lambda each: each[0])
+        yield (
+            (*path, "elements"),
+            f"{shown(n)}, in the whole mechanism {shown(total)} elements; more than "
+            f"{raised(MOST_ELEMENTS):g} take minutes and hundreds of MB for each model; "
+            f"{how_to_raise(total, MOST_ELEMENTS)}",
+        )
 
 
 def superelements_have_rows_of_their_own_for_each_node(tree: Tree) -> Iterator[Finding]:

@@ -2,7 +2,7 @@
 
 A stored model has no mechanism to be checked against. So it takes its answers along: frequencies,
 error estimates, and uᵀK̂(x)u and uᵀM̂(x)u of one vector u without zeros, in which every entry of
-every term counts, at points x from its expansion points out to 0.3 rad and a sixth of each
+every term counts, at points x from its expansion points out to 0.3 rad and 0.6 of each
 design parameter. A model whose arrays were changed answers otherwise, and is refused.
 """
 
@@ -15,7 +15,7 @@ from eigassign.errors import EigassignError
 from eigassign.modal.reduced.model import ReducedModel
 
 Floats = NDArray[np.float64]
-STEPS = (0.0, 0.02, 0.1, 0.3)  # from the point: rad or m, and shares of a parameter
+STEPS = (0.0, 0.02, 0.1, 0.3)  # from the point: rad or m, and half the share of a parameter
 DRAWS = 3  # points at each step but the first
 POINTS = 3  # of several expansion points: the first and last, and one between
 CLOSE = 1e-9  # of answers: other processors round otherwise
@@ -68,7 +68,7 @@ def _points(model: ReducedModel) -> Floats:
     chosen = model.points[np.unique(np.linspace(0, len(model.points) - 1, POINTS).astype(int))]
     found = []
     for x0 in chosen:
-        scale = np.where(x0 != 0.0, 0.5 * np.abs(x0), 0.5)
+        scale = np.where(x0 != 0.0, 2.0 * np.abs(x0), 1.0)
         scale[:n] = 1.0
         for step in STEPS:
             for _ in range(DRAWS if step else 1):
