@@ -25,7 +25,8 @@ class Dimension:
     """A physical dimension: its name, its SI unit, and other units worth mentioning.
 
     ``smallest`` and ``largest`` (SI) enclose every mechanism, from nanotubes to bridges, and keep
-    products of a dozen quantities far from where floating-point numbers end.
+    products of a dozen quantities far from where floating-point numbers end. What may be negative
+    is a difference of such quantities: it may be smaller.
     """
 
     name: str
@@ -34,11 +35,6 @@ class Dimension:
     examples: str
     smallest: float = 1e-30
     largest: float = 1e30
-
-    @property
-    def limits(self) -> str:
-        """``1e-12 to 1e+06 m``."""
-        return f"{self.smallest:g} to {self.largest:g} {self.si}".rstrip()
 
     def __str__(self) -> str:
         unit = f"in {self.si}" if self.si else "a plain number"
@@ -149,7 +145,6 @@ _NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?
 _FACTOR = re.compile(r"([^\W\d_]+|[%°])(?:(?:\^|\*\*)?([-+]?[1-9]))?")
 _SUPERSCRIPTS = str.maketrans("⁻¹²³⁴⁵⁶⁷⁸⁹", "-123456789")
 _LARGEST_EXPONENT = 1000  # of ten
-_NOTHING = 1e-60  # in any unit; round-off of coordinates near 0 is 1e-17
 _LONGEST = 60  # characters of a quantity; keeps the integers of a nonsense unit small
 
 
@@ -158,7 +153,7 @@ def read(value: object, dimension: Dimension | None) -> float:
 
     ``None`` as dimension: whatever unit is written is accepted (used where an error elsewhere has
     left the dimension unknown). Raises QuantityError for anything that is not a finite quantity,
-    or too large or too small to calculate with.
+    or too large to calculate with.
     """
     if isinstance(value, str):
         number, unit = _split(value, dimension)
@@ -172,14 +167,13 @@ def read(value: object, dimension: Dimension | None) -> float:
 
 
 def require_size(si: float, dimension: Dimension | None, given: str) -> None:
-    """Raises QuantityError for a number that is not finite, or of no size to calculate with."""
+    """Raises QuantityError for a number that is not finite, or too large to calculate with."""
     if not math.isfinite(si):
         raise QuantityError(f"must be a finite number, got {given}")
     known = dimension or PLAIN
     if abs(si) > known.largest:
-        raise QuantityError(f"too large to calculate with, got {given}; allowed: {known.limits}")
-    if 0.0 < abs(si) < _NOTHING:
-        raise QuantityError(f"too small to calculate with, got {given}: write 0 where it is meant")
+        most = f"{known.largest:g} {known.si}".rstrip()
+        raise QuantityError(f"too large to calculate with, got {given}; at most {most}")
 
 
 def is_bare(text: str) -> bool:

@@ -23,6 +23,7 @@ T = TypeVar("T")
 L = TypeVar("L")
 P = TypeVar("P", bound="Part")
 V = TypeVar("V")
+_NOTHING = 1e-60  # of what may be negative, in any unit; round-off of places near 0 is 1e-17
 
 
 class Part(BaseModel):
@@ -77,7 +78,7 @@ class Quantity:
     def checked(self, si: float, given: str) -> float:
         """``si`` if it is within the limits. Raises QuantityError.
 
-        What cannot be negative may not be too small to calculate with either, unless it may be 0.
+        Nothing but 0 may be too small to calculate with.
         """
         unit = f" {self.dimension.si}" if self.dimension and self.dimension.si else ""
         for sign, limit, holds in (
@@ -88,10 +89,11 @@ class Quantity:
         ):
             if not holds:
                 raise QuantityError(f"must be {sign} {limit:g}{unit}, got {given}")
-        known = self.dimension or PLAIN
-        if 0 < si < known.smallest and 0 in (self.above, self.at_least):
-            zero = "0, or " if self.at_least == 0 else ""
-            message = f"too small to calculate with, got {given}; allowed: {zero}{known.limits}"
+        known, positive = self.dimension or PLAIN, 0 in (self.above, self.at_least)
+        least = known.smallest if positive else _NOTHING
+        if 0 < abs(si) < least:
+            zero = "" if self.above == 0 else "0 or "
+            message = f"too small to calculate with, got {given}; {zero}at least {least:g}{unit}"
             raise QuantityError(message)
         return si
 
