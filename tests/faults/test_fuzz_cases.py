@@ -98,6 +98,16 @@ def test_what_may_not_happen_is_called_a_fault(ended: dict[str, Any], fault: str
     assert Outcome("check", "", **{**fine, **ended}).faults() == [fault]
 
 
+def test_a_planar_taper_with_shear_has_no_bending_out_of_the_plane(worker: Worker) -> None:
+    tree = shipped()["two_link.yaml"]
+    section = {"start": "rod", "end": "rod"}
+    tree["mechanism"]["links"]["forearm"] |= {"section": section, "shear": "true"}
+    tree["mechanism"]["materials"]["aluminium"]["poissons_ratio"] = "0.3"
+    outcome = worker.run("check", written(tree))
+    assert outcome.code == 0, outcome.err
+    require_no_fault(outcome)
+
+
 @pytest.mark.slow  # starts another process
 def test_a_case_that_ends_the_process_is_seen_and_the_next_one_runs(
     worker: Worker, monkeypatch: pytest.MonkeyPatch

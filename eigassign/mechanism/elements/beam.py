@@ -68,6 +68,9 @@ def shear(profile: Profile, h: Scalar) -> tuple[Shear, Shear]:
     found = []
     for key in ("EI_z", "EI_y"):
         EI = _antisymmetric([getattr(beam, key) for beam in profile])
+        if is_constant(EI) and not np.any(EI):  # out of the plane of a planar mechanism
+            found.append(Shear(0.0, 0.0))
+            continue
         phi = EI * 12.0 / (kGA * h**2.0)
         skew = getattr(profile[1], key) / EI * phi if len(profile) > 1 else 0.0
         found.append(Shear(phi, skew))
