@@ -109,6 +109,21 @@ def test_no_polynomial_of_decoupled_parts_is_below_its_estimate():
     assert tally(range(20_000, 20_400), 6, polynomial, decoupled).covered == 1.0
 
 
+def light(seed: int, samples: int) -> Drawn | None:
+    """An arm with a link almost without mass, and vectors of first order only."""
+    drawn = decoupled(5 * seed + 4, samples)
+    return None if drawn is None else replace(drawn, half_order=1)
+
+
+@pytest.mark.parametrize(
+    "seeds", [range(10), pytest.param(range(10, 400), marks=pytest.mark.slow)], ids=["few", "many"]
+)
+def test_first_order_and_links_almost_without_mass_are_right_or_refused(seeds):
+    found = tally(seeds, 6, reduced_model, light)
+    assert found.covered == 1.0
+    assert found.refused.mean() < 0.5
+
+
 def test_no_fit_of_decoupled_parts_is_below_its_estimate():
     none_of_fits_below(tally(range(8), 20, fitted, near))
 
