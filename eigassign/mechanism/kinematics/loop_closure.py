@@ -419,7 +419,12 @@ def _unclosable(tree: Topology, function: ImplicitFunction, a0: Floats, n: int) 
     J = function.equations(np.repeat(a0[:, None], starts.shape[1], axis=1), starts)[2]
     beyond = function.n_equations - int(np.linalg.matrix_rank(J, RANK).max())
     if not beyond:
-        return f"{message}: links do not reach, or lie beyond a dead point"
+        gap = _spelt(_nearest(function, a0, n))
+        return (
+            f"{message}: links do not reach, or lie beyond a dead point; the nearest pose found "
+            f"leaves {gap}. Correct the lengths and positions, or name coordinates at which the "
+            "mechanism can be put together: mechanism.assembly: {at: {coordinate: value}}"
+        )
     joints = ", ".join(dict.fromkeys(f.joint for f in tree.passive))
     gap = _nearest(function, a0, n)
     if max(gap) < ROUNDED:
@@ -433,7 +438,7 @@ def _unclosable(tree: Topology, function: ImplicitFunction, a0: Floats, n: int) 
     return (
         f"{message}: they pose {function.n_equations} conditions, of which {joints} can meet "
         f"{function.n_equations - beyond}: {beyond} coordinate(s) too many, or joints with too few "
-        f"freedoms for dimensions that do not agree. The nearest they come is {_spelt(gap)}"
+        f"freedoms for dimensions that do not agree. The nearest pose found leaves {_spelt(gap)}"
     )
 
 

@@ -219,8 +219,38 @@ def test_a_cardan_shaft_of_rounded_dimensions_is_told_its_gap_and_what_to_do() -
         built(cardan_shaft([round(value, 6) for value in exact]))
     assert "give positions, lengths and angles with twelve digits" in e.value.message
     assert "too many" not in e.value.message
-    with pytest.raises(MechanismError, match=r"1 coordinate.s. too many.* The nearest .* is 0.0"):
+    with pytest.raises(
+        MechanismError, match=r"1 coordinate.s. too many.* The nearest pose found leaves 0.0"
+    ):
         built(cardan_shaft([1.1, 0.3]))
+
+
+def test_loops_that_do_not_reach_where_they_are_put_together_ask_for_another_pose() -> None:
+    """A boom lifted by a cylinder that is 0.2 m too short before it is driven out."""
+    links = {"boom": straight(1.0, 2), "foot": straight(0.4, 2), "head": straight(0.4, 2)}
+    hinge, ground = {"type": "revolute"}, {"base": "ground"}
+    joints = {
+        "A": {**hinge, **ground, "follower": "boom.start"},
+        "B": {**hinge, **ground, "follower": "foot.start", "position": [0.0, -2.0]},
+        "S": {"type": "prismatic", "base": "foot.end", "follower": "head.start"},
+        "C": {**hinge, "base": "head.end", "follower": "boom.end"},
+    }
+    tree: Tree = {
+        "mechanism": {
+            "space": "planar",
+            "materials": {"m": ALLOY},
+            "sections": {"s": {"shape": "circle", "diameter": 0.02}},
+            "links": links,
+            "joints": joints,
+        },
+        "coordinates": {"stroke": {"joint": "S"}},
+    }
+    says = r"at stroke = 0: links do not reach.* nearest pose found leaves 0.2 m.*assembly: \{at"
+    with pytest.raises(MechanismError, match=says):
+        built(tree)
+    tree["mechanism"]["assembly"] = {"at": {"stroke": 0.6}}
+    with pytest.raises(MechanismError, match=r"close in 2 ways at stroke = 0\.6"):
+        built(tree)
 
 
 def test_a_slide_longer_than_a_turn_is_not_taken_for_an_angle() -> None:
