@@ -97,7 +97,8 @@ def test_no_damaged_reduced_model_answers_otherwise(
             continue
         believed += 1
         np.testing.assert_allclose(found.frequencies(q, y), hz, rtol=WRONG)
-        np.testing.assert_allclose(found.error_estimate(q, y), estimate, rtol=1e-3, atol=WRONG)
+        told = found.error_estimate(q, y)
+        assert (told >= 0.999 * estimate - WRONG).all()  # one that is too high is safe
     record_property("believed, for nothing changed", f"{believed} of {count}")
     assert believed < count // 2
 
