@@ -1,13 +1,14 @@
 """How far the frequencies of a mesh are from those of the beams themselves, without a finer mesh.
 
-Elements are what Craig and Bampton's links are: all that their shapes leave out is the motion
-inside them while their nodes are held, and it is K-orthogonal to the mesh. So the bound of
-`truncation` holds as it is, with
+Elements are what Craig and Bampton's links are in `truncation`: what their shapes leave out, C, is
+the motion inside them while their nodes are held, and K-orthogonal to the mesh. With μ̂_j = 1/λ̂_j of
+its modes, ‖z_j‖_K = 1, the true μ are at most the eigenvalues of
 
-    ρ_j = M_bc v_j − μ̂_j K_bc v_j,   G_jk = Σ_elements ρ_jᵀ S⁻¹ ρ_k,   β = max μ inside an element,
+    [ diag(μ̂)  R ]        R Rᵀ = G,   G_jk = Σ_elements ρ_jᵀ S⁻¹ ρ_k,
+    [ Rᵀ       X ],       ρ_j = M_bc v_j − μ̂_j K_bc v_j        (see `inner`),
 
-see `inner`. Where sections vary along elements, what is left out reaches over nodes; this is small
-beside it and not in β.
+where X is not less than M on C: β = max μ inside an element. Where sections vary along elements, C
+reaches over nodes by some motion of the mesh, and X = β + Rᵀ diag(1/μ̂) R.
 """
 
 from __future__ import annotations
@@ -19,9 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.mechanism.assembly.meshed_links import Alike, MeshedLinks
+from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.inner import InnerPart, inner_parts
 from eigassign.modal.exact.solver import lowest_modes
-from eigassign.modal.truncation import BESIDE, bounds
+from eigassign.modal.truncation import BESIDE, REFUSED
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -48,7 +50,7 @@ def discretisation_error(
         found = lowest_modes(pencil, theta[:, s : s + 1], highest, BESIDE)
         mu = 1.0 / found.lam[0]
         gram, own, beta = inside.at(x[s], found.phi[0] * np.sqrt(mu), mu)
-        total[s] = bounds(mu, gram, float(beta.max()), highest, pencil)[pick]
+        total[s] = _bounds(mu, gram, float(beta.max()), inside.tapered, highest, pencil)[pick]
         room = np.maximum(mu[pick] - beta[:, None], 0.0)
         with np.errstate(divide="ignore"):
             of_links[:, s] = 0.5 * own[:, pick] / (room * mu[pick])
@@ -56,12 +58,27 @@ def discretisation_error(
     return DiscretisationError(total, dict(zip(names, of_links, strict=True)))
 
 
+def _bounds(
+    mu: Floats, gram: Floats, beta: float, tapered: bool, highest: int, pencil: Pencil
+) -> Floats:
+    """√(μ/μ̂) − 1 at most, for every mode up to ``highest``."""
+    kept = len(mu)
+    if kept < len(pencil.elastic) and kept > highest:  # the last stands for all above it
+        kept, beta = kept - 1, max(beta, float(mu[-1]))
+    values, turns = np.linalg.eigh(gram[:kept, :kept])
+    R = turns * np.sqrt(np.maximum(values, 0.0))
+    X = beta * np.eye(kept) + (R.T @ (R / mu[:kept, None]) if tapered else 0.0)
+    top = np.linalg.eigvalsh(np.block([[np.diag(mu[:kept]), R], [R.T, X]]))[::-1][:highest]
+    error = np.sqrt(np.maximum(top / mu[:highest], 1.0)) - 1.0
+    return np.where((mu[:highest] > beta) & (error < REFUSED), error, np.inf)
+
+
 class _Inside:
     """The elements' inner parts; those of one sample serve the next where they are the same."""
 
     def __init__(self, parts: MeshedLinks) -> None:
         self.parts = parts
-        self.key = np.zeros(0)
+        self.key, self.tapered = np.zeros(0), False
         self.inner: list[tuple[Ints, Ints, InnerPart]] = []  # which, as which of the part
 
     def at(self, x: Floats, z: Floats, mu: Floats) -> tuple[Floats, Floats, Floats]:
@@ -83,8 +100,9 @@ class _Inside:
         key = np.concatenate([np.append(each.values, each.h) for each in elements])
         if np.array_equal(key, self.key):
             return
-        self.key, self.inner = key, []
+        self.key, self.inner, self.tapered = key, [], False
         for each in elements:
+            self.tapered |= each.values.shape[1] > 1
             once, like = each.different()
             for part in inner_parts(once.profile(), once.h, self.parts.space):
                 self.inner.append((each.elements, like, part))

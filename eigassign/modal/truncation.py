@@ -109,10 +109,10 @@ def _at(parts: ReducedLinks, interiors: Sequence[_Interior], x: Floats, highest:
     if g.any():
         K = principal(pencil, pencil.stiffness @ theta[:, 0], pencil.elastic)
         gram += SAFETY * (g.T @ factorise(K).solve(g))  # gᵀ S⁻¹ g
-    return bounds(mu, 0.5 * (gram + gram.T), max(one.beta for one in interiors), highest, pencil)
+    return _bounds(mu, 0.5 * (gram + gram.T), max(one.beta for one in interiors), highest, pencil)
 
 
-def bounds(mu: Floats, gram: Floats, beta: float, highest: int, pencil: Pencil) -> Floats:
+def _bounds(mu: Floats, gram: Floats, beta: float, highest: int, pencil: Pencil) -> Floats:
     """√(μ/μ̂) − 1 at most, for every mode up to ``highest``."""
     kept = len(mu)
     if kept < len(pencil.elastic) and kept > highest:  # the last stands for all above it
