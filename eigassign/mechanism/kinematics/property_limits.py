@@ -16,7 +16,7 @@ from eigassign.case import CaseFile
 from eigassign.errors import UsageError
 
 Floats = NDArray[np.float64]
-ROUND_OFF = 1e-9  # of the bounds: what is beyond a limit by less is on it
+ROUND_OFF = 1e-6  # of the bounds: round-off, and the steps of difference quotients
 
 
 @dataclass(frozen=True, eq=False)
