@@ -58,9 +58,9 @@ FAIR_ORDER = 5
 # Number of points from which doubling them must halve the error. That ends a hopeless search before
 # MAX_POINTS; without it three shipped cases at 1e-3 and 1e-5 choose the same at the same cost.
 FAIR_COUNT = 8
-# Products of coefficients (2.3 µs each) from which an order is the last if it does not halve the
-# error of that two steps before: order 10 of five variables, 12 of four. Followed on, series that
-# diverge or miss a mode took 10 s and 1.7 GB, to be refused or replaced by several points at last.
+# Products of coefficients (2.3 µs each) above which an order is not tried if that before does not
+# halve the error of that two steps before: 8 of eight variables, 10 of five, 12 of four. Followed
+# on, series that diverge or miss a mode took 10 s and 1.7 GB, and came to nothing.
 LARGE = 100_000
 FARTHEST = 32  # samples at which the radius of convergence is looked at: all have n × N monomials
 
@@ -214,10 +214,10 @@ class _Judge:
         reach = f", {share:.2f} of the radius of convergence" if np.isfinite(share) else ""
         return f"{what}: {error} ({place}{reach})"
 
-    def large(self, one: _Candidate) -> bool:
-        """Whether it has so many coefficients that higher orders must be worth their cost."""
-        n, p = int(self.pencil.active.sum()), one.parts[0].order
-        return comb(2 * n + p, p) > LARGE
+    def large(self, order: int) -> bool:
+        """Whether it has so many coefficients that the orders before must have helped."""
+        n = int(self.pencil.active.sum())
+        return comb(2 * n + order, order) > LARGE
 
     def _split(self, x: Floats) -> tuple[Floats, Floats]:
         """q and y of x."""
@@ -231,7 +231,7 @@ def _candidates(judge: _Judge, x0: Floats, orders: Sequence[int]) -> Iterator[_C
     alone: dict[int, float] = {}  # order: error without neighbours
     for gap in _gaps(judge.pencil, x0, judge.modes):
         earlier = [np.inf, np.inf]  # errors of the orders before
-        for order in orders:
+        for order, following in zip(orders, (*orders[1:], orders[-1]), strict=True):
             one = judge.candidate(x0, order, gap)
             if one.cost >= limit:
                 break
@@ -240,7 +240,7 @@ def _candidates(judge: _Judge, x0: Floats, orders: Sequence[int]) -> Iterator[_C
                 limit = one.cost
                 break
             singles.append(one)
-            if judge.large(one) and not one.error < 0.5 * earlier[-2]:
+            if judge.large(following) and not one.error < 0.5 * earlier[-2]:
                 break
             earlier.append(one.error)
             if gap == CLUSTER_GAP:
