@@ -99,6 +99,8 @@ class ImplicitFunction:
             reached = np.where(ok & ~good, here, reached)
             ok &= good
             p, before, smallest = made.p, made.J, made.smallest
+            if not ok.any():
+                return p, ok, reached
         F, check, _ = self.equations(a, p)
         missed = np.abs(np.concatenate([F, check])).max(axis=0, initial=0.0)
         return p, ok & (missed < ACCEPT), reached
