@@ -53,10 +53,11 @@ def unlike(pencil: Pencil, stored: Sequence[Expansion], wanted: Wanted) -> str |
     plane = _plane(of_x @ wanted.x0, n_a)
     inner = total_degree(plane.shape[1], max(local.space.order for local in locals_))
     on_plane = LocalSpace(inner, locals_[0].to_z @ plane, plane.T @ of_x, 0)
-    found = taylor_vectors(pencil, wanted.x0, wanted.modes, on_plane, None, wanted.cluster_gap)
+    halves = [vector_set(local.space, local.n_linear, None)[0] for local in locals_]
+    order = max(half.order for half in halves)
+    found = taylor_vectors(pencil, wanted.x0, wanted.modes, on_plane, order, wanted.cluster_gap)
     series = [eigenvalue_series(pencil, found.theta, inner, found.space, Y) for Y in found.vectors]
-    for expansion, local in zip(stored, locals_, strict=True):
-        half, _ = vector_set(local.space, local.n_linear, None)
+    for expansion, local, half in zip(stored, locals_, halves, strict=True):
         if not (
             np.array_equal(expansion.x0, wanted.x0)
             and len(expansion.q0) == pencil.n_q
