@@ -37,6 +37,7 @@ class CaseOptions:
     use_cache: bool = True
     force: bool = False
     figures: tuple[str, ...] = ("png",)
+    report: str = "light"
     allow_outside: bool = False
 
 
@@ -70,6 +71,7 @@ def _optimised(path: str, options: CaseOptions) -> Row:
         options.use_cache,
         options.force,
         options.figures,
+        report=options.report,
         allow_outside=options.allow_outside,
     )
     outcome = optimize(Path(path), how)

@@ -108,7 +108,21 @@ figures = click.option(
 )
 
 
-def running(folder: str = "results/<case>") -> Callable[[F], F]:
-    """The options of a command that leaves a run folder, ``folder`` by default."""
+def report_of(usual: str) -> Callable[[F], F]:
+    """``--report`` with its default."""
+    return click.option(
+        "--report",
+        type=click.Choice(["full", "light", "none"]),
+        default=usual,
+        show_default=True,
+        help="report.html: full moves and zooms (5 MB); light has pictures, no script; or none.",
+    )
+
+
+report = report_of("full")
+
+
+def running(folder: str = "results/<case>", usual: str = "full") -> Callable[[F], F]:
+    """The options of a command that leaves a run folder: ``folder`` and ``usual`` by default."""
     out = click.option("--out", type=PATH, help=f"Folder of the run (default: {folder}).")
-    return several(out, caching, force, figures)
+    return several(out, caching, force, figures, report_of(usual))

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 )
 @click.argument("paths", nargs=-1, required=True, type=arguments.PATH)
 @click.option("--jobs", type=click.IntRange(1), help="Processes (default: one per core).")
-@arguments.running("results, with a folder for each case")
+@arguments.running("results, with a folder for each case", "light")
 @arguments.common
 def batch(paths: tuple[Path, ...], jobs: int | None, **how: Any) -> int:
     """Optimize many cases in parallel: files, or folders searched for *.yaml and *.yml.
@@ -43,6 +43,7 @@ def batch(paths: tuple[Path, ...], jobs: int | None, **how: Any) -> int:
         not how["no_cache"],
         how["force"],
         how["figures"],
+        how["report"],
         how["allow_outside"],
     )
     with reporting(how) as reporter:

@@ -99,6 +99,7 @@ def _options(how: Mapping[str, Any], reporter: Reporter) -> Options:
         use_cache=not how["no_cache"],
         force=how.get("force", False),
         figures=how.get("figures", ()),
+        report=how.get("report", "none"),
         study=how.get("study", "none"),
         allow_outside=how["allow_outside"],
         progress=reporter.stage,
@@ -127,6 +128,7 @@ def _show(outcome: Outcome, as_json: bool) -> None:
 @click.option("--out", type=arguments.PATH, help="Folder (default: results/<case>_update).")
 @arguments.force
 @arguments.figures
+@arguments.report
 @arguments.json
 @arguments.common
 def update(case: Path, as_json: bool, **how: Any) -> int:
@@ -226,6 +228,7 @@ def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
 @click.option("--out", type=arguments.PATH, help="Folder (default: results/<case>_chart).")
 @arguments.force
 @arguments.figures
+@arguments.report
 @arguments.json
 @arguments.common
 def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:

@@ -152,9 +152,16 @@ class Model:
         the mass-normalised modes (m per √kg m), rigid motion φ_q included; ``.nodes`` by
         (link, node). Raises UsageError for several samples.
         """
+        self.one(q, y)
+        return self.shapes_along(q, y, count)[0]
+
+    def shapes_along(self, q: ArrayLike, y: ArrayLike, count: int = 3) -> tuple[ModeShapes, ...]:
+        """The same at each of several samples, for a picture that moves."""
         hz, phi = self.modes(q, y, count)
-        found = shapes(self.poses, self.one(q, y), phi[0])
-        return ModeShapes(hz[0], found.strands, found.nodes)
+        found = shapes(self.poses, self.x(q, y), phi)
+        return tuple(
+            ModeShapes(own, one.strands, one.nodes) for own, one in zip(hz, found, strict=True)
+        )
 
     def tracked(self, q: ArrayLike, y: ArrayLike, modes: Sequence[int] = (1,)) -> Tracked:
         """``modes`` of the first sample followed along the samples by their shapes.

@@ -14,7 +14,8 @@ In reading order; each imports from those above it only:
     terminal       the widths of tables that fit a terminal
     console        results on stdout, progress on stderr
     batch_summary  summary.csv and junit.xml of a batch
-    figures        the figures of runs, modes and charts, through matplotlib
+    figures        the figures of runs, modes and charts, on paper and on screen
+    verdict        the first screen of a report
     report         report.html, and what a run or modes leave in a folder
     notebook       figures and tables of a case or result in a notebook
     update_report  the tables and the folder of an update

@@ -171,13 +171,18 @@ def machine(chart: Chart) -> Table:
 # --- The files
 
 
-def write_chart(chart: Chart, folder: Path, formats: Sequence[str] = ("png",)) -> None:
-    """Into ``folder``, which must exist: chart.json, report.html, the figures in these formats."""
+def write_chart(
+    chart: Chart, folder: Path, formats: Sequence[str] = ("png",), kind: str = "full"
+) -> None:
+    """Into ``folder``, which must exist: chart.json, a report of this kind, the figures."""
     (folder / "chart.json").write_text(to_json(chart), encoding="utf-8")
     plans = chart_figures(chart)
     files = report.write_figures(plans, folder, formats)
-    page = report.page(chart, None, tables(chart), plans, files)
-    (folder / "report.html").write_bytes(page)
+    line = chart.advice[0].words if chart.advice else None
+    report.write_page(
+        folder, kind, chart, tables(chart), plans, files,
+        line=line, document=("chart.json", to_json(chart).encode()),
+    )  # fmt: skip
 
 
 def to_json(chart: Chart) -> str:

@@ -8,7 +8,9 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from eigassign.errors import UsageError
-from eigassign.output.figures.style import FigurePlan, applied, encoded, render
+from eigassign.output.figures.graph import FigurePlan
+from eigassign.output.figures.paper import draw, render
+from eigassign.output.figures.style import applied, encoded
 from eigassign.output.tables import Table
 
 if TYPE_CHECKING:
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
 def drawn(plan: FigurePlan) -> Figure:
     """The figure of a plan; a notebook shows it, though pyplot never hears of it."""
     with applied():
-        figure = plan.draw()
+        figure = draw(plan)
 
     def png() -> bytes:
         with applied():

@@ -1,25 +1,30 @@
-"""report.html, one file that needs no other, no network and no script; and folders full of results.
+"""report.html, one file that makes no request; and folders full of results.
 
-A page shows what a run or a chart found: tables, warnings and notes, figures. `write_run` leaves
-everything that a run shows, `write_modes` the mode shapes as figures and as numbers.
+A page begins with the verdict. A full one plots in the browser with Plotly's own script, which it
+carries; a light one shows figures as pictures and has no script. `write_run` leaves everything that
+a run shows, `write_modes` the mode shapes as figures and as numbers.
 """
 
 from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eigassign._version import __version__
+from eigassign.output.figures import screen
+from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.modes import mode_figures
+from eigassign.output.figures.paper import render
 from eigassign.output.figures.run import run_figures
-from eigassign.output.figures.style import FigurePlan, render
-from eigassign.output.formats import percent
 from eigassign.output.result_files import sample_files, to_json
 from eigassign.output.tables import Table, headline, tables
+from eigassign.output.verdict import verdict_of
 from eigassign.study.results import ModePictures, RunResults
 
 if TYPE_CHECKING:
@@ -28,41 +33,104 @@ if TYPE_CHECKING:
     from eigassign.chart.results import Chart
     from eigassign.study.updating.fit import UpdateResults
 
+KINDS = ("full", "light", "none")
+LIGHT = 900_000  # bytes of the pictures in a light report, at most
+
 # --- The page
 
 _TEMPLATES = Path(__file__).parent / "templates"
 _EMBEDDED = {".png": "image/png", ".svg": "image/svg+xml"}  # the first that there is
 
 
-def to_html(results: RunResults, plans: Sequence[FigurePlan], files: Mapping[str, bytes]) -> bytes:
-    """The report of a run as UTF-8; ``files`` holds what `render` made of ``plans``."""
-    return page(results, headline(results), tables(results), plans, files)
+@dataclass(frozen=True)
+class Shown:
+    """One figure on a page: plots of these heights in pixels, or a picture, or the files' names."""
+
+    plan: FigurePlan
+    parts: tuple[int, ...] = ()
+    image: str | None = None
+    files: tuple[str, ...] = ()
+    columns: tuple[str, ...] = ()
+    rows: Sequence[tuple[str, ...]] = ()
 
 
 def page(
     f: RunResults | Chart | UpdateResults,
-    line: str | None,
     shown: Sequence[Table],
     plans: Sequence[FigurePlan],
     files: Mapping[str, bytes],
+    *,
+    line: str | None = None,
+    tone: str = "fair",
+    first: int = 1,
+    full: bool = True,
+    document: tuple[str, bytes] | None = None,
 ) -> bytes:
-    """Any page of ours: what ``f`` is about, its headline ``line``, tables, notes, figures.
+    """Any page of ours as UTF-8; ``files`` holds what `render` made of ``plans``.
 
-    A figure that was written as PDF only is named in its place; of one that was not written
-    nothing is said.
+    A run begins with its verdict, another page with its ``line`` in a ``tone`` (good, fair, bad);
+    then come the ``first`` figures, and all else below. ``document`` is what can be saved as a
+    file of this name. What a light page cannot hold as a picture is named.
     """
-    figures = []
+    run = f if isinstance(f, RunResults) else None
+    graphs = {p.name: screen.figures(p.shows) for p in plans if full and not callable(p.shows)}
+    moving = run.moving if run is not None and full else ()
+    several = len(run.trajectories) > 1 if run is not None else False
+    html = _template().render(
+        f=f,
+        verdict=None if run is None else verdict_of(run),
+        headline=line,
+        tone=tone,
+        tables=shown,
+        figures=list(_shown(plans, graphs, files)),
+        first=first,
+        moving=[(mode.name, mode.trajectory, several) for mode in moving],
+        moving_json=_inside(screen.moving(moving)) if full else "",
+        figures_json=_inside(graphs) if full else "",
+        document=document[1].decode().replace("<", "\\u003c") if document and full else "",
+        document_name=document[0] if document else "",
+        plotly=_plotly() if full else "",
+        script=(_TEMPLATES / "report.js").read_text("utf-8") if full else "",
+    )
+    return (html + "\n").encode("utf-8", "xmlcharrefreplace")
+
+
+def _inside(data: Any) -> str:
+    """JSON that no browser takes for the end of its script."""
+    text = json.dumps(data, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c")
+
+
+@cache
+def _plotly() -> str:
+    """Plotly's script, from the package's data: its Python side is never imported."""
+    return (resources.files("plotly") / "package_data" / "plotly.min.js").read_text("utf-8")
+
+
+def _shown(
+    plans: Sequence[FigurePlan],
+    graphs: Mapping[str, list[dict[str, Any]]],
+    files: Mapping[str, bytes],
+) -> Iterator[Shown]:
+    """Plots where there are any, with some of their numbers; else pictures while there is room.
+
+    Of a figure that was not written nothing is said.
+    """
+    size = 0
     for plan in plans:
+        if plan.name in graphs and not callable(plan.shows):
+            heights = tuple(one["layout"]["height"] for one in graphs[plan.name])
+            columns, rows = screen.table(plan.shows)
+            yield Shown(plan, heights, columns=columns, rows=rows)
+            continue
         own = {Path(name).suffix: name for name in files if Path(name).stem == plan.name}
         kind = next((kind for kind in _EMBEDDED if kind in own), None)
-        image = None
-        if kind is not None:
-            text = base64.b64encode(files[own[kind]]).decode()
-            image = f"data:{_EMBEDDED[kind]};base64,{text}"
+        text = "" if kind is None else base64.b64encode(files[own[kind]]).decode()
+        size += len(text)
+        fits = kind is not None and size <= LIGHT
+        image = f"data:{_EMBEDDED[kind]};base64,{text}" if kind is not None and fits else None
         if own:
-            figures.append((plan, image, list(own.values())))
-    html = _template().render(f=f, headline=line, tables=shown, figures=figures)
-    return (html + "\n").encode("utf-8", "xmlcharrefreplace")
+            yield Shown(plan, image=image, files=tuple(own.values()))
 
 
 @cache
@@ -77,25 +145,54 @@ def _template() -> Template:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["percent"] = percent
     return environment.get_template("report.html.j2")
 
 
 # --- What is left in a folder
 
 
-def write_run(results: RunResults, folder: Path, formats: Sequence[str] = ("png",)) -> None:
+def write_run(
+    results: RunResults, folder: Path, formats: Sequence[str] = ("png",), kind: str = "full"
+) -> None:
     """results.json, report.html, CSV files and the figures in these formats, in ``folder``.
 
-    It must exist and be empty. Wrap it in :func:`eigassign.output.run_folder.run_folder` to have
-    them whole or not at all.
+    ``kind`` is one of `KINDS`. The folder must exist and be empty. Wrap it in
+    :func:`eigassign.output.run_folder.run_folder` to have them whole or not at all.
     """
-    (folder / "results.json").write_bytes(to_json(results))
+    document = to_json(results)
+    (folder / "results.json").write_bytes(document)
     for name, data in sample_files(results).items():
         (folder / name).write_bytes(data)
-    plans = run_figures(results)
+    plans = run_figures(results) if formats or kind != "none" else ()
     files = write_figures(plans, folder, formats)
-    (folder / "report.html").write_bytes(to_html(results, plans, files))
+    write_page(
+        folder, kind, results, tables(results), plans, files,
+        line=headline(results), document=("results.json", document),
+        first=sum(plan.name.startswith("frequencies") for plan in plans),
+    )  # fmt: skip
+
+
+def write_page(
+    folder: Path,
+    kind: str,
+    f: RunResults | Chart | UpdateResults,
+    shown: Sequence[Table],
+    plans: Sequence[FigurePlan],
+    files: Mapping[str, bytes],
+    *,
+    line: str | None,
+    document: tuple[str, bytes],
+    tone: str = "fair",
+    first: int = 1,
+) -> None:
+    """report.html of one of `KINDS` in ``folder``; the rest is that of `page`."""
+    if kind == "none":
+        return
+    html = page(
+        f, shown, plans, files,
+        line=line, tone=tone, first=first, full=kind == "full", document=document,
+    )  # fmt: skip
+    (folder / "report.html").write_bytes(html)
 
 
 def write_figures(

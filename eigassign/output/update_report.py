@@ -134,13 +134,19 @@ def measurements(results: UpdateResults, most: int | None = None) -> Table:
 # --- The files
 
 
-def write_update(results: UpdateResults, folder: Path, formats: Sequence[str] = ("png",)) -> None:
-    """Into ``folder``, which must exist: results.json, report.html, figures in these formats."""
-    (folder / "results.json").write_text(dumps(document(results)) + "\n", encoding="utf-8")
+def write_update(
+    results: UpdateResults, folder: Path, formats: Sequence[str] = ("png",), kind: str = "full"
+) -> None:
+    """Into ``folder``, which must exist: results.json, a report of this kind, figures."""
+    data = f"{dumps(document(results))}\n".encode()
+    (folder / "results.json").write_bytes(data)
     plans = update_figures(results)
     files = report.write_figures(plans, folder, formats)
-    page = report.page(results, headline(results), tables(results), plans, files)
-    (folder / "report.html").write_bytes(page)
+    report.write_page(
+        folder, kind, results, tables(results), plans, files,
+        line=headline(results), tone="good" if results.verdict == "fitted" else "bad",
+        first=len(plans), document=("results.json", data),
+    )  # fmt: skip
 
 
 def document(results: UpdateResults) -> dict[str, Any]:

@@ -39,7 +39,7 @@ def chart(path: str | Path, options: Options, effort: Effort, request: Request) 
     with new_run_folder(case.file, options.out, options.force) as folder:
         made = chart_case(case, options, effort, request)
         options.progress("writing the chart")
-        write_chart(made, folder.hidden, options.figures)
+        write_chart(made, folder.hidden, options.figures, options.report)
         (folder.hidden / "case.yaml").write_text(case.file.resolved(), encoding="utf-8")
     return Charted(folder.path, made)
 

@@ -20,8 +20,8 @@ from eigassign.mechanism.kinematics.parameters import written_loads
 from eigassign.mechanism.kinematics.travel_limits import resting_pose
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.model import Model
+from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.motion import mechanism_plan
-from eigassign.output.figures.style import FigurePlan
 from eigassign.output.report import write_figures
 from eigassign.pipeline.expansions import ExpansionSize, expansion_size
 from eigassign.pipeline.run_files import RESULTS, new_run_folder

@@ -20,8 +20,8 @@ from eigassign.errors import EigassignError
 from eigassign.modal.expansion import Expansion, NearestExpansion
 from eigassign.output import tables
 from eigassign.output.cache import Cache, default_directory
+from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.run import run_figures
-from eigassign.output.figures.style import FigurePlan
 from eigassign.output.formats import number
 from eigassign.output.notebook import Pictured, html
 from eigassign.output.result_files import frequency_columns
@@ -49,8 +49,9 @@ from eigassign.study.design.followed import (
 from eigassign.study.design.judgement import SolvedDesigns, study_targets
 from eigassign.study.design.wanted import target_frequencies
 from eigassign.study.meaning.overall import Studies, study_meaning
+from eigassign.study.moving import moving_modes
 from eigassign.study.planning import plan_expansion
-from eigassign.study.results import DesignRow, RunResults
+from eigassign.study.results import DesignRow, MovingMode, RunResults, TargetStudy
 from eigassign.study.scene import Expansions, Scene
 
 Floats = NDArray[np.float64]
@@ -65,6 +66,7 @@ class Options:
     use_cache: bool = True
     force: bool = False  # a folder that another case wrote is moved aside
     figures: tuple[str, ...] = ("png",)  # of png, svg and pdf; none are drawn if empty
+    report: str = "full"  # full, light or none
     study: str = "cheap"  # of what the answer means: none, cheap or all
     allow_outside: bool = False  # the case may name files outside its own folder
     progress: Callable[[str], None] = field(
@@ -168,7 +170,8 @@ def solve_case(case: Case, options: Options = DEFAULT) -> Result:
             asked = Studies(options.study)
             meaning = study_meaning(scene, answer, wanted, exact, accepted, asked)
     found = VerifiedAssignment(answer, tuple(wanted), targets, initial, exact, meaning)
-    results = collect_results(scene, studies, found, stages.timing_s)
+    moving = _moving(scene, answer.y, targets, options)
+    results = replace(collect_results(scene, studies, found, stages.timing_s), moving=moving)
     return _result(results, scene.expansions, answer.one_shot)
 
 
@@ -182,6 +185,23 @@ def _one_shot(scene: Scene, answer: Answer, exact: Solved) -> tuple[Solved | Non
         return solve_design(scene, (), answer.one_shot.y), ()
     except EigassignError as error:  # a pose that its lengths cannot reach, say
         return None, (f"no errors of the one-shot design: {error}",)
+
+
+def _moving(
+    scene: Scene, y: Floats, targets: Sequence[TargetStudy], options: Options
+) -> tuple[MovingMode, ...]:
+    """The first wanted mode at design y, if a report shows it; of no targets the first expanded."""
+    if options.report != "full" or scene.trajectory is None:
+        return ()
+    numbers = np.full(len(scene.path.q), np.nan)
+    target = next((t for t in targets if t.kind == "frequency"), next(iter(targets), None))
+    if target is None:
+        name, numbers[:] = f"mode {scene.expansions.modes[0]}", scene.expansions.modes[0]
+    elif target.followed is None:
+        name, numbers[target.rows] = target.curve_name, target.mode
+    else:
+        name, numbers[target.rows] = target.curve_name, target.followed.exact_numbers
+    return moving_modes(scene.file, scene.model, scene.path, y, name, numbers)
 
 
 def prepare(
@@ -243,7 +263,7 @@ def optimize(path: str | Path, options: Options = DEFAULT) -> Outcome:
     with new_run_folder(case.file, options.out, options.force) as folder:
         results = solve_case(case, options).results
         options.progress("writing the report")
-        folder.write(results, options.figures)
+        folder.write(results, options.figures, options.report)
     return _outcome(folder, results, stages)
 
 
@@ -266,9 +286,11 @@ def expand_case(
         with stages("comparison", "comparing the expansion with exact frequencies"):
             studies = study_modes(scene)
             scene = _with_accuracy(scene)
+        moving = _moving(scene, scene.initial, (), options)
         results = collect_results(scene, studies, None, stages.timing_s)
+        results = replace(results, moving=moving)
         options.progress("writing the report")
-        folder.write(results, options.figures, coefficient_files(scene, linear))
+        folder.write(results, options.figures, options.report, coefficient_files(scene, linear))
     return _outcome(folder, results, stages)
 
 

@@ -28,10 +28,11 @@ class RunFolder:
         self,
         results: RunResults,
         formats: Sequence[str],
+        kind: str,
         extra: Mapping[str, bytes] | None = None,
     ) -> None:
-        """Results, report, figures in these formats; the case; the log; ``extra`` by name."""
-        report.write_run(results, self.hidden, formats)
+        """Results, report of this kind, figures in these formats; case; log; ``extra`` by name."""
+        report.write_run(results, self.hidden, formats, kind)
         texts = {"case.yaml": self.file.resolved(), "log.txt": log_text(results)}
         encoded = {name: text.encode() for name, text in texts.items()}
         for name, data in {**encoded, **(extra or {})}.items():

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from eigassign.brief import cut
-from eigassign.output.figures.style import FigurePlan
+from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.update import update_figures
 from eigassign.output.notebook import Pictured, html
 from eigassign.output.update_report import console_tables, headline, write_update
@@ -55,7 +55,7 @@ def update(path: str | Path, options: Options) -> Updated:
     with new_run_folder(case.file, options.out, options.force) as folder:
         found = update_case(case, options)
         options.progress("writing the report")
-        write_update(found.results, folder.hidden, options.figures)
+        write_update(found.results, folder.hidden, options.figures, options.report)
         for name, file in (("case.yaml", case.file), ("updated.yaml", found.case.file)):
             (folder.hidden / name).write_text(file.resolved(), encoding="utf-8")
     return replace(found, folder=folder.path)

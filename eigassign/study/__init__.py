@@ -13,6 +13,7 @@ Reading order:
     meaning     what the answer means, as far as the user asks for it
     accuracy    errors of mesh, reduction, expansion and round-off; whether the motion is slow
     drawing     the mechanism as lines and symbols: in poses, and in its modes
+    moving      one mode along the trajectory, for a picture that moves
     updating    parameters from measured frequencies
     collect     all of it put together as the results of a run
 """

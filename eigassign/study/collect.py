@@ -79,6 +79,7 @@ def collect_results(
         design=() if assigned is None else design_rows(scene, assigned.answer.y),
         targets=() if assigned is None else assigned.targets,
         others=None if assigned is None else _others(scene, assigned),
+        spectrum=None if assigned is None else _spectrum(scene, assigned),
         solver=_solver(assigned),
         assignment=row,
         warnings=(*scene.warnings, *_warnings(scene, assigned), *reach, *motion[1]),
@@ -160,6 +161,14 @@ def _others(scene: Scene, assigned: VerifiedAssignment) -> OtherModes | None:
     columns = [mode - 1 for mode in rest]
     before, after = assigned.initial.hz[:, columns], assigned.exact.hz[:, columns]
     return OtherModes(tuple(rest), before, after)
+
+
+def _spectrum(scene: Scene, assigned: VerifiedAssignment) -> OtherModes:
+    """All modes from the lowest to the one above the highest that a target names."""
+    highest = max((mode for target in assigned.targets for mode in _modes(target)), default=1)
+    modes = scene.shown_modes[: highest + 1]
+    before, after = (solved.hz[:, : len(modes)] for solved in (assigned.initial, assigned.exact))
+    return OtherModes(modes, before, after)
 
 
 def _modes(target: TargetStudy) -> set[int]:

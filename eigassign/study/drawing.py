@@ -87,7 +87,7 @@ def draw_modes(file: CaseFile, model: Model, q: Floats, y: Floats, count: int) -
     """
     shapes, x = model.shapes(q, y, count), model.one(q, y)
     n_q = len(model.q_names)
-    scales = AMPLITUDE * _extent(shapes) / _largest(shapes) * _phase(shapes)
+    scales = AMPLITUDE * extent_of(shapes) / largest_of(shapes) * _phase(shapes)
     coordinates = zip(model.q_names, x[0, :n_q], file.q_units, strict=True)
     design = zip(model.y_names, x[0, n_q:], file.design_units, strict=True)
     return ModePictures(
@@ -102,12 +102,12 @@ def draw_modes(file: CaseFile, model: Model, q: Floats, y: Floats, count: int) -
     )
 
 
-def _extent(shapes: ModeShapes) -> float:
+def extent_of(shapes: ModeShapes) -> float:
     """Diagonal of the box that holds the rigid links, m."""
     return float(np.linalg.norm(np.ptp(np.concatenate([s.places for s in shapes.strands]), axis=0)))
 
 
-def _largest(shapes: ModeShapes) -> Floats:
+def largest_of(shapes: ModeShapes) -> Floats:
     """The largest displacement in each mode, (count,)."""
     each = [np.linalg.norm(strand.motions, axis=2).max(axis=1) for strand in shapes.strands]
     return np.asarray(np.max(each, axis=0))

@@ -553,6 +553,26 @@ class ModePictures(Brief):
     deformed: DrawnPoses  # a pose a mode
 
 
+@dataclass(frozen=True)
+class MovingMode:
+    """One mode at n poses along a trajectory, its largest displacement alike in all of them.
+
+    Lines of ``rest`` (n, n_points, d) with ``motions`` of the same shapes, half a period apart from
+    − to +; ``marks`` are joints and bodies by name and kind, at ``mark_places`` (n, n_marks, d).
+    """
+
+    name: str  # "mode 1"
+    trajectory: str
+    time_s: Floats  # (n,)
+    hz: Floats  # (n,)
+    rest: tuple[Floats, ...]
+    motions: tuple[Floats, ...]
+    marks: tuple[tuple[str, str], ...]  # name; turning, sliding, fixed or body
+    mark_places: Floats
+    mark_motions: Floats
+    tip_path: Floats | None = None  # (…, d)
+
+
 # --- Everything together
 
 
@@ -608,6 +628,8 @@ class RunResults(Brief):
     discretisation: MeshError | None = None
     only: str | None = None  # of several trajectories the one that these are results of
     meaning: Meaning = field(default_factory=Meaning)
+    spectrum: OtherModes | None = None  # every mode up to the one above the highest asked for
+    moving: tuple[MovingMode, ...] = ()  # of every trajectory, where a report shows it
 
     @property
     def along(self) -> str:
@@ -720,6 +742,7 @@ def _along(results: RunResults, row: TrajectoryRow) -> RunResults:
         studies=tuple(_study(study, rows) for study in results.studies),
         targets=tuple(target for target in targets if target is not None),
         others=None if others is None else others.part(rows),
+        spectrum=None if results.spectrum is None else results.spectrum.part(rows),
     )
 
 

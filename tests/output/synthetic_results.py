@@ -78,6 +78,7 @@ def make_results(
         design=tuple(_design_row(i, prefix) for i in range(n_y)),
         targets=targets,
         others=_others(time, n_targets, scale_hz) if n_t else None,
+        spectrum=_spectrum(targets, _others(time, n_targets, scale_hz)) if targets else None,
         solver=SolverRow("solved", 25, 3.1e-17, 2.2e-14, 1.5e-16) if n_y else None,
         assignment=_assignment(n_y, prefix) if targets else None,
         warnings=("section 'rod': <area> & inertia look odd",),
@@ -316,6 +317,13 @@ def _others(time: Floats, n_targets: int, scale: float) -> OtherModes:
     levels = scale * np.array([490.0, 720.0, 1100.0])
     initial = levels * (1.0 + 0.05 * np.outer(np.sin(4 * time), [1.0, -0.4, 0.3]))
     return OtherModes(modes, initial, initial * np.array([0.93, 0.97, 0.99]))
+
+
+def _spectrum(targets: tuple[TargetStudy, ...], others: OtherModes) -> OtherModes:
+    initial = [*(target.initial_hz for target in targets), others.initial_hz[:, 0]]
+    optimal = [*(target.exact_hz for target in targets), others.optimal_hz[:, 0]]
+    modes = tuple(range(1, len(initial) + 1))
+    return OtherModes(modes, np.stack(initial, axis=1), np.stack(optimal, axis=1))
 
 
 def _design_row(index: int, prefix: str) -> DesignRow:

@@ -29,7 +29,9 @@ from eigassign.chart.results import (
 from eigassign.output import chart_report
 from eigassign.output.chart_report import write_chart
 from eigassign.output.figures import style
-from eigassign.output.figures.front import MethodLine, chart_figures, line_style, scatter
+from eigassign.output.figures.front import MethodLine, chart_figures, line_look, scatter
+from eigassign.output.figures.graph import FigurePlan
+from eigassign.output.figures.paper import draw, render
 
 
 def timing(seconds: float, repeats: int = 5) -> Timing:
@@ -113,11 +115,11 @@ CHART = Chart(
 
 def test_every_figure_has_a_name_of_its_own_and_is_drawn() -> None:
     plans = chart_figures(CHART)
-    files = style.render(plans)
+    files = render(plans)
     names = ("cost_one_trajectory", "online_alone", "mesh", "designs")
     assert set(files) == {f"{name}.png" for name in names}
     assert all(data.startswith(b"\x89PNG") for data in files.values())
-    assert style.render(plans) == files
+    assert render(plans) == files
 
 
 def test_captions_tell_what_is_not_drawn() -> None:
@@ -143,7 +145,7 @@ def test_the_mesh_is_drawn_beside_a_taylor_polynomial_that_is_right_somehow(
     plan = next(p for p in chart_figures(chart) if p.name == "mesh")
     assert words in plan.caption
     with style.applied():
-        (axes,) = plan.draw().axes
+        (axes,) = draw(plan).axes
     said = [text.get_text() for text in axes.texts]
     assert said == (["error of Taylor 4 full"] if "dashed" in plan.caption else [])
 
@@ -167,7 +169,7 @@ def test_the_json_holds_every_point_and_no_numbers_that_json_has_not(tmp_path: P
 
 
 def test_the_page_shows_tables_and_figures_and_escapes_titles(tmp_path: Path) -> None:
-    write_chart(CHART, tmp_path)
+    write_chart(CHART, tmp_path, kind="light")
     page = (tmp_path / "report.html").read_text()
     assert "An &lt;arm&gt; &amp; more" in page
     assert page.count("data:image/png;base64") == 4
@@ -206,7 +208,7 @@ def test_what_auto_takes_is_ringed() -> None:
     plan = chart_figures(CHART)[0]
     bare = chart_figures(replace(CHART, advice=()))[0]
     with style.applied():
-        ringed, plain = plan.draw(), bare.draw()
+        ringed, plain = draw(plan), draw(bare)
     (ring,) = [line for line in ringed.axes[0].get_lines() if line.get_markersize() == 12.0]
     np.testing.assert_allclose(ring.get_xydata(), [(CHART.points[1].total_s(152.0), 0.1)])
     assert "taken by order: auto" in words(ringed)
@@ -219,7 +221,7 @@ def words(figure: Figure) -> list[str]:
 
 def test_points_are_drawn_by_family_and_the_front_as_steps_through_the_best() -> None:
     with style.applied():
-        figure = chart_figures(CHART)[1].draw()
+        figure = draw(chart_figures(CHART)[1])
     (axes,) = figure.axes
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("time [s]", "worst error [Hz]")
@@ -230,14 +232,14 @@ def test_points_are_drawn_by_family_and_the_front_as_steps_through_the_best() ->
     np.testing.assert_array_equal(shown["Taylor, full"].get_xydata(), [(1e-7, 0.1)])
     np.testing.assert_array_equal(shown["grid, linear"].get_xydata(), [(2e-7, 0.01)])
     assert shown["grid, linear"].get_markerfacecolor() == "white"
-    (steps,) = [line for line in axes.get_lines() if line.get_drawstyle() == "steps-post"]
-    np.testing.assert_array_equal(steps.get_ydata()[:2], [0.1, 0.01])
+    (steps,) = [line for line in axes.get_lines() if line.get_linewidth() == 7.0]
+    np.testing.assert_array_equal(steps.get_ydata()[1:5], [0.1, 0.1, 0.01, 0.01])
 
 
 def test_no_two_lines_of_a_kind_share_colour_and_shape() -> None:
     for ours in (True, False):
-        looks = [line_style(k, ours) for k in range(16)]
-        assert len({(look["color"], look["marker"]) for look in looks}) == 16
+        looks = [line_look(k, ours) for k in range(16)]
+        assert len({(look.colour, look.marker) for look in looks}) == 16
 
 
 def test_a_time_measured_once_says_so() -> None:
@@ -247,9 +249,9 @@ def test_a_time_measured_once_says_so() -> None:
 
 def test_points_without_a_front_and_a_single_line_can_be_drawn() -> None:
     with style.applied():
-        figure = scatter(
-            "t", ("x", "s"), ("y", "Hz"), [MethodLine("a", np.ones(1), np.ones(1), True)]
-        )
+        lines = [MethodLine("a", np.ones(1), np.ones(1), True)]
+        shown = scatter("t", ("x", "s"), ("y", "Hz"), lines)
+        figure = draw(FigurePlan("", "", "", "", shown))
         assert style.encoded(figure, "png").startswith(b"\x89PNG")
     assert words(figure) == ["a"]
     low, high = figure.axes[0].get_xlim()

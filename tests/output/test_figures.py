@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 from synthetic_results import as_limit, make_results, studied
 
-from eigassign.output.figures import curves, style
+from eigassign.output.figures import graph, style
+from eigassign.output.figures.paper import draw, render
 from eigassign.output.figures.run import run_figures
 from eigassign.study.results import OtherModes, RunResults
 
@@ -40,12 +41,12 @@ def paper() -> RunResults:
 
 @pytest.fixture(scope="module")
 def files(paper: RunResults) -> dict[str, bytes]:
-    return style.render(run_figures(paper))
+    return render(run_figures(paper))
 
 
 def drawn(results: RunResults) -> dict[str, Figure]:
     with style.applied():
-        return {plan.name: plan.draw() for plan in run_figures(results)}
+        return {plan.name: draw(plan) for plan in run_figures(results)}
 
 
 def title(figure: Figure) -> str:
@@ -64,21 +65,22 @@ def pixels(data: bytes) -> np.ndarray:
 
 def test_the_paper_s_case_has_all_of_its_figures(files):
     assert list(files) == [
+        "frequencies.png",
         "mechanism.png",
-        "coordinates.png",
+        "assignment_mode_1.png",
+        "other_modes.png",
+        "progress.png",
         "approximation_mode_1_time.png",
         "approximation_mode_1_q.png",
         "approximation_mode_1_design.png",
-        "progress.png",
-        "assignment_mode_1.png",
-        "other_modes.png",
+        "coordinates.png",
     ]
 
 
 @pytest.mark.parametrize("options", EVERY.values(), ids=EVERY)
 def test_every_kind_of_results_gives_figures_with_nothing_over_their_edge(options):
-    files = style.render(run_figures(studied(make_results(**options))))
-    assert len(files) >= 10
+    files = render(run_figures(studied(make_results(**options))))
+    assert len(files) >= 11
     for name, data in files.items():
         image = pixels(data)
         assert image.shape[1] == 880, name
@@ -155,7 +157,7 @@ def test_steps_that_miss_limits_say_by_how_much(paper):
     row = dataclasses.replace(paper.assignment, steps=tuple(steps))
     above, below = drawn(dataclasses.replace(paper, assignment=row))["progress"].axes
     assert below.get_ylabel() == "limits missed [%]"
-    taken = next(line for line in below.get_lines() if line.get_label() == "taken")
+    _, taken = below.get_lines()[:2]
     assert taken.get_ydata()[0] == pytest.approx(3.0)
     assert above.get_ylabel() == "rms error [%]"
 
@@ -279,27 +281,27 @@ def test_the_mechanism_is_drawn_at_one_scale_in_all_directions(spatial):
     assert legend(figure)[:3] == ["tip path", "elbow_mass", "tool_mass"]
     assert len(legend(figure)) == 3 + len(found.poses.lines)
     if not spatial:
-        tip = next(line for line in axes.get_lines() if line.get_color() == style.VERMILLION)
+        tip = next(line for line in axes.get_lines() if line.get_color() == graph.VERMILLION)
         np.testing.assert_array_equal(tip.get_xydata(), found.poses.tip_path)
 
 
 def test_several_formats_write_each_figure_in_each(paper):
     plans = run_figures(paper)[:2]
-    files = style.render(plans, ("png", "svg", "pdf"))
+    files = render(plans, ("png", "svg", "pdf"))
     assert list(files) == [
-        f"{name}.{kind}" for name in ("mechanism", "coordinates") for kind in style.FORMATS
+        f"{name}.{kind}" for name in ("frequencies", "mechanism") for kind in style.FORMATS
     ]
-    assert files["coordinates.png"].startswith(b"\x89PNG")
-    assert files["coordinates.pdf"].startswith(b"%PDF")
-    assert ET.fromstring(files["coordinates.svg"]).tag.endswith("svg")
-    assert style.render(plans, ()) == {}
+    assert files["mechanism.png"].startswith(b"\x89PNG")
+    assert files["mechanism.pdf"].startswith(b"%PDF")
+    assert ET.fromstring(files["mechanism.svg"]).tag.endswith("svg")
+    assert render(plans, ()) == {}
 
 
 @pytest.mark.parametrize("kind", style.FORMATS)
 def test_drawing_twice_gives_the_same_bytes(paper, kind):
     plans = run_figures(paper)[::3]
-    files = style.render(plans, (kind,))
-    assert style.render(plans, (kind,)) == files
+    files = render(plans, (kind,))
+    assert render(plans, (kind,)) == files
     for word in (b"CreationDate", b"dc:date"):
         assert not any(word in data for data in files.values())
 
@@ -307,12 +309,12 @@ def test_drawing_twice_gives_the_same_bytes(paper, kind):
 def test_the_user_s_matplotlib_settings_change_nothing(paper, files):
     theirs = {"font.size": 30, "font.family": "monospace", "path.simplify": False}
     with matplotlib.rc_context({**theirs, "text.hinting": "force_autohint", "axes.grid": False}):
-        assert style.render(run_figures(paper)) == files
+        assert render(run_figures(paper)) == files
 
 
 def test_drawing_leaves_the_user_s_settings_alone(paper):
     before = dict(matplotlib.rcParams)
-    style.render(run_figures(paper)[:1])
+    render(run_figures(paper)[:1])
     assert dict(matplotlib.rcParams) == before
 
 
@@ -320,8 +322,11 @@ def test_another_answer_gives_another_picture(paper, files):
     target = paper.targets[0]
     moved = dataclasses.replace(target, exact_hz=target.exact_hz * 1.01)
     other = dataclasses.replace(paper, targets=(moved,))
-    changed = style.render(run_figures(other))
-    assert [name for name in files if changed[name] != files[name]] == ["assignment_mode_1.png"]
+    changed = render(run_figures(other))
+    assert [name for name in files if changed[name] != files[name]] == [
+        "frequencies.png",
+        "assignment_mode_1.png",
+    ]
 
 
 def test_results_without_a_trajectory_plan_only_what_they_have():
@@ -340,13 +345,13 @@ def test_an_expansion_that_fails_somewhere_is_still_drawn(paper):
     target = dataclasses.replace(paper.targets[0], predicted_hz=np.full(paper.time_s.size, np.nan))
     studies = (dataclasses.replace(study, over_design=over),)
     found = dataclasses.replace(paper, studies=studies, targets=(target,))
-    assert len(style.render(run_figures(found))) == 8
+    assert len(render(run_figures(found))) == 9
 
 
 def test_a_map_on_which_nothing_varies_is_filled_and_not_left_blank():
     found = make_results(varies=False)
     plans = [p for p in run_figures(found) if p.name.endswith("_design")]
-    (image,) = map(pixels, style.render(plans).values())
+    (image,) = map(pixels, render(plans).values())
     middle = image[image.shape[0] // 2]
     assert (middle < 200).all(axis=1).mean() > 0.5
 
@@ -356,7 +361,7 @@ SPANS = [(0.0, 1.0), (-3.0, 5.0), (190.0, 190.0), (0.0, 0.0), (123456.0, 123456.
 
 @pytest.mark.parametrize("span", SPANS)
 def test_bounds_enclose_all_values_and_are_never_one(span):
-    low, high = style.bounds([np.array([np.nan, *span])])
+    low, high = graph.bounds([np.array([np.nan, *span])])
     assert low <= span[0] <= span[1] <= high
     assert high - low > 1e-6 * abs(high)
 
@@ -373,13 +378,15 @@ def test_bounds_enclose_all_values_and_are_never_one(span):
     ],
 )
 def test_decades_hold_all_values_or_the_highest(values, most, limits):
-    assert style.decades([np.array(values)], most) == pytest.approx(limits, abs=0.0)
+    assert graph.decades([np.array(values)], most) == pytest.approx(limits, abs=0.0)
 
 
 def test_the_lowest_label_of_a_logarithmic_axis_owns_up_to_what_it_cuts():
+    errors = graph.Curve(np.array([0.0, 0.02, 0.5]), graph.Look(graph.BLUE))
+    panel = graph.Panel("error", (errors,), logarithmic=True)
+    shown = graph.Graph("", "", np.arange(3.0), (panel,))
     with style.applied():
-        _, (axes,) = curves.stacked("", "", (2.0,))
-        curves.plot_logarithmic(axes, np.arange(3.0), [(np.array([0.0, 0.02, 0.5]), {})], "error")
+        (axes,) = draw(graph.FigurePlan("", "", "", "", shown)).axes
     show = axes.yaxis.get_major_formatter()
     assert axes.get_ylim() == (0.01, 1.0)
     assert [show(at) for at in (0.01, 0.1, 1.0)] == ["≤0.01", "0.1", "1"]
@@ -387,7 +394,7 @@ def test_the_lowest_label_of_a_logarithmic_axis_owns_up_to_what_it_cuts():
 
 
 def test_powers_of_ten_are_written_as_people_read_them():
-    assert [style.power(at) for at in (1e-7, 1e-3, 1.0, 1e4, 1e5)] == [
+    assert [graph.power(at) for at in (1e-7, 1e-3, 1.0, 1e4, 1e5)] == [
         "10⁻⁷",
         "0.001",
         "1",
@@ -397,23 +404,23 @@ def test_powers_of_ten_are_written_as_people_read_them():
 
 
 def test_labels_at_curve_ends_are_moved_apart_and_no_further():
-    assert curves.spread([0.0, 1.0], 0.2) == [0.0, 1.0]
-    np.testing.assert_allclose(curves.spread([0.5, 0.5, 0.5], 0.2), [0.3, 0.5, 0.7])
-    np.testing.assert_allclose(curves.spread([0.0, 0.1, 0.25], 0.2), [-1 / 12, 7 / 60, 19 / 60])
-    assert curves.spread([], 0.2) == []
+    assert graph.spread([0.0, 1.0], 0.2) == [0.0, 1.0]
+    np.testing.assert_allclose(graph.spread([0.5, 0.5, 0.5], 0.2), [0.3, 0.5, 0.7])
+    np.testing.assert_allclose(graph.spread([0.0, 0.1, 0.25], 0.2), [-1 / 12, 7 / 60, 19 / 60])
+    assert graph.spread([], 0.2) == []
 
 
 def test_neighbouring_curves_never_differ_by_colour_alone():
-    looks = [style.series(i) for i in range(12)]
+    looks = [graph.series(i) for i in range(12)]
     assert len({str(look) for look in looks}) == 12
     for first, second in itertools.pairwise(looks):
-        assert first["linestyle"] != second["linestyle"]
+        assert first.dash != second.dash
 
 
 def test_names_lose_their_control_characters_and_their_middle():
-    assert style.short("a\x1b[31mb\n") == "a [31mb"
-    assert len(style.short("x" * 500)) == 34
-    assert style.short("begin" + "x" * 50 + "end").endswith("end")
+    assert graph.short("a\x1b[31mb\n") == "a [31mb"
+    assert len(graph.short("x" * 500)) == 34
+    assert graph.short("begin" + "x" * 50 + "end").endswith("end")
 
 
 def test_numbers_beside_maps_never_run_into_each_other(paper):

@@ -14,7 +14,7 @@ from PIL import Image
 from synthetic_results import make_results
 
 import eigassign as ea
-from eigassign.output.figures import style
+from eigassign.output.figures import graph, style
 from eigassign.output.figures.mechanism import (
     diameters,
     draw_links,
@@ -26,6 +26,7 @@ from eigassign.output.figures.mechanism import (
     view_of,
 )
 from eigassign.output.figures.modes import mode_figures, thumbnail
+from eigassign.output.figures.paper import draw, render
 from eigassign.output.report import write_modes
 from eigassign.study.drawing import draw_modes
 from eigassign.study.planning import with_middle_loads
@@ -55,7 +56,7 @@ def segments(figure: Figure, colour: str) -> list[np.ndarray]:
 @pytest.mark.parametrize("name", ALL)
 def test_every_shipped_mechanism_has_figures_that_keep_within_their_edges(name: str) -> None:
     found = pictures(name)
-    files = style.render(mode_figures(found))
+    files = render(mode_figures(found))
     assert list(files) == ["mode_1.png", "mode_2.png"]
     for data in files.values():
         image = pixels(data)
@@ -64,19 +65,19 @@ def test_every_shipped_mechanism_has_figures_that_keep_within_their_edges(name: 
         edge = [there[:3], there[-2:], there[:, :3].T, there[:, -3:].T]
         assert not any(side.any() for side in edge)
     assert files["mode_1.png"] != files["mode_2.png"]
-    assert style.render(mode_figures(pictures(name))) == files
+    assert render(mode_figures(pictures(name))) == files
 
 
 def test_a_mode_is_drawn_over_the_links_at_rest_with_the_other_phase_beside_it() -> None:
     found = pictures("four_bar")
     with style.applied():
-        figure = mode_figures(found)[1].draw()
+        figure = draw(mode_figures(found)[1])
     assert figure.get_suptitle().endswith(f"mode 2, {found.frequencies_hz[1]:.5g} Hz")
     for drawn, line in zip(segments(figure, "#c4c4c4"), found.rest.lines[0], strict=True):
         np.testing.assert_allclose(drawn, line)
-    for drawn, line in zip(segments(figure, style.BLUE), found.deformed.lines[1], strict=True):
+    for drawn, line in zip(segments(figure, graph.BLUE), found.deformed.lines[1], strict=True):
         np.testing.assert_allclose(drawn, line)
-    other = [line for line in figure.axes[0].get_lines() if line.get_color() == style.SKY]
+    other = [line for line in figure.axes[0].get_lines() if line.get_color() == graph.SKY]
     for drawn, rest, moved in zip(other, found.rest.lines[0], found.deformed.lines[1], strict=True):
         np.testing.assert_allclose(drawn.get_xydata(), 2.0 * rest - moved)
     assert figure.axes[0].get_aspect() == 1.0
@@ -152,7 +153,7 @@ def test_a_taper_is_drawn_in_pieces_that_grow_thinner() -> None:
     with style.applied():
         figure = style.new_figure("", 3.0, 4.0, layout=None)
         drawing = extent(poses).drawing(figure, (0.5, 0.5, 3.0, 2.0))
-        draw_links(drawing, poses, 0, style.BLUE)
+        draw_links(drawing, poses, 0, graph.BLUE)
     (links,) = drawing.axes.collections
     widths = np.array(links.get_linewidths())
     assert len(widths) > 4

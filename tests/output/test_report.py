@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
+import json
 import re
 from html.parser import HTMLParser
 
 import pytest
-from synthetic_results import make_results
+from synthetic_results import make_results, studied
 
 from eigassign.output import report
 from eigassign.output.figures.run import run_figures
 from eigassign.output.report import write_run
+from eigassign.output.tables import headline, tables
 
-VOID = {"meta", "img", "br"}
-EVIL = '"><script>alert(1)</script>&amp;\x27 {{ 7*7 }}'
+VOID = {"meta", "img", "br", "link", "input"}
+EVIL = '"><script>alert(1)</script>&amp;\x27 {{ 7*7 }} <!-- </SCRIPT>'
 
 
 class Page(HTMLParser):
@@ -41,25 +44,37 @@ class Page(HTMLParser):
         return " ".join(" ".join(self.words).split())
 
 
-def page(results) -> tuple[str, Page, dict[str, bytes]]:
+def page(results, full=False) -> tuple[str, Page, dict[str, bytes]]:
     plans = run_figures(results)
     images = {f"{plan.name}.png": f"PNG of {plan.name}".encode() for plan in plans}
-    html = report.to_html(results, plans, images).decode()
+    data = ("results.json", json.dumps({"title": results.title}).encode())
+    html = report.page(
+        results, tables(results), plans, images, line=headline(results), full=full, document=data
+    ).decode()
     parsed = Page(html)
     assert parsed.open == []
     return html, parsed, images
 
 
-def test_the_report_asks_nothing_of_the_network():
-    html, parsed, _ = page(make_results(title="see https://example.org/x.png"))
+def island(html: str, name: str):
+    """The JSON of one of the page's scripts."""
+    (text,) = re.findall(rf'<script type="application/json" id="{name}">(.*?)</script>', html, re.S)
+    return json.loads(text)
+
+
+@pytest.mark.parametrize("full", [False, True])
+def test_the_report_asks_nothing_of_the_network(full):
+    html, parsed, _ = page(make_results(title="see https://example.org/x.png"), full)
     for tag, attributes in parsed.tags:
-        assert tag not in ("script", "link", "iframe", "object", "base", "form"), tag
+        assert tag not in ("iframe", "object", "base", "form"), tag
+        assert full or tag != "script"
         assert not any(name.startswith("on") for name in attributes)
         assert (attributes.get("src") or "data:image/png;base64,").startswith(
             "data:image/png;base64,"
         )
-        assert "href" not in attributes
-    assert not re.search(r"url\(|@import", html)
+        assert attributes.get("href", "data:,") == "data:,"
+    assert "default-src 'none'" in html
+    assert not re.search(r"url\(|@import", html.split("<script>")[0])
 
 
 def test_every_figure_is_inside_with_its_alternative_text_and_caption():
@@ -74,6 +89,50 @@ def test_every_figure_is_inside_with_its_alternative_text_and_caption():
         assert plan.caption in parsed.text
 
 
+def test_a_full_report_plots_every_description_and_lists_its_numbers():
+    results = studied(make_results())
+    html, parsed, _ = page(results, full=True)
+    plots = [a["data-figure"] for tag, a in parsed.tags if a.get("data-part") == "0"]
+    plans = [plan for plan in run_figures(results) if not callable(plan.shows)]
+    assert plots == [plan.name for plan in plans]
+    assert list(island(html, "figures")) == plots
+    assert sum(tag == "details" for tag, _ in parsed.tags) == len(plots)
+    first = island(html, "figures")["assignment_mode_1"][0]["data"]
+    assert first[0]["name"] == "target"
+    assert first[1]["y"][0] == pytest.approx(results.targets[0].initial_hz[0], rel=1e-6)
+    assert island(html, "results") == {"title": results.title}
+
+
+@pytest.mark.parametrize(
+    ("change", "word", "tone"),
+    [
+        ({"verdict": "reached"}, "Reached", "good"),
+        ({"verdict": "improved", "max_error": 0.001}, "Improved, not reached", "fair"),
+        ({"verdict": "unreachable"}, "Not reachable", "bad"),
+        ({"verdict": "do_not_use"}, "Do not use", "bad"),
+        ({"verdict": "infeasible"}, "Limits contradict", "bad"),
+    ],
+)
+def test_the_verdict_comes_first_in_words_and_colour(change, word, tone):
+    results = make_results()
+    row = dataclasses.replace(results.assignment, reason="so it is", **change)
+    _, parsed, _ = page(dataclasses.replace(results, assignment=row))
+    first = next(a for tag, a in parsed.tags if (a.get("class") or "").startswith("verdict"))
+    assert first["class"] == f"verdict {tone}"
+    assert f"{word} So it is." in parsed.text
+    for asked in ("mode 1 at 190 Hz", "6.00 %", "1.00 % off at worst"):
+        assert asked in parsed.text.split("Frequencies before and after")[0]
+
+
+def test_a_light_report_names_what_it_has_no_room_for(monkeypatch):
+    monkeypatch.setattr(report, "LIGHT", 60)
+    results = make_results()
+    _, parsed, images = page(results)
+    shown = [a for tag, a in parsed.tags if tag == "img"]
+    assert 0 < len(shown) < len(images)
+    assert f"figures/{list(images)[-1]}" in parsed.text
+
+
 def test_numbers_of_the_run_stand_in_the_tables():
     results = make_results()
     _, parsed, _ = page(results)
@@ -83,11 +142,16 @@ def test_numbers_of_the_run_stand_in_the_tables():
         assert line in parsed.text
 
 
-def test_text_from_the_case_is_never_markup():
-    _, parsed, _ = page(make_results(title=EVIL, prefix=EVIL))
-    assert not any(tag == "script" for tag, _ in parsed.tags)
+@pytest.mark.parametrize("full", [False, True])
+def test_text_from_the_case_is_never_markup(full):
+    html, parsed, _ = page(make_results(title=EVIL, prefix=EVIL), full)
+    scripts = [a for tag, a in parsed.tags if tag == "script"]
+    assert len(scripts) == (5 if full else 0)
     assert " ".join(EVIL.split()) in parsed.text
     assert all(set(a) <= {"src", "alt"} for tag, a in parsed.tags if tag == "img")
+    if full:
+        assert island(html, "results") == {"title": EVIL}
+        assert island(html, "figures")
 
 
 def test_unpaired_surrogates_do_not_stop_the_report():
@@ -112,7 +176,7 @@ def test_several_targets_are_listed_and_summed_up():
 
 def test_a_run_leaves_results_report_and_figures(tmp_path):
     results = make_results()
-    write_run(results, tmp_path)
+    write_run(results, tmp_path, kind="light")
     names = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.*")}
     expected = {f"figures/{plan.name}.png" for plan in run_figures(results)}
     assert names == expected | {
@@ -131,7 +195,7 @@ def test_a_run_leaves_results_report_and_figures(tmp_path):
 )
 def test_the_report_is_right_with_figures_of_any_format(tmp_path, formats, embedded):
     results = make_results(n_t=0, n_y=1)
-    write_run(results, tmp_path, formats)
+    write_run(results, tmp_path, formats, "light")
     (plan,) = run_figures(results)
     assert {p.name for p in (tmp_path / "figures").iterdir()} == {
         f"{plan.name}.{kind}" for kind in formats
@@ -145,8 +209,14 @@ def test_the_report_is_right_with_figures_of_any_format(tmp_path, formats, embed
 
 
 def test_the_report_is_right_without_figures(tmp_path):
-    write_run(make_results(), tmp_path, ())
+    write_run(make_results(), tmp_path, (), "light")
     assert not (tmp_path / "figures").exists()
     parsed = Page((tmp_path / "report.html").read_text())
     assert not any(tag in ("img", "figure") for tag, _ in parsed.tags)
     assert "6.00 %" in parsed.text
+
+
+def test_no_report_is_written_where_none_is_wanted(tmp_path):
+    write_run(make_results(), tmp_path, ("png",), "none")
+    assert (tmp_path / "figures").exists()
+    assert not (tmp_path / "report.html").exists()

@@ -58,23 +58,26 @@ class Shapes:
     nodes: Mapping[tuple[str, str], NodeShape]  # by (link, node)
 
 
-def shapes(poses: LinkFrames, x: Floats, phi: Floats) -> Shapes:
-    """The motion of all nodes and beams in the vectors ``phi`` (n_dof, count) at one sample x."""
+def shapes(poses: LinkFrames, x: Floats, phi: Floats) -> tuple[Shapes, ...]:
+    """The motion of all nodes and beams in the vectors ``phi`` (n, n_dof, count) at samples x."""
     case = poses.case
     links, numbering = local_links(case, poses.parameters, poses.motion)
     parts = [
         _symbols(link, placement, numbering.meshes[placement.link], poses)
         for link, placement in zip(links, poses.motion.placements, strict=True)
     ]
-    values = iter(poses.values(x, [array for part in parts for array in part.arrays]))
-    strands: list[StrandShape] = []
-    nodes: dict[tuple[str, str], NodeShape] = {}
+    values = poses.values(x, [array for part in parts for array in part.arrays])
     d = 2 if case.mechanism.space == "planar" else 3
-    for part in parts:
-        motion = _LinkMotion(part, [next(values)[0] for _ in part.arrays], phi, numbering.count)
-        nodes |= motion.nodes()
-        strands += motion.strands(d)
-    return Shapes(tuple(strands), nodes)
+    found = []
+    for k, vectors in enumerate(phi):
+        here = (each[k] for each in values)
+        own = [
+            _LinkMotion(p, [next(here) for _ in p.arrays], vectors, numbering.count) for p in parts
+        ]
+        strands = tuple(strand for motion in own for strand in motion.strands(d))
+        nodes = {name: node for motion in own for name, node in motion.nodes().items()}
+        found.append(Shapes(strands, nodes))
+    return tuple(found)
 
 
 @dataclass(frozen=True)

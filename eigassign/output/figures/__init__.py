@@ -1,8 +1,11 @@
-"""Figures through matplotlib's `Figure` and `Axes`, planned first and drawn when they are written.
+"""Figures: described first, then drawn by matplotlib as files or written for a browser.
 
 In reading order; each imports from those above it only:
 
-    style      the style sheet, an empty figure, limits of axes, file formats
+    graph      what a graph shows, whoever draws it: curves, shades, bars, maps; its limits
+    style      matplotlib: the style sheet, an empty figure, file formats
+    paper      descriptions drawn with matplotlib, and figures as files
+    screen     descriptions as Plotly's data, their tables, a mode that moves
     curves     curves over time or one parameter: coordinates, approximation, assignment
     maps       expansion errors over two parameters
     meaning    sensitivities, reach and tolerance, error against mass

@@ -7,31 +7,35 @@ filled, the others hollow and dashed. A broad band joins the methods that no oth
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.chart.results import Chart, ChartPoint, Front, excess_over
-from eigassign.output.figures import style
-from eigassign.output.figures.style import BLACK, GREY, FigurePlan, labelled, short
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from eigassign.output.figures import graph
+from eigassign.output.figures.graph import (
+    BLACK,
+    GREY,
+    Curve,
+    FigurePlan,
+    Graph,
+    Look,
+    Mark,
+    Panel,
+    Rule,
+    labelled,
+    short,
+)
 
 Floats = NDArray[np.float64]
 LEAST_EXCESS = 1e-10  # an objective nearer to the best one is drawn there
-BAND = "#c9dfee"
 LEGEND_LETTERS = 46  # the longest name of a method has 43
-TALL_IN, KEY_IN = 4.9, 0.2  # of the figure, and of a line of its legend
-COLOURS = (*style.SERIES[:5], BLACK, style.SKY, GREY)
+COLOURS = (*graph.SERIES[:5], BLACK, graph.SKY, GREY)
 MARKERS = {True: ("o", "^"), False: ("s", "D", "p")}
-RING: dict[str, Any] = {
-    "linestyle": "none", "marker": "o", "markersize": 12.0, "markerfacecolor": "none",
-    "markeredgecolor": BLACK, "markeredgewidth": 1.4, "zorder": 4.0,
-}  # fmt: skip
+BAND = Look("#c9dfee", 7.0)
+RING = Look(BLACK, 0.0, marker="o", size=12.0, filled=False)
+LEVEL = Look(GREY, 1.0, "fine")
 
 
 def chart_figures(chart: Chart) -> tuple[FigurePlan, ...]:
@@ -66,7 +70,7 @@ def _front(chart: Chart, front: Front) -> FigurePlan:
         "charted method is both quicker and more accurate; ringed: taken by "
         f"`expansion.order: auto`.{beyond}",
         f"Scatter of worst error in Hz over {what} for every method.",
-        partial(_draw_front, chart, front),
+        _points(chart, front),
     )
 
 
@@ -75,7 +79,7 @@ def _is_shown(chart: Chart, point: ChartPoint) -> bool:
     return point.everywhere.worst_hz <= chart.asked.typical_hz
 
 
-def _draw_front(chart: Chart, front: Front) -> Figure:
+def _points(chart: Chart, front: Front) -> Graph:
     """Every method by family, eigassign's first, and the front through the best."""
     floor = chart.asked.floor_hz
     shown = [p for p in chart.points if _is_shown(chart, p)]
@@ -130,7 +134,7 @@ def _mesh(chart: Chart) -> FigurePlan:
         "Worst error of exact frequencies against the limit that the meshes converge to, "
         f"extrapolated from the two finest ({chart.mesh[-1].elements} elements).{here}{beside}",
         "Discretisation error in Hz over the number of elements.",
-        partial(_draw_mesh, chart),
+        _meshes(chart),
     )
 
 
@@ -140,7 +144,7 @@ def _taylor(chart: Chart) -> ChartPoint | None:
     return max(full, key=lambda p: int(p.parameters["order"]), default=None)
 
 
-def _draw_mesh(chart: Chart) -> Figure:
+def _meshes(chart: Chart) -> Graph:
     """Error and time over elements, with the error of the expansion beside them."""
     rows = [row for row in chart.mesh if row.worst_hz > 0.0]
     counts = np.array([float(r.elements) for r in rows])
@@ -173,11 +177,11 @@ def _designs(chart: Chart) -> FigurePlan:
         f"found ({best.objective:.6g}, by {best.method}), relative to it; searches with all their "
         f"steps. What is nearer than {LEAST_EXCESS:.0e} is drawn there.",
         "Scatter of excess objective over seconds for every way to a design.",
-        partial(_draw_designs, chart),
+        _searches(chart),
     )
 
 
-def _draw_designs(chart: Chart) -> Figure:
+def _searches(chart: Chart) -> Graph:
     """Single answers as points, searches as lines of their improvements."""
     best = min(run.objective for run in chart.designs)
     lines = []
@@ -203,18 +207,11 @@ class MethodLine:
     ours: bool
 
 
-def line_style(number: int, ours: bool) -> dict[str, Any]:
+def line_look(number: int, ours: bool) -> Look:
     """The ``number``-th line of its kind: no two of a kind share colour and marker."""
     markers, colour = MARKERS[ours], COLOURS[number % len(COLOURS)]
-    return {
-        "color": colour,
-        "linewidth": 0.9,
-        "linestyle": "solid" if ours else (0, (2.5, 2.0)),
-        "marker": markers[number // len(COLOURS) % len(markers)],
-        "markersize": 6.0,
-        "markerfacecolor": colour if ours else "white",
-        "markeredgewidth": 0.8,
-    }
+    marker = markers[number // len(COLOURS) % len(markers)]
+    return Look(colour, 0.9, "solid" if ours else "fine", marker, 6.0, ours)
 
 
 def scatter(
@@ -225,50 +222,42 @@ def scatter(
     band: Floats | None = None,
     level: tuple[str, float] | None = None,
     ringed: tuple[str, Floats] | None = None,
-) -> Figure:
+) -> Graph:
     """``lines`` over the axes ``x``, ``y`` (name, unit), with a legend beside them.
 
     ``band`` (n, 2) is drawn as steps, ``level`` is a named height across the axes, and ``ringed``
     says what the points (n, 2) with a ring around them are.
     """
-    from matplotlib.lines import Line2D
-
-    figure = style.new_figure(title, max(TALL_IN, KEY_IN * (len(lines) + 4) + 0.4))
-    axes = figure.subplots()
-    axes.set(xlabel=labelled(*x), ylabel=labelled(*y))
-    heights = [line.y for line in lines]
+    curves: list[Curve] = []
+    for ours, group in ((False, "others"), (True, "eigassign")):
+        own = [line for line in lines if line.ours is ours]
+        curves += [
+            Curve(line.y, line_look(k, ours), short(line.label, LEGEND_LETTERS), line.x, "", group)
+            for k, line in enumerate(own)
+        ]
+    holds = () if level is None else (np.array([level[1], level[1] / 2.0]),)  # room for its name
+    panel = Panel(labelled(*y), tuple(curves), 3.8, True, None, holds)
+    marks: list[Mark] = []
     if level is not None:
-        heights.append(np.array([level[1], level[1] / 2.0]))  # with room for its name
-    x_limits, y_limits = style.decades([line.x for line in lines]), style.decades(heights)
-    style.logarithmic(axes, "x", x_limits)
-    style.logarithmic(axes, "y", y_limits)
-    if level is not None:
-        axes.axhline(level[1], color=GREY, linewidth=1.0, linestyle=(0, (3.0, 3.0)), zorder=1.5)
-        axes.annotate(
-            short(level[0], 60), (x_limits[0], level[1]), (4.0, -4.0), textcoords="offset points",
-            va="top", size=style.SMALL_PT,
-        )  # fmt: skip
+        marks.append(Rule(level[1], LEVEL, note=level[0]))
     if band is not None and len(band):
-        along, best = band[np.argsort(band[:, 0])].T
-        steps = np.append(along, x_limits[1]), np.append(best, best[-1])
-        axes.step(*steps, where="post", color=BAND, linewidth=7.0, zorder=1.6)
-        axes.vlines(along[0], best[0], y_limits[1], color=BAND, linewidth=7.0, zorder=1.6)
-    handles: dict[bool, list[Any]] = {True: [], False: []}
-    for line in lines:
-        above = 3.0 - 1e-3 * sum(map(len, handles.values()))  # the first ones lie on top
-        look = line_style(len(handles[line.ours]), line.ours)
-        handles[line.ours] += axes.plot(
-            line.x, np.maximum(line.y, y_limits[0]), **look, zorder=above,
-            label=short(line.label, LEGEND_LETTERS), clip_on=False,
-        )  # fmt: skip
-    entries: list[Any] = [*handles[True], *handles[False]]
-    headed = bool(handles[True] and handles[False])
-    if headed:
-        ours, others = (Line2D([], [], linestyle="none", label=k) for k in ("eigassign", "others"))
-        entries = [ours, *handles[True], others, *handles[False]]
+        right = graph.decades([line.x for line in lines])[1]
+        marks.append(_steps(band, panel.limits[1], right))
+    marks += panel.curves
     if ringed is not None:
-        entries += axes.plot(*ringed[1].T, **RING, label=ringed[0])
-    key = figure.legend(handles=entries, loc="outside right upper", handlelength=1.6)
-    for place in (0, 1 + len(handles[True])) if headed else ():
-        key.get_texts()[place].set_fontweight("bold")
-    return figure
+        marks.append(Curve(ringed[1][:, 1], RING, ringed[0], ringed[1][:, 0]))
+    return Graph(
+        title=title,
+        x_label=labelled(*x),
+        x=np.zeros(0),
+        panels=(replace(panel, marks=tuple(marks)),),
+        x_logarithmic=True,
+        beside=True,
+    )
+
+
+def _steps(band: Floats, top: float, right: float) -> Curve:
+    """From the top down through the points (n, 2) of a front, and on to the right edge."""
+    along, best = band[np.argsort(band[:, 0])].T
+    y = np.insert(np.repeat(best, 2), 0, top)
+    return Curve(y, BAND, x=np.append(np.repeat(along, 2), right))

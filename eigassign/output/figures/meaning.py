@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.output.figures import style
-from eigassign.output.figures.curves import OPTIMAL, POINT, TARGET, Look, plot, stacked
-from eigassign.output.figures.style import FigurePlan, labelled, legend_above, short
+from eigassign.output.figures import graph
+from eigassign.output.figures.curves import OPTIMAL, POINT, TARGET
+from eigassign.output.figures.graph import (
+    BarGroup,
+    Bars,
+    Curve,
+    FigurePlan,
+    Graph,
+    Look,
+    Panel,
+    Rule,
+    Shade,
+    labelled,
+)
 from eigassign.output.formats import percent
 from eigassign.study.results import (
     RangeRow,
@@ -22,13 +31,9 @@ from eigassign.study.results import (
     TradeOff,
 )
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 Floats = NDArray[np.float64]
-_BAR = 0.16  # inches of a bar
 _MOST = 10  # parameters whose bars are drawn
-_TALLEST = 6.0  # inches
+_TALL = 2.4  # inches
 
 
 def meaning_figures(results: RunResults) -> Iterator[FigurePlan]:
@@ -66,31 +71,22 @@ def sensitivities(rows: tuple[SensitivityRow, ...]) -> FigurePlan:
         "bars are means over the samples, whiskers reach to the largest"
         f"{of_many}.",
         "Bars of the relative sensitivity of each target to each parameter.",
-        partial(draw_sensitivities, rows),
+        _bars(rows, names),
     )
 
 
-def draw_sensitivities(rows: tuple[SensitivityRow, ...]) -> Figure:
+def _bars(rows: tuple[SensitivityRow, ...], names: list[str]) -> Bars:
     """A group of bars a parameter, one colour a target."""
-    names = _most_sensitive(rows)
-    labels = list(dict.fromkeys(row.label for row in rows))
-    height = min(max(1.2, _BAR * len(names) * (len(labels) + 1)), _TALLEST)
-    figure, (axes,) = stacked("Sensitivity of the frequencies", "% per %", (height,))
-    width = 0.8 / len(labels)
-    for k, label in enumerate(labels):
-        own = {row.parameter: row for row in rows if row.label == label and row.parameter in names}
-        at = np.array([names.index(name) + (k + 0.5) * width - 0.4 for name in own])
-        mean = np.array([row.percent_per_percent for row in own.values()])
-        most = np.array([row.percent_per_percent_largest for row in own.values()])
-        colour = style.SERIES[k % len(style.SERIES)]
-        axes.barh(at, mean, 0.85 * width, color=colour, label=short(label, 60))
-        axes.hlines(at, mean, most, color=style.BLACK, linewidth=0.8)
-    axes.axvline(0.0, color=style.BLACK, linewidth=0.8)
-    axes.set_yticks(range(len(names)), [short(name) for name in names])
-    axes.set_ylim(len(names) - 0.5, -0.5)
-    axes.margins(x=0.05)
-    legend_above(axes, axes.get_legend_handles_labels()[0])
-    return figure
+    groups = []
+    for k, label in enumerate(dict.fromkeys(row.label for row in rows)):
+        own = {row.parameter: row for row in rows if row.label == label}
+        mean, most = np.full((2, len(names)), np.nan)
+        for at, name in enumerate(names):
+            if name in own:
+                mean[at] = own[name].percent_per_percent
+                most[at] = own[name].percent_per_percent_largest
+        groups.append(BarGroup(label, graph.SERIES[k % len(graph.SERIES)], mean, most))
+    return Bars("Sensitivity of the frequencies", "% per %", tuple(names), tuple(groups))
 
 
 def _most_sensitive(rows: tuple[SensitivityRow, ...]) -> list[str]:
@@ -128,40 +124,33 @@ def ranges(
         f"{_capital(target.label)}: reach and tolerance{where}",
         " ".join(said),
         "The answer's frequency over time inside the range of others.",
-        partial(draw_ranges, results, target, along.rows, shown, where),
+        _ranges(results, target, along.rows, shown, where),
     )
 
 
-def draw_ranges(
+def _ranges(
     results: RunResults,
     target: TargetStudy,
     rows: slice,
     shown: tuple[RangeRow | None, RangeRow | None],
     where: str,
-) -> Figure:
+) -> Graph:
     """The answer over what is within reach and within tolerance, with what is wanted."""
-    figure, (axes,) = stacked(f"{_capital(target.label)}{where}", "time [s]", (2.4,))
-    time_s = results.time_s[target.rows][rows]
-    colours, labels = (style.GREY, style.BLUE), ("within the bounds", "within the tolerances")
-    edges, shades = [], []
-    for row, colour, label in zip(shown, colours, labels, strict=True):
-        if row is not None:
-            low, high = row.lowest_hz[rows], row.highest_hz[rows]
-            edges += [low, high]
-            shades.append(
-                axes.fill_between(
-                    time_s, low, high, color=colour, alpha=0.35, linewidth=0.0, label=label
-                )
-            )
-    hidden: Look = {"linestyle": "none"}
-    label = "distance of the modes [Hz]" if target.kind == "gap" else "frequency [Hz]"
-    curves = [
-        (target.exact_hz[rows], {**OPTIMAL, "label": "answer"}),
-        (target.target_hz[rows], {**TARGET, "label": "wanted"}),
+    colours, labels = (graph.GREY, graph.BLUE), ("within the bounds", "within the tolerances")
+    shades = [
+        Shade(row.lowest_hz[rows], row.highest_hz[rows], colour, label, 0.35)
+        for row, colour, label in zip(shown, colours, labels, strict=True)
+        if row is not None
     ]
-    plot(axes, time_s, [*curves, *((edge, hidden) for edge in edges)], label)
-    legend_above(axes, [*shades, *axes.get_lines()[:2]])
-    return figure
+    curves = (
+        Curve(target.exact_hz[rows], OPTIMAL, "answer"),
+        Curve(target.target_hz[rows], TARGET, "wanted"),
+    )
+    edges = tuple(e for shade in shades for e in (shade.low, shade.high) if e is not None)
+    label = "distance of the modes [Hz]" if target.kind == "gap" else "frequency [Hz]"
+    panel = Panel(label, (*shades, *curves), _TALL, holds=edges)
+    time_s = results.time_s[target.rows][rows]
+    return Graph(f"{_capital(target.label)}{where}", "time [s]", time_s, (panel,))
 
 
 # --- Error against mass or price
@@ -176,25 +165,29 @@ def trade_off(found: TradeOff) -> FigurePlan:
         f"The least {found.error} found for each {found.quantity}: from {percent(first.error)} to "
         f"{percent(last.error)}, the answer.",
         f"A falling curve of the {found.error} over the {found.quantity}.",
-        partial(draw_trade_off, found),
+        _trade_off(found),
     )
 
 
-def draw_trade_off(found: TradeOff) -> Figure:
+def _trade_off(found: TradeOff) -> Graph:
     """Error in % over mass or price, the initial design's upright, the answer at the end."""
-    figure, (axes,) = stacked(
-        f"{_capital(found.error)} against {found.quantity}",
-        labelled(found.quantity, found.unit),
-        (2.4,),
-    )
     amount = np.array([point.amount for point in found.points])
     error = np.array([100.0 * point.error for point in found.points])
-    look: Look = {"color": style.BLUE, "linewidth": 1.4, "marker": "o", "label": "best found"}
-    (curve,) = axes.plot(amount, error, **look)
-    axes.set(ylabel=f"{found.error} [%]", ylim=(0.0, 1.08 * error.max()))
-    axes.margins(x=0.04)
-    answer: Look = {"color": style.SKY, "marker": "o", "markersize": 10.0, "linestyle": "none"}
-    (end,) = axes.plot(amount[-1:], error[-1:], **answer, label="answer", zorder=1.5)
-    initial = axes.axvline(found.initial, **POINT, label=f"{found.quantity} of the initial design")
-    legend_above(axes, [curve, end, initial])
-    return figure
+    marks = (
+        Curve(error, _BEST, "best found"),
+        Curve(error[-1:], _ANSWER, "answer", amount[-1:]),
+        Rule(found.initial, POINT, f"{found.quantity} of the initial design", upright=True),
+    )
+    low, high = graph.bounds([amount, np.array([found.initial])])
+    margin = 0.04 * (high - low)
+    return Graph(
+        title=f"{_capital(found.error)} against {found.quantity}",
+        x_label=labelled(found.quantity, found.unit),
+        x=amount,
+        panels=(Panel(f"{found.error} [%]", marks, _TALL, from_zero=True),),
+        x_limits=(low - margin, high + margin),
+    )
+
+
+_BEST = Look(graph.BLUE, 1.4, marker="o")
+_ANSWER = Look(graph.SKY, 0.0, marker="o", size=10.0, filled=False)

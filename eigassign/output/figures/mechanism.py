@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.output.figures import style
-from eigassign.output.figures.style import BLACK, GREY, FigurePlan, short
+from eigassign.output.figures import graph, style
+from eigassign.output.figures.graph import BLACK, GREY, FigurePlan, short
 from eigassign.study.results import DrawnBody, DrawnJoint, DrawnPoses, DrawnSpring, RunResults
 
 if TYPE_CHECKING:
@@ -351,7 +351,7 @@ def length_label(length: float) -> str:
     exponent = round(np.floor(np.log10(length)))
     if -3 <= exponent <= 3:
         return f"{length:.6g} m"
-    return f"{length / 10.0**exponent:.0f}·{style.power(10.0**exponent)} m"
+    return f"{length / 10.0**exponent:.0f}·{graph.power(10.0**exponent)} m"
 
 
 # --- The poses along the trajectory
@@ -360,7 +360,7 @@ _TALLEST_IN, _LOWEST_IN = 4.8, 2.0
 _FOOT_IN = {False: 0.5, True: 0.8}  # in a plane, in space
 _LEFT_IN = {False: 0.75, True: 0.2}
 _ROOM = 1.12  # of the axes, relative to what they hold
-_BODIES = (style.BLUE, style.GREEN, style.PURPLE, style.SKY)
+_BODIES = (graph.BLUE, graph.GREEN, graph.PURPLE, graph.SKY)
 _NAMED_BODIES = 6  # in the legend, at most
 
 
@@ -394,7 +394,7 @@ def draw_poses(results: RunResults) -> Figure:
     else:
         drawing.axes.set(xlabel="x [m]", ylabel="y [m]")
     if shown.tip_path is not None:
-        drawing.line(drawing.view.flat(shown.tip_path), style.VERMILLION, 1.8)
+        drawing.line(drawing.view.flat(shown.tip_path), graph.VERMILLION, 1.8)
     draw_ground(drawing, shown.joints)
     for pose, colour in enumerate(colours):
         draw_springs(drawing, shown.springs, pose, GREY)
@@ -424,7 +424,7 @@ def _entries(shown: DrawnPoses, colours: Sequence[str]) -> list[Artist]:
 
     entries = []
     if shown.tip_path is not None:
-        entries.append(Line2D([], [], color=style.VERMILLION, linewidth=1.8, label="tip path"))
+        entries.append(Line2D([], [], color=graph.VERMILLION, linewidth=1.8, label="tip path"))
     for at, body in enumerate(shown.bodies[:_NAMED_BODIES]):
         look: Any = {"color": _BODIES[at % len(_BODIES)], "linestyle": "none", "marker": "o"}
         entries.append(Line2D([], [], **look, label=short(body.name, 22)))

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from eigassign.output.figures import style
+from eigassign.output.figures import graph, style
+from eigassign.output.figures.graph import BLUE, GREY, FigurePlan, short
 from eigassign.output.figures.mechanism import (
     KINDS,
     Drawing,
@@ -21,7 +22,6 @@ from eigassign.output.figures.mechanism import (
     extent,
     points_of,
 )
-from eigassign.output.figures.style import BLUE, GREY, FigurePlan, short
 from eigassign.output.formats import number
 from eigassign.study.results import ModePictures
 
@@ -99,11 +99,11 @@ def _draw_shape(drawing: Drawing, pictures: ModePictures, mode: int) -> None:
     draw_links(drawing, rest, 0, _REST)
     draw_joints(drawing, rest.joints, 0, _REST, KINDS)
     for line, moved in zip(rest.lines[0], deformed.lines[mode], strict=True):
-        drawing.line(drawing.view.flat(2.0 * line - moved), style.SKY, 1.0)
-    draw_springs(drawing, deformed.springs, mode, style.GREEN)
+        drawing.line(drawing.view.flat(2.0 * line - moved), graph.SKY, 1.0)
+    draw_springs(drawing, deformed.springs, mode, graph.GREEN)
     draw_links(drawing, deformed, mode, BLUE)
     draw_joints(drawing, deformed.joints, mode, BLUE, ("sliding", "fixed"))
-    draw_bodies(drawing, deformed.bodies, mode, style.VERMILLION)
+    draw_bodies(drawing, deformed.bodies, mode, graph.VERMILLION)
     draw_joints(drawing, deformed.joints, mode, BLUE, ("turning",))
 
 

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.output.figures import style
+from eigassign.output.figures import graph, style
+from eigassign.output.figures.graph import BLUE, FigurePlan, short
 from eigassign.output.figures.mechanism import (
     KINDS,
     Drawing,
@@ -28,7 +29,6 @@ from eigassign.output.figures.mechanism import (
     extent,
     points_of,
 )
-from eigassign.output.figures.style import BLUE, FigurePlan, short
 from eigassign.study.results import DrawnPoses, ModePictures
 
 if TYPE_CHECKING:
@@ -152,11 +152,11 @@ def _sheet(title: str, held: Extent) -> tuple[Figure, Drawing]:
 
 def _draw_pose(drawing: Drawing, poses: DrawnPoses, pose: int) -> None:
     if poses.tip_path is not None:
-        drawing.line(drawing.view.flat(poses.tip_path), style.VERMILLION, 1.2)
-    draw_springs(drawing, poses.springs, pose, style.GREEN)
+        drawing.line(drawing.view.flat(poses.tip_path), graph.VERMILLION, 1.2)
+    draw_springs(drawing, poses.springs, pose, graph.GREEN)
     draw_links(drawing, poses, pose, BLUE)
     draw_joints(drawing, poses.joints, pose, BLUE, ("sliding", "fixed"))
-    draw_bodies(drawing, poses.bodies, pose, style.VERMILLION)
+    draw_bodies(drawing, poses.bodies, pose, graph.VERMILLION)
     draw_joints(drawing, poses.joints, pose, BLUE, ("turning",))
 
 
@@ -187,7 +187,7 @@ def _frames(animation: Animation) -> list[Image]:
         figure, drawing = _sheet(animation.title, held)
         note = figure.text(
             1.0 - 0.1 / _WIDTH_IN, 0.2 / figure.get_size_inches()[1], "",
-            ha="right", va="center", size=style.SMALL_PT, color=style.GREY,
+            ha="right", va="center", size=style.SMALL_PT, color=graph.GREY,
         )  # fmt: skip
         canvas: Any = FigureCanvasAgg(figure)
         draw_ground(drawing, moving.joints)

@@ -7,21 +7,30 @@ from dataclasses import replace
 from itertools import count
 
 from eigassign.output.figures import curves, maps, mechanism
+from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.meaning import meaning_figures
-from eigassign.output.figures.style import FigurePlan
 from eigassign.study.results import RunResults, along_each
 
 
 def run_figures(results: RunResults) -> tuple[FigurePlan, ...]:
-    """Mechanism, coordinates, approximation of each mode, progress, targets, next modes."""
+    """What was asked for before and after, the mechanism, each target, what it means, how exact."""
     return tuple(_figures(results))
 
 
 def _figures(results: RunResults) -> Iterator[FigurePlan]:
+    each = along_each(results)
+    for one in each:
+        if one.spectrum is not None and one.spectrum.initial_hz.size:
+            yield curves.overview(one, one.spectrum)
     if any(results.poses.lines):
         yield mechanism.poses(results)
-    each = along_each(results)
-    yield from (curves.coordinates(one) for one in each if one.q.size)
+    yield from _targets(results)
+    for one in each:
+        if one.others is not None and one.others.initial_hz.size:
+            yield curves.other_modes(one, one.others)
+    yield from meaning_figures(results)
+    if results.assignment is not None and results.assignment.steps:
+        yield curves.progress(results, results.assignment)
     for k, study in enumerate(results.studies):
         for one in each:
             comparison = one.studies[k].over_time
@@ -32,13 +41,7 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
         yield from maps.approximation(study, study.over_q, study.q0, point, "q")
         names = tuple(row.name for row in results.design)
         yield from maps.approximation(study, study.over_design, study.y0, names, "design")
-    if results.assignment is not None and results.assignment.steps:
-        yield curves.progress(results, results.assignment)
-    yield from _targets(results)
-    yield from meaning_figures(results)
-    for one in each:
-        if one.others is not None and one.others.initial_hz.size:
-            yield curves.other_modes(one, one.others)
+    yield from (curves.coordinates(one) for one in each if one.q.size)
 
 
 def _targets(results: RunResults) -> Iterator[FigurePlan]:

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from eigassign.output.figures import style
-from eigassign.output.figures.curves import INITIAL, stacked
-from eigassign.output.figures.style import FigurePlan, legend_above, short
+from eigassign.output.figures import graph, style
+from eigassign.output.figures.curves import INITIAL
+from eigassign.output.figures.graph import FigurePlan, short
+from eigassign.output.figures.style import legend_above
 from eigassign.output.formats import number
 from eigassign.study.updating.fit import OUTLIER, UpdateResults
 
@@ -50,11 +51,11 @@ def draw_measurements(results: UpdateResults) -> Figure:
         for when in ("initial_hz", "updated_hz")
     )
     bars = 100.0 * np.array([row.deviation_hz for row in rows]) / measured
-    figure, (above, below) = stacked(
-        "Measured frequencies and the model", "measurement", (2.2, 1.6)
-    )
+    figure = style.new_figure("Measured frequencies and the model", 5.2)
+    above, below = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": (2.2, 1.6)})
+    below.set_xlabel("measurement")
     dots = above.errorbar(
-        at, np.zeros(len(at)), bars, fmt="o", color=style.BLACK, markersize=3.0, capsize=2.0,
+        at, np.zeros(len(at)), bars, fmt="o", color=graph.BLACK, markersize=3.0, capsize=2.0,
         linewidth=1.0, label="measured ± standard deviation",
     )  # fmt: skip
     marks = [
@@ -62,16 +63,16 @@ def draw_measurements(results: UpdateResults) -> Figure:
             at, values, marker, color=color, markersize=6.0, markeredgewidth=1.8, label=label
         )[0]
         for values, marker, color, label in (
-            (before, "x", INITIAL["color"], "model before"),
-            (after, "_", style.BLUE, "model after"),
+            (before, "x", INITIAL.colour, "model before"),
+            (after, "_", graph.BLUE, "model after"),
         )
     ]
     above.set_ylabel("off the measured [%]")
-    legend_above(above, [dots, *marks])  # type: ignore[list-item]
-    below.bar(at, [row.residual for row in rows], color=style.BLUE, width=0.6)
+    legend_above(above, [dots, *marks])
+    below.bar(at, [row.residual for row in rows], color=graph.BLUE, width=0.6)
     largest = max(OUTLIER + 0.5, 1.1 * max(abs(row.residual) for row in rows))
     for limit in (-OUTLIER, OUTLIER):
-        below.axhline(limit, color=style.GREY, linewidth=0.9, linestyle=style.DASHED)
+        below.axhline(limit, color=graph.GREY, linewidth=0.9, linestyle="dashed")
     below.set(ylabel="residual [σ]", ylim=(-largest, largest), xlim=(0.4, len(at) + 0.6))
     return figure
 
@@ -89,13 +90,13 @@ def draw_parameters(results: UpdateResults) -> Figure:
         axes.plot(
             [low, high],
             [k, k],
-            color=style.SKY,
+            color=graph.SKY,
             linewidth=5.0,
             label="95 % interval",
             solid_capstyle="butt",
         )
-        axes.plot(initial, k, "x", color=INITIAL["color"], markersize=6.0, label="before")
-        axes.plot(value, k, "o", color=style.BLUE, markersize=5.0, label="after")
+        axes.plot(initial, k, "x", color=INITIAL.colour, markersize=6.0, label="before")
+        axes.plot(value, k, "o", color=graph.BLUE, markersize=5.0, label="after")
     labels = [f"{short(row.name, 20)}\n{number(row.value)} {row.unit}".rstrip() for row in rows]
     axes.set_yticks(range(len(rows)), labels)
     axes.set(xlim=(-0.02, 1.02), ylim=(len(rows) - 0.5, -0.5), xlabel="from bound to bound")

@@ -282,7 +282,9 @@ def _optimality(scene: Scene, answer: Answer) -> OptimalityRow:
             "no design is better" if met else "no design meets all limits, or misses them by less"
         )
         return OptimalityRow("proved", best.stationarity, None, words)
-    words = f"the best of {len(found.optima)} local optima from {many}"
+    count = len(found.optima)
+    which = f"best of {count} local optima" if count > 1 else "only local optimum"
+    words = f"the {which} from {many}"
     if best.end is not End.OPTIMAL:
         words = f"{words}; {best.end.value}"
     return OptimalityRow("local", best.stationarity, None, words)

@@ -1,0 +1,280 @@
+"""What a graph shows, whoever draws it: curves, shades and points over a common abscissa; maps.
+
+A figure is described once. `paper` draws it with matplotlib as a file, `screen` writes it for a
+browser; what can be read off it, its limits and the words on it are settled here.
+"""
+
+from __future__ import annotations
+
+import math
+import unicodedata
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Floats = NDArray[np.float64]
+Dash = str  # solid | dashed | dotted | dash-dotted | fine
+DASHES: tuple[Dash, ...] = ("solid", "dashed", "dotted", "dash-dotted")
+ERROR_DECADES = 5  # of an error axis: what is smaller is as good as nothing
+
+# Okabe and Ito: can be distinguished with every kind of colour vision
+BLACK, ORANGE, SKY, GREEN = "#1a1a1a", "#E69F00", "#56B4E9", "#009E73"
+BLUE, VERMILLION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#8c8c8c"
+SERIES = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
+
+
+@dataclass(frozen=True)
+class Look:
+    """Of a line and its points: colour, width in points of print, dashes; the points' shape."""
+
+    colour: str
+    width: float = 1.4
+    dash: Dash = "solid"
+    marker: str = ""  # o, s, D, ^, p; none
+    size: float = 6.0  # of the marker
+    filled: bool = True
+
+
+def series(number: int) -> Look:
+    """The ``number``-th of any count of like curves: no two neighbours differ by colour alone."""
+    dash = DASHES[(number // len(SERIES) + number) % len(DASHES)]
+    return Look(SERIES[number % len(SERIES)], 1.4, dash)
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """``y`` over the graph's abscissa, or over its own ``x``; ``end`` stands at its right end."""
+
+    y: Floats
+    look: Look
+    label: str = ""  # in the legend
+    x: Floats | None = None
+    end: str = ""
+    group: str = ""  # of the legend
+
+
+@dataclass(frozen=True, eq=False)
+class Shade:
+    """Between two curves; None where it reaches the panel's edge."""
+
+    low: Floats | None
+    high: Floats | None
+    colour: str
+    label: str = ""
+    opacity: float = 0.15
+    x: Floats | None = None  # its own abscissa; else the graph's
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A straight line across the panel at this height, or ``upright`` at this abscissa.
+
+    ``label`` is for the legend, ``note`` is written at its left end.
+    """
+
+    at: float
+    look: Look
+    label: str = ""
+    upright: bool = False
+    note: str = ""
+
+
+Mark = Curve | Shade | Rule
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One ordinate over the graph's abscissa. Later marks lie above earlier ones.
+
+    On a ``logarithmic`` one whole decades are shown, at most ``decades``; what is below them lies
+    on the edge. ``holds`` are values that the ordinate has to hold besides the curves'; ``key``
+    are entries of the legend that no mark has.
+    """
+
+    label: str
+    marks: tuple[Mark, ...]
+    height: float = 2.0  # inches
+    logarithmic: bool = False
+    decades: int | None = ERROR_DECADES
+    holds: tuple[Floats, ...] = ()
+    from_zero: bool = False
+    key: tuple[tuple[str, Look], ...] = ()
+
+    @property
+    def curves(self) -> tuple[Curve, ...]:
+        """Its curves alone."""
+        return tuple(mark for mark in self.marks if isinstance(mark, Curve))
+
+    @cached_property
+    def limits(self) -> tuple[float, float]:
+        """Of the ordinate."""
+        values = [*(curve.y for curve in self.curves), *self.holds]
+        if self.logarithmic:
+            return decades(values, self.decades)
+        low, high = bounds(values)
+        margin = 0.05 * (high - low)
+        return 0.0 if self.from_zero else low - margin, high + margin
+
+    @cached_property
+    def cut(self) -> bool:
+        """Whether values lie below the decades that are shown."""
+        return self.logarithmic and any(bool(np.any(c.y < self.limits[0])) for c in self.curves)
+
+    def shown(self, curve: Curve) -> Floats:
+        """A curve's ordinates, what is below a logarithmic axis lifted to its edge."""
+        return np.maximum(curve.y, self.limits[0]) if self.logarithmic else curve.y
+
+    def ends(self) -> list[tuple[str, float, str]]:
+        """The names at the curves' ends, where they do not overlap, and their colours."""
+        named = sorted((c for c in self.curves if c.end), key=lambda c: float(c.y[-1]))
+        low, high = self.limits
+        places = spread([float(c.y[-1]) for c in named], 0.15 * (high - low) / self.height)
+        return [(c.end, at, c.look.colour) for c, at in zip(named, places, strict=True)]
+
+
+@dataclass(frozen=True, eq=False)
+class Graph:
+    """Panels one above the other over a common abscissa."""
+
+    title: str
+    x_label: str
+    x: Floats
+    panels: tuple[Panel, ...]
+    x_limits: tuple[float, float] | None = None
+    x_logarithmic: bool = False
+    counted: bool = False  # the abscissa: whole numbers
+    beside: bool = False  # where the legend stands; else above
+
+
+@dataclass(frozen=True, eq=False)
+class BarGroup:
+    """Bars of one colour: ``mean`` (n,) with whiskers to ``most`` (n,), NaN where there is none."""
+
+    label: str
+    colour: str
+    mean: Floats
+    most: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Bars:
+    """Lying bars, a group of them at each name, from zero."""
+
+    title: str
+    label: str
+    names: tuple[str, ...]
+    groups: tuple[BarGroup, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """Values (n_1, n_2) over two axes; ``holds`` are values that the scale has to hold."""
+
+    heading: tuple[str, str]
+    values: Floats
+    holds: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Maps:
+    """Fields side by side over the same two axes, one point marked on each."""
+
+    title: str
+    labels: tuple[str, str]
+    axes: tuple[Floats, Floats]
+    fields: tuple[Field, ...]
+    point: Floats | None = None
+    point_label: str = ""
+
+
+Description = Graph | Bars | Maps
+
+
+@dataclass(frozen=True)
+class FigurePlan:
+    """One figure: its file's name without ending, heading, caption, alternative text, content.
+
+    ``shows`` describes it, or draws it where matplotlib alone can.
+    """
+
+    name: str
+    heading: str
+    caption: str
+    alt: str
+    shows: Description | Callable[[], Figure]
+
+
+# --- Limits and places
+
+
+def bounds(values: Sequence[Floats]) -> tuple[float, float]:
+    """Smallest and largest finite value; apart even where all are equal but for round-off.
+
+    A relative spread below 1e-6 is drawn as a level line, not as enlarged round-off.
+    """
+    found = _finite(values)
+    low, high = (float(found.min()), float(found.max())) if found.size else (0.0, 1.0)
+    size = max(abs(low), abs(high))
+    if high - low > 1e-6 * size:
+        return low, high
+    middle, half = (low + high) / 2.0, 0.02 * size or 0.5
+    return middle - half, middle + half
+
+
+def decades(values: Sequence[Floats], most: int | None = None) -> tuple[float, float]:
+    """Whole decades that hold all positive ``values``, or the ``most`` highest of them."""
+    found = _finite(values)
+    found = found[found > 0.0]
+    if not found.size:
+        return 1e-11, 1e-10
+    top = math.ceil(math.log10(found.max()) + 0.02)
+    bottom = min(math.floor(math.log10(found.min()) - 0.02), top - 1)
+    if most is not None:
+        bottom = max(bottom, top - most)
+    return 10.0**bottom, 10.0**top
+
+
+def _finite(values: Sequence[Floats]) -> Floats:
+    found = np.concatenate([np.ravel(v) for v in values] or [np.zeros(0)])
+    return np.asarray(found[np.isfinite(found)])
+
+
+def spread(wanted: Floats | Sequence[float], gap: float) -> list[float]:
+    """Ascending places nearest to the ascending ``wanted`` ones with ``gap`` between them."""
+    clusters: list[tuple[float, int]] = []  # mean place, how many
+    for place in wanted:
+        mean, count = float(place), 1
+        while clusters and clusters[-1][0] + gap * (clusters[-1][1] + count) / 2.0 > mean:
+            other, size = clusters.pop()
+            mean, count = (other * size + mean * count) / (size + count), size + count
+        clusters.append((mean, count))
+    return [mean + gap * (i - (count - 1) / 2.0) for mean, count in clusters for i in range(count)]
+
+
+def power(value: float) -> str:
+    """A power of ten as people read it: ``0.01``, ``10⁻⁷``."""
+    exponent = round(math.log10(value))
+    if -4 <= exponent <= 4:
+        return f"{10.0**exponent:g}"
+    return "10" + str(exponent).translate(str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"))
+
+
+def labelled(quantity: str, unit: str) -> str:
+    """``frequency [Hz]``."""
+    return f"{quantity} [{unit}]" if unit else quantity
+
+
+def short(text: str, length: int = 34) -> str:
+    """A user's name, without control characters and shortened in its middle."""
+    clean = "".join(c if unicodedata.category(c)[0] != "C" else " " for c in text).strip()
+    if len(clean) <= length:
+        return clean
+    head = length * 2 // 3
+    return f"{clean[:head]}…{clean[head + 1 - length :]}"

@@ -1,0 +1,360 @@
+"""Descriptions written for a browser: the data and layout of Plotly figures, as plain numbers.
+
+Colours of paper and ink are left to the page, which knows whether it is dark. Of several fields
+each is a figure of its own, so that they stand one below the other on a narrow screen. Beside each
+figure stands a table of some of its numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.output.figures import graph
+from eigassign.output.figures.graph import (
+    Bars,
+    Curve,
+    Description,
+    Field,
+    Graph,
+    Look,
+    Maps,
+    Panel,
+    Rule,
+    Shade,
+    short,
+)
+from eigassign.output.formats import number
+from eigassign.study.results import MovingMode
+
+Floats = NDArray[np.float64]
+Json = dict[str, Any]
+PIXELS = 78  # of an inch on paper
+_ROOM = 118  # pixels for the legend, the abscissa and its label
+_GAP = 0.07  # between panels
+_DIGITS = 7
+_ROWS = 25  # of a table, at most
+_DASHES = {
+    "solid": "solid",
+    "dashed": "dash",
+    "dotted": "dot",
+    "dash-dotted": "dashdot",
+    "fine": "4px,4px",
+}
+_MARKERS = {"o": "circle", "s": "square", "D": "diamond", "^": "triangle-up", "p": "pentagon"}
+
+
+def figures(shown: Description) -> list[Json]:
+    """``data`` and ``layout`` of each figure that a description is on screen."""
+    if isinstance(shown, Graph):
+        return [_graph(shown)]
+    if isinstance(shown, Bars):
+        return [_bars(shown)]
+    return [_field(shown, field) for field in shown.fields]
+
+
+def _numbers(values: Iterable[float]) -> list[float | None]:
+    """Seven digits are more than a screen shows; JSON has no other numbers than finite ones."""
+    found = (float(f"{value:.{_DIGITS}g}") for value in values)
+    return [value if np.isfinite(value) else None for value in found]
+
+
+# --- Graphs
+
+
+def _graph(shown: Graph) -> Json:
+    heights = np.array([panel.height for panel in shown.panels])
+    free = 1.0 - _GAP * (len(heights) - 1)
+    tops = 1.0 - np.cumsum([0.0, *(free * heights / heights.sum() + _GAP)[:-1]])
+    data: list[Json] = []
+    shapes: list[Json] = []
+    notes: list[Json] = []
+    layout: Json = {"shapes": shapes, "annotations": notes, "hovermode": "closest"}
+    if not shown.x_logarithmic:
+        layout["hovermode"] = "x unified"
+    names = {c.look: c.label for panel in shown.panels for c in panel.curves if c.label}
+    for k, (panel, top) in enumerate(zip(shown.panels, tops, strict=True)):
+        bottom = top - free * panel.height / heights.sum()
+        axis = f"y{k + 1}" if k else "y"
+        layout[f"yaxis{k + 1}" if k else "yaxis"] = {
+            **_ordinate(panel), "domain": [round(max(bottom, 0.0), 4), round(top, 4)],
+        }  # fmt: skip
+        for mark in panel.marks:
+            if isinstance(mark, Curve):
+                data.append(_curve(mark, panel, shown, axis, names))
+            elif isinstance(mark, Shade):
+                data.append(_shade(mark, panel, shown.x, axis))
+            else:
+                shapes.append(_rule(mark, axis))
+                notes += _note(mark, axis)
+        data += [_key(name, look) for name, look in panel.key]
+        notes += [
+            {"text": name, "x": 1.0, "xref": "paper", "xanchor": "left", "xshift": 6, "y": at,
+             "yref": axis, "showarrow": False, "font": {"color": colour}}
+            for name, at, colour in panel.ends()
+        ]  # fmt: skip
+    last = f"y{len(heights)}" if len(heights) > 1 else "y"
+    layout["xaxis"] = {"title": {"text": shown.x_label}, "anchor": last, **_abscissa(shown)}
+    tall = PIXELS * (heights.sum() + 0.15 * len(heights)) + _ROOM
+    return {"data": data, "layout": {**layout, "height": round(tall)}}
+
+
+def _abscissa(shown: Graph) -> Json:
+    if shown.x_logarithmic:
+        own = [c.x for panel in shown.panels for c in panel.curves if c.x is not None]
+        return _decades(graph.decades(own))
+    if shown.x_limits is not None:
+        found: Json = {"range": _numbers(shown.x_limits)}
+        return {**found, "dtick": max(1, int(shown.x.size // 10))} if shown.counted else found
+    low, high = (shown.x.min(), shown.x.max()) if shown.x.size else (0.0, 1.0)
+    return {"range": _numbers((low, high))} if high > low else {}
+
+
+def _ordinate(panel: Panel) -> Json:
+    title: Json = {"title": {"text": panel.label, "standoff": 8}}
+    if panel.logarithmic:
+        return title | _decades(panel.limits, panel.cut)
+    return title | {"range": _numbers(panel.limits)}
+
+
+def _decades(limits: tuple[float, float], cut: bool = False) -> Json:
+    """The lowest label says ≤ where values are cut."""
+    low, high = (round(np.log10(limit)) for limit in limits)
+    step = max(1, (high - low) // 8)
+    ticks = list(range(low, high + 1, step))
+    text = [("≤" if cut and at == low else "") + graph.power(10.0**at) for at in ticks]
+    values = [float(f"1e{at}") for at in ticks]
+    return {"type": "log", "range": [low, high], "tickvals": values, "ticktext": text}
+
+
+def _line(look: Look) -> Json:
+    return {"color": look.colour, "width": look.width * 1.25, "dash": _DASHES[look.dash]}
+
+
+def _mode(look: Look) -> str:
+    parts = [*(("lines",) if look.width else ()), *(("markers",) if look.marker else ())]
+    return "+".join(parts)
+
+
+def _curve(curve: Curve, panel: Panel, shown: Graph, axis: str, names: dict[Look, str]) -> Json:
+    """Curves of one look, in several panels, are hidden and shown together."""
+    x = shown.x if curve.x is None else curve.x
+    look = curve.look
+    name = short(curve.label or curve.end or names.get(look, ""), 60)
+    single = x.size == 1 and not look.marker
+    marker = {
+        "symbol": _MARKERS.get(look.marker, "circle") + ("" if look.filled else "-open"),
+        "size": look.size * 1.3,
+        "color": look.colour,
+    }
+    return {
+        "type": "scatter",
+        "mode": "markers" if single else _mode(look),
+        "x": _numbers(x),
+        "y": _numbers(panel.shown(curve)),
+        "yaxis": axis,
+        "name": name,
+        "legendgroup": name,
+        "showlegend": bool(curve.label),
+        "line": _line(look),
+        **({"marker": marker} if look.marker or single else {}),
+        "cliponaxis": not look.marker,
+        "hovertemplate": "%{y:.5~g}" if not shown.x_logarithmic else "%{y:.3~g} at %{x:.3~g}",
+        **({} if name else {"hoverinfo": "skip", "hovertemplate": None}),
+    }
+
+
+def _key(name: str, look: Look) -> Json:
+    return {
+        "type": "scatter", "mode": "lines", "x": [None], "y": [None], "name": name,
+        "line": _line(look), "hoverinfo": "skip",
+    }  # fmt: skip
+
+
+def _shade(shade: Shade, panel: Panel, x: Floats, axis: str) -> Json:
+    x = x if shade.x is None else shade.x
+    edges = zip((shade.low, shade.high), panel.limits, strict=True)
+    low, high = (np.full(x.size, limit) if edge is None else edge for edge, limit in edges)
+    return {
+        "type": "scatter", "mode": "lines", "fill": "toself", "line": {"width": 0},
+        "x": _numbers([*x, *x[::-1]]), "y": _numbers([*low, *high[::-1]]), "yaxis": axis,
+        "fillcolor": _transparent(shade.colour, shade.opacity), "name": short(shade.label, 60),
+        "showlegend": bool(shade.label), "hoverinfo": "skip",
+    }  # fmt: skip
+
+
+def _transparent(colour: str, opacity: float) -> str:
+    r, g, b = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
+    return f"rgba({r},{g},{b},{opacity})"
+
+
+def _rule(rule: Rule, axis: str) -> Json:
+    (at,) = _numbers((rule.at,))
+    across: Json = {"xref": "paper", "x0": 0, "x1": 1, "yref": axis, "y0": at, "y1": at}
+    up: Json = {"yref": f"{axis} domain", "y0": 0, "y1": 1, "xref": "x", "x0": at, "x1": at}
+    named = {"name": short(rule.label, 60), "showlegend": True} if rule.label else {}
+    return {"type": "line", "line": _line(rule.look), **(up if rule.upright else across), **named}
+
+
+def _note(rule: Rule, axis: str) -> Iterator[Json]:
+    if rule.note:
+        at = float(np.log10(rule.at))  # only logarithmic panels have such rules
+        yield {
+            "text": short(rule.note, 60), "x": 0.0, "xref": "paper", "xanchor": "left", "y": at,
+            "yref": axis, "yanchor": "top", "showarrow": False,
+        }  # fmt: skip
+
+
+# --- Bars and maps
+
+
+def _bars(shown: Bars) -> Json:
+    names = [short(name) for name in shown.names]
+    data = []
+    for group in shown.groups:
+        beyond = group.most - group.mean
+        whisker = {
+            "type": "data", "symmetric": False, "array": _numbers(np.maximum(beyond, 0.0)),
+            "arrayminus": _numbers(np.maximum(-beyond, 0.0)), "thickness": 1, "width": 0,
+            "color": graph.BLACK,
+        }  # fmt: skip
+        data.append(
+            {"type": "bar", "orientation": "h", "x": _numbers(group.mean), "y": names,
+             "name": short(group.label, 60), "marker": {"color": group.colour},
+             "error_x": whisker, "hovertemplate": "%{y}: %{x:.4~g}", "showlegend": True}
+        )  # fmt: skip
+    tall = max(100, 22 * len(names) * (len(shown.groups) + 1)) + _ROOM
+    layout = {
+        "barmode": "group",
+        "xaxis": {"title": {"text": shown.label}, "zeroline": True},
+        "yaxis": {"autorange": "reversed", "automargin": True, "type": "category"},
+        "height": tall,
+    }
+    return {"data": data, "layout": layout}
+
+
+def _field(shown: Maps, field: Field) -> Json:
+    low, high = graph.bounds([field.values, np.array(field.holds)])
+    contour: Json = {
+        "type": "heatmap",
+        "x": _numbers(shown.axes[0]),
+        "y": _numbers(shown.axes[1]),
+        "z": [_numbers(row) for row in field.values.T],
+        "zmin": low,
+        "zmax": high,
+        "colorscale": "Cividis",
+        "colorbar": {"thickness": 12, "outlinewidth": 0},
+        "zsmooth": "best",
+        "name": field.heading[1],
+        "hovertemplate": "%{x:.4~g}, %{y:.4~g}: %{z:.4~g}<extra></extra>",
+    }
+    data = [contour]
+    if shown.point is not None:
+        x, y = _numbers(shown.point)
+        data.append(
+            {"type": "scatter", "mode": "markers", "x": [x], "y": [y], "name": shown.point_label,
+             "marker": {"size": 9, "color": "#ffffff", "line": {"color": "#000000", "width": 1.5}}}
+        )  # fmt: skip
+    layout = {
+        "title": {"text": "<br>".join(field.heading), "font": {"size": 13}},
+        "xaxis": {"title": {"text": shown.labels[0]}, "range": _numbers(shown.axes[0][[0, -1]])},
+        "yaxis": {"title": {"text": shown.labels[1]}, "range": _numbers(shown.axes[1][[0, -1]])},
+        "showlegend": False,
+        "height": 340,
+    }
+    return {"data": data, "layout": layout}
+
+
+# --- Tables
+
+
+def table(shown: Description) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Columns, and some rows of what a description shows, as text."""
+    if isinstance(shown, Graph):
+        return _table_of_graph(shown)
+    if isinstance(shown, Bars):
+        columns = ("", *(group.label for group in shown.groups))
+        means = zip(*(group.mean for group in shown.groups), strict=True)
+        return columns, [
+            (name, *map(number, own)) for name, own in zip(shown.names, means, strict=True)
+        ]
+    x, y = shown.axes
+    columns = (*shown.labels, *(", ".join(field.heading) for field in shown.fields))
+    corners = [(i, j) for i in _some(x.size, 5) for j in _some(y.size, 5)]
+    return columns, [
+        (number(x[i]), number(y[j]), *(number(field.values[i, j]) for field in shown.fields))
+        for i, j in corners
+    ]
+
+
+def _table_of_graph(shown: Graph) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    names = {c.look: c.label for panel in shown.panels for c in panel.curves if c.label}
+    own = [
+        (f"{c.label or c.end or names.get(c.look, '')}, {panel.label}".strip(", "), c)
+        for panel in shown.panels
+        for c in panel.curves
+    ]
+    common = [(label, c.y) for label, c in own if c.x is None]
+    if common:
+        rows = _some(shown.x.size, _ROWS)
+        columns = (shown.x_label, *(label for label, _ in common))
+        return columns, [
+            (number(shown.x[k]), *(number(values[k]) for _, values in common)) for k in rows
+        ]
+    columns = ("", shown.x_label, shown.panels[0].label)
+    return columns, [
+        (label, number(x), number(y))
+        for label, c in own
+        for x, y in zip(c.x if c.x is not None else (), c.y, strict=True)
+        if label
+    ]
+
+
+def _some(count: int, most: int) -> list[int]:
+    return [int(k) for k in np.unique(np.linspace(0, count - 1, min(count, most)).round())]
+
+
+# --- A mode that moves
+
+
+def moving(modes: Sequence[MovingMode]) -> list[Json]:
+    """What the page needs to draw each: lines, NaN between them as null, and marks."""
+    return [_moving(mode) for mode in modes]
+
+
+def _moving(mode: MovingMode) -> Json:
+    rest = [_joined([line[k] for line in mode.rest]) for k in range(len(mode.time_s))]
+    motions = [_joined([line[k] for line in mode.motions]) for k in range(len(mode.time_s))]
+    kinds = list(dict.fromkeys(kind for _, kind in mode.marks))
+    return {
+        "name": mode.name,
+        "trajectory": mode.trajectory,
+        "time": _numbers(mode.time_s),
+        "hz": _numbers(mode.hz),
+        "rest": rest,
+        "motion": motions,
+        "marks": [{"name": short(name), "kind": kind} for name, kind in mode.marks],
+        "kinds": kinds,
+        "places": [_columns(places) for places in mode.mark_places],
+        "moves": [_columns(moves) for moves in mode.mark_motions],
+        "tip": None if mode.tip_path is None else _columns(mode.tip_path),
+    }
+
+
+def _joined(lines: Sequence[Floats]) -> list[list[float | None]]:
+    d = lines[0].shape[1]
+    parts = [part for line in lines for part in (line, np.full((1, d), np.nan))]
+    return _columns(np.concatenate(parts[:-1]))
+
+
+def _columns(points: Floats) -> list[list[float | None]]:
+    """Per direction the places in m, to a tenth of a micrometre of a mechanism of metres."""
+    scale = float(np.nanmax(np.abs(points), initial=0.0)) or 1.0
+    digits = max(0, 5 - int(np.floor(np.log10(scale))))
+    return [
+        [None if np.isnan(value) else round(float(value), digits) for value in column]
+        for column in points.T
+    ]
