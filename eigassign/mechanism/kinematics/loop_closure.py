@@ -426,10 +426,10 @@ def _unclosable(tree: Topology, function: ImplicitFunction, a0: Floats, n: int) 
             "mechanism can be put together: mechanism.assembly: {at: {coordinate: value}}"
         )
     joints = ", ".join(dict.fromkeys(f.joint for f in tree.passive))
-    gap = _nearest(function, a0, n)
-    if max(gap) < ROUNDED:
+    left = _nearest(function, a0, n)
+    if max(left) < ROUNDED:
         return (
-            f"{message}, but nearly: {_spelt(gap)} are left, where {ACCEPT:g} are accepted. They "
+            f"{message}, but nearly: {_spelt(left)} are left, where {ACCEPT:g} are accepted. They "
             f"pose {function.n_equations} conditions, of which {joints} can meet "
             f"{function.n_equations - beyond}, so that the others must agree in their dimensions: "
             "give positions, lengths and angles with twelve digits, or give joints more freedoms, "
@@ -438,7 +438,7 @@ def _unclosable(tree: Topology, function: ImplicitFunction, a0: Floats, n: int) 
     return (
         f"{message}: they pose {function.n_equations} conditions, of which {joints} can meet "
         f"{function.n_equations - beyond}: {beyond} coordinate(s) too many, or joints with too few "
-        f"freedoms for dimensions that do not agree. The nearest pose found leaves {_spelt(gap)}"
+        f"freedoms for dimensions that do not agree. The nearest pose found leaves {_spelt(left)}"
     )
 
 
