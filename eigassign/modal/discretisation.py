@@ -52,8 +52,9 @@ def discretisation_error(
         gram, own, beta = inside.at(x[s], found.phi[0] * np.sqrt(mu), mu)
         total[s] = _bounds(mu, gram, float(beta.max()), inside.tapered, highest, pencil)[pick]
         room = np.maximum(mu[pick] - beta[:, None], 0.0)
-        with np.errstate(divide="ignore"):
-            of_links[:, s] = 0.5 * own[:, pick] / (room * mu[pick])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = 0.5 * own[:, pick] / (room * mu[pick])
+        of_links[:, s] = np.where(own[:, pick] > 0.0, share, 0.0)
     names = [link.name for link in parts.links]
     return DiscretisationError(total, dict(zip(names, of_links, strict=True)))
 

@@ -21,6 +21,7 @@ Floats = NDArray[np.float64]
 STEP = 0.15  # largest change of an argument in one continuation step (rad or m)
 FARTHEST = 500.0  # rad or m from the known solution: 80 turns
 REFINEMENTS = (1, 4, 16, 64)  # of the steps, where ∂F/∂p changes too much for one
+MOST_STEPS = 5000  # of a refinement: some seconds
 TOLERANCE = 1e-13  # on Newton's step, relative to 1 (rad or m)
 ON_THE_WAY = 1e-6  # the same where p is only the start of the next step: what is left is its square
 CONVERGED = 1e-8  # last step of a regular solution; at a dead point Newton only creeps
@@ -68,7 +69,8 @@ class ImplicitFunction:
         steps = int(np.ceil(farthest / STEP)) or 1
         p = np.empty((self.size, a.shape[1]))
         left = np.arange(a.shape[1])
-        for refinement in REFINEMENTS:
+        worth = [r for r in REFINEMENTS if r == 1 or r * steps <= MOST_STEPS]
+        for refinement in worth:
             found, ok, reached = self._continue(a[:, left], steps * refinement)
             p[:, left[ok]] = found[:, ok]
             left, reached = left[~ok], reached[:, ~ok]

@@ -81,8 +81,8 @@ class ExpansionChoice:
 
     @property
     def order(self) -> int:
-        """Their order."""
-        return self.expansions[0].order
+        """Their order, at least 1; where no variable matters, their degree is 0."""
+        return max(self.expansions[0].order, 1)
 
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """(n, n_modes) in Hz, each sample by the nearest expansion."""
@@ -199,7 +199,8 @@ class _Judge:
         first = before.parts[0]
         if any(np.array_equal(q, part.q0) for part in before.parts):
             return None
-        return self.candidate(np.append(q, first.y0), first.order, before.gap, before)
+        order = max(first.order, 1)  # the degree is 0 where no variable matters
+        return self.candidate(np.append(q, first.y0), order, before.gap, before)
 
     def line(self, made: _Candidate, place: str) -> str:
         """Order, clusters, points and error in words; of one point how far its series reaches."""
