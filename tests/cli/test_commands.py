@@ -351,7 +351,7 @@ FAILURES = [
     (["modes", "good.yaml", "--count", "many"], 2, "UsageError"),
     (["expand"], 2, "UsageError"),
     (["chart", "good.yaml", "--out", "good.yaml/x"], 3, "StorageError"),
-    (["update", "nowhere.yaml"], 2, "CaseError"),
+    (["update", "nowhere.yaml"], 2, "UsageError"),
 ]
 
 

@@ -230,7 +230,7 @@ import sys, time
 from pathlib import Path
 from eigassign.output import report
 
-def write_run(results, folder, formats):
+def write_run(results, folder, formats, kind):
     (folder / "half").touch()
     Path(f"{results.case_name}.ready").touch()
     time.sleep(600)

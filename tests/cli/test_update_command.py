@@ -45,7 +45,7 @@ def test_an_update_leaves_a_whole_folder_and_a_case_that_can_be_used(
     assert (kept["verdict"], len(kept["measurements"])) == ("fitted", 12)
 
     assert main(["update", str(folder / "updated.yaml"), "--quiet", "--json", "--figures", "none",
-                 "--out", str(case.parent / "again")]) == 0  # fmt: skip
+                 "--allow-outside", "--out", str(case.parent / "again")]) == 0  # fmt: skip
     again = json.loads(capsys.readouterr().out)
     for name, row in kept["parameters"].items():
         assert again["parameters"][name]["initial"] == row["value"]

@@ -20,8 +20,13 @@ from eigassign.modal.expansion import Expansion, expand
 
 
 def with_design(tree: Tree, **paths: str) -> Tree:
-    design = {n: {"parameter": p, "min": 1e-9, "max": 1e15} for n, p in paths.items()}
+    design = {n: {"parameter": p, **_bounds(p)} for n, p in paths.items()}
     return {**tree, "design": design}
+
+
+def _bounds(path: str) -> dict[str, float]:
+    """Wide ones, of an elastic modulus or of a length, mass or stiffness."""
+    return {"min": 1e6, "max": 1e13} if path.endswith("modulus") else {"min": 1e-4, "max": 1e5}
 
 
 def loop() -> Tree:

@@ -34,7 +34,7 @@ def posed(name: str) -> tuple[ea.Case, Any, Any]:
 
 def every_shape(case: ea.Case, q: Any, y: Any, vectors: Any) -> Any:
     model = case.model()
-    return shapes(model.poses, model.x(q, y), vectors)
+    return shapes(model.poses, model.x(q, y), vectors[None])[0]
 
 
 @pytest.mark.parametrize("phi", [0.0, 0.3, 4.0])
@@ -191,7 +191,8 @@ def test_any_motion_of_any_loops_keeps_their_joints_together(seed: int, space: s
     tree, q, _ = random_closed(seed, space, 1 + seed % 2, seed % 2 == 0, kinds)
     model = built(tree)
     vectors = np.random.default_rng(seed).standard_normal((model.pencil.n_dof, 4))
-    together(model.case, model.motion, shapes(model.poses, model.x(q), vectors))
+    (found,) = shapes(model.poses, model.x(q), vectors[None])
+    together(model.case, model.motion, found)
 
 
 def together(case: Any, motion: Any, found: Any) -> None:

@@ -35,7 +35,7 @@ def test_mesh_and_expansion_together_meet_the_accuracy(x, accuracy, modes):
 
 def test_it_says_what_it_chose_and_why(x):
     mesh = choose_mesh(build, FREE, x, 5e-4)
-    assert mesh.reasons[0] == "2 elements: mode 1 moves 0.36 % with 4"
+    assert mesh.reasons[0] == "2 elements: mode 1 at most 0.4 % too high"
     expansion = choose_expansion(build(mesh.elements).pencil, x, 5e-4)
     assert expansion.order == 5
     assert any(line.startswith("order 4: error at most") for line in expansion.reasons)
