@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from eigassign.output.formats import number, percent
+from eigassign.output.formats import percent
 from eigassign.study.design.judgement import MET
 from eigassign.study.results import RunResults, TargetStudy
 
@@ -89,7 +89,7 @@ def _asked(results: RunResults) -> Iterator[str]:
     yield f"by {names} within the bounds" if parameters else "with the design as it is"
     yield f"along {results.along}, {results.time_s.size} samples"
     if results.mass is not None and results.mass.upper is not None:
-        yield f"mass at most {number(results.mass.upper)} kg"
+        yield f"mass at most {_few(results.mass.upper)} kg"
 
 
 def _finding(target: TargetStudy, accepted: float) -> Finding:
@@ -115,7 +115,8 @@ def _trust(results: RunResults) -> Iterator[str]:
         yield "The search was ended before it was done."
     for clear in row.clearances:
         proof = "proved clear" if clear.clear else "NOT proved clear"
-        yield f"{_sentence(clear.label)[:-1]}: {proof}, {clear.below} modes below."
+        count = f"{clear.below} mode{'' if clear.below == 1 else 's'}"
+        yield f"{_sentence(clear.label)[:-1]}: {proof}, {count} below."
     found = results.meaning.tolerance
     if found is not None:
         yield _sentence(found.words)
@@ -132,10 +133,10 @@ def _bars(results: RunResults) -> Iterator[Bar]:
         )
         yield Bar(
             row.name,
-            number(row.initial),
-            number(row.optimal) if row.choice is None else f"{number(row.optimal)} ({row.choice})",
+            _few(row.initial),
+            _few(row.optimal) if row.choice is None else f"{_few(row.optimal)} ({row.choice})",
             row.unit,
-            (number(row.lower), number(row.upper)),
+            (_few(row.lower), _few(row.upper)),
             round(100.0 * start, 2),
             round(100.0 * end, 2),
         )
@@ -144,8 +145,13 @@ def _bars(results: RunResults) -> Iterator[Bar]:
 def _cost(results: RunResults) -> Iterator[str]:
     mass = results.mass
     if mass is not None:
-        change = number(mass.optimal - mass.initial)
+        change = _few(mass.optimal - mass.initial)
         added = "unchanged" if change == "0" else f"{change} kg".replace("-", "−")
-        yield f"Mass {number(mass.initial)} → {number(mass.optimal)} kg ({added})"
+        yield f"Mass {_few(mass.initial)} → {_few(mass.optimal)} kg ({added})"
     if results.price is not None:
-        yield f"Price of the change {number(results.price)}"
+        yield f"Price of the change {_few(results.price)}"
+
+
+def _few(value: float) -> str:
+    """Four digits: the tables below have more."""
+    return f"{value + 0.0:.4g}"

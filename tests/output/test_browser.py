@@ -98,7 +98,7 @@ def test_sliders_move_the_mechanism_by_keys_too(browser, reports):
     drawn(browser)
     player = browser.find_element("css selector", "[data-moving]")
     browser.execute_script("arguments[0].scrollIntoView()", player)
-    button = player.find_element("css selector", "button")
+    button = player.find_element("css selector", ".tools button")
     time.sleep(0.5)
     if button.text == "Pause":
         button.click()
@@ -137,5 +137,5 @@ def test_without_motion_wanted_nothing_moves(browser, reports):
     at(browser, reports["two_link"], 1200)
     drawn(browser)
     time.sleep(0.5)
-    assert browser.find_element("css selector", "[data-moving] button").text == "Play"
+    assert browser.find_element("css selector", "[data-moving] .tools button").text == "Play"
     browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})

@@ -19,7 +19,7 @@
     const ends = (copy.layout.annotations || []).some((note) => note.xanchor === "left" && note.x === 1);
     copy.layout = { paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
       font: { color: css("--ink"), family: "system-ui, sans-serif", size: 12 },
-      margin: { l: 10, r: ends ? 70 : 34, t: 10, b: 10 },
+      margin: { l: 10, r: ends ? 92 : 34, t: 10, b: 10 },
       modebar: { orientation: "v", bgcolor: "rgba(0,0,0,0)", color: css("--soft"), activecolor: css("--ink") },
       legend: { orientation: "h", yanchor: "bottom", y: 1.01, x: 0, xanchor: "left" },
       hoverlabel: { bgcolor: css("--page"), font: { color: css("--ink") } }, ...copy.layout };
@@ -72,7 +72,7 @@
   function player(root) {
     const mode = moving[+root.dataset.moving], box = root.querySelector(".plot");
     const time = root.querySelector("input[name=time]"), phase = root.querySelector("input[name=phase]");
-    const play = root.querySelector("button"), said = root.querySelector("output");
+    const play = root.querySelector(".tools button"), said = root.querySelector("output");
     const space = mode.rest[0].length === 3, last = mode.time.length - 1;
     time.max = last;
     const axes = space ? ["x", "y", "z"] : ["x", "y"];
