@@ -145,8 +145,8 @@ def _bars(results: RunResults) -> Iterator[Bar]:
 def _cost(results: RunResults) -> Iterator[str]:
     mass = results.mass
     if mass is not None:
-        change = _few(mass.optimal - mass.initial)
-        added = "unchanged" if change == "0" else f"{change} kg".replace("-", "−")
+        change = mass.optimal - mass.initial
+        added = f"{change:+.4g} kg".replace("-", "−") if _few(change) != "0" else "unchanged"
         yield f"Mass {_few(mass.initial)} → {_few(mass.optimal)} kg ({added})"
     if results.price is not None:
         yield f"Price of the change {_few(results.price)}"

@@ -11,7 +11,7 @@
   // --- Plots in the page's colours
 
   function themed(figure) {
-    const copy = JSON.parse(JSON.stringify(figure).replaceAll("#1a1a1a", css("--ink")));
+    const copy = JSON.parse(JSON.stringify(figure).replaceAll("#1a1a1a", css("--ink")).replaceAll("#0072B2", css("--blue")));
     const axis = { gridcolor: css("--line"), zerolinecolor: css("--soft"), linecolor: css("--soft"), automargin: true };
     for (const key of Object.keys(copy.layout)) {
       if (/^[xy]axis/.test(key)) copy.layout[key] = { ...axis, ...copy.layout[key] };
@@ -109,7 +109,7 @@
         modebar: { orientation: "v", bgcolor: "rgba(0,0,0,0)", color: css("--soft"), activecolor: css("--ink") } };
       if (space) {
         const of = (c) => ({ ...quiet, title: { text: axes[c] + " [m]" }, range: [(reach[c][0] + reach[c][1]) / 2 - half, (reach[c][0] + reach[c][1]) / 2 + half] });
-        return { ...base, scene: { xaxis: of(0), yaxis: of(1), zaxis: of(2), aspectmode: "cube", camera: { eye: { x: 1.1, y: -1.3, z: 0.7 }, projection: { type: "orthographic" } } } };
+        return { ...base, scene: { xaxis: of(0), yaxis: of(1), zaxis: of(2), aspectmode: "cube", camera: { eye: { x: 0.8, y: -0.95, z: 0.5 }, projection: { type: "orthographic" } } } };
       }
       const pad = 0.04 * half;
       return { ...base, xaxis: { ...quiet, title: { text: "x [m]" }, range: [reach[0][0] - pad, reach[0][1] + pad], constrain: "domain", automargin: true },
