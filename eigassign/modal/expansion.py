@@ -307,7 +307,8 @@ def companion_order(n_variables: int, known: int) -> int:
 def polynomial_error(polynomial: Floats, reduced: Floats, estimate: Floats) -> Floats:
     """Relative error in frequency (n, n_modes); infinite where λ < 0 or f̂ is refused."""
     apart = np.abs(polynomial / reduced - 1.0)
-    bound = apart * (1.0 + estimate) + estimate
+    with np.errstate(invalid="ignore"):  # 0 · ∞, where f̂ is refused
+        bound = apart * (1.0 + estimate) + estimate
     return np.where(np.isfinite(bound), bound, np.inf)
 
 

@@ -17,7 +17,7 @@ from eigassign.errors import UsageError
 from eigassign.modal import expansion
 from eigassign.modal.exact import solver
 from eigassign.modal.exact.clusters import clusters
-from eigassign.modal.expansion import Expansion
+from eigassign.modal.expansion import Expansion, polynomial_error
 from eigassign.modal.expansion import expand as expand_pencil
 from eigassign.modal.model import Model
 from eigassign.modal.taylor.local_coordinates import substitute
@@ -576,3 +576,10 @@ def test_many_samples_give_what_few_give(gap: float) -> None:
     few = np.vstack([made.eigenvalues(q[i : i + 100], y[i : i + 100]) for i in range(0, 1000, 100)])
     # a sum's round-off is relative to its largest term, which the largest eigenvalue is near
     np.testing.assert_allclose(made.eigenvalues(q, y), few, rtol=1e-12, atol=1e-12 * few.max())
+
+
+def test_where_the_reduced_model_is_refused_the_error_is_infinite_without_a_word() -> None:
+    error = polynomial_error(
+        np.array([[190.0, 191.0]]), np.array([[190.0, 190.0]]), np.array([[np.inf, 0.0]])
+    )
+    np.testing.assert_allclose(error, [[np.inf, 1 / 190]])
