@@ -58,8 +58,9 @@ FAIR_ORDER = 5
 # Number of points from which doubling them must halve the error. That ends a hopeless search before
 # MAX_POINTS; without it three shipped cases at 1e-3 and 1e-5 choose the same at the same cost.
 FAIR_COUNT = 8
-# Products of coefficients (2.3 µs each) above which an order is not tried if that before did not
-# halve the error: 8 of eight variables, 10 of five, 12 of four. Followed on, series that diverge or miss a mode took 10 s and 1.7 GB, and came to nothing.
+# Products of coefficients (2.3 µs each) above which an order is not tried if that before does not
+# halve the error of that two steps before: 8 of eight variables, 10 of five, 12 of four. Followed
+# on, series that diverge or miss a mode took 10 s and 1.7 GB, and came to nothing.
 LARGE = 100_000
 FARTHEST = 32  # samples at which the radius of convergence is looked at: all have n × N monomials
 
@@ -230,7 +231,7 @@ def _candidates(judge: _Judge, x0: Floats, orders: Sequence[int]) -> Iterator[_C
     singles: list[_Candidate] = []
     alone: dict[int, float] = {}  # order: error without neighbours
     for gap in _gaps(judge.pencil, x0, judge.modes):
-        earlier = [np.inf]  # errors of the orders before
+        earlier = [np.inf, np.inf]  # errors of the orders before
         for order, following in zip(orders, (*orders[1:], orders[-1]), strict=True):
             one = judge.candidate(x0, order, gap)
             if one.cost >= limit:
@@ -240,7 +241,7 @@ def _candidates(judge: _Judge, x0: Floats, orders: Sequence[int]) -> Iterator[_C
                 limit = one.cost
                 break
             singles.append(one)
-            if judge.large(following) and not one.error < 0.5 * earlier[-1]:
+            if judge.large(following) and not one.error < 0.5 * earlier[-2]:
                 break
             earlier.append(one.error)
             if gap == CLUSTER_GAP:
