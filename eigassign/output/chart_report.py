@@ -178,10 +178,11 @@ def write_chart(
     (folder / "chart.json").write_text(to_json(chart), encoding="utf-8")
     plans = chart_figures(chart)
     files = report.write_figures(plans, folder, formats)
-    line = chart.advice[0].words if chart.advice else None
+    words = chart.advice[0].words if chart.advice else ""
+    line = f"{words[:1].upper()}{words[1:]}." if words else None
     report.write_page(
         folder, kind, chart, tables(chart), plans, files,
-        line=line, document=("chart.json", to_json(chart).encode()),
+        line=line, tone="good", document=("chart.json", to_json(chart).encode()),
     )  # fmt: skip
 
 
