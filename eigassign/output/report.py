@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eigassign._version import __version__
+from eigassign.output import terminal
 from eigassign.output.figures import screen
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.modes import mode_figures
@@ -133,6 +134,12 @@ def _shown(
             yield Shown(plan, image=image, files=tuple(own.values()))
 
 
+def _texts(table: Table) -> list[bool]:
+    """Which columns are words, not numbers."""
+    columns = range(len(table.columns))
+    return [not terminal.are_numbers([row[k] for row in table.rows]) for k in columns]
+
+
 @cache
 def _template() -> Template:
     """The page's template, compiled once a process."""
@@ -145,6 +152,7 @@ def _template() -> Template:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["texts"] = _texts
     return environment.get_template("report.html.j2")
 
 

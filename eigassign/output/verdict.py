@@ -115,8 +115,8 @@ def _trust(results: RunResults) -> Iterator[str]:
         yield "The search was ended before it was done."
     for clear in row.clearances:
         proof = "proved clear" if clear.clear else "NOT proved clear"
-        count = f"{clear.below} mode{'' if clear.below == 1 else 's'}"
-        yield f"{_sentence(clear.label)[:-1]}: {proof}, {count} below."
+        below = f"{clear.below} mode{'' if clear.below == 1 else 's'}"
+        yield f"{_sentence(clear.label)[:-1]}: {proof}, {below} below."
     found = results.meaning.tolerance
     if found is not None:
         yield _sentence(found.words)
