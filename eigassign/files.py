@@ -81,7 +81,10 @@ def pieces(path: str | Path, limit: int) -> Iterator[bytes]:
     Raises OSError, whose ``strerror`` says what is wrong, for everything else. Opening waits for
     nobody, and a file that grows while it is read is refused as well.
     """
-    _require_regular(os.stat(path))  # opening a device may already do something
+    try:
+        _require_regular(os.stat(path))  # opening a device may already do something
+    except ValueError as error:  # a null character
+        raise OSError(errno.EINVAL, str(error)) from None
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0)
     descriptor = os.open(path, flags | getattr(os, "O_BINARY", 0))
     with open(descriptor, "rb", buffering=0) as file:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from eigassign.case import CaseFile
+from eigassign.errors import UsageError
 from eigassign.files import printable_lines
 from eigassign.output import report
 from eigassign.output.run_folder import run_folder
@@ -43,8 +44,12 @@ class RunFolder:
 def new_run_folder(file: CaseFile, out: Path | None, force: bool) -> Iterator[RunFolder]:
     """Yield the folder to fill: ``out``, or results/<stem of the case file>.
 
-    Raises StorageError on entry already where the folder may not be replaced.
+    Raises StorageError on entry already where the folder may not be replaced, UsageError where the
+    file has no stem.
     """
+    if out is None and not file.path.stem.strip("."):
+        message = f"{file.path} has no name before its ending: say where the run goes, --out DIR"
+        raise UsageError(message)
     target = RESULTS / file.path.stem if out is None else Path(out)
     case = {"case_path": file.path, "case_sha256": file.sha256, "case_files": file.files}
     with run_folder(target, **case, force=force) as hidden:  # type: ignore[arg-type]

@@ -53,6 +53,23 @@ def test_it_holds_for_stretch_twist_shear_and_tapers(
         assert np.median(bound / error) < 1.3
 
 
+def test_it_holds_for_torsion_along_a_tapered_rectangle() -> None:
+    def twisting(n: int) -> Tree:
+        tree = cantilever("spatial", n, section={"start": "a", "end": "b"})
+        for name, side in (("a", 0.04), ("b", 0.01)):
+            tree["mechanism"]["sections"][name] |= {"width": side, "height": side}
+        rotor = {"at": "bar.end", "mass": 0, "inertia": [0.1, 0, 0, 0, 0, 0]}
+        return {**tree, "mechanism": {**tree["mechanism"], "bodies": {"rotor": rotor}}}
+
+    (right,) = case_of(twisting(256)).model().frequencies([], [], 1)[0]
+    for n in (4, 8, 16):
+        model = case_of(twisting(n)).model()
+        error = model.frequencies([], [], 1)[0, 0] / right - 1.0
+        (bound,) = model.discretisation_error([], [], (1,))[0]
+        assert error > 5e-3
+        assert error * 0.99 <= bound < 1.1 * error
+
+
 def test_modes_beside_one_that_errs_much_are_bounded_too() -> None:
     # steep tapers hanging on one another: what mode 1 misses pushes the others the other way
     tree = cantilever("spatial", 3, section={"start": "a", "end": "b"}, shear=True)

@@ -12,7 +12,7 @@ import pytest
 from run_cases import ONE_SHOT, SHIPPED, UNCACHED, chain, shipped, without, written
 
 from eigassign.api import load_case
-from eigassign.errors import StorageError
+from eigassign.errors import StorageError, UsageError
 from eigassign.pipeline.run import Options, Outcome, expand_case, optimize, solve_case
 
 
@@ -261,3 +261,13 @@ def test_equal_cases_with_other_matrices_do_not_replace_each_others_runs(tmp_pat
     expand_case(tmp_path / "same" / "superelement_arm.yaml", in_folder(target))
     with pytest.raises(StorageError, match="holds a run of another case"):
         expand_case(tmp_path / "other" / "superelement_arm.yaml", in_folder(target))
+
+
+def test_a_case_without_a_name_is_told_to_say_where_its_run_goes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("..yaml").write_text(SHIPPED.read_text())
+    with pytest.raises(UsageError, match="--out DIR"):
+        expand_case("..yaml")
+    assert not Path("results").exists()

@@ -52,6 +52,8 @@ def not_allowed(named: Sequence[NamedFile], folder: Path) -> Iterator[Finding]:
     """Files that do not lie below ``folder``."""
     root = os.path.realpath(folder)
     for each in named:
+        if "\0" in each.file:  # no file has such a name: see `unreadable`
+            continue
         place = os.path.realpath(each.file)
         if not Path(place).is_relative_to(root):
             yield (

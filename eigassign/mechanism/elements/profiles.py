@@ -2,8 +2,8 @@
 
 Along a taper the dimensions of the section run linearly. Areas and moments of inertia are then
 polynomials of degree 4 at most, given by five of their values, but for the torsion constant of a
-rectangle. Over an element each value is a sum of Legendre polynomials, Σ_l c_l P_l(2ξ − 1), of
-which those up to P_4 count: see `beam`.
+rectangle, of which five values are taken in each element. Over an element each value is a sum of
+Legendre polynomials, Σ_l c_l P_l(2ξ − 1), of which those up to P_4 count: see `beam`.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ def beam_profiles(
     weights = _legendre_weights(n)
     table = [_combined(v, weights) for v in zip(*map(at, STATIONS.tolist()), strict=True)]
     if _has_series(case, beam):
-        table[BeamValues._fields.index("GJ")] = _mean_torsion(at, n)
+        table[BeamValues._fields.index("GJ")] = _torsion(at, n)
     if together and all(each is None or isinstance(each, np.ndarray) for each in table):
         rows: Any = [[None if each is None else each.T for each in table]]
     else:
@@ -181,16 +181,14 @@ def _has_series(case: CaseFile, beam: Any) -> bool:
     return case.mechanism.space == "spatial" and shape == "rectangle"
 
 
-def _mean_torsion(at: Callable[[float], BeamValues], n: int) -> Any:
-    """GJ averaged over each of n elements, (n, 5) as of `_combined`."""
-    xi, g = np.polynomial.legendre.leggauss(3)
+def _torsion(at: Callable[[float], BeamValues], n: int) -> Any:
+    """GJ over each of n elements, (n, 5) as of `_combined`, from values of its own in each."""
+    legendre = np.polynomial.legendre
+    xi, g = legendre.leggauss(5)
     places = (2.0 * np.arange(n)[:, None] + 1.0 + xi) / n - 1.0
-    mean = [
-        sum((_one_atom(at(t).GJ) * w for t, w in zip(row, 0.5 * g, strict=True)), 0.0)
-        for row in places.tolist()
-    ]
-    rows = [[each, *[0.0] * (TERMS - 1)] for each in mean]
-    return np.array(rows) if all(is_constant(each) for each in mean) else rows
+    weights = (g[:, None] * legendre.legvander(xi, TERMS - 1) * (np.arange(TERMS) + 0.5)).T
+    rows = [_combined(tuple(at(t).GJ for t in row), weights[None])[0] for row in places.tolist()]
+    return np.array(rows) if all(isinstance(row, np.ndarray) for row in rows) else rows
 
 
 def _tapered_values(

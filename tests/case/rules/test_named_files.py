@@ -64,3 +64,9 @@ def test_a_pipe_and_a_file_of_a_terabyte_are_told_at_their_line(tmp_path: Path) 
     for name, reason in (("pipe", "it is a pipe"), ("huge", "100 MB at most; .*=10000 allows it")):
         with pytest.raises(CaseError, match=rf"case\.yaml:\d+:3: trajectory\.file: .*{reason}"):
             load(case_with(tmp_path, f"{name}.csv"))
+
+
+def test_a_name_with_a_null_character_is_a_problem_of_its_line(tmp_path: Path) -> None:
+    for allowed in (False, True):
+        with pytest.raises(CaseError, match=r"trajectory\.file: no such file: .*a\\x00b\.csv"):
+            load(case_with(tmp_path, '"a\\0b.csv"'), allow_outside=allowed)
