@@ -12,6 +12,7 @@ from eigassign.chart.results import SCHEMA, Advice, Chart, Front, Timing
 from eigassign.chart.timing import time_in_words
 from eigassign.output import report
 from eigassign.output.figures.front import chart_figures
+from eigassign.output.formats import capital
 from eigassign.output.result_files import dumps
 from eigassign.output.tables import Table
 
@@ -179,7 +180,7 @@ def write_chart(
     plans = chart_figures(chart)
     files = report.write_figures(plans, folder, formats)
     words = chart.advice[0].words if chart.advice else ""
-    line = f"{words[:1].upper()}{words[1:]}." if words else None
+    line = f"{capital(words)}." if words else None
     report.write_page(
         folder, kind, chart, tables(chart), plans, files,
         line=line, tone="good", document=("chart.json", to_json(chart).encode()),

@@ -5,6 +5,11 @@ from __future__ import annotations
 import math
 
 
+def capital(text: str) -> str:
+    """With its first letter as a sentence or a heading has it."""
+    return text[:1].upper() + text[1:]
+
+
 def number(value: float) -> str:
     """Six significant digits: ``0.228713``; no sign on a zero."""
     return f"{value + 0.0:.6g}"

@@ -24,7 +24,7 @@ from eigassign.output.figures.modes import mode_figures
 from eigassign.output.figures.paper import render
 from eigassign.output.figures.run import run_figures
 from eigassign.output.result_files import sample_files, to_json
-from eigassign.output.tables import Table, headline, tables
+from eigassign.output.tables import Table, tables
 from eigassign.output.verdict import verdict_of
 from eigassign.study.results import ModePictures, RunResults
 
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from eigassign.chart.results import Chart
     from eigassign.study.updating.fit import UpdateResults
 
-KINDS = ("full", "light", "none")
 LIGHT = 900_000  # bytes of the pictures in a light report, at most
 
 # --- The page
@@ -164,7 +163,7 @@ def write_run(
 ) -> None:
     """results.json, report.html, CSV files and the figures in these formats, in ``folder``.
 
-    ``kind`` is one of `KINDS`. The folder must exist and be empty. Wrap it in
+    ``kind`` is full, light or none. The folder must exist and be empty. Wrap it in
     :func:`eigassign.output.run_folder.run_folder` to have them whole or not at all.
     """
     document = to_json(results)
@@ -175,7 +174,7 @@ def write_run(
     files = write_figures(plans, folder, formats)
     write_page(
         folder, kind, results, tables(results), plans, files,
-        line=headline(results), document=("results.json", document),
+        document=("results.json", document),
         first=sum(plan.name.startswith("frequencies") for plan in plans),
     )  # fmt: skip
 
@@ -188,12 +187,12 @@ def write_page(
     plans: Sequence[FigurePlan],
     files: Mapping[str, bytes],
     *,
-    line: str | None,
     document: tuple[str, bytes],
+    line: str | None = None,
     tone: str = "fair",
     first: int = 1,
 ) -> None:
-    """report.html of one of `KINDS` in ``folder``; the rest is that of `page`."""
+    """report.html, full or light, in ``folder``, or none; the rest is that of `page`."""
     if kind == "none":
         return
     html = page(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from eigassign.output.formats import number, percent, residual, seconds
+from eigassign.output.formats import capital, number, percent, residual, seconds
 from eigassign.study.design.judgement import MET
 from eigassign.study.results import (
     Comparison,
@@ -74,7 +74,7 @@ def headline(results: RunResults) -> str | None:
     if row is None:
         return distance
     word = row.verdict.replace("_", " ")
-    return f"{word[0].upper()}{word[1:]}: {row.reason}. {distance}"
+    return f"{capital(word)}: {row.reason}. {distance}"
 
 
 def design(results: RunResults) -> Table:
@@ -176,17 +176,13 @@ def combinations(results: RunResults) -> Table:
         for k, one in enumerate(best, 1)
     )
     columns = ("combination", *best[0].choices, price, "limits")
-    return Table("Combinations", columns, rows, f"{_sentence(row.optimality.words)}.")
+    return Table("Combinations", columns, rows, f"{capital(row.optimality.words)}.")
 
 
 def _by_price(results: RunResults) -> bool:
     """Whether the objective is the price alone."""
     wanted = any(target.kind == "frequency" for target in results.targets)
     return results.price is not None and not wanted
-
-
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def optima(results: RunResults) -> Table:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from eigassign.output.formats import percent
+from eigassign.output.formats import capital, percent
 from eigassign.study.design.judgement import MET
 from eigassign.study.results import RunResults, TargetStudy
 
@@ -77,8 +77,7 @@ def verdict_of(results: RunResults) -> Verdict | None:
 
 
 def _sentence(text: str) -> str:
-    text = text[:1].upper() + text[1:]
-    return text if text.endswith(".") else f"{text}."
+    return capital(text) if text.endswith(".") else f"{capital(text)}."
 
 
 def _asked(results: RunResults) -> Iterator[str]:
@@ -116,7 +115,7 @@ def _trust(results: RunResults) -> Iterator[str]:
     for clear in row.clearances:
         proof = "proved clear" if clear.clear else "NOT proved clear"
         below = f"{clear.below} mode{'' if clear.below == 1 else 's'}"
-        yield f"{_sentence(clear.label)[:-1]}: {proof}, {below} below."
+        yield f"{capital(clear.label)}: {proof}, {below} below."
     found = results.meaning.tolerance
     if found is not None:
         yield _sentence(found.words)

@@ -558,7 +558,7 @@ class MovingMode:
     """One mode at n poses along a trajectory, its largest displacement alike in all of them.
 
     Lines of ``rest`` (n, n_points, d) with ``motions`` of the same shapes, half a period apart from
-    − to +; ``marks`` are joints and bodies by name and kind, at ``mark_places`` (n, n_marks, d).
+    − to +; ``marks`` are joints and bodies by name and type, at ``mark_places`` (n, n_marks, d).
     """
 
     name: str  # "mode 1"
@@ -567,7 +567,7 @@ class MovingMode:
     hz: Floats  # (n,)
     rest: tuple[Floats, ...]
     motions: tuple[Floats, ...]
-    marks: tuple[tuple[str, str], ...]  # name; turning, sliding, fixed or body
+    marks: tuple[tuple[str, str], ...]  # name; the type of the joint, or body
     mark_places: Floats
     mark_motions: Floats
     tip_path: Floats | None = None  # (…, d)

@@ -14,7 +14,7 @@ from synthetic_results import make_results, studied
 from eigassign.output import report
 from eigassign.output.figures.run import run_figures
 from eigassign.output.report import write_run
-from eigassign.output.tables import headline, tables
+from eigassign.output.tables import tables
 
 VOID = {"meta", "img", "br", "link", "input"}
 EVIL = '"><script>alert(1)</script>&amp;\x27 {{ 7*7 }} <!-- </SCRIPT>'
@@ -48,9 +48,7 @@ def page(results, full=False) -> tuple[str, Page, dict[str, bytes]]:
     plans = run_figures(results)
     images = {f"{plan.name}.png": f"PNG of {plan.name}".encode() for plan in plans}
     data = ("results.json", json.dumps({"title": results.title}).encode())
-    html = report.page(
-        results, tables(results), plans, images, line=headline(results), full=full, document=data
-    ).decode()
+    html = report.page(results, tables(results), plans, images, full=full, document=data).decode()
     parsed = Page(html)
     assert parsed.open == []
     return html, parsed, images

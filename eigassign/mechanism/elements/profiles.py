@@ -22,9 +22,7 @@ from eigassign.series.expression import Expression, Scalar, is_constant
 
 Floats = NDArray[np.float64]
 TERMS = 5  # Legendre polynomials over an element of a taper
-STATIONS, _ = np.polynomial.legendre.leggauss(
-    5
-)  # places from −1 to 1 at which a taper is evaluated
+STATIONS, _ = np.polynomial.legendre.leggauss(5)  # from −1 to 1: where a taper is evaluated
 
 
 class BeamValues(NamedTuple):

@@ -26,7 +26,7 @@ from eigassign.output.figures.graph import (
     series,
     short,
 )
-from eigassign.output.formats import percent
+from eigassign.output.formats import capital, percent
 from eigassign.study.results import (
     AssignmentRow,
     Comparison,
@@ -162,12 +162,11 @@ def overview(results: RunResults, spectrum: OtherModes) -> FigurePlan:
     """All modes up to the one above the highest asked for, with targets, limits and bands."""
     wanted = [t for t in results.targets if t.kind == "frequency"]
     limits = [t for t in results.targets if t.kind not in ("frequency", "gap")]
-    after = [curve for curve in before_and_after(spectrum) if curve.end]
-    before = [curve for curve in before_and_after(spectrum) if not curve.end]
+    modes = sorted(before_and_after(spectrum), key=lambda curve: bool(curve.end))  # after on top
     time_s = results.time_s
     shades = (replace(forbidden(t, t.label), x=time_s[t.rows]) for t in limits)
-    targets = (Curve(t.target_hz, TARGET, _capital(t.label), time_s[t.rows]) for t in wanted)
-    marks: tuple[Mark, ...] = (*shades, *before, *after, *targets)
+    targets = (Curve(t.target_hz, TARGET, capital(t.label), time_s[t.rows]) for t in wanted)
+    marks: tuple[Mark, ...] = (*shades, *modes, *targets)
     panels = [Panel("frequency [Hz]", marks, 2.8, key=BEFORE_AND_AFTER)]
     if wanted:
         off = [curve for target in wanted for curve in _off_target(results, target)]
@@ -205,22 +204,18 @@ def assignment(results: RunResults, target: TargetStudy) -> FigurePlan:
         modes = f"like_{target.mode}"
     kind = "assignment" if wanted else target.kind
     heading = (
-        f"{_capital(target.curve_name)}: initial, optimal and target frequency{_where(results)}"
+        f"{capital(target.curve_name)}: initial, optimal and target frequency{_where(results)}"
     )
     what = "distance to the target" if wanted else "violation"
     alt = f"Frequency of {target.curve_name} over time before and after, with its target."
     return FigurePlan(
         f"{kind}_mode_{modes}{_suffix(results)}",
-        heading if wanted else f"{_capital(target.label)}{_where(results)}",
+        heading if wanted else f"{capital(target.label)}{_where(results)}",
         f"Worst {what} {percent(target.error.initial.max_relative)} before and "
         f"{percent(target.error.exact.max_relative)} after.",
-        alt if wanted else f"{_capital(target.label)}: frequencies over time before and after.",
+        alt if wanted else f"{capital(target.label)}: frequencies over time before and after.",
         (_assigned if wanted else _limited)(results, target),
     )
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def _assigned(results: RunResults, target: TargetStudy) -> Graph:
@@ -231,7 +226,7 @@ def _assigned(results: RunResults, target: TargetStudy) -> Graph:
         Panel("frequency [Hz]", (Curve(target.target_hz, TARGET, "target"), *curves), 2.0),
         Panel("off target [%]", (Rule(0.0, LEVEL), *off), 1.35, holds=(np.zeros(1),)),
     )
-    title = f"{_capital(target.curve_name)}: assigned frequency{_where(results)}"
+    title = f"{capital(target.curve_name)}: assigned frequency{_where(results)}"
     return Graph(title, "time [s]", results.time_s[target.rows], panels)
 
 
@@ -270,7 +265,7 @@ def _limited(results: RunResults, target: TargetStudy) -> Graph:
     )
     label = "distance of the modes [Hz]" if target.kind == "gap" else "frequency [Hz]"
     panel = Panel(label, marks, _TALL, key=() if near is None else BEFORE_AND_AFTER)
-    title = f"{_capital(target.label)}{_where(results)}"
+    title = f"{capital(target.label)}{_where(results)}"
     return Graph(title, "time [s]", results.time_s[target.rows], (panel,))
 
 

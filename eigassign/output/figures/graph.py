@@ -131,6 +131,14 @@ class Panel:
         """A curve's ordinates, what is below a logarithmic axis lifted to its edge."""
         return np.maximum(curve.y, self.limits[0]) if self.logarithmic else curve.y
 
+    def edges(self, shade: Shade, x: Floats) -> tuple[Floats, Floats]:
+        """The lower and upper edge of a shade over ``x``, the panel's own where it has none."""
+        low, high = (
+            np.full(x.size, limit) if edge is None else edge
+            for edge, limit in zip((shade.low, shade.high), self.limits, strict=True)
+        )
+        return low, high
+
     def ends(self) -> list[tuple[str, float, str]]:
         """The names at the curves' ends, where they do not overlap, and their colours."""
         named = sorted((c for c in self.curves if c.end), key=lambda c: float(c.y[-1]))

@@ -21,7 +21,7 @@ from eigassign.output.figures.graph import (
     Shade,
     labelled,
 )
-from eigassign.output.formats import percent
+from eigassign.output.formats import capital, percent
 from eigassign.study.results import (
     RangeRow,
     RunResults,
@@ -51,10 +51,6 @@ def meaning_figures(results: RunResults) -> Iterator[FigurePlan]:
             yield ranges(results, target, along, shown, number)
     if found.trade_off is not None and len(found.trade_off.points) > 1:
         yield trade_off(found.trade_off)
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 # --- What the frequencies hang on
@@ -121,7 +117,7 @@ def ranges(
     ]
     return FigurePlan(
         f"range_{number}",
-        f"{_capital(target.label)}: reach and tolerance{where}",
+        f"{capital(target.label)}: reach and tolerance{where}",
         " ".join(said),
         "The answer's frequency over time inside the range of others.",
         _ranges(results, target, along.rows, shown, where),
@@ -150,7 +146,7 @@ def _ranges(
     label = "distance of the modes [Hz]" if target.kind == "gap" else "frequency [Hz]"
     panel = Panel(label, (*shades, *curves), _TALL, holds=edges)
     time_s = results.time_s[target.rows][rows]
-    return Graph(f"{_capital(target.label)}{where}", "time [s]", time_s, (panel,))
+    return Graph(f"{capital(target.label)}{where}", "time [s]", time_s, (panel,))
 
 
 # --- Error against mass or price
@@ -161,7 +157,7 @@ def trade_off(found: TradeOff) -> FigurePlan:
     first, last = found.points[0], found.points[-1]
     return FigurePlan(
         "trade_off",
-        f"{_capital(found.error)} against {found.quantity}",
+        f"{capital(found.error)} against {found.quantity}",
         f"The least {found.error} found for each {found.quantity}: from {percent(first.error)} to "
         f"{percent(last.error)}, the answer.",
         f"A falling curve of the {found.error} over the {found.quantity}.",
@@ -181,7 +177,7 @@ def _trade_off(found: TradeOff) -> Graph:
     low, high = graph.bounds([amount, np.array([found.initial])])
     margin = 0.04 * (high - low)
     return Graph(
-        title=f"{_capital(found.error)} against {found.quantity}",
+        title=f"{capital(found.error)} against {found.quantity}",
         x_label=labelled(found.quantity, found.unit),
         x=amount,
         panels=(Panel(f"{found.error} [%]", marks, _TALL, from_zero=True),),

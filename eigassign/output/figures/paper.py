@@ -163,8 +163,7 @@ def _curve(axes: Axes, panel: Panel, curve: Curve, x: Floats, above: float) -> A
 
 def _shade(axes: Axes, panel: Panel, shade: Shade, x: Floats) -> Any:
     x = x if shade.x is None else shade.x
-    edges = zip((shade.low, shade.high), panel.limits, strict=True)
-    low, high = (np.full(x.size, limit) if edge is None else edge for edge, limit in edges)
+    low, high = panel.edges(shade, x)
     return axes.fill_between(
         x, low, high, color=shade.colour, alpha=shade.opacity, linewidth=0.0,
         label=short(shade.label, 60),

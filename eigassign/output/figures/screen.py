@@ -176,8 +176,7 @@ def _key(name: str, look: Look) -> Json:
 
 def _shade(shade: Shade, panel: Panel, x: Floats, axis: str) -> Json:
     x = x if shade.x is None else shade.x
-    edges = zip((shade.low, shade.high), panel.limits, strict=True)
-    low, high = (np.full(x.size, limit) if edge is None else edge for edge, limit in edges)
+    low, high = panel.edges(shade, x)
     return {
         "type": "scatter", "mode": "lines", "fill": "toself", "line": {"width": 0},
         "x": _numbers([*x, *x[::-1]]), "y": _numbers([*low, *high[::-1]]), "yaxis": axis,
@@ -328,7 +327,6 @@ def moving(modes: Sequence[MovingMode]) -> list[Json]:
 def _moving(mode: MovingMode) -> Json:
     rest = [_joined([line[k] for line in mode.rest]) for k in range(len(mode.time_s))]
     motions = [_joined([line[k] for line in mode.motions]) for k in range(len(mode.time_s))]
-    kinds = list(dict.fromkeys(kind for _, kind in mode.marks))
     return {
         "name": mode.name,
         "trajectory": mode.trajectory,
@@ -337,7 +335,6 @@ def _moving(mode: MovingMode) -> Json:
         "rest": rest,
         "motion": motions,
         "marks": [{"name": short(name), "kind": kind} for name, kind in mode.marks],
-        "kinds": kinds,
         "places": [_columns(places) for places in mode.mark_places],
         "moves": [_columns(moves) for moves in mode.mark_motions],
         "tip": None if mode.tip_path is None else _columns(mode.tip_path),
