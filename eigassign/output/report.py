@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from eigassign.study.updating.fit import UpdateResults
 
 LIGHT = 900_000  # bytes of the pictures in a light report, at most
+DOCUMENT = 400_000  # bytes of a results.json that a full report carries, at most
 
 # --- The page
 
@@ -69,9 +70,11 @@ def page(
     """Any page of ours as UTF-8; ``files`` holds what `render` made of ``plans``.
 
     A run begins with its verdict, another page with its ``line`` in a ``tone`` (good, fair, bad);
-    then come the ``first`` figures, and all else below. ``document`` is what can be saved as a
-    file of this name. What a light page cannot hold as a picture is named.
+    then come the ``first`` figures, and all else below. ``document`` is the file of all numbers,
+    name and content: a full page saves it unless it is long. What a light page cannot hold as a
+    picture is named.
     """
+    name, content = document or ("", b"")
     run = f if isinstance(f, RunResults) else None
     graphs = {p.name: screen.figures(p.shows) for p in plans if full and not callable(p.shows)}
     moving = run.moving if run is not None and full else ()
@@ -87,8 +90,10 @@ def page(
         moving=[(mode.name, mode.trajectory, several) for mode in moving],
         moving_json=_inside(screen.moving(moving)) if full else "",
         figures_json=_inside(graphs) if full else "",
-        document=document[1].decode().replace("<", "\\u003c") if document and full else "",
-        document_name=document[0] if document else "",
+        document=content.decode().replace("<", "\\u003c")
+        if full and len(content) <= DOCUMENT
+        else "",
+        document_name=name,
         plotly=_plotly() if full else "",
         script=(_TEMPLATES / "report.js").read_text("utf-8") if full else "",
     )

@@ -20,7 +20,7 @@ from eigassign.study.drawing import AMPLITUDE, extent_of, largest_of, spread_sam
 from eigassign.study.results import MovingMode, frozen
 
 Floats = NDArray[np.float64]
-FRAMES, FEW_FRAMES = 41, 9  # poses of a trajectory; of large models
+FRAMES, FEW_FRAMES = 41, 9  # poses of all trajectories; of each of several or of a large model
 MOVING = 4  # trajectories that are shown
 POINTS = 24  # of a line
 
@@ -38,9 +38,11 @@ def moving_modes(
 def _moving(
     file: CaseFile, model: Model, path: Trajectories, y: Floats, name: str, numbers: Floats
 ) -> Iterator[MovingMode]:
-    frames = FRAMES if model.n_dof <= DENSE_LIMIT else FEW_FRAMES
+    shown = list(zip(path.parts, path.rows, strict=True))[:MOVING]
+    each = FRAMES // len(shown) if model.n_dof <= DENSE_LIMIT else 0
+    frames = max(each, FEW_FRAMES)
     q = path.at(y)[0]
-    for part, rows in list(zip(path.parts, path.rows, strict=True))[:MOVING]:
+    for part, rows in shown:
         own = rows.start + np.flatnonzero(np.isfinite(numbers[rows]))
         if not len(own):
             continue

@@ -8,10 +8,13 @@ import json
 import re
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 from synthetic_results import make_results, studied
 
 from eigassign.output import report
+from eigassign.output.figures import screen
+from eigassign.output.figures.graph import Curve, Graph, Look, Panel, Shade
 from eigassign.output.figures.run import run_figures
 from eigassign.output.report import write_run
 from eigassign.output.tables import tables
@@ -218,3 +221,28 @@ def test_no_report_is_written_where_none_is_wanted(tmp_path):
     write_run(make_results(), tmp_path, ("png",), "none")
     assert (tmp_path / "figures").exists()
     assert not (tmp_path / "report.html").exists()
+
+
+def test_many_samples_keep_a_report_small_and_their_extremes():
+    t = np.linspace(0.0, 1.0, 20_000)
+    y = np.sin(9.0 * t)
+    y[[7_123, 15_001]] = 5.0, -4.0
+    curve = Curve(y, Look("#000000"), label="measured")
+    shade = Shade(y - 1.0, y + 1.0, "#00ff00")
+    shown = Graph("measured", "t (s)", t, (Panel("f (Hz)", (shade, curve)),))
+    (figure,) = screen.figures(shown)
+    filled, line = figure["data"]
+    assert len(line["x"]) == len(line["y"]) <= 600
+    assert (min(line["y"]), max(line["y"])) == (-4.0, 5.0)
+    assert (line["x"][0], line["x"][-1]) == (0.0, 1.0)
+    assert (min(filled["y"]), max(filled["y"])) == (-5.0, 6.0)
+    assert len(json.dumps(figure)) < 60_000
+
+
+def test_a_long_document_is_named_and_not_carried(monkeypatch):
+    html, _, _ = page(make_results(), full=True)
+    assert 'id="results"' in html
+    monkeypatch.setattr(report, "DOCUMENT", 10)
+    html, parsed, _ = page(make_results(), full=True)
+    assert 'id="results"' not in html
+    assert "All numbers are in results.json beside this page." in parsed.text

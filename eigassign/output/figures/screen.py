@@ -37,6 +37,7 @@ _ROOM = 118  # pixels for the legend, the abscissa and its label
 _GAP = 0.07  # between panels
 _DIGITS = 7
 _ROWS = 25  # of a table, at most
+_SAMPLES = 600  # of a curve, about as many as its pixels, and so that a page keeps its size
 _DASHES = {
     "solid": "solid",
     "dashed": "dash",
@@ -60,6 +61,25 @@ def _numbers(values: Iterable[float]) -> list[float | None]:
     """Seven digits are more than a screen shows; JSON has no other numbers than finite ones."""
     found = (float(f"{value:.{_DIGITS}g}") for value in values)
     return [value if np.isfinite(value) else None for value in found]
+
+
+def _plotted(*ys: Floats) -> NDArray[np.intp]:
+    """Which samples are plotted: all, or of each of many stretches where a ``y`` is at its ends."""
+    every = np.arange(len(ys[0]))
+    if every.size <= _SAMPLES:
+        return every
+    stretches = np.array_split(every, (_SAMPLES - 2) // (2 * len(ys)))
+    low = [
+        part[np.argmin(np.where(np.isnan(y[part]), np.inf, y[part]))]
+        for y in ys
+        for part in stretches
+    ]
+    high = [
+        part[np.argmax(np.where(np.isnan(y[part]), -np.inf, y[part]))]
+        for y in ys
+        for part in stretches
+    ]
+    return np.unique([0, *low, *high, every[-1]])
 
 
 # --- Graphs
@@ -141,7 +161,8 @@ def _mode(look: Look) -> str:
 
 def _curve(curve: Curve, panel: Panel, shown: Graph, axis: str, names: dict[Look, str]) -> Json:
     """Curves of one look, in several panels, are hidden and shown together."""
-    x = shown.x if curve.x is None else curve.x
+    x, y = shown.x if curve.x is None else curve.x, panel.shown(curve)
+    plotted = _plotted(y)
     look = curve.look
     name = short(curve.label or curve.end or names.get(look, ""), 60)
     single = x.size == 1 and not look.marker
@@ -153,8 +174,8 @@ def _curve(curve: Curve, panel: Panel, shown: Graph, axis: str, names: dict[Look
     return {
         "type": "scatter",
         "mode": "markers" if single else _mode(look),
-        "x": _numbers(x),
-        "y": _numbers(panel.shown(curve)),
+        "x": _numbers(x[plotted]),
+        "y": _numbers(y[plotted]),
         "yaxis": axis,
         "name": name,
         "legendgroup": name,
@@ -177,6 +198,8 @@ def _key(name: str, look: Look) -> Json:
 def _shade(shade: Shade, panel: Panel, x: Floats, axis: str) -> Json:
     x = x if shade.x is None else shade.x
     low, high = panel.edges(shade, x)
+    plotted = _plotted(low, high)
+    x, low, high = x[plotted], low[plotted], high[plotted]
     return {
         "type": "scatter", "mode": "lines", "fill": "toself", "line": {"width": 0},
         "x": _numbers([*x, *x[::-1]]), "y": _numbers([*low, *high[::-1]]), "yaxis": axis,
