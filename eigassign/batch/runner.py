@@ -19,7 +19,9 @@ from typing import Any
 
 from eigassign.batch.workers import cores, process_pool
 from eigassign.errors import StorageError, UsageError
-from eigassign.output.batch_summary import CaseOutcome, write_junit, write_summary
+from eigassign.output.batch.junit import write_junit
+from eigassign.output.batch.outcome import CaseOutcome, frequency_ranges
+from eigassign.output.batch.summary import write_summary
 from eigassign.output.run_record import MARKER
 from eigassign.pipeline.run import Options, Outcome, optimize
 from eigassign.process import failure_of
@@ -75,7 +77,7 @@ def _optimised(path: str, options: CaseOptions) -> Row:
         allow_outside=options.allow_outside,
     )
     outcome = optimize(Path(path), how)
-    error = outcome.results.error
+    error, found = outcome.results.error, outcome.results.assignment
     return {
         "status": _status(outcome),
         "message": outcome.shortcoming or "",
@@ -84,6 +86,8 @@ def _optimised(path: str, options: CaseOptions) -> Row:
         "predicted_max_relative": error and error.predicted and error.predicted.max_relative,
         "exact_max_relative": error and error.exact.max_relative,
         "design": tuple((row.name, row.optimal) for row in outcome.results.design),
+        "frequencies": frequency_ranges(outcome.results),
+        "verdict": found.verdict if found else "",
     }
 
 

@@ -13,7 +13,7 @@ from eigassign.cli.reporter import Reporter, reporting
 
 if TYPE_CHECKING:
     from eigassign.batch.runner import Job
-    from eigassign.output.batch_summary import CaseOutcome
+    from eigassign.output.batch.outcome import CaseOutcome
 
 
 @click.command(
@@ -60,7 +60,7 @@ def _watched(
     """Run the jobs with a line of progress each, and a table at the end."""
     from eigassign.batch.runner import run_and_summarise
     from eigassign.output import console
-    from eigassign.output.batch_summary import batch_table
+    from eigassign.output.batch.summary import batch_table
 
     with console.progress("case", len(jobs), stream=reporter.stream()) as advance:
         outcomes = run_and_summarise(

@@ -8,7 +8,8 @@ import pytest
 from synthetic_results import make_results
 
 from eigassign.output import console, terminal
-from eigassign.output.batch_summary import CaseOutcome, batch_table
+from eigassign.output.batch.outcome import CaseOutcome
+from eigassign.output.batch.summary import batch_table
 from eigassign.output.formats import number, percent, residual, seconds
 from eigassign.study.results import ValidationRow
 

@@ -6,14 +6,9 @@ import csv
 import io
 import xml.etree.ElementTree as ET
 
-from eigassign.output.batch_summary import (
-    COLUMNS,
-    CaseOutcome,
-    junit_xml,
-    summary_csv,
-    write_junit,
-    write_summary,
-)
+from eigassign.output.batch.junit import junit_xml, write_junit
+from eigassign.output.batch.outcome import CaseOutcome
+from eigassign.output.batch.summary import COLUMNS, summary_csv, write_summary
 
 GOOD = CaseOutcome(
     name="two_link",

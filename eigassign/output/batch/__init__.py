@@ -1,0 +1,8 @@
+"""What a batch leaves beside the folders of its cases: made from one row a case, in its order.
+
+In reading order; each imports from those above it only:
+
+    outcome  how one case ended: a row of every file below
+    summary  summary.csv, and the table on the console
+    junit    junit.xml for CI servers
+"""

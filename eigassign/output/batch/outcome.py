@@ -1,0 +1,81 @@
+"""How one case of a batch ended: a row of plain values, as text one line of JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import count
+from typing import Any, Literal
+
+from eigassign.study.results import RunResults
+
+Status = Literal["ok", "tolerance", "failed", "error"]
+Range = tuple[str, float, float, float]  # of what, lowest, mean, highest
+
+
+@dataclass(frozen=True)
+class CaseOutcome:
+    """How one case of a batch ended.
+
+    ``status``: ok; tolerance (it ran, and misses the tolerance asked for); failed (it ran, and
+    there is no answer: infeasible, unreachable); error (wrong input, no disk, a bug).
+    Errors are fractions of the target; None where there is no number. ``values`` are what a sweep
+    sets, by key; ``frequencies`` the lowest, mean and highest exact frequency in Hz that each
+    target has along the trajectory at the answer.
+    """
+
+    name: str
+    path: str  # of the case file
+    status: Status
+    seconds: float
+    message: str = ""
+    run_folder: str | None = None
+    initial_max_relative: float | None = None
+    predicted_max_relative: float | None = None
+    exact_max_relative: float | None = None
+    design: Sequence[tuple[str, float]] = ()
+    frequencies: Sequence[Range] = ()
+    verdict: str = ""
+    values: Mapping[str, Any] = field(default_factory=dict)
+    index: int = 0  # place in the batch
+    key: str = ""  # of what was computed
+
+
+_ORDER = (
+    "index", "name", "key", "values", "status", "verdict", "message", "initial_max_relative",
+    "predicted_max_relative", "exact_max_relative", "design", "frequencies", "seconds", "path",
+    "run_folder",
+)  # fmt: skip
+
+
+def to_line(outcome: CaseOutcome) -> str:
+    """One line of JSON, ``index`` first; a number that is not finite is null."""
+    plain = {name: _finite(getattr(outcome, name)) for name in _ORDER}
+    return json.dumps(plain, allow_nan=False)
+
+
+def from_line(line: str | bytes) -> CaseOutcome:
+    """What `to_line` wrote, lists in the place of tuples; raises ValueError or TypeError else."""
+    return CaseOutcome(**json.loads(line))
+
+
+def _finite(value: object) -> object:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def frequency_ranges(results: RunResults) -> tuple[Range, ...]:
+    """The ``frequencies`` of a run, each under a name of its own."""
+    return ranges((t.label, t.trajectory, t.exact_hz.tolist()) for t in results.targets)
+
+
+def ranges(curves: Any) -> tuple[Range, ...]:
+    """Lowest, mean and highest of each (label, trajectory or None, values in Hz)."""
+    found: dict[str, Range] = {}
+    for label, trajectory, hz in curves:
+        name = label if trajectory is None else f"{label} along {trajectory!r}"
+        names = (f"{name} ({k})" if k > 1 else name for k in count(1))
+        free = next(each for each in names if each not in found)
+        found[free] = (free, min(hz), math.fsum(hz) / len(hz), max(hz))
+    return tuple(found.values())
