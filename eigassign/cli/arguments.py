@@ -86,7 +86,7 @@ common = several(
     click.option(
         "--allow-outside",
         is_flag=True,
-        help="Cases may name files outside their own folder.",
+        help="Cases may name files that do not lie below their own folder.",
     ),
 )
 cache_dir = click.option(
@@ -97,7 +97,11 @@ cache_dir = click.option(
 caching = several(
     click.option("--no-cache", is_flag=True, help="Neither read nor write the cache."), cache_dir
 )
-force = click.option("--force", is_flag=True, help="Move what is in the way aside, whatever it is.")
+force = click.option(
+    "--force",
+    is_flag=True,
+    help="Move what is in the way aside, whatever it is; without it the command stops.",
+)
 figures = click.option(
     "--figures",
     callback=figure_formats,

@@ -38,7 +38,12 @@ _DRAWING = ("out", "force", "figures", "allow_outside")
 @arguments.json
 @arguments.common
 def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int:
-    """Check case files: every problem with its line, what a run will take, and what to do next."""
+    """Check case files: every problem with its line, what a run will take, and what to do next.
+
+    A problem is shown as file:line:column: key: what is wrong. A case in order gets plausibility
+    warnings, its degrees of freedom, the coefficients of its expansion, and about how much memory
+    and how many seconds a run will take.
+    """
     from eigassign.pipeline import outlook
     from eigassign.pipeline.queries import check as checked
 
@@ -141,7 +146,11 @@ def modes(
     draw: bool,
     **how: Any,
 ) -> int:
-    """Exact natural frequencies of the elastic modes at one pose and design, and their shapes."""
+    """Exact natural frequencies of the elastic modes at one pose and design, and their shapes.
+
+    Of a case with load cases, what these set may follow the coordinates in --q. A bare angle
+    beyond two turns is refused, as it was probably meant in deg.
+    """
     from eigassign.pipeline import queries
 
     folder = None

@@ -37,7 +37,10 @@ if TYPE_CHECKING:
 @arguments.json
 @arguments.common
 def optimize(case: Path, as_json: bool, **how: Any) -> int:
-    """Assign the frequencies: the best design, proved by exact solves, in a run folder."""
+    """Assign the frequencies: the best design, proved by exact solves, in a run folder.
+
+    Exit code 1 where the limits are infeasible, or an accuracy that was asked for is missed.
+    """
     from eigassign.pipeline import run
 
     return _finished(run.optimize, case, as_json, how)
@@ -65,7 +68,10 @@ def optimize(case: Path, as_json: bool, **how: Any) -> int:
 def expand(
     case: Path, order: int | None, linear: bool, modes: tuple[int, ...], as_json: bool, **how: Any
 ) -> int:
-    """Expand eigenvalues in q and y: coefficients and their accuracy, in a run folder."""
+    """Expand eigenvalues in q and y: coefficients and their accuracy, in a run folder.
+
+    The coefficients are in coefficients.json and coefficients.h5.
+    """
     from eigassign.pipeline import run
 
     def expanded(path: Path, options: Options) -> Outcome:
@@ -208,7 +214,9 @@ def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
     )
 )
 @arguments.case
-@click.option("--quick", is_flag=True, help="In seconds: fewer methods, points and repeats.")
+@click.option(
+    "--quick", is_flag=True, help="In ten seconds to a minute: fewer methods, points and repeats."
+)
 @click.option(
     "--accuracy",
     type=arguments.ACCURACY,

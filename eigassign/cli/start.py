@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -67,17 +68,16 @@ def init(template: str, out: Path | None) -> int:
 
 
 @click.command(
-    epilog=arguments.examples(
-        "eigassign docs", "eigassign docs case-file", "eigassign docs targets"
-    )
+    epilog=arguments.examples("eigassign docs", "eigassign docs keys", "eigassign docs targets")
 )
 @click.argument("topic", nargs=-1)
 def docs(topic: tuple[str, ...]) -> int:
     """Show the manual: a page, or the part of a page below a heading.
 
-    Without TOPIC the list of pages. In a pipe it is the text as it is written, in Markdown.
+    TOPIC is the name of a page, the beginning of a heading, or what stands in brackets behind a
+    link; without it, the list of pages. In a pipe it is the text as it is written, in Markdown.
     """
-    text = _part(" ".join(topic)) if topic else _contents()
+    text = _part(" ".join(topic) or "index")
     if sys.stdout.isatty():
         from eigassign.output.console import markdown
 
@@ -86,41 +86,37 @@ def docs(topic: tuple[str, ...]) -> int:
     return 0
 
 
-def _contents() -> str:
-    lines = []
-    for name, text in _pages().items():
-        headings = [title for level, title, _ in _headings(text) if level == 2]
-        lines.append(f"- **{name}**: {', '.join(headings) or _headings(text)[0][1]}")
-    return "\n".join(
-        ["# The manual of eigassign", *lines, "", "`eigassign docs TOPIC` shows a page or a part."]
-    )
-
-
 def _pages() -> dict[str, str]:
-    pages = sorted(MANUAL.glob("*.md"))
-    return {p.stem: p.read_text(encoding="utf-8") for p in pages if p.stem != "index"}
+    """Text by name; the index first."""
+    pages = sorted(MANUAL.rglob("*.md"), key=lambda p: (p.stem != "index", len(p.parts), p.stem))
+    return {p.stem: p.read_text(encoding="utf-8") for p in pages}
 
 
 def _part(topic: str) -> str:
-    """A page by its name, else the part below a heading of any page, by its beginning."""
-    pages, wanted = _pages(), _folded(topic)
-    if (
-        page := next((text for n, text in pages.items() if _folded(n) == wanted), None)
-    ) is not None:
-        return page
+    """A page by its name, else the part below a heading, by its beginning; or what a link names."""
+    page, _, place = topic.rpartition("/")[2].partition("#")
+    wanted = _folded(place or page.removesuffix(".md"))
+    pages = {_folded(name): text for name, text in _pages().items()}
+    if place and page:
+        pages = {
+            _folded(page.removesuffix(".md")): pages.get(_folded(page.removesuffix(".md")), "")
+        }
+    elif wanted in pages:
+        return pages[wanted]
     found = [
-        (_folded(title) != wanted, name, _below(text, level, start))
-        for name, text in pages.items()
+        (_folded(title) != wanted, _below(text, level, start))
+        for text in pages.values()
         for level, title, start in _headings(text)
         if _folded(title).startswith(wanted)
     ]
     if not found:
         raise UsageError(f"no page and no heading begins with {topic!r}: eigassign docs lists them")
-    return min(found)[2]
+    return min(found, key=lambda exact_first: exact_first[0])[1]
 
 
 def _folded(text: str) -> str:
-    return " ".join(text.lower().replace("-", " ").replace("`", "").split())
+    """As links spell headings: lower case, no punctuation; blanks instead of dashes."""
+    return re.sub(r"[^\w ]", "", text.lower().replace("-", " "))
 
 
 def _headings(text: str) -> list[tuple[int, str, int]]:
@@ -154,7 +150,8 @@ _ZSH = "(( $+functions[compdef] )) || { autoload -Uz compinit && compinit }\n"
 def completion(shell: str | None, install: bool) -> int:
     """Completion of commands, options and files in bash, zsh or fish (default: that of $SHELL).
 
-    Prints the script; with --install it is written where the shell finds it.
+    Prints the script; with --install it is written where the shell finds it: a file in your home
+    folder, and in bash and zsh a line in .bashrc or .zshrc.
     """
     name = shell or Path(os.environ.get("SHELL", "")).name
     if name not in SHELLS:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
 import shutil
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,9 +14,6 @@ import pytest
 import eigassign
 from eigassign import errors
 from eigassign.case import json_schema, parse
-from eigassign.case.schema.joints import JOINTS
-from eigassign.case.schema.links import LINKS
-from eigassign.case.schema.sections import SHAPES
 from eigassign.cli import cli, main
 
 ROOT = Path(__file__).parents[2]
@@ -24,13 +23,19 @@ README = ROOT / "README.md"
 MANUAL = PACKAGE / "docs"
 PAGES = [
     README,
-    *sorted(MANUAL.glob("*.md")),
+    *sorted(MANUAL.rglob("*.md")),
     ROOT / "cases" / "README.md",
     ROOT / "cases" / "stress" / "README.md",
     ROOT / "benchmarks" / "README.md",
     *sorted((ROOT / "benchmarks" / "results").glob("*.md")),
 ]
 MOST_WORDS = 1500
+_SPEC = importlib.util.spec_from_file_location("reference", ROOT / "site" / "reference.py")
+assert _SPEC is not None
+assert _SPEC.loader is not None
+reference = importlib.util.module_from_spec(_SPEC)
+sys.modules["reference"] = reference
+_SPEC.loader.exec_module(reference)
 
 
 def page_id(page: Path) -> str:
@@ -55,9 +60,9 @@ def quoted(page: Path) -> list[str]:
     return re.findall(r"`([^`\n]+)`", prose(page))
 
 
-def anchors(page: Path) -> Iterator[str]:
+def anchors_of(text: str) -> Iterator[str]:
     """Names that headings get on the common hosts: lower case, no punctuation, dashes."""
-    for heading in re.findall(r"^#+ (.*)$", prose(page), re.MULTILINE):
+    for heading in re.findall(r"^#+ (.*)$", text, re.MULTILINE):
         yield re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
@@ -88,18 +93,24 @@ def test_the_case_shown_is_the_case_shipped() -> None:
     assert parse(shown.encode(), TWO_LINK) == parse(TWO_LINK.read_bytes(), TWO_LINK)
 
 
-def test_every_key_of_a_case_file_is_explained() -> None:
-    explained = set(re.findall(r"\w+", " ".join(quoted(MANUAL / "case-file.md"))))
-    schema = json_schema()
-    keys = {key for each in schema["$defs"].values() for key in each.get("properties", {})}
-    assert (keys | set(schema["properties"])) - explained == set()
+def test_every_key_of_a_case_file_says_what_it_is_for() -> None:
+    """In the list `Keys:` of its model's docstring, for editors and for the reference."""
+    models = json_schema()["$defs"].values()
+    silent = [
+        f"{model['title']}.{key}"
+        for model in models
+        for key, node in model.get("properties", {}).items()
+        if "const" not in node and node.get("description", "")[:1] in ("", "\n")
+    ]
+    assert silent == []
+    listed = [k for m in models for k in re.findall(r"^    (\w+):", m["description"], re.MULTILINE)]
+    assert listed == []
 
 
-def test_every_type_of_link_joint_and_section_is_explained() -> None:
-    text = read(MANUAL / "case-file.md")
-    for names in (JOINTS, LINKS, SHAPES):
-        for name in names:
-            assert re.search(rf"^\| `(type: |shape: )?{name}`", text, re.MULTILINE), name
+@pytest.mark.parametrize("name", reference.PAGES)
+def test_the_reference_is_current(name: str) -> None:
+    written = read(MANUAL / "reference" / name)
+    assert reference.PAGES[name]() == written, "python site/reference.py writes it anew"
 
 
 @pytest.mark.parametrize("page", [README, MANUAL / "python.md"], ids=page_id)
@@ -125,12 +136,8 @@ def test_the_log_shown_is_the_log_written(
     assert [line for line in shown.splitlines() if line not in log] == []
 
 
-def test_every_command_and_option_is_explained() -> None:
-    text = read(MANUAL / "command-line.md")
-    for name in cli.commands:
-        assert f"`eigassign {name}" in read(README)
-        assert f"`eigassign {name}" in text
-    assert {option for option in all_options() if f"`{option}" not in text} == set()
+def test_every_command_is_in_the_readme() -> None:
+    assert [name for name in cli.commands if f"`eigassign {name}" not in read(README)] == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=page_id)
@@ -150,7 +157,7 @@ def test_every_link_leads_somewhere(page: Path) -> None:
         target = page.parent / path if path else page
         assert target.exists(), path
         if anchor:
-            assert anchor in set(anchors(target)), f"{path}#{anchor}"
+            assert anchor in set(anchors_of(prose(target))), f"{path}#{anchor}"
 
 
 def names_code(name: str) -> bool:
@@ -190,10 +197,23 @@ def test_every_public_name_and_error_is_explained() -> None:
 
 
 def test_the_manual_s_index_lists_every_page_and_all_are_installed() -> None:
-    index = read(MANUAL / "index.md")
-    pages = {page.name for page in MANUAL.glob("*.md")} - {"index.md"}
-    assert {name for name in pages if f"]({name})" not in index} == set()
-    assert '"docs/*.md"' in read(ROOT / "pyproject.toml")
+    index = re.findall(r"^- \[.*?\]\((.*?)\)", read(MANUAL / "index.md"), re.MULTILINE)
+    pages = {str(page.relative_to(MANUAL)) for page in MANUAL.rglob("*.md")} - {"index.md"}
+    assert sorted(index) == sorted(pages)
+    assert '"docs/*.md", "docs/*/*.md"' in read(ROOT / "pyproject.toml")
+
+
+@pytest.mark.parametrize("page", sorted(MANUAL.rglob("*.md")), ids=page_id)
+def test_what_a_link_names_is_a_topic_of_the_terminal(
+    page: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    links = re.findall(r"\]\(((?!https?:)[^)]*\.md(?:#[^)]*)?)\)", prose(page))
+    for link in dict.fromkeys(links):
+        path, _, anchor = link.partition("#")
+        if MANUAL in (page.parent / path).resolve().parents:
+            assert main(["docs", link]) == 0
+            shown = capsys.readouterr().out.splitlines()[0]
+            assert not anchor or anchor in anchors_of(shown), link
 
 
 def test_every_case_shipped_is_listed() -> None:

@@ -30,10 +30,10 @@ from eigassign.case.suggestions import listed
 from eigassign.case.units import QuantityError
 
 YValue: TypeAlias = Annotated[
-    float, Quantity(elsewhere="quantity of the parameter's dimension (SI when bare)")
+    float, Quantity(elsewhere="of the parameter's dimension, SI when bare")
 ]
 Price: TypeAlias = Annotated[
-    float, Quantity(elsewhere="amount for one SI unit of the parameter, or such as 3 / kg")
+    float, Quantity(elsewhere="for one SI unit when bare, or such as 3 / kg")
 ]
 RESERVED = ("constraints", "mass")  # names under `design` that are no entries of it
 MOST_CHOICES = 1000
@@ -73,7 +73,7 @@ class Tolerance:
 
     @classmethod
     def __get_pydantic_core_schema__(cls, _source: Any, _handler: Any) -> core_schema.CoreSchema:
-        read = Quantity(above=0, elsewhere="2 % of the value, or an amount in the parameter's unit")
+        read = Quantity(above=0, elsewhere="share such as 2 %, or amount, SI when bare")
         return core_schema.no_info_plain_validator_function(
             cls._validate,
             metadata={"pydantic_js_functions": [lambda _schema, _handler: read.json_schema()]},
@@ -93,9 +93,18 @@ def _require_order(low: float | None, high: float | None) -> None:
 
 
 class Parameter(Part):
-    """One design parameter: path of a numeric property, and its bounds or the values it may take.
+    """One design parameter: a property of the mechanism between bounds, or of listed values.
 
-    `price` counts where no target asks for a frequency; `tolerance` is how far it may deviate.
+    Its value in the file is the initial design.
+
+    Keys:
+        parameter: path of a real number in the file, such as `sections.<name>.diameter`,
+            `bodies.<name>.mass`, `links.<name>.length` or `coordinates.<name>.drive.stiffness`
+        min: lower bound
+        max: upper bound
+        values: the values it may take, instead of bounds
+        price: what a unit of it costs
+        tolerance: how far it may deviate from the answer either way
     """
 
     model_config = needs_one_of(("min", "max"), ("values",))
@@ -132,9 +141,13 @@ class Parameter(Part):
 
 
 class Choices(Part):
-    """Properties that are set together: one of the named choices (a list of sections, of motors).
+    """Properties that are set together: a list of sections, of motors.
 
-    All choices set the same properties. `price` is for one unit of a property, by its path.
+    Each property is a part of y, called `<name>.<property>`, as in `boom.area`.
+
+    Keys:
+        choices: by name, each with values by path; all set the same properties
+        price: for one unit of a property, by its path
     """
 
     choices: Annotated[
@@ -179,7 +192,13 @@ class Choices(Part):
 
 
 class Constraint(Part):
-    """min ≤ Σ coefficient · y ≤ max over the named design parameters."""
+    """A linear limit of several parameters.
+
+    Keys:
+        terms: coefficients by design parameter
+        min: lower limit of the sum
+        max: upper limit of the sum
+    """
 
     terms: Annotated[Mapping[str, Annotated[float, Quantity()]], Field(min_length=1), Frozen]
     min: YValue | None = None
@@ -196,7 +215,12 @@ class Constraint(Part):
 
 
 class MassLimits(Part):
-    """min ≤ mass of the whole mechanism (kg) ≤ max."""
+    """Limits of the mass of the whole mechanism.
+
+    Keys:
+        min: at least
+        max: at most
+    """
 
     min: Annotated[float, quantity("mass", above=0)] | None = None
     max: Annotated[float, quantity("mass", above=0)] | None = None
@@ -265,7 +289,13 @@ def column_names(entry: str, properties: Sequence[str]) -> list[str]:
 
 
 class Design(Part):
-    """Design parameters and choices in the order of the file, and limits that they share."""
+    """Design parameters and choices in the order of the file, and limits that they share.
+
+    Keys:
+        entries: by name
+        constraints: linear limits, min ≤ Σ coefficient · y ≤ max
+        mass: of the whole mechanism
+    """
 
     entries: Named[Entry] = FrozenDict()
     constraints: Named[Constraint] = FrozenDict()

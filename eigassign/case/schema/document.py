@@ -32,7 +32,21 @@ def _one_line(text: str) -> str:
 
 
 class Document(Part):
-    """Everything a case file may hold."""
+    """Everything a case file may hold.
+
+    Keys:
+        title: name of the case
+        reference: source of the case
+        mechanism: materials, sections, links, joints, bodies and springs
+        coordinates: which joints make up q, in this order, and how each is held
+        trajectory: q over time; one, or a list of them
+        design: the design parameters y, in this order, and limits that they share
+        expansion: the power series
+        targets: wanted frequencies, limits, bands to keep out of, gaps
+        assignment: how the optimal design is looked for
+        measurements: measured frequencies, for `eigassign update`
+        validation: the accuracy that expansions must have
+    """
 
     title: Annotated[str, Field(min_length=1, max_length=200), AfterValidator(_one_line)]
     reference: Annotated[str, Field(max_length=1000), AfterValidator(_one_line)] | None = None
@@ -290,5 +304,5 @@ def _without_null(node: Any) -> Any:
     options = [option for option in kept.get("anyOf", ()) if option != {"type": "null"}]
     if len(options) == 1:
         del kept["anyOf"]
-        kept.update(options[0])
+        kept = {**options[0], **kept}
     return kept

@@ -17,9 +17,14 @@ from eigassign.case.schema.vectors import PLACE, Angle, Direction, Orientation, 
 class JointBase(Part):
     """What all joints have: where they are and how they are turned.
 
-    `base` (`ground` or `<link>.<node>`) carries `follower` (`<link>.<node>`). The joint stands at
-    `position` (m) in the axes of the base; the follower's zero position is turned by `angle` (rad,
-    planar) or `orientation` ([rx, ry, rz] in rad, R = Rz Ry Rx, spatial).
+    Keys:
+        base: what carries the joint, `ground` or `<link>.<node>`; of a carriage or nut the beam,
+            `<link>`, which carries only one
+        follower: what it carries, `<link>.<node>`
+        position: of the joint in the axes of the base; at the node unless given
+        angle: by which the follower is turned where the coordinate is 0, in a plane
+        orientation: the same in space, `[rx, ry, rz]`, R = Rz Ry Rx
+        axis: in the axes of the follower where the coordinate is 0
     """
 
     freedoms: ClassVar[tuple[str, ...]]  # names of its coordinates: what `component` may be
@@ -46,7 +51,7 @@ Lead: TypeAlias = Annotated[float, PLACE, AfterValidator(_travels)]
 
 
 class RevoluteJoint(JointBase):
-    """Free to turn about `axis` (z unless given; always z in a plane)."""
+    """Turns about `axis`: z unless given, always z in a plane."""
 
     freedoms = ("rotation",)
     planar = True
@@ -55,7 +60,7 @@ class RevoluteJoint(JointBase):
 
 
 class PrismaticJoint(JointBase):
-    """Free to slide along `axis` (x unless given)."""
+    """Slides along `axis`: x unless given."""
 
     freedoms = ("translation",)
     planar = True
@@ -65,7 +70,7 @@ class PrismaticJoint(JointBase):
 
 
 class CylindricalJoint(JointBase):
-    """Free to slide along and turn about `axis` (z unless given)."""
+    """Slides along and turns about `axis`: z unless given. Spatial only."""
 
     freedoms = ("translation", "rotation")
     slides = True
@@ -74,7 +79,11 @@ class CylindricalJoint(JointBase):
 
 
 class ScrewJoint(JointBase):
-    """Turns about `axis` (z unless given) and slides along it by `lead` (m) a turn."""
+    """Turns about `axis`, z unless given, and slides along it as it turns. Spatial only.
+
+    Keys:
+        lead: how far it slides in a turn
+    """
 
     freedoms = ("rotation",)
     slides = True
@@ -85,7 +94,11 @@ class ScrewJoint(JointBase):
 
 
 class UniversalJoint(JointBase):
-    """Turns about the first of two `axes`, then about the second, which the first carries."""
+    """Turns about one axis, then about a second, which the first carries. Spatial only.
+
+    Keys:
+        axes: the two
+    """
 
     freedoms = ("1", "2")
     type: Literal["universal"]
@@ -99,7 +112,11 @@ class UniversalJoint(JointBase):
 
 
 class SphericalJoint(JointBase):
-    """Free to turn in any way: successive rotations about x, y, z are its three components."""
+    """Turns in any way: its freedoms are turns about x, then y, then z. Spatial only.
+
+    R = Rx(c₁) Ry(c₂) Rz(c₃); a guess lists these angles. At c₂ = ±90 deg the first and the third
+    turn alike: free coordinates cannot be told apart there.
+    """
 
     freedoms = ("1", "2", "3")
     type: Literal["spherical"]
@@ -114,7 +131,7 @@ class FixedJoint(JointBase):
 
 
 class CarriageJoint(JointBase):
-    """Rides along a flexible beam, `base: <link>`; its coordinate is the distance from `start`."""
+    """Travels along a flexible beam; the coordinate is the distance from its `start`."""
 
     freedoms = ("translation",)
     planar = True
@@ -124,9 +141,14 @@ class CarriageJoint(JointBase):
 
 
 class NutJoint(JointBase):
-    """A nut on a flexible screw shaft, `base: <link>`: turns once against it per `lead` (m).
+    """Travels along a flexible screw shaft and turns against it once per lead. Spatial only.
 
-    Its coordinate is the distance (m) from the shaft's `start`.
+    The coordinate s is the distance from the shaft's `start`. There its axes are those of the
+    shaft, turned about the shaft's x axis by 2π s/`lead`, and then by `orientation`. It stands on
+    the shaft's axis.
+
+    Keys:
+        lead: how far it travels in a turn
     """
 
     freedoms = ("translation",)

@@ -33,18 +33,30 @@ Dof: TypeAlias = Annotated[int, Field(ge=0)]
 
 
 class Taper(Part):
-    """Two sections of the same shape; dimensions run linearly from `start` to `end`."""
+    """Two sections of the same shape, between which all dimensions run linearly.
+
+    Keys:
+        start: name of the section at the beam's start
+        end: name of the section at its end
+    """
 
     start: str
     end: str
 
 
 class BeamLink(Part):
-    """A straight flexible link along its local x: length in m, material, section, elements.
+    """A straight flexible beam along its local x, with the nodes `start` and `end`.
 
-    `shear`: Timoshenko beam; `roll` (rad) turns the section about the beam's axis. Nodes `start`
-    (the origin of the link's frame) and `end`. `reduce_to` (Hz, or `auto`): Craig–Bampton with the
-    fixed-interface modes up to that frequency.
+    Keys:
+        length: from `start` to `end`
+        material: its name
+        section: its name; or two of a taper, stiffness and mass of which are integrated over each
+            element
+        elements: their number; `auto` looks for the fewest that meet `expansion.accuracy`
+        shear: whether shear bends it too, as a Timoshenko beam
+        roll: by which the section is turned about the beam's axis
+        reduce_to: the inner nodes are replaced by the link's own modes up to this frequency
+            (Craig–Bampton); `auto` takes the lowest that meets a quarter of `expansion.accuracy`
     """
 
     type: Literal["beam"] = "beam"
@@ -58,9 +70,14 @@ class BeamLink(Part):
 
 
 class RigidLink(Part):
-    """A rigid body: nodes in its frame (m), mass (kg), inertia (kg m2) about its centre of mass.
+    """A rigid body.
 
-    `start` is at the origin unless given; with `length` there is a node `end` at [length, 0(, 0)].
+    Keys:
+        nodes: places by name; `start` is at the origin unless given
+        length: makes a node `end` at this distance along x
+        mass: of the body
+        inertia: as of bodies, about the centre of mass
+        center: place of the centre of mass; the origin unless given
     """
 
     type: Literal["rigid"]
@@ -72,7 +89,20 @@ class RigidLink(Part):
 
 
 class FrameBeam(Part):
-    """A beam of a frame, between two of its nodes."""
+    """A beam of a frame; its local x runs from one node to the other.
+
+    Its local y lies in the x-y plane of the link, y = z × x, and is the link's y where the beam is
+    along z.
+
+    Keys:
+        from: name of the node where it begins
+        to: name of the node where it ends
+        material: its name
+        section: its name
+        elements: their number
+        shear: whether shear bends it too
+        roll: by which y and z are turned about x
+    """
 
     from_node: str = Field(alias="from")
     to_node: str = Field(alias="to")
@@ -84,9 +114,13 @@ class FrameBeam(Part):
 
 
 class FrameLink(Part):
-    """Beams rigidly joined at nodes (m, in the link's frame): lattice booms, forks, portals.
+    """Beams joined rigidly at nodes: lattice booms, forks, portals.
 
-    `reduce_to` (Hz, or `auto`): Craig–Bampton; the nodes that nothing uses are interior.
+    Keys:
+        nodes: places by name, in the link's axes; one is called `start`
+        beams: by name
+        reduce_to: the inner nodes are replaced by the link's own modes up to this frequency
+            (Craig–Bampton); `auto` takes the lowest that meets a quarter of `expansion.accuracy`
     """
 
     type: Literal["frame"]
@@ -96,9 +130,12 @@ class FrameLink(Part):
 
 
 class SuperelementNode(Part):
-    """An interface node: its place (m) and its rows in the matrices, counted from 0.
+    """A node at which the part is joined to others.
 
-    `dofs` are those of u_x, u_y, θ_z in a plane; u_x, u_y, u_z, θ_x, θ_y, θ_z in space.
+    Keys:
+        position: its place
+        dofs: its rows in the matrices, counted from 0, in the order u_x, u_y, θ_z, in space u_x,
+            u_y, u_z, θ_x, θ_y, θ_z
     """
 
     position: Vector
@@ -106,9 +143,14 @@ class SuperelementNode(Part):
 
 
 class SuperelementLink(Part):
-    """Stiffness and mass from another program (Matrix Market or NumPy files, SI units).
+    """A part by its matrices, from another program.
 
-    `reduce_to` (Hz, or `auto`): Craig–Bampton with the fixed-interface modes up to that frequency.
+    Keys:
+        stiffness: file of the matrix, Matrix Market or NumPy, in SI units, without supports
+        mass: file of the matrix, likewise
+        nodes: by name; one is called `start`
+        reduce_to: the inner nodes are replaced by the link's own modes up to this frequency
+            (Craig–Bampton); `auto` takes the lowest that meets a quarter of `expansion.accuracy`
     """
 
     type: Literal["superelement"]

@@ -15,9 +15,15 @@ MOST = 10_000  # measurements of one case
 
 
 class Measurement(Part):
-    """A measured frequency (Hz) of a mode, and its standard deviation: `0.5 %` of it, or in Hz.
+    """A measured frequency.
 
-    It was measured at a `time` (s) of a trajectory, or at `q`; `trajectory` names the trajectory.
+    Keys:
+        time: of the trajectory when it was measured; between samples q is linear in time
+        q: instead of the time: one value of each coordinate
+        trajectory: name of the trajectory, where there are several
+        mode: its number, counted from the lowest elastic one
+        frequency: what was measured
+        deviation: its standard deviation; a share is one of the frequency
     """
 
     time: Annotated[float, TIME] | None = None
@@ -35,7 +41,13 @@ class Measurement(Part):
 
 
 class MeasurementFile(Part):
-    """Measurements in a CSV file; `deviation` is that of rows for which the file gives none."""
+    """Measurements in a CSV file.
+
+    Keys:
+        file: relative to the case file; columns of the same names, and one for each coordinate
+            instead of `q`
+        deviation: of rows for which the file gives none
+    """
 
     file: File
     deviation: Tolerance | None = None

@@ -28,7 +28,7 @@ _FAR = DIMENSIONS["angle"].largest  # rad, and m where the joint slides
 Q_VALUE = Quantity(
     at_least=-_FAR,
     at_most=_FAR,
-    elsewhere="angle (in rad when bare; or deg), or length, as its coordinate",
+    elsewhere="rad or m when bare, as its joint turns or slides",
 )
 QValue: TypeAlias = Annotated[float, Q_VALUE]
 Stiffness: TypeAlias = Annotated[float, quantity("stiffness", at_least=0)]
@@ -36,11 +36,15 @@ TurningStiffness: TypeAlias = Annotated[float, quantity("rotational stiffness", 
 
 
 class Body(Part):
-    """A rigid body on a node: mass in kg, inertia in kg m2 about its centre of mass.
+    """A rigid body on a node.
 
-    `offset` (m) runs from the node to the centre of mass, in the link's axes. The inertia is one
-    number in a plane, [Ixx, Iyy, Izz] or [Ixx, Iyy, Izz, Ixy, Ixz, Iyz] in space: entries of the
-    tensor in the link's axes, Ixy = −∫xy dm.
+    Keys:
+        at: the node, `<link>.<node>`
+        mass: of the body
+        inertia: about its centre of mass, in the link's axes; one number in a plane, `[Ixx, Iyy,
+            Izz]` or `[Ixx, Iyy, Izz, Ixy, Ixz, Iyz]` in space: the entries of the tensor, Ixy =
+            −∫xy dm
+        offset: from the node to the centre of mass, in the link's axes
     """
 
     at: str
@@ -50,10 +54,17 @@ class Body(Part):
 
 
 class Spring(Part):
-    """A spring between two nodes, or a node and `ground`: N/m and N m/rad, per axis or for all.
+    """A spring between two nodes, or a node and `ground`; the pose as written is free of stress.
 
-    Its axes are those of the first node's link, turned by `angle` (planar) or `orientation`
-    (spatial), rad.
+    Where the two nodes are apart, the spring acts at the second: what it resists is the motion of
+    that node against a rigid arm from the first.
+
+    Keys:
+        between: two nodes, `<link>.<node>`, or one and `ground`
+        translational: one number for all axes, or one for each
+        rotational: one number for all axes, or one for each
+        angle: by which its axes are turned from those of the first node's link, in a plane
+        orientation: the same in space, `[rx, ry, rz]`, R = Rz Ry Rx
     """
 
     between: tuple[str, str]
@@ -64,7 +75,13 @@ class Spring(Part):
 
 
 class Assembly(Part):
-    """Which way the loops are put together: guesses of passive joints, where `at` holds."""
+    """On which branch the loops are closed; not needed where they close in one way only.
+
+    Keys:
+        at: the coordinates for which the guess holds
+        guess: values of passive joints; of a joint with several freedoms a list with one for each,
+            or for those without a coordinate
+    """
 
     at: ByReference[QValue] = FrozenDict()
     guess: ByReference[OneOrList[QValue, tuple[QValue, ...]]] = FrozenDict()
@@ -73,19 +90,24 @@ class Assembly(Part):
 class Drive(Part):
     """A motor on a joint: a spring that holds it, and the inertia reflected through its gear.
 
-    Both act on the joint's own motion, follower against base: N m/rad and kg m2, or N/m and kg
-    where it slides. Without a stiffness the joint is free.
+    Both act on the joint's own motion, follower against base.
+
+    Keys:
+        stiffness: without it the joint is free
+        inertia: J = J_m N² of a rotor J_m that turns N times as fast as the joint
     """
 
     stiffness: (
         Annotated[
-            float, Quantity(above=0, elsewhere="stiffness (N m/rad, or N/m where the joint slides)")
+            float,
+            Quantity(above=0, elsewhere="N m/rad or N/m when bare, as the joint turns or slides"),
         ]
         | None
     ) = None
     inertia: (
         Annotated[
-            float, Quantity(at_least=0, elsewhere="inertia (kg m2, or kg where the joint slides)")
+            float,
+            Quantity(at_least=0, elsewhere="kg m2 or kg when bare, as the joint turns or slides"),
         ]
         | None
     ) = None
@@ -98,10 +120,15 @@ class Drive(Part):
 
 
 class Coordinate(Part):
-    """One rigid coordinate q: its joint, which freedom of it, and how it is held.
+    """One coordinate of q: its joint, which freedom of it, and how it is held.
 
-    `component` is needed where the joint has several freedoms. `angle: absolute` counts a planar
-    joint's angle from the x axis instead of from its base.
+    Keys:
+        joint: name of the joint; without loops each freedom has exactly one coordinate
+        component: which freedom of a joint with several: `translation` or `rotation` of a
+            cylindrical joint, 1 or 2 of a universal, 1, 2 or 3 of a spherical joint
+        angle: `relative` to the base link, or `absolute`, from the x axis (planar revolute joints;
+            the `angle` of the joint then has no effect)
+        drive: moves freely, not at all, or against a motor
     """
 
     joint: str
@@ -118,7 +145,19 @@ class Coordinate(Part):
 
 
 class Mechanism(Part):
-    """Materials, sections, links, joints, bodies and springs by name, in the order of the file."""
+    """Materials, sections, links, joints, bodies and springs by name, in the order of the file.
+
+    Keys:
+        space: `planar`: vectors are `[x, y]`, parts are turned by `angle`; `spatial`: `[x, y, z]`,
+            and `orientation`
+        materials: of beams
+        sections: cross-sections of beams
+        links: beams, rigid bodies, frames of beams, and parts given by matrices
+        joints: of links with each other and with the ground
+        bodies: rigid bodies on nodes
+        springs: between nodes, and to the ground
+        assembly: on which branch the loops are closed
+    """
 
     space: Literal["planar", "spatial"]
     materials: Named[Material] = FrozenDict()

@@ -3,16 +3,28 @@
 A part is a pydantic model; its fields say which keys it may have and what they may hold. The field
 types here are physical quantities, names, immutable mappings, and values of several kinds, each
 told from the others by its looks, so that only the errors of the kind that was meant are reported.
+
+What a key is for stands in the docstring of its model, in the list `Keys:`. From there it goes into
+the JSON Schema, for editors, and into the reference of the manual.
 """
 
 from __future__ import annotations
 
+import inspect
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias, TypeVar, Union, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    GetJsonSchemaHandler,
+    Tag,
+)
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
@@ -30,6 +42,32 @@ class Part(BaseModel):
     """Base of everything in a case file: frozen, strict, no unknown keys, built with its parent."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, defer_build=True)
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """The docstring, its list of keys at the keys: what each is for, then what it holds."""
+        schema = handler(core)
+        whole = handler.resolve_ref_schema(schema)
+        whole["description"], texts = _docstring(cls)
+        for key, node in whole["properties"].items():
+            options = [node, *node.get("anyOf", ())]
+            holds = next((o["description"] for o in options if "description" in o), None)
+            if key in texts:
+                node["description"] = texts[key] + (f"\n\n{holds}" if holds else "")
+        return schema
+
+
+def _docstring(model: type[Part]) -> tuple[str, dict[str, str]]:
+    """Of a model without its list `Keys:`, and the entries of that list and of its bases."""
+    prose, texts = "", dict[str, str]()
+    for each in reversed(model.__mro__):
+        prose, _, listed = inspect.cleandoc(each.__doc__ or "").partition("Keys:\n")
+        for entry in re.split(r"^    (?=\S)", listed, flags=re.MULTILINE)[1:]:
+            key, _, text = entry.partition(": ")
+            texts[key] = " ".join(text.split())
+    return prose.strip(), texts
 
 
 def needs_one_of(*groups: Sequence[str]) -> ConfigDict:

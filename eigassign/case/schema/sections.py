@@ -21,9 +21,13 @@ SECOND_MOMENT = quantity("second moment of area", above=0)
 
 
 class Material(Part):
-    """Linear elastic, homogeneous, isotropic: moduli in Pa, density in kg/m3.
+    """Linear elastic, homogeneous, isotropic.
 
-    Torsion and shear need Poisson's ratio or the shear modulus, G = E / (2 (1 + ν)).
+    Keys:
+        youngs_modulus: E
+        density: ρ
+        poissons_ratio: ν, for spatial beams and for `shear: true`
+        shear_modulus: G, instead of Poisson's ratio, G = E / (2 (1 + ν))
     """
 
     youngs_modulus: Annotated[float, MODULUS]
@@ -78,12 +82,16 @@ class Shape(Part):
 
 
 class BareSection(Shape):
-    """Properties as given: area in m2, second moments of area in m4.
+    """Properties as given.
 
-    `bending_inertia` (or `inertia_z`) resists bending in the local x-y plane, which is the plane of
-    a planar mechanism; `inertia_y` in x-z. `torsion_constant` (m4) resists torsion;
-    `polar_inertia` (m4) is the inertia of twisting, inertia_y + inertia_z unless given.
-    `shear_coefficient` is κ of κGA, 5/6 unless given.
+    Keys:
+        area: A
+        bending_inertia: second moment for bending in the plane of a planar mechanism
+        inertia_y: for bending in the local x-z plane
+        inertia_z: for bending in the local x-y plane; the same as `bending_inertia`
+        torsion_constant: for torsion; spatial mechanisms need it
+        polar_inertia: for the inertia of twisting; `inertia_y` + `inertia_z` unless given
+        shear_coefficient: κ of κGA; 5/6 unless given
     """
 
     shape: Literal["bare"] = "bare"
@@ -117,7 +125,11 @@ class BareSection(Shape):
 
 
 class CircleSection(Shape):
-    """Solid round bar; diameter in m."""
+    """Solid round bar.
+
+    Keys:
+        diameter: d
+    """
 
     shape: Literal["circle"]
     diameter: Annotated[float, LENGTH]
@@ -128,7 +140,13 @@ class CircleSection(Shape):
 
 
 class TubeSection(Shape):
-    """Round tube; outer diameter and either inner diameter or wall thickness, in m."""
+    """Round tube, by its inner diameter or its wall.
+
+    Keys:
+        outer_diameter: of the tube
+        inner_diameter: of the bore
+        thickness: of the wall
+    """
 
     shape: Literal["tube"]
     outer_diameter: Annotated[float, LENGTH]
@@ -155,8 +173,12 @@ class TubeSection(Shape):
 
 
 class RectangleSection(Shape):
-    """Solid rectangle, in m; `height` lies along local y, the plane of motion of a planar
-    mechanism: I_z = width height³ / 12."""
+    """Solid rectangle; in a planar mechanism I = `width` `height`³ / 12.
+
+    Keys:
+        width: along local z
+        height: along local y, which lies in the plane of a planar mechanism
+    """
 
     shape: Literal["rectangle"]
     width: Annotated[float, LENGTH]
@@ -168,7 +190,14 @@ class RectangleSection(Shape):
 
 
 class IProfileSection(Shape):
-    """Two flanges of `width` × `flange_thickness` and a web, in m; `height` along local y."""
+    """Two flanges and a web.
+
+    Keys:
+        height: along local y
+        width: of the flanges
+        flange_thickness: along local y
+        web_thickness: along local z
+    """
 
     shape: Literal["i_profile"]
     height: Annotated[float, LENGTH]

@@ -19,8 +19,18 @@ Auto: TypeAlias = Literal["auto"]
 class AssignmentKeys(Part):
     """How the optimal design is looked for, and how good it has to be.
 
-    `starts`, `steps` and `seconds` limit the work; `max_error` (relative, in Hz) is how far a
-    frequency may be from its target (2 %; if it is given, a larger error sets the exit code).
+    Keys:
+        method: `sequential` goes on to the optimum of the exact problem; `one_shot` is the paper's
+            single quadratic program, for frequency targets of numbered modes, bounds, lists and
+            linear limits
+        objective: the mean square error, or the largest weighted error
+        starts: number of designs to start from; the first are the initial design and the one shot,
+            the others the most promising of a sample. `auto` goes on until enough of them lead to
+            the best optimum, 12 at most
+        steps: at most so many from each start
+        seconds: at most so long; no limit unless given
+        max_error: how far a frequency may be from its target; 2 % unless given. If it is given, a
+            larger error sets the exit code
     """
 
     method: Literal["sequential", "one_shot"] = "sequential"
@@ -32,9 +42,15 @@ class AssignmentKeys(Part):
 
 
 class ExpansionKeys(Part):
-    """Order of the power series, its point (q, y), and the modes expanded; or `auto`.
+    """Order of the power series, its point, and the modes expanded.
 
-    `accuracy` (relative error in Hz) is what an `auto` order, and `auto` elements, have to meet.
+    Keys:
+        order: `auto` looks for the fewest coefficients that meet `accuracy`
+        accuracy: relative error in Hz that `order`, `elements` and `reduce_to` meet where they are
+            `auto`
+        q: the point; `auto` takes the most central sample of the trajectory
+        y: the point; `auto` takes the middle of the bounds
+        modes: to expand beside those of the targets
     """
 
     order: NumberOr[Annotated[int, Field(ge=1, le=20)], Auto] = 4
@@ -45,7 +61,15 @@ class ExpansionKeys(Part):
 
 
 class ValidationKeys(Part):
-    """How far from exact is too far (fraction), and the box in q that is sampled at random."""
+    """What `eigassign validate` compares, and how far from exact is too far.
+
+    Keys:
+        max_error: how far an expansion may be from exact, relative in Hz
+        q_span: half-width of the box of q about the expansion point that is sampled at random; one
+            for all coordinates, or one for each. The range of the joints' relative angles along the
+            trajectory unless given
+        samples: random points in that box
+    """
 
     max_error: Annotated[float, quantity("fraction", above=0)] = 0.02
     q_span: OneOrList[QSpan, tuple[QSpan, ...]] | None = None

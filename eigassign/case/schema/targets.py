@@ -48,7 +48,12 @@ Modes: TypeAlias = Annotated[tuple[Mode, ...], Field(min_length=1), AfterValidat
 
 
 class FrequencyProfile(Part):
-    """A frequency (Hz) that changes in time (s), linear between the points given."""
+    """A frequency that changes in time, linear between the points given.
+
+    Keys:
+        time: of each point
+        frequency: at each point
+    """
 
     time: Times
     frequency: Annotated[tuple[Frequency, ...], Field(min_length=2)]
@@ -61,7 +66,11 @@ class FrequencyProfile(Part):
 
 
 class FrequencyFile(Part):
-    """The same in a CSV file with the columns `time` (s) and `frequency` (Hz)."""
+    """The same in a CSV file.
+
+    Keys:
+        file: relative to the case file; columns `time` and `frequency`
+    """
 
     file: File
 
@@ -84,7 +93,13 @@ Curve: TypeAlias = Annotated[
 
 
 class Harmonic(Part):
-    """The band `harmonic` · f(t) · (1 ± `margin`) about a multiple of a frequency `of` (Hz)."""
+    """The band `harmonic` · `of` · (1 ± `margin`) about a multiple of a frequency.
+
+    Keys:
+        harmonic: the multiple
+        of: the frequency
+        margin: to either side
+    """
 
     harmonic: Annotated[float, Quantity(above=0)]
     of: Curve
@@ -95,7 +110,13 @@ class Harmonic(Part):
 
 
 class Pose(Part):
-    """Where the mechanism stands: at a `time` (s) of a trajectory, or at `q`."""
+    """Where the mechanism stands.
+
+    Keys:
+        time: of a trajectory
+        trajectory: its name, where there are several
+        q: or one value of each coordinate
+    """
 
     time: Annotated[float, TIME] | None = None
     trajectory: str | None = None
@@ -111,10 +132,12 @@ class Pose(Part):
 
 
 class FollowedMode(Part):
-    """The mode whose shape is that of mode `like` at a pose and design, whatever its number.
+    """The mode whose shape is that of a mode at a pose and design, whatever its number.
 
-    `design` gives values of parameters and names of choices; what it does not name is as in the
-    file.
+    Keys:
+        like: number of the mode there
+        at: the pose
+        design: values of parameters and names of choices there; the others are as in the file
     """
 
     like: Mode
@@ -139,10 +162,13 @@ def _listed(name: str, values: Iterable[float]) -> str:
 
 
 class AnyTarget(Part):
-    """What every target may have: a weight, and where it holds (everywhere if it does not say).
+    """What every target may have: a weight, and where it holds.
 
-    `trajectory` names the only one on which it holds, `during` is the part of it, from one time to
-    another (s).
+    Keys:
+        weight: multiplies the squares of its errors under `least_squares`, the errors under
+            `worst_case`
+        trajectory: name of the only trajectory on which it holds; all unless given
+        during: the part of the trajectory, from one time to another
     """
 
     kind: ClassVar[str]
@@ -160,7 +186,12 @@ class AnyTarget(Part):
 
 
 class ModeTarget(AnyTarget):
-    """A target on a `mode`, or on each of several `modes`."""
+    """A target on a mode, or on each of several.
+
+    Keys:
+        mode: number of the elastic mode, 1 is the lowest; or a mode followed by its shape
+        modes: several numbers, or `all`
+    """
 
     model_config = needs_one_of(("mode",), ("modes",))
 
@@ -188,7 +219,11 @@ class ModeTarget(AnyTarget):
 
 
 class FrequencyTarget(ModeTarget):
-    """Wanted frequency (Hz) of an elastic mode (1 is the lowest)."""
+    """The mode has this frequency.
+
+    Keys:
+        frequency: may change in time
+    """
 
     kind = "frequency"
     frequency: Curve
@@ -201,14 +236,22 @@ class FrequencyTarget(ModeTarget):
 
 
 class AtLeastTarget(ModeTarget):
-    """A frequency (Hz) that a mode must not fall below."""
+    """The mode does not fall below this frequency.
+
+    Keys:
+        at_least: may change in time
+    """
 
     kind = "at_least"
     at_least: Curve
 
 
 class AtMostTarget(ModeTarget):
-    """A frequency (Hz) that a mode must not exceed."""
+    """The mode does not exceed this frequency.
+
+    Keys:
+        at_most: may change in time
+    """
 
     kind = "at_most"
     at_most: Curve
@@ -221,7 +264,13 @@ class AtMostTarget(ModeTarget):
 
 
 class KeepOutTarget(AnyTarget):
-    """A band (Hz), fixed or about a harmonic, that no mode may be in, or none of those named."""
+    """No mode is in this band, or none of those named.
+
+    Keys:
+        keep_out: the band, or one about a harmonic
+        mode: number of the only mode that keeps out
+        modes: several numbers; `all` unless given
+    """
 
     kind = "keep_out"
     keep_out: OneOrList[Harmonic, tuple[Frequency, Frequency]]
@@ -246,7 +295,12 @@ class KeepOutTarget(AnyTarget):
 
 
 class Gap(Part):
-    """At least so many Hz between two modes."""
+    """At least so many Hz between two modes.
+
+    Keys:
+        between: their numbers, the lower first
+        at_least: their distance
+    """
 
     between: tuple[Mode, Mode]
     at_least: Frequency
@@ -262,7 +316,11 @@ class Gap(Part):
 
 
 class GapTarget(AnyTarget):
-    """Two modes that must stay apart."""
+    """Two modes stay apart.
+
+    Keys:
+        gap: which, and how far
+    """
 
     kind = "gap"
     gap: Gap

@@ -43,7 +43,7 @@ Times: TypeAlias = Annotated[
 ]
 Coordinates: TypeAlias = tuple[QValue, ...]
 PropertyValue: TypeAlias = Annotated[
-    float, Quantity(elsewhere="quantity of the property's dimension (SI when bare)")
+    float, Quantity(elsewhere="of the property's dimension, SI when bare")
 ]
 Samples: TypeAlias = Annotated[int, Field(ge=2, le=100_000)]
 
@@ -55,10 +55,12 @@ def _nested_tag(value: object) -> str:
 
 
 class AnyTrajectory(Part):
-    """What every trajectory may have: a `name`, and what each of its seconds weighs beside others.
+    """What every trajectory may have.
 
-    Without a name it is called by its place: "1", "2", … `set` gives properties of the mechanism
-    other values along it, by their paths.
+    Keys:
+        name: of the trajectory; its place "1", "2", … unless given
+        weight: what each of its seconds counts beside those of others
+        set: properties of the mechanism by their paths, with the values they have along it
     """
 
     name: Name | None = None
@@ -67,7 +69,13 @@ class AnyTrajectory(Part):
 
 
 class SampledTrajectory(AnyTrajectory):
-    """Joint samples: q (n_samples, n_q); `time` (s), or `duration` (s) for equal steps from 0."""
+    """Samples of the coordinates.
+
+    Keys:
+        q: one value of each coordinate for each sample
+        time: of each sample
+        duration: instead of times: equal steps from 0
+    """
 
     q: Annotated[tuple[Coordinates, ...], Field(min_length=2)]
     time: Times | None = None
@@ -83,13 +91,25 @@ class SampledTrajectory(AnyTrajectory):
 
 
 class FileTrajectory(AnyTrajectory):
-    """Joint samples in a CSV file: columns `time` (s) and one per coordinate (rad, or [deg])."""
+    """Samples of the coordinates in a CSV file.
+
+    Keys:
+        file: relative to the case file; columns `time` and one for each coordinate
+    """
 
     file: File
 
 
 class Timed(AnyTrajectory):
-    """What moves by a timing law: from rest to rest, but for `linear`, in equal steps of time."""
+    """What moves by a timing law: from rest to rest, but for `linear`, in equal steps of time.
+
+    Keys:
+        timing: `quintic`: no velocity and no acceleration at both ends; `cubic`: no velocity;
+            `trapezoidal`: constant acceleration, then constant velocity, then braking for as long;
+            `linear`: constant velocity
+        acceleration_share: of the time, with `timing: trapezoidal`
+        samples: their number
+    """
 
     timing: Literal["quintic", "cubic", "trapezoidal", "linear"] = "quintic"
     acceleration_share: Annotated[float, Quantity(above=0, at_most=0.5)] = 1 / 3
@@ -104,9 +124,13 @@ class Timed(AnyTrajectory):
 
 
 class PointTrajectory(Timed):
-    """Point to point between joint coordinates (n_points, n_q), resting at each (not if linear).
+    """Point to point between poses, with a rest at each unless `timing` is linear.
 
-    `times` (s, one a point), or `duration` (s) of the whole, shared out between the segments.
+    Keys:
+        points: one value of each coordinate for each point
+        times: of each point
+        duration: instead of times: of the whole. Each segment gets a share in proportion to its
+            largest move of a coordinate, relative to that coordinate's range
     """
 
     points: Annotated[tuple[Coordinates, ...], Field(min_length=2)]
@@ -127,11 +151,18 @@ class PointTrajectory(Timed):
 
 
 class TipTrajectory(Timed):
-    """A path of a link's node through waypoints (m), with timing law, duration (s) and samples.
+    """A path of a node of any link through waypoints.
 
-    `angle` (planar) or `orientation` (spatial: R = Rz Ry Rx) of the tip's link in the world (rad):
-    one that is kept, or one per waypoint. `branch` keeps joints within [low, high] (relative angle
-    in rad, modulo 2π; or m); `start` is an optional first guess of q.
+    Keys:
+        tip: the node, `<link>.<node>`
+        waypoints: places of the node
+        angle: of the tip's link in the world, in a plane; one, or one for each waypoint
+        orientation: the same in space, `[rx, ry, rz]`, R = Rz Ry Rx
+        path: a smooth curve, or straight lines
+        duration: of the whole
+        branch: by joint, `[low, high]`: the range of relative angle, or of place, in which the
+            solution must stay
+        start: first guess of q
     """
 
     tip: str
