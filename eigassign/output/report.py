@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -30,6 +31,7 @@ from eigassign.study.results import ModePictures, RunResults
 
 if TYPE_CHECKING:
     from jinja2 import Template
+    from markupsafe import Markup
 
     from eigassign.chart.results import Chart
     from eigassign.study.updating.fit import UpdateResults
@@ -144,6 +146,13 @@ def _texts(table: Table) -> list[bool]:
     return [not terminal.are_numbers([row[k] for row in table.rows]) for k in columns]
 
 
+def _words(text: str) -> Markup:
+    """Text with what stands between backticks as code, and no markup of its own."""
+    from markupsafe import Markup, escape
+
+    return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+
+
 @cache
 def _template() -> Template:
     """The page's template, compiled once a process."""
@@ -157,6 +166,7 @@ def _template() -> Template:
         lstrip_blocks=True,
     )
     environment.filters["texts"] = _texts
+    environment.filters["words"] = _words
     return environment.get_template("report.html.j2")
 
 

@@ -28,8 +28,8 @@ from eigassign.chart.results import (
 )
 from eigassign.output import chart_report
 from eigassign.output.chart_report import write_chart
-from eigassign.output.figures import style
-from eigassign.output.figures.front import MethodLine, chart_figures, line_look, scatter
+from eigassign.output.figures import screen, style
+from eigassign.output.figures.front import MethodLine, chart_figures, scatter
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.paper import draw, render
 
@@ -145,7 +145,7 @@ def test_the_mesh_is_drawn_beside_a_taylor_polynomial_that_is_right_somehow(
     plan = next(p for p in chart_figures(chart) if p.name == "mesh")
     assert words in plan.caption
     with style.applied():
-        (axes,) = draw(plan).axes
+        axes = draw(plan).axes[0]
     said = [text.get_text() for text in axes.texts]
     assert said == (["error of Taylor 4 full"] if "dashed" in plan.caption else [])
 
@@ -219,27 +219,46 @@ def words(figure: Figure) -> list[str]:
     return [text.get_text() for key in figure.legends for text in key.get_texts()]
 
 
-def test_points_are_drawn_by_family_and_the_front_as_steps_through_the_best() -> None:
+def test_points_are_drawn_by_kind_and_the_front_as_steps_through_the_best() -> None:
     with style.applied():
         figure = draw(chart_figures(CHART)[1])
     (axes,) = figure.axes
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("time [s]", "worst error [Hz]")
     assert words(figure)[:6] == [
-        "eigassign", "exact", "Taylor, full", "others", "grid, linear", "taken by order: auto",
+        "eigassign", "exact solves", "series of λ", "others", "interpolation and surrogates",
+        "taken by order: auto",
     ]  # fmt: skip
     shown = {line.get_label(): line for line in axes.get_lines()}
-    np.testing.assert_array_equal(shown["Taylor, full"].get_xydata(), [(1e-7, 0.1)])
-    np.testing.assert_array_equal(shown["grid, linear"].get_xydata(), [(2e-7, 0.01)])
-    assert shown["grid, linear"].get_markerfacecolor() == "white"
+    np.testing.assert_array_equal(shown["series of λ"].get_xydata(), [(1e-7, 0.1)])
+    np.testing.assert_array_equal(
+        shown["interpolation and surrogates"].get_xydata(), [(2e-7, 0.01)]
+    )
+    assert shown["interpolation and surrogates"].get_markerfacecolor() == "white"
     (steps,) = [line for line in axes.get_lines() if line.get_linewidth() == 7.0]
     np.testing.assert_array_equal(steps.get_ydata()[1:5], [0.1, 0.1, 0.01, 0.01])
 
 
-def test_no_two_lines_of_a_kind_share_colour_and_shape() -> None:
-    for ours in (True, False):
-        looks = [line_look(k, ours) for k in range(16)]
-        assert len({(look.colour, look.marker) for look in looks}) == 16
+def test_every_family_of_methods_has_its_kind_and_a_legend_eight_at_most() -> None:
+    families = (
+        "exact", "exact by others", "Taylor, full", "1/λ, full", "reduced, 1 point",
+        "fit to an accuracy", "fit of given solves", "stations, cubic", "grid, linear",
+        "RBF, quintic", "Taylor, linearised",
+    )  # fmt: skip
+    points = [
+        replace(CHART.points[0], method=f"m {f}", family=f, ours="," not in f) for f in families
+    ]
+    shown = chart_figures(replace(CHART, points=tuple(points)))[0].shows
+    labels = [curve.label for curve in shown.panels[0].curves if curve.label]
+    assert len(labels) == len(set(labels)) <= 8
+    looks = {curve.look for curve in shown.panels[0].curves if curve.names}
+    assert len(looks) == 7
+    (figure,) = screen.figures(shown)
+    assert {name for trace in figure["data"] for name in trace.get("text", ())} == {
+        f"m {family}" for family in families
+    }
+    _, rows = screen.table(shown)
+    assert next(row[0] for row in rows).startswith("m ")
 
 
 def test_a_time_measured_once_says_so() -> None:

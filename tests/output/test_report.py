@@ -246,3 +246,8 @@ def test_a_long_document_is_named_and_not_carried(monkeypatch):
     html, parsed, _ = page(make_results(), full=True)
     assert 'id="results"' not in html
     assert "All numbers are in results.json beside this page." in parsed.text
+
+
+def test_what_stands_between_backticks_is_code_and_nothing_else_is_markup():
+    html, _, _ = page(dataclasses.replace(make_results(), notes=("`order: <b>` was `taken`",)))
+    assert "<code>order: &lt;b&gt;</code> was <code>taken</code>" in html

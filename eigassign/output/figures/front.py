@@ -1,13 +1,15 @@
 """The figures of a chart: time against error on each front, elements, and ways to a design.
 
-Every figure is a scatter over two logarithmic axes. Like methods are joined by a line: eigassign's
-filled, the others hollow and dashed. A broad band joins the methods that no other beats.
+Every figure is a scatter over two logarithmic axes. Methods that differ by a setting are joined by
+a line: eigassign's filled, the others hollow and dashed. A colour is a kind of method; the legend
+names the kinds. A broad band joins the methods that no other beats.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import cycle
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,14 +27,20 @@ from eigassign.output.figures.graph import (
     Panel,
     Rule,
     labelled,
-    short,
 )
 
 Floats = NDArray[np.float64]
 LEAST_EXCESS = 1e-10  # an objective nearer to the best one is drawn there
-LEGEND_LETTERS = 46  # the longest name of a method has 43
+_KINDS = (  # of methods whose family begins so; the first that fits
+    ("Taylor", "series of λ"),
+    ("1/λ", "series of 1/λ"),
+    ("reduced", "reduced models"),
+    ("fit", "fits"),
+    ("exact by others", "exact solves by others"),
+    ("exact", "exact solves"),
+    ("", "interpolation and surrogates"),
+)
 COLOURS = (*graph.SERIES[:5], BLACK, graph.SKY, GREY)
-MARKERS = {True: ("o", "^"), False: ("s", "D", "p")}
 BAND = Look("#c9dfee", 7.0)
 RING = Look(BLACK, 0.0, marker="o", size=12.0, filled=False)
 LEVEL = Look(GREY, 1.0, "fine")
@@ -74,6 +82,10 @@ def _front(chart: Chart, front: Front) -> FigurePlan:
     )
 
 
+def _kind(family: str) -> str:
+    return next(kind for beginning, kind in _KINDS if family.startswith(beginning))
+
+
 def _is_shown(chart: Chart, point: ChartPoint) -> bool:
     """Whether it is wrong by less than 100 % everywhere."""
     return point.everywhere.worst_hz <= chart.asked.typical_hz
@@ -101,8 +113,14 @@ def _points(chart: Chart, front: Front) -> Graph:
         ("time", "s"),
         ("worst error", "Hz"),
         [
-            MethodLine(name, places(own)[:, 0], places(own)[:, 1], own[0].ours)
-            for name, own in families.items()
+            MethodLine(
+                _kind(family),
+                places(own)[:, 0],
+                places(own)[:, 1],
+                own[0].ours,
+                tuple(each.method for each in own),
+            )
+            for family, own in families.items()
         ],
         band=places([p for p in shown if p.method in front.methods]),
         level=("round-off of exact solves", floor),
@@ -145,24 +163,22 @@ def _taylor(chart: Chart) -> ChartPoint | None:
 
 
 def _meshes(chart: Chart) -> Graph:
-    """Error and time over elements, with the error of the expansion beside them."""
+    """Error over elements, with the error of the expansion beside it; below, time over elements."""
     rows = [row for row in chart.mesh if row.worst_hz > 0.0]
     counts = np.array([float(r.elements) for r in rows])
     level, taylor = None, _taylor(chart)
     if taylor is not None and _is_shown(chart, taylor):
         error = max(taylor.everywhere.worst_hz, chart.asked.floor_hz)
         level = (f"error of {taylor.method}", error)
-    solve = np.array([r.solve.median_s for r in rows])
-    return scatter(
-        "Elements against discretisation error",
-        ("elements", ""),
-        ("worst error [Hz], time [s]", ""),
-        [
-            MethodLine("worst error [Hz]", counts, np.array([r.worst_hz for r in rows]), True),
-            MethodLine("time of an exact solve [s]", counts, solve, True),
-        ],
-        level=level,
+    errors = np.array([r.worst_hz for r in rows])
+    times = np.array([r.solve.median_s for r in rows])
+    title, x = "Elements against discretisation error", ("elements", "")
+    above = scatter(
+        title, x, ("worst error", "Hz"), [MethodLine("", counts, errors, True)], level=level
     )
+    below = scatter(title, x, ("exact solve", "s"), [MethodLine("", counts, times, True)])
+    panels = (*above.panels, replace(below.panels[0], height=2.0))
+    return replace(above, panels=panels)
 
 
 # --- Designs
@@ -199,19 +215,27 @@ def _searches(chart: Chart) -> Graph:
 
 @dataclass(frozen=True, eq=False)
 class MethodLine:
-    """Like methods, joined by a line; ``ours`` is filled, others are hollow and dashed."""
+    """Like methods, joined by a line; ``ours`` is filled, others are hollow and dashed.
+
+    Lines of one ``label`` look alike; ``names`` are those of the points.
+    """
 
     label: str
     x: Floats
     y: Floats
     ours: bool
+    names: tuple[str, ...] = ()
 
 
-def line_look(number: int, ours: bool) -> Look:
-    """The ``number``-th line of its kind: no two of a kind share colour and marker."""
-    markers, colour = MARKERS[ours], COLOURS[number % len(COLOURS)]
-    marker = markers[number // len(COLOURS) % len(markers)]
-    return Look(colour, 0.9, "solid" if ours else "fine", marker, 6.0, ours)
+def _looks(lines: Sequence[MethodLine]) -> dict[str, Look]:
+    """Of each label: eigassign's and the others' take colours from opposite ends."""
+    looks: dict[str, Look] = {}
+    for ours, colours in ((True, COLOURS), (False, COLOURS[::-1])):
+        labels = dict.fromkeys(line.label for line in lines if line.ours is ours)
+        dash, marker = ("solid", "o") if ours else ("fine", "s")
+        for label, colour in zip(labels, cycle(colours), strict=False):
+            looks[label] = Look(colour, 0.9, dash, marker, 6.0, ours)
+    return looks
 
 
 def scatter(
@@ -229,12 +253,15 @@ def scatter(
     says what the points (n, 2) with a ring around them are.
     """
     curves: list[Curve] = []
+    looks = _looks(lines)
     for ours, group in ((False, "others"), (True, "eigassign")):
-        own = [line for line in lines if line.ours is ours]
-        curves += [
-            Curve(line.y, line_look(k, ours), short(line.label, LEGEND_LETTERS), line.x, "", group)
-            for k, line in enumerate(own)
-        ]
+        named = set[str]()
+        for line in lines:
+            if line.ours is ours:
+                label = "" if line.label in named else line.label
+                named.add(line.label)
+                look = looks[line.label]
+                curves.append(Curve(line.y, look, label, line.x, "", group, line.names))
     holds = () if level is None else (np.array([level[1], level[1] / 2.0]),)  # room for its name
     panel = Panel(labelled(*y), tuple(curves), 3.8, True, None, holds)
     marks: list[Mark] = []

@@ -58,6 +58,7 @@ class Curve:
     x: Floats | None = None
     end: str = ""
     group: str = ""  # of the legend
+    names: tuple[str, ...] = ()  # of its points, where each has one
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ figure stands a table of some of its numbers.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,7 @@ _DASHES = {
     "dash-dotted": "dashdot",
     "fine": "4px,4px",
 }
+_NAMED = "%{text}<br>%{y:.3~g} at %{x:.3~g}<extra></extra>"
 _MARKERS = {"o": "circle", "s": "square", "D": "diamond", "^": "triangle-up", "p": "pentagon"}
 
 
@@ -184,6 +186,7 @@ def _curve(curve: Curve, panel: Panel, shown: Graph, axis: str, names: dict[Look
         **({"marker": marker} if look.marker or single else {}),
         "cliponaxis": not look.marker,
         "hovertemplate": "%{y:.5~g}" if not shown.x_logarithmic else "%{y:.3~g} at %{x:.3~g}",
+        **({"text": list(curve.names), "hovertemplate": _NAMED} if curve.names else {}),
         **({} if name else {"hoverinfo": "skip", "hovertemplate": None}),
     }
 
@@ -326,12 +329,19 @@ def _table_of_graph(shown: Graph) -> tuple[tuple[str, ...], list[tuple[str, ...]
         return columns, [
             (number(shown.x[k]), *(number(values[k]) for _, values in common)) for k in rows
         ]
-    columns = ("", shown.x_label, shown.panels[0].label)
+    several = len(shown.panels) > 1
+    columns = ("", shown.x_label, "value" if several else shown.panels[0].label)
     return columns, [
-        (label, number(x), number(y))
-        for label, c in own
-        for x, y in zip(c.x if c.x is not None else (), c.y, strict=True)
-        if label
+        (name, number(x), number(y))
+        for panel in shown.panels
+        for c in panel.curves
+        if c.names or c.label or several
+        for name, x, y in zip(
+            c.names or repeat(panel.label if several else c.label),
+            c.x if c.x is not None else (),
+            c.y,
+            strict=False,
+        )
     ]
 
 
