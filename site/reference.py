@@ -62,7 +62,7 @@ A bare number is in SI units; text may carry another unit:
 {units}
 
 Sizes beyond these are no mechanism's, and are refused. 0 stays 0; what may be negative may be
-as small as 1e-60."""
+as small as 10⁻⁶⁰."""
 
 
 def units() -> str:
@@ -77,8 +77,9 @@ def units() -> str:
 
 
 def power(number: float) -> str:
-    """``1e6`` instead of ``1e+06``."""
-    return re.sub(r"e\+?(-?)0*", r"e\1", f"{number:.0e}")
+    """``10⁶``."""
+    exponent = f"{number:.0e}".partition("e")[2]
+    return "10" + f"{int(exponent)}".translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def sections(
