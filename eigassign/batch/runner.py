@@ -7,22 +7,20 @@ The one seam is ``Executor.submit(run_case, path, options) -> small dict``: any
 from __future__ import annotations
 
 import contextlib
-import os
 import signal
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from eigassign.batch.plan import folder_names
 from eigassign.batch.workers import cores, process_pool
-from eigassign.errors import StorageError, UsageError
 from eigassign.output.batch.junit import write_junit
 from eigassign.output.batch.outcome import CaseOutcome, frequency_ranges
 from eigassign.output.batch.summary import write_summary
-from eigassign.output.run_record import MARKER
 from eigassign.pipeline.run import Options, Outcome, optimize
 from eigassign.process import failure_of
 
@@ -215,73 +213,3 @@ def _submitted(pool: Executor, job: Job) -> Future[Row]:
         return pool.submit(run_case, job.case, job.options)
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-# --- Which case files are meant by files and folders, and a name for the run of each
-
-
-def default_cases() -> list[Path]:
-    """The case files of ./cases itself; UsageError where there is none."""
-    folder = Path("cases")
-    found = sorted(p for p in folder.glob("*.y*ml") if p.suffix in (".yaml", ".yml"))
-    if not found:
-        raise UsageError("cases: no such file or folder, or no case files in it; name some")
-    return found
-
-
-def cases_in(paths: Sequence[Path]) -> list[Path]:
-    """`find_cases`; UsageError where a path does not exist or there is no case at all."""
-    for path in paths:
-        if not path.exists():
-            raise UsageError(f"{path}: no such file or folder")
-    if not (found := find_cases(paths)):
-        raise UsageError(f"no case files (*.yaml, *.yml) in {', '.join(map(str, paths))}")
-    return found
-
-
-def find_cases(paths: Sequence[Path]) -> list[Path]:
-    """Case files named, and all ``*.yaml``, ``*.yml`` in the folders named, each file once.
-
-    Hidden folders and run folders (they hold a resolved case) are passed over. Raises StorageError
-    for a folder that cannot be read.
-    """
-    found = [each for path in paths for each in (_in(path) if path.is_dir() else [path])]
-    first = {os.path.realpath(path): path for path in reversed(found)}
-    return [path for path in found if first.pop(os.path.realpath(path), None)]
-
-
-def _in(folder: Path) -> Iterator[Path]:
-    for root, folders, files in os.walk(folder, onerror=_unreadable):
-        if MARKER in files:
-            folders.clear()
-            continue
-        folders[:] = sorted(name for name in folders if not name.startswith("."))
-        for name in sorted(files):
-            if name.endswith((".yaml", ".yml")) and not name.startswith("."):
-                yield Path(root, name)
-
-
-def _unreadable(error: OSError) -> None:
-    raise StorageError(f"{error.filename}: cannot be read: {error.strerror}") from error
-
-
-def folder_names(cases: Sequence[Path]) -> list[str]:
-    """The files' stems; where two would collide, the path that tells them apart joins in."""
-    stems = [case.stem for case in cases]
-    clashing = {
-        s.casefold() for s in stems if [t.casefold() for t in stems].count(s.casefold()) > 1
-    }
-    root = Path(os.path.commonpath([os.path.abspath(case.parent) for case in cases] or ["."]))
-    taken = {"summary.csv", "junit.xml"}
-    names = []
-    for case, stem in zip(cases, stems, strict=True):
-        parts = Path(os.path.abspath(case)).relative_to(root).with_suffix("").parts
-        name = _free("-".join(parts) if stem.casefold() in clashing else stem, taken)
-        taken.add(name.casefold())
-        names.append(name)
-    return names
-
-
-def _free(name: str, taken: set[str]) -> str:
-    candidates = [name, *(f"{name}-{k}" for k in range(2, len(taken) + 3))]
-    return next(each for each in candidates if each.casefold() not in taken)

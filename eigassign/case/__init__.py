@@ -10,11 +10,12 @@ In reading order, each importing only from those above it:
     rules        what keys must have in common, over the plain data; what looks like a slip
     canonical    content of a case → canonical YAML text that reads back equal
     case_file    the validated case as the rest of the program sees it
+    values       other values of some keys
     loading      path or mapping → CaseFile, or all problems of the file at once
 """
 
 from eigassign.case.case_file import CaseFile
-from eigassign.case.loading import from_mapping, load, parse
+from eigassign.case.loading import Unchecked, checked, from_mapping, load, parse, read
 from eigassign.case.schema.design import Catalogue, Choices, DesignColumn, Tolerance
 from eigassign.case.schema.document import json_schema
 from eigassign.case.schema.joints import (
@@ -88,9 +89,12 @@ __all__ = [
     "Tolerance",
     "TrajectoryForm",
     "TubeSection",
+    "Unchecked",
     "UniversalJoint",
+    "checked",
     "from_mapping",
     "json_schema",
     "load",
     "parse",
+    "read",
 ]

@@ -20,6 +20,7 @@ from eigassign.case.schema.measurements import Measurements
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.schema.parts import FrozenDict, Quantity
 from eigassign.case.schema.study import AssignmentKeys, ExpansionKeys, ValidationKeys
+from eigassign.case.schema.sweep import Sweep
 from eigassign.case.schema.targets import Requirement, TargetForm, requirements
 from eigassign.case.schema.trajectory import TrajectoryForm, named_trajectories
 from eigassign.errors import CaseError, Problem
@@ -46,7 +47,8 @@ class CaseFile:
     """One validated case. Two are equal when their content is, wherever they were read from.
 
     ``path`` and ``sha256`` identify the file and its bytes, ``files`` the bytes of those that it
-    names; ``warnings`` are plausibility problems that do not keep the case from being run.
+    names; ``warnings`` are plausibility problems that do not keep the case from being run;
+    ``variant`` are the values it has in place of those in the file.
     """
 
     title: str
@@ -60,11 +62,13 @@ class CaseFile:
     assignment: AssignmentKeys
     measurements: Measurements | None
     validation: ValidationKeys
+    sweep: Sweep | None
     path: Path = field(compare=False)
     sha256: str = field(compare=False)
     warnings: tuple[Problem, ...] = field(compare=False)
     marks: Mark = field(compare=False, repr=False)
     files: Mapping[str, str] = field(compare=False, default_factory=dict)  # SHA-256 by name
+    variant: Mapping[str, object] = field(compare=False, default_factory=dict)  # by dotted key
 
     def __repr__(self) -> str:
         q, y = named(tuple(self.coordinates)), named(tuple(self.design.parameters))

@@ -13,6 +13,7 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -29,11 +30,37 @@ from eigassign.case.rules.properties import (
 )
 from eigassign.case.rules.values import completed
 from eigassign.case.schema.document import Document, validated
+from eigassign.case.schema.parts import FrozenDict
 from eigassign.case.schema.trajectory import named_trajectories
+from eigassign.case.values import with_values
 from eigassign.errors import CaseError, Problem, StorageError, UsageError
 from eigassign.files import CASE, pieces, read_bytes
 
+NO_VALUES: Mapping[str, object] = FrozenDict()
 MOST_PROBLEMS = 100  # shown; of each kind of check twice as many are looked at
+
+
+@dataclass(frozen=True)
+class Unchecked:
+    """A case file as it is written: its bytes, and the tree in them."""
+
+    path: Path
+    data: bytes
+    source: Source
+
+    @property
+    def sha256(self) -> str:
+        """Of its bytes."""
+        return hashlib.sha256(self.data).hexdigest()
+
+    def content(self) -> str:
+        """SHA-256 of what it says and of every file it names, whatever its `sweep` is.
+
+        Comments, the order of lines that say the same, and places of files count for nothing.
+        """
+        tree = {key: body for key, body in self.source.tree.items() if key != "sweep"}
+        digests = _digests(named_files(tree, self.path.parent), self.path.parent)
+        return hashlib.sha256(json.dumps([tree, [*digests.values()]]).encode()).hexdigest()
 
 
 def load(path: str | Path, allow_outside: bool = False) -> CaseFile:
@@ -42,6 +69,16 @@ def load(path: str | Path, allow_outside: bool = False) -> CaseFile:
     Raises CaseError with every problem of the file, UsageError if ``path`` is not a file or one too
     large, and StorageError if it cannot be read.
     """
+    return checked(read(path), allow_outside)
+
+
+def parse(data: bytes, path: str | Path, allow_outside: bool = False) -> CaseFile:
+    """The case file with content ``data``; ``path`` names it and anchors relative paths in it."""
+    return checked(_parsed(data, Path(path)), allow_outside)
+
+
+def read(path: str | Path) -> Unchecked:
+    """The case file at ``path`` before its keys are looked at; raises as `load` does."""
     path = Path(path)
     try:
         data = read_bytes(path, CASE)
@@ -52,17 +89,14 @@ def load(path: str | Path, allow_outside: bool = False) -> CaseFile:
         if error.errno in (errno.EINVAL, errno.EFBIG):
             raise UsageError(f"{path}: expected a case file: {error.strerror}") from None
         raise StorageError(f"{path}: cannot be read: {error.strerror}") from error
-    return parse(data, path, allow_outside)
+    return _parsed(data, path)
 
 
-def parse(data: bytes, path: str | Path, allow_outside: bool = False) -> CaseFile:
-    """The case file with content ``data``; ``path`` names it and anchors relative paths in it."""
-    path = Path(path)
+def _parsed(data: bytes, path: Path) -> Unchecked:
     try:
-        source = read_yaml(data, str(path))
+        return Unchecked(path, data, read_yaml(data, str(path)))
     except CaseError as error:
         raise CaseError(_first(error.problems)) from None
-    return _checked(source, data, path, allow_outside)
 
 
 def from_mapping(
@@ -74,10 +108,20 @@ def from_mapping(
     Raises CaseError with every problem, by its key.
     """
     source = read_mapping(given, str(path))
-    return _checked(source, json.dumps(source.tree).encode(), Path(path), allow_outside)
+    written = Unchecked(Path(path), json.dumps(source.tree).encode(), source)
+    return checked(written, allow_outside)
 
 
-def _checked(source: Source, data: bytes, path: Path, allow_outside: bool) -> CaseFile:
+def checked(
+    written: Unchecked, allow_outside: bool = False, values: Mapping[str, object] = NO_VALUES
+) -> CaseFile:
+    """The case with these ``values`` in place of its own, by dotted key; raises CaseError.
+
+    Each key is in the file, or may be: see `values.objection`.
+    """
+    source, path = written.source, written.path
+    if values:
+        source = replace(source, tree=with_values(source.tree, values))
     if crowded := [source.problem(*finding) for finding in too_many(source.tree)]:
         raise CaseError(tuple(crowded))
     document, schema_findings = validated(completed(source.tree, path.parent))
@@ -92,7 +136,7 @@ def _checked(source: Source, data: bytes, path: Path, allow_outside: bool) -> Ca
     problems = [*source.problems, *(source.problem(*finding) for finding in findings)]
     if problems or document is None:
         raise CaseError(_first(list(dict.fromkeys(problems))))
-    return _case_file(document, source, data, path, named)
+    return _case_file(document, source, written, values, named)
 
 
 def _first(problems: Sequence[Problem]) -> tuple[Problem, ...]:
@@ -106,8 +150,13 @@ def _first(problems: Sequence[Problem]) -> tuple[Problem, ...]:
 
 
 def _case_file(
-    document: Document, source: Source, data: bytes, path: Path, named: Sequence[NamedFile]
+    document: Document,
+    source: Source,
+    written: Unchecked,
+    values: Mapping[str, object],
+    named: Sequence[NamedFile],
 ) -> CaseFile:
+    path = written.path
     content = {name: getattr(document, name) for name in Document.model_fields}
     doubts = [*implausible(document), *starts_outside(source.tree, document.design)]
     doubts += unreadable([each for each in named if each.spare])
@@ -115,10 +164,11 @@ def _case_file(
     return CaseFile(
         **content,
         path=path,
-        sha256=hashlib.sha256(data).hexdigest(),
+        sha256=written.sha256,
         warnings=tuple(sorted(warnings, key=lambda p: (p.line, p.column, p.path))),
         marks=source.marks,
         files=_digests(named, path.parent),
+        variant=values,
     )
 
 

@@ -137,6 +137,25 @@ def read_table(
     )
 
 
+def read_words(file: Path, key: str) -> list[tuple[int, list[str]]]:
+    """Line and cells of every row of a CSV file as they are written, the header first.
+
+    Raises MechanismError at ``key`` if the file cannot be read, has no row below its header, or one
+    of another length.
+    """
+    text = _text(file, key)
+    rows = list(itertools.islice(_rows(text, _dialect(text), file.name, key), _MOST + 2))
+    if not 2 <= len(rows) <= _MOST + 1:
+        many = f"more than {_MOST} rows" if rows[2:] else "a header and rows are expected"
+        raise MechanismError(key, f"{file.name}: {many}")
+    for line, cells in rows:
+        if len(cells) != len(rows[0][1]) or not all(cells):
+            filled = sum(map(bool, cells))
+            message = f"{file.name}:{line}: {filled} values for {len(rows[0][1])} columns"
+            raise MechanismError(key, message)
+    return rows
+
+
 def _text(file: Path, key: str) -> str:
     try:
         text = read_bytes(file, TABLE).decode("utf-8-sig")

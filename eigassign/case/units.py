@@ -176,6 +176,18 @@ def require_size(si: float, dimension: Dimension | None, given: str) -> None:
         raise QuantityError(f"too large to calculate with, got {given}; at most {most}")
 
 
+def number_and_unit(value: object) -> tuple[Fraction, str]:
+    """``"180 Hz"`` → (180, "Hz"), 0.1 → (1/10, ""): the number exactly as its decimals say.
+
+    Raises QuantityError for anything that is not a number, with or without a unit.
+    """
+    si = read(value, None)
+    if not isinstance(value, str):
+        return Fraction(repr(value)), ""
+    number, unit = _split(value, None)
+    return (Fraction(number) if si else Fraction(0)), unit
+
+
 def is_bare(text: str) -> bool:
     """Whether ``text`` is a number without a unit."""
     return _NUMBER.fullmatch(text.strip()) is not None

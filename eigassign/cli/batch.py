@@ -33,7 +33,7 @@ def batch(paths: tuple[Path, ...], jobs: int | None, **how: Any) -> int:
     failed case does not stop the others; exit code 1 if any failed.
     """
     from eigassign.batch import runner as many
-    from eigassign.batch.runner import cases_in
+    from eigassign.batch.plan import cases_in
 
     out = how["out"] or Path("results")
     cache_dir = how["cache_dir"] and str(how["cache_dir"])

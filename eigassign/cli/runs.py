@@ -181,7 +181,7 @@ def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
     CASES are files or folders; the files of ./cases (not of folders below it) when none is named.
     Exit code 1 where an expansion is further off than the case's validation.max_error.
     """
-    from eigassign.batch.runner import cases_in, default_cases
+    from eigassign.batch.plan import cases_in, default_cases
     from eigassign.pipeline import run
 
     rows: list[ValidationRow] = []

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment import Assignment
 from eigassign.assignment.exact.sequential import End
+from eigassign.case.suggestions import shown
 from eigassign.errors import EigassignError
 from eigassign.modal.expansion import Expansion, NearestExpansion
 from eigassign.output import tables
@@ -67,6 +68,7 @@ class Options:
     force: bool = False  # a folder that another case wrote is moved aside
     figures: tuple[str, ...] = ("png",)  # of png, svg and pdf; none are drawn if empty
     report: str = "full"  # full, light or none
+    draw_failed_only: bool = False  # figures and report only of an answer not to build on
     study: str = "cheap"  # of what the answer means: none, cheap or all
     allow_outside: bool = False  # the case may name files outside its own folder
     progress: Callable[[str], None] = field(
@@ -224,7 +226,8 @@ def prepare(
     moving = () if trajectory is None else trajectory.notes
     mesh = () if case.mesh is None else case.mesh.reasons
     smaller = () if case.reduction is None else case.reduction.reasons
-    notes = [*mesh, *smaller, *moving, *plan.notes, *notes]
+    variant = (f"variant: {key} = {shown(value)}" for key, value in file.variant.items())
+    notes = [*variant, *mesh, *smaller, *moving, *plan.notes, *notes]
     return Scene(file, model, initial, trajectory, expansions, tuple(notes))
 
 
@@ -258,12 +261,18 @@ def optimize(path: str | Path, options: Options = DEFAULT) -> Outcome:
 
     Raises StorageError before anything is computed where the folder may not be replaced.
     """
+    return optimize_case(load_case(path, options.allow_outside), options)
+
+
+def optimize_case(case: Case, options: Options = DEFAULT) -> Outcome:
+    """`optimize` of a case that is loaded already."""
     stages = Stages(options.progress)
-    case = load_case(path, options.allow_outside)
     with new_run_folder(case.file, options.out, options.force) as folder:
         results = solve_case(case, options).results
         options.progress("writing the report")
-        folder.write(results, options.figures, options.report)
+        drawn = results.shortcoming is not None or not options.draw_failed_only
+        figures, report = (options.figures, options.report) if drawn else ((), "none")
+        folder.write(results, figures, report)
     return _outcome(folder, results, stages)
 
 

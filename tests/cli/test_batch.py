@@ -18,7 +18,8 @@ from commands import python
 from wrong_inputs import GOOD
 
 from eigassign.batch import runner as many
-from eigassign.batch.runner import CaseOptions, Job, Row, find_cases, folder_names, run_batch
+from eigassign.batch.plan import find_cases, folder_names
+from eigassign.batch.runner import CaseOptions, Job, Row, run_batch
 from eigassign.batch.workers import process_pool
 from eigassign.cli import main
 from eigassign.process import Terminated

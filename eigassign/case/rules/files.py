@@ -16,11 +16,13 @@ from eigassign.case.reader import Finding, KeyPath, Tree, at, text
 from eigassign.case.rules.lookups import curves, links, trajectories
 from eigassign.files import MATRIX, TABLE, objection, printable
 
+_SPARE = ("measurements", "sweep")
+
 
 class NamedFile(NamedTuple):
     """A file that the case names: its key, absolute path and largest size in bytes.
 
-    ``spare``: every command but `update` and `check` does without it.
+    ``spare``: of all commands that run a case only one needs it, `update` or `batch`.
     """
 
     path: KeyPath
@@ -33,7 +35,7 @@ def named_files(tree: Tree, folder: Path) -> list[NamedFile]:
     """Files that the case names; relative paths start in ``folder``."""
     tables = [(path, body, "file") for path, body in trajectories(tree) if at(body, "tip") is None]
     tables += [(path, body, "file") for path, body in curves(tree)]
-    tables += [(("measurements",), at(tree, "measurements"), "file")]
+    tables += [((key,), at(tree, key), "file") for key in _SPARE]
     matrices = [
         (path, body, key)
         for _, path, body in links(tree, "superelement")
@@ -44,7 +46,7 @@ def named_files(tree: Tree, folder: Path) -> list[NamedFile]:
         for path, body, key in group:
             if (file := text(body, key)) is not None:
                 place = os.path.abspath(folder / file)
-                found.append(NamedFile((*path, key), place, limit, path == ("measurements",)))
+                found.append(NamedFile((*path, key), place, limit, path[0] in _SPARE))
     return found
 
 

@@ -13,5 +13,6 @@ In reading order, each importing only from those above it:
     targets       the key `targets`, and the requirements that they come to
     measurements  the key `measurements`
     study         the keys `assignment`, `expansion` and `validation`
+    sweep         the key `sweep`
     document      the whole case file, its errors as readable findings, its JSON Schema
 """

@@ -20,6 +20,7 @@ from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.schema.parts import FrozenDict, Named, Part, Quantity, keys_of, wrong
 from eigassign.case.schema.sections import SHAPES
 from eigassign.case.schema.study import AssignmentKeys, ExpansionKeys, ValidationKeys
+from eigassign.case.schema.sweep import Sweep
 from eigassign.case.schema.targets import CURVES, TARGETS, TargetForm
 from eigassign.case.schema.trajectory import MOTIONS, TrajectoryForms
 from eigassign.case.suggestions import listed, shown, suggestion, unknown
@@ -46,6 +47,7 @@ class Document(Part):
         assignment: how the optimal design is looked for
         measurements: measured frequencies, for `eigassign update`
         validation: the accuracy that expansions must have
+        sweep: variants of the case
     """
 
     title: Annotated[str, Field(min_length=1, max_length=200), AfterValidator(_one_line)]
@@ -59,6 +61,7 @@ class Document(Part):
     assignment: AssignmentKeys = AssignmentKeys.model_construct()
     measurements: Measurements | None = None
     validation: ValidationKeys = ValidationKeys.model_construct()
+    sweep: Sweep | None = None
 
 
 # --- Errors of the schema as findings
@@ -86,6 +89,15 @@ def validated(tree: Tree) -> tuple[Document | None, list[Finding]]:
         details = error.errors(include_url=False)[:_MOST]
         findings = [_finding(detail) for detail in details if not _is_echo(detail)]
         return None, [f for f in findings if not f[1].endswith("got nothing")]  # a rule finds those
+
+
+def validated_sweep(body: object) -> tuple[Sweep | None, list[Finding]]:
+    """The content of the key `sweep` by itself, or None and what the schema has against it."""
+    try:
+        return Sweep.model_validate(body), []
+    except ValidationError as error:
+        details = error.errors(include_url=False)[:_MOST]
+        return None, [_finding({**each, "loc": ("sweep", *each["loc"])}) for each in details]
 
 
 def _with_entries_apart(tree: Tree) -> Tree:

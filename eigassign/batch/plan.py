@@ -1,0 +1,261 @@
+"""What a batch runs, in order: case files, the variants of each, and a name and a key for each.
+
+    files and folders → cases_in → plan_of → Plan: Variant 0, 1, 2, …
+
+A key is the SHA-256 of all that the numbers of a case come from: what its file and the files it
+names say, its own values, and the version. So a result is known again wherever it stands.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate
+from pathlib import Path
+
+from eigassign._version import __version__
+from eigassign.batch.variants import OPTION, Variants, variants_of
+from eigassign.case import read
+from eigassign.case.reader import dotted
+from eigassign.case.values import key_path
+from eigassign.errors import EigassignError, Problem, StorageError, UsageError
+from eigassign.modal.storage import ALGORITHM
+from eigassign.output.run_record import MARKER
+
+FILES = (  # of the folder of a batch, beside the folders of its cases
+    *("batch.json", "manifest.jsonl", "summary.csv", "summary.json", "junit.xml", "index.html"),
+    *("columns.h5", "columns.csv"),
+)
+STUDY = "cheap"  # of what an answer means; see pipeline.run.Options
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One case of a batch: a case file, with these values in place of its own."""
+
+    index: int
+    name: str  # of its folder
+    path: str  # of the case file
+    values: Mapping[str, object]  # by dotted key
+    key: str
+
+
+@dataclass(frozen=True)
+class CaseFile:
+    """A case file of a batch; ``variants`` is None where it is run as it stands."""
+
+    path: str
+    name: str
+    content: str  # SHA-256 of what it says, of the version and of what else changes numbers
+    variants: Variants | None = None
+    prefix: str = ""  # of the names of variants
+    is_set: bool = False  # the variants are from --set
+
+    def __len__(self) -> int:
+        return 1 if self.variants is None else len(self.variants)
+
+    def variant(self, k: int, index: int) -> Variant:
+        """Its k-th variant, which is the ``index``-th of the batch."""
+        values = {} if self.variants is None else self.variants[k]
+        written = json.dumps(values, sort_keys=True)
+        key = hashlib.sha256(f"{self.content} {written}".encode()).hexdigest()
+        name = self.prefix + _named(self._short, values, key) if values else self.name
+        return Variant(index, name, self.path, values, key)
+
+    @cached_property
+    def _short(self) -> Mapping[str, str]:
+        """The end of each key that tells it from all others."""
+        keys = [] if self.variants is None else self.variants.keys
+        parts = {key: key.split(".") for key in keys}
+        ends = {key: [".".join(p[-n:]) for n in range(1, len(p) + 1)] for key, p in parts.items()}
+        return {
+            key: next(e for e in mine if sum(e in other for other in ends.values()) == 1)
+            for key, mine in ends.items()
+        }
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All cases of a batch in order: ``plan[k]`` is made when it is asked for."""
+
+    files: tuple[CaseFile, ...]
+
+    def __len__(self) -> int:
+        return self._ends[-1]
+
+    def __getitem__(self, index: int) -> Variant:
+        if not 0 <= index < len(self):
+            raise IndexError(index)
+        file, k = self.whose(index)
+        return file.variant(k, index)
+
+    def whose(self, index: int) -> tuple[CaseFile, int]:
+        """The case file of a variant, and which of its variants it is."""
+        n = bisect_right(self._ends, index) - 1
+        return self.files[n], index - self._ends[n]
+
+    @cached_property
+    def _ends(self) -> tuple[int, ...]:
+        return tuple(accumulate(map(len, self.files), initial=0))
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of the plan: contents, values, names and order, not where the files are."""
+        values = ["" if f.variants is None else f.variants.digest for f in self.files]
+        parts = [(f.name, f.content, v) for f, v in zip(self.files, values, strict=True)]
+        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+    @property
+    def is_swept(self) -> bool:
+        """Whether any case file has variants."""
+        return any(file.variants is not None for file in self.files)
+
+
+def plan_of(cases: Sequence[Path], settings: Sequence[str] = ()) -> Plan:
+    """The plan of these case files, each with what ``--set`` says (``settings``), else its sweep.
+
+    A case file that cannot be read is a case of its own, which will fail. Raises CaseError for a
+    wrong sweep.
+    """
+    names = folder_names(cases)
+    several = len(cases) > 1
+    return Plan(
+        tuple(
+            _planned(case, name, settings, several) for case, name in zip(cases, names, strict=True)
+        )
+    )
+
+
+def _planned(case: Path, name: str, settings: Sequence[str], several: bool) -> CaseFile:
+    try:
+        written = read(case)
+    except EigassignError as error:
+        if settings:
+            raise
+        return CaseFile(str(case), name, _content(str(error)))
+    variants = variants_of(written.source, case.parent, settings)
+    prefix = f"{name}," if several else ""
+    content = _content(written.content())
+    return CaseFile(str(case), name, content, variants, prefix, bool(settings))
+
+
+def _content(case: str) -> str:
+    parts = [__version__, ALGORITHM, STUDY, case]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def variant_problem(plan: Plan, index: int, problem: Problem) -> Problem:
+    """A problem of a variant at the place where the value at fault was given, else at its own."""
+    variant, (file, k) = plan[index], plan.whose(index)
+    message = f"{variant.name}: {problem.message}"
+    source, variants = read(file.path).source, file.variants
+    paths = {key: dotted(key_path(source.tree, key)) for key in variant.values}
+    key = next((key for key, path in paths.items() if problem.path.startswith(path)), None)
+    if key is None or variants is None:
+        return Problem(problem.file, problem.line, problem.column, problem.path, message)
+    if file.is_set:
+        return Problem(OPTION, 0, 0, key, message)
+    if variants.file:
+        return Problem(variants.file, variants.lines[k], 1, key, message)
+    return source.problem(("sweep", "parameters", key), message)
+
+
+# --- Names of variants
+
+_NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+_UNSAFE = re.compile(r"[^\w.,=+-]")
+_DIGITS = 6  # of a number in a name
+_LONGEST = 100  # characters; file systems allow 255 bytes, and hidden names are longer
+
+
+def _named(short: Mapping[str, str], values: Mapping[str, object], key: str) -> str:
+    """``mass=100g,frequency=180Hz``; where that does not say all, it ends with some of its key."""
+    exact = ",".join(f"{short[key]}={_text(value)}" for key, value in values.items())
+    shown = _UNSAFE.sub("_", _NUMBER.sub(_rounded, exact))
+    return shown if shown == exact and len(shown) <= _LONGEST else f"{shown[:_LONGEST]}~{key[:10]}"
+
+
+def _text(value: object) -> str:
+    text = value if isinstance(value, str) else json.dumps(value)
+    return text.replace(" ", "")
+
+
+def _rounded(number: re.Match[str]) -> str:
+    digits = re.sub(r"[eE].*|[-+.]", "", number.group())
+    return number.group() if len(digits) <= _DIGITS else f"{float(number.group()):.{_DIGITS}g}"
+
+
+# --- Which case files are meant by files and folders, and a name for the run of each
+
+
+def default_cases() -> list[Path]:
+    """The case files of ./cases itself; UsageError where there is none."""
+    folder = Path("cases")
+    found = sorted(p for p in folder.glob("*.y*ml") if p.suffix in (".yaml", ".yml"))
+    if not found:
+        raise UsageError("cases: no such file or folder, or no case files in it; name some")
+    return found
+
+
+def cases_in(paths: Sequence[Path]) -> list[Path]:
+    """`find_cases`; UsageError where a path does not exist or there is no case at all."""
+    for path in paths:
+        if not path.exists():
+            raise UsageError(f"{path}: no such file or folder")
+    if not (found := find_cases(paths)):
+        raise UsageError(f"no case files (*.yaml, *.yml) in {', '.join(map(str, paths))}")
+    return found
+
+
+def find_cases(paths: Sequence[Path]) -> list[Path]:
+    """Case files named, and all ``*.yaml``, ``*.yml`` in the folders named, each file once.
+
+    Hidden folders and run folders (they hold a resolved case) are passed over. Raises StorageError
+    for a folder that cannot be read.
+    """
+    found = [each for path in paths for each in (_in(path) if path.is_dir() else [path])]
+    first = {os.path.realpath(path): path for path in reversed(found)}
+    return [path for path in found if first.pop(os.path.realpath(path), None)]
+
+
+def _in(folder: Path) -> Iterator[Path]:
+    for root, folders, files in os.walk(folder, onerror=_unreadable):
+        if MARKER in files:
+            folders.clear()
+            continue
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        for name in sorted(files):
+            if name.endswith((".yaml", ".yml")) and not name.startswith("."):
+                yield Path(root, name)
+
+
+def _unreadable(error: OSError) -> None:
+    raise StorageError(f"{error.filename}: cannot be read: {error.strerror}") from error
+
+
+def folder_names(cases: Sequence[Path]) -> list[str]:
+    """The files' stems; where two would collide, the path that tells them apart joins in."""
+    stems = [case.stem for case in cases]
+    clashing = {
+        s.casefold() for s in stems if [t.casefold() for t in stems].count(s.casefold()) > 1
+    }
+    root = Path(os.path.commonpath([os.path.abspath(case.parent) for case in cases] or ["."]))
+    taken = set(FILES)
+    names = []
+    for case, stem in zip(cases, stems, strict=True):
+        parts = Path(os.path.abspath(case)).relative_to(root).with_suffix("").parts
+        name = _free("-".join(parts) if stem.casefold() in clashing else stem, taken)
+        taken.add(name.casefold())
+        names.append(name)
+    return names
+
+
+def _free(name: str, taken: set[str]) -> str:
+    candidates = [name, *(f"{name}-{k}" for k in range(2, len(taken) + 3))]
+    return next(each for each in candidates if each.casefold() not in taken)

@@ -1,0 +1,180 @@
+"""Variants of a case: the same file with other values of some keys, as `sweep` or ``--set`` says.
+
+    tree with its sweep → Variants: keys, and the values of each variant
+
+A key is a dotted path into the file: `mechanism.bodies.tool.mass`, `targets.0.frequency`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from eigassign.case.reader import Finding, Source, Tree, read_yaml, resolve
+from eigassign.case.schema.document import validated_sweep
+from eigassign.case.schema.sweep import MOST, Sweep
+from eigassign.case.table import read_words
+from eigassign.case.values import objection
+from eigassign.errors import CaseError, MechanismError, Problem
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+# --- The values of each variant
+
+
+@dataclass(frozen=True)
+class Variants:
+    """The variants of one case in order: a value of each key for each of them.
+
+    ``columns`` has the values of each key: of a grid every combination of them is a variant, the
+    last key changing fastest; else the k-th ones belong together. Of samples ``columns`` are ranges
+    and ``shares`` (n, n_keys) says how far each value is from its `min` to its `max`.
+    """
+
+    keys: tuple[str, ...]
+    columns: tuple[Any, ...]
+    grid: bool = False
+    shares: NDArray[np.float64] | None = None
+    file: str = ""  # the CSV file they are from, a line of ``lines`` for each
+    lines: tuple[int, ...] = ()
+
+    def __len__(self) -> int:
+        if self.shares is not None:
+            return len(self.shares)
+        return math.prod(map(len, self.columns)) if self.grid else len(self.columns[0])
+
+    def __getitem__(self, index: int) -> dict[str, object]:
+        """The values of one variant by key."""
+        row: list[object] = []
+        if self.shares is not None:
+            shares = self.shares[index].tolist()
+            row = [span.value(share) for span, share in zip(self.columns, shares, strict=True)]
+        elif self.grid:
+            for column in reversed(self.columns):
+                index, k = divmod(index, len(column))
+                row.insert(0, column[k])
+        else:
+            row = [column[index] for column in self.columns]
+        return dict(zip(self.keys, row, strict=True))
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of all keys and values in their order."""
+        columns: object = self.columns
+        if self.shares is not None:
+            columns = [(str(span.min), str(span.max)) for span in self.columns]
+        digest = hashlib.sha256(json.dumps([self.keys, columns, self.grid]).encode())
+        digest.update(b"" if self.shares is None else self.shares.tobytes())
+        return digest.hexdigest()
+
+
+def variants_of(source: Source, folder: Path, settings: Sequence[str] = ()) -> Variants | None:
+    """The variants that ``settings`` say, else the `sweep` of the case; None where neither does.
+
+    ``folder`` is that of the case file, ``settings`` are as written behind ``--set``. Raises
+    CaseError for a wrong sweep, and for a key that no case could have.
+    """
+    given = {"parameters": _set(settings)} if settings else source.tree.get("sweep")
+    if given is None:
+        return None
+    sweep, findings = validated_sweep(given)
+    if sweep is not None:
+        try:
+            found = _spread(sweep, folder)
+            findings = [*_wrong_keys(source.tree, folder, found)]
+        except MechanismError as error:
+            findings = [(tuple(error.path.split(".")), error.message)]
+    if findings:
+        problems = tuple(source.problem(*finding) for finding in findings)
+        raise CaseError(tuple(map(_behind_option, problems)) if settings else problems)
+    return found
+
+
+def _spread(sweep: Sweep, folder: Path) -> Variants:
+    bodies = sweep.parameters or {}
+    if sweep.file is not None:
+        file = folder / sweep.file
+        (_, keys), *rows = read_words(file, "sweep.file")
+        columns = zip(*(map(resolve, cells) for _, cells in rows), strict=True)
+        lines = tuple(line for line, _ in rows)
+        return Variants(tuple(keys), tuple(columns), file=file.name, lines=lines)
+    if sweep.sample in ("latin_hypercube", "sobol"):
+        shares = _drawn(sweep, len(bodies))
+        return Variants(tuple(bodies), tuple(bodies.values()), shares=shares)
+    found = Variants(tuple(bodies), sweep.axes(), grid=sweep.sample != "list")
+    if len(found) > MOST:
+        raise MechanismError("sweep.parameters", f"{len(found)} variants: at most {MOST}")
+    return found
+
+
+def _drawn(sweep: Sweep, keys: int) -> NDArray[np.float64]:
+    """A sample of the unit cube, (count, keys)."""
+    import warnings
+
+    from scipy.stats import qmc
+
+    kind = qmc.Sobol if sweep.sample == "sobol" else qmc.LatinHypercube
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Sobol' of a count that is no power of two: fine here
+        drawn: NDArray[np.float64] = kind(keys, seed=sweep.seed or 0).random(sweep.count or 0)
+    return drawn
+
+
+def _wrong_keys(tree: Tree, folder: Path, variants: Variants) -> Iterator[Finding]:
+    """Keys that the file does not have, and that it could not have either."""
+    for key, value in variants[0].items():
+        if (why := objection(tree, folder, key, value)) is not None:
+            if variants.file:
+                yield ("sweep", "file"), f"{variants.file}:1: column {key}: {why}"
+            else:
+                yield ("sweep", "parameters", key), why
+
+
+# --- What --set says
+
+OPTION = "--set"
+_RANGE = re.compile(r"(?P<min>[^,]+?)\s*\.\.\s*(?P<max>[^,]+?)(?:\s*:\s*(?P<count>[0-9]+))?")
+
+
+def _set(settings: Sequence[str]) -> dict[str, object]:
+    """``KEY=V1,V2`` and ``KEY=MIN..MAX:COUNT`` as `parameters` of a sweep."""
+    found: dict[str, object] = {}
+    for setting in settings:
+        key, equals, values = (part.strip() for part in setting.partition("="))
+        if not equals or not key or not values:
+            _refuse(setting, "expected KEY=VALUE,VALUE or KEY=MIN..MAX:COUNT")
+        if key in found:
+            _refuse(key, "is given twice: write all its values behind one")
+        found[key] = _values(key, values)
+    return found
+
+
+def _values(key: str, values: str) -> object:
+    if span := _RANGE.fullmatch(values):
+        if span["count"] is None:
+            _refuse(key, f"how many values? {values}:5 are five, with both ends")
+        ends = {"min": resolve(span["min"]), "max": resolve(span["max"])}
+        return {**ends, "count": int(span["count"])}
+    try:
+        return read_yaml(f"values: [{values}]".encode(), OPTION).tree["values"]
+    except CaseError as error:
+        _refuse(key, error.problems[0].message)
+
+
+def _refuse(key: str, message: str) -> NoReturn:
+    raise CaseError((Problem(OPTION, 0, 0, key, message),))
+
+
+def _behind_option(problem: Problem) -> Problem:
+    path = problem.path.removeprefix("sweep.parameters.")
+    return Problem(OPTION, 0, 0, path, problem.message)
