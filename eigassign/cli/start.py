@@ -68,7 +68,7 @@ def init(template: str, out: Path | None) -> int:
 
 
 @click.command(
-    epilog=arguments.examples("eigassign docs", "eigassign docs keys", "eigassign docs targets")
+    epilog=arguments.examples("eigassign docs", "eigassign docs own-arm", "eigassign docs targets")
 )
 @click.argument("topic", nargs=-1)
 def docs(topic: tuple[str, ...]) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import re
-import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -113,17 +112,6 @@ def test_the_reference_is_current(name: str) -> None:
     assert reference.PAGES[name]() == written, "python site/reference.py writes it anew"
 
 
-@pytest.mark.parametrize("page", [README, MANUAL / "python.md"], ids=page_id)
-def test_the_python_shown_runs(page: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    (tmp_path / "cases").mkdir()
-    shutil.copy(TWO_LINK, tmp_path / "cases")
-    monkeypatch.chdir(tmp_path)  # what it saves goes there
-    names: dict[str, object] = {}
-    for block in blocks(page, "python"):
-        exec(block, names)
-    assert len(names["result"].exact_hz) == 152  # type: ignore[attr-defined]
-
-
 def test_the_log_shown_is_the_log_written(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -182,6 +170,26 @@ def test_every_module_and_file_named_exists(page: Path) -> None:
             assert name.split(".")[0] not in parts or names_code(name), text
         for path in re.findall(r"\b(?:eigassign|tests|benchmarks|cases)/[\w./-]*", text):
             assert (ROOT / path).exists(), path
+
+
+def test_every_section_of_the_theory_names_its_place_in_the_code() -> None:
+    _, *sections = re.split(r"^## ", read(MANUAL / "theory.md"), flags=re.MULTILINE)
+    about_it = ("Symbols", "Where this differs from the paper")
+    for section in sections:
+        named = re.findall(r"`([\w./]+)`", section)
+        places = [name for name in named if names_code(name.removesuffix(".py").replace("/", "."))]
+        assert places or section.startswith(about_it), section.partition("\n")[0]
+
+
+def test_the_places_of_the_equations_name_these_equations() -> None:
+    _, _, listed = read(MANUAL / "theory.md").partition("## Where each equation is\n")
+    rows = re.findall(r"^\| (\(.*?)\|.*\|(.*)\|$", listed, re.MULTILINE)
+    assert len(rows) == 5
+    for equations, places in rows:
+        for name in re.findall(r"`(\w+\.[\w.]+)`", places):
+            source = PACKAGE.joinpath(*name.split(".")).with_suffix(".py")
+            text = read(source) if source.exists() else read(source.with_suffix("") / "__init__.py")
+            assert any(f"({n})" in text for n in re.findall(r"\d+", equations)), name
 
 
 def test_the_architecture_page_names_every_package() -> None:

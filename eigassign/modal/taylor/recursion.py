@@ -1,7 +1,7 @@
 """The eigenvector recursion and the eigenvalue series of a cluster of r modes.
 
 The invariant subspace X(w) (n × r) with K X = M X Λ and Φ0ᵀ M0 X = I is analytic through crossings
-inside the cluster. Order γ of K X = M X Λ reads, column j with λ_j = (Λ0)_jj,
+inside the cluster. Order γ of K X = M X Λ reads (eqs. (4)-(6)), column j with λ_j = (Λ0)_jj,
 
     (K0 − λ_j M0) X_γ,j − M0 Φ0 Λ_γ,j = −Σ_{δ>0} K_δ X_{γ−δ,j} + Σ_{δ>0} M_δ Y_{γ−δ,j} + M0 Ỹ_γ,j
 

@@ -1,0 +1,150 @@
+"""Every block of the manual is what it says: commands run, cases are valid, Python runs.
+
+Page by page, from top to bottom, in a folder with `cases/`:
+
+    bash    line by line; `# exit code 1` behind a command is the code that it must have
+    yaml    with a title a whole case, otherwise top-level keys in the place of those of a case; a
+            comment in its first line names the file, else it is a part of the paper's arm
+    python  one after the other
+    csv     a file, which a comment in its first line names
+    text    below commands: lines that they print, `…` for what is left out; else no output
+
+A comment `<!-- not run: reason -->` above a block leaves it out. By default only quick commands and
+Python run, without drawings, and what they print is compared; all of it with `-m slow`.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from eigassign.case import load
+from eigassign.cli import main
+
+ROOT = Path(__file__).parents[2]
+MANUAL = ROOT / "eigassign" / "docs"
+GENERATED = MANUAL / "reference"  # examples of the help: tests/cli/test_start.py runs them
+PAGES = [
+    ROOT / "README.md",
+    *(page for page in sorted(MANUAL.rglob("*.md")) if page.parent != GENERATED),
+    *sorted((ROOT / "cases").rglob("README.md")),
+    *sorted((ROOT / "benchmarks").rglob("*.md")),
+]
+QUICK = ("init", "check", "modes", "schema", "docs", "completion")
+BLOCK = re.compile(r"(?:^<!-- not run: (.+) -->\n)?^```(\w*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
+Captured = pytest.CaptureFixture[str]
+
+
+def blocks(page: Path) -> Iterator[tuple[str, str]]:
+    """Language and text of what is not left out."""
+    for reason, language, text in BLOCK.findall(page.read_text(encoding="utf-8")):
+        if not reason:
+            yield language, text
+
+
+@dataclass
+class Reader:
+    """Does what a page says."""
+
+    capsys: Captured
+    all_of_it: bool
+    names: dict[str, object] = field(default_factory=dict)
+    printed: str | None = None  # by the commands above; None where some were left out, or none
+
+    def follow(self, page: Path) -> None:
+        for language, text in blocks(page):
+            if language == "text":
+                self.compare(text)
+                continue
+            self.printed = None
+            if language == "bash":
+                self.run(text)
+            elif language == "yaml":
+                self.write_case(text)
+            elif language == "csv":
+                name, _, rest = text.partition("\n")
+                Path(name.removeprefix("# ")).write_text(rest, encoding="utf-8")
+            else:
+                assert language == "python", f"{page}: a block of {language or 'nothing'}"
+                exec(text, self.names)
+
+    def run(self, text: str) -> None:
+        printed = []
+        for line in text.splitlines():
+            command, _, code = line.partition("  # exit code ")
+            words = shlex.split(command.partition(" > ")[0])
+            assert words[0] == "eigassign", line
+            if not self.all_of_it:
+                words = [word for word in words if word != "--draw"]
+                if words[1] not in QUICK:
+                    return
+            assert main(words[1:]) == int(code or 0), line
+            printed.append(self.capsys.readouterr().out)
+            if ">" in command:
+                Path(command.partition(" > ")[2]).write_text(printed.pop(), encoding="utf-8")
+        self.printed = "".join(printed)
+
+    def compare(self, text: str) -> None:
+        if self.printed is not None:
+            lines = [" ".join(line.split()) for line in self.printed.splitlines()]
+            for line in text.splitlines():
+                shown = ".*".join(map(re.escape, " ".join(line.split()).split("…")))
+                assert any(re.fullmatch(shown, each) for each in ["", *lines]), line
+
+    def write_case(self, text: str) -> None:
+        named = re.match(r"# (?:in )?(\S+\.yaml)\n", text)
+        path = Path(named[1] if named else "part.yaml")
+        keys = parts(text)
+        if "title" not in keys:
+            whole = path if named else Path("cases", "two_link.yaml")
+            keys = {**parts(whole.read_text(encoding="utf-8")), **keys}
+            if "design" in parts(text):
+                keys.pop("expansion", None)  # it may be about another design
+        path.write_text("".join(keys.values()), encoding="utf-8")
+        load(path)
+
+
+def parts(text: str) -> dict[str, str]:
+    """Text of each top-level key, what is above it included."""
+    found = re.split(r"^(?=[a-z_]+:)", text, flags=re.MULTILINE)
+    return {part.partition(":")[0]: part for part in found if not part.startswith("#")}
+
+
+def follow(page: Path, folder: Path, capsys: Captured, *, all_of_it: bool) -> None:
+    shutil.copytree(ROOT / "cases", folder / "cases", ignore=shutil.ignore_patterns("*.png"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.setenv("EIGASSIGN_CACHE_DIR", str(folder / "cache"))
+        Reader(capsys, all_of_it).follow(page)
+
+
+with_blocks = [page for page in PAGES if any(blocks(page))]
+with_commands = [page for page in with_blocks if any(kind == "bash" for kind, _ in blocks(page))]
+
+
+def page_id(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+@pytest.mark.parametrize("page", with_blocks, ids=page_id)
+def test_cases_python_and_quick_commands_run(page: Path, tmp_path: Path, capsys: Captured) -> None:
+    follow(page, tmp_path, capsys, all_of_it=False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", with_commands, ids=page_id)
+def test_all_commands_run_and_print_what_is_shown(
+    page: Path, tmp_path: Path, capsys: Captured
+) -> None:
+    follow(page, tmp_path, capsys, all_of_it=True)
+
+
+def test_blocks_that_are_not_run_are_few() -> None:
+    reasons = [r for page in PAGES for r, _, _ in BLOCK.findall(page.read_text()) if r]
+    assert len(reasons) <= 8, reasons
