@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 
+from pygments.lexers import TextLexer
 from sphinx.application import Sphinx
 
 import eigassign
@@ -52,3 +53,4 @@ def with_contents(_app: Sphinx, name: str, source: list[str]) -> None:
 def setup(app: Sphinx) -> None:
     """Called by Sphinx."""
     app.connect("source-read", with_contents)
+    app.add_lexer("csv", TextLexer)  # Pygments has none
