@@ -112,6 +112,12 @@ def _options(how: Mapping[str, Any], reporter: Reporter) -> Options:
     )
 
 
+def _written(folder: Path | None, seconds: float) -> str:
+    """The last line: what to open."""
+    page = folder and folder / "report.html"
+    return f"{page if page and page.exists() else folder} written in {seconds:.2f} s"
+
+
 def _show(outcome: Outcome, as_json: bool) -> None:
     if as_json:
         from eigassign.output.result_files import results_document
@@ -121,7 +127,7 @@ def _show(outcome: Outcome, as_json: bool) -> None:
         from eigassign.output.console import print_assignment
 
         print_assignment(outcome.results)
-        show(f"{outcome.folder} written in {outcome.seconds:.2f} s")
+        show(_written(outcome.folder, outcome.seconds))
 
 
 @click.command(
@@ -161,7 +167,7 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
 
         print_verdict(headline(done.results), done.results.verdict)
         print_tables(console_tables(done.results))
-        show(f"{done.folder} written in {sum(done.results.timing_s.values()):.2f} s")
+        show(_written(done.folder, sum(done.results.timing_s.values())))
     return 0 if done.results.verdict == "fitted" else 1
 
 
@@ -263,5 +269,5 @@ def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
         from eigassign.output.console import print_tables
 
         print_tables(main_tables(made.chart))
-        show(f"{made.folder} written in {made.chart.seconds:.1f} s")
+        show(_written(made.folder, made.chart.seconds))
     return 0

@@ -9,9 +9,10 @@ poses of the trajectory and designs all over their bounds; the reasons are kept 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain, repeat
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -83,7 +84,7 @@ def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[
             raise _wrong(file, "expansion.q", f"{len(given)} values for {n} coordinates")
         q0 = with_middle_loads(file, given)
         why = f"from the case file{of_loads}"
-        return q0, f"expansion point: {shown_point(model.q_names, q0)}, {why}"
+        return q0, f"expansion point: {shown_point(model.q_names, q0, file.q_units)}, {why}"
     if trajectory is None:
         if n == 0:
             return np.zeros(0), ""
@@ -93,7 +94,7 @@ def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[
     poses[:, n:] = 0.0
     k = central_sample(poses @ joint_map(model).T)
     q0 = with_middle_loads(file, trajectory.q[k, :n])
-    point = shown_point(model.q_names, q0)
+    point = shown_point(model.q_names, q0, file.q_units)
     why = f"the most central: its farthest other sample is nearer than any other's{of_loads}"
     return q0, f"expansion point: {point}, {trajectory.where(k)}, {why}"
 
@@ -131,9 +132,13 @@ def _y0(file: CaseFile, model: Model) -> tuple[Floats, str]:
         y0 = np.array(given, dtype=np.float64)
         if len(y0) != n_y:
             raise _wrong(file, "expansion.y", f"{len(y0)} values for {n_y} design parameters")
-        return y0, f"expansion design: {shown_point(model.y_names, y0)}, from the case file"
+        return y0, f"{_design(file, model, y0)}, from the case file"
     y0 = np.array([0.5 * (p.min + p.max) for p in file.design.parameters.values()])
-    return y0, f"expansion design: {shown_point(model.y_names, y0)}, the middle of the bounds"
+    return y0, f"{_design(file, model, y0)}, the middle of the bounds"
+
+
+def _design(file: CaseFile, model: Model, y0: Floats) -> str:
+    return f"expansion design: {shown_point(model.y_names, y0, file.design_units)}"
 
 
 def _modes(file: CaseFile, override: Sequence[int] | None) -> tuple[tuple[int, ...], str]:
@@ -177,9 +182,10 @@ def _outside(
     return notes
 
 
-def shown_point(names: Sequence[str], values: Floats) -> str:
-    """``"q1 = 1.817, q2 = 5.312"``; of many the first."""
-    shown = [f"{n} = {v:.6g}" for n, v in zip(names, values, strict=True)]
+def shown_point(names: Sequence[str], values: Floats, units: Iterable[str] = ()) -> str:
+    """``"q1 = 1.817 rad, q2 = 5.312 rad"``, with units where they are given; of many the first."""
+    own = zip(names, values, chain(units, repeat("")), strict=False)  # as many as names
+    shown = [f"{name} = {value:.6g} {unit}".rstrip() for name, value, unit in own]
     rest = f" and {len(shown) - SHOWN} more" if len(shown) > SHOWN else ""
     return (", ".join(shown[:SHOWN]) or "none") + rest
 

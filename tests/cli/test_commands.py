@@ -181,7 +181,7 @@ def test_optimize_leaves_a_run_folder_and_prints_what_it_found(capsys: Captured)
     out, err = capsys.readouterr()
     written = {path.name for path in Path("results/good").iterdir()}
     assert {"results.json", "report.html", "figures", "case.yaml", "log.txt"} <= written
-    assert "results/good written in" in out
+    assert "results/good/report.html written in" in out
     assert "bodies.tool.mass" in out
     assert "expanding the eigenvalues" in err
 
@@ -313,7 +313,7 @@ def test_no_cache_leaves_no_cache_and_a_cache_is_listed_and_cleared(capsys: Capt
 def test_expand_writes_coefficients_of_the_order_asked_for_beside_a_run(capsys: Captured) -> None:
     assert main(["optimize", "good.yaml"]) == 0
     assert main(["expand", "good.yaml", "--order", "2"]) == 0
-    assert "results/good_expansion written in" in capsys.readouterr().out
+    assert "results/good_expansion/report.html written in" in capsys.readouterr().out
     assert Path("results/good_expansion/coefficients.json").exists()
     assert Path("results/good/results.json").exists()
 

@@ -84,7 +84,7 @@ def test_the_resolved_case_solves_to_the_same_bits(outcome: Outcome) -> None:
 def test_the_log_tells_choices_outcome_and_times(outcome: Outcome) -> None:
     log = (folder_of(outcome) / "log.txt").read_text()
     for line in (
-        "note      expansion point: q1 = 1.817, q2 = 5.312, from the case file",
+        "note      expansion point: q1 = 1.817 rad, q2 = 5.312 rad, from the case file",
         "design    m2 = 0 kg (before: 0)",
         "distance  initial: max 8.309 %",
         "verdict   reached: ",
