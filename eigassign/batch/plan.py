@@ -26,12 +26,10 @@ from eigassign.case.reader import dotted
 from eigassign.case.values import key_path
 from eigassign.errors import EigassignError, Problem, StorageError, UsageError
 from eigassign.modal.storage import ALGORITHM
+from eigassign.output.batch.files import NAMES
 from eigassign.output.run_record import MARKER
 
-FILES = (  # of the folder of a batch, beside the folders of its cases
-    *("batch.json", "manifest.jsonl", "summary.csv", "summary.json", "junit.xml", "index.html"),
-    *("columns.h5", "columns.csv"),
-)
+FILES = ("batch.json", "manifest.jsonl", *NAMES)  # of a batch, beside the folders of its cases
 STUDY = "cheap"  # of what an answer means; see pipeline.run.Options
 
 

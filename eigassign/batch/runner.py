@@ -18,9 +18,8 @@ from typing import Any
 
 from eigassign.batch.plan import folder_names
 from eigassign.batch.workers import cores, process_pool
-from eigassign.output.batch.junit import write_junit
-from eigassign.output.batch.outcome import CaseOutcome, frequency_ranges
-from eigassign.output.batch.summary import write_summary
+from eigassign.output.batch.files import write_files
+from eigassign.output.batch.outcome import CaseOutcome, frequency_ranges, to_line
 from eigassign.pipeline.run import Options, Outcome, optimize
 from eigassign.process import failure_of
 
@@ -79,7 +78,7 @@ def _optimised(path: str, options: CaseOptions) -> Row:
     return {
         "status": _status(outcome),
         "message": outcome.shortcoming or "",
-        "run_folder": str(outcome.folder),
+        "run_folder": outcome.folder and outcome.folder.name,
         "initial_max_relative": error and error.initial.max_relative,
         "predicted_max_relative": error and error.predicted and error.predicted.max_relative,
         "exact_max_relative": error and error.exact.max_relative,
@@ -114,7 +113,7 @@ def plan(cases: Sequence[Path], options: CaseOptions) -> list[Job]:
 def run_and_summarise(
     jobs: Sequence[Job], workers: int | None, out: Path, on_row: Callable[[Row], None]
 ) -> list[CaseOutcome]:
-    """Run the jobs and write summary.csv and junit.xml; after an interrupt, of what there is."""
+    """Run the jobs and write their summaries; after an interrupt, of what there is."""
     done: dict[str, Row] = {}
 
     def record(row: Row) -> None:
@@ -127,8 +126,7 @@ def run_and_summarise(
     finally:
         rows = [done.get(job.case) or not_run(job) for job in jobs]
         outcomes = [CaseOutcome(**row) for row in rows]
-        write_summary(out / "summary.csv", outcomes)
-        write_junit(out / "junit.xml", outcomes)
+        write_files(out, map(to_line, outcomes), len(outcomes))
     return outcomes
 
 

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 def batch(paths: tuple[Path, ...], jobs: int | None, **how: Any) -> int:
     """Optimize many cases in parallel: files, or folders searched for *.yaml and *.yml.
 
-    Every case gets its own folder below --out, beside summary.csv and junit.xml. A
-    failed case does not stop the others; exit code 1 if any failed.
+    Every case gets its own folder below --out, beside index.html, summary.csv, summary.json and
+    junit.xml. A failed case does not stop the others; exit code 1 if any failed.
     """
     from eigassign.batch import runner as many
     from eigassign.batch.plan import cases_in

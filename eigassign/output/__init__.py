@@ -13,7 +13,8 @@ In reading order; each imports from those above it only:
     tables         the tables of a run as text
     terminal       the widths of tables that fit a terminal
     console        results on stdout, progress on stderr
-    batch          what a batch leaves: summary.csv, junit.xml
+    pages          HTML pages from their templates
+    batch          what a batch leaves: summaries, junit.xml, columns, index.html
     figures        the figures of runs, modes and charts, on paper and on screen
     verdict        the first screen of a report
     report         report.html, and what a run or modes leave in a folder

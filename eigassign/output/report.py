@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import base64
 import json
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -24,15 +23,13 @@ from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.modes import mode_figures
 from eigassign.output.figures.paper import render
 from eigassign.output.figures.run import run_figures
+from eigassign.output.pages import TEMPLATES, inside, page_of
 from eigassign.output.result_files import sample_files, to_json
 from eigassign.output.tables import Table, tables
 from eigassign.output.verdict import verdict_of
 from eigassign.study.results import ModePictures, RunResults
 
 if TYPE_CHECKING:
-    from jinja2 import Template
-    from markupsafe import Markup
-
     from eigassign.chart.results import Chart
     from eigassign.study.updating.fit import UpdateResults
 
@@ -41,7 +38,6 @@ DOCUMENT = 400_000  # bytes of a results.json that a full report carries, at mos
 
 # --- The page
 
-_TEMPLATES = Path(__file__).parent / "templates"
 _EMBEDDED = {".png": "image/png", ".svg": "image/svg+xml"}  # the first that there is
 
 
@@ -81,31 +77,25 @@ def page(
     graphs = {p.name: screen.figures(p.shows) for p in plans if full and not callable(p.shows)}
     moving = run.moving if run is not None and full else ()
     several = len(run.trajectories) > 1 if run is not None else False
-    html = _template().render(
+    return page_of(
+        "report.html.j2",
         f=f,
         verdict=None if run is None else verdict_of(run),
         headline=line,
         tone=tone,
-        tables=shown,
+        tables=[(table, _texts(table)) for table in shown],
         figures=list(_shown(plans, graphs, files)),
         first=first,
         moving=[(mode.name, mode.trajectory, several) for mode in moving],
-        moving_json=_inside(screen.moving(moving)) if full else "",
-        figures_json=_inside(graphs) if full else "",
+        moving_json=inside(screen.moving(moving)) if full else "",
+        figures_json=inside(graphs) if full else "",
         document=content.decode().replace("<", "\\u003c")
         if full and len(content) <= DOCUMENT
         else "",
         document_name=name,
         plotly=_plotly() if full else "",
-        script=(_TEMPLATES / "report.js").read_text("utf-8") if full else "",
+        script=(TEMPLATES / "report.js").read_text("utf-8") if full else "",
     )
-    return (html + "\n").encode("utf-8", "xmlcharrefreplace")
-
-
-def _inside(data: Any) -> str:
-    """JSON that no browser takes for the end of its script."""
-    text = json.dumps(data, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c")
 
 
 @cache
@@ -144,30 +134,6 @@ def _texts(table: Table) -> list[bool]:
     """Which columns are words, not numbers."""
     columns = range(len(table.columns))
     return [not terminal.are_numbers([row[k] for row in table.rows]) for k in columns]
-
-
-def _words(text: str) -> Markup:
-    """Text with what stands between backticks as code, and no markup of its own."""
-    from markupsafe import Markup, escape
-
-    return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
-
-
-@cache
-def _template() -> Template:
-    """The page's template, compiled once a process."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FileSystemLoader(_TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["texts"] = _texts
-    environment.filters["words"] = _words
-    return environment.get_template("report.html.j2")
 
 
 # --- What is left in a folder

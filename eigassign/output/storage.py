@@ -59,9 +59,17 @@ def replace_synced(path: Path, data: bytes) -> None:
     A temporary file in the same folder is filled, synced and renamed over ``path``; what killed
     writers of the same ``path`` left there goes.
     """
+    with replacing(path) as made:
+        made.write_bytes(data)
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A file to fill, which takes the place of ``path`` at the end as `replace_synced` does it."""
     sweep_files(path.parent, path.name.__eq__)
     with temporary(path, lambda made: made.touch(exist_ok=False)) as made:
-        write_synced(made, data)
+        yield made
+        sync_path(made)
         os.replace(made, path)
     sync_path(path.parent)
 

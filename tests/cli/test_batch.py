@@ -92,7 +92,8 @@ def test_a_batch_keeps_going_past_every_kind_of_failure(
     assert "mechanism: required key is missing" in rows["wrong"]["message"]
     assert rows["good"]["design"].startswith("m=")
     written = {path.name for path in Path("results").iterdir()}
-    assert written == {"good", "strict", "infeasible", "summary.csv", "junit.xml"}
+    files = {"summary.csv", "summary.json", "junit.xml", "index.html"}
+    assert written == {"good", "strict", "infeasible", *files}
     assert "eigassign: 3 of 4 cases failed" in err
     assert err.count("case ") >= 4
     assert "tolerance" in out

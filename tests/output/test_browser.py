@@ -6,12 +6,15 @@ import json
 import shutil
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from eigassign.cli import main
+from eigassign.output.batch.files import write_files
+from eigassign.output.batch.outcome import CaseOutcome, to_line
 
 webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
 BROWSER, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
@@ -139,3 +142,55 @@ def test_without_motion_wanted_nothing_moves(browser, reports):
     time.sleep(0.5)
     assert browser.find_element("css selector", "[data-moving] .tools button").text == "Play"
     browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
+@pytest.fixture(scope="module")
+def batch(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder, rows = tmp_path_factory.mktemp("batch"), []
+    for k in range(450):
+        status = "failed" if k % 100 == 7 else "ok"
+        values = {"mechanism.bodies.tool.mass": f"{(k * 7) % 450} g"}
+        run = "run" if k == 0 else None
+        row = CaseOutcome(f"tool={k}", "arm.yaml", status, 0.1, run_folder=run, values=values)
+        rows.append(to_line(replace(row, index=k)))
+    (folder / "run" / "figures").mkdir(parents=True)
+    shutil.copy(Path(__file__).parents[2] / "cases" / "two_link.png", folder / "run" / "figures")
+    (folder / "run" / "figures" / "two_link.png").rename(
+        folder / "run" / "figures" / "frequencies.png"
+    )
+    write_files(folder, rows, len(rows), ("mechanism.bodies.tool.mass",))
+    return folder / "index.html"
+
+
+def names(browser: Any) -> list[str]:
+    return browser.execute_script(
+        "return [...document.querySelectorAll('td.case')].map((cell) => cell.textContent)"
+    )
+
+
+def test_rows_of_a_batch_sort_by_size_and_filter_by_words_and_status(browser, batch):
+    browser.get_log("browser")
+    at(browser, batch, 1200)
+    assert names(browser)[:2] == ["tool=0", "tool=1"]
+    mass = browser.find_element("css selector", "[data-column='tool.mass']")
+    mass.find_element("css selector", "button").click()
+    assert names(browser)[1] == "tool=193"  # 193 · 7 = 1351 = 3 · 450 + 1
+    mass.find_element("css selector", "button").click()
+    assert mass.get_attribute("aria-sort") == "descending"
+    assert len(names(browser)) == 200
+    browser.find_element("css selector", ".more button").click()
+    assert len(names(browser)) == 400
+    browser.find_element("css selector", "[data-status=failed]").click()
+    assert sorted(names(browser)) == [f"tool={k}07" if k else "tool=7" for k in (1, 2, 3, 4, 0)]
+    browser.find_element("css selector", "input").send_keys("tool=3")
+    assert names(browser) == ["tool=307"]
+    assert [e for e in browser.get_log("browser") if e["level"] == "SEVERE"] == []
+
+
+def test_a_batch_shows_small_pictures_and_is_no_wider_than_the_window(browser, batch):
+    for width in WIDTHS:
+        at(browser, batch, width)
+        assert browser.execute_script("return document.documentElement.scrollWidth") <= width
+    time.sleep(0.5)
+    wide = browser.execute_script("return document.querySelector('td img').naturalWidth")
+    assert wide > 0

@@ -1,61 +1,72 @@
-"""junit.xml, as CI servers read it."""
+"""junit.xml as CI servers read it, written row by row."""
 
 from __future__ import annotations
 
 import re
-import xml.etree.ElementTree as ET
-from collections.abc import Sequence
-from pathlib import Path
-
-from eigassign.output.batch.outcome import CaseOutcome
-from eigassign.output.storage import replace_synced
+from typing import TextIO
 
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_PLAIN = re.compile(r"[\w .,:;/%=+()\[\]-]*", re.ASCII)
+_MARKUP = re.compile('[&<>"\t\n\r]')
+_HEADER = 320  # characters, of which the counts fill as many as they need at the end
+SUITE = "eigassign"
+_NONE: dict[str, float] = {"tests": 0, "failures": 0, "errors": 0, "time": 0.0}
 
 
-def write_junit(path: Path, outcomes: Sequence[CaseOutcome], suite: str = "eigassign") -> None:
-    """junit.xml as CI servers read it."""
-    replace_synced(path, junit_xml(outcomes, suite))
+class Junit:
+    """Test cases of one suite, a line each; missed tolerances and unsolvable cases are failures.
+
+    How many there are stands in the first line, and is written there at the `end`.
+    """
+
+    def __init__(self, file: TextIO) -> None:
+        self._file, self.totals = file, _NONE.copy()
+        file.write(" " * _HEADER + "\n")
+
+    def add(
+        self, name: str, path: str, seconds: float, status: str, message: str, output: str = ""
+    ) -> None:
+        """One case: ``status`` is ok, error, or the kind of failure."""
+        line = f'<testcase name="{_escaped(name)}" classname="{SUITE}" '
+        line += f'file="{_escaped(path)}" time="{seconds:.3f}">'
+        self.totals["tests"] += 1
+        self.totals["time"] += seconds
+        if status != "ok":
+            tag = "error" if status == "error" else "failure"
+            self.totals[f"{tag}s"] += 1
+            first = _escaped((message.splitlines() or [status])[0])
+            line += (
+                f'<{tag} type="{_escaped(status)}" message="{first}">{_escaped(message)}</{tag}>'
+            )
+        if output:
+            line += f"<system-out>{_escaped(output)}</system-out>"
+        self._file.write(f"{line}</testcase>\n")
+
+    def end(self) -> None:
+        """Close the suite, and write the counts at the beginning."""
+        self._file.write("</testsuite></testsuites>\n")
+        counts = f'name="{SUITE}" ' + " ".join(f'{k}="{_count(v)}"' for k, v in self.totals.items())
+        header = f'<?xml version="1.0" encoding="utf-8"?><testsuites {counts}><testsuite {counts} '
+        self._file.seek(0)
+        self._file.write((header + 'skipped="0"').ljust(_HEADER - 1) + ">")
 
 
-def junit_xml(outcomes: Sequence[CaseOutcome], suite: str = "eigassign") -> bytes:
-    """The bytes of junit.xml: missed tolerances and unsolvable cases are failures."""
-    counts = {
-        "tests": str(len(outcomes)),
-        "failures": str(sum(o.status in ("failed", "tolerance") for o in outcomes)),
-        "errors": str(sum(o.status == "error" for o in outcomes)),
-        "time": _seconds(sum(o.seconds for o in outcomes)),
-    }
-    root = ET.Element("testsuites", {"name": suite, **counts})
-    inside = ET.SubElement(root, "testsuite", {"name": suite, **counts, "skipped": "0"})
-    for outcome in outcomes:
-        inside.append(_testcase(outcome, suite))
-    ET.indent(root)
-    return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
+def totals(header: str) -> dict[str, float]:
+    """The counts and seconds in the first line of a file."""
+    suite = header.partition("<testsuites ")[2].partition(">")[0]
+    return {name: float(value) for name, value in re.findall(r'(\w+)="([\d.]+)"', suite)}
 
 
-def _testcase(outcome: CaseOutcome, suite: str) -> ET.Element:
-    attributes = {
-        "name": _xml(outcome.name),
-        "classname": _xml(suite),
-        "file": _xml(outcome.path),
-        "time": _seconds(outcome.seconds),
-    }
-    case = ET.Element("testcase", attributes)
-    if outcome.status != "ok":
-        tag = "error" if outcome.status == "error" else "failure"
-        first = (outcome.message.splitlines() or [outcome.status])[0]
-        reason = ET.SubElement(case, tag, {"type": outcome.status, "message": _xml(first)})
-        reason.text = _xml(outcome.message)
-    if outcome.run_folder is not None:
-        ET.SubElement(case, "system-out").text = _xml(f"run folder: {outcome.run_folder}")
-    return case
+def _count(value: float) -> str:
+    return f"{value:.3f}" if isinstance(value, float) else str(value)
 
 
-def _seconds(value: float) -> str:
-    return f"{value:.3f}"
+def _escaped(text: str) -> str:
+    """``text`` as content or attribute, on one line.
 
-
-def _xml(text: str) -> str:
-    """``text`` without the characters that XML cannot hold, shown as ``\\x1b``."""
-    return _NOT_XML.sub(lambda found: found.group().encode("unicode_escape").decode(), text)
+    Characters that XML cannot hold are shown as ``\\x1b``.
+    """
+    if _PLAIN.fullmatch(text):
+        return text
+    shown = _NOT_XML.sub(lambda found: found.group().encode("unicode_escape").decode(), text)
+    return _MARKUP.sub(lambda found: f"&#{ord(found.group())};", shown)

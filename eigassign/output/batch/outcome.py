@@ -31,7 +31,7 @@ class CaseOutcome:
     status: Status
     seconds: float
     message: str = ""
-    run_folder: str | None = None
+    run_folder: str | None = None  # as seen from the folder of the batch
     initial_max_relative: float | None = None
     predicted_max_relative: float | None = None
     exact_max_relative: float | None = None

@@ -1,56 +1,94 @@
-"""summary.csv, and the same on the console."""
+"""summary.csv and summary.json, written row by row, and the same on the console."""
 
 from __future__ import annotations
 
 import csv
-import io
+import json
+from collections import Counter
 from collections.abc import Sequence
-from pathlib import Path
+from typing import TextIO
 
+from eigassign._version import __version__
 from eigassign.files import printable
 from eigassign.output.batch.outcome import CaseOutcome
 from eigassign.output.formats import percent
-from eigassign.output.storage import replace_synced
 from eigassign.output.tables import Table
 
+FORMAT = 1
 COLUMNS = (
-    "name", "status", "seconds", "initial_max_relative", "predicted_max_relative",
+    "name", "status", "verdict", "seconds", "initial_max_relative", "predicted_max_relative",
     "exact_max_relative", "design", "message", "path", "run_folder",
 )  # fmt: skip
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # spreadsheets run a cell that starts so
+_SHOWN = 50  # rows of a longer table are counted, and the first that are not ok are shown
 
 
 def batch_table(outcomes: Sequence[CaseOutcome]) -> Table:
-    """One line a case: name, status, seconds, worst exact error if there is one, message."""
+    """One line a case: name, status, seconds, worst exact error if there is one, message.
+
+    Of many cases the first that are not ok, and below it how many there are of each status.
+    """
+    shown, caption = outcomes, ""
+    if len(outcomes) > _SHOWN:
+        shown = [one for one in outcomes if one.status != "ok"][:_SHOWN]
+        counts = Counter[str](one.status for one in outcomes)
+        caption = f"{len(outcomes)} cases: {said(counts)}."
     rows = []
-    for one in outcomes:
+    for one in shown:
         worst = "" if one.exact_max_relative is None else percent(one.exact_max_relative)
         rows.append((one.name, one.status, f"{one.seconds:.2f} s", worst, one.message))
-    return Table("Batch", ("case", "status", "time", "worst error", "message"), tuple(rows))
+    columns = ("case", "status", "time", "worst error", "message")
+    return Table("Batch", columns, tuple(rows), caption)
 
 
-def write_summary(path: Path, outcomes: Sequence[CaseOutcome]) -> None:
-    """summary.csv: one line a case, numbers as ``repr`` writes them."""
-    replace_synced(path, summary_csv(outcomes).encode())
+def said(counts: Counter[str]) -> str:
+    """``58 ok, 2 error``."""
+    order = ("ok", "tolerance", "failed", "error")
+    return ", ".join(f"{counts[status]} {status}" for status in order if counts[status])
 
 
-def summary_csv(outcomes: Sequence[CaseOutcome]) -> str:
-    """The text of summary.csv."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for outcome in outcomes:
-        writer.writerow([_cell(outcome, column) for column in COLUMNS])
-    return text.getvalue()
+class SummaryCsv:
+    """One line a case, numbers as ``repr`` writes them; a column for every swept key too."""
+
+    def __init__(self, file: TextIO, keys: Sequence[str] = ()) -> None:
+        self._writer, self._keys = csv.writer(file, lineterminator="\n"), tuple(keys)
+        self._writer.writerow((COLUMNS[0], *map(cell, self._keys), *COLUMNS[1:]))
+
+    def add(self, row: CaseOutcome) -> None:
+        """Write one line."""
+        design = "; ".join([f"{name}={amount!r}" for name, amount in row.design])
+        line = (
+            cell(row.name),
+            *[cell(row.values.get(key)) for key in self._keys],
+            *(row.status, row.verdict, row.seconds),
+            *(row.initial_max_relative, row.predicted_max_relative, row.exact_max_relative),
+            *(cell(design), cell(row.message), cell(row.path), cell(row.run_folder)),
+        )
+        self._writer.writerow(line)  # floats as repr writes them, None as nothing
 
 
-def _cell(outcome: CaseOutcome, column: str) -> str:
-    value = getattr(outcome, column)
-    if column == "design":
-        value = "; ".join(f"{name}={amount!r}" for name, amount in outcome.design)
-    if value is None:
-        return ""
-    if isinstance(value, float):
-        return repr(value)
-    text = printable(" ".join(str(value).split("\n")))
+def cell(value: object) -> object:
+    """As a cell that stays on its line, and that no spreadsheet takes for a formula."""
+    if value is None or isinstance(value, (bool, int, float)):
+        return value
+    text = value if isinstance(value, str) else json.dumps(value)
+    if not text.isprintable():
+        text = printable(" ".join(text.split("\n")))
     return "'" + text if text.startswith(_FORMULA) else text
+
+
+class SummaryJson:
+    """The rows as the manifest has them, then how many there are of each status."""
+
+    def __init__(self, file: TextIO) -> None:
+        self._file, self._counts = file, Counter[str]()
+        file.write(f'{{"format": {FORMAT}, "version": {json.dumps(__version__)}, "cases": [\n')
+
+    def add(self, row: CaseOutcome, line: str) -> None:
+        """Write one line."""
+        self._file.write(f"{', ' if self._counts else '  '}{line}\n")
+        self._counts[row.status] += 1
+
+    def end(self) -> None:
+        """Write the counts."""
+        self._file.write(f'], "counts": {json.dumps(dict(sorted(self._counts.items())))}}}\n')

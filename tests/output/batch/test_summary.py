@@ -1,25 +1,28 @@
-"""summary.csv and junit.xml say how each case of a batch ended."""
+"""summary.csv, summary.json and junit.xml say how each case of a batch ended."""
 
 from __future__ import annotations
 
 import csv
 import io
+import json
 import xml.etree.ElementTree as ET
+from collections.abc import Sequence
 
-from eigassign.output.batch.junit import junit_xml, write_junit
-from eigassign.output.batch.outcome import CaseOutcome
-from eigassign.output.batch.summary import COLUMNS, summary_csv, write_summary
+from eigassign.output.batch.junit import Junit
+from eigassign.output.batch.outcome import CaseOutcome, to_line
+from eigassign.output.batch.summary import COLUMNS, SummaryCsv, SummaryJson, batch_table
 
 GOOD = CaseOutcome(
     name="two_link",
     path="cases/two_link.yaml",
     status="ok",
     seconds=0.813,
-    run_folder="results/two_link",
+    run_folder="two_link",
     initial_max_relative=0.083,
     predicted_max_relative=0.0148,
     exact_max_relative=0.1 + 0.2,
     design=(("m1", 0.2287), ("m2", 0.0)),
+    values={"title": "=A1", "targets.0.frequency": "190 Hz", "load": [1, 2]},
 )
 LOOSE = CaseOutcome("loose", "cases/loose.yaml", "tolerance", 0.5, "5 % exceeds 2 %")
 STUCK = CaseOutcome("stuck", "cases/stuck.yaml", "failed", 0.1, "no design meets 'total_mass'")
@@ -27,6 +30,23 @@ WRONG = CaseOutcome(
     "wrong <b>", "cases/wrong.yaml", "error", 0.1, "a,b\n\x1b[31m\x00 & <tag> \ud800\ufffe"
 )
 ALL = (GOOD, LOOSE, STUCK, WRONG)
+
+
+def summary_csv(rows: Sequence[CaseOutcome], keys: Sequence[str] = ()) -> str:
+    text = io.StringIO()
+    made = SummaryCsv(text, keys)
+    for row in rows:
+        made.add(row)
+    return text.getvalue()
+
+
+def junit_xml(rows: Sequence[CaseOutcome]) -> str:
+    text = io.StringIO()
+    made = Junit(text)
+    for row in rows:
+        made.add(row.name, row.path, row.seconds, row.status, row.message, row.run_folder or "")
+    made.end()
+    return text.getvalue()
 
 
 def test_the_summary_has_one_line_a_case_that_reads_back():
@@ -38,11 +58,30 @@ def test_the_summary_has_one_line_a_case_that_reads_back():
     assert rows[1]["exact_max_relative"] == ""
 
 
+def test_swept_keys_have_a_column_each():
+    (row,) = csv.DictReader(io.StringIO(summary_csv((GOOD,), tuple(GOOD.values))))
+    assert (row["title"], row["targets.0.frequency"], row["load"]) == ("'=A1", "190 Hz", "[1, 2]")
+    assert list(row)[:2] == ["name", "title"]
+
+
 def test_a_summary_s_message_stays_on_its_line_and_is_no_formula():
-    cases = (CaseOutcome("=1+1", "a.yaml", "error", 0.1, 'two\nlines, "quoted"'),)
-    (row,) = csv.DictReader(io.StringIO(summary_csv(cases)))
+    cases = (CaseOutcome("=1+1", "a.yaml", "error", 0.1, 'two\nlines, "quoted"'), WRONG)
+    row, other = csv.DictReader(io.StringIO(summary_csv(cases)))
     assert row["name"] == "'=1+1"
     assert row["message"] == 'two lines, "quoted"'
+    assert other["message"] == "a,b \\x1b[31m\\x00 & <tag> \\ud800\\ufffe"
+    assert len(summary_csv(cases).splitlines()) == 3
+
+
+def test_the_summary_for_programs_has_the_rows_of_the_manifest_and_counts():
+    text = io.StringIO()
+    made = SummaryJson(text)
+    for row in ALL:
+        made.add(row, to_line(row))
+    made.end()
+    found = json.loads(text.getvalue())
+    assert found["cases"] == [json.loads(to_line(row)) for row in ALL]
+    assert found["counts"] == {"error": 1, "failed": 1, "ok": 1, "tolerance": 1}
 
 
 def test_junit_counts_and_names_what_happened():
@@ -58,11 +97,12 @@ def test_junit_counts_and_names_what_happened():
     assert suite[0].get("file") == "cases/two_link.yaml"
 
 
-def test_junit_shows_characters_that_xml_cannot_hold():
+def test_junit_has_a_line_a_case_and_shows_characters_that_xml_cannot_hold():
     suite = ET.fromstring(junit_xml((WRONG,)))[0]
     assert suite[0].get("name") == "wrong <b>"
     assert suite[0][0].text == "a,b\n\\x1b[31m\\x00 & <tag> \\ud800\\ufffe"
     assert suite[0][0].get("message") == "a,b"
+    assert len(junit_xml(ALL).splitlines()) == 6
 
 
 def test_an_empty_batch_is_still_valid():
@@ -70,10 +110,7 @@ def test_an_empty_batch_is_still_valid():
     assert summary_csv(()) == ",".join(COLUMNS) + "\n"
 
 
-def test_files_are_replaced_whole(tmp_path):
-    for cases in (ALL[:3], ALL[:1]):
-        write_summary(tmp_path / "summary.csv", cases)
-        write_junit(tmp_path / "junit.xml", cases)
-    assert (tmp_path / "summary.csv").read_text() == summary_csv(ALL[:1])
-    assert (tmp_path / "junit.xml").read_bytes() == junit_xml(ALL[:1])
-    assert len(list(tmp_path.iterdir())) == 2
+def test_a_table_of_many_cases_shows_those_that_are_not_ok_and_counts_the_rest():
+    table = batch_table([GOOD] * 60 + [WRONG])
+    assert [row[0] for row in table.rows] == ["wrong <b>"]
+    assert table.caption == "61 cases: 60 ok, 1 error."

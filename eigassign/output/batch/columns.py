@@ -1,0 +1,136 @@
+"""A column for every number of a batch: columns.h5, and the same as columns.csv.
+
+``/name``, ``/status`` and what else every case has as text or number, (n,) each; ``/values/KEY``
+what a sweep set, in SI units, as ``KEY (text)`` what is no number; ``/design/NAME`` the optimum;
+``/frequencies/NAME/lowest_hz``, ``mean_hz`` and ``highest_hz`` of each target. NaN where there is
+no number. Rows are in the order of the batch, and a few thousand at a time are held.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+
+from eigassign._version import __version__
+from eigassign.case.units import QuantityError, read
+from eigassign.output.batch.outcome import CaseOutcome
+from eigassign.output.batch.summary import cell
+
+FORMAT = 1
+ROWS = 8192  # held at a time, and in a chunk of the file
+_TEXTS = ("name", "status", "verdict", "message", "path")
+_NUMBERS = (
+    "seconds", "initial_max_relative", "predicted_max_relative", "exact_max_relative",
+)  # fmt: skip
+_OF_RANGE = ("lowest_hz", "mean_hz", "highest_hz")
+
+
+class Columns:
+    """columns.h5, row by row."""
+
+    def __init__(self, path: Path, total: int) -> None:
+        import h5py
+
+        self._file, self._total, self._start = h5py.File(path, "w", locking=False), total, 0
+        self._rows: list[CaseOutcome] = []
+        self._file.attrs.update({"format": FORMAT, "version": __version__, "cases": total})
+
+    def add(self, row: CaseOutcome) -> None:
+        """Keep it, and write what there is once it is enough."""
+        self._rows.append(row)
+        if len(self._rows) == ROWS:
+            self._flush()
+
+    def end(self) -> None:
+        """Write the rest and close the file."""
+        self._flush()
+        self._file.close()
+
+    def _flush(self) -> None:
+        for name in (*_TEXTS, *_NUMBERS):
+            self._write(name, [getattr(row, name) for row in self._rows])
+        for group, cells in _GROUPS.items():
+            every = [dict(cells(row)) for row in self._rows]
+            for name in dict.fromkeys(name for row in every for name in row):
+                self._write(f"{group}/{name}", [row.get(name) for row in every])
+        self._start += len(self._rows)
+        self._rows = []
+
+    def _write(self, name: str, cells: list[Any]) -> None:
+        """The cells of the rows held, of a column that is made where it is new."""
+        import h5py
+
+        text = any(isinstance(cell, str) for cell in cells)
+        if name not in self._file:
+            kind, empty = (h5py.string_dtype(), None) if text else (np.float64, np.nan)
+            chunk = (min(ROWS, self._total),) if self._total else None
+            self._file.create_dataset(name, (self._total,), kind, fillvalue=empty, chunks=chunk)
+        column = [cell or "" for cell in cells] if text else np.array(cells, dtype=np.float64)
+        self._file[name][self._start : self._start + len(cells)] = column
+
+
+def _values(row: CaseOutcome) -> Iterator[tuple[str, float | str]]:
+    for key, value in row.values.items():
+        number = quantity(value) if isinstance(value, (int, float, str)) else None
+        name = _level(key)
+        if number is not None:
+            yield name, number
+        else:
+            yield f"{name} (text)", value if isinstance(value, str) else json.dumps(value)
+
+
+@lru_cache(maxsize=ROWS, typed=True)
+def quantity(value: float | str) -> float | None:
+    """``value`` in SI units; None where it is no number."""
+    try:
+        return read(value, None)
+    except QuantityError:
+        return None
+
+
+def _design(row: CaseOutcome) -> Iterator[tuple[str, float]]:
+    for name, value in row.design:
+        yield _level(name), value
+
+
+def _ranges(row: CaseOutcome) -> Iterator[tuple[str, float]]:
+    for name, *hz in row.frequencies:
+        for what, value in zip(_OF_RANGE, hz, strict=True):
+            yield f"{_level(name)}/{what}", value
+
+
+def _level(name: str) -> str:
+    """``name`` as one level of a path in the file."""
+    return name.replace("/", "|")
+
+
+_GROUPS = {"values": _values, "design": _design, "frequencies": _ranges}
+
+
+def write_csv(columns: Path, file: TextIO) -> None:
+    """The columns as CSV, each under its path in the file; numbers as ``repr`` writes them."""
+    import h5py
+
+    writer = csv.writer(file, lineterminator="\n")
+    with h5py.File(columns, locking=False) as stored:
+        names = list[str]()
+        stored.visititems(lambda n, v: names.append(n) if isinstance(v, h5py.Dataset) else None)
+        groups = ["", *_GROUPS]
+        names.sort(key=lambda name: groups.index(name.rpartition("/")[0].partition("/")[0]))
+        names = [*_TEXTS, *_NUMBERS, *(name for name in names if "/" in name)]
+        writer.writerow([cell(name) for name in names])
+        for start in range(0, stored.attrs["cases"], ROWS):
+            parts = [_cells(stored[name], slice(start, start + ROWS)) for name in names]
+            writer.writerows(zip(*parts, strict=True))
+
+
+def _cells(column: Any, rows: slice) -> list[object]:
+    if column.dtype.kind == "f":
+        return ["" if value != value else value for value in column[rows].tolist()]
+    return [cell(text) for text in column.asstr()[rows]]

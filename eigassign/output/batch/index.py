@@ -1,0 +1,114 @@
+"""index.html of a batch: its rows to sort and to filter, with a picture where a case has one."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from eigassign._version import __version__
+from eigassign.output.batch.columns import quantity
+from eigassign.output.batch.outcome import CaseOutcome
+from eigassign.output.formats import number, percent, seconds
+from eigassign.output.pages import TEMPLATES, inside, page_of
+
+MOST = 10_000  # rows shown: more would keep a browser busy
+_STATUS = {"ok": "good", "tolerance": "fair", "failed": "bad", "error": "bad"}  # and its tone
+_TAIL = re.compile(r"(?:[^.]*[^.0-9][^.]*(?:\.[0-9]+)*\.)?[^.]*$")
+_ERRORS = {"error before": "initial_max_relative", "error after": "exact_max_relative"}
+
+
+class Index:
+    """The rows that the page shows; those that are not ok are the first to find a place."""
+
+    def __init__(self) -> None:
+        self._good: list[CaseOutcome] = []
+        self._bad: list[CaseOutcome] = []
+        self._counts = Counter[str]()
+
+    def add(self, row: CaseOutcome) -> None:
+        """Keep it while there is a place for it."""
+        self._counts[row.status] += 1
+        rows = self._good if row.status == "ok" else self._bad
+        if len(rows) < MOST:
+            rows.append(row)
+
+    def page(self, folder: Path, title: str, keys: Sequence[str] = ()) -> bytes:
+        """The page of the batch in ``folder``; ``keys`` are those of its sweep."""
+        rows = sorted([*self._bad, *self._good][:MOST], key=lambda row: row.index)
+        columns = _columns(rows, keys)
+        data = {
+            "columns": [name for name, _ in columns],
+            "rows": [[_links(row, folder), *(cell(row) for _, cell in columns)] for row in rows],
+        }
+        return page_of(
+            "batch.html.j2",
+            title=title,
+            total=self._counts.total(),
+            shown=len(rows),
+            counts=[(s, tone, self._counts[s]) for s, tone in _STATUS.items() if self._counts[s]],
+            version=__version__,
+            data=inside(data),
+            script=(TEMPLATES / "batch.js").read_text("utf-8"),
+        )
+
+
+Cell = tuple[str, float | None] | str  # as it is shown, and the number to sort it by
+
+
+def _columns(
+    rows: Sequence[CaseOutcome], keys: Sequence[str]
+) -> list[tuple[str, Callable[[CaseOutcome], Cell]]]:
+    """What each column is called, and its cell in a row; columns without a cell are left out."""
+    designs = dict.fromkeys(name for row in rows for name, _ in row.design)
+    found: list[tuple[str, Callable[[CaseOutcome], Cell]]] = [
+        ("case", lambda row: row.name),
+        *((n, lambda row, key=key: _value(row.values.get(key))) for n, key in _short(keys).items()),
+        ("status", lambda row: row.status),
+        ("verdict", lambda row: row.verdict.replace("_", " ")),
+        *((name, lambda row, of=of: _error(getattr(row, of))) for name, of in _ERRORS.items()),
+        *((name, lambda row, name=name: _optimum(dict(row.design).get(name))) for name in designs),
+        ("message", lambda row: row.message),
+        ("time", lambda row: (seconds(row.seconds), row.seconds)),
+    ]
+    kept = ("case", "status")
+    return [(n, cell) for n, cell in found if n in kept or any(map(_is_there, map(cell, rows)))]
+
+
+def _short(keys: Sequence[str]) -> dict[str, str]:
+    """Each key by its last two names, and numbers between them, where that tells it from others."""
+    tails = {key: _TAIL.findall(key)[0] for key in keys}
+    several = {tail for tail, n in Counter(tails.values()).items() if n > 1}
+    return {key if tail in several else tail: key for key, tail in tails.items()}
+
+
+def _is_there(cell: Cell) -> bool:
+    return bool(cell if isinstance(cell, str) else cell[0])
+
+
+def _value(value: Any) -> Cell:
+    if value is None:
+        return ""
+    amount = quantity(value) if isinstance(value, (int, float, str)) else None
+    return str(value) if amount is None else (str(value), amount)
+
+
+def _error(fraction: float | None) -> Cell:
+    return ("", None) if fraction is None else (percent(fraction), fraction)
+
+
+def _optimum(value: float | None) -> Cell:
+    return ("", None) if value is None else (number(value), value)
+
+
+def _links(row: CaseOutcome, folder: Path) -> list[str]:
+    """The page or else the numbers of a case, and its picture; empty where there is none."""
+    if row.run_folder is None:
+        return []
+    place = Path(row.run_folder)
+    wanted = (("report.html", "results.json"), ("figures/frequencies.png",))
+    there = (next((f for f in names if (folder / place / f).exists()), None) for names in wanted)
+    return ["" if name is None else quote((place / name).as_posix()) for name in there]

@@ -1,0 +1,50 @@
+"""HTML pages from their templates; what they carry as data is safe inside a script."""
+
+from __future__ import annotations
+
+import json
+import re
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+    from markupsafe import Markup
+
+TEMPLATES = Path(__file__).parent / "templates"
+
+
+def page_of(name: str, **shown: Any) -> bytes:
+    """The page of the template ``name`` as UTF-8."""
+    html = _environment().get_template(name).render(**shown)
+    return (html + "\n").encode("utf-8", "xmlcharrefreplace")
+
+
+@cache
+def _environment() -> Environment:
+    """Templates are compiled once a process."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["words"] = _words
+    return environment
+
+
+def _words(text: str) -> Markup:
+    """Text with what stands between backticks as code, and no markup of its own."""
+    from markupsafe import Markup, escape
+
+    return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+
+
+def inside(data: Any) -> str:
+    """JSON that no browser takes for the end of its script."""
+    text = json.dumps(data, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c")
