@@ -145,6 +145,19 @@ def test_all_commands_run_and_print_what_is_shown(
     follow(page, tmp_path, capsys, all_of_it=True)
 
 
+def test_the_tutorial_writes_the_case_that_is_shipped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    reader = Reader(capsys, all_of_it=False)
+    for language, text in blocks(MANUAL / "tutorial.md"):
+        if language == "yaml":
+            reader.write_case(text)
+    written, shipped = load(Path("arm.yaml")), load(ROOT / "cases" / "two_link.yaml")
+    for key in ("mechanism", "coordinates", "trajectory", "design", "targets"):
+        assert getattr(written, key) == getattr(shipped, key), key
+
+
 def test_blocks_that_are_not_run_are_few() -> None:
     reasons = [r for page in PAGES for r, _, _ in BLOCK.findall(page.read_text()) if r]
     assert len(reasons) <= 8, reasons
