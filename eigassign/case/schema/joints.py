@@ -21,7 +21,8 @@ class JointBase(Part):
         base: what carries the joint, `ground` or `<link>.<node>`; of a carriage or nut the beam,
             `<link>`, which carries only one
         follower: what it carries, `<link>.<node>`
-        position: of the joint in the axes of the base; at the node unless given
+        position: of the joint relative to the base's node, in the axes of the base; at the node
+            unless given
         angle: by which the follower is turned where the coordinate is 0, in a plane
         orientation: the same in space, `[rx, ry, rz]`, R = Rz Ry Rx
         axis: in the axes of the follower where the coordinate is 0

@@ -148,7 +148,7 @@ class SuperelementLink(Part):
     Keys:
         stiffness: file of the matrix, Matrix Market or NumPy, in SI units, without supports
         mass: file of the matrix, likewise
-        nodes: by name; one is called `start`
+        nodes: by name
         reduce_to: the inner nodes are replaced by the link's own modes up to this frequency
             (Craig–Bampton); `auto` takes the lowest that meets a quarter of `expansion.accuracy`
     """
