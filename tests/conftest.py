@@ -6,6 +6,7 @@ import os
 import sys
 from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 from eigassign.process import prefer_one_thread
@@ -22,6 +23,18 @@ for folder in (
     "study",
 ):
     sys.path.insert(0, str(Path(__file__).parent / folder))
+
+FEW = 4  # of a family of random mechanisms or problems that are tried by default
+
+
+@pytest.hookimpl(tryfirst=True)  # before markers choose
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """A test parametrised by ``seed`` is slow from its fifth seed on."""
+    for item in items:
+        of = getattr(item, "callspec", None)
+        if of is not None and of.indices.get("seed", 0) >= FEW:
+            item.add_marker(pytest.mark.slow)
+
 
 os.environ.pop("COLUMNS", None)  # tables are as wide as they like, wherever tests run
 

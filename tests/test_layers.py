@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -41,8 +42,15 @@ def name_of(path: Path) -> str:
     return name.removesuffix("__init__").removesuffix(".")
 
 
+@cache
 def parsed(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
+def called(path: Path) -> set[str]:
+    """What is called anywhere in a module, as it is written."""
+    return {ast.unparse(n.func) for n in ast.walk(parsed(path)) if isinstance(n, ast.Call)}
 
 
 def imports(tree: ast.AST) -> Iterator[str]:
@@ -107,18 +115,14 @@ def test_the_case_layer_needs_no_numerical_package() -> None:
 
 @pytest.mark.parametrize("path", MODULES, ids=name_of)
 def test_only_the_command_line_and_the_console_print(path: Path) -> None:
-    called = {
-        ast.unparse(node.func) for node in ast.walk(parsed(path)) if isinstance(node, ast.Call)
-    }
     if name_of(path) not in PRINTING:
-        assert not called & {"print", "click.echo", "sys.stdout.write"}
+        assert not called(path) & {"print", "click.echo", "sys.stdout.write"}
 
 
 def test_only_the_command_line_sets_exit_codes() -> None:
     for path in MODULES:
         if name_of(path) not in {"cli", "__main__"}:
-            calls = [ast.unparse(n.func) for n in ast.walk(parsed(path)) if isinstance(n, ast.Call)]
-            assert not {"sys.exit", "exit", "quit", "os._exit"} & set(calls), path
+            assert not {"sys.exit", "exit", "quit", "os._exit"} & called(path), path
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "cli").glob("*.py")), ids=name_of)
@@ -158,8 +162,9 @@ def private_names(tree: ast.Module) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom):
             yield from (alias.name for alias in node.names if alias.name.startswith("_"))
-        elif isinstance(node, ast.Attribute) and ast.unparse(node.value) not in ("self", "cls"):
-            yield node.attr
+        elif isinstance(node, ast.Attribute) and node.attr.startswith("_"):
+            if ast.unparse(node.value) not in ("self", "cls"):
+                yield node.attr
         elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith(("setattr", "patch")):
             texts = (a.value for a in node.args if isinstance(a, ast.Constant))
             yield from (str(text).rpartition(".")[2] for text in texts)

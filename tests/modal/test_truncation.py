@@ -42,13 +42,13 @@ def compared(seed: int, design: bool) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("design", [False, True])
 def test_the_bound_is_above_the_true_error_and_near_it(design: bool) -> None:
     """Over arms, poses and designs: never below, within 100 times in 90 %, refused in few."""
-    pairs = [compared(seed, design) for seed in range(14)]
+    pairs = [compared(seed, design) for seed in range(6)]
     bound, true = (np.concatenate(p).ravel() for p in zip(*pairs, strict=True))
     assert (true > -NOISE).all()  # Ritz: from above
     assert (bound >= true - NOISE).all()
     sure = np.isfinite(bound) & (true > 10 * NOISE)
     assert np.mean(np.isfinite(bound)) > 0.9
-    assert sure.sum() > 80
+    assert sure.sum() > 30
     ratio = bound[sure] / true[sure]
     assert np.quantile(ratio, 0.9) < 100
     assert np.quantile(ratio, 0.9) < 2  # what it is in fact

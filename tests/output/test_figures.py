@@ -32,6 +32,7 @@ EVERY = {
     "nothing varies": {"varies": False},
     "spatial": {"spatial": True},
 }
+BY_DEFAULT = ("one sample", "long names", "spatial")  # of these figures; all of them: a minute
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +78,13 @@ def test_the_paper_s_case_has_all_of_its_figures(files):
     ]
 
 
-@pytest.mark.parametrize("options", EVERY.values(), ids=EVERY)
+@pytest.mark.parametrize(
+    "options",
+    [
+        pytest.param(EVERY[name], id=name, marks=[] if name in BY_DEFAULT else pytest.mark.slow)
+        for name in EVERY
+    ],
+)
 def test_every_kind_of_results_gives_figures_with_nothing_over_their_edge(options):
     files = render(run_figures(studied(make_results(**options))))
     assert len(files) >= 11

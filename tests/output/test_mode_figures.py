@@ -35,6 +35,7 @@ from eigassign.study.results import DrawnBody, DrawnPoses, ModePictures
 CASES = Path(__file__).parents[2] / "cases"
 GALLERY = CASES / "gallery"
 ALL = sorted(path.stem for path in CASES.glob("*.yaml"))
+BY_DEFAULT = ("two_link", "arm_6r", "four_bar")
 
 
 def pictures(name: str, count: int = 2) -> ModePictures:
@@ -53,7 +54,10 @@ def segments(figure: Figure, colour: str) -> list[np.ndarray]:
     return [piece for collection in drawn for piece in collection.get_segments()]
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize(
+    "name",
+    [n if n in BY_DEFAULT else pytest.param(n, marks=pytest.mark.slow) for n in ALL],
+)
 def test_every_shipped_mechanism_has_figures_that_keep_within_their_edges(name: str) -> None:
     found = pictures(name)
     files = render(mode_figures(found))
