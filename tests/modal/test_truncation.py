@@ -39,16 +39,16 @@ def compared(seed: int, design: bool) -> tuple[np.ndarray, np.ndarray]:
     return truncation_error(parts, x, MODES), true
 
 
-@pytest.mark.parametrize("design", [False, True])
+@pytest.mark.parametrize("design", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_the_bound_is_above_the_true_error_and_near_it(design: bool) -> None:
     """Over arms, poses and designs: never below, within 100 times in 90 %, refused in few."""
-    pairs = [compared(seed, design) for seed in range(6)]
+    pairs = [compared(seed, design) for seed in range(14)]
     bound, true = (np.concatenate(p).ravel() for p in zip(*pairs, strict=True))
     assert (true > -NOISE).all()  # Ritz: from above
     assert (bound >= true - NOISE).all()
     sure = np.isfinite(bound) & (true > 10 * NOISE)
     assert np.mean(np.isfinite(bound)) > 0.9
-    assert sure.sum() > 30
+    assert sure.sum() > 80
     ratio = bound[sure] / true[sure]
     assert np.quantile(ratio, 0.9) < 100
     assert np.quantile(ratio, 0.9) < 2  # what it is in fact
