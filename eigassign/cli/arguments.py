@@ -112,6 +112,25 @@ figures = click.option(
 )
 
 
+against = several(
+    click.option(
+        "--against",
+        type=PATH,
+        metavar="PREVIOUS",
+        help="Name what has moved since: a results folder, results.json, summary.json, or what "
+        "validate --json printed (default: nothing is compared).",
+    ),
+    click.option(
+        "--tolerance",
+        type=Number(0.0),
+        metavar="HZ",
+        default=0.01,
+        show_default=True,
+        help="How far frequencies may be from those of --against.",
+    ),
+)
+
+
 def report_of(usual: str) -> Callable[[F], F]:
     """``--report`` with its default."""
     return click.option(

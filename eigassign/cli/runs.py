@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from eigassign.cli.reporter import Reporter, print_json, reporting, show
 from eigassign.errors import EigassignError
 
 if TYPE_CHECKING:
+    from eigassign.output.previous import Move
     from eigassign.pipeline.run import Options, Outcome
     from eigassign.study.results import ValidationRow
 
@@ -174,43 +175,86 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
 @click.command(
     epilog=arguments.examples(
         "eigassign validate cases/two_link.yaml",
-        "eigassign validate cases",
+        "eigassign validate cases --junit validation.xml",
+        "eigassign validate cases --json > before.json",
+        "eigassign validate cases --against before.json",
     )
 )
 @click.argument("cases", nargs=-1, type=arguments.PATH)
+@click.option(
+    "--junit",
+    type=arguments.PATH,
+    metavar="FILE",
+    help="Write it for CI servers too (default: no file).",
+)
+@arguments.against
 @arguments.caching
 @arguments.json
 @arguments.common
-def validate(cases: tuple[Path, ...], as_json: bool, **how: Any) -> int:
+def validate(
+    cases: tuple[Path, ...],
+    junit: Path | None,
+    against: Path | None,
+    tolerance: float,
+    as_json: bool,
+    **how: Any,
+) -> int:
     """Compare both expansions with exact frequencies, along the trajectory and over boxes.
 
     CASES are files or folders; the files of ./cases (not of folders below it) when none is named.
-    Exit code 1 where an expansion is further off than the case's validation.max_error.
+    Exit code 1 where an expansion is further off than the case's validation.max_error, or an exact
+    frequency further than --tolerance from what it was in --against.
     """
     from eigassign.batch.plan import cases_in, default_cases
+    from eigassign.output import previous
+    from eigassign.output.batch.junit import write_junit
     from eigassign.pipeline import run
 
     rows: list[ValidationRow] = []
     failures: list[dict[str, object]] = []
+    tests: list[tuple[str, str, float, str, str]] = []
     codes = [0]
     with reporting(how) as reporter:
+        since = against and previous.Comparison(against, "validations", tolerance)
         for case in cases_in(cases or default_cases()):
             try:
                 answer = run.validate(case, _options(how, reporter))
             except EigassignError as error:
                 codes.append(process.report(error))
                 failures.append({"case": case.stem, **process.document(error)})
+                tests.append((case.stem, str(case), 0.0, "error", process.failure_of(error).text))
                 continue
             reporter.warn(answer.warnings)
             rows.extend(answer.rows)
-            codes.append(0 if answer.passed else 1)
+            moves = since.add(previous.of_validation(case.stem, answer.rows)) if since else []
+            codes.append(0 if answer.passed and not moves else 1)
+            tests.append((case.stem, str(case), answer.seconds, *_judged(answer.rows, moves)))
+        if junit:
+            write_junit(junit, tests)
+        moved = since.table() if since and rows else None
     if as_json:
-        print_json([*rows, *failures])
-    elif rows:
-        from eigassign.output.console import print_validation
+        print_json([*rows, *failures, *(since.moves if since else ())])
+    else:
+        from eigassign.output.console import print_tables, print_validation
 
-        print_validation(rows)
+        if rows:
+            print_validation(rows)
+        print_tables([moved] if moved else ())
     return max(codes)
+
+
+def _judged(rows: Sequence[ValidationRow], moves: Sequence[Move]) -> tuple[str, str]:
+    """The status of a validated case, and why it is not ok."""
+    from eigassign.output.formats import percent
+
+    reasons = [
+        f"mode {row.mode}, {row.where}: {percent(row.worst_taylor)} from exact, with the design "
+        f"linearised {percent(row.worst_linearised)}; accepted are {percent(row.limit)}"
+        for row in rows
+        if not row.passed
+    ]
+    status = "tolerance" if reasons else "moved" if moves else "ok"
+    return status, "\n".join([*reasons, *map(str, moves)])
 
 
 @click.command(

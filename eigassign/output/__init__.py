@@ -15,6 +15,7 @@ In reading order; each imports from those above it only:
     console        results on stdout, progress on stderr
     pages          HTML pages from their templates
     batch          what a batch leaves: summaries, junit.xml, columns, index.html
+    previous       what an earlier result said, and what has moved since
     figures        the figures of runs, modes and charts, on paper and on screen
     verdict        the first screen of a report
     report         report.html, and what a run or modes leave in a folder

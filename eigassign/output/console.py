@@ -61,7 +61,7 @@ def print_table(
     console, text = _console(out, width)
     if title:
         console.print(Text(printable(title), style="bold"), soft_wrap=True)
-    for group in terminal.groups(columns, every, width):
+    for group in terminal.groups(columns, every, width) if columns else ():
         table = RichTable(
             box=box.SIMPLE_HEAD if unicode else box.ASCII2,
             show_edge=False,

@@ -322,6 +322,9 @@ def _row(scene: Scene, k: int, where: str, values: Comparison) -> ValidationRow:
         rms_linearised=_rms(values.linearised_error),
         limit=limit,
         passed=max(counted) <= limit,
+        lowest_hz=float(values.exact_hz.min()),
+        mean_hz=float(values.exact_hz.mean()),
+        highest_hz=float(values.exact_hz.max()),
     )
 
 

@@ -101,6 +101,9 @@ class ValidationRow:
     rms_linearised: float
     limit: float
     passed: bool
+    lowest_hz: float  # of the exact frequencies there
+    mean_hz: float
+    highest_hz: float
 
 
 # --- What an assignment reaches

@@ -169,6 +169,7 @@ def test_a_validation_says_which_line_failed():
     out = piped()
     common = {"case": "arm", "mode": 1, "order": 4, "limit": 0.02}
     spread = {"worst_linearised": 0.1, "rms_taylor": 1e-4, "rms_linearised": 0.01}
+    spread |= {"lowest_hz": 180.0, "mean_hz": 190.0, "highest_hz": 200.0}
     rows = [
         ValidationRow(
             where=where, points=152, worst_taylor=worst, passed=passed, **common, **spread

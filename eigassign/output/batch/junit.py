@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
+from pathlib import Path
 from typing import TextIO
+
+from eigassign.output.storage import replacing
 
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _PLAIN = re.compile(r"[\w .,:;/%=+()\[\]-]*", re.ASCII)
@@ -49,6 +53,15 @@ class Junit:
         header = f'<?xml version="1.0" encoding="utf-8"?><testsuites {counts}><testsuite {counts} '
         self._file.seek(0)
         self._file.write((header + 'skipped="0"').ljust(_HEADER - 1) + ">")
+
+
+def write_junit(path: Path, tests: Iterable[tuple[str, str, float, str, str]]) -> None:
+    """A file of all ``tests``: name, path, seconds, status and message of each."""
+    with replacing(path) as made, open(made, "w", encoding="utf-8") as file:
+        suite = Junit(file)
+        for test in tests:
+            suite.add(*test)
+        suite.end()
 
 
 def totals(header: str) -> dict[str, float]:

@@ -1,0 +1,181 @@
+"""What an earlier result said of the same cases, and what has moved since.
+
+Frequencies are compared, each by its lowest, mean and highest value in Hz somewhere: of answers
+along the trajectory, of validations at all the places they look at. An earlier result is a file,
+results.json, summary.json or what ``validate --json`` printed, or a folder that has one or several.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from eigassign.errors import UsageError
+from eigassign.files import STORED, read_bytes
+from eigassign.output.batch.outcome import CaseOutcome, Range, ranges
+from eigassign.output.tables import Table
+from eigassign.study.comparison import TRAJECTORY
+from eigassign.study.results import ValidationRow
+
+Kind = Literal["answers", "validations"]
+_STATISTICS = ("lowest", "mean", "highest")
+
+
+@dataclass(frozen=True)
+class Known:
+    """What a result says of one case: frequencies in Hz by what they are of, and how it ended."""
+
+    case: str
+    frequencies: tuple[Range, ...] = ()
+    ended: str = ""
+
+
+@dataclass(frozen=True)
+class Move:
+    """What is not as it was: how a case ended, or a frequency, which moved by ``hz``."""
+
+    case: str
+    what: str
+    before: str
+    now: str
+    hz: float | None = None
+
+    def __str__(self) -> str:
+        by = "" if self.hz is None else f", moved by {self.hz:+.4g} Hz"
+        return f"{self.what}: was {self.before}, is {self.now}{by}"
+
+
+class Comparison:
+    """Cases compared with an earlier result, one by one, and what has moved so far."""
+
+    def __init__(self, path: Path, kind: Kind, tolerance_hz: float) -> None:
+        """Raises UsageError where ``path`` has nothing of this kind."""
+        self._path, self._tolerance = path, tolerance_hz
+        self._before = {known.case: known for known in read_previous(path, kind)}
+        self._compared = self._new = 0
+        self.moves: list[Move] = []
+
+    def add(self, now: Known) -> list[Move]:
+        """What has moved of one case."""
+        before = self._before.get(now.case, Known(now.case))
+        known = {name: hz for name, *hz in before.frequencies}
+        moves = [*_ended(before, now)]
+        for name, *hz in now.frequencies:
+            if name in known:
+                self._compared += 1
+                moves += self._moved(now.case, name, known[name], hz)
+            else:
+                self._new += 1
+        self.moves += moves
+        return moves
+
+    def _moved(self, case: str, name: str, before: list[float], now: list[float]) -> Iterator[Move]:
+        """The value that moved most, if it moved too far."""
+        by, k = max((abs(a - b), k) for k, (a, b) in enumerate(zip(before, now, strict=True)))
+        if by > self._tolerance:
+            what, hz = f"{name}, {_STATISTICS[k]}", now[k] - before[k]
+            yield Move(case, what, f"{before[k]:.8g} Hz", f"{now[k]:.8g} Hz", hz)
+
+    def table(self) -> Table:
+        """What moved, and below it how much was compared.
+
+        Raises UsageError where nothing was: the earlier result is of other cases then.
+        """
+        if not self._compared and not self.moves:
+            some = ", ".join([*self._before][:5])
+            raise UsageError(f"{self._path}: has none of these frequencies; its cases are {some}")
+        columns = ("case", "what", "before", "now", "moved by")
+        rows = [
+            (m.case, m.what, m.before, m.now, "" if m.hz is None else f"{m.hz:+.4g} Hz")
+            for m in self.moves
+        ]
+        caption = f"Frequencies compared: {self._compared}, new ones: {self._new}; "
+        caption += f"tolerance {self._tolerance:g} Hz."
+        word = "Moved" if rows else "Nothing moved"
+        return Table(f"{word} since {self._path}", columns if rows else (), tuple(rows), caption)
+
+
+def _ended(before: Known, now: Known) -> Iterator[Move]:
+    if before.ended and now.ended and before.ended != now.ended:
+        yield Move(now.case, "verdict", before.ended, now.ended)
+
+
+# --- What results say
+
+
+def of_outcome(row: CaseOutcome) -> Known:
+    """What the row of a batch says of its answer."""
+    return Known(row.name, tuple(row.frequencies), row.verdict or row.status)
+
+
+def of_validation(case: str, rows: Iterable[ValidationRow]) -> Known:
+    """What a validation says of the exact frequencies where it looked."""
+    found = [(_place(r.mode, r.where), r.lowest_hz, r.mean_hz, r.highest_hz) for r in rows]
+    return Known(case, tuple(found))
+
+
+def _place(mode: int, where: str) -> str:
+    return f"mode {mode}, {where}"
+
+
+def read_previous(path: Path, kind: Kind) -> list[Known]:
+    """What is known of each case in a file or folder; raises UsageError where nothing is."""
+    found: list[Known] = []
+    files = [path]
+    if path.is_dir():
+        batch, own = path / "summary.json", path / "results.json"
+        below = sorted(path.glob("*/results.json"))
+        files = [batch] if batch.exists() else [own] if own.exists() else below
+    for file in files:
+        try:
+            found += _known(json.loads(read_bytes(file, STORED)), kind)
+        except OSError as error:
+            raise UsageError(f"{file}: cannot be read: {error.strerror}") from error
+        except (ValueError, LookupError, TypeError, AttributeError):
+            expected = "results.json, summary.json, or what validate --json printed"
+            raise UsageError(f"{file}: is not {expected}") from None
+    if not any(known.frequencies for known in found):
+        wanted = "answers of optimize or batch" if kind == "answers" else "a validation or a run"
+        raise UsageError(f"{path}: has no frequencies to compare with; expected {wanted}")
+    return found
+
+
+def _known(document: Any, kind: Kind) -> Iterator[Known]:
+    if isinstance(document, list):
+        if kind == "validations":
+            yield from _validations(document)
+    elif "cases" in document:
+        if kind == "answers":
+            yield from (of_outcome(CaseOutcome(**row)) for row in document["cases"])
+    else:
+        yield _run(document, kind)
+
+
+def _validations(rows: list[Any]) -> Iterator[Known]:
+    by_case: dict[str, list[Range]] = {}
+    for row in rows:
+        if "lowest_hz" in row:
+            hz = (row["lowest_hz"], row["mean_hz"], row["highest_hz"])
+            by_case.setdefault(row["case"], []).append((_place(row["mode"], row["where"]), *hz))
+    yield from (Known(case, tuple(found)) for case, found in by_case.items())
+
+
+def _run(document: Any, kind: Kind) -> Known:
+    """Of an answer the exact frequencies, of a validation those of modes at the initial design."""
+    case, targets = document["case"]["name"], document["targets"]
+    if kind == "answers":
+        curves = [(t["label"], t.get("trajectory"), t["frequencies"]["exact_hz"]) for t in targets]
+        return Known(case, ranges(curves), (document["assignment"] or {}).get("verdict", ""))
+    samples = {row["name"]: row["samples"] for row in document["trajectories"]}
+    found: dict[str, Range] = {}
+    for target in targets:
+        hz, name = target["frequencies"]["initial_hz"], target.get("trajectory")
+        where = TRAJECTORY if len(samples) == 1 else f"{TRAJECTORY} {name!r}"
+        whole = next(iter(samples.values())) if len(samples) == 1 else samples.get(name)
+        if target["kind"] == "frequency" and target["mode"] is not None and len(hz) == whole:
+            place = _place(target["mode"], where)
+            found[place] = ranges([(place, None, hz)])[0]
+    return Known(case, tuple(found.values()))

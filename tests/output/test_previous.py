@@ -1,0 +1,126 @@
+"""What has moved since an earlier result: frequencies, and how a case ended."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import replace
+
+import pytest
+from synthetic_results import make_results
+
+from eigassign.errors import UsageError
+from eigassign.output import console
+from eigassign.output.batch.outcome import CaseOutcome, frequency_ranges, to_line
+from eigassign.output.previous import Comparison, Known, of_outcome, of_validation, read_previous
+from eigassign.output.result_files import to_json
+from eigassign.study.results import ValidationRow
+
+ROW = CaseOutcome(
+    "arm", "arm.yaml", "ok", 0.1, frequencies=(("mode 1", 180.0, 190.0, 200.0),), verdict="reached"
+)
+
+
+def summary(path, *rows):
+    cases = ", ".join(map(to_line, rows))
+    path.write_text(f'{{"cases": [{cases}], "counts": {{}}}}')
+    return path
+
+
+def compared(path, now, tolerance_hz=0.01, kind="answers"):
+    found = Comparison(path, kind, tolerance_hz)
+    found.add(now)
+    return found
+
+
+def with_hz(*hz):
+    return replace(ROW, frequencies=(("mode 1", *hz),))
+
+
+def test_the_value_that_moved_most_is_named_and_small_moves_are_not(tmp_path):
+    before = summary(tmp_path / "summary.json", ROW)
+    assert compared(before, of_outcome(with_hz(180.0, 190.009, 200.0))).moves == []
+    (move,) = compared(before, of_outcome(with_hz(180.0, 189.9, 199.5))).moves
+    assert str(move) == "mode 1, highest: was 200 Hz, is 199.5 Hz, moved by -0.5 Hz"
+    assert compared(before, of_outcome(with_hz(180.0, 189.9, 199.5)), 0.6).moves == []
+
+
+def test_a_case_that_ends_otherwise_has_moved(tmp_path):
+    before = summary(tmp_path / "summary.json", ROW)
+    failed = replace(ROW, status="error", verdict="", frequencies=())
+    (move,) = compared(before, of_outcome(failed)).moves
+    assert str(move) == "verdict: was reached, is error"
+
+
+def test_new_cases_and_frequencies_are_counted_and_do_not_count_as_moved(tmp_path):
+    before = summary(tmp_path / "summary.json", ROW)
+    found = compared(before, Known("arm", (*ROW.frequencies, ("mode 2", 1.0, 1.0, 1.0))))
+    found.add(of_outcome(replace(ROW, name="leg")))
+    assert found.table().rows == ()
+    assert "compared: 1, new ones: 2" in found.table().caption
+    text = io.StringIO()
+    console.print_tables([found.table()], stream=text)
+    assert text.getvalue().startswith("Nothing moved since")
+
+
+def test_a_run_compares_with_its_own_results_and_a_folder_of_runs_with_each(tmp_path):
+    results = make_results(n_targets=2)
+    (tmp_path / "arm").mkdir()
+    (tmp_path / "arm" / "results.json").write_bytes(to_json(results))
+    now = Known(results.case_name, frequency_ranges(results))
+    for place in (tmp_path, tmp_path / "arm", tmp_path / "arm" / "results.json"):
+        found = compared(place, now, 0.0)
+        assert found.moves == []
+        assert "compared: 2, new ones: 0" in found.table().caption
+
+
+def validated(results, hz):
+    common = {"case": results.case_name, "mode": 1, "order": 4, "points": hz.size, "limit": 0.02}
+    errors = dict.fromkeys(
+        ("worst_taylor", "worst_linearised", "rms_taylor", "rms_linearised"), 1e-4
+    )
+    exact = {"lowest_hz": hz.min(), "mean_hz": hz.mean(), "highest_hz": hz.max()}
+    return ValidationRow(where="trajectory", passed=True, **common, **errors, **exact)
+
+
+def test_a_validation_compares_with_the_initial_design_of_a_run_and_with_its_own_json(tmp_path):
+    results = make_results()
+    row = validated(results, results.targets[0].initial_hz)
+    run, own = tmp_path / "results.json", tmp_path / "before.json"
+    run.write_bytes(to_json(results))
+    own.write_text(json.dumps([vars(row), {"case": "broken", "error": "CaseError"}]))
+    for path in (run, own):
+        same = compared(path, of_validation(results.case_name, [row]), 1e-9, "validations")
+        assert same.moves == []
+        assert "compared: 1, new ones: 0" in same.table().caption
+        off = [replace(row, highest_hz=row.highest_hz + 0.1)]
+        assert len(compared(path, of_validation(results.case_name, off), 0.05, "validations").moves)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "is not results.json"),
+        ('{"a": 1}', "is not results.json"),
+        ("[]", "has no frequencies to compare with"),
+        ('{"cases": []}', "has no frequencies to compare with"),
+        ('{"cases": [{"name": 1}]}', "is not results.json"),
+    ],
+)
+def test_what_is_no_earlier_result_is_refused(tmp_path, text, said):
+    (tmp_path / "x.json").write_text(text)
+    with pytest.raises(UsageError, match=said):
+        read_previous(tmp_path / "x.json", "answers")
+
+
+def test_results_of_other_cases_are_refused(tmp_path):
+    found = compared(summary(tmp_path / "s.json", ROW), Known("leg", ROW.frequencies))
+    with pytest.raises(UsageError, match="its cases are arm"):
+        found.table()
+
+
+def test_a_folder_without_results_and_a_file_that_is_not_there_are_refused(tmp_path):
+    with pytest.raises(UsageError, match="has no frequencies"):
+        read_previous(tmp_path, "answers")
+    with pytest.raises(UsageError, match="No such file"):
+        read_previous(tmp_path / "gone.json", "answers")
