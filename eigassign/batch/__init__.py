@@ -1,10 +1,15 @@
-"""Many cases in parallel processes.
+"""Many cases, none computed twice, whoever is killed meanwhile.
 
 Reading order:
 
     variants  the variants of a case: its `sweep`, or what --set says
     plan      which cases, in which order; the name and the key of each
     manifest  what is remembered of each as it finishes, and which plan a folder is of
-    workers   processes to run cases in, gone when the parent is
-    runner    a folder for each case, and a row of the summary
+    lock      who is at work in a folder, and at which case
+    limits    time and memory of a case
+    work      what a worker does: check a variant, run it
+    progress  what of a batch is done: setting up a folder, taking it up again
+    forecast  what a batch will take
+    workers   where tasks run: this process, or processes that are gone when the parent is
+    runner    all of it together: start there
 """

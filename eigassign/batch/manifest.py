@@ -35,6 +35,7 @@ class Header:
     cases: int  # of the whole plan
     shard: tuple[int, int]  # (i, n): cases of the plan with index % n == i − 1
     files: tuple[str, ...]  # the case files, as seen from the folder
+    keys: tuple[str, ...] = ()  # that its variants have values of
     columns: bool = False  # the cases have no folders
     version: str = __version__
     format: int = FORMAT
@@ -54,7 +55,8 @@ def read_header(folder: Path) -> Header | None:
         found = json.loads(read_bytes(folder / HEADER, STORED))
         if found["format"] != FORMAT:
             raise UsageError(f"{folder / HEADER} is of another version of eigassign: use --out")
-        found = {**found, "shard": tuple(found["shard"]), "files": tuple(found["files"])}
+        found = {**found, "shard": tuple(found["shard"])}
+        found |= {name: tuple(found[name]) for name in ("files", "keys")}
         return Header(**found)
     except (FileNotFoundError, NotADirectoryError):
         return None
@@ -136,20 +138,26 @@ def _cut(file: io.FileIO) -> int:
     return end
 
 
-def in_order(folder: Path, indices: range) -> Iterator[CaseOutcome]:
-    """The outcome of each of the cases that has one, in their order.
+class InOrder:
+    """The line of each case that has one, the last it has, in the order of ``indices``.
 
     The file is gone through once for where each line is, and then read line by line: memory is
     8 bytes a case.
     """
-    manifest, places = Manifest(folder), array("q", [-1]) * len(indices)
-    for start, line in manifest.lines():
-        if (found := _outcome(line)) is not None and found.index in indices:
-            places[indices.index(found.index)] = start
-    if max(places, default=-1) < 0:
-        return
-    with open(manifest.path, "rb") as file:
-        for place in places:
-            if place >= 0:
-                file.seek(place)
-                yield from_line(file.readline())
+
+    def __init__(self, folder: Path, indices: range) -> None:
+        self._path, places = folder / LINES, array("q", [-1]) * len(indices)
+        for start, line in Manifest(folder).lines():
+            if (found := _outcome(line)) is not None and found.index in indices:
+                places[indices.index(found.index)] = start
+        self._places = array("q", (place for place in places if place >= 0))
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def __iter__(self) -> Iterator[str]:
+        if self._places:
+            with open(self._path, encoding="utf-8") as file:
+                for place in self._places:
+                    file.seek(place)
+                    yield file.readline()

@@ -8,6 +8,7 @@ names say, its own values, and the version. So a result is known again wherever 
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -15,16 +16,17 @@ import re
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import accumulate
 from pathlib import Path
 
 from eigassign._version import __version__
 from eigassign.batch.variants import OPTION, Variants, variants_of
-from eigassign.case import read
+from eigassign.case import Unchecked, read
 from eigassign.case.reader import dotted
 from eigassign.case.values import key_path
 from eigassign.errors import EigassignError, Problem, StorageError, UsageError
+from eigassign.files import MATRIX, read_bytes
 from eigassign.modal.storage import ALGORITHM
 from eigassign.output.batch.files import NAMES
 from eigassign.output.run_record import MARKER
@@ -55,22 +57,25 @@ class CaseFile:
     prefix: str = ""  # of the names of variants
     is_set: bool = False  # the variants are from --set
 
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """That its variants have values of."""
+        return () if self.variants is None else self.variants.keys
+
     def __len__(self) -> int:
         return 1 if self.variants is None else len(self.variants)
 
     def variant(self, k: int, index: int) -> Variant:
         """Its k-th variant, which is the ``index``-th of the batch."""
         values = {} if self.variants is None else self.variants[k]
-        written = json.dumps(values, sort_keys=True)
-        key = hashlib.sha256(f"{self.content} {written}".encode()).hexdigest()
+        key = key_of(self.content, values, Path(self.path).parent)
         name = self.prefix + _named(self._short, values, key) if values else self.name
         return Variant(index, name, self.path, values, key)
 
     @cached_property
     def _short(self) -> Mapping[str, str]:
         """The end of each key that tells it from all others."""
-        keys = [] if self.variants is None else self.variants.keys
-        parts = {key: key.split(".") for key in keys}
+        parts = {key: key.split(".") for key in self.keys}
         ends = {key: [".".join(p[-n:]) for n in range(1, len(p) + 1)] for key, p in parts.items()}
         return {
             key: next(e for e in mine if sum(e in other for other in ends.values()) == 1)
@@ -136,16 +141,50 @@ def _planned(case: Path, name: str, settings: Sequence[str], several: bool) -> C
     except EigassignError as error:
         if settings:
             raise
-        return CaseFile(str(case), name, _content(str(error)))
+        return CaseFile(str(case), name, _hash([str(error)]))
     variants = variants_of(written.source, case.parent, settings)
     prefix = f"{name}," if several else ""
-    content = _content(written.content())
-    return CaseFile(str(case), name, content, variants, prefix, bool(settings))
+    return CaseFile(str(case), name, content_of(written), variants, prefix, bool(settings))
 
 
-def _content(case: str) -> str:
-    parts = [__version__, ALGORITHM, STUDY, case]
-    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+def content_of(case: Unchecked) -> str:
+    """SHA-256 of what a case file says, and of what else makes its numbers."""
+    return _hash([__version__, ALGORITHM, STUDY, case.content()])
+
+
+def key_of(content: str, values: Mapping[str, object], folder: Path) -> str:
+    """Key of the variant of a case in ``folder`` with this `content_of`; files count by content."""
+    digests = [_digest(folder / text) for text in _texts(values)]
+    return _hash([content, values, [digest for digest in digests if digest]])
+
+
+def _hash(parts: list[object]) -> str:
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def _texts(value: object) -> Iterator[str]:
+    """All text in a value, which may be the name of a file."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, (Mapping, tuple)):
+        for inner in value.values() if isinstance(value, Mapping) else value:
+            yield from _texts(inner)
+
+
+def _digest(file: Path) -> str | None:
+    """SHA-256 of a file, None where there is none."""
+    try:
+        status = os.stat(file)
+    except (OSError, ValueError):
+        return None
+    return _digest_once(file, status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=100)
+def _digest_once(file: Path, _time: int, _size: int) -> str | None:
+    with contextlib.suppress(OSError):
+        return hashlib.sha256(read_bytes(file, MATRIX)).hexdigest()
+    return None
 
 
 def variant_problem(plan: Plan, index: int, problem: Problem) -> Problem:

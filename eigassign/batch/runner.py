@@ -1,213 +1,106 @@
-"""Many cases in parallel processes, a run folder for each; a case that fails does not stop others.
+"""A batch: every case of a plan once, whoever is killed meanwhile, here or in other processes.
 
-The one seam is ``Executor.submit(run_case, path, options) -> small dict``: any
-``concurrent.futures`` executor will do, here or on a cluster. Workers write their own folders.
+    plan → check the variants → what the folder does not hold yet → tasks → a line of the manifest
+    for each result as it comes in → summaries
+
+Where tasks run is a `workers.Place`; they are `work.run_cases` of one or several variants. Workers
+write the folders of their cases, this process writes all else.
 """
 
 from __future__ import annotations
 
-import contextlib
-import signal
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
+from functools import partial
 
-from eigassign.batch.plan import folder_names
-from eigassign.batch.workers import cores, process_pool
-from eigassign.output.batch.files import write_files
-from eigassign.output.batch.outcome import CaseOutcome, frequency_ranges, to_line
-from eigassign.pipeline.run import Options, Outcome, optimize
-from eigassign.process import failure_of
+from eigassign.batch.lock import folder_lock
+from eigassign.batch.manifest import read_header
+from eigassign.batch.plan import Variant, variant_problem
+from eigassign.batch.progress import Batch, Progress, set_up, summarise
+from eigassign.batch.work import check_cases, outcome_of, run_cases
+from eigassign.batch.workers import Place, run_tasks, this_machine
+from eigassign.errors import CaseError, Problem, StorageError
+from eigassign.output.batch.outcome import CaseOutcome
 
-Row = dict[str, Any]  # what a worker sends back: plain text and numbers only
-MakePool = Callable[[int], contextlib.AbstractContextManager[Executor]]
-
-
-@dataclass(frozen=True)
-class CaseOptions:
-    """How one case is run; everything in it can be sent to another process."""
-
-    out: str
-    cache_dir: str | None = None
-    use_cache: bool = True
-    force: bool = False
-    figures: tuple[str, ...] = ("png",)
-    report: str = "light"
-    allow_outside: bool = False
+_CHECKED = 100  # variants in a task that checks them: half a second
+_SHOWN = 10  # problems of variants
+_PAUSE_S = 0.5  # between two looks at what other processes have in flight
 
 
-@dataclass(frozen=True)
-class Job:
-    """One case file and where its run goes."""
+def run(
+    batch: Batch,
+    place: Place,
+    on_start: Callable[[Progress], None],
+    on_outcome: Callable[[CaseOutcome], None],
+    join: bool = False,
+) -> Counter[str]:
+    """Run what is not done yet, and write the summaries; how many of all cases ended in which way.
 
-    case: str
-    options: CaseOptions
-
-
-def run_case(path: str, options: CaseOptions) -> Row:
-    """Run one case into its folder: the fields of a CaseOutcome. Never raises an Exception."""
-    start = time.perf_counter()
-    try:
-        row = _optimised(path, options)
-    except Exception as error:
-        row = _failure(error)
-    return _row(path, options, **row, seconds=time.perf_counter() - start)
-
-
-def _row(path: str, options: CaseOptions, **fields: object) -> Row:
-    return {"name": Path(options.out).name, "path": path, "seconds": 0.0, **fields}
-
-
-def _optimised(path: str, options: CaseOptions) -> Row:
-    cache_dir = Path(options.cache_dir) if options.cache_dir else None
-    how = Options(
-        Path(options.out),
-        cache_dir,
-        options.use_cache,
-        options.force,
-        options.figures,
-        report=options.report,
-        allow_outside=options.allow_outside,
-    )
-    outcome = optimize(Path(path), how)
-    error, found = outcome.results.error, outcome.results.assignment
-    return {
-        "status": _status(outcome),
-        "message": outcome.shortcoming or "",
-        "run_folder": outcome.folder and outcome.folder.name,
-        "initial_max_relative": error and error.initial.max_relative,
-        "predicted_max_relative": error and error.predicted and error.predicted.max_relative,
-        "exact_max_relative": error and error.exact.max_relative,
-        "design": tuple((row.name, row.optimal) for row in outcome.results.design),
-        "frequencies": frequency_ranges(outcome.results),
-        "verdict": found.verdict if found else "",
-    }
-
-
-def _status(outcome: Outcome) -> str:
-    """Failed where there is no answer at all, tolerance where there is one that is not enough."""
-    found = outcome.results.assignment
-    if outcome.shortcoming is None:
-        return "ok"
-    no_answer = found is not None and found.verdict in ("unreachable", "infeasible")
-    return "failed" if no_answer else "tolerance"
-
-
-def _failure(error: Exception) -> Row:
-    failure = failure_of(error)
-    return {"status": "failed" if failure.exit_code == 1 else "error", "message": failure.text}
-
-
-def plan(cases: Sequence[Path], options: CaseOptions) -> list[Job]:
-    """Each case with a folder of its own below ``options.out``, whatever order they come in."""
-    return [
-        Job(str(case), replace(options, out=str(Path(options.out, name))))
-        for case, name in zip(cases, folder_names(cases), strict=True)
-    ]
-
-
-def run_and_summarise(
-    jobs: Sequence[Job], workers: int | None, out: Path, on_row: Callable[[Row], None]
-) -> list[CaseOutcome]:
-    """Run the jobs and write their summaries; after an interrupt, of what there is."""
-    done: dict[str, Row] = {}
-
-    def record(row: Row) -> None:
-        done[row["path"]] = row
-        on_row(row)
-
-    out.mkdir(parents=True, exist_ok=True)
-    try:
-        run_batch(jobs, workers or cores(), record)
-    finally:
-        rows = [done.get(job.case) or not_run(job) for job in jobs]
-        outcomes = [CaseOutcome(**row) for row in rows]
-        write_files(out, map(to_line, outcomes), len(outcomes))
-    return outcomes
-
-
-def run_batch(
-    jobs: Sequence[Job],
-    workers: int,
-    on_row: Callable[[Row], None] = lambda _row: None,
-    executor: MakePool | None = None,
-) -> dict[str, Row]:
-    """Run every job; a row per case, in the order the jobs were given.
-
-    ``on_row`` is called with each as it comes in. When a worker dies, the pool is rebuilt, and the
-    cases that were running are run again, each alone in its own pool: so the one at fault shows.
+    ``on_start`` hears what is done already, ``on_outcome`` of each case that is run. After an
+    interrupt the summaries have what there is. Raises CaseError, before anything is written, where
+    a variant is no valid case, and StorageError where the folder is of another batch, or another
+    process is at work in it and this one is not to ``join``.
     """
-    rows: dict[str, Row] = {}
-    make = executor or process_pool
-
-    def record(row: Row) -> None:
-        rows[row["path"]] = row
-        on_row(row)
-
-    waiting = list(jobs)
-    while waiting:
-        for suspect in _until_broken(waiting, workers, make, record):
-            if _until_broken([suspect], 1, make, record):
-                record(_killed(suspect))
-        waiting = [job for job in waiting if job.case not in rows]
-    return {job.case: rows[job.case] for job in jobs}
-
-
-def _until_broken(
-    jobs: Sequence[Job], workers: int, make: MakePool, record: Callable[[Row], None]
-) -> list[Job]:
-    """Run jobs, at most ``workers`` in flight; the jobs in flight when the pool broke, if it did.
-
-    So few, because a broken pool does not say which of them was the cause.
-    """
-    waiting, running = list(jobs), dict[Future[Row], Job]()
-    with make(min(workers, len(jobs))) as pool:
+    require_valid(batch, place)
+    batch.folder.mkdir(parents=True, exist_ok=True)
+    with folder_lock(batch.folder) as lock:
+        if lock.enter(join):
+            set_up(batch)
+            lock.share()
+        elif read_header(batch.folder) != batch.header:
+            raise StorageError(f"{batch.folder}: the batch at work there is not this one")
+        progress = Progress(batch, lock)
+        on_start(progress)
         try:
-            while waiting or running:
-                while waiting and len(running) < workers:
-                    running[_submitted(pool, waiting[0])] = waiting[0]
-                    del waiting[0]
-                wait(running, return_when=FIRST_COMPLETED)
-                _collect(running, record)
-        except BrokenProcessPool:
-            return list(running.values()) or waiting[:1]
-    return []
+            _run(batch, progress, place, on_outcome)
+        finally:
+            summarise(batch.folder, batch.header)
+    return progress.ends
 
 
-def _collect(running: dict[Future[Row], Job], record: Callable[[Row], None]) -> None:
-    """Take out what is done; raises BrokenProcessPool once all other results are recorded."""
-    broken: BrokenProcessPool | None = None
-    for future in [future for future in running if future.done()]:
-        error = future.exception()
-        if isinstance(error, BrokenProcessPool):
-            broken = error
-            continue
-        job = running.pop(future)
-        record(_killed(job) if error else future.result())
-    if broken:
-        raise broken
+def require_valid(batch: Batch, place: Place) -> None:
+    """Check every variant of a sweep, once for each folder; raises CaseError."""
+    if not batch.plan.is_swept or read_header(batch.folder) == batch.header:
+        return
+    indices = [index for index in batch.header.indices() if batch.plan[index].values]
+    starts = range(0, len(indices), _CHECKED)
+    tasks = ([batch.plan[k] for k in indices[start : start + _CHECKED]] for start in starts)
+    wrong: dict[int, tuple[Problem, ...]] = {}
+    check = partial(check_cases, options=batch.options)
+    where = place if len(starts) > 1 else this_machine(1)
+    if run_tasks(where, tasks, check, lambda _task, found: wrong.update(found)):
+        raise StorageError("a process was killed while it checked variants: perhaps no memory")
+    if wrong:
+        found = [(index, problem) for index in sorted(wrong) for problem in wrong[index]]
+        problems = [variant_problem(batch.plan, *each) for each in found[:_SHOWN]]
+        many = f"{len(wrong)} of {len(indices)} variants are no valid cases: nothing was run"
+        raise CaseError((*problems, Problem(batch.plan.files[0].path, 0, 0, "", many)))
 
 
-def _killed(job: Job) -> Row:
-    message = "the process that ran it was killed, perhaps for want of memory"
-    return _row(job.case, job.options, status="error", message=message)
+def _run(
+    batch: Batch, progress: Progress, place: Place, on_outcome: Callable[[CaseOutcome], None]
+) -> None:
+    """Until all is done, here or elsewhere.
 
+    When a worker dies, those of the cases in flight are run again, each alone: so the one at fault
+    shows, and the others lose nothing.
+    """
 
-def not_run(job: Job) -> Row:
-    """Row of a case that an interrupt came before."""
-    return _row(job.case, job.options, status="error", message="not run: interrupted before")
+    def keep(_task: Sequence[Variant], found: Sequence[CaseOutcome]) -> None:
+        for outcome in found:
+            progress.keep(outcome)
+            on_outcome(outcome)
 
-
-def _submitted(pool: Executor, job: Job) -> Future[Row]:
-    """Submit with SIGINT blocked: processes started here inherit that, Ctrl-C is the parent's."""
-    if not hasattr(signal, "pthread_sigmask"):
-        return pool.submit(run_case, job.case, job.options)
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        return pool.submit(run_case, job.case, job.options)
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    why = "memory or time" if batch.options.seconds else "memory"
+    killed = f"the process that ran it was killed, perhaps for want of {why}"
+    work = partial(run_cases, options=batch.options)
+    while progress.done < progress.total:
+        done = progress.done
+        suspects = run_tasks(place, progress.tasks(), work, keep)
+        for task in ([variant] for suspect in suspects for variant in suspect):
+            if run_tasks(place, iter([task]), work, keep, slots=1):
+                keep(task, [outcome_of(task[0], "error", message=killed)])
+        if progress.done == done:
+            time.sleep(_PAUSE_S)
+            progress.refresh()

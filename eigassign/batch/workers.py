@@ -1,17 +1,27 @@
-"""Processes to run cases in: one BLAS thread each, gone when the parent is."""
+"""Where cases run: this process, or a pool of processes that are gone when their parent is."""
 
 from __future__ import annotations
 
 import contextlib
+import itertools
 import multiprocessing
 import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from types import FrameType
-from typing import Any
+from typing import Any, TypeVar
 
 from eigassign.process import (
     ONE_THREAD,
@@ -20,6 +30,8 @@ from eigassign.process import (
     unwind_when_terminated,
 )
 
+T = TypeVar("T")
+R = TypeVar("R")
 _PATIENCE_S = 5.0  # for workers to clean up after an interrupt
 
 
@@ -30,13 +42,56 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
+@dataclass(frozen=True)
+class Place:
+    """Where tasks run: ``open(slots)`` gives an executor that has so many of them at a time.
+
+    Cases are put together to tasks of about ``task_s`` seconds; of 0 each is a task of its own.
+    """
+
+    slots: int
+    open: Callable[[int], AbstractContextManager[Executor]]
+    task_s: float = 0.0
+
+
+def this_machine(jobs: int | None) -> Place:
+    """This process for one job, else a pool of processes; None is one for each core."""
+    slots = jobs or cores()
+    return Place(slots, in_this_process if slots == 1 else process_pool)
+
+
+class _Here(Executor):
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+@contextlib.contextmanager
+def in_this_process(_slots: int) -> Iterator[Executor]:
+    """Each task as it is submitted, in this process; nobody is there to see it killed."""
+    yield _Here()
+
+
+class _Pool(ProcessPoolExecutor):
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """With SIGINT blocked: processes started here inherit that, Ctrl-C is the parent's."""
+        if not hasattr(signal, "pthread_sigmask"):
+            return super().submit(fn, *args, **kwargs)
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            return super().submit(fn, *args, **kwargs)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 @contextlib.contextmanager
 def process_pool(workers: int) -> Iterator[Executor]:
     """Fresh processes, each with one BLAS thread; on an error inside they are stopped at once."""
     others = set(multiprocessing.active_children())
     with environment(ONE_THREAD):  # before NumPy is imported there
         context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers, context, _prepare_worker) as pool:
+        with _Pool(workers, context, _prepare_worker) as pool:
             try:
                 yield pool
             except BaseException:
@@ -83,6 +138,7 @@ def _end_soon(number: int, frame: FrameType | None) -> None:
     ignores what a callback of a weak reference raises. A pool that ends its workers, because one of
     them was killed, would wait for such a worker for ever.
     """
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)  # it may be that of a case's time
     signal.alarm(int(_PATIENCE_S))  # ends the process
     raise_terminated(number, frame)
 
@@ -95,3 +151,45 @@ def _follow_parent() -> None:
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGTERM)
         time.sleep(_PATIENCE_S)
         os.kill(os.getpid(), signal.SIGKILL)
+
+
+# --- Tasks
+
+
+def run_tasks(
+    place: Place,
+    tasks: Iterator[T],
+    work: Callable[[T], R],
+    keep: Callable[[T, R], None],
+    slots: int | None = None,
+) -> list[T]:
+    """Work on tasks, at most ``slots`` in flight, and keep each result; the tasks that were lost.
+
+    These are the ones in flight when a process of the pool died: it is not known which of them was
+    the cause. Tasks are taken one by one, and none is after that.
+    """
+    running: dict[Future[R], T] = {}
+    slots = slots or place.slots
+    lost: list[T] = []
+    broken = False
+    with place.open(slots) as pool:
+        try:
+            while True:
+                while len(running) < slots and (taken := list(itertools.islice(tasks, 1))):
+                    lost += taken  # until it is in flight
+                    running[pool.submit(work, *taken)] = lost.pop()
+                if not running:
+                    break
+                wait(running, return_when=FIRST_COMPLETED)
+                for future in [future for future in running if future.done()]:
+                    task, error = running.pop(future), future.exception()
+                    if error is None:
+                        keep(task, future.result())
+                    else:
+                        lost.append(task)
+                        broken = broken or isinstance(error, BrokenExecutor)
+                if broken:
+                    break
+        except BrokenExecutor:
+            pass
+    return [*lost, *running.values()]

@@ -14,6 +14,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -53,14 +54,18 @@ class Unchecked:
         """Of its bytes."""
         return hashlib.sha256(self.data).hexdigest()
 
-    def content(self) -> str:
-        """SHA-256 of what it says and of every file it names, whatever its `sweep` is.
+    @cached_property
+    def _said(self) -> str:
+        return json.dumps({k: body for k, body in self.source.tree.items() if k != "sweep"})
 
-        Comments, the order of lines that say the same, and places of files count for nothing.
+    def content(self) -> str:
+        """SHA-256 of what it says, its `sweep` apart, and of every file it names.
+
+        Comments, the form of its lines, and places of files count for nothing.
         """
         tree = {key: body for key, body in self.source.tree.items() if key != "sweep"}
         digests = _digests(named_files(tree, self.path.parent), self.path.parent)
-        return hashlib.sha256(json.dumps([tree, [*digests.values()]]).encode()).hexdigest()
+        return hashlib.sha256(" ".join([self._said, *digests.values()]).encode()).hexdigest()
 
 
 def load(path: str | Path, allow_outside: bool = False) -> CaseFile:

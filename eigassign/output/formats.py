@@ -27,6 +27,14 @@ def seconds(value: float) -> str:
     return f"{1000.0 * value:.3g} ms" if abs(value) < 1.0 else f"{value:.3g} s"
 
 
+def duration(value: float) -> str:
+    """Two digits, in the unit that people would take: ``50 s``, ``3.2 min``, ``27 h``."""
+    for size, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
+        if value >= 2.0 * size:
+            return f"{value / size:.2g} {unit}"
+    return f"{value:.2g} s"
+
+
 def residual(value: float) -> str:
     """Two digits and a power of ten: ``3.1e-17``."""
     return f"{value:.1e}"

@@ -68,7 +68,6 @@ class Options:
     force: bool = False  # a folder that another case wrote is moved aside
     figures: tuple[str, ...] = ("png",)  # of png, svg and pdf; none are drawn if empty
     report: str = "full"  # full, light or none
-    draw_failed_only: bool = False  # figures and report only of an answer not to build on
     study: str = "cheap"  # of what the answer means: none, cheap or all
     allow_outside: bool = False  # the case may name files outside its own folder
     progress: Callable[[str], None] = field(
@@ -261,18 +260,12 @@ def optimize(path: str | Path, options: Options = DEFAULT) -> Outcome:
 
     Raises StorageError before anything is computed where the folder may not be replaced.
     """
-    return optimize_case(load_case(path, options.allow_outside), options)
-
-
-def optimize_case(case: Case, options: Options = DEFAULT) -> Outcome:
-    """`optimize` of a case that is loaded already."""
     stages = Stages(options.progress)
+    case = load_case(path, options.allow_outside)
     with new_run_folder(case.file, options.out, options.force) as folder:
         results = solve_case(case, options).results
         options.progress("writing the report")
-        drawn = results.shortcoming is not None or not options.draw_failed_only
-        figures, report = (options.figures, options.report) if drawn else ((), "none")
-        folder.write(results, figures, report)
+        folder.write(results, options.figures, options.report)
     return _outcome(folder, results, stages)
 
 

@@ -8,13 +8,13 @@ import pytest
 
 from eigassign.batch.manifest import (
     Header,
+    InOrder,
     Manifest,
-    in_order,
     read_header,
     write_header,
 )
 from eigassign.errors import UsageError
-from eigassign.output.batch.outcome import CaseOutcome, Status
+from eigassign.output.batch.outcome import CaseOutcome, Status, from_line
 
 
 def row(index: int, status: Status = "ok") -> CaseOutcome:
@@ -55,9 +55,11 @@ def test_rows_come_in_the_order_of_the_plan_and_the_last_of_a_case_counts(tmp_pa
         manifest.append(each)
     with open(manifest.path, "ab") as file:
         file.write(b"nonsense\n[1]\n")
-    assert list(in_order(tmp_path, range(1, 8, 2))) == [row(3), row(5)]
-    assert list(in_order(tmp_path, range(10, 12))) == []
-    assert list(in_order(tmp_path / "none", range(3))) == []
+    lines = InOrder(tmp_path, range(1, 8, 2))
+    assert list(map(from_line, lines)) == [row(3), row(5)]
+    assert len(lines) == 2
+    assert list(InOrder(tmp_path, range(10, 12))) == []
+    assert list(InOrder(tmp_path / "none", range(3))) == []
 
 
 def test_a_header_reads_back_and_a_damaged_one_is_refused(tmp_path: Path) -> None:

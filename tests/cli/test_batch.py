@@ -17,11 +17,14 @@ import pytest
 from commands import python
 from wrong_inputs import GOOD
 
-from eigassign.batch import runner as many
-from eigassign.batch.plan import find_cases, folder_names
-from eigassign.batch.runner import CaseOptions, Job, Row, run_batch
-from eigassign.batch.workers import process_pool
+from eigassign.batch import work
+from eigassign.batch.plan import find_cases, folder_names, plan_of
+from eigassign.batch.progress import Batch
+from eigassign.batch.runner import run
+from eigassign.batch.work import CaseOptions
+from eigassign.batch.workers import Place, process_pool
 from eigassign.cli import main
+from eigassign.output.batch.outcome import CaseOutcome
 from eigassign.process import Terminated
 
 STRICT = GOOD.replace("50 %", "1e-9") + "assignment: {method: one_shot}\n"
@@ -33,20 +36,19 @@ INFEASIBLE = GOOD.replace("max: 1}", BOUND)
 # as well.
 KILLING = """
 import os, signal, sys, time
-from pathlib import Path
-import eigassign.pipeline.run
+import eigassign.batch.work
 
-solved = eigassign.pipeline.run.optimize
+solved = eigassign.batch.work.solve_case
 
-def optimize(path, options):
-    if Path(path).stem.startswith("kill"):
+def solve_case(case, options):
+    if case.file.path.stem.startswith("kill"):
         time.sleep(0.5)
         os.kill(os.getpid(), signal.SIGKILL)
-    if Path(path).stem.startswith("slow"):
+    if case.file.path.stem.startswith("slow"):
         time.sleep(1.5)
-    return solved(path, options)
+    return solved(case, options)
 
-eigassign.pipeline.run.optimize = optimize
+eigassign.batch.work.solve_case = solve_case
 if __name__ == "__main__":
     from eigassign.cli import main
     sys.exit(main())
@@ -92,8 +94,8 @@ def test_a_batch_keeps_going_past_every_kind_of_failure(
     assert "mechanism: required key is missing" in rows["wrong"]["message"]
     assert rows["good"]["design"].startswith("m=")
     written = {path.name for path in Path("results").iterdir()}
-    files = {"summary.csv", "summary.json", "junit.xml", "index.html"}
-    assert written == {"good", "strict", "infeasible", *files}
+    assert {"good", "strict", "infeasible", "summary.csv", "junit.xml"} < written
+    assert "wrong" not in written
     assert "eigassign: 3 of 4 cases failed" in err
     assert err.count("case ") >= 4
     assert "tolerance" in out
@@ -156,32 +158,15 @@ def test_an_interrupt_stops_the_workers_and_is_passed_on(_again: int) -> None:
     assert set(multiprocessing.active_children()) == before
 
 
-def test_an_interrupt_leaves_a_summary_of_what_was_finished(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    jobs = [Job(f"{name}.yaml", CaseOptions(f"runs/{name}")) for name in "ab"]
-
-    def interrupted(jobs: list[Job], _workers: int, keep: object) -> None:
-        assert callable(keep)
-        keep({"name": "a", "path": "a.yaml", "seconds": 0.0, "status": "ok"})
-        raise Terminated(signal.SIGTERM)
-
-    monkeypatch.setattr(many, "run_batch", interrupted)
-    with pytest.raises(Terminated):
-        many.run_and_summarise(jobs, 1, Path("runs"), lambda _row: None)
-    assert {name: row["status"] for name, row in summary("runs").items()} == {
-        "a": "ok",
-        "b": "error",
-    }
-    assert "not run" in summary("runs")["b"]["message"]
-
-
 class InThisProcess(Executor):
     """An executor that is not a process pool: what a cluster's would look like."""
 
     def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
-        future: Future[Row] = Future()
-        if "poison" in args[0]:
+        future: Future[list[CaseOutcome]] = Future()
+        names = [variant.name for variant in args[0]]
+        if "interrupt" in names:
+            raise Terminated(signal.SIGTERM)
+        if "poison" in names:
             future.set_exception(RuntimeError("worker lost"))
         else:
             future.set_result(fn(*args, **kwargs))
@@ -189,25 +174,41 @@ class InThisProcess(Executor):
 
 
 @contextmanager
-def in_this_process(_workers: int) -> Iterator[Executor]:
+def in_this_process(_slots: int) -> Iterator[Executor]:
     with InThisProcess() as pool:
         yield pool
 
 
+def batch_of(*names: str) -> Batch:
+    cases = [write(f"{name}.yaml") for name in names]
+    return Batch(plan_of(cases), Path("runs"), CaseOptions("runs", reports="none"))
+
+
+def test_an_interrupt_leaves_a_summary_of_what_was_finished() -> None:
+    with pytest.raises(Terminated):
+        run(batch_of("a", "interrupt", "b"), Place(1, in_this_process), print, print)
+    assert {name: row["status"] for name, row in summary("runs").items()} == {"a": "ok"}
+
+
 def test_any_executor_will_do_and_may_lose_a_case() -> None:
-    write("a.yaml")
-    jobs = [Job(f"{name}.yaml", CaseOptions(f"runs/{name}")) for name in ("a", "poison")]
     heard: list[str] = []
-    rows = run_batch(jobs, 3, lambda row: heard.append(row["name"]), in_this_process)
-    assert [row["status"] for row in rows.values()] == ["ok", "error"]
+    ends = run(
+        batch_of("a", "poison"),
+        Place(3, in_this_process),
+        lambda _progress: None,
+        lambda found: heard.append(found.name),
+    )
+    assert ends == {"ok": 1, "error": 1}
     assert sorted(heard) == ["a", "poison"]
+    assert "killed" in summary("runs")["poison"]["message"]
 
 
-def test_a_bug_in_one_case_is_a_row_and_not_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(many, "optimize", lambda _path, _options: 1 / 0)
-    row = many.run_case("a.yaml", CaseOptions("runs/a"))
-    assert row["status"] == "error"
-    assert "ZeroDivisionError" in row["message"]
+def test_a_bug_in_one_case_is_an_outcome_and_not_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(work, "solve_case", lambda _case, _options: 1 / 0)
+    batch = batch_of("a")
+    (found,) = work.run_cases([batch.plan[0]], batch.options)
+    assert found.status == "error"
+    assert "ZeroDivisionError" in found.message
 
 
 def test_stems_that_collide_get_folders_that_tell_them_apart() -> None:

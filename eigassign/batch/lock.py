@@ -1,0 +1,120 @@
+"""One lock file a folder: who is at work there, and at which of its cases.
+
+Its single bytes are locked (``fcntl.lockf``), so that the system lets go of them with the process
+that holds them, however that ends:
+
+    byte 0      who is at work: held alone while the folder is set up, then shared
+    byte 1      a line of the manifest is being written
+    byte 2 + k  case k is in flight
+
+Windows and some network file systems have no such locks. There one batch at a time is on its word.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from eigassign.errors import StorageError
+
+NAME = ".lock"
+_PRESENCE, _LINE, _CASES = 0, 1, 2
+_PAUSE_S = 0.1
+
+
+class FolderLock:
+    """The lock of a batch folder, held by this process; see `folder_lock`."""
+
+    def __init__(self, folder: Path, descriptor: int) -> None:
+        self._folder, self._file = folder, descriptor
+        self._fcntl: Any = None
+        with contextlib.suppress(ImportError):
+            import fcntl
+
+            self._fcntl = fcntl
+
+    def enter(self, join: bool) -> bool:
+        """Whether this process is the first at work here, and alone until `share`.
+
+        With ``join`` it waits until the first one has set up the folder; else raises StorageError
+        where anybody is at work.
+        """
+        if not self._try(_PRESENCE):
+            if not join:
+                message = f"another batch is at work in {self._folder} ({self._who()})"
+                raise StorageError(f"{message}: wait for it, use --out, or work along with --join")
+            while not self._try(_PRESENCE, shared=True):
+                time.sleep(_PAUSE_S)
+            os.lseek(self._file, 0, os.SEEK_END)
+            os.write(self._file, _me().encode())
+            return False
+        os.ftruncate(self._file, 0)
+        os.lseek(self._file, 0, os.SEEK_SET)
+        os.write(self._file, _me().encode())
+        return True
+
+    def share(self) -> None:
+        """The folder is set up: others may join."""
+        self._try(_PRESENCE, shared=True)
+
+    def claim(self, case: int) -> bool:
+        """Take a case; False where another process has it in flight."""
+        return self._try(_CASES + case)
+
+    def release(self, case: int) -> None:
+        """Let go of a case."""
+        self._unlock(_CASES + case)
+
+    @contextlib.contextmanager
+    def line(self) -> Iterator[None]:
+        """Held while a line of the manifest is written."""
+        if self._fcntl is not None:
+            with contextlib.suppress(OSError):
+                self._fcntl.lockf(self._file, self._fcntl.LOCK_EX, 1, _LINE)
+        try:
+            yield
+        finally:
+            self._unlock(_LINE)
+
+    def _try(self, byte: int, shared: bool = False) -> bool:
+        if self._fcntl is None:
+            return True
+        kind = self._fcntl.LOCK_SH if shared else self._fcntl.LOCK_EX
+        try:
+            self._fcntl.lockf(self._file, kind | self._fcntl.LOCK_NB, 1, byte)
+        except (BlockingIOError, PermissionError):  # the systems differ in which
+            return False
+        except OSError:  # a file system without locks
+            return True
+        return True
+
+    def _unlock(self, byte: int) -> None:
+        if self._fcntl is not None:
+            with contextlib.suppress(OSError):
+                self._fcntl.lockf(self._file, self._fcntl.LOCK_UN, 1, byte)
+
+    def _who(self) -> str:
+        os.lseek(self._file, 0, os.SEEK_SET)
+        return ", ".join(os.read(self._file, 1000).decode(errors="replace").splitlines())
+
+
+def _me() -> str:
+    return f"process {os.getpid()} on {socket.gethostname()}\n"
+
+
+@contextlib.contextmanager
+def folder_lock(folder: Path) -> Iterator[FolderLock]:
+    """The lock of a batch folder, which is there; nothing is locked before `FolderLock.enter`."""
+    try:
+        descriptor = os.open(folder / NAME, os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError as error:
+        raise StorageError(f"{folder / NAME}: cannot be opened: {error.strerror}") from error
+    try:
+        yield FolderLock(folder, descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,179 @@
+"""What of a batch is done: a folder is set up or taken up again, its cases are given out and kept.
+
+A result is current where its key is that of the case now, and whole where its line is in the
+manifest and its folder beside it; which folders there are is asked once, and in none is looked.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import os
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from eigassign.batch.lock import FolderLock
+from eigassign.batch.manifest import (
+    LINES,
+    Header,
+    InOrder,
+    Manifest,
+    read_header,
+    write_header,
+)
+from eigassign.batch.plan import Plan, Variant
+from eigassign.batch.work import CaseOptions
+from eigassign.errors import StorageError
+from eigassign.output.batch.files import write_files
+from eigassign.output.batch.outcome import CaseOutcome, to_line
+from eigassign.output.run_record import relative_path
+from eigassign.output.storage import replace_synced
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What is run, where its results go, and how each case is run."""
+
+    plan: Plan
+    folder: Path
+    options: CaseOptions
+    shard: tuple[int, int] = (1, 1)  # (i, n): the cases with index % n == i − 1
+
+    @property
+    def header(self) -> Header:
+        """What batch.json says of it."""
+        folder = Path(os.path.realpath(self.folder))
+        files = tuple(relative_path(Path(f.path), folder) for f in self.plan.files)
+        keys = tuple(dict.fromkeys(key for f in self.plan.files for key in f.keys))
+        plan, count = self.plan.digest, len(self.plan)
+        return Header(plan, count, self.shard, files, keys, self.options.columns)
+
+
+def set_up(batch: Batch) -> None:
+    """Make the folder one of this batch; what it holds of the batch as it was before is kept.
+
+    Raises StorageError where it holds another batch, which ``force`` moves aside.
+    """
+    folder, header = batch.folder, batch.header
+    before = read_header(folder)
+    if before == header:
+        return
+    kept, others = _current(batch)
+    foreign = before is not None and not kept and not set(before.files) & set(header.files)
+    if before is not None and foreign and not batch.options.force:
+        raise StorageError(
+            f"{folder} holds another batch (of {', '.join(before.files[:3])}); it was left "
+            "alone. Choose another folder with --out, or use --force to move its list aside"
+        )
+    if others:
+        _move_aside(folder / LINES)
+    replace_synced(folder / LINES, "".join(f"{to_line(found)}\n" for found in kept).encode())
+    write_header(folder, header)
+
+
+def _current(batch: Batch) -> tuple[list[CaseOutcome], bool]:
+    """The outcomes in the folder that are those of cases of the plan as they are now.
+
+    And whether there are outcomes of cases that are not in the plan.
+    """
+    known, kept = {found.name: found for found in Manifest(batch.folder).news()}, []
+    for index in batch.header.indices() if known else ():
+        variant = batch.plan[index]
+        found = known.pop(variant.name, None)
+        if found is not None and found.key == variant.key:
+            kept.append(replace(found, index=index, path=variant.path))
+    return kept, bool(known)
+
+
+def outcomes_in(batch: Batch) -> Iterator[CaseOutcome]:
+    """The whole and current outcomes that the folder holds; nothing is locked or changed."""
+    if read_header(batch.folder) == batch.header:
+        return _whole(batch, Manifest(batch.folder).news())
+    return _whole(batch, _current(batch)[0])
+
+
+def _whole(batch: Batch, outcomes: Iterable[CaseOutcome]) -> Iterator[CaseOutcome]:
+    """Those that need not be tried again, and have their folder."""
+    folders = None
+    for found in outcomes:
+        if folders is None:
+            folders = set(os.listdir(batch.folder))
+        if found.status != "error" and (batch.options.columns or found.run_folder in folders):
+            yield found
+
+
+def _move_aside(path: Path) -> None:
+    """Keep a file as ``name.1``, or the first number that is free."""
+    names = (path.with_name(f"{path.name}.{k}") for k in itertools.count(1))
+    with contextlib.suppress(FileNotFoundError):
+        os.rename(path, next(name for name in names if not name.exists()))
+
+
+class Progress:
+    """Which cases of a batch are done, in this process or another one.
+
+    ``ends`` counts how they ended. A case that ended in an error before is not done: it is tried
+    again.
+    """
+
+    def __init__(self, batch: Batch, lock: FolderLock) -> None:
+        self._plan, self._indices, self._lock = batch.plan, batch.header.indices(), lock
+        self._ends = [""] * len(self._indices)
+        self._manifest = Manifest(batch.folder, lock.line)
+        self.ends: Counter[str] = Counter()
+        for found in _whole(batch, self._manifest.news()):
+            self._note(found)
+
+    @property
+    def total(self) -> int:
+        """How many cases there are."""
+        return len(self._indices)
+
+    @property
+    def done(self) -> int:
+        """How many of them are done."""
+        return self.ends.total()
+
+    def tasks(self, size: int = 1) -> Iterator[Sequence[Variant]]:
+        """What is neither done nor in flight in another process, so many cases at a time."""
+        task: list[Variant] = []
+        for k, index in enumerate(self._indices):
+            if self._ends[k] or not self._lock.claim(index):
+                continue
+            self.refresh()
+            if self._ends[k]:
+                self._lock.release(index)
+                continue
+            task.append(self._plan[index])
+            if len(task) >= size:
+                yield task
+                task = []
+        if task:
+            yield task
+
+    def refresh(self) -> None:
+        """Take note of what other processes have done."""
+        for found in self._manifest.news():
+            self._note(found)
+
+    def keep(self, found: CaseOutcome) -> None:
+        """Write down how a case ended, and let go of it."""
+        self._manifest.append(found)
+        self._note(found)
+        self._lock.release(found.index)
+
+    def _note(self, found: CaseOutcome) -> None:
+        if found.index in self._indices:
+            k = self._indices.index(found.index)
+            if before := self._ends[k]:
+                self.ends[before] -= 1
+            self._ends[k] = found.status
+            self.ends[found.status] += 1
+
+
+def summarise(folder: Path, header: Header) -> None:
+    """Make the summaries anew from the lines of the manifest, in the order of the plan."""
+    lines = InOrder(folder, header.indices())
+    write_files(folder, lines, len(lines), header.keys, header.columns)

@@ -1,0 +1,162 @@
+"""What a worker does: check a variant, or run it, into its folder or for its numbers only."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from eigassign.batch.limits import OutOfTimeError, limited
+from eigassign.batch.plan import STUDY, Variant, content_of, key_of
+from eigassign.case import Unchecked, checked, read
+from eigassign.errors import CaseError, EigassignError, Problem, UsageError
+from eigassign.output.batch.outcome import CaseOutcome, Status, frequency_ranges
+from eigassign.pipeline.run import Options, solve_case
+from eigassign.pipeline.run_files import new_run_folder
+from eigassign.process import failure_of
+from eigassign.study.built_case import Case
+from eigassign.study.results import RunResults
+
+
+@dataclass(frozen=True)
+class CaseOptions:
+    """How each case is run; everything in it can be sent to another process."""
+
+    out: str  # the folder of the batch
+    cache_dir: str | None = None
+    use_cache: bool = True
+    force: bool = False
+    figures: tuple[str, ...] = ("png",)
+    reports: str = "all"  # of which cases there are figures and a report: all, failed or none
+    columns: bool = False  # the cases have no folders
+    allow_outside: bool = False
+    seconds: float | None = None  # that a case may take
+    megabytes: float | None = None
+
+
+# --- Reading and checking
+
+
+def check_cases(
+    variants: Sequence[Variant], options: CaseOptions
+) -> list[tuple[int, tuple[Problem, ...]]]:
+    """The index of every variant that is no valid case, and what is wrong with it."""
+    found = []
+    for variant in variants:
+        try:
+            load(variant, options)
+        except CaseError as error:
+            found.append((variant.index, error.problems))
+        except EigassignError as error:
+            found.append((variant.index, (Problem(variant.path, 0, 0, "", str(error)),)))
+    return found
+
+
+def load(variant: Variant, options: CaseOptions) -> Case:
+    """The case of a variant; raises CaseError."""
+    return Case(checked(_written(variant.path), options.allow_outside, variant.values))
+
+
+def _written(path: str) -> Unchecked:
+    """The case file, parsed once as long as it stays the same."""
+    try:
+        status = os.stat(path)
+    except OSError:
+        return read(path)
+    return _parsed(path, status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=4)
+def _parsed(path: str, _time: int, _size: int) -> Unchecked:
+    return read(path)
+
+
+# --- Running
+
+
+def run_cases(variants: Sequence[Variant], options: CaseOptions) -> list[CaseOutcome]:
+    """How each of them ended. Never raises an Exception."""
+    return [_run(variant, options) for variant in variants]
+
+
+def _run(variant: Variant, options: CaseOptions) -> CaseOutcome:
+    start = perf_counter()
+    try:
+        with limited(options.seconds, options.megabytes):
+            found = _solved(variant, options)
+    except OutOfTimeError:
+        message = f"takes longer than the {options.seconds:g} s of --case-time"
+        found = {"status": "error", "message": message}
+    except MemoryError:
+        limit = f" (--case-memory is {options.megabytes:g} MB)" if options.megabytes else ""
+        found = {"status": "error", "message": f"out of memory{limit}"}
+    except Exception as error:
+        failure = failure_of(error)
+        status: Status = "failed" if failure.exit_code == 1 else "error"
+        found = {"status": status, "message": failure.text}
+    return outcome_of(variant, seconds=perf_counter() - start, **found)
+
+
+def outcome_of(variant: Variant, status: Status, seconds: float = 0.0, **found: Any) -> CaseOutcome:
+    """How this variant ended."""
+    return CaseOutcome(
+        variant.name,
+        variant.path,
+        status,
+        seconds,
+        values=variant.values,
+        index=variant.index,
+        key=variant.key,
+        **found,
+    )
+
+
+def _solved(variant: Variant, options: CaseOptions) -> dict[str, Any]:
+    case, written = load(variant, options), _written(variant.path)
+    if key_of(content_of(written), variant.values, written.path.parent) != variant.key:
+        raise UsageError("the case file, or a file it names, was changed since the batch began")
+    cache_dir = Path(options.cache_dir) if options.cache_dir else None
+    how = Options(None, cache_dir, options.use_cache, report="none", study=STUDY)
+    if options.columns:
+        return _found(_uninterrupted(case, how))
+    with new_run_folder(case.file, Path(options.out, variant.name), options.force) as folder:
+        results = _uninterrupted(case, how)
+        failed = results.shortcoming is not None
+        drawn = options.reports == "all" or (options.reports == "failed" and failed)
+        folder.write(results, options.figures if drawn else (), "light" if drawn else "none")
+    return {"run_folder": variant.name, **_found(results)}
+
+
+def _uninterrupted(case: Case, how: Options) -> RunResults:
+    """The answer; Ctrl-C ends a batch, and makes no answer of the best design so far."""
+    results = solve_case(case, how).results
+    if results.assignment is not None and results.assignment.ended == "interrupted":
+        raise KeyboardInterrupt
+    return results
+
+
+def _found(results: RunResults) -> dict[str, Any]:
+    error, found = results.error, results.assignment
+    return {
+        "status": _status(results),
+        "message": results.shortcoming or "",
+        "verdict": found.verdict if found else "",
+        "initial_max_relative": error and error.initial.max_relative,
+        "predicted_max_relative": error and error.predicted and error.predicted.max_relative,
+        "exact_max_relative": error and error.exact.max_relative,
+        "design": tuple((row.name, row.optimal) for row in results.design),
+        "frequencies": frequency_ranges(results),
+    }
+
+
+def _status(results: RunResults) -> Status:
+    """Failed where there is no answer at all, tolerance where there is one that is not enough."""
+    if results.shortcoming is None:
+        return "ok"
+    found = results.assignment
+    no_answer = found is not None and found.verdict in ("unreachable", "infeasible")
+    return "failed" if no_answer else "tolerance"
