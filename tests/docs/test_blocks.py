@@ -2,7 +2,8 @@
 
 Page by page, from top to bottom, in a folder with `cases/`:
 
-    bash    line by line; `# exit code 1` behind a command is the code that it must have
+    bash    line by line; `# exit code 1` behind a command is the code that it must have. A script
+            with `#SBATCH --array=1-2` is run once for each number
     yaml    with a title a whole case, otherwise top-level keys in the place of those of a case; a
             comment in its first line names the file, else it is a part of the paper's arm
     python  one after the other
@@ -75,20 +76,31 @@ class Reader:
                 exec(text, self.names)
 
     def run(self, text: str) -> None:
+        array = re.search(r"^#SBATCH --array=1-(\d+)$", text, re.MULTILINE)
         printed = []
-        for line in text.splitlines():
-            command, _, code = line.partition("  # exit code ")
-            words = shlex.split(command.partition(" > ")[0])
-            assert words[0] == "eigassign", line
-            if not self.all_of_it:
-                words = [word for word in words if word != "--draw"]
-                if words[1] not in QUICK:
-                    return
-            assert main(words[1:]) == int(code or 0), line
-            printed.append(self.capsys.readouterr().out)
-            if ">" in command:
-                Path(command.partition(" > ")[2]).write_text(printed.pop(), encoding="utf-8")
-        self.printed = "".join(printed)
+        for task in range(1, int(array[1] if array else 1) + 1):
+            for line in text.replace("$SLURM_ARRAY_TASK_ID", str(task)).splitlines():
+                if line and not line.startswith("#"):
+                    printed.append(self.command(line))
+                    if printed[-1] is None:
+                        return
+        self.printed = "".join(filter(None, printed))
+
+    def command(self, line: str) -> str | None:
+        """What it prints; None if it is left to the slow tests."""
+        command, _, code = line.partition("  # exit code ")
+        command, _, into = command.partition(" > ")
+        program, *words = (name for word in shlex.split(command) for name in expanded(word))
+        assert program == "eigassign", line
+        if not self.all_of_it:
+            words = [word for word in words if word != "--draw"]
+            if words[0] not in QUICK:
+                return None
+        assert main(words) == int(code or 0), line
+        said = self.capsys.readouterr().out
+        if into:
+            Path(into).write_text(said, encoding="utf-8")
+        return "" if into else said
 
     def compare(self, text: str) -> None:
         if self.printed is not None:
@@ -108,6 +120,11 @@ class Reader:
                 keys.pop("expansion", None)  # it may be about another design
         path.write_text("".join(keys.values()), encoding="utf-8")
         load(path)
+
+
+def expanded(word: str) -> list[str]:
+    """The files that a pattern means."""
+    return sorted(map(str, Path().glob(word))) if "*" in word else [word]
 
 
 def parts(text: str) -> dict[str, str]:
