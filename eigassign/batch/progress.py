@@ -67,7 +67,7 @@ def set_up(batch: Batch) -> None:
             f"{folder} holds another batch (of {', '.join(before.files[:3])}); it was left "
             "alone. Choose another folder with --out, or use --force to move its list aside"
         )
-    if others:
+    if others or foreign:
         _move_aside(folder / LINES)
     replace_synced(folder / LINES, "".join(f"{to_line(found)}\n" for found in kept).encode())
     write_header(folder, header)
@@ -95,12 +95,13 @@ def outcomes_in(batch: Batch) -> Iterator[CaseOutcome]:
 
 
 def _whole(batch: Batch, outcomes: Iterable[CaseOutcome]) -> Iterator[CaseOutcome]:
-    """Those that need not be tried again, and have their folder."""
+    """Those not to be tried again that have their folder; without an answer there is none."""
     folders = None
     for found in outcomes:
         if folders is None:
             folders = set(os.listdir(batch.folder))
-        if found.status != "error" and (batch.options.columns or found.run_folder in folders):
+        no_folder = batch.options.columns or (found.status == "failed" and not found.run_folder)
+        if found.status != "error" and (no_folder or found.run_folder in folders):
             yield found
 
 

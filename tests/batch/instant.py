@@ -1,0 +1,73 @@
+"""Batches whose cases take no time: an executor that makes a folder for each and says it is ok."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, Future
+from contextlib import contextmanager
+from pathlib import Path
+
+from eigassign.batch.plan import Variant, plan_of
+from eigassign.batch.progress import Batch
+from eigassign.batch.work import CaseOptions, check_cases, outcome_of
+from eigassign.batch.workers import Place
+
+TEXT = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
+MASS = "mechanism.bodies.tool_mass.mass"
+
+
+def case(folder: Path, name: str = "arm.yaml", end: str = "") -> Path:
+    """A case file."""
+    file = folder / name
+    file.write_text(TEXT + end)
+    return file
+
+
+def batch_of(
+    folder: Path, masses: str = "0..1:5", force: bool = False, file: str = "arm.yaml"
+) -> Batch:
+    """A sweep over the mass, of a case that is there already."""
+    out = folder / "out"
+    return Batch(
+        plan_of([folder / file], [f"{MASS}={masses}"]), out, CaseOptions(str(out), force=force)
+    )
+
+
+class Instant(Executor):
+    """Runs nothing; ``heard`` gets the name of each case that would have run."""
+
+    def __init__(self, out: Path, heard: Callable[[str], None]) -> None:
+        self.out, self.heard = out, heard
+
+    def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
+        future: Future[object] = Future()
+        if fn.func is check_cases:
+            future.set_result(fn(*args))
+        else:
+            future.set_result([self.ended(variant) for variant in args[0]])
+        return future
+
+    def ended(self, variant: Variant):  # type: ignore[no-untyped-def]
+        """How the case ends: well; in an error where its mass is 0.25; without answer at 0.75."""
+        self.heard(variant.name)
+        if variant.values.get(MASS) == 0.25:
+            return outcome_of(variant, "error", message="not this one")
+        if variant.values.get(MASS) == 0.75:
+            return outcome_of(variant, "failed", message="no design meets it")
+        (self.out / variant.name).mkdir(exist_ok=True)
+        return outcome_of(variant, "ok", run_folder=variant.name)
+
+
+def instant(out: Path, heard: Callable[[str], None], slots: int = 2) -> Place:
+    """The place where such batches run."""
+
+    @contextmanager
+    def opened(_slots: int) -> Iterator[Executor]:
+        yield Instant(out, heard)
+
+    return Place(slots, opened)
+
+
+def names(batch: Batch, indices: Sequence[int]) -> list[str]:
+    """Of cases of a batch."""
+    return [batch.plan[index].name for index in indices]

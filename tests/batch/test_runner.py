@@ -1,0 +1,185 @@
+"""A batch computes nothing twice, whoever is killed, and whatever was in its folder before."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import time
+from collections.abc import Iterator
+from concurrent.futures import Executor, Future
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from instant import MASS, Instant, batch_of, case, instant, names
+
+from eigassign.batch.forecast import forecast
+from eigassign.batch.progress import Batch
+from eigassign.batch.runner import run
+from eigassign.batch.workers import Place
+from eigassign.errors import CaseError, StorageError
+
+
+def ran(batch: Batch, place: Place | None = None, join: bool = False) -> list[str]:
+    """Run it; the names of the cases that were not done before."""
+    heard: list[str] = []
+    place = place or instant(batch.folder, lambda _name: None)
+    run(batch, place, lambda _progress: None, lambda found: heard.append(found.name), join)
+    return heard
+
+
+def summary(batch: Batch) -> dict[str, str]:
+    """Status of each case by its name."""
+    rows = json.loads((batch.folder / "summary.json").read_text())["cases"]
+    return {row["name"]: row["status"] for row in rows}
+
+
+def test_what_is_done_is_left_out_and_errors_are_tried_again(tmp_path: Path) -> None:
+    case(tmp_path)
+    batch = batch_of(tmp_path)
+    assert ran(batch) == names(batch, range(5))
+    assert ran(batch) == ["mass=0.25"]
+    assert [*summary(batch).items()] == [
+        ("mass=0", "ok"),
+        ("mass=0.25", "error"),
+        ("mass=0.5", "ok"),
+        ("mass=0.75", "failed"),
+        ("mass=1", "ok"),
+    ]
+    shutil.rmtree(batch.folder / "mass=0.5")
+    assert ran(batch) == ["mass=0.25", "mass=0.5"]
+
+
+def test_a_sweep_may_be_enlarged(tmp_path: Path) -> None:
+    case(tmp_path)
+    ran(batch_of(tmp_path, "0..1:3"))
+    larger = batch_of(tmp_path, "0..1:5")
+    assert forecast(larger, 2).todo == (1, 3)
+    assert ran(larger) == ["mass=0.25", "mass=0.75"]
+    assert list(summary(larger)) == names(larger, range(5))
+    assert not list(larger.folder.glob("manifest.jsonl.*"))
+
+
+def test_results_of_cases_that_are_gone_from_the_plan_are_kept_beside_it(tmp_path: Path) -> None:
+    case(tmp_path)
+    ran(batch_of(tmp_path, "0,1"))
+    assert ran(batch_of(tmp_path, "1,2")) == ["mass=2"]
+    kept = (tmp_path / "out" / "manifest.jsonl.1").read_text()
+    assert '"name": "mass=0"' in kept
+
+
+def test_an_edited_case_runs_again(tmp_path: Path) -> None:
+    case(tmp_path)
+    ran(batch_of(tmp_path, "0,1"))
+    case(tmp_path, end="# a comment\n")
+    assert ran(batch_of(tmp_path, "0,1")) == []
+    case(tmp_path, end="assignment: {starts: 2}\n")
+    assert ran(batch_of(tmp_path, "0,1")) == ["mass=0", "mass=1"]
+
+
+def test_another_batch_is_refused_unless_it_is_forced(tmp_path: Path) -> None:
+    case(tmp_path)
+    ran(batch_of(tmp_path, "0,1"))
+    case(tmp_path, "other.yaml", "assignment: {starts: 2}\n")
+    before = (tmp_path / "out" / "manifest.jsonl").read_bytes()
+    with pytest.raises(StorageError, match="holds another batch"):
+        ran(batch_of(tmp_path, "0,1", file="other.yaml"))
+    assert (tmp_path / "out" / "manifest.jsonl").read_bytes() == before
+    assert len(ran(batch_of(tmp_path, "0,1", force=True, file="other.yaml"))) == 2
+    assert (tmp_path / "out" / "manifest.jsonl.1").read_bytes() == before
+
+
+def test_nothing_runs_where_one_variant_is_no_case(tmp_path: Path) -> None:
+    case(tmp_path)
+    batch = batch_of(tmp_path, "1,-1,-2")
+    with pytest.raises(CaseError) as error:
+        ran(batch)
+    said = [str(problem) for problem in error.value.problems]
+    assert said[0].endswith("2 of 3 variants are no valid cases: nothing was run")
+    assert said[1] == f"--set: {MASS}: mass=-1: must be >= 0 kg, got -1"
+    assert not batch.folder.exists()
+
+
+class Breaking(Instant):
+    """A pool whose process dies with the case of mass 0.5, and has two cases in flight then."""
+
+    broken = False
+
+    def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
+        (variant, *_) = args[0]
+        if isinstance(variant.values.get(MASS), float) and variant.values[MASS] == 0.5:
+            self.broken = True
+        if self.broken:
+            future: Future[object] = Future()
+            future.set_exception(BrokenProcessPool())
+            return future
+        return super().submit(fn, *args, **kwargs)
+
+
+def test_of_a_broken_pool_the_culprit_is_told_and_nobody_else_loses(tmp_path: Path) -> None:
+    case(tmp_path)
+    batch = batch_of(tmp_path, "0,0.5,1,2")
+
+    @contextmanager
+    def opened(_slots: int) -> Iterator[Executor]:
+        yield Breaking(batch.folder, lambda _name: None)
+
+    assert sorted(ran(batch, Place(3, opened))) == names(batch, range(4))
+    assert [*summary(batch).values()] == ["ok", "error", "ok", "ok"]
+
+
+needs_locks = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fcntl and fork")
+
+
+@needs_locks
+def test_a_second_batch_is_refused_or_works_along(tmp_path: Path) -> None:
+    case(tmp_path)
+    batch, log = batch_of(tmp_path, "1..2:21"), tmp_path / "log"
+
+    def heard(name: str) -> None:
+        time.sleep(0.02)
+        with open(log, "a") as file:
+            file.write(f"{os.getpid()} {name}\n")
+
+    other = _forked(lambda: ran(batch, instant(batch.folder, heard, 1)))
+    while not log.exists():
+        time.sleep(0.01)
+    with pytest.raises(StorageError, match=f"at work in .*process {other} on .*--join"):
+        ran(batch)
+    ran(batch, instant(batch.folder, heard, 1), join=True)
+    assert os.waitpid(other, 0)[1] == 0
+    lines = [line.split() for line in log.read_text().splitlines()]
+    assert {int(pid) for pid, _ in lines} == {other, os.getpid()}
+    assert sorted(name for _, name in lines) == sorted(names(batch, range(21)))
+    assert len(summary(batch)) == 21
+
+
+@needs_locks
+def test_a_batch_that_was_killed_is_gone_on_with(tmp_path: Path) -> None:
+    case(tmp_path)
+    batch, log = batch_of(tmp_path, "1..2:21"), tmp_path / "log"
+
+    def heard(name: str) -> None:
+        with open(log, "a") as file:
+            file.write(f"{name}\n")
+        if name == "mass=1.5":
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    other = _forked(lambda: ran(batch, instant(batch.folder, heard, 1)))
+    assert os.waitstatus_to_exitcode(os.waitpid(other, 0)[1]) == -signal.SIGKILL
+    done = log.read_text().split()
+    assert ran(batch) == names(batch, range(21))[len(done) - 1 :]
+
+
+def _forked(job) -> int:  # type: ignore[no-untyped-def]
+    if pid := os.fork():
+        return pid
+    code = 1
+    try:
+        job()
+        code = 0
+    finally:
+        os._exit(code)

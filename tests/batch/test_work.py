@@ -1,0 +1,101 @@
+"""A case runs within its limits, and gives the same numbers wherever it runs."""
+
+from __future__ import annotations
+
+import json
+import resource
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eigassign.batch import work
+from eigassign.batch.limits import OutOfTimeError, limited
+from eigassign.batch.plan import plan_of
+from eigassign.batch.work import CaseOptions, run_cases
+from eigassign.output.batch.outcome import CaseOutcome
+
+SMALL = Path(__file__).parents[2] / "benchmarks" / "small_arm.yaml"
+MASS = "mechanism.bodies.tool.mass"
+
+
+@pytest.fixture
+def options(tmp_path: Path) -> CaseOptions:
+    return CaseOptions(str(tmp_path / "out"), use_cache=False, reports="none")
+
+
+def same(outcome: CaseOutcome) -> CaseOutcome:
+    """But for its time."""
+    return replace(outcome, seconds=0.0)
+
+
+def numbers(folder: Path) -> dict[str, object]:
+    """Of results.json, but for times."""
+    found = json.loads((folder / "results.json").read_text())
+    assert found.pop("timing_s")
+    return found
+
+
+def test_a_case_gives_the_same_numbers_in_any_order(options: CaseOptions, tmp_path: Path) -> None:
+    plan = plan_of([SMALL], [f"{MASS}=0.1,0.3"])
+    first = run_cases([plan[0], plan[1]], options)
+    there = replace(options, out=str(tmp_path / "there"))
+    again = run_cases([plan[1], plan[0]], there)[::-1]
+    assert [*map(same, first)] == [*map(same, again)]
+    for found in first:
+        assert found.run_folder is not None
+        assert numbers(tmp_path / "out" / found.run_folder) == numbers(
+            tmp_path / "there" / found.name
+        )
+    resolved = (tmp_path / "out" / "mass=0.3" / "case.yaml").read_text()
+    assert "mass: 0.3" in resolved
+    assert f"variant: {MASS} = 0.3" in (tmp_path / "out" / "mass=0.3" / "log.txt").read_text()
+
+
+def test_columns_need_no_folder(options: CaseOptions, tmp_path: Path) -> None:
+    (found,) = run_cases([plan_of([SMALL])[0]], replace(options, columns=True))
+    assert (found.status, found.run_folder) == ("ok", None)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_case_that_was_changed_since_the_batch_began_does_not_run(
+    options: CaseOptions, tmp_path: Path
+) -> None:
+    file = tmp_path / "arm.yaml"
+    file.write_text(SMALL.read_text())
+    variant = plan_of([file])[0]
+    file.write_text(SMALL.read_text().replace("180 Hz", "181 Hz"))
+    (found,) = run_cases([variant], options)
+    assert found.status == "error"
+    assert "changed since the batch began" in found.message
+
+
+def test_a_case_that_takes_too_long_is_ended(
+    options: CaseOptions, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(work, "solve_case", lambda _case, _how: time.sleep(20))
+    (found,) = run_cases([plan_of([SMALL])[0]], replace(options, seconds=0.1))
+    assert (found.status, found.message) == ("error", "takes longer than the 0.1 s of --case-time")
+    assert found.seconds < 10
+
+
+def test_limits_are_lifted_behind_a_case() -> None:
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    with pytest.raises(MemoryError), limited(None, 100.0):
+        np.ones(100_000_000)
+    assert resource.getrlimit(resource.RLIMIT_AS) == before
+    with pytest.raises(OutOfTimeError), limited(0.01, None):
+        time.sleep(10)
+    with limited(0.05, 1000.0):
+        pass
+    time.sleep(0.1)
+
+
+def test_a_case_that_takes_too_much_memory_is_ended(
+    options: CaseOptions, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(work, "solve_case", lambda _case, _how: np.ones(100_000_000))
+    (found,) = run_cases([plan_of([SMALL])[0]], replace(options, megabytes=100.0))
+    assert (found.status, found.message) == ("error", "out of memory (--case-memory is 100 MB)")

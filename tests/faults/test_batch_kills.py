@@ -1,0 +1,126 @@
+"""A sweep whose parent and workers are killed at random instants ends as one that nobody disturbed.
+
+Slow: thirty kills, each followed by the same command again.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+import eigassign
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs Linux"),
+]
+CASES, KILLS, JOBS = 60, 30, 2
+ROOT = Path(eigassign.__file__).parents[1]
+SMALL = ROOT / "benchmarks" / "small_arm.yaml"
+
+# The command, which writes the name of every case that it begins to `begun`. Its workers import it.
+PROGRAM = """
+import os, sys, time
+import eigassign.batch.work as work
+
+solved = work.solve_case
+
+def solve_case(case, options):
+    with open("begun", "a") as file:
+        file.write(f"{sorted(case.file.variant.values())}\\n")
+    return solved(case, options)
+
+work.solve_case = solve_case
+if __name__ == "__main__":
+    from eigassign.cli import main
+    sys.exit(main())
+"""
+COMMAND = (
+    *("program.py", "batch", "arm.yaml", "--jobs", str(JOBS), "--out", "out"),
+    *("--set", f"mechanism.bodies.tool.mass=0..0.5:{CASES // 3}"),
+    *("--set", "targets.0.frequency=170 Hz..190 Hz:3"),
+)
+
+
+def begun(folder: Path) -> subprocess.Popen[bytes]:
+    """The command at work in this folder."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    nowhere = subprocess.DEVNULL
+    return subprocess.Popen(
+        [sys.executable, *COMMAND], cwd=folder, env=environment, stdout=nowhere, stderr=nowhere
+    )
+
+
+def workers(pid: int) -> list[int]:
+    """Processes that this one has started and that are at work."""
+    try:
+        children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    except OSError:
+        return []
+    return [int(child) for child in children]
+
+
+def made(folder: Path) -> dict[str, object]:
+    """All that a batch leaves, but for times."""
+    found: dict[str, object] = {}
+    for row in json.loads((folder / "out" / "summary.json").read_text())["cases"]:
+        results = {}
+        if row["run_folder"] is not None:  # else there is no answer
+            results = json.loads((folder / "out" / row["run_folder"] / "results.json").read_text())
+            del results["timing_s"]
+        del row["seconds"]
+        found[row["name"]] = (row, results)
+    return found
+
+
+def placed(folder: Path) -> Path:
+    folder.mkdir()
+    (folder / "arm.yaml").write_text(SMALL.read_text())
+    (folder / "program.py").write_text(PROGRAM)
+    return folder
+
+
+def disturbed(folder: Path, draw: random.Random, kills: int) -> int:
+    """Run the command until it is done, with at most so many kills on the way; how many they were.
+
+    Every other one hits the parent, and the command is given again.
+    """
+    done = 0
+    while True:
+        process = begun(folder)
+        while process.poll() is None and done < kills:
+            time.sleep(draw.uniform(0.0, 4.0))
+            victims = workers(process.pid) if done % 2 else [process.pid]
+            if victims and process.poll() is None:
+                os.kill(draw.choice(victims), signal.SIGKILL)
+                done += 1
+        if process.wait() >= 0:
+            break
+    assert begun(folder).wait() == 1  # what was killed twice was an error, and is tried again
+    return done
+
+
+def test_sweeps_that_are_killed_thirty_times_end_as_if_they_had_not_been(tmp_path: Path) -> None:
+    undisturbed = placed(tmp_path / "undisturbed")
+    assert begun(undisturbed).wait() == 1  # some miss their target
+    expected, draw, left, sweeps, twice = made(undisturbed), random.Random(1), KILLS, 0, 0
+    assert len(expected) == CASES
+    while left:
+        folder, sweeps = placed(tmp_path / f"killed {sweeps}"), sweeps + 1
+        done = disturbed(folder, draw, left)
+        left -= done
+        assert made(folder) == expected
+        starts = Counter((folder / "begun").read_text().splitlines())
+        assert len(starts) == CASES
+        assert starts.total() - CASES <= JOBS * done
+        twice += starts.total() - CASES
+    sys.stdout.write(f"{KILLS} kills in {sweeps} sweeps, {twice} cases begun again\n")
