@@ -24,6 +24,7 @@ from eigassign.output.storage import replace_synced
 
 HEADER, LINES = "batch.json", "manifest.jsonl"
 FORMAT = 1
+_BEGIN, _DIGITS = b'{"index": ', 20  # of a line, and of an index at most
 _BLOCK = 4096  # bytes that are searched for the end of a line at a time
 
 
@@ -124,6 +125,14 @@ def _outcome(line: bytes) -> CaseOutcome | None:
     return found if isinstance(found.index, int) else None
 
 
+def _index(line: bytes) -> int:
+    """The index that a line begins with, and −1 of anything else."""
+    begin, _, rest = line[: len(_BEGIN) + _DIGITS].partition(b",")
+    number = begin.removeprefix(_BEGIN)
+    whole = rest and line.endswith(b"}\n") and begin.startswith(_BEGIN) and number.isdigit()
+    return int(number) if whole else -1
+
+
 def _cut(file: io.FileIO) -> int:
     """Cut off a last line without an end; the length of the file."""
     size = end = file.seek(0, io.SEEK_END)
@@ -148,8 +157,8 @@ class InOrder:
     def __init__(self, folder: Path, indices: range) -> None:
         self._path, places = folder / LINES, array("q", [-1]) * len(indices)
         for start, line in Manifest(folder).lines():
-            if (found := _outcome(line)) is not None and found.index in indices:
-                places[indices.index(found.index)] = start
+            if (index := _index(line)) in indices:
+                places[indices.index(index)] = start
         self._places = array("q", (place for place in places if place >= 0))
 
     def __len__(self) -> int:

@@ -11,7 +11,7 @@ Reading order:
     inspect    check, modes, status, schema
     export     export, animate
     start      init, docs, completion
-    batch      batch
+    batch      batch, merge
     cache      cache path, list, clear
 """
 
@@ -26,7 +26,7 @@ import click
 import eigassign.cli.arguments as arguments
 from eigassign import process
 from eigassign._version import __version__
-from eigassign.cli.batch import batch
+from eigassign.cli.batch import batch, merge
 from eigassign.cli.cache import cache
 from eigassign.cli.export import animate, export
 from eigassign.cli.inspect import check, modes, schema, status
@@ -114,7 +114,7 @@ def cli() -> None:
 
 
 for command in (
-    *(init, check, modes, optimize, expand, update, validate, chart, batch),
+    *(init, check, modes, optimize, expand, update, validate, chart, batch, merge),
     *(status, export, animate),
     *(cache, schema, docs, completion),
 ):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -27,6 +28,24 @@ def examples(*commands: str, after: str = "") -> str:
     """The end of a command's help: how it is used; the tests run each of them."""
     parts = ["\n".join(["\b", "Examples:", *(f"  {command}" for command in commands)])]
     return "\n\n".join([*parts, *([f"\b\n{after}"] if after else [])])
+
+
+class Shard(click.ParamType[tuple[int, int]]):
+    """``2/8``: the second of eight parts."""
+
+    name = "shard"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        """``value`` as (i, n), or a usage error at its option."""
+        if isinstance(value, tuple):
+            return value
+        found = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", value)
+        i, n = map(int, found.groups()) if found else (0, 0)
+        if not 1 <= i <= n:
+            self.fail(f"{value!r} is not I/N with 1 <= I <= N, as 2/8.", param, ctx)
+        return i, n
 
 
 class Number(click.FloatRange):

@@ -1,4 +1,4 @@
-"""Many cases: `batch`."""
+"""Many cases: `batch`, `merge`."""
 
 from __future__ import annotations
 
@@ -13,10 +13,13 @@ import eigassign.cli.arguments as arguments
 from eigassign.cli.reporter import Reporter, reporting, show
 
 if TYPE_CHECKING:
+    from collections import Counter
+
     from eigassign.batch.plan import Plan
     from eigassign.batch.progress import Batch, Progress
     from eigassign.batch.workers import Place
     from eigassign.output.batch.outcome import CaseOutcome
+    from eigassign.output.previous import Comparison
 
 _MANY = 50  # cases: above, only failed ones have figures and a report, and are listed at the end
 _FOLDERS = 10_000  # cases: above, they have no folders
@@ -26,7 +29,7 @@ _FIRST, _LAST = 5, 2  # cases that a dry run lists
 @click.command(
     epilog=arguments.examples(
         "eigassign batch cases --jobs 2",
-        "eigassign batch planar_arm.yaml --set targets.0.frequency=8..12:5 --reports none",
+        "eigassign batch planar_arm.yaml --set targets.0.frequency=12..16:5 --reports none",
         "eigassign batch planar_arm.yaml --set expansion.order=2,3,4 --dry-run",
     )
 )
@@ -40,6 +43,14 @@ _FIRST, _LAST = 5, 2  # cases that a dry run lists
 )
 @click.option("--dry-run", is_flag=True, help="List what would run, with its time and files.")
 @click.option("--jobs", type=click.IntRange(1), help="Processes (default: one per core).")
+@click.option(
+    "--shard",
+    type=arguments.Shard(),
+    metavar="I/N",
+    default="1/1",
+    show_default=True,
+    help="Run the I-th of N parts, in a folder of its own; merge makes one batch of them.",
+)
 @click.option("--join", is_flag=True, help="Work along with a batch that is at work there.")
 @click.option(
     "--reports",
@@ -66,6 +77,7 @@ _FIRST, _LAST = 5, 2  # cases that a dry run lists
 @click.option(
     "--out", type=arguments.PATH, help="Folder (default: results, or results/<case>_sweep)."
 )
+@arguments.against
 @arguments.caching
 @arguments.force
 @arguments.figures
@@ -84,7 +96,7 @@ def batch(
     junit.xml. A case file with a
     sweep, or with --set, is run once for each variant. Cases that are done and current are left
     out, so that the same command goes on where it was interrupted. A failed case does not stop the
-    others; exit code 1 if any failed.
+    others; exit code 1 if any failed, or has moved from --against.
     """
     from eigassign.batch.limits import require_limits_here
     from eigassign.batch.plan import cases_in, plan_of
@@ -100,8 +112,9 @@ def batch(
         place = this_machine(jobs)
         if dry_run:
             return _tell(asked, place)
-        bad = _watched(asked, place, reporter, join)
-    return 1 if bad else 0
+        since = _since(how)
+        ends = _watched(asked, place, reporter, join)
+        return _told(asked.folder, ends, since, reporter)
 
 
 def _batch(plan: Plan, folder: Path, how: Mapping[str, Any]) -> Batch:
@@ -121,16 +134,69 @@ def _batch(plan: Plan, folder: Path, how: Mapping[str, Any]) -> Batch:
         seconds=how["case_time"],
         megabytes=how["case_memory"],
     )
-    return Batch(plan, folder, options)
+    return Batch(plan, folder, options, how["shard"])
 
 
-def _watched(batch: Batch, place: Place, reporter: Reporter, join: bool) -> int:
-    """Run it with a line of progress for each case, and a table at the end; how many failed."""
-    from eigassign.batch import runner
-    from eigassign.batch.manifest import InOrder
+@click.command(
+    epilog=arguments.examples(
+        "eigassign merge results/night part-*",
+        "eigassign merge results/night",
+    )
+)
+@click.argument("folder", type=arguments.PATH)
+@click.argument("shards", nargs=-1, type=arguments.PATH)
+@arguments.against
+@arguments.common
+def merge(folder: Path, shards: tuple[Path, ...], **how: Any) -> int:
+    """Make one batch of the SHARDS of batch --shard, in FOLDER; or its summaries anew, without any.
+
+    A shard that is missing, not finished, or of another batch is an error. The folders of the cases
+    stay where they are. Exit code 1 if any case failed, or has moved from --against.
+    """
+    from eigassign.batch.merge import merge as merged
+
+    with reporting(how) as reporter:
+        since = _since(how)
+        return _told(folder, merged(folder, shards), since, reporter)
+
+
+def _since(how: Mapping[str, Any]) -> Comparison | None:
+    """What --against names: read before it may be written over."""
+    from eigassign.output.previous import Comparison
+
+    against = how["against"]
+    return against and Comparison(against, "answers", how["tolerance"])
+
+
+def _told(folder: Path, ends: Counter[str], since: Comparison | None, reporter: Reporter) -> int:
+    """Show how the cases of a folder ended, all of them or the first that failed; the exit code."""
+    from eigassign.batch.manifest import InOrder, read_header
     from eigassign.output import console
-    from eigassign.output.batch.outcome import from_line
-    from eigassign.output.batch.summary import batch_table
+    from eigassign.output.batch.outcome import from_line, status_of
+    from eigassign.output.batch.summary import batch_table, said
+    from eigassign.output.previous import of_outcome
+
+    header, total = read_header(folder), ends.total()
+    listed: list[CaseOutcome] = []
+    for line in InOrder(folder, header.indices()) if header else ():
+        shown = len(listed) < _MANY and (total <= _MANY or status_of(line) != "ok")
+        if shown or since is not None:
+            found = from_line(line)
+            listed += [found] if shown else []
+            if since is not None:
+                since.add(of_outcome(found))
+    console.print_tables([batch_table(listed)] if listed else [])
+    console.print_tables([since.table()] if since is not None else [])
+    if bad := total - ends["ok"]:
+        reporter.error(f"{bad} of {total} cases failed")
+    show(f"{total} cases in {folder}: {said(ends)}")
+    return 1 if bad or (since is not None and since.moves) else 0
+
+
+def _watched(batch: Batch, place: Place, reporter: Reporter, join: bool) -> Counter[str]:
+    """Run it with a line of progress for each case; how many ended in which way."""
+    from eigassign.batch import runner
+    from eigassign.output import console
 
     with ExitStack() as stack:
         advance: list[Callable[[str], None]] = []
@@ -145,17 +211,7 @@ def _watched(batch: Batch, place: Place, reporter: Reporter, join: bool) -> int:
         def on_outcome(found: CaseOutcome) -> None:
             advance[0](f"{found.name}: {found.status}")
 
-        ends = runner.run(batch, place, on_start, on_outcome, join)
-    total, bad = ends.total(), ends.total() - ends["ok"]
-    listed: list[CaseOutcome] = []
-    for found in map(from_line, InOrder(batch.folder, batch.header.indices())):
-        if len(listed) < _MANY and (total <= _MANY or found.status != "ok"):
-            listed.append(found)
-    console.print_tables([batch_table(listed)] if listed else [])
-    if bad:
-        reporter.error(f"{bad} of {total} cases failed")
-    show(f"{total} cases in {batch.folder}: {', '.join(f'{n} {end}' for end, n in ends.items())}")
-    return bad
+        return runner.run(batch, place, on_start, on_outcome, join)
 
 
 def _tell(batch: Batch, place: Place) -> int:

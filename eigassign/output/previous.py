@@ -167,7 +167,10 @@ def _run(document: Any, kind: Kind) -> Known:
     """Of an answer the exact frequencies, of a validation those of modes at the initial design."""
     case, targets = document["case"]["name"], document["targets"]
     if kind == "answers":
-        curves = [(t["label"], t.get("trajectory"), t["frequencies"]["exact_hz"]) for t in targets]
+        curves = [
+            (_curve(t), t["kind"], t.get("trajectory"), t["frequencies"]["exact_hz"])
+            for t in targets
+        ]
         return Known(case, ranges(curves), (document["assignment"] or {}).get("verdict", ""))
     samples = {row["name"]: row["samples"] for row in document["trajectories"]}
     found: dict[str, Range] = {}
@@ -177,5 +180,10 @@ def _run(document: Any, kind: Kind) -> Known:
         whole = next(iter(samples.values())) if len(samples) == 1 else samples.get(name)
         if target["kind"] == "frequency" and target["mode"] is not None and len(hz) == whole:
             place = _place(target["mode"], where)
-            found[place] = ranges([(place, None, hz)])[0]
+            found[place] = ranges([(place, "frequency", None, hz)])[0]
     return Known(case, tuple(found.values()))
+
+
+def _curve(target: Any) -> str:
+    followed = target.get("followed")
+    return f"mode {target['mode']}" if followed is None else str(followed["name"])

@@ -170,6 +170,7 @@ def test_the_help_of_every_command_has_examples_of_it(name: str, capsys: Capture
 LONG = (
     "chart",
     "batch",
+    "merge",
     "optimize",
     "expand",
     "update",
@@ -194,6 +195,10 @@ def test_the_examples_of_the_help_run(name: str, capsys: Captured) -> None:
             shutil.copy(path, ".")
         if name == "eigassign status":
             assert main(["optimize", "planar_arm.yaml", "--figures", "none"]) == 0
+        for part in ("1", "2") if name == "eigassign merge" else ():
+            swept = ["--set", "expansion.order=2,3", "--columns"]
+            swept += ["--shard", f"{part}/2", "--out", f"part-{part}"]
+            assert main(["batch", "planar_arm.yaml", *swept]) == 0
     for line in lines:
         words = shlex.split(line.partition(" > ")[0])[1:]
         expanded = [

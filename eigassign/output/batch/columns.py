@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TextIO
@@ -53,6 +54,8 @@ class Columns:
         self._file.close()
 
     def _flush(self) -> None:
+        if not self._rows:
+            return
         for name in (*_TEXTS, *_NUMBERS):
             self._write(name, [getattr(row, name) for row in self._rows])
         for group, cells in _GROUPS.items():
@@ -64,15 +67,54 @@ class Columns:
 
     def _write(self, name: str, cells: list[Any]) -> None:
         """The cells of the rows held, of a column that is made where it is new."""
-        import h5py
-
-        text = any(isinstance(cell, str) for cell in cells)
         if name not in self._file:
-            kind, empty = (h5py.string_dtype(), None) if text else (np.float64, np.nan)
-            chunk = (min(ROWS, self._total),) if self._total else None
-            self._file.create_dataset(name, (self._total,), kind, fillvalue=empty, chunks=chunk)
-        column = [cell or "" for cell in cells] if text else np.array(cells, dtype=np.float64)
-        self._file[name][self._start : self._start + len(cells)] = column
+            text = any(isinstance(cell, str) for cell in cells)
+            _create(self._file, name, self._total, text)
+        column = self._file[name]
+        made = [cell or "" for cell in cells] if _is_text(column) else np.array(cells, np.float64)
+        column[self._start : self._start + len(cells)] = made
+
+
+def _create(file: Any, name: str, total: int, text: bool) -> Any:
+    import h5py
+
+    kind, empty = (h5py.string_dtype(), None) if text else (np.float64, np.nan)
+    chunks = (min(ROWS, total),)
+    return file.create_dataset(name, (total,), kind, fillvalue=empty, chunks=chunks)
+
+
+def _is_text(column: Any) -> bool:
+    return bool(column.dtype.kind == "O")
+
+
+def _names(file: Any) -> list[str]:
+    """The paths of all columns, in the order of the groups."""
+    import h5py
+
+    found = list[str]()
+    file.visititems(lambda n, what: found.append(n) if isinstance(what, h5py.Dataset) else None)
+    first = (*_TEXTS, *_NUMBERS)
+    groups = ["", *_GROUPS]
+    found.sort(key=lambda name: groups.index(name.rpartition("/")[0].partition("/")[0]))
+    return [*(name for name in first if name in found), *(name for name in found if "/" in name)]
+
+
+def merge_columns(path: Path, parts: Sequence[Path]) -> None:
+    """columns.h5 of the shards of a batch: row k is row k // n of ``parts[k % n]``."""
+    import h5py
+
+    with ExitStack() as stack:
+        files = [stack.enter_context(h5py.File(part, locking=False)) for part in parts]
+        total, n = sum(int(file.attrs["cases"]) for file in files), len(files)
+        made = stack.enter_context(h5py.File(path, "w", locking=False))
+        made.attrs.update({"format": FORMAT, "version": __version__, "cases": total})
+        for name in dict.fromkeys(name for file in files for name in _names(file)):
+            having = [(k, file[name]) for k, file in enumerate(files) if name in file]
+            text = _is_text(having[0][1])
+            whole = np.full(total, b"" if text else np.nan, object if text else np.float64)
+            for k, column in having:
+                whole[k::n] = column[:]
+            _create(made, name, total, text)[:] = whole
 
 
 def _values(row: CaseOutcome) -> Iterator[tuple[str, float | str]]:
@@ -119,11 +161,7 @@ def write_csv(columns: Path, file: TextIO) -> None:
 
     writer = csv.writer(file, lineterminator="\n")
     with h5py.File(columns, locking=False) as stored:
-        names = list[str]()
-        stored.visititems(lambda n, v: names.append(n) if isinstance(v, h5py.Dataset) else None)
-        groups = ["", *_GROUPS]
-        names.sort(key=lambda name: groups.index(name.rpartition("/")[0].partition("/")[0]))
-        names = [*_TEXTS, *_NUMBERS, *(name for name in names if "/" in name)]
+        names = _names(stored)
         writer.writerow([cell(name) for name in names])
         for start in range(0, stored.attrs["cases"], ROWS):
             parts = [_cells(stored[name], slice(start, start + ROWS)) for name in names]
@@ -131,6 +169,6 @@ def write_csv(columns: Path, file: TextIO) -> None:
 
 
 def _cells(column: Any, rows: slice) -> list[object]:
-    if column.dtype.kind == "f":
+    if not _is_text(column):
         return ["" if value != value else value for value in column[rows].tolist()]
     return [cell(text) for text in column.asstr()[rows]]

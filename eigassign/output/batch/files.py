@@ -1,20 +1,37 @@
-"""All files of a batch in one pass over its rows, so that memory does not grow with them."""
+"""All files of a batch in one pass over its rows, so that memory does not grow with them.
+
+Those of a batch in shards are copied from those of the shards, and no row is read but for the page:
+row k of the whole is row k // n of shard k % n, counted from 0, so that a file with a line a row is
+merged by a line of each shard in turn, and a column by steps of n.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from itertools import chain, islice, zip_longest
 from pathlib import Path
 from typing import TextIO
 
-from eigassign.output.batch.columns import Columns, write_csv
+from eigassign.output.batch.columns import Columns, merge_columns, write_csv
 from eigassign.output.batch.index import Index
 from eigassign.output.batch.junit import Junit
-from eigassign.output.batch.outcome import from_line
+from eigassign.output.batch.outcome import from_line, status_of
 from eigassign.output.batch.summary import SummaryCsv, SummaryJson
 from eigassign.output.storage import replace_synced, replacing
 
-NAMES = ("summary.csv", "summary.json", "junit.xml", "index.html", "columns.h5", "columns.csv")
+_ALWAYS = ("summary.csv", "summary.json", "junit.xml", "index.html")
+_COLUMNS = ("columns.h5", "columns.csv")
+NAMES = (*_ALWAYS, *_COLUMNS)
+
+
+def are_current(folder: Path, columns: bool, since: Path) -> bool:
+    """Whether all files are there and none is older than the file ``since``."""
+    try:
+        made = [(folder / name).stat().st_mtime_ns for name in (NAMES if columns else _ALWAYS)]
+        return min(made) >= since.stat().st_mtime_ns
+    except OSError:
+        return False
 
 
 def write_files(
@@ -30,30 +47,77 @@ def write_files(
     there are columns.h5 and columns.csv too.
     """
     with ExitStack() as stack:
-
-        def opened(name: str) -> TextIO:
-            made = stack.enter_context(replacing(folder / name))
-            return stack.enter_context(open(made, "w", encoding="utf-8", newline=""))
-
-        summary, plain = (
-            SummaryCsv(opened("summary.csv"), keys),
-            SummaryJson(opened("summary.json")),
-        )
-        junit, index = Junit(opened("junit.xml")), Index()
+        summary = SummaryCsv(_opened(stack, folder / "summary.csv"), keys)
+        plain = SummaryJson(_opened(stack, folder / "summary.json"))
+        junit, index = Junit(_opened(stack, folder / "junit.xml")), Index()
         stored = stack.enter_context(replacing(folder / "columns.h5")) if columns else None
         columnar = None if stored is None else Columns(stored, total)
-        for line in lines:
+        for line in map(str.rstrip, lines):
             row = from_line(line)
             summary.add(row)
-            plain.add(row, line)
+            plain.add(row.status, line)
             output = f"run folder: {row.run_folder}" if row.run_folder else ""
             junit.add(row.name, row.path, row.seconds, row.status, row.message, output)
-            index.add(row)
+            index.add(row.status, line)
             if columnar is not None:
                 columnar.add(row)
         plain.end()
         junit.end()
         if stored is not None and columnar is not None:
             columnar.end()
-            write_csv(stored, opened("columns.csv"))
+            write_csv(stored, _opened(stack, folder / "columns.csv"))
     replace_synced(folder / "index.html", index.page(folder, folder.resolve().name, keys))
+
+
+def merge_files(
+    folder: Path,
+    lines: Iterable[str],
+    shards: Sequence[Path],
+    counts: Sequence[int],
+    keys: Sequence[str],
+) -> None:
+    """The same of a batch with columns, of the files of its ``shards``, which hold ``counts`` rows.
+
+    ``lines`` are those of all rows in their order.
+    """
+    with ExitStack() as stack:
+        with _in_turn(shards, "summary.csv", counts) as (heads, rows):
+            _opened(stack, folder / "summary.csv").writelines(chain(heads[:1], rows))
+        with _in_turn(shards, "junit.xml", counts) as (heads, rows):
+            junit = Junit(_opened(stack, folder / "junit.xml"))
+            junit.copy(rows, heads)
+            junit.end()
+        plain, index = SummaryJson(_opened(stack, folder / "summary.json")), Index()
+        for line in map(str.rstrip, lines):
+            status = status_of(line)
+            plain.add(status, line)
+            index.add(status, line)
+        plain.end()
+        stored = stack.enter_context(replacing(folder / "columns.h5"))
+        merge_columns(stored, [shard / "columns.h5" for shard in shards])
+        with _in_turn(shards, "columns.csv", counts) as (heads, rows):
+            file = _opened(stack, folder / "columns.csv")
+            if len(set(heads)) == 1:
+                file.writelines(chain(heads[:1], rows))
+            else:  # a shard without a design, say, where every case has failed
+                write_csv(stored, file)
+    replace_synced(folder / "index.html", index.page(folder, folder.resolve().name, keys))
+
+
+def _opened(stack: ExitStack, path: Path) -> TextIO:
+    """A file that takes the place of ``path`` when the stack is left without an error."""
+    made = stack.enter_context(replacing(path))
+    return stack.enter_context(open(made, "w", encoding="utf-8", newline=""))
+
+
+@contextmanager
+def _in_turn(
+    shards: Sequence[Path], name: str, counts: Sequence[int]
+) -> Iterator[tuple[list[str], Iterator[str]]]:
+    """The first line of each shard's file, and then a line of each in turn."""
+    with ExitStack() as stack:
+        places = [shard / name for shard in shards]
+        files = [stack.enter_context(open(p, encoding="utf-8", newline="")) for p in places]
+        heads = [next(file) for file in files]
+        parts = (islice(file, count) for file, count in zip(files, counts, strict=True))
+        yield heads, chain.from_iterable(zip_longest(*parts, fillvalue=""))

@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from eigassign._version import __version__
 from eigassign.output.batch.columns import quantity
-from eigassign.output.batch.outcome import CaseOutcome
+from eigassign.output.batch.outcome import CaseOutcome, from_line
 from eigassign.output.formats import number, percent, seconds
 from eigassign.output.pages import TEMPLATES, inside, page_of
 
@@ -25,20 +25,21 @@ class Index:
     """The rows that the page shows; those that are not ok are the first to find a place."""
 
     def __init__(self) -> None:
-        self._good: list[CaseOutcome] = []
-        self._bad: list[CaseOutcome] = []
+        self._good: list[str] = []
+        self._bad: list[str] = []
         self._counts = Counter[str]()
 
-    def add(self, row: CaseOutcome) -> None:
-        """Keep it while there is a place for it."""
-        self._counts[row.status] += 1
-        rows = self._good if row.status == "ok" else self._bad
-        if len(rows) < MOST:
-            rows.append(row)
+    def add(self, status: str, line: str) -> None:
+        """Keep the line of a row while there is a place for it."""
+        self._counts[status] += 1
+        lines = self._good if status == "ok" else self._bad
+        if len(lines) < MOST:
+            lines.append(line)
 
     def page(self, folder: Path, title: str, keys: Sequence[str] = ()) -> bytes:
         """The page of the batch in ``folder``; ``keys`` are those of its sweep."""
-        rows = sorted([*self._bad, *self._good][:MOST], key=lambda row: row.index)
+        lines = [*self._bad, *self._good][:MOST]
+        rows = sorted(map(from_line, lines), key=lambda row: row.index)
         columns = _columns(rows, keys)
         data = {
             "columns": [name for name, _ in columns],

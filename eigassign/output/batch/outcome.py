@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 from typing import Any, Literal
@@ -61,20 +61,31 @@ def from_line(line: str | bytes) -> CaseOutcome:
     return CaseOutcome(**json.loads(line))
 
 
+def status_of(line: str) -> str:
+    """The status in a line; quotes in what stands before it are escaped, so it is the first."""
+    return line.partition('"status": "')[2].partition('"')[0]
+
+
 def _finite(value: object) -> object:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def frequency_ranges(results: RunResults) -> tuple[Range, ...]:
-    """The ``frequencies`` of a run, each under a name of its own."""
-    return ranges((t.label, t.trajectory, t.exact_hz.tolist()) for t in results.targets)
+    """The ``frequencies`` of a run, each under a name of its own.
+
+    What is wanted is not in the names: it may be swept.
+    """
+    return ranges(
+        (t.curve_name, t.kind, t.trajectory, t.exact_hz.tolist()) for t in results.targets
+    )
 
 
-def ranges(curves: Any) -> tuple[Range, ...]:
-    """Lowest, mean and highest of each (label, trajectory or None, values in Hz)."""
+def ranges(curves: Iterable[tuple[str, str, str | None, Sequence[float]]]) -> tuple[Range, ...]:
+    """Lowest, mean and highest of each: name, kind of target, trajectory or None, values in Hz."""
     found: dict[str, Range] = {}
-    for label, trajectory, hz in curves:
-        name = label if trajectory is None else f"{label} along {trajectory!r}"
+    for name, kind, trajectory, hz in curves:
+        name += "" if kind == "frequency" else f" {kind.replace('_', ' ')}"
+        name += "" if trajectory is None else f" along {trajectory!r}"
         names = (f"{name} ({k})" if k > 1 else name for k in count(1))
         free = next(each for each in names if each not in found)
         found[free] = (free, min(hz), math.fsum(hz) / len(hz), max(hz))

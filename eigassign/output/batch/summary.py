@@ -20,25 +20,15 @@ COLUMNS = (
     "exact_max_relative", "design", "message", "path", "run_folder",
 )  # fmt: skip
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # spreadsheets run a cell that starts so
-_SHOWN = 50  # rows of a longer table are counted, and the first that are not ok are shown
 
 
 def batch_table(outcomes: Sequence[CaseOutcome]) -> Table:
-    """One line a case: name, status, seconds, worst exact error if there is one, message.
-
-    Of many cases the first that are not ok, and below it how many there are of each status.
-    """
-    shown, caption = outcomes, ""
-    if len(outcomes) > _SHOWN:
-        shown = [one for one in outcomes if one.status != "ok"][:_SHOWN]
-        counts = Counter[str](one.status for one in outcomes)
-        caption = f"{len(outcomes)} cases: {said(counts)}."
+    """One line a case: name, status, seconds, worst exact error if there is one, message."""
     rows = []
-    for one in shown:
+    for one in outcomes:
         worst = "" if one.exact_max_relative is None else percent(one.exact_max_relative)
         rows.append((one.name, one.status, f"{one.seconds:.2f} s", worst, one.message))
-    columns = ("case", "status", "time", "worst error", "message")
-    return Table("Batch", columns, tuple(rows), caption)
+    return Table("Batch", ("case", "status", "time", "worst error", "message"), tuple(rows))
 
 
 def said(counts: Counter[str]) -> str:
@@ -84,10 +74,10 @@ class SummaryJson:
         self._file, self._counts = file, Counter[str]()
         file.write(f'{{"format": {FORMAT}, "version": {json.dumps(__version__)}, "cases": [\n')
 
-    def add(self, row: CaseOutcome, line: str) -> None:
-        """Write one line."""
+    def add(self, status: str, line: str) -> None:
+        """Write the line of a row."""
         self._file.write(f"{', ' if self._counts else '  '}{line}\n")
-        self._counts[row.status] += 1
+        self._counts[status] += 1
 
     def end(self) -> None:
         """Write the counts."""

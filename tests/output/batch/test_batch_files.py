@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import re
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 from eigassign.output.batch import columns, index
-from eigassign.output.batch.files import NAMES, write_files
+from eigassign.output.batch.files import NAMES, are_current, merge_files, write_files
 from eigassign.output.batch.outcome import CaseOutcome, to_line
 
 KEYS = ("body.mass", "kind")
@@ -109,3 +110,48 @@ def test_a_name_is_no_markup_in_the_page(tmp_path):
     write_files(tmp_path, [to_line(hostile)], 1)
     assert page_data(tmp_path)["rows"][0][1] == "</script><b>"
     assert "<img onerror" not in (tmp_path / "index.html").read_text("utf-8")
+
+
+def datasets(path: Path) -> dict[str, list]:
+    found = {}
+    with h5py.File(path) as file:
+        file.visititems(
+            lambda n, d: found.update({n: d[:].tolist()}) if hasattr(d, "shape") else None
+        )
+    return found
+
+
+@pytest.mark.parametrize(("total", "n"), [(10, 3), (3, 3), (2, 4), (9, 1)])
+def test_merged_shards_are_what_one_batch_writes(tmp_path, total, n):
+    whole, merged = tmp_path / "a" / "batch", tmp_path / "b" / "batch"
+    shards = [tmp_path / f"{k}" for k in range(n)]
+    for folder in (whole, merged, *shards):
+        folder.mkdir(parents=True)
+    every = lines(total)
+    write_files(whole, every, total, KEYS, columns=True)
+    parts = [every[k::n] for k in range(n)]
+    for shard, part in zip(shards, parts, strict=True):
+        write_files(shard, part, len(part), KEYS, columns=True)
+    merge_files(merged, every, shards, list(map(len, parts)), KEYS)
+    for name in ("summary.csv", "summary.json", "junit.xml", "index.html", "columns.csv"):
+        assert (merged / name).read_text() == (whole / name).read_text(), name
+    assert str(datasets(merged / "columns.h5")) == str(datasets(whole / "columns.h5"))
+
+
+def test_files_are_current_until_the_manifest_is_newer_or_one_is_gone(tmp_path):
+    manifest = tmp_path / "manifest.jsonl"
+    manifest.write_text("\n".join(lines(2)))
+    assert not are_current(tmp_path, False, manifest)
+    write_files(tmp_path, lines(2), 2)
+    assert are_current(tmp_path, False, manifest)
+    assert not are_current(tmp_path, True, manifest)
+    later = manifest.stat().st_mtime_ns + 10**9
+    os.utime(manifest, ns=(later, later))
+    assert not are_current(tmp_path, False, manifest)
+
+
+def test_a_column_of_text_may_have_gaps(tmp_path, monkeypatch):
+    monkeypatch.setattr(columns, "ROWS", 1)
+    write_files(tmp_path, lines(4), 4, KEYS, columns=True)
+    with h5py.File(tmp_path / "columns.h5") as found:
+        assert list(found["values/kind (text)"].asstr()) == ["steel", "steel", "", "steel"]

@@ -43,9 +43,13 @@ def test_a_torn_line_is_an_error():
 
 
 def test_every_range_has_a_name_of_its_own():
-    curves = [("mode 1", None, [3.0, 1.0, 2.0]), ("mode 1", None, [5.0]), ("mode 1", "pick", [4.0])]
+    curves = [
+        ("mode 1", "frequency", None, [3.0, 1.0, 2.0]),
+        ("mode 1", "frequency", None, [5.0]),
+        ("mode 1", "at_least", "pick", [4.0]),
+    ]
     assert ranges(curves) == (
         ("mode 1", 1.0, 2.0, 3.0),
         ("mode 1 (2)", 5.0, 5.0, 5.0),
-        ("mode 1 along 'pick'", 4.0, 4.0, 4.0),
+        ("mode 1 at least along 'pick'", 4.0, 4.0, 4.0),
     )

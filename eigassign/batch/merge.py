@@ -1,0 +1,127 @@
+"""One batch of its shards, which ran anywhere; and the summaries of what a batch has so far."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, zip_longest
+from pathlib import Path
+
+from eigassign.batch.manifest import LINES, Header, InOrder, read_header, write_header
+from eigassign.batch.progress import summarise
+from eigassign.errors import UsageError
+from eigassign.output.batch.files import are_current, merge_files, write_files
+from eigassign.output.batch.outcome import from_line, status_of, to_line
+from eigassign.output.run_record import relative_path
+from eigassign.output.storage import replacing
+
+_SHOWN = 10  # shards that a message names
+
+
+@dataclass(frozen=True)
+class _Shard:
+    folder: Path
+    header: Header
+    lines: InOrder
+
+
+def merge(out: Path, folders: Sequence[Path]) -> Counter[str]:
+    """Make ``out`` the batch of the shards in ``folders``; how many cases ended in which way.
+
+    The folders of cases stay where they are. Without ``folders`` the summaries of the batch in
+    ``out`` are made anew. Raises UsageError, with all that is wrong, where a shard is missing, not
+    finished, there twice, or of another batch.
+    """
+    if not folders:
+        summarise(out, _header(out))
+        return _counted(InOrder(out, _header(out).indices()))
+    shards = [
+        _Shard(folder, header, InOrder(folder, header.indices()))
+        for folder in folders
+        for header in [_header(folder)]
+    ]
+    header = _merged(out, shards)
+    if problems := [*_problems(shards), *_others(out, header)]:
+        raise UsageError("\n".join(["the shards cannot be merged:", *problems]))
+    shards.sort(key=lambda shard: shard.header.shard)
+    out.mkdir(parents=True, exist_ok=True)
+    with replacing(out / LINES) as made, open(made, "w", encoding="utf-8") as file:
+        file.writelines(_lines(out, shards))
+    with open(out / LINES, encoding="utf-8") as lines:
+        if header.columns:
+            _copy(out, lines, shards, header.keys)
+        else:
+            write_files(out, lines, header.cases, header.keys)
+    write_header(out, header)
+    with open(out / LINES, encoding="utf-8") as lines:
+        return _counted(lines)
+
+
+def _header(folder: Path) -> Header:
+    if (header := read_header(folder)) is None:
+        raise UsageError(f"{folder}: no folder of a batch, there is no batch.json")
+    return header
+
+
+def _counted(lines: Iterator[str] | InOrder) -> Counter[str]:
+    return Counter(map(status_of, lines))
+
+
+def _merged(out: Path, shards: Sequence[_Shard]) -> Header:
+    one, place = shards[0], Path(os.path.realpath(out))
+    files = tuple(relative_path(one.folder / file, place) for file in one.header.files)
+    return replace(one.header, shard=(1, 1), files=files)
+
+
+def _problems(shards: Sequence[_Shard]) -> Iterator[str]:
+    """What is wrong with the shards, a line each."""
+    first = shards[0]
+    of, n = first.header.plan, first.header.shard[1]
+    found: dict[int, Path] = {}
+    for shard in shards:
+        header, (i, count) = shard.header, shard.header.shard
+        alike = (header.plan, count, header.version, header.columns)
+        if alike != (of, n, first.header.version, first.header.columns):
+            yield f"  {shard.folder} is a shard of another batch than {first.folder}"
+        elif i in found:
+            yield f"  {shard.folder} and {found[i]} are the same shard, {i}/{n}"
+        elif (done := len(shard.lines)) < (all_of_it := len(header.indices())):
+            yield f"  {shard.folder}, shard {i}/{n}, is not finished: {done} of {all_of_it} cases"
+        found.setdefault(i, shard.folder)
+    missing = [i for i in range(1, n + 1) if i not in found]
+    if missing:
+        some = ", ".join(map(str, missing[:_SHOWN]))
+        more = f" and {len(missing) - _SHOWN} more" if len(missing) > _SHOWN else ""
+        yield f"  missing of {n} shards: {some}{more}"
+
+
+def _others(out: Path, header: Header) -> Iterator[str]:
+    before = read_header(out)
+    if before is not None and (before.plan, before.shard) != (header.plan, header.shard):
+        yield f"  {out} holds another batch, or one of the shards: choose another folder"
+
+
+def _lines(out: Path, shards: Sequence[_Shard]) -> Iterator[str]:
+    """The lines of all cases in their order; where their folders are is said from ``out``."""
+    parts = [shard.lines if shard.header.columns else _seen_from(out, shard) for shard in shards]
+    return chain.from_iterable(zip_longest(*parts, fillvalue=""))
+
+
+def _seen_from(out: Path, shard: _Shard) -> Iterator[str]:
+    place = Path(os.path.realpath(out))
+    for line in shard.lines:
+        row = from_line(line)
+        if row.run_folder is not None:
+            there = relative_path(shard.folder / row.run_folder, place)
+            line = to_line(replace(row, run_folder=there)) + "\n"
+        yield line
+
+
+def _copy(out: Path, lines: Iterator[str], shards: Sequence[_Shard], keys: Sequence[str]) -> None:
+    for shard in shards:
+        if not are_current(shard.folder, True, shard.folder / LINES):
+            summarise(shard.folder, shard.header)
+    folders, counts = [s.folder for s in shards], [len(s.lines) for s in shards]
+    merge_files(out, lines, folders, counts, keys)

@@ -1,0 +1,122 @@
+"""Shards of a batch become one, or it is said why not; no case is run here."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from eigassign.batch.manifest import Header, Manifest, read_header, write_header
+from eigassign.batch.merge import merge
+from eigassign.cli import main
+from eigassign.errors import UsageError
+from eigassign.output.batch.outcome import CaseOutcome
+
+TOTAL = 7
+RANGES = (("mode 1", 180.0, 190.0, 200.0),)
+
+
+def row(k: int) -> CaseOutcome:
+    values = {"body.mass": f"{k} g"}
+    status = "failed" if k == 3 else "ok"
+    found = CaseOutcome(f"mass={k}g", "arm.yaml", status, 0.1, values=values, index=k)
+    return replace(found, frequencies=RANGES, verdict="reached", run_folder=f"mass={k}g")
+
+
+def shard(folder: Path, i: int, n: int, *, columns: bool = False, **changes: object) -> Path:
+    """The folder of a shard, its cases finished in no order."""
+    header = Header("abc", TOTAL, (i, n), ("../arm.yaml",), ("body.mass",), columns)
+    folder.mkdir(parents=True)
+    write_header(folder, replace(header, **changes))
+    manifest = Manifest(folder)
+    for k in reversed(header.indices()):
+        manifest.append(replace(row(k), run_folder=None) if columns else row(k))
+    return folder
+
+
+def names(folder: Path) -> list[str]:
+    with open(folder / "summary.csv", newline="") as file:
+        return [line["name"] for line in csv.DictReader(file)]
+
+
+@pytest.mark.parametrize("columns", [False, True])
+def test_shards_in_any_order_become_what_one_batch_is(tmp_path: Path, columns: bool) -> None:
+    shards = [shard(tmp_path / str(i), i, 3, columns=columns) for i in (2, 3, 1)]
+    out, whole = tmp_path / "out", shard(tmp_path / "whole", 1, 1, columns=columns)
+    assert merge(out, shards) == {"ok": TOTAL - 1, "failed": 1}
+    assert merge(whole, []) == {"ok": TOTAL - 1, "failed": 1}
+    assert names(out) == [f"mass={k}g" for k in range(TOTAL)]
+    if columns:
+        for name in ("summary.csv", "summary.json", "junit.xml", "columns.csv"):
+            assert (out / name).read_text() == (whole / name).read_text(), name
+    header = read_header(out)
+    assert header is not None
+    assert (header.shard, header.files) == ((1, 1), ("../arm.yaml",))
+
+
+def test_the_folders_of_cases_stay_and_are_found_from_the_new_place(tmp_path: Path) -> None:
+    shards = [shard(tmp_path / "parts" / str(i), i, 2) for i in (1, 2)]
+    merge(tmp_path / "out", shards)
+    found = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert found["cases"][2]["run_folder"] == "../parts/1/mass=2g"
+    merge(tmp_path / "out", shards)  # again, over itself
+
+
+def refused(out: Path, *shards: Path) -> str:
+    with pytest.raises(UsageError) as error:
+        merge(out, shards)
+    assert not (out / "summary.csv").exists()
+    return str(error.value)
+
+
+def test_a_missing_shard_is_named(tmp_path: Path) -> None:
+    shards = [shard(tmp_path / str(i), i, 5) for i in (1, 4)]
+    assert "missing of 5 shards: 2, 3, 5" in refused(tmp_path / "out", *shards)
+
+
+def test_an_unfinished_shard_is_named(tmp_path: Path) -> None:
+    shards = [shard(tmp_path / str(i), i, 2) for i in (1, 2)]
+    lines = (shards[1] / "manifest.jsonl").read_bytes()
+    (shards[1] / "manifest.jsonl").write_bytes(lines[:-5])  # torn
+    assert "shard 2/2, is not finished: 2 of 3 cases" in refused(tmp_path / "out", *shards)
+
+
+def test_shards_of_other_batches_and_the_same_one_twice_are_named(tmp_path: Path) -> None:
+    first = shard(tmp_path / "a", 1, 2)
+    others = [
+        shard(tmp_path / "b", 2, 2, plan="other"),
+        shard(tmp_path / "c", 2, 2, version="0.0.1"),
+        shard(tmp_path / "d", 1, 2),
+    ]
+    said = refused(tmp_path / "out", first, *others)
+    for name in "bc":
+        assert f"{tmp_path / name} is a shard of another batch than {first}" in said
+    assert f"{tmp_path / 'd'} and {first} are the same shard, 1/2" in said
+
+
+def test_no_folder_of_a_batch_and_a_shard_as_target_are_refused(tmp_path: Path) -> None:
+    shards = [shard(tmp_path / str(i), i, 2) for i in (1, 2)]
+    (tmp_path / "empty").mkdir()
+    assert "no folder of a batch" in refused(tmp_path / "out", tmp_path / "empty")
+    assert "or one of the shards" in refused(shards[0], *shards)
+
+
+def test_the_command_counts_and_names_what_has_moved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("before", "now"):
+        shard(Path(name), 1, 1)
+    assert main(["merge", "before"]) == 1  # a case has failed
+    moved = replace(row(5), frequencies=(("mode 1", 180.0, 190.0, 200.5),))
+    Manifest(Path("now")).append(moved)
+    capsys.readouterr()
+    assert main(["merge", "now", "--against", "before"]) == 1
+    out, err = capsys.readouterr()
+    assert re.search(r"mass=5g +mode 1, highest +200 Hz +200\.5 Hz +\+0\.5 Hz", out)
+    assert "7 cases in now: 6 ok, 1 failed" in out
+    assert "1 of 7 cases failed" in err

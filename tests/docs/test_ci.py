@@ -1,0 +1,126 @@
+"""The workflow and the hook of the manual are well formed, and their commands do their work."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from eigassign.cli import main
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "eigassign" / "docs" / "how-to" / "ci.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"^```yaml\n# (\S+)\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
+FILES: dict[str, Any] = {name: yaml.safe_load(text) for name, text in BLOCKS}
+WORKFLOW = FILES[".github/workflows/eigassign.yml"]
+(BASELINE,) = re.findall(r"^```bash\n(.*?)\n```", PAGE, re.DOTALL | re.MULTILINE)
+CASE = """\
+title: A beam
+mechanism:
+  space: planar
+  materials: {steel: {youngs_modulus: 210 GPa, density: 7850}}
+  sections: {rod: {shape: circle, diameter: 20 mm}}
+  links: {arm: {length: 0.5, material: steel, section: rod, elements: 2}}
+  joints: {shoulder: {type: revolute, base: ground, follower: arm.start}}
+  bodies: {tool: {at: arm.end, mass: 0.1}}
+coordinates: {q1: {joint: shoulder}}
+trajectory: {q: [[0], [1]], time: [0, 1]}
+design: {m: {parameter: bodies.tool.mass, min: 0, max: 1}}
+expansion: {order: 2, q: auto, y: auto, modes: [1]}
+targets: [{mode: 1, frequency: 190 Hz}]
+validation: {max_error: 50 %}
+"""
+
+
+@pytest.fixture(autouse=True)
+def _in_a_clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("EIGASSIGN_CACHE_DIR", str(tmp_path / "cache"))
+    Path("cases").mkdir()
+    Path("cases", "two_link.yaml").write_text(CASE)
+
+
+def commands(job: str) -> list[str]:
+    """The lines of a job that are ours."""
+    steps = WORKFLOW["jobs"][job]["steps"]
+    lines = [line for step in steps for line in step.get("run", "").splitlines()]
+    return [line for line in lines if line.startswith("eigassign ")]
+
+
+def run(line: str, **matrix: int) -> int:
+    for name, value in matrix.items():
+        line = line.replace(f"${{{{ matrix.{name} }}}}", str(value))
+    assert "${{" not in line
+    line = line.partition(" > ")[0]
+    words = [
+        name
+        for word in shlex.split(line)[1:]
+        for name in (sorted(map(str, Path().glob(word))) if "*" in word else [word])
+    ]
+    return main(words)
+
+
+def baseline(capsys: pytest.CaptureFixture[str]) -> None:
+    capsys.readouterr()
+    assert run(BASELINE) == 0
+    Path("baseline.json").write_text(capsys.readouterr().out)
+
+
+def test_the_workflow_is_one() -> None:
+    assert WORKFLOW[True] == ["push"]  # YAML 1.1 takes `on` for true, and so do the servers
+    jobs = WORKFLOW["jobs"]
+    for job in jobs.values():
+        assert job["runs-on"]
+        assert job.get("needs", next(iter(jobs))) in jobs
+        for step in job["steps"]:
+            assert ("uses" in step) != ("run" in step)
+            assert set(step) <= {"uses", "with", "run", "if"}
+            assert re.fullmatch(r"actions/[a-z-]+@v\d", step.get("uses", "actions/checkout@v4"))
+    used = set(re.findall(r"matrix\.(\w+)", str(jobs["sweep"]["steps"])))
+    assert used == set(jobs["sweep"]["strategy"]["matrix"])
+    assert all(commands(job) for job in jobs)
+
+
+def test_the_first_job_passes_and_fails_when_a_frequency_moves(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    baseline(capsys)
+    assert [run(line) for line in commands("validate")] == [0, 0]
+    Path("cases", "two_link.yaml").write_text(CASE.replace("7850", "7900"))
+    assert [run(line) for line in commands("validate")] == [0, 1]
+    (suite,) = ET.parse("validation.xml").getroot()
+    assert suite[0][0].get("type") == "moved"
+
+
+def test_the_parts_of_the_sweep_become_one_batch_and_a_missing_one_is_told(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (part,), (merge,) = commands("sweep"), commands("merge")
+    for k in WORKFLOW["jobs"]["sweep"]["strategy"]["matrix"]["part"]:
+        run(f"{part} --reports none --jobs 1 --quiet", part=k)
+    shutil.move("part-2", "elsewhere")
+    assert run(merge) == 2
+    assert "missing of 3 shards: 2" in capsys.readouterr().err
+    shutil.move("elsewhere", "part-2")
+    run(merge)
+    assert "5 cases in sweep" in capsys.readouterr().out
+
+
+def test_the_hook_takes_good_cases_and_no_wrong_one() -> None:
+    (repository,) = FILES[".pre-commit-config.yaml"]["repos"]
+    (hook,) = repository["hooks"]
+    assert repository["repo"] == "local"
+    assert set(hook) == {"id", "name", "entry", "language", "files"}
+    wrong = Path("cases", "wrong.yml")
+    wrong.write_text("title: x")
+    names = [str(path) for path in Path("cases").iterdir()]
+    assert all(re.search(hook["files"], name) for name in names)
+    assert not re.search(hook["files"], "cases/README.md")
+    assert run(f"{hook['entry']} cases/two_link.yaml") == 0
+    assert run(f"{hook['entry']} {' '.join(names)}") == 2
