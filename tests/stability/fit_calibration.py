@@ -77,8 +77,11 @@ def settings(path: Path) -> Iterator[Setting]:
         yield Setting(f"{name} x box", model, (q, box), some, y)
         yield Setting(f"{name} pose", model, (q[0], box), np.tile(q[0], (len(y), 1)), y)
         middle = q[len(q) // 2]
-        around = _inside(rng, np.append(middle - SPAN, low), np.append(middle + SPAN, high))
-        q_box = ea.Box(middle - SPAN, middle + SPAN)
+        q_low, q_high = middle - SPAN, middle + SPAN
+        loads = slice(len(case.file.coordinates), None)  # masses and the like: never below 0
+        q_low[loads] = np.maximum(q_low[loads], 0.0)
+        around = _inside(rng, np.append(q_low, low), np.append(q_high, high))
+        q_box = ea.Box(q_low, q_high)
         yield Setting(f"{name} box x box", model, (q_box, box), *np.hsplit(around, [len(middle)]))
 
 
