@@ -11,6 +11,7 @@ from __future__ import annotations
 import errno
 import math
 import os
+import shlex
 import stat
 from collections.abc import Iterator
 from pathlib import Path
@@ -66,13 +67,17 @@ def objection(path: str | Path, limit: int) -> str | None:
 
 
 def printable(text: str) -> str:
-    """``text`` with control characters written out, so that no name can move a cursor."""
+    """One line of text with control characters written out, so that no name can move a cursor."""
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
-def printable_lines(text: str) -> str:
-    """The same for several lines."""
-    return "\n".join(map(printable, text.split("\n")))
+def quoted(path: str | Path) -> str:
+    """``path`` as a shell takes it, on one line and without control characters."""
+    text = f"./{path}" if str(path).startswith("-") else str(path)
+    if text.isprintable():
+        return shlex.quote(text)
+    escaped = "".join(f"\\{c}" if c in "\\'" else printable(c) for c in text)
+    return f"$'{escaped}'"
 
 
 def pieces(path: str | Path, limit: int) -> Iterator[bytes]:

@@ -20,7 +20,7 @@ from types import FrameType
 from typing import Any, TextIO
 
 from eigassign.errors import CaseError, EigassignError, Problem, StorageError
-from eigassign.files import CASE, printable_lines, read_bytes
+from eigassign.files import CASE, printable, read_bytes
 
 # --- Errors as people read them on stderr, and the exit code of each
 
@@ -71,7 +71,7 @@ def report(error: BaseException, debug: bool = False) -> int:
     if debug and failure.summary:
         import traceback
 
-        say(["".join(traceback.format_exception(error)).rstrip("\n")])
+        say("".join(traceback.format_exception(error)).splitlines())
     say(problem_lines(failure.problems))
     say([f"eigassign: {failure.summary}"] if failure.summary else [])
     return failure.exit_code
@@ -84,7 +84,7 @@ def say(lines: Iterable[str], passing: bool = False) -> None:
     """
     with suppress(OSError, AttributeError, ValueError):
         colours, clears = shows_colours(sys.stderr), _rewrites(sys.stderr)
-        for line in map(printable_lines, lines):
+        for line in map(printable, lines):
             shown = _coloured(line) if colours else line
             if clears:
                 shown = f"\r{line[:_NARROWEST]}\x1b[K\r" if passing else f"{shown}\x1b[K\n"

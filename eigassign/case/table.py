@@ -205,7 +205,8 @@ def _rows(text: str, dialect: _Dialect, name: str, key: str) -> Iterator[tuple[i
                 yield dialect.skipped + reader.line_num, cells
     except csv.Error as error:
         line = dialect.skipped + reader.line_num
-        raise MechanismError(key, f"{name}:{line}: {error}") from error
+        message = f"{name}:{line}: {error}: between separators stands one number, or one name"
+        raise MechanismError(key, f"{message}; close every quote") from error
 
 
 def _hold_numbers(*rows: list[str]) -> bool:

@@ -14,6 +14,7 @@ import eigassign.cli.arguments as arguments
 from eigassign import process
 from eigassign.cli.reporter import print_json, reporting, show
 from eigassign.errors import EigassignError
+from eigassign.files import printable
 
 if TYPE_CHECKING:
     from eigassign.output.run_record import RunStatus
@@ -67,7 +68,7 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
 
         room = terminal.width(sys.stdout)
         for name, answer in answers.items():
-            show(terminal.wrapped(_described(name, answer), room))
+            show(*terminal.wrapped(map(printable, _described(name, answer)), room))
     return max(codes)
 
 
@@ -174,6 +175,7 @@ def modes(
             {
                 "rigid_modes": answer.rigid_modes,
                 "frequencies_hz": answer.frequencies_hz,
+                "round_off": _finite(answer.round_off),
                 **{k: list(map(_finite, v)) for k, v in stated.items() if v is not None},
             }
         )
@@ -189,6 +191,7 @@ def _finite(error: float) -> float | None:
 
 def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
     from eigassign.output.console import print_modes
+    from eigassign.study.accuracy import rounding_line
 
     print_modes(
         answer.frequencies_hz,
@@ -197,6 +200,7 @@ def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
         y=answer.y,
         discretisation=answer.discretisation_error,
         truncation=answer.truncation_error,
+        note=rounding_line(answer.round_off),
     )
     if folder is not None:
         show(f"{folder} written")
@@ -228,15 +232,13 @@ def status(runs: tuple[Path, ...], as_json: bool, **how: Any) -> int:
             judged = {"intact": found.intact, "current": found.current}
             answers[str(run)] = {**judged, **vars(found)}
             if not as_json:
-                show(_state_of(str(run), found))
+                show(*_state_of(str(run), found))
     if as_json:
         print_json(answers)
     return max(codes)
 
 
-def _state_of(name: str, found: RunStatus) -> str:
-    from eigassign.files import printable
-
+def _state_of(name: str, found: RunStatus) -> list[str]:
     changes = found.changes
     verdict = "intact" if found.intact else "damaged or edited"
     lines = [f"{name}: {verdict}; {'up to date' if found.current else 'out of date'}"]
@@ -245,7 +247,7 @@ def _state_of(name: str, found: RunStatus) -> str:
     lines.append(f"  case {found.case}: {_SINCE[found.case_state]}")
     lines += [f"  its file {file}: {_SINCE[state]}" for file, state in found.case_files.items()]
     lines.append(f"  version {found.version}; {found.installed} is installed")
-    return "\n".join(map(printable, lines))
+    return lines
 
 
 _SINCE = {"same": "as it was", "changed": "changed since", "missing": "not there any more"}

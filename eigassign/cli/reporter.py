@@ -17,7 +17,7 @@ from typing import Any, TextIO
 import click
 
 from eigassign.errors import Problem
-from eigassign.files import printable_lines
+from eigassign.files import printable
 from eigassign.process import say
 
 # --- stderr while a command works
@@ -78,9 +78,10 @@ class _Handler(logging.Handler):
 # --- stdout
 
 
-def show(text: str) -> None:
-    """``text`` on stdout, without raw escapes of a name in it."""
-    click.echo(printable_lines(text))
+def show(*lines: str) -> None:
+    """Lines on stdout, without raw escapes and ends of lines of a name in them."""
+    for line in lines:
+        click.echo(printable(line))
 
 
 # --- JSON on stdout, in ASCII, which every terminal shows

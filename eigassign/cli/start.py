@@ -12,7 +12,7 @@ import click
 import eigassign.cli.arguments as arguments
 from eigassign.cli.reporter import show
 from eigassign.errors import StorageError, UsageError
-from eigassign.files import CASE, read_bytes
+from eigassign.files import CASE, quoted, read_bytes
 
 PACKAGE = Path(__file__).parents[1]
 STARTERS = PACKAGE / "starters"
@@ -55,12 +55,12 @@ def init(template: str, out: Path | None) -> int:
             raise StorageError(f"{path} exists and is left alone: choose another name with --out")
     for path, source in files.items():
         path.parent.mkdir(parents=True, exist_ok=True)
-        text = source.read_text(encoding="utf-8").replace(f" {template}.yaml", f" {case}")
+        text = source.read_text(encoding="utf-8").replace(f" {template}.yaml", f" {quoted(case)}")
         with open(path, "x", encoding="utf-8") as file:
             file.write(text)
         show(f"{path} written")
     others = ", ".join(name for name in TEMPLATES if name != template)
-    show(f"next: eigassign check {case} --draw\nother templates: {others}")
+    show(f"next: eigassign check {quoted(case)} --draw", f"other templates: {others}")
     return 0
 
 

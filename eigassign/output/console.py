@@ -163,15 +163,17 @@ def print_modes(
     y: Sequence[tuple[str, float]] = (),
     discretisation: Sequence[float] | None = None,
     truncation: Sequence[float] | None = None,
+    note: str = "",
     stream: TextIO | None = None,
 ) -> None:
     """Elastic modes in Hz from 1 upwards, where they were evaluated, and the rigid modes left out.
 
     ``q`` and ``y`` are (name, value) pairs in SI; ``discretisation`` and ``truncation`` are how
-    much mesh and reduced links raise each frequency at most, relative.
+    much mesh and reduced links raise each frequency at most, relative; ``note`` is said below.
     """
     where = ", ".join(f"{name} = {number(value)}" for name, value in (*q, *y))
     caption = f"{rigid_modes} rigid-body mode{'s' if rigid_modes != 1 else ''} not counted."
+    caption += f" {note[:1].upper()}{note[1:]}." if note else ""
     rows: list[tuple[str, ...]] = [
         (str(mode), f"{hz:.10g}") for mode, hz in enumerate(frequencies_hz, start=1)
     ]

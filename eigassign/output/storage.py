@@ -66,6 +66,8 @@ def replace_synced(path: Path, data: bytes) -> None:
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """A file to fill, which takes the place of ``path`` at the end as `replace_synced` does it."""
+    if "\0" in str(path):  # a ValueError of Python's
+        raise OSError(errno.EINVAL, "a null character in its name")
     sweep_files(path.parent, path.name.__eq__)
     with temporary(path, lambda made: made.touch(exist_ok=False)) as made:
         yield made

@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import shutil
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TextIO
 
 from rich.cells import cell_len, set_cell_size
@@ -32,7 +32,7 @@ def width(out: TextIO) -> int:
     return shutil.get_terminal_size().columns if out.isatty() else ENDLESS
 
 
-def wrapped(lines: Sequence[str], room: int) -> str:
+def wrapped(lines: Iterable[str], room: int) -> list[str]:
     """Lines that end between words; what is continued is indented further than its beginning."""
     text = []
     for line in lines:
@@ -41,7 +41,7 @@ def wrapped(lines: Sequence[str], room: int) -> str:
             room, subsequent_indent=indent, break_on_hyphens=False, break_long_words=False
         )
         text += wrapper.wrap(line) if len(line) > room else [line]
-    return "\n".join(text)
+    return text
 
 
 def groups(headers: Sequence[str], cells: Sequence[Sequence[str]], room: int) -> tuple[Group, ...]:

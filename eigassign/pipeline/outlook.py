@@ -6,7 +6,6 @@ shipped cases); the time of one such solve is measured.
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile
+from eigassign.files import quoted
 from eigassign.mechanism.kinematics.parameters import written_loads
 from eigassign.mechanism.kinematics.travel_limits import resting_pose
 from eigassign.mechanism.trajectory.trajectory import Trajectories
@@ -70,7 +70,7 @@ def _solve_s(model: Model, trajectory: Trajectories, y: Floats) -> float:
 
 def next_step(case: CaseFile) -> str:
     """What to do with a case that is in order."""
-    name = shlex.quote(str(case.path))
+    name = quoted(case.path)
     if case.measurements is not None:
         return f"eigassign update {name}"
     missing = [key for key in ("trajectory", "design", "targets") if not _given(case, key)]

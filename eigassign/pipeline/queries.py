@@ -17,6 +17,7 @@ from eigassign.case.units import DIMENSIONS, TWO_TURNS, QuantityError, is_bare
 from eigassign.errors import CaseError, Problem, UsageError
 from eigassign.mechanism.elements.superelement import weights
 from eigassign.mechanism.kinematics.parameters import written_loads
+from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.output import report
 from eigassign.pipeline.outlook import Outlook, next_step, outlook, some_pose
 from eigassign.pipeline.run_files import RESULTS, new_run_folder
@@ -42,6 +43,7 @@ class ModesAnswer:
     y: tuple[tuple[str, float], ...]
     truncation_error: list[float] | None = None  # of reduced links: relative, too high by at most
     discretisation_error: list[float] | None = None  # of the mesh: likewise; infinite: too coarse
+    round_off: float = 0.0  # of all of these, relative, at most; infinite: not known
 
 
 @dataclass(frozen=True)
@@ -158,6 +160,7 @@ def _answer(case: Case, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
         _pairs(model.y_names, y),
         None if lost is None else [float(value) for value in lost],
         None if coarse is None else [float(value) for value in coarse],
+        rounding_error(model.pencil, model.x(q, y)[0], len(hz)),
     )
 
 

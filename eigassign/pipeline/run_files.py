@@ -9,7 +9,7 @@ from pathlib import Path
 
 from eigassign.case import CaseFile
 from eigassign.errors import UsageError
-from eigassign.files import printable_lines
+from eigassign.files import printable
 from eigassign.output import report
 from eigassign.output.run_folder import run_folder
 from eigassign.study.results import AssignmentRow, ErrorSummary, RunResults
@@ -68,7 +68,7 @@ def log_text(results: RunResults) -> str:
         *_outcome_lines(results),
         *(f"time      {stage}: {1e3 * spent:.2f} ms" for stage, spent in results.timing_s.items()),
     ]
-    return printable_lines("\n".join(lines) + "\n")
+    return "".join(f"{printable(line)}\n" for line in lines)
 
 
 def _distances(error: ErrorSummary, along: str) -> Iterator[str]:

@@ -78,8 +78,21 @@ class LowerSet(Brief):
 
     @cached_property
     def table(self) -> ProductTable:
-        """The product table, made once per set."""
+        """The product table, made once per set. Raises UsageError as `require_affordable` does."""
         return _product_table(self)
+
+    def require_affordable(self) -> None:
+        """Raise UsageError where so many members meet in products that memory would not suffice."""
+        starts, order = self.degree_starts, self.order
+        members = np.diff(starts)
+        count = int(members @ starts[order + 1 : 0 : -1])
+        if count > raised(MOST_PAIRS):
+            size = f"about {count * PAIR_BYTES / 1e9:.2g} GB"
+            raise UsageError(
+                f"order {order} in {self.n_variables} variables: {len(self)} coefficients have "
+                f"{count:.3g} products of two, which takes {size}: lower the order, or "
+                f" {how_to_raise(count, MOST_PAIRS)}"
+            )
 
     @cached_property
     def units(self) -> Ints:
@@ -156,14 +169,8 @@ def _weights(n: int) -> NDArray[np.uint64]:
 
 
 def _product_table(space: LowerSet) -> ProductTable:
-    starts, order = space.degree_starts, space.order
-    count = sum(int((starts[d + 1] - starts[d]) * starts[order - d + 1]) for d in range(order + 1))
-    if count > raised(MOST_PAIRS):
-        raise UsageError(
-            f"order {order} in {space.n_variables} variables: {len(space)} coefficients have "
-            f"{count:.3g} products of two, which takes about {count * PAIR_BYTES / 1e9:.2g} GB: "
-            f"lower the order, or {how_to_raise(count, MOST_PAIRS)}"
-        )
+    space.require_affordable()
+    starts = space.degree_starts
     parts = [
         space.pairs(
             np.arange(starts[degree], starts[degree + 1]),

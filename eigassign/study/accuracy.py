@@ -36,6 +36,8 @@ from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 POSES = 9  # at which the mesh is judged; each costs an exact solve
+POSES_LARGE = 3  # of a model of more than `LARGE` degrees of freedom, where one takes half a second
+LARGE = 10_000
 SAMPLES = 20  # at which the expansion's own estimate is evaluated
 
 
@@ -52,8 +54,14 @@ def accuracy_notes(scene: Scene, optimum: Floats | None = None) -> list[str]:
         lines += _estimated_lines(scene, _spread(q, SAMPLES))
     first = scene.model.x(q[0], scene.initial)[0]
     lost = rounding_error(scene.model.pencil, first, max(scene.expansions.modes))
-    lines.append(f"round-off of the exact frequencies: below {lost:.1g} relative")
-    return lines
+    return [*lines, rounding_line(lost)]
+
+
+def rounding_line(lost: float) -> str:
+    """What round-off does to the exact frequencies at most, relative, in words."""
+    if not np.isfinite(lost):
+        return "round-off of the exact frequencies: not known; they may be nothing else"
+    return f"round-off of the exact frequencies: below {lost:.1g} relative"
 
 
 def judged_mesh(
@@ -70,7 +78,8 @@ def judged_mesh(
     """
     if model.meshed is None:
         return None
-    q = q0[None] if trajectory is None else _spread(poses_at(trajectory, y), POSES)
+    count = POSES if model.n_dof <= LARGE else POSES_LARGE
+    q = q0[None] if trajectory is None else _spread(poses_at(trajectory, y), count)
     error = model.discretisation_error(q, y, modes).max(axis=0)
     return MeshError(tuple(modes), tuple(float(e) for e in error), len(q), design)
 

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import hadamard
 
 from eigassign.case import CaseFile
-from eigassign.errors import AccuracyError, CaseError, TrajectoryError
+from eigassign.errors import AccuracyError, CaseError, TrajectoryError, UsageError
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.adaptive.link_reduction import POSES, ReductionChoice, choose_reduction
@@ -28,6 +28,7 @@ from eigassign.modal.adaptive.order import ExpansionChoice, choose_expansion
 from eigassign.modal.arguments import spread
 from eigassign.modal.exact.clusters import CLUSTER_GAP
 from eigassign.modal.model import Model
+from eigassign.modal.taylor.local_coordinates import local_space
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -61,7 +62,8 @@ def plan_expansion(
     """Settle the expansion; ``order`` and ``modes`` override the file's.
 
     Raises CaseError at the key at fault: lengths that differ from the model's, modes it does not
-    have, an automatic expansion point without a trajectory to be central in.
+    have, an automatic expansion point without a trajectory to be central in, an order of which
+    the memory would not suffice; UsageError for such an ``order``.
     """
     q0, q_note = _q0(file, model, trajectory)
     y0, y_note = _y0(file, model)
@@ -70,10 +72,19 @@ def plan_expansion(
     notes = [q_note, y_note, modes_note, *_outside(file, q0, y0, model, trajectory)]
     wanted: int | str = file.expansion.order if order is None else order
     if isinstance(wanted, int):
+        _require_affordable(file, model, wanted, given=order is None)
         return Plan(q0, y0, wanted, chosen, tuple(note for note in notes if note))
     found = choose_order(file, model, trajectory, q0, y0, chosen)
     all_notes = tuple(note for note in (*notes, *found.reasons) if note)
     return Plan(q0, y0, found.order, chosen, all_notes, found.more_q, found.cluster_gap)
+
+
+def _require_affordable(file: CaseFile, model: Model, order: int, given: bool) -> None:
+    """The linearised series is made of any order; the full one, see `pipeline.expansions`."""
+    try:
+        local_space(model.pencil, order, True, None).space.require_affordable()
+    except UsageError as error:
+        raise (_wrong(file, "expansion.order", str(error)) if given else error) from None
 
 
 def _q0(file: CaseFile, model: Model, trajectory: Trajectories | None) -> tuple[Floats, str]:

@@ -35,6 +35,29 @@ def test_a_case_file_with_escapes_in_its_name_is_named_without_them(
     said(capsys)
 
 
+@pytest.mark.parametrize(
+    ("name", "typed"),
+    [
+        ("a\nb.yaml", r"$'a\nb.yaml'"),
+        ("it's \\ \x1b.yaml", r"$'it\'s \\ \x1b.yaml'"),
+        ("it's fine.yaml", "'it'\"'\"'s fine.yaml'"),
+        ("-dash.yaml", "./-dash.yaml"),
+    ],
+)
+def test_the_next_command_can_be_typed_and_a_name_stays_on_its_line(
+    name: str, typed: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path(name).write_text(GOOD)
+    assert main(["check", f"./{name}"]) == 0
+    assert said(capsys).splitlines()[-1].split(maxsplit=2)[1:] == ["eigassign", f"optimize {typed}"]
+    Path(name).write_text(GOOD.replace("steel", "stel", 1))
+    for command in ("check", "modes"):
+        assert main([command, f"./{name}"]) == 2
+        assert "\nb.yaml" not in said(capsys)
+    main(["init", "--out", f"new{name}"])
+    assert "\nb.yaml" not in said(capsys)
+
+
 def test_columns_with_escapes_are_named_without_them(capsys: pytest.CaptureFixture[str]) -> None:
     start, end = GOOD.index("trajectory:"), GOOD.index("design:")
     name = ESCAPE.replace("[", "").replace("]", "")

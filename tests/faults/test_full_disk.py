@@ -75,7 +75,7 @@ def copied(scene: Scene, folder: Path) -> Scene:
     ("write", "most"),
     [
         pytest.param(write_a_few_files, 12, id="a few files"),
-        pytest.param(optimize, 60, marks=pytest.mark.slow, id="optimize"),
+        pytest.param(optimize, 1600, marks=pytest.mark.slow, id="optimize"),
     ],
 )
 def test_a_disk_with_too_few_pages_costs_the_run_alone(
@@ -89,7 +89,7 @@ def test_a_disk_with_too_few_pages_costs_the_run_alone(
     shutil.rmtree(scene.root / "cache", ignore_errors=True)
 
     def run_on(pages: int) -> int:
-        own_disk(disk, "size=16m")
+        own_disk(disk, "size=32m")
         there = copied(scene, disk)
         free = os.statvfs(disk).f_bfree
         (disk / "filler").write_bytes(bytes((free - pages) * PAGE))

@@ -21,9 +21,20 @@ def test_terms_are_projected_alike_from_stacks_and_from_their_rows(
     thin = sparsely(monkeypatch, lambda: projection.project(arm(drives).pencil, V))
     monkeypatch.setattr(projection, "CHUNK", 7)  # terms cut into pieces
     cut = sparsely(monkeypatch, lambda: projection.project(arm(drives).pencil, V))
-    for a, b, c in zip(full, thin, cut, strict=True):
-        np.testing.assert_allclose(b, a, atol=1e-12 * np.abs(a).max())
-        np.testing.assert_allclose(c, a, atol=1e-12 * np.abs(a).max())
+    monkeypatch.setattr(projection, "PIECE", 70)  # and some terms at a time
+    few = projection.project(arm(drives).pencil, V)
+    fewer = sparsely(monkeypatch, lambda: projection.project(arm(drives).pencil, V))
+    for right, *others in zip(full, thin, cut, few, fewer, strict=True):
+        for found in others:
+            np.testing.assert_allclose(found, right, atol=1e-12 * np.abs(right).max())
+
+
+def test_no_rows_have_no_projection(monkeypatch: pytest.MonkeyPatch) -> None:
+    pencil = arm(DRIVES[0]).pencil
+    V = np.ones((2, pencil.n_dof))
+    for found in (list, lambda parts: sparsely(monkeypatch, lambda: list(parts))):
+        for part in found(projection.project_terms(pencil, V[:0], V, np.arange(pencil.n_theta))):
+            assert part.values.shape[2:] == (0, 2)
 
 
 @pytest.mark.parametrize("limit", [0, 10**9])

@@ -72,6 +72,14 @@ def test_a_missing_file_and_a_missing_folder_are_named(reduced, tmp_path: Path):
         api.save_reduced(reduced, tmp_path / "none" / "arm.h5")
 
 
+@pytest.mark.parametrize("name", ["a\0.h5", "a\0.npz", "a\0.c", "a\0/b.h5"])
+def test_a_name_that_no_file_can_have_is_refused(reduced, tmp_path: Path, name: str):
+    with pytest.raises(StorageError, match="null"):
+        api.save_reduced(reduced, f"{tmp_path}/{name}")
+    with pytest.raises(StorageError, match="null"):
+        api.load_reduced(f"{tmp_path}/{name}")
+
+
 def test_arrays_of_another_version_are_refused(reduced):
     arrays = reduced_arrays(reduced)
     tree = json.loads(arrays["tree"].tobytes())

@@ -139,14 +139,14 @@ def test_columns_that_need_a_second_part_are_not_shortened_for_nothing(monkeypat
 
 def test_long_lines_end_between_words_and_go_on_indented():
     lines = ["a short line", "  note: one two three /a/path/longer/than/the/line four"]
-    assert terminal.wrapped(lines, 20).splitlines() == [
+    assert terminal.wrapped(lines, 20) == [
         "a short line",
         "  note: one two",
         "    three",
         "    /a/path/longer/than/the/line",
         "    four",
     ]
-    assert terminal.wrapped(lines, terminal.ENDLESS) == "\n".join(lines)
+    assert terminal.wrapped(lines, terminal.ENDLESS) == lines
 
 
 def test_control_characters_do_not_reach_the_terminal():

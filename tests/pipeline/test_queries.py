@@ -54,6 +54,20 @@ def test_questions_that_make_no_sense_are_refused(
         modes(SHIPPED, q, y, count)
 
 
+def test_modes_state_what_round_off_leaves(tmp_path: Path) -> None:
+    answers = []
+    for factor in (1.0, 7.3, 0.61, 23.7):  # of stiffness and mass: no frequency changes
+        text = shipped(
+            ("69 GPa", f"{69e9 * factor}"),
+            ("2690.007033", f"{2690.007033 * factor}"),
+            ("elements: 4", "elements: 60"),
+            ("joint: shoulder}", f"joint: shoulder, drive: {{stiffness: {1e15 * factor}}}}}"),
+        )
+        answers.append(modes(written(tmp_path, text)))
+    hz = np.array([answer.frequencies_hz for answer in answers])
+    assert 1e-10 < (np.ptp(hz, axis=0) / hz[0]).max() < answers[0].round_off < 1e-2
+
+
 def test_check_says_what_the_case_amounts_to() -> None:
     answer = check(SHIPPED)
     assert (answer.n_dof, answer.n_rigid, answer.samples, answer.duration_s) == (23, 2, 152, 1.0)

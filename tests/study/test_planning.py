@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scenes import HEAD, SHIPPED, automatic, changed, scene_of
 
 from eigassign.api import load_case
-from eigassign.errors import CaseError
+from eigassign.errors import CaseError, UsageError
 from eigassign.study.planning import Plan, central_sample, joint_map, plan_expansion, shown_point
 
 
@@ -84,6 +84,16 @@ def test_a_plan_that_cannot_be_is_refused_at_its_key(
 ) -> None:
     with pytest.raises(CaseError, match=message):
         plan_of(tmp_path, text)
+
+
+def test_an_order_that_fills_the_memory_is_refused_before_the_expansion(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("eigassign.series.multi_index.MOST_PAIRS", 20)
+    with pytest.raises(CaseError, match=r"expansion.order: order 4 in 3 .*EIGASSIGN_LIMITS="):
+        plan_of(tmp_path, SHIPPED)
+    with pytest.raises(UsageError, match="lower the order"):
+        plan_of(tmp_path, SHIPPED, order=6)
 
 
 def test_without_a_design_only_q_is_planned(tmp_path: Path) -> None:

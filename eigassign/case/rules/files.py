@@ -61,7 +61,7 @@ def not_allowed(named: Sequence[NamedFile], folder: Path) -> Iterator[Finding]:
             yield (
                 each.path,
                 f"{printable(each.file)} lies outside the folder of the case file: put it there, "
-                "or allow it with --allow-outside (in Python allow_outside=True)",
+                "or add --allow-outside to the command (in Python allow_outside=True)",
             )
 
 

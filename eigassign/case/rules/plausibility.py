@@ -329,7 +329,7 @@ def goals_can_be_meant(document: Document) -> Iterator[Finding]:
     for part in ("assignment", "validation"):
         accepted = getattr(document, part).max_error
         if accepted is not None and accepted > LARGEST_ERROR:
-            message = f"this is {100 * accepted:g} %; write the % if it was meant so"
+            message = f"{100 * accepted:g} % accepts nearly anything: usual is 2 %, which is 0.02"
             yield (part, "max_error"), message
     if document.expansion.y != "auto":
         bounds = document.design.parameters.items()

@@ -16,6 +16,10 @@ from eigassign.modal.exact.condensation import Modes, rigid_coupling
 from eigassign.modal.exact.massless import mass_sizes, may_be_roundoff, modes_with_mass
 
 Floats = NDArray[np.float64]
+FINE = (
+    "the exact modes were not found: so fine a mesh, or stiffnesses so far apart, leave nothing "
+    "but round-off; give the links fewer elements"
+)
 DENSE_MOST = 4000  # elastic unknowns up to which dense algebra settles what may be round-off
 
 
@@ -78,7 +82,7 @@ def lanczos(
         raise AccuracyError(f"the exact modes did not converge: {error}") from error
     except linalg.ArpackError as error:
         if n > DENSE_MOST:
-            raise AccuracyError(f"the exact modes were not found: {error}") from error
+            raise AccuracyError(FINE) from error
         # Few directions have mass: ARPACK before SciPy 1.16 cannot build a larger Krylov space.
         return np.zeros(count), np.zeros((n, count))  # no mode is sure: dense algebra decides
     order = np.argsort(-mu)

@@ -127,8 +127,11 @@ def test_lines_that_are_wrong_are_named(tmp_path, line, message):
         (b"\x89PNG\r\n\x1a\n\x00\x00", "not a text file in UTF-8"),
         (b"time,q1,q2\n0,1,\x00\n", "zero bytes"),
         ("time,q1,q2\n".encode("utf-16"), "not a text file in UTF-8"),
-        (b'time,q1,q2\n0,1,"2\n', "arm.csv:2: unexpected end of data"),
-        (b"time,q1,q2\n0,1," + b"9" * 200_000 + b"\n", "arm.csv:2: field larger"),
+        (b'time,q1,q2\n0,1,"2\n', "arm.csv:2: unexpected end of data.*close every quote"),
+        (
+            b"time,q1,q2\n0,1," + b"9" * 200_000 + b"\n",
+            "arm.csv:2: field larger.*one number, or one name",
+        ),
     ],
 )
 def test_files_that_are_no_table_of_text(tmp_path, content, message):
