@@ -25,6 +25,7 @@ OWNERS = {
     "platformdirs": {"output"},
     "click": {"cli"},
     "sklearn": {"chart"},
+    "distributed": {"batch"},
     "yourdfpy": {"pipeline"},
 }
 EVERYWHERE = {"numpy", "scipy"}

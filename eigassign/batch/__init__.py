@@ -12,5 +12,6 @@ Reading order:
     merge     one batch of its shards
     forecast  what a batch will take
     workers   where tasks run: this process, or processes that are gone when the parent is
+    cluster   the workers of a dask.distributed scheduler
     runner    all of it together: start there
 """

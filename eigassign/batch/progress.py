@@ -10,7 +10,7 @@ import contextlib
 import itertools
 import os
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -137,8 +137,8 @@ class Progress:
         """How many of them are done."""
         return self.ends.total()
 
-    def tasks(self, size: int = 1) -> Iterator[Sequence[Variant]]:
-        """What is neither done nor in flight in another process, so many cases at a time."""
+    def tasks(self, size: Callable[[], int]) -> Iterator[Sequence[Variant]]:
+        """What is neither done nor in flight in another process, ``size()`` cases at a time."""
         task: list[Variant] = []
         for k, index in enumerate(self._indices):
             if self._ends[k] or not self._lock.claim(index):
@@ -148,7 +148,7 @@ class Progress:
                 self._lock.release(index)
                 continue
             task.append(self._plan[index])
-            if len(task) >= size:
+            if len(task) >= size():
                 yield task
                 task = []
         if task:

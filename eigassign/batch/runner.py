@@ -19,7 +19,7 @@ from eigassign.batch.manifest import read_header
 from eigassign.batch.plan import Variant, variant_problem
 from eigassign.batch.progress import Batch, Progress, set_up, summarise
 from eigassign.batch.work import check_cases, outcome_of, run_cases
-from eigassign.batch.workers import Place, run_tasks, this_machine
+from eigassign.batch.workers import Pace, Place, run_tasks, this_machine
 from eigassign.errors import CaseError, Problem, StorageError
 from eigassign.output.batch.outcome import CaseOutcome
 
@@ -87,9 +87,12 @@ def _run(
     shows, and the others lose nothing.
     """
 
+    pace = Pace(place.task_s)
+
     def keep(_task: Sequence[Variant], found: Sequence[CaseOutcome]) -> None:
         for outcome in found:
             progress.keep(outcome)
+            pace.note(outcome.seconds)
             on_outcome(outcome)
 
     why = "memory or time" if batch.options.seconds else "memory"
@@ -97,7 +100,7 @@ def _run(
     work = partial(run_cases, options=batch.options)
     while progress.done < progress.total:
         done = progress.done
-        suspects = run_tasks(place, progress.tasks(), work, keep)
+        suspects = run_tasks(place, progress.tasks(pace.size), work, keep)
         for task in ([variant] for suspect in suspects for variant in suspect):
             if run_tasks(place, iter([task]), work, keep, slots=1):
                 keep(task, [outcome_of(task[0], "error", message=killed)])

@@ -54,6 +54,22 @@ class Place:
     task_s: float = 0.0
 
 
+class Pace:
+    """How many cases make a task of about ``task_s`` seconds, by the mean of those done."""
+
+    def __init__(self, task_s: float) -> None:
+        self._task_s, self._seconds, self._cases = task_s, 0.0, 0
+
+    def note(self, seconds: float) -> None:
+        """Of a case that is done."""
+        self._seconds += seconds
+        self._cases += 1
+
+    def size(self) -> int:
+        """One until a case is done."""
+        return int(max(1.0, self._task_s * self._cases / max(self._seconds, 1e-9)))
+
+
 def this_machine(jobs: int | None) -> Place:
     """This process for one job, else a pool of processes; None is one for each core."""
     slots = jobs or cores()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ import click
 
 import eigassign.cli.arguments as arguments
 from eigassign.cli.reporter import Reporter, reporting, show
+from eigassign.errors import UsageError
 
 if TYPE_CHECKING:
     from collections import Counter
@@ -43,6 +44,11 @@ _FIRST, _LAST = 5, 2  # cases that a dry run lists
 )
 @click.option("--dry-run", is_flag=True, help="List what would run, with its time and files.")
 @click.option("--jobs", type=click.IntRange(1), help="Processes (default: one per core).")
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Run on the workers of this dask.distributed scheduler (default: on this machine).",
+)
 @click.option(
     "--shard",
     type=arguments.Shard(),
@@ -100,7 +106,6 @@ def batch(
     """
     from eigassign.batch.limits import require_limits_here
     from eigassign.batch.plan import cases_in, plan_of
-    from eigassign.batch.workers import this_machine
 
     require_limits_here(how["case_time"], how["case_memory"])
     cases = cases_in(paths)
@@ -109,12 +114,26 @@ def batch(
     usual = Path("results", f"{cases[0].stem}_sweep") if swept else Path("results")
     with reporting(how) as reporter:
         asked = _batch(plan, how["out"] or usual, how)
-        place = this_machine(jobs)
-        if dry_run:
-            return _tell(asked, place)
-        since = _since(how)
-        ends = _watched(asked, place, reporter, join)
+        with _place(how["scheduler"], jobs) as place:
+            if dry_run:
+                return _tell(asked, place)
+            since = _since(how)
+            ends = _watched(asked, place, reporter, join)
         return _told(asked.folder, ends, since, reporter)
+
+
+def _place(scheduler: str | None, jobs: int | None) -> AbstractContextManager[Place]:
+    from eigassign.batch.workers import this_machine
+
+    if scheduler is None:
+        return nullcontext(this_machine(jobs))
+    from eigassign.batch.cluster import cluster
+
+    if jobs is not None:
+        raise UsageError(
+            "--jobs is for this machine: how many work at --scheduler is settled there"
+        )
+    return cluster(scheduler)
 
 
 def _batch(plan: Plan, folder: Path, how: Mapping[str, Any]) -> Batch:

@@ -1,0 +1,89 @@
+"""Cases on a cluster: the workers of a dask.distributed scheduler that somebody has started.
+
+A worker that dies is replaced or not, as its cluster does it; what it had in flight runs again on
+another one. Workers share the folders of the cases and of the results.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from eigassign._version import __version__
+from eigassign.batch.workers import Place
+from eigassign.errors import StorageError, UsageError
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+_TASK_S = 5.0  # a scheduler bears some 1 000 tasks a second: 400 workers finish 80 of these
+_AHEAD = 2  # tasks for each worker, so that it need not wait for the next one
+_ANSWER_S = 10.0
+
+
+@contextlib.contextmanager
+def cluster(address: str) -> Iterator[Place]:
+    """The workers at ``address``.
+
+    Raises UsageError where dask.distributed is not installed here, or the workers are not fit for
+    this; StorageError where no scheduler answers.
+    """
+    try:
+        from distributed import Client
+    except ImportError:
+        message = "--scheduler needs dask.distributed: pip install 'eigassign[cluster]'"
+        raise UsageError(message) from None
+    try:
+        client = Client(address, timeout=_ANSWER_S)
+    except (OSError, ValueError) as error:
+        raise StorageError(f"--scheduler {address}: no scheduler answers: {error}") from error
+    with client:
+        folder = os.getcwd()
+        workers = _require_fit(client, folder)
+        yield Place(_AHEAD * workers, partial(_executor, client, folder), _TASK_S)
+
+
+def _require_fit(client: Client, folder: str) -> int:
+    """How many workers there are; raises UsageError where one could not do its work."""
+    threads = client.nthreads()
+    if not threads:
+        raise UsageError("--scheduler: there are no workers yet")
+    if several := [worker for worker, n in threads.items() if n != 1]:
+        raise UsageError(f"--scheduler: worker {several[0]} has several threads; use --nthreads 1")
+    for worker, (version, is_there) in client.run(_seen, folder).items():
+        if version != __version__:
+            raise UsageError(f"--scheduler: worker {worker} has eigassign {version}, not the same")
+        if not is_there:
+            raise UsageError(f"--scheduler: worker {worker} does not see the folder {folder}")
+    return len(threads)
+
+
+def _seen(folder: str) -> tuple[str, bool]:
+    return __version__, os.path.isdir(folder)
+
+
+@contextlib.contextmanager
+def _executor(client: Client, folder: str, _slots: int) -> Iterator[Executor]:
+    """One that runs every task in ``folder``; on an error inside, what is in flight is given up."""
+    pool = client.get_executor(pure=False)
+    try:
+        yield _There(pool, folder)
+    finally:
+        pool.shutdown(wait=False)  # and what is in flight is cancelled
+
+
+class _There(Executor):
+    def __init__(self, pool: Executor, folder: str) -> None:
+        self._pool, self._folder = pool, folder
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        return self._pool.submit(_in_folder, self._folder, fn, *args, **kwargs)
+
+
+def _in_folder(folder: str, work: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+    os.chdir(folder)  # names of files are as seen from there
+    return work(*args, **kwargs)

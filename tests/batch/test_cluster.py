@@ -1,0 +1,112 @@
+"""A batch on a dask.distributed cluster is the same as on this machine, whoever is killed."""
+
+from __future__ import annotations
+
+import csv
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from eigassign.batch.workers import Pace
+from eigassign.cli import main
+
+CASE = """\
+title: A beam
+mechanism:
+  space: planar
+  materials: {steel: {youngs_modulus: 210 GPa, density: 7850}}
+  sections: {rod: {shape: circle, diameter: 20 mm}}
+  links: {arm: {length: 0.5, material: steel, section: rod, elements: 2}}
+  joints: {shoulder: {type: revolute, base: ground, follower: arm.start}}
+  bodies: {tool: {at: arm.end, mass: 0.1}}
+coordinates: {q1: {joint: shoulder}}
+trajectory: {q: [[0], [1]], time: [0, 1]}
+design: {m: {parameter: bodies.tool.mass, min: 0, max: 1}}
+expansion: {order: 2, q: auto, y: auto, modes: [1]}
+targets: [{mode: 1, frequency: 190 Hz}]
+validation: {max_error: 50 %}
+sweep:
+  parameters: {mechanism.links.arm.length: {min: 0.4, max: 0.6, count: 60}}
+"""
+
+
+def test_tasks_take_as_many_cases_as_fill_their_seconds() -> None:
+    pace, single = Pace(5.0), Pace(0.0)
+    assert pace.size() == 1
+    for seconds in (0.5, 0.3):
+        pace.note(seconds)
+        single.note(seconds)
+    assert (pace.size(), single.size()) == (12, 1)
+    pace.note(60.0)
+    assert pace.size() == 1
+
+
+@pytest.fixture
+def started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
+    monkeypatch.chdir(tmp_path)
+    Path("arm.yaml").write_text(CASE)
+    ours = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": ":0"}
+    with distributed.LocalCluster(**ours) as cluster:
+        yield cluster
+
+
+def summary(folder: str) -> list[dict[str, str]]:
+    with open(Path(folder, "summary.csv"), newline="") as file:
+        return [{**row, "seconds": ""} for row in csv.DictReader(file)]
+
+
+@pytest.mark.slow
+def test_a_cluster_with_a_worker_killed_half_way_gives_the_same_summary(
+    started: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from distributed import Client
+
+    from eigassign.output import console
+
+    with Client(started) as client:
+        first = next(iter(client.run(os.getpid).values()))
+    counted = console.progress
+
+    @contextmanager
+    def killing(*args: Any, **how: Any) -> Iterator[Any]:
+        ended = 0
+
+        def count(what: str) -> None:
+            nonlocal ended
+            ended += 1
+            if ended == 5:
+                os.kill(first, signal.SIGKILL)
+            advance(what)
+
+        with counted(*args, **how) as advance:
+            yield count
+
+    here = ["batch", "arm.yaml", "--jobs", "1", "--columns", "--out", "here"]
+    assert main(here) == 1  # some frequencies cannot be reached
+    monkeypatch.setattr(console, "progress", killing)
+    address = started.scheduler_address
+    there = ["batch", "arm.yaml", "--scheduler", address, "--columns", "--out", "there"]
+    assert main(there) == 1
+    assert len(summary("here")) == 60
+    assert summary("there") == summary("here")
+
+
+@pytest.mark.slow
+def test_workers_that_are_not_fit_and_no_scheduler_are_told(
+    started: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["batch", "arm.yaml", "--scheduler", "tcp://127.0.0.1:1"]) == 3
+    assert "no scheduler answers" in capsys.readouterr().err
+    from distributed import LocalCluster
+
+    both = ["batch", "arm.yaml", "--scheduler", started.scheduler_address, "--jobs", "2"]
+    assert main(both) == 2
+    with LocalCluster(n_workers=1, threads_per_worker=2, dashboard_address=":0") as other:
+        assert main(["batch", "arm.yaml", "--scheduler", other.scheduler_address]) == 2
+    assert "use --nthreads 1" in capsys.readouterr().err
