@@ -12,7 +12,7 @@ from pathlib import Path
 from eigassign.batch.manifest import LINES, Header, InOrder, read_header, write_header
 from eigassign.batch.progress import summarise
 from eigassign.errors import UsageError
-from eigassign.output.batch.files import are_current, merge_files, write_files
+from eigassign.output.batch.files import merge_files, write_files
 from eigassign.output.batch.outcome import from_line, status_of, to_line
 from eigassign.output.run_record import relative_path
 from eigassign.output.storage import replacing
@@ -35,7 +35,7 @@ def merge(out: Path, folders: Sequence[Path]) -> Counter[str]:
     finished, there twice, or of another batch.
     """
     if not folders:
-        summarise(out, _header(out))
+        summarise(out, _header(out), anew=True)
         return _counted(InOrder(out, _header(out).indices()))
     shards = [
         _Shard(folder, header, InOrder(folder, header.indices()))
@@ -121,7 +121,6 @@ def _seen_from(out: Path, shard: _Shard) -> Iterator[str]:
 
 def _copy(out: Path, lines: Iterator[str], shards: Sequence[_Shard], keys: Sequence[str]) -> None:
     for shard in shards:
-        if not are_current(shard.folder, True, shard.folder / LINES):
-            summarise(shard.folder, shard.header)
+        summarise(shard.folder, shard.header)
     folders, counts = [s.folder for s in shards], [len(s.lines) for s in shards]
     merge_files(out, lines, folders, counts, keys)

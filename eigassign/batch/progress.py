@@ -26,7 +26,7 @@ from eigassign.batch.manifest import (
 from eigassign.batch.plan import Plan, Variant
 from eigassign.batch.work import CaseOptions
 from eigassign.errors import StorageError
-from eigassign.output.batch.files import write_files
+from eigassign.output.batch.files import are_current, write_files
 from eigassign.output.batch.outcome import CaseOutcome, to_line
 from eigassign.output.run_record import relative_path
 from eigassign.output.storage import replace_synced
@@ -174,7 +174,12 @@ class Progress:
             self.ends[found.status] += 1
 
 
-def summarise(folder: Path, header: Header) -> None:
-    """Make the summaries anew from the lines of the manifest, in the order of the plan."""
+def summarise(folder: Path, header: Header, *, anew: bool = False) -> None:
+    """Make the summaries from the lines of the manifest, in the order of the plan.
+
+    Those that are as new as the manifest stay, unless all are to be made ``anew``.
+    """
+    if not anew and are_current(folder, header.columns, folder / LINES):
+        return
     lines = InOrder(folder, header.indices())
     write_files(folder, lines, len(lines), header.keys, header.columns)
