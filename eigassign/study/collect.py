@@ -117,7 +117,8 @@ def _notes(
     if assigned is None or row is None:
         return ()
     swaps = swap_notes(scene.path, assigned.targets)
-    return (*assigned.answer.notes, *limit_notes(assigned.answer, row), *swaps)
+    missed = [target.label for target in assigned.targets if not target.satisfied]
+    return (*assigned.answer.notes, *limit_notes(assigned.answer, row, missed), *swaps)
 
 
 def _trajectories(file: CaseFile, path: Trajectories | None) -> tuple[TrajectoryRow, ...]:

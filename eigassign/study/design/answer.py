@@ -7,7 +7,7 @@ otherwise.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -329,11 +329,16 @@ def _of_program(answer: Answer) -> Iterator[ActiveRow]:
         yield ActiveRow(one.name, one.kind, one.side, one.multiplier)
 
 
-def limit_notes(answer: Answer, row: AssignmentRow) -> list[str]:
-    """What holds the answer back, and what the one shot's program does not depend on."""
+def limit_notes(answer: Answer, row: AssignmentRow, missed: Collection[str]) -> list[str]:
+    """What holds the answer back, and what the one shot's program does not depend on.
+
+    ``missed`` are the labels of the targets that the answer does not meet.
+    """
     grouped: dict[str, list[str]] = {}
     for limit in row.active:
-        on = "just meets" if limit.kind == "target" else f"lies on its {limit.side} {limit.kind} of"
+        on = f"lies on its {limit.side} {limit.kind} of"
+        if limit.kind == "target":
+            on = "misses, by as little as was found," if limit.name in missed else "just meets"
         grouped.setdefault(on, []).append(limit.name)
     notes = [f"the optimum {on} {', '.join(dict.fromkeys(n))}" for on, n in grouped.items()]
     if answer.found is None and answer.one_shot is not None and answer.one_shot.undetermined:
