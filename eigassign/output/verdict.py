@@ -152,5 +152,5 @@ def _cost(results: RunResults) -> Iterator[str]:
 
 
 def _few(value: float) -> str:
-    """Four digits: the tables below have more."""
-    return f"{value + 0.0:.4g}"
+    """Four digits, and 15000 rather than 1.5e+04: the tables below have more."""
+    return f"{float(f'{value:.4g}') + 0.0:.7g}"

@@ -125,6 +125,18 @@ def test_the_verdict_comes_first_in_words_and_colour(change, word, tone):
         assert asked in parsed.text.split("Frequencies before and after")[0]
 
 
+def test_bars_write_large_numbers_out():
+    results = make_results()
+    row = dataclasses.replace(
+        results.design[0], initial=8000.0, optimal=15432.6, lower=5000.0, upper=2e4
+    )
+    _, parsed, _ = page(dataclasses.replace(results, design=(row, *results.design[1:])))
+    first = parsed.text.split("Frequencies before and after")[0]
+    assert "8000 → 15430" in first
+    assert "20000" in first
+    assert "e+04" not in first
+
+
 def test_a_light_report_names_what_it_has_no_room_for(monkeypatch):
     monkeypatch.setattr(report, "LIGHT", 60)
     results = make_results()

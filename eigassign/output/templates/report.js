@@ -7,6 +7,8 @@
   const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
   const config = { displaylogo: false, responsive: true, scrollZoom: false,
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+  // Beside a colour bar is no room for buttons that stay, as they do where nothing hovers.
+  const bare = { ...config, displayModeBar: matchMedia("(hover: hover)").matches ? "hover" : false };
 
   // --- Plots in the page's colours
 
@@ -31,7 +33,8 @@
   function draw(box) {
     const figure = themed(figures[box.dataset.figure][+box.dataset.part]);
     drawn.set(box, true);
-    return Plotly.react(box, figure.data, figure.layout, config);
+    const mapped = figure.data.some((trace) => trace.type === "heatmap");
+    return Plotly.react(box, figure.data, figure.layout, mapped ? bare : config);
   }
   const boxes = [...document.querySelectorAll(".plot[data-figure]")];
   const seen = new IntersectionObserver((entries) => {
@@ -93,7 +96,7 @@
       found.push({ type, mode: "lines", name: "rigid links", ...as(rest), line: { color: css("--soft"), width: 2 }, hoverinfo: "skip", connectgaps: false });
       found.push({ type, mode: "lines", name: mode.name, ...as(shape), line: { color: css("--accent"), width: 5 }, hoverinfo: "skip", connectgaps: false });
       if (marks) found.push({ type, mode: "markers", name: "joints and bodies", ...as(marks), text: mode.marks.map((m) => m.name), hovertemplate: "%{text}<extra></extra>",
-        marker: { size: mode.marks.map((m) => m.kind === "body" ? (space ? 6 : 10) : (space ? 4 : 7)), symbol: mode.marks.map((m) => symbols[m.kind] || "circle"), color: mode.marks.map((m) => m.kind === "body" ? "#D55E00" : css("--ink")) } });
+        marker: { size: mode.marks.map((m) => m.kind === "body" ? (space ? 8 : 10) : (space ? 6 : 7)), symbol: mode.marks.map((m) => symbols[m.kind] || "circle"), color: mode.marks.map((m) => m.kind === "body" ? "#D55E00" : css("--ink")) } });
       return found;
     }
     const reach = axes.map((_, c) => {
@@ -108,8 +111,11 @@
         margin: { l: 10, r: 10, t: 10, b: 10 }, height: 440, showlegend: true, legend: { orientation: "h", y: -0.08 }, uirevision: "kept",
         modebar: { orientation: "v", bgcolor: "rgba(0,0,0,0)", color: css("--soft"), activecolor: css("--ink") } };
       if (space) {
-        const of = (c) => ({ ...quiet, title: { text: axes[c] + " [m]" }, range: [(reach[c][0] + reach[c][1]) / 2 - half, (reach[c][0] + reach[c][1]) / 2 + half] });
-        return { ...base, scene: { xaxis: of(0), yaxis: of(1), zaxis: of(2), aspectmode: "cube", camera: { eye: { x: 0.8, y: -0.95, z: 0.5 }, projection: { type: "orthographic" } } } };
+        const reaches = reach.map(([low, high]) => Math.max((high - low) * 0.54, half / 4));  // no axis without room for its numbers
+        const of = (c) => ({ ...quiet, title: { text: axes[c] + " [m]" }, range: [(reach[c][0] + reach[c][1]) / 2 - reaches[c], (reach[c][0] + reach[c][1]) / 2 + reaches[c]] });
+        const size = 2.2 / Math.hypot(...reaches);
+        const aspectratio = { x: reaches[0] * size, y: reaches[1] * size, z: reaches[2] * size };
+        return { ...base, scene: { xaxis: of(0), yaxis: of(1), zaxis: of(2), aspectmode: "manual", aspectratio, camera: { eye: { x: 0.8, y: -0.95, z: 0.5 }, projection: { type: "orthographic" } } } };
       }
       const pad = 0.04 * half;
       return { ...base, xaxis: { ...quiet, title: { text: "x [m]" }, range: [reach[0][0] - pad, reach[0][1] + pad], constrain: "domain", automargin: true },
