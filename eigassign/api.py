@@ -185,7 +185,7 @@ def assign(case: built_case.Case) -> Result:
     CaseError for what the case lacks, InfeasibleError for limits that contradict each other,
     AccuracyError for numbers that cannot be vouched for.
     """
-    return solve_case(case)
+    return solve_case(_loaded(case))
 
 
 def update(case: built_case.Case) -> Updated:
@@ -197,8 +197,15 @@ def update(case: built_case.Case) -> Updated:
     ``.case`` with the values found. Raises CaseError for what the case lacks and for wrong
     measurements.
     """
-    found = update_case(case)
+    found = update_case(_loaded(case))
     return replace(found, case=Case(found.case.file))
+
+
+def _loaded(case: object) -> built_case.Case:
+    """Raises UsageError for what is none, such as the name of its file."""
+    if not isinstance(case, built_case.Case):
+        raise UsageError(f"expected a case, got {type(case).__name__}: ea.load_case(...) makes one")
+    return case
 
 
 def save_reduced(reduced: ReducedModel, path: str | Path) -> None:

@@ -118,3 +118,9 @@ def test_the_case_of_an_update_can_be_drawn_too() -> None:
     assert len(repr(updated)) <= LONGEST
     assert updated.figures == ("measurements", "parameters")
     assert "data:image/png;base64," in updated._repr_html_()
+
+
+def test_what_is_no_case_is_refused_with_what_makes_one():
+    for whole in (ea.assign, ea.update):
+        with pytest.raises(ea.EigassignError, match=r"expected a case, got str: ea\.load_case"):
+            whole("arm.yaml")

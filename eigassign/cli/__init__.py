@@ -86,6 +86,13 @@ class _InOrder(click.Group):
     def list_commands(self, _context: click.Context) -> list[str]:
         return list(self.commands)
 
+    def resolve_command(
+        self, context: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args[0] not in self.commands and args[0].endswith((".yaml", ".yml")):
+            context.fail(f"{args[0]!r} is a case: say what to do, 'eigassign check {args[0]}'.")
+        return super().resolve_command(context, args)
+
     def format_commands(self, _context: click.Context, formatter: click.HelpFormatter) -> None:
         rows = [(name, each.get_short_help_str(200)) for name, each in self.commands.items()]
         with formatter.section("Commands"):

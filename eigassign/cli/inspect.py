@@ -196,8 +196,7 @@ def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
     print_modes(
         answer.frequencies_hz,
         rigid_modes=answer.rigid_modes,
-        q=answer.q,
-        y=answer.y,
+        where=answer.where,
         discretisation=answer.discretisation_error,
         truncation=answer.truncation_error,
         note=rounding_line(answer.round_off),

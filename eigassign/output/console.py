@@ -20,7 +20,6 @@ from eigassign import process
 from eigassign.files import printable
 from eigassign.output import tables as summary
 from eigassign.output import terminal
-from eigassign.output.formats import number
 from eigassign.study.results import RunResults, ValidationRow
 
 _PAGE = 100  # columns: longer lines are hard to read
@@ -159,8 +158,7 @@ def print_modes(
     frequencies_hz: Sequence[float],
     *,
     rigid_modes: int,
-    q: Sequence[tuple[str, float]] = (),
-    y: Sequence[tuple[str, float]] = (),
+    where: str = "",
     discretisation: Sequence[float] | None = None,
     truncation: Sequence[float] | None = None,
     note: str = "",
@@ -168,10 +166,9 @@ def print_modes(
 ) -> None:
     """Elastic modes in Hz from 1 upwards, where they were evaluated, and the rigid modes left out.
 
-    ``q`` and ``y`` are (name, value) pairs in SI; ``discretisation`` and ``truncation`` are how
-    much mesh and reduced links raise each frequency at most, relative; ``note`` is said below.
+    ``where`` is the pose and design in words; ``discretisation`` and ``truncation`` are how much
+    mesh and reduced links raise each frequency at most, relative; ``note`` is said below.
     """
-    where = ", ".join(f"{name} = {number(value)}" for name, value in (*q, *y))
     caption = f"{rigid_modes} rigid-body mode{'s' if rigid_modes != 1 else ''} not counted."
     caption += f" {note[:1].upper()}{note[1:]}." if note else ""
     rows: list[tuple[str, ...]] = [

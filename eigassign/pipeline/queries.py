@@ -26,7 +26,7 @@ from eigassign.study.accuracy import judged_mesh, mesh_lines, truncation_lines
 from eigassign.study.built_case import Case, load_case
 from eigassign.study.design.followed import named_notes
 from eigassign.study.design.wanted import target_frequencies
-from eigassign.study.planning import plan_expansion
+from eigassign.study.planning import plan_expansion, shown_point
 from eigassign.study.updating.measured import read_measurements
 
 Floats = NDArray[np.float64]
@@ -41,6 +41,7 @@ class ModesAnswer:
     frequencies_hz: list[float]
     q: tuple[tuple[str, float], ...]  # where: name and value, SI
     y: tuple[tuple[str, float], ...]
+    where: str  # the same in words, with units
     truncation_error: list[float] | None = None  # of reduced links: relative, too high by at most
     discretisation_error: list[float] | None = None  # of the mesh: likewise; infinite: too coarse
     round_off: float = 0.0  # of all of these, relative, at most; infinite: not known
@@ -158,10 +159,18 @@ def _answer(case: Case, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
         [float(value) for value in hz],
         _pairs(model.q_names, q),
         _pairs(model.y_names, y),
+        _where(case, q, y),
         None if lost is None else [float(value) for value in lost],
         None if coarse is None else [float(value) for value in coarse],
         rounding_error(model.pencil, model.x(q, y)[0], len(hz)),
     )
+
+
+def _where(case: Case, q: Floats, y: Floats) -> str:
+    """``"q1 = 1.8 rad, m1 = 0.125 kg"``."""
+    model, file = case.model(), case.file
+    named = ((model.q_names, q, file.q_units), (model.y_names, y, file.design_units))
+    return ", ".join(shown_point(*point) for point in named if point[0])
 
 
 def _pairs(names: Sequence[str], numbers: Floats) -> tuple[tuple[str, float], ...]:

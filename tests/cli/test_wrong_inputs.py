@@ -78,6 +78,7 @@ def test_every_problem_has_a_line_and_the_first_ones_a_caret(
         (["batch"], "Missing argument 'PATHS...'"),
         (["batch", ".", "--jobs", "0"], "0 is not in the range"),
         (["optimise", "good.yaml"], "No such command 'optimise'"),
+        (["good.yaml"], "'good.yaml' is a case: say what to do, 'eigassign check good.yaml'"),
         (["optimize"], "Missing argument 'CASE'"),
         (["optimize", "good.yaml", "--ouut", "x"], "No such option"),
         (["modes", "good.yaml", "--count", "0"], "0 is not in the range"),

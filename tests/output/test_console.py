@@ -158,11 +158,11 @@ def test_control_characters_do_not_reach_the_terminal():
 
 def test_modes_are_numbered_from_the_first_elastic_one():
     out = piped()
-    console.print_modes([202.21961234567, 513.2], rigid_modes=2, q=[("q1", 1.8)], stream=out)
+    console.print_modes([202.21961234567, 513.2], rigid_modes=2, where="q1 = 1.8 rad", stream=out)
     text = read(out)
     assert "202.2196123" in text
     assert "2 rigid-body modes not counted" in text
-    assert "q1 = 1.8" in text
+    assert "Modes at q1 = 1.8 rad" in text
 
 
 def test_a_validation_says_which_line_failed():

@@ -75,9 +75,11 @@ def property_at(tree: Tree, path: str) -> Property | None:
         raise NoPropertyError(f"paths start below mechanism: write {'.'.join(rest)!r}")
     if group == "coordinates" and len(rest) == 3 and rest[1] == "drive" and rest[2] in DRIVEN:
         return _of_drive(tree, rest[0], rest[2])
+    if group == "coordinates" and len(rest) == 3 and rest[1] == "drive":
+        wrong = f"a drive has no property {rest[2]!r}{suggestion(rest[2], DRIVEN)}"
+        raise NoPropertyError(f"{wrong}; can vary: {listed(DRIVEN)}")
     if group not in _GROUPS or len(rest) != 2:
-        hint = suggestion(group, (*_GROUPS, "coordinates")) if group not in _GROUPS else ""
-        raise NoPropertyError(f"{_FORMS}; got {path!r}{hint}")
+        raise NoPropertyError(f"{_FORMS}; got {path!r}{_meant(tree, group, path)}")
     return _of_part(tree, group, *rest)
 
 
@@ -92,6 +94,17 @@ def known_property(tree: Tree, path: str | None) -> Property | None:
 def properties(tree: Tree) -> dict[str, Property | None]:
     """Property of each component of y, None where it is unknown."""
     return {column.name: known_property(tree, column.parameter) for column in columns(tree)}
+
+
+def _meant(tree: Tree, group: str, path: str) -> str:
+    """The group that was left out or misspelt, as a question."""
+    if group in (*_GROUPS, "coordinates"):
+        return ""
+    for known in _GROUPS:
+        named = at(tree, "mechanism", known)
+        if isinstance(named, Mapping) and group in named:
+            return f"; did you mean '{known}.{path}'?"
+    return suggestion(group, (*_GROUPS, "coordinates"))
 
 
 def _of_part(tree: Tree, group: str, name: str, key: str) -> Property | None:

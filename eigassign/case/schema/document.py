@@ -216,6 +216,11 @@ def _mapping(error: Any) -> _Explained:
     return (), f"expected {what}, got {shown(given)}{unspaced(given)}"
 
 
+def _whole(error: Any) -> _Explained:
+    hint = ": write modes: all" if "mode" in error["loc"][-2:] and error["input"] == "all" else ""
+    return (), f"expected a whole number, got {shown(error['input'])}{hint}"
+
+
 def _expected(what: str) -> Any:
     return lambda error: ((), f"expected {what}, got {shown(error['input'])}")
 
@@ -261,7 +266,7 @@ _EXPLAIN: dict[str, Any] = {
     "is_instance_of": _mapping,
     "tuple_type": _list,
     "bool_type": _expected("true or false"),
-    "int_type": _expected("a whole number"),
+    "int_type": _whole,
     "int_from_float": _expected("a whole number"),
     "string_type": _text,
     "string_too_short": _expected("some text"),

@@ -38,6 +38,7 @@ def _increasing(times: tuple[float, ...]) -> tuple[float, ...]:
     return times
 
 
+_UPWARDS = "low must be below high; a range of angles across zero is [350 deg, 370 deg]"
 Times: TypeAlias = Annotated[
     tuple[Annotated[float, TIME], ...], Field(min_length=2), AfterValidator(_increasing)
 ]
@@ -188,7 +189,7 @@ class TipTrajectory(Timed):
                 raise wrong("the same point as the one before it", "waypoints", k)
         for joint, (low, high) in self.branch.items():
             if not low < high:
-                raise wrong(f"low must be below high, got [{low:g}, {high:g}]", "branch", joint)
+                raise wrong(_UPWARDS, "branch", joint)
         return self
 
     @model_validator(mode="after")

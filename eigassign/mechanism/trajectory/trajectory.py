@@ -40,6 +40,7 @@ from eigassign.mechanism.trajectory.csv import read_samples
 from eigassign.mechanism.trajectory.timing import point_to_point, shared_times, timing_law
 
 SAME = 1e-9  # of the duration: a sample this near to a corner is on it, and ends both parts
+SPARSE = 0.5  # rad between listed samples: more looks like points of a motion
 _BACKWARDS = "time must increase, and goes from {:g} s to {:g} s"
 _PATHS: dict[str, Callable[[ArrayLike], TipPath]] = {"spline": spline, "straight": straight}
 
@@ -181,7 +182,8 @@ def _from_samples(
         time_s = np.linspace(0.0, spec.duration or 1.0, len(q))
     else:
         time_s = _checked_time(spec.time, len(q), "time", "sample")
-    return Trajectory(time_s, q, None, _jumps(q, q_names, q_units))
+    notes = _jumps(q, q_names, q_units) or _sparse(q, q_names, q_units)
+    return Trajectory(time_s, q, None, notes)
 
 
 def _from_points(spec: PointTrajectory, q_names: Sequence[str]) -> Trajectory:
@@ -241,6 +243,19 @@ def _jumps(q: Floats, q_names: Sequence[str], q_units: Sequence[str]) -> tuple[s
             zip(q_names, q_units or ["rad"] * len(q_names), strict=True)
         )
         if unit == "rad" and steps[k := int(np.argmax(steps[:, i])), i] > np.pi
+    )
+
+
+def _sparse(q: Floats, q_names: Sequence[str], q_units: Sequence[str]) -> tuple[str, ...]:
+    """A note where listed samples are so far apart that a motion between them seems to be meant."""
+    steps = np.abs(np.diff(q, axis=0))
+    steps[:, [unit != "rad" for unit in q_units or ["rad"] * len(q_names)]] = 0.0
+    if not np.any(steps > SPARSE):
+        return ()
+    k, i = divmod(int(np.argmax(steps)), steps.shape[1])
+    return (
+        f"{q_names[i]} moves by {np.rad2deg(steps[k, i]):.3g} deg from sample {k} to {k + 1}: q "
+        "lists every pose that is looked at; for a motion through a few poses write points",
     )
 
 
