@@ -68,9 +68,13 @@ class CaseFile:
     def variant(self, k: int, index: int) -> Variant:
         """Its k-th variant, which is the ``index``-th of the batch."""
         values = {} if self.variants is None else self.variants[k]
-        key = key_of(self.content, values, Path(self.path).parent)
+        key = key_of(self.content, values, self._folder)
         name = self.prefix + _named(self._short, values, key) if values else self.name
         return Variant(index, name, self.path, values, key)
+
+    @cached_property
+    def _folder(self) -> Path:
+        return Path(self.path).parent
 
     @cached_property
     def _short(self) -> Mapping[str, str]:
@@ -206,6 +210,7 @@ def variant_problem(plan: Plan, index: int, problem: Problem) -> Problem:
 # --- Names of variants
 
 _NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+_LONG = re.compile(r"[0-9.]{7}")  # what may have more digits than a name has
 _UNSAFE = re.compile(r"[^\w.,=+-]")
 _DIGITS = 6  # of a number in a name
 _LONGEST = 100  # characters; file systems allow 255 bytes, and hidden names are longer
@@ -214,7 +219,8 @@ _LONGEST = 100  # characters; file systems allow 255 bytes, and hidden names are
 def _named(short: Mapping[str, str], values: Mapping[str, object], key: str) -> str:
     """``mass=100g,frequency=180Hz``; where that does not say all, it ends with some of its key."""
     exact = ",".join(f"{short[key]}={_text(value)}" for key, value in values.items())
-    shown = _UNSAFE.sub("_", _NUMBER.sub(_rounded, exact))
+    rounded = _NUMBER.sub(_rounded, exact) if _LONG.search(exact) else exact
+    shown = _UNSAFE.sub("_", rounded)
     return shown if shown == exact and len(shown) <= _LONGEST else f"{shown[:_LONGEST]}~{key[:10]}"
 
 

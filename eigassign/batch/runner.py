@@ -15,13 +15,15 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from eigassign.batch.lock import folder_lock
-from eigassign.batch.manifest import read_header
+from eigassign.batch.manifest import LINES, read_header
 from eigassign.batch.plan import Variant, variant_problem
 from eigassign.batch.progress import Batch, Progress, set_up, summarise
 from eigassign.batch.work import check_cases, outcome_of, run_cases
 from eigassign.batch.workers import Pace, Place, run_tasks, this_machine
 from eigassign.errors import CaseError, Problem, StorageError
+from eigassign.output.batch.files import are_current
 from eigassign.output.batch.outcome import CaseOutcome
+from eigassign.pipeline.stages import silent
 
 _CHECKED = 100  # variants in a task that checks them: half a second
 _SHOWN = 10  # problems of variants
@@ -34,6 +36,7 @@ def run(
     on_start: Callable[[Progress], None],
     on_outcome: Callable[[CaseOutcome], None],
     join: bool = False,
+    say: Callable[[str], None] = silent,
 ) -> Counter[str]:
     """Run what is not done yet, and write the summaries; how many of all cases ended in which way.
 
@@ -42,7 +45,7 @@ def run(
     a variant is no valid case, and StorageError where the folder is of another batch, or another
     process is at work in it and this one is not to ``join``.
     """
-    require_valid(batch, place)
+    require_valid(batch, place, say)
     batch.folder.mkdir(parents=True, exist_ok=True)
     with folder_lock(batch.folder) as lock:
         if lock.enter(join):
@@ -55,17 +58,20 @@ def run(
         try:
             _run(batch, progress, place, on_outcome)
         finally:
-            summarise(batch.folder, batch.header)
+            if not are_current(batch.folder, batch.options.columns, batch.folder / LINES):
+                summarise(batch.folder, batch.header)
     return progress.ends
 
 
-def require_valid(batch: Batch, place: Place) -> None:
+def require_valid(batch: Batch, place: Place, say: Callable[[str], None] = silent) -> None:
     """Check every variant of a sweep, once for each folder; raises CaseError."""
     if not batch.plan.is_swept or read_header(batch.folder) == batch.header:
         return
-    indices = [index for index in batch.header.indices() if batch.plan[index].values]
+    plan = batch.plan
+    indices = [k for k in batch.header.indices() if plan.whose(k)[0].variants is not None]
+    say(f"checking {len(indices)} variants")
     starts = range(0, len(indices), _CHECKED)
-    tasks = ([batch.plan[k] for k in indices[start : start + _CHECKED]] for start in starts)
+    tasks = ([plan[k] for k in indices[start : start + _CHECKED]] for start in starts)
     wrong: dict[int, tuple[Problem, ...]] = {}
     check = partial(check_cases, options=batch.options)
     where = place if len(starts) > 1 else this_machine(1)
@@ -73,9 +79,9 @@ def require_valid(batch: Batch, place: Place) -> None:
         raise StorageError("a process was killed while it checked variants: perhaps no memory")
     if wrong:
         found = [(index, problem) for index in sorted(wrong) for problem in wrong[index]]
-        problems = [variant_problem(batch.plan, *each) for each in found[:_SHOWN]]
+        problems = [variant_problem(plan, *each) for each in found[:_SHOWN]]
         many = f"{len(wrong)} of {len(indices)} variants are no valid cases: nothing was run"
-        raise CaseError((*problems, Problem(batch.plan.files[0].path, 0, 0, "", many)))
+        raise CaseError((*problems, Problem(plan.files[0].path, 0, 0, "", many)))
 
 
 def _run(

@@ -230,7 +230,7 @@ def _watched(batch: Batch, place: Place, reporter: Reporter, join: bool) -> Coun
         def on_outcome(found: CaseOutcome) -> None:
             advance[0](f"{found.name}: {found.status}")
 
-        return runner.run(batch, place, on_start, on_outcome, join)
+        return runner.run(batch, place, on_start, on_outcome, join, reporter.stage)
 
 
 def _tell(batch: Batch, place: Place) -> int:
