@@ -98,7 +98,9 @@ def disturbed(folder: Path, draw: random.Random, kills: int) -> int:
     while True:
         process = begun(folder)
         while process.poll() is None and done < kills:
-            time.sleep(draw.uniform(0.0, 4.0))
+            if not _goes_on(process, folder / "begun"):
+                break
+            time.sleep(draw.uniform(0.0, 1.0))
             victims = workers(process.pid) if done % 2 else [process.pid]
             if victims and process.poll() is None:
                 os.kill(draw.choice(victims), signal.SIGKILL)
@@ -107,6 +109,16 @@ def disturbed(folder: Path, draw: random.Random, kills: int) -> int:
             break
     assert begun(folder).wait() == 1  # what was killed twice was an error, and is tried again
     return done
+
+
+def _goes_on(process: subprocess.Popen[bytes], begun: Path) -> bool:
+    """Wait until another case is begun; False where the command ends before."""
+    before = begun.stat().st_size if begun.exists() else 0
+    while process.poll() is None:
+        if begun.exists() and begun.stat().st_size > before:
+            return True
+        time.sleep(0.01)
+    return False
 
 
 def test_sweeps_that_are_killed_thirty_times_end_as_if_they_had_not_been(tmp_path: Path) -> None:
