@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 
 from eigassign.case.reader import KeyPath
 from eigassign.case.schema.design import YValue
@@ -283,6 +283,13 @@ class KeepOutTarget(AnyTarget):
         if isinstance(self.keep_out, Harmonic):
             return ((("keep_out", "of"), self.keep_out.of),)
         return tuple((("keep_out", k), edge) for k, edge in enumerate(self.keep_out))
+
+    @field_validator("keep_out", mode="before")
+    @classmethod
+    def _has_two_edges(cls, value: Any) -> Any:
+        if isinstance(value, Mapping) and value.keys() & {"min", "max"}:
+            raise wrong("a band is written with its two edges, as [40 Hz, 50 Hz]")
+        return value
 
     @model_validator(mode="after")
     def _is_a_band(self) -> Self:

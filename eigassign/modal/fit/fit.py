@@ -247,6 +247,11 @@ def fit(
 ) -> Fit | PathFit:
     """Fit ``modes`` of ``source`` over a trajectory or a box of q and a design or a box of y.
 
+    f_i(q, y)^p ≈ Σ_γ c_γ h_γ(q, y) with p = 1, 2 or −2, a polynomial through frequencies that are
+    asked of ``source`` where they are needed. The `Fit` answers ``.frequencies(q, y)`` (n, n_modes)
+    in Hz, and has their ``.error_estimate``, relative in Hz. ``modes`` count from 1; unless given
+    they are all of the source, of a Model the first.
+
     ``source`` is a Model (exact solves), a ReducedModel or an Expansion, whose own error estimates
     count. ``q`` are samples of a trajectory (n_t, n_q), one pose (n_q,), a `Box`, or several
     trajectories: ``case.trajectory`` or a list of samples; ``y`` (n_y,) or a `Box`. ``accuracy``

@@ -22,6 +22,7 @@ from eigassign.case import (
     parse,
 )
 from eigassign.case.reader import read_yaml
+from eigassign.errors import CaseError
 
 T = "  - {mode: 1, frequency: 190 Hz}\n"
 KINDS = {
@@ -180,3 +181,9 @@ def test_a_profile_covers_only_the_part_that_is_wanted() -> None:
 def test_targets_may_be_on_modes_that_the_file_does_not_expand() -> None:
     case = with_target("{mode: 3, frequency: 300}")
     assert case.expansion.modes == (1, 2)
+
+
+def test_a_band_written_with_min_and_max_is_told_how_to_write_it():
+    with pytest.raises(CaseError, match=r"with its two edges, as \[40 Hz, 50 Hz\]") as raised:
+        with_target("{keep_out: {min: 48 Hz, max: 52 Hz}}")
+    assert len(raised.value.problems) == 1
