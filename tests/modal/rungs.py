@@ -67,14 +67,21 @@ def truncation(pencil: Pencil, e: Expansion, span: Floats, h: float) -> float:
 
 
 def slope(pencil: Pencil, e: Expansion, span: Floats, floor: float) -> float | None:
-    """Slope of log error against log h, at errors of 1e3 to 1e5 times round-off ``floor``.
+    """Slope of log error against log h, over two decades of the error.
 
-    None where it is less over the whole box: nearly a polynomial of this order.
+    They end at 1e5 times round-off ``floor``, where that is over 1e-6 nearer to it: terms of higher
+    order, and other modes that come near far outside, have died away there. None where the error is
+    less over the whole box: nearly a polynomial of this order.
     """
-    power, whole = e.order + 1.0, truncation(pencil, e, span, 1.0)
-    if whole < 1e4 * floor:
+    power, error, start = e.order + 1.0, truncation(pencil, e, span, 1.0), 1.0
+    if error < 1e4 * floor:
         return None
-    start = min(1.0, (1e5 * floor / whole) ** (1.0 / power))
+    most = min(1e5 * floor, max(1e-6, 1e3 * floor))
+    for _ in range(8):  # a guess from an error far above is a bad one
+        if error < 2.0 * most and (error > 0.5 * most or start == 1.0):
+            break
+        start = min(1.0, start * (most / error) ** (1.0 / power))
+        error = truncation(pencil, e, span, start)
     steps = start * 10.0 ** (-2.0 / power * np.array([0.0, 0.5, 1.0]))
     errors = [truncation(pencil, e, span, h) for h in steps.tolist()]
     return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
