@@ -15,13 +15,12 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from eigassign.batch.lock import folder_lock
-from eigassign.batch.manifest import LINES, read_header
+from eigassign.batch.manifest import read_header
 from eigassign.batch.plan import Variant, variant_problem
 from eigassign.batch.progress import Batch, Progress, set_up, summarise
 from eigassign.batch.work import check_cases, outcome_of, run_cases
 from eigassign.batch.workers import Pace, Place, run_tasks, this_machine
 from eigassign.errors import CaseError, Problem, StorageError
-from eigassign.output.batch.files import are_current
 from eigassign.output.batch.outcome import CaseOutcome
 from eigassign.pipeline.stages import silent
 
@@ -58,8 +57,7 @@ def run(
         try:
             _run(batch, progress, place, on_outcome)
         finally:
-            if not are_current(batch.folder, batch.options.columns, batch.folder / LINES):
-                summarise(batch.folder, batch.header)
+            summarise(batch.folder, batch.header)
     return progress.ends
 
 
