@@ -34,13 +34,16 @@ def write_synced(path: Path, data: bytes) -> None:
 
 def sync_path(path: Path) -> None:
     """Wait until a file or folder is on disk; folders of file systems that cannot are skipped."""
+    folder = path.is_dir()
     try:
-        descriptor = os.open(path, os.O_RDONLY)
+        descriptor = os.open(path, os.O_RDONLY if folder else os.O_RDWR)
     except PermissionError:  # Windows opens no folders
         return
     try:
-        with contextlib.suppress(OSError):
-            os.fsync(descriptor)
+        os.fsync(descriptor)
+    except OSError:
+        if not folder:
+            raise
     finally:
         os.close(descriptor)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import stat
 import subprocess
 import sys
 from collections.abc import Callable
@@ -193,6 +194,20 @@ def test_a_failure_while_publishing_leaves_the_earlier_run(target, case, step, m
         write(target, case, "two")
     assert snapshot(target) == before
     assert [p.name for p in target.parent.iterdir()] == ["arm"]
+
+
+def test_a_file_that_does_not_reach_the_disk_leaves_the_earlier_run(target, case, monkeypatch):
+    write(target, case, "one")
+
+    def fail(descriptor: int) -> None:
+        if stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", fail)
+    with pytest.raises(StorageError, match="No space left"):
+        write(target, case, "two")
+    assert (target / "results.json").read_text() == "one"
+    assert hidden(target) == []
 
 
 def test_a_second_rename_that_fails_brings_the_earlier_run_back(target, case, monkeypatch):
