@@ -36,7 +36,7 @@ from eigassign.pipeline.run import prepare
 from eigassign.pipeline.stages import Stages
 from eigassign.study.design.optimum import Task, find_optimum, variant_of
 from eigassign.study.design.response import ExactResponse
-from eigassign.study.design.wanted import target_frequencies
+from eigassign.study.wanted import target_frequencies
 
 NEAR = 1e-3  # of the best rms: there a search has arrived
 ELEMENTS = 230  # a link

@@ -34,8 +34,8 @@ from eigassign.errors import EigassignError
 from eigassign.modal.expansion import expand
 from eigassign.study.design.one_shot import assign_design
 from eigassign.study.design.optimum import Found, Task, Variant, find_optimum, variant_of
-from eigassign.study.design.wanted import Wanted, target_frequencies
 from eigassign.study.scene import Expansions, Scene
+from eigassign.study.wanted import Wanted, target_frequencies
 
 Floats = NDArray[np.float64]
 

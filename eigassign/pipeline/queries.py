@@ -25,9 +25,9 @@ from eigassign.study import drawing
 from eigassign.study.accuracy import judged_mesh, mesh_lines, truncation_lines
 from eigassign.study.built_case import Case, load_case
 from eigassign.study.design.followed import named_notes
-from eigassign.study.design.wanted import target_frequencies
 from eigassign.study.planning import plan_expansion, shown_point
 from eigassign.study.updating.measured import read_measurements
+from eigassign.study.wanted import target_frequencies
 
 Floats = NDArray[np.float64]
 ROUND_OFF = 1e-9  # of a bound: a design this far beyond it is on it

@@ -48,12 +48,12 @@ from eigassign.study.design.followed import (
     solve_design,
 )
 from eigassign.study.design.judgement import SolvedDesigns, study_targets
-from eigassign.study.design.wanted import target_frequencies
 from eigassign.study.meaning.overall import Studies, study_meaning
 from eigassign.study.moving import moving_modes
 from eigassign.study.planning import plan_expansion
 from eigassign.study.results import DesignRow, MovingMode, RunResults, TargetStudy
 from eigassign.study.scene import Expansions, Scene
+from eigassign.study.wanted import target_frequencies
 
 Floats = NDArray[np.float64]
 

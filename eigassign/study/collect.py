@@ -17,7 +17,6 @@ from eigassign.study.design.answer import Answer, assignment_row, limit_notes
 from eigassign.study.design.followed import Solved
 from eigassign.study.design.judgement import crossing_warnings, swap_notes
 from eigassign.study.design.one_shot import design_rows, solver_row
-from eigassign.study.design.wanted import Wanted
 from eigassign.study.drawing import draw_poses, rest_pose
 from eigassign.study.results import (
     AssignmentRow,
@@ -32,6 +31,7 @@ from eigassign.study.results import (
     TrajectoryRow,
 )
 from eigassign.study.scene import Scene
+from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 

@@ -2,7 +2,6 @@
 
 Reading order:
 
-    wanted       what the targets ask for, at the samples of the trajectories
     followed     modes that targets follow by their shape, at any design
     one_shot     the paper's answer: one quadratic program about one expansion point
     response     frequencies along the trajectory and their slopes in the design

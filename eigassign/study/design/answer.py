@@ -29,7 +29,6 @@ from eigassign.study.design.conclusions import (
 from eigassign.study.design.judgement import verdict
 from eigassign.study.design.one_shot import assign_design, catalogues
 from eigassign.study.design.optimum import MASS, Found, Task, find_optimum, variant_of
-from eigassign.study.design.wanted import Wanted
 from eigassign.study.results import (
     ActiveRow,
     AssignmentRow,
@@ -42,6 +41,7 @@ from eigassign.study.results import (
     TargetStudy,
 )
 from eigassign.study.scene import Scene
+from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 MAX_ERROR = 0.02  # of a wanted frequency, where the case says nothing

@@ -23,9 +23,9 @@ from eigassign.modal.exact.condensation import Modes
 from eigassign.modal.exact.following import MoreModesError, Place, Shape, follow, places
 from eigassign.modal.exact.tracking import COINCIDENT, EXTRA
 from eigassign.modal.model import Model
-from eigassign.study.design.wanted import Wanted, followed_modes, named_design, named_pose
 from eigassign.study.planning import shown_point
 from eigassign.study.scene import AT_LEAST, BLOCK, Scene
+from eigassign.study.wanted import Wanted, followed_modes, named_design, named_pose
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

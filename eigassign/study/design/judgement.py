@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.design.followed import Solved
-from eigassign.study.design.wanted import Wanted, time_weights
 from eigassign.study.results import (
     ErrorRow,
     ErrorSummary,
@@ -26,6 +25,7 @@ from eigassign.study.results import (
     TargetAlong,
     TargetStudy,
 )
+from eigassign.study.wanted import Wanted, time_weights
 
 Floats = NDArray[np.float64]
 MET = 1e-8  # a violation below it is round-off

@@ -22,9 +22,9 @@ from eigassign.assignment import (
 )
 from eigassign.case import CaseFile
 from eigassign.errors import AccuracyError
-from eigassign.study.design.wanted import Wanted, time_weights
 from eigassign.study.results import DesignRow, SolverRow
 from eigassign.study.scene import Scene
+from eigassign.study.wanted import Wanted, time_weights
 
 Floats = NDArray[np.float64]
 

@@ -41,8 +41,8 @@ from eigassign.study.design.response import (
     exact_response,
     reduced_models,
 )
-from eigassign.study.design.wanted import Wanted, followed_modes, target_frequencies, time_weights
 from eigassign.study.scene import Scene
+from eigassign.study.wanted import Wanted, followed_modes, target_frequencies, time_weights
 
 Floats = NDArray[np.float64]
 MOST_BELOW = 24  # combinations of numbers of modes below the bands that are tried

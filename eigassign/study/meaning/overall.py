@@ -19,13 +19,13 @@ from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.study.design.answer import Answer, active_rows
 from eigassign.study.design.followed import Solved
 from eigassign.study.design.optimum import Found, Task, variant_of
-from eigassign.study.design.wanted import Wanted
 from eigassign.study.meaning.reach import misses, proved_ranges, reach_rows, unreachable
 from eigassign.study.meaning.sensitivity import error_kind, relaxed_limits, sensitivities
 from eigassign.study.meaning.tolerance import study_tolerance
 from eigassign.study.meaning.tradeoff import trade_off
 from eigassign.study.results import Meaning, RelaxedRow, ToleranceRows, TradeOff
 from eigassign.study.scene import Scene
+from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 

@@ -23,10 +23,10 @@ from eigassign.study.design.followed import Solved, followers, solve_design
 from eigassign.study.design.judgement import curve_range, errors_of, least_errors
 from eigassign.study.design.one_shot import linear_constraints
 from eigassign.study.design.response import exact_response
-from eigassign.study.design.wanted import Wanted
 from eigassign.study.meaning.monotone import corners, effects
 from eigassign.study.results import RangeRow
 from eigassign.study.scene import Scene
+from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 LIMIT = 1e-4  # of a limit: by so much it must be missed to be called out of reach

@@ -16,8 +16,8 @@ from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, 
 from eigassign.assignment.exact.requirements import FrequencyLimit, Requirements
 from eigassign.case import CaseFile
 from eigassign.study.design.optimum import MASS
-from eigassign.study.design.wanted import Wanted
 from eigassign.study.results import ActiveRow, RelaxedRow, SensitivityRow
+from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 STEP = 0.04  # of the range of a bound, or of a limit: how far it is relaxed, to one digit

@@ -19,10 +19,10 @@ from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.modal.reduced.reduce import reduce
 from eigassign.study.design.followed import Follower, Solved, followers, solve_design
 from eigassign.study.design.judgement import curve_range, errors_of, worst_errors
-from eigassign.study.design.wanted import Wanted
 from eigassign.study.meaning.monotone import corners, effects
 from eigassign.study.results import RangeRow, ToleranceRows
 from eigassign.study.scene import Scene
+from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 DRAWS = 64  # a power of two, as Sobol's points want

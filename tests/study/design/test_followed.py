@@ -24,8 +24,8 @@ from eigassign.study.design.followed import (
     solve_design,
 )
 from eigassign.study.design.response import exact_response
-from eigassign.study.design.wanted import Wanted, target_frequencies
 from eigassign.study.scene import Scene
+from eigassign.study.wanted import Wanted, target_frequencies
 
 RAIL_LIKE = {"like": 1, "at": {"time": 0.0}}
 MAST_LIKE = {"like": 2, "at": {"time": 0.0}}

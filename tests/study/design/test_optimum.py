@@ -12,7 +12,7 @@ from eigassign.assignment.exact.requirements import Frequencies
 from eigassign.assignment.exact.sequential import End
 from eigassign.study.design.optimum import Found, find_optimum
 from eigassign.study.design.response import ExactResponse
-from eigassign.study.design.wanted import target_frequencies
+from eigassign.study.wanted import target_frequencies
 
 
 def found_of(folder: Path, text: str, starts: list[str]) -> Found:

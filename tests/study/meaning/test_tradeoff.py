@@ -11,10 +11,10 @@ from scenes import changed, scene_of
 
 from eigassign.study.design.answer import find_answer
 from eigassign.study.design.optimum import Found
-from eigassign.study.design.wanted import target_frequencies
 from eigassign.study.meaning.tradeoff import trade_off
 from eigassign.study.results import TradeOff
 from eigassign.study.scene import Scene
+from eigassign.study.wanted import target_frequencies
 
 FEW = ("samples: 152", "samples: 12")
 PRICED = "{parameter: bodies.elbow_mass.mass, price: 2, "
