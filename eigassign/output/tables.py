@@ -157,11 +157,20 @@ def _violation(worst: float) -> str:
 def clearances(results: RunResults) -> Table:
     """Each band to keep out of: how many modes are below it, and whether that is proved."""
     rows = tuple(
-        (row.label, str(row.below), percent(max(row.room, 0.0)), "proved" if row.clear else "NO")
+        (
+            row.label,
+            str(row.below),
+            percent(max(row.room, 0.0)),
+            "not bounded" if row.raised is None else percent(row.raised),
+            "proved" if row.clear else "NO",
+        )
         for row in (results.assignment.clearances if results.assignment else ())
     )
-    columns = ("band", "modes below", "room at least", "clear")
-    caption = "Of all modes at every sample, and between the samples; room relative to the edge."
+    columns = ("band", "modes below", "room at least", "model too high by", "clear")
+    caption = (
+        "Of all modes at every sample, and between the samples; room relative to the edge. By how "
+        "much mesh and reduced links raise the mode above the band at most is taken off."
+    )
     return Table("Clearance", columns, rows, caption)
 
 

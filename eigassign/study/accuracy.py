@@ -27,6 +27,7 @@ from eigassign.mechanism.trajectory.trajectory import (
     Trajectory,
     rates,
 )
+from eigassign.modal.arguments import spread
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.model import Model
 from eigassign.modal.slow_motion import motion_effect
@@ -51,7 +52,7 @@ def accuracy_notes(scene: Scene, optimum: Floats | None = None) -> list[str]:
     lines = mesh_lines(scene.discretisation)
     lines += truncation_notes(scene, optimum)
     if optimum is None:
-        lines += _estimated_lines(scene, _spread(q, SAMPLES))
+        lines += _estimated_lines(scene, spread(q, SAMPLES))
     first = scene.model.x(q[0], scene.initial)[0]
     lost = rounding_error(scene.model.pencil, first, max(scene.expansions.modes))
     return [*lines, rounding_line(lost)]
@@ -78,10 +79,14 @@ def judged_mesh(
     """
     if model.meshed is None:
         return None
-    count = POSES if model.n_dof <= LARGE else POSES_LARGE
-    q = q0[None] if trajectory is None else _spread(poses_at(trajectory, y), count)
+    q = q0[None] if trajectory is None else judged_poses(model, poses_at(trajectory, y))
     error = model.discretisation_error(q, y, modes).max(axis=0)
     return MeshError(tuple(modes), tuple(float(e) for e in error), len(q), design)
+
+
+def judged_poses(model: Model, q: Floats) -> Floats:
+    """Those of q (n, n_q) at which the mesh is judged."""
+    return spread(q, POSES if model.n_dof <= LARGE else POSES_LARGE)
 
 
 def mesh_lines(found: MeshError | None) -> list[str]:
@@ -130,7 +135,7 @@ def truncation_lines(model: Model, modes: tuple[int, ...], q: Floats, designs: F
     """
     if model.reduced is None:
         return []
-    few, different = _spread(q, SAMPLES), np.unique(designs, axis=0)
+    few, different = spread(q, SAMPLES), np.unique(designs, axis=0)
     error = np.array([model.truncation_error(few, y, modes) for y in different]).max(axis=(0, 1))
     where = f"{len(few)} poses" + (f" and {len(different)} designs" if len(different) > 1 else "")
     for mode, worst in zip(modes, error, strict=True):
@@ -144,12 +149,6 @@ def truncation_lines(model: Model, modes: tuple[int, ...], q: Floats, designs: F
         f"high), over {where}"
         for mode, worst in zip(modes, error, strict=True)
     ]
-
-
-def _spread(q: Floats, count: int) -> Floats:
-    """At most ``count`` rows of q (n, n_q), evenly spaced; the first and last too."""
-    rows = np.unique(np.linspace(0, len(q) - 1, min(count, len(q))).round().astype(int))
-    return np.asarray(q[rows])
 
 
 # --- Is the motion slow?

@@ -23,10 +23,11 @@ from eigassign.errors import AccuracyError, CaseError, TrajectoryError, UsageErr
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.adaptive.link_reduction import POSES, ReductionChoice, choose_reduction
-from eigassign.modal.adaptive.mesh import MeshChoice, choose_mesh
+from eigassign.modal.adaptive.mesh import MeshChoice, ModesAt, choose_mesh
 from eigassign.modal.adaptive.order import ExpansionChoice, choose_expansion
 from eigassign.modal.arguments import spread
 from eigassign.modal.exact.clusters import CLUSTER_GAP
+from eigassign.modal.exact.inertia import count_below
 from eigassign.modal.model import Model
 from eigassign.modal.taylor.local_coordinates import local_space
 
@@ -230,6 +231,20 @@ def wanted_modes(file: CaseFile) -> tuple[int, ...]:
     return tuple(sorted(named)) or (1,)
 
 
+def modes_that_matter(file: CaseFile, bands_hz: Floats) -> ModesAt:
+    """`wanted_modes`, and at every x the first above each of the edges ``bands_hz`` (k,)."""
+    wanted = wanted_modes(file)
+
+    def modes_at(model: Model, x: Floats) -> tuple[int, ...]:
+        if not len(bands_hz):
+            return wanted
+        above = np.unique(count_below(model.pencil, x, bands_hz[None])) + 1
+        last = len(model.pencil.elastic)  # of a mesh too coarse for the band: no bound on its error
+        return tuple(sorted({*wanted, *(min(max(int(mode), 1), last) for mode in above)}))
+
+    return modes_at
+
+
 def automatic_elements(file: CaseFile) -> dict[str, int | None]:
     """Elements of every beam link, None where they are left to auto."""
     beams = {n: getattr(link, "elements", None) for n, link in file.mechanism.links.items()}
@@ -241,6 +256,7 @@ def settle_mesh(
     build: Callable[[Mapping[str, int]], Model],
     trajectory: Trajectories | None,
     q0: Floats,
+    modes_at: ModesAt,
 ) -> MeshChoice:
     """The fewest elements that leave the mesh's share of the accuracy all over the design's bounds.
 
@@ -248,7 +264,7 @@ def settle_mesh(
     at more, at random designs and at those that are worse than the worst of these; where that
     fails, chosen anew. Raises AccuracyError where no mesh will do.
     """
-    accuracy, modes = mesh_share(file) - truncation_share(file), wanted_modes(file)
+    accuracy = mesh_share(file) - truncation_share(file)
     y, elements = initial_design(file), automatic_elements(file)
     at_upper = corners(len(y))
     seen, every = (
@@ -259,24 +275,24 @@ def settle_mesh(
         every = every.joined(at_random(file, trajectory, q0, y, MESH_FEW))
     reasons: list[str] = []
     for _ in range(1 + ATTEMPTS):
-        found = choose_mesh(build, elements, seen.x, accuracy, modes)
+        found = choose_mesh(build, elements, seen.x, accuracy, modes_at)
         reasons += found.reasons
         model = build(found.elements)
-        every, error = with_worse_designs(every, partial(_mesh_error, model, modes), file)
+        every, error = with_worse_designs(every, partial(_mesh_error, model, modes_at), file)
         worst = float(error.max())
         line = f"at {len(error)} poses and designs in all: at most {100.0 * worst:.2g} % too high"
         if worst <= accuracy:
             reasons.append(line)
-            return replace(found, error=np.full(len(modes), worst), reasons=tuple(reasons))
+            return replace(found, error=np.full_like(found.error, worst), reasons=tuple(reasons))
         reasons.append(f"{line}, chosen anew")
         top = np.argsort(-error, kind="stable")[:CLIMBERS]
         seen = seen.joined(replace(every, x=every.x[top], samples=every.samples[top]))
     raise AccuracyError(f"no mesh was found that leaves {accuracy:.1e}: {reasons[-1]}")
 
 
-def _mesh_error(model: Model, modes: Sequence[int], x: Floats) -> Floats:
-    """Of all modes at x (n, n_x), (n,)."""
-    n_q = len(model.q_names)
+def _mesh_error(model: Model, modes_at: ModesAt, x: Floats) -> Floats:
+    """Of all modes that matter at x (n, n_x), (n,)."""
+    n_q, modes = len(model.q_names), modes_at(model, x)
     return np.asarray(model.discretisation_error(x[:, :n_q], x[:, n_q:], modes).max(axis=1))
 
 
@@ -308,11 +324,13 @@ def truncation_share(file: CaseFile) -> float:
 def settle_reduction(
     file: CaseFile,
     names: tuple[str, ...],
-    build: Callable[[float | None], Model],
-    samples: Callable[[Model], Floats],
+    whole: Model,
+    build: Callable[[float], Model],
+    x: Floats,
+    modes_at: ModesAt,
 ) -> ReductionChoice:
-    """The lowest frequency to which links may be reduced at ``samples(model)``, if it pays."""
-    return choose_reduction(names, build, samples, truncation_share(file), wanted_modes(file))
+    """The lowest frequency to which links may be reduced at x (n, n_x), if it pays."""
+    return choose_reduction(names, whole, build, x, truncation_share(file), modes_at)
 
 
 def require_little_truncation(file: CaseFile, model: Model, x: Floats) -> None:

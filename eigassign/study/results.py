@@ -321,7 +321,8 @@ class ClearanceRow:
     """Whether a band is proved clear along a trajectory with ``below`` modes under it.
 
     ``room`` is the least distance of a mode relative to the edge, less what it may deviate between
-    the points looked at.
+    the points looked at, and less ``raised``: how much too high the mode above may be for mesh and
+    reduced links, relative; None where that is not known.
     """
 
     label: str
@@ -329,6 +330,7 @@ class ClearanceRow:
     clear: bool
     room: float
     counted: bool
+    raised: float | None
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.brief import Brief
 from eigassign.case import CaseFile
-from eigassign.errors import CaseError
+from eigassign.errors import CaseError, MissingMassError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.expansion import Expansion, NearestExpansion
 from eigassign.modal.model import Model
@@ -122,12 +123,20 @@ class Scene:
         parameters = self.file.design.parameters.values()
         return np.array([p.min for p in parameters]), np.array([p.max for p in parameters])
 
-    @property
+    @cached_property
     def shown_modes(self) -> tuple[int, ...]:
-        """Every mode solved along the trajectory: to three above the expanded and asked ones."""
+        """Every mode solved along the trajectory: the expanded and asked ones and three above.
+
+        Of those above, as many as have mass.
+        """
         available = self.model.n_dof - self.model.n_rigid
         highest = max(*self.expansions.modes, self.asked_modes)
-        return tuple(range(1, min(highest + OTHERS, available) + 1))
+        last = min(highest + OTHERS, available)
+        try:
+            self.model.frequencies(self.q0, self.initial, last)
+        except MissingMassError as error:
+            last = max(highest, error.most)
+        return tuple(range(1, last + 1))
 
     def exact(
         self, y: Floats, progress: Callable[[int, int], None] = lambda _done, _of: None

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +26,12 @@ from eigassign.study.planning import (
     at_corners,
     automatic_elements,
     automatic_reduction,
+    modes_that_matter,
     settle_mesh,
     settle_reduction,
     with_middle_loads,
 )
+from eigassign.study.wanted import target_frequencies
 
 Floats = NDArray[np.float64]
 TRIAL = 2  # elements of a link left to auto, in the model whose trajectory choices are judged on
@@ -69,7 +70,8 @@ def _chosen_elements(file: CaseFile) -> MeshChoice | None:
         return build_model(with_elements(file, elements))
 
     trial = meshed({name: TRIAL for name, given in wanted.items() if given is None})
-    return settle_mesh(file, meshed, *_path(file, trial))
+    path, q0 = _path(file, trial)
+    return settle_mesh(file, meshed, path, q0, modes_that_matter(file, _bands_hz(file, path)))
 
 
 def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | None:
@@ -77,15 +79,23 @@ def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | No
     if not names:
         return None
 
-    def reduced(frequency_hz: float | None) -> Model:
+    def reduced(frequency_hz: float) -> Model:
         return build_model(with_reduction(file, dict.fromkeys(names, frequency_hz)), links)
 
-    return settle_reduction(file, names, reduced, partial(_judged_at, file))
+    whole = build_model(with_reduction(file, dict.fromkeys(names)), links)
+    path, q0 = _path(file, whole)
+    x = at_corners(file, path, q0, initial_design(file)).x
+    modes_at = modes_that_matter(file, _bands_hz(file, path))
+    return settle_reduction(file, names, whole, reduced, x, modes_at)
 
 
-def _judged_at(file: CaseFile, trial: Model) -> Floats:
-    """x (n, n_x): poses and designs at which reductions are judged."""
-    return at_corners(file, *_path(file, trial), initial_design(file)).x
+def _bands_hz(file: CaseFile, path: Trajectories | None) -> Floats:
+    """The highest edges of the bands that every mode shall keep out of, (k,) in Hz."""
+    if path is None:
+        return np.empty(0)
+    wanted = target_frequencies(file, path)
+    bands = [w for w in wanted if w.requirement.kind == "keep_out" and not w.requirement.modes]
+    return np.array([w.upper_hz.max() for w in bands])
 
 
 def _path(file: CaseFile, trial: Model) -> tuple[Trajectories | None, Floats]:

@@ -44,12 +44,18 @@ def test_bands_say_how_many_modes_are_below_and_whether_that_is_proved() -> None
     results = make_results()
     assert table(results, "Clearance") is None
     assert results.assignment is not None
-    rows = (ClearanceRow("a band", 2, True, 0.013, True), ClearanceRow("b", 0, False, -0.1, True))
+    rows = (
+        ClearanceRow("a band", 2, True, 0.013, True, 0.002),
+        ClearanceRow("b", 0, False, -0.1, True, None),
+    )
     found = table(
         replace(results, assignment=replace(results.assignment, clearances=rows)), "Clearance"
     )
     assert found is not None
-    assert found.rows == (("a band", "2", "1.30 %", "proved"), ("b", "0", "0.00 %", "NO"))
+    assert found.rows == (
+        ("a band", "2", "1.30 %", "0.200 %", "proved"),
+        ("b", "0", "0.00 %", "not bounded", "NO"),
+    )
 
 
 def test_combinations_take_the_place_of_local_optima_and_have_prices() -> None:

@@ -1,9 +1,8 @@
 """The frequency up to which links keep their fixed-interface modes, and whether reducing pays.
 
-With no such modes at all the links give frequencies that are too high. The first trial is twice the
-highest frequency that matters in that model; it is raised until the bound on the truncation error
-fits. A model with fewer than half of the dofs pays: its dense blocks then cost less than the sparse
-ones of the whole mechanism (benchmarks/craig_bampton.py).
+The first trial is twice the highest frequency that matters; it is raised until the bound on the
+truncation error fits. A model with fewer than half of the dofs pays: its dense blocks then cost
+less than the sparse ones of the whole mechanism (benchmarks/craig_bampton.py).
 """
 
 from __future__ import annotations
@@ -14,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.modal.adaptive.mesh import ModesAt
 from eigassign.modal.arguments import spread
 from eigassign.modal.model import Model
 
 Floats = NDArray[np.float64]
-STATIC = 1e-6  # Hz: below every fixed-interface mode
 FIRST = 2.0  # times the highest frequency that matters
 STEP = 1.5  # from one trial to the next
 MAX_TRIALS = 16  # up to some 900 times the highest frequency that matters
@@ -37,22 +36,21 @@ class ReductionChoice:
 
 def choose_reduction(
     names: Sequence[str],
-    build: Callable[[float | None], Model],
-    samples: Callable[[Model], Floats],
+    whole: Model,
+    build: Callable[[float], Model],
+    x: Floats,
     accuracy: float,
-    modes: Sequence[int],
+    modes_at: ModesAt,
 ) -> ReductionChoice:
-    """The lowest frequency tried whose truncation error is ≤ ``accuracy`` at ``samples(model)``.
+    """The lowest frequency tried whose truncation error is ≤ ``accuracy`` at x (n, n_x).
 
-    The links stay whole where the model keeps more than `PAYS` of its dofs.
+    The links stay as they are in ``whole`` where the model keeps more than `PAYS` of its dofs.
     """
-    whole = build(None)
-    x = spread(samples(whole), POSES)
+    x = spread(x, POSES)
     q, y = x[:, : len(whole.q_names)], x[:, len(whole.q_names) :]
     reasons: list[str] = []
-    static = build(STATIC)
-    highest = static.frequencies(q, y, min(max(modes), len(static.pencil.elastic))).max()
-    frequency = FIRST * float(highest)
+    modes = modes_at(whole, x)
+    frequency = FIRST * float(whole.frequencies(q[:1], y[:1], max(modes)).max())
     size = 0
     for _ in range(MAX_TRIALS):
         model = build(frequency)

@@ -18,6 +18,7 @@ START = 2  # elements of a link at first
 MAX_ELEMENTS = 256  # of a link; with more round-off, which grows as n⁴, is the larger error
 MAX_MESHES = 8  # tried at most; the paper's arm needs three at most, down to 1e-6
 Build = Callable[[Mapping[str, int]], Model]
+ModesAt = Callable[[Model, Floats], tuple[int, ...]]  # that matter at x (n, n_x)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,9 +35,11 @@ def choose_mesh(
     elements: Mapping[str, int | None],
     x: Floats,
     accuracy: float,
-    modes: Sequence[int] = (1,),
+    modes_at: ModesAt = lambda _model, _x: (1,),
 ) -> MeshChoice:
     """Elements for the links that have None, the others kept; error ≤ ``accuracy`` at x (n, n_x).
+
+    It is that of the modes that `modes_at` names, which may depend on the mesh.
 
     Raises AccuracyError where `MAX_ELEMENTS` do not suffice or round-off is in the way.
     """
@@ -46,6 +49,7 @@ def choose_mesh(
     before: dict[str, tuple[int, float]] = {}
     for _ in range(MAX_MESHES):
         model = build(now)
+        modes = modes_at(model, x)
         if (lost := rounding_error(model.pencil, x[0], max(modes))) > accuracy:
             raise AccuracyError(
                 f"with {_shown(now)} elements round-off is {lost:.1e}, above the {accuracy:.1e} "

@@ -182,7 +182,7 @@ def assignment_row(
     contradiction = _in_words(scene, wanted, answer.conflict, proved)
     merits = initial, optimal
     word, reason = verdict(targets, merits, trusted, unreachable, contradiction)
-    unproved = [row.label for row in clearances if not row.clear]
+    unproved = [_why_unproved(row) for row in clearances if not row.clear]
     if word == "reached" and unproved:
         word, reason = "do_not_use", f"not proved clear along the motion: {'; '.join(unproved)}"
     if found is not None and found.best.end in (End.SECONDS, End.STEPS, End.INTERRUPTED):
@@ -212,7 +212,25 @@ def assignment_row(
 
 
 def _clearance(found: Clearance) -> ClearanceRow:
-    return ClearanceRow(found.label, found.below, found.clear, found.room, found.counted)
+    return ClearanceRow(
+        found.label,
+        found.below,
+        found.clear,
+        found.room,
+        found.counted,
+        found.raised if np.isfinite(found.raised) else None,
+    )
+
+
+def _why_unproved(row: ClearanceRow) -> str:
+    """Its label; and what to do where it is for what the model is too high by."""
+    if row.raised is not None and row.room + row.raised <= 0.0:
+        return row.label
+    how = "not bounded" if row.raised is None else f"{100 * row.raised:.2g} % too high at most"
+    return (
+        f"{row.label} (what mesh and reduced links do to the mode above it: {how}; give the links "
+        "more elements, raise reduce_to, or write auto)"
+    )
 
 
 def _catalogue(scene: Scene, answer: Answer, wanted: Sequence[Wanted]) -> CatalogueRow | None:

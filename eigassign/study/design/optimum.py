@@ -30,8 +30,14 @@ from eigassign.assignment.exact.requirements import (
 )
 from eigassign.assignment.exact.sequential import End, Optimum, distinct, minimise, worth
 from eigassign.assignment.feasibility import constraints_agree
-from eigassign.errors import CaseError, EigassignError, InfeasibleError, LostModeError
-from eigassign.study.design.clearance import Band, Clearance, prove_clear, wanting
+from eigassign.errors import (
+    CaseError,
+    EigassignError,
+    InfeasibleError,
+    LostModeError,
+    MissingMassError,
+)
+from eigassign.study.design.clearance import Band, Clearance, mode_above, prove_clear, wanting
 from eigassign.study.design.followed import Follower, followers
 from eigassign.study.design.one_shot import catalogues, linear_constraints
 from eigassign.study.design.response import (
@@ -426,7 +432,7 @@ def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Vari
     of_bands = [
         limit
         for band, k in zip(task.bands, below, strict=True)
-        for limit in _beside(band, k, task.margin)
+        for limit in _beside(scene, band, k, task.margin)
     ]
     constraints, elastic = _linear(scene, missed)
     asked = Requirements(
@@ -540,15 +546,15 @@ def _possible(scene: Scene, band: _Band) -> list[int]:
     return sorted(possible, key=lambda k: (abs(k - first), k))
 
 
-def _beside(band: _Band, k: int, margin: float) -> Iterator[FrequencyLimit]:
+def _beside(scene: Scene, band: _Band, k: int, margin: float) -> Iterator[FrequencyLimit]:
     """The limits that say: k of the named modes (of all, if none is named) are below the band."""
     lower, upper = band.lower_hz * (1.0 - margin), band.upper_hz * (1.0 + margin)
     label, named = band.wanted.requirement.label, tuple(sorted(band.wanted.requirement.modes))
-    below = named[k - 1] if named and k else k
-    above = named[k] if named and k < len(named) else k + 1
     if k:
+        below = named[k - 1] if named else k
         yield FrequencyLimit(label, ((below, 1.0),), lower, band.rows, False)
-    if not named or k < len(named):
+    q = scene.path.at(scene.initial)[0][band.rows]
+    if above := mode_above(scene.model, k, named, q, scene.initial):
         yield FrequencyLimit(label, ((above, 1.0),), upper, band.rows, True)
 
 
@@ -571,11 +577,15 @@ def _counts(scene: Scene, band: _Band, named: tuple[int, ...]) -> NDArray[np.int
 
 
 def _all_below(scene: Scene, q: Floats, y: Floats, hz: float) -> Floats:
-    """The lowest frequencies (n, count), as many as reach beyond ``hz`` everywhere."""
+    """The lowest frequencies (n, count), as many as reach beyond ``hz`` everywhere or have mass."""
     available = scene.model.n_dof - scene.model.n_rigid
     count = min(4, available)
     while True:
-        found = scene.model.frequencies(q, y, count)
+        try:
+            found = scene.model.frequencies(q, y, count)
+        except MissingMassError as error:
+            count = available = error.most
+            continue
         if count == available or found[:, -1].min() > hz:
             return found
         count = min(2 * count, available)

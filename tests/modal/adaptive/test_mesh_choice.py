@@ -21,7 +21,7 @@ def test_a_fixed_mesh_that_is_too_coarse_is_refused_with_its_worst_link(x):
 
 
 def test_the_choice_is_as_good_as_it_says(x):
-    found = choose_mesh(build, FREE, x, 1e-4, (1, 2))
+    found = choose_mesh(build, FREE, x, 1e-4, lambda _model, _x: (1, 2))
     true = exact(build({"upper": 40, "fore": 40}), x, (1, 2))
     error = exact(build(found.elements), x, (1, 2)) / true - 1.0
     assert (error.max(axis=0) <= found.error).all()

@@ -26,7 +26,7 @@ def x() -> np.ndarray:
     ("accuracy", "modes"), [(a, m) for a in (1e-2, 1e-3, 1e-4) for m in ((1,), (1, 2))][:-1]
 )
 def test_mesh_and_expansion_together_meet_the_accuracy(x, accuracy, modes):
-    mesh = choose_mesh(build, FREE, x, 0.5 * accuracy, modes)
+    mesh = choose_mesh(build, FREE, x, 0.5 * accuracy, lambda _model, _x: modes)
     expansion = choose_expansion(build(mesh.elements).pencil, x, 0.5 * accuracy, modes)
     true = exact(build({"upper": 40, "fore": 40}), x, modes)
     f = expansion.frequencies(x[:, :2], x[:, 2:])

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.io
 from scenes import SHIPPED, changed, scene_of
 
+import eigassign
 from eigassign.pipeline.run import solve_case
 from eigassign.study.built_case import load_case
 from eigassign.study.design.clearance import Band, prove_clear
@@ -55,3 +58,86 @@ def test_answers_called_clear_stay_clear_at_random_instants(low: float, tmp_path
     between = np.column_stack([np.interp(at, np.arange(len(q)), column) for column in q.T])
     hz = case.model().frequencies(between, y, 3)
     assert not ((hz > low) & (hz < low + 12.0)).any()
+
+
+COARSE = (("elements: 4", "elements: 2"), ("elements: 3", "elements: 2"))
+REDUCED = (
+    ("elements: 4", "elements: 12, reduce_to: 500 Hz"),
+    ("elements: 3", "elements: 12, reduce_to: 500 Hz"),
+)
+
+
+@pytest.mark.parametrize(
+    ("changes", "low", "high", "below", "bounded"),
+    [(COARSE, 745.0, 790.0, 2, True), (REDUCED, 540.0, 565.0, 1, False)],
+)
+def test_a_mode_that_mesh_or_reduced_links_raise_beyond_a_band_is_not_clear_of_it(
+    changes: tuple[tuple[str, str], ...],
+    low: float,
+    high: float,
+    below: int,
+    bounded: bool,
+    tmp_path: Path,
+) -> None:
+    fine = (("elements: 4", "elements: 12"), ("elements: 3", "elements: 12"))
+    (tmp_path / "own").mkdir()
+    (tmp_path / "fine").mkdir()
+    scene = scene_of(tmp_path / "own", changed(*changes))
+    true = scene_of(tmp_path / "fine", changed(*fine))
+    pose = np.array([[1.817, 5.312]])
+    assert scene.model.frequencies(pose, scene.initial, 3)[0, below] > high
+    assert true.model.frequencies(pose, scene.initial, 3)[0, below] < low
+    there = Band("band", pose, np.array([low]), np.array([high]), below)
+    found = prove_clear(scene.model, there, scene.initial)
+    assert found.counted
+    assert not found.clear
+    assert np.isfinite(found.raised) == bounded
+    above = Band("band", pose, there.lower_hz, there.upper_hz, below + 1)
+    assert prove_clear(true.model, above, scene.initial).clear
+
+
+def test_links_left_to_auto_are_modelled_up_to_the_bands(tmp_path: Path) -> None:
+    """Of elements and reduction, by the mode above the band and not by the targets alone."""
+    for name, key in (("elements", "elements: auto"), ("reduced", "elements: 16, reduce_to: auto")):
+        links = (("elements: 4", key), ("elements: 3", key))
+        path = tmp_path / f"{name}.yaml"
+        targets = ("- {mode: 1, frequency: 190 Hz}", "- {keep_out: [900 Hz, 950 Hz]}")
+        path.write_text(changed(*links, targets))
+        case = load_case(path)
+        model, q = case.model(), case.trajectory.q[::50]
+        error = model.discretisation_error(q, case.initial_design, (4,)).max()
+        error += model.truncation_error(q, case.initial_design, (4,)).max()
+        assert error < 5e-4
+        assert model.n_dof < 80
+
+
+def test_a_band_above_all_modes_of_the_model_is_not_proved_clear(tmp_path: Path) -> None:
+    one = (("elements: 4", "elements: 1"), ("elements: 3", "elements: 1"))
+    path = tmp_path / "case.yaml"
+    path.write_text(changed(*one, ("mode: 1, frequency: 190 Hz", "keep_out: [20 kHz, 21 kHz]")))
+    row = solve_case(load_case(path)).results.assignment
+    assert row is not None
+    assert row.verdict == "do_not_use"
+    assert "raise reduce_to" in row.reason
+    assert [one.raised for one in row.clearances] == [None]
+
+
+@pytest.mark.parametrize(
+    ("target", "verdict"),
+    [("{mode: 24, at_least: 3 Hz}", "reached"), ("{keep_out: [100 kHz, 101 kHz]}", "do_not_use")],
+)
+def test_modes_that_have_no_mass_are_not_asked_for(
+    target: str, verdict: str, tmp_path: Path
+) -> None:
+    """A part with masses and no inertias: 25 of 32 modes of the arm have mass."""
+    starters = Path(eigassign.__file__).parent / "starters"
+    shutil.copytree(starters / "imported_part", tmp_path / "imported_part")
+    points = np.diag(np.tile([0.13, 0.13, 0.0], 7))
+    scipy.io.mmwrite(tmp_path / "imported_part" / "mass.mtx", points)
+    text = (starters / "imported_part.yaml").read_text()
+    path = tmp_path / "case.yaml"
+    path.write_text(text.replace("{mode: 1, frequency: 15 Hz}", target))
+    row = solve_case(load_case(path)).results.assignment
+    assert row is not None
+    assert row.verdict == verdict
+    assert [one.below for one in row.clearances] == ([25] if "keep_out" in target else [])
