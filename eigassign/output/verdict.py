@@ -112,6 +112,9 @@ def _trust(results: RunResults) -> Iterator[str]:
     yield _sentence(row.optimality.words)
     if not row.finished:
         yield "The search was ended before it was done."
+    if row.model_error != 0.0:
+        how = "not known" if row.model_error is None else f"{percent(row.model_error)} at most"
+        yield f"How much mesh and reduced links raise the modes asked for: {how}."
     for clear in row.clearances:
         proof = "proved clear" if clear.clear else "NOT proved clear"
         below = f"{clear.below} mode{'' if clear.below == 1 else 's'}"

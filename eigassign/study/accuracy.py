@@ -12,7 +12,7 @@ eigenproblem with these terms is solved (`modal.slow_motion`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,6 +56,21 @@ def accuracy_notes(scene: Scene, optimum: Floats | None = None) -> list[str]:
     first = scene.model.x(q[0], scene.initial)[0]
     lost = rounding_error(scene.model.pencil, first, max(scene.expansions.modes))
     return [*lines, rounding_line(lost)]
+
+
+def model_error(scene: Scene, y: Floats, modes: Collection[int]) -> float:
+    """By how much mesh and reduced links raise ``modes`` at most at design y (n_y,), relative.
+
+    The mesh's part is that of `Scene.discretisation`; infinite where nothing is known.
+    """
+    judged = scene.discretisation
+    mesh = {} if judged is None else dict(zip(judged.modes, judged.error, strict=True))
+    of_mesh = max((mesh.get(mode, 0.0) for mode in modes), default=0.0)
+    if scene.model.reduced is None or not modes:
+        return of_mesh
+    q = judged_poses(scene.model, poses_at(scene.path, y))
+    of_links = float(scene.model.truncation_error(q, y, sorted(modes)).max())
+    return (1.0 + of_mesh) * (1.0 + of_links) - 1.0
 
 
 def rounding_line(lost: float) -> str:

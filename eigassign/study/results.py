@@ -361,6 +361,8 @@ class AssignmentRow(Brief):
 
     ``objective_initial``, ``objective_optimal`` are of the exact problem: the weighted mean square
     relative error in Hz, of the worst case the largest weighted error; prices included.
+    ``model_error`` is by how much mesh and reduced links raise the modes with a target at most,
+    relative, at the answer; None where that is not known. (Of bands, see their `ClearanceRow`.)
     """
 
     method: str
@@ -381,6 +383,7 @@ class AssignmentRow(Brief):
     max_error: float
     max_error_given: bool
     clearances: tuple[ClearanceRow, ...]
+    model_error: float | None
     conflict: tuple[str, ...] = ()  # limits that contradict each other
     catalogue: CatalogueRow | None = None
 

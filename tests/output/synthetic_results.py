@@ -305,6 +305,7 @@ def _assignment(n_y: int, prefix: str) -> AssignmentRow:
         max_error=0.02,
         max_error_given=False,
         clearances=(),
+        model_error=3e-4,
     )
 
 

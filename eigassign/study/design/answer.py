@@ -18,6 +18,7 @@ from eigassign.assignment.exact.design_problem import MET
 from eigassign.assignment.exact.sequential import End
 from eigassign.case import CaseFile
 from eigassign.errors import AccuracyError, InfeasibleError
+from eigassign.study.accuracy import model_error
 from eigassign.study.design.clearance import Clearance
 from eigassign.study.design.conclusions import (
     Conflict,
@@ -183,6 +184,11 @@ def assignment_row(
     merits = initial, optimal
     word, reason = verdict(targets, merits, trusted, unreachable, contradiction)
     unproved = [_why_unproved(row) for row in clearances if not row.clear]
+    of_model = {m for t in targets if t.kind in RAISED for m in t.modes}
+    raised = model_error(scene, answer.y, of_model)
+    largest = MAX_ERROR if keys.max_error is None else keys.max_error
+    if word == "reached" and any(_stake(target, raised) > largest for target in targets):
+        word, reason = "do_not_use", _too_coarse(raised, largest)
     if word == "reached" and unproved:
         word, reason = "do_not_use", f"not proved clear along the motion: {'; '.join(unproved)}"
     if found is not None and found.best.end in (End.SECONDS, End.STEPS, End.INTERRUPTED):
@@ -203,9 +209,10 @@ def assignment_row(
         finished=found is None or found.best.end in (End.OPTIMAL, End.STALLED),
         active=tuple(_of_program(answer) if found is None else active_rows(scene, answer)),
         one_shot=None if answer.one_shot is None else answer.one_shot.y,
-        max_error=MAX_ERROR if keys.max_error is None else keys.max_error,
+        max_error=largest,
         max_error_given=keys.max_error is not None,
         clearances=clearances,
+        model_error=raised if np.isfinite(raised) else None,
         conflict=() if answer.conflict is None else answer.conflict.names,
         catalogue=_catalogue(scene, answer, wanted),
     )
@@ -222,15 +229,34 @@ def _clearance(found: Clearance) -> ClearanceRow:
     )
 
 
+RAISED = ("frequency", "at_least", "gap")  # what a model that is too stiff may seem to meet
+FINER = "give the links more elements, raise reduce_to, or write auto"
+
+
+def _stake(target: TargetStudy, raised: float) -> float:
+    """How far off a target may be, relative, for a model whose frequencies are ``raised`` at most.
+
+    A lower limit that is met with room may lose that first.
+    """
+    if target.kind == "at_least":
+        return float((1.0 - target.exact_hz / (1.0 + raised) / target.lower_hz).max())
+    return raised if target.kind in RAISED else 0.0
+
+
+def _too_coarse(raised: float, accepted: float) -> str:
+    how = f"by up to {100 * raised:.2g} %" if np.isfinite(raised) else "by more than can be told"
+    return (
+        f"mesh and reduced links raise the frequencies {how}, and {100 * accepted:.2g} % are "
+        f"accepted: {FINER}"
+    )
+
+
 def _why_unproved(row: ClearanceRow) -> str:
     """Its label; and what to do where it is for what the model is too high by."""
     if row.raised is not None and row.room + row.raised <= 0.0:
         return row.label
     how = "not bounded" if row.raised is None else f"{100 * row.raised:.2g} % too high at most"
-    return (
-        f"{row.label} (what mesh and reduced links do to the mode above it: {how}; give the links "
-        "more elements, raise reduce_to, or write auto)"
-    )
+    return f"{row.label} (what mesh and reduced links do to the mode above it: {how}; {FINER})"
 
 
 def _catalogue(scene: Scene, answer: Answer, wanted: Sequence[Wanted]) -> CatalogueRow | None:
