@@ -25,6 +25,7 @@ from eigassign.output.storage import replace_synced
 HEADER, LINES = "batch.json", "manifest.jsonl"
 FORMAT = 1
 _BEGIN, _DIGITS = b'{"index": ', 20  # of a line, and of an index at most
+_AHEAD = 1 << 20  # bytes held of a file of which lines are read in nearly their order
 _BLOCK = 4096  # bytes that are searched for the end of a line at a time
 
 
@@ -166,7 +167,8 @@ class InOrder:
 
     def __iter__(self) -> Iterator[str]:
         if self._places:
-            with open(self._path, encoding="utf-8") as file:
+            with open(self._path, "rb", buffering=_AHEAD) as file:
                 for place in self._places:
-                    file.seek(place)
-                    yield file.readline()
+                    if file.tell() != place:
+                        file.seek(place)
+                    yield file.readline().decode()
