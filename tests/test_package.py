@@ -86,7 +86,7 @@ def test_a_notebook_shows_a_picture_and_what_was_found(case: ea.Case, result: Re
     assert "data:image/png;base64," in case._repr_html_()
     page = result._repr_html_()
     assert "data:image/png;base64," in page
-    assert f"{result.design['m1']:.6g}" in page
+    assert f"{1000.0 * result.design['m1']:.6g}" in page  # g
 
 
 def test_an_unknown_figure_and_a_mode_zero_are_refused(case: ea.Case, result: Result) -> None:

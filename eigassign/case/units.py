@@ -107,6 +107,34 @@ DIMENSIONS = {d.name: d for d in _DIMENSIONS}
 PLAIN = DIMENSIONS["fraction"]
 _BY_EXPONENTS = {d.exponents: d for d in _DIMENSIONS}
 
+_HANDY = {  # units that people read, the largest first
+    "kg": {"kg": 1.0, "g": 1e-3},
+    "m": {"m": 1.0, "mm": 1e-3},
+    "m2": {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6},
+    "m4": {"m4": 1.0, "cm4": 1e-8, "mm4": 1e-12},
+    "Pa": {"GPa": 1e9, "MPa": 1e6, "Pa": 1.0},
+    "N/m": {"MN/m": 1e6, "kN/m": 1e3, "N/m": 1.0},
+    "N m/rad": {"MN m/rad": 1e6, "kN m/rad": 1e3, "N m/rad": 1.0},
+    "kg m2": {"kg m2": 1.0, "kg cm2": 1e-4},
+}
+
+
+def handy_unit(unit: str, *values: float) -> tuple[str, float]:
+    """The largest unit that makes the largest of ``values`` (in SI ``unit``) at least 1, in SI.
+
+    The smallest one if none does; where there is nothing but zeros, ``unit`` itself.
+    """
+    most = max((abs(value) for value in values), default=0.0)
+    units = _HANDY.get(unit, {unit: 1.0}) if most else {unit: 1.0}
+    return next(((n, size) for n, size in units.items() if most >= size), [*units.items()][-1])
+
+
+def handy(amount: float, unit: str) -> str:
+    """An amount in SI ``unit`` to three digits, in its handy unit: ``2 kN m/rad``."""
+    name, size = handy_unit(unit, amount)
+    return f"{amount / size:.3g} {name}".rstrip()
+
+
 _PREFIXES = {"n": -9, "u": -6, "µ": -6, "μ": -6, "m": -3, "c": -2, "k": 3, "M": 6, "G": 9, "T": 12}
 _PREFIXED: tuple[tuple[str, str, Exponents], ...] = (  # the µ of two: micro sign, Greek mu
     ("m", "n u µ μ m c k", (0, 1, 0, 0, 0)),

@@ -5,16 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.case.units import handy_unit
 from eigassign.output.formats import capital, number, percent, residual, seconds
 from eigassign.study.design.judgement import MET
 from eigassign.study.results import (
     Comparison,
+    DesignRow,
     ErrorSummary,
     RangeRow,
     RunResults,
     TargetStudy,
     ValidationRow,
 )
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -89,17 +96,19 @@ def design(results: RunResults) -> Table:
         for name, shown in (("lies on", on), ("choice", chosen), ("change costs", priced))
         if shown
     ]
-    rows = [
-        (row.name, row.parameter, row.unit, *map(number, (row.initial, row.optimal)),
-         *map(number, (row.lower, row.upper)), *((on.get(row.name, ""),) if on else ()),
-         *((row.choice or "",) if chosen else ()),
-         *((number(row.cost),) if priced else ()))
-        for row in results.design
-    ]  # fmt: skip
+    rows = []
+    for row in results.design:
+        unit, size = _unit(row)
+        values = (row.initial, row.optimal, row.lower, row.upper)
+        rows.append(
+            (row.name, row.parameter, unit, *(number(value / size) for value in values),
+             *((on.get(row.name, ""),) if on else ()), *((row.choice or "",) if chosen else ()),
+             *((number(row.cost),) if priced else ()))
+        )  # fmt: skip
     if (mass := results.mass) is not None:
         edges = ("" if limit is None else number(limit) for limit in (mass.lower, mass.upper))
-        values = (number(mass.initial), number(mass.optimal), *edges)
-        rows.append(("mass", "of all links and bodies", "kg", *values, *("" for _ in more)))
+        both = (number(mass.initial), number(mass.optimal))
+        rows.append(("mass", "of all links and bodies", "kg", *both, *edges, *("" for _ in more)))
     constraints = [limit.name for limit in active if limit.kind == "constraint"]
     caption = f"The constraint {', '.join(constraints)} is active." if constraints else ""
     if results.price is not None:
@@ -107,10 +116,28 @@ def design(results: RunResults) -> Table:
     return Table("Design", (*columns, *more), tuple(rows), caption)
 
 
+def _unit(row: DesignRow) -> tuple[str, float]:
+    """The unit that a parameter is shown in, and its size in SI."""
+    return handy_unit(row.unit, row.initial, row.optimal, row.lower, row.upper)
+
+
+def _by_name(results: RunResults, y: Floats) -> Iterator[str]:
+    """A design in these units."""
+    for row, value in zip(results.design, y, strict=True):
+        yield number(float(value) / _unit(row)[1])
+
+
+def _named(results: RunResults) -> Iterator[str]:
+    """The parameters with these units: ``wall [mm]``."""
+    for row in results.design:
+        unit = _unit(row)[0]
+        yield f"{row.name} [{unit}]" if unit else row.name
+
+
 def errors(results: RunResults) -> Table:
     """Distance to the wanted frequencies before, as predicted, and exact, side by side."""
     kinds = _stages(results)
-    columns = ("target", *(f"{kind} {what}" for what in ("worst", "rms") for kind in kinds))
+    columns = ("target", "distance", *kinds)
     wanted = [target for target in results.targets if target.kind == "frequency"]
     if not wanted:
         return Table("Distance to the target", columns, ())
@@ -123,9 +150,9 @@ def errors(results: RunResults) -> Table:
     rows = []
     for label, summary in summaries:
         errors = [getattr(summary, kind.replace(" ", "_")) for kind in kinds]
-        worst = ("" if error is None else percent(error.max_relative) for error in errors)
-        rms = ("" if error is None else percent(error.rms_relative) for error in errors)
-        rows.append((label, *worst, *rms))
+        for what, of in (("worst", "max_relative"), ("rms", "rms_relative")):
+            cells = ("" if error is None else percent(getattr(error, of)) for error in errors)
+            rows.append((label, what, *cells))
     caption = "Frequency against its target in Hz, relative to the target, along "
     caption += f"{results.along}."
     if len({target.weight for target in wanted}) > 1:
@@ -168,8 +195,9 @@ def clearances(results: RunResults) -> Table:
     )
     columns = ("band", "modes below", "room at least", "model too high by", "clear")
     caption = (
-        "Of all modes at every sample, and between the samples; room relative to the edge. By how "
-        "much mesh and reduced links raise the mode above the band at most is taken off."
+        "Of all modes at every sample, and between the samples. Room is the distance to the "
+        "nearest edge, relative to it. Mesh and reduced links put the mode above the band too "
+        "high, by no more than stated: the room counts from there."
     )
     return Table("Clearance", columns, rows, caption)
 
@@ -197,12 +225,16 @@ def _by_price(results: RunResults) -> bool:
 def optima(results: RunResults) -> Table:
     """The distinct local optima, the best first; none of a single one."""
     row = results.assignment
-    names = tuple(each.name for each in results.design)
-    columns = ("optimum", "objective", "violation", *names)
+    columns = ("optimum", "objective", "violation", *_named(results))
     if row is None or row.catalogue is not None or len(row.local_optima) < 2:
         return Table("Local optima", columns, ())
     rows = tuple(
-        (str(k), number(each.objective), _violation(each.violation), *map(number, each.design))
+        (
+            str(k),
+            number(each.objective),
+            _violation(each.violation),
+            *_by_name(results, each.design),
+        )
         for k, each in enumerate(row.local_optima, 1)
     )
     return Table(
@@ -228,13 +260,20 @@ def _of_target(target: TargetStudy) -> Iterator[tuple[str, ErrorSummary]]:
 def sensitivity(results: RunResults) -> Table:
     """What the targeted frequencies hang on, at the answer."""
     columns = ("parameter", "target", "Hz per unit", "unit", "% per %", "% per % at most")
-    rows = tuple(
-        (row.parameter, row.label, number(row.hz_per_unit), row.unit,
-         number(row.percent_per_percent), number(row.percent_per_percent_largest))
-        for row in results.meaning.sensitivity
-    )  # fmt: skip
-    caption = "Slopes of exact frequencies at the optimum, as means over the samples."
-    return Table("Sensitivity", columns, rows, caption)
+    units = {row.name: _unit(row) for row in results.design}
+    rows = []
+    for row in results.meaning.sensitivity:
+        unit, size = units.get(row.parameter, (row.unit, 1.0))
+        shares = (row.percent_per_percent, row.percent_per_percent_largest)
+        rows.append(
+            (row.parameter, row.label, f"{row.hz_per_unit * size:.3g}", unit,
+             *(f"{share + 0.0:.3g}" for share in shares))
+        )  # fmt: skip
+    caption = (
+        "Slopes of exact frequencies at the optimum, as means over the samples: by how many Hz a "
+        "frequency rises for a unit more, and by how many per cent for a per cent more."
+    )
+    return Table("Sensitivity", columns, tuple(rows), caption)
 
 
 def limits(results: RunResults) -> Table:
@@ -262,12 +301,12 @@ def trade_off(results: RunResults) -> Table:
     if found is None:
         return Table("Trade-off", (), ())
     unit = f" [{found.unit}]" if found.unit else ""
-    columns = (f"{found.quantity}{unit}", "added", found.error, *(r.name for r in results.design))
+    columns = (f"{found.quantity}{unit}", "added", found.error, *_named(results))
     rows = []
     for point in found.points:
         added = round(point.amount - found.initial, 12) + 0.0  # not −0
         cells = (number(point.amount), number(added), percent(point.error))
-        rows.append((*cells, *map(number, point.design)))
+        rows.append((*cells, *_by_name(results, point.design)))
     caption = "The best design found for each; the last is the answer."
     return Table("Trade-off", columns, tuple(rows), caption)
 

@@ -5,10 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.case.units import handy_unit
 from eigassign.output.formats import capital, percent
 from eigassign.study.design.judgement import MET
 from eigassign.study.results import RunResults, TargetStudy
 
+Floats = NDArray[np.float64]
+DETAILED = 3  # targets: of more only the worst distance is told
 TONES = {"reached": "good", "improved": "fair"}  # every other verdict is bad
 WORDS = {
     "reached": "Reached",
@@ -34,12 +40,13 @@ class Bar:
 
 @dataclass(frozen=True)
 class Finding:
-    """One target before and after, in words, and whether it is met."""
+    """One target before and after, in words, in a tone, and what else there is to say of it."""
 
     label: str
     before: str
     after: str
-    met: bool
+    tone: str
+    more: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -63,13 +70,13 @@ def verdict_of(results: RunResults) -> Verdict | None:
         return None
     misled = row.method == "one_shot" and not results.within_tolerance
     word = "do_not_use" if misled else row.verdict
-    short = results.shortcoming
+    short, few = results.shortcoming, len(results.targets) <= DETAILED
     return Verdict(
         word=WORDS[word],
         tone=TONES.get(word, "bad") if short is None else "bad",
         reason=_sentence(short if misled and short else row.reason),
         asked=tuple(_asked(results)),
-        findings=tuple(_finding(target, row.max_error) for target in results.targets),
+        findings=tuple(_finding(target, row.max_error, few) for target in results.targets),
         trust=tuple(_trust(results)),
         bars=tuple(_bars(results)),
         cost=tuple(_cost(results)),
@@ -81,9 +88,11 @@ def _sentence(text: str) -> str:
 
 
 def _asked(results: RunResults) -> Iterator[str]:
+    row = results.assignment
     for target in results.targets:
-        yield target.label
-    parameters = [row.name for row in results.design]
+        within = f", within {100 * row.max_error:.3g} %" if row and _is_wanted(target) else ""
+        yield f"{capital(target.label)}{within}"
+    parameters = [each.name for each in results.design]
     names = ", ".join(parameters[:4]) + (", …" if len(parameters) > 4 else "")
     yield f"by {names} within the bounds" if parameters else "with the design as it is"
     yield f"along {results.along}, {results.time_s.size} samples"
@@ -91,13 +100,30 @@ def _asked(results: RunResults) -> Iterator[str]:
         yield f"mass at most {_few(results.mass.upper)} kg"
 
 
-def _finding(target: TargetStudy, accepted: float) -> Finding:
-    """Worst distances; of a limit by how much it is violated."""
-    before, after = target.error.initial.max_relative, target.error.exact.max_relative
-    if target.kind != "frequency":
-        return Finding(target.label, _violated(before), _violated(after), target.satisfied)
-    reached = f"{percent(after)} off at worst"
-    return Finding(target.label, percent(before), reached, after <= accepted)
+def _is_wanted(target: TargetStudy) -> bool:
+    return target.kind == "frequency"
+
+
+def _finding(target: TargetStudy, accepted: float, detailed: bool) -> Finding:
+    """Worst distances, with rms and frequencies; of a limit by how much it is violated."""
+    start, end = target.error.initial, target.error.exact
+    before, after = start.max_relative, end.max_relative
+    met = after <= accepted if _is_wanted(target) else target.satisfied
+    tone = "good" if met else "fair" if after < before else "bad"
+    more = [f"{_between(target.initial_hz)} → {_between(target.exact_hz)} Hz"]
+    if not _is_wanted(target):
+        said = _violated(before), _violated(after)
+        more *= target.kind in ("at_least", "at_most")
+    else:
+        said = percent(before), f"{percent(after)} off at worst"
+        more.insert(0, f"{percent(start.rms_relative)} → {percent(end.rms_relative)} rms")
+    return Finding(target.label, *said, tone, tuple(more) if detailed else ())
+
+
+def _between(hz: Floats) -> str:
+    """``186.9–192.6``; one number where they are alike."""
+    low, high = f"{np.nanmin(hz):.4g}", f"{np.nanmax(hz):.4g}"
+    return low if low == high else f"{low}–{high}"
 
 
 def _violated(worst: float) -> str:
@@ -106,9 +132,14 @@ def _violated(worst: float) -> str:
 
 def _trust(results: RunResults) -> Iterator[str]:
     row = results.assignment
-    yield f"Exact eigenvalues at all {results.time_s.size} samples."
+    yield f"Frequencies solved exactly at all {results.time_s.size} samples."
     if row is None:
         return
+    mesh = results.discretisation
+    if mesh is not None:
+        most = max(mesh.error)
+        known = f"by at most {percent(most)}" if np.isfinite(most) else "by an unknown amount"
+        yield f"The mesh makes them too high {known}."
     yield _sentence(row.optimality.words)
     if not row.finished:
         yield "The search was ended before it was done."
@@ -130,15 +161,17 @@ def _trust(results: RunResults) -> Iterator[str]:
 def _bars(results: RunResults) -> Iterator[Bar]:
     for row in results.design:
         width = row.upper - row.lower or 1.0
+        unit, size = handy_unit(row.unit, row.lower, row.upper, row.initial, row.optimal)
+        after = _few(row.optimal / size)
         start, end = (
             min(max((value - row.lower) / width, 0.0), 1.0) for value in (row.initial, row.optimal)
         )
         yield Bar(
             row.name,
-            _few(row.initial),
-            _few(row.optimal) if row.choice is None else f"{_few(row.optimal)} ({row.choice})",
-            row.unit,
-            (_few(row.lower), _few(row.upper)),
+            _few(row.initial / size),
+            after if row.choice is None else f"{after} ({row.choice})",
+            unit,
+            (_few(row.lower / size), _few(row.upper / size)),
             round(100.0 * start, 2),
             round(100.0 * end, 2),
         )

@@ -33,7 +33,7 @@ def test_an_assignment_shows_its_numbers_without_colour_codes_in_a_pipe():
     console.print_assignment(make_results(), stream=out)
     text = read(out)
     assert "\x1b" not in text
-    for words in ("0.2287", "6.00 %", "1.00 %", "solved", "3.1e-17", "over m1 and m2"):
+    for words in ("228.7", "6.00 %", "1.00 %", "solved", "3.1e-17", "over m1 and m2"):
         assert words in text
     assert not any(line != line.rstrip() for line in text.splitlines())
 

@@ -84,8 +84,8 @@ def test_error_stands_against_mass_and_what_is_added() -> None:
     meaning = Meaning(trade_off=TradeOff("mass", "kg", 2.0, "rms error", points))
     found = table(replace(make_results(), meaning=meaning), "Trade-off")
     assert found is not None
-    assert found.columns[:3] == ("mass [kg]", "added", "rms error")
-    assert found.rows[1] == ("2.25", "0.25", "1.00 %", "2.25", "0")
+    assert found.columns[:4] == ("mass [kg]", "added", "rms error", "m1 [g]")
+    assert found.rows[1] == ("2.25", "0.25", "1.00 %", "2250", "0")
 
 
 def test_the_headline_says_what_the_initial_design_violated_and_round_off_is_met() -> None:
@@ -102,3 +102,28 @@ def test_the_headline_says_what_the_initial_design_violated_and_round_off_is_met
     found = table(both, "Limits and bands")
     assert found is not None
     assert found.rows[0][-2] == "met"
+
+
+def test_parameters_are_shown_in_units_that_people_read() -> None:
+    results = make_results()
+    wall = replace(
+        results.design[0], name="wall", unit="m",
+        initial=0.005, optimal=0.0055, lower=0.0045, upper=0.0055,
+    )  # fmt: skip
+    drive = replace(
+        results.design[1], name="drive", unit="N m/rad",
+        initial=8e4, optimal=68679.2, lower=6.5e4, upper=9.5e4,
+    )  # fmt: skip
+    found = table(replace(results, design=(wall, drive)), "Design")
+    assert found is not None
+    assert found.rows[0][2:7] == ("mm", "5", "5.5", "4.5", "5.5")
+    assert found.rows[1][2:5] == ("kN m/rad", "80", "68.6792")
+
+
+def test_each_target_has_its_worst_and_its_rms_distance_in_a_row() -> None:
+    found = table(make_results(), "Distance to the target")
+    assert found is not None
+    assert found.columns == ("target", "distance", "initial", "one shot", "predicted", "exact")
+    assert [row[1] for row in found.rows] == ["worst", "rms"]
+    assert found.rows[0][2] == "6.00 %"
+    assert found.rows[0][-1] == "1.00 %"

@@ -71,8 +71,8 @@ def _columns(
         ("status", lambda row: row.status),
         ("verdict", lambda row: row.verdict.replace("_", " ")),
         *((name, lambda row, of=of: _error(getattr(row, of))) for name, of in _ERRORS.items()),
-        *((name, lambda row, name=name: _optimum(dict(row.design).get(name))) for name in designs),
         ("message", lambda row: row.message),
+        *((name, lambda row, name=name: _optimum(dict(row.design).get(name))) for name in designs),
         ("time", lambda row: (seconds(row.seconds), row.seconds)),
     ]
     kept = ("case", "status")

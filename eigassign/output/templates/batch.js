@@ -35,7 +35,8 @@
     row.slice(1).forEach((cell, k) => {
       const at = k + 1, content = text(cell);
       const kind = isNumber[k] ? "number" : at === status ? tones[content] : at === message ? "message" : k === 0 ? "case" : "";
-      const into = element("td", k === 0 ? undefined : content, kind);
+      const shown = k === 0 ? undefined : at === message ? element("div", content) : content;
+      const into = element("td", shown, kind);
       if (k === 0) {
         const name = element(page ? "a" : "span");
         content.split(/(?<=[,;])/).forEach((part) => name.append(part, element("wbr")));

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, Objective
 from eigassign.assignment.exact.requirements import FrequencyLimit, Requirements
 from eigassign.case import CaseFile
+from eigassign.case.units import handy
 from eigassign.study.design.optimum import MASS
 from eigassign.study.results import ActiveRow, RelaxedRow, SensitivityRow
 from eigassign.study.wanted import Wanted
@@ -82,7 +83,7 @@ def relaxed_limits(
 ) -> Iterator[RelaxedRow]:
     """What a little more room at each active limit gains, if anything."""
     for row in active:
-        if row.multiplier <= 0.0:
+        if row.multiplier <= 0.0 or _is_natural(file, problem, row):
             continue
         amount, unit = _amount(file, problem, row)
         while row.multiplier * amount > MOST * abs(F) > 0.0:
@@ -92,6 +93,14 @@ def relaxed_limits(
             row.name, row.kind, row.side, amount, unit, kind, before, after,
             f"{_room(file, row, amount, unit)}: {kind} {_from_to(kind, before, after)}",
         )  # fmt: skip
+
+
+def _is_natural(file: CaseFile, problem: DesignProblem, row: ActiveRow) -> bool:
+    """Whether nature sets the bound: no mass, inertia or stiffness is below zero."""
+    if row.kind != "bound" or row.side != "lower":
+        return False
+    k = list(file.design.parameters).index(row.name)
+    return problem.lower[k] == 0.0 and file.design_units[k].startswith(("kg", "N"))
 
 
 def _amount(file: CaseFile, problem: DesignProblem, row: ActiveRow) -> tuple[float, str]:
@@ -117,32 +126,13 @@ def _rounded(value: float) -> float:
 def _room(file: CaseFile, row: ActiveRow, amount: float, unit: str) -> str:
     if row.kind != "target":
         more = "more" if row.side == "upper" else "less"
-        return f"{_handy(amount, unit)} {more} at the {row.side} {_limit(row)}"
+        return f"{handy(amount, unit)} {more} at the {row.side} {_limit(row)}"
     if row.name != MASS or (mass := file.design.mass) is None:
         return f"{row.name}, relaxed by {100 * amount:g} %"
     limit, more = (mass.max, "more") if row.side == "upper" else (mass.min, "less")
     if limit is None:
         return f"the limit of the mass, relaxed by {100 * amount:g} %"
-    return f"{_handy(amount * limit, 'kg')} {more} mass"
-
-
-_HANDY = {  # units that people read, the largest first
-    "kg": {"kg": 1.0, "g": 1e-3},
-    "m": {"m": 1.0, "mm": 1e-3},
-    "m2": {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6},
-    "m4": {"m4": 1.0, "cm4": 1e-8, "mm4": 1e-12},
-    "Pa": {"GPa": 1e9, "MPa": 1e6, "Pa": 1.0},
-    "N/m": {"MN/m": 1e6, "kN/m": 1e3, "N/m": 1.0},
-    "N m/rad": {"MN m/rad": 1e6, "kN m/rad": 1e3, "N m/rad": 1.0},
-    "kg m2": {"kg m2": 1.0, "kg cm2": 1e-4},
-}
-
-
-def _handy(amount: float, unit: str) -> str:
-    """An amount in SI with a unit that makes it at least 1, or the smallest."""
-    units = _HANDY.get(unit, {unit: 1.0})
-    name = next((name for name, size in units.items() if amount >= size), list(units)[-1])
-    return f"{amount / units[name]:.3g} {name}".rstrip()
+    return f"{handy(amount * limit, 'kg')} {more} mass"
 
 
 def _limit(row: ActiveRow) -> str:

@@ -104,3 +104,9 @@ def test_a_limit_of_the_mass_is_relaxed_in_grams(tmp_path: Path) -> None:
     _, _, found = answered(tmp_path, text)
     (row,) = [row for row in found.relaxed if row.name == "design.mass"]
     assert row.words.startswith(f"{2100.0 * row.amount:.3g} g more mass: rms error ")
+
+
+def test_a_mass_of_zero_is_no_limit_that_could_be_relaxed(tmp_path: Path) -> None:
+    _, answer, found = answered(tmp_path, changed(("samples: 152", "samples: 12")))
+    assert answer.y[1] == 0.0
+    assert "m2" not in [row.name for row in found.relaxed]
