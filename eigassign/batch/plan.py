@@ -24,6 +24,7 @@ from eigassign._version import __version__
 from eigassign.batch.variants import OPTION, Variants, variants_of
 from eigassign.case import Unchecked, read
 from eigassign.case.reader import dotted
+from eigassign.case.schema.sweep import text_of
 from eigassign.case.values import key_path
 from eigassign.errors import EigassignError, Problem, StorageError, UsageError
 from eigassign.files import MATRIX, read_bytes
@@ -69,7 +70,7 @@ class CaseFile:
         """Its k-th variant, which is the ``index``-th of the batch."""
         values = {} if self.variants is None else self.variants[k]
         key = key_of(self.content, values, self._folder)
-        name = self.prefix + _named(self._short, values, key) if values else self.name
+        name = self.prefix + _named(self._short, values) if values else self.name
         return Variant(index, name, self.path, values, key)
 
     @cached_property
@@ -213,20 +214,19 @@ _NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?
 _LONG = re.compile(r"[0-9.]{7}")  # what may have more digits than a name has
 _UNSAFE = re.compile(r"[^\w.,=+-]")
 _DIGITS = 6  # of a number in a name
-_LONGEST = 100  # characters; file systems allow 255 bytes, and hidden names are longer
+_LONGEST = 100  # bytes; file systems allow 255, and hidden names are longer
+_HASH = 10  # digits
 
 
-def _named(short: Mapping[str, str], values: Mapping[str, object], key: str) -> str:
-    """``mass=100g,frequency=180Hz``; where that does not say all, it ends with some of its key."""
-    exact = ",".join(f"{short[key]}={_text(value)}" for key, value in values.items())
+def _named(short: Mapping[str, str], values: Mapping[str, object]) -> str:
+    """``mass=100g,frequency=180Hz``; what does not say all ends with digits of a hash of it."""
+    exact = ",".join(f"{short[key]}={text_of(value)}" for key, value in values.items())
     rounded = _NUMBER.sub(_rounded, exact) if _LONG.search(exact) else exact
     shown = _UNSAFE.sub("_", rounded)
-    return shown if shown == exact and len(shown) <= _LONGEST else f"{shown[:_LONGEST]}~{key[:10]}"
-
-
-def _text(value: object) -> str:
-    text = value if isinstance(value, str) else json.dumps(value)
-    return text.replace(" ", "")
+    if shown == exact and len(shown.encode()) <= _LONGEST:
+        return shown
+    digits = hashlib.sha256(exact.encode()).hexdigest()[:_HASH]
+    return f"{shown.encode()[:_LONGEST].decode(errors='ignore')}~{digits}"
 
 
 def _rounded(number: re.Match[str]) -> str:

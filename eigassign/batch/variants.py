@@ -14,14 +14,15 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from eigassign.case.reader import Finding, Source, Tree, read_yaml, resolve
 from eigassign.case.schema.document import validated_sweep
-from eigassign.case.schema.sweep import MOST, Sweep
+from eigassign.case.schema.sweep import MOST, Sweep, text_of
 from eigassign.case.table import read_words
-from eigassign.case.values import objection
+from eigassign.case.values import key_path, objection
 from eigassign.errors import CaseError, MechanismError, Problem
 
 if TYPE_CHECKING:
@@ -92,6 +93,7 @@ def variants_of(source: Source, folder: Path, settings: Sequence[str] = ()) -> V
         try:
             found = _spread(sweep, folder)
             findings = [*_wrong_keys(source.tree, folder, found)]
+            findings = findings or [*_overlaps(source.tree, found), *_repeated(found)]
         except MechanismError as error:
             findings = [(tuple(error.path.split(".")), error.message)]
     if findings:
@@ -138,6 +140,40 @@ def _wrong_keys(tree: Tree, folder: Path, variants: Variants) -> Iterator[Findin
                 yield ("sweep", "file"), f"{variants.file}:1: column {key}: {why}"
             else:
                 yield ("sweep", "parameters", key), why
+
+
+def _overlaps(tree: Tree, variants: Variants) -> Iterator[Finding]:
+    """Keys whose values do not last, since a later key stands in the same place or around it."""
+    paths = {key: key_path(tree, key) for key in variants.keys}
+    for k, (key, path) in enumerate(paths.items()):
+        later = (
+            other for other in variants.keys[k + 1 :] if path[: len(paths[other])] == paths[other]
+        )
+        for other in islice(later, 1):
+            what = "is the same key" if paths[other] == path else "replaces it: write that first"
+            yield _place(variants, key), f"{other!r} {what}"
+
+
+def _repeated(variants: Variants) -> Iterator[Finding]:
+    """The first variant of a list or file whose values are those of one before."""
+    if variants.grid or variants.shares is not None:
+        return  # of a grid, values of a key are told apart; samples do not meet
+    seen: dict[tuple[str, ...], int] = {}
+    for k, row in enumerate(zip(*variants.columns, strict=True)):
+        first = seen.setdefault(tuple(map(text_of, row)), k)
+        if first == k:
+            continue
+        if variants.file:
+            line, other = variants.lines[k], variants.lines[first]
+            yield ("sweep", "file"), f"{variants.file}:{line}: the values of line {other} again"
+        else:
+            why = f"variant {k + 1} has the values of variant {first + 1}"
+            yield ("sweep", "parameters"), why
+        return
+
+
+def _place(variants: Variants, key: str) -> tuple[str, ...]:
+    return ("sweep", "file") if variants.file else ("sweep", "parameters", key)
 
 
 # --- What --set says

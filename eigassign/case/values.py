@@ -71,6 +71,8 @@ def objection(tree: Tree, folder: Path, key: str, value: object) -> str | None:
     ``folder`` is that of the file.
     """
     path, node = key_path(tree, key), tree
+    if path[0] == "sweep":
+        return "a sweep gives values to other keys than its own"
     known = 0  # steps of the path that are there
     for step in path:
         if (below := _below(node, step)) is None:
@@ -93,7 +95,8 @@ def objection(tree: Tree, folder: Path, key: str, value: object) -> str | None:
 
 def _nearest(tree: Tree, key: str) -> str | None:
     """The key of the file that was probably meant."""
-    known = [".".join(map(str, path)) for path in islice(_leaves(tree, ()), _MOST_COMPARED)]
+    names = (".".join(map(str, path)) for path in _leaves(tree, ()) if path[0] != "sweep")
+    known = list(islice(names, _MOST_COMPARED))
     longer = [name for name in known if name.endswith(f".{key}")]
     return next(iter(longer or get_close_matches(key, known, n=1, cutoff=0.6)), None)
 

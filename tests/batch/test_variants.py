@@ -88,6 +88,7 @@ def test_the_rows_of_a_file_are_variants(tmp_path: Path) -> None:
         (f"{MASS}\n1\n2,3\n", "runs.csv:3: 2 values for 1 columns"),
         (f"{MASS},{WANTED}\n1,\n", "runs.csv:2: 1 values for 2 columns"),
         (f"{MASS}\n", "a header and rows are expected"),
+        (f"{MASS},{WANTED}\n1 g,2\n\n1g,2\n", "runs.csv:4: the values of line 2 again"),
         ("tool_mass.mass\n1\n", "runs.csv:1: column tool_mass.mass: no such key; did you mean"),
     ],
 )
@@ -110,6 +111,13 @@ def test_a_wrong_file_of_variants_is_refused_with_its_line(
         (f"  sample: sobol\n  parameters: {{{MASS}: {{min: 1, max: 2}}}}\n", "how many variants"),
         (f"  sample: sobol\n  count: 3\n  parameters: {{{MASS}: [1]}}\n", "needs a range"),
         (f"  sample: list\n  parameters: {{{MASS}: [1, 2], {WANTED}: [1]}}\n", "equally many"),
+        (
+            f"  sample: list\n  parameters: {{{MASS}: [1, 2, 1]}}\n",
+            "variant 3 has the values of variant 1",
+        ),
+        (f"  parameters: {{{MASS}: [1, '1']}}\n", "'1' is given twice"),
+        (f"  parameters: {{{MASS}: [1 g, 1g]}}\n", "'1g' is given twice"),
+        ("  parameters: {sweep.count: [1, 2]}\n", "other keys than its own"),
         (f"  parameters: {{{MASS}: [1]}}\n  sampel: list\n", "did you mean 'sample'"),
         (f"  parameters: {{{MASS}: {{min: 1 g, max: 2 kg, count: 2}}}}\n", "in the same unit"),
     ],
@@ -133,6 +141,9 @@ def test_a_wrong_setting_is_a_problem_of_its_option() -> None:
     assert "how many values" in refused(f"{MASS}=1..2")
     assert "max must be larger" in refused(f"{MASS}=2..1:3")
     assert "not valid YAML" in refused(f"{MASS}=[1")
+    assert f"'{WANTED}' is the same key" in refused("targets[0].frequency=1", f"{WANTED}=2")
+    assert "replaces it" in refused(f"{MASS}=1,2", "mechanism.bodies={}")
+    assert len(given("targets.0={mode: 1, frequency: 1}", f"{WANTED}=2,3")) == 2
 
 
 def test_a_key_may_be_one_that_the_file_leaves_to_its_default() -> None:

@@ -75,6 +75,11 @@ class Range(Part):
         return tuple(self.value(Fraction(k, count - 1)) for k in range(count))
 
 
+def text_of(value: object) -> str:
+    """A value as variants are told apart by: without the blanks of its text."""
+    return (value if isinstance(value, str) else json.dumps(value)).replace(" ", "")
+
+
 Values: TypeAlias = Annotated[tuple[Value, ...], Field(min_length=1, max_length=MOST)]
 
 
@@ -131,7 +136,7 @@ class Sweep(Part):
         elif self.sample != "list":
             seen: set[str] = set()
             for k, value in enumerate(body):
-                if (written := json.dumps(value)) in seen:
+                if (written := text_of(value)) in seen:
                     raise wrong(f"{shown(value)} is given twice", *place, k)
                 seen.add(written)
 
