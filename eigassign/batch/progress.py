@@ -10,7 +10,7 @@ import contextlib
 import itertools
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -30,6 +30,9 @@ from eigassign.output.batch.files import are_current, write_files
 from eigassign.output.batch.outcome import CaseOutcome, to_line
 from eigassign.output.run_record import relative_path
 from eigassign.output.storage import replace_synced
+
+GONE = -1  # index of an outcome of a case that the plan has no more
+REPORT = "report.html"
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,8 @@ class Batch:
 def set_up(batch: Batch) -> None:
     """Make the folder one of this batch; what it holds of the batch as it was before is kept.
 
-    Raises StorageError where it holds another batch, which ``force`` moves aside.
+    So are outcomes of cases that the plan has no more: it may have them again. Raises StorageError
+    where the folder holds another batch, which ``force`` moves aside, or another shard of this one.
     """
     folder, header = batch.folder, batch.header
     before = read_header(folder)
@@ -62,21 +66,30 @@ def set_up(batch: Batch) -> None:
         return
     kept, others = _current(batch)
     foreign = before is not None and not kept and not set(before.files) & set(header.files)
-    if before is not None and foreign and not batch.options.force:
-        raise StorageError(
-            f"{folder} holds another batch (of {', '.join(before.files[:3])}); it was left "
-            "alone. Choose another folder with --out, or use --force to move its list aside"
-        )
-    if others or foreign:
+    if before is not None and not batch.options.force:
+        if before.plan == header.plan and any(found.index >= 0 for found in others):
+            i, n = before.shard
+            raise StorageError(
+                f"{folder} holds shard {i}/{n} of this batch: give each shard a folder of its own "
+                "with --out"
+            )
+        if foreign:
+            raise StorageError(
+                f"{folder} holds another batch (of {', '.join(before.files[:3])}); it was left "
+                "alone. Choose another folder with --out, or use --force to move its list aside"
+            )
+    if foreign:
         _move_aside(folder / LINES)
-    replace_synced(folder / LINES, "".join(f"{to_line(found)}\n" for found in kept).encode())
+        others = []
+    rows = [*(replace(found, index=GONE) for found in others), *kept]
+    replace_synced(folder / LINES, "".join(f"{to_line(found)}\n" for found in rows).encode())
     write_header(folder, header)
 
 
-def _current(batch: Batch) -> tuple[list[CaseOutcome], bool]:
+def _current(batch: Batch) -> tuple[list[CaseOutcome], list[CaseOutcome]]:
     """The outcomes in the folder that are those of cases of the plan as they are now.
 
-    And whether there are outcomes of cases that are not in the plan.
+    And those of cases that are not in the plan.
     """
     known, kept = {found.name: found for found in Manifest(batch.folder).news()}, []
     for index in batch.header.indices() if known else ():
@@ -84,7 +97,7 @@ def _current(batch: Batch) -> tuple[list[CaseOutcome], bool]:
         found = known.pop(variant.name, None)
         if found is not None and found.key == variant.key:
             kept.append(replace(found, index=index, path=variant.path))
-    return kept, bool(known)
+    return kept, [*known.values()]
 
 
 def outcomes_in(batch: Batch) -> Iterator[CaseOutcome]:
@@ -95,14 +108,24 @@ def outcomes_in(batch: Batch) -> Iterator[CaseOutcome]:
 
 
 def _whole(batch: Batch, outcomes: Iterable[CaseOutcome]) -> Iterator[CaseOutcome]:
-    """Those not to be tried again that have their folder; without an answer there is none."""
-    folders = None
+    """Those not to be tried again that have all that they are to leave; errors are tried again."""
+    folders, indices = None, batch.header.indices()
     for found in outcomes:
         if folders is None:
             folders = set(os.listdir(batch.folder))
-        no_folder = batch.options.columns or (found.status == "failed" and not found.run_folder)
-        if found.status != "error" and (no_folder or found.run_folder in folders):
+        if found.status != "error" and found.index in indices and _is_whole(batch, found, folders):
             yield found
+
+
+def _is_whole(batch: Batch, found: CaseOutcome, folders: Collection[str]) -> bool:
+    """Whether it has its folder, one of ``folders`` or in a shard, and the report it shall have."""
+    options, name = batch.options, found.run_folder
+    if options.columns or (found.status == "failed" and not name):
+        return True  # without an answer there is no folder
+    if name is None or not (name in folders or ("/" in name and (batch.folder / name).is_dir())):
+        return False
+    wanted = options.redraw and options.draws(found.status)
+    return not wanted or (batch.folder / name / REPORT).exists()
 
 
 def _move_aside(path: Path) -> None:

@@ -13,6 +13,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 
 from eigassign.batch.lock import folder_lock
 from eigassign.batch.manifest import read_header
@@ -22,6 +23,7 @@ from eigassign.batch.work import check_cases, outcome_of, run_cases
 from eigassign.batch.workers import Pace, Place, run_tasks, this_machine
 from eigassign.errors import CaseError, Problem, StorageError
 from eigassign.output.batch.outcome import CaseOutcome
+from eigassign.output.run_record import MARKER
 from eigassign.pipeline.stages import silent
 
 _CHECKED = 100  # variants in a task that checks them: half a second
@@ -44,6 +46,7 @@ def run(
     a variant is no valid case, and StorageError where the folder is of another batch, or another
     process is at work in it and this one is not to ``join``.
     """
+    require_folder(batch.folder)
     require_valid(batch, place, say)
     batch.folder.mkdir(parents=True, exist_ok=True)
     with folder_lock(batch.folder) as lock:
@@ -59,6 +62,14 @@ def run(
         finally:
             summarise(batch.folder, batch.header)
     return progress.ends
+
+
+def require_folder(folder: Path) -> None:
+    """Raise StorageError where the results of a batch cannot go there."""
+    if folder.exists() and not folder.is_dir():
+        raise StorageError(f"{folder} is a file: choose a folder with --out")
+    if (folder / MARKER).exists():
+        raise StorageError(f"{folder} is the folder of a run: choose another one with --out")
 
 
 def require_valid(batch: Batch, place: Place, say: Callable[[str], None] = silent) -> None:

@@ -32,10 +32,15 @@ class CaseOptions:
     force: bool = False
     figures: tuple[str, ...] = ("png",)
     reports: str = "all"  # of which cases there are figures and a report: all, failed or none
+    redraw: bool = False  # cases that were done without theirs run again
     columns: bool = False  # the cases have no folders
     allow_outside: bool = False
     seconds: float | None = None  # that a case may take
     megabytes: float | None = None
+
+    def draws(self, status: Status) -> bool:
+        """Whether a case that ended so has figures and a report."""
+        return self.reports == "all" or (self.reports == "failed" and status != "ok")
 
 
 # --- Reading and checking
@@ -125,8 +130,7 @@ def _solved(variant: Variant, options: CaseOptions) -> dict[str, Any]:
         return _found(_uninterrupted(case, how))
     with new_run_folder(case.file, Path(options.out, variant.name), options.force) as folder:
         results = _uninterrupted(case, how)
-        failed = results.shortcoming is not None
-        drawn = options.reports == "all" or (options.reports == "failed" and failed)
+        drawn = options.draws(_status(results))
         folder.write(results, options.figures if drawn else (), "light" if drawn else "none")
     return {"run_folder": variant.name, **_found(results)}
 

@@ -61,7 +61,8 @@ _FIRST, _LAST = 5, 2  # cases that a dry run lists
 @click.option(
     "--reports",
     type=click.Choice(["none", "failed", "all"]),
-    help="Cases with figures and a light report (default: all up to 50 cases, else failed).",
+    help="Cases with figures and a light report (default: all up to 50 cases, else failed); "
+    "those that are done without theirs run again.",
 )
 @click.option(
     "--columns",
@@ -148,6 +149,7 @@ def _batch(plan: Plan, folder: Path, how: Mapping[str, Any]) -> Batch:
         force=how["force"],
         figures=how["figures"],
         reports=how["reports"] or ("all" if len(plan) <= _MANY else "failed"),
+        redraw=how["reports"] is not None,
         columns=columns,
         allow_outside=how["allow_outside"],
         seconds=how["case_time"],

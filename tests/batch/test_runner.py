@@ -11,12 +11,14 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, Future
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from instant import MASS, Instant, batch_of, case, instant, names
 
 from eigassign.batch.forecast import forecast
+from eigassign.batch.merge import merge
 from eigassign.batch.progress import Batch
 from eigassign.batch.runner import run
 from eigassign.batch.workers import Place
@@ -63,12 +65,66 @@ def test_a_sweep_may_be_enlarged(tmp_path: Path) -> None:
     assert not list(larger.folder.glob("manifest.jsonl.*"))
 
 
-def test_results_of_cases_that_are_gone_from_the_plan_are_kept_beside_it(tmp_path: Path) -> None:
+def test_results_of_cases_that_are_gone_from_the_plan_are_kept_for_when_it_has_them(
+    tmp_path: Path,
+) -> None:
     case(tmp_path)
     ran(batch_of(tmp_path, "0,1"))
-    assert ran(batch_of(tmp_path, "1,2")) == ["mass=2"]
-    kept = (tmp_path / "out" / "manifest.jsonl.1").read_text()
-    assert '"name": "mass=0"' in kept
+    other = batch_of(tmp_path, "1,2")
+    assert ran(other) == ["mass=2"]
+    assert [*summary(other)] == ["mass=1", "mass=2"]
+    assert forecast(other, 2).done == 2
+    assert ran(other) == []
+    again = batch_of(tmp_path, "2,1,0")
+    assert ran(again) == []
+    assert [*summary(again)] == ["mass=2", "mass=1", "mass=0"]
+
+
+def test_the_folder_of_a_shard_is_not_that_of_another_one(tmp_path: Path) -> None:
+    case(tmp_path)
+    first, second = (replace(batch_of(tmp_path, "0,1,2"), shard=(i, 2)) for i in (1, 2))
+    assert ran(first) == ["mass=0", "mass=2"]
+    with pytest.raises(StorageError, match="holds shard 1/2 of this batch"):
+        ran(second)
+    assert [*summary(first)] == ["mass=0", "mass=2"]
+    assert ran(batch_of(tmp_path, "0,1,2")) == ["mass=1"]
+
+
+def test_cases_of_merged_shards_are_done(tmp_path: Path) -> None:
+    case(tmp_path)
+    whole = batch_of(tmp_path, "0,1,2")
+    parts = [tmp_path / "part-1", tmp_path / "part-2"]
+    for i, part in enumerate(parts, 1):
+        ran(replace(whole, folder=part, shard=(i, 2)))
+    merge(whole.folder, parts)
+    assert ran(whole) == []
+    shutil.rmtree(parts[1] / "mass=1")
+    assert ran(whole) == ["mass=1"]
+    assert (whole.folder / "mass=1").is_dir()
+
+
+def test_cases_without_the_report_that_is_asked_for_run_again(tmp_path: Path) -> None:
+    case(tmp_path)
+    batch = batch_of(tmp_path, "0,0.75,1")
+    ran(batch)
+    (batch.folder / "mass=1" / "report.html").touch()
+    assert ran(batch) == []  # as reports are drawn unless one says otherwise
+    for reports, again in (("none", []), ("failed", []), ("all", ["mass=0"])):
+        asked = replace(batch.options, reports=reports, redraw=True)
+        assert ran(replace(batch, options=asked)) == again
+
+
+def test_a_file_and_the_folder_of_a_run_are_no_place_for_a_batch(tmp_path: Path) -> None:
+    case(tmp_path)
+    batch = batch_of(tmp_path, "0,1")
+    batch.folder.touch()
+    with pytest.raises(StorageError, match="is a file: choose a folder with --out"):
+        ran(batch)
+    batch.folder.unlink()
+    batch.folder.mkdir()
+    (batch.folder / "run.json").touch()
+    with pytest.raises(StorageError, match="is the folder of a run"):
+        ran(batch)
 
 
 def test_an_edited_case_runs_again(tmp_path: Path) -> None:
