@@ -59,7 +59,10 @@ def read_header(folder: Path) -> Header | None:
             raise UsageError(f"{folder / HEADER} is of another version of eigassign: use --out")
         found = {**found, "shard": tuple(found["shard"])}
         found |= {name: tuple(found[name]) for name in ("files", "keys")}
-        return Header(**found)
+        header = Header(**found)
+        if header.indices().start < 0:
+            raise ValueError("shards are counted from 1")
+        return header
     except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
@@ -120,17 +123,22 @@ class Manifest:
 def _outcome(line: bytes) -> CaseOutcome | None:
     """What a line says; None where it says nothing, in a file that somebody edited."""
     try:
-        found = from_line(line)
-    except (ValueError, TypeError):
+        return from_line(line)
+    except StorageError:
         return None
-    return found if isinstance(found.index, int) else None
 
 
 def _index(line: bytes) -> int:
     """The index that a line begins with, and −1 of anything else."""
     begin, _, rest = line[: len(_BEGIN) + _DIGITS].partition(b",")
     number = begin.removeprefix(_BEGIN)
-    whole = rest and line.endswith(b"}\n") and begin.startswith(_BEGIN) and number.isdigit()
+    whole = (
+        rest
+        and line.isascii()
+        and line.endswith(b"}\n")
+        and begin.startswith(_BEGIN)
+        and number.isdigit()
+    )
     return int(number) if whole else -1
 
 

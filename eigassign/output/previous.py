@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 from eigassign.errors import UsageError
 from eigassign.files import STORED, read_bytes
-from eigassign.output.batch.outcome import CaseOutcome, Range, ranges
+from eigassign.output.batch.outcome import CaseOutcome, Range, from_plain, ranges
 from eigassign.output.tables import Table
 from eigassign.study.comparison import TRAJECTORY
 from eigassign.study.results import ValidationRow
@@ -149,7 +149,7 @@ def _known(document: Any, kind: Kind) -> Iterator[Known]:
             yield from _validations(document)
     elif "cases" in document:
         if kind == "answers":
-            yield from (of_outcome(CaseOutcome(**row)) for row in document["cases"])
+            yield from (of_outcome(from_plain(row)) for row in document["cases"])
     else:
         yield _run(document, kind)
 
@@ -158,7 +158,7 @@ def _validations(rows: list[Any]) -> Iterator[Known]:
     by_case: dict[str, list[Range]] = {}
     for row in rows:
         if "lowest_hz" in row:
-            hz = (row["lowest_hz"], row["mean_hz"], row["highest_hz"])
+            hz = float(row["lowest_hz"]), float(row["mean_hz"]), float(row["highest_hz"])
             by_case.setdefault(row["case"], []).append((_place(row["mode"], row["where"]), *hz))
     yield from (Known(case, tuple(found)) for case, found in by_case.items())
 

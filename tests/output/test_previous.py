@@ -105,6 +105,8 @@ def test_a_validation_compares_with_the_initial_design_of_a_run_and_with_its_own
         ("[]", "has no frequencies to compare with"),
         ('{"cases": []}', "has no frequencies to compare with"),
         ('{"cases": [{"name": 1}]}', "is not results.json"),
+        (f'{{"cases": [{to_line(ROW).replace("190.0", "null")}]}}', "is not results.json"),
+        (f'{{"cases": [{to_line(ROW).replace("190.0, ", "")}]}}', "is not results.json"),
     ],
 )
 def test_what_is_no_earlier_result_is_refused(tmp_path, text, said):

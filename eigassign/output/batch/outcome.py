@@ -7,8 +7,9 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
+from eigassign.errors import StorageError
 from eigassign.study.results import RunResults
 
 Status = Literal["ok", "tolerance", "failed", "error"]
@@ -43,6 +44,8 @@ class CaseOutcome:
     key: str = ""  # of what was computed
 
 
+_STATUSES = get_args(Status)
+_SHOWN = 40  # characters of a damaged line
 _ORDER = (
     "index", "name", "key", "values", "status", "verdict", "message", "initial_max_relative",
     "predicted_max_relative", "exact_max_relative", "design", "frequencies", "seconds", "path",
@@ -57,8 +60,32 @@ def to_line(outcome: CaseOutcome) -> str:
 
 
 def from_line(line: str | bytes) -> CaseOutcome:
-    """What `to_line` wrote, lists in the place of tuples; raises ValueError or TypeError else."""
-    return CaseOutcome(**json.loads(line))
+    """What `to_line` wrote, lists in the place of tuples; raises StorageError else."""
+    try:
+        return from_plain(json.loads(line))
+    except (ValueError, TypeError):
+        begin = line[:_SHOWN].decode(errors="replace") if isinstance(line, bytes) else line[:_SHOWN]
+        message = f"manifest.jsonl has a damaged line, {begin}…: delete it and run the batch again"
+        raise StorageError(message) from None
+
+
+def from_plain(row: Any) -> CaseOutcome:
+    """The outcome that is written as these plain values; raises ValueError or TypeError else."""
+    found = CaseOutcome(**row)
+    folder = "" if found.run_folder is None else found.run_folder
+    texts = [found.name, found.path, found.message, found.verdict, found.key, folder]
+    errors = (found.initial_max_relative, found.predicted_max_relative, found.exact_max_relative)
+    numbers = [found.seconds, *(error for error in errors if error is not None)]
+    for name, number in found.design:
+        texts.append(name)
+        numbers.append(number)
+    for name, lowest, mean, highest in found.frequencies:
+        texts.append(name)
+        numbers += (lowest, mean, highest)
+    right = found.status in _STATUSES and type(found.values) is dict and type(found.index) is int
+    if not right or {*map(type, texts)} != {str} or not {*map(type, numbers)} <= {int, float}:
+        raise ValueError("no outcome of a case")
+    return found
 
 
 def status_of(line: str) -> str:

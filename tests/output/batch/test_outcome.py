@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pytest
 
+from eigassign.errors import StorageError
 from eigassign.output.batch.outcome import CaseOutcome, from_line, ranges, to_line
 
 ROW = CaseOutcome(
@@ -38,7 +39,7 @@ def test_what_is_not_finite_is_null():
 
 
 def test_a_torn_line_is_an_error():
-    with pytest.raises(ValueError, match="Unterminated"):
+    with pytest.raises(StorageError, match="has a damaged line"):
         from_line(to_line(ROW)[:-30])
 
 
