@@ -284,7 +284,9 @@ def notes(groups: Sequence[tuple[int, ...]], local: LocalSpace, pencil: Pencil) 
     ]
     idle = len(pencil.active) - np.count_nonzero(pencil.active)
     if idle:
-        lines.append(f"{idle} variable(s) on which no frequency depends are dropped")
+        which = "1 variable is" if idle == 1 else f"{idle} variables are"
+        them = "it" if idle == 1 else "them"
+        lines.append(f"{which} left out of the expansion: no frequency depends on {them}")
     return tuple(lines)
 
 

@@ -22,6 +22,16 @@ from eigassign.study.results import (
 )
 
 Floats = NDArray[np.float64]
+STAGES = {  # of a run, as they are named in results.json
+    "model": "assembly of K and M",
+    "trajectory": "trajectory",
+    "expansion": "expansion of the eigenvalues",
+    "assignment": "search of the design",
+    "initial": "exact frequencies of the initial design",
+    "verification": "exact frequencies of the optimal design",
+    "comparison": "comparison of the expansion with exact",
+    "meaning": "study of what the answer means",
+}
 
 
 @dataclass(frozen=True)
@@ -352,7 +362,7 @@ def solver(results: RunResults) -> Table:
 
 def timing(results: RunResults) -> Table:
     """Where the time went."""
-    rows = tuple((stage, seconds(value)) for stage, value in results.timing_s.items())
+    rows = tuple((STAGES.get(k, k), seconds(value)) for k, value in results.timing_s.items())
     return Table("Timing", ("stage", "time"), rows)
 
 

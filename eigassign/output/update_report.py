@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from eigassign.output import report
-from eigassign.output.figures.update import update_figures
+from eigassign.output.figures.update import shown_in, update_figures
 from eigassign.output.formats import number
 from eigassign.output.result_files import dumps, origin
 from eigassign.output.tables import Table
@@ -23,19 +23,21 @@ _SHOWN = 30  # measurements in a table on the console
 
 def headline(results: UpdateResults) -> str:
     """The verdict in a sentence: what the parameters are, and whether that explains anything."""
-    found = ", ".join(
-        f"{row.name} = {number(row.value)} {row.unit}".rstrip()
-        + f" ({number(row.low)} to {number(row.high)})"
-        for row in results.parameters
-    )
-    return f"{found}: {_verdict(results)}"
+    return f"{_verdict(results)}. {', '.join(map(_found, results.parameters))}."
+
+
+def _found(row: UpdatedParameter) -> str:
+    """``k1 = 52.47 kN m/rad (50.75 to 54.27)``."""
+    unit, size = shown_in(row)
+    value, low, high = (f"{each / size:.4g}" for each in (row.value, row.low, row.high))
+    return f"{row.name} = {value} {unit}".rstrip() + f" ({low} to {high})"
 
 
 def _verdict(results: UpdateResults) -> str:
     chance = "" if results.p_value is None else f", p = {results.p_value:.2g}"
     fit = f"χ² = {results.chi_squared:.3g} with {results.degrees} degrees of freedom{chance}"
     return {
-        "fitted": f"this explains the measurements ({fit})",
+        "fitted": f"Explained: the model fits the measurements ({fit})",
         "poor_fit": f"NOT EXPLAINED: the measurements are further off than their standard "
         f"deviations allow ({fit}, below {POOR:g}); the intervals do not hold",
         "not_identified": f"NOT IDENTIFIED: {'; '.join(d.words for d in results.unidentified)} "
@@ -58,12 +60,16 @@ def console_tables(results: UpdateResults) -> tuple[Table, ...]:
 def parameters(results: UpdateResults) -> Table:
     """Each parameter before and after, with its standard deviation and interval."""
     columns = ("name", "parameter", "unit", "before", "after", "deviation", "95 % from", "to", "")
-    rows = tuple(
-        (row.name, row.parameter, row.unit, number(row.initial), number(row.value),
-         "" if row.deviation is None else f"{row.deviation:.3g}",
-         number(row.low), number(row.high), remark(row))
-        for row in results.parameters
-    )  # fmt: skip
+    rows = []
+    for row in results.parameters:
+        unit, size = shown_in(row)
+        initial, value, low, high = (
+            number(each / size) for each in (row.initial, row.value, row.low, row.high)
+        )
+        deviation = "" if row.deviation is None else f"{row.deviation / size:.3g}"
+        rows.append(
+            (row.name, row.parameter, unit, initial, value, deviation, low, high, remark(row))
+        )
     caption = (
         "The deviation is the standard deviation by the linear model; the interval is that of the "
         "profile likelihood, the other parameters fitted anew at each of its values."
@@ -71,7 +77,7 @@ def parameters(results: UpdateResults) -> Table:
     held = [row.name for row in results.parameters if row.held]
     if held and any(row.deviation is not None for row in results.parameters):
         caption += f" The deviations hold only with {' and '.join(held)} at the bound."
-    return Table("Parameters", columns, rows, caption)
+    return Table("Parameters", columns, tuple(rows), caption)
 
 
 def remark(row: UpdatedParameter) -> str:
@@ -100,8 +106,9 @@ def directions(results: UpdateResults) -> Table:
 def fit(results: UpdateResults) -> Table:
     """Before and after."""
     chance = "none" if results.p_value is None else f"{results.p_value:.3g}"
-    row = (number(results.initial_chi_squared), number(results.chi_squared), str(results.degrees),
-           chance, str(results.steps), results.ended)  # fmt: skip
+    before, after = results.initial_chi_squared, results.chi_squared
+    chi_squared = f"{before:.4g}", f"{after:.4g}"
+    row = (*chi_squared, str(results.degrees), chance, str(results.steps), results.ended)
     columns = ("χ² before", "χ² after", "degrees of freedom", "p", "steps", "ended")
     caption = (
         "χ² is the sum of squared residuals in standard deviations; p is the chance of so large a "
@@ -121,7 +128,7 @@ def measurements(results: UpdateResults, most: int | None = None) -> Table:
                "residual", "")  # fmt: skip
     rows = tuple(
         (row.label, str(row.mode), number(row.measured_hz), f"{row.deviation_hz:.3g}",
-         number(row.initial_hz), number(row.updated_hz), f"{row.residual:+.2f}",
+         f"{row.initial_hz:.5g}", f"{row.updated_hz:.5g}", f"{row.residual:+.2f}",
          "outlier" if row.is_outlier else "")
         for row in shown
     )  # fmt: skip

@@ -135,17 +135,13 @@ def _trust(results: RunResults) -> Iterator[str]:
     yield f"Frequencies solved exactly at all {results.time_s.size} samples."
     if row is None:
         return
-    mesh = results.discretisation
-    if mesh is not None:
-        most = max(mesh.error)
-        known = f"by at most {percent(most)}" if np.isfinite(most) else "by an unknown amount"
-        yield f"The mesh makes them too high {known}."
+    if row.model_error != 0.0:
+        most = row.model_error
+        how = "an unknown amount" if most is None else f"{percent(most)} at most"
+        yield f"Mesh and reduced links put them too high by {how}."
     yield _sentence(row.optimality.words)
     if not row.finished:
         yield "The search was ended before it was done."
-    if row.model_error != 0.0:
-        how = "not known" if row.model_error is None else f"{percent(row.model_error)} at most"
-        yield f"How much mesh and reduced links raise the modes asked for: {how}."
     for clear in row.clearances:
         proof = "proved clear" if clear.clear else "NOT proved clear"
         below = f"{clear.below} mode{'' if clear.below == 1 else 's'}"

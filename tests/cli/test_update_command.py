@@ -29,8 +29,8 @@ def test_an_update_leaves_a_whole_folder_and_a_case_that_can_be_used(
 ) -> None:
     assert run(case) == 0
     shown = capsys.readouterr().out
-    assert shown.splitlines()[0].startswith("k1 = ")
-    assert "this explains the measurements" in shown.splitlines()[0]
+    assert shown.startswith("Explained: the model fits the measurements (χ² = ")
+    assert "kN m/rad" in shown.splitlines()[0]
     folder = case.parent / "out"
     names = {path.name for path in folder.iterdir()}
     assert names == {"case.yaml", "figures", "report.html", "results.json", "run.json",
@@ -42,6 +42,7 @@ def test_an_update_leaves_a_whole_folder_and_a_case_that_can_be_used(
     kept = json.loads((folder / "results.json").read_text())
     page = (folder / "report.html").read_text()
     assert kept["headline"].replace("χ", "&#967;")[:20] in page
+    assert page.count('class="plot"') == 2
     assert (kept["verdict"], len(kept["measurements"])) == ("fitted", 12)
 
     assert main(["update", str(folder / "updated.yaml"), "--quiet", "--json", "--figures", "none",

@@ -453,3 +453,19 @@ def test_numbers_beside_maps_never_run_into_each_other(paper):
             ]
             boxes = [box for box in boxes if box.width > 1.0]
             assert not any(a.overlaps(b) for a, b in itertools.pairwise(boxes))
+
+
+def test_limits_are_strips_on_their_wrong_side_so_that_other_modes_stay_legible(paper):
+    (target,) = paper.targets
+    endless = np.full(target.lower_hz.size, np.inf)
+    limits = (
+        as_limit(target, "at_least", target.lower_hz, endless),
+        as_limit(target, "at_most", -endless, target.lower_hz),
+    )
+    axes = drawn(dataclasses.replace(paper, targets=limits))["frequencies"].axes[0]
+    below, above = (shade.get_paths()[0].get_extents() for shade in axes.collections)
+    edge = target.lower_hz[0]
+    assert below.y1 == pytest.approx(edge)
+    assert above.y0 == pytest.approx(edge)
+    low, high = axes.get_ylim()
+    assert max(below.height, above.height) < 0.06 * (high - low)

@@ -63,7 +63,7 @@ def coordinates(results: RunResults) -> FigurePlan:
     return FigurePlan(
         f"coordinates{_suffix(results)}",
         f"Coordinates{_where(results)}",
-        f"The coordinates {names} along {results.along} of {results.time_s.size} samples.",
+        f"{names} along {results.along}, {results.time_s.size} samples.",
         f"Curves of {names} over time.",
         _coordinates(results),
     )
@@ -164,9 +164,10 @@ def overview(results: RunResults, spectrum: OtherModes) -> FigurePlan:
     limits = [t for t in results.targets if t.kind not in ("frequency", "gap")]
     modes = sorted(before_and_after(spectrum), key=lambda curve: bool(curve.end))  # after on top
     time_s = results.time_s
-    shades = (replace(forbidden(t, t.label), x=time_s[t.rows]) for t in limits)
+    low, high = graph.bounds([curve.y for curve in modes])
+    asked = [mark for t in limits for mark in _asked(t, time_s[t.rows], 0.05 * (high - low))]
     targets = (Curve(t.target_hz, TARGET, capital(t.label), time_s[t.rows]) for t in wanted)
-    marks: tuple[Mark, ...] = (*shades, *modes, *targets)
+    marks: tuple[Mark, ...] = (*asked, *modes, *targets)
     panels = [Panel("frequency [Hz]", marks, 2.8, key=BEFORE_AND_AFTER)]
     if wanted:
         off = [curve for target in wanted for curve in _off_target(results, target)]
@@ -181,6 +182,21 @@ def overview(results: RunResults, spectrum: OtherModes) -> FigurePlan:
         "Frequencies over time before and after, with targets, limits and bands.",
         Graph(heading, "time [s]", time_s, tuple(panels)),
     )
+
+
+def _asked(target: TargetStudy, x: Floats, width: float) -> Iterator[Mark]:
+    """A band; of a limit a strip on its wrong side in its mode's colour, for others may lie there.
+
+    ``width`` is that of the strip in Hz.
+    """
+    if target.kind == "keep_out":
+        yield replace(forbidden(target, target.label), x=x)
+        return
+    upper, colour = target.kind == "at_most", mode_colour(target.mode)
+    edge = target.upper_hz if upper else target.lower_hz
+    low, high = (edge, edge + width) if upper else (edge - width, edge)
+    yield Shade(low, high, colour, target.label, 0.25, x)
+    yield Curve(edge, Look(colour, 1.0, "fine"), x=x)
 
 
 def _off_target(results: RunResults, target: TargetStudy) -> Iterator[Curve]:
@@ -363,14 +379,14 @@ _GIVEN_UP = replace(_TAKEN, filled=False)
 
 
 def other_modes(results: RunResults, others: OtherModes) -> FigurePlan:
-    """The modes that were not assigned, before and after."""
+    """The modes of which no frequency is wanted, before and after."""
     modes = ", ".join(map(str, others.modes))
     panel = Panel("frequency [Hz]", before_and_after(others), _TALL, key=BEFORE_AND_AFTER)
-    title = f"Next modes before and after, exact{_where(results)}"
+    title = f"Other modes before and after, exact{_where(results)}"
     return FigurePlan(
         f"other_modes{_suffix(results)}",
-        f"Next modes{_where(results)}",
-        f"Exact frequencies of modes {modes}, which were not assigned, before and after.",
+        f"Other modes{_where(results)}",
+        f"Exact frequencies before and after of modes {modes}, for which no frequency was asked.",
         f"Frequencies of modes {modes} over time before and after.",
         Graph(title, "time [s]", results.time_s, (panel,)),
     )

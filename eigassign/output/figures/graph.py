@@ -96,7 +96,7 @@ class Panel:
 
     On a ``logarithmic`` one whole decades are shown, at most ``decades``; what is below them lies
     on the edge. ``holds`` are values that the ordinate has to hold besides the curves'; ``key``
-    are entries of the legend that no mark has.
+    are entries of the legend that no mark has. ``names`` are those of the ordinates 0, −1, −2, ….
     """
 
     label: str
@@ -107,6 +107,7 @@ class Panel:
     holds: tuple[Floats, ...] = ()
     from_zero: bool = False
     key: tuple[tuple[str, Look], ...] = ()
+    names: tuple[str, ...] = ()
 
     @property
     def curves(self) -> tuple[Curve, ...]:

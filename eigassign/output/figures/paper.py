@@ -106,6 +106,8 @@ def _ordinate(axes: Axes, panel: Panel) -> None:
         _logarithmic(axes, "y", panel.limits, cut=panel.cut)
         return
     axes.set_ylim(panel.limits)
+    if panel.names:
+        axes.set_yticks(-np.arange(len(panel.names)), [short(name) for name in panel.names])
     axes.yaxis.set_offset_position("right")  # a power of ten, away from the legend
 
 

@@ -139,6 +139,12 @@ def _ordinate(panel: Panel) -> Json:
     title: Json = {"title": {"text": panel.label, "standoff": 8}}
     if panel.logarithmic:
         return title | _decades(panel.limits, panel.cut)
+    if panel.names:
+        title |= {
+            "tickvals": [-k for k in range(len(panel.names))],
+            "ticktext": [short(name) for name in panel.names],
+            "zeroline": False,
+        }
     return title | {"range": _numbers(panel.limits)}
 
 
@@ -330,6 +336,12 @@ def _table_of_graph(shown: Graph) -> tuple[tuple[str, ...], list[tuple[str, ...]
             (number(shown.x[k]), *(number(values[k]) for _, values in common)) for k in rows
         ]
     several = len(shown.panels) > 1
+    if shown.panels[0].names:
+        named = [curve for _, curve in own if curve.names]
+        return ("", *(curve.label for curve in named)), [
+            (name, *(number(curve.x[k]) for curve in named if curve.x is not None))
+            for k, name in enumerate(shown.panels[0].names)
+        ]
     columns = ("", shown.x_label, "value" if several else shown.panels[0].label)
     return columns, [
         (name, number(x), number(y))

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import NDArray
 
-from eigassign.output.figures import graph, style
-from eigassign.output.figures.curves import INITIAL
-from eigassign.output.figures.graph import FigurePlan, short
-from eigassign.output.figures.style import legend_above
-from eigassign.output.formats import number
-from eigassign.study.updating.fit import OUTLIER, UpdateResults
+from eigassign.case.units import handy_unit
+from eigassign.output.figures import graph
+from eigassign.output.figures.curves import LEVEL
+from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Mark, Panel, Rule, Shade
+from eigassign.study.updating.fit import OUTLIER, UpdatedParameter, UpdateResults
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+Floats = NDArray[np.float64]
+_BEFORE = Look(graph.ORANGE, 0.0, marker="s", filled=False)
+_AFTER = Look(graph.BLUE, 0.0, marker="o")
+_DEVIATION = Look(graph.BLACK, 1.2)
+_STEM = Look(graph.BLUE, 1.2)
+_OUTLIER = Look(graph.GREY, 0.9, "dashed")
+_INTERVAL = Look(graph.SKY, 5.0)
+_BARS = 150  # measurements; the deviations of more are a band
 
 
 def update_figures(results: UpdateResults) -> tuple[FigurePlan, ...]:
@@ -28,7 +31,7 @@ def update_figures(results: UpdateResults) -> tuple[FigurePlan, ...]:
             "The model's frequencies against the measured ones, whose bars are one standard "
             f"deviation. The worst is {after:.2g} standard deviations off after updating.",
             "Measured frequencies with error bars, and those of the model before and after.",
-            partial(draw_measurements, results),
+            _measurements(results),
         ),
         FigurePlan(
             "parameters",
@@ -36,69 +39,87 @@ def update_figures(results: UpdateResults) -> tuple[FigurePlan, ...]:
             "Each parameter between its bounds: as in the file, as updated, and the interval of "
             "values that the measurements allow while the others are fitted anew.",
             "One line for each parameter between its bounds, with its interval.",
-            partial(draw_parameters, results),
+            _parameters(results),
         ),
     )
 
 
-def draw_measurements(results: UpdateResults) -> Figure:
+def _measurements(results: UpdateResults) -> Graph:
     """Frequencies relative to the measured ones above, standardised residuals below."""
     rows = results.measurements
-    at = np.arange(1, len(rows) + 1)
+    at = np.arange(1.0, len(rows) + 1.0)
     measured = np.array([row.measured_hz for row in rows])
     before, after = (
         100.0 * (np.array([getattr(row, when) for row in rows]) / measured - 1.0)
         for when in ("initial_hz", "updated_hz")
     )
-    bars = 100.0 * np.array([row.deviation_hz for row in rows]) / measured
-    figure = style.new_figure("Measured frequencies and the model", 5.2)
-    above, below = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": (2.2, 1.6)})
-    below.set_xlabel("measurement")
-    dots = above.errorbar(
-        at, np.zeros(len(at)), bars, fmt="o", color=graph.BLACK, markersize=3.0, capsize=2.0,
-        linewidth=1.0, label="measured ± standard deviation",
-    )  # fmt: skip
-    marks = [
-        above.plot(
-            at, values, marker, color=color, markersize=6.0, markeredgewidth=1.8, label=label
-        )[0]
-        for values, marker, color, label in (
-            (before, "x", INITIAL.colour, "model before"),
-            (after, "_", graph.BLUE, "model after"),
-        )
-    ]
-    above.set_ylabel("off the measured [%]")
-    legend_above(above, [dots, *marks])
-    below.bar(at, [row.residual for row in rows], color=graph.BLUE, width=0.6)
-    largest = max(OUTLIER + 0.5, 1.1 * max(abs(row.residual) for row in rows))
-    for limit in (-OUTLIER, OUTLIER):
-        below.axhline(limit, color=graph.GREY, linewidth=0.9, linestyle="dashed")
-    below.set(ylabel="residual [σ]", ylim=(-largest, largest), xlim=(0.4, len(at) + 0.6))
-    return figure
+    names = tuple(f"{row.label}, mode {row.mode}" for row in rows)
+    above: tuple[Mark, ...] = (
+        Rule(0.0, LEVEL),
+        _deviations(at, 100.0 * np.array([row.deviation_hz for row in rows]) / measured),
+        Curve(before, _BEFORE, "model before", names=names),
+        Curve(after, _AFTER, "model after", names=names),
+    )
+    residual = np.array([row.residual for row in rows])
+    below: tuple[Mark, ...] = (
+        Rule(0.0, LEVEL),
+        *(Rule(limit, _OUTLIER) for limit in (-OUTLIER, OUTLIER)),
+        _segments(at, np.zeros(at.size), residual, _STEM),
+        Curve(residual, _AFTER, names=names),
+    )
+    room = np.array([-OUTLIER - 0.5, OUTLIER + 0.5])
+    panels = (
+        Panel("off the measured [%]", above, 2.2),
+        Panel("residual [σ]", below, 1.6, holds=(room,)),
+    )
+    ends = 0.4, at.size + 0.6
+    title = "Measured frequencies and the model"
+    return Graph(title, "measurement", at, panels, x_limits=ends, counted=True)
 
 
-def draw_parameters(results: UpdateResults) -> Figure:
+def _deviations(at: Floats, bars: Floats) -> Mark:
+    """One standard deviation to either side of each measurement."""
+    label = "measured ± standard deviation"
+    if at.size > _BARS:
+        return Shade(-bars, bars, graph.GREY, label, 0.35)
+    return _segments(at, -bars, bars, _DEVIATION, label)
+
+
+def _segments(
+    at: Floats, low: Floats, high: Floats, look: Look, label: str = "", lying: bool = False
+) -> Curve:
+    """Lines from low to high, upright or lying."""
+    gap = np.full(at.size, np.nan)
+    ends, places = (np.stack(parts, axis=1).ravel() for parts in ((low, high, gap), (at, at, at)))
+    return Curve(places, look, label, ends) if lying else Curve(ends, look, label, places)
+
+
+def _parameters(results: UpdateResults) -> Graph:
     """From bound to bound, one line each."""
     rows = [row for row in results.parameters if row.upper > row.lower]
-    figure = style.new_figure("Parameters with their 95 % intervals", 1.2 + 0.45 * len(rows))
-    axes = figure.subplots()
-    for k, row in enumerate(rows):
-        width = row.upper - row.lower
-        low, high, value, initial = (
-            (each - row.lower) / width for each in (row.low, row.high, row.value, row.initial)
-        )
-        axes.plot(
-            [low, high],
-            [k, k],
-            color=graph.SKY,
-            linewidth=5.0,
-            label="95 % interval",
-            solid_capstyle="butt",
-        )
-        axes.plot(initial, k, "x", color=INITIAL.colour, markersize=6.0, label="before")
-        axes.plot(value, k, "o", color=graph.BLUE, markersize=5.0, label="after")
-    labels = [f"{short(row.name, 20)}\n{number(row.value)} {row.unit}".rstrip() for row in rows]
-    axes.set_yticks(range(len(rows)), labels)
-    axes.set(xlim=(-0.02, 1.02), ylim=(len(rows) - 0.5, -0.5), xlabel="from bound to bound")
-    legend_above(axes, axes.get_lines()[:3])
-    return figure
+    at = -np.arange(float(len(rows)))
+    low, high, value, initial = (
+        np.array([(getattr(row, of) - row.lower) / (row.upper - row.lower) for row in rows])
+        for of in ("low", "high", "value", "initial")
+    )
+    names = tuple(map(_named, rows))
+    curves = (
+        _segments(at, low, high, _INTERVAL, "95 % interval", lying=True),
+        Curve(at, _BEFORE, "before", initial, names=names),
+        Curve(at, _AFTER, "after", value, names=names),
+    )
+    room = np.array([0.5, 0.5 - len(rows)])
+    panel = Panel("", curves, 0.4 + 0.5 * len(rows), holds=(room,), names=names)
+    title, label = "Parameters with their 95 % intervals", "from bound to bound"
+    return Graph(title, label, np.zeros(0), (panel,), x_limits=(-0.02, 1.02))
+
+
+def _named(row: UpdatedParameter) -> str:
+    """``k1 = 52.47 kN m/rad``."""
+    unit, size = shown_in(row)
+    return f"{row.name} = {row.value / size:.4g} {unit}".rstrip()
+
+
+def shown_in(row: UpdatedParameter) -> tuple[str, float]:
+    """The unit that a parameter is shown in, and its size in SI."""
+    return handy_unit(row.unit, row.lower, row.upper, row.value, row.initial)

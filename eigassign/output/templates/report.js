@@ -7,8 +7,10 @@
   const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
   const config = { displaylogo: false, responsive: true, scrollZoom: false,
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
-  // Beside a colour bar is no room for buttons that stay, as they do where nothing hovers.
-  const bare = { ...config, displayModeBar: matchMedia("(hover: hover)").matches ? "hover" : false };
+  // A small screen has no room for buttons; nor is there any beside a colour bar.
+  const touched = !matchMedia("(hover: hover)").matches || innerWidth < 600;
+  if (touched) config.displayModeBar = false;
+  const bare = { ...config, displayModeBar: touched ? false : "hover" };
 
   // --- Plots in the page's colours
 
@@ -21,7 +23,7 @@
     const ends = (copy.layout.annotations || []).some((note) => note.xanchor === "left" && note.x === 1);
     copy.layout = { paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
       font: { color: css("--ink"), family: "system-ui, sans-serif", size: 12 },
-      margin: { l: 10, r: ends ? 92 : 34, t: 10, b: 10 },
+      margin: { l: 10, r: ends ? (touched ? 58 : 92) : (touched ? 12 : 34), t: 10, b: 10 },
       modebar: { orientation: "v", bgcolor: "rgba(0,0,0,0)", color: css("--soft"), activecolor: css("--ink") },
       legend: { orientation: "h", yanchor: "bottom", y: 1.01, x: 0, xanchor: "left" },
       hoverlabel: { bgcolor: css("--page"), font: { color: css("--ink") } }, ...copy.layout };
@@ -112,8 +114,8 @@
         modebar: { orientation: "v", bgcolor: "rgba(0,0,0,0)", color: css("--soft"), activecolor: css("--ink") } };
       if (space) {
         const reaches = reach.map(([low, high]) => Math.max((high - low) * 0.54, half / 4));  // no axis without room for its numbers
-        const of = (c) => ({ ...quiet, title: { text: axes[c] + " [m]" }, range: [(reach[c][0] + reach[c][1]) / 2 - reaches[c], (reach[c][0] + reach[c][1]) / 2 + reaches[c]] });
-        const size = 2.2 / Math.hypot(...reaches);
+        const of = (c) => ({ ...quiet, title: { text: axes[c] + " [m]" }, nticks: 4, range: [(reach[c][0] + reach[c][1]) / 2 - reaches[c], (reach[c][0] + reach[c][1]) / 2 + reaches[c]] });
+        const size = 2.4 / Math.hypot(...reaches);
         const aspectratio = { x: reaches[0] * size, y: reaches[1] * size, z: reaches[2] * size };
         return { ...base, scene: { xaxis: of(0), yaxis: of(1), zaxis: of(2), aspectmode: "manual", aspectratio, camera: { eye: { x: 0.8, y: -0.95, z: 0.5 }, projection: { type: "orthographic" } } } };
       }
