@@ -101,7 +101,7 @@ def advise_accuracy(
 
     Nothing is advised below ``floor`` (relative): no method can be seen to be that accurate.
     """
-    asked = f"for {evaluations:,.0f} evaluations, each within {accuracy:.1e} of exact"
+    asked = f"for {evaluations:,.0f} evaluations within {_share(accuracy)} of exact"
     if accuracy >= floor:
         found = cheapest(points, accuracy, evaluations)
         return _advice("accuracy", accuracy, None, evaluations, found, asked)
@@ -129,9 +129,12 @@ def _advice(
         words = f"{asked}: no charted method does that"
         return Advice(kind, accuracy, budget_s, evaluations, None, {}, None, None, words)
     total, worst = found.total_s(evaluations), found.everywhere.worst_relative
-    anew = "" if found.random else ", solved anew for every design"
-    words = f"{asked}: {found.method}{anew}, {time_in_words(total)} in all, worst error {worst:.1e}"
-    words += f"; {found.use}" if found.use else ""
+    anew = "" if found.random else "; it is set up anew for every design"
+    words = (
+        f"{asked} the {'quickest' if kind == 'accuracy' else 'most accurate'} is {found.method}: "
+        f"{_explained(found.family)}. It takes {time_in_words(total)} in all and is off by "
+        f"{_share(worst)} at most{anew}"
+    )
     return Advice(
         kind, accuracy, budget_s, evaluations, found.method, found.parameters, worst, total, words
     )
@@ -147,14 +150,35 @@ def beside_auto(advice: Advice, points: Sequence[ChartPoint], autos: Sequence[Au
         why = own.refused or f"{own.method} could not be charted"
         auto = AutoTakes(None, None, None, own.seconds, why)
         said = f"`expansion.order: auto` refuses: {why}"
-        return replace(advice, auto=auto, words=f"{advice.words}; {said}")
+        return replace(advice, auto=auto, words=f"{advice.words}. {said}")
     total, worst = point.total_s(advice.evaluations), point.everywhere.worst_relative
     against = ""
     if advice.total_s and advice.method != point.method:
-        against = f", {total / advice.total_s:.2g} times as long as {advice.method}"
+        against = f" ({total / advice.total_s:.2g} times as long)"
     said = (
-        f"`expansion.order: auto` takes {point.method}, {time_in_words(total)} in all{against}, "
-        f"worst error {worst:.1e}, after {time_in_words(own.seconds)} of choosing"
+        f"`expansion.order: auto` takes {point.method}: {time_in_words(total)}{against}, off by "
+        f"{_share(worst)} at most, after {time_in_words(own.seconds)} of choosing"
     )
     auto = AutoTakes(point.method, worst, total, own.seconds, "")
-    return replace(advice, auto=auto, words=f"{advice.words}; {said}")
+    return replace(advice, auto=auto, words=f"{advice.words}. {said}")
+
+
+_EXPLAINED = (  # what the methods of a family do; the first whose name it begins with
+    ("Taylor", "power series of λ about one pose and design, or several"),
+    ("1/λ", "power series of 1/λ about one pose and design"),
+    ("reduced", "small models of modes and their derivatives at a few points"),
+    ("fit", "polynomials through exact solves"),
+    ("exact", "eigenvalues solved at every sample"),
+    ("stations", "exact solves at a few samples of the trajectory, interpolated between them"),
+    ("grid", "exact solves on a grid of poses and designs, interpolated between them"),
+    ("", "a surrogate through exact solves at random poses and designs"),
+)
+
+
+def _explained(family: str) -> str:
+    return next(words for beginning, words in _EXPLAINED if family.startswith(beginning))
+
+
+def _share(relative: float) -> str:
+    """``0.13 %``; of what is far below as a power of ten."""
+    return f"{100.0 * relative:.2g} %" if relative >= 1e-6 or not relative else f"{relative:.1e}"

@@ -104,14 +104,42 @@ def _part(topic: str) -> str:
     elif wanted in pages:
         return pages[wanted]
     found = [
-        (_folded(title) != wanted, _below(text, level, start))
+        (not _is_about(_folded(title), wanted), level, _below(text, level, start))
         for text in pages.values()
         for level, title, start in _headings(text)
-        if _folded(title).startswith(wanted)
+        if _is_about(_folded(title), wanted) or _folded(title).startswith(wanted)
     ]
     if not found:
-        raise UsageError(f"no page and no heading begins with {topic!r}: eigassign docs lists them")
-    return min(found, key=lambda exact_first: exact_first[0])[1]
+        where = _mentions(page or topic)
+        listed = f"; it is mentioned below {', '.join(where)}" if where else ""
+        raise UsageError(
+            f"no page and no heading begins with {topic!r}{listed}: eigassign docs lists the pages"
+        )
+    exact = [one for one in found if not one[0]]
+    return min(exact or found[:1], key=lambda whole_first: whole_first[1])[2]
+
+
+def _is_about(title: str, wanted: str) -> bool:
+    """Whether a heading is that of the topic, or of a part that is told apart by it."""
+    return title == wanted or title.endswith(f" with {wanted}")
+
+
+_OF_THE_CODE = {"architecture", "contributing"}  # pages that no user of a case looks for
+
+
+def _mentions(topic: str) -> list[str]:
+    """The headings below which a word stands most often, without what stands below others."""
+    word = re.compile(rf"\b{re.escape(topic.rstrip('s'))}s?\b", re.IGNORECASE)
+    counts: dict[str, int] = {}
+    for name, text in _pages().items():
+        if name in _OF_THE_CODE:
+            continue
+        lines, starts = text.splitlines(), _headings(text)
+        ends = [start for _, _, start in starts[1:]] + [len(lines)]
+        for (_, title, start), end in zip(starts, ends, strict=True):
+            counts[title] = counts.get(title, 0) + len(word.findall("\n".join(lines[start:end])))
+    most = sorted(counts, key=lambda title: -counts[title])[:4]
+    return [repr(title) for title in most if counts[title]]
 
 
 def _folded(text: str) -> str:

@@ -22,7 +22,7 @@ from eigassign.output.tables import Table
 def tables(chart: Chart) -> tuple[Table, ...]:
     """What to choose, the fronts, all methods, the mesh, the designs: those there are."""
     fronts = (front(chart, each) for each in chart.fronts)
-    made = (advice(chart), auto(chart), *fronts, methods(chart),
+    made = (advice(chart, how=True), auto(chart), *fronts, methods(chart),
             mesh(chart), designs(chart), machine(chart))  # fmt: skip
     return tuple(table for table in made if table.rows)
 
@@ -44,15 +44,17 @@ def spread(timing: Timing) -> str:
     return f"{median} ({time_in_words(timing.low_s)}–{time_in_words(timing.high_s)})"
 
 
-def advice(chart: Chart) -> Table:
-    """The recommendations."""
-    rows = []
+def advice(chart: Chart, how: bool = False) -> Table:
+    """The recommendations; ``how`` they are followed, as a call or in the case file."""
+    rows, uses = [], {p.method: p.use for p in chart.points}
     for a in chart.advice:
         found = ("none", "", "") if a.method is None else (
             a.method, f"{a.worst_relative:.1e}", time_in_words(a.total_s or 0.0),
         )  # fmt: skip
-        rows.append((_asked_for(a), f"{a.evaluations:,.0f}", *found))
-    columns = ("asked for", "evaluations", "choose", "worst error", "time in all")
+        use = (uses.get(a.method or "", ""),) if how else ()
+        rows.append((_asked_for(a), f"{a.evaluations:,.0f}", *found, *use))
+    last = ("how",) if how else ()
+    columns = ("asked for", "evaluations", "choose", "worst error", "time in all", *last)
     caption = "Accuracy is the worst relative error in Hz; time is set-up and all evaluations."
     return Table("What to choose", columns, tuple(rows), caption)
 

@@ -78,7 +78,6 @@ def chart_case(case: Case, options: Options, effort: Effort, request: Request) -
         mesh=mesh,
         designs=designs,
         notes=(
-            *(advice.words for advice in compared.advice),
             *compared.notes,
             *truncation_notes(scene),
             *design_notes,

@@ -13,7 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case import CaseFile, TrajectoryForm
-from eigassign.errors import CaseError, MechanismError, SingularityError
+from eigassign.errors import (
+    CaseError,
+    MechanismError,
+    Problem,
+    SingularityError,
+    TrajectoryError,
+)
 from eigassign.mechanism.assembly.build import (
     WholeLinks,
     build_pencil,
@@ -53,7 +59,15 @@ def located(file: CaseFile, trajectory: str = "trajectory") -> Iterator[None]:
         path = error.path
         if path.split(".")[0] == "trajectory":
             path = trajectory + path.removeprefix("trajectory")
-        raise CaseError((file.problem(path, error.message),)) from error
+        doubts = _doubts(file) if isinstance(error, TrajectoryError) else ()
+        raise CaseError((file.problem(path, error.message), *doubts)) from error
+
+
+def _doubts(file: CaseFile) -> Iterator[Problem]:
+    """Warnings of dimensions, which may be why a trajectory cannot be followed."""
+    for warning in file.warnings:
+        if warning.path.startswith(("mechanism.links", "mechanism.joints", "trajectory")):
+            yield replace(warning, message=f"this may be why: {warning.message}")
 
 
 def build_links(file: CaseFile) -> WholeLinks:

@@ -129,3 +129,12 @@ def test_peers_on_a_front_are_named() -> None:
 def test_nothing_takes_no_time() -> None:
     assert NO_TIME.plus(timing(2.0)).median_s == 2.0
     assert timing(2.0).times(3.0).high_s == 6.0
+
+
+def test_advice_is_a_sentence_that_says_what_the_method_does() -> None:
+    stations = replace(point("stations linear 3", 0.0, 1e-3, 1e-3), family="stations, linear")
+    found = advise_accuracy([stations], 1e-2, 152, 0.0)
+    assert found.words.startswith(
+        "for 152 evaluations within 1 % of exact the quickest is stations linear 3: exact solves at"
+    )
+    assert "and is off by 0.001 % at most" in found.words

@@ -89,8 +89,12 @@ def test_the_manual_is_found_by_page_and_by_heading(capsys: Captured) -> None:
     assert "### bodies" not in joints
     assert shown("../reference/keys.md#joints-type-nut").startswith("#### joints, type: nut")
     assert shown("set-up").startswith("## Set-up")
+    assert shown("keep_out").startswith("### targets, with keep_out")
+    assert "#### keep_out" in shown("keep_out")
     assert main(["docs", "no such thing"]) == 2
-    assert "eigassign docs lists them" in capsys.readouterr().err
+    assert "eigassign docs lists the pages" in capsys.readouterr().err
+    assert main(["docs", "waypoints"]) == 2
+    assert "it is mentioned below 'trajectory, with tip'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

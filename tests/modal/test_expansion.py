@@ -382,7 +382,7 @@ def test_the_shoulder_angle_is_dropped_and_said_to_be() -> None:
     assert e.space.n_variables == 3
     assert e.indices.shape == (35, 4)
     assert not e.indices[:, 0].any()
-    assert any("1 variable(s)" in note for note in e.notes)
+    assert any("1 variable is left out" in note for note in e.notes)
     near, far = e.eigenvalues([0.0, 3.3], Y0), e.eigenvalues([2.5, 3.3], Y0)
     np.testing.assert_array_equal(near, far)
 

@@ -15,7 +15,13 @@ from eigassign.case.schema.joints import freedom_of
 from eigassign.case.schema.links import BeamLink, FrameBeam, FrameLink, RigidLink, Taper
 from eigassign.case.schema.mechanism import Body
 from eigassign.case.schema.sections import BareSection
-from eigassign.case.schema.targets import FrequencyFile, FrequencyProfile
+from eigassign.case.schema.targets import (
+    AtLeastTarget,
+    AtMostTarget,
+    FrequencyFile,
+    FrequencyProfile,
+    ModeTarget,
+)
 from eigassign.case.schema.trajectory import (
     PointTrajectory,
     SampledTrajectory,
@@ -339,6 +345,29 @@ def goals_can_be_meant(document: Document) -> Iterator[Finding]:
                 yield ("expansion", "y", k), message
 
 
+def limits_leave_room(document: Document) -> Iterator[Finding]:
+    """No mode is to lie above one frequency and, or a higher one, below a lesser one."""
+    limits = [
+        (k, target.kind, mode, target.curve, (target.trajectory, target.during))
+        for k, target in enumerate(document.targets)
+        if isinstance(target, (AtLeastTarget, AtMostTarget)) and isinstance(target.curve, float)
+        for mode in _numbers(target)
+    ]
+    for k, _, upper, most, when in (one for one in limits if one[1] == "at_most"):
+        for _, _, lower, least, also in (one for one in limits if one[1] == "at_least"):
+            if lower <= upper and least > most and (when == also or (None, None) in (when, also)):
+                other = "" if lower == upper else f"mode {lower} below it "
+                message = f"mode {upper} is to be at most {most:g} Hz and {other}at least {least:g}"
+                yield ("targets", k, "at_most"), f"{message} Hz: no design meets both"
+                break
+
+
+def _numbers(target: ModeTarget) -> Sequence[int]:
+    if target.modes is not None:
+        return (1,) if isinstance(target.modes, str) else target.modes
+    return (target.mode,) if isinstance(target.mode, int) else ()
+
+
 def constraints_can_be_met(document: Document) -> Iterator[Finding]:
     """Somewhere within the bounds each constraint is met."""
     columns = document.design.parameters
@@ -375,5 +404,6 @@ WARNINGS: tuple[Callable[[Document], Iterator[Finding]], ...] = (
     angles_of_joints_have_an_effect,
     joints_hold_something_new,
     goals_can_be_meant,
+    limits_leave_room,
     constraints_can_be_met,
 )

@@ -27,6 +27,7 @@ Floats = NDArray[np.float64]
 Quantity = Callable[[Floats], tuple[float, Floats]]  # of a design: its value and slope (n_y,)
 LIMITS = 8
 STEPS = 30  # from one optimum to the next
+SEEN = 1e-3  # of an error: a gain that its three digits do not show
 SAME = 1e-6  # of the mass: a range too small to trade in
 
 
@@ -62,7 +63,7 @@ def trade_off(scene: Scene, found: Found) -> TradeOff | None:
         "" if priced else "kg",
         first,
         kind,
-        tuple(_kept(points)),
+        tuple(kept(points)),
     )
 
 
@@ -106,10 +107,12 @@ def _point(y: Floats, amount: float, F: float, kind: str) -> TradeOffPoint:
     return TradeOffPoint(amount, as_error(kind, F), y)
 
 
-def _kept(points: list[TradeOffPoint]) -> list[TradeOffPoint]:
-    """Ascending, without those that cost more and are no better."""
-    kept: list[TradeOffPoint] = []
-    for point in sorted(points, key=lambda one: (one.amount, one.error)):
-        if not kept or point.error < kept[-1].error:
-            kept.append(point)
-    return kept
+def kept(points: list[TradeOffPoint]) -> list[TradeOffPoint]:
+    """Ascending, without those that cost more and are no better by `SEEN`; the answer, the last."""
+    found: list[TradeOffPoint] = []
+    ascending = sorted(points, key=lambda one: (one.amount, one.error))
+    for point in ascending:
+        need = 1.0 if point is ascending[-1] else 1.0 - SEEN
+        if not found or point.error < need * found[-1].error:
+            found.append(point)
+    return found

@@ -52,6 +52,30 @@ SLIPS = {
 # fmt: on
 
 
+@pytest.mark.parametrize(
+    ("limits", "said"),
+    [
+        ("{mode: 1, at_least: 200 Hz}, {mode: 1, at_most: 185 Hz}", "and at least 200 Hz"),
+        ("{mode: 1, at_least: 200 Hz}, {mode: 2, at_most: 185 Hz}", "and mode 1 below it at least"),
+        ("{modes: all, at_least: 200 Hz}, {modes: [2, 3], at_most: 185 Hz}", "mode 1 below it"),
+        ("{mode: 2, at_least: 200 Hz}, {mode: 1, at_most: 185 Hz}", ""),
+        ("{mode: 1, at_least: 180 Hz}, {mode: 1, at_most: 185 Hz}", ""),
+        (
+            "{mode: 1, at_least: 9 Hz, during: [0 s, 1 s]}, {mode: 1, at_most: 8, during: [1, 2]}",
+            "",
+        ),
+    ],
+)
+def test_limits_that_contradict_each_other_are_warned_of(limits: str, said: str) -> None:
+    found = [
+        text
+        for _, _, text in warnings_of(TEXT[: TEXT.index("targets:")] + f"targets: [{limits}]\n")
+    ]
+    assert ([said in text for text in found if "no design meets both" in text] or [False])[
+        0
+    ] == bool(said)
+
+
 @pytest.mark.parametrize(("old", "new", "message"), SLIPS.values(), ids=SLIPS)
 def test_a_slip_is_warned_of_at_its_place(old: str, new: str, message: str) -> None:
     text, (place,) = unmarked(edited(old, new))

@@ -11,8 +11,8 @@ from scenes import changed, scene_of
 
 from eigassign.study.design.answer import find_answer
 from eigassign.study.design.optimum import Found
-from eigassign.study.meaning.tradeoff import trade_off
-from eigassign.study.results import TradeOff
+from eigassign.study.meaning.tradeoff import kept, trade_off
+from eigassign.study.results import TradeOff, TradeOffPoint
 from eigassign.study.scene import Scene
 from eigassign.study.wanted import target_frequencies
 
@@ -86,3 +86,9 @@ def test_an_answer_that_removes_mass_is_followed_to_the_lightest_design(tmp_path
 
 def test_limits_alone_have_no_error_to_trade(tmp_path: Path) -> None:
     assert curve_of(tmp_path, ("frequency: 190 Hz", "at_most: 195 Hz"))[2] is None
+
+
+def test_gains_that_no_digit_shows_are_left_out_but_for_the_answer() -> None:
+    errors = (0.08, 0.05, 0.04999, 0.03, 0.029999)
+    points = [TradeOffPoint(float(k), error, np.zeros(1)) for k, error in enumerate(errors)]
+    assert [point.amount for point in kept(points)] == [0.0, 1.0, 3.0, 4.0]
