@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import faulthandler
 import multiprocessing
 import os
@@ -33,8 +34,9 @@ def require_limits_here(seconds: float | None, megabytes: float | None) -> None:
 def limited(seconds: float | None, megabytes: float | None) -> Iterator[None]:
     """Raise OutOfTimeError or MemoryError inside, as soon as more than that is taken.
 
-    The memory is what is taken beside what the process has already. A worker that is deep in
-    compiled code, and does not hear that its time is over, is ended some seconds later.
+    The memory is what is taken beside what the process has already. A process of a pool or a
+    cluster that is deep in compiled code, and does not hear that its time is over, is ended some
+    seconds later.
     """
     with _in_time(seconds), _in_memory(megabytes):
         yield
@@ -45,22 +47,44 @@ def _in_time(seconds: float | None) -> Iterator[None]:
     if seconds is None:
         yield
         return
-    hears = threading.current_thread() is threading.main_thread()
+    in_main = threading.current_thread() is threading.main_thread()
     with open(os.devnull, "w") as nowhere:
         if is_worker := multiprocessing.parent_process() is not None:
-            most = seconds + (_PATIENCE_S if hears else 0.0)
-            faulthandler.dump_traceback_later(most, exit=True, file=nowhere)
-        if hears:
-            signal.signal(signal.SIGALRM, _over)
-            signal.setitimer(signal.ITIMER_REAL, seconds, _AGAIN_S)
+            faulthandler.dump_traceback_later(seconds + _PATIENCE_S, exit=True, file=nowhere)
         try:
-            yield
+            with (_alarm if in_main else _alarm_of_thread)(seconds):
+                yield
         finally:
-            if hears and signal.getsignal(signal.SIGALRM) is _over:
-                signal.setitimer(signal.ITIMER_REAL, 0.0)
-                signal.signal(signal.SIGALRM, signal.SIG_DFL)
             if is_worker:
                 faulthandler.cancel_dump_traceback_later()
+
+
+@contextlib.contextmanager
+def _alarm(seconds: float) -> Iterator[None]:
+    signal.signal(signal.SIGALRM, _over)
+    signal.setitimer(signal.ITIMER_REAL, seconds, _AGAIN_S)
+    try:
+        yield
+    finally:
+        if signal.getsignal(signal.SIGALRM) is _over:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.signal(signal.SIGALRM, signal.SIG_DFL)
+
+
+@contextlib.contextmanager
+def _alarm_of_thread(seconds: float) -> Iterator[None]:
+    """Signals reach the main thread alone; the tasks of a cluster's worker run in another one."""
+    raise_in = ctypes.pythonapi.PyThreadState_SetAsyncExc
+    here = ctypes.c_ulong(threading.get_ident())
+    timer = threading.Timer(seconds, raise_in, (here, ctypes.py_object(OutOfTimeError)))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()  # behind this it raises nothing more
+        raise_in(here, None)  # nor what this thread has not heard yet
 
 
 def _over(_number: int, _frame: FrameType | None) -> None:

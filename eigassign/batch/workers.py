@@ -70,10 +70,13 @@ class Pace:
         return int(max(1.0, self._task_s * self._cases / max(self._seconds, 1e-9)))
 
 
-def this_machine(jobs: int | None) -> Place:
-    """This process for one job, else a pool of processes; None is one for each core."""
+def this_machine(jobs: int | None, apart: bool = False) -> Place:
+    """This process for one job, else a pool of processes; None is one for each core.
+
+    ``apart``: not in this process, since a case could end it.
+    """
     slots = jobs or cores()
-    return Place(slots, in_this_process if slots == 1 else process_pool)
+    return Place(slots, in_this_process if slots == 1 and not apart else process_pool)
 
 
 class _Here(Executor):

@@ -71,13 +71,13 @@ _FIRST, _LAST = 5, 2  # cases that a dry run lists
 )
 @click.option(
     "--case-time",
-    type=arguments.POSITIVE,
+    type=arguments.LIMIT,
     metavar="SECONDS",
     help="End a case that takes longer (default: never).",
 )
 @click.option(
     "--case-memory",
-    type=arguments.POSITIVE,
+    type=arguments.LIMIT,
     metavar="MB",
     help="End a case that takes more (default: never).",
 )
@@ -115,7 +115,7 @@ def batch(
     usual = Path("results", f"{cases[0].stem}_sweep") if swept else Path("results")
     with reporting(how) as reporter:
         asked = _batch(plan, how["out"] or usual, how)
-        with _place(how["scheduler"], jobs) as place:
+        with _place(how["scheduler"], jobs, how["case_memory"] is not None) as place:
             if dry_run:
                 return _tell(asked, place)
             since = _since(how)
@@ -123,11 +123,11 @@ def batch(
         return _told(asked.folder, ends, since, reporter)
 
 
-def _place(scheduler: str | None, jobs: int | None) -> AbstractContextManager[Place]:
+def _place(scheduler: str | None, jobs: int | None, apart: bool) -> AbstractContextManager[Place]:
     from eigassign.batch.workers import this_machine
 
     if scheduler is None:
-        return nullcontext(this_machine(jobs))
+        return nullcontext(this_machine(jobs, apart))  # OpenBLAS without memory ends its process
     from eigassign.batch.cluster import cluster
 
     if jobs is not None:

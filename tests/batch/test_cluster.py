@@ -98,6 +98,20 @@ def test_a_cluster_with_a_worker_killed_half_way_gives_the_same_summary(
 
 
 @pytest.mark.slow
+def test_a_case_that_takes_too_long_is_ended_and_its_worker_stays(started: Any) -> None:
+    from distributed import Client
+
+    with Client(started) as client:
+        before = client.run(os.getpid)
+        there = ["batch", "arm.yaml", "--scheduler", started.scheduler_address, "--columns"]
+        assert main([*there, "--case-time", "0.01", "--out", "there"]) == 1
+        assert client.run(os.getpid) == before
+    assert {row["message"] for row in summary("there")} == {
+        "takes longer than the 0.01 s of --case-time"
+    }
+
+
+@pytest.mark.slow
 def test_workers_that_are_not_fit_and_no_scheduler_are_told(
     started: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:

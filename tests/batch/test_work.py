@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import resource
+import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from eigassign.batch import work
 from eigassign.batch.limits import OutOfTimeError, limited
 from eigassign.batch.plan import plan_of
 from eigassign.batch.work import CaseOptions, run_cases
+from eigassign.batch.workers import in_this_process, process_pool, this_machine
 from eigassign.output.batch.outcome import CaseOutcome
 
 SMALL = Path(__file__).parents[2] / "benchmarks" / "small_arm.yaml"
@@ -79,6 +81,32 @@ def test_a_case_that_takes_too_long_is_ended(
     (found,) = run_cases([plan_of([SMALL])[0]], replace(options, seconds=0.1))
     assert (found.status, found.message) == ("error", "takes longer than the 0.1 s of --case-time")
     assert found.seconds < 10
+
+
+def test_a_case_in_a_thread_is_ended_too() -> None:
+    """As on the workers of a cluster; what it does there afterwards is not disturbed."""
+    ended: list[str] = []
+
+    def work_on() -> None:
+        for limit in (0.01, 60.0):
+            start = time.monotonic()
+            try:
+                with limited(limit, None):
+                    while limit < 1.0 and time.monotonic() < start + 10.0:
+                        time.sleep(0.001)
+            except OutOfTimeError:
+                ended.append(f"after {limit} s")
+        ended.append("at the end")
+
+    thread = threading.Thread(target=work_on)
+    thread.start()
+    thread.join()
+    assert ended == ["after 0.01 s", "at the end"]
+
+
+def test_a_case_that_may_end_its_process_does_not_run_in_ours() -> None:
+    assert this_machine(1).open is in_this_process
+    assert this_machine(1, apart=True).open is process_pool
 
 
 def test_limits_are_lifted_behind_a_case() -> None:
