@@ -191,21 +191,22 @@ def _since(how: Mapping[str, Any]) -> Comparison | None:
 
 def _told(folder: Path, ends: Counter[str], since: Comparison | None, reporter: Reporter) -> int:
     """Show how the cases of a folder ended, all of them or the first that failed; the exit code."""
-    from eigassign.batch.manifest import InOrder, read_header
+    from itertools import islice
+
+    from eigassign.batch.manifest import LINES, InOrder, read_header
     from eigassign.output import console
+    from eigassign.output.batch.files import write_moves
     from eigassign.output.batch.outcome import from_line, status_of
     from eigassign.output.batch.summary import batch_table, said
     from eigassign.output.previous import of_outcome
 
     header, total = read_header(folder), ends.total()
-    listed: list[CaseOutcome] = []
-    for line in InOrder(folder, header.indices()) if header else ():
-        shown = len(listed) < _MANY and (total <= _MANY or status_of(line) != "ok")
-        if shown or since is not None:
-            found = from_line(line)
-            listed += [found] if shown else []
-            if since is not None:
-                since.add(of_outcome(found))
+    lines = InOrder(folder, header.indices()) if header else ()
+    told = (line for line in lines if total <= _MANY or status_of(line) != "ok")
+    listed = [from_line(line) for line in islice(told, _MANY)]
+    if since is not None:
+        rows = ((row, [*map(str, since.add(of_outcome(row)))]) for row in map(from_line, lines))
+        write_moves(folder, rows, folder / LINES)
     console.print_tables([batch_table(listed)] if listed else [])
     console.print_tables([since.table()] if since is not None else [])
     if bad := total - ends["ok"]:

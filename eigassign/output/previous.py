@@ -21,6 +21,7 @@ from eigassign.study.comparison import TRAJECTORY
 from eigassign.study.results import ValidationRow
 
 Kind = Literal["answers", "validations"]
+_SHOWN = 5  # cases that a message names
 _STATISTICS = ("lowest", "mean", "highest")
 
 
@@ -56,10 +57,12 @@ class Comparison:
         self._path, self._tolerance = path, tolerance_hz
         self._before = {known.case: known for known in read_previous(path, kind)}
         self._compared = self._new = 0
+        self._seen: set[str] = set()
         self.moves: list[Move] = []
 
     def add(self, now: Known) -> list[Move]:
         """What has moved of one case."""
+        self._seen.add(now.case)
         before = self._before.get(now.case, Known(now.case))
         known = {name: hz for name, *hz in before.frequencies}
         moves = [*_ended(before, now)]
@@ -85,7 +88,7 @@ class Comparison:
         Raises UsageError where nothing was: the earlier result is of other cases then.
         """
         if not self._compared and not self.moves:
-            some = ", ".join([*self._before][:5])
+            some = ", ".join([*self._before][:_SHOWN])
             raise UsageError(f"{self._path}: has none of these frequencies; its cases are {some}")
         columns = ("case", "what", "before", "now", "moved by")
         rows = [
@@ -94,6 +97,9 @@ class Comparison:
         ]
         caption = f"Frequencies compared: {self._compared}, new ones: {self._new}; "
         caption += f"tolerance {self._tolerance:g} Hz."
+        if gone := [case for case in self._before if case not in self._seen]:
+            some = ", ".join(gone[:_SHOWN]) + (", …" if len(gone) > _SHOWN else "")
+            caption += f" Cases that are not here any more: {len(gone)} ({some})."
         word = "Moved" if rows else "Nothing moved"
         return Table(f"{word} since {self._path}", columns if rows else (), tuple(rows), caption)
 

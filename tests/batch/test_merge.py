@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 
 from eigassign.batch.manifest import Header, Manifest, read_header, write_header
 from eigassign.batch.merge import merge
+from eigassign.batch.progress import summarise
 from eigassign.cli import main
 from eigassign.errors import UsageError
 from eigassign.output.batch.outcome import CaseOutcome
@@ -120,3 +122,14 @@ def test_the_command_counts_and_names_what_has_moved(
     assert re.search(r"mass=5g +mode 1, highest +200 Hz +200\.5 Hz +\+0\.5 Hz", out)
     assert "7 cases in now: 6 ok, 1 failed" in out
     assert "1 of 7 cases failed" in err
+    tests = {test.get("name"): test for test in ET.parse("now/junit.xml").iter("testcase")}
+    failures = {name: test.find("failure") for name, test in tests.items()}
+    assert [name for name, found in failures.items() if found is not None] == ["mass=3g", "mass=5g"]
+    said = failures["mass=5g"]
+    assert said is not None
+    assert said.get("type") == "moved"
+    assert said.text == "mode 1, highest: was 200 Hz, is 200.5 Hz, moved by +0.5 Hz"
+    header = read_header(Path("now"))
+    assert header is not None
+    summarise(Path("now"), header)  # without a comparison
+    assert "moved" not in Path("now/junit.xml").read_text()

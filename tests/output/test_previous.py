@@ -57,10 +57,17 @@ def test_new_cases_and_frequencies_are_counted_and_do_not_count_as_moved(tmp_pat
     found = compared(before, Known("arm", (*ROW.frequencies, ("mode 2", 1.0, 1.0, 1.0))))
     found.add(of_outcome(replace(ROW, name="leg")))
     assert found.table().rows == ()
-    assert "compared: 1, new ones: 2" in found.table().caption
+    assert found.table().caption.endswith("compared: 1, new ones: 2; tolerance 0.01 Hz.")
     text = io.StringIO()
     console.print_tables([found.table()], stream=text)
     assert text.getvalue().startswith("Nothing moved since")
+
+
+def test_cases_that_are_gone_are_named_and_do_not_count_as_moved(tmp_path):
+    rows = [replace(ROW, name=name) for name in ("arm", *"abcdef")]
+    found = compared(summary(tmp_path / "summary.json", *rows), of_outcome(ROW))
+    assert found.moves == []
+    assert "Cases that are not here any more: 6 (a, b, c, d, e, …)." in found.table().caption
 
 
 def test_a_run_compares_with_its_own_results_and_a_folder_of_runs_with_each(tmp_path):

@@ -7,6 +7,7 @@ merged by a line of each shard in turn, and a column by steps of n.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from itertools import chain, islice, zip_longest
@@ -16,7 +17,7 @@ from typing import TextIO
 from eigassign.output.batch.columns import Columns, merge_columns, write_csv
 from eigassign.output.batch.index import Index
 from eigassign.output.batch.junit import Junit
-from eigassign.output.batch.outcome import from_line, status_of
+from eigassign.output.batch.outcome import CaseOutcome, from_line, status_of
 from eigassign.output.batch.summary import SummaryCsv, SummaryJson
 from eigassign.output.storage import replace_synced, replacing
 
@@ -56,8 +57,7 @@ def write_files(
             row = from_line(line)
             summary.add(row)
             plain.add(row.status, line)
-            output = f"run folder: {row.run_folder}" if row.run_folder else ""
-            junit.add(row.name, row.path, row.seconds, row.status, row.message, output)
+            _test(junit, row)
             index.add(row.status, line)
             if columnar is not None:
                 columnar.add(row)
@@ -67,6 +67,29 @@ def write_files(
             columnar.end()
             write_csv(stored, _opened(stack, folder / "columns.csv"))
     replace_synced(folder / "index.html", index.page(folder, folder.resolve().name, keys))
+
+
+def write_moves(
+    folder: Path, rows: Iterable[tuple[CaseOutcome, Sequence[str]]], since: Path
+) -> None:
+    """junit.xml in which what has moved of a row is a failure too.
+
+    It is older than the file ``since``: without a comparison it is not current (`are_current`).
+    """
+    with ExitStack() as stack:
+        junit = Junit(_opened(stack, folder / "junit.xml"))
+        for row, moves in rows:
+            _test(junit, row, moves)
+        junit.end()
+    older = since.stat().st_mtime_ns - 1
+    os.utime(folder / "junit.xml", ns=(older, older))
+
+
+def _test(junit: Junit, row: CaseOutcome, moves: Sequence[str] = ()) -> None:
+    output = f"run folder: {row.run_folder}" if row.run_folder else ""
+    status = "moved" if moves and row.status == "ok" else row.status
+    message = "\n".join(filter(None, (row.message, *moves)))
+    junit.add(row.name, row.path, row.seconds, status, message, output)
 
 
 def merge_files(
