@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,8 +14,8 @@ from click.core import ParameterSource
 import eigassign.cli.arguments as arguments
 from eigassign import process
 from eigassign.cli.reporter import print_json, reporting, show
-from eigassign.errors import EigassignError
-from eigassign.files import printable
+from eigassign.errors import CaseError, EigassignError
+from eigassign.files import printable, quoted
 
 if TYPE_CHECKING:
     from eigassign.output.run_record import RunStatus
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from eigassign.pipeline.queries import CheckAnswer, ModesAnswer
 
 
+_VARIANTS = 100  # of a sweep that are checked: half a second
+_SHOWN = 10  # problems of variants
 _DRAWING = ("out", "force", "figures", "allow_outside")
 
 
@@ -41,9 +44,9 @@ _DRAWING = ("out", "force", "figures", "allow_outside")
 def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int:
     """Check case files: every problem with its line, what a run will take, and what to do next.
 
-    A problem is shown as file:line:column: key: what is wrong. A case in order gets plausibility
-    warnings, its degrees of freedom, the coefficients of its expansion, and about how much memory
-    and how many seconds a run will take.
+    A problem is shown as file:line:column: key: what is wrong; the first variants of a sweep are
+    checked too. A case in order gets plausibility warnings, its degrees of freedom, the
+    coefficients of its expansion, and about how much memory and how many seconds a run will take.
     """
     from eigassign.pipeline import outlook
     from eigassign.pipeline.queries import check as checked
@@ -52,7 +55,9 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
     with reporting(how) as reporter:
         for case in cases:
             try:
-                answers[str(case)] = answer = checked(case, how["allow_outside"])
+                answer = checked(case, how["allow_outside"])
+                notes = (*answer.notes, *_sweep(case, how["allow_outside"]))
+                answers[str(case)] = replace(answer, notes=notes)
                 reporter.warn(answer.warnings)
                 if draw:
                     folder = outlook.draw(case, None, *(how[key] for key in _DRAWING[1:]))
@@ -70,6 +75,24 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
         for name, answer in answers.items():
             show(*terminal.wrapped(map(printable, _described(name, answer)), room))
     return max(codes)
+
+
+def _sweep(case: Path, allow_outside: bool) -> list[str]:
+    """What is said of its variants, if any; raises CaseError where one of the first is wrong."""
+    from eigassign.batch.plan import plan_of, variant_problem
+    from eigassign.batch.work import CaseOptions, check_cases
+
+    plan = plan_of([case])
+    if not plan.is_swept:
+        return []
+    count = min(len(plan), _VARIANTS)
+    first = [plan[k] for k in range(count)]
+    if wrong := check_cases(first, CaseOptions("", allow_outside=allow_outside)):
+        found = [(index, problem) for index, problems in wrong for problem in problems]
+        raise CaseError(tuple(variant_problem(plan, *each) for each in found[:_SHOWN]))
+    seen = "all of them valid" if count == len(plan) else f"the first {count} of them valid"
+    command = f"eigassign batch {quoted(case)} --dry-run"
+    return [f"sweep: {len(plan)} variants, {seen}; what they take: {command}"]
 
 
 def _trajectories(answer: CheckAnswer) -> list[str]:

@@ -103,6 +103,24 @@ def test_a_batch_keeps_going_past_every_kind_of_failure(
     assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("4", "2", "1")
 
 
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ("{targets.0.freqency: [1, 2]}", "did you mean 'targets.0.frequency'"),
+        ("{targets.0.frequency: [100 Hz, 1 kg]}", "frequency=1kg: expected a frequency"),
+    ],
+)
+def test_check_sees_a_wrong_sweep(
+    values: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write("a.yaml", f"{GOOD}sweep: {{parameters: {values}}}\n")
+    assert main(["check", "a.yaml"]) == 2
+    assert said in capsys.readouterr().err
+    write("a.yaml", f"{GOOD}sweep: {{parameters: {{mechanism.bodies.tool.mass: [0.1, 0.2]}}}}\n")
+    assert main(["check", "a.yaml"]) == 0
+    assert "sweep: 2 variants, all of them valid" in " ".join(capsys.readouterr().out.split())
+
+
 def test_a_batch_in_which_all_is_well_ends_with_0() -> None:
     write("a.yaml")
     assert main(["batch", "a.yaml", "--out", "runs", "--quiet"]) == 0
