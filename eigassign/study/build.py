@@ -63,11 +63,14 @@ def located(file: CaseFile, trajectory: str = "trajectory") -> Iterator[None]:
         raise CaseError((file.problem(path, error.message), *doubts)) from error
 
 
+_MAY_BE = "this may be why the trajectory cannot be followed"
+
+
 def _doubts(file: CaseFile) -> Iterator[Problem]:
     """Warnings of dimensions, which may be why a trajectory cannot be followed."""
     for warning in file.warnings:
         if warning.path.startswith(("mechanism.links", "mechanism.joints", "trajectory")):
-            yield replace(warning, message=f"this may be why: {warning.message}")
+            yield replace(warning, message=f"{_MAY_BE}: {warning.message}")
 
 
 def build_links(file: CaseFile) -> WholeLinks:

@@ -470,3 +470,15 @@ def test_a_run_without_figures_does_not_load_matplotlib() -> None:
     left = {path.name for path in Path("results/good").iterdir()}
     assert {"results.json", "report.html"} <= left
     assert "figures" not in left
+
+
+def test_lengths_that_look_like_millimetres_are_named_beside_a_path_out_of_reach(
+    capsys: Captured,
+) -> None:
+    text = Path(TWO_LINK).read_text().replace("length: 0.6,", "length: 600,")
+    Path("mm.yaml").write_text(text)
+    assert main(["check", "mm.yaml"]) == 2
+    said = capsys.readouterr().err
+    assert "trajectory.waypoints" in said
+    assert "may be why the trajectory cannot be followed: 600 m is outside" in said
+    assert "write 600 mm if that was meant" in said

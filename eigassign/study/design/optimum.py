@@ -165,7 +165,7 @@ def _search_all(
         search = _Search(variant_of(tasks[0], below), keys.steps, deadline)
         for start in _in_turn(tasks[0], search.variant, starts, keys.starts):
             made += 1
-            progress(f"  from start {made}")
+            progress(f"  from start {made}{search.left(keys.starts)}")
             search.run(start)
             if search.ended or search.agreed(keys.starts):
                 break
@@ -173,6 +173,8 @@ def _search_all(
                 break
         solves += search.variant.response.exact_solves
         for task in tasks[1:]:
+            if not search.ended:
+                progress("  from what was found, on all samples and exactly")
             search = _refined(variant_of(task, below), search, scene.initial)
             solves += search.variant.response.exact_solves
         if search.optima:
@@ -247,6 +249,7 @@ class _Search:
         self.variant, self.steps, self.deadline = variant, steps, deadline
         self.optima: list[Optimum] = []
         self.appraisals = 0
+        self.began = monotonic()
         self.ended = ended  # by the clock or by Ctrl-C, here or in the search before
 
     def run(self, start: Floats, before: Optimum | None = None) -> None:
@@ -294,15 +297,29 @@ class _Search:
         """
         if isinstance(starts, int) or not self.optima:
             return False
-        problem, best = self.variant.problem, worth(best_first(self.optima, worth)[0])
-        if problem.prices is None and best[0] <= MET and best[1] <= NOTHING:
+        best = worth(best_first(self.optima, worth)[0])
+        if self.variant.problem.prices is None and best[0] <= MET and best[1] <= NOTHING:
             return True
+        return self._lacking() <= 0
+
+    def _lacking(self) -> int:
+        """How many more starts have to lead to the best optimum, if no other is found."""
+        problem, best = self.variant.problem, worth(best_first(self.optima, worth)[0])
         least = best[1] + SAME * abs(best[1]) + NOTHING
         same = [
             o for o in self.optima if o.seen.violation <= best[0] + MET and o.objective <= least
         ]
         enough = AGREED + len(problem.lower) // 2
-        return len(same) >= enough * len(distinct(self.optima, problem))
+        return enough * len(distinct(self.optima, problem)) - len(same)
+
+    def left(self, starts: int | str) -> str:
+        """In words how long the starts take that are still to come, at the pace so far."""
+        done = len(self.optima)
+        if not done:
+            return ""
+        more = starts - done if isinstance(starts, int) else min(self._lacking(), STARTS - done)
+        seconds = (monotonic() - self.began) / done * max(more, 1)
+        return f", some {seconds:.0f} s left at least" if seconds >= 1.0 else ""
 
 
 def _continued(before: Optimum, found: Optimum) -> Optimum:

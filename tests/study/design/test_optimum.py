@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -48,6 +49,19 @@ def test_no_time_leaves_the_initial_design_and_says_so(tmp_path: Path) -> None:
     assert found.best.end is End.SECONDS
     assert starts == ["  from start 1"]
     np.testing.assert_array_equal(found.best.y, [0.0, 0.0])
+
+
+def test_starts_say_how_long_those_to_come_take_at_least(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = count()
+    monkeypatch.setattr("eigassign.study.design.optimum.monotonic", lambda: float(next(clock)))
+    lines: list[str] = []
+    found_of(tmp_path, SHIPPED + "\nassignment: {starts: 3}\n", lines)
+    first, *others = [line for line in lines if "from start" in line]
+    assert first == "  from start 1"
+    assert len(others) == 2
+    assert all(line.endswith("s left at least") for line in others)
 
 
 # An arm of two tubes with drives: three starts in a row lead to an optimum of 9.6 %, few to 4.69 %
