@@ -265,10 +265,10 @@ def test_maps_stand_side_by_side_with_the_expansion_point(paper):
     ]
     over = paper.studies[0].over_design
     for axes in maps:
-        assert axes.get_xlabel() == "m1 [kg]"
-        assert axes.get_xlim() == (over.axes[0][0], over.axes[0][-1])
+        assert axes.get_xlabel() == "m1 [g]"  # 0.25 kg at most
+        assert axes.get_xlim() == pytest.approx((0.0, 1000.0 * over.axes[0][-1]))
         ((x,), (y,)) = axes.get_lines()[0].get_data()
-        assert (x, y) == (0.125, 0.125)
+        assert (x, y) == pytest.approx((125.0, 125.0))
     (bands,) = [c for c in maps[0].collections if c.get_array() is not None]
     assert bands.levels[0] <= over.values.exact_hz.min()
     assert bands.levels[-1] >= over.values.exact_hz.max()

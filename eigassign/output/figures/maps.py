@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.case.units import handy_unit
 from eigassign.output.figures.curves import over_one, worst_errors
 from eigassign.output.figures.graph import Field, FigurePlan, Maps, labelled, short
 from eigassign.output.formats import percent
@@ -29,7 +31,17 @@ def approximation(
     """
     if over is None or not over.axes or min(axis.size for axis in over.axes) < 2:
         return
-    point = np.array([x0[names.index(n)] for n in over.names if n in names])
+    shown_in = [
+        handy_unit(unit, axis[0], axis[-1])
+        for unit, axis in zip(over.units, over.axes, strict=True)
+    ]
+    sizes = {name: size for name, (_, size) in zip(over.names, shown_in, strict=True)}
+    point = np.array([x0[names.index(n)] / sizes[n] for n in over.names if n in names])
+    over = replace(
+        over,
+        units=tuple(unit for unit, _ in shown_in),
+        axes=tuple(a / size for a, size in zip(over.axes, sizes.values(), strict=True)),
+    )
     shown = " and ".join(over.names)
     describe = over_one if len(over.axes) == 1 else over_two
     yield FigurePlan(
