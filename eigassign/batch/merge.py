@@ -44,7 +44,7 @@ def merge(out: Path, folders: Sequence[Path]) -> Counter[str]:
     ]
     header = _merged(out, shards)
     if problems := [*_problems(shards), *_others(out, header)]:
-        raise UsageError("\n".join(["the shards cannot be merged:", *problems]))
+        raise UsageError(f"the shards cannot be merged: {'; '.join(problems)}")
     shards.sort(key=lambda shard: shard.header.shard)
     out.mkdir(parents=True, exist_ok=True)
     with replacing(out / LINES) as made, open(made, "w", encoding="utf-8") as file:
@@ -76,7 +76,7 @@ def _merged(out: Path, shards: Sequence[_Shard]) -> Header:
 
 
 def _problems(shards: Sequence[_Shard]) -> Iterator[str]:
-    """What is wrong with the shards, a line each."""
+    """What is wrong with the shards."""
     first = shards[0]
     of, n = first.header.plan, first.header.shard[1]
     found: dict[int, Path] = {}
@@ -84,23 +84,23 @@ def _problems(shards: Sequence[_Shard]) -> Iterator[str]:
         header, (i, count) = shard.header, shard.header.shard
         alike = (header.plan, count, header.version, header.columns)
         if alike != (of, n, first.header.version, first.header.columns):
-            yield f"  {shard.folder} is a shard of another batch than {first.folder}"
+            yield f"{shard.folder} is a shard of another batch than {first.folder}"
         elif i in found:
-            yield f"  {shard.folder} and {found[i]} are the same shard, {i}/{n}"
+            yield f"{shard.folder} and {found[i]} are the same shard, {i}/{n}"
         elif (done := len(shard.lines)) < (all_of_it := len(header.indices())):
-            yield f"  {shard.folder}, shard {i}/{n}, is not finished: {done} of {all_of_it} cases"
+            yield f"{shard.folder}, shard {i}/{n}, is not finished: {done} of {all_of_it} cases"
         found.setdefault(i, shard.folder)
     missing = [i for i in range(1, n + 1) if i not in found]
     if missing:
         some = ", ".join(map(str, missing[:_SHOWN]))
         more = f" and {len(missing) - _SHOWN} more" if len(missing) > _SHOWN else ""
-        yield f"  missing of {n} shards: {some}{more}"
+        yield f"missing of {n} shards: {some}{more}"
 
 
 def _others(out: Path, header: Header) -> Iterator[str]:
     before = read_header(out)
     if before is not None and (before.plan, before.shard) != (header.plan, header.shard):
-        yield f"  {out} holds another batch, or one of the shards: choose another folder"
+        yield f"{out} holds another batch, or one of the shards: choose another folder"
 
 
 def _lines(out: Path, shards: Sequence[_Shard]) -> Iterator[str]:

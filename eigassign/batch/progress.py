@@ -26,6 +26,7 @@ from eigassign.batch.manifest import (
 from eigassign.batch.plan import Plan, Variant
 from eigassign.batch.work import CaseOptions
 from eigassign.errors import StorageError
+from eigassign.files import quoted
 from eigassign.output.batch.files import are_current, write_files
 from eigassign.output.batch.outcome import CaseOutcome, to_line
 from eigassign.output.run_record import relative_path
@@ -205,4 +206,10 @@ def summarise(folder: Path, header: Header, *, anew: bool = False) -> None:
     if not anew and are_current(folder, header.columns, folder / LINES):
         return
     lines = InOrder(folder, header.indices())
-    write_files(folder, lines, len(lines), header.keys, header.columns)
+    try:
+        write_files(folder, lines, len(lines), header.keys, header.columns)
+    except OSError as error:
+        message = f"{folder}: the summaries cannot be written: {error.strerror}"
+        raise StorageError(
+            f"{message}; eigassign merge {quoted(folder)} makes them anew"
+        ) from error

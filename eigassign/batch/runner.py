@@ -78,7 +78,8 @@ def require_valid(batch: Batch, place: Place, say: Callable[[str], None] = silen
         return
     plan = batch.plan
     indices = [k for k in batch.header.indices() if plan.whose(k)[0].variants is not None]
-    say(f"checking {len(indices)} variants")
+    if indices:
+        say(f"checking {len(indices)} variant{'s' if len(indices) > 1 else ''}")
     starts = range(0, len(indices), _CHECKED)
     tasks = ([plan[k] for k in indices[start : start + _CHECKED]] for start in starts)
     wrong: dict[int, tuple[Problem, ...]] = {}

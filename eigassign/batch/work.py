@@ -123,7 +123,9 @@ def outcome_of(variant: Variant, status: Status, seconds: float = 0.0, **found: 
 def _solved(variant: Variant, options: CaseOptions) -> dict[str, Any]:
     case, written = load(variant, options), _written(variant.path)
     if key_of(content_of(written), variant.values, written.path.parent) != variant.key:
-        raise UsageError("the case file, or a file it names, was changed since the batch began")
+        raise UsageError(
+            "the case file, or a file it names, was changed since the batch began: run it again"
+        )
     cache_dir = Path(options.cache_dir) if options.cache_dir else None
     how = Options(None, cache_dir, options.use_cache, report="none", study=STUDY)
     if options.columns:

@@ -117,7 +117,7 @@ def batch(
         asked = _batch(plan, how["out"] or usual, how)
         with _place(how["scheduler"], jobs, how["case_memory"] is not None) as place:
             if dry_run:
-                return _tell(asked, place)
+                return _tell(asked, place, reporter)
             since = _since(how)
             ends = _watched(asked, place, reporter, join)
         return _told(asked.folder, ends, since, reporter)
@@ -210,8 +210,8 @@ def _told(folder: Path, ends: Counter[str], since: Comparison | None, reporter: 
     console.print_tables([batch_table(listed)] if listed else [])
     console.print_tables([since.table()] if since is not None else [])
     if bad := total - ends["ok"]:
-        reporter.error(f"{bad} of {total} cases failed")
-    show(f"{total} cases in {folder}: {said(ends)}")
+        reporter.error(f"{bad} of {_cases(total)} failed")
+    show(f"{_cases(total)} in {folder}: {said(ends) or 'nothing to run'}")
     return 1 if bad or (since is not None and since.moves) else 0
 
 
@@ -236,22 +236,29 @@ def _watched(batch: Batch, place: Place, reporter: Reporter, join: bool) -> Coun
         return runner.run(batch, place, on_start, on_outcome, join, reporter.stage)
 
 
-def _tell(batch: Batch, place: Place) -> int:
+def _cases(count: int) -> str:
+    return "1 case" if count == 1 else f"{count} cases"
+
+
+def _tell(batch: Batch, place: Place, reporter: Reporter) -> int:
     """What would run."""
     from eigassign.batch.forecast import forecast
     from eigassign.batch.runner import require_valid
     from eigassign.output.console import print_table
     from eigassign.output.formats import duration
 
-    require_valid(batch, place)
+    require_valid(batch, place, reporter.stage)
     found = forecast(batch, place.slots)
     first, last = found.todo[:_FIRST], found.todo[_FIRST:][-_LAST:]
     rows = [(str(index + 1), batch.plan[index].name) for index in first]
     if len(found.todo) > _FIRST + _LAST:
         rows.append(("…", f"{len(found.todo) - _FIRST - _LAST} more"))
     rows += [(str(index + 1), batch.plan[index].name) for index in last]
-    print_table("Cases that would run", ("case", "name"), rows)
-    show(f"{len(found.todo)} cases would run, {found.done} are done and current")
+    if rows:
+        print_table("Cases that would run", ("case", "name"), rows)
+    show(f"{_cases(len(found.todo))} would run, {found.done} are done and current")
+    if not rows:
+        return 0
     processes = f"{place.slots} process{'es' if place.slots > 1 else ''}"
     if found.case_s is not None and found.total_s is not None:
         source = "as those that are done took" if found.measured else "estimated from the first"

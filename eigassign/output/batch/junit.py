@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TextIO
 
+from eigassign.errors import StorageError
 from eigassign.output.storage import replacing
 
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -64,12 +65,18 @@ class Junit:
 
 
 def write_junit(path: Path, tests: Iterable[tuple[str, str, float, str, str]]) -> None:
-    """A file of all ``tests``: name, path, seconds, status and message of each."""
-    with replacing(path) as made, open(made, "w", encoding="utf-8") as file:
-        suite = Junit(file)
-        for test in tests:
-            suite.add(*test)
-        suite.end()
+    """A file of all ``tests``: name, path, seconds, status and message of each.
+
+    Raises StorageError where it cannot be written.
+    """
+    try:
+        with replacing(path) as made, open(made, "w", encoding="utf-8") as file:
+            suite = Junit(file)
+            for test in tests:
+                suite.add(*test)
+            suite.end()
+    except OSError as error:
+        raise StorageError(f"{path}: cannot be written: {error.strerror}") from error
 
 
 def _count(value: float) -> str:
