@@ -33,6 +33,7 @@ from eigassign.errors import StorageError
 from eigassign.output.run_record import RunOf, changes, read_record, relative_path, write_record
 from eigassign.output.storage import (
     abandoned,
+    names_of,
     put_in_place,
     remove,
     sync_path,
@@ -143,7 +144,7 @@ def _publish(folder: Path, target: Path, run: RunOf, *, force: bool) -> None:
         sync_path(target.parent)
     finally:
         with contextlib.ExitStack() as rest:  # whatever becomes of one of them
-            for hidden in sorted(target.parent.glob(f".*.{token_of(folder)}.*")):
+            for hidden in names_of(new):
                 rest.callback(_settle, hidden, target)
 
 

@@ -198,6 +198,12 @@ def put_in_place(new: Path, target: Path) -> None:
     raise StorageError(f"{target} is being written by another run; try again")
 
 
+def names_of(new: Path) -> list[Path]:
+    """The hidden names there are of what was to be put in place as ``new``."""
+    suffixes = (".tmp", ".new", *(f".old{attempt}" for attempt in range(_ATTEMPTS)))
+    return [path for path in map(new.with_suffix, suffixes) if os.path.lexists(path)]
+
+
 def exchange(first: Path, second: Path) -> bool:
     """Swap two paths in one step; False where the system or the file system cannot."""
     if not sys.platform.startswith("linux"):
