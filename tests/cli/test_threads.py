@@ -20,7 +20,8 @@ def answer(case: Path, threads: int, out: Path) -> dict[str, Any]:
     """results.json of a run with so many threads in the linear algebra."""
     without = ["--report", "none", "--figures", "none", "--no-cache", "--quiet", "--out", str(out)]
     ours = environment(OPENBLAS_NUM_THREADS=str(threads))
-    assert eigassign_process("optimize", case, *without, env=ours).returncode == 0
+    done = eigassign_process("optimize", case, *without, env=ours)
+    assert done.returncode in (0, 1), done.stderr  # 1: a target out of reach
     found: dict[str, Any] = json.loads((out / "results.json").read_text())
     return found
 

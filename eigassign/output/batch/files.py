@@ -45,7 +45,7 @@ def write_files(
     """Write what is made of the ``total`` rows of a batch, each file whole or not at all.
 
     ``lines`` are the rows as `to_line` writes them, ``keys`` those of the sweep; with ``columns``
-    there are columns.h5 and columns.csv too.
+    there are columns.h5 and columns.csv too, and else none that are left from before.
     """
     with ExitStack() as stack:
         summary = SummaryCsv(_opened(stack, folder / "summary.csv"), keys)
@@ -67,6 +67,8 @@ def write_files(
             columnar.end()
             write_csv(stored, _opened(stack, folder / "columns.csv"))
     replace_synced(folder / "index.html", index.page(folder, folder.resolve().name, keys))
+    for name in () if columns else _COLUMNS:  # of the batch as it was before
+        (folder / name).unlink(missing_ok=True)
 
 
 def write_moves(

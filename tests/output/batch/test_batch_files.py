@@ -155,3 +155,9 @@ def test_a_column_of_text_may_have_gaps(tmp_path, monkeypatch):
     write_files(tmp_path, lines(4), 4, KEYS, columns=True)
     with h5py.File(tmp_path / "columns.h5") as found:
         assert list(found["values/kind (text)"].asstr()) == ["steel", "steel", "", "steel"]
+
+
+def test_columns_of_a_batch_that_has_folders_now_do_not_stay(tmp_path):
+    write_files(tmp_path, lines(4), 4, KEYS, columns=True)
+    write_files(tmp_path, lines(4), 4, KEYS)
+    assert not [*tmp_path.glob("columns.*")]
