@@ -106,7 +106,7 @@ def test_a_wrong_file_of_variants_is_refused_with_its_line(
         ("  count: 3\n", "sweep: give either parameters or file"),
         ("  parameters: {}\n", "sweep.parameters: needs at least 1 entries"),
         (f"  parameters: {{{MASS}: []}}\n", "needs at least 1 entries"),
-        (f"  parameters: {{{MASS}: 3}}\n", "expected a mapping"),
+        (f"  parameters: {{{MASS}: 3}}\n", "expected a list of values or a range"),
         (f"  parameters: {{{MASS}: {{min: 1, max: 2}}}}\n", "how many values"),
         (f"  sample: sobol\n  parameters: {{{MASS}: {{min: 1, max: 2}}}}\n", "how many variants"),
         (f"  sample: sobol\n  count: 3\n  parameters: {{{MASS}: [1]}}\n", "needs a range"),

@@ -7,10 +7,11 @@ the second ones, and so on. Samples are spread over ranges: `latin_hypercube`, `
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from fractions import Fraction
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from eigassign.case.schema.parts import ByReference, File, OneOrList, Part, wrong
 from eigassign.case.suggestions import shown
@@ -31,6 +32,15 @@ Amount: TypeAlias = Annotated[
     Any, AfterValidator(_amount), Field(description="a number, or text with a unit")
 ]
 Value: TypeAlias = Annotated[Any, Field(description="whatever the key may hold")]
+
+
+def _listed(value: Any) -> Any:
+    if not isinstance(value, (Mapping, list, tuple)):
+        what = "a list of values or a range, {min: ..., max: ..., count: ...}"
+        raise wrong(f"expected {what}, got {shown(value)}")
+    return value
+
+
 Count: TypeAlias = Annotated[int, Field(ge=1, le=MOST)]
 
 
@@ -83,6 +93,9 @@ def text_of(value: object) -> str:
 Values: TypeAlias = Annotated[tuple[Value, ...], Field(min_length=1, max_length=MOST)]
 
 
+Body: TypeAlias = Annotated[OneOrList[Range, Values], BeforeValidator(_listed)]
+
+
 class Sweep(Part):
     """Values that other keys have in the variants of the case, for `eigassign batch`.
 
@@ -98,7 +111,7 @@ class Sweep(Part):
             variant
     """
 
-    parameters: Annotated[ByReference[OneOrList[Range, Values]], Field(min_length=1)] | None = None
+    parameters: Annotated[ByReference[Body], Field(min_length=1)] | None = None
     sample: Literal["grid", "list", "latin_hypercube", "sobol"] | None = None
     count: Count | None = None
     seed: Annotated[int, Field(ge=0, le=2**32 - 1)] | None = None
