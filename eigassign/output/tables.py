@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case.units import handy_unit
+from eigassign.case.units import handy_unit, is_bare
 from eigassign.output.formats import capital, number, percent, residual, seconds
 from eigassign.study.design.judgement import MET
 from eigassign.study.results import (
@@ -98,7 +98,7 @@ def design(results: RunResults) -> Table:
     """Each design parameter before and after, what it lies on, was chosen or costs; the mass."""
     active = results.assignment.active if results.assignment else ()
     on = {limit.name: limit.side for limit in active if limit.kind == "bound"}
-    chosen = any(row.choice is not None for row in results.design)
+    chosen = any(row.chosen for row in results.design)
     columns = ("name", "parameter", "unit", "initial", "optimal", "lower", "upper")
     priced = results.price is not None
     more = [
@@ -112,7 +112,7 @@ def design(results: RunResults) -> Table:
         values = (row.initial, row.optimal, row.lower, row.upper)
         rows.append(
             (row.name, row.parameter, unit, *(number(value / size) for value in values),
-             *((on.get(row.name, ""),) if on else ()), *((row.choice or "",) if chosen else ()),
+             *((on.get(row.name, ""),) if on else ()), *((row.chosen,) if chosen else ()),
              *((number(row.cost),) if priced else ()))
         )  # fmt: skip
     if (mass := results.mass) is not None:
@@ -218,12 +218,22 @@ def combinations(results: RunResults) -> Table:
     if row is None or row.catalogue is None:
         return Table("Combinations", (), ())
     best, price = row.catalogue.best, "price" if _by_price(results) else "objective"
+    own = {each.name: each for each in results.design}
     rows = tuple(
-        (str(k), *one.choices.values(), number(one.objective), _violated(one.violation))
+        (str(k), *(_choice(own.get(name), choice) for name, choice in one.choices.items()),
+         number(one.objective), _violated(one.violation))
         for k, one in enumerate(best, 1)
-    )
+    )  # fmt: skip
     columns = ("combination", *best[0].choices, price, "limits")
     return Table("Combinations", columns, rows, f"{capital(row.optimality.words)}.")
+
+
+def _choice(row: DesignRow | None, choice: str) -> str:
+    """Its name, or the value that it is in the unit of its parameter."""
+    if row is None or not is_bare(choice):
+        return choice
+    unit, size = _unit(row)
+    return f"{number(float(choice) / size)} {unit}".rstrip()
 
 
 def _by_price(results: RunResults) -> bool:

@@ -137,7 +137,7 @@ def _trust(results: RunResults) -> Iterator[str]:
         return
     if row.model_error != 0.0:
         most = row.model_error
-        how = "an unknown amount" if most is None else f"{percent(most)} at most"
+        how = "an unknown amount" if most is None else f"{percent(max(most, 1e-5))} at most"
         yield f"Mesh and reduced links put them too high by {how}."
     yield _sentence(row.optimality.words)
     if not row.finished:
@@ -158,15 +158,14 @@ def _bars(results: RunResults) -> Iterator[Bar]:
     for row in results.design:
         width = row.upper - row.lower or 1.0
         unit, size = handy_unit(row.unit, row.lower, row.upper, row.initial, row.optimal)
-        after = _few(row.optimal / size)
         start, end = (
             min(max((value - row.lower) / width, 0.0), 1.0) for value in (row.initial, row.optimal)
         )
         yield Bar(
             row.name,
             _few(row.initial / size),
-            after if row.choice is None else f"{after} ({row.choice})",
-            unit,
+            _few(row.optimal / size),
+            f"{unit} ({row.chosen})" if row.chosen else unit,
             (_few(row.lower / size), _few(row.upper / size)),
             round(100.0 * start, 2),
             round(100.0 * end, 2),
@@ -180,7 +179,7 @@ def _cost(results: RunResults) -> Iterator[str]:
         added = f"{change:+.4g} kg".replace("-", "−") if _few(change) != "0" else "unchanged"
         yield f"Mass {_few(mass.initial)} → {_few(mass.optimal)} kg ({added})"
     if results.price is not None:
-        yield f"Price of the change {_few(results.price)}"
+        yield f"Price of the change {_few(results.price)}".replace("-", "−")
 
 
 def _few(value: float) -> str:

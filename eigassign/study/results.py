@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.brief import Brief
+from eigassign.case.units import is_bare
 
 Floats = NDArray[np.float64]
 
@@ -125,6 +126,11 @@ class DesignRow:
     upper: float
     choice: str | None = None
     price: float | None = None
+
+    @property
+    def chosen(self) -> str:
+        """The name of what was chosen; empty for a value, which stands for itself."""
+        return "" if self.choice is None or is_bare(self.choice) else self.choice
 
     @property
     def cost(self) -> float:

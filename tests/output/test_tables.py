@@ -127,3 +127,19 @@ def test_each_target_has_its_worst_and_its_rms_distance_in_a_row() -> None:
     assert [row[1] for row in found.rows] == ["worst", "rms"]
     assert found.rows[0][2] == "6.00 %"
     assert found.rows[0][-1] == "1.00 %"
+
+
+def test_values_of_a_catalogue_have_their_unit_and_names_stand_for_themselves() -> None:
+    results = searched()
+    drive = replace(
+        results.design[0], name="hub", unit="N m/rad", choice="20000",
+        initial=8e3, optimal=2e4, lower=8e3, upper=2e4,
+    )  # fmt: skip
+    rod = replace(results.design[1], name="rod.width", choice="light")
+    changed = replace(results, design=(drive, rod))
+    found, design = table(changed, "Combinations"), table(changed, "Design")
+    assert found is not None
+    assert found.rows[0][1:3] == ("light", "0.02 kN m/rad")  # "20" of the made-up catalogue
+    assert design is not None
+    at = design.columns.index("choice")
+    assert [row[at] for row in design.rows[:2]] == ["", "light"]

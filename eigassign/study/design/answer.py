@@ -314,10 +314,11 @@ def _optimality(scene: Scene, answer: Answer) -> OptimalityRow:
     many = f"{found.starts} start{'s' if found.starts > 1 else ''}"
     if chosen is not None and chosen.search is not None:
         gap = chosen.search.relative_gap
+        better = f"better by more than {100 * gap:.2g} % of the objective" if gap else "better"
         words = (
-            f"the best of the catalogues to {100 * gap:.2g} % of the objective by branch and "
-            f"bound in {chosen.search.nodes} nodes, as far as the optima of the relaxed problems, "
-            f"the first from {many}, are global"
+            f"the best combination of the catalogues, by branch and bound in {chosen.search.nodes} "
+            f"nodes: none is {better}, if the optima of the relaxed problems (the first from "
+            f"{many}) are global"
         )
         return OptimalityRow("bounded", best.stationarity, gap, words)
     if chosen is None and is_proved(scene, found):
