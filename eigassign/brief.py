@@ -31,6 +31,16 @@ def named(names: tuple[str, ...]) -> str:
     return f"({first}, … {len(names)} in all)" if len(names) > _FEW else f"({first})"
 
 
+def counted(count: int, what: str) -> str:
+    """``1 solve``, ``7 solves``."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+def of_modes(modes: tuple[int, ...]) -> str:
+    """``mode 1``, ``modes (1, 2)``."""
+    return f"mode {modes[0]}" if len(modes) == 1 else f"modes {modes}"
+
+
 def _short(value: Any) -> str:
     if hasattr(value, "shape"):
         if getattr(value, "size", _FEW + 1) <= _FEW and value.ndim == 1:

@@ -55,6 +55,10 @@ def test_a_repr_says_what_it_is(case: ea.Case, result: Result) -> None:
     assert "q = (q1, q2), y = (m1, m2), 1 target" in repr(case)
     assert "23 degrees of freedom, 2 of them rigid" in repr(case.model())
     assert f"m1 = {result.design['m1']:.6g} kg" in repr(result)
+    expansion = ea.expand(case.model(), [1.8, 5.3], [0.1, 0.1], order=2)
+    assert repr(expansion).startswith("<Expansion of λ of mode 1: order 2, 10 coefficients in 3 va")
+    fitted = ea.fit(case.model(), case.trajectory.q, [0.1, 0.1], modes=[1, 2], solves=5)
+    assert "of modes (1, 2): 5 terms in 1 variable from 5 solves>" in repr(fitted)
 
 
 @pytest.mark.parametrize("name", [n for n in ea.__all__ if inspect.isfunction(getattr(ea, n))])

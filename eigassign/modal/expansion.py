@@ -19,7 +19,7 @@ from math import comb
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.brief import Brief, cut
+from eigassign.brief import Brief, counted, cut, of_modes
 from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import mode_numbers, point, relative_gap, samples, whole_within
@@ -72,8 +72,8 @@ class Expansion:
     def __repr__(self) -> str:
         at = ", ".join(f"{value:.6g}" for value in self.x0)
         return cut(
-            f"<Expansion of λ of modes {self.modes}: order {self.order}, {len(self.space)} "
-            f"coefficients in {self.space.n_variables} variables, about (q, y) = ({at})>"
+            f"<Expansion of λ of {of_modes(self.modes)}: order {self.order}, {len(self.space)} "
+            f"coefficients in {counted(self.space.n_variables, 'variable')}, about (q, y) = ({at})>"
         )
 
     def eigenvalues(self, q: ArrayLike, y: ArrayLike) -> Floats:
@@ -405,7 +405,7 @@ class NearestExpansion:
     parts: tuple[Expansion, ...]
 
     def __repr__(self) -> str:
-        return f"<NearestExpansion of modes {self.modes}: {len(self.parts)} expansion points>"
+        return f"<NearestExpansion of {of_modes(self.modes)}: {len(self.parts)} expansion points>"
 
     @property
     def modes(self) -> tuple[int, ...]:

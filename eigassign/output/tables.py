@@ -147,7 +147,7 @@ def _named(results: RunResults) -> Iterator[str]:
 def errors(results: RunResults) -> Table:
     """Distance to the wanted frequencies before, as predicted, and exact, side by side."""
     kinds = _stages(results)
-    columns = ("target", "distance", *kinds)
+    columns = ("target", "error", *kinds)
     wanted = [target for target in results.targets if target.kind == "frequency"]
     if not wanted:
         return Table("Distance to the target", columns, ())

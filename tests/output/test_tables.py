@@ -123,7 +123,7 @@ def test_parameters_are_shown_in_units_that_people_read() -> None:
 def test_each_target_has_its_worst_and_its_rms_distance_in_a_row() -> None:
     found = table(make_results(), "Distance to the target")
     assert found is not None
-    assert found.columns == ("target", "distance", "initial", "one shot", "predicted", "exact")
+    assert found.columns == ("target", "error", "initial", "one shot", "predicted", "exact")
     assert [row[1] for row in found.rows] == ["worst", "rms"]
     assert found.rows[0][2] == "6.00 %"
     assert found.rows[0][-1] == "1.00 %"

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from eigassign.brief import counted, of_modes
 from eigassign.errors import AccuracyError, UsageError
 from eigassign.interpolation.adaptive import MISSED, adaptive
 from eigassign.interpolation.given import WORTHLESS, fewest, given
@@ -65,8 +66,9 @@ class Fit:
 
     def __repr__(self) -> str:
         return (
-            f"<Fit of {self.quantity} of modes {self.modes}: {len(self.indices)} terms in "
-            f"{self.region.d} variables from {self.solves} solves>"
+            f"<Fit of {self.quantity} of {of_modes(self.modes)}: "
+            f"{counted(len(self.indices), 'term')} in {counted(self.region.d, 'variable')} "
+            f"from {counted(self.solves, 'solve')}>"
         )
 
     @cached_property
@@ -179,7 +181,7 @@ class PathFit:
 
     def __repr__(self) -> str:
         pieces = f"{len(self.parts)} stretches from {self.solves} solves"
-        return f"<PathFit of modes {self.modes}: {pieces}>"
+        return f"<PathFit of {of_modes(self.modes)}: {pieces}>"
 
     @property
     def modes(self) -> tuple[int, ...]:

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from eigassign.brief import counted, of_modes
 from eigassign.modal.arguments import chunks, samples
 from eigassign.modal.reduced.error_estimate import ErrorTerms, relative_error
 from eigassign.modal.reduced.pencil import ReducedPencil, ritz_values
@@ -36,8 +37,8 @@ class ReducedModel(ReducedPencil):
 
     def __repr__(self) -> str:
         return (
-            f"<ReducedModel of modes {self.modes}: {self.size} elastic unknowns, Taylor vectors "
-            f"to order {self.half_order} at {len(self.points)} point(s); "
+            f"<ReducedModel of {of_modes(self.modes)}: {self.size} elastic unknowns, Taylor "
+            f"vectors to order {self.half_order} at {counted(len(self.points), 'point')}; "
             f"{self.n_q} q, {self.n_y} y>"
         )
 
