@@ -18,7 +18,7 @@ from eigassign.output.pages import TEMPLATES, inside, page_of
 MOST = 10_000  # rows shown: more would keep a browser busy
 _STATUS = {"ok": "good", "tolerance": "fair", "failed": "bad", "error": "bad"}  # and its tone
 _TAIL = re.compile(r"(?:[^.]*[^.0-9][^.]*(?:\.[0-9]+)*\.)?[^.]*$")
-_ERRORS = {"error before": "initial_max_relative", "error after": "exact_max_relative"}
+_ERRORS = {"worst before": "initial_max_relative", "worst after": "exact_max_relative"}
 
 
 class Index:
