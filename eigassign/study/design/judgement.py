@@ -254,7 +254,7 @@ def verdict(
     worst = max(missed, key=lambda target: target.error.exact.max_relative)
     far = _far(worst)
     if unreachable:
-        return "unreachable", f"{'; '.join(unreachable)}; what was found: {far}"
+        return "unreachable", f"{'; '.join(unreachable)}; the nearest design: {far}"
     if conflict:
         return "infeasible", f"{conflict} ({far})"
     (before_violation, before), (violation, after) = merits

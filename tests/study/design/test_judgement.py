@@ -31,5 +31,5 @@ def test_limits_are_violated_not_off() -> None:
     word, why = verdict((target,), ((0.112, 0.0), (0.0568, 0.0)), True, ["mode 1 is out of reach"])
     assert word == "unreachable"
     assert why == (
-        "mode 1 is out of reach; what was found: mode 1 at 48 Hz: violated by 5.68 % at worst"
+        "mode 1 is out of reach; the nearest design: mode 1 at 48 Hz: violated by 5.68 % at worst"
     )
