@@ -76,15 +76,28 @@ def _alarm_of_thread(seconds: float) -> Iterator[None]:
     """Signals reach the main thread alone; the tasks of a cluster's worker run in another one."""
     raise_in = ctypes.pythonapi.PyThreadState_SetAsyncExc
     here = ctypes.c_ulong(threading.get_ident())
-    timer = threading.Timer(seconds, raise_in, (here, ctypes.py_object(OutOfTimeError)))
-    timer.daemon = True
-    timer.start()
+    ended, out_of_time = threading.Event(), ctypes.py_object(OutOfTimeError)
+
+    def ring() -> None:
+        wait_s = seconds
+        while not ended.wait(wait_s):
+            raise_in(here, out_of_time)
+            wait_s = _AGAIN_S
+
+    def stop() -> None:
+        ended.set()
+        ringing.join()  # behind this it raises nothing more
+        raise_in(here, None)  # nor what this thread has not heard yet
+
+    ringing = threading.Thread(target=ring, daemon=True)
+    ringing.start()
     try:
         yield
     finally:
-        timer.cancel()
-        timer.join()  # behind this it raises nothing more
-        raise_in(here, None)  # nor what this thread has not heard yet
+        try:
+            stop()
+        finally:
+            stop()  # the last ring may have come while it stopped
 
 
 def _over(_number: int, _frame: FrameType | None) -> None:
