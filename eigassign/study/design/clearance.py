@@ -146,7 +146,7 @@ def _room(
 ) -> Floats:
     """g (n,) at places ``at`` along the samples: 1.5 is midway between the second and third."""
     samples = np.arange(len(band.q))
-    q = np.column_stack([np.interp(at, samples, column) for column in band.q.T])
+    q = np.reshape([np.interp(at, samples, column) for column in band.q.T], (-1, len(at))).T
     lower, upper = (np.interp(at, samples, edge) for edge in (band.lower_hz, band.upper_hz))
     k = band.below
     low = band.named[k - 1] if band.named and k else k
