@@ -12,6 +12,7 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import json
 import platform
+import resource
 import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -56,6 +57,12 @@ def milliseconds(seconds: float) -> str:
     return f"{seconds * 1e3:.3g} ms"
 
 
+def children_s() -> float:
+    """Processor seconds of all processes that were started here and have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def report(name: str, title: str, rows: Sequence[Row], remarks: Sequence[str] = ()) -> None:
     """Print a table and keep it as ``results/<name>.md`` and ``.json``."""
     lines = [f"# {title}", "", *_table(rows), "", *(f"- {r}" for r in remarks), f"- {_machine()}"]
@@ -67,7 +74,7 @@ def report(name: str, title: str, rows: Sequence[Row], remarks: Sequence[str] = 
 
 
 def _table(rows: Sequence[Row]) -> list[str]:
-    head = list(rows[0])
+    head = list(dict.fromkeys(key for row in rows for key in row))
     body = [[_text(row.get(key, "")) for key in head] for row in rows]
     return [
         "| " + " | ".join(head) + " |",

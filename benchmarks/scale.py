@@ -84,14 +84,13 @@ def finished(batch: Batch) -> None:
 
 
 def command(*words: object) -> dict[str, float]:
-    """Seconds and memory of a command."""
-    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    """Wall-clock and processor seconds of a command."""
+    before, start = common.children_s(), time.perf_counter()
     program = [sys.executable, "-m", "eigassign", *map(str, words)]
     done = subprocess.run(program, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     assert "cases failed" in done.stderr, done.stderr
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return {"wall s": time.perf_counter() - start, "processor s": processor}
+    wall = time.perf_counter() - start
+    return {"wall s": wall, "processor s": common.children_s() - before}
 
 
 class AtOnce(Executor):
@@ -195,9 +194,7 @@ def main() -> None:
         f"the merged batch has {len(files)} files of {sum(files):.0f} MB together",
         f"memory of the process that gives out {asked.resumed} cases: {given['mb']:.0f} MB",
     ]
-    columns = ("", "wall s", "processor s", "hours", "workers busy", "parent busy", "tasks/s")
-    whole = [{name: row.get(name, "") for name in columns} for row in rows]
-    common.report("scale", "Batches of very many cases", whole, remarks)
+    common.report("scale", "Batches of very many cases", rows, remarks)
 
 
 if __name__ == "__main__":

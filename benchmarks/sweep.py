@@ -97,7 +97,7 @@ def memory_mb(pid: int) -> dict[int, float]:
 def swept(case: Path, out: Path, count: int) -> dict[str, float]:
     """One whole command: wall-clock and processor time, and memory early and late."""
     command = [sys.executable, "-m", "eigassign", "batch", str(case), "--jobs", "2"]
-    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    before, start = common.children_s(), time.perf_counter()
     process = subprocess.Popen(
         [*command, "--out", str(out), "--reports", "none", "--quiet"], stdout=subprocess.DEVNULL
     )
@@ -115,12 +115,11 @@ def swept(case: Path, out: Path, count: int) -> dict[str, float]:
     process.wait()
     over.set()
     watcher.join()
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
     early = [size for done, size in looks if 0.02 * count < done <= 0.1 * count]
     late = [size for done, size in looks if 0.9 * count < done]
     return {
         "wall": time.perf_counter() - start,
-        "processor": after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime,
+        "processor": common.children_s() - before,
         "early_mb": max(early, default=0.0),
         "late_mb": max(late, default=0.0),
     }
@@ -158,11 +157,10 @@ def main() -> None:
         {"": "sweep, whole", "wall clock": f"{sweep['wall']:.0f} s"},
         {"": "the same command again, all done", "wall clock": f"{again['wall']:.1f} s"},
     ]
-    columns = ("", "processor", "wall clock", "ratio")
     common.report(
         "sweep",
         f"A sweep of {asked.count} small assignments in two processes",
-        [{key: row.get(key, "") for key in columns} for row in rows],
+        rows,
         [
             f"largest process: {sweep['early_mb']:.0f} MB within the first tenth of the cases, "
             f"{sweep['late_mb']:.0f} MB within the last",

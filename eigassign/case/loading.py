@@ -55,17 +55,19 @@ class Unchecked:
         return hashlib.sha256(self.data).hexdigest()
 
     @cached_property
-    def _said(self) -> str:
-        return json.dumps({k: body for k, body in self.source.tree.items() if k != "sweep"})
+    def _without_sweep(self) -> tuple[Mapping[str, Any], str]:
+        """What it says but for its `sweep`: the tree, and the same as text."""
+        tree = {key: body for key, body in self.source.tree.items() if key != "sweep"}
+        return tree, json.dumps(tree)
 
     def content(self) -> str:
         """SHA-256 of what it says, its `sweep` apart, and of every file it names.
 
         Comments, the form of its lines, and places of files count for nothing.
         """
-        tree = {key: body for key, body in self.source.tree.items() if key != "sweep"}
+        tree, said = self._without_sweep
         digests = _digests(named_files(tree, self.path.parent), self.path.parent)
-        return hashlib.sha256(" ".join([self._said, *digests.values()]).encode()).hexdigest()
+        return hashlib.sha256(" ".join([said, *digests.values()]).encode()).hexdigest()
 
 
 def load(path: str | Path, allow_outside: bool = False) -> CaseFile:

@@ -27,7 +27,7 @@ from eigassign.modal.adaptive.mesh import MeshChoice, ModesAt, choose_mesh
 from eigassign.modal.adaptive.order import ExpansionChoice, choose_expansion
 from eigassign.modal.arguments import spread
 from eigassign.modal.exact.clusters import CLUSTER_GAP
-from eigassign.modal.exact.inertia import count_below
+from eigassign.modal.exact.inertia import UNCERTAIN, count_below
 from eigassign.modal.model import Model
 from eigassign.modal.taylor.local_coordinates import local_space
 
@@ -238,9 +238,10 @@ def modes_that_matter(file: CaseFile, bands_hz: Floats) -> ModesAt:
     def modes_at(model: Model, x: Floats) -> tuple[int, ...]:
         if not len(bands_hz):
             return wanted
-        above = np.unique(count_below(model.pencil, x, bands_hz[None])) + 1
+        below = np.unique(count_below(model.pencil, x, bands_hz[None]))
         last = len(model.pencil.elastic)  # of a mesh too coarse for the band: no bound on its error
-        return tuple(sorted({*wanted, *(min(max(int(mode), 1), last) for mode in above)}))
+        above = {min(int(k) + 1, last) for k in below if k != UNCERTAIN}  # a mode is at that edge
+        return tuple(sorted({*wanted, *above}))
 
     return modes_at
 

@@ -10,29 +10,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import beam
 import pytest
 
 from eigassign.batch.workers import Pace
 from eigassign.cli import main
 
-CASE = """\
-title: A beam
-mechanism:
-  space: planar
-  materials: {steel: {youngs_modulus: 210 GPa, density: 7850}}
-  sections: {rod: {shape: circle, diameter: 20 mm}}
-  links: {arm: {length: 0.5, material: steel, section: rod, elements: 2}}
-  joints: {shoulder: {type: revolute, base: ground, follower: arm.start}}
-  bodies: {tool: {at: arm.end, mass: 0.1}}
-coordinates: {q1: {joint: shoulder}}
-trajectory: {q: [[0], [1]], time: [0, 1]}
-design: {m: {parameter: bodies.tool.mass, min: 0, max: 1}}
-expansion: {order: 2, q: auto, y: auto, modes: [1]}
-targets: [{mode: 1, frequency: 190 Hz}]
-validation: {max_error: 50 %}
-sweep:
-  parameters: {mechanism.links.arm.length: {min: 0.4, max: 0.6, count: 60}}
-"""
+SWEEP = "sweep: {parameters: {mechanism.links.arm.length: {min: 0.4, max: 0.6, count: 60}}}\n"
 
 
 def test_tasks_take_as_many_cases_as_fill_their_seconds() -> None:
@@ -50,7 +34,7 @@ def test_tasks_take_as_many_cases_as_fill_their_seconds() -> None:
 def started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
     monkeypatch.chdir(tmp_path)
-    Path("arm.yaml").write_text(CASE)
+    Path("arm.yaml").write_text(beam.TEXT + SWEEP)
     ours = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": ":0"}
     with distributed.LocalCluster(**ours) as cluster:
         yield cluster

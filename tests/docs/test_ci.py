@@ -9,6 +9,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
 
+import beam
 import pytest
 import yaml
 
@@ -20,22 +21,6 @@ BLOCKS = re.findall(r"^```yaml\n# (\S+)\n(.*?)^```", PAGE, re.DOTALL | re.MULTIL
 FILES: dict[str, Any] = {name: yaml.safe_load(text) for name, text in BLOCKS}
 WORKFLOW = FILES[".github/workflows/eigassign.yml"]
 (BASELINE,) = re.findall(r"^```bash\n(.*?)\n```", PAGE, re.DOTALL | re.MULTILINE)
-CASE = """\
-title: A beam
-mechanism:
-  space: planar
-  materials: {steel: {youngs_modulus: 210 GPa, density: 7850}}
-  sections: {rod: {shape: circle, diameter: 20 mm}}
-  links: {arm: {length: 0.5, material: steel, section: rod, elements: 2}}
-  joints: {shoulder: {type: revolute, base: ground, follower: arm.start}}
-  bodies: {tool: {at: arm.end, mass: 0.1}}
-coordinates: {q1: {joint: shoulder}}
-trajectory: {q: [[0], [1]], time: [0, 1]}
-design: {m: {parameter: bodies.tool.mass, min: 0, max: 1}}
-expansion: {order: 2, q: auto, y: auto, modes: [1]}
-targets: [{mode: 1, frequency: 190 Hz}]
-validation: {max_error: 50 %}
-"""
 
 
 @pytest.fixture(autouse=True)
@@ -43,7 +28,7 @@ def _in_a_clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("EIGASSIGN_CACHE_DIR", str(tmp_path / "cache"))
     Path("cases").mkdir()
-    Path("cases", "two_link.yaml").write_text(CASE)
+    Path("cases", "two_link.yaml").write_text(beam.TEXT)
 
 
 def commands(job: str) -> list[str]:
@@ -92,7 +77,7 @@ def test_the_first_job_passes_and_fails_when_a_frequency_moves(
 ) -> None:
     baseline(capsys)
     assert [run(line) for line in commands("validate")] == [0, 0]
-    Path("cases", "two_link.yaml").write_text(CASE.replace("7850", "7900"))
+    Path("cases", "two_link.yaml").write_text(beam.TEXT.replace("7850", "7900"))
     assert [run(line) for line in commands("validate")] == [0, 1]
     (suite,) = ET.parse("validation.xml").getroot()
     assert suite[0][0].get("type") == "moved"

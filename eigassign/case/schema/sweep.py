@@ -91,8 +91,6 @@ def text_of(value: object) -> str:
 
 
 Values: TypeAlias = Annotated[tuple[Value, ...], Field(min_length=1, max_length=MOST)]
-
-
 Body: TypeAlias = Annotated[OneOrList[Range, Values], BeforeValidator(_listed)]
 
 
