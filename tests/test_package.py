@@ -11,7 +11,7 @@ import pytest
 
 import eigassign as ea
 from eigassign.brief import LONGEST
-from eigassign.pipeline.run import Result
+from eigassign.pipeline import Result
 
 TWO_LINK = Path(__file__).parents[1] / "cases" / "two_link.yaml"
 

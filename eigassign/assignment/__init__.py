@@ -13,44 +13,30 @@ Reading order:
     assign       build, solve, judge: from targets to the optimal design
 """
 
-from __future__ import annotations
+from eigassign.faces import face
 
-from eigassign.assignment.assign import ActiveLimit, Assignment, solve_assignment
-from eigassign.assignment.catalogues.branching import Catalogue
-from eigassign.assignment.program import (
-    Bounds,
-    Goal,
-    LinearConstraint,
-    LinearModel,
-    QuadraticProgram,
-    build_program,
-    quadratic_form,
+__all__, __getattr__, __dir__ = face(
+    __name__,
+    {
+        "assign": "ActiveLimit Assignment solve_assignment",
+        "catalogues.branching": "Catalogue Effort hull search_catalogue",
+        "catalogues.choosing": "choose",
+        "catalogues.linear": "solve_catalogue",
+        "exact.design_problem": "Appraisal DesignProblem MET Objective best_first",
+        "exact.identification": "Identified MeasuredFrequencies identify",
+        "exact.requirements": (
+            "Frequencies FrequencyLimit FrequencyTarget QuantityLimit Requirements"
+        ),
+        "exact.sequential": "End Optimum",
+        "exact.stationarity": "stationarity",
+        "optimality": "ACCEPT Certificate judge",
+        "program": (
+            "Bounds Candidate Goal LinearConstraint LinearModel QuadraticProgram "
+            "ScaledProgram build_program quadratic_form scaled_program unscaled"
+        ),
+        "solver": "Polished SETTINGS Status polish solve_osqp",
+        "targets": (
+            "RelativeError hz_from_lam lam_from_hz relative_error sample_target trapezoidal_weights"
+        ),
+    },
 )
-from eigassign.assignment.targets import (
-    RelativeError,
-    hz_from_lam,
-    lam_from_hz,
-    relative_error,
-    sample_target,
-    trapezoidal_weights,
-)
-
-__all__ = [
-    "ActiveLimit",
-    "Assignment",
-    "Bounds",
-    "Catalogue",
-    "Goal",
-    "LinearConstraint",
-    "LinearModel",
-    "QuadraticProgram",
-    "RelativeError",
-    "build_program",
-    "hz_from_lam",
-    "lam_from_hz",
-    "quadratic_form",
-    "relative_error",
-    "sample_target",
-    "solve_assignment",
-    "trapezoidal_weights",
-]

@@ -15,3 +15,19 @@ Reading order:
     cluster   the workers of a dask.distributed scheduler
     runner    all of it together: start there
 """
+
+from eigassign.faces import face
+
+__all__, __getattr__, __dir__ = face(
+    __name__,
+    {
+        "limits": "OutOfTimeError limited",
+        "manifest": "Header InOrder Manifest read_header write_header",
+        "plan": "Plan Variant find_cases folder_names plan_of variant_problem",
+        "progress": "Batch summarise",
+        "runner": "run",
+        "variants": "Variants variants_of",
+        "work": "CaseOptions check_cases outcome_of run_cases",
+        "workers": "Pace Place in_this_process process_pool this_machine",
+    },
+)

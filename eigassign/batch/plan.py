@@ -22,7 +22,7 @@ from pathlib import Path
 
 from eigassign._version import __version__
 from eigassign.batch.variants import OPTION, Variants, variants_of
-from eigassign.case import Unchecked, read
+from eigassign.case.loading import Unchecked, read
 from eigassign.case.reader import dotted
 from eigassign.case.schema.sweep import text_of
 from eigassign.case.values import key_path

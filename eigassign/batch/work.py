@@ -12,7 +12,7 @@ from typing import Any
 
 from eigassign.batch.limits import OutOfTimeError, limited
 from eigassign.batch.plan import STUDY, Variant, content_of, key_of
-from eigassign.case import Unchecked, checked, read
+from eigassign.case.loading import Unchecked, checked, read
 from eigassign.errors import CaseError, EigassignError, Problem, UsageError
 from eigassign.output.batch.outcome import CaseOutcome, Status, frequency_ranges
 from eigassign.pipeline.run import Options, solve_case

@@ -14,87 +14,34 @@ In reading order, each importing only from those above it:
     loading      path or mapping → CaseFile, or all problems of the file at once
 """
 
-from eigassign.case.case_file import CaseFile
-from eigassign.case.loading import Unchecked, checked, from_mapping, load, parse, read
-from eigassign.case.schema.design import Catalogue, Choices, DesignColumn, Tolerance
-from eigassign.case.schema.document import json_schema
-from eigassign.case.schema.joints import (
-    CarriageJoint,
-    FixedJoint,
-    NutJoint,
-    RevoluteJoint,
-    ScrewJoint,
-    UniversalJoint,
-)
-from eigassign.case.schema.links import FrameLink, RigidLink, SuperelementLink, Taper
-from eigassign.case.schema.measurements import Measurement, MeasurementFile
-from eigassign.case.schema.mechanism import Drive
-from eigassign.case.schema.sections import BareSection, CircleSection, IProfileSection, TubeSection
-from eigassign.case.schema.targets import (
-    AtLeastTarget,
-    AtMostTarget,
-    FollowedMode,
-    FrequencyFile,
-    FrequencyProfile,
-    FrequencyTarget,
-    GapTarget,
-    Harmonic,
-    KeepOutTarget,
-    Requirement,
-    TargetForm,
-)
-from eigassign.case.schema.trajectory import (
-    FileTrajectory,
-    PointTrajectory,
-    SampledTrajectory,
-    TipTrajectory,
-    TrajectoryForm,
-)
+from eigassign.faces import face
 
-__all__ = [
-    "AtLeastTarget",
-    "AtMostTarget",
-    "BareSection",
-    "CarriageJoint",
-    "CaseFile",
-    "Catalogue",
-    "Choices",
-    "CircleSection",
-    "DesignColumn",
-    "Drive",
-    "FileTrajectory",
-    "FixedJoint",
-    "FollowedMode",
-    "FrameLink",
-    "FrequencyFile",
-    "FrequencyProfile",
-    "FrequencyTarget",
-    "GapTarget",
-    "Harmonic",
-    "IProfileSection",
-    "KeepOutTarget",
-    "Measurement",
-    "MeasurementFile",
-    "NutJoint",
-    "PointTrajectory",
-    "Requirement",
-    "RevoluteJoint",
-    "RigidLink",
-    "SampledTrajectory",
-    "ScrewJoint",
-    "SuperelementLink",
-    "Taper",
-    "TargetForm",
-    "TipTrajectory",
-    "Tolerance",
-    "TrajectoryForm",
-    "TubeSection",
-    "Unchecked",
-    "UniversalJoint",
-    "checked",
-    "from_mapping",
-    "json_schema",
-    "load",
-    "parse",
-    "read",
-]
+__all__, __getattr__, __dir__ = face(
+    __name__,
+    {
+        "canonical": "plain to_yaml",
+        "case_file": "CaseFile",
+        "loading": "Unchecked checked from_mapping load parse read",
+        "reader": "dotted read_yaml resolve",
+        "rules.properties": "impossible",
+        "schema.design": "Catalogue Choices Design DesignColumn Tolerance column_names",
+        "schema.document": "Document json_schema",
+        "schema.joints": (
+            "CarriageJoint FixedJoint NutJoint RevoluteJoint ScrewJoint UniversalJoint"
+        ),
+        "schema.links": "FrameLink RigidLink SuperelementLink Taper",
+        "schema.measurements": "Measurement MeasurementFile",
+        "schema.mechanism": "Drive",
+        "schema.parts": "FrozenDict Quantity",
+        "schema.sections": "BareSection CircleSection IProfileSection TubeSection",
+        "schema.targets": (
+            "AtLeastTarget AtMostTarget FollowedMode FrequencyFile FrequencyProfile "
+            "FrequencyTarget GapTarget Harmonic KeepOutTarget Requirement TargetForm"
+        ),
+        "schema.trajectory": (
+            "FileTrajectory PointTrajectory SampledTrajectory TipTrajectory TrajectoryForm"
+        ),
+        "units": "DIMENSIONS PLAIN QuantityError UNITS parse_unit read_rate",
+        "values": "key_path",
+    },
+)

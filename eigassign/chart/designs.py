@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, differential_evolution, minimize
 
-from eigassign.assignment import Assignment
+from eigassign.assignment.assign import Assignment
 from eigassign.assignment.exact.design_problem import DesignProblem
 from eigassign.assignment.exact.requirements import Frequencies
 from eigassign.assignment.exact.sequential import minimise
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.chart.effort import Effort, suited
 from eigassign.chart.question import SEED
 from eigassign.chart.results import DesignRun, Timing, excess_over

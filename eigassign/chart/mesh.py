@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.chart.results import MeshRow, Timing
 from eigassign.chart.timing import Patience, measure
 from eigassign.modal.model import Model

@@ -283,7 +283,7 @@ _SINCE = {"same": "as it was", "changed": "changed since", "missing": "not there
 def schema() -> int:
     """Print the JSON Schema of case files, for editors."""
 
-    from eigassign.case import json_schema
+    from eigassign.case.schema.document import json_schema
 
     print_json(json_schema(), indent=2)
     return 0

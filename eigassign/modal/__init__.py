@@ -18,3 +18,52 @@ In reading order:
     adaptive     the least mesh, order and reduction that meet an accuracy
     fit          polynomials through exact frequencies, with an error estimate
 """
+
+from eigassign.faces import face
+
+__all__, __getattr__, __dir__ = face(
+    __name__,
+    {
+        "adaptive.mesh": "choose_mesh",
+        "adaptive.order": "FINER MAX_POINTS TOLERABLE choose_expansion more_points_help",
+        "adaptive.reduced_model": "central reduce_adaptively",
+        "confirmation": "Wanted unlike",
+        "discretisation": "discretisation_error",
+        "exact.clusters": "CLUSTER_GAP clusters",
+        "exact.condensation": "Modes condense",
+        "exact.dense": "solve_dense solve_single",
+        "exact.following": "MoreModesError Place Shape follow places",
+        "exact.inertia": "UNCERTAIN count_below",
+        "exact.roundoff": "rounding_error rounding_weights",
+        "exact.solver": "eigenvalues lowest_modes modes",
+        "exact.sparse": "block principal solve_sparse",
+        "exact.substructure": "Inner proved solve_large solve_together varying_unknowns",
+        "exact.tracking": "overlaps track turn_coincident",
+        "expansion": (
+            "Cluster Expansion NearestExpansion companion_order expand polynomial_error "
+            "radius_share"
+        ),
+        "fit.path": "interval_nodes smooth_parts stretches",
+        "fit.region": "Box",
+        "fit.source": "FINE",
+        "model": "Model",
+        "reduced.added_mass": "AddedMass added_mass",
+        "reduced.basis": "RitzBasis ritz_basis",
+        "reduced.error_estimate": "frequency_error largest_outside mode_missing",
+        "reduced.model": "ReducedModel",
+        "reduced.pencil": "ritz_pairs",
+        "reduced.reduce": "reduce",
+        "reduced.residual": "half_solve residual_gram",
+        "slopes": "eigenvalue_slopes mixed_slopes",
+        "slow_motion": "change_at motion_effect moving_modes theta_in_time",
+        "storage": (
+            "expansion_arrays expansions_from_arrays flatten pencil_parts reduced_arrays "
+            "reduced_from_arrays"
+        ),
+        "taylor.bordered": "add_product factor_dense factor_sparse with_partial_pivoting",
+        "taylor.local_coordinates": "substitute",
+        "taylor.rayleigh": "vector_members",
+        "taylor.recursion": "expand_subspace",
+        "truncation": "truncation_error",
+    },
+)

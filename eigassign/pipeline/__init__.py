@@ -15,3 +15,18 @@ Reading order:
     update             measured frequencies to the parameters that explain them
     chart              time against accuracy of every method on one case
 """
+
+from eigassign.faces import face
+
+__all__, __getattr__, __dir__ = face(
+    __name__,
+    {
+        "chart": "chart_case skipped_notes",
+        "expansions": "affordable_order expand_plan expansion_key",
+        "outlook": "draw",
+        "queries": "check modes split",
+        "run": "Options Outcome Result expand_case optimize prepare solve_case validate",
+        "stages": "Stages silent",
+        "update": "update_case",
+    },
+)

@@ -14,7 +14,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.files import quoted
 from eigassign.mechanism.kinematics.parameters import written_loads
 from eigassign.mechanism.kinematics.travel_limits import resting_pose

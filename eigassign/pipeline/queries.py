@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.case.rules.properties import impossible
 from eigassign.case.schema.parts import Quantity, quantity
 from eigassign.case.units import DIMENSIONS, TWO_TURNS, QuantityError, is_bare

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment import Assignment
+from eigassign.assignment.assign import Assignment
 from eigassign.assignment.exact.sequential import End
 from eigassign.case.suggestions import shown
 from eigassign.errors import EigassignError

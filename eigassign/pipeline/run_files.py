@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.errors import UsageError
 from eigassign.files import printable
 from eigassign.output import report

@@ -9,3 +9,19 @@ In reading order:
     compiler      recorded atoms as a straight-line program, run in either algebra
     implicit      solutions p(a) of F(p, a) = 0, by continuation and by Newton's method on series
 """
+
+from eigassign.faces import face
+
+__all__, __getattr__, __dir__ = face(
+    __name__,
+    {
+        "algebra": "Samples Tangents Truncated",
+        "compiler": "compile_program compile_table",
+        "expression": "Expression Recorder Scalar cos derivative exp sin",
+        "implicit": "ImplicitFunction",
+        "multi_index": "LowerSet box lower_set on_faces partially_linear total_degree",
+        "power_series": (
+            "BLOCK compose monomials monomials_of multiply polynomials power_taylor wave_taylor"
+        ),
+    },
+)

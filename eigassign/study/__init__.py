@@ -18,3 +18,48 @@ Reading order:
     updating    parameters from measured frequencies
     collect     all of it put together as the results of a run
 """
+
+from eigassign.faces import face
+
+__all__, __getattr__, __dir__ = face(
+    __name__,
+    {
+        "accuracy": "least_gap",
+        "build": "build_model",
+        "built_case": "Case load_case",
+        "comparison": (
+            "COARSE DESIGN_BOX RANDOM_BOX TRAJECTORY box_points compare grid_over q_grid "
+            "random_q reach_warnings study_modes validate_expansions"
+        ),
+        "design.answer": "Answer find_answer",
+        "design.clearance": "Band prove_clear",
+        "design.followed": "Solved followers require_one_shape solve_design",
+        "design.judgement": "crossing_warnings verdict",
+        "design.optimum": "Found find_optimum",
+        "design.response": (
+            "ExactResponse MOST ReducedModels ReducedResponse exact_response reduced_models"
+        ),
+        "drawing": "AMPLITUDE draw_modes draw_poses rest_pose spread_samples",
+        "meaning.overall": "Studies study_meaning",
+        "meaning.reach": "proved_ranges unreachable",
+        "meaning.tolerance": "reduced_ranges study_tolerance",
+        "meaning.tradeoff": "kept trade_off",
+        "planning": (
+            "Plan at_corners at_random automatic_elements central_sample corners joint_map "
+            "mesh_share plan_expansion series_share shown_point truncation_share "
+            "with_middle_loads with_worse_designs"
+        ),
+        "results": (
+            "ActiveRow AssignmentRow CatalogueRow ClearanceRow CombinationRow Comparison "
+            "DesignMap DesignRow DrawnBody DrawnJoint DrawnPoses DrawnSpring ErrorRow "
+            "ErrorSummary LocalOptimum Meaning ModePictures ModeStudy OptimalityRow "
+            "OtherModes RangeRow RunResults SensitivityRow SolverRow StepRow TargetAlong "
+            "TargetStudy ToleranceRows TradeOff TradeOffPoint TrajectoryRow ValidationRow"
+        ),
+        "scene": "Scene",
+        "settling": "settle_model",
+        "updating.fit": "UpdateResults solve_update update_problem",
+        "updating.measured": "read_measurements",
+        "wanted": "Wanted named_design named_pose target_frequencies time_weights",
+    },
+)

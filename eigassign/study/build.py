@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile, TrajectoryForm
+from eigassign.case.case_file import CaseFile
+from eigassign.case.schema.trajectory import TrajectoryForm
 from eigassign.errors import (
     CaseError,
     MechanismError,

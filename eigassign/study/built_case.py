@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile, from_mapping, load
+from eigassign.case.case_file import CaseFile
+from eigassign.case.loading import from_mapping, load
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectories
 from eigassign.modal.adaptive.link_reduction import ReductionChoice

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign._version import __version__
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.accuracy import study_motion
 from eigassign.study.comparison import reach_warnings

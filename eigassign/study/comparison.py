@@ -31,7 +31,7 @@ from itertools import product, zip_longest
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.errors import CaseError
 from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.modal.model import Model

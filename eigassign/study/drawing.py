@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import RIDING, SLIDING
 from eigassign.mechanism.elements.sections import section_values
 from eigassign.mechanism.kinematics.joints import mounting, sliding_axis

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.kinematics.topology import split
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.arguments import DENSE_LIMIT

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import hadamard
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, CaseError, TrajectoryError, UsageError
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories

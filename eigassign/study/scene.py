@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.brief import Brief
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.errors import CaseError, MissingMassError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.expansion import Expansion, NearestExpansion

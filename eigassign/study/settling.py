@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.assembly.build import WholeLinks, with_elements, with_reduction
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.kinematics.travel_limits import resting_pose

@@ -16,11 +16,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.assignment import sample_target, trapezoidal_weights
 from eigassign.assignment.checks import frozen
-from eigassign.case import (
-    CaseFile,
-    Choices,
+from eigassign.assignment.targets import sample_target, trapezoidal_weights
+from eigassign.case.case_file import CaseFile
+from eigassign.case.schema.design import Choices
+from eigassign.case.schema.targets import (
     FollowedMode,
     FrequencyFile,
     FrequencyProfile,

@@ -12,9 +12,9 @@ from eigassign.assignment import (
     LinearModel,
     build_program,
     quadratic_form,
+    scaled_program,
     trapezoidal_weights,
 )
-from eigassign.assignment.program import scaled_program
 from eigassign.errors import UsageError
 
 

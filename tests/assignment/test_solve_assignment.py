@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear, minimize
 
 from eigassign.assignment import (
+    ACCEPT,
     Bounds,
     LinearConstraint,
     build_program,
     solve_assignment,
     trapezoidal_weights,
 )
-from eigassign.assignment.optimality import ACCEPT
 
 LAM = 1.0e6
 INF = np.inf

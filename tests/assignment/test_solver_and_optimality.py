@@ -10,15 +10,24 @@ import pytest
 from assignment_problems import goal, random_problem
 
 from eigassign.assignment import (
+    SETTINGS,
     Bounds,
+    Candidate,
+    Certificate,
     LinearConstraint,
+    Polished,
+    ScaledProgram,
+    Status,
     build_program,
+    judge,
+    polish,
+    scaled_program,
     solve_assignment,
+    solve_osqp,
     solver,
+    unscaled,
 )
-from eigassign.assignment.optimality import Certificate, judge
-from eigassign.assignment.program import Candidate, ScaledProgram, scaled_program, unscaled
-from eigassign.assignment.solver import SETTINGS, Polished, Status, minimise, polish, solve_osqp
+from eigassign.assignment.solver import minimise
 from eigassign.errors import AccuracyError, UsageError
 
 

@@ -7,10 +7,7 @@ from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from pathlib import Path
 
-from eigassign.batch.plan import Variant, plan_of
-from eigassign.batch.progress import Batch
-from eigassign.batch.work import CaseOptions, check_cases, outcome_of
-from eigassign.batch.workers import Place
+from eigassign.batch import Batch, CaseOptions, Place, Variant, check_cases, outcome_of, plan_of
 
 TEXT = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
 MASS = "mechanism.bodies.tool_mass.mass"

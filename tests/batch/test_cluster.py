@@ -13,7 +13,7 @@ from typing import Any
 import beam
 import pytest
 
-from eigassign.batch.workers import Pace
+from eigassign.batch import Pace
 from eigassign.cli import main
 
 SWEEP = "sweep: {parameters: {mechanism.links.arm.length: {min: 0.4, max: 0.6, count: 60}}}\n"

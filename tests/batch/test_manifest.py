@@ -6,15 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from eigassign.batch.manifest import (
-    Header,
-    InOrder,
-    Manifest,
-    read_header,
-    write_header,
-)
+from eigassign.batch import Header, InOrder, Manifest, read_header, write_header
 from eigassign.errors import StorageError, UsageError
-from eigassign.output.batch.outcome import CaseOutcome, Status, from_line
+from eigassign.output import CaseOutcome, Status, from_line
 
 
 def row(index: int, status: Status = "ok") -> CaseOutcome:

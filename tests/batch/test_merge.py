@@ -11,12 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from eigassign.batch.manifest import Header, Manifest, read_header, write_header
+from eigassign.batch import Header, Manifest, read_header, summarise, write_header
 from eigassign.batch.merge import merge
-from eigassign.batch.progress import summarise
 from eigassign.cli import main
 from eigassign.errors import UsageError
-from eigassign.output.batch.outcome import CaseOutcome
+from eigassign.output import CaseOutcome
 
 TOTAL = 7
 RANGES = (("mode 1", 180.0, 190.0, 200.0),)

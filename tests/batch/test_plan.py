@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from eigassign.batch.plan import Plan, plan_of, variant_problem
+from eigassign.batch import Plan, plan_of, variant_problem
 from eigassign.errors import Problem
 
 TWO_LINK = Path(__file__).parents[2] / "cases" / "two_link.yaml"

@@ -17,11 +17,9 @@ from pathlib import Path
 import pytest
 from instant import MASS, Instant, batch_of, case, instant, names
 
+from eigassign.batch import Batch, Place, run
 from eigassign.batch.forecast import forecast
 from eigassign.batch.merge import merge
-from eigassign.batch.progress import Batch
-from eigassign.batch.runner import run
-from eigassign.batch.workers import Place
 from eigassign.errors import CaseError, StorageError
 
 

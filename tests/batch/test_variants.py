@@ -6,10 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from eigassign.batch.variants import Variants, variants_of
-from eigassign.case import CaseFile, checked, load, parse, read
-from eigassign.case.reader import read_yaml
-from eigassign.case.values import key_path
+from eigassign.batch import Variants, variants_of
+from eigassign.case import CaseFile, checked, key_path, load, parse, read, read_yaml
 from eigassign.errors import CaseError
 
 TEXT = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()

@@ -13,12 +13,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eigassign.batch import work
-from eigassign.batch.limits import OutOfTimeError, limited
-from eigassign.batch.plan import plan_of
-from eigassign.batch.work import CaseOptions, run_cases
-from eigassign.batch.workers import in_this_process, process_pool, this_machine
-from eigassign.output.batch.outcome import CaseOutcome
+from eigassign.batch import (
+    CaseOptions,
+    OutOfTimeError,
+    in_this_process,
+    limited,
+    plan_of,
+    process_pool,
+    run_cases,
+    this_machine,
+    work,
+)
+from eigassign.output import CaseOutcome
 
 SMALL = Path(__file__).parents[2] / "benchmarks" / "small_arm.yaml"
 MASS = "mechanism.bodies.tool.mass"

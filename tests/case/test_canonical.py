@@ -9,9 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_case import TEXT, edited
 
-from eigassign.case import load, parse
-from eigassign.case.canonical import to_yaml
-from eigassign.case.reader import read_yaml
+from eigassign.case import load, parse, read_yaml, to_yaml
 
 CASES = Path(__file__).parents[2] / "cases"
 MOTION = """\

@@ -21,6 +21,7 @@ from eigassign.case import (
     FileTrajectory,
     FixedJoint,
     FrequencyProfile,
+    FrozenDict,
     RevoluteJoint,
     SampledTrajectory,
     TipTrajectory,
@@ -28,7 +29,6 @@ from eigassign.case import (
     load,
     parse,
 )
-from eigassign.case.schema.parts import FrozenDict
 
 CASES = Path(__file__).parents[2] / "cases"
 MINIMAL = """\

@@ -8,9 +8,8 @@ import pytest
 from mistakes import problems_of
 from small_case import TEXT, edited, unmarked
 
-from eigassign.case import parse
-from eigassign.case.schema.parts import Quantity
-from eigassign.case.units import DIMENSIONS, PLAIN, QuantityError, read
+from eigassign.case import DIMENSIONS, PLAIN, Quantity, QuantityError, parse
+from eigassign.case.units import read
 from eigassign.errors import CaseError
 
 LARGE, SMALL = "too large to calculate with", "too small to calculate with"

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from eigassign.case.reader import dotted, read_yaml, resolve
+from eigassign.case import dotted, read_yaml, resolve
 from eigassign.errors import CaseError
 
 

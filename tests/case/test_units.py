@@ -7,7 +7,8 @@ from fractions import Fraction
 
 import pytest
 
-from eigassign.case.units import DIMENSIONS, UNITS, QuantityError, parse_unit, read
+from eigassign.case import DIMENSIONS, UNITS, QuantityError, parse_unit
+from eigassign.case.units import read
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from scenes import SHIPPED, scene_of
 
 from eigassign.chart.comparison import MethodComparison, Request, compare_methods
 from eigassign.chart.question import EvaluationPoints, build_features, build_points
-from eigassign.study.scene import Scene
+from eigassign.study import Scene
 
 
 @pytest.fixture(scope="session")

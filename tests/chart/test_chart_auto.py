@@ -14,7 +14,7 @@ from eigassign.chart.methods import auto_methods, auto_orders, exact_methods
 from eigassign.chart.question import build_features, build_points
 from eigassign.chart.results import Advice
 from eigassign.modal.adaptive import order as expansion_choice
-from eigassign.study.scene import Scene
+from eigassign.study import Scene
 
 CASES = Path(__file__).parents[2] / "cases"
 

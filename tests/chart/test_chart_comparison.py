@@ -22,8 +22,8 @@ from eigassign.chart.question import EvaluationPoints, build_features, build_poi
 from eigassign.chart.surrogates import KINDS, tensor_interpolation
 from eigassign.chart.timing import Patience
 from eigassign.errors import CaseError
-from eigassign.modal.expansion import expand
-from eigassign.study.scene import Scene
+from eigassign.modal import expand
+from eigassign.study import Scene
 
 
 def test_what_is_solved_anew_is_timed_by_whole_trajectories(

@@ -18,7 +18,7 @@ from eigassign.chart.designs import (
     chart_designs,
     design_task,
 )
-from eigassign.study.scene import Scene
+from eigassign.study import Scene
 
 
 def test_the_objective_has_the_slope_it_says(arm: Scene) -> None:

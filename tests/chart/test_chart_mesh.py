@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scenes import SHIPPED, changed
 
-from eigassign.api import Case, load_case
+from eigassign import Case, load_case
 from eigassign.chart.mesh import chart_meshes, meshes, refined
 from eigassign.chart.timing import Patience
-from eigassign.study.build import build_model
+from eigassign.study import build_model
 
 ONCE = Patience(rounds=1, seconds=0.0)
 

@@ -17,10 +17,9 @@ from eigassign.chart import rivals
 from eigassign.chart.comparison import exact_frequencies
 from eigassign.chart.methods import fit_methods
 from eigassign.chart.question import EvaluationPoints, build_features, build_points
+from eigassign.modal import FINE, NearestExpansion
 from eigassign.modal.exact import solver
-from eigassign.modal.expansion import NearestExpansion
-from eigassign.modal.fit.source import FINE
-from eigassign.study.scene import Scene
+from eigassign.study import Scene
 
 
 class Spy:

@@ -12,7 +12,7 @@ from eigassign.chart.comparison import affordable_points
 from eigassign.chart.effort import QUICK, Effort
 from eigassign.chart.question import EvaluationPoints, box_corners, build_features, build_points
 from eigassign.errors import CaseError
-from eigassign.study.planning import joint_map
+from eigassign.study import joint_map
 
 
 def test_features_lead_back_to_poses_with_the_same_frequencies(tmp_path: Path) -> None:

@@ -11,8 +11,7 @@ from scenes import scene_of
 
 from eigassign.chart.designs import design_task
 from eigassign.chart.question import build_features
-from eigassign.study.scene import Scene
-from eigassign.study.wanted import time_weights
+from eigassign.study import Scene, time_weights
 
 CASES = Path(__file__).parents[2] / "cases"
 

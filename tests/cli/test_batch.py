@@ -17,14 +17,19 @@ import pytest
 from commands import python
 from wrong_inputs import GOOD
 
-from eigassign.batch import work
-from eigassign.batch.plan import find_cases, folder_names, plan_of
-from eigassign.batch.progress import Batch
-from eigassign.batch.runner import run
-from eigassign.batch.work import CaseOptions
-from eigassign.batch.workers import Place, process_pool
+from eigassign.batch import (
+    Batch,
+    CaseOptions,
+    Place,
+    find_cases,
+    folder_names,
+    plan_of,
+    process_pool,
+    run,
+    work,
+)
 from eigassign.cli import main
-from eigassign.output.batch.outcome import CaseOutcome
+from eigassign.output import CaseOutcome
 from eigassign.process import Terminated
 
 STRICT = GOOD.replace("50 %", "1e-9") + "assignment: {method: one_shot}\n"

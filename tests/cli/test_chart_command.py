@@ -10,8 +10,8 @@ import pytest
 from eigassign.chart.comparison import Request
 from eigassign.chart.effort import QUICK
 from eigassign.cli import main
+from eigassign.pipeline import Options
 from eigassign.pipeline.chart import chart
-from eigassign.pipeline.run import Options
 
 ARM = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 

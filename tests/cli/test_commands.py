@@ -18,7 +18,7 @@ from eigassign.cli import main
 from eigassign.cli.reporter import dumps
 from eigassign.errors import UsageError
 from eigassign.output.figures import style
-from eigassign.pipeline.queries import split
+from eigassign.pipeline import split
 
 # Belotti et al. 2021, recomputed with an independent frame program (same mesh)
 REFERENCE = {

@@ -127,7 +127,7 @@ class Worker:
 
 def _serve() -> None:
     """Import what `check` needs, and build the schema; then run a command for each line."""
-    from eigassign.pipeline.queries import check
+    from eigassign.pipeline import check
 
     check(CASES / "two_link.yaml")
     answers = open(os.dup(1), "w", encoding="utf-8")  # noqa: SIM115

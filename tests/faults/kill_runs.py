@@ -29,7 +29,7 @@ from run_scenes import EARLIER, Scene, Stage, edited, faults
 from stopping import can_stop, stopped_after, stopped_at
 
 from eigassign.cli import main
-from eigassign.output.cache import Cache
+from eigassign.output import Cache
 
 TWO_LINK = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 SHORT = (("samples: 152", "samples: 12"), ("order: 4", "order: 2"))

@@ -9,8 +9,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from eigassign.output import changes, read_record
 from eigassign.output.run_folder import run_folder
-from eigassign.output.run_record import changes, read_record
 
 Write = Callable[[Path, Path, bool], int]  # a whole run of a case file at a target; force
 

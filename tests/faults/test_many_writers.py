@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 from run_scenes import CASE, TARGET, snapshot, write_a_few_files
 
-from eigassign.output.cache import Cache, key
-from eigassign.output.run_record import MARKER, run_status
+from eigassign.output import MARKER, Cache, key, run_status
 
 WRITERS, KILLED = 16, 6
 KEY = key("shared")

@@ -10,7 +10,7 @@ import pytest
 from eigassign.errors import AccuracyError
 from eigassign.interpolation.adaptive import adaptive, interpolate
 from eigassign.interpolation.newton import Interpolant, Nodes, interval, leja, newton_polynomials
-from eigassign.modal.fit.path import interval_nodes
+from eigassign.modal import interval_nodes
 
 Function = Callable[[np.ndarray], np.ndarray]
 NODES = interval()[leja(interval(), 20)]

@@ -18,7 +18,7 @@ from eigassign.interpolation.newton import (
     newton_polynomials,
     products,
 )
-from eigassign.series.multi_index import total_degree
+from eigassign.series import total_degree
 
 AXES = tuple(interval()[leja(interval(), k)] for k in (9, 7, 6))
 TABLES = [basis(v, v) for v in AXES]

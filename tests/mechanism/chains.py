@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from eigassign.api import Case
-from eigassign.case.loading import parse
-from eigassign.modal.model import Model
+from eigassign import Case
+from eigassign.case import parse
+from eigassign.modal import Model
 
 Tree = dict[str, Any]
 I_PAPER = 3.97e-8  # m4

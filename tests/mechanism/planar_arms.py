@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from eigassign.mechanism.inverse_kinematics.chain import TipChain, TipEvaluation
+from eigassign.mechanism import TipChain, TipEvaluation
 
 NAMES = ("shoulder", "elbow", "wrist", "j4", "j5", "j6")
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from chains import bar, case_of, two_link
 
-from eigassign.api import Case
-from eigassign.case.loading import parse
+from eigassign import Case
+from eigassign.case import parse
 
 CASES = Path(__file__).parents[2] / "cases"
 

@@ -11,14 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from eigassign.case import CaseFile
-from eigassign.case.loading import parse
-from eigassign.mechanism.assembly.build import build_pencil, kinematics
-from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.kinematics.forward import Kinematics
-from eigassign.mechanism.kinematics.link_frames import LinkFrames, build_link_frames
-from eigassign.mechanism.kinematics.parameters import ModelParameters, initial_design, parameters
-from eigassign.modal.exact.solver import eigenvalues
+from eigassign.case import CaseFile, parse
+from eigassign.mechanism import (
+    Kinematics,
+    LinkFrames,
+    ModelParameters,
+    Pencil,
+    build_link_frames,
+    build_pencil,
+    initial_design,
+    parameters,
+)
+from eigassign.mechanism.assembly.build import kinematics
+from eigassign.modal import eigenvalues
 
 Tree = dict[str, Any]
 STEEL = {"youngs_modulus": 210e9, "density": 7850.0, "poissons_ratio": 0.3}

@@ -7,7 +7,7 @@ import pytest
 from small_case import edited
 
 from eigassign.case import CaseFile, parse
-from eigassign.study.built_case import Case
+from eigassign.study import Case
 
 D = "  d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}\n"
 ENTRIES = """\

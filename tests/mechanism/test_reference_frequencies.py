@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from reference_mechanisms import ARM_3R, FOUR_BAR, GANTRY, SLIDER_CRANK, two_link
 
-from eigassign.api import load_case
+from eigassign import load_case
 
 
 class Reference(NamedTuple):

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eigassign.api import Case, load_case
-from eigassign.mechanism.assembly.build import with_elements, with_reduction
+from eigassign import Case, load_case
+from eigassign.mechanism import with_elements, with_reduction
 
 CASES = Path(__file__).parents[2] / "cases"
 SHIPPED = sorted(path.stem for path in CASES.glob("*.yaml"))

@@ -10,9 +10,8 @@ from numpy.polynomial import chebyshev
 from scipy.interpolate import CubicSpline
 from spatial_cases import Built
 
-from eigassign.mechanism.assembly.velocity_terms import velocity_terms
-from eigassign.mechanism.trajectory.trajectory import Rates, Trajectory, rates
-from eigassign.modal.exact.solver import modes
+from eigassign.mechanism import Rates, Trajectory, rates, velocity_terms
+from eigassign.modal import modes
 
 ROOT = np.sqrt(15.0)
 GAUSS = np.array([0.5 - ROOT / 10, 0.5, 0.5 + ROOT / 10])

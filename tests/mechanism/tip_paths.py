@@ -9,13 +9,14 @@ from scipy.spatial.transform import Rotation
 from spatial_cases import Built
 from spatial_oracle import Pose, Tree, solve_pose
 
-from eigassign.mechanism.inverse_kinematics.chain import TipChain, tip_chain
-from eigassign.mechanism.inverse_kinematics.tip_path import (
+from eigassign.mechanism import (
     Course,
+    TipChain,
     planar_attitude,
     spatial_attitude,
     spline,
     straight,
+    tip_chain,
 )
 
 

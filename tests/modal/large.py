@@ -11,7 +11,7 @@ from chains import model_of, two_link
 from rungs import treat_as_large
 
 from eigassign.mechanism.assembly import pencil as pencil_module
-from eigassign.modal.model import Model
+from eigassign.modal import Model
 
 HELD = {"stiffness": 2e3}
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])

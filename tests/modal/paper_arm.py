@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from chains import model_of, two_link
 
-from eigassign.api import load_case
-from eigassign.modal.model import Model
+from eigassign import load_case
+from eigassign.modal import Model
 
 FREE = {"upper": None, "fore": None}
 

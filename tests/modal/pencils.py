@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import sparse
 
-from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.series.compiler import compile_program
-from eigassign.series.expression import Recorder, Scalar
+from eigassign.mechanism import Pencil
+from eigassign.series import Recorder, Scalar, compile_program
 
 Terms = Sequence[tuple[Scalar, np.ndarray]]
 

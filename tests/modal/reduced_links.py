@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 from spatial_cases import ALLOY, Built, built
 
-from eigassign.mechanism.assembly.build import build_pencil, local_links
-from eigassign.mechanism.assembly.local_motion import ReducedLinks, reduced_links
-from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism import Pencil, ReducedLinks, build_pencil, local_links, reduced_links
 
 Tree = dict[str, Any]
 

@@ -9,13 +9,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism import Pencil
+from eigassign.modal import Expansion, eigenvalues, expand_subspace, modes
 from eigassign.modal.exact import solver
-from eigassign.modal.exact.solver import eigenvalues, modes
-from eigassign.modal.expansion import Expansion
 from eigassign.modal.taylor import coefficients
-from eigassign.modal.taylor.recursion import expand_subspace
-from eigassign.series.multi_index import total_degree
+from eigassign.series import total_degree
 
 Floats = np.ndarray
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from chains import model_of, two_link
 
-from eigassign.api import expand, load_case, reduce
+from eigassign import expand, load_case, reduce
 from eigassign.errors import EigassignError, UsageError
-from eigassign.modal.expansion import expand as expand_pencil
-from eigassign.modal.model import Model
-from eigassign.series.multi_index import lower_set
+from eigassign.modal import Model
+from eigassign.modal import expand as expand_pencil
+from eigassign.series import lower_set
 
 CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 Q0, Y0 = [1.817, 5.312], [0.125, 0.125]

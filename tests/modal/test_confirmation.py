@@ -9,10 +9,16 @@ import pytest
 from chains import model_of, two_link
 
 from eigassign.errors import UsageError
-from eigassign.modal.confirmation import Wanted, unlike
-from eigassign.modal.expansion import Cluster, Expansion, expand
-from eigassign.modal.reduced.reduce import reduce
-from eigassign.modal.storage import reduced_arrays, reduced_from_arrays
+from eigassign.modal import (
+    Cluster,
+    Expansion,
+    Wanted,
+    expand,
+    reduce,
+    reduced_arrays,
+    reduced_from_arrays,
+    unlike,
+)
 
 Q0, Y0, ORDER = np.array([1.817, 5.312]), np.array([0.125, 0.125]), 4
 

@@ -8,7 +8,7 @@ from chains import Tree, case_of, model_of
 from paper_arm import build, exact, samples
 
 from eigassign.chart.mesh import refined
-from eigassign.study.build import build_model
+from eigassign.study import build_model
 
 
 def test_the_bound_is_above_the_true_error_and_close_to_it() -> None:

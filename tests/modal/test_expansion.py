@@ -12,24 +12,21 @@ from chains import bar, model_of, random_chain, two_link
 from pencils import crossing
 from rungs import derivative, richardson, treat_as_large
 
-from eigassign.api import expand
+from eigassign import expand
 from eigassign.errors import UsageError
-from eigassign.modal import expansion
-from eigassign.modal.exact import solver
-from eigassign.modal.exact.clusters import clusters
-from eigassign.modal.expansion import Expansion, polynomial_error
-from eigassign.modal.expansion import expand as expand_pencil
-from eigassign.modal.model import Model
-from eigassign.modal.taylor.local_coordinates import substitute
-from eigassign.modal.taylor.rayleigh import vector_members
-from eigassign.modal.taylor.recursion import expand_subspace
-from eigassign.series.multi_index import (
-    box,
-    lower_set,
-    partially_linear,
-    total_degree,
+from eigassign.modal import (
+    Expansion,
+    Model,
+    clusters,
+    expand_subspace,
+    expansion,
+    polynomial_error,
+    substitute,
+    vector_members,
 )
-from eigassign.series.power_series import monomials
+from eigassign.modal import expand as expand_pencil
+from eigassign.modal.exact import solver
+from eigassign.series import box, lower_set, monomials, partially_linear, total_degree
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 HELD = {"stiffness": 2e3}

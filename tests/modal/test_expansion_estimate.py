@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from chains import model_of, two_link
 
-from eigassign.api import load_case
+from eigassign import load_case
 from eigassign.errors import UsageError
-from eigassign.modal.expansion import companion_order, expand, radius_share
-from eigassign.series.multi_index import box
+from eigassign.modal import companion_order, expand, radius_share
+from eigassign.series import box
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 

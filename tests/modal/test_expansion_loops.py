@@ -16,7 +16,7 @@ from spatial_cases import built, changed
 from spatial_examples import arm3r, four_bar, gantry, slider_crank
 from spatial_oracle import Tree, world
 
-from eigassign.modal.expansion import Expansion, expand
+from eigassign.modal import Expansion, expand
 
 
 def with_design(tree: Tree, **paths: str) -> Tree:

@@ -17,13 +17,10 @@ from rungs import derivative, residual, slope, treat_as_large
 from spatial_cases import changed
 from spatial_oracle import world
 
-from eigassign.api import Case, expand, load_case, reduce
-from eigassign.case.canonical import plain
-from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.exact.roundoff import rounding_error
-from eigassign.modal.exact.solver import eigenvalues
-from eigassign.modal.expansion import Expansion
-from eigassign.modal.model import Model
+from eigassign import Case, expand, load_case, reduce
+from eigassign.case import plain
+from eigassign.mechanism import Pencil
+from eigassign.modal import Expansion, Model, eigenvalues, rounding_error
 
 SHIPPED = sorted((Path(__file__).parents[2] / "cases").glob("*.yaml"))
 every_case = pytest.mark.parametrize("path", SHIPPED, ids=lambda p: p.stem)

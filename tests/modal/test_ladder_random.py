@@ -9,8 +9,7 @@ from rungs import residual, slope
 from wide_draws import FAMILIES
 
 from eigassign.errors import EigassignError
-from eigassign.modal.exact.roundoff import rounding_error
-from eigassign.modal.expansion import Expansion, expand
+from eigassign.modal import Expansion, expand, rounding_error
 
 EVERY = {"planar trees": draw, **FAMILIES}
 SPAN = 0.2  # rad or m, and of the design parameters' middle values

@@ -18,11 +18,10 @@ from redesigned_arms import (
 )
 from scenes import SHIPPED, scene_of
 
-from eigassign.api import Case, load_case
-from eigassign.modal.exact.solver import eigenvalues
-from eigassign.modal.slopes import eigenvalue_slopes, mixed_slopes
-from eigassign.series.multi_index import total_degree
-from eigassign.study.scene import Scene
+from eigassign import Case, load_case
+from eigassign.modal import eigenvalue_slopes, eigenvalues, mixed_slopes
+from eigassign.series import total_degree
+from eigassign.study import Scene
 
 CASES = Path(__file__).parents[2] / "cases"
 

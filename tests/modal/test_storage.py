@@ -13,8 +13,7 @@ from chains import model_of, random_chain, two_link
 
 from eigassign import api
 from eigassign.errors import StorageError, UsageError
-from eigassign.modal.reduced.reduce import reduce
-from eigassign.modal.storage import reduced_arrays, reduced_from_arrays
+from eigassign.modal import reduce, reduced_arrays, reduced_from_arrays
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 Q = Q0 + np.column_stack([np.zeros(9), np.linspace(-0.5, 0.5, 9)])

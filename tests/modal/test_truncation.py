@@ -13,14 +13,12 @@ from reduced_links import parts_of, random_arm, random_x, reduced
 from spatial_cases import built, changed
 from spatial_examples import four_bar, gantry
 
-from eigassign.api import Case, load_case
+from eigassign import Case, load_case
 from eigassign.errors import AccuracyError
-from eigassign.mechanism.assembly.build import with_elements, with_reduction
-from eigassign.modal.exact.solver import eigenvalues
-from eigassign.modal.truncation import truncation_error
-from eigassign.pipeline.queries import check, modes
-from eigassign.pipeline.run import Options, expand_case
-from eigassign.study.planning import plan_expansion
+from eigassign.mechanism import with_elements, with_reduction
+from eigassign.modal import eigenvalues, truncation_error
+from eigassign.pipeline import Options, check, expand_case, modes
+from eigassign.study import plan_expansion
 
 MODES = (1, 2, 3)
 NOISE = 1e-9  # relative round-off of the exact frequencies compared with, with room

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.study.results import (
+from eigassign.study import (
     ActiveRow,
     AssignmentRow,
     Comparison,

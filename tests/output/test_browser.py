@@ -13,8 +13,7 @@ from typing import Any
 import pytest
 
 from eigassign.cli import main
-from eigassign.output.batch.files import write_files
-from eigassign.output.batch.outcome import CaseOutcome, to_line
+from eigassign.output import CaseOutcome, to_line, write_files
 
 webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
 BROWSER, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")

@@ -13,9 +13,17 @@ import numpy as np
 import pytest
 
 from eigassign.errors import StorageError, UsageError
+from eigassign.output import (
+    HEADER_BYTES,
+    Cache,
+    default_directory,
+    key,
+    lock,
+    pack,
+    replace_synced,
+    unpack,
+)
 from eigassign.output import cache as module
-from eigassign.output.cache import HEADER_BYTES, Cache, default_directory, key, pack, unpack
-from eigassign.output.storage import lock, replace_synced
 
 ARRAYS = {
     "coefficients": np.array([1.0, -0.0, 5e-324, np.nan, np.inf, 1.7e308]).reshape(2, 3),
@@ -115,7 +123,7 @@ def resealed(path: Path, change) -> bytes:
 
     import h5py
 
-    from eigassign.output.cache import header
+    from eigassign.output import header
 
     buffer = io.BytesIO(path.read_bytes())
     with h5py.File(buffer, "r+") as file:
@@ -125,7 +133,7 @@ def resealed(path: Path, change) -> bytes:
 
 
 def not_hdf5(path: Path) -> bytes:
-    from eigassign.output.cache import header
+    from eigassign.output import header
 
     return header(KEY, b"rubbish") + b"rubbish"
 

@@ -26,12 +26,17 @@ from eigassign.chart.results import (
     MeshRow,
     Timing,
 )
-from eigassign.output import chart_report
-from eigassign.output.chart_report import write_chart
+from eigassign.output import (
+    FigurePlan,
+    MethodLine,
+    chart_figures,
+    chart_report,
+    draw,
+    render,
+    scatter,
+    write_chart,
+)
 from eigassign.output.figures import screen, style
-from eigassign.output.figures.front import MethodLine, chart_figures, scatter
-from eigassign.output.figures.graph import FigurePlan
-from eigassign.output.figures.paper import draw, render
 
 
 def timing(seconds: float, repeats: int = 5) -> Timing:

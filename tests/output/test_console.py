@@ -7,11 +7,17 @@ import io
 import pytest
 from synthetic_results import make_results
 
-from eigassign.output import console, terminal
-from eigassign.output.batch.outcome import CaseOutcome
-from eigassign.output.batch.summary import batch_table
-from eigassign.output.formats import number, percent, residual, seconds
-from eigassign.study.results import ValidationRow
+from eigassign.output import (
+    CaseOutcome,
+    batch_table,
+    console,
+    number,
+    percent,
+    residual,
+    seconds,
+    terminal,
+)
+from eigassign.study import ValidationRow
 
 
 class Terminal(io.StringIO):

@@ -14,10 +14,9 @@ from matplotlib.figure import Figure
 from PIL import Image
 from synthetic_results import as_limit, make_results, studied
 
+from eigassign.output import draw, render, run_figures
 from eigassign.output.figures import graph, style
-from eigassign.output.figures.paper import draw, render
-from eigassign.output.figures.run import run_figures
-from eigassign.study.results import OtherModes, RunResults
+from eigassign.study import OtherModes, RunResults
 
 LONG = "ein_sehr_langer_Name_für_$x_1^2$_中_\x1b[31m_"
 EVERY = {

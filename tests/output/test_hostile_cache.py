@@ -14,8 +14,16 @@ import numpy as np
 import pytest
 
 from eigassign.errors import StorageError
-from eigassign.output.cache import HEADER_BYTES, Cache, DamagedError, header, key, pack, unpack
-from eigassign.output.reduced_file import load_reduced
+from eigassign.output import (
+    HEADER_BYTES,
+    Cache,
+    DamagedError,
+    header,
+    key,
+    load_reduced,
+    pack,
+    unpack,
+)
 
 KEY = key(("hostile",))
 ARRAYS = {"numbers": np.arange(6.0), "integers": np.arange(3)}

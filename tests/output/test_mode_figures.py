@@ -14,23 +14,23 @@ from PIL import Image
 from synthetic_results import make_results
 
 import eigassign as ea
-from eigassign.output.figures import graph, style
-from eigassign.output.figures.mechanism import (
+from eigassign.output import (
     diameters,
+    draw,
     draw_links,
     extent,
     length_label,
     line_widths,
+    mode_figures,
     points_of,
+    render,
     round_length,
+    thumbnail,
     view_of,
+    write_modes,
 )
-from eigassign.output.figures.modes import mode_figures, thumbnail
-from eigassign.output.figures.paper import draw, render
-from eigassign.output.report import write_modes
-from eigassign.study.drawing import draw_modes
-from eigassign.study.planning import with_middle_loads
-from eigassign.study.results import DrawnBody, DrawnPoses, ModePictures
+from eigassign.output.figures import graph, style
+from eigassign.study import DrawnBody, DrawnPoses, ModePictures, draw_modes, with_middle_loads
 
 CASES = Path(__file__).parents[2] / "cases"
 GALLERY = CASES / "gallery"

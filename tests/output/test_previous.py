@@ -10,11 +10,19 @@ import pytest
 from synthetic_results import make_results
 
 from eigassign.errors import UsageError
-from eigassign.output import console
-from eigassign.output.batch.outcome import CaseOutcome, frequency_ranges, to_line
-from eigassign.output.previous import Comparison, Known, of_outcome, of_validation, read_previous
-from eigassign.output.result_files import to_json
-from eigassign.study.results import ValidationRow
+from eigassign.output import (
+    CaseOutcome,
+    Comparison,
+    Known,
+    console,
+    frequency_ranges,
+    of_outcome,
+    of_validation,
+    read_previous,
+    to_json,
+    to_line,
+)
+from eigassign.study import ValidationRow
 
 ROW = CaseOutcome(
     "arm", "arm.yaml", "ok", 0.1, frequencies=(("mode 1", 180.0, 190.0, 200.0),), verdict="reached"

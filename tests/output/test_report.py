@@ -12,11 +12,8 @@ import numpy as np
 import pytest
 from synthetic_results import make_results, studied
 
-from eigassign.output import report
+from eigassign.output import Curve, Graph, Look, Panel, Shade, report, run_figures, write_run
 from eigassign.output.figures import screen
-from eigassign.output.figures.graph import Curve, Graph, Look, Panel, Shade
-from eigassign.output.figures.run import run_figures
-from eigassign.output.report import write_run
 from eigassign.output.tables import tables
 
 VOID = {"meta", "img", "br", "link", "input"}

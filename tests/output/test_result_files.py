@@ -10,8 +10,8 @@ import pytest
 from synthetic_results import as_limit, make_results
 
 from eigassign.errors import EigassignError
-from eigassign.output.result_files import dumps, to_json
-from eigassign.study.results import ErrorRow, TargetStudy
+from eigassign.output import dumps, to_json
+from eigassign.study import ErrorRow, TargetStudy
 
 
 def read(results) -> dict:

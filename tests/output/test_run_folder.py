@@ -13,10 +13,9 @@ from pathlib import Path
 import pytest
 
 from eigassign.errors import StorageError
+from eigassign.output import MARKER, storage
 from eigassign.output import run_folder as module
-from eigassign.output import storage
 from eigassign.output.run_folder import run_folder
-from eigassign.output.run_record import MARKER
 
 
 @pytest.fixture

@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 from eigassign.errors import UsageError
-from eigassign.output import run_record
+from eigassign.output import MARKER, RunStatus, run_record, run_status
 from eigassign.output.run_folder import run_folder
-from eigassign.output.run_record import MARKER, RunStatus, run_status
 
 FILES = {"results.json": "{}", "case.yaml": "title: arm\n", "figures/modes.png": "png"}
 

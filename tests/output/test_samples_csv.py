@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from synthetic_results import as_limit, make_results
 
-from eigassign.mechanism.trajectory.csv import read_samples
-from eigassign.output.result_files import sample_files
-from eigassign.study.results import Comparison, OtherModes, RunResults
+from eigassign.mechanism import read_samples
+from eigassign.output import sample_files
+from eigassign.study import Comparison, OtherModes, RunResults
 
 
 def rows_of(data: bytes) -> list[dict[str, str]]:

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 from synthetic_results import as_limit, make_results
 
-from eigassign.output.tables import Table, headline, tables
-from eigassign.study.results import (
+from eigassign.output import Table, headline
+from eigassign.output.tables import tables
+from eigassign.study import (
     CatalogueRow,
     ClearanceRow,
     CombinationRow,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from eigassign.api import Case, load_case
-from eigassign.pipeline.run import Options, Result, solve_case
+from eigassign import Case, load_case
+from eigassign.pipeline import Options, Result, solve_case
 
 SHIPPED = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 UNCACHED = Options(use_cache=False)

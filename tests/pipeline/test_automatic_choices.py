@@ -8,14 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eigassign.api import load_case
+from eigassign import load_case
 from eigassign.errors import AccuracyError
-from eigassign.mechanism.assembly.build import with_elements
-from eigassign.modal.expansion import NearestExpansion
-from eigassign.pipeline.run import prepare, solve_case
-from eigassign.pipeline.stages import Stages
-from eigassign.study.build import build_model
-from eigassign.study.planning import corners
+from eigassign.mechanism import with_elements
+from eigassign.modal import NearestExpansion
+from eigassign.pipeline import Stages, prepare, solve_case
+from eigassign.study import build_model, corners
 
 CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 

@@ -10,19 +10,18 @@ import numpy as np
 import pytest
 from run_cases import TARGET, automatic, case_of, chain, shipped
 
-from eigassign.api import Case
+from eigassign import Case
 from eigassign.errors import UsageError
-from eigassign.modal.expansion import Expansion
-from eigassign.modal.storage import (
+from eigassign.modal import (
+    Expansion,
     expansion_arrays,
     expansions_from_arrays,
     flatten,
     pencil_parts,
 )
-from eigassign.output.cache import Cache
-from eigassign.pipeline.expansions import affordable_order, expand_plan, expansion_key
-from eigassign.pipeline.run import Options, solve_case
-from eigassign.study.planning import Plan, plan_expansion
+from eigassign.output import Cache
+from eigassign.pipeline import Options, affordable_order, expand_plan, expansion_key, solve_case
+from eigassign.study import Plan, plan_expansion
 
 
 def plan_of(case: Case) -> Plan:

@@ -6,13 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from eigassign.api import load_case
+from eigassign import load_case
 from eigassign.chart.comparison import Request
 from eigassign.chart.effort import Effort
 from eigassign.chart.timing import Patience
 from eigassign.modal.adaptive import order as expansion_choice
-from eigassign.pipeline.chart import chart_case, skipped_notes
-from eigassign.pipeline.run import Options
+from eigassign.pipeline import Options, chart_case, skipped_notes
 
 SHIPPED = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
 EFFORT = Effort(

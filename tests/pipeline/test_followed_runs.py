@@ -15,10 +15,9 @@ from rail_and_mast import HEIGHT, LAMP, OUT, alone, case, tree
 from scipy.optimize import brentq, minimize_scalar
 
 from eigassign.errors import CaseError, LostModeError
-from eigassign.output.result_files import frequencies_csv, results_document
-from eigassign.pipeline.queries import check
-from eigassign.pipeline.run import Options, expand_case, optimize, solve_case, validate
-from eigassign.study.results import RunResults
+from eigassign.output import frequencies_csv, results_document
+from eigassign.pipeline import Options, check, expand_case, optimize, solve_case, validate
+from eigassign.study import RunResults
 
 RAIL, MAST = alone("rail").model(), alone("mast").model()
 X = alone("rail").trajectory.q

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from eigassign.case import parse
-from eigassign.pipeline.run import Result, solve_case
-from eigassign.study.built_case import Case
-from eigassign.study.results import AssignmentRow, CatalogueRow
+from eigassign.pipeline import Result, solve_case
+from eigassign.study import AssignmentRow, Case, CatalogueRow
 
 TEXT = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
 HEAD, REST = TEXT.replace("samples: 152", "samples: 11").split("design: #")

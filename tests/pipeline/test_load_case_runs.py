@@ -10,12 +10,11 @@ import pytest
 from load_cases import INERTIA, LOADED, MASS, alone, arm, case, text
 from run_cases import UNCACHED, solved, written
 
-from eigassign.api import load_case
+from eigassign import load_case
 from eigassign.errors import CaseError, UsageError
-from eigassign.output.result_files import results_document, sample_files
-from eigassign.pipeline.queries import check, modes
-from eigassign.pipeline.run import Options, Result, optimize, validate
-from eigassign.study.updating.measured import read_measurements
+from eigassign.output import results_document, sample_files
+from eigassign.pipeline import Options, Result, check, modes, optimize, validate
+from eigassign.study import read_measurements
 
 TARGET = [{"mode": 1, "frequency": 13.0}]
 

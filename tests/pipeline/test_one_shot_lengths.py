@@ -6,8 +6,8 @@ from pathlib import Path
 
 from run_cases import UNCACHED, written
 
-from eigassign.api import load_case
-from eigassign.pipeline.run import solve_case
+from eigassign import load_case
+from eigassign.pipeline import solve_case
 
 LENGTHS = Path(__file__).parents[2] / "cases" / "arm_lengths.yaml"
 

@@ -8,8 +8,7 @@ import pytest
 from run_cases import SHIPPED
 
 from eigassign.errors import StorageError
-from eigassign.pipeline.outlook import draw
-from eigassign.pipeline.queries import check
+from eigassign.pipeline import check, draw
 
 
 def test_check_states_coefficients_memory_and_seconds_and_the_next_step() -> None:

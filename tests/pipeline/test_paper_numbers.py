@@ -12,9 +12,8 @@ import pytest
 from run_cases import ONE_SHOT, SHIPPED, UNCACHED, shipped, solved
 
 import eigassign as ea
-from eigassign.pipeline.queries import modes
-from eigassign.pipeline.run import Result, validate
-from eigassign.study.results import ValidationRow
+from eigassign.pipeline import Result, modes, validate
+from eigassign.study import ValidationRow
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import pytest
 from run_cases import SHIPPED, automatic, chain, shipped, without, written
 
 from eigassign.errors import CaseError, UsageError
-from eigassign.pipeline.queries import check, modes
+from eigassign.pipeline import check, modes
 
 
 def test_modes_are_taken_where_the_case_says_unless_asked_elsewhere() -> None:

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from run_cases import ONE_SHOT, SHIPPED, UNCACHED, chain, shipped, without, written
 
-from eigassign.api import load_case
+from eigassign import load_case
 from eigassign.errors import StorageError, UsageError
-from eigassign.pipeline.run import Options, Outcome, expand_case, optimize, solve_case
+from eigassign.pipeline import Options, Outcome, expand_case, optimize, solve_case
 
 
 def in_folder(path: Path) -> Options:

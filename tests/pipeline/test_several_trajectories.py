@@ -12,9 +12,8 @@ from scipy.optimize import lsq_linear
 
 import eigassign as ea
 from eigassign.errors import CaseError
-from eigassign.output.result_files import results_document, sample_files, to_json
-from eigassign.pipeline.queries import check
-from eigassign.pipeline.run import Options, Result, optimize, validate
+from eigassign.output import results_document, sample_files, to_json
+from eigassign.pipeline import Options, Result, check, optimize, validate
 
 REST = without(shipped(), "trajectory", "targets") + ONE_SHOT
 TARGETS = "targets:\n  - {mode: 1, frequency: 194 Hz}\n"  # that leaves m1 between its bounds

@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from eigassign.pipeline.stages import Stages, silent
+from eigassign.pipeline import Stages, silent
 
 
 class Lines:

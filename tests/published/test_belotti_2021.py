@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import eigassign as ea
-from eigassign.api import Case, expand
+from eigassign import Case, expand
 
 CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])

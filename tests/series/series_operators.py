@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.series.multi_index import LowerSet
-from eigassign.series.power_series import compose, monomials, multiply, power_taylor, wave_taylor
+from eigassign.series import LowerSet, compose, monomials, multiply, power_taylor, wave_taylor
 
 Floats = NDArray[np.float64]
 

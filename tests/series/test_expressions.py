@@ -13,10 +13,21 @@ from hypothesis import strategies as st
 from series_operators import PowerSeries
 
 from eigassign.errors import UsageError
-from eigassign.series.algebra import Samples, Tangents, Truncated
-from eigassign.series.compiler import compile_program, compile_table
-from eigassign.series.expression import Expression, Recorder, cos, derivative, exp, sin
-from eigassign.series.multi_index import on_faces, total_degree
+from eigassign.series import (
+    Expression,
+    Recorder,
+    Samples,
+    Tangents,
+    Truncated,
+    compile_program,
+    compile_table,
+    cos,
+    derivative,
+    exp,
+    on_faces,
+    sin,
+    total_degree,
+)
 
 N = 3
 SPACE = total_degree(N, 4)

@@ -8,11 +8,19 @@ import numpy as np
 import pytest
 
 from eigassign.errors import SingularityError
-from eigassign.series.algebra import Samples, Truncated
-from eigassign.series.compiler import compile_program
-from eigassign.series.expression import Expression, Recorder, Scalar, cos, derivative, sin
-from eigassign.series.implicit import ImplicitFunction
-from eigassign.series.multi_index import total_degree
+from eigassign.series import (
+    Expression,
+    ImplicitFunction,
+    Recorder,
+    Samples,
+    Scalar,
+    Truncated,
+    compile_program,
+    cos,
+    derivative,
+    sin,
+    total_degree,
+)
 
 Equations = Callable[[list[Expression], list[Expression]], Sequence[Scalar]]
 

@@ -9,13 +9,7 @@ import numpy as np
 import pytest
 
 from eigassign.errors import UsageError
-from eigassign.series.multi_index import (
-    LowerSet,
-    box,
-    lower_set,
-    partially_linear,
-    total_degree,
-)
+from eigassign.series import LowerSet, box, lower_set, partially_linear, total_degree
 
 SETS = {
     "total degree": total_degree(3, 4),

@@ -5,8 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from eigassign.series.multi_index import LowerSet, box, partially_linear, total_degree
-from eigassign.series.power_series import BLOCK, monomials, monomials_of, polynomials
+from eigassign.series import (
+    BLOCK,
+    LowerSet,
+    box,
+    monomials,
+    monomials_of,
+    partially_linear,
+    polynomials,
+    total_degree,
+)
 
 SETS = [
     total_degree(1, 5),

@@ -9,15 +9,17 @@ import numpy as np
 import pytest
 from series_operators import PowerSeries, sine_taylor
 
-from eigassign.series import power_series
-from eigassign.series.multi_index import (
+from eigassign.series import (
     LowerSet,
     box,
+    compose,
     lower_set,
+    monomials,
+    multiply,
     partially_linear,
+    power_series,
     total_degree,
 )
-from eigassign.series.power_series import compose, monomials, multiply
 
 SETS = {
     "total degree": total_degree(3, 5),

@@ -10,8 +10,7 @@ import numpy as np
 from chains import Tree, model_of, random_chain
 
 from eigassign.errors import EigassignError, MechanismError
-from eigassign.modal.exact.roundoff import rounding_error
-from eigassign.modal.model import Model
+from eigassign.modal import Model, rounding_error
 
 SPAN = np.pi / 3.0  # rad: q is drawn within this of q0, coordinate by coordinate
 Floats = np.ndarray

@@ -20,7 +20,7 @@ from wide_draws import hanging_arm
 
 import eigassign as ea
 from eigassign.errors import EigassignError
-from eigassign.modal.model import Model
+from eigassign.modal import Model
 
 ACCURACIES = (1e-2, 1e-4, 1e-6, 1e-8)
 SOLVES = (5, 9, 12, 16, 25)

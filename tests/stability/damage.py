@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.output.cache import HEADER_BYTES, header, pack
+from eigassign.output import HEADER_BYTES, header, pack
 
 Arrays = dict[str, NDArray[Any]]
 Damage = Callable[[Arrays, np.random.Generator], None]

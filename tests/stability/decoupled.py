@@ -12,7 +12,7 @@ from calibration import Drawn
 from chains import Tree, model_of
 
 from eigassign.errors import EigassignError
-from eigassign.modal.model import Model
+from eigassign.modal import Model
 
 KINDS = ("comb", "rake", "pods", "tree", "light")
 Random = np.random.Generator

@@ -16,8 +16,7 @@ import numpy as np
 
 import eigassign as ea
 from eigassign.errors import AccuracyError, UsageError
-from eigassign.modal.exact.roundoff import rounding_error
-from eigassign.modal.model import Model
+from eigassign.modal import Model, rounding_error
 
 CASES = (*sorted(Path("cases").glob("*.yaml")), Path("cases/stress/wide_motion.yaml"))
 ACCURACIES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)

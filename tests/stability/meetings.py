@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from chains import Tree, model_of
 
-from eigassign.modal.model import Model
+from eigassign.modal import Model
 
 E_ONE, E_LOW, E_HIGH = 70e9, 60e9, 80e9
 

@@ -16,11 +16,9 @@ from wide_draws import FAMILIES
 from eigassign.case import CaseFile
 from eigassign.chart.mesh import refined
 from eigassign.errors import AccuracyError, EigassignError
-from eigassign.mechanism.assembly.build import with_elements
-from eigassign.modal.model import Model
-from eigassign.study.build import build_model
-from eigassign.study.planning import automatic_elements
-from eigassign.study.settling import settle_model
+from eigassign.mechanism import with_elements
+from eigassign.modal import Model
+from eigassign.study import automatic_elements, build_model, settle_model
 
 FINER = 8.0
 DRAWS = (draw, *FAMILIES.values())

@@ -14,7 +14,7 @@ import numpy as np
 from chains import Tree, model_of
 
 from eigassign.errors import EigassignError
-from eigassign.modal.exact.roundoff import rounding_error
+from eigassign.modal import rounding_error
 
 FACTORS = (1.0, 1.1, 1.0 / 3.0, 7.3, 0.61, 1.9, 23.7, 0.013)
 Random = np.random.Generator

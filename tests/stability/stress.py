@@ -7,8 +7,8 @@ from typing import Protocol
 
 import numpy as np
 
-from eigassign.api import Case, load_case
-from eigassign.modal.model import Model
+from eigassign import Case, load_case
+from eigassign.modal import Model
 
 ATLAS = Path(__file__).parents[2] / "cases" / "stress"
 

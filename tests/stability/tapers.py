@@ -13,8 +13,8 @@ import numpy as np
 from chains import Tree, case_of
 
 from eigassign.chart.mesh import refined
-from eigassign.modal.exact.roundoff import rounding_error
-from eigassign.study.build import build_model
+from eigassign.modal import rounding_error
+from eigassign.study import build_model
 
 FINE = 64  # elements of what is called true
 Random = np.random.Generator

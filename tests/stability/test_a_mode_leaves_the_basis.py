@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from stress import answered, judged
 
-from eigassign.api import load_case
-from eigassign.modal.reduced.reduce import reduce
+from eigassign import load_case
+from eigassign.modal import reduce
 
 Q0, Y0 = [1.817, 5.312], [0.125, 0.125]
 

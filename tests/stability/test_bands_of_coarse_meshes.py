@@ -10,10 +10,8 @@ from meshes import DRAWS, FINER
 
 from eigassign.chart.mesh import refined
 from eigassign.errors import EigassignError
-from eigassign.mechanism.assembly.build import with_elements, with_reduction
-from eigassign.study.build import build_model
-from eigassign.study.design.clearance import Band, prove_clear
-from eigassign.study.planning import automatic_elements
+from eigassign.mechanism import with_elements, with_reduction
+from eigassign.study import Band, automatic_elements, build_model, prove_clear
 
 EACH = 6  # bands of one mechanism
 

@@ -7,9 +7,7 @@ import pytest
 from stress import answered, case, judged
 
 from eigassign.errors import AccuracyError
-from eigassign.modal.adaptive.order import choose_expansion
-from eigassign.modal.adaptive.reduced_model import reduce_adaptively
-from eigassign.modal.expansion import expand, radius_share
+from eigassign.modal import choose_expansion, expand, radius_share, reduce_adaptively
 
 ELBOW = np.deg2rad(np.linspace(20.0, 170.0, 61))
 Q = np.column_stack([np.zeros(61), ELBOW])

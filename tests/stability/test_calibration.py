@@ -7,8 +7,7 @@ import pytest
 from calibration import Drawn, Floats, Tally, tally
 from wide_draws import FAMILIES
 
-from eigassign.modal.expansion import expand
-from eigassign.modal.reduced.reduce import reduce
+from eigassign.modal import expand, reduce
 
 COVERED, OVERESTIMATE = 0.999, 30.0
 CLOSE = 0.9  # share of the answers within 100 × the true error, where that is above round-off

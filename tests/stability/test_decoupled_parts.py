@@ -13,11 +13,8 @@ from stress import answered, judged
 from test_calibration import polynomial, reduced_model
 
 from eigassign.errors import AccuracyError, UsageError
-from eigassign.modal.adaptive.reduced_model import reduce_adaptively
-from eigassign.modal.expansion import expand
+from eigassign.modal import Box, expand, reduce, reduce_adaptively
 from eigassign.modal.fit.fit import fit
-from eigassign.modal.fit.region import Box
-from eigassign.modal.reduced.reduce import reduce
 
 TIP = np.linspace(0.0, 0.1, 21)[:, None]  # kg
 

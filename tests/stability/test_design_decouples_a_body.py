@@ -7,8 +7,7 @@ import pytest
 from stress import answered, case, judged
 
 from eigassign.errors import UsageError
-from eigassign.modal.expansion import expand
-from eigassign.modal.reduced.reduce import reduce
+from eigassign.modal import expand, reduce
 
 POSE = [0.0, 1.0]
 K = np.concatenate([np.geomspace(1e-6, 100.0, 17), np.linspace(200.0, 1000.0, 9)])[:, None]

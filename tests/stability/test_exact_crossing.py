@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from stress import answered, case, judged
 
-from eigassign.modal.expansion import expand
-from eigassign.modal.reduced.reduce import reduce
+from eigassign.modal import expand, reduce
 
 E = np.linspace(60e9, 80e9, 41)[:, None]
 CROSSING = np.array([70e9])

@@ -8,8 +8,7 @@ from chains import model_of, two_link
 from stress import case
 
 from eigassign.errors import AccuracyError
-from eigassign.modal.exact.roundoff import rounding_error
-from eigassign.modal.reduced.reduce import reduce
+from eigassign.modal import reduce, rounding_error
 
 Q0, Y0 = [1.817, 5.312], [0.125, 0.125]
 

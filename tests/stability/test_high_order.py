@@ -9,7 +9,7 @@ import pytest
 from chains import model_of, two_link
 from stress import judged
 
-from eigassign.modal.expansion import expand
+from eigassign.modal import expand
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 

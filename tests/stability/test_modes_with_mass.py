@@ -11,13 +11,9 @@ from scipy.linalg import eigh
 from stress import ATLAS, case
 
 from eigassign.errors import MissingMassError
-from eigassign.mechanism.kinematics.parameters import initial_design
+from eigassign.mechanism import initial_design
+from eigassign.modal import Model, condense, expand, lowest_modes, reduce
 from eigassign.modal.exact import sparse as exact_sparse
-from eigassign.modal.exact.condensation import condense
-from eigassign.modal.exact.solver import lowest_modes
-from eigassign.modal.expansion import expand
-from eigassign.modal.model import Model
-from eigassign.modal.reduced.reduce import reduce
 
 POSE = [0.3, 0.9]
 ELEMENTS = 3  # of a link: 9 unknowns, and one more where its root turns

@@ -8,8 +8,7 @@ from chains import bar, model_of
 from stress import answered, case, judged
 
 from eigassign.errors import MechanismError
-from eigassign.modal.expansion import expand
-from eigassign.modal.reduced.reduce import reduce
+from eigassign.modal import expand, reduce
 
 M = np.linspace(5.0, 40.0, 15)[:, None]
 POSE = [0.0, 1.0]

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from stress import answered, case, judged
 
-from eigassign.modal.expansion import expand
-from eigassign.modal.reduced.reduce import reduce
+from eigassign.modal import expand, reduce
 
 D = np.linspace(0.008, 0.012, 9)[:, None]
 

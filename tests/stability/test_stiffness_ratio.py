@@ -6,8 +6,7 @@ import numpy as np
 from chains import model_of
 from stress import answered, case, judged
 
-from eigassign.modal.expansion import expand
-from eigassign.modal.reduced.reduce import reduce
+from eigassign.modal import expand, reduce
 
 E = np.linspace(1e9, 4e9, 13)[:, None]
 POSE = [0.2, 0.9]

@@ -12,11 +12,10 @@ from damage import damaged
 
 import eigassign as ea
 from eigassign.errors import StorageError
-from eigassign.modal.reduced.model import ReducedModel
-from eigassign.modal.storage import expansion_arrays
-from eigassign.output.cache import Cache, unpack
-from eigassign.pipeline.expansions import affordable_order, expand_plan, expansion_key
-from eigassign.study.planning import Plan, plan_expansion
+from eigassign.modal import ReducedModel, expansion_arrays
+from eigassign.output import Cache, unpack
+from eigassign.pipeline import affordable_order, expand_plan, expansion_key
+from eigassign.study import Plan, plan_expansion
 
 CASES = Path(__file__).parents[2] / "cases"
 WRONG = 1e-8  # relative in Hz; what is nearer than this to the undamaged is no wrong number

@@ -8,8 +8,7 @@ from chains import model_of, two_link
 from stress import answered, case, judged
 
 from eigassign.errors import CaseError
-from eigassign.modal.expansion import expand
-from eigassign.modal.reduced.reduce import reduce
+from eigassign.modal import expand, reduce
 
 Y0 = np.array([0.125, 0.125])
 

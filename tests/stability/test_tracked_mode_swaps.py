@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from stress import answered, case, judged
 
-from eigassign.modal.expansion import expand
-from eigassign.modal.reduced.reduce import reduce
+from eigassign.modal import expand, reduce
 
 Q = np.deg2rad(np.linspace(10.0, 165.0, 40))[:, None]
 

@@ -7,10 +7,7 @@ import pytest
 from chains import model_of
 from stress import answered, case, judged
 
-from eigassign.modal.exact.clusters import CLUSTER_GAP
-from eigassign.modal.expansion import expand
-from eigassign.modal.model import Model
-from eigassign.modal.reduced.reduce import reduce
+from eigassign.modal import CLUSTER_GAP, Model, expand, reduce
 
 E0 = 70e9
 # Length of the stub in m and factor on its modulus that leave these relative gaps in frequency.

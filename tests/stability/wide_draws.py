@@ -14,7 +14,7 @@ from spatial_cases import ALLOY, STEEL
 from spatial_random import random_closed, random_open
 
 from eigassign.errors import EigassignError
-from eigassign.modal.model import Model
+from eigassign.modal import Model
 
 SLIDE = 0.1  # m: a sliding joint is drawn within this of its place at q0
 LOOP_SPAN = 0.5  # rad: a loop seldom closes over more

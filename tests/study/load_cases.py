@@ -8,8 +8,8 @@ from typing import Any
 
 from chains import Tree, two_link
 
-from eigassign.api import Case
-from eigassign.case.loading import parse
+from eigassign import Case
+from eigassign.case import parse
 
 MASS, INERTIA = "bodies.payload.mass", "bodies.payload.inertia"
 PICK = {"points": [[0.3, 1.2], [1.0, 2.2]], "duration": 1.0, "samples": 11}

@@ -7,7 +7,7 @@ from typing import Any
 
 from chains import Tree, case_of
 
-from eigassign.api import Case
+from eigassign import Case
 
 HEIGHT = {"parameter": "sections.rail.height", "min": 0.02, "max": 0.05}
 LAMP = {"parameter": "bodies.lamp.mass", "min": 0.2, "max": 3.0}

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from eigassign.api import load_case
-from eigassign.pipeline.run import prepare
-from eigassign.pipeline.stages import Stages
-from eigassign.study.scene import Scene
+from eigassign import load_case
+from eigassign.pipeline import Stages, prepare
+from eigassign.study import Scene
 
 SHIPPED = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
 HEAD = SHIPPED[: SHIPPED.index("# The paper draws")]  # mechanism and coordinates only

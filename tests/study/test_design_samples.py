@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scenes import SHIPPED, scene_of
 
-from eigassign.study.planning import at_corners, at_random, corners, with_worse_designs
-from eigassign.study.scene import Scene
+from eigassign.study import Scene, at_corners, at_random, corners, with_worse_designs
 
 
 @pytest.fixture(scope="module")

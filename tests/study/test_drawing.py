@@ -10,9 +10,15 @@ from scenes import HEAD, SHIPPED, changed, scene_of
 
 import eigassign as ea
 from eigassign.case import parse
-from eigassign.study.drawing import AMPLITUDE, draw_modes, draw_poses, rest_pose, spread_samples
-from eigassign.study.planning import with_middle_loads
-from eigassign.study.results import ModePictures
+from eigassign.study import (
+    AMPLITUDE,
+    ModePictures,
+    draw_modes,
+    draw_poses,
+    rest_pose,
+    spread_samples,
+    with_middle_loads,
+)
 
 CASES = Path(__file__).parents[2] / "cases"
 ALL = sorted(path.stem for path in CASES.glob("*.yaml"))

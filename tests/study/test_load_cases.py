@@ -10,14 +10,10 @@ from load_cases import INERTIA, LOADED, MASS, alone, arm, case, text
 from scenes import scene_of
 
 import eigassign as ea
-from eigassign.case.loading import parse
-from eigassign.mechanism.assembly.velocity_terms import velocity_terms
-from eigassign.mechanism.trajectory.trajectory import rates
-from eigassign.modal.expansion import NearestExpansion
-from eigassign.modal.slopes import eigenvalue_slopes
-from eigassign.modal.slow_motion import motion_effect
-from eigassign.study.comparison import random_q
-from eigassign.study.planning import plan_expansion
+from eigassign.case import parse
+from eigassign.mechanism import rates, velocity_terms
+from eigassign.modal import NearestExpansion, eigenvalue_slopes, motion_effect
+from eigassign.study import plan_expansion, random_q
 
 Y = [0.1, 0.05]
 SETS = {

@@ -8,7 +8,7 @@ import numpy as np
 from chains import Tree, case_of
 
 from eigassign.chart.mesh import refined
-from eigassign.study.build import build_model
+from eigassign.study import build_model
 
 ACCURACY = 1e-2
 

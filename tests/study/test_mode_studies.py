@@ -7,7 +7,7 @@ import pytest
 from scenes import HEAD, SHIPPED, changed, scene_of
 
 from eigassign.case import parse
-from eigassign.study.comparison import COARSE, compare, grid_over, q_grid, study_modes
+from eigassign.study import COARSE, compare, grid_over, q_grid, study_modes
 
 
 def test_a_map_holds_at_each_point_what_a_solve_there_gives(tmp_path: Path) -> None:

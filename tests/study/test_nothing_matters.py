@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from eigassign.case import parse
-from eigassign.modal.adaptive.order import choose_expansion
-from eigassign.modal.discretisation import discretisation_error
-from eigassign.study.built_case import Case
+from eigassign.modal import choose_expansion, discretisation_error
+from eigassign.study import Case
 
 TEXT = """
 title: A locked arm and a material that no link is made of

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scenes import HEAD, SHIPPED, automatic, changed, scene_of
 
-from eigassign.api import load_case
+from eigassign import load_case
 from eigassign.errors import CaseError, UsageError
-from eigassign.study.planning import Plan, central_sample, joint_map, plan_expansion, shown_point
+from eigassign.study import Plan, central_sample, joint_map, plan_expansion, shown_point
 
 
 def plan_of(folder: Path, text: str, **override: object) -> Plan:

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from scenes import SHIPPED
 
-from eigassign.api import load_case
-from eigassign.study.planning import mesh_share, series_share, truncation_share
+from eigassign import load_case
+from eigassign.study import mesh_share, series_share, truncation_share
 
 
 @pytest.mark.parametrize(

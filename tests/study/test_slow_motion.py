@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eigassign.api import load_case
-from eigassign.mechanism.trajectory.trajectory import Rates, Trajectory, rates
-from eigassign.pipeline.run import solve_case
+from eigassign import load_case
+from eigassign.mechanism import Rates, Trajectory, rates
+from eigassign.pipeline import solve_case
 
 CASE = Path(__file__).parents[2] / "cases" / "two_link.yaml"
 
@@ -51,8 +51,8 @@ def test_the_corners_of_a_trapezoid_are_judged_by_its_acceleration(tmp_path: Pat
 
 
 def test_the_effect_grows_with_the_square_of_the_speed(tmp_path: Path) -> None:
-    from eigassign.mechanism.assembly.velocity_terms import velocity_terms
-    from eigassign.modal.slow_motion import motion_effect
+    from eigassign.mechanism import velocity_terms
+    from eigassign.modal import motion_effect
 
     case = load_case(CASE)
     model, path = case.model(), case.trajectory
@@ -70,7 +70,7 @@ def test_the_effect_grows_with_the_square_of_the_speed(tmp_path: Path) -> None:
 
 def test_near_modes_are_not_settled_by_the_simple_estimate() -> None:
     """g is the nearest neighbour of a wanted mode, 1 at most and never 0."""
-    from eigassign.study.accuracy import least_gap
+    from eigassign.study import least_gap
 
     hz = np.array([[100.0, 150.0, 300.0], [100.0, 110.0, 300.0]])
     assert least_gap(hz, (1,)) == pytest.approx(0.21)

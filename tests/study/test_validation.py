@@ -8,7 +8,7 @@ import pytest
 from scenes import HEAD, SHIPPED, automatic, changed, scene_of
 
 from eigassign.errors import CaseError
-from eigassign.study.comparison import (
+from eigassign.study import (
     DESIGN_BOX,
     RANDOM_BOX,
     TRAJECTORY,

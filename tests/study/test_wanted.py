@@ -11,8 +11,8 @@ from small_case import TEXT
 
 from eigassign.case import load
 from eigassign.errors import CaseError
-from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectories, Trajectory
-from eigassign.study.wanted import Wanted, named_design, named_pose, target_frequencies
+from eigassign.mechanism import NamedTrajectory, Trajectories, Trajectory
+from eigassign.study import Wanted, named_design, named_pose, target_frequencies
 
 MOTION = TEXT[TEXT.index("trajectory:\n") : TEXT.index("design:\n")]
 SEVERAL = "trajectory:\n  - {name: a, file: a.csv}\n  - {name: b, file: b.csv}\n"

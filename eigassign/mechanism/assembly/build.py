@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.affine_entries import AffineEntries, pattern
 from eigassign.mechanism.assembly.congruence import LocalLink, add_links

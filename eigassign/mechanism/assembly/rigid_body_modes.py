@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError, SingularityError
 from eigassign.mechanism.assembly.node_motion import MotionRows
 from eigassign.mechanism.assembly.springs import resists, spring_ends

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.assembly.affine_entries import AffineEntries
 from eigassign.mechanism.assembly.node_motion import (
     MotionRow,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.elements.mesh import LinkMesh
 from eigassign.mechanism.kinematics.loop_closure import reference
 from eigassign.mechanism.kinematics.parameters import ModelParameters

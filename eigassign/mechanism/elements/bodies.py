@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.elements.mesh import (
     Entries,
     LinkMesh,

@@ -24,7 +24,7 @@ from scipy import sparse
 from scipy.linalg import eigh
 from scipy.sparse import linalg
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, MechanismError
 from eigassign.mechanism.elements.mesh import LinkMesh, Reduction, Term, total
 from eigassign.mechanism.elements.sparse_factor import kept_factor

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.sections import SectionValues, section_values
 from eigassign.mechanism.kinematics.parameters import ModelParameters

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.bodies import add_bodies
 from eigassign.mechanism.elements.craig_bampton import held_factor

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import RIDING
 from eigassign.mechanism.kinematics.coordinates import CoordinateMap
 from eigassign.mechanism.kinematics.joints import JointMotion, joint_motion, mounting, turned

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type, node_position
 from eigassign.mechanism.kinematics.topology import split

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import FREEDOMS
 from eigassign.errors import MechanismError
 from eigassign.mechanism.kinematics.coordinates import CoordinateMap

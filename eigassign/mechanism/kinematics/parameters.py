@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.kinematics.coordinates import coordinates
 from eigassign.mechanism.kinematics.rotations import Objects, vector
 from eigassign.mechanism.kinematics.topology import NodeName, Topology, build_tree

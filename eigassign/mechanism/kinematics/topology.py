@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import FREEDOMS, RIDING
 from eigassign.errors import MechanismError
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import RIDING
 from eigassign.errors import TravelError
 from eigassign.mechanism.kinematics.parameters import ModelParameters, length, station

@@ -22,7 +22,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.brief import Brief, cut
-from eigassign.case import FileTrajectory, PointTrajectory, SampledTrajectory, TipTrajectory
+from eigassign.case.schema.trajectory import (
+    FileTrajectory,
+    PointTrajectory,
+    SampledTrajectory,
+    TipTrajectory,
+)
 from eigassign.errors import MechanismError, TrajectoryError, UsageError
 from eigassign.mechanism.inverse_kinematics.chain import TipChain
 from eigassign.mechanism.inverse_kinematics.follow import follow

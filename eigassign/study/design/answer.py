@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment import Assignment, hz_from_lam
+from eigassign.assignment.assign import Assignment
 from eigassign.assignment.exact.design_problem import MET
 from eigassign.assignment.exact.sequential import End
-from eigassign.case import CaseFile
+from eigassign.assignment.targets import hz_from_lam
+from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, InfeasibleError
 from eigassign.study.accuracy import model_error
 from eigassign.study.design.clearance import Clearance

@@ -17,7 +17,7 @@ from time import monotonic
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment import Catalogue
+from eigassign.assignment.catalogues.branching import Catalogue
 from eigassign.assignment.catalogues.choosing import choose
 from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
 from eigassign.assignment.exact.requirements import Requirements

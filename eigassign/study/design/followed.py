@@ -16,7 +16,8 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case import CaseFile, FollowedMode
+from eigassign.case.case_file import CaseFile
+from eigassign.case.schema.targets import FollowedMode
 from eigassign.errors import CaseError, LostModeError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.condensation import Modes

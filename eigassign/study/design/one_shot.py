@@ -11,16 +11,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment import (
-    Assignment,
-    Bounds,
-    Catalogue,
-    Goal,
-    LinearConstraint,
-    LinearModel,
-    solve_assignment,
-)
-from eigassign.case import CaseFile
+from eigassign.assignment.assign import Assignment, solve_assignment
+from eigassign.assignment.catalogues.branching import Catalogue
+from eigassign.assignment.program import Bounds, Goal, LinearConstraint, LinearModel
+from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError
 from eigassign.study.results import DesignRow, SolverRow
 from eigassign.study.scene import Scene

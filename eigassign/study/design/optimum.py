@@ -18,7 +18,6 @@ from time import monotonic
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment import Bounds, LinearConstraint
 from eigassign.assignment.catalogues.choosing import KEPT, RELAXED, Chosen, choose
 from eigassign.assignment.exact.design_problem import MET, Box, DesignProblem, Objective, best_first
 from eigassign.assignment.exact.requirements import (
@@ -30,6 +29,7 @@ from eigassign.assignment.exact.requirements import (
 )
 from eigassign.assignment.exact.sequential import End, Optimum, distinct, minimise, worth
 from eigassign.assignment.feasibility import constraints_agree
+from eigassign.assignment.program import Bounds, LinearConstraint
 from eigassign.errors import (
     CaseError,
     EigassignError,

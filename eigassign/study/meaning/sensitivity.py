@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, Objective
 from eigassign.assignment.exact.requirements import FrequencyLimit, Requirements
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy
 from eigassign.study.design.optimum import MASS
 from eigassign.study.results import ActiveRow, RelaxedRow, SensitivityRow

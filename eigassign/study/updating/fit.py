@@ -19,7 +19,7 @@ from eigassign._version import __version__
 from eigassign.assignment.exact.identification import Identified, MeasuredFrequencies, identify
 from eigassign.assignment.exact.sequential import End
 from eigassign.brief import Brief
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.modal.model import Model
 from eigassign.study.built_case import Case
 from eigassign.study.design.judgement import NEAR

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.assignment.checks import frozen
-from eigassign.case import CaseFile
+from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.design import Tolerance
 from eigassign.case.schema.measurements import MOST, Measurement, MeasurementFile
 from eigassign.case.suggestions import shown, unknown

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares, linprog, minimize
 
-from eigassign.assignment import Bounds
-from eigassign.assignment.catalogues.branching import Catalogue, Effort, hull, search_catalogue
+from eigassign.assignment import Bounds, Catalogue, Effort, hull, search_catalogue
 from eigassign.errors import AccuracyError, InfeasibleError, UsageError
 
 

@@ -10,11 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from eigassign.assignment.catalogues.branching import Catalogue
-from eigassign.assignment.catalogues.choosing import choose
-from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
+from eigassign.assignment import MET, Appraisal, Catalogue, DesignProblem, LinearConstraint, choose
 from eigassign.assignment.exact.sequential import minimise
-from eigassign.assignment.program import LinearConstraint
 from eigassign.errors import InfeasibleError
 
 pytestmark = pytest.mark.slow  # half a minute each; the pipeline has a short one

@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 from assignment_problems import goal
 
-from eigassign.assignment import Bounds, LinearConstraint, build_program
-from eigassign.assignment.catalogues.branching import Catalogue, Effort
-from eigassign.assignment.catalogues.linear import solve_catalogue
+from eigassign.assignment import (
+    Bounds,
+    Catalogue,
+    Effort,
+    LinearConstraint,
+    build_program,
+    solve_catalogue,
+)
 from eigassign.errors import AccuracyError, InfeasibleError, UsageError
 
 

@@ -8,16 +8,19 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from eigassign.assignment import LinearConstraint
-from eigassign.assignment.exact.design_problem import DesignProblem, Objective
-from eigassign.assignment.exact.requirements import (
+from eigassign.assignment import (
+    DesignProblem,
+    End,
     Frequencies,
     FrequencyLimit,
     FrequencyTarget,
+    LinearConstraint,
+    Objective,
+    Optimum,
     Requirements,
+    stationarity,
 )
-from eigassign.assignment.exact.sequential import End, Optimum, minimise
-from eigassign.assignment.exact.stationarity import stationarity
+from eigassign.assignment.exact.sequential import minimise
 
 N = 12
 TIME = np.linspace(0.0, 1.0, N)

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq, least_squares
 from scipy.stats import chi2
 
-from eigassign.assignment.exact.identification import Identified, MeasuredFrequencies, identify
+from eigassign.assignment import Identified, MeasuredFrequencies, identify
 from eigassign.errors import MechanismError
 
 Response = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]

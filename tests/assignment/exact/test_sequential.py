@@ -11,16 +11,19 @@ import pytest
 from scipy.linalg import eigh
 from scipy.optimize import least_squares, minimize
 
-from eigassign.assignment import LinearConstraint
-from eigassign.assignment.exact.design_problem import (
+from eigassign.assignment import (
     Appraisal,
     DesignProblem,
+    End,
+    FrequencyLimit,
+    LinearConstraint,
     Objective,
+    QuantityLimit,
+    Requirements,
     best_first,
+    stationarity,
 )
-from eigassign.assignment.exact.requirements import FrequencyLimit, QuantityLimit, Requirements
-from eigassign.assignment.exact.sequential import End, minimise
-from eigassign.assignment.exact.stationarity import stationarity
+from eigassign.assignment.exact.sequential import minimise
 from eigassign.errors import AccuracyError
 
 TIME = np.linspace(0.0, 1.0, 40)

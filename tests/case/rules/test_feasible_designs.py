@@ -5,9 +5,7 @@ from __future__ import annotations
 import pytest
 from small_case import TEXT, edited
 
-from eigassign.case import parse
-from eigassign.case.rules.properties import impossible
-from eigassign.case.schema.sections import IProfileSection
+from eigassign.case import IProfileSection, impossible, parse
 from eigassign.errors import CaseError
 
 DIAMETER = "{parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}"

@@ -8,10 +8,19 @@ from hypothesis import strategies as st
 from json_schema_reader import SCHEMA, accepts
 from small_case import TEXT, edited
 
-from eigassign.case import CaseFile, Catalogue, DesignColumn, Tolerance, parse
-from eigassign.case.reader import read_yaml
-from eigassign.case.schema.design import Design, column_names
-from eigassign.case.units import DIMENSIONS, QuantityError, read_rate
+from eigassign.case import (
+    DIMENSIONS,
+    CaseFile,
+    Catalogue,
+    Design,
+    DesignColumn,
+    QuantityError,
+    Tolerance,
+    column_names,
+    parse,
+    read_rate,
+    read_yaml,
+)
 
 D = "  d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}\n"
 BOOM = """\

@@ -23,8 +23,8 @@ from eigassign.case import (
     Taper,
     UniversalJoint,
     load,
+    read_yaml,
 )
-from eigassign.case.reader import read_yaml
 
 
 def test_planar_parts_are_read_in_si(tmp_path: Path) -> None:

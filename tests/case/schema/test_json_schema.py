@@ -9,9 +9,7 @@ from typing import Any
 from json_schema_reader import SCHEMA, accepts
 from small_case import TEXT
 
-from eigassign.case import parse
-from eigassign.case.reader import read_yaml
-from eigassign.case.schema.document import Document
+from eigassign.case import Document, parse, read_yaml
 
 
 def nodes(node: Any) -> Iterator[dict[str, Any]]:

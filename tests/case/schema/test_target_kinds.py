@@ -20,8 +20,8 @@ from eigassign.case import (
     KeepOutTarget,
     load,
     parse,
+    read_yaml,
 )
-from eigassign.case.reader import read_yaml
 from eigassign.errors import CaseError
 
 T = "  - {mode: 1, frequency: 190 Hz}\n"

@@ -9,8 +9,7 @@ import pytest
 from json_schema_reader import SCHEMA, accepts
 from small_case import edited, unmarked
 
-from eigassign.case import CaseFile, SampledTrajectory, TipTrajectory, parse
-from eigassign.case.reader import read_yaml
+from eigassign.case import CaseFile, SampledTrajectory, TipTrajectory, parse, read_yaml
 from eigassign.errors import CaseError
 
 ONE = (

@@ -9,10 +9,7 @@ from spatial_examples import arm3r, four_bar
 from spatial_oracle import Tree
 from spatial_random import random_closed, random_open
 
-from eigassign.mechanism.assembly.build import local_links
-from eigassign.mechanism.assembly.congruence import LocalLink
-from eigassign.mechanism.assembly.local_motion import motion_matrix, motion_scalars
-from eigassign.mechanism.elements.mesh import total
+from eigassign.mechanism import LocalLink, local_links, motion_matrix, motion_scalars, total
 
 
 def products(model: Built, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

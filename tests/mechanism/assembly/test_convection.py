@@ -17,10 +17,9 @@ import pytest
 from spatial_cases import ALLOY, Built, built
 from spatial_oracle import Tree
 
-from eigassign.case.loading import parse
-from eigassign.mechanism.assembly.build import kinematics, local_links
-from eigassign.mechanism.assembly.velocity_terms import VelocityTerms, fields, velocity_terms
-from eigassign.mechanism.kinematics.parameters import parameters
+from eigassign.case import parse
+from eigassign.mechanism import VelocityTerms, fields, local_links, parameters, velocity_terms
+from eigassign.mechanism.assembly.build import kinematics
 
 CASES = Path(__file__).parents[3] / "cases"
 LENGTH, ELEMENTS = 1.2, 7  # 3 elements before the carriage, 4 behind

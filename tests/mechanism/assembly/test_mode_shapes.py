@@ -13,13 +13,18 @@ from spatial_random import random_closed
 import eigassign as ea
 from eigassign.case import parse
 from eigassign.errors import UsageError
-from eigassign.mechanism.assembly.build import with_elements, with_reduction
-from eigassign.mechanism.assembly.mode_shapes import shapes
-from eigassign.mechanism.elements.beam import bending_mass, bending_shapes
-from eigassign.mechanism.kinematics.loop_closure import all_moving
-from eigassign.mechanism.kinematics.parameters import node_position
-from eigassign.mechanism.kinematics.rotations import cross, multiply
-from eigassign.study.planning import with_middle_loads
+from eigassign.mechanism import (
+    all_moving,
+    bending_mass,
+    bending_shapes,
+    cross,
+    multiply,
+    node_position,
+    shapes,
+    with_elements,
+    with_reduction,
+)
+from eigassign.study import with_middle_loads
 
 CASES = Path(__file__).parents[3] / "cases"
 ALL = sorted(path.stem for path in CASES.glob("*.yaml"))
@@ -116,7 +121,7 @@ def drawn_mass(case: ea.Case, q: Any, y: Any) -> Any:
 
 
 def _line_density(mechanism: Any, beam: Any) -> float:
-    from eigassign.mechanism.elements.sections import section_values
+    from eigassign.mechanism import section_values
 
     section = section_values(mechanism.sections[beam.section], lambda _key, value: value)
     return float(mechanism.materials[beam.material].density * section.area)

@@ -11,12 +11,10 @@ from spatial_cases import ALLOY, Built, built
 from spatial_examples import four_bar
 from timed_motions import RestToRest, integrated
 
-from eigassign.case.loading import parse
+from eigassign.case import parse
+from eigassign.mechanism import parameters, velocity_terms
 from eigassign.mechanism.assembly.build import kinematics
-from eigassign.mechanism.assembly.velocity_terms import velocity_terms
-from eigassign.mechanism.kinematics.parameters import parameters
-from eigassign.modal.exact.solver import eigenvalues, modes
-from eigassign.modal.slow_motion import change_at, moving_modes, theta_in_time
+from eigassign.modal import change_at, eigenvalues, modes, moving_modes, theta_in_time
 
 CASE = Path(__file__).parents[3] / "cases" / "two_link.yaml"
 

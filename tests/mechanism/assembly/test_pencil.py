@@ -7,11 +7,10 @@ import pytest
 from chains import A_PAPER, bar, model_of, random_chain, two_link
 from frame_oracle import frame
 
-from eigassign.api import load_case
+from eigassign import load_case
 from eigassign.errors import CaseError, MechanismError, UsageError
-from eigassign.modal.exact.roundoff import rounding_error
-from eigassign.modal.model import Model
-from eigassign.series.multi_index import on_faces, total_degree
+from eigassign.modal import Model, rounding_error
+from eigassign.series import on_faces, total_degree
 
 SEEDS = range(0, 60, 4)
 

@@ -14,7 +14,7 @@ from spatial_random import add_springs as add_random_springs
 from spatial_random import random_closed, random_open
 
 from eigassign.errors import MechanismError
-from eigassign.modal.exact.solver import eigenvalues
+from eigassign.modal import eigenvalues
 
 
 def chain(springs: Tree, n: int = 3, **joint: Any) -> Tree:

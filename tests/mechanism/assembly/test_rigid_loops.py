@@ -13,8 +13,7 @@ from spatial_oracle import Tree, world
 from spatial_random import random_closed
 
 from eigassign.errors import MechanismError
-from eigassign.mechanism.assembly.rigid_loops import require_consistent
-from eigassign.mechanism.kinematics.topology import JointEdge
+from eigassign.mechanism import JointEdge, require_consistent
 
 
 def effective_inertia(theta: float) -> float:

@@ -12,7 +12,7 @@ from spatial_examples import arm3r, four_bar, gantry, slider_crank
 from spatial_oracle import world
 from spatial_random import random_closed, random_open
 
-from eigassign.modal.exact.solver import eigenvalues
+from eigassign.modal import eigenvalues
 
 
 @pytest.mark.parametrize("space", ["planar", "spatial"])

@@ -11,7 +11,7 @@ from spatial_cases import ALLOY, built, changed
 from spatial_examples import gantry
 from spatial_oracle import Tree, world
 
-from eigassign.modal.exact.solver import eigenvalues
+from eigassign.modal import eigenvalues
 
 
 def arm(

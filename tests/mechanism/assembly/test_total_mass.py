@@ -11,7 +11,7 @@ from small_case import edited
 
 from eigassign.case import parse
 from eigassign.errors import UsageError
-from eigassign.study.built_case import Case, load_case
+from eigassign.study import Case, load_case
 
 CASES = Path(__file__).parents[3] / "cases"
 

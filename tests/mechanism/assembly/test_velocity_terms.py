@@ -12,8 +12,8 @@ from spatial_oracle import Tree
 from spatial_random import random_closed, random_open
 from timed_motions import timed
 
-from eigassign.mechanism.assembly.velocity_terms import VelocityTerms, velocity_terms
-from eigassign.modal.slow_motion import motion_effect
+from eigassign.mechanism import VelocityTerms, velocity_terms
+from eigassign.modal import motion_effect
 
 NONE = np.zeros(0)
 

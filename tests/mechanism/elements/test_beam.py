@@ -8,11 +8,8 @@ import numpy as np
 import pytest
 from frame_oracle import element
 
-from eigassign.mechanism.elements.links import link_mesh
-from eigassign.mechanism.elements.mesh import LinkMesh
-from eigassign.mechanism.kinematics.parameters import ModelParameters
-from eigassign.mechanism.kinematics.topology import Topology
-from eigassign.series.expression import Recorder
+from eigassign.mechanism import LinkMesh, ModelParameters, Topology, link_mesh
+from eigassign.series import Recorder
 
 E, A, I, RHO, L = 70e9, 3e-4, 5e-9, 2700.0, 0.8  # noqa: E741
 

@@ -16,12 +16,9 @@ from spatial_oracle import Tree
 from timed_motions import timed
 
 from eigassign.errors import CaseError
-from eigassign.mechanism.assembly.build import local_links
-from eigassign.mechanism.assembly.velocity_terms import velocity_terms
+from eigassign.mechanism import coefficients, local_links, total, velocity_terms
 from eigassign.mechanism.elements import sparse_factor
-from eigassign.mechanism.elements.craig_bampton import coefficients
-from eigassign.mechanism.elements.mesh import total
-from eigassign.modal.slow_motion import motion_effect
+from eigassign.modal import motion_effect
 
 THIN = {"area": 5e-4, "bending_inertia": 1e-9}
 

@@ -12,7 +12,7 @@ import pytest
 from scipy import sparse
 
 from eigassign.errors import MechanismError
-from eigassign.mechanism.elements.matrix_file import read_matrix
+from eigassign.mechanism import read_matrix
 
 GOOD = sparse.csr_array(np.diag(np.arange(1.0, 6.0)) + np.eye(5, k=1) + np.eye(5, k=-1))
 PARTS: dict[str, Any] = {

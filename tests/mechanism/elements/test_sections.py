@@ -9,8 +9,8 @@ import pytest
 from spatial_cases import ALLOY, built
 from spatial_oracle import Tree
 
-from eigassign.mechanism.elements.sections import section_values
-from eigassign.modal.exact.solver import eigenvalues
+from eigassign.mechanism import section_values
+from eigassign.modal import eigenvalues
 
 
 def as_written(key: str, value: float) -> float:

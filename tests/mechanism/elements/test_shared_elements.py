@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from chains import Tree, case_of, model_of
 
-from eigassign.mechanism.assembly.build import whole_links
+from eigassign.mechanism import whole_links
 
 TAPER = {"start": "thick", "end": "thin"}
 

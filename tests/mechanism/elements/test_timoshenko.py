@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from spatial_cases import built
 from spatial_oracle import Tree
 
-from eigassign.mechanism.elements.sections import SectionValues, section_values
+from eigassign.mechanism import SectionValues, section_values
 
 E, NU, RHO = 210e9, 0.3, 7800.0
 G = E / (2 + 2 * NU)

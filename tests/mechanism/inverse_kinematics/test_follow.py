@@ -9,11 +9,18 @@ import pytest
 from planar_arms import open_chain_tip, serial_arm, two_link_angles
 
 from eigassign.errors import MechanismError, TrajectoryError
-from eigassign.mechanism.inverse_kinematics.chain import TipChain
-from eigassign.mechanism.inverse_kinematics.follow import RESIDUAL, follow
-from eigassign.mechanism.inverse_kinematics.solver import Trace, interpolated
-from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipPath, spline, straight
-from eigassign.mechanism.trajectory.timing import timing_law
+from eigassign.mechanism import (
+    RESIDUAL,
+    Course,
+    TipChain,
+    TipPath,
+    Trace,
+    follow,
+    interpolated,
+    spline,
+    straight,
+    timing_law,
+)
 
 TAU = 2.0 * np.pi
 UP, DOWN = {"elbow": (0.0, np.pi)}, {"elbow": (np.pi, TAU)}

@@ -18,7 +18,7 @@ from redesigned_arms import (
     two_link_lengths,
 )
 
-from eigassign.api import Case
+from eigassign import Case
 from eigassign.errors import CaseError, TrajectoryError
 
 EVERY = [two_link_lengths, three_links, six_joints, five_bar, slider_crank]

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eigassign.api import Case
-from eigassign.case.loading import parse
+from eigassign import Case
+from eigassign.case import parse
 from eigassign.errors import CaseError
 
 CASES = Path(__file__).parents[3] / "cases"

@@ -10,7 +10,7 @@ from spatial_oracle import Tree
 from spatial_random import last_node, random_closed, random_open
 from tip_paths import chain_of, states, tips
 
-from eigassign.mechanism.inverse_kinematics.chain import TipChain
+from eigassign.mechanism import TipChain
 
 H = 1e-6  # central differences: error about h² and 1e-16 / h
 EVERY = [(seed, space) for seed in range(12) for space in ("planar", "spatial")]

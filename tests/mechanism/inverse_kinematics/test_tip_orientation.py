@@ -10,7 +10,7 @@ from spatial_oracle import X, Y, Z, turn
 from tip_paths import between, course
 
 from eigassign.errors import MechanismError, TrajectoryError
-from eigassign.mechanism.inverse_kinematics.follow import follow
+from eigassign.mechanism import follow
 
 POINTS = [(0.6, 0.2), (0.5, 0.5), (0.2, 0.6), (-0.1, 0.5)]
 SPACE = [(*p, 0.1 * k**2) for k, p in enumerate(POINTS)]

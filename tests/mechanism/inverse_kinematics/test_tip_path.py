@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from eigassign.errors import MechanismError, UsageError
-from eigassign.mechanism.inverse_kinematics.tip_path import spline, straight
+from eigassign.mechanism import spline, straight
 
 S = np.linspace(0.0, 1.0, 301)
 BOTH = pytest.mark.parametrize("path", [straight, spline])

@@ -12,8 +12,7 @@ from spatial_oracle import Tree
 from spatial_random import Random, last_node, random_closed, random_open
 from tip_paths import between, chain_of, course, states, tips
 
-from eigassign.mechanism.inverse_kinematics.chain import reduced
-from eigassign.mechanism.inverse_kinematics.follow import follow
+from eigassign.mechanism import follow, reduced
 
 SIZE = 1e-9  # of the path's size: a tip on its path
 

@@ -9,8 +9,7 @@ from spatial_cases import built
 from tip_paths import chain_of, course
 
 from eigassign.errors import MechanismError, TrajectoryError
-from eigassign.mechanism.inverse_kinematics.chain import TipChain
-from eigassign.mechanism.inverse_kinematics.follow import follow
+from eigassign.mechanism import TipChain, follow
 
 FAR = [(0.5, 3.0), (2.0, 7.5), (6.0, 5.0)]  # m: far more than 2π, all of it
 

@@ -10,7 +10,7 @@ from spatial_cases import built, case_of, changed
 from spatial_examples import four_bar, gantry
 from spatial_oracle import Tree
 
-from eigassign.case.loading import load
+from eigassign.case import load
 
 CASES = Path(__file__).parents[3] / "cases"
 PIN = {"type": "revolute", "base": "crank.end", "follower": "coupler.start"}

@@ -15,11 +15,8 @@ from spatial_random import random_closed, random_open
 
 from eigassign.case.schema import joints as schema
 from eigassign.errors import MechanismError
-from eigassign.mechanism.kinematics.forward import Kinematics
-from eigassign.mechanism.kinematics.joints import JointMotion, joint_motion, turned
-from eigassign.mechanism.kinematics.loop_closure import all_moving
-from eigassign.series.algebra import Samples
-from eigassign.series.compiler import compile_table
+from eigassign.mechanism import JointMotion, Kinematics, all_moving, joint_motion, turned
+from eigassign.series import Samples, compile_table
 
 H = 1e-5  # central differences: error about H² = 1e-10 times third derivatives of order 1
 JOINTS = [

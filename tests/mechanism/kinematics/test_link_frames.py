@@ -8,9 +8,7 @@ import numpy as np
 from chains import model_of, two_link
 from frame_oracle import frame
 
-from eigassign.mechanism.kinematics.forward import Placement
-from eigassign.mechanism.kinematics.rotations import rotation, vector
-from eigassign.mechanism.kinematics.topology import GROUND, JointEdge
+from eigassign.mechanism import GROUND, JointEdge, Placement, rotation, vector
 
 
 def test_a_two_link_arm_reaches_where_trigonometry_says() -> None:

@@ -11,7 +11,7 @@ from spatial_cases import ALLOY, Built, built, changed
 from spatial_examples import arm3r, four_bar, gantry, slider_crank, slotted_lever, straight
 from spatial_oracle import Tree, world
 
-from eigassign.case.reader import read_yaml
+from eigassign.case import read_yaml
 from eigassign.errors import CaseError, MechanismError, SingularityError
 
 

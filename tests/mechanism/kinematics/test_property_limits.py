@@ -10,7 +10,7 @@ from chains import Tree, case_of, two_link
 
 import eigassign as ea
 from eigassign.errors import CaseError, UsageError
-from eigassign.modal.model import Model
+from eigassign.modal import Model
 
 SECTIONS: dict[str, Tree] = {
     "tube": {"shape": "tube", "outer_diameter": 0.03, "thickness": 0.003},

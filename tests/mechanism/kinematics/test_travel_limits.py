@@ -8,9 +8,8 @@ from spatial_cases import built, changed
 from spatial_examples import ball_screw, gantry, slotted_lever
 
 from eigassign.errors import TravelError
-from eigassign.mechanism.kinematics.travel_limits import resting_pose
-from eigassign.modal.exact.solver import eigenvalues
-from eigassign.modal.expansion import expand
+from eigassign.mechanism import resting_pose
+from eigassign.modal import eigenvalues, expand
 
 FIRST = 6 * 1e-4 * 1.6  # m: six elements of L/10⁴ before the carriage
 

@@ -7,8 +7,7 @@ import pytest
 
 from eigassign.case import PointTrajectory
 from eigassign.errors import MechanismError
-from eigassign.mechanism.trajectory.timing import timing_law
-from eigassign.mechanism.trajectory.trajectory import build_trajectory
+from eigassign.mechanism import build_trajectory, timing_law
 
 Q = ("q1", "q2")
 POINTS = ((0.0, 0.2), (1.0, 0.2), (0.5, 0.6), (0.5, 0.7))

@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eigassign.api import load_case
+from eigassign import load_case
 from eigassign.case import PointTrajectory
-from eigassign.mechanism.inverse_kinematics.chain import TipChain
-from eigassign.mechanism.trajectory.trajectory import Trajectory, build_trajectory, rates
+from eigassign.mechanism import TipChain, Trajectory, build_trajectory, rates
 
 CASE = Path(__file__).parents[3] / "cases" / "two_link.yaml"
 WAYPOINTS = [[0.30, 0.19], [0.108, 0.2104], [0.02, 0.1845]]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from eigassign.assignment import trapezoidal_weights
 from eigassign.errors import UsageError
-from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectories, Trajectory
+from eigassign.mechanism import NamedTrajectory, Trajectories, Trajectory
 
 
 def one(n: int, start: float = 0.0, notes: tuple[str, ...] = ()) -> Trajectory:

@@ -8,8 +8,7 @@ from planar_arms import serial_arm
 
 from eigassign.case import FileTrajectory, SampledTrajectory, TipTrajectory
 from eigassign.errors import MechanismError, TrajectoryError
-from eigassign.mechanism.inverse_kinematics.chain import TipChain
-from eigassign.mechanism.trajectory.trajectory import build_trajectory
+from eigassign.mechanism import TipChain, build_trajectory
 
 Q = ("q1", "q2")
 PAPER = ((0.33, 0.12), (0.30, 0.19), (0.108, 0.2104), (0.02, 0.1845), (-0.01, 0.19))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from eigassign.errors import MechanismError, TrajectoryError
-from eigassign.mechanism.trajectory.csv import read_samples
+from eigassign.mechanism import read_samples
 
 Q = ("q1", "q2")
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from eigassign.errors import UsageError
-from eigassign.mechanism.trajectory.timing import POLYNOMIALS, timing_law, trapezoidal
+from eigassign.mechanism import POLYNOMIALS, timing_law, trapezoidal
 
 SHARES = (0.05, 1 / 3, 0.5)
 LAWS = [*POLYNOMIALS.values(), *map(trapezoidal, SHARES)]

@@ -7,7 +7,7 @@ import pytest
 from paper_arm import FREE, build, exact, samples
 
 from eigassign.errors import AccuracyError
-from eigassign.modal.adaptive.mesh import choose_mesh
+from eigassign.modal import choose_mesh
 
 
 @pytest.fixture(scope="module")

@@ -7,12 +7,12 @@ import pytest
 from paper_arm import FREE, build, exact, samples
 
 from eigassign.errors import AccuracyError
-from eigassign.modal.adaptive.mesh import choose_mesh
-from eigassign.modal.adaptive.order import (
+from eigassign.modal import (
     FINER,
     MAX_POINTS,
     TOLERABLE,
     choose_expansion,
+    choose_mesh,
     more_points_help,
 )
 

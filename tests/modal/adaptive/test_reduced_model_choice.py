@@ -7,7 +7,7 @@ import pytest
 from paper_arm import build, exact, samples
 
 from eigassign.errors import AccuracyError
-from eigassign.modal.adaptive.reduced_model import central, reduce_adaptively
+from eigassign.modal import central, reduce_adaptively
 
 
 @pytest.fixture(scope="module")

@@ -10,11 +10,8 @@ from chains import bar, model_of, random_chain, two_link
 from large import HELD, Q0, Y0, arm
 
 from eigassign.errors import UsageError
+from eigassign.modal import Model, block, principal, rounding_error, solve_single
 from eigassign.modal.exact import dense, solver
-from eigassign.modal.exact.dense import solve_single
-from eigassign.modal.exact.roundoff import rounding_error
-from eigassign.modal.exact.sparse import block, principal
-from eigassign.modal.model import Model
 
 POSES = np.array([[0.3, 1.9], [1.0, 0.2], [-2.0, 0.5]])
 DESIGN = np.array([[0.0, 0.1], [0.2, 0.0], [0.25, 0.25]])

@@ -7,8 +7,7 @@ import pytest
 from meetings import E_ONE, line, two_bars
 
 from eigassign.errors import LostModeError
-from eigassign.modal.exact.following import MoreModesError, Place, Shape, follow, places
-from eigassign.modal.model import Model
+from eigassign.modal import Model, MoreModesError, Place, Shape, follow, places
 
 
 def start(at: Place, number: int) -> Shape:

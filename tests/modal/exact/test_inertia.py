@@ -12,10 +12,9 @@ from spatial_oracle import Tree, world
 from spatial_random import random_closed, random_open
 
 from eigassign.errors import MechanismError, UsageError
-from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism import Pencil
+from eigassign.modal import UNCERTAIN, count_below, eigenvalues
 from eigassign.modal.exact import inertia
-from eigassign.modal.exact.inertia import UNCERTAIN, count_below
-from eigassign.modal.exact.solver import eigenvalues
 
 Floats = np.ndarray
 

@@ -13,19 +13,18 @@ from scipy.linalg import eigh
 
 import eigassign as ea
 from eigassign.errors import MissingMassError
-from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.elements.sparse_factor import factorise
-from eigassign.modal.exact import substructure
-from eigassign.modal.exact.dense import solve_dense
-from eigassign.modal.exact.roundoff import rounding_error
-from eigassign.modal.exact.sparse import solve_sparse
-from eigassign.modal.exact.substructure import (
+from eigassign.mechanism import Pencil, factorise
+from eigassign.modal import (
     Inner,
     proved,
+    rounding_error,
+    solve_dense,
     solve_large,
+    solve_sparse,
     solve_together,
     varying_unknowns,
 )
+from eigassign.modal.exact import substructure
 
 CASES = sorted((Path(__file__).parents[3] / "cases").glob("*.yaml"))
 SAMPLES = 24

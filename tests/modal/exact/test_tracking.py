@@ -7,11 +7,9 @@ import pytest
 from chains import model_of, two_link
 from meetings import E_ONE, line, two_bars
 
-from eigassign.api import load_case
+from eigassign import load_case
 from eigassign.errors import UsageError
-from eigassign.modal.exact.condensation import Modes
-from eigassign.modal.exact.solver import modes
-from eigassign.modal.exact.tracking import overlaps, track, turn_coincident
+from eigassign.modal import Modes, modes, overlaps, track, turn_coincident
 
 
 @pytest.mark.parametrize("count", [10, 11, 41])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from eigassign.modal.fit.path import smooth_parts
+from eigassign.modal import smooth_parts
 
 
 def polyline(corners, n, rest):

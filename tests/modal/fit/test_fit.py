@@ -7,8 +7,7 @@ import pytest
 
 import eigassign as ea
 from eigassign.errors import AccuracyError, UsageError
-from eigassign.modal.exact.roundoff import rounding_error
-from eigassign.modal.model import Model
+from eigassign.modal import Model, rounding_error
 
 BOX = ea.Box([0.0, 0.0], [0.25, 0.25])
 Q0, Y0 = [1.817, 5.312], [0.125, 0.125]

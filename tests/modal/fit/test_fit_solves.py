@@ -7,8 +7,7 @@ import pytest
 
 import eigassign as ea
 from eigassign.errors import AccuracyError, UsageError
-from eigassign.modal.fit.path import stretches
-from eigassign.modal.model import Model
+from eigassign.modal import Model, stretches
 
 BOX = ea.Box([0.0, 0.0], [0.25, 0.25])
 Y0 = [0.125, 0.125]

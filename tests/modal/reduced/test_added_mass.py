@@ -9,13 +9,9 @@ from decoupled import comb
 from scipy.linalg import eigh
 from spatial_random import random_closed
 
-from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.elements.sparse_factor import factorise
-from eigassign.modal.exact.condensation import condense
-from eigassign.modal.model import Model
+from eigassign.mechanism import Pencil, factorise
+from eigassign.modal import AddedMass, Model, RitzBasis, added_mass, condense, ritz_basis
 from eigassign.modal.reduced import added_mass as module
-from eigassign.modal.reduced.added_mass import AddedMass, added_mass
-from eigassign.modal.reduced.basis import RitzBasis, ritz_basis
 
 Floats = np.ndarray
 E, RHO, WIDTH, HEIGHT = 70e9, 2700.0, 0.02, 0.004

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from chains import model_of, random_chain
 
-from eigassign.api import load_case
+from eigassign import load_case
 from eigassign.errors import UsageError
+from eigassign.modal import reduce, reduced_arrays, reduced_from_arrays
 from eigassign.modal.reduced import compression
-from eigassign.modal.reduced.reduce import reduce
-from eigassign.modal.storage import reduced_arrays, reduced_from_arrays
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 SPAN = (np.array([0.3, 0.3]), np.array([0.1, 0.1]))

@@ -10,17 +10,19 @@ from scipy import sparse
 from wide_draws import planar_loop, spatial_loop, spatial_tree
 
 from eigassign.errors import AccuracyError, SingularityError
-from eigassign.mechanism.elements.sparse_factor import factorise
-from eigassign.modal.exact.roundoff import rounding_error, rounding_weights
-from eigassign.modal.reduced.basis import ritz_basis
-from eigassign.modal.reduced.error_estimate import (
+from eigassign.mechanism import factorise
+from eigassign.modal import (
     frequency_error,
+    half_solve,
     largest_outside,
     mode_missing,
+    reduce,
+    residual_gram,
+    ritz_basis,
+    ritz_pairs,
+    rounding_error,
+    rounding_weights,
 )
-from eigassign.modal.reduced.pencil import ritz_pairs
-from eigassign.modal.reduced.reduce import reduce
-from eigassign.modal.reduced.residual import half_solve, residual_gram
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 

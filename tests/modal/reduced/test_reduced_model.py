@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from chains import model_of, random_chain, two_link
 
-from eigassign.api import load_case
+from eigassign import load_case
 from eigassign.errors import UsageError
-from eigassign.modal.reduced.reduce import reduce
+from eigassign.modal import reduce
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 ELBOW = np.pi / 3.0

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from large import DRIVES, Q0, Y0, arm
 
-from eigassign.mechanism.elements.sparse_factor import factorise
+from eigassign.mechanism import factorise
+from eigassign.modal import ritz_basis
 from eigassign.modal.reduced import residual
-from eigassign.modal.reduced.basis import ritz_basis
 
 
 @pytest.mark.parametrize("drives", DRIVES, ids=str)

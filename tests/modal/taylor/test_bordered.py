@@ -10,15 +10,9 @@ from large import DRIVES, Q0, Y0, arm
 from pencils import crossing
 
 from eigassign.errors import AccuracyError
-from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.elements.sparse_factor import factorise
+from eigassign.mechanism import Pencil, factorise
+from eigassign.modal import add_product, factor_dense, factor_sparse, with_partial_pivoting
 from eigassign.modal.exact import solver
-from eigassign.modal.taylor.bordered import (
-    add_product,
-    factor_dense,
-    factor_sparse,
-    with_partial_pivoting,
-)
 
 
 def mode_system(pencil: Pencil, x0: np.ndarray, mode: int) -> tuple[np.ndarray, ...]:

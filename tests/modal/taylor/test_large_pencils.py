@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from large import DRIVES, Q0, Y0, arm, sparsely
 
-from eigassign.modal.expansion import Expansion, expand
+from eigassign.modal import Expansion, expand
 
 
 def agree(thin: Expansion, full: Expansion, tolerance: float) -> None:

@@ -12,9 +12,8 @@ import h5py
 import numpy as np
 import pytest
 
+from eigassign.output import NAMES, CaseOutcome, are_current, merge_files, to_line, write_files
 from eigassign.output.batch import columns, index
-from eigassign.output.batch.files import NAMES, are_current, merge_files, write_files
-from eigassign.output.batch.outcome import CaseOutcome, to_line
 
 KEYS = ("body.mass", "kind")
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from eigassign.errors import StorageError
-from eigassign.output.batch.outcome import CaseOutcome, from_line, ranges, to_line
+from eigassign.output import CaseOutcome, from_line, ranges, to_line
 
 ROW = CaseOutcome(
     name="tool=0.1",

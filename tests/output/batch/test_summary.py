@@ -8,9 +8,7 @@ import json
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 
-from eigassign.output.batch.junit import Junit
-from eigassign.output.batch.outcome import CaseOutcome, to_line
-from eigassign.output.batch.summary import COLUMNS, SummaryCsv, SummaryJson
+from eigassign.output import COLUMNS, CaseOutcome, Junit, SummaryCsv, SummaryJson, to_line
 
 GOOD = CaseOutcome(
     name="two_link",

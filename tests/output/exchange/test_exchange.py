@@ -18,9 +18,9 @@ from scipy.io import loadmat
 
 import eigassign as ea
 from eigassign.errors import StorageError, UsageError
-from eigassign.modal.reduced.model import ReducedModel
+from eigassign.modal import ReducedModel
+from eigassign.output import write_exchange
 from eigassign.output.exchange import numpy_reader
-from eigassign.output.exchange.files import write_exchange
 
 Floats = NDArray[np.float64]
 CASES = Path(__file__).parents[3] / "cases"

@@ -11,10 +11,8 @@ import scipy.io
 from scenes import SHIPPED, changed, scene_of
 
 import eigassign
-from eigassign.pipeline.run import solve_case
-from eigassign.study.built_case import load_case
-from eigassign.study.design.clearance import Band, prove_clear
-from eigassign.study.scene import Scene
+from eigassign.pipeline import solve_case
+from eigassign.study import Band, Scene, load_case, prove_clear
 
 
 @pytest.fixture(scope="module")

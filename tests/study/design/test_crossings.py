@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from eigassign.mechanism.trajectory.trajectory import NamedTrajectory, Trajectories, Trajectory
-from eigassign.study.design.judgement import crossing_warnings
+from eigassign.mechanism import NamedTrajectory, Trajectories, Trajectory
+from eigassign.study import crossing_warnings
 
 TIME = np.linspace(0.0, 1.0, 11)
 

@@ -12,20 +12,20 @@ from rail_and_mast import HEIGHT, LAMP, OUT, alone, case
 from redesigned_arms import cart, extrapolated
 from scipy.optimize import brentq
 
-from eigassign.api import Case
-from eigassign.case.loading import parse
+from eigassign import Case
+from eigassign.case import parse
 from eigassign.errors import CaseError, LostModeError
-from eigassign.pipeline.run import prepare
-from eigassign.pipeline.stages import Stages
-from eigassign.study.design.followed import (
+from eigassign.pipeline import Stages, prepare
+from eigassign.study import (
+    Scene,
     Solved,
+    Wanted,
+    exact_response,
     followers,
     require_one_shape,
     solve_design,
+    target_frequencies,
 )
-from eigassign.study.design.response import exact_response
-from eigassign.study.scene import Scene
-from eigassign.study.wanted import Wanted, target_frequencies
 
 RAIL_LIKE = {"like": 1, "at": {"time": 0.0}}
 MAST_LIKE = {"like": 2, "at": {"time": 0.0}}

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from eigassign.study.design.judgement import verdict
-from eigassign.study.results import ErrorRow, ErrorSummary, TargetStudy
+from eigassign.study import ErrorRow, ErrorSummary, TargetStudy, verdict
 
 
 def missed(kind: str, initial: ErrorRow, exact: ErrorRow) -> TargetStudy:

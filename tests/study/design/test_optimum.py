@@ -9,11 +9,8 @@ import numpy as np
 import pytest
 from scenes import SHIPPED, scene_of
 
-from eigassign.assignment.exact.requirements import Frequencies
-from eigassign.assignment.exact.sequential import End
-from eigassign.study.design.optimum import Found, find_optimum
-from eigassign.study.design.response import ExactResponse
-from eigassign.study.wanted import target_frequencies
+from eigassign.assignment import End, Frequencies
+from eigassign.study import ExactResponse, Found, find_optimum, target_frequencies
 
 
 def found_of(folder: Path, text: str, starts: list[str]) -> Found:

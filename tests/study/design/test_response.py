@@ -10,16 +10,15 @@ import yaml
 from redesigned_arms import cart, extrapolated
 
 import eigassign as ea
-from eigassign.pipeline.run import prepare
-from eigassign.pipeline.stages import Stages
-from eigassign.study.design.response import (
+from eigassign.pipeline import Stages, prepare
+from eigassign.study import (
     MOST,
     ReducedModels,
     ReducedResponse,
+    Scene,
     exact_response,
     reduced_models,
 )
-from eigassign.study.scene import Scene
 
 
 def test_a_coordinate_that_rests_may_follow_the_design_all_the_same() -> None:

@@ -9,13 +9,17 @@ import numpy as np
 import pytest
 from scenes import changed, scene_of
 
-from eigassign.api import load_case
-from eigassign.pipeline.run import Options, solve_case
-from eigassign.study.design.followed import solve_design
-from eigassign.study.meaning.reach import proved_ranges, unreachable
-from eigassign.study.meaning.tolerance import reduced_ranges, study_tolerance
-from eigassign.study.scene import Scene
-from eigassign.study.wanted import target_frequencies
+from eigassign import load_case
+from eigassign.pipeline import Options, solve_case
+from eigassign.study import (
+    Scene,
+    proved_ranges,
+    reduced_ranges,
+    solve_design,
+    study_tolerance,
+    target_frequencies,
+    unreachable,
+)
 
 SHORT = ("samples: 152", "samples: 8")
 

@@ -8,12 +8,16 @@ import numpy as np
 import pytest
 from scenes import changed, scene_of
 
-from eigassign.study.design.answer import Answer, find_answer
-from eigassign.study.design.followed import solve_design
-from eigassign.study.meaning.overall import Studies, study_meaning
-from eigassign.study.results import Meaning
-from eigassign.study.scene import Scene
-from eigassign.study.wanted import target_frequencies
+from eigassign.study import (
+    Answer,
+    Meaning,
+    Scene,
+    Studies,
+    find_answer,
+    solve_design,
+    study_meaning,
+    target_frequencies,
+)
 
 
 def answered(

@@ -9,12 +9,16 @@ import numpy as np
 import pytest
 from scenes import changed, scene_of
 
-from eigassign.study.design.answer import find_answer
-from eigassign.study.design.optimum import Found
-from eigassign.study.meaning.tradeoff import kept, trade_off
-from eigassign.study.results import TradeOff, TradeOffPoint
-from eigassign.study.scene import Scene
-from eigassign.study.wanted import target_frequencies
+from eigassign.study import (
+    Found,
+    Scene,
+    TradeOff,
+    TradeOffPoint,
+    find_answer,
+    kept,
+    target_frequencies,
+    trade_off,
+)
 
 FEW = ("samples: 152", "samples: 12")
 PRICED = "{parameter: bodies.elbow_mass.mass, price: 2, "

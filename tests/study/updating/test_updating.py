@@ -10,10 +10,15 @@ import pytest
 
 from eigassign.case import Measurement, MeasurementFile
 from eigassign.errors import CaseError
-from eigassign.pipeline.update import update_case
-from eigassign.study.built_case import Case, load_case
-from eigassign.study.updating.fit import UpdateResults, solve_update, update_problem
-from eigassign.study.updating.measured import read_measurements
+from eigassign.pipeline import update_case
+from eigassign.study import (
+    Case,
+    UpdateResults,
+    load_case,
+    read_measurements,
+    solve_update,
+    update_problem,
+)
 
 CASES = Path(__file__).parents[3] / "cases"
 NOISE = 0.005
