@@ -29,7 +29,7 @@ PAGES = [
     *sorted((ROOT / "benchmarks" / "results").glob("*.md")),
 ]
 MOST_WORDS = 1500
-_SPEC = importlib.util.spec_from_file_location("reference", ROOT / "site" / "reference.py")
+_SPEC = importlib.util.spec_from_file_location("reference", ROOT / "page_builder" / "reference.py")
 assert _SPEC is not None
 assert _SPEC.loader is not None
 reference = importlib.util.module_from_spec(_SPEC)
@@ -109,7 +109,7 @@ def test_every_key_of_a_case_file_says_what_it_is_for() -> None:
 @pytest.mark.parametrize("name", reference.PAGES)
 def test_the_reference_is_current(name: str) -> None:
     written = read(MANUAL / "reference" / name)
-    assert reference.PAGES[name]() == written, "python site/reference.py writes it anew"
+    assert reference.PAGES[name]() == written, "python page_builder/reference.py writes it anew"
 
 
 def test_the_log_shown_is_the_log_written(

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_the_site_is_built_and_its_links_lead_somewhere(tmp_path: Path) -> None:
-    command = ["-q", "-W", "--keep-going", "-c", "site", "-d", str(tmp_path / "trees"), "."]
+    command = ["-q", "-W", "--keep-going", "-c", "page_builder", "-d", str(tmp_path / "trees"), "."]
     done = subprocess.run(
         [sys.executable, "-m", "sphinx", *command, str(tmp_path / "site")],
         cwd=ROOT, capture_output=True, text=True, check=False,
