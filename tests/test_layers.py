@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import ast
 import re
+import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-
-import pytest
 
 import eigassign
 
@@ -73,84 +72,61 @@ def reading_order(package: Path) -> list[str]:
     return re.findall(r"^    (\w+)  +\S", text, re.MULTILINE)
 
 
-@pytest.mark.parametrize("package", PACKAGES, ids=lambda p: name_of(p / "__init__.py") or "top")
-def test_modules_import_only_from_those_above_them_in_the_reading_order(package: Path) -> None:
-    prefix = name_of(package / "__init__.py")
-    order = reading_order(package)
-    inside = {p.stem for p in package.glob("*.py")} | {
-        p.parent.name for p in package.glob("*/*.py")
-    }
-    assert set(order) == inside - {"__init__"}
-    for k, name in enumerate(order):
-        own = package / name if (package / name).is_dir() else package / f"{name}.py"
-        for path in sorted(own.rglob("*.py")) if own.is_dir() else [own]:
-            for used in imports(parsed(path)):
-                full = f"eigassign.{prefix}." if prefix else "eigassign."
-                part = used.removeprefix(full).split(".")[0] if used.startswith(full) else name
-                assert part not in order[k + 1 :], f"{name_of(path)} imports {used}"
+def test_modules_import_only_from_those_above_them_in_the_reading_order() -> None:
+    for package in PACKAGES:
+        prefix = name_of(package / "__init__.py")
+        order = reading_order(package)
+        inside = {p.stem for p in package.glob("*.py")} | {
+            p.parent.name for p in package.glob("*/*.py")
+        }
+        assert set(order) == inside - {"__init__"}, prefix
+        for k, name in enumerate(order):
+            own = package / name if (package / name).is_dir() else package / f"{name}.py"
+            for path in sorted(own.rglob("*.py")) if own.is_dir() else [own]:
+                for used in imports(parsed(path)):
+                    full = f"eigassign.{prefix}." if prefix else "eigassign."
+                    part = used.removeprefix(full).split(".")[0] if used.startswith(full) else name
+                    assert part not in order[k + 1 :], f"{name_of(path)} imports {used}"
 
 
-@pytest.mark.parametrize("path", MODULES, ids=name_of)
-def test_our_own_modules_are_imported_at_the_top(path: Path) -> None:
+def test_our_own_modules_are_imported_at_the_top() -> None:
     """But in the command line and ``import eigassign``, which load what is used only."""
-    name = name_of(path)
-    functions = (n for n in ast.walk(parsed(path)) if isinstance(n, ast.FunctionDef))
-    inside = {used for function in functions for used in imports(function)}
-    if name and name.split(".")[0] not in ("cli", "__main__"):
-        assert not {used for used in inside if used.split(".")[0] == "eigassign"}
-
-
-@pytest.mark.parametrize("path", MODULES, ids=name_of)
-def test_a_third_party_is_imported_by_its_owner_only(path: Path) -> None:
-    package = name_of(path).split(".")[0]
-    for name in imports(parsed(path)):
-        party = name.split(".")[0]
-        assert package in OWNERS.get(party, {package}), f"{party} belongs to {OWNERS[party]}"
-
-
-def test_the_case_layer_needs_no_numerical_package() -> None:
     for path in MODULES:
-        if name_of(path).startswith("case"):
-            assert not {name.split(".")[0] for name in imports(parsed(path))} & EVERYWHERE
+        name = name_of(path)
+        functions = (n for n in ast.walk(parsed(path)) if isinstance(n, ast.FunctionDef))
+        inside = {used for function in functions for used in imports(function)}
+        if name and name.split(".")[0] not in ("cli", "__main__"):
+            assert not {used for used in inside if used.split(".")[0] == "eigassign"}, name
 
 
-@pytest.mark.parametrize("path", MODULES, ids=name_of)
-def test_only_the_command_line_and_the_console_print(path: Path) -> None:
-    if name_of(path) not in PRINTING:
-        assert not called(path) & {"print", "click.echo", "sys.stdout.write"}
-
-
-def test_only_the_command_line_sets_exit_codes() -> None:
+def test_third_parties_have_one_owner_each_and_the_case_needs_no_numerical_package() -> None:
     for path in MODULES:
-        if name_of(path) not in {"cli", "__main__"}:
-            assert not {"sys.exit", "exit", "quit", "os._exit"} & called(path), path
+        package = name_of(path).split(".")[0]
+        parties = {name.split(".")[0] for name in imports(parsed(path))}
+        for party in parties:
+            assert package in OWNERS.get(party, {package}), f"{name_of(path)} imports {party}"
+        assert package != "case" or not parties & EVERYWHERE, name_of(path)
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "cli").glob("*.py")), ids=name_of)
-def test_the_command_line_imports_only_click_and_light_modules_at_its_top(path: Path) -> None:
-    at_top = {
-        name.removeprefix("eigassign.")
-        for node in parsed(path).body
-        if isinstance(node, (ast.Import, ast.ImportFrom))
-        for name in imports(ast.Module(body=[node], type_ignores=[]))
-    }
+def test_only_the_command_line_and_the_console_print_and_only_the_former_sets_exit_codes() -> None:
+    for path in MODULES:
+        name = name_of(path)
+        if name not in PRINTING:
+            assert not called(path) & {"print", "click.echo", "sys.stdout.write"}, name
+        if name not in {"cli", "__main__"}:
+            assert not {"sys.exit", "exit", "quit", "os._exit"} & called(path), name
+
+
+def test_the_command_line_imports_only_click_and_light_modules_at_its_top() -> None:
     light = {"click", "cli", "process", "files", "_version", "errors"}
-    standard = {
-        "os",
-        "sys",
-        "math",
-        "io",
-        "json",
-        "logging",
-        "re",
-        "dataclasses",
-        "__future__",
-        "collections",
-        "contextlib",
-        "pathlib",
-        "typing",
-    }
-    assert {name.split(".")[0] for name in at_top} <= light | standard
+    for path in sorted((ROOT / "cli").glob("*.py")):
+        at_top = {
+            name.removeprefix("eigassign.").split(".")[0]
+            for node in parsed(path).body
+            if isinstance(node, (ast.Import, ast.ImportFrom))
+            for name in imports(ast.Module(body=[node], type_ignores=[]))
+        }
+        assert at_top <= light | sys.stdlib_module_names, path
 
 
 TESTS = sorted(Path(__file__).parent.rglob("*.py"))
@@ -171,12 +147,9 @@ def private_names(tree: ast.Module) -> Iterator[str]:
             yield from (str(text).rpartition(".")[2] for text in texts)
 
 
-@pytest.mark.parametrize("path", TESTS, ids=lambda path: path.stem)
-def test_no_test_uses_a_private_name_of_the_package(path: Path) -> None:
-    used = {n for n in private_names(parsed(path)) if re.match("_[^_]", n)} - STANDARD
-    assert not used
-
-
-def test_test_files_have_names_of_their_own() -> None:
+def test_tests_have_names_of_their_own_and_use_nothing_private() -> None:
     names = [path.name for path in TESTS if path.name != "conftest.py"]
     assert sorted(set(names)) == sorted(names)
+    for path in TESTS:
+        used = {n for n in private_names(parsed(path)) if re.match("_[^_]", n)} - STANDARD
+        assert not used, path
