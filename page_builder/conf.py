@@ -1,4 +1,4 @@
-"""The manual as a site: `sphinx-build -W -c page_builder . build/site` in the root of the repository.
+"""The manual as pages: `sphinx-build -W -c page_builder . build/site` in the repository's root.
 
 The site has the manual, the README, the cases and the benchmarks, at the places that they have in
 the repository, so that every link leads where it does there. The headings of the manual's index and

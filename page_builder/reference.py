@@ -1,8 +1,8 @@
 """Write the manual's reference: the keys from the schema, the commands from the command line.
 
-`python page_builder/reference.py` writes eigassign/docs/reference/keys.md and commands.md. What a key is
-for stands in the docstring of its model in `eigassign.case.schema`, what a command does in that of
-its function in `eigassign.cli`.
+`python page_builder/reference.py` writes eigassign/docs/reference/keys.md and commands.md. What a
+key is for stands in the docstring of its model in `eigassign.case.schema`, what a command does in
+that of its function in `eigassign.cli`.
 """
 
 from __future__ import annotations
