@@ -19,22 +19,20 @@ __all__, __getattr__, __dir__ = face(
     __name__,
     {
         "assign": "ActiveLimit Assignment solve_assignment",
-        "catalogues.branching": "Catalogue Effort hull search_catalogue",
+        "catalogues.branching": "ListedValues SearchLimits hull search_catalogue",
         "catalogues.choosing": "choose",
         "catalogues.linear": "solve_catalogue",
         "exact.design_problem": "Appraisal DesignProblem MET Objective best_first",
         "exact.identification": "Identified MeasuredFrequencies identify",
-        "exact.requirements": (
-            "Frequencies FrequencyLimit FrequencyTarget QuantityLimit Requirements"
-        ),
-        "exact.sequential": "End Optimum",
+        "exact.requirements": ("Frequencies FrequencyLimit ModeTarget QuantityLimit Requirements"),
+        "exact.sequential": "End Optimum minimise",
         "exact.stationarity": "stationarity",
         "optimality": "ACCEPT Certificate judge",
         "program": (
-            "Bounds Candidate Goal LinearConstraint LinearModel QuadraticProgram "
+            "Bounds ProgramAnswer Goal LinearConstraint LinearModel QuadraticProgram "
             "ScaledProgram build_program quadratic_form scaled_program unscaled"
         ),
-        "solver": "Polished SETTINGS Status polish solve_osqp",
+        "solver": "solve_active_set Polished SETTINGS Status polish solve_osqp",
         "targets": (
             "RelativeError hz_from_lam lam_from_hz relative_error sample_target trapezoidal_weights"
         ),

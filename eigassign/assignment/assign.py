@@ -14,15 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.assignment.catalogues.branching import Catalogue, CatalogueSearch
+from eigassign.assignment.catalogues.branching import CatalogueSearch, ListedValues
 from eigassign.assignment.catalogues.linear import held, solve_catalogue
 from eigassign.assignment.checks import Floats, finite, frozen
 from eigassign.assignment.optimality import ACCEPT, best_candidate
 from eigassign.assignment.program import (
     Bounds,
-    Candidate,
     Goal,
     LinearConstraint,
+    ProgramAnswer,
     QuadraticProgram,
     build_program,
 )
@@ -80,7 +80,7 @@ def solve_assignment(
     bounds: Bounds,
     constraints: Sequence[LinearConstraint] = (),
     names: Sequence[str] | None = None,
-    catalogues: Sequence[Catalogue] = (),
+    catalogues: Sequence[ListedValues] = (),
 ) -> Assignment:
     """The design y within its limits that minimises J of eqs. (13)–(14), in relative error.
 
@@ -94,7 +94,7 @@ def solve_assignment(
         UsageError: shapes that do not fit, values that are not finite, empty ranges.
         InfeasibleError: no design meets all limits; ``constraints`` names those that contradict.
         AccuracyError: the KKT residuals of the best answer found exceed 1e-8; or no combination
-            of the catalogues was found within the effort of `branching.Effort`.
+            of the catalogues was found within `branching.SearchLimits`.
         KeyboardInterrupt: Ctrl-C while the solver runs.
     """
     program = build_program(goals, time_weights, y0, y_initial, bounds, constraints, names)
@@ -124,7 +124,7 @@ def solve_assignment(
 
 
 def _active_limits(
-    program: QuadraticProgram, answer: Candidate, listed: Collection[int]
+    program: QuadraticProgram, answer: ProgramAnswer, listed: Collection[int]
 ) -> Iterator[ActiveLimit]:
     """Bounds met exactly, not of ``listed`` columns; then constraints met to 1e-8 of their unit."""
     for j, name in enumerate(program.names):

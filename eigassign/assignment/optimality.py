@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from eigassign.assignment.checks import Floats
-from eigassign.assignment.program import Candidate, QuadraticProgram
+from eigassign.assignment.program import ProgramAnswer, QuadraticProgram
 from eigassign.errors import AccuracyError
 
 ACCEPT = 1e-8
@@ -53,8 +53,8 @@ class Certificate:
 
 
 def best_candidate(
-    program: QuadraticProgram, candidates: Sequence[Candidate]
-) -> tuple[Candidate, Certificate]:
+    program: QuadraticProgram, candidates: Sequence[ProgramAnswer]
+) -> tuple[ProgramAnswer, Certificate]:
     """The first of ``candidates`` that is optimal to within 1e-8, with its residuals.
 
     Raises AccuracyError with the figures of the least bad one where none is.
@@ -72,7 +72,7 @@ def best_candidate(
     )
 
 
-def judge(program: QuadraticProgram, answer: Candidate) -> Certificate:
+def judge(program: QuadraticProgram, answer: ProgramAnswer) -> Certificate:
     """Residuals of ``answer``, from the program's unscaled data only."""
     scales, free = program.scales, list(program.scales.free)
     y, mu, nu = answer.y, answer.bound_multipliers, answer.constraint_multipliers

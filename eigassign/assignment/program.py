@@ -328,7 +328,7 @@ def scaled_program(program: QuadraticProgram) -> ScaledProgram:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class ProgramAnswer:
     """A design y (n_y,) with signed multipliers of bounds (n_y,) and constraints (n_c,).
 
     Multipliers are in J per SI unit of y or of the constraint: positive at the upper limit,
@@ -340,7 +340,9 @@ class Candidate:
     constraint_multipliers: Floats
 
 
-def unscaled(program: QuadraticProgram, scaled: ScaledProgram, x: Floats, mu: Floats) -> Candidate:
+def unscaled(
+    program: QuadraticProgram, scaled: ScaledProgram, x: Floats, mu: Floats
+) -> ProgramAnswer:
     """x (n,) and mu (rows of G,) of the scaled program, back in SI units."""
     scales, free = program.scales, list(program.scales.free)
     n = len(free)
@@ -350,7 +352,7 @@ def unscaled(program: QuadraticProgram, scaled: ScaledProgram, x: Floats, mu: Fl
     nu = 2.0 * scales.objective * mu[n:] / scales.rows
     bound = -(program.gradient(y) + program.C.T @ nu)  # the multipliers of fixed parameters
     bound[free] = 2.0 * scales.objective * mu[:n] / scales.y[free]
-    return Candidate(y, bound, nu)
+    return ProgramAnswer(y, bound, nu)
 
 
 def _of_finite_limits(mu: Floats, lower: Floats, upper: Floats) -> Floats:

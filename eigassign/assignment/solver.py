@@ -34,7 +34,7 @@ import numpy as np
 from eigassign.assignment.checks import Floats
 from eigassign.assignment.feasibility import contradiction, feasible_point, refuse_impossible
 from eigassign.assignment.program import (
-    Candidate,
+    ProgramAnswer,
     QuadraticProgram,
     ScaledProgram,
     scaled_program,
@@ -50,7 +50,7 @@ class Solution:
     ``undetermined`` counts the directions of the free parameters that change no target.
     """
 
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[ProgramAnswer, ...]
     status: str
     iterations: int
     undetermined: int
@@ -84,12 +84,12 @@ def solve_scaled(
     From a ``start`` (n,) that is feasible the active-set method goes alone, without OSQP.
     """
     if start is not None:
-        return minimise(scaled, start)
+        return solve_active_set(scaled, start)
     raw = solve_osqp(scaled)
     start = feasible_point(scaled) if raw.x is None else raw.x
     if start is None:
         return None
-    return minimise(scaled, start)
+    return solve_active_set(scaled, start)
 
 
 def _start(program: QuadraticProgram, scaled: ScaledProgram, raw: RawSolution) -> Floats:
@@ -222,9 +222,9 @@ def polish(scaled: ScaledProgram, x: Floats) -> Polished:
     """Refine a nearly feasible x to the optimum (nearest to 0, if there are several)."""
     values, rows = np.linalg.svd(scaled.A)[1:]
     rank = int(np.sum(values > RANK * np.max(values, initial=0.0)))
-    x, mu = minimise(scaled, x)
+    x, mu = solve_active_set(scaled, x)
     if rank < x.size:
-        x = minimise(_nearest(scaled, rows[:rank], x), x)[0]
+        x = solve_active_set(_nearest(scaled, rows[:rank], x), x)[0]
     return Polished(x, mu, rank)
 
 
@@ -246,7 +246,7 @@ def _nearest(scaled: ScaledProgram, rows: Floats, x: Floats) -> ScaledProgram:
     )
 
 
-def minimise(scaled: ScaledProgram, x: Floats) -> tuple[Floats, Floats]:
+def solve_active_set(scaled: ScaledProgram, x: Floats) -> tuple[Floats, Floats]:
     """x and mu at the optimum, from a nearly feasible x.
 
     Moving onto the limits shifts x by the solver's tolerance at first, by round-off in the end.

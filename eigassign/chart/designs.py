@@ -33,7 +33,7 @@ from eigassign.chart.timing import measure
 from eigassign.errors import EigassignError
 from eigassign.modal.expansion import expand
 from eigassign.study.design.one_shot import assign_design
-from eigassign.study.design.optimum import Found, Task, Variant, find_optimum, variant_of
+from eigassign.study.design.optimum import Found, PosedProblem, Task, find_optimum, variant_of
 from eigassign.study.scene import Expansions, Scene
 from eigassign.study.wanted import Wanted, target_frequencies
 
@@ -97,7 +97,7 @@ class DesignTask:
     wanted: tuple[Wanted, ...]  # at them
 
     @cached_property
-    def variant(self) -> Variant:
+    def variant(self) -> PosedProblem:
         """The targets on exact frequencies."""
         return variant_of(Task(self.scene, self.wanted, 0.0), ())
 

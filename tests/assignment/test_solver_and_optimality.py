@@ -12,22 +12,22 @@ from assignment_problems import goal, random_problem
 from eigassign.assignment import (
     SETTINGS,
     Bounds,
-    Candidate,
     Certificate,
     LinearConstraint,
     Polished,
+    ProgramAnswer,
     ScaledProgram,
     Status,
     build_program,
     judge,
     polish,
     scaled_program,
+    solve_active_set,
     solve_assignment,
     solve_osqp,
     solver,
     unscaled,
 )
-from eigassign.assignment.solver import minimise
 from eigassign.errors import AccuracyError, UsageError
 
 
@@ -38,7 +38,7 @@ def small_program(upper=0.1):
 
 
 def answer(y, mu, nu=0.0):
-    return Candidate(np.array([y]), np.array([mu]), np.array([nu]))
+    return ProgramAnswer(np.array([y]), np.array([mu]), np.array([nu]))
 
 
 def test_the_optimum_by_hand_has_no_residual():
@@ -215,7 +215,7 @@ def test_an_equality_is_held_whichever_way_it_is_pulled(sign):
         upper=np.array([1.0, 1.0, 0.0]),
         cost=np.zeros(2),
     )
-    x, mu = minimise(scaled, np.zeros(2))
+    x, mu = solve_active_set(scaled, np.zeros(2))
     np.testing.assert_array_equal(x, np.zeros(2))
     np.testing.assert_allclose(mu, [0.0, 0.0, -sign])
 

@@ -39,7 +39,7 @@ PROVED = 1e-9
 
 
 @dataclass(frozen=True)
-class Catalogue:
+class ListedValues:
     """Listed values of some columns of y: row r sets y[columns] = rows[r], (n_rows, n_columns)."""
 
     name: str
@@ -97,7 +97,7 @@ class CatalogueSearch:
 
 
 @dataclass(frozen=True)
-class Effort:
+class SearchLimits:
     """How many combinations to keep, and after how many nodes or seconds to stop."""
 
     keep: int = 5
@@ -124,7 +124,7 @@ class Relaxed:
     mu: Floats
 
 
-class Model(Protocol):
+class CatalogueProblem(Protocol):
     """What the tree searches.
 
     ``coordinates``: of every catalogue, its rows (n_rows, any) where distances are measured.
@@ -143,7 +143,7 @@ class Model(Protocol):
         """Those of a small node that can be below the cutoff; ``near`` is a node around it."""
 
 
-class _Found:
+class _Best:
     """The best combinations so far, distinct, the best first."""
 
     def __init__(self, keep: int) -> None:
@@ -162,13 +162,13 @@ class _Found:
 
 
 def branch_and_bound(
-    model: Model, root: Node, effort: Effort, start: Iterable[Combination] = ()
+    model: CatalogueProblem, root: Node, limits: SearchLimits, start: Iterable[Combination] = ()
 ) -> CatalogueSearch:
     """The lowest bound first, knowing some combinations at the start.
 
     ``best`` is empty where there is no combination, or none was met before a limit.
     """
-    found, nodes, end = _Found(effort.keep), 0, time.monotonic() + effort.seconds
+    found, nodes, end = _Best(limits.keep), 0, time.monotonic() + limits.seconds
     found.add(start)
     heap: list[tuple[float, int, Relaxed]] = []
     pending: list[Node] = [root]
@@ -181,7 +181,7 @@ def branch_and_bound(
                 found.add(model.combinations(_rounded(model, relaxed), relaxed, found.cutoff))
                 heapq.heappush(heap, (relaxed.bound, nodes, relaxed))
         exhausted = not heap or heap[0][0] >= found.cutoff() - PROVED * abs(found.cutoff())
-        if exhausted or nodes >= effort.nodes or time.monotonic() > end:
+        if exhausted or nodes >= limits.nodes or time.monotonic() > end:
             break
         above = heapq.heappop(heap)[2]
         pending = []
@@ -193,7 +193,7 @@ def branch_and_bound(
     return CatalogueSearch(tuple(found.best), min(bounds, default=np.inf), nodes, exhausted)
 
 
-def _distances(model: Model, relaxed: Relaxed) -> list[Floats]:
+def _distances(model: CatalogueProblem, relaxed: Relaxed) -> list[Floats]:
     """Of every catalogue, how far its rows in the node are from the relaxation's optimum."""
     return [
         np.linalg.norm(at[list(rows)] - point, axis=1)
@@ -201,13 +201,13 @@ def _distances(model: Model, relaxed: Relaxed) -> list[Floats]:
     ]
 
 
-def _rounded(model: Model, relaxed: Relaxed) -> Node:
+def _rounded(model: CatalogueProblem, relaxed: Relaxed) -> Node:
     """The node of one combination, the nearest row of every catalogue."""
     away = _distances(model, relaxed)
     return tuple((rows[np.argmin(d)],) for rows, d in zip(relaxed.node, away, strict=True))
 
 
-def _split(model: Model, relaxed: Relaxed) -> list[Node]:
+def _split(model: CatalogueProblem, relaxed: Relaxed) -> list[Node]:
     """Two nodes that share out the rows of the catalogue furthest from being decided."""
     away = [d.min() if d.size > 1 else -1.0 for d in _distances(model, relaxed)]
     k = int(np.argmax(away))
@@ -223,7 +223,7 @@ def _split(model: Model, relaxed: Relaxed) -> list[Node]:
 
 
 def answered(found: CatalogueSearch) -> CatalogueSearch:
-    """What was found, or AccuracyError where a limit of the effort came first."""
+    """What was found, or AccuracyError where a limit of the limits came first."""
     if found.best:
         return found
     raise AccuracyError(
@@ -232,12 +232,12 @@ def answered(found: CatalogueSearch) -> CatalogueSearch:
     )
 
 
-def distinct_rows(catalogue: Catalogue) -> NDArray[np.int_]:
+def distinct_rows(catalogue: ListedValues) -> NDArray[np.int_]:
     """Of equal rows the first, in the order of the list."""
     return np.sort(np.unique(catalogue.rows, axis=0, return_index=True)[1])
 
 
-def refuse_columns(catalogues: Sequence[Catalogue], n_y: int) -> None:
+def refuse_columns(catalogues: Sequence[ListedValues], n_y: int) -> None:
     """UsageError unless every column is one of y (n_y,) and has one owner."""
     owner: dict[int, str] = {}
     for catalogue in catalogues:
@@ -255,10 +255,10 @@ def refuse_columns(catalogues: Sequence[Catalogue], n_y: int) -> None:
 
 
 def search_catalogue(
-    catalogues: Sequence[Catalogue],
+    catalogues: Sequence[ListedValues],
     relax: Callable[[Node, Floats | None], tuple[Floats, float] | None],
     fix: Callable[[Rows], tuple[Floats, float] | None],
-    effort: Effort | None = None,
+    limits: SearchLimits | None = None,
     starts: Iterable[Rows] = (),
 ) -> CatalogueSearch:
     """Combinations of a model that need not be linear or convex, by the same tree.
@@ -276,26 +276,26 @@ def search_catalogue(
     Raises:
         UsageError: columns that two catalogues own.
         InfeasibleError: there is no combination.
-        AccuracyError: a limit of ``effort`` was reached before any combination was found.
+        AccuracyError: a limit of ``limits`` was reached before any combination was found.
     """
-    effort = effort or Effort()
+    limits = limits or SearchLimits()
     refuse_columns(catalogues, 1 + max(max(own.columns) for own in catalogues))
-    model = _AnyModel(catalogues, relax, fix, time.monotonic() + effort.seconds)
+    model = _AnyModel(catalogues, relax, fix, time.monotonic() + limits.seconds)
     known = (one for rows in starts for one in model.improved(rows, 1))
-    found = branch_and_bound(model, model.root, replace(effort, keep=1), known)
+    found = branch_and_bound(model, model.root, replace(limits, keep=1), known)
     if not found.best and found.exhausted:
         names = tuple(own.name for own in catalogues)
         listed = ", ".join(map(repr, names))
         raise InfeasibleError(f"no combination of the catalogues {listed} meets all limits", names)
     list(model.improved(answered(found).best[0].rows, 2))
-    best = _Found(effort.keep)
+    best = _Best(limits.keep)
     best.add(one for one in model.known.values() if one is not None)
     lower = min(found.lower_bound, best.best[0].objective)
     return replace(found, best=tuple(best.best), lower_bound=lower)
 
 
 def hull(
-    catalogues: Sequence[Catalogue], node: Node, bounds: Bounds
+    catalogues: Sequence[ListedValues], node: Node, bounds: Bounds
 ) -> tuple[Bounds, list[LinearConstraint]]:
     """Limits of y around the rows of a node: of every column, and along their principal axes.
 
@@ -328,7 +328,7 @@ class _AnyModel:
 
     def __init__(
         self,
-        catalogues: Sequence[Catalogue],
+        catalogues: Sequence[ListedValues],
         relax: Callable[[Node, Floats | None], tuple[Floats, float] | None],
         fix: Callable[[Rows], tuple[Floats, float] | None],
         end: float,

@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from eigassign.assignment.catalogues.branching import (
-    Catalogue,
     CatalogueSearch,
-    Effort,
+    ListedValues,
     Node,
     Rows,
+    SearchLimits,
     distinct_rows,
     hull,
     search_catalogue,
@@ -55,7 +55,7 @@ class _StoppedError(Exception):
 
 def choose(
     problem: DesignProblem,
-    catalogues: Sequence[Catalogue],
+    catalogues: Sequence[ListedValues],
     starts: Sequence[Floats],
     steps: int = 100,
     deadline: float = np.inf,
@@ -95,7 +95,7 @@ class _Tree:
     def __init__(
         self,
         problem: DesignProblem,
-        catalogues: Sequence[Catalogue],
+        catalogues: Sequence[ListedValues],
         starts: Sequence[Floats],
         steps: int,
         deadline: float,
@@ -129,9 +129,9 @@ class _Tree:
             return None if optimum is None or worth is None else (optimum.y, worth)
 
         left = min(self.deadline - time.monotonic(), SECONDS)
-        effort = Effort(keep=KEPT, seconds=max(left, 0.0))
+        limits = SearchLimits(keep=KEPT, seconds=max(left, 0.0))
         starts = dict.fromkeys(map(self.nearest, self.starts))
-        return search_catalogue(self.catalogues, relax, fix, effort, starts)
+        return search_catalogue(self.catalogues, relax, fix, limits, starts)
 
     def _relaxed(self, node: Node, near: Floats | None) -> Iterator[Optimum]:
         self.nodes += 1

@@ -25,13 +25,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.catalogues.branching import (
-    Catalogue,
     CatalogueSearch,
     Combination,
-    Effort,
+    ListedValues,
     Node,
     Relaxed,
     Rows,
+    SearchLimits,
     answered,
     branch_and_bound,
     distinct_rows,
@@ -46,7 +46,9 @@ from eigassign.errors import InfeasibleError
 
 
 def solve_catalogue(
-    program: QuadraticProgram, catalogues: Sequence[Catalogue], effort: Effort | None = None
+    program: QuadraticProgram,
+    catalogues: Sequence[ListedValues],
+    limits: SearchLimits | None = None,
 ) -> CatalogueSearch:
     """The combinations of least J(y), the continuous columns at their optimum for each.
 
@@ -57,9 +59,9 @@ def solve_catalogue(
         UsageError: columns that do not exist, or that two catalogues own.
         InfeasibleError: no combination meets all limits (the tree was searched to its end);
             ``constraints`` names a smallest set of them, or the catalogue without admissible row.
-        AccuracyError: a limit of ``effort`` was reached before any combination was found.
+        AccuracyError: a limit of ``limits`` was reached before any combination was found.
     """
-    effort = effort or Effort()
+    limits = limits or SearchLimits()
     program, root = _listed(program, catalogues)
     refuse_impossible(program)
     if not program.scales.free:
@@ -67,14 +69,14 @@ def solve_catalogue(
             tuple(rows[0] for rows in root), program.y_start, program.objective(program.y_start)
         )
         return CatalogueSearch((only,), only.objective, 1, True)
-    found = branch_and_bound(_LinearModel(program, catalogues), root, effort)
+    found = branch_and_bound(_LinearModel(program, catalogues), root, limits)
     if not found.best and found.exhausted:
-        raise _contradiction(program, catalogues, root, effort)
+        raise _contradiction(program, catalogues, root, limits)
     return answered(found)
 
 
 def _listed(
-    program: QuadraticProgram, catalogues: Sequence[Catalogue]
+    program: QuadraticProgram, catalogues: Sequence[ListedValues]
 ) -> tuple[QuadraticProgram, Node]:
     """The program with bounds around the rows, and of equal rows within its bounds the first."""
     refuse_columns(catalogues, program.y0.size)
@@ -106,7 +108,7 @@ def _within(program: QuadraticProgram, lower: Floats, upper: Floats) -> Quadrati
 
 
 def held(
-    program: QuadraticProgram, catalogues: Sequence[Catalogue], rows: Rows
+    program: QuadraticProgram, catalogues: Sequence[ListedValues], rows: Rows
 ) -> QuadraticProgram:
     """The program of a combination's continuous columns, the others held at its rows.
 
@@ -134,7 +136,7 @@ def _constrained(program: QuadraticProgram, kept: Iterable[int]) -> QuadraticPro
 
 
 def _contradiction(
-    program: QuadraticProgram, catalogues: Sequence[Catalogue], root: Node, effort: Effort
+    program: QuadraticProgram, catalogues: Sequence[ListedValues], root: Node, limits: SearchLimits
 ) -> InfeasibleError:
     """The error that names constraints, none of which can be left out of the contradiction."""
     program = replace(program, A=np.zeros_like(program.A), b=np.zeros_like(program.b))
@@ -143,7 +145,7 @@ def _contradiction(
         rest = [other for other in needed if other != name]
         kept = [k for k, own in enumerate(program.constraint_names) if own in rest]
         only = _LinearModel(_constrained(program, kept), catalogues)
-        tried = branch_and_bound(only, root, replace(effort, keep=1))
+        tried = branch_and_bound(only, root, replace(limits, keep=1))
         if not tried.best and tried.exhausted:
             needed = rest
     listed = " and ".join(repr(name) for name in needed)
@@ -177,7 +179,7 @@ class _LinearModel:
     # 4096 and with 16384
     small = 4096
 
-    def __init__(self, program: QuadraticProgram, catalogues: Sequence[Catalogue]) -> None:
+    def __init__(self, program: QuadraticProgram, catalogues: Sequence[ListedValues]) -> None:
         self.program, self.catalogues = program, catalogues
         scaled, free = scaled_program(program), program.scales.free
         n = self.n = len(free)

@@ -27,7 +27,7 @@ ANGLES = np.pi / 4.0 * np.arange(1, 8)  # of the mixtures of two modes that opti
 
 
 @dataclass(frozen=True)
-class Pairs:
+class NeighbourPairs:
     """Rows whose mode may meet a neighbour, p of them; the matrix of each is
 
         [[value + slopes·δ,  mixed·δ          ],
@@ -43,13 +43,13 @@ class Pairs:
     gap: Floats  # (p,), relative distance of both frequencies
     larger: NDArray[np.bool_]  # (p,), whether the row is the larger eigenvalue
 
-    def scaled(self, free: list[int], width: Floats) -> Pairs:
+    def scaled(self, free: list[int], width: Floats) -> NeighbourPairs:
         """The same with slopes in units ``width`` of the design parameters ``free``."""
         return replace(self, others=self.others[:, free] * width, mixed=self.mixed[:, free] * width)
 
-    def chosen(self, mask: NDArray[np.bool_]) -> Pairs:
+    def chosen(self, mask: NDArray[np.bool_]) -> NeighbourPairs:
         """Some of them."""
-        return Pairs(*(getattr(self, name)[mask] for name in self.__dataclass_fields__))
+        return NeighbourPairs(*(getattr(self, name)[mask] for name in self.__dataclass_fields__))
 
     def along(
         self, values: Floats, slopes: Floats, shift: Floats, d: Floats
@@ -83,12 +83,12 @@ class Pairs:
         return np.tile(here.row, len(ANGLES)), np.concatenate(mixtures)
 
 
-def joined(parts: Sequence[Pairs]) -> Pairs | None:
+def joined(parts: Sequence[NeighbourPairs]) -> NeighbourPairs | None:
     """All of them as one; None where there are none."""
     if not parts:
         return None
     columns = (
         np.concatenate([getattr(part, name) for part in parts])
-        for name in Pairs.__dataclass_fields__
+        for name in NeighbourPairs.__dataclass_fields__
     )
-    return Pairs(*columns)
+    return NeighbourPairs(*columns)

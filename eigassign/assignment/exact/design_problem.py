@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.checks import Floats
-from eigassign.assignment.exact.crossing import Pairs
+from eigassign.assignment.exact.crossing import NeighbourPairs
 from eigassign.assignment.program import LinearConstraint, ScaledProgram
 from eigassign.assignment.solver import solve_scaled
 
@@ -49,7 +49,7 @@ class Appraisal:
     slopes: Floats
     excess: Floats
     excess_slopes: Floats
-    pairs: Pairs | None = None
+    pairs: NeighbourPairs | None = None
 
     @property
     def violation(self) -> float:
@@ -87,7 +87,7 @@ class DesignProblem:
 
 
 @dataclass(frozen=True)
-class Box:
+class UnitBox:
     """z = (y − lower)/width of the parameters with room, and the linear constraints over z."""
 
     lower: Floats
@@ -100,7 +100,7 @@ class Box:
     prices: Floats
 
     @classmethod
-    def of(cls, problem: DesignProblem) -> Box:
+    def of(cls, problem: DesignProblem) -> UnitBox:
         """The units of a problem."""
         width = problem.upper - problem.lower
         free = [int(j) for j in np.flatnonzero(width > 0.0)]
@@ -159,7 +159,7 @@ class Box:
 
 
 @dataclass(frozen=True)
-class Place:
+class DesignPoint:
     """A design in units of the bounds, with its slopes in these units."""
 
     z: Floats
@@ -167,7 +167,7 @@ class Place:
     J: Floats
     C: Floats
     value: float  # F
-    pairs: Pairs | None
+    pairs: NeighbourPairs | None
 
     def smooth_slopes(self, kinked: NDArray[np.bool_]) -> Floats:
         """Of all rows (m + k, n); of those at kinks the mean of both branches."""
@@ -179,7 +179,7 @@ class Place:
         return slopes
 
     @classmethod
-    def of(cls, problem: DesignProblem, box: Box, z: Floats, seen: Appraisal) -> Place:
+    def of(cls, problem: DesignProblem, box: UnitBox, z: Floats, seen: Appraisal) -> DesignPoint:
         """What was ``seen`` of the design at z."""
         J, C = (slopes[:, box.free] * box.width for slopes in (seen.slopes, seen.excess_slopes))
         pairs = None if seen.pairs is None else seen.pairs.scaled(box.free, box.width)

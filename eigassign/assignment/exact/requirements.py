@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.checks import Floats
-from eigassign.assignment.exact.crossing import Pairs, joined
+from eigassign.assignment.exact.crossing import NeighbourPairs, joined
 from eigassign.assignment.exact.design_problem import Appraisal, Objective
 
 
@@ -45,7 +45,7 @@ Response = Callable[[Floats], Frequencies]
 
 
 @dataclass(frozen=True)
-class FrequencyTarget:
+class ModeTarget:
     """A mode is to be near ``hz`` (n,) at ``rows`` of all samples."""
 
     mode: int
@@ -79,7 +79,7 @@ class QuantityLimit:
 class Requirements:
     """All that is asked, with the weights ω (n_t,) in s of the integral over time."""
 
-    targets: tuple[FrequencyTarget, ...]
+    targets: tuple[ModeTarget, ...]
     limits: tuple[FrequencyLimit, ...]
     quantities: tuple[QuantityLimit, ...]
     time_weights: Floats
@@ -116,7 +116,7 @@ class Requirements:
         excesses += [part for limit in self.quantities for part in _of_quantity(limit, y)]
         return Appraisal(*_stacked(residuals, len(y)), *_stacked(excesses, len(y)), pairs)
 
-    def _pairs(self, found: Frequencies) -> Pairs | None:
+    def _pairs(self, found: Frequencies) -> NeighbourPairs | None:
         """Rows of one mode beside its neighbours; None where nothing is known of these.
 
         Squares of errors of neighbours that are both wanted are smooth together where they meet at
@@ -124,7 +124,7 @@ class Requirements:
         """
         if found.mixed is None:
             return None
-        parts: list[Pairs] = []
+        parts: list[NeighbourPairs] = []
         start = 0
         for target in self.targets:
             scale, at = self._factor(target) / target.hz, np.arange(start, start + len(target.hz))
@@ -191,13 +191,13 @@ class Requirements:
     def _total(self) -> float:
         return float(sum(t.weight * self.time_weights[t.rows].sum() for t in self.targets))
 
-    def _factor(self, target: FrequencyTarget) -> Floats:
+    def _factor(self, target: ModeTarget) -> Floats:
         """What multiplies f / f_d − 1 (n,)."""
         if self.objective is Objective.WORST_CASE:
             return np.full(len(target.hz), target.weight)
         return np.sqrt(target.weight * self.time_weights[target.rows] / self._total)
 
-    def _residual(self, target: FrequencyTarget, found: Frequencies) -> tuple[Floats, Floats]:
+    def _residual(self, target: ModeTarget, found: Frequencies) -> tuple[Floats, Floats]:
         factor, column = self._factor(target), _column(target.mode)
         hz, slopes = found.hz[target.rows, column], found.slopes[target.rows, column]
         return factor * (hz / target.hz - 1.0), (factor / target.hz)[:, None] * slopes
@@ -219,7 +219,7 @@ def _beside(
     at: NDArray[np.intp],
     scale: Floats,
     wanted: Floats,
-) -> Iterator[Pairs]:
+) -> Iterator[NeighbourPairs]:
     """Rows ``at``, scale (f − wanted), each with the modes below and above that are not asked."""
     assert found.mixed is not None
     lowest = found.mixed.shape[1] + 1
@@ -228,7 +228,7 @@ def _beside(
         if neighbour in asked or not 1 <= neighbour <= lowest:
             continue
         hz = found.hz[rows, neighbour - 1]
-        yield Pairs(
+        yield NeighbourPairs(
             row=at,
             other=scale * (hz - wanted),
             others=scale[:, None] * found.slopes[rows, neighbour - 1],

@@ -21,14 +21,14 @@ from eigassign.assignment.exact.design_problem import (
     MET,
     ON,
     Appraisal,
-    Box,
+    DesignPoint,
     DesignProblem,
-    Place,
+    UnitBox,
     best_first,
     merit,
 )
-from eigassign.assignment.exact.stationarity import Limit, active_limits, stationarity
-from eigassign.assignment.exact.step import SMALLEST, Move, TrustRegion, step_program
+from eigassign.assignment.exact.stationarity import BindingLimit, active_limits, stationarity
+from eigassign.assignment.exact.step import SMALLEST, ProposedStep, TrustRegion, step_program
 from eigassign.assignment.program import SNAP
 from eigassign.errors import EigassignError
 
@@ -50,7 +50,7 @@ class End(StrEnum):
 
 
 @dataclass(frozen=True)
-class Step:
+class StepRecord:
     """One program: the design it led to, what that is worth, and whether it was taken."""
 
     y: Floats
@@ -73,10 +73,10 @@ class Optimum:
     seen: Appraisal
     objective: float
     stationarity: float
-    limits: tuple[Limit, ...]
+    limits: tuple[BindingLimit, ...]
     predicted: Floats | None
     end: End
-    steps: tuple[Step, ...]
+    steps: tuple[StepRecord, ...]
     appraisals: int
 
 
@@ -84,7 +84,7 @@ class Optimum:
 class _Progress(TrustRegion):
     """The steps made, too."""
 
-    steps: list[Step] = field(default_factory=list)
+    steps: list[StepRecord] = field(default_factory=list)
     appraisals: int = 0
 
 
@@ -99,7 +99,7 @@ def minimise(
     ``stop`` is asked between steps; Ctrl-C ends them too, and the best design so far is returned.
     Raises what ``appraise`` raises at the start.
     """
-    box = Box.of(problem)
+    box = UnitBox.of(problem)
     progress = _Progress(FIRST, np.zeros((box.n, box.n)), 0.0)
     place = best = _placed(problem, box, box.inside(box.z(start)), progress)
     predicted: Floats | None = None
@@ -145,19 +145,23 @@ def minimise(
     )
 
 
-def _placed(problem: DesignProblem, box: Box, z: Floats, progress: _Progress) -> Place:
+def _placed(problem: DesignProblem, box: UnitBox, z: Floats, progress: _Progress) -> DesignPoint:
     progress.appraisals += 1
-    return Place.of(problem, box, z, problem.appraise(box.y(z)))
+    return DesignPoint.of(problem, box, z, problem.appraise(box.y(z)))
 
 
-def _better(best: Place, place: Place) -> Place:
+def _better(best: DesignPoint, place: DesignPoint) -> DesignPoint:
     """By violation first, then by F."""
     return best_first([best, place], lambda p: (p.seen.violation, p.value))[0]
 
 
 def _try(
-    problem: DesignProblem, box: Box, place: Place, move: Move, progress: _Progress
-) -> Place | None:
+    problem: DesignProblem,
+    box: UnitBox,
+    place: DesignPoint,
+    move: ProposedStep,
+    progress: _Progress,
+) -> DesignPoint | None:
     """The place that a move leads to if it keeps a tenth of its promise, corrected once if not."""
     reached = _go(problem, box, place, move, progress)
     if reached is not None and not _kept(problem, box, place, reached, move, progress):
@@ -184,8 +188,12 @@ def _try(
 
 
 def _go(
-    problem: DesignProblem, box: Box, place: Place, move: Move, progress: _Progress
-) -> Place | None:
+    problem: DesignProblem,
+    box: UnitBox,
+    place: DesignPoint,
+    move: ProposedStep,
+    progress: _Progress,
+) -> DesignPoint | None:
     """Where a move leads, None where no design is."""
     z = place.z + move.d
     z = np.where(z <= SNAP, 0.0, np.where(z >= 1.0 - SNAP, 1.0, z))
@@ -195,7 +203,9 @@ def _go(
         return None
 
 
-def _fall(problem: DesignProblem, place: Place, reached: Place, progress: _Progress) -> float:
+def _fall(
+    problem: DesignProblem, place: DesignPoint, reached: DesignPoint, progress: _Progress
+) -> float:
     before, after = (
         merit(problem, p.value, p.seen.violation, progress.weight) for p in (place, reached)
     )
@@ -203,7 +213,12 @@ def _fall(problem: DesignProblem, place: Place, reached: Place, progress: _Progr
 
 
 def _kept(
-    problem: DesignProblem, box: Box, place: Place, reached: Place, move: Move, progress: _Progress
+    problem: DesignProblem,
+    box: UnitBox,
+    place: DesignPoint,
+    reached: DesignPoint,
+    move: ProposedStep,
+    progress: _Progress,
 ) -> bool:
     fall = _fall(problem, place, reached, progress)
     if move.promised > 0.0:
@@ -216,9 +231,11 @@ def _kept(
     return fall >= -paid and after <= 0.5 * before
 
 
-def _record(progress: _Progress, box: Box, reached: Place, move: Move, taken: bool) -> None:
+def _record(
+    progress: _Progress, box: UnitBox, reached: DesignPoint, move: ProposedStep, taken: bool
+) -> None:
     progress.steps.append(
-        Step(
+        StepRecord(
             y=frozen(box.y(reached.z)),
             objective=reached.value,
             violation=reached.seen.violation,
@@ -229,7 +246,7 @@ def _record(progress: _Progress, box: Box, reached: Place, move: Move, taken: bo
     )
 
 
-def _updated(S: Floats, place: Place, reached: Place, move: Move) -> Floats:
+def _updated(S: Floats, place: DesignPoint, reached: DesignPoint, move: ProposedStep) -> Floats:
     """S with S d = (J⁺ − J)ᵀ w + (C⁺ − C)ᵀ μ, by a symmetric rank-one update.
 
     Of rows at kinks the mean of both branches is taken, which is smooth.

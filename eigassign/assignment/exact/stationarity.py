@@ -17,15 +17,15 @@ from eigassign.assignment.exact.design_problem import (
     ON,
     TINY,
     Appraisal,
-    Box,
+    DesignPoint,
     DesignProblem,
     Objective,
-    Place,
+    UnitBox,
 )
 
 
 @dataclass(frozen=True)
-class Limit:
+class BindingLimit:
     """A limit that the optimum lies on: what F falls by when it is relaxed by one unit, ≥ 0.
 
     ``kind`` is bound, constraint or excess; ``index`` counts among them, ``upper`` says which side.
@@ -48,16 +48,18 @@ def stationarity(problem: DesignProblem, y: Floats, seen: Appraisal) -> float:
     return _balance(problem, y, seen)[0]
 
 
-def active_limits(problem: DesignProblem, y: Floats, seen: Appraisal) -> Iterator[Limit]:
+def active_limits(problem: DesignProblem, y: Floats, seen: Appraisal) -> Iterator[BindingLimit]:
     """The limits that y lies on, with what F falls by per unit relaxed."""
     yield from _balance(problem, y, seen)[1]
 
 
-def _balance(problem: DesignProblem, y: Floats, seen: Appraisal) -> tuple[float, tuple[Limit, ...]]:
-    box = Box.of(problem)
+def _balance(
+    problem: DesignProblem, y: Floats, seen: Appraisal
+) -> tuple[float, tuple[BindingLimit, ...]]:
+    box = UnitBox.of(problem)
     if box.n == 0:
         return 0.0, ()
-    place = Place.of(problem, box, box.z(y), seen)
+    place = DesignPoint.of(problem, box, box.z(y), seen)
     J, r, m = place.J, seen.residual, len(seen.residual)
     rows, branches = _branches(place)
     own = rows < m
@@ -96,7 +98,7 @@ def _balance(problem: DesignProblem, y: Floats, seen: Appraisal) -> tuple[float,
     mu = nnls(system, -slope, maxiter=50 * max(system.shape))[0] if system.size else np.zeros(0)
     left = slope + (system @ mu if system.size else 0.0)
     found = tuple(
-        Limit(kind, index, upper, float(m / unit))
+        BindingLimit(kind, index, upper, float(m / unit))
         for (kind, index, upper), unit, m in zip(owners, units, mu, strict=False)
     )
     rest = float(np.abs(left).max()) / size
@@ -110,7 +112,7 @@ def _columns(*parts: tuple[Floats, float | Floats]) -> Floats:
     return np.hstack([np.hstack([a, np.tile(np.atleast_1d(b), (len(a), 1))]).T for a, b in parts])
 
 
-def _branches(place: Place) -> tuple[NDArray[np.intp], Floats]:
+def _branches(place: DesignPoint) -> tuple[NDArray[np.intp], Floats]:
     """Where a row has a kink that the design may lie in: its rows, and slopes of other branches.
 
     Behind other kinks the row is better than its own branch says: no optimum lies there.
@@ -123,7 +125,7 @@ def _branches(place: Place) -> tuple[NDArray[np.intp], Floats]:
 
 
 def _normals(
-    box: Box, place: Place, excess: Floats
+    box: UnitBox, place: DesignPoint, excess: Floats
 ) -> tuple[Floats, list[tuple[str, int, bool]], list[float]]:
     """Outward normals of the limits that z lies on, which they are, and their units."""
     z, normals, owners, units = place.z, [], [], []
@@ -149,7 +151,7 @@ def _normals(
     return np.array(normals).reshape(-1, box.n), owners, units
 
 
-def _unbalanced_violation(box: Box, place: Place) -> float:
+def _unbalanced_violation(box: UnitBox, place: DesignPoint) -> float:
     """The same of the largest excess: 0 where no direction within the limits lowers it."""
     excess = place.seen.excess
     normals = _normals(box, place, np.full(len(excess), -np.inf))[0]

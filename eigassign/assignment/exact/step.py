@@ -23,10 +23,10 @@ from eigassign.assignment.checks import Floats
 from eigassign.assignment.exact.design_problem import (
     MET,
     TINY,
-    Box,
+    DesignPoint,
     DesignProblem,
     Objective,
-    Place,
+    UnitBox,
     merit,
 )
 from eigassign.assignment.program import ScaledProgram
@@ -49,7 +49,7 @@ class TrustRegion:
 
 
 @dataclass(frozen=True)
-class Move:
+class ProposedStep:
     """A program's step d, what it promises, and its multipliers for the Hessian."""
 
     d: Floats
@@ -77,7 +77,7 @@ class Expected:
     kinked: NDArray[np.bool_]
 
 
-def _expected_at(place: Place, r: Floats, c: Floats, d: Floats) -> Expected:
+def _expected_at(place: DesignPoint, r: Floats, c: Floats, d: Floats) -> Expected:
     """Of a step from values r and c, which are those at the place but after a spoilt step."""
     m = len(r)
     values, slopes = np.append(r, c), np.vstack([place.J, place.C])
@@ -133,7 +133,7 @@ class _Kinks:
     objective: _Cuts
 
     def with_model(
-        self, problem: DesignProblem, place: Place, r: Floats, d: Floats, model: Expected
+        self, problem: DesignProblem, place: DesignPoint, r: Floats, d: Floats, model: Expected
     ) -> _Kinks:
         """With what is expected at d."""
         m = len(r)
@@ -157,11 +157,11 @@ class _Kinks:
 
 def step_program(
     problem: DesignProblem,
-    box: Box,
-    place: Place,
+    box: UnitBox,
+    place: DesignPoint,
     region: TrustRegion,
-    spoilt: tuple[Place, Move] | None = None,
-) -> Move | None:
+    spoilt: tuple[DesignPoint, ProposedStep] | None = None,
+) -> ProposedStep | None:
     """The step of the program at a place; None where there is none.
 
     After a ``spoilt`` step the model passes through what was found there, not only through here.
@@ -185,7 +185,7 @@ def step_program(
             region.weight, solved = heavier.weight, again
     before = merit(problem, place.value, place.seen.violation, region.weight)
     curved = _convex(region.S, place.J, problem)[0]
-    best: Move | None = None
+    best: ProposedStep | None = None
     for _ in range(CUTS):
         if solved is None:
             break
@@ -197,7 +197,7 @@ def step_program(
             problem, _value(problem, box, place, d, model.residual), behind, region.weight
         )
         if best is None or before - after > best.promised:
-            best = Move(d, before - after, model, on_residual, on_excess)
+            best = ProposedStep(d, before - after, model, on_residual, on_excess)
         linear = r + place.J @ d
         value = _value(problem, box, place, d, linear)
         t = cuts.objective.at(d)
@@ -218,7 +218,9 @@ def step_program(
     return step_program(problem, box, place, region)
 
 
-def _weigh_first(problem: DesignProblem, box: Box, place: Place, region: TrustRegion) -> None:
+def _weigh_first(
+    problem: DesignProblem, box: UnitBox, place: DesignPoint, region: TrustRegion
+) -> None:
     """ν, at first ten times what balances the steepest objective with the flattest excess."""
     if region.weight == 0.0 and len(place.C):
         half = place.J.T @ place.seen.residual
@@ -230,7 +232,7 @@ def _weigh_first(problem: DesignProblem, box: Box, place: Place, region: TrustRe
         region.weight = 10.0 * max(steep, 1e-3) / max(flat, 1e-3)
 
 
-def _value(problem: DesignProblem, box: Box, place: Place, d: Floats, r: Floats) -> float:
+def _value(problem: DesignProblem, box: UnitBox, place: DesignPoint, d: Floats, r: Floats) -> float:
     """F of residuals r after a step."""
     price = problem.price(box.y(place.z + d))
     if problem.objective is Objective.WORST_CASE:
@@ -251,8 +253,8 @@ def _convex(S: Floats, J: Floats, problem: DesignProblem) -> tuple[Floats, Float
 
 def _solved(
     problem: DesignProblem,
-    box: Box,
-    place: Place,
+    box: UnitBox,
+    place: DesignPoint,
     region: TrustRegion,
     r: Floats,
     c: Floats,

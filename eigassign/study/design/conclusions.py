@@ -17,14 +17,14 @@ from time import monotonic
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.catalogues.branching import Catalogue
+from eigassign.assignment.catalogues.branching import ListedValues
 from eigassign.assignment.catalogues.choosing import choose
 from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import OPTIMAL, End, Optimum, minimise
 from eigassign.assignment.exact.stationarity import active_limits, stationarity
 from eigassign.errors import EigassignError
-from eigassign.study.design.optimum import Found, Variant
+from eigassign.study.design.optimum import Found, PosedProblem
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -101,7 +101,7 @@ class Conflict:
     smallest: bool
 
 
-def conflict(found: Found, listed: Sequence[Catalogue], steps: int) -> Conflict | None:
+def conflict(found: Found, listed: Sequence[ListedValues], steps: int) -> Conflict | None:
     """What contradicts where the best design misses limits; None where it meets them.
 
     Deletion filter: a limit without which the rest still cannot be met is left out. Each trial
@@ -125,7 +125,7 @@ def conflict(found: Found, listed: Sequence[Catalogue], steps: int) -> Conflict 
 
 
 def _can_be_met(
-    problem: DesignProblem, listed: Sequence[Catalogue], start: Floats, steps: int
+    problem: DesignProblem, listed: Sequence[ListedValues], start: Floats, steps: int
 ) -> bool | None:
     """None where the catalogues are too long to say."""
     try:
@@ -149,7 +149,7 @@ def _effects(problem: DesignProblem, seen: Appraisal) -> Floats:
     return np.vstack([seen.slopes, seen.excess_slopes, prices]) * width
 
 
-def idle_notes(names: Sequence[str], variant: Variant, seen: Appraisal) -> Iterator[str]:
+def idle_notes(names: Sequence[str], variant: PosedProblem, seen: Appraisal) -> Iterator[str]:
     """Parameters without effect, and those that only together have one, in words."""
     free = np.flatnonzero(variant.problem.upper > variant.problem.lower)
     J = _effects(variant.problem, seen)[:, free]

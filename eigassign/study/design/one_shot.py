@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.assign import Assignment, solve_assignment
-from eigassign.assignment.catalogues.branching import Catalogue
+from eigassign.assignment.catalogues.branching import ListedValues
 from eigassign.assignment.program import Bounds, Goal, LinearConstraint, LinearModel
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError
@@ -54,10 +54,10 @@ def assign_design(scene: Scene, targets: Sequence[Wanted]) -> Assignment:
     )
 
 
-def catalogues(file: CaseFile) -> tuple[Catalogue, ...]:
+def catalogues(file: CaseFile) -> tuple[ListedValues, ...]:
     """The case's catalogues, as the assignment takes them."""
     return tuple(
-        Catalogue(own.name, own.columns, np.array(own.rows), own.choices)
+        ListedValues(own.name, own.columns, np.array(own.rows), own.choices)
         for own in file.design.catalogues
     )
 
@@ -117,7 +117,7 @@ def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:
     )
 
 
-def _chosen(catalogue: Catalogue, y: Floats) -> Iterator[tuple[int, str]]:
+def _chosen(catalogue: ListedValues, y: Floats) -> Iterator[tuple[int, str]]:
     """Each column of a catalogue with the name of the choice that y holds."""
     own = y[list(catalogue.columns)]
     row = next((k for k, row in enumerate(catalogue.rows) if np.array_equal(row, own)), None)

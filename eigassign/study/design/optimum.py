@@ -19,11 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.catalogues.choosing import KEPT, RELAXED, Chosen, choose
-from eigassign.assignment.exact.design_problem import MET, Box, DesignProblem, Objective, best_first
+from eigassign.assignment.exact.design_problem import (
+    MET,
+    DesignProblem,
+    Objective,
+    UnitBox,
+    best_first,
+)
 from eigassign.assignment.exact.requirements import (
     Frequencies,
     FrequencyLimit,
-    FrequencyTarget,
+    ModeTarget,
     QuantityLimit,
     Requirements,
 )
@@ -69,7 +75,7 @@ PERCENT = {Objective.LEAST_SQUARES: 1e4, Objective.WORST_CASE: 1e2}  # of F: wha
 
 
 @dataclass(frozen=True)
-class Variant:
+class PosedProblem:
     """One choice of the number of modes below each band, with the problem that it makes."""
 
     below: tuple[tuple[str, int], ...]  # the band in words, and k
@@ -83,10 +89,10 @@ class Variant:
 class Found:
     """The best design, what it was chosen among, and how much work that was."""
 
-    variant: Variant
+    variant: PosedProblem
     best: Optimum
     optima: tuple[Optimum, ...]  # distinct local optima of the best variant, the best first
-    variants: tuple[tuple[Variant, Optimum], ...]  # the best of each
+    variants: tuple[tuple[PosedProblem, Optimum], ...]  # the best of each
     initial: tuple[float, float]  # violation and objective of the initial design
     clearances: tuple[Clearance, ...]  # of every band along every trajectory
     starts: int
@@ -142,7 +148,7 @@ def _search_all(
     listed = catalogues(scene.file)
     whole = Task(scene, tuple(wanted), margin)
     tasks = [whole] if listed else _rougher(whole, models)
-    best_of: list[tuple[Variant, tuple[Optimum, ...], Chosen | None]] = []
+    best_of: list[tuple[PosedProblem, tuple[Optimum, ...], Chosen | None]] = []
     made, solves = 0, 0
     ended: End | None = None
     for below in _below(whole):
@@ -198,7 +204,7 @@ def _search_all(
     )
 
 
-def _clearances(task: Task, variant: Variant, y: Floats) -> Iterator[Clearance]:
+def _clearances(task: Task, variant: PosedProblem, y: Floats) -> Iterator[Clearance]:
     q = task.scene.path.at(y)[0]
     for band, (label, below) in zip(task.bands, variant.below, strict=True):
         named = tuple(sorted(band.wanted.requirement.modes))
@@ -206,7 +212,7 @@ def _clearances(task: Task, variant: Variant, y: Floats) -> Iterator[Clearance]:
         yield prove_clear(task.scene.model, own, y)
 
 
-def _refined(variant: Variant, coarse: _Search, initial: Floats) -> _Search:
+def _refined(variant: PosedProblem, coarse: _Search, initial: Floats) -> _Search:
     """What the optima on few samples lead to on all; from the initial design too if it is better.
 
     An optimum keeps the steps that led to it. One that has no frequencies on all samples leads
@@ -227,7 +233,7 @@ def _refined(variant: Variant, coarse: _Search, initial: Floats) -> _Search:
     return fine
 
 
-def _initial(scene: Scene, variant: Variant) -> tuple[float, float]:
+def _initial(scene: Scene, variant: PosedProblem) -> tuple[float, float]:
     """Violation (of bounds and constraints too, relative to their ranges) and F at the start."""
     y, problem = scene.initial, variant.problem
     seen = problem.appraise(y)
@@ -244,7 +250,7 @@ class _Search:
     """The optima of one variant, start after start."""
 
     def __init__(
-        self, variant: Variant, steps: int, deadline: float, ended: End | None = None
+        self, variant: PosedProblem, steps: int, deadline: float, ended: End | None = None
     ) -> None:
         self.variant, self.steps, self.deadline = variant, steps, deadline
         self.optima: list[Optimum] = []
@@ -331,7 +337,7 @@ def _continued(before: Optimum, found: Optimum) -> Optimum:
 
 
 def _in_turn(
-    task: Task, variant: Variant, starts: Sequence[Floats], count: int | str
+    task: Task, variant: PosedProblem, starts: Sequence[Floats], count: int | str
 ) -> Iterator[Floats]:
     """The first starts, then spread designs, those that promise most first.
 
@@ -345,7 +351,7 @@ def _in_turn(
     if task.models is not None or task.followers:
         yield from _spread_designs(task.scene, most, 0)
         return
-    box, fewest = Box.of(variant.problem), _thinned(task, FEWEST) or task
+    box, fewest = UnitBox.of(variant.problem), _thinned(task, FEWEST) or task
     asked = variant_of(fewest, tuple(k for _, k in variant.below))
     ranked: list[tuple[tuple[float, float], Floats]] = []
     for y in _spread_designs(task.scene, max(most, min(SCREENED * box.n, MOST_SCREENED)), 0):
@@ -362,7 +368,7 @@ def _in_turn(
     yield from (box.y(z) for z in [*apart, *near][:most])
 
 
-def _merit(task: Task, variant: Variant, y: Floats) -> tuple[float, float]:
+def _merit(task: Task, variant: PosedProblem, y: Floats) -> tuple[float, float]:
     """Violation and F of a design, by its frequencies alone."""
     asked, scene = variant.requirements, task.scene
     hz = scene.model.frequencies(scene.path.at(y)[0], y, asked.modes)
@@ -431,7 +437,7 @@ def _below(task: Task) -> Iterator[tuple[int, ...]]:
     yield from itertools.islice(itertools.product(*possible), MOST_BELOW)
 
 
-def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Variant:
+def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> PosedProblem:
     """The problem of a task with so many modes below each of its bands.
 
     Linear limits may be ``missed`` as others may, and are where they contradict each other.
@@ -440,7 +446,7 @@ def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Vari
     lower, upper = scene.bounds
     width = np.where(upper > lower, upper - lower, 1.0)
     targets = tuple(
-        FrequencyTarget(w.mode, w.hz, w.rows, w.weight)
+        ModeTarget(w.mode, w.hz, w.rows, w.weight)
         for w in wanted
         if w.requirement.kind == "frequency"
     )
@@ -484,7 +490,7 @@ def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Vari
 
     labels = (band.label for band in task.bands)
     named = tuple(zip(labels, below, strict=True))
-    return Variant(named, asked, asks(asked.limit_names), response, asks)
+    return PosedProblem(named, asked, asks(asked.limit_names), response, asks)
 
 
 def _mass(scene: Scene) -> Iterator[QuantityLimit]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares, linprog, minimize
 
-from eigassign.assignment import Bounds, Catalogue, Effort, hull, search_catalogue
+from eigassign.assignment import Bounds, ListedValues, SearchLimits, hull, search_catalogue
 from eigassign.errors import AccuracyError, InfeasibleError, UsageError
 
 
@@ -101,7 +101,7 @@ def lists(seed, n_y, widest):
     while first < n_y:
         last = min(first + int(rng.integers(1, widest + 1)), n_y)
         rows = rng.uniform(0, 1, (int(rng.integers(2, 6)), last - first))
-        found.append(Catalogue(f"list{first}", tuple(range(first, last)), rows))
+        found.append(ListedValues(f"list{first}", tuple(range(first, last)), rows))
         first = last
     return found
 
@@ -128,7 +128,9 @@ def test_so_it_is_on_many_models_narrow_and_wide(seed):
 
 def test_the_best_few_are_distinct_and_in_order():
     arm, catalogues = Arm(7), lists(7, 7, 1)
-    search = search_catalogue(catalogues, arm.relax(catalogues), arm.fix(catalogues), Effort(8))
+    search = search_catalogue(
+        catalogues, arm.relax(catalogues), arm.fix(catalogues), SearchLimits(8)
+    )
     figures = [one.objective for one in search.best]
     assert figures == sorted(figures)
     assert len({one.rows for one in search.best}) == len(figures) == 8
@@ -171,11 +173,13 @@ def test_without_any_possible_combination_the_lists_are_named():
         search_catalogue(catalogues, arm.relax(catalogues), lambda rows: None)
     assert e.value.constraints == ("list0", "list1", "list2")
     with pytest.raises(AccuracyError, match="was found in 1 nodes"):
-        search_catalogue(catalogues, arm.relax(catalogues), lambda rows: None, Effort(nodes=1))
+        search_catalogue(
+            catalogues, arm.relax(catalogues), lambda rows: None, SearchLimits(nodes=1)
+        )
 
 
 def test_a_column_with_two_owners_is_refused():
-    twice = [Catalogue("a", (0,), [[1.0]]), Catalogue("b", (0,), [[1.0]])]
+    twice = [ListedValues("a", (0,), [[1.0]]), ListedValues("b", (0,), [[1.0]])]
     with pytest.raises(UsageError, match="'a' and 'b' both set column 0"):
         search_catalogue(twice, lambda node, near: None, lambda rows: None)
 
@@ -185,7 +189,7 @@ def test_a_column_with_two_owners_is_refused():
 def test_a_hull_holds_its_rows_and_is_exact_for_two_of_them(n_rows, width):
     rng = np.random.default_rng(10 * n_rows + width)
     unit = 10.0 ** rng.uniform(-6, 6, width)
-    catalogue = Catalogue(
+    catalogue = ListedValues(
         "a", tuple(range(1, width + 1)), rng.normal(size=(n_rows + 3, width)) * unit
     )
     node = (tuple(range(2, n_rows + 2)),)

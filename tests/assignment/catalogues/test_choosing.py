@@ -10,8 +10,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from eigassign.assignment import MET, Appraisal, Catalogue, DesignProblem, LinearConstraint, choose
-from eigassign.assignment.exact.sequential import minimise
+from eigassign.assignment import (
+    MET,
+    Appraisal,
+    DesignProblem,
+    LinearConstraint,
+    ListedValues,
+    choose,
+    minimise,
+)
 from eigassign.errors import InfeasibleError
 
 pytestmark = pytest.mark.slow  # half a minute each; the pipeline has a short one
@@ -31,18 +38,18 @@ def curved(rng: np.random.Generator, n: int, m: int, limit: float) -> DesignProb
     return DesignProblem(appraise, np.full(n, -1.0), np.full(n, 1.0))
 
 
-def lists(rng: np.random.Generator) -> tuple[Catalogue, ...]:
+def lists(rng: np.random.Generator) -> tuple[ListedValues, ...]:
     """Two lists of four values, and one of five pairs; one column stays continuous."""
     values = [np.sort(rng.uniform(-1, 1, (4, 1)), axis=0) for _ in range(2)]
     return (
-        Catalogue("a", (0,), values[0]),
-        Catalogue("b", (2,), values[1]),
-        Catalogue("pair", (1, 4), rng.uniform(-1, 1, (5, 2))),
+        ListedValues("a", (0,), values[0]),
+        ListedValues("b", (2,), values[1]),
+        ListedValues("pair", (1, 4), rng.uniform(-1, 1, (5, 2))),
     )
 
 
 def brute_force(
-    problem: DesignProblem, catalogues: tuple[Catalogue, ...]
+    problem: DesignProblem, catalogues: tuple[ListedValues, ...]
 ) -> list[tuple[float, float, tuple[int, ...]]]:
     found = []
     for rows in itertools.product(*(range(len(own.rows)) for own in catalogues)):

@@ -8,9 +8,9 @@ from assignment_problems import goal
 
 from eigassign.assignment import (
     Bounds,
-    Catalogue,
-    Effort,
     LinearConstraint,
+    ListedValues,
+    SearchLimits,
     build_program,
     solve_catalogue,
 )
@@ -48,11 +48,11 @@ def random_case(seed, most, n_continuous=0, n_constraints=0):
             rows[-1] = rows[0]
         if rng.random() < 0.2:
             rows[:, 0] = rows[0, 0]
-        catalogues.append(Catalogue(f"list{n_y}", tuple(range(n_y, n_y + width)), rows))
+        catalogues.append(ListedValues(f"list{n_y}", tuple(range(n_y, n_y + width)), rows))
         n_y, count = n_y + width, count * length
     order, unit = rng.permutation(n_y), 10.0 ** rng.uniform(-6, 6, n_y)
     catalogues = [
-        Catalogue(c.name, tuple(order[list(c.columns)]), c.rows * unit[order[list(c.columns)]])
+        ListedValues(c.name, tuple(order[list(c.columns)]), c.rows * unit[order[list(c.columns)]])
         for c in catalogues
     ]
     l0, slope = smooth(seed, n_y, n_t=20, decay=rng.uniform(0.5, 1.0))
@@ -176,7 +176,7 @@ def three_valued(seed, decay):
     rng = np.random.default_rng(seed)
     l0, slope = smooth(seed, 12, decay=decay)
     lists = np.sort(rng.uniform(-0.3, 0.3, (12, 3)))
-    catalogues = [Catalogue(f"v{j}", (j,), lists[j][:, np.newaxis]) for j in range(12)]
+    catalogues = [ListedValues(f"v{j}", (j,), lists[j][:, np.newaxis]) for j in range(12)]
     return program(l0, slope, -np.ones(12), np.ones(12)), catalogues
 
 
@@ -194,7 +194,7 @@ def test_twelve_parameters_of_three_values_need_few_nodes(decay):
 def test_a_search_that_is_stopped_states_a_gap_that_holds():
     p, catalogues = three_valued(2, 0.3)
     whole = solve_catalogue(p, catalogues)
-    part = solve_catalogue(p, catalogues, Effort(nodes=5))
+    part = solve_catalogue(p, catalogues, SearchLimits(nodes=5))
     assert not part.exhausted
     assert part.gap > 0.0
     assert not part.proved
@@ -211,7 +211,7 @@ def test_the_same_search_gives_the_same_answer():
 
 
 BASE = ([1.2, 1.1, 0.9], [[-0.1, 0.02], [0.03, -0.1], [0.05, 0.05]])
-PAIR = [Catalogue("rod", (0,), [[0.0], [1.0]]), Catalogue("hub", (1,), [[0.0], [1.0]])]
+PAIR = [ListedValues("rod", (0,), [[0.0], [1.0]]), ListedValues("hub", (1,), [[0.0], [1.0]])]
 
 
 def test_constraints_that_only_the_relaxation_meets_are_named():
@@ -238,23 +238,23 @@ def test_two_constraints_that_contradict_each_other_on_the_rows_are_named_togeth
 
 
 def test_rows_outside_the_bounds_do_not_count_and_a_list_without_others_is_named():
-    rod = Catalogue("rod", (0,), [[-5.0], [0.5], [5.0]])
+    rod = ListedValues("rod", (0,), [[-5.0], [0.5], [5.0]])
     p = program(*BASE, [0, 0], [1, 1])
     search = solve_catalogue(p, [rod, PAIR[1]])
     assert {one.rows for one in search.best} == {(1, 0), (1, 1)}
     with pytest.raises(InfeasibleError, match="'rod': no row is within the bounds"):
-        solve_catalogue(p, [Catalogue("rod", (0,), [[-5.0]]), PAIR[1]])
+        solve_catalogue(p, [ListedValues("rod", (0,), [[-5.0]]), PAIR[1]])
 
 
 def test_of_equal_rows_the_first_is_chosen():
-    rod = Catalogue("rod", (0,), [[1.0], [1.0], [0.0], [1.0]])
+    rod = ListedValues("rod", (0,), [[1.0], [1.0], [0.0], [1.0]])
     search = solve_catalogue(program(*BASE, [0, 0], [1, 1]), [rod, PAIR[1]])
     assert {one.rows[0] for one in search.best} == {0, 2}
     assert len(search.best) == 4
 
 
 def test_a_single_combination_is_the_answer():
-    only = [Catalogue("rod", (0,), [[0.5]]), Catalogue("hub", (1,), [[0.25]])]
+    only = [ListedValues("rod", (0,), [[0.5]]), ListedValues("hub", (1,), [[0.25]])]
     search = solve_catalogue(program(*BASE, [0, 0], [1, 1]), only)
     np.testing.assert_array_equal(search.best[0].y, [0.5, 0.25])
     assert search.proved
@@ -264,20 +264,20 @@ def test_a_single_combination_is_the_answer():
 def test_a_limit_reached_before_anything_was_found_is_said():
     rng = np.random.default_rng(0)
     rows = rng.uniform(0, 1, (12, 30))
-    catalogues = [Catalogue(f"v{j}", (j,), rows[j][:, np.newaxis]) for j in range(12)]
+    catalogues = [ListedValues(f"v{j}", (j,), rows[j][:, np.newaxis]) for j in range(12)]
     total = LinearConstraint("total", np.ones(12), *[rows[:, 4].sum() + s * 1e-7 for s in (-1, 1)])
     l0, slope = smooth(1, 12)
     p = program(l0, slope, np.zeros(12), np.ones(12), [total])
     with pytest.raises(AccuracyError, match="found in 1 nodes"):
-        solve_catalogue(p, catalogues, Effort(nodes=1))
+        solve_catalogue(p, catalogues, SearchLimits(nodes=1))
 
 
 @pytest.mark.parametrize(
     ("catalogues", "message"),
     [
-        ([Catalogue("a", (2,), [[1.0]])], "no column 2"),
+        ([ListedValues("a", (2,), [[1.0]])], "no column 2"),
         (
-            [Catalogue("a", (0,), [[1.0]]), Catalogue("b", (1, 0), [[1.0, 1.0]])],
+            [ListedValues("a", (0,), [[1.0]]), ListedValues("b", (1, 0), [[1.0, 1.0]])],
             "both set column 0",
         ),
     ],
@@ -298,4 +298,4 @@ def test_columns_that_do_not_exist_or_have_two_owners_are_refused(catalogues, me
 )
 def test_lists_that_are_none_are_refused(columns, rows, labels, message):
     with pytest.raises(UsageError, match=f"'a'.*{message}"):
-        Catalogue("a", columns, rows, labels)
+        ListedValues("a", columns, rows, labels)

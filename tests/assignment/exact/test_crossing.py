@@ -13,14 +13,14 @@ from eigassign.assignment import (
     End,
     Frequencies,
     FrequencyLimit,
-    FrequencyTarget,
     LinearConstraint,
+    ModeTarget,
     Objective,
     Optimum,
     Requirements,
+    minimise,
     stationarity,
 )
-from eigassign.assignment.exact.sequential import minimise
 
 N = 12
 TIME = np.linspace(0.0, 1.0, N)
@@ -68,7 +68,7 @@ def frequencies(matrices: Matrices) -> Callable[[np.ndarray], Frequencies]:
 
 def problem(
     matrices: Matrices,
-    targets: tuple[FrequencyTarget, ...],
+    targets: tuple[ModeTarget, ...],
     limits: tuple[FrequencyLimit, ...] = (),
     objective: Objective = Objective.LEAST_SQUARES,
     constraints: tuple[LinearConstraint, ...] = (),
@@ -85,8 +85,8 @@ def problem(
     )
 
 
-def first(hz: float, mode: int = 1) -> FrequencyTarget:
-    return FrequencyTarget(mode, np.full(N, hz), EVERY)
+def first(hz: float, mode: int = 1) -> ModeTarget:
+    return ModeTarget(mode, np.full(N, hz), EVERY)
 
 
 BUDGET = (LinearConstraint("budget", np.array([1.0, 1.2, 1.5]), upper=1.0),)

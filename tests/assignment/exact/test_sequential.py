@@ -21,9 +21,9 @@ from eigassign.assignment import (
     QuantityLimit,
     Requirements,
     best_first,
+    minimise,
     stationarity,
 )
-from eigassign.assignment.exact.sequential import minimise
 from eigassign.errors import AccuracyError
 
 TIME = np.linspace(0.0, 1.0, 40)
