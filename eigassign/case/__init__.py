@@ -30,10 +30,10 @@ __all__, __getattr__, __dir__ = face(
             "CarriageJoint FixedJoint NutJoint RevoluteJoint ScrewJoint UniversalJoint"
         ),
         "schema.links": "FrameLink RigidLink SuperelementLink Taper",
-        "schema.measurements": "Measurement MeasurementFile",
         "schema.mechanism": "Drive",
         "schema.parts": "FrozenDict Quantity",
         "schema.sections": "BareSection CircleSection IProfileSection TubeSection",
+        "schema.study": "Measurement MeasurementFile",
         "schema.targets": (
             "AtLeastTarget AtMostTarget FollowedMode FrequencyFile FrequencyProfile "
             "FrequencyTarget GapTarget Harmonic KeepOutTarget Requirement TargetForm"

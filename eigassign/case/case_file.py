@@ -16,10 +16,9 @@ from eigassign.case.rules.properties import property_at
 from eigassign.case.schema.design import Design
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.joints import freedom_of
-from eigassign.case.schema.measurements import Measurements
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.schema.parts import FrozenDict, Quantity
-from eigassign.case.schema.study import AssignmentKeys, ExpansionKeys, ValidationKeys
+from eigassign.case.schema.study import AssignmentKeys, ExpansionKeys, Measurements, ValidationKeys
 from eigassign.case.schema.sweep import Sweep
 from eigassign.case.schema.targets import Requirement, TargetForm, requirements
 from eigassign.case.schema.trajectory import TrajectoryForm, named_trajectories

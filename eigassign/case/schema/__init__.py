@@ -2,17 +2,16 @@
 
 In reading order, each importing only from those above it:
 
-    parts         the base of all models; field types: quantities, names, values of several kinds
-    vectors       points, directions, angles, inertia tensors
-    sections      the keys `materials` and `sections` of a mechanism; the shapes of sections
-    links         the key `links`
-    joints        the key `joints`, and what each type of joint lets move
-    mechanism     bodies, springs, drives, coordinates, and the mechanism as a whole
-    trajectory    the key `trajectory`
-    design        the key `design`: parameters, catalogues, limits, and the one vector y they make
-    targets       the key `targets`, and the requirements that they come to
-    measurements  the key `measurements`
-    study         the keys `assignment`, `expansion` and `validation`
-    sweep         the key `sweep`
-    document      the whole case file, its errors as readable findings, its JSON Schema
+    parts       the base of all models; field types: quantities, names, values of several kinds
+    vectors     points, directions, angles, inertia tensors
+    sections    the keys `materials` and `sections` of a mechanism; the shapes of sections
+    links       the key `links`
+    joints      the key `joints`, and what each type of joint lets move
+    mechanism   bodies, springs, drives, coordinates, and the mechanism as a whole
+    trajectory  the key `trajectory`
+    design      the key `design`: parameters, catalogues, limits, and the one vector y they make
+    targets     the key `targets`, and the requirements that they come to
+    study       the keys `assignment`, `expansion`, `validation` and `measurements`
+    sweep       the key `sweep`
+    document    the whole case file, its errors as readable findings, its JSON Schema
 """

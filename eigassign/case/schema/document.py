@@ -15,11 +15,10 @@ from eigassign.case.reader import Finding, KeyPath, Tree, unspaced
 from eigassign.case.schema.design import ENTRIES, RESERVED, Design, Parameter, is_entry
 from eigassign.case.schema.joints import JOINTS
 from eigassign.case.schema.links import LINKS
-from eigassign.case.schema.measurements import Measurements
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.schema.parts import FrozenDict, Named, Part, Quantity, keys_of, wrong
 from eigassign.case.schema.sections import SHAPES
-from eigassign.case.schema.study import AssignmentKeys, ExpansionKeys, ValidationKeys
+from eigassign.case.schema.study import AssignmentKeys, ExpansionKeys, Measurements, ValidationKeys
 from eigassign.case.schema.sweep import Sweep
 from eigassign.case.schema.targets import CURVES, TARGETS, TargetForm
 from eigassign.case.schema.trajectory import MOTIONS, TrajectoryForms

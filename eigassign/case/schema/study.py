@@ -1,19 +1,31 @@
-"""The keys that say how the work is done: `assignment`, `expansion`, `validation`."""
+"""The keys that say how the work is done: `assignment`, `expansion`, `validation`, `measurements`.
+
+Measurements are frequencies that were measured, listed or in a CSV file.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal, Self, TypeAlias
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from eigassign.case.schema.design import YValue
+from eigassign.case.schema.design import Tolerance, YValue
 from eigassign.case.schema.mechanism import Q_VALUE
-from eigassign.case.schema.parts import NumberOr, OneOrList, Part, Quantity, quantity
-from eigassign.case.schema.targets import Modes
-from eigassign.case.schema.trajectory import DURATION, Coordinates
+from eigassign.case.schema.parts import (
+    File,
+    NumberOr,
+    OneOrList,
+    Part,
+    Quantity,
+    quantity,
+    wrong,
+)
+from eigassign.case.schema.targets import Frequency, Mode, Modes
+from eigassign.case.schema.trajectory import DURATION, TIME, Coordinates
 
 QSpan: TypeAlias = Annotated[float, Quantity(at_least=0, elsewhere=Q_VALUE.elsewhere)]
 Auto: TypeAlias = Literal["auto"]
+MOST_MEASUREMENTS = 10_000  # of one case
 
 
 class AssignmentKeys(Part):
@@ -74,3 +86,48 @@ class ValidationKeys(Part):
     max_error: Annotated[float, quantity("fraction", above=0)] = 0.02
     q_span: OneOrList[QSpan, tuple[QSpan, ...]] | None = None
     samples: Annotated[int, Field(ge=1, le=1_000_000)] = 200
+
+
+class Measurement(Part):
+    """A measured frequency.
+
+    Keys:
+        time: of the trajectory when it was measured; between samples q is linear in time
+        q: instead of the time: one value of each coordinate
+        trajectory: name of the trajectory, where there are several
+        mode: its number, counted from the lowest elastic one
+        frequency: what was measured
+        deviation: its standard deviation; a share is one of the frequency
+    """
+
+    time: Annotated[float, TIME] | None = None
+    q: Coordinates | None = None
+    trajectory: str | None = None
+    mode: Mode
+    frequency: Frequency
+    deviation: Tolerance
+
+    @model_validator(mode="after")
+    def _has_one_pose(self) -> Self:
+        if (self.time is None) == (self.q is None):
+            raise wrong("give either time or q, and not both")
+        return self
+
+
+class MeasurementFile(Part):
+    """Measurements in a CSV file.
+
+    Keys:
+        file: relative to the case file; columns of the same names, and one for each coordinate
+            instead of `q`
+        deviation: of rows for which the file gives none
+    """
+
+    file: File
+    deviation: Tolerance | None = None
+
+
+Measurements: TypeAlias = OneOrList[
+    MeasurementFile,
+    Annotated[tuple[Measurement, ...], Field(min_length=1, max_length=MOST_MEASUREMENTS)],
+]

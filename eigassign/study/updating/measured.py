@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from eigassign.assignment.checks import frozen
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.design import Tolerance
-from eigassign.case.schema.measurements import MOST, Measurement, MeasurementFile
+from eigassign.case.schema.study import MOST_MEASUREMENTS, Measurement, MeasurementFile
 from eigassign.case.suggestions import shown, unknown
 from eigassign.case.table import Column, Table, read_table
 from eigassign.case.units import DIMENSIONS
@@ -107,8 +107,10 @@ def _from_file(
         ),
     ]
     table = read_table(Path(given.file), _KEY, columns)
-    if not 0 < len(table.lines) <= MOST:
-        some = "no measurements" if not table.lines else f"more than {MOST} measurements"
+    if not 0 < len(table.lines) <= MOST_MEASUREMENTS:
+        some = (
+            "no measurements" if not table.lines else f"more than {MOST_MEASUREMENTS} measurements"
+        )
         raise MechanismError(_KEY, f"{table.file}: {some}")
     with_q = [name for name in names if name in table.numbers]
     if len(with_q) != (0 if TIME in table.numbers else len(names)):
