@@ -40,7 +40,7 @@ _PLAIN = Unit(Fraction(1), (0, 0, 0, 0, 0))
 
 
 @dataclass(frozen=True)
-class Column:
+class CsvColumn:
     """A column to be read: numbers of one of these dimensions, or words where it has none.
 
     The first dimension is meant where the header gives no unit.
@@ -52,7 +52,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Table:
+class CsvTable:
     """Columns by their name, the line each row stands in, and what was passed over."""
 
     file: str
@@ -68,7 +68,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class _Found:
+class _Heading:
     """A column in the header; the unit of its numbers, None for words."""
 
     name: str
@@ -81,12 +81,12 @@ class _Found:
 def read_table(
     file: Path,
     key: str,
-    columns: Sequence[Column],
+    columns: Sequence[CsvColumn],
     row_error: Callable[[str, str, int], MechanismError] = lambda key, text, _: MechanismError(
         key, text
     ),
     known: Collection[str] = (),
-) -> Table:
+) -> CsvTable:
     """The ``columns`` of a CSV file; ``known`` others are ignored without a note.
 
     ``key`` of the case names the file. Raises MechanismError at ``key`` if the file cannot be read
@@ -127,7 +127,7 @@ def read_table(
     used = {column.index for column in found}
     passed_over = [n for i, (n, _) in enumerate(names) if i not in used and n not in known]
     extra = listed(name or "(no name)" for name in passed_over)
-    return Table(
+    return CsvTable(
         file=file.name,
         lines=tuple(lines),
         numbers={c.name: tuple(map(float, v)) for c, v in both if c.unit},
@@ -226,14 +226,14 @@ def _split(cell: str, where: str, key: str) -> tuple[str, str]:
     return match.group(1), match.group(2) or ""
 
 
-def _found(column: Column, names: Sequence[tuple[str, str]], where: str, key: str) -> _Found:
+def _found(column: CsvColumn, names: Sequence[tuple[str, str]], where: str, key: str) -> _Heading:
     """The one column of that name, with its unit."""
     name, known = column.name, [other for other, _ in names]
     if known.count(name) != 1:
         raise MechanismError(key, f"{where}: {_miscounted(column, known)}")
     index = known.index(name)
     if not column.dimensions:
-        return _Found(name, index, None, None)
+        return _Heading(name, index, None, None)
     first, written = column.dimensions[0], names[index][1]
     try:
         unit = parse_unit(written or first.si, first) if written or first.si else _PLAIN
@@ -241,12 +241,12 @@ def _found(column: Column, names: Sequence[tuple[str, str]], where: str, key: st
         raise MechanismError(key, f"{where}: column {name}: {error}") from error
     for dimension in column.dimensions:
         if unit.exponents == dimension.exponents:
-            return _Found(name, index, unit, dimension, bare=not written)
+            return _Heading(name, index, unit, dimension, bare=not written)
     kinds = " or ".join(map(str, column.dimensions))
     raise MechanismError(key, f"{where}: column {name}: [{written}] is no unit of {kinds}")
 
 
-def _miscounted(column: Column, known: Sequence[str]) -> str:
+def _miscounted(column: CsvColumn, known: Sequence[str]) -> str:
     name = column.name
     if name in known:
         return f"column {name} appears {known.count(name)} times"
@@ -264,7 +264,7 @@ def _miscounted(column: Column, known: Sequence[str]) -> str:
 
 
 def _values(
-    row: list[str], columns: Sequence[_Found], n: int, k: int, dialect: _Dialect
+    row: list[str], columns: Sequence[_Heading], n: int, k: int, dialect: _Dialect
 ) -> Iterator[float | str]:
     """One row in SI units; raises ValueError with what is wrong with it."""
     if k >= _MOST:

@@ -24,7 +24,7 @@ from eigassign.modal.reduced.error_estimate import ErrorTerms
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.rehearsal import answers, same_answers
 from eigassign.modal.reduced.residual import JointCorrection, ResidualTerms
-from eigassign.series.compiler import Program, Step
+from eigassign.series.compiler import Instruction, Program
 from eigassign.series.implicit import ImplicitFunction
 from eigassign.series.multi_index import LowerSet
 
@@ -41,7 +41,7 @@ STORED = (
     ResidualTerms,
     JointCorrection,
     Program,
-    Step,
+    Instruction,
     ImplicitFunction,
 )
 CLASSES: dict[str, type] = {c.__name__: c for c in STORED}

@@ -32,7 +32,7 @@ DENSE_FORMS = 2_000  # entries up to which the matrix of a linear step is kept d
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class Instruction:
     """Atoms of one kind and one level: computed together from atoms of lower levels.
 
     Kinds are "linear", "product", "power", "exponential" and "wave": sines and cosines together.
@@ -63,7 +63,7 @@ class Program:
     n_atoms: int
     inputs: Ints  # atom of each used variable
     input_variables: Ints  # which variable it is
-    steps: tuple[Step, ...]
+    steps: tuple[Instruction, ...]
     outputs: Ints  # atom of each output
     dependence: NDArray[np.bool_]  # (n_outputs, n_variables): structural
 
@@ -86,7 +86,7 @@ class Program:
         return np.asarray(values[self.outputs])
 
 
-def _take(step: Step, algebra: Algebra, values: Floats) -> Floats:
+def _take(step: Instruction, algebra: Algebra, values: Floats) -> Floats:
     a = values.take(step.left, axis=0)
     if step.kind == "product":
         return algebra.product(a, values.take(step.right, axis=0))
@@ -181,7 +181,7 @@ def _dependence(
     return bits[:, :n_variables].astype(bool)
 
 
-def _schedule(nodes: Sequence[Node], levels: Sequence[int]) -> tuple[Step, ...]:
+def _schedule(nodes: Sequence[Node], levels: Sequence[int]) -> tuple[Instruction, ...]:
     groups: dict[tuple[int, str, int], list[int]] = {}
     systems: dict[Node, int] = {}
     for k, (node, level) in enumerate(zip(nodes, levels, strict=True)):
@@ -193,7 +193,7 @@ def _schedule(nodes: Sequence[Node], levels: Sequence[int]) -> tuple[Step, ...]:
     return tuple(_step(kind, atoms, nodes) for (_, kind, _), atoms in sorted(groups.items()))
 
 
-def _step(kind: str, atoms: list[int], nodes: Sequence[Node]) -> Step:
+def _step(kind: str, atoms: list[int], nodes: Sequence[Node]) -> Instruction:
     targets = np.array(atoms, dtype=np.intp)
     empty = np.zeros(0, dtype=np.intp)
     if kind == "linear":
@@ -205,24 +205,24 @@ def _step(kind: str, atoms: list[int], nodes: Sequence[Node]) -> Step:
     right = arguments[:, 1] if kind == "product" else empty
     if kind == "wave":
         right = np.array([nodes[k][0] == "cosine" for k in atoms], dtype=np.intp)
-    return Step(kind, targets, arguments[:, 0], right, np.array(numbers), None, empty, None)
+    return Instruction(kind, targets, arguments[:, 0], right, np.array(numbers), None, empty, None)
 
 
-def _system_step(targets: Ints, nodes: list[Node]) -> Step:
+def _system_step(targets: Ints, nodes: list[Node]) -> Instruction:
     empty = np.zeros(0, dtype=np.intp)
     components = np.array([int(str(node[-1])) for node in nodes], dtype=np.intp)
     match nodes[0]:
         case ("solve", tuple(left), tuple(right), int(n), _):
             a, b = np.array(left, dtype=np.intp), np.array(right, dtype=np.intp)
-            return Step("solve", targets, a, b, np.array([float(n)]), None, components, None)
+            return Instruction("solve", targets, a, b, np.array([float(n)]), None, components, None)
         case ("implicit", tuple(arguments), function, _):
             a = np.array(arguments, dtype=np.intp)
             numbers = np.zeros(0)
-            return Step("implicit", targets, a, empty, numbers, None, components, function)  # type: ignore[arg-type]
+            return Instruction("implicit", targets, a, empty, numbers, None, components, function)  # type: ignore[arg-type]
     raise UsageError(f"unknown system {nodes[0]!r}")
 
 
-def _linear_step(targets: Ints, nodes: list[Node]) -> Step:
+def _linear_step(targets: Ints, nodes: list[Node]) -> Instruction:
     rows, columns, values = [], [], []
     for row, (_, _, terms) in enumerate(nodes):
         for atom, value in terms:  # type: ignore[attr-defined]
@@ -234,7 +234,7 @@ def _linear_step(targets: Ints, nodes: list[Node]) -> Step:
     matrix = sparse.csr_array((values, (rows, local)), shape=shape, dtype=np.float64)
     constants = np.array([float(str(node[1])) for node in nodes])
     sources, empty = sources.astype(np.intp), targets[:0]
-    return Step("linear", targets, sources, empty, constants, matrix, empty, None)
+    return Instruction("linear", targets, sources, empty, constants, matrix, empty, None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,7 +288,7 @@ def faces(program: Program) -> NDArray[np.bool_]:
     return np.array(bits, dtype=bool).reshape(len(every), program.n_variables)
 
 
-def _of_step(step: Step, found: list[Faces]) -> list[Faces]:
+def _of_step(step: Instruction, found: list[Faces]) -> list[Faces]:
     """The faces of each of the step's atoms."""
     if step.kind == "product":
         pairs = zip(step.left, step.right, strict=True)

@@ -29,7 +29,7 @@ from eigassign.case.schema.targets import (
     KeepOutTarget,
     Requirement,
 )
-from eigassign.case.table import Column, read_table
+from eigassign.case.table import CsvColumn, read_table
 from eigassign.case.units import DIMENSIONS
 from eigassign.errors import CaseError, UsageError
 from eigassign.mechanism.kinematics.parameters import initial_design, written_loads
@@ -145,7 +145,7 @@ def _knots(file: CaseFile, curve: _Curve, key: str) -> tuple[ArrayLike, ArrayLik
     if isinstance(curve, FrequencyProfile):
         return curve.frequency, curve.time
     if isinstance(curve, FrequencyFile):
-        columns = [Column(name, (DIMENSIONS[name],)) for name in ("time", "frequency")]
+        columns = [CsvColumn(name, (DIMENSIONS[name],)) for name in ("time", "frequency")]
         with located(file):
             numbers = read_table(Path(curve.file), f"{key}.file", columns).numbers
         return numbers["frequency"], numbers["time"]

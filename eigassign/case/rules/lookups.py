@@ -179,7 +179,7 @@ def choices(entry: object) -> list[tuple[str, object]] | None:
     return None if at(entry, "choices") is None else items(entry, "choices")
 
 
-class Column(NamedTuple):
+class PlacedColumn(NamedTuple):
     """One component of y as the file has it: its name, its property, and where that is named."""
 
     name: str
@@ -187,18 +187,18 @@ class Column(NamedTuple):
     place: KeyPath
 
 
-def columns(tree: Tree) -> list[Column]:
+def columns(tree: Tree) -> list[PlacedColumn]:
     """The components of y, in order: parameters, and what the first choice of a list sets."""
     found = []
     for name, body in design_entries(tree):
         listed_choices = choices(body)
         if listed_choices is None:
-            found.append(Column(name, text(body, "parameter"), ("design", name, "parameter")))
+            found.append(PlacedColumn(name, text(body, "parameter"), ("design", name, "parameter")))
         for first, choice in (listed_choices or ())[:1]:
             paths = names(choice)
             place: KeyPath = ("design", name, "choices", first)
             pairs = zip(column_names(name, paths), paths, strict=True)
-            found += [Column(column, path, (*place, path)) for column, path in pairs]
+            found += [PlacedColumn(column, path, (*place, path)) for column, path in pairs]
     return found
 
 

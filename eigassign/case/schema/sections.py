@@ -43,7 +43,7 @@ class Material(Part):
 
 
 @dataclass(frozen=True)
-class Limit:
+class DimensionLimit:
     """``factor × small < large`` between two dimensions of a section, or ≤ where they may meet."""
 
     small: str
@@ -61,14 +61,14 @@ class Limit:
         return f"must be {'at most' if self.may_meet else 'less than'} {share}"
 
 
-class Shape(Part):
+class SectionBase(Part):
     """What all sections say of themselves."""
 
     def depth(self, spatial: bool) -> float:
         """Depth in the plane of bending, m; in space the larger of the two."""
         raise NotImplementedError
 
-    def limits(self) -> tuple[Limit, ...]:
+    def limits(self) -> tuple[DimensionLimit, ...]:
         """What must hold between its dimensions for the section to exist."""
         return ()
 
@@ -81,7 +81,7 @@ class Shape(Part):
         return self
 
 
-class BareSection(Shape):
+class BareSection(SectionBase):
     """Properties as given.
 
     Keys:
@@ -124,7 +124,7 @@ class BareSection(Shape):
         return 2 * math.sqrt(inertia / self.area)
 
 
-class CircleSection(Shape):
+class CircleSection(SectionBase):
     """Solid round bar.
 
     Keys:
@@ -139,7 +139,7 @@ class CircleSection(Shape):
         return self.diameter
 
 
-class TubeSection(Shape):
+class TubeSection(SectionBase):
     """Round tube, by its inner diameter or its wall.
 
     Keys:
@@ -163,16 +163,16 @@ class TubeSection(Shape):
         """The outer diameter."""
         return self.outer_diameter
 
-    def limits(self) -> tuple[Limit, ...]:
+    def limits(self) -> tuple[DimensionLimit, ...]:
         """The wall ends at the middle, where a tube is solid; a bore needs a wall around it."""
         if self.inner_diameter is not None:
-            return (Limit("inner_diameter", "outer_diameter"),)
+            return (DimensionLimit("inner_diameter", "outer_diameter"),)
         if self.thickness is not None:
-            return (Limit("thickness", "outer_diameter", factor=2, may_meet=True),)
+            return (DimensionLimit("thickness", "outer_diameter", factor=2, may_meet=True),)
         return ()
 
 
-class RectangleSection(Shape):
+class RectangleSection(SectionBase):
     """Solid rectangle; in a planar mechanism I = `width` `height`³ / 12.
 
     Keys:
@@ -189,7 +189,7 @@ class RectangleSection(Shape):
         return max(self.height, self.width) if spatial else self.height
 
 
-class IProfileSection(Shape):
+class IProfileSection(SectionBase):
     """Two flanges and a web.
 
     Keys:
@@ -209,11 +209,11 @@ class IProfileSection(Shape):
         """The height, or the larger side."""
         return max(self.height, self.width) if spatial else self.height
 
-    def limits(self) -> tuple[Limit, ...]:
+    def limits(self) -> tuple[DimensionLimit, ...]:
         """There is a web between the flanges, no wider than they are."""
         return (
-            Limit("flange_thickness", "height", factor=2),
-            Limit("web_thickness", "width", may_meet=True),
+            DimensionLimit("flange_thickness", "height", factor=2),
+            DimensionLimit("web_thickness", "width", may_meet=True),
         )
 
 

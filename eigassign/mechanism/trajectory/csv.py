@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case.table import Column, Table, read_table
+from eigassign.case.table import CsvColumn, CsvTable, read_table
 from eigassign.case.units import DIMENSIONS
 from eigassign.errors import MechanismError, TrajectoryError
 
@@ -30,7 +30,7 @@ class SampleTable:
 
     time_s: Floats  # (n,)
     q: Floats  # (n, n_q) in rad or m
-    table: Table
+    table: CsvTable
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -42,11 +42,12 @@ class SampleTable:
         return self.table.where(k)
 
 
-def coordinate_columns(q_names: Sequence[str], q_units: Sequence[str] = ()) -> list[Column]:
+def coordinate_columns(q_names: Sequence[str], q_units: Sequence[str] = ()) -> list[CsvColumn]:
     """One for each coordinate; ``q_units`` are "rad" or "m", all rad if empty."""
     units = q_units or ["rad"] * len(q_names)
     return [
-        Column(name, (DIMENSIONS[_KINDS[unit]],)) for name, unit in zip(q_names, units, strict=True)
+        CsvColumn(name, (DIMENSIONS[_KINDS[unit]],))
+        for name, unit in zip(q_names, units, strict=True)
     ]
 
 
@@ -58,7 +59,7 @@ def read_samples(file: Path, q_names: Sequence[str], q_units: Sequence[str] = ()
     Raises MechanismError if the file cannot be read, has a wrong header or too few samples, and
     TrajectoryError for a line that does not hold one finite number a column; both name the line.
     """
-    columns = [Column(TIME, (DIMENSIONS["time"],)), *coordinate_columns(q_names, q_units)]
+    columns = [CsvColumn(TIME, (DIMENSIONS["time"],)), *coordinate_columns(q_names, q_units)]
     table = read_table(file, _KEY, columns, TrajectoryError, TIP_COLUMNS)
     if len(table.lines) < 2:
         message = f"{file.name}: {len(table.lines)} samples; at least two are needed"

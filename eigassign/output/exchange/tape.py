@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from eigassign.errors import UsageError
 from eigassign.modal.reduced.model import ReducedModel
-from eigassign.series.compiler import Program, Step
+from eigassign.series.compiler import Instruction, Program
 from eigassign.series.implicit import ImplicitFunction
 
 Array = NDArray[Any]
@@ -93,12 +93,14 @@ class _Tape:
         self.functions[number] = (about, [place[int(a)] for a in program.outputs], known)
         return number
 
-    def _inner(self, step: Step) -> int:
+    def _inner(self, step: Instruction) -> int:
         if not isinstance(step.function, ImplicitFunction):
             raise UsageError(f"a {type(step.function).__name__} cannot be exported")
         return self.function(step.function.program, step.function)
 
-    def _step(self, step: Step, place: dict[int, int], count: int, inner: dict[int, int]) -> int:
+    def _step(
+        self, step: Instruction, place: dict[int, int], count: int, inner: dict[int, int]
+    ) -> int:
         """Append the operations of a step; the number of values after it."""
         left = [place[int(a)] for a in step.left]
         if step.kind in ("solve", "implicit"):

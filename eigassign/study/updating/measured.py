@@ -18,7 +18,7 @@ from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.design import Tolerance
 from eigassign.case.schema.study import MOST_MEASUREMENTS, Measurement, MeasurementFile
 from eigassign.case.suggestions import shown, unknown
-from eigassign.case.table import Column, Table, read_table
+from eigassign.case.table import CsvColumn, CsvTable, read_table
 from eigassign.case.units import DIMENSIONS
 from eigassign.errors import MechanismError
 from eigassign.mechanism.trajectory.csv import TIME, coordinate_columns
@@ -96,13 +96,13 @@ def _from_file(
     file, hz = case.file, DIMENSIONS["frequency"]
     names = list(file.coordinates)
     columns = [
-        Column(TIME, (DIMENSIONS["time"],), optional=True),
-        Column("trajectory", optional=True),
-        Column("mode", (DIMENSIONS["fraction"],)),
-        Column("frequency", (hz,)),
-        Column("deviation", (hz, DIMENSIONS["fraction"]), optional=given.deviation is not None),
+        CsvColumn(TIME, (DIMENSIONS["time"],), optional=True),
+        CsvColumn("trajectory", optional=True),
+        CsvColumn("mode", (DIMENSIONS["fraction"],)),
+        CsvColumn("frequency", (hz,)),
+        CsvColumn("deviation", (hz, DIMENSIONS["fraction"]), optional=given.deviation is not None),
         *(
-            Column(column.name, column.dimensions, optional=True)
+            CsvColumn(column.name, column.dimensions, optional=True)
             for column in coordinate_columns(names, file.coordinate_units)
         ),
     ]
@@ -120,7 +120,7 @@ def _from_file(
 
 
 def _rows(
-    case: Case, table: Table, default: Tolerance | None, names: list[str]
+    case: Case, table: CsvTable, default: Tolerance | None, names: list[str]
 ) -> Iterator[PosedMeasurement]:
     known = [name for _, name, _ in case.file.trajectories]
     for k in range(len(table.lines)):
@@ -149,7 +149,7 @@ def _rows(
         yield PosedMeasurement(label, time, named or None, frozen(q), int(mode), hz, deviation)
 
 
-def _deviation(table: Table, k: int, hz: float, default: Tolerance | None) -> float:
+def _deviation(table: CsvTable, k: int, hz: float, default: Tolerance | None) -> float:
     """In Hz."""
     if "deviation" not in table.numbers:
         return default.deviation(hz) if default is not None else 0.0
