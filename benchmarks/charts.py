@@ -23,7 +23,7 @@ import fronts
 from eigassign.api import load_case
 from eigassign.chart.comparison import Request
 from eigassign.chart.effort import QUICK, Effort
-from eigassign.output.chart_report import tables, write_chart
+from eigassign.output.reports.chart import tables, write_chart
 from eigassign.output.tables import Table
 from eigassign.pipeline import chart as charting
 from eigassign.pipeline.run import Options

@@ -18,9 +18,9 @@ from eigassign.modal.model import Model, as_model
 from eigassign.modal.reduced import compression
 from eigassign.modal.reduced import reduce as modal_reduced
 from eigassign.modal.reduced.model import ReducedModel
-from eigassign.output import reduced_file
+from eigassign.output.exchange import reduced_file
 from eigassign.output.figures.modes import mode_figures
-from eigassign.output.notebook import drawn, html
+from eigassign.output.reports.notebook import drawn, html
 from eigassign.pipeline import queries
 from eigassign.pipeline.animation import animate
 from eigassign.pipeline.outlook import picture

@@ -20,7 +20,7 @@ from eigassign._version import __version__
 from eigassign.errors import StorageError, UsageError
 from eigassign.files import STORED, read_bytes
 from eigassign.output.batch.outcome import CaseOutcome, from_line, to_line
-from eigassign.output.storage import replace_synced
+from eigassign.output.store.atomic import replace_synced
 
 HEADER, LINES = "batch.json", "manifest.jsonl"
 FORMAT = 1

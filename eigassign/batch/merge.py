@@ -14,8 +14,8 @@ from eigassign.batch.progress import summarise
 from eigassign.errors import UsageError
 from eigassign.output.batch.files import merge_files, write_files
 from eigassign.output.batch.outcome import from_line, status_of, to_line
-from eigassign.output.run_record import relative_path
-from eigassign.output.storage import replacing
+from eigassign.output.store.atomic import replacing
+from eigassign.output.store.run_record import relative_path
 
 _SHOWN = 10  # shards that a message names
 

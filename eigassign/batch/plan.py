@@ -30,7 +30,7 @@ from eigassign.errors import EigassignError, Problem, StorageError, UsageError
 from eigassign.files import MATRIX, read_bytes
 from eigassign.modal.storage import ALGORITHM
 from eigassign.output.batch.files import NAMES
-from eigassign.output.run_record import MARKER
+from eigassign.output.store.run_record import MARKER
 
 FILES = ("batch.json", "manifest.jsonl", *NAMES)  # of a batch, beside the folders of its cases
 STUDY = "cheap"  # of what an answer means; see pipeline.run.Options

@@ -29,8 +29,8 @@ from eigassign.errors import StorageError
 from eigassign.files import quoted
 from eigassign.output.batch.files import are_current, write_files
 from eigassign.output.batch.outcome import CaseOutcome, to_line
-from eigassign.output.run_record import relative_path
-from eigassign.output.storage import replace_synced
+from eigassign.output.store.atomic import replace_synced
+from eigassign.output.store.run_record import relative_path
 
 GONE = -1  # index of an outcome of a case that the plan has no more
 REPORT = "report.html"

@@ -23,7 +23,7 @@ from eigassign.batch.work import check_cases, outcome_of, run_cases
 from eigassign.batch.workers import Pace, Place, run_tasks, this_machine
 from eigassign.errors import CaseError, Problem, StorageError
 from eigassign.output.batch.outcome import CaseOutcome
-from eigassign.output.run_record import MARKER
+from eigassign.output.store.run_record import MARKER
 from eigassign.pipeline.stages import silent
 
 _CHECKED = 100  # variants in a task that checks them: half a second

@@ -11,7 +11,7 @@ import eigassign.cli.arguments as arguments
 from eigassign.errors import UsageError
 
 if TYPE_CHECKING:
-    from eigassign.output.cache import Cache
+    from eigassign.output.store.cache import Cache
 
 
 @click.group(epilog=arguments.examples("eigassign cache list", "eigassign cache clear"))
@@ -55,7 +55,7 @@ def cache_list(cache_dir: Path | None) -> int:
 
 
 def _cache(directory: Path | None) -> Cache:
-    from eigassign.output.cache import Cache, default_directory
+    from eigassign.output.store.cache import Cache, default_directory
 
     found = default_directory() if directory is None else directory
     if found is None:

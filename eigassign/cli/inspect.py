@@ -18,7 +18,7 @@ from eigassign.errors import CaseError, EigassignError
 from eigassign.files import printable, quoted
 
 if TYPE_CHECKING:
-    from eigassign.output.run_record import RunStatus
+    from eigassign.output.store.run_record import RunStatus
     from eigassign.pipeline.outlook import Outlook
     from eigassign.pipeline.queries import CheckAnswer, ModesAnswer
 
@@ -239,7 +239,7 @@ def status(runs: tuple[Path, ...], as_json: bool, **how: Any) -> int:
     that it names, and the version with the one installed. Exit code 0 where all agree; 1 where
     something was changed, or is missing; 2 where there is no finished run.
     """
-    from eigassign.output.run_record import run_status
+    from eigassign.output.store.run_record import run_status
 
     codes, answers = [0], dict[str, Any]()
     with reporting(how):

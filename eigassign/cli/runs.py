@@ -159,12 +159,12 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
         done = updating.update(case, given)
         reporter.warn(done.results.warnings)
     if as_json:
-        from eigassign.output.update_report import document
+        from eigassign.output.reports.update import document
 
         print_json({"run_folder": str(done.folder), **document(done.results)})
     else:
         from eigassign.output.console import print_tables, print_verdict
-        from eigassign.output.update_report import console_tables, headline
+        from eigassign.output.reports.update import console_tables, headline
 
         print_verdict(headline(done.results), done.results.verdict)
         print_tables(console_tables(done.results))
@@ -309,8 +309,8 @@ def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
     if as_json:
         print_json({"run_folder": str(made.folder), **vars(made.chart)})
     else:
-        from eigassign.output.chart_report import main_tables
         from eigassign.output.console import print_tables
+        from eigassign.output.reports.chart import main_tables
 
         print_tables(main_tables(made.chart))
         show(_written(made.folder, made.chart.seconds))

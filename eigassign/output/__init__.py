@@ -2,26 +2,18 @@
 
 In reading order; each imports from those above it only:
 
-    formats        numbers as people read them
-    storage        files and folders that are written whole or not at all
-    run_record     run.json: the case, version and files of a run, and what has changed since
-    run_folder     the folder of a run: hidden until finished; replaces only runs of the same case
-    cache          arrays by content key, checked by their hash
-    exchange       a reduced model for other programs: NumPy, MATLAB, C99
-    reduced_file   a reduced model in one file
-    result_files   results.json and the CSV files
-    tables         the tables of a run as text
-    terminal       the widths of tables that fit a terminal
-    console        results on stdout, progress on stderr
-    pages          HTML pages from their templates
-    batch          what a batch leaves: summaries, junit.xml, columns, index.html
-    previous       what an earlier result said, and what has moved since
-    figures        the figures of runs, modes and charts, on paper and on screen
-    verdict        the first screen of a report
-    report         report.html, and what a run or modes leave in a folder
-    notebook       figures and tables of a case or result in a notebook
-    update_report  the tables and the folder of an update
-    chart_report   the tables and the folder of a chart
+    formats       numbers as people read them
+    store         files and folders that are written whole or not at all: runs, the cache
+    exchange      a reduced model in files: HDF5, NumPy, MATLAB, C99
+    result_files  results.json and the CSV files
+    tables        the tables of a run as text
+    terminal      the widths of tables that fit a terminal
+    console       results on stdout, progress on stderr
+    pages         HTML pages from their templates
+    batch         what a batch leaves: summaries, junit.xml, columns, index.html
+    previous      what an earlier result said, and what has moved since
+    figures       the figures of runs, modes and charts, on paper and on screen
+    reports       report.html, and what runs, updates and charts leave in a folder; notebooks
 """
 
 from eigassign.faces import face
@@ -33,8 +25,8 @@ __all__, __getattr__, __dir__ = face(
         "batch.junit": "Junit",
         "batch.outcome": "CaseOutcome Status frequency_ranges from_line ranges to_line",
         "batch.summary": "COLUMNS SummaryCsv SummaryJson batch_table",
-        "cache": "Cache DamagedError HEADER_BYTES default_directory header key pack unpack",
-        "chart_report": "write_chart",
+        "store.cache": "Cache DamagedError HEADER_BYTES default_directory header key pack unpack",
+        "reports.chart": "write_chart",
         "exchange.files": "write_exchange",
         "figures.front": "MethodLine chart_figures scatter",
         "figures.graph": "Curve FigurePlan Graph Look Panel Shade",
@@ -46,11 +38,11 @@ __all__, __getattr__, __dir__ = face(
         "figures.run": "run_figures",
         "formats": "number percent residual seconds",
         "previous": "Comparison Known of_outcome of_validation read_previous",
-        "reduced_file": "load_reduced",
-        "report": "write_modes write_run",
+        "exchange.reduced_file": "load_reduced",
+        "reports.page": "write_modes write_run",
         "result_files": "dumps frequencies_csv results_document sample_files to_json",
-        "run_record": "MARKER RunStatus changes read_record run_status",
-        "storage": "lock replace_synced",
+        "store.run_record": "MARKER RunStatus changes read_record run_status",
+        "store.atomic": "lock replace_synced",
         "tables": "Table headline",
     },
 )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from eigassign.errors import StorageError, UsageError
 from eigassign.output.figures import motion
-from eigassign.output.storage import replace_synced
+from eigassign.output.store.atomic import replace_synced
 from eigassign.pipeline.queries import pose_and_design
 from eigassign.study import drawing
 from eigassign.study.built_case import Case

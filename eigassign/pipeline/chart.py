@@ -14,7 +14,7 @@ from eigassign.chart.mesh import chart_meshes, meshes
 from eigassign.chart.results import Chart
 from eigassign.chart.timing import machine
 from eigassign.errors import AccuracyError
-from eigassign.output.chart_report import write_chart
+from eigassign.output.reports.chart import write_chart
 from eigassign.pipeline.run import Options, prepare
 from eigassign.pipeline.run_files import new_run_folder
 from eigassign.pipeline.stages import Stages

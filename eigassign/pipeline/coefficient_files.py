@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.modal.expansion import Expansion
-from eigassign.output.cache import key, pack
 from eigassign.output.result_files import dumps
+from eigassign.output.store.cache import key, pack
 from eigassign.study.scene import Scene
 
 Array = NDArray[Any]

@@ -21,7 +21,7 @@ from eigassign.modal.storage import (
     expansions_from_arrays,
     pencil_parts,
 )
-from eigassign.output.cache import Cache, key
+from eigassign.output.store.cache import Cache, key
 from eigassign.study.planning import Plan
 from eigassign.study.scene import Expansions
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from eigassign.errors import TrajectoryError, UsageError
 from eigassign.modal.adaptive.reduced_model import reduce_adaptively
 from eigassign.output.exchange.files import ENDINGS, write_exchange
-from eigassign.output.reduced_file import save_reduced
+from eigassign.output.exchange.reduced_file import save_reduced
 from eigassign.pipeline.queries import pose_and_design
 from eigassign.study.built_case import Case
 from eigassign.study.drawing import spread_samples

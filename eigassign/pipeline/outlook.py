@@ -22,7 +22,7 @@ from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.model import Model
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.motion import mechanism_plan
-from eigassign.output.report import write_figures
+from eigassign.output.reports.page import write_figures
 from eigassign.pipeline.expansions import ExpansionSize, expansion_size
 from eigassign.pipeline.run_files import RESULTS, new_run_folder
 from eigassign.study.built_case import Case, load_case

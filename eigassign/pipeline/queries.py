@@ -18,7 +18,7 @@ from eigassign.errors import CaseError, Problem, UsageError
 from eigassign.mechanism.elements.superelement import weights
 from eigassign.mechanism.kinematics.parameters import written_loads
 from eigassign.modal.exact.roundoff import rounding_error
-from eigassign.output import report
+from eigassign.output.reports import page as report
 from eigassign.pipeline.outlook import Outlook, next_step, outlook, some_pose
 from eigassign.pipeline.run_files import RESULTS, new_run_folder
 from eigassign.study import drawing

@@ -20,12 +20,12 @@ from eigassign.case.suggestions import shown
 from eigassign.errors import EigassignError
 from eigassign.modal.expansion import Expansion, NearestExpansion
 from eigassign.output import tables
-from eigassign.output.cache import Cache, default_directory
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.run import run_figures
 from eigassign.output.formats import number
-from eigassign.output.notebook import Pictured, html
+from eigassign.output.reports.notebook import Pictured, html
 from eigassign.output.result_files import frequency_columns
+from eigassign.output.store.cache import Cache, default_directory
 from eigassign.pipeline.coefficient_files import coefficient_files
 from eigassign.pipeline.expansions import expand_plan, expansion_size
 from eigassign.pipeline.run_files import RunFolder, new_run_folder

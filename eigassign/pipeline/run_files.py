@@ -10,8 +10,8 @@ from pathlib import Path
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import UsageError
 from eigassign.files import printable
-from eigassign.output import report
-from eigassign.output.run_folder import run_folder
+from eigassign.output.reports import page as report
+from eigassign.output.store.run_folder import run_folder
 from eigassign.study.results import AssignmentRow, ErrorSummary, RunResults
 
 RESULTS = Path("results")  # below the current folder

@@ -8,8 +8,8 @@ from pathlib import Path
 from eigassign.brief import cut
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.update import update_figures
-from eigassign.output.notebook import Pictured, html
-from eigassign.output.update_report import console_tables, headline, write_update
+from eigassign.output.reports.notebook import Pictured, html
+from eigassign.output.reports.update import console_tables, headline, write_update
 from eigassign.pipeline.run import DEFAULT, Options
 from eigassign.pipeline.run_files import new_run_folder
 from eigassign.pipeline.stages import Stages

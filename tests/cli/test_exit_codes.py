@@ -228,7 +228,7 @@ def test_a_cache_that_cannot_be_written_costs_a_warning_and_no_result(
 SLOW = """
 import sys, time
 from pathlib import Path
-from eigassign.output import report
+from eigassign.output.reports import page as report
 
 def write_run(results, folder, formats, kind):
     (folder / "half").touch()

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from eigassign.output import changes, read_record
-from eigassign.output.run_folder import run_folder
+from eigassign.output.store.run_folder import run_folder
 
 Write = Callable[[Path, Path, bool], int]  # a whole run of a case file at a target; force
 

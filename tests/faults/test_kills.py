@@ -14,7 +14,7 @@ import pytest
 from run_scenes import EARLIER, Stage, added, faults, write_a_few_files
 from stopping import can_stop, stopped_at
 
-from eigassign.output import storage
+from eigassign.output.store import atomic as storage
 from eigassign.process import Terminated, failure_of, terminable
 
 pytestmark = pytest.mark.skipif(not can_stop(), reason="needs ptrace, on Linux")

@@ -23,7 +23,7 @@ from eigassign.output import (
     replace_synced,
     unpack,
 )
-from eigassign.output import cache as module
+from eigassign.output.store import cache as module
 
 ARRAYS = {
     "coefficients": np.array([1.0, -0.0, 5e-324, np.nan, np.inf, 1.7e308]).reshape(2, 3),
@@ -218,7 +218,7 @@ def test_equal_numbers_have_one_key_whatever_their_memory_looks_like():
 def test_the_algorithm_version_and_the_schema_change_the_key(monkeypatch):
     before = key((1,), algorithm="1")
     assert key((1,), algorithm="2") != before
-    monkeypatch.setattr("eigassign.output.cache.SCHEMA", 2)
+    monkeypatch.setattr("eigassign.output.store.cache.SCHEMA", 2)
     assert key((1,), algorithm="1") != before
 
 
@@ -343,7 +343,7 @@ WRITER = """
 import sys
 from pathlib import Path
 import numpy as np
-from eigassign.output.cache import Cache, key
+from eigassign.output.store.cache import Cache, key
 cache = Cache(Path(sys.argv[1]))
 for turn in range(40):
     loaded = cache.load(key("shared"))

@@ -30,13 +30,13 @@ from eigassign.output import (
     FigurePlan,
     MethodLine,
     chart_figures,
-    chart_report,
     draw,
     render,
     scatter,
     write_chart,
 )
 from eigassign.output.figures import screen, style
+from eigassign.output.reports import chart as chart_report
 
 
 def timing(seconds: float, repeats: int = 5) -> Timing:

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from synthetic_results import make_results, studied
 
-from eigassign.output import Curve, Graph, Look, Panel, Shade, report, run_figures, write_run
+from eigassign.output import Curve, Graph, Look, Panel, Shade, run_figures, write_run
 from eigassign.output.figures import screen
+from eigassign.output.reports import page as report
 from eigassign.output.tables import tables
 
 VOID = {"meta", "img", "br", "link", "input"}

@@ -13,9 +13,10 @@ from pathlib import Path
 import pytest
 
 from eigassign.errors import StorageError
-from eigassign.output import MARKER, storage
-from eigassign.output import run_folder as module
-from eigassign.output.run_folder import run_folder
+from eigassign.output import MARKER
+from eigassign.output.store import atomic as storage
+from eigassign.output.store import run_folder as module
+from eigassign.output.store.run_folder import run_folder
 
 
 @pytest.fixture
@@ -285,7 +286,7 @@ def test_what_a_killed_swap_had_moved_away_comes_back(target, case):
 WRITER = """
 import sys
 from pathlib import Path
-from eigassign.output.run_folder import run_folder
+from eigassign.output.store.run_folder import run_folder
 target, case, me = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3]
 for turn in range(20):
     with run_folder(target, case_path=case, case_sha256="a") as folder:

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from eigassign.errors import UsageError
-from eigassign.output import MARKER, RunStatus, run_record, run_status
-from eigassign.output.run_folder import run_folder
+from eigassign.output import MARKER, RunStatus, run_status
+from eigassign.output.store import run_record
+from eigassign.output.store.run_folder import run_folder
 
 FILES = {"results.json": "{}", "case.yaml": "title: arm\n", "figures/modes.png": "png"}
 

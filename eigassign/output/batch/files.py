@@ -19,7 +19,7 @@ from eigassign.output.batch.index import Index
 from eigassign.output.batch.junit import Junit
 from eigassign.output.batch.outcome import CaseOutcome, from_line, status_of
 from eigassign.output.batch.summary import SummaryCsv, SummaryJson
-from eigassign.output.storage import replace_synced, replacing
+from eigassign.output.store.atomic import replace_synced, replacing
 
 _ALWAYS = ("summary.csv", "summary.json", "junit.xml", "index.html")
 _COLUMNS = ("columns.h5", "columns.csv")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TextIO
 
 from eigassign.errors import StorageError
-from eigassign.output.storage import replacing
+from eigassign.output.store.atomic import replacing
 
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _PLAIN = re.compile(r"[\w .,:;/%=+()\[\]-]*", re.ASCII)

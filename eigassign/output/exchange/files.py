@@ -15,7 +15,7 @@ from eigassign.files import CASE, read_bytes
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.output.exchange.c_source import c_source, identifier
 from eigassign.output.exchange.tape import reduced_tape
-from eigassign.output.storage import replace_synced
+from eigassign.output.store.atomic import replace_synced
 
 FORMAT = "eigassign reduced model 1"
 ENDINGS = (".npz", ".mat", ".c")

@@ -17,7 +17,7 @@ from typing import Literal
 from eigassign._version import __version__
 from eigassign.errors import StorageError, UsageError
 from eigassign.files import CASE, MATRIX, pieces, read_bytes
-from eigassign.output.storage import write_synced
+from eigassign.output.store.atomic import write_synced
 
 MARKER = "run.json"
 _SCHEMA = 2

@@ -10,9 +10,9 @@ from typing import Any
 
 from eigassign.chart.results import SCHEMA, Advice, Chart, Front, Timing
 from eigassign.chart.timing import time_in_words
-from eigassign.output import report
 from eigassign.output.figures.front import chart_figures
 from eigassign.output.formats import capital
+from eigassign.output.reports import page as report
 from eigassign.output.result_files import dumps
 from eigassign.output.tables import Table
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from eigassign.output import report
 from eigassign.output.figures.update import shown_in, update_figures
 from eigassign.output.formats import number
+from eigassign.output.reports import page as report
 from eigassign.output.result_files import dumps, origin
 from eigassign.output.tables import Table
 from eigassign.study.updating.fit import POOR, UpdatedParameter, UpdateResults

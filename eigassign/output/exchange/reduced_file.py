@@ -8,9 +8,9 @@ from eigassign.errors import StorageError, UsageError
 from eigassign.files import STORED, read_bytes
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.storage import FORMAT, reduced_arrays, reduced_from_arrays
-from eigassign.output.cache import DamagedError, key, pack, unpack
 from eigassign.output.exchange.files import ENDINGS, write_exchange
-from eigassign.output.storage import replace_synced
+from eigassign.output.store.atomic import replace_synced
+from eigassign.output.store.cache import DamagedError, key, pack, unpack
 
 
 def save_reduced(reduced: ReducedModel, path: str | Path) -> None:

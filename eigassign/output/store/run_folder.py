@@ -30,8 +30,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from eigassign.errors import StorageError
-from eigassign.output.run_record import RunOf, changes, read_record, relative_path, write_record
-from eigassign.output.storage import (
+from eigassign.output.store.atomic import (
     abandoned,
     names_of,
     put_in_place,
@@ -40,6 +39,13 @@ from eigassign.output.storage import (
     sync_tree,
     temporary,
     token_of,
+)
+from eigassign.output.store.run_record import (
+    RunOf,
+    changes,
+    read_record,
+    relative_path,
+    write_record,
 )
 
 _log = logging.getLogger(__name__)

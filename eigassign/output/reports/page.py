@@ -24,9 +24,9 @@ from eigassign.output.figures.modes import mode_figures
 from eigassign.output.figures.paper import render
 from eigassign.output.figures.run import run_figures
 from eigassign.output.pages import TEMPLATES, inside, page_of
+from eigassign.output.reports.verdict import verdict_of
 from eigassign.output.result_files import sample_files, to_json
 from eigassign.output.tables import Table, tables
-from eigassign.output.verdict import verdict_of
 from eigassign.study.results import ModePictures, RunResults
 
 if TYPE_CHECKING:
@@ -145,7 +145,7 @@ def write_run(
     """results.json, report.html, CSV files and the figures in these formats, in ``folder``.
 
     ``kind`` is full, light or none. The folder must exist and be empty. Wrap it in
-    :func:`eigassign.output.run_folder.run_folder` to have them whole or not at all.
+    :func:`eigassign.output.store.run_folder.run_folder` to have them whole or not at all.
     """
     document = to_json(results)
     (folder / "results.json").write_bytes(document)

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from eigassign.errors import EigassignError, StorageError, UsageError
 from eigassign.files import STORED, read_bytes
-from eigassign.output.storage import replace_synced, sweep_files
+from eigassign.output.store.atomic import replace_synced, sweep_files
 
 # --- A file: its key, its bytes, and how they are checked
 

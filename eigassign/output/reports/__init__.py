@@ -1,0 +1,10 @@
+"""What runs, updates and charts leave for people: a page, and what a notebook shows.
+
+In reading order; each imports from those above it only:
+
+    verdict   the first screen of a report
+    page      report.html, and what a run or modes leave in a folder
+    notebook  figures and tables of a case or result in a notebook
+    update    the tables and the folder of an update
+    chart     the tables and the folder of a chart
+"""
