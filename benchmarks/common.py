@@ -14,6 +14,7 @@ import json
 import platform
 import resource
 import statistics
+import subprocess
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -91,7 +92,17 @@ def _machine() -> str:
     import numpy
     import scipy
 
+    import eigassign
+
     return (
-        f"Python {platform.python_version()}, NumPy {numpy.__version__}, SciPy {scipy.__version__},"
-        f" {platform.machine()}, one BLAS thread"
+        f"eigassign {eigassign.__version__} at commit {_commit()},"
+        f" Python {platform.python_version()}, NumPy {numpy.__version__},"
+        f" SciPy {scipy.__version__}, {platform.machine()}, one BLAS thread"
     )
+
+
+def _commit() -> str:
+    """The commit that is measured, with a + if files of it have been changed since."""
+    command = ["git", "describe", "--always", "--dirty=+", "--exclude=*"]
+    done = subprocess.run(command, cwd=CASES, capture_output=True, text=True, check=False)
+    return done.stdout.strip() or "unknown"
