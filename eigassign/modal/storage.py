@@ -31,7 +31,7 @@ from eigassign.series.multi_index import LowerSet
 Array = NDArray[Any]
 ALGORITHM = "expansion 3"  # raise it whenever the numbers an expansion is made of may change
 FORMAT = "reduced model 6"  # raise it whenever what the arrays of a reduced model mean changes
-STORED = (
+STORED: tuple[type, ...] = (
     Expansion,
     Cluster,
     LowerSet,
@@ -44,7 +44,8 @@ STORED = (
     Instruction,
     ImplicitFunction,
 )
-CLASSES: dict[str, type] = {c.__name__: c for c in STORED}
+NAMES = {c: c.__name__ for c in STORED} | {Instruction: "Step"}  # in files
+CLASSES = {name: c for c, name in NAMES.items()}
 _DAMAGE = (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError)
 _KINDS: dict[str, Any] = {"f": np.float64, "i": np.int64, "u": np.uint8}
 
@@ -144,9 +145,9 @@ def _tree(thing: Any, arrays: dict[str, Array]) -> Any:
         name = f"a{len(arrays)}"
         arrays[name] = np.ascontiguousarray(thing, dtype=stored)
         return {"array": name, "kind": thing.dtype.kind}
-    if is_dataclass(thing) and type(thing).__name__ in CLASSES:
+    if (stored_as := NAMES.get(type(thing))) is not None:
         members = {f.name: _tree(getattr(thing, f.name), arrays) for f in fields(thing)}
-        return {"class": type(thing).__name__, "fields": members}
+        return {"class": stored_as, "fields": members}
     raise UsageError(f"a {type(thing).__name__} cannot be stored")
 
 
