@@ -19,9 +19,7 @@ __all__, __getattr__, __dir__ = face(
         "compiler": "compile_program compile_table",
         "expression": "Expression Recorder Scalar cos derivative exp sin",
         "implicit": "ImplicitFunction",
-        "multi_index": "LowerSet box lower_set on_faces partially_linear total_degree",
-        "power_series": (
-            "BLOCK compose monomials monomials_of multiply polynomials power_taylor wave_taylor"
-        ),
+        "multi_index": "LowerSet lower_set on_faces partially_linear total_degree",
+        "power_series": "monomials polynomials",
     },
 )

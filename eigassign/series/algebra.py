@@ -26,7 +26,7 @@ Weights = sparse.csr_array | NDArray[np.float64]
 
 
 class Algebra(Protocol):
-    """What a program needs to run: rows of numbers standing for values."""
+    """Operations that a program needs to run, on rows of numbers standing for values."""
 
     def constant(self, values: Floats) -> Floats:
         """Numbers (n,) as rows (n, …)."""
@@ -212,7 +212,7 @@ class Truncated:
         return compose(self.space, exponential_taylor(a[:, 0], self.space.order), a)
 
     def solve(self, A: Floats, B: Floats, n: int) -> Floats:
-        """Each chord step X ← X + A_0⁻¹ (B − A X) gains one degree."""
+        """Chord steps X ← X + A_0⁻¹ (B − A X), each of which gains one degree."""
         m, size = len(B) // n, len(self.space)
         inverse = np.linalg.inv(A[:, 0].reshape(n, n))
         right = B.reshape(n, m * size)

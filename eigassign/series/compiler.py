@@ -13,7 +13,7 @@ function one face with all variables.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,7 +28,9 @@ from eigassign.series.expression import Expression, Node, Recorder, Scalar
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 WAVES: dict[object, str] = {"sine": "wave", "cosine": "wave"}
-DENSE_FORMS = 2_000  # entries up to which the matrix of a linear step is kept dense
+# Entries up to which the matrix of a linear step is kept dense: at one sample that saves the 3 µs
+# that the call of a sparse product takes; of more entries the products with zeros take as long.
+DENSE_FORMS = 2_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +71,7 @@ class Program:
 
     @cached_property
     def is_implicit(self) -> bool:
-        """Whether anything in it solves equations: it may then have no value at all."""
+        """True where a step solves equations: the program may then have no value at all."""
         return any(step.function is not None for step in self.steps)
 
     @cached_property
@@ -110,24 +112,19 @@ def compile_program(recorder: Recorder, outputs: Sequence[int], n_variables: int
     for atom in range(len(recorder.nodes) - 1, -1, -1):
         if atom in wanted:
             wanted.update(_arguments(recorder.nodes[atom]))
-    needed = sorted(wanted)
-    renumbered = {atom: k for k, atom in enumerate(needed)}
-    nodes = [_renumber(recorder.nodes[atom], renumbered) for atom in needed]
-    arguments = [_arguments(node) for node in nodes]
-    levels: list[int] = []
-    for atoms in arguments:
-        levels.append(1 + max((levels[a] for a in atoms), default=-1))
-    depends = _dependence(nodes, arguments, n_variables)
-    variables = [(k, int(str(node[1]))) for k, node in enumerate(nodes) if node[0] == "variable"]
-    final = np.array([renumbered[atom] for atom in outputs], dtype=np.intp)
+    nodes = {atom: recorder.nodes[atom] for atom in sorted(wanted)}
+    place = np.zeros(len(recorder.nodes), dtype=np.intp)
+    place[list(nodes)] = np.arange(len(nodes))
+    variables = [(atom, int(str(node[1]))) for atom, node in nodes.items() if node[0] == "variable"]
+    final = place[list(outputs)]
     return Program(
         n_variables=n_variables,
         n_atoms=len(nodes),
-        inputs=np.array([k for k, _ in variables], dtype=np.intp),
+        inputs=place[[atom for atom, _ in variables]],
         input_variables=np.array([v for _, v in variables], dtype=np.intp),
-        steps=_schedule(nodes, levels),
+        steps=_schedule(nodes, place),
         outputs=final,
-        dependence=depends[final] if len(final) else np.zeros((0, n_variables), dtype=bool),
+        dependence=_dependence(nodes, n_variables)[final],
     )
 
 
@@ -148,98 +145,86 @@ def _arguments(node: Node) -> tuple[int, ...]:
     raise UsageError(f"unknown expression {node!r}")
 
 
-def _renumber(node: Node, new: dict[int, int]) -> Node:
-    match node:
-        case ("variable", _):
-            return node
-        case ("linear", constant, terms):
-            return ("linear", constant, tuple((new[a], c) for a, c in terms))  # type: ignore[attr-defined]
-        case ("product", int(a), int(b)):
-            return ("product", new[a], new[b])
-        case ("solve", tuple(left), tuple(right), *rest):
-            return ("solve", tuple(new[a] for a in left), tuple(new[a] for a in right), *rest)
-        case ("implicit", tuple(arguments), *rest):
-            return ("implicit", tuple(new[a] for a in arguments), *rest)
-        case (kind, int(a), *rest):
-            return (kind, new[a], *rest)
-    raise UsageError(f"unknown expression {node!r}")
-
-
-def _dependence(
-    nodes: Sequence[Node], arguments: Sequence[tuple[int, ...]], n_variables: int
-) -> NDArray[np.bool_]:
-    """Which variables each atom is made of: sets of few members, each a bit of one number."""
-    depends: list[int] = []
-    for node, atoms in zip(nodes, arguments, strict=True):
+def _dependence(nodes: Mapping[int, Node], n_variables: int) -> NDArray[np.bool_]:
+    """Variables that each atom is made of: sets of few members, each a bit of one number."""
+    depends: dict[int, int] = {}
+    for atom, node in nodes.items():
         found = 1 << int(str(node[1])) if node[0] == "variable" else 0
-        for atom in atoms:
-            found |= depends[atom]
-        depends.append(found)
-    size = (n_variables + 7) // 8
-    packed = np.frombuffer(b"".join(d.to_bytes(size, "little") for d in depends), dtype=np.uint8)
-    bits = np.unpackbits(packed.reshape(len(nodes), size), axis=1, bitorder="little")
-    return bits[:, :n_variables].astype(bool)
+        for argument in _arguments(node):
+            found |= depends[argument]
+        depends[atom] = found
+    return _bits(list(depends.values()), n_variables)
 
 
-def _schedule(nodes: Sequence[Node], levels: Sequence[int]) -> tuple[Instruction, ...]:
+def _bits(sets: Sequence[int], n: int) -> NDArray[np.bool_]:
+    """(n_sets, n): the members of sets whose bit k stands for variable k."""
+    size = (n + 7) // 8
+    packed = np.frombuffer(b"".join(s.to_bytes(size, "little") for s in sets), dtype=np.uint8)
+    bits = np.unpackbits(packed.reshape(len(sets), size), axis=1, bitorder="little")
+    return bits[:, :n].astype(bool)
+
+
+def _schedule(nodes: Mapping[int, Node], place: Ints) -> tuple[Instruction, ...]:
+    levels: dict[int, int] = {}
     groups: dict[tuple[int, str, int], list[int]] = {}
     systems: dict[Node, int] = {}
-    for k, (node, level) in enumerate(zip(nodes, levels, strict=True)):
+    for atom, node in nodes.items():
+        level = levels[atom] = 1 + max((levels[a] for a in _arguments(node)), default=-1)
         if node[0] in ("solve", "implicit"):  # one step for each system of equations
             system = systems.setdefault(node[:-1], len(systems))
-            groups.setdefault((level, str(node[0]), system), []).append(k)
+            groups.setdefault((level, str(node[0]), system), []).append(atom)
         elif node[0] != "variable":
-            groups.setdefault((level, WAVES.get(node[0], str(node[0])), -1), []).append(k)
-    return tuple(_step(kind, atoms, nodes) for (_, kind, _), atoms in sorted(groups.items()))
+            groups.setdefault((level, WAVES.get(node[0], str(node[0])), -1), []).append(atom)
+    return tuple(
+        _instruction(kind, place[atoms], [nodes[atom] for atom in atoms], place)
+        for (_, kind, _), atoms in sorted(groups.items())
+    )
 
 
-def _step(kind: str, atoms: list[int], nodes: Sequence[Node]) -> Instruction:
-    targets = np.array(atoms, dtype=np.intp)
+def _instruction(kind: str, targets: Ints, nodes: list[Node], place: Ints) -> Instruction:
     empty = np.zeros(0, dtype=np.intp)
     if kind == "linear":
-        return _linear_step(targets, [nodes[k] for k in atoms])
+        return _linear_forms(targets, nodes, place)
     if kind in ("solve", "implicit"):
-        return _system_step(targets, [nodes[k] for k in atoms])
-    arguments = np.array([_arguments(nodes[k]) for k in atoms], dtype=np.intp)
-    numbers = [float(str(nodes[k][2])) for k in atoms] if kind == "power" else []
+        return _system(targets, nodes, place)
+    arguments = place[[_arguments(node) for node in nodes]]
+    numbers = [float(str(node[2])) for node in nodes] if kind == "power" else []
     right = arguments[:, 1] if kind == "product" else empty
     if kind == "wave":
-        right = np.array([nodes[k][0] == "cosine" for k in atoms], dtype=np.intp)
+        right = np.array([node[0] == "cosine" for node in nodes], dtype=np.intp)
     return Instruction(kind, targets, arguments[:, 0], right, np.array(numbers), None, empty, None)
 
 
-def _system_step(targets: Ints, nodes: list[Node]) -> Instruction:
-    empty = np.zeros(0, dtype=np.intp)
+def _system(targets: Ints, nodes: list[Node], place: Ints) -> Instruction:
     components = np.array([int(str(node[-1])) for node in nodes], dtype=np.intp)
     match nodes[0]:
         case ("solve", tuple(left), tuple(right), int(n), _):
-            a, b = np.array(left, dtype=np.intp), np.array(right, dtype=np.intp)
-            return Instruction("solve", targets, a, b, np.array([float(n)]), None, components, None)
+            a, b, numbers = place[list(left)], place[list(right)], np.array([float(n)])
+            return Instruction("solve", targets, a, b, numbers, None, components, None)
         case ("implicit", tuple(arguments), function, _):
-            a = np.array(arguments, dtype=np.intp)
-            numbers = np.zeros(0)
-            return Instruction("implicit", targets, a, empty, numbers, None, components, function)  # type: ignore[arg-type]
+            a, b, numbers = place[list(arguments)], targets[:0], np.zeros(0)
+            return Instruction("implicit", targets, a, b, numbers, None, components, function)  # type: ignore[arg-type]
     raise UsageError(f"unknown system {nodes[0]!r}")
 
 
-def _linear_step(targets: Ints, nodes: list[Node]) -> Instruction:
+def _linear_forms(targets: Ints, nodes: list[Node], place: Ints) -> Instruction:
     rows, columns, values = [], [], []
     for row, (_, _, terms) in enumerate(nodes):
         for atom, value in terms:  # type: ignore[attr-defined]
             rows.append(row)
             columns.append(atom)
             values.append(value)
-    sources, local = np.unique(np.array(columns, dtype=np.intp), return_inverse=True)
+    sources, local = np.unique(place[columns], return_inverse=True)
     shape = (len(nodes), len(sources))
     matrix = sparse.csr_array((values, (rows, local)), shape=shape, dtype=np.float64)
     constants = np.array([float(str(node[1])) for node in nodes])
-    sources, empty = sources.astype(np.intp), targets[:0]
+    empty = targets[:0]
     return Instruction("linear", targets, sources, empty, constants, matrix, empty, None)
 
 
 @dataclass(frozen=True, eq=False)
 class CompiledTable:
-    """values = constants + weights × program outputs."""
+    """Scalars by one program: values = constants + weights × program outputs."""
 
     program: Program
     constants: Floats  # (n,)
@@ -271,7 +256,7 @@ def compile_table(recorder: Recorder, scalars: Sequence[Scalar], n_variables: in
 
 # --- Faces of a program
 
-MOST = 16  # faces that an atom may have; more are taken together
+MOST = 16  # faces of an atom, since a product compares all pairs of them; more are taken together
 Faces = frozenset[int]  # bit k of a face is variable k
 
 
@@ -284,8 +269,7 @@ def faces(program: Program) -> NDArray[np.bool_]:
         for atom, there in zip(step.targets, _of_step(step, found), strict=True):
             found[atom] = there
     every = sorted(_largest(face for atom in set(found) for face in atom))
-    bits = [[bool(face >> k & 1) for k in range(program.n_variables)] for face in every]
-    return np.array(bits, dtype=bool).reshape(len(every), program.n_variables)
+    return _bits(every, program.n_variables)
 
 
 def _of_step(step: Instruction, found: list[Faces]) -> list[Faces]:
@@ -311,7 +295,7 @@ def _few(some: Iterable[int]) -> Faces:
 
 
 def _largest(some: Iterable[int]) -> Faces:
-    """Those that are within no other."""
+    """Faces that are within no other."""
     distinct = set(some)
     return frozenset(f for f in distinct if not any(f != g and f & g == f for g in distinct))
 

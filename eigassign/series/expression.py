@@ -85,7 +85,7 @@ class Expression:
         self.terms = terms
 
     def single(self) -> tuple[float, int]:
-        """This expression as factor × atom, recording a linear form first where it is a sum."""
+        """Factor and atom whose product it is; a sum is recorded as a linear form first."""
         if self.constant == 0.0 and len(self.terms) == 1:
             ((atom, factor),) = self.terms.items()
             return factor, atom
@@ -247,5 +247,5 @@ def _rule(
 
 
 def is_constant(x: Scalar) -> TypeIs[float]:
-    """Whether x is a plain number."""
+    """True for a plain number."""
     return not isinstance(x, Expression)

@@ -18,7 +18,7 @@ from eigassign.series.algebra import Algebra, Samples, Tangents, Truncated
 from eigassign.series.compiler import Program
 
 Floats = NDArray[np.float64]
-STEP = 0.15  # largest change of an argument in one continuation step (rad or m)
+STEP = 0.15  # rad or m: a continuation step; where it is too long, REFINEMENTS divide it
 FARTHEST = 500.0  # rad or m from the known solution: 80 turns
 REFINEMENTS = (1, 4, 16, 64)  # of the steps, where ∂F/∂p changes too much for one
 MOST_STEPS = 5000  # of a refinement: some seconds
@@ -161,7 +161,7 @@ class ImplicitFunction:
         return np.hstack([p, slopes.reshape(self.size, -1)])
 
     def evaluate(self, algebra: Algebra, a: Floats) -> Floats:
-        """p in any algebra."""
+        """The solution p in any algebra."""
         if isinstance(algebra, Truncated):
             return self.series(algebra, a)
         if isinstance(algebra, Tangents):

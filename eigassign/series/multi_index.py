@@ -20,7 +20,7 @@ from eigassign.errors import UsageError
 from eigassign.files import how_to_raise, raised
 
 Ints = NDArray[np.intp]
-MAX_SIZE = 200_000
+MAX_SIZE = 200_000  # members: 1.6 MB for each variable and each series over them
 MOST_PAIRS = 10_000_000  # of coefficients that meet in a product
 PAIR_BYTES = 90  # measured for 5 to 9 variables
 
@@ -101,7 +101,7 @@ class LowerSet(Brief):
 
     @cached_property
     def by_degree(self) -> tuple[DegreePairs, ...]:
-        """All pairs with left ≠ 0, degree by degree of their target."""
+        """Pairs with left ≠ 0, degree by degree of their target."""
         table, starts = self.table, self.degree_starts
         cuts = np.searchsorted(table.target, starts)
         pairs = []
@@ -240,12 +240,6 @@ def partially_linear(n_q: int, n_y: int, order: int) -> LowerSet:
 
 
 @lru_cache(maxsize=64)
-def box(orders: tuple[int, ...]) -> LowerSet:
-    """{γ : γ_i ≤ orders_i}, a tensor-product set."""
-    return lower_set(list(itertools.product(*(range(o + 1) for o in orders))))
-
-
-@lru_cache(maxsize=64)
 def on_faces(space: LowerSet, faces: bytes) -> tuple[LowerSet, Ints]:
     """The members in the variables of one face (n_faces, n) alone, and their places in the set.
 
@@ -260,7 +254,7 @@ def on_faces(space: LowerSet, faces: bytes) -> tuple[LowerSet, Ints]:
 
 
 def _simplex(n: int, order: int) -> NDArray[np.int64]:
-    """All multi-indices of n variables with total degree at most ``order``."""
+    """Multi-indices of n variables with total degree at most ``order``."""
     rows = np.zeros((1, 0), dtype=np.int64)
     for _ in range(n):
         room = order - rows.sum(axis=1)

@@ -134,19 +134,6 @@ def power_taylor(at: Floats, exponent: float, order: int) -> Floats:
     return np.array(rows)
 
 
-def monomials(space: LowerSet, x: Floats) -> Floats:
-    """x^γ for every γ of the set, at points x (n_points, n): shape (n_points, N)."""
-    result = np.ones((len(x), len(space)))
-    for variable in range(space.n_variables):
-        exponents = space.indices[:, variable]
-        powers = np.ones((len(x), int(exponents.max()) + 1))
-        np.cumprod(
-            np.broadcast_to(x[:, [variable]], powers[:, 1:].shape), axis=1, out=powers[:, 1:]
-        )
-        result *= powers[:, exponents]
-    return result
-
-
 # --- Polynomials at many points
 
 BLOCK = 512  # points at once: what they need stays in the cache
@@ -154,7 +141,7 @@ BLOCK = 512  # points at once: what they need stays in the cache
 
 @dataclass(frozen=True, eq=False)
 class Monomials:
-    """All x^γ of one lower set, as rows; ``steps`` hold (first, last, parents, variables)."""
+    """The x^γ of one lower set as rows; ``steps`` hold (first, last, parents, variables)."""
 
     size: int
     n_variables: int
@@ -205,8 +192,14 @@ def _split(space: LowerSet) -> tuple[Monomials, Monomials, Ints, Ints]:
     return monomials_of(heads), monomials_of(tails), row, column
 
 
+def monomials(space: LowerSet, x: Floats) -> Floats:
+    """x^γ for every γ of the set, at points x (n_points, n): shape (n_points, N)."""
+    return monomials_of(space)(x.T).T
+
+
+@lru_cache(maxsize=64)
 def monomials_of(space: LowerSet) -> Monomials:
-    """How the monomials of a set follow from one another."""
+    """The products by which the monomials of a set follow from one another."""
     steps = []
     for first, last in itertools.pairwise(space.degree_starts[1:]):
         members = space.indices[first:last]

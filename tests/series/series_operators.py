@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.series import LowerSet, compose, monomials, multiply, power_taylor, wave_taylor
+from eigassign.series import LowerSet, Truncated, monomials
 
 Floats = NDArray[np.float64]
-
-
-def sine_taylor(at: Floats, order: int) -> Floats:
-    return wave_taylor(at, np.zeros(len(at), dtype=np.intp), order)
-
-
-def cosine_taylor(at: Floats, order: int) -> Floats:
-    return wave_taylor(at, np.ones(len(at), dtype=np.intp), order)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,12 +53,13 @@ class PowerSeries:
 
     def __mul__(self, other: PowerSeries | float) -> PowerSeries:
         left, right = self.coefficients[None], self._other(other)[None]
-        return PowerSeries(self.space, multiply(self.space, left, right)[0])
+        return PowerSeries(self.space, Truncated(self.space).product(left, right)[0])
 
     __rmul__ = __mul__
 
     def __pow__(self, exponent: float) -> PowerSeries:
-        return self._apply(lambda at, p: power_taylor(at, exponent, p))
+        algebra, one = Truncated(self.space), self.coefficients[None]
+        return PowerSeries(self.space, algebra.power(one, np.array([exponent]))[0])
 
     def __truediv__(self, other: PowerSeries | float) -> PowerSeries:
         if isinstance(other, PowerSeries):
@@ -79,15 +71,15 @@ class PowerSeries:
 
     def sin(self) -> PowerSeries:
         """Sine of the series (argument in rad)."""
-        return self._apply(sine_taylor)
+        return self._wave(0)
 
     def cos(self) -> PowerSeries:
         """Cosine of the series (argument in rad)."""
-        return self._apply(cosine_taylor)
+        return self._wave(1)
 
-    def _apply(self, taylor: Callable[[Floats, int], Floats]) -> PowerSeries:
-        derivatives = taylor(self.coefficients[:1], self.space.order)
-        return PowerSeries(self.space, compose(self.space, derivatives, self.coefficients[None])[0])
+    def _wave(self, quarters: int) -> PowerSeries:
+        algebra, one = Truncated(self.space), self.coefficients[None]
+        return PowerSeries(self.space, algebra.wave(one, np.array([quarters]))[0])
 
     def __call__(self, x: Floats) -> Floats:
         """Value at displacements x (n,) or (n_points, n) from the expansion point."""

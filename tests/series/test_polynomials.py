@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from eigassign.series import (
-    BLOCK,
     LowerSet,
-    box,
+    lower_set,
     monomials,
-    monomials_of,
     partially_linear,
     polynomials,
     total_degree,
@@ -23,7 +21,7 @@ SETS = [
     total_degree(5, 3),
     partially_linear(2, 3, 4),
     partially_linear(0, 3, 4),
-    box((2, 0, 3, 1)),
+    lower_set(list(np.ndindex(3, 1, 4, 2))),
 ]
 
 
@@ -31,17 +29,19 @@ SETS = [
 def test_prepared_polynomials_are_the_sum_over_monomials(space: LowerSet) -> None:
     random = np.random.default_rng(1)
     coefficients = random.standard_normal((2, len(space)))
-    x = random.uniform(-1.5, 1.5, (BLOCK + 7, space.n_variables))
+    x = random.uniform(-1.5, 1.5, (1200, space.n_variables))
     powers = monomials(space, x)
     size = np.abs(powers) @ np.abs(coefficients).T  # what a sum's round-off is relative to
     found = polynomials(space, coefficients)(x)
     assert np.all(np.abs(found - powers @ coefficients.T) <= 1e-14 * size)
 
 
-def test_monomials_follow_the_order_of_their_set() -> None:
-    space, x = total_degree(3, 3), np.array([[2.0], [3.0], [5.0]])
-    expected = (np.array([2.0, 3.0, 5.0]) ** space.indices).prod(axis=1)
-    assert np.array_equal(monomials_of(space)(x)[:, 0], expected)
+@pytest.mark.parametrize("space", SETS, ids=lambda s: f"{s.n_variables}x{len(s)}")
+def test_monomials_are_powers_in_the_order_of_their_set(space: LowerSet) -> None:
+    x = np.random.default_rng(0).standard_normal((6, space.n_variables))
+    expected = np.prod(x[:, None, :] ** space.indices[None], axis=2)
+    np.testing.assert_allclose(monomials(space, x), expected, rtol=1e-13)
+    assert monomials(space, 0.0 * x)[:, 0].tolist() == [1.0] * 6
 
 
 def test_no_points_give_no_values() -> None:
