@@ -10,7 +10,6 @@ Reading order:
     work      what a worker does: check a variant, run it
     progress  what of a batch is done: setting up a folder, taking it up again
     merge     one batch of its shards
-    forecast  what a batch will take
     workers   where tasks run: this process, or processes that are gone when the parent is
     cluster   the workers of a dask.distributed scheduler
     runner    all of it together: start there

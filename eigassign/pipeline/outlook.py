@@ -1,15 +1,11 @@
-"""What a run will take, before it is made; and a picture of the mechanism alone.
-
-`optimize` solves all samples exactly, some `SEARCH` times for four starts (26 to 165 times on the
-shipped cases); the time of one such solve is measured.
-"""
+"""What a run will take, before it is made; and a picture of the mechanism alone."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
+from timeit import repeat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +15,6 @@ from eigassign.files import quoted
 from eigassign.mechanism.kinematics.parameters import written_loads
 from eigassign.mechanism.kinematics.travel_limits import resting_pose
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.modal.model import Model
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.motion import mechanism_plan
 from eigassign.output.reports.page import write_figures
@@ -30,10 +25,7 @@ from eigassign.study.drawing import draw_poses, rest_pose
 from eigassign.study.planning import Plan
 
 Floats = NDArray[np.float64]
-SEARCH = 100  # times that all samples are solved exactly, with up to four starts
-STARTS = 4
-TIMED = 8  # samples whose exact solve is timed
-ELSE_S = 1.5  # what every run takes: start, report and figures
+ELSE_S = 1.5  # s, of every run of the shipped cases: start, report and figures
 
 
 @dataclass(frozen=True)
@@ -46,45 +38,37 @@ class Outlook:
 
 
 def outlook(case: Case, plan: Plan, trajectory: Trajectories | None) -> Outlook:
-    """Estimated from sizes, and from one exact solve of some samples, which is timed."""
-    size, file = expansion_size(case.model(), plan), case.file
-    if trajectory is None or not file.targets:
+    """Estimated from sizes, and from one exact solve of some samples, which is timed.
+
+    `optimize` solves all samples exactly some 100 times for up to four starts: 26 to 165 times on
+    the shipped cases.
+    """
+    size, asked = expansion_size(case.model(), plan), case.file.assignment
+    if trajectory is None or not case.file.targets:
         return Outlook(plan.modes, size, None)
-    starts, least_s = file.assignment.starts, ELSE_S + size.seconds
-    share = max(1.0, (STARTS if isinstance(starts, str) else starts) / STARTS)
-    solve_s = _solve_s(case.model(), trajectory, case.initial_design)
-    search_s = SEARCH * share * len(trajectory.q) * solve_s
-    allowed_s = np.inf if file.assignment.seconds is None else file.assignment.seconds
-    return Outlook(plan.modes, size, least_s + min(search_s, allowed_s))
-
-
-def _solve_s(model: Model, trajectory: Trajectories, y: Floats) -> float:
-    """Seconds that the exact solve of one sample takes here, the quicker of two tries."""
-    q = trajectory.q[trajectory.spread(TIMED)]
-    times = [perf_counter()]
-    for _ in range(2):
-        model.frequencies(q, y, 1)
-        times.append(perf_counter())
-    return float(np.diff(times).min()) / len(q)
+    q, y = trajectory.q[trajectory.spread(8)], case.initial_design
+    solve_s = min(repeat(lambda: case.model().frequencies(q, y, 1), number=1, repeat=2)) / len(q)
+    share = 1.0 if isinstance(asked.starts, str) else max(1.0, asked.starts / 4)
+    search_s = 100 * share * len(trajectory.q) * solve_s
+    search_s = search_s if asked.seconds is None else min(search_s, asked.seconds)
+    return Outlook(plan.modes, size, ELSE_S + size.seconds + search_s)
 
 
 def next_step(case: CaseFile) -> str:
-    """What to do with a case that is in order."""
+    """The command for a case that is in order."""
     name = quoted(case.path)
     if case.measurements is not None:
         return f"eigassign update {name}"
-    missing = [key for key in ("trajectory", "design", "targets") if not _given(case, key)]
+    given = (case.trajectory, case.design.parameters, case.targets)
+    keys = ("trajectory", "design", "targets")
+    missing = [key for key, value in zip(keys, given, strict=True) if not value]
     if not missing:
         return f"eigassign optimize {name}"
-    keys = " and ".join(filter(None, [", ".join(missing[:-1]), missing[-1]]))
+    needs = " and ".join(filter(None, [", ".join(missing[:-1]), missing[-1]]))
     pose, more = "", f"eigassign docs {missing[0]}"
     if case.trajectory is None and case.expansion.q == "auto" and case.coordinates:
         pose = f' --q "{", ".join(f"{value:g}" for value in resting_pose(case))}"'
-    return f"eigassign modes {name}{pose} --draw (to optimize it needs {keys}: {more})"
-
-
-def _given(case: CaseFile, key: str) -> bool:
-    return bool(case.design.parameters if key == "design" else getattr(case, key))
+    return f"eigassign modes {name}{pose} --draw (to optimize it needs {needs}: {more})"
 
 
 def draw(

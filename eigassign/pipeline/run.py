@@ -27,7 +27,7 @@ from eigassign.output.reports.notebook import Pictured, html
 from eigassign.output.result_files import frequency_columns
 from eigassign.output.store.cache import Cache, default_directory
 from eigassign.pipeline.coefficient_files import coefficient_files
-from eigassign.pipeline.expansions import expand_plan, expansion_size
+from eigassign.pipeline.expansions import expand_plan
 from eigassign.pipeline.run_files import RunFolder, new_run_folder
 from eigassign.pipeline.stages import Stages, silent
 from eigassign.study.accuracy import accuracy_notes, judged_mesh, truncation_notes
@@ -220,7 +220,6 @@ def prepare(
         trajectory = None if file.trajectory is None else case.trajectory
     with stages("expansion", "expanding the eigenvalues"):
         plan = plan_expansion(file, model, trajectory, order, modes)
-        stages.expect(expansion_size(model, plan).seconds)
         expansions, notes = expand_plan(model, plan, cache)
     moving = () if trajectory is None else trajectory.notes
     mesh = () if case.mesh is None else case.mesh.reasons

@@ -18,7 +18,6 @@ import pytest
 from instant import MASS, Instant, batch_of, case, instant, names
 
 from eigassign.batch import Batch, Place, run
-from eigassign.batch.forecast import forecast
 from eigassign.batch.merge import merge
 from eigassign.errors import CaseError, StorageError
 
@@ -57,7 +56,6 @@ def test_a_sweep_may_be_enlarged(tmp_path: Path) -> None:
     case(tmp_path)
     ran(batch_of(tmp_path, "0..1:3"))
     larger = batch_of(tmp_path, "0..1:5")
-    assert forecast(larger, 2).todo == (1, 3)
     assert ran(larger) == ["mass=0.25", "mass=0.75"]
     assert list(summary(larger)) == names(larger, range(5))
     assert not list(larger.folder.glob("manifest.jsonl.*"))
@@ -71,7 +69,6 @@ def test_results_of_cases_that_are_gone_from_the_plan_are_kept_for_when_it_has_t
     other = batch_of(tmp_path, "1,2")
     assert ran(other) == ["mass=2"]
     assert [*summary(other)] == ["mass=1", "mass=2"]
-    assert forecast(other, 2).done == 2
     assert ran(other) == []
     again = batch_of(tmp_path, "2,1,0")
     assert ran(again) == []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import threading
 
 import pytest
@@ -27,23 +26,16 @@ class Lines:
             assert self._changed.wait_for(lambda: len(self.lines) >= count, timeout=30)
 
 
-def test_a_stage_that_lasts_says_how_far_it_is_and_how_much_time_is_left() -> None:
+def test_a_stage_that_lasts_says_how_far_it_is() -> None:
     lines = Lines()
     stages = Stages(lines, first_s=0.01)
     with stages("expansion", "expanding"):
         lines.wait(2)
-        sum(range(1_000_000))  # some work, by which the pace is known
-        stages.expect(3600.0)
-        lines.wait(len(lines.lines) + 2)
-        stages.advance(0, 8)  # no piece is done: nothing can be told from that
-        lines.wait(len(lines.lines) + 2)
         stages.advance(7, 8)
         lines.wait(len(lines.lines) + 2)
     assert lines.lines[0] == "expanding"
     assert lines.lines[1] == "  0 s"
-    told = [re.fullmatch(r"  \d s, some (\d+) min left", line) for line in lines.lines]
-    assert any(line and int(line[1]) > 10 for line in told)
-    assert re.fullmatch(r"  7 of 8, some \d s left", lines.lines[-1])
+    assert lines.lines[-1] == "  7 of 8"
     count = len(lines.lines)
     with stages("expansion", "again"):
         lines.wait(count + 2)
