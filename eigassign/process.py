@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import atexit
 import contextlib
 import errno
-import gc
 import io
 import os
 import re
@@ -180,7 +178,7 @@ def document(error: BaseException) -> dict[str, object]:
     }
 
 
-# --- Signals, streams, threads of the linear algebra, garbage collection
+# --- Signals, streams, threads of the linear algebra
 
 _THREADS = ("OPENBLAS", "OMP", "MKL", "BLIS", "VECLIB_MAXIMUM", "NUMEXPR")
 ONE_THREAD: Mapping[str, str] = {f"{library}_NUM_THREADS": "1" for library in _THREADS}
@@ -241,15 +239,6 @@ def prefer_one_thread() -> None:
     """
     for name, value in ONE_THREAD.items():
         os.environ.setdefault(name, value)
-
-
-def collect_garbage_rarely() -> None:
-    """Search for cyclic garbage rarely, and not at the end: a fifth of a short run's time.
-
-    Memory is freed by reference counts as ever.
-    """
-    gc.set_threshold(50_000, 10, 10)
-    atexit.register(gc.freeze)
 
 
 @contextlib.contextmanager

@@ -40,8 +40,6 @@ _CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the command line on ``args`` (default: those of the process); returns the exit code."""
-    if args is None:
-        process.collect_garbage_rarely()
     arguments = sys.argv[1:] if args is None else list(args)
     process.prefer_one_thread()
     process.refuse_closed_stdout()
