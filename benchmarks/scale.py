@@ -27,11 +27,11 @@ from pathlib import Path
 from typing import Any
 
 from eigassign.batch.manifest import LINES, write_header
-from eigassign.batch.plan import Plan, Variant, plan_of
+from eigassign.batch.plan import BatchPlan, Variant, plan_of
 from eigassign.batch.progress import Batch, summarise
 from eigassign.batch.runner import run
 from eigassign.batch.work import CaseOptions, outcome_of
-from eigassign.batch.workers import Place
+from eigassign.batch.workers import Workers
 from eigassign.output.batch.outcome import CaseOutcome, to_line
 
 SWEEP = """sweep:
@@ -63,13 +63,13 @@ def outcome(variant: Variant) -> CaseOutcome:
     )
 
 
-def planned(folder: Path, count: int) -> Plan:
+def planned(folder: Path, count: int) -> BatchPlan:
     path = folder / "arm.yaml"
     path.write_text((common.CASES / "two_link.yaml").read_text() + SWEEP.format(count=count))
     return plan_of([path])
 
 
-def batch_in(plan: Plan, folder: Path, shard: tuple[int, int] = (1, 1)) -> Batch:
+def batch_in(plan: BatchPlan, folder: Path, shard: tuple[int, int] = (1, 1)) -> Batch:
     return Batch(plan, folder, CaseOptions(str(folder), columns=True), shard)
 
 
@@ -115,7 +115,7 @@ def given_out(batch: Batch) -> dict[str, float]:
     for index in batch.header.indices():
         outcome(batch.plan[index])
     made_up = time.process_time() - start
-    place = Place(800, at_once, TASK_S)
+    place = Workers(800, at_once, TASK_S)
     start = time.process_time()
     run(batch, place, lambda _progress: None, lambda _outcome: None)
     whole = time.process_time() - start

@@ -14,7 +14,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from eigassign._version import __version__
-from eigassign.batch.workers import Place
+from eigassign.batch.workers import Workers
 from eigassign.errors import StorageError, UsageError
 
 if TYPE_CHECKING:
@@ -22,11 +22,10 @@ if TYPE_CHECKING:
 
 _TASK_S = 5.0  # a scheduler bears some 1 000 tasks a second: 400 workers finish 80 of these
 _AHEAD = 2  # tasks for each worker, so that it need not wait for the next one
-_ANSWER_S = 10.0
 
 
 @contextlib.contextmanager
-def cluster(address: str) -> Iterator[Place]:
+def cluster(address: str) -> Iterator[Workers]:
     """The workers at ``address``.
 
     Raises UsageError where dask.distributed is not installed here, or the workers are not fit for
@@ -38,17 +37,17 @@ def cluster(address: str) -> Iterator[Place]:
         message = "--scheduler needs dask.distributed: pip install 'eigassign[cluster]'"
         raise UsageError(message) from None
     try:
-        client = Client(address, timeout=_ANSWER_S)
+        client = Client(address, timeout=10.0)
     except (OSError, ValueError) as error:
         raise StorageError(f"--scheduler {address}: no scheduler answers: {error}") from error
     with client:
         folder = os.getcwd()
         workers = _require_fit(client, folder)
-        yield Place(_AHEAD * workers, partial(_executor, client, folder), _TASK_S)
+        yield Workers(_AHEAD * workers, partial(_executor, client, folder), _TASK_S)
 
 
 def _require_fit(client: Client, folder: str) -> int:
-    """How many workers there are; raises UsageError where one could not do its work."""
+    """Number of workers; raises UsageError where one could not do its work."""
     threads = client.nthreads()
     if not threads:
         raise UsageError("--scheduler: there are no workers yet")

@@ -24,7 +24,6 @@ from eigassign.errors import StorageError
 
 NAME = ".lock"
 _PRESENCE, _LINE, _CASES = 0, 1, 2
-_PAUSE_S = 0.1
 
 
 class FolderLock:
@@ -39,24 +38,24 @@ class FolderLock:
             self._fcntl = fcntl
 
     def enter(self, join: bool) -> bool:
-        """Whether this process is the first at work here, and alone until `share`.
+        """True where this process is the first at work here, and alone until `share`.
 
         With ``join`` it waits until the first one has set up the folder; else raises StorageError
         where anybody is at work.
         """
-        if not self._try(_PRESENCE):
+        if not (first := self._try(_PRESENCE)):
             if not join:
-                message = f"another batch is at work in {self._folder} ({self._who()})"
+                os.lseek(self._file, 0, os.SEEK_SET)
+                others = os.read(self._file, 1000).decode(errors="replace").splitlines()
+                message = f"another batch is at work in {self._folder} ({', '.join(others)})"
                 raise StorageError(f"{message}: wait for it, use --out, or work along with --join")
             while not self._try(_PRESENCE, shared=True):
-                time.sleep(_PAUSE_S)
-            os.lseek(self._file, 0, os.SEEK_END)
-            os.write(self._file, _me().encode())
-            return False
-        os.ftruncate(self._file, 0)
-        os.lseek(self._file, 0, os.SEEK_SET)
-        os.write(self._file, _me().encode())
-        return True
+                time.sleep(0.1)
+        else:
+            os.ftruncate(self._file, 0)
+        os.lseek(self._file, 0, os.SEEK_END)
+        os.write(self._file, f"process {os.getpid()} on {socket.gethostname()}\n".encode())
+        return first
 
     def share(self) -> None:
         """The folder is set up: others may join."""
@@ -97,14 +96,6 @@ class FolderLock:
         if self._fcntl is not None:
             with contextlib.suppress(OSError):
                 self._fcntl.lockf(self._file, self._fcntl.LOCK_UN, 1, byte)
-
-    def _who(self) -> str:
-        os.lseek(self._file, 0, os.SEEK_SET)
-        return ", ".join(os.read(self._file, 1000).decode(errors="replace").splitlines())
-
-
-def _me() -> str:
-    return f"process {os.getpid()} on {socket.gethostname()}\n"
 
 
 @contextlib.contextmanager

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import re
 from array import array
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
@@ -23,10 +24,8 @@ from eigassign.output.batch.outcome import CaseOutcome, from_line, to_line
 from eigassign.output.store.atomic import replace_synced
 
 HEADER, LINES = "batch.json", "manifest.jsonl"
-FORMAT = 1
-_BEGIN, _DIGITS = b'{"index": ', 20  # of a line, and of an index at most
-_AHEAD = 1 << 20  # bytes held of a file of which lines are read in nearly their order
-_BLOCK = 4096  # bytes that are searched for the end of a line at a time
+FORMAT = 1  # of batch.json: others are refused
+_BEGIN = re.compile(rb'\{"index": ([0-9]{1,20}),')  # of a line
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,7 @@ class Header:
     format: int = FORMAT
 
     def indices(self) -> range:
-        """Of the cases that are this folder's."""
+        """Indices of the cases that are this folder's."""
         i, n = self.shard
         return range(i - 1, self.cases, n)
 
@@ -92,11 +91,14 @@ class Manifest:
     def news(self) -> Iterator[CaseOutcome]:
         """The outcomes that were added since this was last asked for, by whomever."""
         for _, line in self.lines():
-            if (outcome := _outcome(line)) is not None:
-                yield outcome
+            try:
+                outcome = from_line(line)
+            except StorageError:  # somebody edited the file
+                continue
+            yield outcome
 
     def lines(self) -> Iterator[tuple[int, bytes]]:
-        """Where each line begins, and the line; one without an end is left for later."""
+        """Yield where each line begins, and the line; one without an end is left for later."""
         try:
             with open(self.path, "rb") as file:
                 file.seek(self._read)
@@ -120,33 +122,17 @@ class Manifest:
             raise StorageError(f"{self.path}: cannot be written: {error.strerror}") from error
 
 
-def _outcome(line: bytes) -> CaseOutcome | None:
-    """What a line says; None where it says nothing, in a file that somebody edited."""
-    try:
-        return from_line(line)
-    except StorageError:
-        return None
-
-
 def _index(line: bytes) -> int:
-    """The index that a line begins with, and −1 of anything else."""
-    begin, _, rest = line[: len(_BEGIN) + _DIGITS].partition(b",")
-    number = begin.removeprefix(_BEGIN)
-    whole = (
-        rest
-        and line.isascii()
-        and line.endswith(b"}\n")
-        and begin.startswith(_BEGIN)
-        and number.isdigit()
-    )
-    return int(number) if whole else -1
+    """The index that a whole line begins with, and −1 of anything else."""
+    begin = _BEGIN.match(line)
+    return int(begin[1]) if begin and line.isascii() and line.endswith(b"}\n") else -1
 
 
 def _cut(file: io.FileIO) -> int:
     """Cut off a last line without an end; the length of the file."""
     size = end = file.seek(0, io.SEEK_END)
     while end:
-        begin = file.seek(max(0, end - _BLOCK))
+        begin = file.seek(max(0, end - 4096))
         last = file.read(end - begin).rfind(b"\n")
         end = begin + last + 1
         if last >= 0:
@@ -175,7 +161,7 @@ class InOrder:
 
     def __iter__(self) -> Iterator[str]:
         if self._places:
-            with open(self._path, "rb", buffering=_AHEAD) as file:
+            with open(self._path, "rb", buffering=1 << 20) as file:  # nearly in order
                 for place in self._places:
                     if file.tell() != place:
                         file.seek(place)

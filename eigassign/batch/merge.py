@@ -17,8 +17,6 @@ from eigassign.output.batch.outcome import from_line, status_of, to_line
 from eigassign.output.store.atomic import replacing
 from eigassign.output.store.run_record import relative_path
 
-_SHOWN = 10  # shards that a message names
-
 
 @dataclass(frozen=True)
 class _Shard:
@@ -27,7 +25,7 @@ class _Shard:
     lines: InOrder
 
 
-def merge(out: Path, folders: Sequence[Path]) -> Counter[str]:
+def merge_shards(out: Path, folders: Sequence[Path]) -> Counter[str]:
     """Make ``out`` the batch of the shards in ``folders``; how many cases ended in which way.
 
     The folders of cases stay where they are. Without ``folders`` the summaries of the batch in
@@ -36,27 +34,36 @@ def merge(out: Path, folders: Sequence[Path]) -> Counter[str]:
     """
     if not folders:
         summarise(out, _header(out), anew=True)
-        return _counted(InOrder(out, _header(out).indices()))
+        return Counter(map(status_of, InOrder(out, _header(out).indices())))
     shards = [
         _Shard(folder, header, InOrder(folder, header.indices()))
         for folder in folders
         for header in [_header(folder)]
     ]
-    header = _merged(out, shards)
-    if problems := [*_problems(shards), *_others(out, header)]:
+    one, place = shards[0], Path(os.path.realpath(out))
+    files = tuple(relative_path(one.folder / file, place) for file in one.header.files)
+    header = replace(one.header, shard=(1, 1), files=files)
+    problems, before = [*_problems(shards)], read_header(out)
+    if before is not None and (before.plan, before.shard) != (header.plan, header.shard):
+        problems.append(f"{out} holds another batch, or one of the shards: choose another folder")
+    if problems:
         raise UsageError(f"the shards cannot be merged: {'; '.join(problems)}")
     shards.sort(key=lambda shard: shard.header.shard)
     out.mkdir(parents=True, exist_ok=True)
     with replacing(out / LINES) as made, open(made, "w", encoding="utf-8") as file:
-        file.writelines(_lines(out, shards))
+        parts = [shard.lines if header.columns else _seen_from(place, shard) for shard in shards]
+        file.writelines(chain.from_iterable(zip_longest(*parts, fillvalue="")))
     with open(out / LINES, encoding="utf-8") as lines:
         if header.columns:
-            _copy(out, lines, shards, header.keys)
+            for shard in shards:
+                summarise(shard.folder, shard.header)
+            folders, counts = [s.folder for s in shards], [len(s.lines) for s in shards]
+            merge_files(out, lines, folders, counts, header.keys)
         else:
             write_files(out, lines, header.cases, header.keys)
     write_header(out, header)
     with open(out / LINES, encoding="utf-8") as lines:
-        return _counted(lines)
+        return Counter(map(status_of, lines))
 
 
 def _header(folder: Path) -> Header:
@@ -65,18 +72,8 @@ def _header(folder: Path) -> Header:
     return header
 
 
-def _counted(lines: Iterator[str] | InOrder) -> Counter[str]:
-    return Counter(map(status_of, lines))
-
-
-def _merged(out: Path, shards: Sequence[_Shard]) -> Header:
-    one, place = shards[0], Path(os.path.realpath(out))
-    files = tuple(relative_path(one.folder / file, place) for file in one.header.files)
-    return replace(one.header, shard=(1, 1), files=files)
-
-
 def _problems(shards: Sequence[_Shard]) -> Iterator[str]:
-    """What is wrong with the shards."""
+    """Yield what is wrong with the shards."""
     first = shards[0]
     of, n = first.header.plan, first.header.shard[1]
     found: dict[int, Path] = {}
@@ -92,35 +89,16 @@ def _problems(shards: Sequence[_Shard]) -> Iterator[str]:
         found.setdefault(i, shard.folder)
     missing = [i for i in range(1, n + 1) if i not in found]
     if missing:
-        some = ", ".join(map(str, missing[:_SHOWN]))
-        more = f" and {len(missing) - _SHOWN} more" if len(missing) > _SHOWN else ""
+        some = ", ".join(map(str, missing[:10]))
+        more = f" and {len(missing) - 10} more" if len(missing) > 10 else ""
         yield f"missing of {n} shards: {some}{more}"
 
 
-def _others(out: Path, header: Header) -> Iterator[str]:
-    before = read_header(out)
-    if before is not None and (before.plan, before.shard) != (header.plan, header.shard):
-        yield f"{out} holds another batch, or one of the shards: choose another folder"
-
-
-def _lines(out: Path, shards: Sequence[_Shard]) -> Iterator[str]:
-    """The lines of all cases in their order; where their folders are is said from ``out``."""
-    parts = [shard.lines if shard.header.columns else _seen_from(out, shard) for shard in shards]
-    return chain.from_iterable(zip_longest(*parts, fillvalue=""))
-
-
-def _seen_from(out: Path, shard: _Shard) -> Iterator[str]:
-    place = Path(os.path.realpath(out))
+def _seen_from(place: Path, shard: _Shard) -> Iterator[str]:
+    """Yield the lines of a shard, in which the folders of cases are named from ``place``."""
     for line in shard.lines:
         row = from_line(line)
         if row.run_folder is not None:
             there = relative_path(shard.folder / row.run_folder, place)
             line = to_line(replace(row, run_folder=there)) + "\n"
         yield line
-
-
-def _copy(out: Path, lines: Iterator[str], shards: Sequence[_Shard], keys: Sequence[str]) -> None:
-    for shard in shards:
-        summarise(shard.folder, shard.header)
-    folders, counts = [s.folder for s in shards], [len(s.lines) for s in shards]
-    merge_files(out, lines, folders, counts, keys)

@@ -1,6 +1,6 @@
 """What a batch runs, in order: case files, the variants of each, and a name and a key for each.
 
-    files and folders → cases_in → plan_of → Plan: Variant 0, 1, 2, …
+    files and folders → cases_in → plan_of → BatchPlan: Variant 0, 1, 2, …
 
 A key is the SHA-256 of all that the numbers of a case come from: what its file and the files it
 names say, its own values, and the version. So a result is known again wherever it stands.
@@ -14,6 +14,7 @@ import json
 import os
 import re
 from bisect import bisect_right
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -48,7 +49,7 @@ class Variant:
 
 
 @dataclass(frozen=True)
-class CaseFile:
+class PlannedFile:
     """A case file of a batch; ``variants`` is None where it is run as it stands."""
 
     path: str
@@ -60,7 +61,7 @@ class CaseFile:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """That its variants have values of."""
+        """Keys that its variants have values of."""
         return () if self.variants is None else self.variants.keys
 
     def __len__(self) -> int:
@@ -69,13 +70,9 @@ class CaseFile:
     def variant(self, k: int, index: int) -> Variant:
         """Its k-th variant, which is the ``index``-th of the batch."""
         values = {} if self.variants is None else self.variants[k]
-        key = key_of(self.content, values, self._folder)
+        key = key_of(self.content, values, Path(self.path).parent)
         name = self.prefix + _named(self._short, values) if values else self.name
         return Variant(index, name, self.path, values, key)
-
-    @cached_property
-    def _folder(self) -> Path:
-        return Path(self.path).parent
 
     @cached_property
     def _short(self) -> Mapping[str, str]:
@@ -89,10 +86,10 @@ class CaseFile:
 
 
 @dataclass(frozen=True)
-class Plan:
-    """All cases of a batch in order: ``plan[k]`` is made when it is asked for."""
+class BatchPlan:
+    """The cases of a batch in order: ``plan[k]`` is made when it is asked for."""
 
-    files: tuple[CaseFile, ...]
+    files: tuple[PlannedFile, ...]
 
     def __len__(self) -> int:
         return self._ends[-1]
@@ -103,7 +100,7 @@ class Plan:
         file, k = self.whose(index)
         return file.variant(k, index)
 
-    def whose(self, index: int) -> tuple[CaseFile, int]:
+    def whose(self, index: int) -> tuple[PlannedFile, int]:
         """The case file of a variant, and which of its variants it is."""
         n = bisect_right(self._ends, index) - 1
         return self.files[n], index - self._ends[n]
@@ -121,11 +118,11 @@ class Plan:
 
     @property
     def is_swept(self) -> bool:
-        """Whether any case file has variants."""
+        """True where a case file has variants."""
         return any(file.variants is not None for file in self.files)
 
 
-def plan_of(cases: Sequence[Path], settings: Sequence[str] = ()) -> Plan:
+def plan_of(cases: Sequence[Path], settings: Sequence[str] = ()) -> BatchPlan:
     """The plan of these case files, each with what ``--set`` says (``settings``), else its sweep.
 
     A case file that cannot be read is a case of its own, which will fail. Raises CaseError for a
@@ -133,23 +130,20 @@ def plan_of(cases: Sequence[Path], settings: Sequence[str] = ()) -> Plan:
     """
     names = folder_names(cases)
     several = len(cases) > 1
-    return Plan(
-        tuple(
-            _planned(case, name, settings, several) for case, name in zip(cases, names, strict=True)
-        )
-    )
+    named = zip(cases, names, strict=True)
+    return BatchPlan(tuple(_planned(case, name, settings, several) for case, name in named))
 
 
-def _planned(case: Path, name: str, settings: Sequence[str], several: bool) -> CaseFile:
+def _planned(case: Path, name: str, settings: Sequence[str], several: bool) -> PlannedFile:
     try:
         written = read(case)
     except EigassignError as error:
         if settings:
             raise
-        return CaseFile(str(case), name, _hash([str(error)]))
+        return PlannedFile(str(case), name, _hash([str(error)]))
     variants = variants_of(written.source, case.parent, settings)
     prefix = f"{name}," if several else ""
-    return CaseFile(str(case), name, content_of(written), variants, prefix, bool(settings))
+    return PlannedFile(str(case), name, content_of(written), variants, prefix, bool(settings))
 
 
 def content_of(case: Unchecked) -> str:
@@ -168,7 +162,7 @@ def _hash(parts: list[object]) -> str:
 
 
 def _texts(value: object) -> Iterator[str]:
-    """All text in a value, which may be the name of a file."""
+    """Yield all text in a value, which may be the name of a file."""
     if isinstance(value, str):
         yield value
     elif isinstance(value, (Mapping, tuple)):
@@ -192,7 +186,7 @@ def _digest_once(file: Path, _time: int, _size: int) -> str | None:
     return None
 
 
-def variant_problem(plan: Plan, index: int, problem: Problem) -> Problem:
+def variant_problem(plan: BatchPlan, index: int, problem: Problem) -> Problem:
     """A problem of a variant at the place where the value at fault was given, else at its own."""
     variant, (file, k) = plan[index], plan.whose(index)
     message = f"{variant.name}: {problem.message}"
@@ -213,62 +207,57 @@ def variant_problem(plan: Plan, index: int, problem: Problem) -> Problem:
 _NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _LONG = re.compile(r"[0-9.]{7}")  # what may have more digits than a name has
 _UNSAFE = re.compile(r"[^\w.,=+-]")
-_DIGITS = 6  # of a number in a name
-_LONGEST = 100  # bytes; file systems allow 255, and hidden names are longer
-_HASH = 10  # digits
 
 
 def _named(short: Mapping[str, str], values: Mapping[str, object]) -> str:
-    """``mass=100g,frequency=180Hz``; what does not say all ends with digits of a hash of it."""
+    """``mass=100g,frequency=180Hz``; what does not say all ends with digits of a hash of it.
+
+    File systems allow names of 255 bytes, and hidden ones are longer than these.
+    """
     exact = ",".join(f"{short[key]}={text_of(value)}" for key, value in values.items())
-    rounded = _NUMBER.sub(_rounded, exact) if _LONG.search(exact) else exact
+    rounded = _NUMBER.sub(_six_digits, exact) if _LONG.search(exact) else exact
     shown = _UNSAFE.sub("_", rounded)
-    if shown == exact and len(shown.encode()) <= _LONGEST:
+    if shown == exact and len(shown.encode()) <= 100:
         return shown
-    digits = hashlib.sha256(exact.encode()).hexdigest()[:_HASH]
-    return f"{shown.encode()[:_LONGEST].decode(errors='ignore')}~{digits}"
+    digits = hashlib.sha256(exact.encode()).hexdigest()[:10]
+    return f"{shown.encode()[:100].decode(errors='ignore')}~{digits}"
 
 
-def _rounded(number: re.Match[str]) -> str:
+def _six_digits(number: re.Match[str]) -> str:
+    """A number with at most so many."""
     digits = re.sub(r"[eE].*|[-+.]", "", number.group())
-    return number.group() if len(digits) <= _DIGITS else f"{float(number.group()):.{_DIGITS}g}"
+    return number.group() if len(digits) <= 6 else f"{float(number.group()):.6g}"
 
 
 # --- Which case files are meant by files and folders, and a name for the run of each
 
 
-def default_cases() -> list[Path]:
-    """The case files of ./cases itself; UsageError where there is none."""
-    folder = Path("cases")
-    found = sorted(p for p in folder.glob("*.y*ml") if p.suffix in (".yaml", ".yml"))
-    if not found:
-        raise UsageError("cases: no such file or folder, or no case files in it; name some")
-    return found
-
-
 def cases_in(paths: Sequence[Path]) -> list[Path]:
-    """`find_cases`; UsageError where a path does not exist or there is no case at all."""
+    """Case files named, and all ``*.yaml``, ``*.yml`` in the folders named, each file once.
+
+    Without ``paths`` those of ./cases itself. Hidden folders and run folders (they hold a resolved
+    case) are passed over. Raises UsageError where a path does not exist or there is no case at all,
+    StorageError for a folder that cannot be read.
+    """
+    if not paths:
+        paths = sorted(p for p in Path("cases").glob("*.y*ml") if p.suffix in (".yaml", ".yml"))
+        if not paths:
+            raise UsageError("cases: no such file or folder, or no case files in it; name some")
     for path in paths:
         if not path.exists():
             raise UsageError(f"{path}: no such file or folder")
-    if not (found := find_cases(paths)):
-        raise UsageError(f"no case files (*.yaml, *.yml) in {', '.join(map(str, paths))}")
-    return found
-
-
-def find_cases(paths: Sequence[Path]) -> list[Path]:
-    """Case files named, and all ``*.yaml``, ``*.yml`` in the folders named, each file once.
-
-    Hidden folders and run folders (they hold a resolved case) are passed over. Raises StorageError
-    for a folder that cannot be read.
-    """
     found = [each for path in paths for each in (_in(path) if path.is_dir() else [path])]
+    if not found:
+        raise UsageError(f"no case files (*.yaml, *.yml) in {', '.join(map(str, paths))}")
     first = {os.path.realpath(path): path for path in reversed(found)}
     return [path for path in found if first.pop(os.path.realpath(path), None)]
 
 
 def _in(folder: Path) -> Iterator[Path]:
-    for root, folders, files in os.walk(folder, onerror=_unreadable):
+    def refuse(error: OSError) -> None:
+        raise StorageError(f"{error.filename}: cannot be read: {error.strerror}") from error
+
+    for root, folders, files in os.walk(folder, onerror=refuse):
         if MARKER in files:
             folders.clear()
             continue
@@ -278,27 +267,16 @@ def _in(folder: Path) -> Iterator[Path]:
                 yield Path(root, name)
 
 
-def _unreadable(error: OSError) -> None:
-    raise StorageError(f"{error.filename}: cannot be read: {error.strerror}") from error
-
-
 def folder_names(cases: Sequence[Path]) -> list[str]:
     """The files' stems; where two would collide, the path that tells them apart joins in."""
-    stems = [case.stem for case in cases]
-    clashing = {
-        s.casefold() for s in stems if [t.casefold() for t in stems].count(s.casefold()) > 1
-    }
+    counts = Counter(case.stem.casefold() for case in cases)
     root = Path(os.path.commonpath([os.path.abspath(case.parent) for case in cases] or ["."]))
     taken = set(FILES)
     names = []
-    for case, stem in zip(cases, stems, strict=True):
+    for case in cases:
         parts = Path(os.path.abspath(case)).relative_to(root).with_suffix("").parts
-        name = _free("-".join(parts) if stem.casefold() in clashing else stem, taken)
-        taken.add(name.casefold())
-        names.append(name)
+        stem = "-".join(parts) if counts[case.stem.casefold()] > 1 else case.stem
+        free = (stem, *(f"{stem}-{k}" for k in range(2, len(taken) + 3)))
+        names.append(next(name for name in free if name.casefold() not in taken))
+        taken.add(names[-1].casefold())
     return names
-
-
-def _free(name: str, taken: set[str]) -> str:
-    candidates = [name, *(f"{name}-{k}" for k in range(2, len(taken) + 3))]
-    return next(each for each in candidates if each.casefold() not in taken)

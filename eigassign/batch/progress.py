@@ -15,15 +15,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from eigassign.batch.lock import FolderLock
-from eigassign.batch.manifest import (
-    LINES,
-    Header,
-    InOrder,
-    Manifest,
-    read_header,
-    write_header,
-)
-from eigassign.batch.plan import Plan, Variant
+from eigassign.batch.manifest import LINES, Header, InOrder, Manifest, read_header, write_header
+from eigassign.batch.plan import BatchPlan, Variant
 from eigassign.batch.work import CaseOptions
 from eigassign.errors import StorageError
 from eigassign.files import quoted
@@ -38,16 +31,16 @@ REPORT = "report.html"
 
 @dataclass(frozen=True)
 class Batch:
-    """What is run, where its results go, and how each case is run."""
+    """A plan, the folder of its results, and how each case is run."""
 
-    plan: Plan
+    plan: BatchPlan
     folder: Path
     options: CaseOptions
     shard: tuple[int, int] = (1, 1)  # (i, n): the cases with index % n == i − 1
 
     @property
     def header(self) -> Header:
-        """What batch.json says of it."""
+        """The content of batch.json."""
         folder = Path(os.path.realpath(self.folder))
         files = tuple(relative_path(Path(f.path), folder) for f in self.plan.files)
         keys = tuple(dict.fromkeys(key for f in self.plan.files for key in f.keys))
@@ -80,7 +73,9 @@ def set_up(batch: Batch) -> None:
                 "alone. Choose another folder with --out, or use --force to move its list aside"
             )
     if foreign:
-        _move_aside(folder / LINES)
+        names = (folder / f"{LINES}.{k}" for k in itertools.count(1))
+        with contextlib.suppress(FileNotFoundError):
+            os.rename(folder / LINES, next(name for name in names if not name.exists()))
         others = []
     rows = [*(replace(found, index=GONE) for found in others), *kept]
     replace_synced(folder / LINES, "".join(f"{to_line(found)}\n" for found in rows).encode())
@@ -109,7 +104,7 @@ def outcomes_in(batch: Batch) -> Iterator[CaseOutcome]:
 
 
 def _whole(batch: Batch, outcomes: Iterable[CaseOutcome]) -> Iterator[CaseOutcome]:
-    """Those not to be tried again that have all that they are to leave; errors are tried again."""
+    """Yield those that are not to be tried again, as errors are, and have all they are to leave."""
     folders, indices = None, batch.header.indices()
     for found in outcomes:
         if folders is None:
@@ -119,7 +114,7 @@ def _whole(batch: Batch, outcomes: Iterable[CaseOutcome]) -> Iterator[CaseOutcom
 
 
 def _is_whole(batch: Batch, found: CaseOutcome, folders: Collection[str]) -> bool:
-    """Whether it has its folder, one of ``folders`` or in a shard, and the report it shall have."""
+    """True where it has its folder, of ``folders`` or in a shard, and the report it shall have."""
     options, name = batch.options, found.run_folder
     if options.columns or (found.status == "failed" and not name):
         return True  # without an answer there is no folder
@@ -127,13 +122,6 @@ def _is_whole(batch: Batch, found: CaseOutcome, folders: Collection[str]) -> boo
         return False
     wanted = options.redraw and options.draws(found.status)
     return not wanted or (batch.folder / name / REPORT).exists()
-
-
-def _move_aside(path: Path) -> None:
-    """Keep a file as ``name.1``, or the first number that is free."""
-    names = (path.with_name(f"{path.name}.{k}") for k in itertools.count(1))
-    with contextlib.suppress(FileNotFoundError):
-        os.rename(path, next(name for name in names if not name.exists()))
 
 
 class Progress:
@@ -153,16 +141,16 @@ class Progress:
 
     @property
     def total(self) -> int:
-        """How many cases there are."""
+        """Number of cases."""
         return len(self._indices)
 
     @property
     def done(self) -> int:
-        """How many of them are done."""
+        """Number of cases that are done."""
         return self.ends.total()
 
     def tasks(self, size: Callable[[], int]) -> Iterator[Sequence[Variant]]:
-        """What is neither done nor in flight in another process, ``size()`` cases at a time."""
+        """Yield what is neither done nor in flight elsewhere, ``size()`` cases at a time."""
         task: list[Variant] = []
         for k, index in enumerate(self._indices):
             if self._ends[k] or not self._lock.claim(index):
@@ -209,7 +197,7 @@ def summarise(folder: Path, header: Header, *, anew: bool = False) -> None:
     try:
         write_files(folder, lines, len(lines), header.keys, header.columns)
     except OSError as error:
-        message = f"{folder}: the summaries cannot be written: {error.strerror}"
         raise StorageError(
-            f"{message}; eigassign merge {quoted(folder)} makes them anew"
+            f"{folder}: the summaries cannot be written: {error.strerror}; "
+            f"eigassign merge {quoted(folder)} makes them anew"
         ) from error

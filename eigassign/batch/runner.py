@@ -3,7 +3,7 @@
     plan → check the variants → what the folder does not hold yet → tasks → a line of the manifest
     for each result as it comes in → summaries
 
-Where tasks run is a `workers.Place`; they are `work.run_cases` of one or several variants. Workers
+Where tasks run is `workers.Workers`; they are `work.run_cases` of one or several variants. Workers
 write the folders of their cases, this process writes all else.
 """
 
@@ -13,27 +13,24 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 
 from eigassign.batch.lock import folder_lock
 from eigassign.batch.manifest import read_header
 from eigassign.batch.plan import Variant, variant_problem
 from eigassign.batch.progress import Batch, Progress, set_up, summarise
 from eigassign.batch.work import check_cases, outcome_of, run_cases
-from eigassign.batch.workers import Pace, Place, run_tasks, this_machine
+from eigassign.batch.workers import Workers, run_tasks, this_machine
 from eigassign.errors import CaseError, Problem, StorageError
 from eigassign.output.batch.outcome import CaseOutcome
 from eigassign.output.store.run_record import MARKER
 from eigassign.pipeline.stages import silent
 
 _CHECKED = 100  # variants in a task that checks them: half a second
-_SHOWN = 10  # problems of variants
-_PAUSE_S = 0.5  # between two looks at what other processes have in flight
 
 
 def run(
     batch: Batch,
-    place: Place,
+    workers: Workers,
     on_start: Callable[[Progress], None],
     on_outcome: Callable[[CaseOutcome], None],
     join: bool = False,
@@ -46,33 +43,29 @@ def run(
     a variant is no valid case, and StorageError where the folder is of another batch, or another
     process is at work in it and this one is not to ``join``.
     """
-    require_folder(batch.folder)
-    require_valid(batch, place, say)
-    batch.folder.mkdir(parents=True, exist_ok=True)
-    with folder_lock(batch.folder) as lock:
-        if lock.enter(join):
-            set_up(batch)
-            lock.share()
-        elif read_header(batch.folder) != batch.header:
-            raise StorageError(f"{batch.folder}: the batch at work there is not this one")
-        progress = Progress(batch, lock)
-        on_start(progress)
-        try:
-            _run(batch, progress, place, on_outcome)
-        finally:
-            summarise(batch.folder, batch.header)
-    return progress.ends
-
-
-def require_folder(folder: Path) -> None:
-    """Raise StorageError where the results of a batch cannot go there."""
+    folder = batch.folder
     if folder.exists() and not folder.is_dir():
         raise StorageError(f"{folder} is a file: choose a folder with --out")
     if (folder / MARKER).exists():
         raise StorageError(f"{folder} is the folder of a run: choose another one with --out")
+    require_valid(batch, workers, say)
+    folder.mkdir(parents=True, exist_ok=True)
+    with folder_lock(folder) as lock:
+        if lock.enter(join):
+            set_up(batch)
+            lock.share()
+        elif read_header(folder) != batch.header:
+            raise StorageError(f"{folder}: the batch at work there is not this one")
+        progress = Progress(batch, lock)
+        on_start(progress)
+        try:
+            _run(batch, progress, workers, on_outcome)
+        finally:
+            summarise(folder, batch.header)
+    return progress.ends
 
 
-def require_valid(batch: Batch, place: Place, say: Callable[[str], None] = silent) -> None:
+def require_valid(batch: Batch, workers: Workers, say: Callable[[str], None] = silent) -> None:
     """Check every variant of a sweep, once for each folder; raises CaseError."""
     if not batch.plan.is_swept or read_header(batch.folder) == batch.header:
         return
@@ -84,42 +77,46 @@ def require_valid(batch: Batch, place: Place, say: Callable[[str], None] = silen
     tasks = ([plan[k] for k in indices[start : start + _CHECKED]] for start in starts)
     wrong: dict[int, tuple[Problem, ...]] = {}
     check = partial(check_cases, options=batch.options)
-    where = place if len(starts) > 1 else this_machine(1)
+    where = workers if len(starts) > 1 else this_machine(1)
     if run_tasks(where, tasks, check, lambda _task, found: wrong.update(found)):
         raise StorageError("a process was killed while it checked variants: perhaps no memory")
     if wrong:
         found = [(index, problem) for index in sorted(wrong) for problem in wrong[index]]
-        problems = [variant_problem(plan, *each) for each in found[:_SHOWN]]
+        problems = [variant_problem(plan, *each) for each in found[:10]]
         many = f"{len(wrong)} of {len(indices)} variants are no valid cases: nothing was run"
         raise CaseError((*problems, Problem(plan.files[0].path, 0, 0, "", many)))
 
 
 def _run(
-    batch: Batch, progress: Progress, place: Place, on_outcome: Callable[[CaseOutcome], None]
+    batch: Batch, progress: Progress, workers: Workers, on_outcome: Callable[[CaseOutcome], None]
 ) -> None:
-    """Until all is done, here or elsewhere.
+    """Run cases until all are done, here or elsewhere.
 
     When a worker dies, those of the cases in flight are run again, each alone: so the one at fault
     shows, and the others lose nothing.
     """
-
-    pace = Pace(place.task_s)
+    cases, seconds = 0, 0.0
 
     def keep(_task: Sequence[Variant], found: Sequence[CaseOutcome]) -> None:
+        nonlocal cases, seconds
         for outcome in found:
             progress.keep(outcome)
-            pace.note(outcome.seconds)
+            cases, seconds = cases + 1, seconds + outcome.seconds
             on_outcome(outcome)
+
+    def size() -> int:
+        """Cases of a task: one until a case is done."""
+        return int(max(1.0, workers.task_s * cases / max(seconds, 1e-9)))
 
     why = "memory or time" if batch.options.seconds else "memory"
     killed = f"the process that ran it was killed, perhaps for want of {why}"
     work = partial(run_cases, options=batch.options)
     while progress.done < progress.total:
         done = progress.done
-        suspects = run_tasks(place, progress.tasks(pace.size), work, keep)
+        suspects = run_tasks(workers, progress.tasks(size), work, keep)
         for task in ([variant] for suspect in suspects for variant in suspect):
-            if run_tasks(place, iter([task]), work, keep, slots=1):
+            if run_tasks(workers, iter([task]), work, keep, slots=1):
                 keep(task, [outcome_of(task[0], "error", message=killed)])
         if progress.done == done:
-            time.sleep(_PAUSE_S)
+            time.sleep(0.5)  # other processes have the rest in flight
             progress.refresh()

@@ -14,7 +14,6 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -97,8 +96,12 @@ def variants_of(source: Source, folder: Path, settings: Sequence[str] = ()) -> V
         except MechanismError as error:
             findings = [(tuple(error.path.split(".")), error.message)]
     if findings:
-        problems = tuple(source.problem(*finding) for finding in findings)
-        raise CaseError(tuple(map(_behind_option, problems)) if settings else problems)
+        problems = [source.problem(*finding) for finding in findings]
+        if settings:
+            paths = (problem.path.removeprefix("sweep.parameters.") for problem in problems)
+            given_as = zip(paths, problems, strict=True)
+            problems = [Problem(OPTION, 0, 0, path, problem.message) for path, problem in given_as]
+        raise CaseError(tuple(problems))
     return found
 
 
@@ -146,12 +149,12 @@ def _overlaps(tree: Tree, variants: Variants) -> Iterator[Finding]:
     """Keys whose values do not last, since a later key stands in the same place or around it."""
     paths = {key: key_path(tree, key) for key in variants.keys}
     for k, (key, path) in enumerate(paths.items()):
-        later = (
-            other for other in variants.keys[k + 1 :] if path[: len(paths[other])] == paths[other]
-        )
-        for other in islice(later, 1):
+        later = variants.keys[k + 1 :]
+        other = next((o for o in later if path[: len(paths[o])] == paths[o]), None)
+        if other is not None:
             what = "is the same key" if paths[other] == path else "replaces it: write that first"
-            yield _place(variants, key), f"{other!r} {what}"
+            place = ("sweep", "file") if variants.file else ("sweep", "parameters", key)
+            yield place, f"{other!r} {what}"
 
 
 def _repeated(variants: Variants) -> Iterator[Finding]:
@@ -170,10 +173,6 @@ def _repeated(variants: Variants) -> Iterator[Finding]:
             why = f"variant {k + 1} has the values of variant {first + 1}"
             yield ("sweep", "parameters"), why
         return
-
-
-def _place(variants: Variants, key: str) -> tuple[str, ...]:
-    return ("sweep", "file") if variants.file else ("sweep", "parameters", key)
 
 
 # --- What --set says
@@ -209,8 +208,3 @@ def _values(key: str, values: str) -> object:
 
 def _refuse(key: str, message: str) -> NoReturn:
     raise CaseError((Problem(OPTION, 0, 0, key, message),))
-
-
-def _behind_option(problem: Problem) -> Problem:
-    path = problem.path.removeprefix("sweep.parameters.")
-    return Problem(OPTION, 0, 0, path, problem.message)

@@ -24,7 +24,7 @@ from eigassign.study.results import RunResults
 
 @dataclass(frozen=True)
 class CaseOptions:
-    """How each case is run; everything in it can be sent to another process."""
+    """Options of each case's run, which can be sent to another process."""
 
     out: str  # the folder of the batch
     cache_dir: str | None = None
@@ -39,7 +39,7 @@ class CaseOptions:
     megabytes: float | None = None
 
     def draws(self, status: Status) -> bool:
-        """Whether a case that ended so has figures and a report."""
+        """True where a case that ended so has figures and a report."""
         return self.reports == "all" or (self.reports == "failed" and status != "ok")
 
 
@@ -84,7 +84,7 @@ def _parsed(path: str, _time: int, _size: int) -> Unchecked:
 
 
 def run_cases(variants: Sequence[Variant], options: CaseOptions) -> list[CaseOutcome]:
-    """How each of them ended. Never raises an Exception."""
+    """The outcome of each. Never raises an Exception."""
     return [_run(variant, options) for variant in variants]
 
 
@@ -107,7 +107,7 @@ def _run(variant: Variant, options: CaseOptions) -> CaseOutcome:
 
 
 def outcome_of(variant: Variant, status: Status, seconds: float = 0.0, **found: Any) -> CaseOutcome:
-    """How this variant ended."""
+    """The outcome of this variant."""
     return CaseOutcome(
         variant.name,
         variant.path,

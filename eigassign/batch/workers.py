@@ -35,16 +35,9 @@ R = TypeVar("R")
 _PATIENCE_S = 5.0  # for workers to clean up after an interrupt
 
 
-def cores() -> int:
-    """Processor cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
 @dataclass(frozen=True)
-class Place:
-    """Where tasks run: ``open(slots)`` gives an executor that has so many of them at a time.
+class Workers:
+    """A place where tasks run: ``open(slots)`` gives an executor of so many at a time.
 
     Cases are put together to tasks of about ``task_s`` seconds; of 0 each is a task of its own.
     """
@@ -54,32 +47,17 @@ class Place:
     task_s: float = 0.0
 
 
-class Pace:
-    """How many cases make a task of about ``task_s`` seconds, by the mean of those done."""
-
-    def __init__(self, task_s: float) -> None:
-        self._task_s, self._seconds, self._cases = task_s, 0.0, 0
-
-    def note(self, seconds: float) -> None:
-        """Of a case that is done."""
-        self._seconds += seconds
-        self._cases += 1
-
-    def size(self) -> int:
-        """One until a case is done."""
-        return int(max(1.0, self._task_s * self._cases / max(self._seconds, 1e-9)))
-
-
-def this_machine(jobs: int | None, apart: bool = False) -> Place:
+def this_machine(jobs: int | None, apart: bool = False) -> Workers:
     """This process for one job, else a pool of processes; None is one for each core.
 
     ``apart``: not in this process, since a case could end it.
     """
-    slots = jobs or cores()
-    return Place(slots, in_this_process if slots == 1 and not apart else process_pool)
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    slots = jobs or usable or 1
+    return Workers(slots, in_this_process if slots == 1 and not apart else process_pool)
 
 
-class _Here(Executor):
+class _AtOnce(Executor):
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
         future: Future[Any] = Future()
         future.set_result(fn(*args, **kwargs))
@@ -88,13 +66,13 @@ class _Here(Executor):
 
 @contextlib.contextmanager
 def in_this_process(_slots: int) -> Iterator[Executor]:
-    """Each task as it is submitted, in this process; nobody is there to see it killed."""
-    yield _Here()
+    """An executor that runs each task in this process as it is submitted."""
+    yield _AtOnce()
 
 
 class _Pool(ProcessPoolExecutor):
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """With SIGINT blocked: processes started here inherit that, Ctrl-C is the parent's."""
+        """Submit with SIGINT blocked, which new processes inherit: Ctrl-C is the parent's."""
         if not hasattr(signal, "pthread_sigmask"):
             return super().submit(fn, *args, **kwargs)
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
@@ -121,18 +99,13 @@ def process_pool(workers: int) -> Iterator[Executor]:
 def _stop(pool: Executor, workers: set[Any]) -> None:
     """Start nothing more, end the workers, and wait until the pool has taken note of their ends.
 
-    The pool's own thread waits for the same processes: until it is done, a worker that it has
-    reaped still counts as alive here.
+    They may remove their temporary folders; those that take too long are killed. The pool's own
+    thread waits for the same processes: until it is done, a worker that it has reaped still counts
+    as alive here.
     """
     ending = threading.Thread(target=pool.shutdown, args=(True,), kwargs={"cancel_futures": True})
     ending.daemon = True
     ending.start()
-    _end(workers)
-    ending.join(_PATIENCE_S)
-
-
-def _end(workers: set[Any]) -> None:
-    """Let workers remove their temporary folders, then kill those that take too long."""
     deadline = time.monotonic() + _PATIENCE_S
     for worker in workers:
         worker.terminate()
@@ -140,6 +113,7 @@ def _end(workers: set[Any]) -> None:
         worker.join(max(0.0, deadline - time.monotonic()))
         worker.kill()
         worker.join(_PATIENCE_S)
+    ending.join(_PATIENCE_S)
 
 
 def _prepare_worker() -> None:
@@ -176,7 +150,7 @@ def _follow_parent() -> None:
 
 
 def run_tasks(
-    place: Place,
+    workers: Workers,
     tasks: Iterator[T],
     work: Callable[[T], R],
     keep: Callable[[T, R], None],
@@ -188,10 +162,10 @@ def run_tasks(
     the cause. Tasks are taken one by one, and none is after that.
     """
     running: dict[Future[R], T] = {}
-    slots = slots or place.slots
+    slots = slots or workers.slots
     lost: list[T] = []
     broken = False
-    with place.open(slots) as pool:
+    with workers.open(slots) as pool:
         try:
             while True:
                 while len(running) < slots and (taken := list(itertools.islice(tasks, 1))):

@@ -16,9 +16,9 @@ from eigassign.errors import EigassignError, UsageError
 if TYPE_CHECKING:
     from collections import Counter
 
-    from eigassign.batch.plan import Plan
+    from eigassign.batch.plan import BatchPlan
     from eigassign.batch.progress import Batch, Progress
-    from eigassign.batch.workers import Place
+    from eigassign.batch.workers import Workers
     from eigassign.output.batch.outcome import CaseOutcome
     from eigassign.output.previous import Comparison
 
@@ -115,15 +115,17 @@ def batch(
     usual = Path("results", f"{cases[0].stem}_sweep") if swept else Path("results")
     with reporting(how) as reporter:
         asked = _batch(plan, how["out"] or usual, how)
-        with _place(how["scheduler"], jobs, how["case_memory"] is not None) as place:
+        with _workers(how["scheduler"], jobs, how["case_memory"] is not None) as workers:
             if dry_run:
-                return _tell(asked, place, reporter)
+                return _tell(asked, workers, reporter)
             since = _since(how)
-            ends = _watched(asked, place, reporter, join)
+            ends = _watched(asked, workers, reporter, join)
         return _told(asked.folder, ends, since, reporter)
 
 
-def _place(scheduler: str | None, jobs: int | None, apart: bool) -> AbstractContextManager[Place]:
+def _workers(
+    scheduler: str | None, jobs: int | None, apart: bool
+) -> AbstractContextManager[Workers]:
     from eigassign.batch.workers import this_machine
 
     if scheduler is None:
@@ -137,7 +139,7 @@ def _place(scheduler: str | None, jobs: int | None, apart: bool) -> AbstractCont
     return cluster(scheduler)
 
 
-def _batch(plan: Plan, folder: Path, how: Mapping[str, Any]) -> Batch:
+def _batch(plan: BatchPlan, folder: Path, how: Mapping[str, Any]) -> Batch:
     from eigassign.batch.progress import Batch
     from eigassign.batch.work import CaseOptions
 
@@ -174,11 +176,11 @@ def merge(folder: Path, shards: tuple[Path, ...], **how: Any) -> int:
     A shard that is missing, not finished, or of another batch is an error. The folders of the cases
     stay where they are. Exit code 1 if any case failed, or has moved from --against.
     """
-    from eigassign.batch.merge import merge as merged
+    from eigassign.batch.merge import merge_shards
 
     with reporting(how) as reporter:
         since = _since(how)
-        return _told(folder, merged(folder, shards), since, reporter)
+        return _told(folder, merge_shards(folder, shards), since, reporter)
 
 
 def _since(how: Mapping[str, Any]) -> Comparison | None:
@@ -215,7 +217,7 @@ def _told(folder: Path, ends: Counter[str], since: Comparison | None, reporter: 
     return 1 if bad or (since is not None and since.moves) else 0
 
 
-def _watched(batch: Batch, place: Place, reporter: Reporter, join: bool) -> Counter[str]:
+def _watched(batch: Batch, workers: Workers, reporter: Reporter, join: bool) -> Counter[str]:
     """Run it with a line of progress for each case; how many ended in which way."""
     from eigassign.batch import runner
     from eigassign.output import console
@@ -233,21 +235,21 @@ def _watched(batch: Batch, place: Place, reporter: Reporter, join: bool) -> Coun
         def on_outcome(found: CaseOutcome) -> None:
             advance[0](f"{found.name}: {found.status}")
 
-        return runner.run(batch, place, on_start, on_outcome, join, reporter.stage)
+        return runner.run(batch, workers, on_start, on_outcome, join, reporter.stage)
 
 
 def _cases(count: int) -> str:
     return "1 case" if count == 1 else f"{count} cases"
 
 
-def _tell(batch: Batch, place: Place, reporter: Reporter) -> int:
+def _tell(batch: Batch, workers: Workers, reporter: Reporter) -> int:
     """List the cases that would run, and say about how long, in how much memory and files."""
     from eigassign.batch.progress import outcomes_in
     from eigassign.batch.runner import require_valid
     from eigassign.output.console import print_table
     from eigassign.output.formats import duration
 
-    require_valid(batch, place, reporter.stage)
+    require_valid(batch, workers, reporter.stage)
     spent = {found.index: found.seconds for found in outcomes_in(batch)}
     todo = [index for index in batch.header.indices() if index not in spent]
     first, last = todo[:_FIRST], todo[_FIRST:][-_LAST:]
@@ -262,13 +264,13 @@ def _tell(batch: Batch, place: Place, reporter: Reporter) -> int:
         return 0
     drawn = len(todo) if batch.options.reports == "all" else 0
     folders = 0 if batch.options.columns else len(todo)
-    processes = f"{place.slots} process{'es' if place.slots > 1 else ''}"
+    processes = f"{workers.slots} process{'es' if workers.slots > 1 else ''}"
     case_s, memory_mb = _of_first(batch, todo[0], bool(drawn))
     source = "as those that are done took" if spent else "estimated from the first"
     if spent:
         case_s = sum(spent.values()) / len(spent)
     if case_s is not None:
-        total = duration(case_s * len(todo) / min(place.slots, len(todo)))
+        total = duration(case_s * len(todo) / min(workers.slots, len(todo)))
         show(f"time     about {total} in {processes}: {duration(case_s)} a case, {source}")
     show(f"memory   about {150 + memory_mb:.0f} MB in each of {processes}")
     # of the paper's arm: a folder has 7 files and 30 kB, a report 14 more and 700 kB, a line 1 kB

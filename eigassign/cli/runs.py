@@ -205,7 +205,7 @@ def validate(
     Exit code 1 where an expansion is further off than the case's validation.max_error, or an exact
     frequency further than --tolerance from what it was in --against.
     """
-    from eigassign.batch.plan import cases_in, default_cases
+    from eigassign.batch.plan import cases_in
     from eigassign.output import previous
     from eigassign.output.batch.junit import write_junit
     from eigassign.pipeline import run
@@ -216,7 +216,7 @@ def validate(
     codes = [0]
     with reporting(how) as reporter:
         since = against and previous.Comparison(against, "validations", tolerance)
-        for case in cases_in(cases or default_cases()):
+        for case in cases_in(cases):
             try:
                 answer = run.validate(case, _options(how, reporter))
             except EigassignError as error:

@@ -7,7 +7,7 @@ from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from pathlib import Path
 
-from eigassign.batch import Batch, CaseOptions, Place, Variant, check_cases, outcome_of, plan_of
+from eigassign.batch import Batch, CaseOptions, Variant, Workers, check_cases, outcome_of, plan_of
 
 TEXT = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
 MASS = "mechanism.bodies.tool_mass.mass"
@@ -55,14 +55,14 @@ class Instant(Executor):
         return outcome_of(variant, "ok", run_folder=variant.name)
 
 
-def instant(out: Path, heard: Callable[[str], None], slots: int = 2) -> Place:
+def instant(out: Path, heard: Callable[[str], None], slots: int = 2) -> Workers:
     """The place where such batches run."""
 
     @contextmanager
     def opened(_slots: int) -> Iterator[Executor]:
         yield Instant(out, heard)
 
-    return Place(slots, opened)
+    return Workers(slots, opened)
 
 
 def names(batch: Batch, indices: Sequence[int]) -> list[str]:

@@ -13,21 +13,9 @@ from typing import Any
 import beam
 import pytest
 
-from eigassign.batch import Pace
 from eigassign.cli import main
 
 SWEEP = "sweep: {parameters: {mechanism.links.arm.length: {min: 0.4, max: 0.6, count: 60}}}\n"
-
-
-def test_tasks_take_as_many_cases_as_fill_their_seconds() -> None:
-    pace, single = Pace(5.0), Pace(0.0)
-    assert pace.size() == 1
-    for seconds in (0.5, 0.3):
-        pace.note(seconds)
-        single.note(seconds)
-    assert (pace.size(), single.size()) == (12, 1)
-    pace.note(60.0)
-    assert pace.size() == 1
 
 
 @pytest.fixture

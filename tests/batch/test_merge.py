@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from eigassign.batch import Header, Manifest, read_header, summarise, write_header
-from eigassign.batch.merge import merge
+from eigassign.batch import Header, Manifest, merge_shards, read_header, summarise, write_header
 from eigassign.cli import main
 from eigassign.errors import UsageError
 from eigassign.output import CaseOutcome
@@ -48,8 +47,8 @@ def names(folder: Path) -> list[str]:
 def test_shards_in_any_order_become_what_one_batch_is(tmp_path: Path, columns: bool) -> None:
     shards = [shard(tmp_path / str(i), i, 3, columns=columns) for i in (2, 3, 1)]
     out, whole = tmp_path / "out", shard(tmp_path / "whole", 1, 1, columns=columns)
-    assert merge(out, shards) == {"ok": TOTAL - 1, "failed": 1}
-    assert merge(whole, []) == {"ok": TOTAL - 1, "failed": 1}
+    assert merge_shards(out, shards) == {"ok": TOTAL - 1, "failed": 1}
+    assert merge_shards(whole, []) == {"ok": TOTAL - 1, "failed": 1}
     assert names(out) == [f"mass={k}g" for k in range(TOTAL)]
     if columns:
         for name in ("summary.csv", "summary.json", "junit.xml", "columns.csv"):
@@ -61,15 +60,15 @@ def test_shards_in_any_order_become_what_one_batch_is(tmp_path: Path, columns: b
 
 def test_the_folders_of_cases_stay_and_are_found_from_the_new_place(tmp_path: Path) -> None:
     shards = [shard(tmp_path / "parts" / str(i), i, 2) for i in (1, 2)]
-    merge(tmp_path / "out", shards)
+    merge_shards(tmp_path / "out", shards)
     found = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert found["cases"][2]["run_folder"] == "../parts/1/mass=2g"
-    merge(tmp_path / "out", shards)  # again, over itself
+    merge_shards(tmp_path / "out", shards)  # again, over itself
 
 
 def refused(out: Path, *shards: Path) -> str:
     with pytest.raises(UsageError) as error:
-        merge(out, shards)
+        merge_shards(out, shards)
     assert not (out / "summary.csv").exists()
     return str(error.value)
 

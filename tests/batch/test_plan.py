@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from eigassign.batch import Plan, plan_of, variant_problem
+from eigassign.batch import BatchPlan, plan_of, variant_problem
 from eigassign.errors import Problem
 
 TWO_LINK = Path(__file__).parents[2] / "cases" / "two_link.yaml"
@@ -19,11 +19,11 @@ def case(folder: Path, name: str = "arm.yaml", end: str = "") -> Path:
     return file
 
 
-def names(plan: Plan) -> list[str]:
+def names(plan: BatchPlan) -> list[str]:
     return [plan[k].name for k in range(len(plan))]
 
 
-def keys(plan: Plan) -> list[str]:
+def keys(plan: BatchPlan) -> list[str]:
     return [plan[k].key for k in range(len(plan))]
 
 

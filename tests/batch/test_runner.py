@@ -17,12 +17,11 @@ from pathlib import Path
 import pytest
 from instant import MASS, Instant, batch_of, case, instant, names
 
-from eigassign.batch import Batch, Place, run
-from eigassign.batch.merge import merge
+from eigassign.batch import Batch, Workers, merge_shards, run
 from eigassign.errors import CaseError, StorageError
 
 
-def ran(batch: Batch, place: Place | None = None, join: bool = False) -> list[str]:
+def ran(batch: Batch, place: Workers | None = None, join: bool = False) -> list[str]:
     """Run it; the names of the cases that were not done before."""
     heard: list[str] = []
     place = place or instant(batch.folder, lambda _name: None)
@@ -91,7 +90,7 @@ def test_cases_of_merged_shards_are_done(tmp_path: Path) -> None:
     parts = [tmp_path / "part-1", tmp_path / "part-2"]
     for i, part in enumerate(parts, 1):
         ran(replace(whole, folder=part, shard=(i, 2)))
-    merge(whole.folder, parts)
+    merge_shards(whole.folder, parts)
     assert ran(whole) == []
     shutil.rmtree(parts[1] / "mass=1")
     assert ran(whole) == ["mass=1"]
@@ -178,7 +177,7 @@ def test_of_a_broken_pool_the_culprit_is_told_and_nobody_else_loses(tmp_path: Pa
     def opened(_slots: int) -> Iterator[Executor]:
         yield Breaking(batch.folder, lambda _name: None)
 
-    assert sorted(ran(batch, Place(3, opened))) == names(batch, range(4))
+    assert sorted(ran(batch, Workers(3, opened))) == names(batch, range(4))
     assert [*summary(batch).values()] == ["ok", "error", "ok", "ok"]
 
 

@@ -20,8 +20,8 @@ from wrong_inputs import GOOD
 from eigassign.batch import (
     Batch,
     CaseOptions,
-    Place,
-    find_cases,
+    Workers,
+    cases_in,
     folder_names,
     plan_of,
     process_pool,
@@ -209,7 +209,7 @@ def batch_of(*names: str) -> Batch:
 
 def test_an_interrupt_leaves_a_summary_of_what_was_finished() -> None:
     with pytest.raises(Terminated):
-        run(batch_of("a", "interrupt", "b"), Place(1, in_this_process), print, print)
+        run(batch_of("a", "interrupt", "b"), Workers(1, in_this_process), print, print)
     assert {name: row["status"] for name, row in summary("runs").items()} == {"a": "ok"}
 
 
@@ -217,7 +217,7 @@ def test_any_executor_will_do_and_may_lose_a_case() -> None:
     heard: list[str] = []
     ends = run(
         batch_of("a", "poison"),
-        Place(3, in_this_process),
+        Workers(3, in_this_process),
         lambda _progress: None,
         lambda found: heard.append(found.name),
     )
@@ -253,7 +253,7 @@ def test_folders_are_searched_but_not_their_runs_and_nothing_comes_twice() -> No
     for name in ("results/a/case.yaml", ".hidden/d.yaml", ".e.yaml", "notes.txt"):
         write(f"cases/{name}")
     write("cases/results/a/run.json", "{}")
-    found = find_cases([Path("cases"), Path("cases/a.yaml"), Path("cases/../cases")])
+    found = cases_in([Path("cases"), Path("cases/a.yaml"), Path("cases/../cases")])
     assert found == kept
 
 
