@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from eigassign.assignment.program import (
 )
 from eigassign.errors import InfeasibleError
 
+T = TypeVar("T")
 TOUCH = 1e-9  # in units of `Scales`: a tenth of the violation that `optimality` accepts
 
 
@@ -27,14 +29,18 @@ def refuse_impossible(program: QuadraticProgram) -> None:
         InfeasibleError: with the names of all such constraints.
     """
     lowest, highest = reach(program)
-    slack = TOUCH * program.scales.rows
-    slack = slack + 1e-15 * (np.abs(program.C) @ np.abs(program.y_start))  # C y costs this rounding
+    slack = TOUCH * program.scales.rows + row_rounding(program)
     bad = (program.c_lower > highest + slack) | (program.c_upper < lowest - slack)
     if not bad.any():
         return
     lines = [_range_message(program, int(k), lowest[k], highest[k]) for k in np.flatnonzero(bad)]
     names = tuple(program.constraint_names[k] for k in np.flatnonzero(bad))
     raise InfeasibleError("; ".join(lines), names)
+
+
+def row_rounding(program: QuadraticProgram) -> Floats:
+    """The round-off (n_c,) of C y, some units in the last place of its terms."""
+    return np.asarray(1e-15 * (np.abs(program.C) @ np.abs(program.y_start)))
 
 
 def reach(program: QuadraticProgram) -> tuple[Floats, Floats]:
@@ -98,17 +104,23 @@ def constraints_agree(rows: Sequence[LinearConstraint], bounds: Bounds) -> bool:
 
 
 def contradiction(program: QuadraticProgram, scaled: ScaledProgram) -> InfeasibleError:
-    """The error that names a smallest set of constraints that cannot be met together.
-
-    Deletion filter: a constraint without which the rest is still impossible is left out. Of what
-    remains every one is needed for the contradiction.
-    """
-    needed = list(range(len(program.constraint_names)))
-    for k in list(needed):
-        rest = [other for other in needed if other != k]
-        if feasible_point(scaled, rest) is None:
-            needed = rest
+    """The error that names a smallest set of constraints that cannot be met together."""
+    every = range(len(program.constraint_names))
+    needed = smallest(every, lambda rows: feasible_point(scaled, rows) is None)
     names = tuple(program.constraint_names[k] for k in needed)
     listed = " and ".join(repr(name) for name in names)
     together = " together" if len(names) > 1 else ""
     return InfeasibleError(f"no design within the bounds meets {listed}{together}", names)
+
+
+def smallest(every: Iterable[T], contradict: Callable[[list[T]], bool]) -> list[T]:
+    """Those of ``every`` limit, which contradict, that are all needed for the contradiction.
+
+    Deletion filter: a limit without which the rest still contradict is left out.
+    """
+    needed = list(every)
+    for one in list(needed):
+        rest = [other for other in needed if other != one]
+        if contradict(rest):
+            needed = rest
+    return needed

@@ -346,7 +346,7 @@ def unscaled(
     """x (n,) and mu (rows of G,) of the scaled program, back in SI units."""
     scales, free = program.scales, list(program.scales.free)
     n = len(free)
-    mu = _of_finite_limits(mu, scaled.lower, scaled.upper)
+    mu = of_finite_limits(mu, scaled.lower, scaled.upper)
     y = program.y_start.copy()
     y[free] = _snapped(program, scaled, x)
     nu = 2.0 * scales.objective * mu[n:] / scales.rows
@@ -355,8 +355,8 @@ def unscaled(
     return ProgramAnswer(y, bound, nu)
 
 
-def _of_finite_limits(mu: Floats, lower: Floats, upper: Floats) -> Floats:
-    """Without the multipliers of limits that do not exist."""
+def of_finite_limits(mu: Floats, lower: Floats, upper: Floats) -> Floats:
+    """Multipliers without those of limits that do not exist."""
     missing = ((mu > 0.0) & np.isinf(upper)) | ((mu < 0.0) & np.isinf(lower))
     return np.where(missing, 0.0, mu)
 

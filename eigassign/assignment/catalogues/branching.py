@@ -19,8 +19,8 @@ from __future__ import annotations
 import heapq
 import itertools
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from math import prod
 from typing import Protocol
 
@@ -113,34 +113,33 @@ class Relaxed:
     """A node after its relaxation.
 
     ``node``: the rows that may still be better. ``bound``: no combination of them is below it.
-    ``points``: the optimum's part in every catalogue, in the model's ``coordinates``. ``x`` and
-    ``mu``: the optimum and its multipliers, in the model's own units.
+    ``y`` (n_y,): the optimum, with the multipliers ``mu`` that the problem may want of it again.
     """
 
     node: Node
     bound: float
-    points: tuple[Floats, ...]
-    x: Floats
-    mu: Floats
+    y: Floats
+    mu: Floats = field(default_factory=lambda: np.zeros(0))
 
 
 class CatalogueProblem(Protocol):
-    """What the tree searches.
+    """A problem over catalogues, by its nodes.
 
-    ``coordinates``: of every catalogue, its rows (n_rows, any) where distances are measured.
-    ``small``: up to so many combinations of a node are looked at together.
+    ``metric`` (any, n_y): designs are as far apart as ``metric @ y``. ``small``: the number of
+    combinations up to which all those of a node are looked at together.
     """
 
-    coordinates: tuple[Floats, ...]
+    catalogues: Sequence[ListedValues]
+    metric: Floats
     small: int
 
     def relax(self, node: Node, above: Relaxed | None, cutoff: float) -> Relaxed | None:
-        """None if the node has no combination below the cutoff; ``above`` is the node split."""
+        """Return None if no combination is below the cutoff; ``above`` is the node split."""
 
     def combinations(
         self, node: Node, near: Relaxed, cutoff: Callable[[], float]
     ) -> Iterable[Combination]:
-        """Those of a small node that can be below the cutoff; ``near`` is a node around it."""
+        """Yield those that can be below the cutoff; ``near`` is a node around this small one."""
 
 
 class _Best:
@@ -148,74 +147,68 @@ class _Best:
 
     def __init__(self, keep: int) -> None:
         self.keep = keep
-        self.best: list[Combination] = []
+        self.found: list[Combination] = []
 
     def cutoff(self) -> float:
-        """What a combination must be below to be kept."""
-        return self.best[-1].objective if len(self.best) >= self.keep else np.inf
+        """The objective that a combination must be below to be kept."""
+        return self.found[-1].objective if len(self.found) >= self.keep else np.inf
 
     def add(self, combinations: Iterable[Combination]) -> None:
         for one in combinations:
-            if one.objective < self.cutoff() and all(one.rows != other.rows for other in self.best):
-                self.best = sorted([*self.best, one], key=lambda c: (c.objective, c.rows))
-                self.best = self.best[: self.keep]
+            if one.objective < self.cutoff() and all(one.rows != k.rows for k in self.found):
+                self.found = sorted([*self.found, one], key=lambda c: (c.objective, c.rows))
+                self.found = self.found[: self.keep]
 
 
 def branch_and_bound(
-    model: CatalogueProblem, root: Node, limits: SearchLimits, start: Iterable[Combination] = ()
+    problem: CatalogueProblem, root: Node, limits: SearchLimits, start: Iterable[Combination] = ()
 ) -> CatalogueSearch:
     """The lowest bound first, knowing some combinations at the start.
 
     ``best`` is empty where there is no combination, or none was met before a limit.
     """
-    found, nodes, end = _Best(limits.keep), 0, time.monotonic() + limits.seconds
-    found.add(start)
+    best, nodes, end = _Best(limits.keep), 0, time.monotonic() + limits.seconds
+    best.add(start)
     heap: list[tuple[float, int, Relaxed]] = []
     pending: list[Node] = [root]
     above: Relaxed | None = None
     while True:
         for node in pending:
             nodes += 1
-            relaxed = model.relax(node, above, found.cutoff())
+            relaxed = problem.relax(node, above, best.cutoff())
             if relaxed is not None:
-                found.add(model.combinations(_rounded(model, relaxed), relaxed, found.cutoff))
+                near = [int(np.linalg.norm(d, axis=1).argmin()) for d in _away(problem, relaxed)]
+                rounded = tuple((rows[k],) for rows, k in zip(relaxed.node, near, strict=True))
+                best.add(problem.combinations(rounded, relaxed, best.cutoff))
                 heapq.heappush(heap, (relaxed.bound, nodes, relaxed))
-        exhausted = not heap or heap[0][0] >= found.cutoff() - PROVED * abs(found.cutoff())
+        exhausted = not heap or heap[0][0] >= best.cutoff() - PROVED * abs(best.cutoff())
         if exhausted or nodes >= limits.nodes or time.monotonic() > end:
             break
         above = heapq.heappop(heap)[2]
         pending = []
-        if prod(map(len, above.node)) <= model.small:
-            found.add(model.combinations(above.node, above, found.cutoff))
+        if prod(map(len, above.node)) <= problem.small:
+            best.add(problem.combinations(above.node, above, best.cutoff))
         else:
-            pending = _split(model, above)
-    bounds = [bound for bound, *_ in heap[:1]] + [one.objective for one in found.best[:1]]
-    return CatalogueSearch(tuple(found.best), min(bounds, default=np.inf), nodes, exhausted)
+            pending = _split(problem, above)
+    bounds = [bound for bound, *_ in heap[:1]] + [one.objective for one in best.found[:1]]
+    return CatalogueSearch(tuple(best.found), min(bounds, default=np.inf), nodes, exhausted)
 
 
-def _distances(model: CatalogueProblem, relaxed: Relaxed) -> list[Floats]:
-    """Of every catalogue, how far its rows in the node are from the relaxation's optimum."""
+def _away(problem: CatalogueProblem, relaxed: Relaxed) -> list[Floats]:
+    """The way (rows, any) from the relaxation's optimum to each row in the node, by catalogue."""
     return [
-        np.linalg.norm(at[list(rows)] - point, axis=1)
-        for at, rows, point in zip(model.coordinates, relaxed.node, relaxed.points, strict=True)
+        (own.rows[list(rows)] - relaxed.y[list(own.columns)]) @ problem.metric[:, own.columns].T
+        for own, rows in zip(problem.catalogues, relaxed.node, strict=True)
     ]
 
 
-def _rounded(model: CatalogueProblem, relaxed: Relaxed) -> Node:
-    """The node of one combination, the nearest row of every catalogue."""
-    away = _distances(model, relaxed)
-    return tuple((rows[np.argmin(d)],) for rows, d in zip(relaxed.node, away, strict=True))
-
-
-def _split(model: CatalogueProblem, relaxed: Relaxed) -> list[Node]:
+def _split(problem: CatalogueProblem, relaxed: Relaxed) -> list[Node]:
     """Two nodes that share out the rows of the catalogue furthest from being decided."""
-    away = [d.min() if d.size > 1 else -1.0 for d in _distances(model, relaxed)]
-    k = int(np.argmax(away))
-    rows = np.array(relaxed.node[k])
-    at = model.coordinates[k][rows]
-    direction = np.linalg.svd(at - at.mean(axis=0), full_matrices=False)[2][0]
-    along = at @ direction
-    low = along <= relaxed.points[k] @ direction
+    ways = _away(problem, relaxed)
+    k = int(np.argmax([np.linalg.norm(d, axis=1).min() if len(d) > 1 else -1.0 for d in ways]))
+    rows, away = np.array(relaxed.node[k]), ways[k]
+    along = away @ np.linalg.svd(away - away.mean(axis=0), full_matrices=False)[2][0]
+    low = along <= 0.0
     if low.all() or not low.any():
         low = np.isin(np.arange(rows.size), np.argsort(along, kind="stable")[: rows.size // 2])
     halves = (tuple(rows[side].tolist()) for side in (low, ~low))
@@ -266,8 +259,8 @@ def search_catalogue(
     ``relax(node, near)`` returns y (n_y,) and the objective at the optimum over the hull of a
     node's rows (`hull`), or None where there is none; ``near`` is the optimum of the node around
     it, to start from. ``fix(rows)`` does so for one combination. ``starts``: combinations to begin
-    with. What rounding finds is improved by exchanging rows: of one catalogue while the tree is
-    searched, of two at its end.
+    with. At the end the rows of the best combination are exchanged in two catalogues at a time, as
+    long as that finds a better one.
 
     Relaxations are dear, so the tree is for the best combination; the others in ``best`` are the
     best of those met. The lower bound is as good as the optima of ``relax``: on a model that is
@@ -276,22 +269,27 @@ def search_catalogue(
     Raises:
         UsageError: columns that two catalogues own.
         InfeasibleError: there is no combination.
-        AccuracyError: a limit of ``limits`` was reached before any combination was found.
+        AccuracyError: a limit was reached before any combination was found.
     """
     limits = limits or SearchLimits()
-    refuse_columns(catalogues, 1 + max(max(own.columns) for own in catalogues))
-    model = _AnyModel(catalogues, relax, fix, time.monotonic() + limits.seconds)
-    known = (one for rows in starts for one in model.improved(rows, 1))
-    found = branch_and_bound(model, model.root, replace(limits, keep=1), known)
+    end = time.monotonic() + limits.seconds
+    problem = _AnyProblem(catalogues, relax, fix)
+    known = filter(None, map(problem.combination, starts))
+    found = branch_and_bound(problem, problem.root, replace(limits, keep=1), known)
     if not found.best and found.exhausted:
         names = tuple(own.name for own in catalogues)
         listed = ", ".join(map(repr, names))
         raise InfeasibleError(f"no combination of the catalogues {listed} meets all limits", names)
-    list(model.improved(answered(found).best[0].rows, 2))
-    best = _Best(limits.keep)
-    best.add(one for one in model.known.values() if one is not None)
-    lower = min(found.lower_bound, best.best[0].objective)
-    return replace(found, best=tuple(best.best), lower_bound=lower)
+    here, better = None, answered(found).best[0]
+    while better is not here and time.monotonic() < end:
+        here = better
+        for pair in itertools.combinations(range(len(catalogues)), min(2, len(catalogues))):
+            rows = (every if k in pair else (here.rows[k],) for k, every in enumerate(problem.root))
+            exchanged = filter(None, map(problem.combination, itertools.product(*rows)))
+            better = min([better, *exchanged], key=lambda one: one.objective)
+    met = filter(None, problem.known.values())
+    best = tuple(sorted(met, key=lambda one: (one.objective, one.rows))[: limits.keep])
+    return replace(found, best=best, lower_bound=min(found.lower_bound, best[0].objective))
 
 
 def hull(
@@ -321,7 +319,7 @@ def hull(
     return Bounds(lower, upper), rows
 
 
-class _AnyModel:
+class _AnyProblem:
     """The caller's relaxations and combinations; every combination is asked for once."""
 
     small = 1
@@ -331,59 +329,30 @@ class _AnyModel:
         catalogues: Sequence[ListedValues],
         relax: Callable[[Node, Floats | None], tuple[Floats, float] | None],
         fix: Callable[[Rows], tuple[Floats, float] | None],
-        end: float,
     ) -> None:
-        self.catalogues, self._relax, self._fix, self.end = catalogues, relax, fix, end
-        ranges = [np.ptp(own.rows, axis=0) for own in catalogues]
-        self.widths = [np.where(width > 0.0, width, 1.0) for width in ranges]
-        pairs = zip(catalogues, self.widths, strict=True)
-        self.coordinates = tuple(own.rows / width for own, width in pairs)
+        self.catalogues, self._relax, self._fix = catalogues, relax, fix
+        width = np.ones(1 + max(max(own.columns) for own in catalogues))
+        refuse_columns(catalogues, width.size)
+        for own in catalogues:
+            width[list(own.columns)] = np.ptp(own.rows, axis=0)
+        self.metric = np.diag(1.0 / np.where(width > 0.0, width, 1.0))
         self.root = tuple(tuple(distinct_rows(own).tolist()) for own in catalogues)
         self.known: dict[Rows, Combination | None] = {}
 
     def relax(self, node: Node, above: Relaxed | None, cutoff: float) -> Relaxed | None:
-        optimum = self._relax(node, None if above is None else above.x)
+        optimum = self._relax(node, None if above is None else above.y)
         if optimum is None or optimum[1] >= cutoff:
             return None
-        y, objective = optimum
-        pairs = zip(self.catalogues, self.widths, strict=True)
-        points = tuple(y[list(own.columns)] / width for own, width in pairs)
-        return Relaxed(node, objective, points, y, np.zeros(0))
+        return Relaxed(node, optimum[1], optimum[0])
 
     def combinations(
         self, node: Node, near: Relaxed, cutoff: Callable[[], float]
-    ) -> Iterator[Combination]:
-        for rows in itertools.product(*node):
-            yield from self.improved(rows, 1)
+    ) -> Iterable[Combination]:
+        return filter(None, map(self.combination, itertools.product(*node)))
 
-    def _combination(self, rows: Rows) -> Combination | None:
+    def combination(self, rows: Rows) -> Combination | None:
+        """The combination with its objective, None where it has none."""
         if rows not in self.known:
             fixed = self._fix(rows)
             self.known[rows] = Combination(rows, frozen(fixed[0]), fixed[1]) if fixed else None
         return self.known[rows]
-
-    def improved(self, rows: Rows, most: int) -> Iterator[Combination]:
-        """This combination; if it is the best so far, what exchanging ``most`` rows leads to."""
-        lowest = min((one.objective for one in self.known.values() if one), default=np.inf)
-        here = self._combination(rows)
-        if here is None:
-            return
-        yield here
-        while here.objective <= lowest and time.monotonic() < self.end:
-            lowest = here.objective
-            around = [one for one in map(self._combination, self._around(here.rows, most)) if one]
-            yield from around
-            here = min(around, key=lambda one: one.objective)
-            if here.objective >= lowest:
-                return
-
-    def _around(self, rows: Rows, most: int) -> Iterator[Rows]:
-        """Combinations that differ in the rows of at most ``most`` catalogues."""
-        every = range(len(rows))
-        for changed in itertools.combinations(every, min(most, len(rows))):
-            yield from itertools.product(
-                *(
-                    own if k in changed else (rows[k],)
-                    for k, own in zip(every, self.root, strict=True)
-                )
-            )

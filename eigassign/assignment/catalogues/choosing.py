@@ -166,15 +166,15 @@ class _Tree:
         return found
 
     def _minimised(self, problem: DesignProblem, start: Floats) -> Optimum | None:
+        def stop() -> End | None:
+            return End.SECONDS if time.monotonic() > self.deadline else None
+
         try:
-            found = minimise(problem, start, self.steps, self._stop)
+            found = minimise(problem, start, self.steps, stop)
         except EigassignError:
             return None
         self.appraisals += found.appraisals
         return found if _admissible(problem, found.y) else None
-
-    def _stop(self) -> End | None:
-        return End.SECONDS if time.monotonic() > self.deadline else None
 
     def nearest(self, y: Floats) -> Rows:
         """The rows nearest to a design, relative to the ranges of their columns."""
