@@ -1,4 +1,4 @@
-"""Where sparse algebra overtakes dense: sets the limits in ``eigassign/modal/arguments.py``.
+"""Where sparse algebra overtakes dense: sets ``DENSE_LIMIT`` of the pencil.
 
 Both paths are forced in turn on arms of growing mesh; a row gives the median times of one expansion
 of order 4 and of one exact solve for two modes.
@@ -9,47 +9,26 @@ from __future__ import annotations
 import common  # first: settles the threads
 
 # isort: split
-from collections.abc import Callable
+from dataclasses import replace
 
 import arms
 import numpy as np
 from literal_procedure import Q0, design
 
 import eigassign as ea
-from eigassign.modal import projection
-from eigassign.modal.exact import solver
-from eigassign.modal.model import Model
-from eigassign.modal.taylor import coefficients
-
-
-def forced(limit: int, job: Callable[[], object]) -> Callable[[], object]:
-    """The job with every limit set to ``limit``."""
-
-    def run() -> object:
-        kept = [module.DENSE_LIMIT for module in (coefficients, solver, projection)]
-        for module in (coefficients, solver, projection):
-            module.DENSE_LIMIT = limit
-        try:
-            return job()
-        finally:
-            for module, value in zip((coefficients, solver, projection), kept, strict=True):
-                module.DENSE_LIMIT = value
-
-    return run
+from eigassign.modal import Model
 
 
 def row(model: Model, what: str, q0: np.ndarray, y0: np.ndarray) -> common.Row:
-    jobs = {
-        "expand": lambda: ea.expand(model, q0, y0, (1,), 4),
-        "one exact solve": lambda: model.modes(q0, y0, 2),
-        "50 exact solves": lambda: model.frequencies(np.tile(q0, (50, 1)), y0, 2),
-    }
-    both = {
-        f"{name}, {kind}": forced(limit, job)
-        for name, job in jobs.items()
-        for kind, limit in (("dense", 10**9), ("sparse", 0))
-    }
-    times = common.medians(both, 9)
+    jobs = {}
+    for kind, limit in (("dense", 10**9), ("sparse", 0)):
+        forced = replace(model, pencil=replace(model.pencil, dense_limit=limit))
+        jobs |= {
+            f"expand, {kind}": lambda m=forced: ea.expand(m, q0, y0, (1,), 4),
+            f"one exact solve, {kind}": lambda m=forced: m.modes(q0, y0, 2),
+            f"50 exact solves, {kind}": lambda m=forced: m.frequencies(np.tile(q0, (50, 1)), y0, 2),
+        }
+    times = common.medians(jobs, 9)
     cells = {name: common.milliseconds(seconds) for name, seconds in times.items()}
     return {"arm": what, "n_dof": model.n_dof, **cells}
 

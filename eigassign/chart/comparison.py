@@ -38,7 +38,6 @@ from eigassign.chart.results import NO_TIME, Advice, Asked, ChartPoint, Errors, 
 from eigassign.chart.surrogates import has_kriging
 from eigassign.chart.timing import Patience, take_turns, timed
 from eigassign.errors import EigassignError
-from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.modal.model import Model
 from eigassign.study.scene import Scene
 
@@ -246,7 +245,7 @@ def _round_off(bench: Bench) -> float:
     there to change every entry of the K_j and M_j by one unit in its last place.
     """
     model, modes = bench.scene.model, bench.scene.expansions.modes
-    small = model.n_dof <= DENSE_LIMIT
+    small = model.pencil.is_dense
     few = spread_rows(len(bench.points.x), 40 if small else 2)
     x, exact, wanted = bench.points.x[few], bench.exact_hz[few], np.array(modes) - 1
     others = [exact_frequencies(replace(bench.scene, model=_rounded(model)), x)]

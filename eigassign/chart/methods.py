@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from eigassign.chart.question import EvaluationPoints, Features
 from eigassign.chart.timing import time_in_words, timed
 from eigassign.errors import AccuracyError
-from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.modal.exact.clusters import CLUSTER_GAP
 from eigassign.modal.exact.sparse import solve_sparse
 from eigassign.modal.expansion import NearestExpansion, expand
@@ -81,7 +80,7 @@ def _at_points(count: int) -> str:
 def exact_methods(model: Model, modes: Sequence[int], most: int | None) -> Iterator[Method]:
     """The exact solves that eigassign offers: dense in batches where small, and sparse."""
     count, wanted = max(modes), np.array(modes) - 1
-    if model.n_dof <= DENSE_LIMIT:
+    if model.pencil.is_dense:
         yield Method(
             "exact dense",
             "exact",

@@ -129,5 +129,4 @@ def spread(x: Floats, most: int) -> Floats:
 
 # --- Sizes
 
-DENSE_LIMIT = 220  # n_dof up to which matrices are kept dense (benchmarks/dense_or_sparse.py)
 MOST_TERMS = 20_000  # of one full series that is made without being asked for by order

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.arguments import DENSE_LIMIT
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -62,7 +61,7 @@ def project_terms(
 
 def project_at(pencil: Pencil, theta: Floats, rows: Floats) -> Floats:
     """R K Rᵀ and R M Rᵀ at θ (n_theta, 1), (2, k, k), for rows R (k, n_dof)."""
-    if pencil.n_dof <= DENSE_LIMIT:
+    if pencil.is_dense:
         return np.asarray(rows @ pencil.both_matrices(theta)[:, 0] @ rows.T)
     V = np.ascontiguousarray(rows.T)
     out = np.zeros((2, len(rows), len(rows)))

@@ -33,7 +33,6 @@ from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import CaseError
-from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.modal.model import Model
 from eigassign.study.planning import joint_map, travelled
 from eigassign.study.results import (
@@ -164,7 +163,7 @@ def study_modes(scene: Scene, initial_hz: Floats | None = None) -> tuple[ModeStu
 
 
 def _counts(scene: Scene) -> Mapping[int, int]:
-    return AXES if scene.model.n_dof <= DENSE_LIMIT else COARSE
+    return AXES if scene.model.pencil.is_dense else COARSE
 
 
 def design_grid(scene: Scene) -> Grid | None:

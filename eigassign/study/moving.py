@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.kinematics.topology import split
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.modal.model import Model, ModeShapes
 from eigassign.study.drawing import AMPLITUDE, extent_of, largest_of, spread_samples
 from eigassign.study.results import MovingMode, frozen
@@ -39,7 +38,7 @@ def _moving(
     file: CaseFile, model: Model, path: Trajectories, y: Floats, name: str, numbers: Floats
 ) -> Iterator[MovingMode]:
     shown = list(zip(path.parts, path.rows, strict=True))[:MOVING]
-    each = FRAMES // len(shown) if model.n_dof <= DENSE_LIMIT else 0
+    each = FRAMES // len(shown) if model.pencil.is_dense else 0
     frames = max(each, FEW_FRAMES)
     q = path.at(y)[0]
     for part, rows in shown:

@@ -1,16 +1,14 @@
-"""Any arm treated as a large one: every limit up to which algebra is dense set to nothing."""
+"""Arms of any size, treated as large ones: sparse algebra for a handful of unknowns."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pytest
 from chains import model_of, two_link
-from rungs import treat_as_large
 
-from eigassign.mechanism.assembly import pencil as pencil_module
+from eigassign.mechanism import Pencil
 from eigassign.modal import Model
 
 HELD = {"stiffness": 2e3}
@@ -22,10 +20,10 @@ def arm(drives: tuple[Any, Any] = ("free", "free"), elements: tuple[int, int] = 
     return model_of(two_link(elements, drives=drives))
 
 
-def sparsely(patch: pytest.MonkeyPatch, job: Callable[[], Any]) -> Any:
-    """The job with every size counted as large."""
-    with patch.context() as inside:
-        treat_as_large(inside)
-        inside.setattr(pencil_module, "STACK_LIMIT", 0)
-        inside.setattr(pencil_module, "TINY_STACK", 0)
-        return job()
+def large(pencil: Pencil, limit: int = 0) -> Pencil:
+    """The same pencil with dense algebra up to ``limit`` unknowns only."""
+    return replace(pencil, dense_limit=limit)
+
+
+def large_model(model: Model, limit: int = 0) -> Model:
+    return replace(model, pencil=large(model.pencil, limit))

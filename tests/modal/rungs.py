@@ -1,28 +1,25 @@
-"""The rungs of the ladder that tests of the expansion share: residual, slope, differences."""
+"""The rungs of the ladder: residual of the recursion, slope of the error, differences."""
 
 from __future__ import annotations
 
 import itertools
-import sys
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import pytest
 
 from eigassign.mechanism import Pencil
 from eigassign.modal import Expansion, eigenvalues, expand_subspace, modes
-from eigassign.modal.exact import solver
-from eigassign.modal.taylor import coefficients
 from eigassign.series import total_degree
 
 Floats = np.ndarray
 
 
 def residual(pencil: Pencil, x0: Floats, span: Floats, order: int, wanted: Sequence[int]) -> Floats:
-    """Largest entry of Σ K_δ X_{γ−δ} − Σ M_δ X_ε Λ_ζ at every γ (N,), by plain loops.
+    """Largest entry of Σ K_δ X_{γ−δ} − Σ M_δ X_ε Λ_ζ and of Φ0ᵀM0X_γ − I, γ by γ (N,), by loops.
 
-    Relative to |K_δ||X_{γ−δ}|, which round-off is proportional to. x is scaled by ``span``, so that
-    all variables weigh alike; where nothing depends on x^γ at all, relative to 1e-5 |K_0||X_0|.
+    Relative to |K_δ||X_{γ−δ}| and |Φ0ᵀ||M0||X_γ|, which round-off is proportional to. x is scaled
+    by ``span``, so that all variables weigh alike; where nothing depends on x^γ at all, relative to
+    1e-5 |K_0||X_0|.
     """
     space = total_degree(len(x0), order)
     theta = pencil.theta_series(space, x0, pencil.to_program * span)
@@ -50,7 +47,12 @@ def residual(pencil: Pencil, x0: Floats, span: Floats, order: int, wanted: Seque
         size[c] = max(size[c], (abs(K[a]) @ np.abs(X[b])).max())
     for a, b, c in pairs:
         right[c] += M[a] @ product[b]
-    return np.abs(left - right).max(axis=(1, 2)) / np.maximum(size, 1e-5 * size[0])
+    left_over = np.abs(left - right).max(axis=(1, 2)) / np.maximum(size, 1e-5 * size[0])
+    border = phi0.T @ M[0] @ X
+    border[0] -= np.eye(len(pick))
+    largest = (np.abs(phi0).T @ abs(M[0]) @ np.abs(X)).max(axis=(1, 2))
+    apart = np.abs(border).max(axis=(1, 2)) / np.maximum(largest, 1e-5 * largest[0])
+    return np.maximum(left_over, apart)
 
 
 def truncation(pencil: Pencil, e: Expansion, span: Floats, h: float) -> float:
@@ -107,15 +109,3 @@ def derivative(at: Callable[[Floats], Floats], along: Floats, centre: Floats) ->
     if (a == b).all():
         return richardson(lambda h: (even(h, a) - 2 * centre) / (2 * h**2), 1.0)
     return richardson(lambda h: (even(h, a + b) - even(h, a - b)) / (4 * h**2), 1.0)
-
-
-def treat_as_large(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every dense limit of the modal package to nothing, wherever it has been imported to."""
-    limited = [
-        module
-        for name, module in list(sys.modules.items())
-        if name.startswith("eigassign.modal.") and hasattr(module, "DENSE_LIMIT")
-    ]
-    assert {solver, coefficients} <= set(limited)
-    for module in limited:
-        monkeypatch.setattr(module, "DENSE_LIMIT", 0)

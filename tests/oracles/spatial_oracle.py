@@ -232,11 +232,15 @@ def solve_pose(tree: Tree, q: Array) -> Pose:
     n = max(1, int(np.ceil(np.abs(q - start).max(initial=0.0) / 0.05)))
     for t in np.linspace(0.0, 1.0, n + 1):
         here = dict(zip(names, start + t * (q - start), strict=True))
-        p = newton(tree, here, passive, p)
+        p = newton(tree, here, passive, p, 1e-13 if t == 1.0 else 1e-3)
     return walk(tree, here, dict(zip(passive, p, strict=True)))
 
 
-def newton(tree: Tree, q: dict[str, float], passive: list[tuple[str, int]], p: Array) -> Array:
+def newton(
+    tree: Tree, q: dict[str, float], passive: list[tuple[str, int]], p: Array, close: float
+) -> Array:
+    """Passive coordinates from nearby p, until a step is shorter than ``close``."""
+
     def gap(p: Array) -> Array:
         return walk(tree, q, dict(zip(passive, p, strict=True))).gaps
 
@@ -244,9 +248,9 @@ def newton(tree: Tree, q: dict[str, float], passive: list[tuple[str, int]], p: A
         J = np.array([(gap(p + e) - gap(p - e)) / 2e-6 for e in 1e-6 * np.eye(len(p))]).T
         step = np.linalg.lstsq(J, -gap(p), rcond=1e-9)[0]
         p = p + np.clip(step, -0.3, 0.3)
-        if np.abs(step).max() < 1e-13:
+        if np.abs(step).max() < close:
             break
-    if np.abs(gap(p)).max() > 1e-10:
+    if np.abs(gap(p)).max() > max(1e-10, close):
         raise ValueError("the oracle cannot close the loops")
     return p
 

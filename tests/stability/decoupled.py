@@ -184,13 +184,16 @@ def _design(tree: Tree, rng: Random) -> dict[str, Tree]:
 
 
 def comb(
-    tines: int, bodies: tuple[int, ...] | None = None, densities: tuple[int, ...] = ()
+    tines: int,
+    bodies: tuple[int, ...] | None = None,
+    densities: tuple[int, ...] = (),
+    elements: int = 3,
 ) -> Model:
     """Cantilevers of 0.25 m / 1.06^k; masses at the tips ``bodies`` (the last), then densities."""
     tree = _empty()
     m = tree["mechanism"]
     for k in range(tines):
-        _bar(tree, f"t{k}", 0.25 / 1.06**k, 0.004, 3)
+        _bar(tree, f"t{k}", 0.25 / 1.06**k, 0.004, elements)
         _fix(tree, f"t{k}", "ground", 0.0)
     paths = [f"materials.t{k}.density" for k in densities]
     for k in reversed(bodies if bodies is not None else (tines - 1,)):

@@ -23,6 +23,7 @@ from eigassign.series.multi_index import LowerSet, on_faces
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+DENSE_LIMIT = 220  # n_dof up to which matrices are kept dense (benchmarks/dense_or_sparse.py)
 STACK_LIMIT = 500_000  # numbers: 4 MB
 TINY_STACK = 20_000
 MANY = 200  # coefficients from which it pays to know which of them are zero
@@ -82,6 +83,12 @@ class Pencil(Brief):
     n_loads: int = 0
     rails: TravelRanges | None = None  # where carriages and nuts may stand
     limits: PossibleValues | None = None  # of the loads and design parameters
+    dense_limit: int = DENSE_LIMIT
+
+    @property
+    def is_dense(self) -> bool:
+        """True where matrices of all unknowns are kept dense; else algebra is sparse."""
+        return self.n_dof <= self.dense_limit
 
     @property
     def n_joints(self) -> int:
@@ -106,7 +113,7 @@ class Pencil(Brief):
     @cached_property
     def term_stacks(self) -> Floats | None:
         """All K_j and M_j dense, as (row, 2, n_theta, column), where that is small."""
-        if self.n_theta * self.n_dof**2 > STACK_LIMIT:
+        if not self.is_dense or self.n_theta * self.n_dof**2 > STACK_LIMIT:
             return None
         dense = self._pair(np.stack([self.stiffness.toarray(), self.mass.toarray()]))
         return np.ascontiguousarray(dense.transpose(2, 0, 1, 3))
@@ -213,7 +220,7 @@ class Pencil(Brief):
     @cached_property
     def _stack(self) -> Floats | None:
         """All K_j and M_j dense, (2, n_theta, n_dof²), where products with zeros cost nothing."""
-        if self.n_theta * self.n_dof**2 > TINY_STACK:
+        if not self.is_dense or self.n_theta * self.n_dof**2 > TINY_STACK:
             return None
         dense = self._pair(np.stack([self.stiffness.toarray(), self.mass.toarray()]))
         return dense.reshape(2, self.n_theta, -1)

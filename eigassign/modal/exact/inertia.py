@@ -30,7 +30,7 @@ from scipy.linalg import lapack
 from eigassign.errors import MechanismError, UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.sparse_factor import factorise
-from eigassign.modal.arguments import DENSE_LIMIT, chunks
+from eigassign.modal.arguments import chunks
 from eigassign.modal.exact.condensation import NO_MASS
 from eigassign.modal.exact.sparse import principal
 
@@ -72,7 +72,7 @@ def count_below(pencil: Pencil, x: Floats, hz: ArrayLike) -> Ints:
 def _counted(pencil: Pencil, theta: Floats, hz: Floats) -> Ints:
     """The counts (n_samples, k) below hz (n_samples, k) at θ (n_theta, n_samples)."""
     sigma = (2.0 * np.pi * hz) ** 2
-    if pencil.n_dof > DENSE_LIMIT:
+    if not pencil.is_dense:
         return np.array(
             [[_sparse(pencil, t, s) for s in row] for t, row in zip(theta.T, sigma, strict=True)],
             dtype=np.intp,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from eigassign.errors import MissingMassError, UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.arguments import DENSE_LIMIT, whole
+from eigassign.modal.arguments import whole
 from eigassign.modal.exact.condensation import Modes
 from eigassign.modal.exact.dense import solve_dense
 from eigassign.modal.exact.substructure import solve_large
@@ -48,7 +48,7 @@ def _solve(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
         raise UsageError(f"{count} modes asked for; the model has 1 to {elastic} elastic ones")
     if not np.isfinite(theta).all():
         raise UsageError("q or y is not finite, or outside the domain of a section or length")
-    if pencil.n_dof <= DENSE_LIMIT or 2 * count > elastic:  # Lanczos is for few modes of many
+    if pencil.is_dense or 2 * count > elastic:  # Lanczos is for few modes of many
         return solve_dense(pencil, theta, count, vectors)
     return solve_large(pencil, theta, count, vectors)
 

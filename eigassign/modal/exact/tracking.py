@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from eigassign.brief import Brief
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.arguments import DENSE_LIMIT, chunks, mode_numbers
+from eigassign.modal.arguments import chunks, mode_numbers
 from eigassign.modal.exact.condensation import Modes, block
 from eigassign.modal.exact.solver import eigenvalues, lowest_modes
 
@@ -143,11 +143,11 @@ def links(pencil: Pencil, x: Floats, before: Floats, after: Floats) -> tuple[Flo
     M is that at x (n, n_x), M_c the same without the rigid motion that shapes contain there.
     """
     theta = pencil.theta(x)
-    dense = pencil.n_dof <= DENSE_LIMIT
     across = np.empty((len(x), after.shape[2], before.shape[2]))
     sizes = np.empty((len(x), before.shape[2], before.shape[2]))
-    for at in chunks(np.arange(len(x)), pencil.n_dof**2) if dense else np.arange(len(x))[:, None]:
-        if dense:
+    every = np.arange(len(x))
+    for at in chunks(every, pencil.n_dof**2) if pencil.is_dense else every[:, None]:
+        if pencil.is_dense:
             M = pencil.mass_matrices(theta[:, at])
             product, M_FF = M @ before[at], block(M, pencil.rigid, pencil.rigid)
         else:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from eigassign.errors import AccuracyError, MissingMassError, UsageError
 from eigassign.interpolation.newton import Interpolant
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.arguments import DENSE_LIMIT, mode_numbers, shown_numbers
+from eigassign.modal.arguments import mode_numbers, shown_numbers
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.exact.solver import eigenvalues
 from eigassign.modal.expansion import Expansion, InverseExpansion
@@ -44,7 +44,7 @@ def own_error(
 
 def fine(model: Model) -> float:
     """Accuracy below which the round-off of exact solves is looked at."""
-    return FINE if model.n_dof <= DENSE_LIMIT else FINE_LARGE
+    return FINE if model.pencil.is_dense else FINE_LARGE
 
 
 def dependence(source: Any) -> tuple[Floats, int]:

@@ -29,7 +29,6 @@ from scipy.sparse import linalg
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.exact.condensation import rigid_coupling
 from eigassign.modal.exact.sparse import block
-from eigassign.modal.reduced.residual import UNIT_LIMIT
 from eigassign.series.algebra import Samples
 
 Floats = NDArray[np.float64]
@@ -81,9 +80,8 @@ def added_mass(
     depends = np.vstack([np.zeros(len(pencil.shift), dtype=bool), pencil.program.dependence])
     sizes = np.diff(terms.indptr)
     changed = np.flatnonzero(depends[:, n:].any(axis=1) & (sizes > 0))
-    small = len(pencil.elastic) <= UNIT_LIMIT
     rows = {t: np.unique(pencil.rows[_entries(terms, t)]) for t in changed.tolist()}
-    wide = np.array([not small and len(rows[t]) > WIDE for t in rows], dtype=bool)
+    wide = np.array([not pencil.is_dense and len(rows[t]) > WIDE for t in rows], dtype=bool)
     scaled = changed[wide & ~depends[changed, :n].any(axis=1)]
     dofs = np.unique(np.concatenate([[], *(rows[t] for t in changed[~wide].tolist())])).astype(
         np.intp

@@ -33,7 +33,6 @@ from eigassign.modal.reduced.basis import INDEFINITE
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Coordinates = tuple[Ints, Floats]  # which columns of A (c,), and how much of them (c, k)
-UNIT_LIMIT = 300  # elastic dofs up to which A is the identity
 MOST_JOINT_ROWS = 200  # rows J up to which the correction for turned joints is made
 FLOOR = 1e-6  # part of ρᵀK0⁻¹ρ that is kept whatever the correction says: its own round-off
 
@@ -116,7 +115,7 @@ def residual_terms(
     stiff = _blocks(pencil, pencil.by_term[0], np.ascontiguousarray(wide[:, :k]))
     heavy = _blocks(pencil, pencil.by_term[1], wide)
     k_terms, m_terms = (np.array([b.theta for b in some], np.intp) for some in (stiff, heavy))
-    if n <= UNIT_LIMIT:
+    if pencil.is_dense:  # A is the identity
         try:
             L = np.asarray(np.linalg.cholesky(K0.toarray()), dtype=np.float64)
         except np.linalg.LinAlgError as error:

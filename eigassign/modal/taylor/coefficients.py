@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.modal.taylor.bordered import Solve, add_product, factor_dense, factor_sparse
 from eigassign.series.multi_index import LowerSet, first_of_each
 
@@ -49,7 +48,7 @@ class PencilSeries(Protocol):
 
 def pencil_series(pencil: Pencil, theta: Floats, space: LowerSet) -> PencilSeries:
     """The pencil's coefficients over ``space`` from θ's own (n_theta, N)."""
-    if pencil.n_dof > DENSE_LIMIT:
+    if not pencil.is_dense:
         return _sparse_series(pencil, theta, space)
     stored = np.flatnonzero(theta.any(axis=0))  # θ_0 = 1: position 0 is always there
     both = zip(pencil.matrices(theta[:, stored]), pencil.by_term, strict=True)

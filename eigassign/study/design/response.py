@@ -19,7 +19,6 @@ from numpy.typing import ArrayLike, NDArray
 from eigassign.assignment.exact.requirements import Frequencies
 from eigassign.errors import AccuracyError, EigassignError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.modal.exact.condensation import Modes
 from eigassign.modal.model import Model
 from eigassign.modal.reduced.model import ReducedModel
@@ -204,5 +203,5 @@ class ReducedResponse:
 
 def reduced_models(scene: Scene) -> ReducedModels | None:
     """For models of which exact solves are dear; None for others."""
-    large = scene.model.n_dof > DENSE_LIMIT
+    large = not scene.model.pencil.is_dense
     return ReducedModels(scene.model, scene.path) if large else None

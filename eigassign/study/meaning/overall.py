@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from eigassign.assignment.exact.design_problem import MET, Appraisal
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.errors import EigassignError
-from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.study.design.answer import Answer, active_rows
 from eigassign.study.design.followed import Solved
 from eigassign.study.design.optimum import Found, Task, variant_of
@@ -52,7 +51,7 @@ def study_meaning(
     """
     missed = any(misses(w, exact, max_error) for w in wanted)
     # two exact solves a pose are cheap for small models, even where nothing is missed
-    small = scene.model.n_dof <= DENSE_LIMIT
+    small = scene.model.pencil.is_dense
     asked_for = studies is Studies.ALL or (studies is Studies.CHEAP and small)
     ranges = proved_ranges(scene) if missed or asked_for else None
     beyond = tuple(unreachable(scene, wanted, answer.y, exact, max_error, ranges))

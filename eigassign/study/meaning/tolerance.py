@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import AccuracyError
-from eigassign.modal.arguments import DENSE_LIMIT
 from eigassign.modal.reduced.reduce import reduce
 from eigassign.study.design.followed import Follower, Solved, followers, solve_design
 from eigassign.study.design.judgement import curve_range, errors_of, worst_errors
@@ -58,10 +57,12 @@ def study_tolerance(
 
         points = qmc.Sobol(len(drawn), seed=0).random_base2(DRAWS.bit_length() - 1)
         designs[:, drawn] = lower[drawn] + points * (upper - lower)[drawn]
-        if scene.model.n_dof > DENSE_LIMIT:
+        pencil = scene.model.pencil
+        if not pencil.is_dense:
             if own:
                 raise AccuracyError(
-                    f"modes of more than {DENSE_LIMIT} unknowns are not followed through tolerances"
+                    f"modes of more than {pencil.dense_limit} unknowns are not followed through "
+                    "tolerances"
                 )
             ranges = reduced_ranges(scene, y, exact.hz.shape[1])
     lowest, highest = exact, exact

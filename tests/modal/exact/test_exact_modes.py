@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 from chains import bar, model_of, random_chain, two_link
-from large import HELD, Q0, Y0, arm
+from large import HELD, Q0, Y0, arm, large_model
 
 from eigassign.errors import UsageError
-from eigassign.modal import Model, block, principal, rounding_error, solve_single
-from eigassign.modal.exact import dense, solver
+from eigassign.modal import Model, block, modes, principal, rounding_error, solve_single
 
 POSES = np.array([[0.3, 1.9], [1.0, 0.2], [-2.0, 0.5]])
 DESIGN = np.array([[0.0, 0.1], [0.2, 0.0], [0.25, 0.25]])
@@ -32,8 +31,9 @@ def certify(model: Model, q: np.ndarray, y: np.ndarray, f: np.ndarray, phi: np.n
     assert (np.diff(f) > 0).all()
 
 
-def test_dense_modes_are_modes() -> None:
-    model = model_of(two_link())
+@pytest.mark.parametrize("limit", [10**6, 0], ids=["dense", "sparse"])
+def test_modes_are_modes(limit: int) -> None:
+    model = large_model(model_of(two_link()), limit)
     f, phi = model.modes(POSES, DESIGN, 6)
     for k in range(3):
         certify(model, POSES[k], DESIGN[k], f[k], phi[k])
@@ -44,58 +44,52 @@ def test_dense_modes_are_modes() -> None:
     "drives", [("free", "free"), ("locked", {"stiffness": 3e3}), ("free", {"stiffness": 3e3})]
 )
 def test_how_many_are_solved_at_once_does_not_show(
-    drives: tuple[object, object], monkeypatch: pytest.MonkeyPatch
+    drives: tuple[object, object],
 ) -> None:
-    """One by one, in parts and all at once; designs at one pose, which share K, and poses."""
+    """One by one, some and in parts of many; designs at one pose, which share K, and poses."""
     model = model_of(two_link(drives=drives))
     for q, y in ((POSES, DESIGN), (POSES[:1], DESIGN)):
         x = model.x(q, y)
         alone = np.vstack([model.frequencies(row[:2], row[2:], 6) for row in x])
         shapes = np.vstack([model.modes(row[:2], row[2:], 6)[1] for row in x])
-        for numbers, at_once in ((dense.NUMBERS, 2048), (1, 2)):
-            monkeypatch.setattr(dense, "NUMBERS", numbers)
-            monkeypatch.setattr("eigassign.modal.arguments.CHUNK", at_once)
-            f, phi = model.modes(q, y, 6)
-            np.testing.assert_allclose(model.frequencies(q, y, 6), alone, rtol=1e-12)
-            np.testing.assert_allclose(f, alone, rtol=1e-12)
-            np.testing.assert_allclose(phi, shapes, atol=1e-9 * np.abs(shapes).max())
-
-
-def test_sparse_modes_are_modes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(solver, "DENSE_LIMIT", 0)
-    model = model_of(two_link())
-    f, phi = model.modes(POSES, DESIGN, 6)
-    for k in range(3):
-        certify(model, POSES[k], DESIGN[k], f[k], phi[k])
+        for times in (1, 25):  # of 75 samples some 50 are solved at once
+            many = np.tile(x, (times, 1))
+            f, phi = model.modes(many[:, :2], many[:, 2:], 6)
+            expected = np.tile(alone, (times, 1))
+            np.testing.assert_allclose(
+                model.frequencies(many[:, :2], many[:, 2:], 6), expected, rtol=1e-12
+            )
+            np.testing.assert_allclose(f, expected, rtol=1e-12)
+            np.testing.assert_allclose(
+                phi, np.tile(shapes, (times, 1, 1)), atol=1e-9 * np.abs(shapes).max()
+            )
 
 
 @pytest.mark.parametrize("drives", [("free", "free"), ("locked", {"stiffness": 3e3})])
-def test_dense_and_sparse_solvers_agree(
-    drives: tuple[object, object], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_dense_and_sparse_solvers_agree(drives: tuple[object, object]) -> None:
     model = model_of(two_link((12, 9), drives=drives))
     f, phi = model.modes(POSES, DESIGN, 5)
-    monkeypatch.setattr(solver, "DENSE_LIMIT", 0)
+    model = large_model(model)
     found, vectors = model.modes(POSES, DESIGN, 5)
     np.testing.assert_allclose(found, f, rtol=1e-10)
     np.testing.assert_allclose(vectors, phi, atol=1e-7 * np.abs(phi).max())
     np.testing.assert_array_equal(model.modes(POSES, DESIGN, 5)[1], vectors)  # no random start
 
 
-def test_a_chain_of_300_unknowns_agrees_in_both_solvers(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_chain_of_300_unknowns_agrees_in_both_solvers() -> None:
     model = model_of(two_link((56, 44)))
-    assert model.n_dof > solver.DENSE_LIMIT
+    assert not model.pencil.is_dense
     f = model.frequencies(POSES[0], DESIGN[0], 4)
-    monkeypatch.setattr(solver, "DENSE_LIMIT", 10_000)
+    dense = large_model(model, 10_000)
     # round-off in K itself: 1e-16 × (elements)⁴
-    np.testing.assert_allclose(f, model.frequencies(POSES[0], DESIGN[0], 4), rtol=1e-8)
+    np.testing.assert_allclose(f, dense.frequencies(POSES[0], DESIGN[0], 4), rtol=1e-8)
 
 
-def test_all_modes_of_a_large_model_can_be_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_modes_of_a_large_model_can_be_asked_for() -> None:
     model = model_of(two_link())
     f = model.frequencies(POSES, DESIGN, 21)
-    monkeypatch.setattr(solver, "DENSE_LIMIT", 0)
-    np.testing.assert_allclose(model.frequencies(POSES, DESIGN, 21), f, rtol=1e-9)
+    thin = large_model(model)
+    np.testing.assert_allclose(thin.frequencies(POSES, DESIGN, 21), f, rtol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(0, 60, 5))
@@ -257,7 +251,7 @@ def test_one_sample_has_the_modes_of_the_batch(
 ) -> None:
     model = arm(drives, elements)
     x = model.x(np.tile(Q0, (2, 1)), np.tile(Y0, (2, 1)))
-    batch = solver.modes(model.pencil, x, 4)
+    batch = modes(model.pencil, x, 4)
     lam, phi = solve_single(model.pencil, model.pencil.theta(x[:1]), 4)
     np.testing.assert_allclose(lam, batch.lam[0], rtol=1e-10)
     np.testing.assert_allclose(phi, batch.phi[0], atol=1e-7 * np.abs(phi).max())

@@ -11,14 +11,19 @@ from pencils import crossing
 
 from eigassign.errors import AccuracyError
 from eigassign.mechanism import Pencil, factorise
-from eigassign.modal import add_product, factor_dense, factor_sparse, with_partial_pivoting
-from eigassign.modal.exact import solver
+from eigassign.modal import (
+    add_product,
+    factor_dense,
+    factor_sparse,
+    modes,
+    with_partial_pivoting,
+)
 
 
 def mode_system(pencil: Pencil, x0: np.ndarray, mode: int) -> tuple[np.ndarray, ...]:
     """Non-zeros of K0 − λM0, the border M0 φ0 and φ0 as rows."""
     theta = pencil.theta(x0[None])
-    found = solver.modes(pencil, x0[None], mode)
+    found = modes(pencil, x0[None], mode)
     lam, phi = found.lam[0, -1], found.phi[0][:, -1]
     data = (pencil.stiffness - lam * pencil.mass) @ theta[:, 0]
     border = pencil.sparse(pencil.mass @ theta[:, 0]) @ phi
@@ -67,7 +72,7 @@ def test_a_double_mode_with_half_its_border_is_refused() -> None:
     pencil = crossing(0.0)
     x0 = np.zeros(2)
     theta = pencil.theta(x0[None])
-    found = solver.modes(pencil, x0[None], 2)
+    found = modes(pencil, x0[None], 2)
     assert found.lam[0, 1] == pytest.approx(found.lam[0, 0], rel=1e-12)
     data = (pencil.stiffness - found.lam[0, 0] * pencil.mass) @ theta[:, 0]
     M = pencil.sparse(pencil.mass @ theta[:, 0])

@@ -9,6 +9,7 @@ from rungs import residual, slope
 from wide_draws import FAMILIES
 
 from eigassign.errors import EigassignError
+from eigassign.mechanism import Pencil
 from eigassign.modal import Expansion, expand, rounding_error
 
 EVERY = {"planar trees": draw, **FAMILIES}
@@ -19,7 +20,7 @@ def climb(family: str, seed: int) -> list[float]:
     """Slopes beyond order + 1; that none falls short, and the residual, are asserted on the way.
 
     There is none where no variable matters, and where modes lie so close that they are expanded
-    together: λ_1 is then no polynomial, and clusters have a ladder of their own in test_expansion.
+    together: λ_1 is then no polynomial, and clusters have a ladder of their own in test_clusters.
     """
     drawn = EVERY[family](seed, 1)
     if drawn is None or not drawn.model.pencil.active.any():
@@ -44,7 +45,7 @@ def scaled(drawn: Drawn) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([drawn.q0, drawn.y0]), span
 
 
-def apart(pencil, e: Expansion, span: np.ndarray, floor: float) -> float | None:  # type: ignore[no-untyped-def]
+def apart(pencil: Pencil, e: Expansion, span: np.ndarray, floor: float) -> float | None:
     if e.clusters[0].modes != (1,):
         return None
     for share in (1.0, 0.1, 0.01):  # as much of the box as can be posed
