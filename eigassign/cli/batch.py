@@ -246,8 +246,9 @@ def _tell(batch: Batch, workers: Workers, reporter: Reporter) -> int:
     """List the cases that would run, and say about how long, in how much memory and files."""
     from eigassign.batch.progress import outcomes_in
     from eigassign.batch.runner import require_valid
-    from eigassign.output.console import print_table
+    from eigassign.output.console import print_tables
     from eigassign.output.formats import duration
+    from eigassign.output.tables import Table
 
     require_valid(batch, workers, reporter.stage)
     spent = {found.index: found.seconds for found in outcomes_in(batch)}
@@ -258,7 +259,7 @@ def _tell(batch: Batch, workers: Workers, reporter: Reporter) -> int:
         rows.append(("…", f"{len(todo) - _FIRST - _LAST} more"))
     rows += [(str(index + 1), batch.plan[index].name) for index in last]
     if rows:
-        print_table("Cases that would run", ("case", "name"), rows)
+        print_tables([Table("Cases that would run", ("case", "name"), tuple(rows))])
     show(f"{_cases(len(todo))} would run, {len(spent)} are done and current")
     if not rows:
         return 0

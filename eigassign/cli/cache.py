@@ -40,17 +40,18 @@ def cache_clear(cache_dir: Path | None) -> int:
 @arguments.cache_dir
 def cache_list(cache_dir: Path | None) -> int:
     """List what is in the cache, oldest first."""
-    from eigassign.output.console import print_table
+    from eigassign.output.console import print_tables
+    from eigassign.output.tables import Table
 
-    rows = [
+    rows = tuple(
         (
             entry.key[:12],
             f"{entry.size_bytes / 1000:.1f}",
             "; ".join(f"{k} {v}" for k, v in entry.meta.items()) if entry.intact else "damaged",
         )
         for entry in _cache(cache_dir).entries()
-    ]
-    print_table("", ("key", "kB", "what"), rows)
+    )
+    print_tables([Table("", ("key", "kB", "what"), rows)])
     return 0
 
 

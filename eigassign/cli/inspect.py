@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -69,11 +68,11 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
     if as_json:
         print_json(answers)
     else:
-        from eigassign.output import terminal
+        from eigassign.output import console
 
-        room = terminal.width(sys.stdout)
         for name, answer in answers.items():
-            show(*terminal.wrapped(map(printable, _described(name, answer)), room))
+            lines = map(printable, _described(name, answer))
+            show(*console.wrapped(lines, console.width()))
     return max(codes)
 
 
@@ -213,10 +212,11 @@ def _finite(error: float) -> float | None:
 
 
 def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
-    from eigassign.output.console import print_modes
+    from eigassign.output.console import print_tables
+    from eigassign.output.tables import modes_table
     from eigassign.study.accuracy import rounding_line
 
-    print_modes(
+    found = modes_table(
         answer.frequencies_hz,
         rigid_modes=answer.rigid_modes,
         where=answer.where,
@@ -224,6 +224,7 @@ def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:
         truncation=answer.truncation_error,
         note=rounding_line(answer.round_off),
     )
+    print_tables([found])
     if folder is not None:
         show(f"{folder} written")
 

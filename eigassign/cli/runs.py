@@ -235,10 +235,10 @@ def validate(
     if as_json:
         print_json([*rows, *failures, *(since.moves if since else ())])
     else:
-        from eigassign.output.console import print_tables, print_validation
+        from eigassign.output.console import print_tables
+        from eigassign.output.tables import validation_table
 
-        if rows:
-            print_validation(rows)
+        print_tables([validation_table(rows)] if rows else ())
         print_tables([moved] if moved else ())
     return max(codes)
 

@@ -7,7 +7,6 @@ In reading order; each imports from those above it only:
     exchange      a reduced model in files: HDF5, NumPy, MATLAB, C99
     result_files  results.json and the CSV files
     tables        the tables of a run as text
-    terminal      the widths of tables that fit a terminal
     console       results on stdout, progress on stderr
     pages         HTML pages from their templates
     batch         what a batch leaves: summaries, junit.xml, columns, index.html
@@ -43,6 +42,7 @@ __all__, __getattr__, __dir__ = face(
         "result_files": "dumps frequencies_csv results_document sample_files to_json",
         "store.run_record": "MARKER RunStatus changes read_record run_status",
         "store.atomic": "lock replace_synced",
-        "tables": "Table headline",
+        "console": "print_assignment print_tables print_verdict progress wrapped",
+        "tables": "Table headline modes_table run_tables validation_table",
     },
 )

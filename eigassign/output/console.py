@@ -4,187 +4,168 @@ from __future__ import annotations
 
 import contextlib
 import io
-import math
+import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from typing import TextIO
 
 from rich import box
+from rich.cells import cell_len
 from rich.console import Console
 from rich.markdown import Markdown
-from rich.table import Table as RichTable
+from rich.table import Table as Drawn
 from rich.text import Text
 
 from eigassign import process
 from eigassign.files import printable
-from eigassign.output import tables as summary
-from eigassign.output import terminal
-from eigassign.study.results import RunResults, ValidationRow
+from eigassign.output.tables import Table, headline, run_tables
+from eigassign.study.results import RunResults
 
-_PAGE = 100  # columns: longer lines are hard to read
+_GAP = 2  # columns that rich leaves between two columns of a table
 _COLOURS = {
     "green": {"reached", "met", "ok", "proved", "fitted"},
     "yellow": {"improved", "unfinished"},
     "red": {
-        "unreachable",
-        "infeasible",
-        "do not use",
-        "violated",
-        "failed",
-        "no",
-        "error",
-        "poor_fit",
-        "not_identified",
+        *("unreachable", "infeasible", "do not use", "violated", "failed", "no", "error"),
+        *("poor_fit", "not_identified"),
     },
 }
 
 
-def print_table(
-    title: str,
-    columns: Sequence[str],
-    rows: Sequence[Sequence[str]],
-    *,
-    caption: str = "",
-    stream: TextIO | None = None,
-) -> None:
-    """A table of finished text; none of it is read as markup.
+def width() -> int:
+    """Columns: those of COLUMNS, else of the terminal; without either lines have no end."""
+    return shutil.get_terminal_size((100_000, 0)).columns
 
-    Where it is wider than the terminal, lines end between words, long words (paths) are shortened
-    in the middle, and columns that still find no room follow in a table below, behind the first.
-    """
-    out = sys.stdout if stream is None else stream
-    width, unicode = terminal.width(out), _speaks_unicode(out)
-    cells = [[printable(cell) for cell in row] for row in rows]
-    every = [[row[k] for row in cells] for k in range(len(columns))]
-    console, text = _console(out, width)
-    if title:
-        console.print(Text(printable(title), style="bold"), soft_wrap=True)
-    for group in terminal.groups(columns, every, width) if columns else ():
-        table = RichTable(
-            box=box.SIMPLE_HEAD if unicode else box.ASCII2,
-            show_edge=False,
-            pad_edge=False,
-            collapse_padding=True,
+
+def wrapped(lines: Iterable[str], room: int) -> list[str]:
+    """Lines that end between words; what is continued is indented further than its beginning."""
+    text = []
+    for line in lines:
+        indent = " " * (len(line) - len(line.lstrip()) + 2)
+        wrapper = textwrap.TextWrapper(
+            room, subsequent_indent=indent, break_on_hyphens=False, break_long_words=False
         )
-        for k, room in group:
-            right = k > 0 and terminal.are_numbers(every[k])
-            header = terminal.fitted(columns[k], room, unicode)
-            table.add_column(Text(header), justify="right" if right else "left", width=room)
-        for row in cells:
-            fitted = (terminal.fitted(row[k], room, unicode) for k, room in group)
-            table.add_row(*(Text(cell, style=_colour(cell)) for cell in fitted))
-        console.print(table)
-    _write_paragraph(console, caption)
-    lines = [line.rstrip() for line in text.getvalue().splitlines()]
-    write_text(out, "\n".join(line for line in lines if line) + "\n\n")
+        text += wrapper.wrap(line) if len(line) > room else [line]
+    return text
 
 
-def _console(out: TextIO, width: int) -> tuple[Console, io.StringIO]:
-    """A console of rich that writes into a text, in colours where ``out`` shows them."""
-    text, colours = io.StringIO(), process.shows_colours(out)
-    console = Console(
-        file=text,
-        force_terminal=colours,
-        width=width,
-        color_system="standard" if colours else None,
-        markup=False,
-        highlight=False,
-        emoji=False,
-    )
-    return console, text
-
-
-def _write_paragraph(console: Console, text: str, style: str = "") -> None:
-    """Lines that end between words only; a word longer than the line is left to the terminal."""
-    for line in textwrap.wrap(
-        printable(text), console.width, break_long_words=False, break_on_hyphens=False
-    ):
-        console.print(Text(line, style=style), soft_wrap=True)
-
-
-def _colour(cell: str) -> str:
-    """Of a verdict; nothing else has one."""
-    word = cell.lower()
-    if word.startswith("violated by"):
-        return "red"
-    return next((colour for colour, words in _COLOURS.items() if word in words), "")
-
-
-def write_text(out: TextIO, text: str) -> None:
-    """Write ``text``; what the stream's encoding lacks becomes ``?`` instead of an error."""
-    encoding = out.encoding or "utf-8"
-    out.write(text.encode(encoding, "replace").decode(encoding))
-
-
-def _speaks_unicode(out: TextIO) -> bool:
-    return (out.encoding or "utf-8").lower().replace("-", "").startswith("utf")
+def markdown(text: str, out: TextIO) -> str:
+    """A page of the manual as ``out`` shows it, in lines of at most 100 columns."""
+    console = _console(out, min(width(), 100))
+    console.print(Markdown(text, hyperlinks=False))
+    return _written(console)
 
 
 def print_assignment(results: RunResults, *, stream: TextIO | None = None) -> None:
     """The verdict, then design, distances, limits, approximation and the solver's certificate."""
-    if (line := summary.headline(results)) is not None:
+    if (line := headline(results)) is not None:
         print_verdict(line, stream=stream)
-    print_tables((t for t in summary.tables(results) if t.title != "Timing"), stream=stream)
+    print_tables((t for t in run_tables(results) if t.title != "Timing"), stream=stream)
 
 
 def print_verdict(line: str, verdict: str = "", *, stream: TextIO | None = None) -> None:
     """The first sentence of a result, in the colour of its verdict, or of what it begins with."""
     out = sys.stdout if stream is None else stream
-    console, text = _console(out, terminal.width(out))
-    _write_paragraph(console, line, _colour(verdict or line.partition(":")[0]))
-    write_text(out, text.getvalue() + "\n")
+    console = _console(out, width())
+    _paragraph(console, line, _colour(verdict or line.partition(":")[0]))
+    out.write(f"{_written(console)}\n")
 
 
-def markdown(text: str, out: TextIO) -> str:
-    """A page of the manual as ``out`` shows it."""
-    console, made = _console(out, min(terminal.width(out), _PAGE))
-    console.print(Markdown(text, hyperlinks=False))
-    return made.getvalue()
+def print_tables(shown: Iterable[Table], *, stream: TextIO | None = None) -> None:
+    """Tables of finished text, one below the other; none of it is read as markup.
 
-
-def print_validation(rows: Sequence[ValidationRow], *, stream: TextIO | None = None) -> None:
-    """Both expansions against exact, one line a mode and place."""
-    print_tables([summary.validation(tuple(rows))], stream=stream)
-
-
-def print_tables(tables: Iterable[summary.Table], *, stream: TextIO | None = None) -> None:
-    """Tables of a run, a chart or a batch, one below the other."""
-    for table in tables:
-        print_table(table.title, table.columns, table.rows, caption=table.caption, stream=stream)
-
-
-def print_modes(
-    frequencies_hz: Sequence[float],
-    *,
-    rigid_modes: int,
-    where: str = "",
-    discretisation: Sequence[float] | None = None,
-    truncation: Sequence[float] | None = None,
-    note: str = "",
-    stream: TextIO | None = None,
-) -> None:
-    """Elastic modes in Hz from 1 upwards, where they were evaluated, and the rigid modes left out.
-
-    ``where`` is the pose and design in words; ``discretisation`` and ``truncation`` are how much
-    mesh and reduced links raise each frequency at most, relative; ``note`` is said below.
+    Where a table is wider than the terminal, text goes on in the next line, and columns that still
+    find no room follow in a table below, behind the first.
     """
-    caption = f"{rigid_modes} rigid-body mode{'s' if rigid_modes != 1 else ''} not counted."
-    caption += f" {note[:1].upper()}{note[1:]}." if note else ""
-    rows: list[tuple[str, ...]] = [
-        (str(mode), f"{hz:.10g}") for mode, hz in enumerate(frequencies_hz, start=1)
-    ]
-    columns: tuple[str, ...] = ("mode", "frequency [Hz]")
-    for cause, errors in (("mesh", discretisation), ("reduced links", truncation)):
-        if errors is not None:
-            columns = (*columns, f"{cause}: too high by at most")
-            rows = [(*row, _bounded(e)) for row, e in zip(rows, errors, strict=True)]
-    title = f"Modes at {where}" if where else "Modes"
-    print_table(title, columns, rows, caption=caption, stream=stream)
+    out = sys.stdout if stream is None else stream
+    for table in shown:
+        console = _console(out, width())
+        if table.title:
+            console.print(Text(printable(table.title), style="bold"), soft_wrap=True)
+        for part in _parts(table, console.width):
+            console.print(part)
+        if table.caption:
+            _paragraph(console, table.caption)
+        out.write(f"{_written(console)}\n")
 
 
-def _bounded(error: float) -> str:
-    return f"{100 * error:.2g} %" if math.isfinite(error) else "cannot be bounded"
+def _parts(table: Table, room: int) -> Iterator[Drawn]:
+    """The columns of a table in groups that fit side by side, each behind those that name the rows.
+
+    The first column names the rows, or the first two where it alone does not tell them apart.
+    Numbers are always whole; text may be narrowed to a third of the room, or, where that does not
+    bring all columns side by side, to half of it.
+    """
+    rows = [[printable(cell) for cell in row] for row in table.rows]
+    cells = [[row[k] for row in rows] for k in range(len(table.columns))]
+    longest = [max(map(cell_len, column), default=1) for column in cells]
+    least: list[int] = []
+    for narrow in (room // 3, room // 2):
+        least = [
+            max(wide if number else min(wide, narrow), *map(cell_len, header.split()), 1)
+            for header, wide, number in zip(table.columns, longest, table.numeric, strict=True)
+        ]
+        if sum(least) + _GAP * (len(least) - 1) <= room:
+            break
+    names = [0] if len(set(cells[0] if cells else ())) == len(rows) else [0, 1]
+    groups = [names[: len(cells)]] if cells else []
+    for k in range(len(names), len(cells)):
+        together = [*groups[-1], k]
+        fits = sum(least[j] + _GAP for j in together) - _GAP <= room
+        if fits or groups[-1] == names:
+            groups[-1] = together
+        else:
+            groups.append([*names, k])
+    for group in groups:
+        wide = sum(max(longest[k], cell_len(table.columns[k])) + _GAP for k in group) - _GAP > room
+        drawn = Drawn(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, collapse_padding=True)
+        for k in group:
+            drawn.add_column(
+                Text(table.columns[k]),
+                justify="right" if k and table.numeric[k] else "left",
+                width=least[k] if wide and table.numeric[k] else None,
+                overflow="fold",
+            )
+        for row in rows:
+            drawn.add_row(*(Text(row[k], style=_colour(row[k])) for k in group))
+        yield drawn
+
+
+def _console(out: TextIO, columns: int) -> Console:
+    """A console of rich that writes into memory as ``out`` would show it: colours, character set.
+
+    What its character set lacks becomes ``?`` instead of an error.
+    """
+    colours = process.shows_colours(out)
+    return Console(
+        file=io.TextIOWrapper(io.BytesIO(), out.encoding or "utf-8", "replace", newline="\n"),
+        force_terminal=colours,
+        width=columns,
+        color_system="standard" if colours else None,
+        markup=False,
+        highlight=False,
+        emoji=False,
+    )
+
+
+def _written(console: Console) -> str:
+    """What the console holds, without blanks at the ends of lines."""
+    console.file.seek(0)
+    return "".join(f"{line.rstrip()}\n" for line in console.file)
+
+
+def _paragraph(console: Console, text: str, style: str = "") -> None:
+    """Lines that end between words only; a word longer than the line is left to the terminal."""
+    console.print(Text(printable(text), style=style, overflow="ignore"), crop=False)
+
+
+def _colour(cell: str) -> str:
+    """The colour of a verdict; nothing else has one."""
+    word = cell.lower()
+    if word.startswith("violated by"):
+        return "red"
+    return next((colour for colour, words in _COLOURS.items() if word in words), "")
 
 
 @contextlib.contextmanager
@@ -196,20 +177,19 @@ def progress(
     On a terminal one line is rewritten; elsewhere every piece gets a line of its own.
     """
     out = sys.stderr if stream is None else stream
-    rewrites, done = out.isatty(), 0
+    encoding, rewrites, done = out.encoding or "utf-8", out.isatty(), 0
 
     def advance(what: str = "") -> None:
         nonlocal done
         done += 1
         line = printable(f"{label} {done}/{total} {what}".rstrip())
-        write_text(
-            out, f"\r\x1b[2K{line[: min(terminal.width(out), 80) - 1]}" if rewrites else f"{line}\n"
-        )
+        line = line.encode(encoding, "replace").decode(encoding)
+        out.write(f"\r\x1b[2K{line[: min(width(), 80) - 1]}" if rewrites else f"{line}\n")
         out.flush()
 
     try:
         yield advance
     finally:
         if rewrites and done:
-            write_text(out, "\r\x1b[2K")
+            out.write("\r\x1b[2K")
             out.flush()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,8 +44,22 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     caption: str = ""
 
+    @property
+    def numeric(self) -> tuple[bool, ...]:
+        """True for each column of numbers, whatever their unit; empty cells do not count."""
+        cells = ([row[k] for row in self.rows if row[k]] for k in range(len(self.columns)))
+        return tuple(bool(column) and all(map(_is_number, column)) for column in cells)
 
-def tables(results: RunResults) -> tuple[Table, ...]:
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell.removesuffix("ms").rstrip("s% "))
+    except ValueError:
+        return False
+    return True
+
+
+def run_tables(results: RunResults) -> tuple[Table, ...]:
     """Design, distances, limits, local optima, what the answer means, approximation, solver, time.
 
     Those that there is something to show in.
@@ -376,27 +391,43 @@ def timing(results: RunResults) -> Table:
     return Table("Timing", ("stage", "time"), rows)
 
 
-def validation(rows: tuple[ValidationRow, ...]) -> Table:
+def validation_table(rows: Sequence[ValidationRow]) -> Table:
     """Both expansions against exact, and whether the full one is within the case's tolerance."""
-    columns = (
-        "case",
-        "mode",
-        "where",
-        "points",
-        "order",
-        "Taylor",
-        "linearised in y",
-        "limit",
-        "verdict",
-    )
-    return Table(
-        "Validation",
-        columns,
-        tuple(
-            (row.case, str(row.mode), row.where, str(row.points), str(row.order),
-             percent(row.worst_taylor), percent(row.worst_linearised), percent(row.limit),
-             "ok" if row.passed else "FAILED")
-            for row in rows
-        ),
-        "Worst relative error in Hz.",
+    columns = ("case", "mode", "where", "points", "order", "Taylor", "linearised in y", "limit",
+               "verdict")  # fmt: skip
+    shown = tuple(
+        (row.case, str(row.mode), row.where, str(row.points), str(row.order),
+         percent(row.worst_taylor), percent(row.worst_linearised), percent(row.limit),
+         "ok" if row.passed else "FAILED")
+        for row in rows
     )  # fmt: skip
+    return Table("Validation", columns, shown, "Worst relative error in Hz.")
+
+
+def modes_table(
+    frequencies_hz: Sequence[float],
+    *,
+    rigid_modes: int,
+    where: str,
+    discretisation: Sequence[float] | None = None,
+    truncation: Sequence[float] | None = None,
+    note: str = "",
+) -> Table:
+    """Elastic modes in Hz from 1 upwards, where they were evaluated, and the rigid modes left out.
+
+    ``where`` is the pose and design in words; ``discretisation`` and ``truncation`` are how much
+    mesh and reduced links raise each frequency at most, relative; ``note`` is said below.
+    """
+    columns = {
+        "mode": [str(mode) for mode, _ in enumerate(frequencies_hz, start=1)],
+        "frequency [Hz]": [f"{hz:.10g}" for hz in frequencies_hz],
+    }
+    for cause, errors in (("mesh", discretisation), ("reduced links", truncation)):
+        if errors is not None:
+            columns[f"{cause}: too high by at most"] = [
+                f"{100 * e:.2g} %" if math.isfinite(e) else "cannot be bounded" for e in errors
+            ]
+    caption = f"{rigid_modes} rigid-body mode{'s' if rigid_modes != 1 else ''} not counted."
+    caption += f" {capital(note)}." if note else ""
+    rows = tuple(zip(*columns.values(), strict=True))
+    return Table(f"Modes at {where}", tuple(columns), rows, caption)

@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 from synthetic_results import make_results, studied
 
-from eigassign.output import Curve, Graph, Look, Panel, Shade, run_figures, write_run
+from eigassign.output import Curve, Graph, Look, Panel, Shade, run_figures, run_tables, write_run
 from eigassign.output.figures import screen
 from eigassign.output.reports import page as report
-from eigassign.output.tables import tables
 
 VOID = {"meta", "img", "br", "link", "input"}
 EVIL = '"><script>alert(1)</script>&amp;\x27 {{ 7*7 }} <!-- </SCRIPT>'
@@ -49,7 +48,9 @@ def page(results, full=False) -> tuple[str, Page, dict[str, bytes]]:
     plans = run_figures(results)
     images = {f"{plan.name}.png": f"PNG of {plan.name}".encode() for plan in plans}
     data = ("results.json", json.dumps({"title": results.title}).encode())
-    html = report.page(results, tables(results), plans, images, full=full, document=data).decode()
+    html = report.page(
+        results, run_tables(results), plans, images, full=full, document=data
+    ).decode()
     parsed = Page(html)
     assert parsed.open == []
     return html, parsed, images

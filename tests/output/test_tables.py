@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 from synthetic_results import as_limit, make_results
 
-from eigassign.output import Table, headline
-from eigassign.output.tables import tables
+from eigassign.output import Table, headline, run_tables
 from eigassign.study import (
     CatalogueRow,
     ClearanceRow,
@@ -22,7 +21,7 @@ from eigassign.study import (
 
 
 def table(results: RunResults, title: str) -> Table | None:
-    return next((one for one in tables(results) if one.title == title), None)
+    return next((one for one in run_tables(results) if one.title == title), None)
 
 
 def searched() -> RunResults:

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eigassign._version import __version__
-from eigassign.output import terminal
 from eigassign.output.figures import screen
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.modes import mode_figures
@@ -26,7 +25,7 @@ from eigassign.output.figures.run import run_figures
 from eigassign.output.pages import TEMPLATES, inside, page_of
 from eigassign.output.reports.verdict import verdict_of
 from eigassign.output.result_files import sample_files, to_json
-from eigassign.output.tables import Table, tables
+from eigassign.output.tables import Table, run_tables
 from eigassign.study.results import ModePictures, RunResults
 
 if TYPE_CHECKING:
@@ -83,7 +82,7 @@ def page(
         verdict=None if run is None else verdict_of(run),
         headline=line,
         tone=tone,
-        tables=[(table, _texts(table)) for table in shown],
+        tables=[(table, [not number for number in table.numeric]) for table in shown],
         figures=list(_shown(plans, graphs, files)),
         first=first,
         moving=[(mode.name, mode.trajectory, several) for mode in moving],
@@ -130,12 +129,6 @@ def _shown(
             yield Shown(plan, image=image, files=tuple(own.values()))
 
 
-def _texts(table: Table) -> list[bool]:
-    """Which columns are words, not numbers."""
-    columns = range(len(table.columns))
-    return [not terminal.are_numbers([row[k] for row in table.rows]) for k in columns]
-
-
 # --- What is left in a folder
 
 
@@ -154,7 +147,7 @@ def write_run(
     plans = run_figures(results) if formats or kind != "none" else ()
     files = write_figures(plans, folder, formats)
     write_page(
-        folder, kind, results, tables(results), plans, files,
+        folder, kind, results, run_tables(results), plans, files,
         document=("results.json", document),
         first=sum(plan.name.startswith("frequencies") for plan in plans),
     )  # fmt: skip
