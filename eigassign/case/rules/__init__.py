@@ -9,7 +9,6 @@ In reading order, each importing only from those above it:
     properties    design parameters: the number that a path names, and its bounds
     files         files that the case names: whether they may and can be read
     values        values whose unit another key decides → SI, before the schema sees them
-    space         rules: planar and spatial mechanisms
     links         rules: links, materials, sections, and what stands on nodes
     joints        rules: joints between links, coordinates, loops
     study         rules: trajectory, design, expansion, validation

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 
 from eigassign.case.reader import Finding, KeyPath, Tree, items, names
-from eigassign.case.rules import joints, links, properties, space, study, targets
+from eigassign.case.rules import joints, links, properties, study, targets
 from eigassign.case.schema.mechanism import Mechanism
 
 Rule = Callable[[Tree], Iterator[Finding]]
@@ -46,9 +46,6 @@ def reserved_names_are_not_used(tree: Tree) -> Iterator[Finding]:
 RULES: tuple[Rule, ...] = (
     keys_have_values,
     reserved_names_are_not_used,
-    space.vectors_have_as_many_components_as_the_space,
-    space.keys_belong_to_a_planar_mechanism,
-    space.keys_belong_to_a_spatial_mechanism,
     links.beams_have_known_materials,
     links.beams_have_known_sections,
     links.materials_have_a_shear_modulus_where_beams_need_it,

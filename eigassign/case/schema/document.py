@@ -11,7 +11,7 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import AfterValidator, BaseModel, Field, ValidationError
 from pydantic.json_schema import GenerateJsonSchema
 
-from eigassign.case.reader import Finding, KeyPath, Tree, unspaced
+from eigassign.case.reader import Finding, KeyPath, Tree, text, unspaced
 from eigassign.case.schema.design import ENTRIES, RESERVED, Design, Parameter, is_entry
 from eigassign.case.schema.joints import JOINTS
 from eigassign.case.schema.links import LINKS
@@ -83,7 +83,8 @@ _Explained = tuple[KeyPath, str]  # keys to append to the path, message
 def validated(tree: Tree) -> tuple[Document | None, list[Finding]]:
     """The document, or None and everything the schema has against it."""
     try:
-        return Document.model_validate(_with_entries_apart(tree)), []
+        context = {"space": text(tree, "mechanism", "space")}  # see `schema.vectors`
+        return Document.model_validate(_with_entries_apart(tree), context=context), []
     except ValidationError as error:
         details = error.errors(include_url=False)[:_MOST]
         findings = [_finding(detail) for detail in details if not _is_echo(detail)]

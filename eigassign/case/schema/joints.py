@@ -6,12 +6,24 @@ To add a type of joint: write its model and put it into the union `Joint`. How i
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
-from pydantic import AfterValidator, model_validator
+from pydantic import AfterValidator, ValidationInfo, model_validator
 
 from eigassign.case.schema.parts import KindBy, Part, kinds, wrong
-from eigassign.case.schema.vectors import PLACE, Angle, Direction, Orientation, Vector, parallel
+from eigassign.case.schema.vectors import (
+    IN_PLANE,
+    IN_SPACE,
+    PLACE,
+    Angle,
+    Direction,
+    Orientation,
+    Vector,
+    only_in,
+    parallel,
+    space_of,
+)
+from eigassign.case.suggestions import listed
 
 
 class JointBase(Part):
@@ -38,8 +50,16 @@ class JointBase(Part):
     base: str
     follower: str
     position: Vector | None = None
-    angle: Angle = 0.0
-    orientation: Orientation | None = None
+    angle: Annotated[Angle, IN_PLANE] = 0.0
+    orientation: Annotated[Orientation | None, IN_SPACE] = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _belongs_to_the_space(cls, value: Any, info: ValidationInfo) -> Any:
+        if space_of(info) == "planar" and not cls.planar:
+            message = f"a {value['type']} joint is spatial; planar mechanisms have {listed(PLANAR)}"
+            raise wrong(message, "type")
+        return value
 
 
 def _travels(lead: float) -> float:
@@ -57,7 +77,10 @@ class RevoluteJoint(JointBase):
     freedoms = ("rotation",)
     planar = True
     type: Literal["revolute"]
-    axis: Direction | None = None
+    axis: Annotated[
+        Direction | None,
+        only_in("spatial", "a planar revolute joint turns about z: leave the axis out"),
+    ] = None
 
 
 class PrismaticJoint(JointBase):

@@ -21,13 +21,21 @@ from eigassign.case.schema.parts import (
     kinds,
     quantity,
 )
-from eigassign.case.schema.vectors import LENGTH, Angle, Inertia, Vector
+from eigassign.case.schema.vectors import LENGTH, Angle, Inertia, Vector, only_in
 
 Elements: TypeAlias = Annotated[int, Field(ge=1, le=100_000)]
 ReduceTo: TypeAlias = Annotated[
     Annotated[float, quantity("frequency", above=0), Tag("<number>")]
     | Annotated[Literal["auto"], Tag("<auto>")],
     Discriminator(lambda value: "<auto>" if value == "auto" else "<number>"),
+]
+Roll: TypeAlias = Annotated[
+    Angle,
+    only_in(
+        "spatial",
+        "is for spatial mechanisms: in a plane height lies in it, and width does not",
+        neutral=0.0,
+    ),
 ]
 Dof: TypeAlias = Annotated[int, Field(ge=0)]
 
@@ -65,7 +73,7 @@ class BeamLink(Part):
     section: ValueOr[str, Taper]
     elements: NumberOr[Elements, Literal["auto"]]
     shear: bool = False
-    roll: Angle = 0.0
+    roll: Roll = 0.0
     reduce_to: ReduceTo | None = None
 
 
@@ -110,7 +118,7 @@ class FrameBeam(Part):
     section: str
     elements: Elements = 1
     shear: bool = False
-    roll: Angle = 0.0
+    roll: Roll = 0.0
 
 
 class FrameLink(Part):

@@ -21,7 +21,16 @@ from eigassign.case.schema.parts import (
     wrong,
 )
 from eigassign.case.schema.sections import Material, Section
-from eigassign.case.schema.vectors import Angle, Inertia, Orientation, Vector
+from eigassign.case.schema.vectors import (
+    IN_PLANE,
+    IN_SPACE,
+    Angle,
+    Components,
+    Inertia,
+    Orientation,
+    Vector,
+    only_in,
+)
 from eigassign.case.units import DIMENSIONS
 
 _FAR = DIMENSIONS["angle"].largest  # rad, and m where the joint slides
@@ -33,6 +42,13 @@ Q_VALUE = Quantity(
 QValue: TypeAlias = Annotated[float, Q_VALUE]
 Stiffness: TypeAlias = Annotated[float, quantity("stiffness", at_least=0)]
 TurningStiffness: TypeAlias = Annotated[float, quantity("rotational stiffness", at_least=0)]
+
+
+_AboutAxes: TypeAlias = Annotated[
+    tuple[TurningStiffness, ...],
+    Components(),
+    only_in("spatial", "planar: one number, about z, got a list"),
+]
 
 
 class Body(Part):
@@ -68,10 +84,10 @@ class Spring(Part):
     """
 
     between: tuple[str, str]
-    translational: OneOrList[Stiffness, tuple[Stiffness, ...]] = 0.0
-    rotational: OneOrList[TurningStiffness, tuple[TurningStiffness, ...]] = 0.0
-    angle: Angle = 0.0
-    orientation: Orientation | None = None
+    translational: OneOrList[Stiffness, Annotated[tuple[Stiffness, ...], Components()]] = 0.0
+    rotational: OneOrList[TurningStiffness, _AboutAxes] = 0.0
+    angle: Annotated[Angle, IN_PLANE] = 0.0
+    orientation: Annotated[Orientation | None, IN_SPACE] = None
 
 
 class Assembly(Part):
@@ -133,12 +149,19 @@ class Coordinate(Part):
 
     joint: str
     component: Literal[1, 2, 3, "rotation", "translation"] | None = None
-    angle: Literal["relative", "absolute"] = "relative"
+    angle: Annotated[
+        Literal["relative", "absolute"],
+        only_in(
+            "planar",
+            "an absolute angle is for planar mechanisms: in space angles are relative",
+            neutral="relative",
+        ),
+    ] = "relative"
     drive: ValueOr[Literal["free", "locked"], Drive] = "free"
 
     @property
     def moves(self) -> Literal["free", "held", "locked"]:
-        """Whether it moves freely, against the drive's stiffness, or not at all."""
+        """Its way to move: freely, against the drive's stiffness, or not at all."""
         if isinstance(self.drive, str):
             return self.drive
         return "free" if self.drive.stiffness is None else "held"

@@ -25,7 +25,7 @@ from eigassign.case.schema.parts import (
     quantity,
     wrong,
 )
-from eigassign.case.schema.vectors import Angle, Orientation, Vector
+from eigassign.case.schema.vectors import IN_PLANE, IN_SPACE, Angle, Orientation, Vector
 
 DURATION = quantity("time", above=0)
 TIME = quantity("time")
@@ -53,6 +53,12 @@ def _nested_tag(value: object) -> str:
     """Tag of one triple of angles, or a list of them."""
     nested = isinstance(value, (tuple, list)) and any(isinstance(v, (tuple, list)) for v in value)
     return "<list>" if nested else "<one>"
+
+
+Orientations: TypeAlias = Annotated[
+    Annotated[Orientation, Tag("<one>")] | Annotated[tuple[Orientation, ...], Tag("<list>")],
+    Discriminator(_nested_tag),
+]
 
 
 class AnyTrajectory(Part):
@@ -168,15 +174,8 @@ class TipTrajectory(Timed):
 
     tip: str
     waypoints: Annotated[tuple[Vector, ...], Field(min_length=2)]
-    angle: OneOrList[Angle, tuple[Angle, ...]] | None = None
-    orientation: (
-        Annotated[
-            Annotated[Orientation, Tag("<one>")]
-            | Annotated[tuple[Orientation, ...], Tag("<list>")],
-            Discriminator(_nested_tag),
-        ]
-        | None
-    ) = None
+    angle: Annotated[OneOrList[Angle, tuple[Angle, ...]] | None, IN_PLANE] = None
+    orientation: Annotated[Orientations | None, IN_SPACE] = None
     path: Literal["spline", "straight"] = "spline"
     duration: Annotated[float, DURATION] = 1.0
     branch: ByReference[tuple[QValue, QValue]] = FrozenDict()

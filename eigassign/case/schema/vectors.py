@@ -1,11 +1,17 @@
-"""Points, directions, angles and inertia tensors: what several parts of a mechanism share."""
+"""Points, directions, angles and inertia tensors: what several parts of a mechanism share.
+
+Vectors have two components in a plane and three in space, and some keys belong to one space only.
+The space of the mechanism is the context of a validation, {"space": "planar"}; without one, as of
+parts built in Python, every space is right.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Annotated, Any, TypeAlias
 
-from pydantic import AfterValidator
+from pydantic import AfterValidator, BeforeValidator, ValidationInfo
+from pydantic_core import core_schema
 
 from eigassign.case.schema.parts import OneOrList, Quantity, quantity, wrong
 
@@ -16,14 +22,46 @@ _SHORTEST = 1e-30  # component of a direction; squares of less end in 0
 _ROUND_OFF = 1e-12  # of the trace: a thin rod's zero inertia computed elsewhere
 
 
-class _Components:
-    """Two components in a plane, three in space; the rules of the space say which are wanted."""
+def space_of(info: ValidationInfo) -> str | None:
+    """planar or spatial; None where the file does not say, or there is no file."""
+    space = info.context and info.context["space"]
+    return space if space in ("planar", "spatial") else None
+
+
+def only_in(space: str, message: str, neutral: object = None) -> Any:
+    """Validator of a key that belongs to one space; in the other it may be ``neutral``."""
+
+    def belongs(value: object, info: ValidationInfo) -> object:
+        if value != neutral and space_of(info) not in (None, space):
+            raise wrong(message)
+        return value
+
+    return BeforeValidator(belongs) if neutral is None else AfterValidator(belongs)
+
+
+IN_PLANE = only_in("planar", "is for planar mechanisms: in space write orientation: [rx, ry, rz]")
+IN_SPACE = only_in("spatial", "is for spatial mechanisms: in a plane write angle")
+
+
+class Components:
+    """A component along each axis: two in a plane, three in space."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
+        def fits(value: Any, info: ValidationInfo) -> Any:
+            space = space_of(info) or ""
+            axes = {"planar": "x, y", "spatial": "x, y, z"}.get(space)
+            if axes and isinstance(value, tuple) and len(value) != len(axes.split()):
+                needed = f"{space}: needs {len(axes.split())} components ({axes})"
+                raise wrong(f"{needed}, got {len(value)}")
+            return value
+
+        return core_schema.with_info_before_validator_function(fits, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
         return {**handler(schema), "minItems": 2, "maxItems": 3}
 
 
-Vector: TypeAlias = Annotated[tuple[Annotated[float, PLACE], ...], _Components()]
+Vector: TypeAlias = Annotated[tuple[Annotated[float, PLACE], ...], Components()]
 Angle: TypeAlias = Annotated[float, ANGLE]
 Orientation: TypeAlias = tuple[Angle, Angle, Angle]  # rad, about x, y, z: R = Rz Ry Rx
 
@@ -35,12 +73,12 @@ def _points_somewhere(direction: tuple[float, ...]) -> tuple[float, ...]:
 
 
 Direction: TypeAlias = Annotated[
-    tuple[Annotated[float, Quantity()], ...], _Components(), AfterValidator(_points_somewhere)
+    tuple[Annotated[float, Quantity()], ...], Components(), AfterValidator(_points_somewhere)
 ]
 
 
 def parallel(a: Sequence[float], b: Sequence[float]) -> bool:
-    """Whether two directions agree within a millionth of a radian."""
+    """True for directions that agree within a millionth of a radian."""
     n = max(len(a), len(b), 3)
     x, y = [[*v, *([0.0] * (n - len(v)))] for v in (a, b)]
     cross = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
@@ -58,7 +96,7 @@ def tensor(inertia: Sequence[float]) -> list[list[float]]:
 
 
 def semidefinite(a: list[list[float]]) -> bool:
-    """Whether no direction has a negative value: every principal minor is at least zero."""
+    """True where no direction has a negative value: every principal minor is at least zero."""
     scale = sum(abs(a[i][i]) for i in range(3)) or max(abs(v) for row in a for v in row)
     if scale == 0.0:
         return True
@@ -66,13 +104,9 @@ def semidefinite(a: list[list[float]]) -> bool:
     pairs = ((0, 1), (0, 2), (1, 2))
     minors = [b[i][i] for i in range(3)]
     minors += [b[i][i] * b[j][j] - b[i][j] ** 2 for i, j in pairs]
-    minors.append(_determinant(b))
-    return min(minors) >= -_ROUND_OFF
-
-
-def _determinant(b: list[list[float]]) -> float:
-    (a, d, e), (_, f, g), (_, _, h) = b  # symmetric
-    return a * (f * h - g * g) - d * (d * h - g * e) + e * (d * g - f * e)
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = b
+    determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
+    return min(*minors, determinant) >= -_ROUND_OFF
 
 
 def spread(inertia: Sequence[float]) -> list[list[float]]:
@@ -82,13 +116,19 @@ def spread(inertia: Sequence[float]) -> list[list[float]]:
     return [[half * (i == j) - J[i][j] for j in range(3)] for i in range(3)]
 
 
-def _is_inertia(inertia: float | tuple[float, ...]) -> float | tuple[float, ...]:
+def _is_inertia(
+    inertia: float | tuple[float, ...], info: ValidationInfo
+) -> float | tuple[float, ...]:
     if isinstance(inertia, tuple):
+        if space_of(info) == "planar":
+            raise wrong("planar: one number, about the axis out of the plane, got a list")
         if len(inertia) not in (3, 6):
             message = "expected 3 (Ixx, Iyy, Izz) or 6 (… Ixy, Ixz, Iyz) entries, got "
             raise wrong(f"{message}{len(inertia)}")
         if not semidefinite(tensor(inertia)):
             raise wrong("not positive: turning about some axis would take no energy")
+    elif inertia != 0 and space_of(info) == "spatial":
+        raise wrong("spatial: needs [Ixx, Iyy, Izz] or [Ixx, Iyy, Izz, Ixy, Ixz, Iyz]")
     return inertia
 
 
