@@ -15,8 +15,8 @@ __all__, __getattr__, __dir__ = face(
     __name__,
     {
         "assembly.build": "build_pencil local_links whole_links with_elements with_reduction",
-        "assembly.congruence": "LocalLink",
-        "assembly.local_motion": "ReducedLinks motion_matrix motion_scalars reduced_links",
+        "assembly.congruence": "LocalLink motion_matrix motion_scalars",
+        "assembly.inside_links": "ReducedLinks reduced_links",
         "assembly.mode_shapes": "shapes",
         "assembly.pencil": "Pencil",
         "assembly.rigid_loops": "require_consistent",

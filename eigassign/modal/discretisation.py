@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.mechanism.assembly.meshed_links import Alike, MeshedLinks
+from eigassign.mechanism.assembly.inside_links import Alike, MeshedLinks
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.inner import InnerPart, inner_parts
 from eigassign.modal.exact.solver import lowest_modes

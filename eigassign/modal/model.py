@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.brief import cut, named
 from eigassign.errors import UsageError
-from eigassign.mechanism.assembly.local_motion import ReducedLinks
-from eigassign.mechanism.assembly.meshed_links import MeshedLinks
+from eigassign.mechanism.assembly.inside_links import MeshedLinks, ReducedLinks
 from eigassign.mechanism.assembly.mode_shapes import NodeShape, StrandShape, shapes
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.assembly.total_mass import TotalMass

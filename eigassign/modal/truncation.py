@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.errors import AccuracyError
-from eigassign.mechanism.assembly.local_motion import ReducedLinks
+from eigassign.mechanism.assembly.inside_links import ReducedLinks
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.craig_bampton import largest_left_out
 from eigassign.mechanism.elements.sparse_factor import factorise, kept_factor

@@ -27,8 +27,7 @@ from eigassign.mechanism.assembly.build import (
     local_links,
     whole_links,
 )
-from eigassign.mechanism.assembly.local_motion import reduced_links
-from eigassign.mechanism.assembly.meshed_links import meshed_links
+from eigassign.mechanism.assembly.inside_links import meshed_links, reduced_links
 from eigassign.mechanism.assembly.total_mass import total_mass
 from eigassign.mechanism.inverse_kinematics.chain import tip_chain
 from eigassign.mechanism.kinematics.link_frames import build_link_frames, design_dependence

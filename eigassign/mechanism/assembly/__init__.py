@@ -3,10 +3,9 @@
 Read in this order; each imports only from those above it:
 
     pencil            K = Σ θ_j(q, y) K_j, M = Σ θ_j(q, y) M_j: what everything else evaluates
-    affine_entries    entries (scalar) × (number) on their way to the pencil
+    affine_entries    where entries go, and with what function of (q, y)
     congruence        Bᵀ k B and Bᵀ m B of every link: where eq. (1) is formed
-    local_motion      B of a link as numbers
-    meshed_links      all beam elements in a row, their values and motion as numbers
+    inside_links      reduced links and the elements of beams, as numbers
     node_motion       Q: the elastic motion of every node from the independent unknowns u
     rigid_loops       loops between rigid links: passive joints follow elastically
     springs           springs between nodes

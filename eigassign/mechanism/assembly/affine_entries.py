@@ -2,7 +2,7 @@
 
 An affine matrix is Σ θ_j A_j with constant sparse A_j. Its entries come as (scalar) × (number) at
 (row, column); a scalar is a sum c + Σ c_k a_k over atoms a_k of its recorder, and each atom that
-occurs becomes one θ_j.
+occurs becomes one θ_j. K and M are symmetric: what is off the diagonal comes with its transpose.
 """
 
 from __future__ import annotations
@@ -14,74 +14,86 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from eigassign.mechanism.kinematics.rotations import Objects, some
 from eigassign.series.expression import Expression, Scalar
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+Row = Sequence[tuple[int, Scalar]]  # one row of a matrix: unknown and coefficient
+Block = tuple[Ints, Ints, int, Floats]  # rows, columns, the atom of all (−1: the number 1), values
 
 
 @dataclass
 class AffineEntries:
-    """Collects entries (row, column, atom) → value; atom -1 stands for the constant 1."""
+    """Collects the entries of one symmetric matrix.
 
-    rows: list[Ints] = field(default_factory=list)
-    columns: list[Ints] = field(default_factory=list)
-    atoms: list[Ints] = field(default_factory=list)
-    values: list[Floats] = field(default_factory=list)
-    small: dict[tuple[int, int], Scalar] = field(default_factory=dict)
+    ``places`` of local dofs are their unknowns, −1 for those that are none; a row r is one over all
+    unknowns, v a vector of the local dofs. What joins few unknowns, where many functions meet, is
+    summed before it is split into atoms.
+    """
 
-    def add(
-        self, coefficients: Sequence[Scalar], rows: Ints, columns: Ints, values: Floats
-    ) -> None:
-        """coefficients[k] × values (m,) at row k of places (k, m), for copies of one block."""
-        parts = [
-            (k, atom, factor)
-            for k, coefficient in enumerate(coefficients)
-            for atom, factor in _parts(coefficient)
-            if factor != 0.0
-        ]
-        if len(parts) == 1:
-            ((k, atom, factor),) = parts
-            self.rows.append(rows[k])
-            self.columns.append(columns[k])
-            self.atoms.append(np.full(len(values), atom, dtype=np.intp))
-            self.values.append(values if factor == 1.0 else factor * values)
-        elif parts and len(values):
-            which, atoms, factors = (np.array(part) for part in zip(*parts, strict=True))
-            self.rows.append(rows[which].ravel())
-            self.columns.append(columns[which].ravel())
-            self.atoms.append(np.repeat(atoms, len(values)))
-            self.values.append(np.multiply.outer(factors, values).ravel())
+    blocks: list[Block] = field(default_factory=list)
+    sums: dict[tuple[int, int], Scalar] = field(default_factory=dict)
 
-    def add_symmetric(
-        self, coefficients: Sequence[Scalar], rows: Ints, column: Ints, values: Floats
-    ) -> None:
-        """One column (k,) of each copy and its transpose, off the diagonal blocks."""
-        columns = np.broadcast_to(column[:, None], rows.shape)
-        self.add(coefficients, rows, columns, values)
-        self.add(coefficients, columns, rows, values)
+    def add_block(self, coefficient: Scalar, matrix: sparse.csr_array, places: Ints) -> None:
+        """coefficient × Pᵀ matrix P."""
+        i = places[np.repeat(np.arange(len(places)), np.diff(matrix.indptr))]
+        j = places[matrix.indices]
+        inner = (i >= 0) & (j >= 0)
+        self._add(coefficient, i[inner], j[inner], matrix.data[inner])
 
-    def add_small(self, row: int, column: int, value: Scalar) -> None:
-        """An entry among joint nodes and q̇, where many functions meet: summed before use."""
-        if not isinstance(value, Expression) and value == 0.0:
-            return
-        self.small[row, column] = self.small.get((row, column), 0.0) + value
+    def add_coupling(self, coefficient: Scalar, v: Floats, places: Ints, r: Row) -> None:
+        """coefficient × (Pᵀ v r + rᵀ vᵀ P)."""
+        present = (places >= 0) & (v != 0.0)
+        rows, values = places[present], v[present]
+        for unknown, factor in r if len(rows) else ():
+            columns = np.full(len(rows), unknown)
+            both = np.concatenate([rows, columns]), np.concatenate([columns, rows])
+            self._add(coefficient * factor, *both, np.concatenate([values, values]))
+
+    def add_square(self, coefficient: Scalar, r: Row) -> None:
+        """coefficient × rᵀ r."""
+        for i, a in r if some(coefficient) else ():
+            for j, b in r:
+                self.add(i, j, coefficient * (a * b))
+
+    def add_product(self, coefficient: Scalar, left: Row, right: Row) -> None:
+        """coefficient × (leftᵀ right + rightᵀ left)."""
+        for i, a in left if some(coefficient) else ():
+            for j, b in right:
+                value = coefficient * (a * b)
+                self.add(i, j, value)
+                self.add(j, i, value)
+
+    def add_corner(self, first: int, block: Objects) -> None:
+        """A symmetric block of scalars over the unknowns from ``first`` on."""
+        for i, j in np.ndindex(block.shape):
+            self.add(first + i, first + j, block[min(i, j), max(i, j)])
+
+    def add(self, row: int, column: int, value: Scalar) -> None:
+        """A single entry."""
+        if some(value):
+            self.sums[row, column] = self.sums.get((row, column), 0.0) + value
+
+    def _add(self, coefficient: Scalar, rows: Ints, columns: Ints, values: Floats) -> None:
+        for atom, factor in _parts(coefficient):
+            self.blocks.append((rows, columns, atom, factor * values))
 
     def finish(self, n_u: int) -> tuple[Ints, Ints, Ints, Floats]:
-        """All entries as arrays; q̇-q̇ entries become one atom each."""
-        small = [
+        """Row, column, atom and value of all entries; sums among the q̇ become one atom each."""
+        sums = [
             (row, column, atom, factor)
-            for (row, column), value in self.small.items()
+            for (row, column), value in self.sums.items()
             for atom, factor in _parts(_whole(value) if min(row, column) >= n_u else value)
-            if factor != 0.0
         ]
-        rows, columns, atoms, values = zip(*small, strict=True) if small else ((), (), (), ())
-        return (
-            np.concatenate([*self.rows, np.array(rows, dtype=np.intp)]),
-            np.concatenate([*self.columns, np.array(columns, dtype=np.intp)]),
-            np.concatenate([*self.atoms, np.array(atoms, dtype=np.intp)]),
-            np.concatenate([*self.values, np.array(values, dtype=np.float64)]),
+        single = np.array(sums, dtype=object).reshape(-1, 4).T
+        several = list(zip(*self.blocks, strict=True)) or [()] * 4
+        several[2] = tuple(np.full(len(rows), atom) for rows, _, atom, _ in self.blocks)
+        i, j, atom = (
+            np.concatenate([own.astype(np.intp), *parts])
+            for own, parts in zip(single[:3], several, strict=False)
         )
+        return i, j, atom, np.concatenate([single[3].astype(np.float64), *several[3]])
 
 
 def _whole(value: Scalar) -> Scalar:
@@ -92,10 +104,11 @@ def _whole(value: Scalar) -> Scalar:
     return Expression(value.recorder, 0.0, {atom: factor})
 
 
-def _parts(coefficient: Scalar) -> list[tuple[int, float]]:
-    if not isinstance(coefficient, Expression):
-        return [(-1, float(coefficient))]
-    return [(-1, coefficient.constant), *coefficient.terms.items()]
+def _parts(value: Scalar) -> list[tuple[int, float]]:
+    """The atoms of a scalar and their factors."""
+    if not isinstance(value, Expression):
+        return [(-1, float(value))] if value else []
+    return [(-1, value.constant)] * (value.constant != 0.0) + list(value.terms.items())
 
 
 def pattern(
@@ -103,22 +116,15 @@ def pattern(
 ) -> tuple[Ints, Ints, list[sparse.csr_array]]:
     """Common pattern of several matrices and their weights (n_nonzeros, n_theta) on it."""
     keys = np.concatenate([rows * n_dof + columns for rows, columns, _, _ in entries])
-    unique, place = _ranked(keys)
-    shape = (len(unique), n_theta)
-    ends = np.cumsum([len(rows) for rows, _, _, _ in entries])[:-1]
-    weights = [
-        sparse.csr_array((values, (at, theta)), shape=shape)
-        for at, (_, _, theta, values) in zip(np.split(place, ends), entries, strict=True)
-    ]
-    return (unique // n_dof).astype(np.intp), (unique % n_dof).astype(np.intp), weights
-
-
-def _ranked(keys: Ints) -> tuple[Ints, Ints]:
-    """The distinct keys, ascending, and the place of each key among them: one sort for both."""
     order = np.argsort(keys, kind="stable")  # a few ascending runs: merged
     ascending = keys[order]
-    new = np.ones(len(keys), dtype=bool)
-    new[1:] = ascending[1:] != ascending[:-1]
+    new = np.append(True, ascending[1:] != ascending[:-1])
     place = np.empty(len(keys), dtype=np.intp)
     place[order] = np.cumsum(new) - 1
-    return ascending[new], place
+    unique = ascending[new]
+    ends = np.cumsum([len(rows) for rows, _, _, _ in entries])[:-1]
+    weights = [
+        sparse.csr_array((values, (at, theta)), shape=(len(unique), n_theta))
+        for at, (_, _, theta, values) in zip(np.split(place, ends), entries, strict=True)
+    ]
+    return unique // n_dof, unique % n_dof, weights

@@ -178,7 +178,7 @@ def _add_drives(
                 continue
             value = parameters.number(f"coordinates.{name}.drive.{key}", given)
             for row, column in zip(*np.nonzero(np.outer(r, r)), strict=True):
-                target.add_small(n_u + row, n_u + column, value * (r[row] * r[column]))
+                target.add(n_u + row, n_u + column, value * (r[row] * r[column]))
 
 
 def _compile(

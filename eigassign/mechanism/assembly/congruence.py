@@ -1,30 +1,33 @@
 """K = Bᵀ k B and M = Bᵀ m B of eq. (1) with B = [Q, N T], link by link.
 
-The local motion v = B [u; q̇] of a link's dofs consists of
+The local motion of a link's dofs is v = Q u + N T q̇. Some dofs are unknowns themselves (P picks
+them, with constant entries 1), dofs s move with other links (c_s, a row of functions of (q, y)):
 
-    v = P u_own + Σ_s e_s c_s + Σ_b ν_b N_b τ,    c = C(q, y) u,    τ = T(q, y) q̇:
+    Q = P + Σ_s e_s c_s,    N = Σ_b ν_b(y) N_b,    T = T(q, y).
 
-dofs that are unknowns themselves (P, constant), dofs s that move with other links (c_s), and the
-rigid motion N τ with N = Σ_b ν_b(y) N_b. With the constant E = [P, e_s, N_b] and z = [u; c; ν_b τ],
+With constant symmetric matrices a of k = Σ κ_i(y) k_i and m = Σ μ_i(y) m_i, and a_s = a e_s,
 
-    v = E z,    z = R [u; q̇],    Bᵀ a B = Rᵀ (Eᵀ a E) R .
+    Qᵀ a Q = Pᵀ a P + Σ_s (Pᵀ a_s c_s + c_sᵀ a_sᵀ P) + Σ_st a_st c_sᵀ c_t,
 
-Eᵀ a E is made of numbers for every constant matrix a of k = Σ κ_i(y) k_i and m = Σ μ_i(y) m_i; all
-that varies with q stands in the few rows of R for c and τ. Because k N = 0 exactly, Bᵀ k B is
-Qᵀ k Q: no rigid column enters K.
+    K = | Qᵀ k Q  0 |        M = | Qᵀ m Q   Qᵀ m N T     |
+        | 0       0 |,           | sym.     Tᵀ (Nᵀ m N) T |,
+
+for k N = 0 exactly: a rigid motion strains nothing. Where entries go, with what function of (q, y),
+is the matter of `affine_entries`.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
-from eigassign.mechanism.assembly.affine_entries import AffineEntries
-from eigassign.mechanism.elements.mesh import Reduction, Term
+from eigassign.mechanism.assembly.affine_entries import AffineEntries, Row
+from eigassign.mechanism.elements.mesh import Reduction, Term, total
 from eigassign.mechanism.kinematics.rotations import multiply
 from eigassign.series.expression import Scalar
 
@@ -37,136 +40,111 @@ Objects = NDArray[np.object_]
 class LocalLink:
     """One link in its own frame, with its place among the global unknowns.
 
-    ``own`` (n_local,) is the global index of each local dof, or -1 where it is slaved;
-    ``carried`` maps a slaved local dof to its (global index, C) pairs: none for a clamped one.
+    ``own`` (n_local,) is P: the global index of each local dof, or -1 where it is slaved;
+    ``carried`` maps a slaved local dof s to c_s: empty for a clamped one.
     """
 
-    stiffness: Sequence[Term]
-    mass: Sequence[Term]
+    stiffness: Sequence[Term]  # κ_i k_i
+    mass: Sequence[Term]  # μ_i m_i
     rigid: Sequence[Term]  # ν_b N_b, each (n_local, n_twist)
-    twist: Objects  # (n_twist, n_columns)
+    twist: Objects  # T (n_twist, n_columns)
     own: Ints
-    carried: dict[int, list[tuple[int, Scalar]]]
+    carried: Mapping[int, Row]
     reduction: Reduction | None = None
 
 
 def add_links(K: AffineEntries, M: AffineEntries, links: Sequence[LocalLink], n_u: int) -> None:
-    """K += Bᵀ k B and M += Bᵀ m B; links that differ only in where they hang are added together."""
-    for copies in _copies(links):
-        own = np.array([link.own for link in copies])
-        Q, NT = _carried(copies), _spread(copies, n_u)
-        for term in copies[0].stiffness:
-            _add_product(K, term, own, Q)
-        for term in copies[0].mass:
-            _add_product(M, term, own, [*NT, *Q])
-        if NT:
-            _add_rigid_inertia(M, copies, n_u)
-
-
-def _copies(links: Sequence[LocalLink]) -> list[list[LocalLink]]:
-    """Links with the same matrices and the same dofs carried, by as many unknowns."""
-    alike: dict[object, list[LocalLink]] = {}
+    """K += Bᵀ k B and M += Bᵀ m B of every link; the q̇ are numbered from ``n_u`` on."""
+    known: dict[object, _Constants] = {}
     for link in links:
-        shared = id(link.stiffness), id(link.mass), id(link.rigid)
-        carried = tuple((slot, len(masters)) for slot, masters in link.carried.items())
-        alike.setdefault((shared, (link.own >= 0).tobytes(), carried), []).append(link)
-    return list(alike.values())
+        matrices = id(link.stiffness), id(link.mass), id(link.rigid)
+        kind = matrices, tuple(link.carried), (link.own < 0).tobytes()
+        numbers = known[kind] if kind in known else known.setdefault(kind, _constants(link))
+        for k, k_s in zip(link.stiffness, numbers.stiffness, strict=True):
+            _add_elastic(K, k, k_s, link)  # Qᵀ k Q
+        for m, m_s in zip(link.mass, numbers.mass, strict=True):
+            _add_elastic(M, m, m_s, link)  # Qᵀ m Q
+        if link.twist.shape[1]:
+            T = [[(n_u + k, rate) for k, rate in enumerate(row)] for row in link.twist.tolist()]
+            for coefficient, momentum in numbers.momenta:
+                _add_mixed(M, coefficient, momentum, link, T)  # Qᵀ m N T and its transpose
+            M.add_corner(n_u, multiply(link.twist.T, multiply(numbers.inertia, link.twist)))
 
 
 @dataclass(frozen=True, eq=False)
-class _Column:
-    """One column e_s or ν_b N_b of E beside P, and the rows of R for it, of each of k copies."""
+class _Constants:
+    """The numbers of a link that its copies at other places share; s are its carried dofs."""
 
-    values: Floats  # (n_local,)
-    factor: Scalar  # ν_b, or 1
-    rows: Sequence[Sequence[tuple[int, Scalar]]]  # of each copy: unknown and coefficient
-    slot: int | None  # s; None for a rigid motion
-
-
-def _carried(copies: Sequence[LocalLink]) -> list[_Column]:
-    """Dofs that move with other links: c = C u."""
-    columns = []
-    for slot, masters in copies[0].carried.items():
-        if masters:
-            unit = np.zeros(len(copies[0].own))
-            unit[slot] = 1.0
-            rows = [link.carried[slot] for link in copies]
-            columns.append(_Column(unit, 1.0, rows, slot))
-    return columns
+    stiffness: list[Floats]  # rows s of each k_i, (n_s, n_local)
+    mass: list[Floats]  # of each m_i
+    momenta: list[tuple[Scalar, Floats]]  # μ_i ν_b and m_i N_b
+    inertia: Objects  # Nᵀ m N (n_twist, n_twist), about the link's origin
 
 
-def _spread(copies: Sequence[LocalLink], n_u: int) -> list[_Column]:
-    """The rigid motion: τ = T q̇; none where nothing moves rigidly."""
-    if not copies[0].twist.shape[1]:
-        return []
-    rows = [
-        [[(n_u + k, rate) for k, rate in enumerate(twist)] for twist in of_all]
-        for of_all in zip(*(link.twist.tolist() for link in copies), strict=True)
+def _constants(link: LocalLink) -> _Constants:
+    slots = list(link.carried)
+    momenta = [
+        (m.coefficient * N.coefficient, (m.matrix @ N.matrix).toarray())
+        for m, N in itertools.product(link.mass, link.rigid)
     ]
-    return [
-        _Column(values, spread.coefficient, rows[component], None)
-        for spread in copies[0].rigid
-        for component, values in enumerate(spread.matrix.toarray().T)
-    ]
+    J = np.zeros((len(link.twist), len(link.twist)), dtype=object)
+    for (factor, momentum), N in itertools.product(momenta, link.rigid):
+        constant, scale = N.matrix.T @ momentum, factor * N.coefficient
+        for a, b in zip(*np.nonzero(constant), strict=True):
+            J[a, b] = J[a, b] + scale * float(constant[a, b])
+    return _Constants(
+        [k.matrix[slots].toarray() for k in link.stiffness],
+        [m.matrix[slots].toarray() for m in link.mass],
+        momenta,
+        J,
+    )
 
 
-def _add_product(target: AffineEntries, term: Term, own: Ints, columns: Sequence[_Column]) -> None:
-    """Rᵀ (Eᵀ a E) R of one term a, but for its q̇-q̇ part; ``own`` (k, n_local) of the copies."""
-    free = own[0] >= 0
-    i = np.repeat(np.arange(len(free)), np.diff(term.matrix.indptr))
-    j, values = term.matrix.indices, term.matrix.data
-    inner = free[i] & free[j]
-    scale = term.coefficient
-    target.add([scale] * len(own), own[:, i[inner]], own[:, j[inner]], values[inner])
-    if not columns:
-        return
-    E = np.stack([column.values for column in columns], axis=1)
-    image = np.asarray(term.matrix @ E)
-    for column, moved in zip(columns, image.T, strict=True):
-        rows = np.flatnonzero(free & (moved != 0.0))
-        if len(rows):
-            factor = scale * column.factor
-            for of_all in zip(*column.rows, strict=True):  # one unknown of each copy
-                factors = [factor * coefficient for _, coefficient in of_all]
-                unknowns = np.array([unknown for unknown, _ in of_all], dtype=np.intp)
-                target.add_symmetric(factors, own[:, rows], unknowns, moved[rows])
-    for right in columns:
-        if right.slot is not None:  # e_sᵀ a E is row s of a E, for a is symmetric
-            for k in np.flatnonzero(image[right.slot]):
-                _add_pair(target, scale, columns[int(k)], right, float(image[right.slot, k]))
+def _add_elastic(target: AffineEntries, a: Term, a_s: Floats, link: LocalLink) -> None:
+    """Qᵀ a Q of one term; ``a_s`` are the rows s of its matrix, which is symmetric."""
+    target.add_block(a.coefficient, a.matrix, link.own)
+    rows = [(s, c_s, a_row) for (s, c_s), a_row in zip(link.carried.items(), a_s, strict=True)]
+    for n, (s, c_s, a_row) in enumerate(rows):
+        target.add_coupling(a.coefficient, a_row, link.own, c_s)
+        target.add_square(a.coefficient * float(a_row[s]), c_s)
+        for t, c_t, _ in rows[n + 1 :]:
+            target.add_product(a.coefficient * float(a_row[t]), c_s, c_t)
 
 
-def _add_pair(
-    target: AffineEntries, scale: Scalar, left: _Column, right: _Column, value: float
+def _add_mixed(
+    M: AffineEntries, coefficient: Scalar, g: Floats, link: LocalLink, T: Sequence[Row]
 ) -> None:
-    """What a column c_s on the right gives with any other, and its transpose for a rigid one."""
-    factor = scale * left.factor * right.factor
-    for of_left, of_right in zip(left.rows, right.rows, strict=True):
-        for i, a in of_left:
-            scaled = factor * a
-            for j, b in of_right:
-                entry = scaled * b * value
-                target.add_small(i, j, entry)
-                if left.slot is None:
-                    target.add_small(j, i, entry)
+    """Qᵀ g T and its transpose, g (n_local, n_twist)."""
+    for g_column, row in zip(g.T, T, strict=True):
+        M.add_coupling(coefficient, g_column, link.own, row)
+        for s, c_s in link.carried.items():
+            M.add_product(coefficient * float(g_column[s]), c_s, row)
 
 
-def _add_rigid_inertia(M: AffineEntries, copies: Sequence[LocalLink], n_u: int) -> None:
-    """The q̇-q̇ part Tᵀ (Nᵀ m N) T; Nᵀ m N is the rigid inertia about the link's origin."""
-    first = copies[0]
-    size = first.twist.shape[0]
-    inertia = np.zeros((size, size), dtype=object)
-    spreads = [(spread.coefficient, spread.matrix.toarray()) for spread in first.rigid]
-    for term, (right_factor, right) in itertools.product(first.mass, spreads):
-        momentum = np.asarray(term.matrix @ right)
-        for left_factor, left in spreads:
-            constant = left.T @ momentum
-            factor = term.coefficient * left_factor * right_factor
-            for a, b in zip(*np.nonzero(constant), strict=True):
-                inertia[a, b] = inertia[a, b] + factor * float(constant[a, b])
-    for link in copies:
-        block = multiply(link.twist.T, multiply(inertia, link.twist))
-        for i, j in itertools.combinations_with_replacement(range(len(block)), 2):
-            M.add_small(n_u + i, n_u + j, block[i, j])
-            if i != j:
-                M.add_small(n_u + j, n_u + i, block[i, j])
+# --- B of a single link as numbers
+
+
+def motion_scalars(link: LocalLink) -> list[list[Scalar]]:
+    """The functions of (q, y) in B, in three groups: all c_s, T, all ν_b."""
+    return [
+        [carry for row in link.carried.values() for _, carry in row],
+        list(link.twist.ravel()),
+        [N.coefficient for N in link.rigid],
+    ]
+
+
+def motion_matrix(
+    link: LocalLink, carries: Floats, twist: Floats, rigid: Floats, n_u: int, n_dof: int
+) -> sparse.csr_array:
+    """B (n_local, n_dof) from the values of `motion_scalars`: P, c_s, N T."""
+    own = np.flatnonzero(link.own >= 0)
+    pairs = [(slot, unknown) for slot, row in link.carried.items() for unknown, _ in row]
+    slots, unknowns = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
+    places = np.concatenate([own, slots]), np.concatenate([link.own[own], unknowns])
+    values = np.concatenate([np.ones(len(own)), carries])
+    B = sparse.csr_array((values, places), shape=(len(link.own), n_dof))
+    if link.twist.shape[1]:
+        N, T = total(link.rigid, rigid), twist.reshape(link.twist.shape)
+        wide = sparse.csr_array((len(link.own), n_u))
+        B = B + sparse.hstack([wide, sparse.csr_array(N @ T)], format="csr")
+    return B

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from eigassign.brief import Brief
 from eigassign.mechanism.assembly.build import local_links
-from eigassign.mechanism.assembly.congruence import LocalLink
-from eigassign.mechanism.assembly.local_motion import motion_matrix, motion_scalars
+from eigassign.mechanism.assembly.congruence import LocalLink, motion_matrix, motion_scalars
 from eigassign.mechanism.elements.beam import PLANES, Shear, bending_shapes
 from eigassign.mechanism.elements.links import axes
 from eigassign.mechanism.elements.mesh import LinkMesh, Strand

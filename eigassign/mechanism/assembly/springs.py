@@ -44,7 +44,7 @@ def add_springs(
         row = {i: value for i, value in full.items() if i not in rigid and resists(k)}
         for i, left in row.items():
             for j, right in row.items():
-                target.add_small(i, j, k * left * right)
+                target.add(i, j, k * left * right)
 
 
 def resists(stiffness: Scalar) -> bool:

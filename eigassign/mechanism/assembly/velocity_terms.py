@@ -38,8 +38,7 @@ from scipy import sparse
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.build import local_links
-from eigassign.mechanism.assembly.congruence import LocalLink
-from eigassign.mechanism.assembly.local_motion import motion_scalars
+from eigassign.mechanism.assembly.congruence import LocalLink, motion_scalars
 from eigassign.mechanism.elements.beam import PLANES, RealOrComplex, bending_shapes, bending_slopes
 from eigassign.mechanism.elements.mesh import LinkMesh, Term
 from eigassign.mechanism.elements.profiles import field_inertia
