@@ -13,7 +13,7 @@ from eigassign.case.schema.parts import Part
 from eigassign.case.schema.trajectory import AnyTrajectory, Timed
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
-_WIDTH = 90
+_WIDTH = 90  # characters of a line, so that it is read without turning a page
 
 
 def to_yaml(content: Mapping[str, object]) -> str:

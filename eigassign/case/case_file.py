@@ -148,7 +148,7 @@ class CaseFile:
 
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
-        """Between which values each property that varies may be: loads, then design parameters."""
+        """Least and largest value of each property that varies: loads, then design parameters."""
         of_design = {p.parameter: (p.min, p.max) for p in self.design.parameters.values()}
         return {path: load.range for path, load in self.loads.items()} | of_design
 

@@ -51,12 +51,12 @@ class Unchecked:
 
     @property
     def sha256(self) -> str:
-        """Of its bytes."""
+        """SHA-256 of its bytes."""
         return hashlib.sha256(self.data).hexdigest()
 
     @cached_property
     def _without_sweep(self) -> tuple[Mapping[str, Any], str]:
-        """What it says but for its `sweep`: the tree, and the same as text."""
+        """The tree without its `sweep`, and the same as text."""
         tree = {key: body for key, body in self.source.tree.items() if key != "sweep"}
         return tree, json.dumps(tree)
 

@@ -20,7 +20,7 @@ from eigassign.case.suggestions import shown
 from eigassign.errors import CaseError, Problem
 from eigassign.files import CASE, raised
 
-MAX_DEPTH = 50
+MAX_DEPTH = 50  # levels; a case has ten, and Python calls itself a thousand times
 ENTRIES = 200_000  # of all lists and mappings: some seconds and 400 MB, whatever is wrong with them
 KeyPath = tuple[str | int, ...]
 Tree = Mapping[str, object]

@@ -35,7 +35,7 @@ _HEADER_CELL = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _SEPARATOR_LINE = re.compile(r"sep=([;,\t])", re.IGNORECASE)  # a spreadsheet's hint to itself
 _POINT = re.compile(r"\d\.\d")
-_MOST = 1_000_000  # rows
+_MOST = 1_000_000  # rows: what 100 MB hold, the limit of a table
 _PLAIN = Unit(Fraction(1), (0, 0, 0, 0, 0))
 
 
@@ -170,7 +170,7 @@ def _text(file: Path, key: str) -> str:
 
 @dataclass(frozen=True)
 class _Dialect:
-    """What stands between cells, lines before any cell, whether decimals take a comma."""
+    """The separator of cells, lines before any cell, and whether decimals take a comma."""
 
     between: str
     skipped: int
@@ -210,7 +210,7 @@ def _rows(text: str, dialect: _Dialect, name: str, key: str) -> Iterator[tuple[i
 
 
 def _hold_numbers(*rows: list[str]) -> bool:
-    """Whether at least half of the words of one of these rows are numbers."""
+    """True where at least half of the words of one of these rows are numbers."""
     words = [" ".join(row).replace(",", ".").split() for row in rows]
     shares = [[_NUMBER.fullmatch(word) is not None for word in row] for row in words]
     return any(share and 2 * sum(share) >= len(share) for share in shares)

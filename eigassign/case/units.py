@@ -71,7 +71,7 @@ class Unit:
         units then compare as their author expects.
         """
         exponent = number.lower().partition("e")[2]
-        if abs(int(exponent or 0)) > _LARGEST_EXPONENT:
+        if abs(int(exponent or 0)) > 1000:
             return float(number)  # 0 or infinite, in any unit
         try:
             return float(Fraction(number) * self.factor) * math.pi**self.pi
@@ -172,8 +172,6 @@ TWO_TURNS = 4 * math.pi  # rad: a bare number beyond was probably meant in degre
 _NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _FACTOR = re.compile(r"([^\W\d_]+|[%°])(?:(?:\^|\*\*)?([-+]?[1-9]))?")
 _SUPERSCRIPTS = str.maketrans("⁻¹²³⁴⁵⁶⁷⁸⁹", "-123456789")
-_LARGEST_EXPONENT = 1000  # of ten
-_LONGEST = 60  # characters of a quantity; keeps the integers of a nonsense unit small
 
 
 def read(value: object, dimension: Dimension | None) -> float:
@@ -217,7 +215,7 @@ def number_and_unit(value: object) -> tuple[Fraction, str]:
 
 
 def is_bare(text: str) -> bool:
-    """Whether ``text`` is a number without a unit."""
+    """True for the text of a number without a unit."""
     return _NUMBER.fullmatch(text.strip()) is not None
 
 
@@ -254,7 +252,7 @@ def _split(text: str, dimension: Dimension | None) -> tuple[str, str]:
     """``"30 mm"`` → ``("30", "mm")``."""
     stripped = text.strip()
     match = _NUMBER.match(stripped)
-    if match is None or len(stripped) > _LONGEST:
+    if match is None or len(stripped) > 60:  # keeps the integers of a nonsense unit small
         raise QuantityError(f"{_expected(dimension)}, got text {shown(text)}")
     rest = stripped[match.end() :].strip()
     if re.match(r",\d", rest):

@@ -171,7 +171,7 @@ def coordinates_move_one_freedom_each(tree: Tree) -> Iterator[Finding]:
 
 
 def _coordinate(tree: Tree, joint: str | None, body: object, path: KeyPath) -> Iterator[Finding]:
-    """What is wrong with the joint, or with the component of it."""
+    """Mistakes in the joint, or in the component of it."""
     if joint is None:
         return
     if lacks(tree, _JOINTS, joint):

@@ -143,7 +143,7 @@ def _loose_nodes(path: KeyPath, joined: Mapping[str, list[str]]) -> Iterator[Fin
 
 
 def beams_have_no_more_elements_than_can_be_meant(tree: Tree) -> Iterator[Finding]:
-    """All beams together have MOST_ELEMENTS at most."""
+    """The beams together have MOST_ELEMENTS at most."""
     given = [(path, at(body, "elements")) for path, body in beams(tree)]
     allowed = range(100_000 + 1)  # the schema finds the others
     known = [(n, path) for path, n in given if type(n) is int and n in allowed]
@@ -159,7 +159,7 @@ def beams_have_no_more_elements_than_can_be_meant(tree: Tree) -> Iterator[Findin
 
 
 def superelements_have_rows_of_their_own_for_each_node(tree: Tree) -> Iterator[Finding]:
-    """Every node of a superelement has as many rows as degrees of freedom, shared with no other."""
+    """A node of a superelement has as many rows as degrees of freedom, shared with no other."""
     wanted = "u_x, u_y, θ_z" if is_planar(tree) else "u_x, u_y, u_z, θ_x, θ_y, θ_z"
     n = len(wanted.split())
     for _, path, body in links(tree, "superelement"):

@@ -19,7 +19,6 @@ from eigassign.case.suggestions import listed, shown, suggestion, unknown
 from eigassign.case.units import QuantityError
 
 ANY = Quantity()  # dimension unknown because of an error elsewhere
-_MOST = 6  # node names spelt out in a message
 
 
 def number(value: object, quantity: Quantity) -> float | None:
@@ -31,12 +30,12 @@ def number(value: object, quantity: Quantity) -> float | None:
 
 
 def is_spatial(tree: Tree) -> bool:
-    """Whether the mechanism is said to be spatial."""
+    """True where the file says that the mechanism is spatial."""
     return text(tree, "mechanism", "space") == "spatial"
 
 
 def is_planar(tree: Tree) -> bool:
-    """Whether the mechanism is said to be planar."""
+    """True where the file says that the mechanism is planar."""
     return text(tree, "mechanism", "space") == "planar"
 
 
@@ -82,7 +81,7 @@ def node_names(link: object) -> list[str] | None:
 
 
 def node_problem(tree: Tree, value: str, also: str = "") -> str | None:
-    """What is wrong with ``value`` as `<link>.<node>`; ``also`` is what else may stand there."""
+    """The mistake in ``value`` as `<link>.<node>`; ``also`` may stand there too."""
     link, _, node = value.partition(".")
     or_else = [also] if also else []
     if lacks(tree, ("mechanism", "links"), link):
@@ -96,7 +95,7 @@ def node_problem(tree: Tree, value: str, also: str = "") -> str | None:
     if nodes is None or node in nodes:
         return None
     few = [repr(f"{link}.{name}") for name in nodes]
-    spelt = few if len(nodes) <= _MOST else [f"'{link}.<node>' ({listed(nodes)})"]
+    spelt = few if len(nodes) <= 6 else [f"'{link}.<node>' ({listed(nodes)})"]
     expected = " or ".join([*or_else, *spelt])
     return f"expected {expected}, got {shown(value)}{suggestion(node, nodes)}"
 
@@ -115,7 +114,7 @@ def moving(tree: Tree) -> list[str]:
 
 
 def driven(tree: Tree, coordinate: object) -> str | None:
-    """Which freedom of its joint a coordinate is; None where that cannot be told."""
+    """The freedom of its joint that a coordinate is; None where that cannot be told."""
     known = freedoms(tree, text(coordinate, "joint") or "")
     component = at(coordinate, "component")
     if not known or isinstance(component, bool):
@@ -147,8 +146,22 @@ def of_freedom(freedom: str | None) -> Quantity:
 
 
 def coordinate_quantities(tree: Tree) -> list[Quantity]:
-    """What each coordinate is, in the order of q."""
+    """Angle or length for each coordinate, in the order of q."""
     return [of_freedom(driven(tree, body)) for _, body in items(tree, "coordinates")]
+
+
+def coordinate_lists(tree: Tree) -> Iterator[tuple[KeyPath, object]]:
+    """Key path and content of whatever has an entry for each coordinate, if it is a list."""
+    for place in (("expansion", "q"), ("validation", "q_span")):
+        yield place, at(tree, *place)
+    for path, body in trajectories(tree):
+        for key in ("q", "points"):
+            yield from (((*path, key, k), row) for k, row in enumerate(entries(body, key)))
+        yield (*path, "start"), at(body, "start")
+    for path, body in followed_modes(tree):
+        yield (*path, "at", "q"), at(body, "at", "q")
+    for k, body in enumerate(entries(tree, "measurements")):
+        yield ("measurements", k, "q"), at(body, "q")
 
 
 # --- Trajectories, targets and design parameters
@@ -163,7 +176,7 @@ def trajectories(tree: Tree) -> list[tuple[KeyPath, object]]:
 
 
 def trajectory_names(tree: Tree) -> list[str]:
-    """What each trajectory is called: its name, or its place counted from 1."""
+    """Names of the trajectories; of one without, its place counted from 1."""
     bodies = [body for _, body in trajectories(tree)]
     return [text(body, "name") or str(k) for k, body in enumerate(bodies, start=1)]
 

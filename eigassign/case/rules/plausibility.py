@@ -231,7 +231,7 @@ def angles_are_in_radians(document: Document) -> Iterator[Finding]:
 
 
 def _angles(document: Document) -> Iterator[tuple[KeyPath, object]]:
-    """Every angle of the file, or a nest of them."""
+    """Angles of the file, or nests of them, by key path."""
     joints = document.mechanism.joints
     for name, joint in joints.items():
         yield ("mechanism", "joints", name, "angle"), joint.angle

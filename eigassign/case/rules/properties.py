@@ -178,7 +178,7 @@ def _of_drive(tree: Tree, name: str, key: str) -> Property:
 
 
 def drive_quantity(tree: Tree, coordinate: object, key: str) -> Quantity:
-    """What the stiffness or inertia of a coordinate's drive is."""
+    """Quantity of the stiffness or inertia of a coordinate's drive."""
     freedom = driven(tree, coordinate)
     if freedom is None:
         return ANY
@@ -199,7 +199,7 @@ def parameters_name_properties(tree: Tree) -> Iterator[Finding]:
 
 
 def load_cases_set_properties(tree: Tree) -> Iterator[Finding]:
-    """What a trajectory sets is a number that can vary, and no design parameter."""
+    """Trajectories set numbers that can vary, and no design parameters."""
     owner = {column.parameter: column.name for column in columns(tree)}
     for place, body in trajectories(tree):
         for path in names(body, "set"):
@@ -249,7 +249,7 @@ Ranges = Mapping[str, tuple[float, float]]  # SI, by path of the parameter
 
 
 def bounds_hold_no_impossible_section(mechanism: Any, design: Design) -> Iterator[Finding]:
-    """Every section exists wherever the design may go, each problem at the bound to narrow."""
+    """Sections exist wherever the design may go; each problem is at the bound to narrow."""
     ranges = {p.parameter: (p.min, p.max) for p in design.parameters.values()}
     entry = {p: name for name, e in design.entries.items() for p in _paths(e)}
     for path, bound, message in impossible(mechanism.sections, ranges):
@@ -269,7 +269,7 @@ def _paths(entry: Entry) -> tuple[str, ...]:
 def load_cases_have_possible_sections(
     mechanism: Any, design: Any, motions: Sequence[tuple[KeyPath, str, Any]]
 ) -> Iterator[Finding]:
-    """Every section exists along each trajectory that sets one of its dimensions."""
+    """Sections exist along each trajectory that sets one of their dimensions."""
     ranges = {p.parameter: (p.min, p.max) for p in design.parameters.values()}
     for place, _, motion in motions:
         own = {path: (value, value) for path, value in motion.set.items()}

@@ -9,6 +9,7 @@ from eigassign.case.reader import Finding, KeyPath, Tree, at, entries, items, na
 from eigassign.case.rules.lookups import (
     choices,
     columns,
+    coordinate_lists,
     design_entries,
     freedoms,
     moving,
@@ -22,15 +23,10 @@ from eigassign.case.suggestions import listed, unknown
 
 
 def lists_have_an_entry_for_each_coordinate(tree: Tree) -> Iterator[Finding]:
-    """Points of a trajectory, the expansion point and the validated box are as long as q."""
+    """Points of trajectories and other poses are as long as q, and so is the validated box."""
     q = names(tree, "coordinates")
-    for path, body in trajectories(tree):
-        for key in ("q", "points"):
-            for k, row in enumerate(entries(body, key)):
-                yield from _one_for_each(row, (*path, key, k), "coordinate", q)
-        yield from _one_for_each(at(body, "start"), (*path, "start"), "coordinate", q)
-    for place in (("validation", "q_span"), ("expansion", "q")):
-        yield from _one_for_each(at(tree, *place), place, "coordinate", q)
+    for path, listed_values in coordinate_lists(tree):
+        yield from _one_for_each(listed_values, path, "coordinate", q)
 
 
 def expansion_point_has_an_entry_for_each_parameter(tree: Tree) -> Iterator[Finding]:
@@ -87,7 +83,7 @@ def branches_are_ranges_of_driven_joints(tree: Tree) -> Iterator[Finding]:
 
 
 def parameters_vary_different_properties(tree: Tree) -> Iterator[Finding]:
-    """Each component of the design has a property of its own."""
+    """Components of the design have properties of their own."""
     owner: dict[str, str] = {}
     for name, path, place in columns(tree):
         entry = str(place[1])

@@ -67,7 +67,7 @@ def a_mode_has_one_frequency_at_a_time(tree: Tree) -> Iterator[Finding]:
 
 
 def _meet(a: tuple[int, str, Span | None], b: tuple[int, str, Span | None]) -> bool:
-    """Whether two (mode, trajectory, part of it) have an instant in common."""
+    """True for two (mode, trajectory, part of it) that have an instant in common."""
     if a[:2] != b[:2]:
         return False
     return a[2] is None or b[2] is None or (a[2][0] < b[2][1] and b[2][0] < a[2][1])
@@ -91,19 +91,15 @@ def followed_modes_are_at_a_pose(tree: Tree) -> Iterator[Finding]:
 
 
 def measurements_are_at_poses(tree: Tree) -> Iterator[Finding]:
-    """Each measurement of a list was made at a time of a trajectory, or with a value for each q."""
+    """Measurements of a list were made at a time of a trajectory, or with a value for each q."""
     for k, body in enumerate(entries(tree, "measurements")):
         yield from _no_pose(tree, ("measurements", k), body)
 
 
 def _no_pose(tree: Tree, path: KeyPath, body: object) -> Iterator[Finding]:
-    """What keeps `time`, `trajectory` and `q` of a part from being a pose of the mechanism."""
-    q, known = names(tree, "coordinates"), trajectory_names(tree)
-    given, where = at(body, "q"), text(body, "trajectory")
+    """Mistakes that keep `time` and `trajectory` of a part from being a pose of the mechanism."""
+    known, where = trajectory_names(tree), text(body, "trajectory")
     time = number(at(body, "time"), TIME)
-    if isinstance(given, tuple) and len(given) != len(q):
-        message = f"needs {len(q)} entries, one for each coordinate ({listed(q)}); got "
-        yield (*path, "q"), f"{message}{len(given)}"
     if where is not None and where not in known:
         yield (*path, "trajectory"), unknown("trajectory", where, known)
     elif time is not None and not known:

@@ -16,6 +16,7 @@ from eigassign.case.rules.files import named_files
 from eigassign.case.rules.lookups import (
     ANY,
     choices,
+    coordinate_lists,
     coordinate_quantities,
     design_entries,
     driven,
@@ -47,7 +48,7 @@ def completed(tree: Tree, folder: Path) -> Tree:
     for path, value in [
         *_numbers(tree),
         *_prices(tree),
-        *_files(tree, folder),
+        *((each.path, each.file) for each in named_files(tree, folder)),
         *_defaults(tree),
     ]:
         inner = changes
@@ -112,10 +113,9 @@ def _undecided(tree: Tree) -> Iterator[Undecided]:
     for k, value in enumerate(entries(tree, "expansion", "y")):
         of_parameters = [p.quantity if p else ANY for p in known.values()]
         yield ("expansion", "y", k), value, of_parameters[k] if k < len(of_parameters) else ANY
-    yield from _in_list(at(tree, "expansion", "q"), kinds, ("expansion", "q"))
+    for path, listed in coordinate_lists(tree):
+        yield from _in_list(listed, kinds, path)
     for path, body in trajectories(tree):
-        for key in ("q", "points", "start"):
-            yield from _in_list(at(body, key), kinds, (*path, key))
         for name, value in items(body, "set"):
             prop = known_property(tree, name)
             yield (*path, "set", name), value, prop.quantity if prop else ANY
@@ -124,13 +124,11 @@ def _undecided(tree: Tree) -> Iterator[Undecided]:
             both = [of_freedom(freedom[0] if len(freedom) == 1 else None)] * 2
             yield from _in_list(limits, both, (*path, "branch", joint))
     for path, body in followed_modes(tree):
-        yield from _in_list(at(body, "at", "q"), kinds, (*path, "at", "q"))
         for name, value in items(body, "design"):
             if name in known:
                 prop = known[name]
                 yield (*path, "design", name), value, prop.quantity if prop else ANY
     for k, body in enumerate(entries(tree, "measurements")):
-        yield from _in_list(at(body, "q"), kinds, ("measurements", k, "q"))
         yield from _of_deviation(at(body, "deviation"), ("measurements", k, "deviation"))
     path = ("measurements", "deviation")
     yield from _of_deviation(at(tree, *path), path)
@@ -138,7 +136,6 @@ def _undecided(tree: Tree) -> Iterator[Undecided]:
     alike = len({kind.dimension for kind in kinds}) <= 1
     common = (kinds[0] if kinds else ANY) if alike else None
     yield ("validation", "q_span"), span, common
-    yield from _in_list(span, kinds, ("validation", "q_span"))
     yield from _of_assembly(tree)
     for name, body in items(tree, "coordinates"):
         for key in DRIVEN:
@@ -179,7 +176,7 @@ def _of_deviation(value: object, path: KeyPath) -> Iterator[Undecided]:
 
 
 def _of_assembly(tree: Tree) -> Iterator[Undecided]:
-    """Where the loops are put together, and guesses of their passive joints."""
+    """Coordinates at which loops are put together, and guesses of their passive joints."""
     path: KeyPath = ("mechanism", "assembly")
     for name, value in items(tree, "mechanism", "assembly", "at"):
         quantity = of_freedom(driven(tree, at(tree, "coordinates", name)))
@@ -200,13 +197,7 @@ def _in_list(value: object, kinds: Sequence[Quantity], path: KeyPath) -> Iterato
             yield from _in_list(v, kinds, (*path, k))
 
 
-# --- Files and defaults
-
-
-def _files(tree: Tree, folder: Path) -> Iterator[tuple[KeyPath, object]]:
-    """Files that the case names as absolute paths."""
-    for each in named_files(tree, folder):
-        yield each.path, each.file
+# --- Defaults
 
 
 def _defaults(tree: Tree) -> Iterator[tuple[KeyPath, object]]:

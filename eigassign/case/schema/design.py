@@ -36,7 +36,7 @@ Price: TypeAlias = Annotated[
     float, Quantity(elsewhere="for one SI unit when bare, or such as 3 / kg")
 ]
 RESERVED = ("constraints", "mass")  # names under `design` that are no entries of it
-MOST_CHOICES = 1000
+MOST_CHOICES = 1000  # of an entry; a maker's whole list of profiles has some hundreds
 _SHARE = quantity("fraction", above=0)
 
 
@@ -55,7 +55,7 @@ class Tolerance:
         return self.amount * abs(value) if self.relative else self.amount
 
     def written(self) -> str | float:
-        """As a file may hold it; a share reads back as the very same number."""
+        """Text or number for a file; a share reads back as the very same number."""
         return f"{100 * Decimal(repr(self.amount)):f} %" if self.relative else self.amount
 
     @classmethod
@@ -234,7 +234,7 @@ class MassLimits(Part):
 
 
 def is_entry(value: object) -> bool:
-    """Whether what stands under `design` looks like a parameter or a list of choices."""
+    """True for what looks like a parameter or a list of choices, as it stands under `design`."""
     return isinstance(value, Mapping) and ("parameter" in value or "choices" in value)
 
 
@@ -320,7 +320,7 @@ class Design(Part):
 
     @cached_property
     def catalogues(self) -> tuple[Catalogue, ...]:
-        """What can only take listed values, in the order of the file."""
+        """Columns that can only take listed values, in the order of the file."""
         found, start = [], 0
         for name, entry in self.entries.items():
             if isinstance(entry, Choices):

@@ -76,18 +76,16 @@ _KINDS: dict[str, type[Part]] = {
 }
 _TAGS = {f"<{kind}>" for kind in _KINDS}
 _TAGS |= {"<one>", "<list>", "<number>", "<auto>", "<value>", "<part>"}
-_MOST = 200  # errors explained; nobody reads more
 _Explained = tuple[KeyPath, str]  # keys to append to the path, message
 
 
 def validated(tree: Tree) -> tuple[Document | None, list[Finding]]:
     """The document, or None and everything the schema has against it."""
+    context = {"space": text(tree, "mechanism", "space")}  # see `schema.vectors`
     try:
-        context = {"space": text(tree, "mechanism", "space")}  # see `schema.vectors`
         return Document.model_validate(_with_entries_apart(tree), context=context), []
     except ValidationError as error:
-        details = error.errors(include_url=False)[:_MOST]
-        findings = [_finding(detail) for detail in details if not _is_echo(detail)]
+        findings = _findings(error)
         return None, [f for f in findings if not f[1].endswith("got nothing")]  # a rule finds those
 
 
@@ -96,8 +94,26 @@ def validated_sweep(body: object) -> tuple[Sweep | None, list[Finding]]:
     try:
         return Sweep.model_validate(body), []
     except ValidationError as error:
-        details = error.errors(include_url=False)[:_MOST]
-        return None, [_finding({**each, "loc": ("sweep", *each["loc"])}) for each in details]
+        return None, _findings(error, "sweep")
+
+
+def _findings(error: ValidationError, *below: str) -> list[Finding]:
+    """Errors in words, but for echoes: pydantic counts only the valid entries of a list."""
+    found: list[Finding] = []
+    each: Any
+    for each in error.errors(include_url=False)[:200]:  # nobody reads more
+        if each["type"] == "too_short" and len(each["input"]) >= each["ctx"]["min_length"]:
+            continue
+        detail = {**each, "loc": (*below, *each["loc"])}
+        path = tuple(p for p in detail["loc"] if p not in _TAGS and p != "[key]")
+        if path[:2] == ("design", "entries"):
+            path = (path[0], *path[2:])
+        kind = each["type"]
+        if kind.startswith("no_") and not isinstance(each["input"], Mapping):
+            kind = "no_mapping"
+        suffix, message = _EXPLAIN.get(kind, _by_message)(detail)
+        found.append(((*path, *suffix), message))
+    return found
 
 
 def _with_entries_apart(tree: Tree) -> Tree:
@@ -111,19 +127,6 @@ def _with_entries_apart(tree: Tree) -> Tree:
     apart = {key: design[key] for key in RESERVED if key in design and not is_entry(design[key])}
     entries = {name: body for name, body in design.items() if name not in apart}
     return {**tree, "design": {"entries": entries, **apart}}
-
-
-def _is_echo(error: Any) -> bool:
-    """Pydantic counts only valid entries; a list that is long enough had other errors."""
-    return error["type"] == "too_short" and bool(len(error["input"]) >= error["ctx"]["min_length"])
-
-
-def _finding(error: Any) -> Finding:
-    path = tuple(p for p in error["loc"] if p not in _TAGS and p != "[key]")
-    if path[:2] == ("design", "entries"):
-        path = (path[0], *path[2:])
-    suffix, message = _EXPLAIN.get(error["type"], _by_message)(error)
-    return (*path, *suffix), message
 
 
 def _by_message(error: Any) -> _Explained:
@@ -171,12 +174,9 @@ def _parts_in(annotation: object) -> Iterator[type[Part]]:
 
 
 def _no_kind(key: str, known: Mapping[str, object]) -> Any:
-    """Of a mapping whose ``key`` names none of the ``known`` kinds."""
+    """Explanation of a mapping whose ``key`` names none of the ``known`` kinds."""
 
     def explain(error: Any) -> _Explained:
-        if not isinstance(error["input"], Mapping):
-            given = error["input"]
-            return (), f"expected a mapping, got {shown(given)}{unspaced(given)}"
         if key not in error["input"]:
             return (key,), f"required key is missing: one of {listed(known)}"
         value = error["input"][key]
@@ -188,8 +188,6 @@ def _no_kind(key: str, known: Mapping[str, object]) -> Any:
 
 
 def _no_motion(error: Any) -> _Explained:
-    if not isinstance(error["input"], Mapping):
-        return (), f"expected a mapping, got {shown(error['input'])}"
     return (), (
         "expected one of the keys tip (path of a link's node), points (point to point), q (joint "
         f"samples) or file (CSV); got {listed(error['input'])}"
@@ -198,8 +196,6 @@ def _no_motion(error: Any) -> _Explained:
 
 def _no_target(error: Any) -> _Explained:
     given = error["input"]
-    if not isinstance(given, Mapping):
-        return (), f"expected a mapping, got {shown(given)}"
     kinds = [key for key in TARGETS if key in given]
     if kinds:
         return (kinds[1],), f"{kinds[0]} is given already: write a target of its own for each"
@@ -253,6 +249,10 @@ _EXPLAIN: dict[str, Any] = {
     "at_key": lambda e: (e["ctx"]["keys"], e["ctx"]["text"]),
     "missing": _missing,
     "extra_forbidden": _extra,
+    "no_mapping": lambda e: (
+        (),
+        f"expected a mapping, got {shown(e['input'])}{unspaced(e['input'])}",
+    ),
     "no_shape": _no_kind("shape", SHAPES),
     "no_link": _no_kind("type", LINKS),
     "no_joint": _no_kind("type", JOINTS),

@@ -60,7 +60,7 @@ class Part(BaseModel):
 
 
 def _docstring(model: type[Part]) -> tuple[str, dict[str, str]]:
-    """Of a model without its list `Keys:`, and the entries of that list and of its bases."""
+    """Docstring of a model up to its list `Keys:`, and the entries of that and its bases' lists."""
     prose, texts = "", dict[str, str]()
     for each in reversed(model.__mro__):
         prose, _, listed = inspect.cleandoc(each.__doc__ or "").partition("Keys:\n")
@@ -71,7 +71,7 @@ def _docstring(model: type[Part]) -> tuple[str, dict[str, str]]:
 
 
 def needs_one_of(*groups: Sequence[str]) -> ConfigDict:
-    """As ``model_config``: one of the groups of keys is needed, which a validator sees to."""
+    """A ``model_config``: one of the groups of keys is needed, which a validator sees to."""
     options: list[Any] = [{"required": list(group)} for group in groups]
     return ConfigDict(json_schema_extra={"anyOf": options})
 

@@ -52,7 +52,7 @@ class DimensionLimit:
     may_meet: bool = False
 
     def holds(self, small: float, large: float) -> bool:
-        """Whether these values of the two dimensions are possible."""
+        """True where these values of the two dimensions are possible."""
         a = self.factor * small
         return a < large or (self.may_meet and a == large)
 
@@ -62,14 +62,14 @@ class DimensionLimit:
 
 
 class SectionBase(Part):
-    """What all sections say of themselves."""
+    """Depth and limits, which all sections have."""
 
     def depth(self, spatial: bool) -> float:
         """Depth in the plane of bending, m; in space the larger of the two."""
         raise NotImplementedError
 
     def limits(self) -> tuple[DimensionLimit, ...]:
-        """What must hold between its dimensions for the section to exist."""
+        """Inequalities between its dimensions without which the section cannot exist."""
         return ()
 
     @model_validator(mode="after")
@@ -210,7 +210,7 @@ class IProfileSection(SectionBase):
         return max(self.height, self.width) if spatial else self.height
 
     def limits(self) -> tuple[DimensionLimit, ...]:
-        """There is a web between the flanges, no wider than they are."""
+        """The web stands between the flanges and is no wider than they are."""
         return (
             DimensionLimit("flange_thickness", "height", factor=2),
             DimensionLimit("web_thickness", "width", may_meet=True),

@@ -17,7 +17,7 @@ from eigassign.case.schema.parts import ByReference, File, OneOrList, Part, wron
 from eigassign.case.suggestions import shown
 from eigassign.case.units import QuantityError, number_and_unit
 
-MOST = 10_000_000  # variants of one case
+MOST = 10_000_000  # variants of one case: ten times what has been measured (benchmarks)
 
 
 def _amount(value: Any) -> Any:

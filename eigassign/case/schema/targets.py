@@ -279,7 +279,7 @@ class KeepOutTarget(AnyTarget):
 
     @property
     def frequencies(self) -> tuple[tuple[KeyPath, Curve], ...]:
-        """What the file says in Hz, each with its keys below the target."""
+        """Frequencies that the file gives, each with its keys below the target."""
         if isinstance(self.keep_out, Harmonic):
             return ((("keep_out", "of"), self.keep_out.of),)
         return tuple((("keep_out", k), edge) for k, edge in enumerate(self.keep_out))

@@ -226,11 +226,9 @@ TrajectoryForm: TypeAlias = Annotated[
     Discriminator(_motion_tag, "no_motion", "no key names a motion"),
 ]
 
-MOST = 100  # trajectories of one case
-
 TrajectoryForms: TypeAlias = OneOrList[
     TrajectoryForm,
-    Annotated[tuple[TrajectoryForm, ...], Field(min_length=1, max_length=MOST)],
+    Annotated[tuple[TrajectoryForm, ...], Field(min_length=1, max_length=100)],
 ]
 
 
