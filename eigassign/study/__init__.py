@@ -36,9 +36,7 @@ __all__, __getattr__, __dir__ = face(
         "design.followed": "Solved followers require_one_shape solve_design",
         "design.judgement": "crossing_warnings verdict",
         "design.optimum": "Found find_optimum",
-        "design.response": (
-            "ExactResponse MOST ReducedModels ReducedResponse exact_response reduced_models"
-        ),
+        "design.response": ("DesignResponse ReducedModels reduced_models response_of"),
         "drawing": "AMPLITUDE draw_modes draw_poses rest_pose spread_samples",
         "meaning.overall": "Studies study_meaning",
         "meaning.reach": "proved_ranges unreachable",

@@ -117,7 +117,7 @@ def conflict(found: Found, listed: Sequence[ListedValues], steps: int) -> Confli
     needed, smallest = list(asked.limit_names), True
     for name in asked.limit_names:
         rest = [other for other in needed if other != name]
-        met = _can_be_met(found.variant.asks(rest), listed, best.y, steps) if rest else True
+        met = _can_be_met(found.variant.with_limits(rest), listed, best.y, steps) if rest else True
         smallest = smallest and met is not None
         if met is False:
             needed = rest

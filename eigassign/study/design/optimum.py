@@ -11,13 +11,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from time import monotonic
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.catalogues.branching import ListedValues
 from eigassign.assignment.catalogues.choosing import KEPT, RELAXED, Chosen, choose
 from eigassign.assignment.exact.design_problem import (
     MET,
@@ -40,18 +41,16 @@ from eigassign.errors import (
     CaseError,
     EigassignError,
     InfeasibleError,
-    LostModeError,
     MissingMassError,
 )
 from eigassign.study.design.clearance import Band, Clearance, mode_above, prove_clear, wanting
 from eigassign.study.design.followed import Follower, followers
 from eigassign.study.design.one_shot import catalogues, linear_constraints
 from eigassign.study.design.response import (
-    ExactResponse,
+    DesignResponse,
     ReducedModels,
-    ReducedResponse,
-    exact_response,
     reduced_models,
+    response_of,
 )
 from eigassign.study.scene import Scene
 from eigassign.study.wanted import Wanted, followed_modes, target_frequencies, time_weights
@@ -71,7 +70,6 @@ REFINED = 3  # optima on few samples that are followed on all
 AGREED = 3  # starts, and half the parameters more, for each optimum seen that lead to the best
 SAME = 1e-4  # relative, in F: optima of the same worth
 NOTHING = 1e-14  # of F: no error
-PERCENT = {Objective.LEAST_SQUARES: 1e4, Objective.WORST_CASE: 1e2}  # of F: what prices count in
 
 
 @dataclass(frozen=True)
@@ -81,8 +79,12 @@ class PosedProblem:
     below: tuple[tuple[str, int], ...]  # the band in words, and k
     requirements: Requirements
     problem: DesignProblem
-    response: ExactResponse | ReducedResponse
-    asks: Callable[[Collection[str]], DesignProblem]  # the problem with these limits only
+    response: DesignResponse
+
+    def with_limits(self, names: Collection[str]) -> DesignProblem:
+        """The problem with those limits only that are named."""
+        some = self.requirements.with_limits(names)
+        return replace(self.problem, appraise=lambda y: some.appraise(y, self.response(y)))
 
 
 @dataclass(frozen=True)
@@ -144,25 +146,22 @@ def _search_all(
     that is worse than the initial one. Where none meets all limits, it is the one that misses them
     least, relative to the limits.
     """
-    keys = scene.file.assignment
-    listed = catalogues(scene.file)
+    keys, listed = scene.file.assignment, catalogues(scene.file)
     whole = Task(scene, tuple(wanted), margin)
-    tasks = [whole] if listed else _rougher(whole, models)
+    few = _thinned(whole, FEW)
+    tasks = [] if few is None else [replace(few, models=models)]
+    tasks += [whole] if models is None else [replace(whole, models=models), whole]
     best_of: list[tuple[PosedProblem, tuple[Optimum, ...], Chosen | None]] = []
     made, solves = 0, 0
     ended: End | None = None
-    for below in _below(whole):
+    lost: list[str] = []
+    possible = (_possible(scene, band) for band in whole.bands)
+    for below in itertools.islice(itertools.product(*possible), MOST_BELOW):
         if listed:
             near = list(starts[: KEPT + 1])
-            for missed in (False, True):
-                variant = variant_of(whole, below, missed)
-                try:
-                    chosen = choose(variant.problem, listed, near, keys.steps, deadline, progress)
-                    break
-                except InfeasibleError:  # no combination meets the linear limits
-                    if missed:
-                        raise
+            variant, chosen = _chosen(whole, below, listed, near, deadline, progress)
             best_of.append((variant, chosen.optima, chosen))
+            lost += variant.response.lost
             solves += chosen.appraisals * len(scene.path.q)
             made += min(len(near), RELAXED)
             if chosen.search is None:
@@ -171,21 +170,24 @@ def _search_all(
         search = _Search(variant_of(tasks[0], below), keys.steps, deadline)
         for start in _in_turn(tasks[0], search.variant, starts, keys.starts):
             made += 1
-            progress(f"  from start {made}{search.left(keys.starts)}")
+            progress(f"  from start {made}")
             search.run(start)
-            if search.ended or search.agreed(keys.starts):
+            if search.ended:
                 break
-            if keys.starts == "auto" and search.falls_behind([o[0] for _, o, _ in best_of]):
+            best = [optima[0] for _, optima, _ in best_of]
+            if keys.starts == "auto" and (search.agreed() or search.falls_behind(best)):
                 break
-        solves += search.variant.response.exact_solves
+        searches = [search]
         for task in tasks[1:]:
             if not search.ended:
                 progress("  from what was found, on all samples and exactly")
             search = _refined(variant_of(task, below), search, scene.initial)
-            solves += search.variant.response.exact_solves
+            searches.append(search)
+        solves += sum(one.variant.response.exact_solves for one in searches)
+        lost += (line for one in searches for line in one.variant.response.lost)
         if search.optima:
-            found = search.variant, distinct(search.optima, search.variant.problem), None
-            best_of.append(found)
+            optima = distinct(search.optima, search.variant.problem)
+            best_of.append((search.variant, optima, None))
         if ended := search.ended:
             break
     best_of = best_first(best_of, lambda found: worth(found[1][0]))
@@ -200,8 +202,26 @@ def _search_all(
         starts=made,
         exact_solves=solves + len(scene.path.q),
         chosen=chosen_of,
-        lost=tuple(dict.fromkeys(whole.lost)),
+        lost=tuple(dict.fromkeys(lost)),
     )
+
+
+def _chosen(
+    task: Task,
+    below: tuple[int, ...],
+    listed: Sequence[ListedValues],
+    near: Sequence[Floats],
+    deadline: float,
+    progress: Callable[[str], None],
+) -> tuple[PosedProblem, Chosen]:
+    """The best combinations; where none meets the linear limits, these are missed as others are."""
+    steps = task.scene.file.assignment.steps
+    variant = variant_of(task, below)
+    try:
+        return variant, choose(variant.problem, listed, near, steps, deadline, progress)
+    except InfeasibleError:
+        variant = variant_of(task, below, missed=True)
+        return variant, choose(variant.problem, listed, near, steps, deadline, progress)
 
 
 def _clearances(task: Task, variant: PosedProblem, y: Floats) -> Iterator[Clearance]:
@@ -254,8 +274,6 @@ class _Search:
     ) -> None:
         self.variant, self.steps, self.deadline = variant, steps, deadline
         self.optima: list[Optimum] = []
-        self.appraisals = 0
-        self.began = monotonic()
         self.ended = ended  # by the clock or by Ctrl-C, here or in the search before
 
     def run(self, start: Floats, before: Optimum | None = None) -> None:
@@ -273,22 +291,21 @@ class _Search:
                 return
             found = self._follow(start)
         except EigassignError:
-            if not self.optima and self.appraisals == 0:
+            if not self.optima:
                 raise
             return
         self.optima.append(found if before is None else _continued(before, found))
-        self.appraisals += found.appraisals
         if found.end in (End.SECONDS, End.INTERRUPTED):
             self.ended = found.end
 
     def _follow(self, start: Floats) -> Optimum:
-        return minimise(self.variant.problem, start, self.steps, self._stop)
+        def stop() -> End | None:
+            return self.ended or (End.SECONDS if monotonic() > self.deadline else None)
 
-    def _stop(self) -> End | None:
-        return self.ended or (End.SECONDS if monotonic() > self.deadline else None)
+        return minimise(self.variant.problem, start, self.steps, stop)
 
     def falls_behind(self, others: Sequence[Optimum]) -> bool:
-        """Whether some starts came nowhere near what ``others`` have: more would not either."""
+        """True where some starts came nowhere near what ``others`` have: more would not either."""
         if len(self.optima) < BEHIND or not others:
             return False
         own, best = (worth(best_first(optima, worth)[0]) for optima in (self.optima, others))
@@ -296,36 +313,23 @@ class _Search:
             return True
         return own[0] >= best[0] - MET and own[1] > best[1] + (FAR_BEHIND - 1.0) * abs(best[1])
 
-    def agreed(self, starts: int | str) -> bool:
-        """Whether enough starts led to the best optimum: more where others were seen.
+    def agreed(self) -> bool:
+        """True where enough starts led to the best optimum: more where others were seen.
 
         No errors at all cannot be improved; a price, which may be negative, can.
         """
-        if isinstance(starts, int) or not self.optima:
+        if not self.optima:
             return False
-        best = worth(best_first(self.optima, worth)[0])
-        if self.variant.problem.prices is None and best[0] <= MET and best[1] <= NOTHING:
+        problem = self.variant.problem
+        violation, value = worth(best_first(self.optima, worth)[0])
+        if problem.prices is None and violation <= MET and value <= NOTHING:
             return True
-        return self._lacking() <= 0
-
-    def _lacking(self) -> int:
-        """How many more starts have to lead to the best optimum, if no other is found."""
-        problem, best = self.variant.problem, worth(best_first(self.optima, worth)[0])
-        least = best[1] + SAME * abs(best[1]) + NOTHING
+        least = value + SAME * abs(value) + NOTHING
         same = [
-            o for o in self.optima if o.seen.violation <= best[0] + MET and o.objective <= least
+            o for o in self.optima if o.seen.violation <= violation + MET and o.objective <= least
         ]
         enough = AGREED + len(problem.lower) // 2
-        return enough * len(distinct(self.optima, problem)) - len(same)
-
-    def left(self, starts: int | str) -> str:
-        """In words how long the starts take that are still to come, at the pace so far."""
-        done = len(self.optima)
-        if not done:
-            return ""
-        more = starts - done if isinstance(starts, int) else min(self._lacking(), STARTS - done)
-        seconds = (monotonic() - self.began) / done * max(more, 1)
-        return f", some {seconds:.0f} s left at least" if seconds >= 1.0 else ""
+        return len(same) >= enough * len(distinct(self.optima, problem))
 
 
 def _continued(before: Optimum, found: Optimum) -> Optimum:
@@ -398,24 +402,16 @@ class Task:
     wanted: tuple[Wanted, ...]
     margin: float  # by which the limits of bands are drawn in, relative
     models: ReducedModels | None = None  # that stand for exact solves
-    lost: list[str] = field(default_factory=list)  # where followed modes were lost
 
     @cached_property
     def bands(self) -> tuple[_Band, ...]:
-        """Every band along each trajectory for itself: only there k must not change."""
+        """The bands along each trajectory for itself."""
         return tuple(_bands(self.scene, self.wanted))
 
     @cached_property
     def followers(self) -> tuple[Follower, ...]:
-        """Of every mode that targets follow by its shape."""
+        """The followers of every mode that targets follow by its shape."""
         return followers(self.scene, self.wanted)
-
-
-def _rougher(whole: Task, models: ReducedModels | None) -> list[Task]:
-    """The task on few samples, if it has many; by reduced models, if there are; and as it is."""
-    few = _thinned(whole, FEW)
-    tasks = [] if few is None else [replace(few, models=models)]
-    return [*tasks, *([] if models is None else [replace(whole, models=models)]), whole]
 
 
 def _thinned(whole: Task, few: int) -> Task | None:
@@ -431,12 +427,6 @@ def _thinned(whole: Task, few: int) -> Task | None:
     return task if len(task.bands) == len(tuple(_bands(scene, whole.wanted))) else None
 
 
-def _below(task: Task) -> Iterator[tuple[int, ...]]:
-    """How many modes are below each band: every combination, the likeliest first."""
-    possible = [_possible(task.scene, band) for band in task.bands]
-    yield from itertools.islice(itertools.product(*possible), MOST_BELOW)
-
-
 def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> PosedProblem:
     """The problem of a task with so many modes below each of its bands.
 
@@ -444,20 +434,22 @@ def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Pose
     """
     scene, wanted = task.scene, task.wanted
     lower, upper = scene.bounds
-    width = np.where(upper > lower, upper - lower, 1.0)
     targets = tuple(
         ModeTarget(w.mode, w.hz, w.rows, w.weight)
         for w in wanted
         if w.requirement.kind == "frequency"
     )
     objective = Objective(scene.file.assignment.objective)
-    prices = _prices(scene, objective if targets else None)
+    prices = np.array([column.price or 0.0 for column in scene.file.design.parameters.values()])
+    if targets:  # F is errors, and prices are in %² of them, in the worst case in %
+        prices = prices / (1e2 if objective is Objective.WORST_CASE else 1e4)
     of_bands = [
         limit
         for band, k in zip(task.bands, below, strict=True)
         for limit in _beside(scene, band, k, task.margin)
     ]
     constraints, elastic = _linear(scene, missed)
+    width = np.where(upper > lower, upper - lower, 1.0)
     asked = Requirements(
         targets=targets,
         limits=(*_limits(wanted), *of_bands),
@@ -466,31 +458,18 @@ def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Pose
         objective=objective,
         least_change=(scene.initial, width) if not targets and not prices.any() else None,
     )
-    exact = exact_response(scene, asked.modes, task.followers)
-    response = exact if task.models is None else ReducedResponse(exact, task.models)
-
-    def frequencies(y: Floats) -> Frequencies:
-        try:
-            return response(y)
-        except LostModeError as error:
-            task.lost.append(str(error))
-            raise
-
-    def asks(names: Collection[str]) -> DesignProblem:
-        some = asked.with_limits(names)
-        return DesignProblem(
-            appraise=lambda y: some.appraise(y, frequencies(y)),
-            lower=lower,
-            upper=upper,
-            constraints=constraints,
-            prices=prices if prices.any() else None,
-            reference=scene.initial,
-            objective=objective if targets else Objective.LEAST_SQUARES,
-        )
-
-    labels = (band.label for band in task.bands)
-    named = tuple(zip(labels, below, strict=True))
-    return PosedProblem(named, asked, asks(asked.limit_names), response, asks)
+    response = response_of(scene, asked.modes, task.followers, task.models)
+    problem = DesignProblem(
+        appraise=lambda y: asked.appraise(y, response(y)),
+        lower=lower,
+        upper=upper,
+        constraints=constraints,
+        prices=prices if prices.any() else None,
+        reference=scene.initial,
+        objective=objective if targets else Objective.LEAST_SQUARES,
+    )
+    named = zip((band.label for band in task.bands), below, strict=True)
+    return PosedProblem(tuple(named), asked, problem, response)
 
 
 def _mass(scene: Scene) -> Iterator[QuantityLimit]:
@@ -508,20 +487,12 @@ def _linear(
     rows = tuple(linear_constraints(scene.file))
     if not missed and constraints_agree(rows, Bounds(*scene.bounds)):
         return rows, ()
-    return (), tuple(
-        QuantityLimit(row.name, partial(_linear_value, row.coefficients), row.lower, row.upper)
-        for row in rows
-    )
+    return (), tuple(QuantityLimit(r.name, partial(_sum, r), r.lower, r.upper) for r in rows)
 
 
-def _linear_value(coefficients: Floats, y: Floats) -> tuple[float, Floats]:
-    return float(coefficients @ y), coefficients
-
-
-def _prices(scene: Scene, objective: Objective | None) -> Floats:
-    """Of F per SI unit; where F is errors, prices are in %² of them (worst case: %)."""
-    given = np.array([column.price or 0.0 for column in scene.file.design.parameters.values()])
-    return given if objective is None else given / PERCENT[objective]
+def _sum(row: LinearConstraint, y: Floats) -> tuple[float, Floats]:
+    """The value of a linear limit and its slopes."""
+    return float(row.coefficients @ y), row.coefficients
 
 
 def _limits(wanted: Sequence[Wanted]) -> Iterator[FrequencyLimit]:
@@ -548,7 +519,7 @@ class _Band:
 
 
 def _bands(scene: Scene, wanted: Sequence[Wanted]) -> Iterator[_Band]:
-    """Every band along each trajectory for itself: only there the number below must not change."""
+    """Yield every band along each trajectory for itself: only there k must not change."""
     for w in wanted:
         if w.requirement.kind != "keep_out":
             continue
@@ -562,9 +533,23 @@ def _bands(scene: Scene, wanted: Sequence[Wanted]) -> Iterator[_Band]:
 
 
 def _possible(scene: Scene, band: _Band) -> list[int]:
-    """What k may be: from the fewest modes below the band to the most, at designs all over."""
-    counts = _counts(scene, band, tuple(sorted(band.wanted.requirement.modes)))
-    first = int(np.median(counts[0]))
+    """Each k that may be, from the fewest modes below the band to the most, at designs all over.
+
+    The likeliest comes first.
+    """
+    named, (lower, upper) = sorted(band.wanted.requirement.modes), scene.bounds
+    designs = [scene.initial, lower, upper, 0.5 * (lower + upper)]
+    if len(lower):
+        designs += list(_spread_designs(scene, 8, 1))
+    found = []
+    for y in designs:
+        with suppress(EigassignError):
+            q = scene.path.at(y)[0][band.rows]
+            hz = _all_below(scene, q, y, float(band.upper_hz.max()))
+            hz = hz[:, [m - 1 for m in named if m <= hz.shape[1]]] if named else hz
+            edges = (band.lower_hz, band.upper_hz)
+            found.append(np.concatenate([(hz < e[:, None]).sum(axis=1) for e in edges]))
+    first, counts = int(np.median(found[0])), np.array(found)
     possible = range(int(counts.min()), int(counts.max()) + 1)
     return sorted(possible, key=lambda k: (abs(k - first), k))
 
@@ -579,24 +564,6 @@ def _beside(scene: Scene, band: _Band, k: int, margin: float) -> Iterator[Freque
     q = scene.path.at(scene.initial)[0][band.rows]
     if above := mode_above(scene.model, k, named, q, scene.initial):
         yield FrequencyLimit(label, ((above, 1.0),), upper, band.rows, True)
-
-
-def _counts(scene: Scene, band: _Band, named: tuple[int, ...]) -> NDArray[np.intp]:
-    """How many of the modes are below the band's lower and upper edge, (designs, 2 · samples)."""
-    lower, upper = scene.bounds
-    designs = [scene.initial, lower, upper, 0.5 * (lower + upper)]
-    if len(lower):
-        designs += list(_spread_designs(scene, 8, 1))
-    found = []
-    for y in designs:
-        try:
-            hz = _all_below(scene, scene.path.at(y)[0][band.rows], y, float(band.upper_hz.max()))
-        except EigassignError:
-            continue
-        columns = [m - 1 for m in named if m <= hz.shape[1]] if named else list(range(hz.shape[1]))
-        edges = (band.lower_hz, band.upper_hz)
-        found.append(np.concatenate([(hz[:, columns] < e[:, None]).sum(axis=1) for e in edges]))
-    return np.array(found)
 
 
 def _all_below(scene: Scene, q: Floats, y: Floats, hz: float) -> Floats:

@@ -11,13 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.assignment.exact.requirements import Frequencies
-from eigassign.errors import AccuracyError, EigassignError
+from eigassign.errors import AccuracyError, EigassignError, LostModeError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.condensation import Modes
 from eigassign.modal.model import Model
@@ -31,10 +30,11 @@ Floats = NDArray[np.float64]
 
 
 @dataclass
-class ExactResponse:
+class DesignResponse:
     """The lowest ``count`` frequencies at every sample and the one above, then those followed.
 
-    By exact solves; of a design that it was asked for before it knows them.
+    By exact solves, which are remembered; by reduced ``models``, if any, where they can be trusted,
+    and then without the one above.
     """
 
     model: Model
@@ -42,30 +42,44 @@ class ExactResponse:
     wanted: NDArray[np.bool_]  # (n_x,): where slopes are wanted
     count: int
     followers: tuple[Follower, ...] = ()
+    models: ReducedModels | None = None
     exact_solves: int = 0  # so far
     known: dict[bytes, Frequencies] = field(default_factory=dict)
+    lost: list[str] = field(default_factory=list)  # designs at which a followed mode is lost
 
     def __call__(self, y: Floats) -> Frequencies:
         """Raises EigassignError where the mechanism has no modes, or no pose, at this design.
 
         LostModeError where a followed mode is lost.
         """
+        reduced = None if self.models is None else self.models.at(y, self.count)
+        if reduced is not None:
+            q, of_design = self.path.at(y)
+            found = reduced.eigenvalue_slopes(self.model.x(q, y), self.count, self.wanted)
+            hz, slopes = _in_hz(*found)
+            return Frequencies(hz, _in_design(slopes, of_design, self.path.follows_design))
         key = y.tobytes()
         if key not in self.known:
-            q, of_design = self.path.at(y)
-            self.exact_solves += len(q)
-            x, follows = self.model.x(q, y), self.path.follows_design
-            if self.followers:
-                lam, slopes, mixed = self._with_followed(y)
-            else:
-                solve = mixed_slopes, self.model, x, self.count, self.wanted
-                lam, slopes, mixed = _in_blocks(*solve)
-            hz, slopes = _in_hz(lam, slopes)
-            lower, upper = (hz[:, k : k + mixed.shape[1]] for k in (0, 1))
-            mixed = mixed / (4.0 * np.pi**2 * (lower + upper))[..., None]
-            both = (_in_design(part, of_design, follows) for part in (slopes, mixed))
-            self.known[key] = Frequencies(hz, *both)
+            try:
+                self.known[key] = self._exact(y)
+            except LostModeError as error:
+                self.lost.append(str(error))
+                raise
         return self.known[key]
+
+    def _exact(self, y: Floats) -> Frequencies:
+        q, of_design = self.path.at(y)
+        self.exact_solves += len(q)
+        if self.followers:
+            lam, slopes, mixed = self._with_followed(y)
+        else:
+            x = self.model.x(q, y)
+            lam, slopes, mixed = _in_blocks(mixed_slopes, self.model, x, self.count, self.wanted)
+        hz, slopes = _in_hz(lam, slopes)
+        lower, upper = (hz[:, k : k + mixed.shape[1]] for k in (0, 1))
+        mixed = mixed / (4.0 * np.pi**2 * (lower + upper))[..., None]
+        follows = self.path.follows_design
+        return Frequencies(hz, *(_in_design(part, of_design, follows) for part in (slopes, mixed)))
 
     def _with_followed(self, y: Floats) -> tuple[Floats, Floats, Floats]:
         """λ, its slopes in (q, y), and those off the diagonal of numbered modes alone."""
@@ -78,7 +92,7 @@ class ExactResponse:
 
 
 def _in_design(slopes: Floats, of_design: Floats, follows: bool) -> Floats:
-    """From slopes in (q, y) to those in y alone; dq/dy is ``of_design`` where q follows y."""
+    """Slopes in y alone of those in (q, y); dq/dy is ``of_design`` where q follows y."""
     n_q = slopes.shape[2] - of_design.shape[2]
     by_y = slopes[..., n_q:]
     return by_y + slopes[..., :n_q] @ of_design if follows else by_y
@@ -99,7 +113,7 @@ def _in_blocks(
     count: int,
     wanted: ArrayLike,
 ) -> Iterator[Floats]:
-    """What ``solve`` finds, some samples at a time; as many modes as there are at all of them."""
+    """Yield what ``solve`` finds, block by block, of the modes that there are at all samples."""
     block = max(AT_LEAST, BLOCK // model.n_dof**2)
     parts = [
         solve(model.pencil, x[at : at + block], count, wanted) for at in range(0, len(x), block)
@@ -114,13 +128,18 @@ def _in_hz(lam: Floats, slopes: Floats) -> tuple[Floats, Floats]:
     return hz, slopes / (8.0 * np.pi**2 * hz[..., None])
 
 
-def exact_response(scene: Scene, count: int, followers: tuple[Follower, ...] = ()) -> ExactResponse:
-    """Of all samples of the scene's trajectory."""
+def response_of(
+    scene: Scene,
+    count: int,
+    followers: tuple[Follower, ...] = (),
+    models: ReducedModels | None = None,
+) -> DesignResponse:
+    """The response at all samples of the scene's trajectory."""
     lower, upper = scene.bounds
     moving = np.full(scene.path.q.shape[1], scene.path.follows_design)
     moving[scene.model.pencil.n_joints :] = False  # loads do not follow the design
     wanted = np.append(moving, upper > lower)
-    return ExactResponse(scene.model, scene.path, wanted, count, followers)
+    return DesignResponse(scene.model, scene.path, wanted, count, followers, models)
 
 
 # --- Reduced models
@@ -128,7 +147,6 @@ def exact_response(scene: Scene, count: int, followers: tuple[Follower, ...] = (
 POSES = 3  # at which modes and their derivatives make a reduced model
 WATCHED = 5  # samples at which its error is estimated
 TRUSTED = 1e-3  # relative, of the estimate; the errors themselves were below 1e-5
-MOST = 8  # reduced models of one search
 
 
 @dataclass
@@ -137,20 +155,20 @@ class ReducedModels:
 
     model: Model
     path: Trajectories
+    left: int = 8  # that may still be tried in one search
     made: list[ReducedModel] = field(default_factory=list)  # the last used one last
-    tries: int = 0
 
     def at(self, y: Floats, count: int) -> ReducedModel | None:
         """One whose lowest ``count`` modes hold at y (n_y,); None where no more shall be made."""
-        watched = self._watched.at(y)[0]
+        watched = self.path.chosen(self.path.spread(WATCHED)).at(y)[0]
         for k in range(len(self.made) - 1, -1, -1):
             if len(self.made[k].modes) >= count and self._holds(self.made[k], watched, y):
                 self.made.append(self.made.pop(k))
                 return self.made[-1]
-        if self.tries >= MOST:
+        if self.left <= 0:
             return None
-        self.tries += 1
-        poses = self._poses.at(y)[0]
+        self.left -= 1
+        poses = self.path.chosen(self.path.spread(POSES)).at(y)[0]
         modes = tuple(range(1, count + 1))
         try:
             one = reduce(self.model.pencil, poses, np.tile(y, (len(poses), 1)), modes, 1)
@@ -161,14 +179,6 @@ class ReducedModels:
         self.made.append(one)
         return one
 
-    @cached_property
-    def _watched(self) -> Trajectories:
-        return self.path.chosen(self.path.spread(WATCHED))
-
-    @cached_property
-    def _poses(self) -> Trajectories:
-        return self.path.chosen(self.path.spread(POSES))
-
     @staticmethod
     def _holds(reduced: ReducedModel, q: Floats, y: Floats) -> bool:
         try:
@@ -177,31 +187,7 @@ class ReducedModels:
             return False
 
 
-@dataclass
-class ReducedResponse:
-    """The lowest frequencies by reduced models, by exact solves where none can be trusted."""
-
-    exact: ExactResponse
-    models: ReducedModels
-
-    @property
-    def exact_solves(self) -> int:
-        """Those that were needed so far."""
-        return self.exact.exact_solves
-
-    def __call__(self, y: Floats) -> Frequencies:
-        """Raises what `ExactResponse` raises."""
-        own = self.exact
-        reduced = self.models.at(y, own.count)
-        if reduced is None:
-            return own(y)
-        q, of_design = own.path.at(y)
-        found = reduced.eigenvalue_slopes(own.model.x(q, y), own.count, own.wanted)
-        hz, slopes = _in_hz(*found)
-        return Frequencies(hz, _in_design(slopes, of_design, own.path.follows_design))
-
-
 def reduced_models(scene: Scene) -> ReducedModels | None:
-    """For models of which exact solves are dear; None for others."""
+    """Models to be reduced as a search needs them; None where exact solves are not dear."""
     large = not scene.model.pencil.is_dense
     return ReducedModels(scene.model, scene.path) if large else None

@@ -22,7 +22,7 @@ from eigassign.errors import EigassignError
 from eigassign.study.design.followed import Solved, followers, solve_design
 from eigassign.study.design.judgement import curve_range, errors_of, least_errors
 from eigassign.study.design.one_shot import linear_constraints
-from eigassign.study.design.response import exact_response
+from eigassign.study.design.response import response_of
 from eigassign.study.meaning.monotone import corners, effects
 from eigassign.study.results import RangeRow
 from eigassign.study.scene import Scene
@@ -126,7 +126,7 @@ def _nearest(scene: Scene, wanted: Wanted, k: int, y: Floats, allowed: float) ->
     asked = Requirements((target,), (), (), np.ones(1))
     alone = replace(scene, trajectory=scene.path.chosen([at]))
     own = followers(alone, [replace(wanted, rows=slice(0, 1))])
-    response = exact_response(alone, asked.modes, own)
+    response = response_of(alone, asked.modes, own)
 
     def appraise(y: Floats) -> Appraisal:
         return asked.appraise(y, response(y))

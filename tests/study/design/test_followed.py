@@ -20,9 +20,9 @@ from eigassign.study import (
     Scene,
     Solved,
     Wanted,
-    exact_response,
     followers,
     require_one_shape,
+    response_of,
     solve_design,
     target_frequencies,
 )
@@ -96,7 +96,7 @@ def test_slopes_are_those_of_the_shape_even_where_modes_cross() -> None:
     rail = RAIL.frequencies(scene.path.q[[k]], [height], 1)[0, 0]
     lamp = brentq(lambda m: MAST.frequencies([], [m], 1)[0, 0] - rail, 0.2, 3.0, xtol=1e-15)
     y = np.array([height, lamp])
-    response = exact_response(scene, 1, followers(scene, asked(scene)))
+    response = response_of(scene, 1, followers(scene, asked(scene)))
     found = response(y)
     beside = extrapolated(lambda v: halves(scene.path.q, v), y, 1e-3)
     np.testing.assert_allclose(found.slopes[:, -2:], beside, rtol=1e-7, atol=1e-7)
@@ -106,7 +106,7 @@ def test_slopes_are_those_of_the_shape_even_where_modes_cross() -> None:
 def test_slopes_hold_the_part_of_coordinates_that_follow_the_design() -> None:
     target = {"mode": {"like": 2, "at": {"time": 0.4}}, "frequency": 50.0}
     scene = scene_of(cart([[0.2, 0.3], [0.6, 0.3]], leaning=True, targets=[target]))
-    response = exact_response(scene, 2, followers(scene, asked(scene)))
+    response = response_of(scene, 2, followers(scene, asked(scene)))
     y = np.array([0.52])
     found = response(y)
     np.testing.assert_allclose(found.hz[:, -1], found.hz[:, 1], rtol=1e-10)

@@ -12,19 +12,17 @@ from redesigned_arms import cart, extrapolated
 import eigassign as ea
 from eigassign.pipeline import Stages, prepare
 from eigassign.study import (
-    MOST,
     ReducedModels,
-    ReducedResponse,
     Scene,
-    exact_response,
     reduced_models,
+    response_of,
 )
 
 
 def test_a_coordinate_that_rests_may_follow_the_design_all_the_same() -> None:
     scene = prepare(cart([[0.2, 0.3], [0.6, 0.3]], leaning=True), Stages(lambda line: None), None)
     assert np.ptp(scene.path.q[:, 1]) < 1e-12
-    response, y = exact_response(scene, 2), np.array([0.52])
+    response, y = response_of(scene, 2), np.array([0.52])
     slopes = response(y).slopes
     beside = extrapolated(lambda v: response(v).hz, y, 1e-3)
     np.testing.assert_allclose(slopes, beside, rtol=1e-7)
@@ -43,9 +41,9 @@ def fine(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 def test_reduced_models_stand_for_exact_solves_of_large_models(fine: Scene) -> None:
     """At the initial design and far from it, where a second one may be made."""
-    models, exact = reduced_models(fine), exact_response(fine, 2)
+    models, exact = reduced_models(fine), response_of(fine, 2)
     assert models is not None
-    reduced = ReducedResponse(exact_response(fine, 2), models)
+    reduced = response_of(fine, 2, models=models)
     lower, upper = fine.bounds
     for y in (fine.initial, 0.05 * lower + 0.95 * upper):
         said, right = reduced(y), exact(y)
@@ -56,9 +54,9 @@ def test_reduced_models_stand_for_exact_solves_of_large_models(fine: Scene) -> N
 
 
 def test_exact_solves_stand_in_where_no_reduced_model_may_be_made(fine: Scene) -> None:
-    models = ReducedModels(fine.model, fine.path, tries=MOST)
-    reduced = ReducedResponse(exact_response(fine, 1), models)
-    right = exact_response(fine, 1)(fine.initial)
+    models = ReducedModels(fine.model, fine.path, left=0)
+    reduced = response_of(fine, 1, models=models)
+    right = response_of(fine, 1)(fine.initial)
     np.testing.assert_array_equal(reduced(fine.initial).hz, right.hz)
     assert reduced.exact_solves == len(fine.path.q)
 
