@@ -31,7 +31,7 @@ T = TypeVar("T")
 
 
 class Objective(StrEnum):
-    """What is made small: the mean square of the residuals, or the largest of them."""
+    """The measure that is made small: the mean square of the residuals, or the largest."""
 
     LEAST_SQUARES = "least_squares"
     WORST_CASE = "worst_case"
@@ -69,12 +69,20 @@ class DesignProblem:
     reference: Floats | None = None  # (n_y,), y that costs nothing
     objective: Objective = Objective.LEAST_SQUARES
 
+    @property
+    def is_worst_case(self) -> bool:
+        """True where the largest residual is what is made small."""
+        return self.objective is Objective.WORST_CASE
+
     def __call__(self, y: Floats, seen: Appraisal) -> float:
         """F of a design and what `appraise` found of it."""
-        r = seen.residual
-        if self.objective is Objective.WORST_CASE:
-            return float(np.max(np.abs(r), initial=0.0)) + self.price(y)
-        return float(r @ r) + self.price(y)
+        return self.value(y, seen.residual)
+
+    def value(self, y: Floats, residual: Floats) -> float:
+        """F of a design that has these residuals."""
+        if self.is_worst_case:
+            return float(np.max(np.abs(residual), initial=0.0)) + self.price(y)
+        return float(residual @ residual) + self.price(y)
 
     def price(self, y: Floats) -> float:
         """p·(y − y_ref)."""
@@ -122,7 +130,7 @@ class UnitBox:
 
     @property
     def n(self) -> int:
-        """How many parameters have room."""
+        """The number of parameters with room."""
         return len(self.free)
 
     def z(self, y: Floats) -> Floats:
@@ -170,7 +178,7 @@ class DesignPoint:
     pairs: NeighbourPairs | None
 
     def smooth_slopes(self, kinked: NDArray[np.bool_]) -> Floats:
-        """Of all rows (m + k, n); of those at kinks the mean of both branches."""
+        """Slopes of all rows (m + k, n); of those at kinks the mean of both branches."""
         slopes = np.vstack([self.J, self.C])
         if self.pairs is not None:
             on = kinked[self.pairs.row]
@@ -180,16 +188,17 @@ class DesignPoint:
 
     @classmethod
     def of(cls, problem: DesignProblem, box: UnitBox, z: Floats, seen: Appraisal) -> DesignPoint:
-        """What was ``seen`` of the design at z."""
+        """The design at z with what was ``seen`` of it."""
         J, C = (slopes[:, box.free] * box.width for slopes in (seen.slopes, seen.excess_slopes))
         pairs = None if seen.pairs is None else seen.pairs.scaled(box.free, box.width)
         return cls(z, seen, J, C, problem(box.y(z), seen), pairs)
 
 
 def best_first(found: Iterable[T], worth: Callable[[T], tuple[float, float]]) -> list[T]:
-    """By violation, then by F; ``worth`` gives both. Violations apart by `MET` at most are equal.
+    """Order by violation, then by F; ``worth`` gives both.
 
-    So are all up to `MET`. Of equals the first stays first.
+    Violations apart by `MET` at most are equal, and so are all up to `MET`. Of equals the first
+    stays first.
     """
     worths = sorted(
         ((max(v, MET), value, one) for one in found for v, value in [worth(one)]),
@@ -207,5 +216,4 @@ def best_first(found: Iterable[T], worth: Callable[[T], tuple[float, float]]) ->
 
 def merit(problem: DesignProblem, value: float, violation: float, weight: float) -> float:
     """Half of F for least squares, as in the program, and the weighted violation."""
-    half = 0.5 if problem.objective is Objective.LEAST_SQUARES else 1.0
-    return half * value + weight * violation
+    return (1.0 if problem.is_worst_case else 0.5) * value + weight * violation

@@ -11,7 +11,7 @@ how well promises are kept. The answer is judged by first-order optimality of th
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -80,14 +80,6 @@ class Optimum:
     appraisals: int
 
 
-@dataclass
-class _Progress(TrustRegion):
-    """The steps made, too."""
-
-    steps: list[StepRecord] = field(default_factory=list)
-    appraisals: int = 0
-
-
 def minimise(
     problem: DesignProblem,
     start: Floats,
@@ -99,151 +91,128 @@ def minimise(
     ``stop`` is asked between steps; Ctrl-C ends them too, and the best design so far is returned.
     Raises what ``appraise`` raises at the start.
     """
-    box = UnitBox.of(problem)
-    progress = _Progress(FIRST, np.zeros((box.n, box.n)), 0.0)
-    place = best = _placed(problem, box, box.inside(box.z(start)), progress)
+    run = _Run(problem)
+    place = best = run.placed(run.box.inside(run.box.z(start)))
     predicted: Floats | None = None
     end = End.STEPS
     try:
-        while len(progress.steps) < steps:
+        while len(run.steps) < steps:
             # beyond a limit by a little, where one more program ends on it
             beyond = place is not best or MET < place.seen.violation <= ON
-            if not beyond and stationarity(problem, box.y(place.z), place.seen) <= OPTIMAL:
+            if not beyond and run.unbalanced(place) <= OPTIMAL:
                 end = End.OPTIMAL
                 break
             if (asked := stop()) is not None:
                 end = asked
                 break
-            move = step_program(problem, box, place, progress)
-            if move is None or progress.radius < SMALLEST:
+            move = run.proposed(place)
+            if move is None or run.region.radius < SMALLEST:
                 end = End.STALLED
                 break
-            reached = _try(problem, box, place, move, progress)
+            reached = run.taken(place, move)
             if reached is not None:
                 last = place is best and move.promised == 0.0
                 place, predicted = reached, move.model.residual
-                best = place if last else _better(best, place)
+                both = [place] if last else [best, place]
+                best = best_first(both, lambda p: (p.seen.violation, p.value))[0]
             elif move.promised == 0.0 and np.abs(move.d).max() < NEAR:
                 end = End.STALLED
                 break
     except KeyboardInterrupt:
         end = End.INTERRUPTED
-    y = box.y(best.z)
-    if best is not place:
-        predicted = None
-    left = stationarity(problem, y, best.seen)
+    y, left = run.box.y(best.z), run.unbalanced(best)
     return Optimum(
         y=frozen(y),
         seen=best.seen,
         objective=best.value,
         stationarity=left,
         limits=tuple(active_limits(problem, y, best.seen)),
-        predicted=predicted,
+        predicted=predicted if best is place else None,
         end=End.OPTIMAL if left <= OPTIMAL else end,
-        steps=tuple(progress.steps),
-        appraisals=progress.appraisals,
+        steps=tuple(run.steps),
+        appraisals=run.appraisals,
     )
 
 
-def _placed(problem: DesignProblem, box: UnitBox, z: Floats, progress: _Progress) -> DesignPoint:
-    progress.appraisals += 1
-    return DesignPoint.of(problem, box, z, problem.appraise(box.y(z)))
+class _Run:
+    """The steps made, and the trust region that they have left."""
 
+    def __init__(self, problem: DesignProblem) -> None:
+        self.problem, self.box = problem, UnitBox.of(problem)
+        self.region = TrustRegion(FIRST, np.zeros((self.box.n, self.box.n)), 0.0)
+        self.steps: list[StepRecord] = []
+        self.appraisals = 0
 
-def _better(best: DesignPoint, place: DesignPoint) -> DesignPoint:
-    """By violation first, then by F."""
-    return best_first([best, place], lambda p: (p.seen.violation, p.value))[0]
+    def placed(self, z: Floats) -> DesignPoint:
+        """The design at z, appraised."""
+        self.appraisals += 1
+        return DesignPoint.of(self.problem, self.box, z, self.problem.appraise(self.box.y(z)))
 
+    def unbalanced(self, place: DesignPoint) -> float:
+        """The stationarity of a place."""
+        return stationarity(self.problem, self.box.y(place.z), place.seen)
 
-def _try(
-    problem: DesignProblem,
-    box: UnitBox,
-    place: DesignPoint,
-    move: ProposedStep,
-    progress: _Progress,
-) -> DesignPoint | None:
-    """The place that a move leads to if it keeps a tenth of its promise, corrected once if not."""
-    reached = _go(problem, box, place, move, progress)
-    if reached is not None and not _kept(problem, box, place, reached, move, progress):
-        corrected = step_program(problem, box, place, progress, (reached, move))
-        if corrected is not None:
-            again = _go(problem, box, place, corrected, progress)
-            if again is not None and _kept(problem, box, place, again, move, progress):
+    def proposed(
+        self, place: DesignPoint, spoilt: tuple[DesignPoint, ProposedStep] | None = None
+    ) -> ProposedStep | None:
+        """The step of the program there, or its correction after a ``spoilt`` one."""
+        move, self.region = step_program(self.problem, self.box, place, self.region, spoilt)
+        return move
+
+    def taken(self, place: DesignPoint, move: ProposedStep) -> DesignPoint | None:
+        """The place that a move leads to if it keeps a tenth of its promise, or once corrected."""
+        reached = self._reached(place, move)
+        taken = reached is not None and self._kept(place, reached, move)
+        if reached is not None and not taken:
+            corrected = self.proposed(place, (reached, move))
+            again = None if corrected is None else self._reached(place, corrected)
+            if corrected and again is not None and self._kept(place, again, move):
                 reached, move = again, replace(corrected, promised=move.promised)
-    length = float(np.abs(move.d).max(initial=0.0))
-    taken = reached is not None and _kept(problem, box, place, reached, move, progress)
-    _record(progress, box, place if reached is None else reached, move, taken)
-    if reached is None or not taken:
-        progress.radius = 0.25 * min(length, progress.radius)
-        if reached is not None:
-            progress.S = _updated(progress.S, place, reached, move)
-        return None
-    fall = _fall(problem, place, reached, progress)
-    if fall > GOOD * move.promised and length > 0.9 * progress.radius:
-        progress.radius = min(2.0 * progress.radius, LARGEST)
-    elif fall < 0.25 * move.promised:
-        progress.radius = max(0.5 * length, SMALLEST)
-    progress.S = _updated(progress.S, place, reached, move)
-    return reached
+                taken = True
+        at, radius = place if reached is None else reached, self.region.radius
+        length = float(np.abs(move.d).max(initial=0.0))
+        y = frozen(self.box.y(at.z))
+        step = StepRecord(y, at.value, at.seen.violation, radius, move.promised, taken)
+        self.steps.append(step)
+        if reached is None or not taken:
+            radius = 0.25 * min(length, radius)
+        else:
+            fall = self._fall(place, reached)
+            if fall > GOOD * move.promised and length > 0.9 * radius:
+                radius = min(2.0 * radius, LARGEST)
+            elif fall < 0.25 * move.promised:
+                radius = max(0.5 * length, SMALLEST)
+        S = self.region.S if reached is None else _updated(self.region.S, place, reached, move)
+        self.region = replace(self.region, radius=radius, S=S)
+        return reached if taken else None
 
+    def _reached(self, place: DesignPoint, move: ProposedStep) -> DesignPoint | None:
+        """The place that a move leads to, None where no design is."""
+        z = place.z + move.d
+        z = np.where(z <= SNAP, 0.0, np.where(z >= 1.0 - SNAP, 1.0, z))
+        try:
+            return self.placed(z)
+        except EigassignError:
+            return None
 
-def _go(
-    problem: DesignProblem,
-    box: UnitBox,
-    place: DesignPoint,
-    move: ProposedStep,
-    progress: _Progress,
-) -> DesignPoint | None:
-    """Where a move leads, None where no design is."""
-    z = place.z + move.d
-    z = np.where(z <= SNAP, 0.0, np.where(z >= 1.0 - SNAP, 1.0, z))
-    try:
-        return _placed(problem, box, z, progress)
-    except EigassignError:
-        return None
-
-
-def _fall(
-    problem: DesignProblem, place: DesignPoint, reached: DesignPoint, progress: _Progress
-) -> float:
-    before, after = (
-        merit(problem, p.value, p.seen.violation, progress.weight) for p in (place, reached)
-    )
-    return before - after
-
-
-def _kept(
-    problem: DesignProblem,
-    box: UnitBox,
-    place: DesignPoint,
-    reached: DesignPoint,
-    move: ProposedStep,
-    progress: _Progress,
-) -> bool:
-    fall = _fall(problem, place, reached, progress)
-    if move.promised > 0.0:
-        return bool(fall > TAKEN * move.promised)
-    if reached.seen.violation > max(place.seen.violation, MET):
-        return False
-    # the program keeps off limits by `MET`, which may cost this much
-    paid = ROUND_OFF * abs(place.value) + MET * float(np.abs(move.on_excess).sum())
-    before, after = (stationarity(problem, box.y(p.z), p.seen) for p in (place, reached))
-    return fall >= -paid and after <= 0.5 * before
-
-
-def _record(
-    progress: _Progress, box: UnitBox, reached: DesignPoint, move: ProposedStep, taken: bool
-) -> None:
-    progress.steps.append(
-        StepRecord(
-            y=frozen(box.y(reached.z)),
-            objective=reached.value,
-            violation=reached.seen.violation,
-            radius=progress.radius,
-            promised=move.promised,
-            taken=taken,
+    def _fall(self, place: DesignPoint, reached: DesignPoint) -> float:
+        """The fall of the merit between two places."""
+        before, after = (
+            merit(self.problem, p.value, p.seen.violation, self.region.weight)
+            for p in (place, reached)
         )
-    )
+        return before - after
+
+    def _kept(self, place: DesignPoint, reached: DesignPoint, move: ProposedStep) -> bool:
+        """True where enough of what the move promised has come."""
+        fall = self._fall(place, reached)
+        if move.promised > 0.0:
+            return bool(fall > TAKEN * move.promised)
+        if reached.seen.violation > max(place.seen.violation, MET):
+            return False
+        # the program keeps off limits by `MET`, which may cost this much
+        paid = ROUND_OFF * abs(place.value) + MET * float(np.abs(move.on_excess).sum())
+        return fall >= -paid and self.unbalanced(reached) <= 0.5 * self.unbalanced(place)
 
 
 def _updated(S: Floats, place: DesignPoint, reached: DesignPoint, move: ProposedStep) -> Floats:
