@@ -35,7 +35,7 @@ __all__, __getattr__, __dir__ = face(
         "design.clearance": "Band prove_clear",
         "design.followed": "Solved followers require_one_shape solve_design",
         "design.judgement": "crossing_warnings verdict",
-        "design.optimum": "Found find_optimum",
+        "design.optimum": "Found Task find_optimum variant_of",
         "design.response": ("DesignResponse ReducedModels reduced_models response_of"),
         "drawing": "AMPLITUDE draw_modes draw_poses rest_pose spread_samples",
         "meaning.overall": "Studies study_meaning",
