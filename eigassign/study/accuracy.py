@@ -74,7 +74,7 @@ def model_error(scene: Scene, y: Floats, modes: Collection[int]) -> float:
 
 
 def rounding_line(lost: float) -> str:
-    """What round-off does to the exact frequencies at most, relative, in words."""
+    """The largest relative round-off of the exact frequencies, in words."""
     if not np.isfinite(lost):
         return "round-off of the exact frequencies: not known; they may be nothing else"
     return f"round-off of the exact frequencies: below {lost:.1g} relative"
@@ -100,7 +100,7 @@ def judged_mesh(
 
 
 def judged_poses(model: Model, q: Floats) -> Floats:
-    """Those of q (n, n_q) at which the mesh is judged."""
+    """The poses of q (n, n_q) at which the mesh is judged."""
     return spread(q, POSES if model.n_dof <= LARGE else POSES_LARGE)
 
 

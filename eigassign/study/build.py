@@ -74,7 +74,7 @@ def _doubts(file: CaseFile) -> Iterator[Problem]:
 
 
 def build_links(file: CaseFile) -> WholeLinks:
-    """Every link with all dofs of its mesh, before any is reduced; raises CaseError."""
+    """The links with all dofs of their meshes, before any is reduced; raises CaseError."""
     with located(file):
         return whole_links(file)
 

@@ -76,7 +76,7 @@ class Case:
 
     @property
     def trajectories(self) -> tuple[NamedTrajectory, ...]:
-        """Each trajectory by itself: ``(name, trajectory, weight)``."""
+        """The trajectories one by one: ``(name, trajectory, weight)``."""
         return self.trajectory.parts
 
     def located(self) -> AbstractContextManager[None]:

@@ -113,7 +113,7 @@ def _assignment(scene: Scene, assigned: VerifiedAssignment | None) -> Assignment
 def _notes(
     scene: Scene, assigned: VerifiedAssignment | None, row: AssignmentRow | None
 ) -> tuple[str, ...]:
-    """What was chosen on the way to the answer, and what holds it back."""
+    """Notes on the choices on the way to the answer, and on the limits that hold it back."""
     if assigned is None or row is None:
         return ()
     swaps = swap_notes(scene.path, assigned.targets)
@@ -165,7 +165,7 @@ def _others(scene: Scene, assigned: VerifiedAssignment) -> OtherModes | None:
 
 
 def _spectrum(scene: Scene, assigned: VerifiedAssignment) -> OtherModes:
-    """All modes from the lowest to the one above the highest that a target names."""
+    """The modes from the lowest to the one above the highest that a target names."""
     highest = max((mode for target in assigned.targets for mode in _modes(target)), default=1)
     modes = scene.shown_modes[: highest + 1]
     before, after = (solved.hz[:, : len(modes)] for solved in (assigned.initial, assigned.exact))
@@ -178,7 +178,7 @@ def _modes(target: TargetStudy) -> set[int]:
 
 
 def _warnings(scene: Scene, assigned: VerifiedAssignment | None) -> Iterator[str]:
-    """Where the results may mislead: crossing modes, a poor prediction, a worse design."""
+    """Warnings of results that may mislead: crossing modes, a poor prediction, a worse design."""
     if assigned is None:
         return
     modes = tuple(sorted({mode for target in assigned.targets for mode in target.modes}))
@@ -190,7 +190,7 @@ def _warnings(scene: Scene, assigned: VerifiedAssignment | None) -> Iterator[str
 
 
 def _accuracy_warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
-    """For each target whose predicted frequency is farther off than the case accepts."""
+    """A warning for each target whose predicted frequency is farther off than the case accepts."""
     limit, y = scene.file.validation.max_error, assigned.answer.y
     off = [t for t in assigned.targets if not t.approximation_error <= limit]
     for target in off:
@@ -228,7 +228,7 @@ def _worsening(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
 
 
 def _is_feasible(scene: Scene) -> bool:
-    """Whether the initial design meets the bounds and constraints."""
+    """True if the initial design meets the bounds and constraints."""
     lower, upper = scene.bounds
     if np.any((scene.initial < lower) | (scene.initial > upper)):
         return False

@@ -64,7 +64,7 @@ def compare(
 
     ``exact_hz`` (n, at least the highest mode) are exact frequencies already known there.
     """
-    q, y = _split(model, x)
+    q, y = np.split(x, [len(model.q_names)], axis=1)
     if exact_hz is None:
         exact_hz = model.frequencies(q, y, max(expansions.modes))
     taylor, linearised = expansions.taylor_hz(q, y), expansions.linearised_hz(q, y)
@@ -72,11 +72,6 @@ def compare(
         Comparison(frozen(exact_hz[:, mode - 1]), frozen(taylor[:, k]), frozen(linearised[:, k]))
         for k, mode in enumerate(expansions.modes)
     )
-
-
-def _split(model: Model, x: Floats) -> tuple[Floats, Floats]:
-    n_q = len(model.q_names)
-    return x[:, :n_q], x[:, n_q:]
 
 
 @dataclass(frozen=True)
@@ -95,7 +90,7 @@ class Grid:
         return tuple(len(axis) for axis in self.axes)
 
     def points(self) -> Floats:
-        """All of them, (n, n_x), the last axis varying fastest."""
+        """The points of the grid, (n, n_x), the last axis varying fastest."""
         mesh = np.meshgrid(*self.axes, indexing="ij")
         x = np.tile(self.x0, (mesh[0].size, 1))
         for entry, values in zip(self.entries, mesh, strict=True):
@@ -134,15 +129,12 @@ def map_over(model: Model, expansions: Expansions, grid: Grid | None) -> tuple[D
     """One map for each expanded mode; none without a grid."""
     if grid is None:
         return ()
-    return tuple(
-        DesignMap(grid.names, grid.units, grid.axes, _reshaped(values, grid.shape))
-        for values in compare(model, expansions, grid.points())
-    )
-
-
-def _reshaped(values: Comparison, shape: tuple[int, ...]) -> Comparison:
-    parts = (values.exact_hz, values.taylor_hz, values.linearised_hz)
-    return Comparison(*(part.reshape(shape) for part in parts))
+    found = []
+    for values in compare(model, expansions, grid.points()):
+        parts = (values.exact_hz, values.taylor_hz, values.linearised_hz)
+        shaped = Comparison(*(part.reshape(grid.shape) for part in parts))
+        found.append(DesignMap(grid.names, grid.units, grid.axes, shaped))
+    return tuple(found)
 
 
 # --- Mode studies: what the figures show
@@ -225,7 +217,7 @@ class Validation:
 
     @property
     def passed(self) -> bool:
-        """Whether every row is within the case's tolerance."""
+        """True if every row is within the case's tolerance."""
         return all(row.passed for row in self.rows)
 
 
@@ -246,7 +238,7 @@ def validate_expansions(scene: Scene) -> tuple[ValidationRow, ...]:
 
 
 def _places(scene: Scene) -> Iterator[tuple[str, Floats]]:
-    """Where, and the points x (n, n_x) there."""
+    """The places of a validation, each with its points x (n, n_x)."""
     model, random = scene.model, np.random.default_rng(SEED)
     if scene.trajectory is not None:
         for part in scene.trajectory.parts:
@@ -272,7 +264,7 @@ def box_points(lower: Floats, upper: Floats, samples: int, random: np.random.Gen
 
 
 def _corners(d: int, random: np.random.Generator) -> Floats:
-    """All corners of the unit box if they are few, else a random choice of them."""
+    """The corners of the unit box: all if they are few, else a random choice."""
     if 2**d <= _CORNERS:
         return np.array(list(product((0.0, 1.0), repeat=d)))
     chosen = random.integers(0, 2, (_CORNERS, d)).astype(np.float64)

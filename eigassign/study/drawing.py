@@ -71,7 +71,7 @@ def rest_pose(file: CaseFile, model: Model, q: Floats, y: Floats) -> DrawnPoses:
 
 
 def spread_samples(q: Floats, count: int) -> list[int]:
-    """At most ``count`` samples, evenly spread over the distance travelled; first and last too."""
+    """The rows of at most ``count`` samples, spread evenly over the distance travelled."""
     steps = np.linalg.norm(np.diff(q, axis=0), axis=1)
     travelled = np.concatenate([[0.0], np.cumsum(steps)])
     if travelled[-1] == 0.0:
@@ -175,7 +175,7 @@ def _posed(
 def _symbols(
     file: CaseFile, model: Model, y: Floats, at: At, axes: Sequence[Floats]
 ) -> dict[str, Any]:
-    """What poses have besides their lines."""
+    """The joints, bodies and springs of poses."""
     paths = [p.parameter for p in file.design.parameters.values()]
     design = dict(zip(paths, y.tolist(), strict=True))
     poses = model.poses
@@ -192,7 +192,7 @@ def _symbols(
 
 
 def _named_nodes(file: CaseFile, model: Model) -> list[NodeName]:
-    """Every node that something is drawn at, once."""
+    """The nodes that something is drawn at, each once."""
     poses = model.poses
     drawn = zip(poses.links, poses.drawn, strict=True)
     nodes = [(link, name) for link, pairs in drawn for pair in pairs for name in pair]
@@ -229,12 +229,12 @@ _ALONG = np.array([1.0, 0.0, 0.0])
 
 
 def edges(tree: Topology) -> tuple[JointEdge, ...]:
-    """All joints as the file has them, those that close loops last."""
+    """The joints as the file has them, those that close loops last."""
     return tuple(edge.written for edge in (*tree.edges, *tree.loops))
 
 
 def joint_axes(file: CaseFile, poses: LinkFrames) -> list[NDArray[np.object_]]:
-    """Per joint the direction to draw it along, in world axes: where it slides, else its link."""
+    """The direction to draw each joint along, in world axes: where it slides, else its link."""
     return [_axis(file, poses, edge) for edge in edges(poses.motion.tree)]
 
 
@@ -254,7 +254,7 @@ def _axis(file: CaseFile, poses: LinkFrames, edge: JointEdge) -> NDArray[np.obje
 def joints(
     file: CaseFile, tree: Topology, at: At, axes: Sequence[Floats]
 ) -> tuple[DrawnJoint, ...]:
-    """Every joint, at its follower's node; ``axes`` are (n, d) each."""
+    """The joints, each at its follower's node; ``axes`` are (n, d) each."""
     driven = {coordinate.joint for coordinate in file.coordinates.values()}
     found = []
     for edge, axis in zip(edges(tree), axes, strict=True):
@@ -267,7 +267,7 @@ def joints(
 
 
 def bodies(file: CaseFile, mass: Callable[[str, float], float], at: At) -> tuple[DrawnBody, ...]:
-    """Every body, and every rigid link that has no extent; ``mass(path, value)`` at the design."""
+    """The bodies, and the rigid links without extent; ``mass(path, value)`` at the design."""
     found = []
     for name, body in file.mechanism.bodies.items():
         found.append(DrawnBody(name, mass(f"bodies.{name}.mass", body.mass), at(split(body.at))))
@@ -285,7 +285,7 @@ def _has_extent(link: Any) -> bool:
 
 
 def springs(file: CaseFile, at: At) -> tuple[DrawnSpring, ...]:
-    """Every spring."""
+    """The springs between nodes and to the ground."""
     given: Mapping[str, Any] = getattr(file.mechanism, "springs", None) or {}
     found = []
     for name, spring in given.items():
@@ -299,7 +299,7 @@ def springs(file: CaseFile, at: At) -> tuple[DrawnSpring, ...]:
 def sizes(
     file: CaseFile, links: tuple[str, ...], drawn: tuple[tuple[tuple[str, str], ...], ...]
 ) -> tuple[tuple[float, float], ...]:
-    """Per line the larger radius of gyration √(I/A) of its section at both ends, in m."""
+    """The larger radius of gyration √(I/A) of each line's section at its two ends, in m."""
     found: list[tuple[float, float]] = []
     for link, pairs in zip(links, drawn, strict=True):
         data: Any = file.mechanism.links[link]

@@ -90,12 +90,12 @@ def _along(
 
 
 def _few(count: int) -> NDArray[np.intp]:
-    """Which of so many points are drawn."""
+    """The points that are drawn of so many."""
     return np.unique(np.linspace(0, count - 1, min(count, POINTS)).round().astype(np.intp))
 
 
 def _scales(found: Sequence[ModeShapes], modes: NDArray[np.intp]) -> Floats:
-    """What makes the largest displacements alike, with the sign of the pose before."""
+    """The factor of each pose that makes the largest displacements alike, signs following on."""
     size = AMPLITUDE * max(extent_of(one) for one in found)
     scales = np.array(
         [size / largest_of(one)[mode] for one, mode in zip(found, modes, strict=True)]

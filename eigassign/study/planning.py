@@ -118,7 +118,7 @@ def with_middle_loads(file: CaseFile, coordinates: ArrayLike) -> Floats:
 
 
 def joint_map(model: Model) -> Floats:
-    """From q to the relative joint coordinates and loads on which a frequency depends."""
+    """The matrix from q to the joint coordinates and loads on which a frequency depends."""
     n_q = len(model.q_names)
     return np.asarray(model.pencil.to_program[:n_q, :n_q][model.pencil.active[:n_q]])
 
@@ -292,7 +292,7 @@ def settle_mesh(
 
 
 def _mesh_error(model: Model, modes_at: ModesAt, x: Floats) -> Floats:
-    """Of all modes that matter at x (n, n_x), (n,)."""
+    """The largest mesh error of all modes that matter at x (n, n_x), (n,)."""
     n_q, modes = len(model.q_names), modes_at(model, x)
     return np.asarray(model.discretisation_error(x[:, :n_q], x[:, n_q:], modes).max(axis=1))
 
@@ -412,7 +412,7 @@ def choose_order(
 
 
 def _largest_estimate(found: ExpansionChoice, x: Floats) -> Floats:
-    """Of all modes at x (n, n_x), (n,)."""
+    """The largest estimate of all modes at x (n, n_x), (n,)."""
     n_q = len(found.expansions[0].q0)
     return np.asarray(found.error_estimate(x[:, :n_q], x[:, n_q:]).max(axis=1))
 
@@ -440,7 +440,7 @@ class DesignSamples:
         return self.trajectory.sample(int(self.samples[row]))
 
     def joined(self, other: DesignSamples) -> DesignSamples:
-        """With the rows of another at the end."""
+        """The same samples with the rows of another at the end."""
         x, samples = np.vstack([self.x, other.x]), np.append(self.samples, other.samples)
         return replace(self, x=x, samples=samples)
 
@@ -469,7 +469,7 @@ def at_corners(
 def at_random(
     file: CaseFile, trajectory: Trajectories | None, q0: Floats, y0: Floats, count: int
 ) -> DesignSamples:
-    """At random samples, half with designs anywhere within the bounds, half with corners."""
+    """Random samples, half with designs anywhere within the bounds, half at corners."""
     lower, upper = _bounds(file)
     random = np.random.default_rng(SEED)
     share = random.random((count, len(y0)))

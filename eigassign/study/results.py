@@ -76,7 +76,7 @@ class DesignMap(Brief):
 
 @dataclass(frozen=True, repr=False)
 class ModeStudy(Brief):
-    """How good the expansion of one mode is (the paper's Figure 3)."""
+    """The accuracy of the expansion of one mode (the paper's Figure 3)."""
 
     mode: int
     order: int
@@ -206,7 +206,7 @@ class OtherModes(Brief):
     optimal_hz: Floats
 
     def part(self, rows: slice) -> OtherModes:
-        """At these rows only."""
+        """The same curves at these rows only."""
         return OtherModes(self.modes, self.initial_hz[rows], self.optimal_hz[rows])
 
 
@@ -243,7 +243,7 @@ class TargetStudy(Brief):
 
     @property
     def curve_name(self) -> str:
-        """Whose frequency its curves are, to tell columns and files apart."""
+        """The name of the mode whose frequency its curves are, to tell columns and files apart."""
         return f"mode {self.mode}" if self.followed is None else self.followed.name
 
     @property
@@ -269,7 +269,7 @@ class TargetStudy(Brief):
 
 @dataclass(frozen=True)
 class SolverRow:
-    """What the one-shot program's solver reached, residuals recomputed from the data."""
+    """The residuals that the one-shot program's solver reached, recomputed from the data."""
 
     status: str
     iterations: int
@@ -486,7 +486,7 @@ class TradeOff(Brief):
 
 @dataclass(frozen=True, repr=False)
 class Meaning(Brief):
-    """What the answer means: what it hangs on, what holds it back, how sure it is."""
+    """The meaning of the answer: what it hangs on, what holds it back, how sure it is."""
 
     sensitivity: tuple[SensitivityRow, ...] = ()
     relaxed: tuple[RelaxedRow, ...] = ()
@@ -604,7 +604,7 @@ class TrajectoryRow(Brief):
 
 @dataclass(frozen=True)
 class MeshError:
-    """How much the mesh raises frequencies at most, relative; infinite where it is too coarse."""
+    """The largest relative error of the mesh in frequency; infinite where it is too coarse."""
 
     modes: tuple[int, ...]
     error: tuple[float, ...]
@@ -647,7 +647,7 @@ class RunResults(Brief):
 
     @property
     def along(self) -> str:
-        """What the samples belong to, in words."""
+        """The trajectory that the samples belong to, in words."""
         if self.only is not None:
             return f"trajectory {self.only!r}"
         several = len(self.trajectories) > 1
@@ -655,14 +655,14 @@ class RunResults(Brief):
 
     @property
     def approximation_error(self) -> float | None:
-        """How far the predicted frequencies are from the exact ones at most; None without."""
+        """The largest distance of the predicted frequencies from the exact ones; None without."""
         if not self.targets:
             return None
         return max(target.approximation_error for target in self.targets)
 
     @property
     def within_tolerance(self) -> bool:
-        """Whether the prediction that the optimum rests on is as exact as the case asks for."""
+        """True if the prediction that the optimum rests on is as exact as the case asks for."""
         error = self.approximation_error
         return error is None or error <= self.tolerance
 
@@ -693,7 +693,7 @@ class RunResults(Brief):
 
     @property
     def price(self) -> float | None:
-        """What the change of the design costs; None where nothing has a price."""
+        """The cost of the change of the design; None where nothing has a price."""
         priced = [row.cost for row in self.design if row.price is not None]
         return sum(priced) if priced else None
 

@@ -88,7 +88,7 @@ class Expansions(Brief):
 
 @dataclass(frozen=True)
 class Scene:
-    """What all studies of one case start from. SI units."""
+    """The model, trajectory and expansions that all studies of one case start from. SI units."""
 
     file: CaseFile
     model: Model
@@ -114,7 +114,7 @@ class Scene:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is implausible in the case file, with its place."""
+        """The warnings of what is implausible in the case file, with its place."""
         return tuple(str(problem) for problem in self.file.warnings)
 
     @property

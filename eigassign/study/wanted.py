@@ -57,7 +57,7 @@ class Wanted:
 
     @property
     def weight(self) -> float:
-        """What its errors are multiplied by."""
+        """The factor of its errors."""
         return self.requirement.target.weight
 
 

@@ -22,7 +22,7 @@ from eigassign.study.meaning.reach import misses, proved_ranges, reach_rows, unr
 from eigassign.study.meaning.sensitivity import error_kind, relaxed_limits, sensitivities
 from eigassign.study.meaning.tolerance import study_tolerance
 from eigassign.study.meaning.tradeoff import trade_off
-from eigassign.study.results import Meaning, RelaxedRow, ToleranceRows, TradeOff
+from eigassign.study.results import Meaning, RelaxedRow, ToleranceRows
 from eigassign.study.scene import Scene
 from eigassign.study.wanted import Wanted
 
@@ -30,7 +30,7 @@ Floats = NDArray[np.float64]
 
 
 class Studies(StrEnum):
-    """How much is asked of what the answer means."""
+    """The studies of an answer that the user asks for."""
 
     NONE = "none"
     CHEAP = "cheap"
@@ -58,14 +58,14 @@ def study_meaning(
     reach = () if ranges is None else tuple(reach_rows(wanted, ranges))
     if studies is Studies.NONE:
         return Meaning(unreachable=beyond)
-    asked, seen = _judged(scene, answer, wanted)
+    found, (asked, seen) = answer.found, _judged(scene, answer, wanted)
     notes: list[str] = []
     return Meaning(
         sensitivity=tuple(sensitivities(scene.file, wanted, asked, answer.y, seen)),
-        relaxed=() if answer.found is None else tuple(_relaxed(scene, answer, answer.found)),
+        relaxed=() if found is None else tuple(_relaxed(scene, answer, found)),
         reach=reach,
         tolerance=_tolerance(scene, answer, wanted, exact, notes),
-        trade_off=_trade_off(scene, answer) if studies is Studies.ALL else None,
+        trade_off=trade_off(scene, found) if found and studies is Studies.ALL else None,
         unreachable=beyond,
         notes=tuple(notes),
     )
@@ -85,10 +85,6 @@ def _tolerance(
     return found
 
 
-def _trade_off(scene: Scene, answer: Answer) -> TradeOff | None:
-    return None if answer.found is None else trade_off(scene, answer.found)
-
-
 def _relaxed(scene: Scene, answer: Answer, found: Found) -> Iterator[RelaxedRow]:
     variant = found.variant
     if found.best.seen.violation > MET:  # a limit that is missed is no price of the objective
@@ -101,7 +97,7 @@ def _relaxed(scene: Scene, answer: Answer, found: Found) -> Iterator[RelaxedRow]
 def _judged(
     scene: Scene, answer: Answer, wanted: Sequence[Wanted]
 ) -> tuple[Requirements, Appraisal]:
-    """What is asked, and what it says of the answer; solved only where it was not before."""
+    """The studies asked for, with their results; solved only where they were not before."""
     if answer.found is not None:
         variant = answer.found.variant
         return variant.requirements, answer.found.best.seen

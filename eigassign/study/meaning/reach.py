@@ -49,7 +49,7 @@ def proved_ranges(scene: Scene) -> tuple[Solved, Solved] | None:
 
 
 def reach_rows(wanted: Sequence[Wanted], ranges: tuple[Solved, Solved]) -> Iterator[RangeRow]:
-    """What each target's curve can take at every sample, and the least error that is left."""
+    """The range of each target's curve at every sample, and the least error that is left."""
     for w in wanted:
         if w.requirement.kind != "keep_out" and w.requirement.followed is None:
             error = float(least_errors(w, *ranges).max())
@@ -57,7 +57,7 @@ def reach_rows(wanted: Sequence[Wanted], ranges: tuple[Solved, Solved]) -> Itera
 
 
 def misses(wanted: Wanted, exact: Solved, max_error: float) -> bool:
-    """Whether a target is missed by more than is allowed, ``max_error`` of a wanted frequency."""
+    """True if a target is missed by more than is allowed, ``max_error`` of a wanted frequency."""
     return bool(np.abs(errors_of(wanted, exact)).max() > _allowed(wanted, max_error))
 
 
@@ -73,7 +73,7 @@ def unreachable(
     max_error: float,
     ranges: tuple[Solved, Solved] | None,
 ) -> Iterator[str]:
-    """In words, each target that is out of reach at some sample; only those that y misses."""
+    """The targets that y misses and that are out of reach at some sample, in words."""
     for w in wanted:
         if not misses(w, exact, max_error):
             continue

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, Objective
-from eigassign.assignment.exact.requirements import FrequencyLimit, Requirements
+from eigassign.assignment.exact.requirements import Requirements
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy
 from eigassign.study.design.optimum import MASS
@@ -50,22 +50,18 @@ def _largest(values: Floats) -> float:
 
 
 def _labels(wanted: Sequence[Wanted], asked: Requirements) -> Iterator[str]:
-    """What each curve is called: as its target, and at the edge of a band by its mode."""
+    """The name of each curve: as its target, and at the edge of a band by its mode."""
     yield from (w.requirement.label for w in wanted if w.requirement.kind == "frequency")
     bands = {w.requirement.label for w in wanted if w.requirement.kind == "keep_out"}
     for limit in asked.limits:
-        yield f"{limit.name}: mode {_mode(limit)}" if limit.name in bands else limit.name
-
-
-def _mode(limit: FrequencyLimit) -> int:
-    return limit.terms[0][0]
+        yield f"{limit.name}: mode {limit.terms[0][0]}" if limit.name in bands else limit.name
 
 
 # --- Limits
 
 
 def error_kind(problem: DesignProblem, asked: Requirements) -> str:
-    """What F is in words: an error only where frequencies are wanted and nothing has a price."""
+    """The objective F in words: an error only where nothing has a price."""
     if not asked.targets and problem.prices is not None:
         return "price"
     if not asked.targets or problem.prices is not None:
@@ -81,7 +77,7 @@ def as_error(kind: str, F: float) -> float:
 def relaxed_limits(
     file: CaseFile, problem: DesignProblem, kind: str, F: float, active: Sequence[ActiveRow]
 ) -> Iterator[RelaxedRow]:
-    """What a little more room at each active limit gains, if anything."""
+    """The gain of a little more room at each active limit, if there is any."""
     for row in active:
         if row.multiplier <= 0.0 or _is_natural(file, problem, row):
             continue
@@ -96,7 +92,7 @@ def relaxed_limits(
 
 
 def _is_natural(file: CaseFile, problem: DesignProblem, row: ActiveRow) -> bool:
-    """Whether nature sets the bound: no mass, inertia or stiffness is below zero."""
+    """True if nature sets the bound: no mass, inertia or stiffness is below zero."""
     if row.kind != "bound" or row.side != "lower":
         return False
     k = list(file.design.parameters).index(row.name)
@@ -119,24 +115,21 @@ def _amount(file: CaseFile, problem: DesignProblem, row: ActiveRow) -> tuple[flo
 
 
 def _rounded(value: float) -> float:
-    """To one digit; 1 where there is nothing to round."""
+    """``value`` to one digit; 1 where there is nothing to round."""
     return float(f"{value:.0e}") if value > 0.0 else 1.0
 
 
 def _room(file: CaseFile, row: ActiveRow, amount: float, unit: str) -> str:
     if row.kind != "target":
         more = "more" if row.side == "upper" else "less"
-        return f"{handy(amount, unit)} {more} at the {row.side} {_limit(row)}"
+        named = f"{'bound' if row.kind == 'bound' else 'limit'} of {row.name}"
+        return f"{handy(amount, unit)} {more} at the {row.side} {named}"
     if row.name != MASS or (mass := file.design.mass) is None:
         return f"{row.name}, relaxed by {100 * amount:g} %"
     limit, more = (mass.max, "more") if row.side == "upper" else (mass.min, "less")
     if limit is None:
         return f"the limit of the mass, relaxed by {100 * amount:g} %"
     return f"{handy(amount * limit, 'kg')} {more} mass"
-
-
-def _limit(row: ActiveRow) -> str:
-    return f"bound of {row.name}" if row.kind == "bound" else f"limit of {row.name}"
 
 
 def _from_to(kind: str, before: float, after: float) -> str:

@@ -50,14 +50,15 @@ def trade_off(scene: Scene, found: Found) -> TradeOff | None:
     if high - low <= SAME * abs(high):
         return None
     kind = error_kind(problem, variant.requirements)
-    points = [_point(best.y, high, problem(best.y, best.seen), kind)]
+    error = as_error(kind, problem(best.y, best.seen))
+    points = [TradeOffPoint(high, error, best.y)]
     y = best.y
     for limit in np.linspace(low, high, LIMITS)[-2::-1]:
         optimum = _optimum(_limited(problem, quantity, float(limit), high - low), y)
         if optimum is None or optimum.seen.violation > MET:
             break
         y = optimum.y
-        points.append(_point(y, quantity(y)[0], optimum.objective, kind))
+        points.append(TradeOffPoint(quantity(y)[0], as_error(kind, optimum.objective), y))
     return TradeOff(
         "price" if priced else "mass",
         "" if priced else "kg",
@@ -101,10 +102,6 @@ def _optimum(problem: DesignProblem, start: Floats) -> Optimum | None:
         return minimise(problem, start, STEPS)
     except EigassignError:
         return None
-
-
-def _point(y: Floats, amount: float, F: float, kind: str) -> TradeOffPoint:
-    return TradeOffPoint(amount, as_error(kind, F), y)
 
 
 def kept(points: list[TradeOffPoint]) -> list[TradeOffPoint]:
