@@ -21,27 +21,15 @@ __all__, __getattr__, __dir__ = face(
     {
         "canonical": "plain to_yaml",
         "case_file": "CaseFile",
-        "loading": "Unchecked checked from_mapping load parse read",
-        "reader": "dotted read_yaml resolve",
-        "rules.properties": "impossible",
-        "schema.design": "Catalogue Choices Design DesignColumn Tolerance column_names",
-        "schema.document": "Document json_schema",
-        "schema.joints": (
-            "CarriageJoint FixedJoint NutJoint RevoluteJoint ScrewJoint UniversalJoint"
-        ),
-        "schema.links": "FrameLink RigidLink SuperelementLink Taper",
-        "schema.mechanism": "Drive",
-        "schema.parts": "FrozenDict Quantity",
-        "schema.sections": "BareSection CircleSection IProfileSection TubeSection",
+        "loading": "checked from_mapping load parse read",
+        "reader": "read_yaml",
+        "schema.design": "Tolerance",
+        "schema.document": "json_schema",
+        "schema.joints": "FREEDOMS",
+        "schema.parts": "Quantity",
         "schema.study": "Measurement MeasurementFile",
-        "schema.targets": (
-            "AtLeastTarget AtMostTarget FollowedMode FrequencyFile FrequencyProfile "
-            "FrequencyTarget GapTarget Harmonic KeepOutTarget Requirement TargetForm"
-        ),
-        "schema.trajectory": (
-            "FileTrajectory PointTrajectory SampledTrajectory TipTrajectory TrajectoryForm"
-        ),
-        "units": "DIMENSIONS PLAIN QuantityError UNITS parse_unit read_rate",
+        "schema.trajectory": "FileTrajectory PointTrajectory SampledTrajectory TipTrajectory",
+        "units": "DIMENSIONS QuantityError read_quantity",
         "values": "key_path",
     },
 )

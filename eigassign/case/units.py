@@ -174,7 +174,7 @@ _FACTOR = re.compile(r"([^\W\d_]+|[%°])(?:(?:\^|\*\*)?([-+]?[1-9]))?")
 _SUPERSCRIPTS = str.maketrans("⁻¹²³⁴⁵⁶⁷⁸⁹", "-123456789")
 
 
-def read(value: object, dimension: Dimension | None) -> float:
+def read_quantity(value: object, dimension: Dimension | None) -> float:
     """``value`` (number, or text with a unit) in SI units of ``dimension``.
 
     ``None`` as dimension: whatever unit is written is accepted (used where an error elsewhere has
@@ -207,7 +207,7 @@ def number_and_unit(value: object) -> tuple[Fraction, str]:
 
     Raises QuantityError for anything that is not a number, with or without a unit.
     """
-    si = read(value, None)
+    si = read_quantity(value, None)
     if not isinstance(value, str):
         return Fraction(repr(value)), ""
     number, unit = _split(value, None)
@@ -222,16 +222,17 @@ def is_bare(text: str) -> bool:
 def read_rate(value: object, dimension: Dimension | None) -> float:
     """``value`` for one SI unit of ``dimension``: a bare number, or text such as `3 / kg`.
 
-    Raises QuantityError as `read` does.
+    Raises QuantityError as `read_quantity` does.
     """
     if not isinstance(value, str):
-        return read(value, None)
+        return read_quantity(value, None)
     amount, slash, unit_text = value.partition("/")
     number, rest = _split(amount, None)
     if not slash or rest:
         si = dimension.si if dimension and dimension.si else "kg"
         raise QuantityError(f"expected an amount per unit, such as 3 / {si}, got {shown(value)}")
-    return read(float(number) / _checked(value, unit_text.strip(), dimension).to_si(1.0), None)
+    unit = _checked(value, unit_text.strip(), dimension)
+    return read_quantity(float(number) / unit.to_si(1.0), None)
 
 
 def _expected(dimension: Dimension | None) -> str:

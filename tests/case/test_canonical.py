@@ -98,7 +98,7 @@ VALUES = st.recursive(
     lambda inner: (
         st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4)
     ),
-    max_leaves=12,
+    max_leaves=8,
 )
 
 
@@ -108,7 +108,7 @@ def frozen(value: object) -> object:
     return tuple(map(frozen, value)) if isinstance(value, list) else value
 
 
-@settings(derandomize=True, deadline=None, max_examples=200)
+@settings(derandomize=True, deadline=None, max_examples=100)
 @given(st.dictionaries(st.text(max_size=8), VALUES, min_size=1, max_size=4))
 def test_whatever_is_written_is_read_back(content: dict[str, object]) -> None:
     text = to_yaml(content)

@@ -13,22 +13,7 @@ import pytest
 from pydantic import ValidationError
 from small_case import TEXT, edited
 
-from eigassign.case import (
-    BareSection,
-    CaseFile,
-    CircleSection,
-    Drive,
-    FileTrajectory,
-    FixedJoint,
-    FrequencyProfile,
-    FrozenDict,
-    RevoluteJoint,
-    SampledTrajectory,
-    TipTrajectory,
-    TubeSection,
-    load,
-    parse,
-)
+from eigassign.case import CaseFile, load, parse
 
 CASES = Path(__file__).parents[2] / "cases"
 MINIMAL = """\
@@ -58,16 +43,14 @@ def test_the_small_case_is_read_in_si() -> None:
     assert case.reference is None
     assert mechanism.space == "planar"
     assert mechanism.materials["alu"].youngs_modulus == 69e9
-    assert mechanism.sections["rod"] == CircleSection(shape="circle", diameter=0.03)
-    assert mechanism.sections["pipe"] == TubeSection(
-        shape="tube", outer_diameter=0.04, thickness=0.002
-    )
-    assert mechanism.sections["bar"] == BareSection(area=7.0632e-4, bending_inertia=3.97e-8)
-    assert mechanism.sections["bar"].shape == "bare"
+    rod, pipe, bar = mechanism.sections.values()
+    assert (rod.shape, rod.diameter) == ("circle", 0.03)
+    assert (pipe.shape, pipe.outer_diameter, pipe.thickness) == ("tube", 0.04, 0.002)
+    assert (bar.shape, bar.area, bar.bending_inertia) == ("bare", 7.0632e-4, 3.97e-8)
+    assert pipe.inner_diameter is None
     assert list(mechanism.links) == ["upper", "fore", "hand"]
     assert mechanism.links["fore"].elements == 3
-    assert isinstance(mechanism.joints["elbow"], RevoluteJoint)
-    assert isinstance(mechanism.joints["wrist"], FixedJoint)
+    assert [j.type for j in mechanism.joints.values()] == ["revolute", "revolute", "fixed"]
     assert mechanism.joints["wrist"].angle == math.radians(10)
     assert mechanism.joints["shoulder"].position == (0.0, 0.0)
     assert (mechanism.bodies["tool"].mass, mechanism.bodies["tool"].inertia) == (0.1, 0.0)
@@ -78,8 +61,8 @@ def test_the_studies_of_the_small_case_are_read_in_si() -> None:
     assert list(case.coordinates) == ["q1", "q2"]
     assert case.coordinates["q1"].drive == "free"
     assert case.coordinates["q1"].angle == "relative"
-    assert case.coordinates["q2"].drive == Drive(stiffness=100)
-    assert isinstance(case.trajectory, TipTrajectory)
+    assert case.coordinates["q2"].drive.stiffness == 100
+    assert case.trajectory.tip == "hand.end"
     assert case.trajectory.branch["elbow"] == pytest.approx((math.pi / 18, math.pi * 17 / 18))
     assert (case.trajectory.duration, case.trajectory.samples) == (1.0, 101)
     assert [(p.min, p.max) for p in case.design.parameters.values()] == [(0, 0.25), (0.02, 0.04)]
@@ -111,7 +94,6 @@ def test_values_whose_unit_another_key_decides_are_put_into_si() -> None:
     assert case.expansion.q == (math.pi / 2, 1.0)
     assert case.expansion.y == (0.1, 0.03)
     assert case.validation.q_span == (math.radians(1), 0.1)
-    assert isinstance(case.trajectory, TipTrajectory)
     assert case.trajectory.start == (math.pi / 2, 0.0)
 
 
@@ -122,8 +104,6 @@ def test_a_span_may_be_one_number_for_all_coordinates() -> None:
 def test_joint_samples_may_come_with_times_or_a_duration_and_in_degrees() -> None:
     timed = read(edited(MOTION, "  q: [[0, 90 deg], [1, 2]]\n  time: [0, 200 ms]\n")).trajectory
     even = read(edited(MOTION, "  q: [[0, 90 deg], [1, 2]]\n  duration: 200 ms\n")).trajectory
-    assert isinstance(timed, SampledTrajectory)
-    assert isinstance(even, SampledTrajectory)
     assert timed.q == even.q == ((0.0, math.pi / 2), (1.0, 2.0))
     assert (timed.time, timed.duration) == ((0.0, 0.2), None)
     assert (even.time, even.duration) == (None, 0.2)
@@ -132,13 +112,13 @@ def test_joint_samples_may_come_with_times_or_a_duration_and_in_degrees() -> Non
 def test_a_trajectory_file_is_found_beside_the_case(tmp_path: Path) -> None:
     (tmp_path / "path.csv").write_text("time,q1,q2\n0,0,0\n1,1,1\n")
     (tmp_path / "case.yaml").write_text(edited(MOTION, "  file: path.csv\n"))
-    trajectory = load(tmp_path / "case.yaml").trajectory
-    assert trajectory == FileTrajectory(file=str(tmp_path / "path.csv"))
+    assert load(tmp_path / "case.yaml").trajectory.file == str(tmp_path / "path.csv")
 
 
 def test_a_wanted_frequency_may_change_in_time() -> None:
     text = edited("frequency: 190 Hz", "frequency: {time: [0, 1 s], frequency: [0.19 kHz, 200]}")
-    assert read(text).targets[0].frequency == FrequencyProfile(time=(0, 1), frequency=(190, 200))
+    profile = read(text).targets[0].frequency
+    assert (profile.time, profile.frequency) == ((0, 1), (190, 200))
 
 
 @pytest.mark.parametrize(
@@ -222,28 +202,19 @@ def test_the_order_of_coordinates_is_part_of_the_content() -> None:
 def test_nothing_in_a_case_can_be_changed() -> None:
     case = read(TEXT)
     with pytest.raises(AttributeError):
-        case.title = "x"  # type: ignore[misc]
+        case.title = "x"
     with pytest.raises(ValidationError):
         case.mechanism.links["fore"].length = 1.0
     for mapping in (case.mechanism.links, case.coordinates, case.design.parameters):
         with pytest.raises(TypeError):
-            mapping["x"] = 1  # type: ignore[index]
+            mapping["x"] = 1
         with pytest.raises(AttributeError):
-            mapping.clear()  # type: ignore[attr-defined]
-
-
-def test_a_frozen_mapping_cannot_be_changed_through_what_it_was_made_of() -> None:
-    source = {"a": 1}
-    frozen = FrozenDict(source)
-    source["a"] = 2
-    assert frozen == {"a": 1}
-    assert frozen == MappingProxyType({"a": 1})
-    assert frozen != {"b": 1}
-    assert frozen != 1
-    (storage,) = FrozenDict.__slots__
-    for change in (lambda: setattr(frozen, storage, {}), lambda: delattr(frozen, storage)):
-        with pytest.raises(TypeError):
-            change()
+            mapping.clear()
+        for name in (*type(mapping).__slots__, "other"):
+            with pytest.raises(TypeError):
+                setattr(mapping, name, {})
+        assert mapping == MappingProxyType(dict(mapping))
+        assert mapping != 1
 
 
 def test_a_case_survives_pickling_and_copying() -> None:
@@ -255,7 +226,6 @@ def test_a_case_survives_pickling_and_copying() -> None:
 def test_the_shipped_arm_has_the_papers_mass_per_length() -> None:
     case = load(CASES / "two_link.yaml")
     section, material = case.mechanism.sections["rod"], case.mechanism.materials["aluminium"]
-    assert isinstance(section, BareSection)
     # 1e-8 relative: frequencies go with its square root and are wanted to 1e-6
     assert section.area * material.density == pytest.approx(1.9, rel=1e-8)
     assert (material.youngs_modulus, section.bending_inertia) == (69e9, 3.97e-8)

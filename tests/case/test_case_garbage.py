@@ -17,55 +17,29 @@ from eigassign.errors import CaseError, Problem
 DATA = TEXT.encode()
 TOKENS = re.findall(r"[\w.%-]+|\s+|[^\w\s]", TEXT)
 STRAY = [
-    "[",
-    "]",
-    "{",
-    "}",
-    ":",
-    ": ",
-    ",",
-    "- ",
-    "\n",
-    "\t",
-    "  ",
-    "&a",
-    "*a",
-    "!!int",
-    "? ",
-    "|",
-    ">",
+    *(
+        "[",
+        "]",
+        "{",
+        "}",
+        ":",
+        ": ",
+        ",",
+        "- ",
+        "\n",
+        "\t",
+        "  ",
+        "&a",
+        "*a",
+        "!!int",
+        "? ",
+        "|",
+        ">",
+    ),
+    *("~", "null", "true", "1", "-1", "0", "1e999", ".nan", "x", "''", '"', "%", "#", "---", "..."),
+    *("[1, 2]", "{a: 1}", "[[1]]", "auto", "q1", "ground", "1 mm", "9" * 400, "\u2028", "é", "\0"),
 ]
-STRAY += [
-    "~",
-    "null",
-    "true",
-    "1",
-    "-1",
-    "0",
-    "1e999",
-    ".nan",
-    "x",
-    "''",
-    '"',
-    "%",
-    "#",
-    "---",
-    "...",
-]
-STRAY += [
-    "[1, 2]",
-    "{a: 1}",
-    "[[1]]",
-    "auto",
-    "q1",
-    "ground",
-    "1 mm",
-    "9" * 400,
-    "\u2028",
-    "é",
-    "\0",
-]
-quick = settings(derandomize=True, deadline=None, max_examples=300)
+quick = settings(derandomize=True, deadline=None, max_examples=150)
 
 
 def survives(data: bytes) -> None:
@@ -131,25 +105,25 @@ MATRICES = Path(__file__).parents[2] / "cases" / "superelement_arm"
 WITH_FILES = PLANAR.replace("K.mtx", str(MATRICES / "stiffness.mtx")).replace(
     "M.npz", str(MATRICES / "mass.mtx")
 )
-WORDS = ("~", "true", "-1", "1e999", ".nan", "x", "[1, 2]", "[[[1]]]", "{a: 1}", "[{}]")
+WORDS = ("~", "x", "-1", "[1, 2]", "{a: 1}")
+MORE = ("true", "1e999", ".nan", "[[[1]]]", "[{}]")
 VALUE = re.compile(r"(?<=: )([\w.%-]+(?: \w+)?|\[[^\]]*\]|\{[^}]*\})")
 
 
+@pytest.mark.parametrize("words", [WORDS, pytest.param(MORE, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("text", [TEXT, WITH_FILES, SPATIAL], ids=["small", "planar", "spatial"])
-def test_every_value_of_a_case_replaced_by_every_stray_word(text: str) -> None:
+def test_every_value_of_a_case_replaced_by_every_stray_word(
+    text: str, words: tuple[str, ...]
+) -> None:
     """Exhaustive where it matters: each value in turn is a number, a list, a mapping, nothing, …"""
     for start, end in [m.span(1) for m in VALUE.finditer(text)]:
-        for word in WORDS:
+        for word in words:
             survives((text[:start] + word + text[end:]).encode())
 
 
 @pytest.mark.parametrize("text", [WITH_FILES, SPATIAL], ids=["planar", "spatial"])
-def test_the_wide_cases_are_valid_to_begin_with(text: str) -> None:
-    assert isinstance(outcome(text.encode()), CaseFile)
-
-
-@pytest.mark.parametrize("text", [WITH_FILES, SPATIAL], ids=["planar", "spatial"])
 def test_every_line_of_a_case_left_out(text: str) -> None:
+    assert isinstance(outcome(text.encode()), CaseFile)
     lines = text.splitlines(keepends=True)
     for k in range(len(lines)):
         survives("".join(lines[:k] + lines[k + 1 :]).encode())

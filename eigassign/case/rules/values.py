@@ -37,7 +37,7 @@ from eigassign.case.rules.properties import (
 from eigassign.case.schema.parts import Quantity
 from eigassign.case.schema.targets import FREQUENCY
 from eigassign.case.suggestions import shown
-from eigassign.case.units import QuantityError, read, read_rate
+from eigassign.case.units import QuantityError, read_quantity, read_rate
 
 Undecided = tuple[KeyPath, object, Quantity | None]  # None: no unit can be meant
 
@@ -96,14 +96,14 @@ def _prices(tree: Tree) -> Iterator[tuple[KeyPath, object]]:
 
 def _in_si(value: object, quantity: Quantity | None) -> float:
     if quantity is ANY:
-        return read(value, None)
+        return read_quantity(value, None)
     if quantity is not None:
         return quantity.read(value)
     if isinstance(value, str):
         raise QuantityError(
             f"terms of different dimensions: give a plain number in SI units, got {shown(value)}"
         )
-    return read(value, None)
+    return read_quantity(value, None)
 
 
 def _undecided(tree: Tree) -> Iterator[Undecided]:

@@ -29,7 +29,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from eigassign.case.suggestions import shown
-from eigassign.case.units import DIMENSIONS, PLAIN, Dimension, QuantityError, read
+from eigassign.case.units import DIMENSIONS, PLAIN, Dimension, QuantityError, read_quantity
 
 T = TypeVar("T")
 L = TypeVar("L")
@@ -111,7 +111,7 @@ class Quantity:
             raise value
         if self.dimension is None and isinstance(value, str):
             raise QuantityError(f"expected a number without unit, got text {shown(value)}")
-        return self.checked(read(value, self.dimension), shown(value))
+        return self.checked(read_quantity(value, self.dimension), shown(value))
 
     def checked(self, si: float, given: str) -> float:
         """``si`` if it is within the limits. Raises QuantityError.

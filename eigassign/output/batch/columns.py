@@ -19,7 +19,7 @@ from typing import Any, TextIO
 import numpy as np
 
 from eigassign._version import __version__
-from eigassign.case.units import QuantityError, read
+from eigassign.case.units import QuantityError, read_quantity
 from eigassign.output.batch.outcome import CaseOutcome
 from eigassign.output.batch.summary import cell
 
@@ -131,7 +131,7 @@ def _values(row: CaseOutcome) -> Iterator[tuple[str, float | str]]:
 def quantity(value: float | str) -> float | None:
     """``value`` in SI units; None where it is no number."""
     try:
-        return read(value, None)
+        return read_quantity(value, None)
     except QuantityError:
         return None
 

@@ -3,24 +3,13 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from json_schema_reader import SCHEMA, accepts
 from small_case import TEXT, edited
 
-from eigassign.case import (
-    DIMENSIONS,
-    CaseFile,
-    Catalogue,
-    Design,
-    DesignColumn,
-    QuantityError,
-    Tolerance,
-    column_names,
-    parse,
-    read_rate,
-    read_yaml,
-)
+from eigassign.case import CaseFile, Tolerance, parse, read_yaml
+from eigassign.errors import CaseError
 
 D = "  d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}\n"
 BOOM = """\
@@ -42,10 +31,12 @@ def with_entries(text: str) -> CaseFile:
 
 def test_a_parameter_with_values_is_a_column_between_the_least_and_the_largest() -> None:
     design = with_entries(LISTED).design
-    assert design.parameters["d"] == DesignColumn("sections.rod.diameter", 0.02, 0.03, price=3000.0)
-    assert design.catalogues == (
-        Catalogue("d", (1,), ("0.02", "0.025", "0.03"), ((0.02,), (0.025,), (0.03,))),
-    )
+    d = design.parameters["d"]
+    assert (d.parameter, d.min, d.max, d.price) == ("sections.rod.diameter", 0.02, 0.03, 3000.0)
+    (catalogue,) = design.catalogues
+    assert (catalogue.name, catalogue.columns) == ("d", (1,))
+    assert catalogue.choices == ("0.02", "0.025", "0.03")
+    assert catalogue.rows == ((0.02,), (0.025,), (0.03,))
 
 
 def test_choices_make_a_column_of_each_property_and_say_which_belong_together() -> None:
@@ -55,8 +46,8 @@ def test_choices_make_a_column_of_each_property_and_say_which_belong_together() 
     area = case.design.parameters["boom.area"]
     assert (area.parameter, area.min, area.max) == ("sections.bar.area", 4e-4, 6e-4)
     boom, d = case.design.catalogues
-    assert boom == Catalogue("boom", (1, 2), ("light", "heavy"), ((4e-4, 2e-8), (6e-4, 5e-8)))
-    assert d.columns == (3,)
+    assert (boom.name, boom.columns, d.columns) == ("boom", (1, 2), (3,))
+    assert (boom.choices, boom.rows) == (("light", "heavy"), ((4e-4, 2e-8), (6e-4, 5e-8)))
 
 
 def test_a_property_that_choices_set_has_a_price_for_each_unit_of_it() -> None:
@@ -66,10 +57,12 @@ def test_a_property_that_choices_set_has_a_price_for_each_unit_of_it() -> None:
 
 
 def test_properties_that_end_alike_keep_their_whole_path() -> None:
-    assert column_names("arm", ["sections.a.area", "sections.b.area", "links.c.length"]) == [
-        "arm.sections.a.area",
-        "arm.sections.b.area",
-        "arm.length",
+    values = "{links.upper.length: 1, links.fore.length: %d, sections.rod.diameter: 2 cm}"
+    case = with_entries(f"  arm: {{choices: {{a: {values % 1}, b: {values % 2}}}}}\n")
+    assert list(case.design.parameters)[1:] == [
+        "arm.links.upper.length",
+        "arm.links.fore.length",
+        "arm.diameter",
     ]
 
 
@@ -102,24 +95,36 @@ def test_a_tolerance_is_a_share_or_an_amount(
     assert tolerance.deviation(-2.0) == pytest.approx(about_2, rel=1e-15)
 
 
+@settings(deadline=None, max_examples=30)
 @given(st.floats(1e-12, 0.999))
 def test_a_share_is_written_so_that_the_same_number_is_read_back(share: float) -> None:
     written = Tolerance(share, relative=True).written()
-    entry = {"parameter": "bodies.a.mass", "min": 0.0, "max": 1.0, "tolerance": written}
-    design = Design.model_validate({"entries": {"m": entry}})
-    assert design.parameters["m"].tolerance == Tolerance(share, relative=True)
+    case = with_entries(D.replace("}", f", tolerance: {written}}}"))
+    assert case.design.parameters["d"].tolerance == Tolerance(share, relative=True)
 
 
-def test_a_price_is_for_one_si_unit() -> None:
-    mass, length = DIMENSIONS["mass"], DIMENSIONS["length"]
-    assert read_rate(3, mass) == 3.0
-    assert read_rate("3 / kg", mass) == 3.0
-    assert read_rate("3/g", mass) == pytest.approx(3000.0, rel=1e-15)
-    assert read_rate("-0.5 / mm", length) == pytest.approx(-500.0, rel=1e-15)
-    assert read_rate("1 / N m/rad", DIMENSIONS["rotational stiffness"]) == 1.0
-    for wrong in ("3 kg", "kg", "3 /", "3 g / kg", "1e999 / kg"):
-        with pytest.raises(QuantityError):
-            read_rate(wrong, mass)
+@pytest.mark.parametrize(
+    ("path", "price", "value"),
+    [
+        ("bodies.tool.inertia", "3", 3.0),
+        ("sections.rod.diameter", "3 / m", 3.0),
+        ("sections.rod.diameter", "3/mm", 3000.0),
+        ("sections.rod.diameter", "-0.5 / mm", -500.0),
+        ("coordinates.q2.drive.stiffness", "1 / N m/rad", 1.0),
+        *(
+            ("sections.rod.diameter", wrong, None)
+            for wrong in ("3 m", "m", "3 /", "3 g / m", "1e999 / m")
+        ),
+    ],
+)
+def test_a_price_is_for_one_si_unit(path: str, price: str, value: float | None) -> None:
+    entry = f"  d: {{parameter: {path}, min: 0.02, max: 0.04, price: {price}}}\n"
+    if value is None:
+        with pytest.raises(CaseError, match=r"design\.d\.price"):
+            with_entries(entry)
+    else:
+        found = with_entries(entry).design.parameters["d"].price
+        assert found == pytest.approx(value, rel=1e-15)
 
 
 @pytest.mark.parametrize(

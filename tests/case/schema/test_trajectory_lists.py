@@ -9,7 +9,7 @@ import pytest
 from json_schema_reader import SCHEMA, accepts
 from small_case import edited, unmarked
 
-from eigassign.case import CaseFile, SampledTrajectory, TipTrajectory, parse, read_yaml
+from eigassign.case import CaseFile, parse, read_yaml
 from eigassign.errors import CaseError
 
 ONE = (
@@ -38,14 +38,13 @@ def test_a_list_is_read_in_order_with_names_and_weights() -> None:
     file = read(listed())
     (path1, name1, first), (path2, name2, second) = file.trajectories
     assert (path1, name1, path2, name2) == ("trajectory[0]", "pick", "trajectory[1]", "2")
-    assert isinstance(first, TipTrajectory)
-    assert isinstance(second, SampledTrajectory)
-    assert (first.weight, second.weight, second.time) == (1.0, 2.5, (1.0, 3.0))
+    assert (first.tip, first.weight) == ("hand.end", 1.0)
+    assert (second.weight, second.time) == (2.5, (1.0, 3.0))
 
 
 def test_a_mapping_stays_what_it_was_and_is_called_1() -> None:
     file = read(edited(ONE, ONE))
-    assert isinstance(file.trajectory, TipTrajectory)
+    assert file.trajectory.tip == "hand.end"
     assert [(path, name) for path, name, _ in file.trajectories] == [("trajectory", "1")]
 
 
