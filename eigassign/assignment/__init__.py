@@ -18,23 +18,21 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "assign": "ActiveLimit Assignment solve_assignment",
+        "assign": "Assignment solve_assignment",
         "catalogues.branching": "ListedValues SearchLimits hull search_catalogue",
         "catalogues.choosing": "choose",
         "catalogues.linear": "solve_catalogue",
-        "exact.design_problem": "Appraisal DesignProblem MET Objective best_first",
+        "exact.design_problem": "Appraisal DesignProblem Objective best_first",
         "exact.identification": "Identified MeasuredFrequencies identify",
-        "exact.requirements": ("Frequencies FrequencyLimit ModeTarget QuantityLimit Requirements"),
+        "exact.requirements": "Frequencies FrequencyLimit ModeTarget QuantityLimit Requirements",
         "exact.sequential": "End Optimum minimise",
         "exact.stationarity": "stationarity",
-        "optimality": "ACCEPT Certificate judge",
+        "optimality": "Certificate best_candidate judge",
         "program": (
-            "Bounds ProgramAnswer Goal LinearConstraint LinearModel QuadraticProgram "
-            "ScaledProgram build_program quadratic_form scaled_program unscaled"
+            "Bounds Goal LinearConstraint LinearModel ProgramAnswer ScaledProgram build_program "
+            "quadratic_form scaled_program unscaled"
         ),
-        "solver": "solve_active_set Polished SETTINGS Status polish solve_osqp",
-        "targets": (
-            "RelativeError hz_from_lam lam_from_hz relative_error sample_target trapezoidal_weights"
-        ),
+        "solver": "Status solve_program solve_scaled",
+        "targets": "hz_from_lam lam_from_hz relative_error sample_target trapezoidal_weights",
     },
 )

@@ -85,7 +85,7 @@ def feasible_point(scaled: ScaledProgram, rows: list[int] | None = None) -> Floa
 
 
 def constraints_agree(rows: Sequence[LinearConstraint], bounds: Bounds) -> bool:
-    """Whether some design within the bounds meets all linear limits, to 1e-9 of their terms."""
+    """True where a design within the bounds meets all linear limits, to 1e-9 of their terms."""
     if not rows:
         return True
     from scipy.optimize import linprog  # heavy, and few cases have linear limits

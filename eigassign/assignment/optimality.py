@@ -23,8 +23,8 @@ from eigassign.assignment.checks import Floats
 from eigassign.assignment.program import ProgramAnswer, QuadraticProgram
 from eigassign.errors import AccuracyError
 
-ACCEPT = 1e-8
-ROUNDING = 4.0 * np.finfo(np.float64).eps
+ACCEPT = 1e-8  # ten times the tolerance that OSQP is asked for
+ROUNDING = 4.0 * np.finfo(np.float64).eps  # of sums: a few units in the last place
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Certificate:
 
     @property
     def accepted(self) -> bool:
-        """All three within 1e-8."""
+        """True where all three are within 1e-8."""
         return self.worst <= ACCEPT
 
 
@@ -96,7 +96,7 @@ def _largest(values: Floats) -> float:
 
 
 def _violation(value: Floats, lower: Floats, upper: Floats) -> Floats:
-    """How far each value is outside its limits; 0 inside."""
+    """The distance of each value to its limits; 0 inside."""
     return np.asarray(np.maximum(np.maximum(lower - value, value - upper), 0.0))
 
 

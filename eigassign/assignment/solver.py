@@ -104,7 +104,7 @@ def _start(program: QuadraticProgram, scaled: ScaledProgram, raw: RawSolution) -
 
 # --- OSQP
 class Status(IntEnum):
-    """What OSQP says of a run; the names are its own."""
+    """The end of a run in OSQP's words; the names are its own."""
 
     SOLVED = 1
     SOLVED_INACCURATE = 2
@@ -120,13 +120,13 @@ class Status(IntEnum):
 
     @property
     def words(self) -> str:
-        """For people: ``maximum iterations`` and the like."""
+        """The name for people: ``maximum iterations`` and the like."""
         return self.name.lower().replace("_", " ")
 
 
 @dataclass(frozen=True)
 class RawSolution:
-    """What OSQP returned: x (n,) and multipliers mu (rows of G,), None unless it says solved."""
+    """OSQP's answer: x (n,) and multipliers mu (rows of G,), None unless it says solved."""
 
     status: Status
     iterations: int
@@ -185,7 +185,7 @@ def _refuse_nan(P: Floats, c: Floats, scaled: ScaledProgram) -> None:
 RANK = 1e-9  # of the largest singular value; leaves a gradient a tenth of what is accepted
 SIGN = 1e-11  # multipliers of the wrong sign below this are round-off; gradients are O(1)
 INDEPENDENT = 1e-9  # sine of a unit row's angle to the span of the others
-PASSES = 4
+PASSES = 4  # at most: from the second on, moves onto the limits are round-off
 NEAR = 1e-6  # this near a limit, the first guess takes it as active
 FAR = 1e6  # beyond every limit, in units in which the program is O(1)
 
@@ -275,7 +275,7 @@ def _descend(scaled: ScaledProgram, state: _State) -> _State:
 
 
 def _first_guess(scaled: ScaledProgram, x: Floats) -> _State:
-    """All equalities, then every limit x is near to, as far as they are independent."""
+    """The working set of all equalities, then every limit x is near to, if independent."""
     row, equal = scaled.G @ x, scaled.lower == scaled.upper
     below, above = row - scaled.lower <= NEAR, scaled.upper - row <= NEAR
     side = np.where(above, 1, np.where(below, -1, 0))

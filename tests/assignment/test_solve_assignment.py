@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear, minimize
 
 from eigassign.assignment import (
-    ACCEPT,
     Bounds,
     LinearConstraint,
     build_program,
@@ -17,6 +16,7 @@ from eigassign.assignment import (
 )
 
 LAM = 1.0e6
+ACCEPT = 1e-8
 INF = np.inf
 
 

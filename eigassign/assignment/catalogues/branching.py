@@ -98,7 +98,7 @@ class CatalogueSearch:
 
 @dataclass(frozen=True)
 class SearchLimits:
-    """How many combinations to keep, and after how many nodes or seconds to stop."""
+    """The number of combinations to keep, and of nodes or seconds after which to stop."""
 
     keep: int = 5
     nodes: int = 100_000
@@ -216,7 +216,7 @@ def _split(problem: CatalogueProblem, relaxed: Relaxed) -> list[Node]:
 
 
 def answered(found: CatalogueSearch) -> CatalogueSearch:
-    """What was found, or AccuracyError where a limit of the limits came first."""
+    """Return what was found; raise AccuracyError where a limit of the search came first."""
     if found.best:
         return found
     raise AccuracyError(
@@ -226,7 +226,7 @@ def answered(found: CatalogueSearch) -> CatalogueSearch:
 
 
 def distinct_rows(catalogue: ListedValues) -> NDArray[np.int_]:
-    """Of equal rows the first, in the order of the list."""
+    """The first of all rows that are equal, in the order of the list."""
     return np.sort(np.unique(catalogue.rows, axis=0, return_index=True)[1])
 
 

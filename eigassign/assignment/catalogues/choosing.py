@@ -30,9 +30,8 @@ from eigassign.assignment.program import Bounds
 from eigassign.errors import AccuracyError, EigassignError, InfeasibleError
 
 RELAXED = 3  # starts of the relaxation of all combinations
-KEPT = 5  # combinations that are told of
+KEPT = SearchLimits().keep
 TOUCH = 1e-7  # of a constraint's terms: what the programs leave of a limit
-SECONDS = 600.0  # where the case gives none
 STOPPED = (End.SECONDS, End.INTERRUPTED)
 
 
@@ -80,15 +79,6 @@ def choose(
     return Chosen(tuple(best), tuple(tree.fixed[r] for r in best), search, tree.appraisals)
 
 
-def _admissible(problem: DesignProblem, y: Floats) -> bool:
-    """Whether y meets the linear constraints, which no step can mend where bounds are too tight."""
-    for row in problem.constraints:
-        value, size = row.coefficients @ y, TOUCH * (np.abs(row.coefficients) @ np.abs(y) + 1e-300)
-        if not row.lower - size <= value <= row.upper + size:
-            return False
-    return True
-
-
 class _Tree:
     """The caller's problem as relaxations and combinations; every combination is solved once."""
 
@@ -108,7 +98,7 @@ class _Tree:
         self.appraisals, self.nodes = 0, 0
 
     def searched(self) -> CatalogueSearch:
-        """By F of what meets all limits; where nothing does, by the violation."""
+        """Search by F of what meets all limits; where nothing does, by the violation."""
         try:
             return self._search(lambda o: o.objective if o.seen.violation <= MET else None)
         except InfeasibleError:
@@ -128,8 +118,8 @@ class _Tree:
             worth = None if optimum is None else value(optimum)
             return None if optimum is None or worth is None else (optimum.y, worth)
 
-        left = min(self.deadline - time.monotonic(), SECONDS)
-        limits = SearchLimits(keep=KEPT, seconds=max(left, 0.0))
+        left = min(max(self.deadline - time.monotonic(), 0.0), 600.0)  # where the case gives none
+        limits = SearchLimits(seconds=left)
         starts = dict.fromkeys(map(self.nearest, self.starts))
         return search_catalogue(self.catalogues, relax, fix, limits, starts)
 
@@ -174,7 +164,11 @@ class _Tree:
         except EigassignError:
             return None
         self.appraisals += found.appraisals
-        return found if _admissible(problem, found.y) else None
+        for row in problem.constraints:  # which no step can mend where bounds are too tight
+            size = TOUCH * (np.abs(row.coefficients) @ np.abs(found.y) + 1e-300)
+            if not row.lower - size <= row.coefficients @ found.y <= row.upper + size:
+                return None
+        return found
 
     def nearest(self, y: Floats) -> Rows:
         """The rows nearest to a design, relative to the ranges of their columns."""

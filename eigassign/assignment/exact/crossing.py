@@ -48,7 +48,7 @@ class NeighbourPairs:
         return replace(self, others=self.others[:, free] * width, mixed=self.mixed[:, free] * width)
 
     def chosen(self, mask: NDArray[np.bool_]) -> NeighbourPairs:
-        """Some of them."""
+        """The pairs of a mask."""
         return NeighbourPairs(*(getattr(self, name)[mask] for name in self.__dataclass_fields__))
 
     def along(
@@ -84,7 +84,7 @@ class NeighbourPairs:
 
 
 def joined(parts: Sequence[NeighbourPairs]) -> NeighbourPairs | None:
-    """All of them as one; None where there are none."""
+    """The rows of all parts as one; None where there are no parts."""
     if not parts:
         return None
     columns = (

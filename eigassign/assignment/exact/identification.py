@@ -112,7 +112,15 @@ def identify(
     ``start`` (n_y,) is put within the bounds. Where a profile comes upon a better explanation than
     the fit, the fit starts anew from there. Raises what ``response`` raises at the start.
     """
-    problem = _problem(response, measured, lower, upper)
+    from scipy.special import gammaincc  # loaded only where something is identified
+
+    def appraise(y: Floats) -> Appraisal:
+        hz, slopes = response(y)
+        slopes = slopes / measured.deviation[:, None]
+        nothing = np.zeros(0), np.zeros((0, len(y)))
+        return Appraisal(measured.standardised(hz), slopes, *nothing)
+
+    problem = DesignProblem(appraise, lower, upper)
     start = np.clip(start, lower, upper)
     initial_hz = response(start)[0]
     fit = _fitted(problem, start)
@@ -135,7 +143,7 @@ def identify(
         initial_chi_squared=float(np.sum(measured.standardised(initial_hz) ** 2)),
         chi_squared=chi_squared,
         degrees=degrees,
-        p_value=_p_value(chi_squared, degrees),
+        p_value=float(gammaincc(degrees / 2.0, chi_squared / 2.0)) if degrees > 0 else None,
         covariance=frozen(covariance),
         intervals=intervals,
         held=held,
@@ -144,33 +152,12 @@ def identify(
     )
 
 
-def _problem(
-    response: Response, measured: MeasuredFrequencies, lower: Floats, upper: Floats
-) -> DesignProblem:
-    def appraise(y: Floats) -> Appraisal:
-        hz, slopes = response(y)
-        return Appraisal(
-            residual=measured.standardised(hz),
-            slopes=slopes / measured.deviation[:, None],
-            excess=np.zeros(0),
-            excess_slopes=np.zeros((0, len(y))),
-        )
-
-    return DesignProblem(appraise, lower, upper)
-
-
 def _fitted(problem: DesignProblem, start: Floats) -> Optimum:
     """A fit; Ctrl-C ends the whole work, for no part of it is an answer."""
     found = minimise(problem, start)
     if found.end is End.INTERRUPTED:
         raise KeyboardInterrupt
     return found
-
-
-def _p_value(chi_squared: float, degrees: int) -> float | None:
-    from scipy.special import gammaincc
-
-    return float(gammaincc(degrees / 2.0, chi_squared / 2.0)) if degrees > 0 else None
 
 
 # --- Covariance, and what cannot be told
@@ -198,7 +185,7 @@ def _covariance(problem: DesignProblem, fit: Optimum, held: tuple[str, ...]) -> 
 
 
 def _directions(slopes: Floats) -> tuple[Floats, Floats]:
-    """All n singular values, 0 where there are fewer rows, and Vᵀ (n, n)."""
+    """Return all n singular values, 0 where there are fewer rows, and Vᵀ (n, n)."""
     _, sizes, V = np.linalg.svd(slopes)
     s = np.zeros(slopes.shape[1])
     s[: len(sizes)] = sizes
@@ -279,15 +266,22 @@ class _Profile:
         self.width = problem.upper - problem.lower
 
     def intervals(self) -> tuple[Interval, ...]:
-        """From the last value below ŷ_j that χ² allows to the last above it, of each parameter."""
+        """Intervals from the last value below ŷ_j that χ² allows to the last above it."""
         sides = (self.problem.lower, self.problem.upper)
         ends: dict[tuple[int, int], tuple[float, bool]] = {}
+
+        def passed(j: int, side: int) -> bool:
+            """True where a fit that χ² allows lies beyond the end."""
+            sign, end = 2 * side - 1, ends[j, side][0]
+            margin = PRECISION * abs(end - float(self.fit.y[j]))
+            return any(sign * (found.y[j] - end) > margin for found in self.allowed)
+
         for _ in range(ROUNDS):
             open_ends = [
                 (j, side)
                 for j in range(len(self.width))
                 for side in range(2)
-                if (j, side) not in ends or self._is_passed(j, side, ends[j, side][0])
+                if (j, side) not in ends or passed(j, side)
             ]
             if not open_ends:
                 break
@@ -295,11 +289,6 @@ class _Profile:
                 ends[j, side] = self._end(j, float(sides[side][j]))
         pairs = [(ends[j, 0], ends[j, 1]) for j in range(len(self.width))]
         return tuple(Interval(low, high, a, b) for (low, a), (high, b) in pairs)
-
-    def _is_passed(self, j: int, side: int, end: float) -> bool:
-        """Whether a fit that χ² allows lies beyond the end."""
-        sign, margin = 2 * side - 1, PRECISION * abs(end - float(self.fit.y[j]))
-        return any(sign * (found.y[j] - end) > margin for found in self.allowed)
 
     def _end(self, j: int, bound: float) -> tuple[float, bool]:
         """The end of the interval towards ``bound``, and whether it is the bound.
@@ -345,7 +334,7 @@ class _Profile:
         return min(float(np.sqrt(rise)) - NOTICED, FAR)
 
     def _first(self, j: int) -> float:
-        """How far from ŷ_j the interval reaches by the linear model without bounds."""
+        """The distance from ŷ_j to the interval's end by the linear model without bounds."""
         slopes = self.fit.seen.slopes * self.width
         others = np.delete(slopes, j, axis=1)
         rest = slopes[:, j] - others @ np.linalg.lstsq(others, slopes[:, j], rcond=SINGULAR)[0]
@@ -374,7 +363,7 @@ class _Profile:
         return found
 
     def _linear(self, j: int, at: float) -> Floats:
-        """Where χ² of the linear model is least within the bounds, y_j ``at`` a value."""
+        """The design with y_j ``at`` a value at which χ² of the linear model is least."""
         from scipy.optimize import lsq_linear
 
         start, width = self.fit.y.copy(), self.width

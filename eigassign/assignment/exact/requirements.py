@@ -77,7 +77,7 @@ class QuantityLimit:
 
 @dataclass(frozen=True)
 class Requirements:
-    """All that is asked, with the weights ω (n_t,) in s of the integral over time."""
+    """Targets and limits, with the weights ω (n_t,) in s of the integral over time."""
 
     targets: tuple[ModeTarget, ...]
     limits: tuple[FrequencyLimit, ...]
@@ -107,14 +107,20 @@ class Requirements:
 
     def appraise(self, y: Floats, found: Frequencies) -> Appraisal:
         """Residuals and excesses of a design whose frequencies are ``found``, with slopes."""
-        residuals = [self._residual(target, found) for target in self.targets]
-        pairs = self._pairs(found)
+        residuals = []
+        for target in self.targets:
+            factor, column = self._factor(target), _column(target.mode)
+            hz, slopes = found.hz[target.rows, column], found.slopes[target.rows, column]
+            error = factor * (hz / target.hz - 1.0)
+            residuals.append((error, (factor / target.hz)[:, None] * slopes))
         if self.least_change is not None:
             reference, width = self.least_change
             residuals.append(((y - reference) / width, np.diag(1.0 / width)))
         excesses = [_excess(limit, found) for limit in self.limits]
         excesses += [part for limit in self.quantities for part in _of_quantity(limit, y)]
-        return Appraisal(*_stacked(residuals, len(y)), *_stacked(excesses, len(y)), pairs)
+        return Appraisal(
+            *_stacked(residuals, len(y)), *_stacked(excesses, len(y)), self._pairs(found)
+        )
 
     def _pairs(self, found: Frequencies) -> NeighbourPairs | None:
         """Rows of one mode beside its neighbours; None where nothing is known of these.
@@ -129,8 +135,13 @@ class Requirements:
         for target in self.targets:
             scale, at = self._factor(target) / target.hz, np.arange(start, start + len(target.hz))
             start += len(target.hz)
-            both = {other.mode for other in self.targets if _overlap(other.rows, target.rows)}
-            asked = both if self.objective is Objective.LEAST_SQUARES else set()
+            asked = {
+                other.mode
+                for other in self.targets
+                if self.objective is Objective.LEAST_SQUARES
+                and max(other.rows.start, target.rows.start)
+                < min(other.rows.stop, target.rows.stop)
+            }
             parts += _beside(found, target.mode, asked, target.rows, at, scale, target.hz)
         start += 0 if self.least_change is None else len(self.least_change[0])
         for limit in self.limits:
@@ -166,15 +177,8 @@ class Requirements:
             slopes = scale[:, None] * seen.excess_slopes[rows]
             yield scale * seen.excess[rows] + limit.hz, slopes
 
-    def owner(self, index: int) -> str:
-        """The name of the limit that an excess (k,) belongs to."""
-        return self._owner(index)[0]
-
-    def side(self, index: int) -> str:
-        """Whether that is a lower or an upper limit."""
-        return self._owner(index)[1]
-
-    def _owner(self, index: int) -> tuple[str, str]:
+    def owner(self, index: int) -> tuple[str, str]:
+        """The name of the limit that an excess (k,) belongs to, and its side, lower or upper."""
         for limit in self.limits:
             if index < len(limit.hz):
                 return limit.name, "lower" if limit.at_least else "upper"
@@ -187,28 +191,16 @@ class Requirements:
         ]
         return bounds[index]
 
-    @property
-    def _total(self) -> float:
-        return float(sum(t.weight * self.time_weights[t.rows].sum() for t in self.targets))
-
     def _factor(self, target: ModeTarget) -> Floats:
-        """What multiplies f / f_d − 1 (n,)."""
+        """The factors (n,) of f / f_d − 1."""
         if self.objective is Objective.WORST_CASE:
             return np.full(len(target.hz), target.weight)
-        return np.sqrt(target.weight * self.time_weights[target.rows] / self._total)
-
-    def _residual(self, target: ModeTarget, found: Frequencies) -> tuple[Floats, Floats]:
-        factor, column = self._factor(target), _column(target.mode)
-        hz, slopes = found.hz[target.rows, column], found.slopes[target.rows, column]
-        return factor * (hz / target.hz - 1.0), (factor / target.hz)[:, None] * slopes
+        total = float(sum(t.weight * self.time_weights[t.rows].sum() for t in self.targets))
+        return np.sqrt(target.weight * self.time_weights[target.rows] / total)
 
 
 def _column(mode: int) -> int:
     return mode - 1 if mode > 0 else mode
-
-
-def _overlap(one: slice, other: slice) -> bool:
-    return bool(max(one.start, other.start) < min(one.stop, other.stop))
 
 
 def _beside(

@@ -96,7 +96,7 @@ class _Cuts:
         return float(np.max(self.value + self.slopes @ d, initial=0.0))
 
     def and_through(self, d: Floats, value: Floats, slopes: Floats, owners: Floats) -> _Cuts:
-        """These, and those that have a value and slope at d."""
+        """Add cuts that have a value and slope at d."""
         return _Cuts(
             np.append(self.value, value - slopes @ d),
             np.vstack([self.slopes, slopes]),
@@ -115,7 +115,7 @@ class _Kinks:
     objective: _Cuts
 
     def with_model(self, local: _LocalProblem, d: Floats, model: Expected) -> _Kinks:
-        """These, and what is expected at d."""
+        """Add what is expected at d."""
         m, place = len(local.r), local.place
         own, on = model.kinked[:m], model.kinked[m:]
         excess = self.excess.and_through(d, model.excess[on], model.C[on], np.eye(len(on))[on])

@@ -87,8 +87,9 @@ def find_answer(scene: Scene, wanted: Sequence[Wanted], progress: Callable[[str]
     contradict each other, AccuracyError where it cannot be vouched for.
     """
     sequential = scene.file.assignment.method == "sequential"
-    one_shot, notes = None, []
-    if _has_one_shot(scene.file):
+    one_shot, notes, asked = None, [], scene.file.requirements
+    plain = all(one.kind == "frequency" and one.followed is None for one in asked)
+    if asked and plain and scene.file.design.mass is None:  # eqs. (13)–(14) take all of it
         try:
             one_shot = assign_design(scene, wanted)
         except (AccuracyError, InfeasibleError) as error:
@@ -100,7 +101,11 @@ def find_answer(scene: Scene, wanted: Sequence[Wanted], progress: Callable[[str]
             raise AccuracyError("the one-shot program has no answer")
         lam = tuple(hz_from_lam(values) for values in one_shot.lam)
         return Answer(one_shot.y, lam, one_shot, None, tuple(notes))
-    found = least_changed(find_optimum(scene, wanted, _designs(one_shot), progress), scene.initial)
+    starts = []
+    if one_shot is not None:  # of catalogues the best few combinations
+        search = one_shot.search
+        starts = [one_shot.y] if search is None else [one.y for one in search.best]
+    found = least_changed(find_optimum(scene, wanted, starts, progress), scene.initial)
     contradiction = conflict(found, catalogues(scene.file), scene.file.assignment.steps)
     notes += idle_notes(scene.model.y_names, found.variant, found.best.seen)
     notes += _band_notes(found)
@@ -110,15 +115,8 @@ def find_answer(scene: Scene, wanted: Sequence[Wanted], progress: Callable[[str]
     return Answer(found.best.y, predicted, one_shot, found, tuple(notes), contradiction)
 
 
-def _designs(one_shot: Assignment | None) -> list[Floats]:
-    """The one shot, of catalogues the best few combinations."""
-    if one_shot is None:
-        return []
-    return [one_shot.y] if one_shot.search is None else [one.y for one in one_shot.search.best]
-
-
 def _band_notes(found: Found) -> Iterator[str]:
-    """What came of each number of modes below the bands, where there was a choice."""
+    """Say what came of each number of modes below the bands, where there was a choice."""
     for variant, best in found.variants if len(found.variants) > 1 else ():
         choice = ", ".join(f"{band} with {k} below it" for band, k in variant.below)
         missed = best.seen.violation
@@ -129,7 +127,7 @@ def _band_notes(found: Found) -> Iterator[str]:
 def _in_words(
     scene: Scene, wanted: Sequence[Wanted], contradiction: Conflict | None, proved: bool
 ) -> str:
-    """Which limits contradict, with their lines in the case file; empty where none do."""
+    """Name the limits that contradict, with their lines in the case file; empty where none do."""
     if contradiction is None:
         return ""
     file = scene.file
@@ -145,12 +143,6 @@ def _in_words(
         return f"no design {meets} all limits; the nearest one misses {listed}"
     together = " together" if len(contradiction.names) > 1 else ""
     return f"no design within the bounds {meets} {listed}{together}"
-
-
-def _has_one_shot(file: CaseFile) -> bool:
-    """Whether the quadratic program of eqs. (13)–(14) takes all that the case asks."""
-    plain = (one.kind == "frequency" and one.followed is None for one in file.requirements)
-    return bool(file.requirements) and all(plain) and file.design.mass is None
 
 
 def _predicted(found: Found, wanted: Sequence[Wanted]) -> Iterator[Floats | None]:
@@ -202,13 +194,20 @@ def assignment_row(
         optimality=optimality,
         verdict=word,
         reason=reason,
-        steps=() if found is None else tuple(_steps(found)),
+        steps=()
+        if found is None
+        else tuple(
+            StepRow(step.y, step.objective, step.violation, step.radius, bool(step.taken))
+            for step in found.best.steps
+        ),
         starts=0 if found is None else found.starts,
-        local_optima=() if found is None else tuple(_local_optima(found)),
+        local_optima=()
+        if found is None
+        else tuple(LocalOptimum(o.y, o.objective, o.seen.violation) for o in found.optima),
         exact_solves=0 if found is None else found.exact_solves,
         ended="one program" if found is None else found.best.end.value,
         finished=found is None or found.best.end in (End.OPTIMAL, End.STALLED),
-        active=tuple(_of_program(answer) if found is None else active_rows(scene, answer)),
+        active=tuple(active_rows(scene, answer)),
         one_shot=None if answer.one_shot is None else answer.one_shot.y,
         max_error=largest,
         max_error_given=keys.max_error is not None,
@@ -336,20 +335,12 @@ def _optimality(scene: Scene, answer: Answer) -> OptimalityRow:
     return OptimalityRow("local", best.stationarity, None, words)
 
 
-def _steps(found: Found) -> Iterator[StepRow]:
-    for step in found.best.steps:
-        yield StepRow(step.y, step.objective, step.violation, step.radius, bool(step.taken))
-
-
-def _local_optima(found: Found) -> Iterator[LocalOptimum]:
-    for optimum in found.optima:
-        yield LocalOptimum(optimum.y, optimum.objective, optimum.seen.violation)
-
-
 def active_rows(scene: Scene, answer: Answer) -> Iterator[ActiveRow]:
-    """The limits that the answer lies on; none of the one shot."""
+    """The limits that the answer lies on; of the one shot with the multipliers of its program."""
     found = answer.found
     if found is None:
+        for one in () if answer.one_shot is None else answer.one_shot.active:
+            yield ActiveRow(one.name, one.kind, one.side, one.multiplier)
         return
     names = tuple(scene.file.design.parameters)
     constraints = tuple(scene.file.design.constraints)
@@ -363,16 +354,10 @@ def active_rows(scene: Scene, answer: Answer) -> Iterator[ActiveRow]:
     shares: dict[tuple[str, str], float] = {}
     for limit in found.best.limits:
         if limit.kind == "excess":
-            own = asked.owner(limit.index), asked.side(limit.index)
+            own = asked.owner(limit.index)
             shares[own] = shares.get(own, 0.0) + limit.multiplier
     for (name, side), multiplier in shares.items():
         yield ActiveRow(name, "target", side, multiplier)
-
-
-def _of_program(answer: Answer) -> Iterator[ActiveRow]:
-    """The limits that the one shot lies on, in the multipliers of its program."""
-    for one in () if answer.one_shot is None else answer.one_shot.active:
-        yield ActiveRow(one.name, one.kind, one.side, one.multiplier)
 
 
 def limit_notes(answer: Answer, row: AssignmentRow, missed: Collection[str]) -> list[str]:

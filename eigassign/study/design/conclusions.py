@@ -21,8 +21,9 @@ from eigassign.assignment.catalogues.branching import ListedValues
 from eigassign.assignment.catalogues.choosing import choose
 from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
 from eigassign.assignment.exact.requirements import Requirements
-from eigassign.assignment.exact.sequential import OPTIMAL, End, Optimum, minimise
+from eigassign.assignment.exact.sequential import OPTIMAL, End, minimise
 from eigassign.assignment.exact.stationarity import active_limits, stationarity
+from eigassign.assignment.feasibility import smallest
 from eigassign.errors import EigassignError
 from eigassign.study.design.optimum import Found, PosedProblem
 from eigassign.study.scene import Scene
@@ -61,7 +62,7 @@ def is_proved(scene: Scene, found: Found) -> bool:
 
 
 def _are_convex(scene: Scene, asked: Requirements) -> bool:
-    """Whether the limits allow a convex set of designs, and price and least change are convex."""
+    """True where the limits allow a convex set of designs; prices and least change are convex."""
     if scene.file.design.catalogues or scene.path.follows_design:
         return False
     if not asked.limits and scene.file.design.mass is None:
@@ -71,7 +72,7 @@ def _are_convex(scene: Scene, asked: Requirements) -> bool:
 
 
 def _is_affine(scene: Scene) -> bool:
-    """Whether K, M and the total mass have the same slopes in y at designs all over the bounds."""
+    """True where K, M and the total mass have the same slopes in y all over the bounds."""
     lower, upper = scene.bounds
     pencil, n_q = scene.model.pencil, scene.path.q.shape[1]
     along = n_q + np.arange(len(lower))
@@ -104,30 +105,30 @@ class Conflict:
 def conflict(found: Found, listed: Sequence[ListedValues], steps: int) -> Conflict | None:
     """What contradicts where the best design misses limits; None where it meets them.
 
-    Deletion filter: a limit without which the rest still cannot be met is left out. Each trial
-    starts at the compromise, and searches the catalogues ``listed``.
+    Each trial starts at the compromise, and searches the catalogues ``listed``.
     """
     best, asked = found.best, found.variant.requirements
     if best.seen.violation <= MET or best.end in (End.SECONDS, End.STEPS, End.INTERRUPTED):
         return None
-    owners = [asked.owner(int(k)) for k in np.flatnonzero(best.seen.excess > MET)]
+    owners = [asked.owner(int(k))[0] for k in np.flatnonzero(best.seen.excess > MET)]
     missed = tuple(dict.fromkeys(owners))
     if len(asked.limit_names) > MOST:
         return Conflict(missed, False)
-    needed, smallest = list(asked.limit_names), True
-    for name in asked.limit_names:
-        rest = [other for other in needed if other != name]
+    answers: list[bool | None] = []
+
+    def contradict(rest: list[str]) -> bool:
         met = _can_be_met(found.variant.with_limits(rest), listed, best.y, steps) if rest else True
-        smallest = smallest and met is not None
-        if met is False:
-            needed = rest
-    return Conflict(tuple(needed), smallest) if smallest else Conflict(missed, False)
+        answers.append(met)
+        return met is False
+
+    needed = smallest(asked.limit_names, contradict)
+    return Conflict(missed, False) if None in answers else Conflict(tuple(needed), True)
 
 
 def _can_be_met(
     problem: DesignProblem, listed: Sequence[ListedValues], start: Floats, steps: int
 ) -> bool | None:
-    """None where the catalogues are too long to say."""
+    """True where all limits can be met; None where the catalogues are too long to say."""
     try:
         if not listed:
             return minimise(problem, start, steps).seen.violation <= MET
@@ -202,17 +203,12 @@ def least_changed(found: Found, initial: Floats) -> Found:
     limit = best.objective + SAME * abs(best.objective) + 1e-20
     if value > limit or seen.violation > max(best.seen.violation * (1.0 + SAME), MET):
         return found
-    moved = _at(problem, best, y, seen)
-    return replace(found, best=moved, optima=(moved, *found.optima[1:]))
-
-
-def _at(problem: DesignProblem, optimum: Optimum, y: Floats, seen: Appraisal) -> Optimum:
-    """An optimum moved to a design of the same worth."""
-    return replace(
-        optimum,
+    moved = replace(
+        best,
         y=y,
         seen=seen,
-        objective=problem(y, seen),
+        objective=value,
         stationarity=stationarity(problem, y, seen),
         limits=tuple(active_limits(problem, y, seen)),
     )
+    return replace(found, best=moved, optima=(moved, *found.optima[1:]))

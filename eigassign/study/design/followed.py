@@ -106,7 +106,7 @@ class Follower:
 
     @cached_property
     def routes(self) -> tuple[Route, ...]:
-        """From the pose to all samples needed."""
+        """The routes from the pose to all samples needed."""
         return tuple(
             route
             for part, rows in zip(self.path.parts, self.path.rows, strict=True)
@@ -133,11 +133,7 @@ class Follower:
 
 def followers(scene: Scene, wanted: Sequence[Wanted]) -> tuple[Follower, ...]:
     """One for each mode that the case's targets follow, needed where ``wanted`` ask for it."""
-    return tuple(_followers(scene, wanted))
-
-
-def _followers(scene: Scene, wanted: Sequence[Wanted]) -> Iterator[Follower]:
-    file, path = scene.file, scene.path
+    file, path, found = scene.file, scene.path, []
     for mode in followed_modes(file):
         needed = np.zeros(len(path.q), dtype=np.bool_)
         for one in wanted:
@@ -145,11 +141,12 @@ def _followers(scene: Scene, wanted: Sequence[Wanted]) -> Iterator[Follower]:
                 needed[one.rows] = True
         y = named_design(file, mode)
         pose = partial(named_pose, file, mode, path)
-        yield Follower(mode, scene.model, path, y, pose, needed)
+        found.append(Follower(mode, scene.model, path, y, pose, needed))
+    return tuple(found)
 
 
 def named_notes(file: CaseFile, model: Model, path: Trajectories) -> Iterator[str]:
-    """What each followed mode is where it is named."""
+    """Say which frequency each followed mode has where it is named."""
     for mode in followed_modes(file):
         y = named_design(file, mode)
         hz = model.frequencies(named_pose(file, mode, path, y), y, mode.like)[0, -1]
@@ -182,7 +179,7 @@ def _alike(lam: Floats, own: Floats | float) -> NDArray[np.bool_]:
 
 
 def _always(scene: Scene, follower: Follower, twins: int) -> bool:
-    """Whether so many modes coincide at all samples needed, at the initial design."""
+    """True where so many modes coincide at all samples needed, at the initial design."""
     try:
         found = follow_all(scene.model, scene.path, [follower], scene.initial, 1)
     except LostModeError:
@@ -247,7 +244,7 @@ class Solved:
     numbers: Ints
 
     def curve(self, mode: int) -> Floats:
-        """Of one mode (n_t,), numbered as in `wanted`."""
+        """The curve (n_t,) of one mode, numbered as in `wanted`."""
         return np.asarray(self.hz[:, mode - 1] if mode > 0 else self.followed[:, mode])
 
 
@@ -257,7 +254,7 @@ def solve_design(
     y: Floats,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> Solved:
-    """All shown modes and those followed; raises what exact solves raise, and LostModeError."""
+    """Solve all shown modes and those followed; raises what these raise, and LostModeError."""
     hz, n = scene.exact(y, progress), len(scene.path.q)
     if not own:
         return Solved(hz, np.zeros((n, 0)), np.zeros((n, 0), dtype=np.intp))

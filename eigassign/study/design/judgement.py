@@ -167,7 +167,7 @@ def least_errors(wanted: Wanted, lowest: Solved, highest: Solved) -> Floats:
 
 
 def curve_range(wanted: Wanted, lowest: Solved, highest: Solved) -> tuple[Floats, Floats]:
-    """Between what the curve (n,) of a target lies where each mode is between two frequencies."""
+    """The range (n,) of a target's curve where each mode is between two frequencies."""
     if wanted.requirement.kind == "gap":
         low, high = (m - 1 for m in wanted.requirement.modes)
         least, most = lowest.hz[wanted.rows], highest.hz[wanted.rows]
@@ -176,7 +176,7 @@ def curve_range(wanted: Wanted, lowest: Solved, highest: Solved) -> tuple[Floats
 
 
 def _inside(wanted: Wanted, lowest: Floats, highest: Floats) -> Floats:
-    """How far the modes are from being clear, with the best constant number of them below."""
+    """The way that the modes lack to be clear, with the best constant number of them below."""
     named = [m - 1 for m in sorted(wanted.requirement.modes)]
     lowest, highest = (hz[:, named] if named else hz for hz in (lowest, highest))
     low, high = wanted.lower_hz[:, None], wanted.upper_hz[:, None]
@@ -268,7 +268,7 @@ def verdict(
 
 
 def _far(target: TargetStudy) -> str:
-    """How far it is missed: ``mode 1 at 48 Hz: 6.02 % off at worst``."""
+    """The target and how far it is missed: ``mode 1 at 48 Hz: 6.02 % off at worst``."""
     worst = f"{100 * target.error.exact.max_relative:.3g} %"
     if target.kind == "frequency":
         return f"{target.label}: {worst} off at worst"
@@ -276,7 +276,7 @@ def _far(target: TargetStudy) -> str:
 
 
 def _though(target: TargetStudy) -> str:
-    """That the largest error has grown, where the mean one is what has fallen."""
+    """Say that the largest error has grown, where the mean one is what has fallen."""
     before, after = target.error.initial, target.error.exact
     if target.kind != "frequency" or after.max_relative <= before.max_relative:
         return ""
@@ -293,7 +293,7 @@ SHOWN = 8  # changes that a note lists
 
 
 def swap_notes(path: Trajectories, targets: Sequence[TargetStudy]) -> tuple[str, ...]:
-    """Which mode each followed one is, and where it swaps; only if it is not always the named."""
+    """Say which mode each followed one is and where it swaps, if it is not always the named."""
     return tuple(
         dict.fromkeys(
             f"with the {design} design {target.followed.name} {_runs(path, target, numbers)}"
@@ -309,7 +309,7 @@ def swap_notes(path: Trajectories, targets: Sequence[TargetStudy]) -> tuple[str,
 
 
 def _runs(path: Trajectories, target: TargetStudy, numbers: NDArray[np.intp]) -> str:
-    """In words: "swaps its number: mode 2 from sample 0 (t = 0 s), mode 3 from sample 4 …"."""
+    """Write ``swaps its number: mode 2 from sample 0 (t = 0 s), mode 3 from sample 4 …``."""
     if (numbers == numbers[0]).all():
         return f"is mode {numbers[0]} throughout"
     first = {rows.start for rows in path.rows} | {target.rows.start}

@@ -118,7 +118,7 @@ def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:
 
 
 def _chosen(catalogue: ListedValues, y: Floats) -> Iterator[tuple[int, str]]:
-    """Each column of a catalogue with the name of the choice that y holds."""
+    """Yield each column of a catalogue with the name of the choice that y holds."""
     own = y[list(catalogue.columns)]
     row = next((k for k, row in enumerate(catalogue.rows) if np.array_equal(row, own)), None)
     if row is not None:
@@ -127,7 +127,7 @@ def _chosen(catalogue: ListedValues, y: Floats) -> Iterator[tuple[int, str]]:
 
 
 def solver_row(assignment: Assignment) -> SolverRow:
-    """What the solver reached, as plain numbers."""
+    """The solver's status and residuals, as plain numbers."""
     return SolverRow(
         assignment.status,
         assignment.iterations,

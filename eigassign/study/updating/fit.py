@@ -82,7 +82,7 @@ class ExplainedMeasurement:
 
     @property
     def is_outlier(self) -> bool:
-        """Whether it is further off than three standard deviations."""
+        """True where it is further off than three standard deviations."""
         return abs(self.residual) > OUTLIER
 
 
@@ -96,7 +96,7 @@ class UnidentifiedDirection:
 
 @dataclass(frozen=True, repr=False)
 class UpdateResults(Brief):
-    """What updating a case found."""
+    """The answer of updating a case."""
 
     title: str
     reference: str | None
@@ -188,7 +188,7 @@ class UpdateProblem:
 
 
 def update_problem(case: Case) -> UpdateProblem:
-    """What is to be solved; raises CaseError for wrong measurements."""
+    """Read what is to be solved; raises CaseError for wrong measurements."""
     require_updatable(case.file)
     measured, notes = read_measurements(case)
     q, rows = np.unique(np.array([each.q for each in measured]), axis=0, return_inverse=True)

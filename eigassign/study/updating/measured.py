@@ -150,7 +150,7 @@ def _rows(
 
 
 def _deviation(table: CsvTable, k: int, hz: float, default: Tolerance | None) -> float:
-    """In Hz."""
+    """The standard deviation of a row, in Hz."""
     if "deviation" not in table.numbers:
         return default.deviation(hz) if default is not None else 0.0
     value = table.numbers["deviation"][k]

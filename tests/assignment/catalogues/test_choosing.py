@@ -11,7 +11,6 @@ import pytest
 from numpy.typing import NDArray
 
 from eigassign.assignment import (
-    MET,
     Appraisal,
     DesignProblem,
     LinearConstraint,
@@ -24,6 +23,7 @@ from eigassign.errors import InfeasibleError
 pytestmark = pytest.mark.slow  # half a minute each; the pipeline has a short one
 
 Floats = NDArray[np.float64]
+MET = 1e-9
 
 
 def curved(rng: np.random.Generator, n: int, m: int, limit: float) -> DesignProblem:
