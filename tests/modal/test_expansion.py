@@ -20,10 +20,9 @@ from eigassign.modal import (
     modes,
     polynomial_error,
     substitute,
-    vector_members,
 )
 from eigassign.modal import expand as expand_pencil
-from eigassign.series import lower_set, monomials, partially_linear, total_degree
+from eigassign.series import lower_set, monomials, total_degree
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 BOTH = ("absolute", "absolute")
@@ -56,11 +55,9 @@ def test_the_quotient_has_the_eigenvalues_of_the_recursion() -> None:
 
 
 def test_only_a_set_that_is_linear_in_some_variables_may_leave_out_their_vectors() -> None:
-    design = np.array([False, True, True])
-    linear, full = partially_linear(1, 2, 4), total_degree(3, 4)
-    members = linear.indices[vector_members(linear, design)]
-    assert members.tolist() == [[k, 0, 0] for k in range(5)]
-    np.testing.assert_array_equal(vector_members(full, design), full.degrees <= 2)
+    linear, full = (expand(paper(), Q0, Y0, (1,), 4, linear_in_y=each) for each in (True, False))
+    assert linear.vector_space.indices.tolist() == [[k, 0, 0] for k in range(5)]
+    assert len(full.vector_space) == len(total_degree(3, 2))
 
 
 def test_variables_may_be_renamed_in_another_order() -> None:

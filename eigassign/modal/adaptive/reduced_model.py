@@ -6,7 +6,7 @@ until it meets the accuracy. The smallest model that does so is kept.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,7 +44,7 @@ class AdaptiveReduction:
 
 
 def row_in_words(k: int) -> str:
-    """What row k of x is called where nothing better is known."""
+    """The name of row k of x where nothing better is known."""
     return f"sample {k}"
 
 
@@ -68,17 +68,25 @@ def reduce_adaptively(
     closest: AdaptiveReduction | None = None  # that with the least error
     least, at = np.inf, 0  # of all, also those of too many vectors
     reasons: list[str] = []
+    q, y = x[:, : pencil.n_q], x[:, pencil.n_q :]
     for half_order in half_orders:
         limit = max_size if best is None else best.reduced.size - 1
-        for made in _growing(pencil, x, accuracy, modes, half_order):
+        points = [central(x)]
+        while len(points) <= MAX_POINTS:
+            reduced = reduce(pencil, q[points], y[points], modes, half_order)
+            made = AdaptiveReduction(reduced, reduced.error_estimate(q, y))
             reasons.append(_line(half_order, made, place(made.worst)))
             least, at = min((least, at), (made.error, made.worst))
-            if made.reduced.size > limit:
+            if reduced.size > limit:
                 break
             if closest is None or made.error < closest.error:
                 closest = made
             if made.error <= accuracy:
                 best = made
+                break
+            if made.worst in points:
+                break
+            points.append(made.worst)
     found, bound = best or closest, accuracy if tolerable is None else tolerable
     if found is None or not found.error <= bound:
         raise AccuracyError(
@@ -86,21 +94,6 @@ def reduce_adaptively(
             f"(q, y) = {shown_numbers(x[at])}, the estimated error is {least:.1e}"
         )
     return replace(found, reasons=tuple(reasons))
-
-
-def _growing(
-    pencil: Pencil, x: Floats, accuracy: float, modes: Sequence[int], half_order: int
-) -> Iterator[AdaptiveReduction]:
-    """Models about more and more samples, each added where the estimate was largest."""
-    points, n_q = [central(x)], pencil.n_q
-    while len(points) <= MAX_POINTS:
-        at = x[points]
-        reduced = reduce(pencil, at[:, :n_q], at[:, n_q:], modes, half_order)
-        made = AdaptiveReduction(reduced, reduced.error_estimate(x[:, :n_q], x[:, n_q:]))
-        yield made
-        if made.error <= accuracy or made.worst in points:
-            return
-        points.append(made.worst)
 
 
 def _line(half_order: int, made: AdaptiveReduction, sample: str) -> str:

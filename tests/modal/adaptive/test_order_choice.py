@@ -7,14 +7,7 @@ import pytest
 from paper_arm import FREE, build, exact, samples
 
 from eigassign.errors import AccuracyError
-from eigassign.modal import (
-    FINER,
-    MAX_POINTS,
-    TOLERABLE,
-    choose_expansion,
-    choose_mesh,
-    more_points_help,
-)
+from eigassign.modal import choose_expansion, choose_mesh
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +67,7 @@ def test_many_points_do_while_more_of_them_help(x):
     model = build({"upper": 4, "fore": 3})
     x = np.hstack([x[:, :2], np.full((len(x), 2), 0.125)])
     chosen = choose_expansion(model.pencil, x, 2e-6, orders=(2,))
-    assert 8 < len(chosen.expansions) <= MAX_POINTS
+    assert 8 < len(chosen.expansions) <= 32
     f = chosen.frequencies(x[:, :2], x[:, 2:])
     assert np.abs(f / exact(model, x, (1,)) - 1.0).max() <= 2e-6
 
@@ -84,22 +77,6 @@ def test_neighbours_that_do_not_help_are_soon_left_alone(x):
     chosen = choose_expansion(model.pencil, x, 1e-6, (1,), orders=(2, 3, 4, 5, 6, 8, 12, 14))
     together = [line for line in chosen.reasons if "as one cluster" in line]
     assert len(together) <= 2 * 3
-
-
-@pytest.mark.parametrize(
-    ("errors", "more"),
-    [
-        ([1.0] * 7, True),  # too few to tell
-        ([1.0] * 4 + [0.5] * 4, False),
-        ([1.0] * 4 + [0.4] * 4, True),
-        ([np.inf] * 8, False),
-        ([np.inf] * 7 + [0.005], True),
-        ([1.0] * 16 + [0.01] * 15, True),
-        ([1.0] * 16 + [0.01] * 16, False),  # no more are allowed
-    ],
-)
-def test_points_are_added_while_twice_as_many_halve_the_error(errors, more):
-    assert more_points_help(errors) is more
 
 
 def test_an_order_that_cannot_do_it_is_refused_at_the_worst_sample(x):
@@ -112,7 +89,8 @@ def test_round_off_of_a_fine_mesh_is_no_refusal_while_it_leaves_half_of_the_accu
     model = build({"upper": 100, "fore": 100})
     x = x[::3]
     chosen = choose_expansion(model.pencil, x, 1e-5)
-    assert FINER * 1e-5 < chosen.beside.estimate.max() <= TOLERABLE * 1e-5
+    # without that, the reduced model beside it should reach a twentieth
+    assert 0.05 * 1e-5 < chosen.beside.estimate.max() <= 0.5 * 1e-5
     assert chosen.estimate.max() <= 1e-5
     f = chosen.frequencies(x[:, :2], x[:, 2:])
     assert np.abs(f / exact(model, x, (1,)) - 1.0).max() <= 1e-5

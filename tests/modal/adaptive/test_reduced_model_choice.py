@@ -7,7 +7,7 @@ import pytest
 from paper_arm import build, exact, samples
 
 from eigassign.errors import AccuracyError
-from eigassign.modal import central, reduce_adaptively
+from eigassign.modal import reduce_adaptively
 
 
 @pytest.fixture(scope="module")
@@ -32,6 +32,9 @@ def test_a_reduced_model_that_may_not_grow_is_refused_at_the_worst_sample(x):
         reduce_adaptively(model.pencil, x, 1e-9, (1, 2), max_size=8)
 
 
-def test_the_central_sample_is_nearest_to_the_middle_in_every_coordinate():
-    x = np.array([[0.0, 0.0], [10.0, 1.0], [5.0, 0.1], [4.0, 0.5]])
-    assert central(x) == 3
+def test_the_first_point_is_the_sample_nearest_to_the_middle_in_every_coordinate():
+    model = build({"upper": 4, "fore": 3})
+    x = np.array([[0.0, 0.0], [1.0, 0.1], [0.5, 0.01], [0.4, 0.05]])
+    x = np.hstack([np.zeros((4, 1)), x, np.full((4, 1), 0.1)])
+    found = reduce_adaptively(model.pencil, x, 1e-3)
+    np.testing.assert_array_equal(found.reduced.points[0], x[3])

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 from chains import bar, model_of, random_chain, two_link
-from large import HELD, Q0, Y0, arm, large_model
+from large import HELD, large_model
 
 from eigassign.errors import UsageError
-from eigassign.modal import Model, block, modes, principal, rounding_error, solve_single
+from eigassign.modal import Model, rounding_error
 
 POSES = np.array([[0.3, 1.9], [1.0, 0.2], [-2.0, 0.5]])
 DESIGN = np.array([[0.0, 0.1], [0.2, 0.0], [0.25, 0.25]])
@@ -41,13 +39,20 @@ def test_modes_are_modes(limit: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "drives", [("free", "free"), ("locked", {"stiffness": 3e3}), ("free", {"stiffness": 3e3})]
+    ("drives", "elements"),
+    [
+        (("free", "free"), (4, 3)),
+        (("locked", HELD), (4, 3)),
+        (("free", HELD), (4, 3)),
+        ((HELD, "free"), (20, 15)),
+    ],
 )
 def test_how_many_are_solved_at_once_does_not_show(
-    drives: tuple[object, object],
+    drives: tuple[object, object], elements: tuple[int, int]
 ) -> None:
     """One by one, some and in parts of many; designs at one pose, which share K, and poses."""
-    model = model_of(two_link(drives=drives))
+    model = model_of(two_link(elements, drives=drives))
+    tolerance = 1e-12 if elements[0] < 10 else 1e-10  # round-off in K grows with n⁴
     for q, y in ((POSES, DESIGN), (POSES[:1], DESIGN)):
         x = model.x(q, y)
         alone = np.vstack([model.frequencies(row[:2], row[2:], 6) for row in x])
@@ -57,9 +62,9 @@ def test_how_many_are_solved_at_once_does_not_show(
             f, phi = model.modes(many[:, :2], many[:, 2:], 6)
             expected = np.tile(alone, (times, 1))
             np.testing.assert_allclose(
-                model.frequencies(many[:, :2], many[:, 2:], 6), expected, rtol=1e-12
+                model.frequencies(many[:, :2], many[:, 2:], 6), expected, rtol=tolerance
             )
-            np.testing.assert_allclose(f, expected, rtol=1e-12)
+            np.testing.assert_allclose(f, expected, rtol=tolerance)
             np.testing.assert_allclose(
                 phi, np.tile(shapes, (times, 1, 1)), atol=1e-9 * np.abs(shapes).max()
             )
@@ -230,28 +235,3 @@ def test_a_mechanism_without_coordinates_and_design_has_modes() -> None:
     assert model.n_rigid == 0
     assert model.frequencies([], [], 2).shape == (1, 2)
     assert model.frequencies(np.zeros((3, 0)), np.zeros((3, 0)), 2).shape == (3, 2)
-
-
-def test_a_principal_part_is_what_slicing_gives() -> None:
-    pencil = arm((HELD, "free")).pencil
-    data = pencil.mass @ pencil.theta(np.concatenate([Q0, Y0])[None])[:, 0]
-    whole = pencil.sparse(data).toarray()
-    dofs = np.flatnonzero(np.random.default_rng(3).random(pencil.n_dof) < 0.6)
-    np.testing.assert_array_equal(
-        principal(pencil, data, dofs).toarray(), whole[np.ix_(dofs, dofs)]
-    )
-    assert principal(pencil, data, dofs).nnz == np.count_nonzero(whole[np.ix_(dofs, dofs)])
-    np.testing.assert_array_equal(block(pencil, data, dofs), whole[dofs])
-
-
-@pytest.mark.parametrize("drives", [("free", "free"), ("free", HELD), (HELD, "free")], ids=str)
-@pytest.mark.parametrize("elements", [(4, 3), (20, 15)])
-def test_one_sample_has_the_modes_of_the_batch(
-    drives: tuple[Any, Any], elements: tuple[int, int]
-) -> None:
-    model = arm(drives, elements)
-    x = model.x(np.tile(Q0, (2, 1)), np.tile(Y0, (2, 1)))
-    batch = modes(model.pencil, x, 4)
-    lam, phi = solve_single(model.pencil, model.pencil.theta(x[:1]), 4)
-    np.testing.assert_allclose(lam, batch.lam[0], rtol=1e-10)
-    np.testing.assert_allclose(phi, batch.phi[0], atol=1e-7 * np.abs(phi).max())

@@ -9,7 +9,7 @@ from meetings import E_ONE, line, two_bars
 
 from eigassign import load_case
 from eigassign.errors import UsageError
-from eigassign.modal import Modes, modes, overlaps, track, turn_coincident
+from eigassign.modal import overlaps, track
 
 
 @pytest.mark.parametrize("count", [10, 11, 41])
@@ -92,16 +92,3 @@ def test_overlaps_of_the_modes_with_themselves_are_one_and_ignore_rigid_motion()
 def test_modes_that_are_not_there_are_refused(wanted):
     with pytest.raises(UsageError, match="modes"):
         track(two_bars().pencil, line(3), wanted)
-
-
-def test_arbitrary_shapes_of_coincident_modes_are_turned_to_those_before():
-    model = two_bars()
-    x = np.array([E_ONE])
-    found = modes(model.pencil, x[None], 4)
-    lam, phi = found.lam[0], found.phi[0]
-    c, s = np.cos(0.7), np.sin(0.7)
-    turned = phi.copy()
-    turned[:, :2] = phi[:, :2] @ np.array([[c, -s], [s, c]])
-    back = turn_coincident(model.pencil, phi[:, :2], x, Modes(lam, turned))
-    shares = overlaps(model.pencil, phi[:, :2], x, back)[:, :2]
-    np.testing.assert_allclose(shares, np.eye(2), atol=1e-12)
