@@ -34,7 +34,7 @@ LEAST = 1e-4
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ExpansionRequest:
     """What expansions were asked for: of these modes about x0, of these orders and kinds."""
 
     x0: Floats
@@ -43,7 +43,7 @@ class Wanted:
     sets: tuple[tuple[int, bool], ...]  # order, and whether linear in y, of each
 
 
-def unlike(pencil: Pencil, stored: Sequence[Expansion], wanted: Wanted) -> str | None:
+def unlike(pencil: Pencil, stored: Sequence[Expansion], wanted: ExpansionRequest) -> str | None:
     """How ``stored`` differ from the expansions of ``pencil`` wanted; None if they do not.
 
     Point, modes, sets and notes must be equal, coefficients and vectors as close as CLOSE.

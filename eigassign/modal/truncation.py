@@ -41,7 +41,7 @@ REFUSED = 0.5  # relative error in frequency above which nothing is said
 
 
 @dataclass(frozen=True, eq=False)
-class _Interior:
+class _LinkInterior:
     """One link at one design. ρ_i = X a for a = [v; −μ̂ v], v its reduced local motion."""
 
     gram: Floats  # Xᵀ K_ii⁻¹ X
@@ -69,7 +69,7 @@ def truncation_error(parts: ReducedLinks, x: Floats, modes: Sequence[int]) -> Fl
     return out
 
 
-def _interior(parts: ReducedLinks, k: int, values: Floats) -> _Interior:
+def _interior(parts: ReducedLinks, k: int, values: Floats) -> _LinkInterior:
     """The factor of K_ii serves the Gram matrix, the constraint modes and β alike."""
     reduction = parts.links[k].reduction
     assert reduction is not None
@@ -86,10 +86,10 @@ def _interior(parts: ReducedLinks, k: int, values: Floats) -> _Interior:
     solved = factor.solve(X)
     drawn = np.empty((n_b, X.shape[1]))
     drawn[place] = -np.asarray(K[b][:, i] @ solved) - T[i][:, place].T @ X
-    return _Interior(X.T @ solved, drawn, largest_left_out(K_ii, M_ii, factor, T[i, n_b:]))
+    return _LinkInterior(X.T @ solved, drawn, largest_left_out(K_ii, M_ii, factor, T[i, n_b:]))
 
 
-def _at(parts: ReducedLinks, interiors: Sequence[_Interior], x: Floats, highest: int) -> Floats:
+def _at(parts: ReducedLinks, interiors: Sequence[_LinkInterior], x: Floats, highest: int) -> Floats:
     """Bounds (highest,) at one sample."""
     pencil = parts.pencil
     theta = pencil.theta(x[None])

@@ -12,7 +12,7 @@ import scipy
 
 from eigassign.errors import UsageError
 from eigassign.modal.arguments import MOST_TERMS
-from eigassign.modal.confirmation import Wanted, unlike
+from eigassign.modal.confirmation import ExpansionRequest, unlike
 from eigassign.modal.expansion import expand
 from eigassign.modal.model import Model
 from eigassign.modal.storage import (
@@ -130,7 +130,7 @@ def _stored(
         full, linear = (replace(e, pencil=model.pencil) for e in found)
         x0 = np.concatenate([plan.q0, plan.y0])
         sets = ((full_order, False), (plan.order, True))
-        wanted = Wanted(x0, tuple(sorted(plan.modes)), plan.cluster_gap, sets)
+        wanted = ExpansionRequest(x0, tuple(sorted(plan.modes)), plan.cluster_gap, sets)
         if (reason := unlike(model.pencil, (full, linear), wanted)) is not None:
             raise UsageError(reason)
         return Expansions(full, linear, plan.order, full_order)

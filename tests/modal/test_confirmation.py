@@ -12,7 +12,7 @@ from eigassign.errors import UsageError
 from eigassign.modal import (
     Cluster,
     Expansion,
-    Wanted,
+    ExpansionRequest,
     expand,
     reduce,
     reduced_arrays,
@@ -33,7 +33,7 @@ def changed(expansion: Expansion, k: int) -> Expansion:
 def test_every_coefficient_counts(linear: bool) -> None:
     pencil = model_of(two_link()).pencil
     true = expand(pencil, Q0, Y0, (1,), ORDER, linear_in_y=linear)
-    wanted = Wanted(np.concatenate([Q0, Y0]), (1,), 1e-3, ((ORDER, linear),))
+    wanted = ExpansionRequest(np.concatenate([Q0, Y0]), (1,), 1e-3, ((ORDER, linear),))
     assert unlike(pencil, (true,), wanted) is None
     for k in np.flatnonzero(np.abs(true.clusters[0].coefficients[0, 0]) > 1.0):
         assert unlike(pencil, (changed(true, int(k)),), wanted) is not None, true.space.indices[k]

@@ -13,7 +13,7 @@ are evaluated: each sample by the nearest point, beside one reduced model of the
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import comb
 
@@ -48,6 +48,9 @@ MOST_IN_ALL = 10 * MOST_TERMS  # what several points may cost where one will not
 FINER = 0.05  # part of the accuracy that the reduced model beside them should reach
 TOLERABLE = 0.5  # the same where round-off does not allow that
 WIDEST_CLUSTER = 0.7  # relative gap in λ up to which two neighbours are tried as one cluster
+# Orders from which a cluster must halve the error of the modes alone. Followed on, the search of
+# stress/wide_motion to 1e-5 takes four times as long, for the same choice.
+FAIR_ORDERS = 4
 # Number of points from which doubling them must halve the error. That ends a hopeless search before
 # MAX_POINTS; without it three shipped cases at 1e-3 and 1e-5 choose the same at the same cost.
 FAIR_COUNT = 8
@@ -133,7 +136,7 @@ def choose_expansion(
     while waiting:
         trial = min(waiting, key=lambda each: each.cost)
         waiting.remove(trial)
-        if not trial.parts and _hopeless(alone[trial.gap], int(pencil.active.sum()), trial.order):
+        if not trial.parts and _hopeless(trial, alone, int(pencil.active.sum())):
             continue
         q0, y0 = np.split(x0 if trial.point is None else trial.point, [pencil.n_q])
         part = expand(pencil, q0, y0, modes, trial.order, cluster_gap=trial.gap)
@@ -192,9 +195,12 @@ def _affordable(pencil: Pencil, orders: Sequence[int]) -> Sequence[int]:
     return [p for p in orders if comb(n + p, p) <= MOST_TERMS] or orders[:1]
 
 
-def _hopeless(errors: Sequence[float], n: int, order: int) -> bool:
-    """True where an order is large, and the last of those before did not help."""
-    if comb(2 * n + order, order) <= LARGE or not errors:
+def _hopeless(trial: _Trial, alone: Mapping[float, Sequence[float]], n: int) -> bool:
+    """True where orders before did not help: one of a cluster, or the last of a large one."""
+    errors, without = alone[trial.gap], alone[CLUSTER_GAP]
+    if trial.gap > CLUSTER_GAP and len(errors) >= FAIR_ORDERS:
+        return not errors[-1] < 0.5 * without[: len(errors)][-1]
+    if comb(2 * n + trial.order, trial.order) <= LARGE or not errors:
         return False
     return not errors[-1] < 0.5 * (errors[-3] if len(errors) > 2 else np.inf)
 

@@ -40,7 +40,7 @@ class MoreModesError(Exception):
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class ModesAtPoint:
     """The lowest modes at x (n_x,); ``complete`` where there are no more."""
 
     x: Floats
@@ -50,10 +50,10 @@ class Place:
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class FollowedShape:
     """A shape ψ = Φ a at a place, |a| = 1; ``a`` (count,) is 0 of modes far from it."""
 
-    at: Place
+    at: ModesAtPoint
     a: Floats
 
     @property
@@ -88,7 +88,7 @@ class Shape:
         return np.asarray(np.abs(self.at.lam / self.lam - 1.0) <= COINCIDENT)
 
 
-def candidates(at: Place, shares: Floats, most: int = 3) -> tuple[Candidate, ...]:
+def candidates(at: ModesAtPoint, shares: Floats, most: int = 3) -> tuple[Candidate, ...]:
     """The modes of the largest shares, the largest first; none that have hardly any."""
     order = np.argsort(-shares, kind="stable")[:most]
     hz = np.sqrt(at.lam) / (2.0 * np.pi)
@@ -98,7 +98,7 @@ def candidates(at: Place, shares: Floats, most: int = 3) -> tuple[Candidate, ...
 
 def places(
     pencil: Pencil, x: Floats, least: int, extra: int, block: int | None = None
-) -> list[Place]:
+) -> list[ModesAtPoint]:
     """The lowest modes at x (n, n_x), at all as many: ``least``, and up to ``extra`` more.
 
     They are solved in blocks of so many samples. Raises what `lowest_modes` raises.
@@ -114,10 +114,12 @@ def places(
         for name in ("lam", "phi")
     )
     complete = count < least + extra or count == len(pencil.elastic)
-    return [Place(*each, complete) for each in zip(x, lam, phi, strict=True)]
+    return [ModesAtPoint(*each, complete) for each in zip(x, lam, phi, strict=True)]
 
 
-def follow(pencil: Pencil, start: Shape, path: Sequence[Place]) -> list[Shape]:
+def follow(
+    pencil: Pencil, start: FollowedShape, path: Sequence[ModesAtPoint]
+) -> list[FollowedShape]:
     """``start`` carried to the first place of a path, from there to the next, and so on.
 
     Raises LostModeError, whose ``step`` is the place that the shape was not carried to;
@@ -136,14 +138,18 @@ def follow(pencil: Pencil, start: Shape, path: Sequence[Place]) -> list[Shape]:
     return found[1:]
 
 
-def _link(pencil: Pencil, here: Place, there: Place) -> tuple[Floats, Floats]:
+def _link(pencil: Pencil, here: ModesAtPoint, there: ModesAtPoint) -> tuple[Floats, Floats]:
     across, sizes = links(pencil, there.x[None], here.phi[None], there.phi[None])
     return across[0], sizes[0]
 
 
 def _carried(
-    pencil: Pencil, here: Shape, there: Place, link: tuple[Floats, Floats], depth: int
-) -> Shape:
+    pencil: Pencil,
+    here: FollowedShape,
+    there: ModesAtPoint,
+    link: tuple[Floats, Floats],
+    depth: int,
+) -> FollowedShape:
     """The shape at the next place, by way of the midpoint where the step is unclear."""
     across, sizes = link
     c = across @ here.a
@@ -155,7 +161,7 @@ def _carried(
     is_clear = shares[near].sum() >= CLEAR
     if is_clear and (depth == HALVINGS or _is_met(here, best, near)):
         a = np.where(near, c, 0.0)
-        return Shape(there, a / np.linalg.norm(a))
+        return FollowedShape(there, a / np.linalg.norm(a))
     if depth == HALVINGS:
         if shares.sum() < CLEAR and not there.complete:
             raise MoreModesError
@@ -167,12 +173,12 @@ def _carried(
     return _carried(pencil, half, there, _link(pencil, middle, there), depth + 1)
 
 
-def _near(at: Place, best: int) -> NDArray[np.bool_]:
+def _near(at: ModesAtPoint, best: int) -> NDArray[np.bool_]:
     """Which modes are near one, in the logarithm of the frequency: then it is near them too."""
     return np.asarray(np.abs(np.log(at.lam / at.lam[best])) < 2.0 * NEAR)
 
 
-def _is_met(here: Shape, best: int, near: NDArray[np.bool_]) -> bool:
+def _is_met(here: FollowedShape, best: int, near: NDArray[np.bool_]) -> bool:
     """Whether all modes passed on the way to number ``best`` are near it at both ends."""
     before = here.number - 1
     passed = slice(min(before, best), max(before, best) + 1)

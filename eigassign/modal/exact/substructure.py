@@ -336,7 +336,7 @@ def _prepared(
 
 
 @dataclass(frozen=True, eq=False)
-class Pairs:
+class RitzPairs:
     """All Ritz pairs of n samples, μ̂ descending: (n, p), a (n, k, p), u_S (n, s, p)."""
 
     mu: Floats
@@ -344,7 +344,7 @@ class Pairs:
     u: Floats
 
 
-def _ritz(inner: Inner, outer: Outer, A: Floats) -> Pairs:
+def _ritz(inner: Inner, outer: Outer, A: Floats) -> RitzPairs:
     """z = [a; u_S] has unit K-norm."""
     k, e, s = inner.W.shape[1], outer.inverse.shape[1], outer.mass.shape[1]
     n, low = len(outer.mass), np.swapaxes(outer.inverse, 1, 2)
@@ -359,10 +359,10 @@ def _ritz(inner: Inner, outer: Outer, A: Floats) -> Pairs:
     mu, v = np.linalg.eigh(M_c)
     mu, v = mu[:, ::-1], v[:, :, ::-1].copy()
     v[:, k:] = low @ v[:, k:]
-    return Pairs(mu, v[:, :k], np.concatenate([v[:, k:], -coupling @ v], axis=1))
+    return RitzPairs(mu, v[:, :k], np.concatenate([v[:, k:], -coupling @ v], axis=1))
 
 
-def _residuals(inner: Inner, outer: Outer, pairs: Pairs) -> Floats:
+def _residuals(inner: Inner, outer: Outer, pairs: RitzPairs) -> Floats:
     """ρ (n, q, p) in coordinates of Q: their length is that in K_II.
 
     μ̂ W a cancels what W has of the rest: in a fine mesh down to the round-off of K itself, by
@@ -450,7 +450,7 @@ def solve_together(
 
 def _converged(
     inner: Inner, outer: Outer, A: Floats, count: int
-) -> tuple[Inner, Pairs, Flags] | None:
+) -> tuple[Inner, RitzPairs, Flags] | None:
     """W grown until all residuals are small and the modes are proved; None if that fails."""
     n = len(outer.mass)
     start = np.random.default_rng(0).standard_normal((inner.K.shape[0], count))
@@ -527,7 +527,13 @@ NUMBERS = 2_000_000  # of shapes at once
 
 
 def _shapes(
-    pencil: Pencil, split: Split, inner: Inner, outer: Outer, X: Floats, pairs: Pairs, count: int
+    pencil: Pencil,
+    split: Split,
+    inner: Inner,
+    outer: Outer,
+    X: Floats,
+    pairs: RitzPairs,
+    count: int,
 ) -> Iterator[tuple[slice, Floats]]:
     """φ (n, n_dof, count) with φᵀMφ = 1, of some samples at a time."""
     columns = np.hstack([inner.vectors, X])

@@ -76,7 +76,7 @@ class Tracked(Brief):
 
 
 @dataclass(frozen=True)
-class _Here:
+class _TrackedShapes:
     """Shapes of the tracked modes at x, their ordinals (0-based), least overlap on the way."""
 
     x: Floats
@@ -93,7 +93,7 @@ def track(pencil: Pencil, x: Floats, modes: Sequence[int], extra: int = EXTRA) -
     wanted = mode_numbers(modes)
     found = lowest_modes(pencil, pencil.theta(x), wanted[-1], extra)
     first = np.array(wanted, dtype=np.intp) - 1
-    path = [_Here(x[0], found.phi[0][:, first], first, np.ones(len(first)))]
+    path = [_TrackedShapes(x[0], found.phi[0][:, first], first, np.ones(len(first)))]
     for k in range(1, len(x)):
         path.append(_advance(pencil, path[-1], x[k], _sample(found, k), 0))
     ordinals = np.array([here.ordinals for here in path])
@@ -113,7 +113,9 @@ def _sample(found: Modes, k: int) -> Modes:
     return Modes(found.lam[k], found.phi[k])
 
 
-def _advance(pencil: Pencil, here: _Here, x: Floats, there: Modes, depth: int) -> _Here:
+def _advance(
+    pencil: Pencil, here: _TrackedShapes, x: Floats, there: Modes, depth: int
+) -> _TrackedShapes:
     """Match the shapes at hand with the modes at x, by way of the midpoint where unclear."""
     from scipy.optimize import linear_sum_assignment
 
@@ -127,8 +129,8 @@ def _advance(pencil: Pencil, here: _Here, x: Floats, there: Modes, depth: int) -
         at = lowest_modes(pencil, pencil.theta(middle[None]), count, 0)
         half = _advance(pencil, here, middle, _sample(at, 0), depth + 1)
         rest = _advance(pencil, half, x, there, depth + 1)
-        return _Here(x, rest.shapes, rest.ordinals, np.minimum(half.overlap, rest.overlap))
-    return _Here(x, shapes[:, columns], columns, clear)
+        return _TrackedShapes(x, rest.shapes, rest.ordinals, np.minimum(half.overlap, rest.overlap))
+    return _TrackedShapes(x, shapes[:, columns], columns, clear)
 
 
 def overlaps(pencil: Pencil, shapes: Floats, x: Floats, modes: Floats) -> Floats:

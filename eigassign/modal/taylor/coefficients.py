@@ -56,7 +56,7 @@ def pencil_series(pencil: Pencil, theta: Floats, space: LowerSet) -> PencilSerie
 
 
 @dataclass(frozen=True)
-class Pairs:
+class ProductPairs:
     """Products A_δ X_β of all β + δ = γ with |γ| and |δ| fixed, sorted by γ.
 
     The δ are among the ``slots`` of what is stored and the β among ``below``; ``left``, ``right``
@@ -74,7 +74,7 @@ class Pairs:
 
 
 @lru_cache(maxsize=64)
-def pairs(space: LowerSet, stored: bytes) -> tuple[tuple[Pairs, ...], ...]:
+def pairs(space: LowerSet, stored: bytes) -> tuple[tuple[ProductPairs, ...], ...]:
     """For every degree the pairs with δ among the ``stored`` positions, by ascending |δ|."""
     present = np.frombuffer(stored, dtype=np.intp)
     slot = np.full(len(space), -1, dtype=np.intp)
@@ -86,7 +86,7 @@ def pairs(space: LowerSet, stored: bytes) -> tuple[tuple[Pairs, ...], ...]:
     )
 
 
-def _pairs(space: LowerSet, slot: Ints, degree: int, of_delta: int) -> Pairs:
+def _pairs(space: LowerSet, slot: Ints, degree: int, of_delta: int) -> ProductPairs:
     table, starts = space.by_degree[degree], space.degree_starts
     keep = (slot[table.left] >= 0) & (space.degrees[table.left] == of_delta)
     stored = slot[table.left[keep]]
@@ -94,7 +94,7 @@ def _pairs(space: LowerSet, slot: Ints, degree: int, of_delta: int) -> Pairs:
     first = first_of_each(target)
     low = int(stored.min(initial=len(space)))
     below = slice(int(starts[degree - of_delta]), int(starts[degree - of_delta + 1]))
-    return Pairs(
+    return ProductPairs(
         slice(low, int(stored.max(initial=-1)) + 1),
         below,
         stored - low,
@@ -112,7 +112,7 @@ def _pairs(space: LowerSet, slot: Ints, degree: int, of_delta: int) -> Pairs:
 class DenseTerms:
     """The coefficients of one matrix that are not zero in one stack; the first is that of w = 0."""
 
-    pairs: tuple[tuple[Pairs, ...], ...]
+    pairs: tuple[tuple[ProductPairs, ...], ...]
     stack: Floats  # (n_stored, n, n)
 
     def sums(self, degree: int, X: Floats) -> Iterator[tuple[Ints, Floats]]:
@@ -174,7 +174,7 @@ class SparseTerms:
     edge_dofs: Ints
     B: Floats  # (n_edges, n)
 
-    def add_products(self, p: Pairs, X: Floats, sign: float, out: Floats) -> None:
+    def add_products(self, p: ProductPairs, X: Floats, sign: float, out: Floats) -> None:
         """out_γ += sign Σ A_δ X_β over the pairs; X (N_below, r, n), out (N_degree, r, n)."""
         for slot in range(p.slots.start, p.slots.stop):
             if slot in self.bodies:
@@ -187,7 +187,9 @@ class SparseTerms:
         if begin < end:
             self._add_edges(p, slice(begin, end), X, sign, out)
 
-    def _add_edges(self, p: Pairs, edges: slice, X: Floats, sign: float, out: Floats) -> None:
+    def _add_edges(
+        self, p: ProductPairs, edges: slice, X: Floats, sign: float, out: Floats
+    ) -> None:
         """Bᵀ (Eᵀ X) for all pairs in one product, and E (B X) likewise."""
         n, B, dofs = X.shape[2], self.B[edges], self.edge_dofs[edges]
         pair, edge = np.nonzero(p.left[:, None] == self.edge_slots[edges] - p.slots.start)
@@ -206,7 +208,7 @@ class SparseSeries:
     """K and M over ``space``; those of w = 0 as they are, all others by what they touch."""
 
     pencil: Pencil
-    pairs: tuple[tuple[Pairs, ...], ...]
+    pairs: tuple[tuple[ProductPairs, ...], ...]
     stiffness: SparseTerms
     mass: SparseTerms
     K0: Floats  # non-zeros on the pencil's pattern

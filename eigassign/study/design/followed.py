@@ -21,7 +21,13 @@ from eigassign.case.schema.targets import FollowedMode
 from eigassign.errors import CaseError, LostModeError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.condensation import Modes
-from eigassign.modal.exact.following import MoreModesError, Place, Shape, follow, places
+from eigassign.modal.exact.following import (
+    FollowedShape,
+    ModesAtPoint,
+    MoreModesError,
+    follow,
+    places,
+)
 from eigassign.modal.exact.tracking import COINCIDENT, EXTRA
 from eigassign.modal.model import Model
 from eigassign.study.planning import shown_point
@@ -51,7 +57,7 @@ class Follower:
     pose: Callable[[Floats], Floats]  # of a design: q where the mode is named
     needed: NDArray[np.bool_]  # (n_t,)
 
-    def along(self, y: Floats, samples: Sequence[Place]) -> dict[int, Shape]:
+    def along(self, y: Floats, samples: Sequence[ModesAtPoint]) -> dict[int, FollowedShape]:
         """The shape at design y and the samples needed, by their numbers.
 
         ``samples`` are the modes there. Raises LostModeError, saying where; MoreModesError where
@@ -59,7 +65,7 @@ class Follower:
         """
         if not self.needed.any():
             return {}
-        found: dict[int | None, Shape] = {None: self._at_pose(y)}
+        found: dict[int | None, FollowedShape] = {None: self._at_pose(y)}
         for route in self.routes:
             way = [samples[k] for k in route.samples]
             try:
@@ -75,13 +81,13 @@ class Follower:
         return needed
 
     @cached_property
-    def start(self) -> Shape:
+    def start(self) -> FollowedShape:
         """The mode where it is named."""
         like, x = self.mode.like, self.model.x(self.pose(self.named_y), self.named_y)
         (at,) = places(self.model.pencil, x, like, EXTRA)
-        return Shape(at, np.where(np.arange(len(at.lam)) == like - 1, 1.0, 0.0))
+        return FollowedShape(at, np.where(np.arange(len(at.lam)) == like - 1, 1.0, 0.0))
 
-    def _at_pose(self, y: Floats) -> Shape:
+    def _at_pose(self, y: Floats) -> FollowedShape:
         """The shape where it is named, at another design."""
         if np.array_equal(y, self.named_y):
             return self.start

@@ -7,14 +7,14 @@ import pytest
 from meetings import E_ONE, line, two_bars
 
 from eigassign.errors import LostModeError
-from eigassign.modal import Model, MoreModesError, Place, Shape, follow, places
+from eigassign.modal import FollowedShape, Model, ModesAtPoint, MoreModesError, follow, places
 
 
-def start(at: Place, number: int) -> Shape:
-    return Shape(at, np.eye(len(at.lam))[number - 1])
+def start(at: ModesAtPoint, number: int) -> FollowedShape:
+    return FollowedShape(at, np.eye(len(at.lam))[number - 1])
 
 
-def followed(model: Model, x: np.ndarray, number: int = 1, extra: int = 3) -> list[Shape]:
+def followed(model: Model, x: np.ndarray, number: int = 1, extra: int = 3) -> list[FollowedShape]:
     """Mode ``number`` of the first sample along all of them."""
     along = places(model.pencil, x, 2, extra)
     return follow(model.pencil, start(along[0], number), along)
