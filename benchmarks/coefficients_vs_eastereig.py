@@ -19,8 +19,7 @@ import eastereig
 import numpy as np
 
 import eigassign as ea
-from eigassign.modal.expansion import Expansion
-from eigassign.modal.model import Model
+from eigassign.modal import Expansion, Model
 from eigassign.series.multi_index import total_degree
 
 ORDER = 4

@@ -16,8 +16,7 @@ import numpy as np
 from arms import STEEL, case_of
 
 import eigassign as ea
-from eigassign.modal.exact.roundoff import rounding_error
-from eigassign.modal.model import Model
+from eigassign.modal import Model, rounding_error
 
 BAYS = 23
 MODES = (1, 2, 3)

@@ -35,10 +35,9 @@ from scipy.sparse import linalg
 import eigassign as ea
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.sparse_factor import factorise
-from eigassign.modal.exact import sparse as symmetric
-from eigassign.modal.exact.solver import modes
-from eigassign.modal.taylor import bordered, recursion
+from eigassign.modal import factor_sparse, modes
 
+BLOCK = 16  # right-hand sides at once, as in the recursion
 BRANCHES = (3, 10, 33, 103, 326)
 Q0 = np.array([0.3, 0.5, -0.4, 0.6])
 PLAIN = {
@@ -74,17 +73,18 @@ def own_floor(
     rows = np.random.default_rng(0).standard_normal((n, len(border)))
 
     def run() -> None:
-        solve = bordered.factor_sparse(pencil, data, border[None], phi[None])
-        for i in range(0, n, recursion.BLOCK):
-            solve(rows[i : i + recursion.BLOCK])
+        solve = factor_sparse(pencil, data, border[None], phi[None])
+        for i in range(0, n, BLOCK):
+            solve(rows[i : i + BLOCK])
 
     return run
 
 
 def stiffness_factor(pencil: Pencil, theta: np.ndarray) -> Callable[[], object]:
     """The factorisation of K alone that finding the eigenpair takes."""
-    data = pencil.stiffness @ theta
-    return lambda: factorise(symmetric.principal(pencil, data, pencil.elastic))
+    K = pencil.sparse(pencil.stiffness @ theta)
+    K.eliminate_zeros()
+    return lambda: factorise(K[pencil.elastic][:, pencil.elastic])
 
 
 def one(branches: int) -> dict[str, float]:

@@ -19,9 +19,7 @@ import arms
 import numpy as np
 
 import eigassign as ea
-from eigassign.modal.exact.solver import modes
-from eigassign.modal.expansion import Expansion
-from eigassign.modal.model import Model
+from eigassign.modal import Expansion, Model, modes
 from eigassign.series.multi_index import LowerSet, total_degree
 
 ORDER = 4

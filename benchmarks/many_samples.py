@@ -19,8 +19,7 @@ import numpy as np
 import profiles
 import yaml
 
-from eigassign.modal.exact.sparse import solve_sparse
-from eigassign.modal.exact.substructure import solve_together
+from eigassign.modal import solve_sparse, solve_together
 
 COUNT = 4
 

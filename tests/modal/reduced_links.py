@@ -1,4 +1,4 @@
-"""Random arms whose links can be reduced, and both of them: reduced and whole."""
+"""Random arms whose links can be reduced."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import copy
 from typing import Any
 
 import numpy as np
-from spatial_cases import ALLOY, Built, built
-
-from eigassign.mechanism import Pencil, ReducedLinks, build_pencil, local_links, reduced_links
+from spatial_cases import ALLOY, Built
 
 Tree = dict[str, Any]
 
@@ -102,16 +100,9 @@ def random_x(model: Built, rng: np.random.Generator) -> np.ndarray:
     return np.array([*rng.uniform(-2.0, 2.0, 2), *y])
 
 
-def reduced(tree: Tree, hertz: float, links: tuple[str, ...] = ("beam", "frame")) -> Built:
+def reduced_tree(tree: Tree, hertz: float, links: tuple[str, ...] = ("beam", "frame")) -> Tree:
     """The same mechanism with some links reduced."""
     out = copy.deepcopy(tree)
     for name in links:
         out["mechanism"]["links"][name]["reduce_to"] = hertz
-    return built(out)
-
-
-def parts_of(model: Built) -> tuple[Pencil, ReducedLinks | None]:
-    """The pencil and what its truncation error is estimated from."""
-    local = local_links(model.case, model.numbers, model.motion)
-    pencil = build_pencil(model.case, model.numbers, model.motion, local)
-    return pencil, reduced_links(model.numbers, local[0], pencil)
+    return out

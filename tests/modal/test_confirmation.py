@@ -10,7 +10,6 @@ from chains import model_of, two_link
 
 from eigassign.errors import UsageError
 from eigassign.modal import (
-    Cluster,
     Expansion,
     ExpansionRequest,
     expand,
@@ -26,7 +25,8 @@ Q0, Y0, ORDER = np.array([1.817, 5.312]), np.array([0.125, 0.125]), 4
 def changed(expansion: Expansion, k: int) -> Expansion:
     coefficients = expansion.clusters[0].coefficients.copy()
     coefficients[0, 0, k] *= 1.0 + 1e-4
-    return replace(expansion, clusters=(Cluster((1,), coefficients),))
+    cluster = replace(expansion.clusters[0], coefficients=coefficients)
+    return replace(expansion, clusters=(cluster,))
 
 
 @pytest.mark.parametrize("linear", [False, True])

@@ -7,7 +7,7 @@ import pytest
 from chains import model_of
 from stress import answered, case, judged
 
-from eigassign.modal import CLUSTER_GAP, Model, expand, reduce
+from eigassign.modal import Model, expand, reduce
 
 E0 = 70e9
 # Length of the stub in m and factor on its modulus that leave these relative gaps in frequency.
@@ -73,7 +73,7 @@ def test_a_single_mode_admits_how_wrong_it_is_across_the_veering(gap):
 def test_both_modes_as_a_cluster_are_right_across_it(gap):
     model = coupled(GAPS[gap])
     E = np.linspace(6.6e10, 7.4e10, 41)[:, None]
-    together = max(CLUSTER_GAP, 3.0 * gap)
+    together = max(0.02, 3.0 * gap)
     expansion = expand(model.pencil, [], [E0], (1, 2), order=8, cluster_gap=together)
     assert [c.modes for c in expansion.clusters] == [(1, 2)]
     assert judged(model, expansion, [], E).max() < 1e-8

@@ -15,9 +15,10 @@ from spatial_random import random_closed, random_open
 
 from eigassign.errors import MechanismError, UsageError
 from eigassign.mechanism import Pencil
-from eigassign.modal import UNCERTAIN, count_below, eigenvalues
+from eigassign.modal import count_below, eigenvalues
 
 Floats = np.ndarray
+UNCERTAIN = -1
 Way = Callable[[Pencil], Pencil]
 
 

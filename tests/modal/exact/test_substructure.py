@@ -204,7 +204,7 @@ def test_pairs_called_proved_are_those_of_the_lowest_modes(seed: int) -> None:
 
 
 def test_samples_that_are_not_proved_are_solved_alone() -> None:
-    """At every third sample nine bars are alike, with six equal modes: no cut lies apart, and nothing is proved."""
+    """At every third sample nine bars are alike: of six equal modes no cut lies apart."""
     names = [f"arm{k}" for k in range(9)]
     tree = twins(len(names))
     tree["mechanism"]["bodies"] = {name: {"at": f"{name}.end", "mass": 0.0} for name in names}
