@@ -18,7 +18,6 @@ one function, `eigassign.pipeline.run.solve_case`.
     faces          what a package shows to those outside, loaded at first use
     process        the process around a command: errors on stderr, signals, streams, threads
     series         truncated power series and expressions that are evaluated on them
-    interpolation  polynomial interpolation in several variables
     case           a case file: schema, units, rules, every problem with its line
     mechanism      links, joints, kinematics: K and M of eq. (1), and the trajectory
     modal          exact modes, expansions of eqs. (4)–(9), reduced models, fits

@@ -25,7 +25,7 @@ from scipy.interpolate import BSpline, RBFInterpolator, make_interp_spline
 from scipy.sparse import csr_array
 
 from eigassign.errors import UsageError
-from eigassign.interpolation.newton import spread_steps
+from eigassign.modal.fit.interpolation import spread_steps
 from eigassign.series.multi_index import lower_set, total_degree
 from eigassign.series.power_series import monomials, monomials_of
 

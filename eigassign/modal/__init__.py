@@ -40,7 +40,8 @@ __all__, __getattr__, __dir__ = face(
         "expansion": (
             "Expansion NearestExpansion companion_order expand polynomial_error radius_share"
         ),
-        "fit.path": "interval_nodes smooth_parts stretches",
+        "fit.interpolation": "Interpolant Nodes basis_at interpolate interval_nodes sample_nodes",
+        "fit.path": "smooth_parts",
         "fit.region": "Box",
         "fit.source": "FINE",
         "model": "Model",

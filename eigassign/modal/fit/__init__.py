@@ -2,9 +2,10 @@
 
 Reading order:
 
-    path     a trajectory as axes v ∈ [−1, 1] between its corners, with nodes
-    region   a trajectory or a box of q, times a box of y, as axes
-    meeting  what is missed where modes meet between the nodes
-    source   where a fit takes frequencies from: a model, a reduced model or an expansion
-    fit      the polynomial that answers in its place
+    meeting        what is missed where modes meet between the nodes
+    interpolation  nodes, coefficients and error of a polynomial on one axis or several
+    path           a trajectory, cut at its corners
+    region         a trajectory or a box of q, times a box of y, as axes
+    source         where a fit takes frequencies from: a model, a reduced model or an expansion
+    fit            the polynomial that answers in its place
 """

@@ -2,10 +2,8 @@
 
     f(q, y)^p ≈ Σ_γ c_γ h_γ(v(q, y)),   p ∈ {1, 2, −2}:  f, λ or 1/λ, whichever needs fewest terms
 
-in Newton's basis over a lower set of multi-indices. The polynomial of a region grows where its
-coefficients say so (`interpolation.adaptive`), or has as many terms as solves were given
-(`interpolation.given`). A path with corners has one polynomial for each stretch between them; what
-all of them ask for in one round is one batch of frequencies.
+in Newton's basis over a lower set of multi-indices (`interpolation`). A path with corners has one
+polynomial for each stretch between them.
 """
 
 from __future__ import annotations
@@ -14,32 +12,34 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.brief import counted, of_modes
-from eigassign.errors import AccuracyError, UsageError
-from eigassign.interpolation.adaptive import MISSED, adaptive
-from eigassign.interpolation.given import WORTHLESS, fewest, given
-from eigassign.interpolation.margin import keys
-from eigassign.interpolation.newton import Asking, Interpolant, newton_polynomials
+from eigassign.errors import UsageError
 from eigassign.modal.arguments import whole_within
-from eigassign.modal.fit.meeting import cause, missed_between
-from eigassign.modal.fit.path import Path, Stretch, stretches
-from eigassign.modal.fit.region import Box, Region, build_region, require_path_followed
+from eigassign.modal.exact.roundoff import rounding_error
+from eigassign.modal.fit.interpolation import (
+    Interpolant,
+    basis_at,
+    fewest,
+    interpolate,
+    newton_basis,
+)
+from eigassign.modal.fit.path import moves, read_path
+from eigassign.modal.fit.region import Box, Region, build_region
 from eigassign.modal.fit.source import (
     SHARE,
+    affordable,
     dependence,
-    floor_of,
-    known_error,
+    fine,
     modes_of,
     own_error,
     question,
 )
 from eigassign.modal.model import Model
-from eigassign.series.power_series import Polynomials
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -123,7 +123,7 @@ class Fit:
 
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """(n, n_modes) in Hz. Raises UsageError outside the region."""
-        return self._hz(self._ready(self.region.v(q, y)))
+        return self._values(self.region.v(self.region.samples(q, y)))
 
     def along(self, y: ArrayLike | None = None) -> Floats:
         """At every sample of the trajectory: (n_t, n_modes) in Hz for one design y (n_y,).
@@ -131,34 +131,33 @@ class Fit:
         (n_designs, n_t, n_modes) for many (n_designs, n_y); without y at that of the fit. Raises
         UsageError for a fit over a box of q, for y outside the region, or missing.
         """
-        path, line = self.region.path, self.region.line
-        if path is None:
+        region, n_q, indices = self.region, self.region.n_q, self.indices
+        if region.path is None:
             raise UsageError("the fit is over a box of q: it has no trajectory to go along")
-        if y is None and line is not None and self.region.d == 1:
-            return self._hz(line.table[:, : len(self.indices)] @ self.coefficients.T)
-        if y is None:
+        if y is None and (region.place is None or region.d > 1):
             raise UsageError("the fit is over a box of y: along which design?")
-        v = self.region.design(y)
-        if line is None:
-            g = np.repeat(self._ready(v)[:, None], len(path), axis=1)
+        v = region.v(region.samples(region.centre[:n_q], region.centre[n_q:] if y is None else y))
+        if region.place is None:
+            hz = np.repeat(self._values(v)[:, None], len(region.path), axis=1)
         else:  # one product of matrices for all designs
-            right = self._ready.second(np.ascontiguousarray(v[:, 1:].T))
-            g = np.empty((len(v), len(path), len(self.modes)))
-            for k, table in enumerate(self._samples):
-                np.matmul(right.T, table, out=g[:, :, k])
-        hz = self._hz(g)
-        return hz[0] if np.ndim(y) == 1 else hz
+            others, row = np.unique(indices[:, 1:], axis=0, return_inverse=True)
+            table = np.zeros((len(self.modes), len(others), int(indices[:, 0].max()) + 1))
+            table[:, row.reshape(-1), indices[:, 0]] = self.coefficients
+            left = newton_basis(region.nodes[0].v[: table.shape[2]], region.place)
+            right = basis_at(region.nodes[1:], others, v[:, 1:])
+            g = np.empty((len(v), len(left), len(self.modes)))
+            for k, each in enumerate(table @ left.T):
+                np.matmul(right, each, out=g[:, :, k])
+            hz = self._hz(g)
+        return hz if y is not None and np.ndim(y) == 2 else hz[0]
 
-    @cached_property
-    def _samples(self) -> Floats:
-        """The polynomials of y at each sample of the trajectory, (n_modes, N_second, n_t)."""
-        assert self.region.line is not None
-        return self._ready.table @ self._ready.first(self.region.line.place[None])
-
-    @cached_property
-    def _ready(self) -> Polynomials:
-        nodes = [axis.nodes for axis in self.region.axes]
-        return newton_polynomials(self.indices, nodes, self.coefficients)
+    def _values(self, v: Floats, block: int = 512) -> Floats:
+        """f in Hz (n, n_modes) at v (n, d), in blocks that stay in the processor's cache."""
+        parts = [v[i : i + block] for i in range(0, len(v), block)]
+        g = [
+            basis_at(self.region.nodes, self.indices, each) @ self.coefficients.T for each in parts
+        ]
+        return self._hz(np.vstack(g))
 
     def _hz(self, g: Floats) -> Floats:
         """f of f^p, in its place."""
@@ -177,7 +176,7 @@ class PathFit:
     """
 
     parts: tuple[Fit, ...]
-    rows: tuple[slice, ...]  # which of all samples are whose
+    rows: tuple[slice, ...]
 
     def __repr__(self) -> str:
         pieces = f"{len(self.parts)} stretches from {self.solves} solves"
@@ -214,12 +213,11 @@ class PathFit:
 
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """(n, n_modes) in Hz. Raises UsageError outside the region."""
-        x = self.parts[0].region.samples(q, y)
+        x, n_q = self.parts[0].region.samples(q, y), self.parts[0].region.n_q
         hz, left = np.empty((len(x), len(self.modes))), np.ones(len(x), dtype=np.bool_)
         for part in self.parts:
             mine = left & part.region.on_path(x)
             if mine.any():
-                n_q = part.region.n_q
                 hz[mine] = part.frequencies(x[mine, :n_q], x[mine, n_q:])
                 left &= ~mine
         if left.any():
@@ -268,75 +266,53 @@ def fit(
         raise UsageError("a fit has an accuracy or a number of solves, not both")
     _check_numbers(accuracy, most)
     directions, n_q = dependence(source)
-    path = None if isinstance(q, Box) else stretches(q, directions, n_q)
-    parts: tuple[Any, ...] = (q,) if path is None else path.parts
+    path = None if isinstance(q, Box) else read_path(q, directions, n_q)
+    stretches: tuple[Any, ...] = (q,) if path is None else path.stretches
+    rests = path is not None and any(moves(each, directions, n_q) for each in path.stretches)
     wanted = modes_of(source, modes)
+    regions = [build_region(directions, n_q, each, y, rests) for each in stretches]
+    counts = [most] * len(regions)
     if solves is None:
         accuracy = ACCURACY if accuracy is None else accuracy
-        regions, floors, runs = _to_accuracy(source, parts, y, wanted, accuracy, most)
     else:
-        count = whole_within(solves, "solves", 1, MOST)
-        regions, floors, runs = _by_solves(source, path, parts, y, wanted, count)
-    ended = list(zip(regions, _run(source, wanted, regions, runs), strict=True))
-    if not isinstance(source, Model):
-        xs = (region.x(each.asked) for region, each in ended)
-        each_ = zip(floors, xs, strict=True)
-        floors = [max(floor, known_error(source, x, wanted, accuracy)) for floor, x in each_]
-    found = [_with_meetings(wanted, region, each, accuracy) for region, each in ended]
+        counts = [whole_within(solves, "solves", 1, MOST)]
+        if path is not None:
+            counts = path.shares(solves, fewest(max(region.d for region in regions)))
+        for region, count in zip(regions, counts, strict=True):
+            region.require_followed(count)
     fits = tuple(
-        Fit(wanted, region, accuracy, made, partial(own_error, source, region, wanted, made, floor))
-        for region, made, floor in zip(regions, found, floors, strict=True)
+        _fit_region(source, region, wanted, accuracy, count)
+        for region, count in zip(regions, counts, strict=True)
     )
     return fits[0] if path is None or len(fits) == 1 else PathFit(fits, path.rows)
 
 
-_Plan = tuple[list[Region], list[float], list[Asking]]  # of each part: with the source's own error
+def _fit_region(
+    source: Any, region: Region, modes: tuple[int, ...], accuracy: float | None, most: int
+) -> Fit:
+    """One polynomial for each mode, to an accuracy or of ``most`` frequencies."""
+    ask, floors, left = question(source, modes), [0.0], accuracy
+    round_off = partial(_round_off, source, region, modes)
+    if not isinstance(source, Model):
+        left = None if accuracy is None else (1.0 - SHARE) * accuracy
+    elif accuracy is not None and accuracy < fine(source):
+        floors = [affordable("round-off", round_off(), accuracy)]
+        left = accuracy - floors[0]
+
+    def asked(points: Ints) -> Floats:
+        x = region.x(points)
+        if not isinstance(source, Model):
+            floors.append(own_error(source, x, modes, accuracy))
+        return ask(x)
+
+    found = interpolate(region.nodes, asked, modes, left, most)
+    small = isinstance(source, Model) and floors == [0.0] and found.error < fine(source)
+    own = round_off if small else partial(max, floors)
+    return Fit(modes, region, accuracy, found, own)
 
 
-def _to_accuracy(
-    source: Any,
-    parts: Sequence[Any],
-    y: ArrayLike | Box,
-    modes: tuple[int, ...],
-    accuracy: float,
-    most: int,
-) -> _Plan:
-    """Runs that ask until their estimate meets the accuracy."""
-    directions, n_q = dependence(source)
-    rests = _some_move(parts)
-    regions = [build_region(directions, n_q, part, y, rests=rests) for part in parts]
-    floors = [floor_of(source, region, modes, accuracy) for region in regions]
-    runs = []
-    for region, floor in zip(regions, floors, strict=True):
-        # what another source than a model costs is only known where it was asked
-        cost = floor if isinstance(source, Model) else SHARE * accuracy
-        runs.append(adaptive(region.nodes, accuracy - cost, most))
-    return regions, floors, runs
-
-
-def _by_solves(
-    source: Any,
-    path: Path | None,
-    parts: Sequence[Any],
-    y: ArrayLike | Box,
-    modes: tuple[int, ...],
-    count: int,
-) -> _Plan:
-    """Runs that ask for ``count`` frequencies in all."""
-    directions, n_q = dependence(source)
-    counts = [count]
-    if path is not None and len(path.parts) > 1:
-        d = max(build_region(directions, n_q, each, y, rests=True).d for each in parts)
-        counts = path.shares(count, fewest(d))
-    regions, floors = _best_nodes(source, parts, y, modes, counts)
-    require_path_followed(regions)
-    pairs = zip(regions, counts, strict=True)
-    return regions, floors, [given(region.nodes, own) for region, own in pairs]
-
-
-def _some_move(parts: Sequence[Any]) -> bool:
-    """Whether stretches that stand still are part of something that does not."""
-    return any(isinstance(part, Stretch) and part.line(None) is not None for part in parts)
+def _round_off(model: Model, region: Region, modes: tuple[int, ...]) -> float:
+    return rounding_error(model.pencil, region.centre, modes[-1])
 
 
 def _check_numbers(accuracy: object, most: object) -> None:
@@ -349,92 +325,3 @@ def _check_numbers(accuracy: object, most: object) -> None:
         raise UsageError(
             f"accuracy {accuracy!r} is not a number within {LEAST_ACCURACY} to 1, as 1e-4"
         )
-
-
-def _best_nodes(
-    source: Any,
-    parts: Sequence[Any],
-    y: ArrayLike | Box,
-    modes: tuple[int, ...],
-    counts: Sequence[int],
-) -> tuple[list[Region], list[float]]:
-    """Regions with the best nodes for the counts, and the source's own error in each.
-
-    That is looked at on nested nodes, which hold both ends of every axis.
-    """
-    directions, n_q = dependence(source)
-    pairs, rests = zip(parts, counts, strict=True), _some_move(parts)
-    regions = [build_region(directions, n_q, part, y, count, rests) for part, count in pairs]
-    if isinstance(source, Model):
-        return regions, [0.0] * len(regions)
-    nested = (build_region(directions, n_q, part, y, rests=rests) for part in parts)
-    return regions, [floor_of(source, region, modes, None) for region in nested]
-
-
-def _run(
-    source: Any, modes: tuple[int, ...], regions: Sequence[Region], runs: Sequence[Asking]
-) -> list[_Found]:
-    """What all runs end with.
-
-    What they ask for in one round is one batch of frequencies.
-    """
-    ask, own = question(source, modes), [mode - 1 for mode in modes]
-    found: dict[int, Interpolant] = {}
-    asked: list[list[Ints]] = [[] for _ in runs]
-    answers: list[list[Floats]] = [[] for _ in runs]
-    hz: dict[int, Floats | None] = dict.fromkeys(range(len(runs)))
-    while hz:
-        wanted: dict[int, Floats] = {}
-        for k, values in hz.items():
-            try:
-                members = runs[k].send(values)  # type: ignore[arg-type]
-                asked[k].append(members)
-                wanted[k] = regions[k].x(members)
-            except StopIteration as end:
-                found[k] = end.value
-            except AccuracyError as error:
-                raise AccuracyError(f"{error}{cause(answers[k], modes)}") from None
-        if not wanted:
-            break
-        every, start = ask(np.vstack(list(wanted.values()))), 0
-        hz = {}
-        for k, x in wanted.items():
-            answers[k].append(every[start : start + len(x)])
-            hz[k] = answers[k][-1][:, own]
-            start += len(x)
-    return [_Found(found[k], np.vstack(asked[k]), np.vstack(answers[k])) for k in range(len(runs))]
-
-
-class _Found(NamedTuple):
-    """An interpolant, all members that its run asked for, and f in Hz there."""
-
-    interpolant: Interpolant
-    asked: Ints  # (n, d)
-    hz: Floats  # (n, modes[-1] + 1): of all modes up to those fitted, and of one more
-
-    def missed(self, region: Region, modes: tuple[int, ...]) -> float:
-        """|δf/f| that modes may cost which meet between the nodes, with a margin."""
-        at, members = keys(self.asked), self.interpolant.members
-        order = np.argsort(at, kind="stable")
-        rows = order[np.searchsorted(at, keys(members), sorter=order)]
-        own = [mode - 1 for mode in modes]
-        missed = missed_between(region.nodes, members, self.hz[rows], own, self.interpolant.power)
-        return MISSED * missed
-
-
-def _with_meetings(
-    modes: tuple[int, ...],
-    region: Region,
-    each: _Found,
-    accuracy: float | None,
-) -> Interpolant:
-    """The interpolant, its error that where modes meet, if more; AccuracyError if too large."""
-    missed = each.missed(region, modes)
-    if missed <= each.interpolant.error:
-        return each.interpolant
-    if missed > (WORTHLESS if accuracy is None else accuracy):
-        raise AccuracyError(
-            f"{each.interpolant.asked} values may miss {missed:.1e} between them"
-            f"{cause([each.hz], modes)}"
-        )
-    return each.interpolant._replace(error=missed)

@@ -1,12 +1,13 @@
 """Where a fit holds: a trajectory or a box of q, times a box of y, as few axes v ∈ [−1, 1].
 
-A trajectory is one axis. Joint coordinates and design parameters that no frequency depends on are
-no axes; of joint coordinates that matter only together their combinations are.
+A trajectory is one axis. Where it is straight in joint space, v is the joint coordinate along it;
+else v is the distance travelled there, and its samples alone can be asked for. Joint coordinates
+and design parameters that no frequency depends on are no axes; of joint coordinates that matter
+only together their combinations are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,22 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import AccuracyError, UsageError
-from eigassign.interpolation.newton import Nodes
 from eigassign.modal.arguments import samples
-from eigassign.modal.fit.path import (
-    STILL,
-    Axis,
-    Line,
-    Stretch,
-    chosen_nodes,
-    interval_nodes,
-    joints_of,
-)
+from eigassign.modal.fit.interpolation import Nodes, interval_nodes, newton_basis, sample_nodes
+from eigassign.modal.fit.path import STILL, along_chord, moving_joints
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-MOST_NODES = 20  # on an axis of a box
-MOST_AXES = 10
+MOST_NODES = 128  # on an axis; with 500 round-off grew to 7e-3
 OUTSIDE = 1e-9  # by how much |v| may exceed 1
 OFF_PATH = 10.0 * STILL  # what is farther lies off the path
 MOST_MISSED = 0.03  # of its reach by which a path may be missed by its interpolant
@@ -57,14 +49,22 @@ class Box:
 
 
 @dataclass(frozen=True, eq=False)
+class Axis:
+    """One variable v of a region: its nodes, and x − centre at each of their points."""
+
+    nodes: Nodes
+    steps: Floats  # (n_points, n_x)
+    row: Floats  # dv/dx (n_x,); zeros on a curved path
+
+
+@dataclass(frozen=True, eq=False)
 class Region:
-    """v = ``to_v`` x + ``offset`` for x inside; on a curved path v_0 is that of its samples."""
+    """v = v_c + dv/dx (x − x_c) for x inside; on a curved path v_0 is that of its samples."""
 
     axes: tuple[Axis, ...]
-    centre: Floats  # (n_x,)
-    rows: tuple[Floats, ...]  # dv/dx, (n_x,) each
+    centre: Floats  # x_c (n_x,); on a trajectory its first sample
     path: Floats | None  # samples of the trajectory (n_t, n_q)
-    line: Line | None  # the first axis, if it is that of a path that moves
+    place: Floats | None  # v_0 of the samples (n_t,), if they move
     directions: Floats  # (n_w, n_x): the combinations of x on which anything depends
     n_q: int
 
@@ -75,154 +75,151 @@ class Region:
 
     @property
     def nodes(self) -> list[Nodes]:
-        """Of each axis."""
-        return [axis.points for axis in self.axes]
+        """Nodes of each axis."""
+        return [axis.nodes for axis in self.axes]
+
+    @property
+    def straight(self) -> bool:
+        """True unless v_0 is that of the samples of a curved path."""
+        return self.place is None or bool(self.axes[0].row.any()) or not np.ptp(self.place)
 
     @cached_property
-    def to_v(self) -> Floats:
-        """dv/dx, (d, n_x)."""
-        return np.array(self.rows)
-
-    @cached_property
-    def offset(self) -> Floats:
-        """v of x = 0, (d,)."""
-        offset = -self.to_v @ self.centre
-        if self.line is not None:
-            offset[0] += self.line.place[0]
-        return np.asarray(offset)
-
-    @cached_property
-    def joints(self) -> Floats:
-        """The joint coordinates that matter, (n_s, n_q)."""
-        return joints_of(self.directions, self.n_q)
-
-    def x(self, members: Ints) -> Floats:
-        """(q, y) (n, n_x) at the nodes of multi-indices (n, d)."""
-        out = self.axes[0].steps.take(members[:, 0], axis=0) + self.centre
-        for j, axis in enumerate(self.axes[1:], 1):
-            out += axis.steps.take(members[:, j], axis=0)
-        return out
-
-    def v(self, q: ArrayLike, y: ArrayLike) -> Floats:
-        """(n, d) of samples. Raises UsageError for any outside the region."""
-        x = self.samples(q, y)
-        v = x @ self.to_v.T + self.offset
-        if self.path is not None:
-            off = self._project(x[:, : self.n_q], v).max(initial=0.0)
-            if not off <= OFF_PATH:
-                raise UsageError(f"q lies off the path that was fitted, by up to {off:.3g}")
-        self._inside(v)
-        self._kept(x)
-        return np.asarray(v)
+    def _to_v(self) -> Floats:
+        """dv/dx (d, n_x)."""
+        return np.array([axis.row for axis in self.axes])
 
     def samples(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """x (n, n_x) of q and y. Raises UsageError for wrong shapes."""
         return samples(q, y, self.n_q, len(self.centre) - self.n_q)
 
-    def on_path(self, x: Floats) -> NDArray[np.bool_]:
-        """Which of x (n, n_x) lie on the path between its ends."""
-        v = x @ self.to_v.T + self.offset
-        off = self._project(x[:, : self.n_q], v)
-        return np.asarray((off <= OFF_PATH) & (np.abs(v[:, 0]) <= 1.0 + OUTSIDE))
+    def x(self, points: Ints) -> Floats:
+        """(q, y) (n, n_x) at points (n, d) of the axes."""
+        steps = (axis.steps[column] for axis, column in zip(self.axes, points.T, strict=True))
+        return np.asarray(self.centre + sum(steps))
 
-    def design(self, y: ArrayLike) -> Floats:
-        """v (n_designs, d) of designs y (n_y,) or (n_designs, n_y), on the path's first sample."""
-        to_v, offset, still = self._by_design
-        rows = _designs(y, to_v.shape[1])
-        v = rows @ to_v.T
-        v += offset
-        self._inside(v)
-        if len(still):
-            self._kept(np.hstack([np.tile(self._first, (len(rows), 1)), rows]))
-        return np.asarray(v)
-
-    @property
-    def _first(self) -> Floats:
-        return self.centre[: self.n_q] if self.path is None else self.path[0]
-
-    @cached_property
-    def _by_design(self) -> tuple[Floats, Floats, Ints]:
-        """dv/dy (d, n_y), v at y = 0 on the first sample, and parameters with one value only."""
-        offset = self.offset + self.to_v[:, : self.n_q] @ self._first
-        return self.to_v[:, self.n_q :], offset, self.still[self.still >= self.n_q]
-
-    def _inside(self, v: Floats) -> None:
-        reach = float(np.abs(v).max())
+    def v(self, x: Floats) -> Floats:
+        """(n, d) of samples x (n, n_x). Raises UsageError for any outside the region."""
+        v, off = self._placed(x)
+        if not off.max(initial=0.0) <= OFF_PATH:
+            raise UsageError(f"q lies off the path that was fitted, by up to {off.max():.3g}")
+        reach = float(np.abs(v).max(initial=0.0))
         if not reach <= 1.0 + OUTSIDE:
             raise UsageError(f"q or y lies outside the region of the fit: {reach:.6g} half-widths")
+        still = self._still
+        off = np.abs(x[:, still] - self.centre[still])
+        if not (off <= STILL * (1.0 + np.abs(self.centre[still]))).all():
+            raise UsageError("q or y differs from what the fit was made at")
+        return v
 
-    def _kept(self, x: Floats) -> None:
-        """Raise UsageError for another value of what matters and was not varied."""
-        if len(self.still):
-            off = np.abs(x[:, self.still] - self.centre[self.still])
-            if not (off <= STILL * (1.0 + np.abs(self.centre[self.still]))).all():
-                raise UsageError("q or y differs from what the fit was made at")
+    def on_path(self, x: Floats) -> NDArray[np.bool_]:
+        """True for those of x (n, n_x) that lie on the path between its ends."""
+        v, off = self._placed(x)
+        return np.asarray((off <= OFF_PATH) & (np.abs(v[:, 0]) <= 1.0 + OUTSIDE))
+
+    def _placed(self, x: Floats) -> tuple[Floats, Floats]:
+        """v (n, d) of x, wherever that is, and how far each q lies off the path (n,)."""
+        v = (x - self.centre) @ self._to_v.T
+        if self.path is None:
+            return v, np.zeros(len(x))
+        if self.place is not None:
+            v[:, 0] += self.place[0]
+        joints = moving_joints(self.directions, self.n_q)
+        s, known = x[:, : self.n_q] @ joints.T, self.path @ joints.T
+        if self.straight:
+            _, far, _ = along_chord(known - known[0])
+            parts = (s - known[0]) @ far / max(float(far @ far), 1e-300)
+            return v, np.abs(s - known[0] - np.outer(parts, far)).max(axis=1, initial=0.0)
+        from scipy.spatial import cKDTree
+
+        off, nearest = cKDTree(known).query(s)
+        assert self.place is not None
+        v[:, 0] = self.place[nearest]
+        return v, np.asarray(off)
 
     @cached_property
-    def still(self) -> Ints:
+    def _still(self) -> Ints:
         """Entries of x that matter and have one value in the whole region."""
-        moved = (self.to_v != 0.0).any(axis=0)
+        moved = (self._to_v != 0.0).any(axis=0)
         if self.path is not None:
             moved[: self.n_q] = True
         return np.flatnonzero((self.directions != 0.0).any(axis=0) & ~moved)
 
-    def _project(self, q: Floats, v: Floats) -> Floats:
-        """How far each of q lies off the path (n,); along a curved one v_0 becomes its sample's."""
-        assert self.path is not None
-        s, known = q @ self.joints.T, self.path @ self.joints.T
-        if self.line is None or self.line.straight:
-            far = known[np.argmax(np.square(known - known[0]).sum(axis=1))] - known[0]
-            t = (s - known[0]) @ far / max(float(far @ far), 1e-300)
-            return np.asarray(np.abs(s - known[0] - t[:, None] * far).max(axis=1, initial=0.0))
-        from scipy.spatial import cKDTree
+    def require_followed(self, count: int) -> None:
+        """Raise AccuracyError where ``count`` nodes of a curved path do not even show the path.
 
-        distance, nearest = cKDTree(known).query(s)
-        v[:, 0] = self.line.place[nearest]
-        return np.asarray(distance)
+        The error of frequencies along it is not smaller than that of its own interpolant, whatever
+        few of them show.
+        """
+        if self.straight or self.d > 1:
+            return
+        assert self.path is not None
+        assert self.place is not None
+        nodes = self.nodes[0].v[:count]
+        reach = (self.path - self.path[0]) @ moving_joints(self.directions, self.n_q).T
+        at = [int(np.flatnonzero(self.place == v)[0]) for v in nodes]
+        c = np.linalg.solve(newton_basis(nodes, nodes), reach[at])
+        missed = np.abs(newton_basis(nodes, self.place) @ c - reach).max() / np.abs(reach).max()
+        if missed > MOST_MISSED:
+            raise AccuracyError(
+                f"{len(nodes)} solves do not follow the path: between them it is missed by "
+                f"{missed:.0%} of its reach; give more"
+            )
 
 
 def build_region(
     directions: Floats,
     n_q: int,
-    q: Stretch | Box,
+    q: Floats | Box,
     y: ArrayLike | Box,
-    count: int | None = None,
-    rests: bool = False,
+    rests: bool,
 ) -> Region:
-    """The region of q, a stretch of a trajectory, one pose or a box, and of y, a design or a box.
+    """The region of q, a stretch of a trajectory or a box, and of y, a design or a box.
 
-    ``directions`` (n_w, n_x) are the combinations of x on which anything depends. A single axis has
-    the best ``count`` nodes where that is given. Raises UsageError for wrong lengths, and where
-    nothing that matters varies, unless the stretch may be one that ``rests`` while others move.
+    ``directions`` (n_w, n_x) are the combinations of x on which anything depends. Raises UsageError
+    for wrong lengths, and where nothing that matters varies, unless the stretch may be one that
+    ``rests`` while others move.
     """
-    n_y = directions.shape[1] - n_q
-    path = None if isinstance(q, Box) else q.q
-    axes: list[Axis] = []
-    rows: list[Floats] = []
-    if path is not None and not isinstance(y, Box):
-        centre = np.concatenate([path[0], _numbers(y, n_y, "y")])
-    else:
-        both = [_ends(q if isinstance(q, Box) else q.q[0], n_q, "q"), _ends(y, n_y, "y")]
-        low, high = np.hstack(both)
-        centre = 0.5 * (low + high)
-        rows, axes = _box_axes(directions, low, high, n_q, count if path is None else None)
-    line = None if isinstance(q, Box) else q.line(None if axes else count)
-    if line is not None:
-        axes, rows = [line.axis, *axes], [line.row, *rows]
-    if not axes and rests and not isinstance(q, Box):
-        line = q.rest()
-        axes, rows = [line.axis], [line.row]
+    path = None if isinstance(q, Box) else q
+    ends = [
+        _ends(q if path is None else path[0], n_q, "q"),
+        _ends(y, directions.shape[1] - n_q, "y"),
+    ]
+    low, high = np.hstack(ends)
+    rows, steps = _box_axes(directions, low, high, n_q)
+    line = None if path is None else _travelled(path, moving_joints(directions, n_q))
+    nodes = interval_nodes(MOST_NODES)
+    axes = [
+        Axis(nodes, nodes.points[:, None] * step, row)
+        for row, step in zip(rows, steps, strict=True)
+    ]
+    place = None
+    if line is not None and path is not None:
+        place, row = line
+        axes.insert(0, _line_axis(path, place, row, len(low)))
+    elif not axes and rests and path is not None:  # a single node
+        zero, place = np.zeros((1, len(low))), np.zeros(len(path))
+        axes = [Axis(sample_nodes(np.zeros(1), 1), zero, zero[0])]
     if not axes:
         raise UsageError("nothing to fit: no coordinate or parameter that matters has room")
-    if len(axes) > MOST_AXES:
-        raise UsageError(f"a fit has at most {MOST_AXES} axes, not {len(axes)}: fix some of them")
-    return Region(tuple(axes), centre, tuple(rows), path, line, directions, n_q)
+    return Region(tuple(axes), 0.5 * (low + high), path, place, directions, n_q)
+
+
+def _ends(value: ArrayLike | Box, n: int, name: str) -> Floats:
+    """Lower and upper ends (2, n)."""
+    ends = (value.lower, value.upper) if isinstance(value, Box) else (value, value)
+    try:
+        numbers = np.array([np.asarray(end, dtype=np.float64).reshape(-1) for end in ends])
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"{name} must be {n} real numbers") from error
+    if numbers.shape[1] != n or not np.isfinite(numbers).all():
+        raise UsageError(f"{name} has {numbers.shape[1]} values, or not finite ones; expected {n}")
+    return numbers
 
 
 def _box_axes(
-    directions: Floats, low: Floats, high: Floats, n_q: int, count: int | None
-) -> tuple[list[Floats], list[Axis]]:
-    """Rows dv/dx and axes of the box: of x, or of fewer combinations of q that matter."""
+    directions: Floats, low: Floats, high: Floats, n_q: int
+) -> tuple[list[Floats], list[Floats]]:
+    """dv/dx and half-widths (n_x,) of the axes: of x, or of fewer combinations of q that matter."""
     half = 0.5 * (high - low)
     free = np.flatnonzero((half > 0.0) & (directions != 0.0).any(axis=0))
     joints = free[free < n_q]
@@ -237,43 +234,36 @@ def _box_axes(
             rows.append(np.append(row[:n_q], np.zeros(len(half) - n_q)) / reach)
             steps.append(shift * reach)
         free = free[free >= n_q]
-    for k in free:
-        unit = np.eye(len(half))[k]
-        rows.append(unit / half[k])
-        steps.append(unit * half[k])
-    points = chosen_nodes(count) if count and len(rows) == 1 else interval_nodes(MOST_NODES)
-    return rows, [Axis(points, points.points[:, None] * step) for step in steps]
+    for unit, width in zip(np.eye(len(half))[free], half[free], strict=True):
+        rows.append(unit / width)
+        steps.append(unit * width)
+    return rows, steps
 
 
-def _ends(value: ArrayLike | Box, n: int, name: str) -> Floats:
-    """Lower and upper ends (2, n)."""
-    ends = (value.lower, value.upper) if isinstance(value, Box) else (value, value)
-    return np.array([_numbers(end, n, name) for end in ends])
+def _travelled(q: Floats, joints: Floats) -> tuple[Floats, Floats] | None:
+    """v_0 (n_t,) of samples in [−1, 1] and dv_0/dq, zero on a curved path; None if they rest."""
+    reach = (q - q[0]) @ joints.T
+    if np.abs(reach).max(initial=0.0) <= STILL:
+        return None
+    along, far, straight = along_chord(reach)
+    if not straight:
+        steps = np.linalg.norm(np.diff(reach, axis=0), axis=1)
+        along = np.concatenate([[0.0], np.cumsum(steps)])
+    low, width = along.min(), np.ptp(along)
+    row = 2.0 / width * (far / (far @ far)) @ joints if straight else np.zeros(q.shape[1])
+    return 2.0 * (along - low) / width - 1.0, row
 
 
-def _numbers(value: ArrayLike, n: int, name: str) -> Floats:
-    """Numbers (n,); UsageError for others."""
-    try:
-        numbers = np.asarray(value, dtype=np.float64).reshape(-1)
-    except (TypeError, ValueError) as error:
-        raise UsageError(f"{name} must be {n} real numbers") from error
-    if len(numbers) != n or not np.isfinite(numbers).all():
-        raise UsageError(f"{name} has {len(numbers)} values, or not finite ones; expected {n}")
-    return numbers
-
-
-def _designs(y: ArrayLike, n_y: int) -> Floats:
-    """(n_designs, n_y); those outside, or not finite, are no place of the region."""
-    if isinstance(y, np.ndarray) and y.dtype == np.float64 and y.ndim == 2 and y.shape[1] == n_y:
-        return y
-    return samples([], y, 0, n_y)
-
-
-def require_path_followed(regions: Sequence[Region]) -> None:
-    """Raise AccuracyError where nodes that were given do not even show the path."""
-    for region in regions:
-        if region.d == 1 and region.line is not None and region.line.missed > MOST_MISSED:
-            raise AccuracyError(
-                f"{len(region.axes[0].nodes)} solves do not follow the path: between them it is "
-                f"missed by {region.line.missed:.0%} of its reach; give more"
-            )
+def _line_axis(q: Floats, place: Floats, row: Floats, n_x: int) -> Axis:
+    """The axis of a path: of a straight one the whole interval, of another some of its samples."""
+    if row.any():
+        nodes = interval_nodes(MOST_NODES)
+        far = int(np.abs(place - place[0]).argmax())
+        back = (q[far] - q[0]) / (place[far] - place[0])
+        steps = np.outer(nodes.points - place[0], back)
+    else:
+        distinct, first = np.unique(place, return_index=True)
+        nodes = sample_nodes(distinct, MOST_NODES)
+        steps = q[first[np.searchsorted(distinct, nodes.points)]] - q[0]
+    missing = n_x - q.shape[1]
+    return Axis(nodes, np.pad(steps, ((0, 0), (0, missing))), np.pad(row, (0, missing)))

@@ -7,7 +7,7 @@ import pytest
 
 import eigassign as ea
 from eigassign.errors import AccuracyError, UsageError
-from eigassign.modal import Model, stretches
+from eigassign.modal import Model
 
 BOX = ea.Box([0.0, 0.0], [0.25, 0.25])
 Y0 = [0.125, 0.125]
@@ -40,7 +40,7 @@ def test_at_as_many_solves_it_is_better_than_plain_chebyshev_interpolation(
 ) -> None:
     model, q = arm
     fit = ea.fit(model, q, Y0, solves=5)
-    place = fit.region.line.place
+    place = fit.region.place
     ends = q[[place.argmin(), place.argmax()]]
     share = 0.5 - 0.5 * np.cos(np.pi * np.arange(5) / 4.0)
     f = model.frequencies(ends[0] + np.outer(share, ends[1] - ends[0]), Y0, 1)[:, 0]
@@ -117,7 +117,7 @@ def test_a_path_with_corners_is_fitted_from_one_to_the_next(
     hz = model.frequencies(q, y, 1)
     fit = ea.fit(model, q, y, accuracy=1e-6)  # in one piece 48 solves leave 1 %
     assert len(fit.parts) == 4
-    assert all(part.region.line.straight for part in fit.parts)
+    assert all(part.region.straight for part in fit.parts)
     assert np.abs(fit.along() / hz - 1.0).max() <= fit.error_estimate <= 1e-6
     assert fit.solves == sum(part.solves for part in fit.parts) <= 40
     back = np.arange(len(q))[::-1]
@@ -167,7 +167,7 @@ def test_a_corner_within_a_step_leaves_both_its_ends_on_their_lines() -> None:
         before = turn - np.outer(np.arange(8)[::-1] * 0.04 + gap, first)
         q = np.vstack([before, turn + np.outer(np.arange(8) * 0.04 + 0.04 - gap, second)])
         fit = ea.fit(model, q, [1.5e5, 8.0e4, 0.005], solves=8)
-        assert [part.region.line.straight for part in fit.parts] == [True, True]
+        assert [part.region.straight for part in fit.parts] == [True, True]
 
 
 def test_several_trajectories_have_a_polynomial_each() -> None:
@@ -181,24 +181,15 @@ def test_several_trajectories_have_a_polynomial_each() -> None:
         assert np.abs(fit.along() / hz - 1.0).max() <= fit.error_estimate <= 1e-5
 
 
-def test_a_smooth_curve_has_no_corners_and_a_rough_one_is_left_whole() -> None:
-    angle = np.linspace(0.0, 3.0, 30)
-    curve = np.column_stack([np.cos(angle), np.sin(angle)])
-    assert len(stretches(curve, np.eye(2), 2).parts) == 1
-    rough = np.random.default_rng(0).uniform(size=(60, 2))
-    assert len(stretches(rough, np.eye(2), 2).parts) == 1
-    there_and_back = np.outer([0.0, 1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0, 0.0], [1.0, 2.0])
-    assert len(stretches(there_and_back, np.array([[1.0, 1.0]]), 2).parts) == 1
-
-
 def test_solves_that_do_not_follow_the_path_are_refused_whatever_they_show() -> None:
     case = ea.load_case("cases/arm_3r.yaml")
     t = 2.0 * np.pi * np.linspace(0.0, 1.0, 201)
     ring = case.trajectory.q[0] + 0.3 * np.stack([0.0 * t, np.cos(t), np.sin(t)], axis=1)
     with pytest.raises(AccuracyError, match="4 solves do not follow the path"):
         ea.fit(case.model(), ring, case.initial_design, solves=4)
-    with pytest.raises(AccuracyError, match="leave an estimated error"):  # followed, but no more
-        ea.fit(case.model(), ring, case.initial_design, solves=13)
+    fit = ea.fit(case.model(), ring, case.initial_design, solves=13)  # followed, but no more
+    hz = case.model().frequencies(ring, case.initial_design, 1)
+    assert 0.01 < np.abs(fit.along() / hz - 1.0).max() <= fit.error_estimate
 
 
 @pytest.mark.parametrize("solves", [128, 400, 2000])
