@@ -1,4 +1,4 @@
-"""The cases that are charted: two arms, and scenes of 10⁴ and 5 · 10⁴ degrees of freedom."""
+"""Cases of some size: a spatial arm, and a scene of 10⁴ degrees of freedom."""
 
 from __future__ import annotations
 
@@ -8,11 +8,6 @@ import arms
 import numpy as np
 import yaml
 from common import CASES
-
-
-def paper() -> str:
-    """The shipped case."""
-    return (CASES / "two_link.yaml").read_text(encoding="utf-8")
 
 
 def six() -> str:
@@ -26,11 +21,6 @@ def large(branches: int = 33) -> str:
     data["design"] = {name: part for name, part in data["design"].items() if name in ("m1", "m3")}
     start = np.array([0.0, 0.7, -0.8, 0.5])
     return _with_motion(data, start, start + np.array([0.3, 0.3, -0.3, 0.3]), 21, 1)
-
-
-def larger() -> str:
-    """The same with 5 · 10⁴."""
-    return large(166)
 
 
 def _with_motion(

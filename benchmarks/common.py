@@ -66,11 +66,11 @@ def children_s() -> float:
 
 def report(name: str, title: str, rows: Sequence[Row], remarks: Sequence[str] = ()) -> None:
     """Print a table and keep it as ``results/<name>.md`` and ``.json``."""
-    lines = [f"# {title}", "", *_table(rows), "", *(f"- {r}" for r in remarks), f"- {_machine()}"]
+    lines = [f"# {title}", "", *_table(rows), "", *(f"- {r}" for r in remarks), f"- {machine()}"]
     print("\n".join(lines))
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / f"{name}.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    data = {"title": title, "rows": list(rows), "remarks": list(remarks), "machine": _machine()}
+    data = {"title": title, "rows": list(rows), "remarks": list(remarks), "machine": machine()}
     (RESULTS / f"{name}.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
 
 
@@ -88,7 +88,8 @@ def _text(value: object) -> str:
     return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
-def _machine() -> str:
+def machine() -> str:
+    """The version and commit that are measured, and what they run on."""
     import numpy
     import scipy
 

@@ -16,12 +16,8 @@ from collections.abc import Callable
 import numpy as np
 
 import eigassign as ea
-from eigassign.chart.comparison import exact_frequencies
-from eigassign.chart.methods import reduced_methods, series_methods
-from eigassign.chart.question import build_features, build_points
-from eigassign.chart.surrogates import spread_points
-from eigassign.pipeline.run import prepare
-from eigassign.pipeline.stages import Stages
+from eigassign.chart import Effort, build_features, build_question, spread_points
+from eigassign.pipeline import Stages, prepare
 
 Fit = Callable[[], Callable[[np.ndarray], np.ndarray]]
 COUNTS = (27, 64, 125, 343)
@@ -50,35 +46,36 @@ def sklearn_process(u: np.ndarray, f: np.ndarray) -> Callable[[np.ndarray], np.n
 def main() -> None:
     warnings.simplefilter("ignore")
     scene = prepare(ea.load_case(common.CASES / "two_link.yaml"), Stages(lambda line: None), None)
-    features = build_features(scene)
-    points = build_points(scene, features, 600, 5, 152)
-    exact = exact_frequencies(scene, points.x)[:, 0]
-    many = points.repeated(3)
-    solve = common.once(lambda: exact_frequencies(scene, points.x)) / len(exact)
+    features, model = build_features(scene), scene.model
+    points = build_question(scene, features, Effort(designs=5), 0.0).points
+    exact = model.frequencies(points.q, points.y, 1)[:, 0]
+    many = points[np.tile(np.arange(len(exact)), 3)]
+    solve = common.once(lambda: model.frequencies(points.q, points.y, 1)) / len(exact)
     peers = {"SMT": smt_kriging, "scikit-learn": sklearn_process}
     rows = []
     for count in COUNTS:
-        u = spread_points(count, features.d)
-        f = exact_frequencies(scene, features.x(u))[:, 0]
+        at = features.nearest(spread_points(count, len(features.names)))
+        f = model.frequencies(at.q, at.y, 1)[:, 0]
         for name, fit in peers.items():
-            made = fit(u, f)
-            fitting = common.once(lambda fit=fit, u=u, f=f: fit(u, f))
-            online = common.medians({"": lambda made=made: made(many.u)}, 3)[""] / len(many.u)
+            made = fit(at.u, f)
+            fitting = common.once(lambda fit=fit, u=at.u, f=f: fit(u, f))
+            online = common.medians({"": lambda made=made: made(many.u)}, 3)[""] / len(many)
             off = np.abs(made(points.u) - exact)
             rows.append(_row(name, count, count * solve, fitting, online, off))
-    series = [m for m in series_methods(scene, [4, 8], []) if m.family == "1/λ, full"]
-    for method in (*series, *reduced_methods(scene, [2], [1])):
-        made = method.build(np.zeros((0, 1)))
-        jobs = {
-            "fit": lambda m=method: m.build(np.zeros((0, 1))),
-            "run": lambda made=made: made(many),
-        }
+    q0, y0 = scene.expansions.full.q0, scene.expansions.full.y0
+    ours = {
+        "1/λ 4 full": lambda: ea.expand(model, q0, y0, order=4).inverse,
+        "1/λ 8 full": lambda: ea.expand(model, q0, y0, order=8).inverse,
+        "reduced m = 2, 1 point": lambda: ea.reduce(model, q0, y0, half_order=2),
+    }
+    for name, build in ours.items():
+        made = build()
+        jobs = {"fit": build, "run": lambda made=made: made.frequencies(many.q, many.y)}
         spent = common.medians(jobs, 5)
-        off = np.abs(made(points)[:, 0] - exact)
-        online = spent["run"] / len(many.u)
-        rows.append(
-            _row(f"eigassign: {method.name}", method.solves, 0.0, spent["fit"], online, off)
-        )
+        off = np.abs(made.frequencies(points.q, points.y)[:, 0] - exact)
+        solves = 3 if name.startswith("reduced") else 1
+        online = spent["run"] / len(many)
+        rows.append(_row(f"eigassign: {name}", solves, 0.0, spent["fit"], online, off))
     import sklearn
     import smt
 

@@ -1,437 +1,204 @@
 """Every method put the same question: built, evaluated, timed, and compared.
 
 All methods run once, which gives their answers and warms caches; then they are timed in turns.
-Evaluations are timed in large batches of whole runs along the trajectory, as a search over designs
-asks for them.
+Evaluations are timed in large batches, as a search over designs asks for them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
-from math import comb
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
-from eigassign.chart import methods, rivals
-from eigassign.chart.effort import Effort, suited
-from eigassign.chart.front import (
-    advise_accuracy,
-    advise_budget,
-    beside_auto,
-    break_even,
-    front,
-    front_notes,
-)
-from eigassign.chart.methods import AutoOrder, Evaluator, Method
+from eigassign._version import __version__
+from eigassign.chart.advice import advise, front, front_notes
+from eigassign.chart.methods import Method, list_methods, most_solves
 from eigassign.chart.question import (
     SEED,
-    EvaluationPoints,
-    Features,
+    Points,
+    Question,
     build_features,
-    build_points,
+    build_question,
+    exact_frequencies,
 )
-from eigassign.chart.results import NO_TIME, Advice, Asked, ChartPoint, Errors, Front, Timing
-from eigassign.chart.surrogates import has_kriging
-from eigassign.chart.timing import Patience, take_turns, timed
+from eigassign.chart.results import Asked, Chart, ChartPoint, Errors, Request, Timing
+from eigassign.chart.surrogates import surrogate_families
+from eigassign.chart.timing import Effort, Job, machine, take_turns, time_in_words, timed
 from eigassign.errors import EigassignError
-from eigassign.modal.model import Model
+from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
-ACCURACIES = (1e-2, 1e-4, 1e-6, 1e-8)
-FEWEST = 3  # designs along the trajectory, however long a solve takes: two, and a corner of the box
-MANY = 1000.0  # trajectories of the second front: a search over designs
-BATCH = 32768  # evaluations in one call, where methods are timed
-LONG_BATCH_S = 0.02  # no batch that would take longer is timed, but few of the question's own runs
-TIMED = 3  # runs along the trajectory on which slow methods are timed
-
-
-@dataclass(frozen=True)
-class Request:
-    """What advice is asked for."""
-
-    accuracy: float | None = None  # worst relative error in Hz; `ACCURACIES` if None
-    budget_s: float | None = None  # advice for this time, too
-    evaluations: float | None = None  # one trajectory, and `MANY` of them, if None
-
-    @property
-    def accuracies(self) -> tuple[float, ...]:
-        """Those for which advice is given."""
-        return ACCURACIES if self.accuracy is None else (self.accuracy,)
-
-
-@dataclass(frozen=True)
-class MethodComparison:
-    """All methods on one case."""
-
-    asked: Asked
-    points: tuple[ChartPoint, ...]
-    skipped: tuple[tuple[str, str], ...]
-    fronts: tuple[Front, ...]
-    advice: tuple[Advice, ...]
-    notes: tuple[str, ...]
+NOTHING = Timing(0.0, 0.0, 0.0, 0)
 
 
 def compare_methods(
     scene: Scene, effort: Effort, request: Request, progress: Callable[[str], None]
-) -> MethodComparison:
-    """Time against error of every method. Raises CaseError where nothing varies."""
-    features, effort = build_features(scene), suited(effort, scene.model.n_dof)
-    solve_s = _solve_cost(scene)
-    progress("asking what auto takes")
-    autos, unasked = methods.auto_orders(scene, request.accuracies, effort.choosing_s)
-    points = affordable_points(scene, features, effort, solve_s)
-    progress(f"solving {len(points.x)} points exactly")
-    exact_hz = exact_frequencies(scene, points.x)
-    bench = Bench(scene, points, exact_hz, effort.patience, points.whole_runs(features))
-    floor_hz = _round_off(bench)
-    listed = _methods(scene, features, points, effort, solve_s, autos)
-    charted, skipped = chart_methods(bench, listed, floor_hz, progress)
+) -> Chart:
+    """Time against error of every method; no meshes and designs yet.
+
+    Raises CaseError where the case has no trajectory, or nothing that changes a frequency.
+    """
+    features, model, modes = build_features(scene), scene.model, scene.expansions.modes
+    solve_s, samples = _solve_cost(scene), len(features.q)
+    question = build_question(scene, features, effort, solve_s)
+    points = question.points
+    progress(f"solving {len(points)} points exactly")
+    exact_hz = exact_frequencies(scene, points)
+    ends = (np.concatenate([points.q[k], points.y[k]]) for k in (0, -1))
+    floor = max(rounding_error(model.pencil, x, max(modes)) for x in ends)
     asked = Asked(
-        modes=scene.expansions.modes,
-        n_dof=scene.model.n_dof,
+        modes=modes,
+        n_dof=model.n_dof,
         features=features.names,
-        random_points=points.n_random,
-        designs=points.designs,
-        samples_per_design=len(points.along),
-        trajectory_samples=len(scene.path.q),
-        evaluations=request.evaluations or float(len(scene.path.q)),
+        random_points=question.n_random,
+        designs=len(question.runs),
+        samples_per_design=len(points[question.runs[0]]),
+        trajectory_samples=samples,
+        evaluations=request.evaluations or float(samples),
         seed=SEED,
         typical_hz=float(np.median(exact_hz)),
-        floor_hz=floor_hz,
+        floor_hz=floor * float(exact_hz.max()),
     )
-    fronts = _fronts(charted, asked, request)
-    given = _advice(charted, asked, request)
-    advice = tuple(beside_auto(each, charted, autos) for each in given)
-    left_out = _left_out(scene, features, effort, solve_s)
-    notes = (*unasked, *left_out, *front_notes(charted, fronts))
-    return MethodComparison(asked, charted, skipped, fronts, advice, notes)
-
-
-def _fronts(charted: Sequence[ChartPoint], asked: Asked, request: Request) -> tuple[Front, ...]:
-    once = float(asked.trajectory_samples)
-    counts: dict[str, float | None] = {
-        "one trajectory": once,
-        f"{MANY:.0f} trajectories": MANY * once,
-    }
-    if request.evaluations is not None:
+    listed = list_methods(scene, features, effort, request.accuracies, solve_s)
+    charted, skipped = chart_methods(listed, question, exact_hz, asked, effort, progress)
+    counts = {"one trajectory": float(samples), "1000 trajectories": 1000.0 * samples}
+    wanted = [request.evaluations] if request.evaluations else list(counts.values())
+    if request.evaluations:
         counts[f"{request.evaluations:g} evaluations"] = request.evaluations
-    counts["online alone"] = None
-    return tuple(front(charted, name, n, asked.floor_hz) for name, n in counts.items())
-
-
-def _advice(charted: Sequence[ChartPoint], asked: Asked, request: Request) -> Iterator[Advice]:
-    floor, once = asked.floor_hz / asked.typical_hz, float(asked.trajectory_samples)
-    for n in (once, MANY * once) if request.evaluations is None else (request.evaluations,):
-        yield from (advise_accuracy(charted, a, n, floor) for a in request.accuracies)
-        if request.budget_s is not None:
-            yield advise_budget(charted, request.budget_s, n)
-
-
-# --- What can be afforded: points, methods
-
-
-def exact_frequencies(scene: Scene, x: Floats) -> Floats:
-    """The charted modes at x (n, n_x) by eigassign's own exact solve, (n, n_modes) in Hz."""
-    model, modes = scene.model, scene.expansions.modes
-    if not len(x):
-        return np.zeros((0, len(modes)))
-    n_q = len(model.q_names)
-    hz = model.frequencies(x[:, :n_q], x[:, n_q:], max(modes))
-    return np.asarray(hz[:, np.array(modes) - 1])
-
-
-def spread_rows(n: int, count: int) -> NDArray[np.intp]:
-    """At most ``count`` of n rows, evenly spread."""
-    return np.unique(np.linspace(0, n - 1, min(n, count)).astype(np.intp))
+    named = {**counts, "online alone": None}.items()
+    fronts = tuple(front(charted, name, n, asked.floor_hz) for name, n in named)
+    notes = [*front_notes(charted, fronts), *skipped_notes(skipped)]
+    most, d = most_solves(effort, solve_s), len(features.names)
+    if most < max([*effort.training, *(k**d for k in effort.nodes)]):
+        notes.append(f"no grid or surrogate is trained on over {most} exact solves")
+    if "Kriging" not in [family for family, *_ in surrogate_families()]:
+        notes.append("no Kriging: it is charted where scikit-learn is installed")
+    return Chart(
+        title=scene.file.title,
+        case_name=scene.file.path.stem,
+        case_sha256=scene.file.sha256,
+        reference=scene.file.reference,
+        version=__version__,
+        quick=effort.quick,
+        machine=machine(),
+        asked=asked,
+        points=charted,
+        skipped=tuple(skipped.items()),
+        fronts=fronts,
+        advice=tuple(advise(charted, asked, request, wanted, skipped)),
+        notes=tuple(notes),
+        warnings=scene.warnings,
+    )
 
 
 def _solve_cost(scene: Scene) -> float:
     """Seconds of one exact solve, roughly: to decide how many can be afforded."""
-    few = 1 if scene.model.n_dof > 1000 else 16
-    x = scene.model.x(scene.path.q[spread_rows(len(scene.path.q), few)], scene.initial)
-    exact_frequencies(scene, x[:1])
-    return max(timed(lambda: exact_frequencies(scene, x))[1] / len(x), 1e-6)
+    q = scene.path.q[: 1 if scene.model.n_dof > 1000 else 16]
+    some = Points(q, np.tile(scene.initial, (len(q), 1)), q)
+    exact_frequencies(scene, some[:1])
+    return max(timed(lambda: exact_frequencies(scene, some))[1] / len(q), 1e-6)
 
 
-def affordable_points(
-    scene: Scene, features: Features, effort: Effort, solve_s: float
-) -> EvaluationPoints:
-    """The points of the question, fewer where an exact solve takes long (``solve_s``)."""
-    along = effort.designs * effort.samples_per_design
-    share = min(1.0, effort.reference_s / ((effort.random_points + along) * solve_s))
-    designs = max(min(FEWEST, effort.designs), round(effort.designs * share))
-    n_random, per_design = int(effort.random_points * share), int(along * share / designs)
-    return build_points(scene, features, max(4, n_random), designs, max(4, per_design))
-
-
-def _methods(
-    scene: Scene,
-    features: Features,
-    points: EvaluationPoints,
-    effort: Effort,
-    solve_s: float,
-    autos: Sequence[AutoOrder],
-) -> Iterator[Method]:
-    model, modes = scene.model, scene.expansions.modes
-    most = _most_solves(effort, solve_s)
-    few = max(1, min(len(points.x), int(0.2 * effort.reference_s / solve_s), effort.one_by_one))
-    yield from methods.exact_methods(model, modes, few)
-    if model.n_dof <= effort.most_dense:
-        most_points = max(1, min(40, int(4e9 / model.n_dof**3)))
-        yield rivals.dense_by_scipy(model, modes, most_points)
-    n = int(model.pencil.active.sum())
-    wanted = {*effort.orders, scene.expansions.order}
-    orders = sorted(p for p in wanted if comb(n + p, p) <= effort.coefficients)
-    of_auto = {each.plain_order for each in autos if each.plain_order is not None}
-    yield from methods.series_methods(scene, orders, sorted({*orders, *of_auto}))
-    yield from methods.piecewise_methods(scene, orders[1:], effort.expansion_points[1:])
-    yield from methods.auto_methods(scene, autos)
-    yield from methods.reduced_methods(scene, effort.half_orders, effort.expansion_points)
-    reduced = [each for each in effort.fitted if each[1] <= max(effort.expansion_points)]
-    yield from methods.fit_methods(scene, features, points, effort.accuracies, reduced, most)
-    stations = [k for k in effort.stations if k * points.designs <= most]
-    yield from rivals.station_methods(features, stations, len(model.q_names))
-    yield from rivals.grid_methods(features, [k for k in effort.nodes if k**features.d <= most])
-    yield from rivals.surrogate_methods(
-        features, [k for k in effort.training if k <= most] or [most]
-    )
-
-
-def _most_solves(effort: Effort, solve_s: float) -> int:
-    """Exact solves that the training of one method may take."""
-    return max(4, int(effort.training_s / solve_s))
-
-
-def _left_out(scene: Scene, features: Features, effort: Effort, solve_s: float) -> Iterator[str]:
-    """What was left out because it would take too long, or is not there."""
-    most, d = _most_solves(effort, solve_s), features.d
-    dropped = [k for k in effort.nodes if k**d > most]
-    if dropped:
-        yield (
-            f"grids of {', '.join(map(str, dropped))} nodes an axis in {d} dimensions are left "
-            f"out: over {most} exact solves"
-        )
-    if any(n > most for n in effort.training):
-        yield f"no surrogate is trained on over {most} exact solves: {effort.training_s:g} s"
-    if scene.model.n_dof > effort.most_dense:
-        yield f"no dense solve one by one: {scene.model.n_dof} degrees of freedom"
-    if not has_kriging():
-        yield "no Kriging: it is charted where scikit-learn is installed"
-
-
-# --- The question with its exact answers, and what round-off does to them
-
-
-@dataclass(frozen=True, eq=False)
-class Bench:
-    """The question with its exact answers (n, n_modes) in Hz."""
-
-    scene: Scene
-    points: EvaluationPoints
-    exact_hz: Floats
-    patience: Patience
-    whole: EvaluationPoints  # the designs of the runs at every sample: for times only
-
-
-def _round_off(bench: Bench) -> float:
-    """What rounding does to the exact answers, in Hz: no error below it means anything.
-
-    The larger of two: how far two exact solvers disagree on a few of the points, and what it does
-    there to change every entry of the K_j and M_j by one unit in its last place.
-    """
-    model, modes = bench.scene.model, bench.scene.expansions.modes
-    small = model.pencil.is_dense
-    few = spread_rows(len(bench.points.x), 40 if small else 2)
-    x, exact, wanted = bench.points.x[few], bench.exact_hz[few], np.array(modes) - 1
-    others = [exact_frequencies(replace(bench.scene, model=_rounded(model)), x)]
-    if small:
-        others.append(methods.sparse_frequencies(model, x, max(modes))[:, wanted])
-    elif model.n_dof <= rivals.MOST_DENSE:
-        others.append(rivals.scipy_frequencies(model, x, max(modes))[:, wanted])
-    off = [float(np.abs(other - exact).max()) for other in others]
-    return float(max(*off, np.finfo(float).eps * bench.exact_hz.max()))
-
-
-def _rounded(model: Model) -> Model:
-    """The model with its numbers changed in the last place, up or down at random."""
-    random, eps = np.random.default_rng(SEED), np.finfo(float).eps
-
-    def changed(weights: sparse.csr_array) -> sparse.csr_array:
-        signs = random.choice(np.array([-1.0, 1.0]), len(weights.data))
-        data = weights.data * (1.0 + eps * signs)
-        return sparse.csr_array((data, weights.indices, weights.indptr), shape=weights.shape)
-
-    pencil = model.pencil
-    rounded = replace(pencil, stiffness=changed(pencil.stiffness), mass=changed(pencil.mass))
-    return replace(model, pencil=rounded)
-
-
-# --- Each method run once, then timed in turns with all others
-
-_Job = tuple[Callable[[], object], float]  # what is timed, and the seconds it took the first time
-
-
-@dataclass(frozen=True)
-class _FirstRun:
-    """A method that has run once: what it answered, and the jobs to time."""
-
-    method: Method
-    trained: int  # exact solves of its training, and of fits
-    hz: Floats
-    points: EvaluationPoints
-    set_up: _Job  # of one design where that is done for each
-    evaluate: _Job
-    evaluations: int  # in one call of the last job
-    estimate: float | None  # of its error by the method itself, relative in Hz
+def skipped_notes(skipped: Mapping[str, str]) -> Iterator[str]:
+    """Each reason once, with the methods that it kept from an answer."""
+    for why in dict.fromkeys(skipped.values()):
+        names = [name for name, own in skipped.items() if own == why]
+        yield f"{', '.join(names)} {'has' if len(names) == 1 else 'have'} no answer: {why}"
 
 
 def chart_methods(
-    bench: Bench, listed: Iterable[Method], floor_hz: float, progress: Callable[[str], None]
-) -> tuple[tuple[ChartPoint, ...], tuple[tuple[str, str], ...]]:
-    """A point for every method, and (method, why) for those that cannot answer.
+    listed: Iterable[Method],
+    question: Question,
+    exact_hz: Floats,
+    asked: Asked,
+    effort: Effort,
+    progress: Callable[[str], None],
+) -> tuple[tuple[ChartPoint, ...], dict[str, str]]:
+    """A point for every method; of those that cannot answer, why.
 
-    The error of an exact method is at least what round-off does to exact answers (``floor_hz``).
+    After a set-up that takes over ``effort.most_s`` no other of its family is made.
     """
-    first_runs, skipped, families = [], [], set[str]()
-    known: dict[bytes, tuple[Floats, float]] = {}
+    run: list[tuple[ChartPoint, list[Job], int]] = []
+    skipped, families = dict[str, str](), dict[str, str]()  # why no other is made, or nothing
     for method in listed:
         if method.family not in families:
-            families.add(method.family)
             progress(f"charting {method.family}")
         try:
-            first_runs.append(_run_first(bench, method, known))
+            if why := families.setdefault(method.family, ""):
+                raise EigassignError(why)
+            run.append(_run_once(method, question, exact_hz, asked))
         except EigassignError as error:
-            skipped.append((method.name, str(error)))
+            skipped[method.name] = str(error)
+        else:
+            if (spent := run[-1][1][0][1]) > effort.most_s:
+                families[method.family] = f"{method.name} took {time_in_words(spent)} to set up"
     progress("timing all methods in turns")
-    jobs = [job for each in first_runs for job in (each.set_up, each.evaluate)]
-    spent = take_turns(jobs, bench.patience)
-    pairs = [
-        (set_up, batch.times(1.0 / each.evaluations))
-        for each, set_up, batch in zip(first_runs, spent[::2], spent[1::2], strict=True)
+    timings = take_turns([job for _, jobs, _ in run for job in jobs], effort)
+    charted = []
+    for (point, _, n), set_up, batch in zip(run, timings[::2], timings[1::2], strict=True):
+        offline, online = set_up, batch.times(1.0 / n)
+        if point.at_once > 1:
+            online = online.plus(set_up.times(1.0 / point.at_once))
+        if point.solves_online:
+            offline = NOTHING
+        charted.append(replace(point, offline=offline, online=online))
+    exact_s = min(p.online.median_s for p in charted if p.family.startswith("exact"))
+    for k, p in enumerate(charted):  # from so many: offline + N online < N exact
+        gain = exact_s - p.online.median_s
+        if gain > 0.0 and not p.family.startswith("exact"):
+            charted[k] = replace(p, break_even=p.offline.median_s / gain)
+    return tuple(charted), skipped
+
+
+def _run_once(
+    method: Method, question: Question, exact_hz: Floats, asked: Asked
+) -> tuple[ChartPoint, list[Job], int]:
+    """The point without times; set-up and evaluation to be timed, and evaluations in one call."""
+    points, n, first, solver = question.points, question.n_random, 0, "exact" in method.family
+    parts = [points[: method.most]]
+    if method.per_design:
+        parts, first, n = [points[run] for run in question.runs], n, 0
+    made, building_s = timed(lambda: [method.build(part.y[0]) for part in parts])
+    pairs = list(zip(made, parts, strict=True))
+    hz, spent = timed(lambda: np.vstack([each.evaluate(part) for each, part in pairs]))
+    some = parts[0]
+    if not method.most:  # as many as take 20 ms at the pace of the first answers, 32768 at most
+        many = max(300, int(min(0.02 * len(hz) / (spent + 1e-9), 32768)))
+        some = some[np.resize(np.arange(len(some)), many)]
+    jobs: list[Job] = [
+        (lambda: method.build(parts[0].y[0]), building_s / len(parts)),
+        (lambda: made[0].evaluate(some), spent * len(some) / len(hz)),
     ]
-    exact_s = min(
-        online.median_s
-        for each, (_, online) in zip(first_runs, pairs, strict=True)
-        if each.method.exact
-    )
-    made = (
-        _point(bench, each, *pair, exact_s, floor_hz)
-        for each, pair in zip(first_runs, pairs, strict=True)
-    )
-    return tuple(made), tuple(skipped)
-
-
-def _run_first(bench: Bench, method: Method, known: dict[bytes, tuple[Floats, float]]) -> _FirstRun:
-    """Train, build and evaluate once; answers that are ``known`` are not solved for again."""
-    points = bench.points.runs() if method.per_design else bench.points
-    points = points.head(method.most or len(points.x))
-    x = bench.points.x[:0] if method.train is None else method.train(bench.points)
-    key = x.tobytes()
-    if key not in known:
-        known[key] = timed(lambda: exact_frequencies(bench.scene, x))
-    answers, solving = known[key]
-    evaluator, building = timed(lambda: method.build(answers))
-    hz = evaluator(points)
-    many, evaluating = timed_batch(bench, method, evaluator, points)
-    parts = bench.points.designs if method.per_design else 1
-    of_one = x[: len(x) // parts]
-    set_up = method.one or (lambda: method.build(exact_frequencies(bench.scene, of_one)))
-    return _FirstRun(
-        method,
-        trained=len(x) + getattr(evaluator, "solves", 0),
-        hz=hz,
-        points=points,
-        set_up=(set_up, (solving + building) / parts),
-        evaluate=(lambda: evaluator(many), evaluating),
-        evaluations=len(many.x),
-        estimate=getattr(evaluator, "estimate", None),
-    )
-
-
-def timed_batch(
-    bench: Bench,
-    method: Method,
-    evaluator: Evaluator,
-    points: EvaluationPoints,
-) -> tuple[EvaluationPoints, float]:
-    """What evaluations are timed on, and about the seconds that takes.
-
-    Whole runs along the trajectory, many at once: 4, 16 … times as many, then a whole batch, for a
-    short one tells what a call costs by itself. A slow method answers few, at those of their
-    samples that the question has.
-    """
-    if method.most or method.per_design:
-        many = points if method.most else bench.whole
-        return many, timed(partial(evaluator, many))[1]
-    many = points.runs(TIMED)
-    spent = timed(partial(evaluator, many))[1]
-    larger, copies = [], 4
-    while copies * len(many.x) < BATCH:
-        larger.append((many, copies))
-        copies *= 4
-    for runs, times in (*larger, (bench.whole, -(-BATCH // len(bench.whole.x)))):
-        if spent * len(runs.x) * times > LONG_BATCH_S * len(many.x):
-            break
-        many = runs.repeated(times)
-        spent = timed(partial(evaluator, many))[1]
-    return many, spent
-
-
-def _point(
-    bench: Bench,
-    first: _FirstRun,
-    set_up: Timing,
-    online: Timing,
-    exact_s: float,
-    floor_hz: float,
-) -> ChartPoint:
-    method, samples = first.method, len(bench.scene.path.q)
-    offline, solves, solves_online = set_up, method.solves + first.trained, 0.0
-    everywhere, random, along = _errors(bench, first.points, first.hz)
-    if method.exact:
-        offline, solves, solves_online = NO_TIME, 0, 1.0
-        everywhere = replace(everywhere, worst_hz=max(everywhere.worst_hz, floor_hz))
-    elif method.per_design:
-        online = online.plus(set_up.times(1.0 / samples))
-        offline, solves, solves_online = NO_TIME, 0, first.trained / len(bench.whole.x)
-    gain = break_even(offline.median_s, online.median_s, exact_s)
-    return ChartPoint(
+    exact, solves, online = exact_hz[first : first + len(hz)], sum(b.solves for b in made), 0.0
+    if solver or method.per_design:  # an error below round-off means nothing
+        online = 1.0 if solver else solves / (asked.trajectory_samples * len(parts))
+        solves = 0
+    everywhere = errors(hz, exact)
+    if solver:
+        everywhere = replace(everywhere, worst_hz=max(everywhere.worst_hz, asked.floor_hz))
+    note = "set up anew for every design: answers the runs along the trajectory only"
+    point = ChartPoint(
         method=method.name,
         family=method.family,
         ours=method.ours,
         parameters=method.parameters,
-        offline=offline,
-        online=online,
+        offline=NOTHING,
+        online=NOTHING,
         solves=solves,
-        solves_online=solves_online,
+        solves_online=online,
         everywhere=everywhere,
-        random=random,
-        trajectory=along,
-        break_even=None if method.exact else gain,
-        note=method.note,
+        random=errors(hz[:n], exact[:n]) if n else None,
+        trajectory=errors(hz[n:], exact[n:]) if len(hz) > n else None,
+        break_even=None,
+        note=note if method.per_design else "",
         use=method.use,
-        at_once=samples if method.per_design else 1,
-        estimate=first.estimate,
+        at_once=asked.trajectory_samples if method.per_design else 1,
+        estimate=max((b.estimate for b in made if b.estimate is not None), default=None),
     )
-
-
-def _errors(
-    bench: Bench, points: EvaluationPoints, hz: Floats
-) -> tuple[Errors, Errors | None, Errors | None]:
-    """Everywhere, at the random points, and along the trajectory."""
-    start = 0 if points.n_random else bench.points.n_random
-    exact = bench.exact_hz[start : start + len(hz)]
-    n = points.n_random
-    return (
-        errors(hz, exact),
-        errors(hz[:n], exact[:n]) if n else None,
-        errors(hz[n:], exact[n:]) if len(hz) > n else None,
-    )
+    return point, jobs, len(some)
 
 
 def errors(hz: Floats, exact: Floats) -> Errors:
@@ -439,10 +206,5 @@ def errors(hz: Floats, exact: Floats) -> Errors:
     off = np.abs(hz - exact)
     failed = ~np.isfinite(off)
     off = np.where(failed, np.inf, off)
-    return Errors(
-        float(off.max()),
-        float(np.sqrt(np.mean(np.square(off)))),
-        float((off / exact).max()),
-        len(hz),
-        int(failed.any(axis=1).sum()),
-    )
+    rms, relative = float(np.sqrt(np.mean(np.square(off)))), float((off / exact).max())
+    return Errors(float(off.max()), rms, relative, len(hz), int(failed.any(axis=1).sum()))

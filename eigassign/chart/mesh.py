@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -11,22 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
-from eigassign.chart.results import MeshRow, Timing
-from eigassign.chart.timing import Patience, measure
-from eigassign.modal.model import Model
+from eigassign.chart.results import MeshRow
+from eigassign.chart.timing import Effort, measure
 from eigassign.study.build import build_model
 
 Floats = NDArray[np.float64]
-RATE = 16.0  # a frequency's error falls so when cubic beam elements are halved: h⁴
-
-
-@dataclass(frozen=True)
-class Mesh:
-    """A case with ``factor`` times the elements in every link, ``elements`` in all."""
-
-    factor: float
-    elements: int
-    file: CaseFile
 
 
 def refined(file: CaseFile, factor: float) -> tuple[CaseFile, tuple[int, ...]]:
@@ -50,62 +39,41 @@ def refined(file: CaseFile, factor: float) -> tuple[CaseFile, tuple[int, ...]]:
     return replace(file, mechanism=mechanism), tuple(counts)
 
 
-def meshes(file: CaseFile, factors: Sequence[float]) -> Iterator[Mesh]:
-    """From coarse to fine, each mesh once; none where no link has elements."""
-    seen: set[tuple[int, ...]] = set()
-    for factor in sorted(factors):
-        finer, counts = refined(file, factor)
-        if counts and counts not in seen:
-            seen.add(counts)
-            yield Mesh(factor, sum(counts), finer)
-
-
 def chart_meshes(
-    listed: Sequence[Mesh],
+    file: CaseFile,
     x: Floats,
     modes: Sequence[int],
-    most_dof: int,
-    patience: Patience,
+    effort: Effort,
 ) -> tuple[MeshRow, ...]:
-    """One row for each mesh up to ``most_dof``, at the points x (n, n_x).
+    """One row for each mesh up to ``effort.most_dof``, from coarse to fine, at points x (n, n_x).
 
-    The limit is extrapolated from the two finest, f + (f − f_coarser)/15, for errors fall like h⁴;
-    the finest row's own error is therefore an estimate. Fewer than two meshes: no rows.
+    The limit is extrapolated from the two finest, f + (f − f_coarser)/15, for errors fall like h⁴
+    where cubic beam elements are halved; the finest row's own error is therefore an estimate. No
+    rows where fewer than two meshes differ.
     """
-    solved: list[tuple[Mesh, int, Floats, Timing]] = []
-    for mesh in listed:
-        model = build_model(mesh.file)
-        if model.n_dof > most_dof:
+    meshes = {
+        counts: (k, finer) for k in sorted(effort.factors) for finer, counts in [refined(file, k)]
+    }
+    rows, solved, columns = list[MeshRow](), list[Floats](), np.array(modes) - 1
+    for counts, (factor, finer) in meshes.items():
+        model = build_model(finer)
+        if not counts or model.n_dof > effort.most_dof:
             break
-        hz, spent = measure(partial(_frequencies, model, x, modes), patience)
-        solved.append((mesh, model.n_dof, hz, spent.times(1.0 / len(x))))
-    if len(solved) < 2:
+        q, y = np.split(x, [len(model.q_names)], axis=1)
+        hz, spent = measure(partial(model.frequencies, q, y, max(modes)), effort)
+        solved.append(hz[:, columns])
+        each = spent.times(1.0 / len(x))
+        rows.append(MeshRow(factor, sum(counts), model.n_dof, 0.0, 0.0, None, each))
+    if len(rows) < 2:
         return ()
-    finest, coarser = solved[-1][2], solved[-2][2]
-    limit = finest + (finest - coarser) / (RATE - 1.0)
-    worst = [float(np.abs(hz - limit).max()) for _, _, hz, _ in solved]
-    factors = [mesh.factor for mesh, *_ in solved]
-    return tuple(
-        MeshRow(
-            mesh.factor,
-            mesh.elements,
-            n_dof,
-            worst[k],
-            float(np.abs(hz / limit - 1.0).max()),
-            _order(factors[k : k + 2], worst[k : k + 2]) if k + 2 < len(solved) else None,
-            spent,
+    limit = solved[-1] + (solved[-1] - solved[-2]) / 15.0
+    for k, hz in enumerate(solved):
+        worst = float(np.abs(hz - limit).max())
+        rows[k] = replace(
+            rows[k], worst_hz=worst, worst_relative=float(np.abs(hz / limit - 1.0).max())
         )
-        for k, (mesh, n_dof, hz, spent) in enumerate(solved)
-    )
-
-
-def _frequencies(model: Model, x: Floats, modes: Sequence[int]) -> Floats:
-    n_q = len(model.q_names)
-    return model.frequencies(x[:, :n_q], x[:, n_q:], max(modes))[:, np.array(modes) - 1]
-
-
-def _order(factors: Sequence[float], worst: Sequence[float]) -> float | None:
-    """log(error ratio)/log(mesh ratio) of two meshes; None where one has no error."""
-    if min(worst) <= 0.0:
-        return None
-    return float(np.log(worst[0] / worst[1]) / np.log(factors[1] / factors[0]))
+        if 0 < k < len(rows) - 1 and 0.0 < worst < np.inf and rows[k - 1].worst_hz > 0.0:
+            ratio = np.log(rows[k].factor / rows[k - 1].factor)
+            order = float(np.log(rows[k - 1].worst_hz / worst) / ratio)
+            rows[k - 1] = replace(rows[k - 1], order=order)
+    return tuple(rows)

@@ -1,22 +1,20 @@
 """The question put to every method: frequencies along the trajectory, over the box of designs.
 
-The points are of two kinds: random samples of trajectory × design box, and the trajectory at
-several designs. Surrogates and grids are functions of a few *features* u in [0, 1]: the place along
-the trajectory, and each design parameter that may change. The place is the joint coordinate itself
-where only one matters to any frequency, else the distance travelled in joint coordinates. Either is
-the best choice for them: they need not learn poses that the trajectory never takes.
+The points are random samples of trajectory × design box, and the trajectory at several designs.
+Surrogates and grids are functions of a few *features* u in [0, 1]: the place along the trajectory,
+and each design parameter that may change. The place is the joint coordinate itself where only one
+matters to any frequency, else the distance travelled in joint coordinates. Either is the best
+choice for them: they need not learn poses that the trajectory never takes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
+from eigassign.chart.timing import Effort
 from eigassign.errors import CaseError
 from eigassign.study.planning import joint_map
 from eigassign.study.scene import Scene
@@ -24,72 +22,81 @@ from eigassign.study.scene import Scene
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 SEED = 20211204
-STILL = 1e-9  # rad or m: a coordinate that travels less stands still
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Poses q (n, n_q), designs y (n, n_y) and features u (n, d)."""
+
+    q: Floats
+    y: Floats
+    u: Floats
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    def __getitem__(self, rows: slice | Ints) -> Points:
+        return Points(self.q[rows], self.y[rows], self.u[rows])
+
+
+def exact_frequencies(scene: Scene, points: Points) -> Floats:
+    """The charted modes by eigassign's own exact solve, (n, n_modes) in Hz."""
+    modes = scene.expansions.modes
+    hz = scene.model.frequencies(points.q, points.y, max(modes))
+    return np.asarray(hz[:, np.array(modes) - 1])
 
 
 @dataclass(frozen=True, eq=False)
 class Features:
-    """From features u (n, d) in [0, 1] to x = (q, y); ``place`` (n_t,) is u_0 of the samples."""
+    """The trajectory and the box of designs as features."""
 
     names: tuple[str, ...]
-    place: Floats | None  # None: no pose that matters changes
     q: Floats  # (n_t, n_q) of the trajectory
-    pose: Callable[[Floats], Floats]  # u_0 (n,) → q (n, n_q)
-    lower: Floats  # (n_y,)
+    place: Floats | None  # u_0 (n_t,) of its samples; None: no pose that matters changes
+    lower: Floats  # (n_y,); the same as upper where a parameter is kept
     upper: Floats
-    fixed_y: Floats  # (n_y,): parameters whose bounds coincide are kept here
 
-    @property
-    def d(self) -> int:
-        """How many features there are."""
-        return len(self.names)
+    def points(self, samples: Ints, y: Floats) -> Points:
+        """Samples of the trajectory (n,) at designs (n, n_y)."""
+        free = self.upper > self.lower
+        u = (y - self.lower)[:, free] / (self.upper - self.lower)[free]
+        u = u if self.place is None else np.column_stack([self.place[samples], u])
+        return Points(self.q[samples], y, u)
 
-    @cached_property
-    def free(self) -> Ints:
-        """The design parameters that may change."""
-        return np.flatnonzero(self.upper > self.lower)
-
-    def x(self, u: Floats) -> Floats:
-        """(n, n_x) at features u (n, d)."""
-        if self.place is None:
-            return np.hstack([np.tile(self.q[0], (len(u), 1)), self.design(u)])
-        return np.hstack([self.pose(u[:, 0]), self.design(u[:, 1:])])
+    def nearest(self, u: Floats) -> Points:
+        """The points at features (n, d), each at the nearest sample of the trajectory."""
+        samples, unit = np.zeros(len(u), dtype=np.intp), u
+        if self.place is not None:
+            order = np.argsort(self.place, kind="stable")
+            known, unit = self.place[order], u[:, 1:]
+            samples = order[np.searchsorted(0.5 * (known[1:] + known[:-1]), u[:, 0])]
+        return self.points(samples, self.design(unit))
 
     def design(self, unit: Floats) -> Floats:
         """y (n, n_y) at ``unit`` (n, n_free), 0 at the lower and 1 at the upper bounds."""
-        lower, upper = self.lower[self.free], self.upper[self.free]
-        y = np.tile(self.fixed_y, (len(unit), 1))
-        y[:, self.free] = (1.0 - unit) * lower + unit * upper
+        free, y = self.upper > self.lower, np.tile(self.lower, (len(unit), 1))
+        y[:, free] = (1.0 - unit) * self.lower[free] + unit * self.upper[free]
         return y
-
-    def at_samples(self, samples: Ints, y: Floats) -> tuple[Floats, Floats]:
-        """x and u at samples of the trajectory (n,) and designs (n, n_y)."""
-        lower, upper = self.lower[self.free], self.upper[self.free]
-        u = (y[:, self.free] - lower) / (upper - lower)
-        if self.place is not None:
-            u = np.hstack([self.place[samples, None], u])
-        return np.hstack([self.q[samples], y]), u
 
 
 def build_features(scene: Scene) -> Features:
     """Raises CaseError where nothing varies that a frequency could depend on."""
     lower, upper = scene.bounds
-    place, pose = _place(scene)
-    names = [scene.model.y_names[k] for k in np.flatnonzero(upper > lower)]
-    if place is not None:
-        names.insert(0, "place along the trajectory")
+    room, place = upper > lower, _place(scene)
+    names = ["place along the trajectory"] if place is not None else []
+    names += [scene.model.y_names[k] for k in np.flatnonzero(room)]
     if not names:
         raise CaseError((scene.file.problem("trajectory", _nothing_varies(scene)),))
-    fixed_y = np.clip(scene.initial, lower, upper)
-    return Features(tuple(names), place, scene.path.q, pose, lower, upper, fixed_y)
+    kept = np.clip(scene.initial, lower, upper)
+    bounds = np.where(room, lower, kept), np.where(room, upper, kept)
+    return Features(tuple(names), scene.path.q, place, *bounds)
 
 
 def _nothing_varies(scene: Scene) -> str:
     """Why there is nothing to chart, and what to do."""
     pencil, driven = scene.model.pencil, list(scene.file.coordinates.values())
     which = np.flatnonzero(pencil.active[: pencil.n_q])
-    which = which[which < len(driven)]
-    joints = ", ".join(dict.fromkeys(driven[k].joint for k in which))  # in the order of q
+    joints = ", ".join(dict.fromkeys(driven[k].joint for k in which if k < len(driven)))
     fixed, room = "no design parameter may change", "a design parameter a `max` above its `min`"
     if not joints:
         return f"nothing to chart: no coordinate changes a frequency, and {fixed}; give {room}"
@@ -97,135 +104,56 @@ def _nothing_varies(scene: Scene) -> str:
     return f"nothing to chart: {why}, and {fixed}; let it move, or give {room}"
 
 
-def _place(scene: Scene) -> tuple[Floats | None, Callable[[Floats], Floats]]:
-    """The place (n_t,) of every sample, and the pose at any place."""
-    S, q = joint_map(scene.model), scene.path.q
-    s = q @ S.T
-    if not len(S) or np.ptp(s, axis=0).max() <= STILL:
-        return None, lambda u: np.tile(q[0], (len(u), 1))
-    if len(S) > 1:
-        return _distance(s, q, scene.path.rows)
-    low, reach, back = s.min(), np.ptp(s), np.linalg.pinv(S)[:, 0]
-    return (s[:, 0] - low) / reach, lambda u: q[0] + np.outer(low + u * reach - s[0, 0], back)
-
-
-def _distance(
-    s: Floats, q: Floats, parts: Sequence[slice]
-) -> tuple[Floats, Callable[[Floats], Floats]]:
-    """Distance travelled, as a fraction; poses between samples by a cubic spline over it.
-
-    Each trajectory has a spline of its own; on the way from one to the next the pose is linear.
-    """
-    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(s, axis=0), axis=1))])
-    place = travelled / travelled[-1]
-    apart = np.concatenate([[True], np.diff(place) > 1e-9])
-    apart[[rows.start for rows in parts]] = True
-    kept = [np.flatnonzero(apart[rows]) + rows.start for rows in parts]
-    splines = [CubicSpline(place[own], q[own]) for own in kept if len(own) > 1]
-
-    def pose(u: Floats) -> Floats:
-        out = np.column_stack([np.interp(u, place, column) for column in q.T])
-        for spline in splines:
-            inside = (u >= spline.x[0]) & (u <= spline.x[-1])
-            out[inside] = spline(u[inside])
-        return out
-
-    return place, pose
+def _place(scene: Scene) -> Floats | None:
+    """The place (n_t,) of every sample."""
+    s = scene.path.q @ joint_map(scene.model).T
+    if not s.size or np.ptp(s, axis=0).max() <= 1e-9:  # rad or m: it stands still
+        return None
+    if s.shape[1] == 1:
+        return np.asarray((s[:, 0] - s.min()) / np.ptp(s))
+    travelled = np.cumsum(np.linalg.norm(np.diff(s, axis=0, prepend=s[:1]), axis=1))
+    return np.asarray(travelled / travelled[-1])
 
 
 @dataclass(frozen=True, eq=False)
-class EvaluationPoints:
-    """x (n, n_x) and u (n, d): first random ones, then ``designs`` runs along the trajectory."""
+class Question:
+    """``points``: first ``n_random`` ones, then runs along the trajectory, one for each design."""
 
-    x: Floats
-    u: Floats
+    points: Points
     n_random: int
-    designs: int
-    n_q: int
-    along: Ints  # samples of the trajectory in every run
-
-    @property
-    def q(self) -> Floats:
-        """(n, n_q)."""
-        return self.x[:, : self.n_q]
-
-    @property
-    def y(self) -> Floats:
-        """(n, n_y)."""
-        return self.x[:, self.n_q :]
-
-    @property
-    def run_designs(self) -> Floats:
-        """The design of every run along the trajectory, (designs, n_y)."""
-        return self.y[self.n_random :: len(self.along)]
-
-    def head(self, count: int) -> EvaluationPoints:
-        """The first points only, for methods that are too slow for all."""
-        if count >= len(self.x):
-            return self
-        n_random = min(self.n_random, count)
-        return replace(self, x=self.x[:count], u=self.u[:count], n_random=n_random, designs=0)
-
-    def repeated(self, copies: int) -> EvaluationPoints:
-        """The same runs several times over, to time large batches."""
-        x, u = np.tile(self.x, (copies, 1)), np.tile(self.u, (copies, 1))
-        return replace(self, x=x, u=u, designs=copies * self.designs)
-
-    def runs(self, most: int | None = None) -> EvaluationPoints:
-        """The runs along the trajectory only, ``most`` of them if given."""
-        designs = self.designs if most is None else min(most, self.designs)
-        rows = slice(self.n_random, self.n_random + designs * len(self.along))
-        return replace(self, x=self.x[rows], u=self.u[rows], n_random=0, designs=designs)
-
-    def whole_runs(self, features: Features) -> EvaluationPoints:
-        """The same designs at every sample of the trajectory."""
-        along = np.arange(len(features.q))
-        y = np.repeat(self.run_designs, len(along), axis=0)
-        x, u = features.at_samples(np.tile(along, self.designs), y)
-        return replace(self, x=x, u=u, n_random=0, along=along)
+    runs: tuple[slice, ...]
 
 
-def build_points(
-    scene: Scene, features: Features, n_random: int, designs: int, per_design: int, seed: int = SEED
-) -> EvaluationPoints:
+def build_question(scene: Scene, features: Features, effort: Effort, solve_s: float) -> Question:
     """Seeded points, every third of the random ones at a corner of the box of designs.
 
     The runs are of the initial design, of the expansion's, then of corners and random ones in turn,
-    each design once: of one design only where no parameter may change.
+    each design once: of one design only where no parameter may change. The points are fewer where
+    an exact solve takes long (``solve_s``), but at least three designs are followed.
     """
-    random = np.random.default_rng(seed)
-    n_t, n_y = len(scene.path.q), len(features.lower)
-    samples = random.integers(0, n_t, n_random)
-    y = _in_box(features, random.random((n_random, n_y)), slice(2, None, 3), random)
+    random, n_t = np.random.default_rng(SEED), len(features.q)
+    in_runs = effort.designs * effort.samples_per_design
+    share = min(1.0, effort.most_s / ((effort.random_points + in_runs) * solve_s))
+    designs = max(min(3, effort.designs), round(effort.designs * share))
+    n_random, per_design = (
+        max(4, int(share * n)) for n in (effort.random_points, in_runs / designs)
+    )
+
+    def in_box(n: int, ends: slice) -> Floats:
+        unit = random.random((n, int((features.upper > features.lower).sum())))
+        corners = random.integers(0, 2, unit[ends].shape)
+        pairs = len(corners) // 2
+        corners[1::2] = 1 - corners[: 2 * pairs : 2]  # opposite: errors are largest at such ends
+        unit[ends] = corners
+        return features.design(unit)
+
+    samples, y = random.integers(0, n_t, n_random), in_box(n_random, slice(2, None, 3))
     first = np.vstack([scene.initial, scene.expansions.full.y0])
-    unit = random.random((2 * designs, n_y))
-    others = _in_box(features, unit, slice(0, None, 2), random)
-    runs = np.vstack([np.clip(first, features.lower, features.upper), others])
-    once = np.sort(np.unique(runs, axis=0, return_index=True)[1])
-    runs = runs[once[:designs]]
+    first = np.clip(first, features.lower, features.upper)
+    followed = np.vstack([first, in_box(2 * designs, slice(0, None, 2))])
+    followed = followed[np.sort(np.unique(followed, axis=0, return_index=True)[1])[:designs]]
     along = np.unique(np.linspace(0, n_t - 1, min(per_design, n_t)).round().astype(np.intp))
-    samples = np.concatenate([samples, np.tile(along, len(runs))])
-    x, u = features.at_samples(samples, np.vstack([y, np.repeat(runs, len(along), axis=0)]))
-    return EvaluationPoints(x, u, n_random, len(runs), len(scene.model.q_names), along)
-
-
-def _in_box(features: Features, unit: Floats, at: slice, random: np.random.Generator) -> Floats:
-    """Designs at ``unit`` (n, n_y) in [0, 1], but corners of the box in the rows ``at``."""
-    inside = unit[:, features.free]
-    inside[at] = box_corners(len(inside[at]), len(features.free), random)
-    return features.design(inside)
-
-
-def box_corners(count: int, d: int, random: np.random.Generator) -> Floats:
-    """(count, d) of 0 and 1: all corners in turn where they are few enough, else random ones.
-
-    Every second is opposite to the one before: the errors are largest at such ends.
-    """
-    half = -(-count // 2)
-    if d > 0 and 2**d <= count:
-        number = np.resize(random.permutation(2 ** (d - 1)), half)
-        ends = (number[:, None] >> np.arange(d)) & 1
-    else:
-        ends = random.integers(0, 2, (half, d))
-    both = np.stack([ends, 1 - ends], axis=1).reshape(2 * half, d)
-    return both[:count].astype(np.float64)
+    samples = np.concatenate([samples, np.tile(along, len(followed))])
+    y, n = np.vstack([y, np.repeat(followed, len(along), axis=0)]), len(along)
+    runs = tuple(slice(n_random + k * n, n_random + (k + 1) * n) for k in range(len(followed)))
+    return Question(features.points(samples, y), n_random, runs)

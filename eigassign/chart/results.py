@@ -12,7 +12,20 @@ from math import ceil
 from typing import Any
 
 SCHEMA = 4  # of chart.json
-NEARLY_NOTHING = 1e-12  # of an objective: a rms relative error of 1e-6
+
+
+@dataclass(frozen=True)
+class Request:
+    """What advice is asked for."""
+
+    accuracy: float | None = None  # worst relative error in Hz; several if None
+    budget_s: float | None = None  # advice for this time, too
+    evaluations: float | None = None  # one trajectory, and a thousand of them, if None
+
+    @property
+    def accuracies(self) -> tuple[float, ...]:
+        """Those for which advice is given."""
+        return (1e-2, 1e-4, 1e-6, 1e-8) if self.accuracy is None else (self.accuracy,)
 
 
 @dataclass(frozen=True)
@@ -34,15 +47,9 @@ class Timing:
 
     def plus(self, other: Timing) -> Timing:
         """One after the other; quartiles add, which overstates the spread."""
-        return Timing(
-            self.median_s + other.median_s,
-            self.low_s + other.low_s,
-            self.high_s + other.high_s,
-            min(self.repeats, other.repeats),
-        )
-
-
-NO_TIME = Timing(0.0, 0.0, 0.0, 0)
+        low, high = self.low_s + other.low_s, self.high_s + other.high_s
+        repeats = min(self.repeats, other.repeats)
+        return Timing(self.median_s + other.median_s, low, high, repeats)
 
 
 @dataclass(frozen=True)
@@ -96,9 +103,8 @@ class Front:
 
     def cost_s(self, point: ChartPoint) -> float:
         """Seconds that count on this front."""
-        if self.evaluations is None:
-            return point.online.median_s
-        return point.total_s(self.evaluations)
+        n = self.evaluations
+        return point.online.median_s if n is None else point.total_s(n)
 
 
 @dataclass(frozen=True)
@@ -123,11 +129,11 @@ class Advice:
     accuracy: float | None  # worst relative error in Hz
     budget_s: float | None
     evaluations: float
-    method: str | None  # None: no charted method does it
-    parameters: Mapping[str, Any]
-    worst_relative: float | None
-    total_s: float | None
-    words: str
+    method: str | None = None  # None: no charted method does it
+    parameters: Mapping[str, Any] | None = None
+    worst_relative: float | None = None
+    total_s: float | None = None
+    words: str = ""
     is_below_round_off: bool = False
     auto: AutoTakes | None = None  # None: not looked at
 
@@ -147,11 +153,7 @@ class MeshRow:
 
 @dataclass(frozen=True)
 class DesignRun:
-    """One way to a design: time against the exact objective reached.
-
-    ``objective`` is F, the mean square of f/f_d − 1 by exact solves; ``trace`` the best one so far
-    against seconds, for searches.
-    """
+    """One way to a design: time against F, the mean square of f/f_d − 1 by exact solves."""
 
     method: str
     ours: bool
@@ -163,25 +165,13 @@ class DesignRun:
     max_relative: float  # distance to the target in Hz, exact
     rms_relative: float
     excess: float  # objective over the best one found by any method: see `excess_over`
-    trace: tuple[tuple[float, float], ...] = ()
+    trace: tuple[tuple[float, float], ...] = ()  # of searches: seconds, the best F so far
     note: str = ""
 
 
 def excess_over(best: float, objective: float) -> float:
-    """(F − F_best) / F_best; where F_best is next to nothing, relative to `NEARLY_NOTHING`."""
-    return (objective - best) / max(best, NEARLY_NOTHING)
-
-
-@dataclass(frozen=True)
-class Machine:
-    """What the times were measured on."""
-
-    processor: str
-    cores: int
-    system: str
-    versions: Mapping[str, str]
-    blas: str
-    threads: str
+    """(F − F_best) / F_best; an F_best below 1e-12, a rms error of 1e-6, is no yardstick."""
+    return (objective - best) / max(best, 1e-12)
 
 
 @dataclass(frozen=True)
@@ -211,14 +201,14 @@ class Chart:
     reference: str | None
     version: str
     quick: bool
-    machine: Machine
+    machine: Mapping[str, Any]  # that the times were measured on
     asked: Asked
     points: tuple[ChartPoint, ...]
     skipped: tuple[tuple[str, str], ...]  # method, why
     fronts: tuple[Front, ...]
     advice: tuple[Advice, ...]
-    mesh: tuple[MeshRow, ...]
-    designs: tuple[DesignRun, ...]
-    notes: tuple[str, ...]
-    warnings: tuple[str, ...]
-    seconds: float
+    mesh: tuple[MeshRow, ...] = ()
+    designs: tuple[DesignRun, ...] = ()
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    seconds: float = 0.0

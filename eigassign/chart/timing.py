@@ -1,4 +1,4 @@
-"""How jobs are timed: a first run, repeats in turns, medians with quartiles; and the machine.
+"""How much a chart tries, and how jobs are timed: a first run, repeats in turns, medians.
 
 Processor time, which on one thread is the time it takes where nothing else runs.
 """
@@ -7,82 +7,102 @@ from __future__ import annotations
 
 import os
 import platform
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from time import process_time
 from typing import Any, TypeVar
 
 import numpy as np
 import scipy
 
 from eigassign._version import __version__
-from eigassign.chart.results import Machine, Timing
+from eigassign.chart.results import Timing
 
 T = TypeVar("T")
-Clock = Callable[[], float]
-CPU_INFO = Path("/proc/cpuinfo")
+Job = tuple[Callable[[], object], float]  # and the seconds that it took the first time
 
 
 @dataclass(frozen=True)
-class Patience:
-    """How long jobs are repeated: ``rounds`` times, each for at least ``seconds`` in all.
+class Effort:
+    """Points, sizes of the methods and time limits, unless given those without ``--quick``."""
 
-    A job whose first run takes longer than ``long_s`` is not repeated.
-    """
+    quick: bool = False
+    random_points: int = 600  # at which methods are compared, beside
+    designs: int = 15  # runs along the trajectory
+    samples_per_design: int = 152
+    most_s: float = 60.0  # for the exact answers, one method's set-up, one search for a design
+    orders: tuple[int, ...] = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12)
+    coefficients: int = 5000  # largest set that is expanded
+    half_orders: tuple[int, ...] = (0, 1, 2, 3)
+    expansion_points: tuple[int, ...] = (1, 3, 5)
+    fitted: tuple[tuple[int, int], ...] = ((1, 3), (2, 1))  # half order, points of reduced models
+    accuracies: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)  # of fits
+    nodes: tuple[int, ...] = (2, 3, 4, 5, 6, 7, 9, 11)  # of a grid, along each axis
+    stations: tuple[int, ...] = (3, 5, 9, 17, 33, 65)
+    training: tuple[int, ...] = (27, 64, 125, 343)  # points of surrogates
+    factors: tuple[float, ...] = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # of a mesh's elements
+    most_dof: int = 40_000  # of a refined mesh
+    objectives: int = 600  # exact evaluations of the objective in a search
+    rounds: int = 7  # in which jobs are repeated, each
+    round_s: float = 0.01  # for at least so long in all
+    long_s: float = 1.0  # a job whose first run takes longer is not repeated
 
-    rounds: int = 7
-    seconds: float = 0.01
-    long_s: float = 1.0
+
+QUICK = Effort(
+    quick=True,
+    random_points=150,
+    designs=9,
+    most_s=2.0,
+    orders=(1, 2, 3, 4, 6, 8),
+    coefficients=1000,
+    expansion_points=(1, 3),
+    fitted=(),
+    accuracies=(1e-2, 1e-4, 1e-6, 1e-8),
+    nodes=(3, 5, 7),
+    stations=(5, 17),
+    training=(27, 125),
+    factors=(0.5, 1.0, 2.0, 4.0),
+    most_dof=2500,
+    objectives=60,
+    rounds=3,
+    round_s=0.0,
+    long_s=0.06,
+)
 
 
-def timed(job: Callable[[], T], clock: Clock = process_time) -> tuple[T, float]:
+def timed(job: Callable[[], T]) -> tuple[T, float]:
     """What the job returns, and the seconds it took."""
-    start = clock()
+    start = time.process_time()
     result = job()
-    return result, clock() - start
+    return result, time.process_time() - start
 
 
-def take_turns(
-    jobs: Sequence[tuple[Callable[[], object], float]],
-    patience: Patience,
-    clock: Clock = process_time,
-) -> list[Timing]:
-    """Time each (job, seconds of its first run), all of which have run once.
+def take_turns(jobs: Sequence[Job], effort: Effort) -> list[Timing]:
+    """Time each job, all of which have run once.
 
     The jobs take turns, round after round, so that all see the same machine; within a round a short
     job is repeated and its quickest run counts, which is the one least disturbed.
     """
     spent: list[list[float]] = [[] for _ in jobs]
-    for _ in range(patience.rounds):
+    for _ in range(effort.rounds):
         for (job, first), mine in zip(jobs, spent, strict=True):
-            if first <= patience.long_s:
-                mine.append(_quickest(job, patience.seconds, clock))
-    return [_summary(mine, first) for (_, first), mine in zip(jobs, spent, strict=True)]
+            if first <= effort.long_s:
+                once = [timed(job)[1]]
+                while sum(once) < effort.round_s:
+                    once.append(max(timed(job)[1], 1e-7))
+                mine.append(min(once))
+    made = []
+    for (_, first), mine in zip(jobs, spent, strict=True):
+        median, low, high = np.quantile(mine or [first], (0.5, 0.25, 0.75)).tolist()
+        made.append(Timing(median, low, high, len(mine)))
+    return made
 
 
-def _quickest(job: Callable[[], object], seconds: float, clock: Clock) -> float:
-    best, total = float("inf"), 0.0
-    while total < seconds or best == float("inf"):
-        _, once = timed(job, clock)
-        best, total = min(best, once), total + max(once, 1e-7)
-    return best
-
-
-def _summary(spent: Sequence[float], first: float) -> Timing:
-    """Median and quartiles; of a job that was not repeated, its first run."""
-    if not spent:
-        return Timing(first, first, first, 0)
-    low, median, high = (float(v) for v in np.quantile(spent, (0.25, 0.5, 0.75)))
-    return Timing(median, low, high, len(spent))
-
-
-def measure(
-    job: Callable[[], T], patience: Patience, clock: Clock = process_time
-) -> tuple[T, Timing]:
+def measure(job: Callable[[], T], effort: Effort) -> tuple[T, Timing]:
     """What one job returns, and how long it takes after a first run."""
-    result, first = timed(job, clock)
-    return result, take_turns([(job, first)], patience, clock)[0]
+    result, first = timed(job)
+    return result, take_turns([(job, first)], effort)[0]
 
 
 def time_in_words(seconds: float) -> str:
@@ -93,29 +113,20 @@ def time_in_words(seconds: float) -> str:
     return f"{seconds / 1e-9:.3g} ns" if seconds > 0.0 else "0"
 
 
-def machine(cpu_info: Path = CPU_INFO) -> Machine:
-    """Processor, cores, versions, linear algebra and its threads; no names of host or user.
-
-    ``cpu_info`` is where the operating system names the processor.
-    """
-    try:
-        lines = cpu_info.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        lines = []
+def machine() -> dict[str, Any]:
+    """Processor, cores, versions, linear algebra and its threads; no names of host or user."""
+    file = Path("/proc/cpuinfo")
+    lines = file.read_text(errors="replace").splitlines() if file.exists() else []
     named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     settings: Any = np.show_config(mode="dicts")
     blas = settings.get("Build Dependencies", {}).get("blas", {})
     threads = {os.environ.get(f"{name}_NUM_THREADS") for name in ("OPENBLAS", "OMP", "MKL")}
-    return Machine(
-        processor=(named or [platform.processor()])[0] or platform.machine(),
-        cores=os.cpu_count() or 1,
-        system=f"{platform.system()} {platform.machine()}",
-        versions={
-            "eigassign": __version__,
-            "Python": platform.python_version(),
-            "NumPy": np.__version__,
-            "SciPy": scipy.__version__,
-        },
-        blas=f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip(),
-        threads="1" if threads == {"1"} else "as the library chooses",  # NumPy does not tell
-    )
+    packages = {"eigassign": __version__, "NumPy": np.__version__, "SciPy": scipy.__version__}
+    return {
+        "processor": (named or [platform.processor()])[0] or platform.machine(),
+        "cores": os.cpu_count() or 1,
+        "system": f"{platform.system()} {platform.machine()}",
+        "versions": {"Python": platform.python_version(), **packages},
+        "blas": f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip(),
+        "threads": "1" if threads == {"1"} else "as the library chooses",  # NumPy does not tell
+    }

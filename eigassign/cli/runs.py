@@ -296,22 +296,22 @@ def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
     exact answers on this machine; the mesh; and ways to a design. Leaves figures, chart.json and
     report.html, and says what to choose.
     """
-    from eigassign.chart.comparison import Request
-    from eigassign.chart.effort import QUICK, Effort
+    from eigassign.chart.results import Request
+    from eigassign.chart.timing import QUICK, Effort
     from eigassign.pipeline import chart as charting
 
     request = Request(how["accuracy"], how["budget_s"], how["evaluations"])
     out = how["out"] or Path("results", f"{case.stem}_chart")
     with reporting(how) as reporter:
         given = _options({**how, "out": out, "cache_dir": None, "no_cache": True}, reporter)
-        made = charting.chart(case, given, QUICK if quick else Effort(), request)
-        reporter.warn(made.chart.warnings)
+        folder, made = charting.chart(case, given, QUICK if quick else Effort(), request)
+        reporter.warn(made.warnings)
     if as_json:
-        print_json({"run_folder": str(made.folder), **vars(made.chart)})
+        print_json({"run_folder": str(folder), **vars(made)})
     else:
         from eigassign.output.console import print_tables
         from eigassign.output.reports.chart import main_tables
 
-        print_tables(main_tables(made.chart))
-        show(_written(made.folder, made.chart.seconds))
+        print_tables(main_tables(made))
+        show(_written(folder, made.seconds))
     return 0

@@ -25,9 +25,9 @@ __all__, __getattr__, __dir__ = face(
         "batch.outcome": "CaseOutcome Status frequency_ranges from_line ranges to_line",
         "batch.summary": "COLUMNS SummaryCsv SummaryJson batch_table",
         "store.cache": "Cache DamagedError HEADER_BYTES default_directory header key pack unpack",
-        "reports.chart": "write_chart",
+        "reports.chart": "chart_tables write_chart",
         "exchange.files": "write_exchange",
-        "figures.front": "MethodLine chart_figures scatter",
+        "figures.front": "chart_figures",
         "figures.graph": "Curve FigurePlan Graph Look Panel Shade",
         "figures.mechanism": (
             "diameters draw_links extent length_label line_widths points_of round_length view_of"

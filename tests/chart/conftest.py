@@ -6,8 +6,7 @@ import pytest
 from chart_scenes import TINY
 from scenes import SHIPPED, scene_of
 
-from eigassign.chart.comparison import MethodComparison, Request, compare_methods
-from eigassign.chart.question import EvaluationPoints, build_features, build_points
+from eigassign.chart import Chart, Request, compare_methods
 from eigassign.study import Scene
 
 
@@ -17,10 +16,5 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 
 @pytest.fixture(scope="session")
-def points(arm: Scene) -> EvaluationPoints:
-    return build_points(arm, build_features(arm), 25, 2, 7)
-
-
-@pytest.fixture(scope="session")
-def compared(arm: Scene) -> MethodComparison:
+def compared(arm: Scene) -> Chart:
     return compare_methods(arm, TINY, Request(budget_s=10.0, evaluations=1e4), lambda line: None)

@@ -1,34 +1,45 @@
-"""Fronts, break-even counts and advice follow from the numbers alone."""
+"""Fronts and advice follow from the numbers alone; times are medians of repeats in turns."""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from eigassign.chart.front import (
-    advise_accuracy,
-    advise_budget,
-    break_even,
-    cheapest,
+from eigassign.chart import (
+    Advice,
+    Asked,
+    ChartPoint,
+    Effort,
+    Errors,
+    Request,
+    Timing,
+    advise,
+    excess_over,
     front,
-    front_notes,
+    machine,
+    measure,
     pareto,
+    skipped_notes,
+    time_in_words,
 )
-from eigassign.chart.results import NO_TIME, ChartPoint, Errors, Timing, excess_over
 
 
 def timing(seconds: float) -> Timing:
     return Timing(seconds, seconds, seconds, 3)
 
 
-def point(name: str, offline: float, online: float, worst: float, ours: bool = True) -> ChartPoint:
+def point(name: str, offline: float, online: float, worst: float, **more: Any) -> ChartPoint:
     errors = Errors(worst, worst / 2.0, worst / 100.0, 10, 0)
-    return ChartPoint(
-        name, "family", ours, {}, timing(offline), timing(online), 1, 0.0,
+    made = ChartPoint(
+        name, "family", True, {}, timing(offline), timing(online), 1, 0.0,
         errors, errors, errors, None,
     )  # fmt: skip
+    return replace(made, **more)
 
 
 POINTS = [
@@ -39,11 +50,13 @@ POINTS = [
 ]
 
 
-def test_what_doubts_itself_is_not_advised_however_well_it_did() -> None:
-    quick = replace(point("lucky", 0.0, 1e-7, 1e-6), estimate=1e-3)
-    assert cheapest([*POINTS, quick], 1e-6, 1e4).method == "good"  # type: ignore[union-attr]
-    assert advise_accuracy([*POINTS, quick], 1e-6, 1e4, 0.0).method == "good"
-    assert advise_accuracy([*POINTS, quick], 1e-5, 1e4, 0.0).method == "lucky"
+def advised(points: list[ChartPoint], n: float, floor: float = 0.0, **request: Any) -> Advice:
+    asked = Asked((1,), 1, ("m",), 1, 1, 1, 1, n, 1, 1.0, floor)
+    (given,) = [
+        a for a in advise(points, asked, Request(**request), [n], {})
+        if a.asked == ("accuracy" if "accuracy" in request else "budget")
+    ]  # fmt: skip
+    return given
 
 
 def test_no_front_member_is_beaten_and_every_other_is() -> None:
@@ -60,15 +73,72 @@ def test_no_front_member_is_beaten_and_every_other_is() -> None:
                 equal = [j for j in kept if cost[j] == cost[k] and error[j] == error[k]]
                 assert beaten or equal
         assert list(error[kept]) == sorted(error[kept])
+    assert pareto(np.array([1.0, 2.0]), np.array([np.inf, 3.0])) == [1]
+    assert pareto(np.array([np.nan, 2.0]), np.array([1.0, 3.0])) == [1]
+
+
+def test_a_front_counts_the_set_up_or_leaves_it_out_and_nothing_below_the_floor_wins() -> None:
+    assert front(POINTS, "few", 2.0, 0.0).methods == ("exact", "rough")
+    assert front(POINTS, "many", 1e4, 0.0).methods == ("exact", "good", "rough")
+    assert front(POINTS, "online", None, 0.0).methods == ("exact", "good", "rough")
+    assert front(POINTS, "many", 1e4, 1e-5).methods == ("good", "rough")
 
 
 def test_what_is_set_up_for_a_whole_trajectory_is_paid_for_whole() -> None:
-    stations = replace(point("stations", 0.0, 1e-6, 1e-4), at_once=150)
+    stations = point("stations", 0.0, 1e-6, 1e-4, at_once=150)
     assert stations.total_s(1) == stations.total_s(150) == pytest.approx(150e-6)
     assert stations.total_s(151) == pytest.approx(300e-6)
     exact = point("exact", 0.0, 4e-5, 0.0)
-    assert cheapest([stations, exact], 1e-2, 1) is exact
-    assert cheapest([stations, exact], 1e-2, 150) is stations
+    assert advised([stations, exact], 1, accuracy=1e-2).method == "exact"
+    assert advised([stations, exact], 150, accuracy=1e-2).method == "stations"
+
+
+def test_advice_is_the_cheapest_that_is_good_enough_and_does_not_doubt_itself() -> None:
+    found = advised(POINTS, 1e4, accuracy=1e-7)
+    assert found.method == "good"
+    assert found.total_s == pytest.approx(1e-2 + 1e4 * 1e-5)
+    assert advised(POINTS, 1e4, accuracy=1e-2).method == "rough"
+    assert advised(POINTS[1:], 1e4, accuracy=1e-9).method is None
+    lucky = point("lucky", 0.0, 1e-7, 1e-6, estimate=1e-3)
+    assert advised([*POINTS, lucky], 1e4, accuracy=1e-6).method == "good"
+    assert advised([*POINTS, lucky], 1e4, accuracy=1e-5).method == "lucky"
+
+
+def test_nothing_is_advised_below_round_off() -> None:
+    found = advised(POINTS, 1e4, 2e-7, accuracy=1e-7)
+    assert found.method is None
+    assert found.auto is None
+    assert "round-off moves even exact solves by 2.0e-07" in found.words
+
+
+def test_advice_for_a_budget_is_the_most_accurate_in_time() -> None:
+    assert advised(POINTS, 1e4, budget_s=0.2).method == "good"
+    assert advised(POINTS, 1e4, budget_s=20.0).method == "exact"
+    assert advised(POINTS, 1e4, budget_s=1e-9).method is None
+
+
+def test_advice_is_a_sentence_that_says_what_the_method_does_and_that_auto_refuses() -> None:
+    stations = point("stations linear 3", 0.0, 1e-3, 1e-3, family="stations, linear")
+    found = advised([stations], 152, accuracy=1e-2)
+    assert found.words.startswith(
+        "for 152 evaluations within 1 % of exact the quickest is stations linear 3: exact solves at"
+    )
+    assert "and is off by 0.001 % at most" in found.words
+    asked = Asked((1,), 1, ("m",), 1, 1, 1, 1, 1.0, 1, 1.0, 0.0)
+    refused = {"auto 1e-02": "no expansion of order up to 4"}
+    (found,) = advise([stations], asked, Request(accuracy=1e-2), [152], refused)
+    assert found.auto is not None
+    assert found.auto.method is None
+    assert found.auto.refused == "no expansion of order up to 4"
+    assert found.words.endswith("`expansion.order: auto` refuses: no expansion of order up to 4")
+
+
+def test_a_reason_that_many_methods_share_is_said_once_with_their_names() -> None:
+    skipped = {"fit 1": "too many axes", "RBF": "too few points", "fit 2": "too many axes"}
+    assert list(skipped_notes(skipped)) == [
+        "fit 1, fit 2 have no answer: too many axes",
+        "RBF has no answer: too few points",
+    ]
 
 
 def test_an_objective_of_next_to_nothing_is_no_yardstick() -> None:
@@ -77,64 +147,50 @@ def test_an_objective_of_next_to_nothing_is_no_yardstick() -> None:
     assert excess_over(0.0, 0.0) == 0.0
 
 
-def test_what_gives_no_number_is_on_no_front() -> None:
-    assert pareto(np.array([1.0, 2.0]), np.array([np.inf, 3.0])) == [1]
-    assert pareto(np.array([np.nan, 2.0]), np.array([1.0, 3.0])) == [1]
+# --- Times
 
 
-def test_a_front_counts_the_set_up_or_leaves_it_out() -> None:
-    assert front(POINTS, "few", 2.0, 0.0).methods == ("exact", "rough")
-    assert front(POINTS, "many", 1e4, 0.0).methods == ("exact", "good", "rough")
-    assert front(POINTS, "online", None, 0.0).methods == ("exact", "good", "rough")
+@pytest.fixture
+def cost(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """A clock that advances by what is run: a job of given costs."""
+    now = [0.0]
+    monkeypatch.setattr(time, "process_time", lambda: now[0])
+
+    def job(costs: Iterator[float]) -> str:
+        now[0] += next(costs)
+        return "done"
+
+    return job
 
 
-def test_differences_below_the_floor_win_nothing() -> None:
-    assert front(POINTS, "many", 1e4, 1e-5).methods == ("good", "rough")
+def test_the_first_run_warms_up_and_a_long_one_is_not_repeated(cost: Any) -> None:
+    costs = iter([0.5, 3.0, 1.0, 2.0])
+    effort = Effort(rounds=3, round_s=0.0, long_s=10.0)
+    result, spent = measure(lambda: cost(costs), effort)
+    assert result == "done"
+    assert (spent.median_s, spent.low_s, spent.high_s, spent.repeats) == (2.0, 1.5, 2.5, 3)
+    _, spent = measure(lambda: cost(iter([7.0])), Effort(long_s=5.0))
+    assert (spent.median_s, spent.repeats) == (7.0, 0)
 
 
-def test_it_pays_from_where_both_costs_are_equal() -> None:
-    count = break_even(1e-2, 1e-5, 1e-3)
-    assert count is not None
-    assert 1e-2 + count * 1e-5 == pytest.approx(count * 1e-3)
-    assert break_even(0.0, 2.0, 1.0) is None
+def test_within_a_round_a_short_job_is_repeated_and_its_quickest_run_counts(cost: Any) -> None:
+    costs = iter([0.5, 0.5, 0.2, 0.5, 9.0])
+    _, spent = measure(lambda: cost(costs), Effort(rounds=1, round_s=1.0, long_s=10.0))
+    assert spent.median_s == pytest.approx(0.2)
+    assert next(costs) == 9.0
 
 
-def test_advice_is_the_cheapest_that_is_good_enough() -> None:
-    found = advise_accuracy(POINTS, 1e-7, 1e4, 0.0)
-    assert found.method == "good"
-    assert found.total_s == pytest.approx(1e-2 + 1e4 * 1e-5)
-    assert "good" in found.words
-    assert advise_accuracy(POINTS, 1e-2, 1e4, 0.0).method == "rough"
-    assert advise_accuracy(POINTS[1:], 1e-9, 1e4, 0.0).method is None
+def test_the_machine_is_described_without_names_of_host_or_paths() -> None:
+    found = machine()
+    assert {"Python", "NumPy", "SciPy", "eigassign"} == set(found["versions"])
+    assert found["cores"] >= 1
+    assert found["processor"]
+    assert "/" not in found["system"]
 
 
-def test_nothing_is_advised_below_round_off() -> None:
-    found = advise_accuracy(POINTS, 1e-7, 1e4, 2e-7)
-    assert found.method is None
-    assert "round-off moves even exact solves by 2.0e-07" in found.words
-
-
-def test_advice_for_a_budget_is_the_most_accurate_in_time() -> None:
-    assert advise_budget(POINTS, 0.2, 1e4).method == "good"
-    assert advise_budget(POINTS, 20.0, 1e4).method == "exact"
-    assert advise_budget(POINTS, 1e-9, 1e4).method is None
-
-
-def test_peers_on_a_front_are_named() -> None:
-    (note,) = front_notes(POINTS, [front(POINTS, "many", 1e4, 0.0)])
-    assert "1 of 2" in note or "0 of 1" in note
-    assert "rough" in note
-
-
-def test_nothing_takes_no_time() -> None:
-    assert NO_TIME.plus(timing(2.0)).median_s == 2.0
-    assert timing(2.0).times(3.0).high_s == 6.0
-
-
-def test_advice_is_a_sentence_that_says_what_the_method_does() -> None:
-    stations = replace(point("stations linear 3", 0.0, 1e-3, 1e-3), family="stations, linear")
-    found = advise_accuracy([stations], 1e-2, 152, 0.0)
-    assert found.words.startswith(
-        "for 152 evaluations within 1 % of exact the quickest is stations linear 3: exact solves at"
-    )
-    assert "and is off by 0.001 % at most" in found.words
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(2.5, "2.5 s"), (2.5e-3, "2.5 ms"), (2.5e-6, "2.5 µs"), (2e-8, "20 ns"), (0, "0")],
+)
+def test_times_are_written_with_a_fitting_unit(seconds: float, text: str) -> None:
+    assert time_in_words(seconds) == text

@@ -1,155 +1,199 @@
-"""Every charted method answers the same question, at the price it states."""
+"""What a chart of the shipped arm shows: every method, at the price and with its error."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from scenes import SHIPPED, scene_of
+from chart_scenes import TINY
+from scenes import HEAD, SHIPPED, scene_of
 
 import eigassign
 import eigassign as ea
-from eigassign.chart import methods as own
-from eigassign.chart import rivals
-from eigassign.chart.comparison import exact_frequencies
-from eigassign.chart.methods import fit_methods
-from eigassign.chart.question import EvaluationPoints, build_features, build_points
-from eigassign.modal import FINE, NearestExpansion
-from eigassign.modal.exact import solver
+from eigassign.chart import Chart, Request, build_features, build_question, compare_methods
+from eigassign.errors import CaseError
+from eigassign.modal import NearestExpansion
 from eigassign.study import Scene
 
-
-class Spy:
-    """Counts the exact eigenproblems solved while it watches."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.solved = 0
-        solve = solver.solve_dense
-
-        def counted(pencil, theta, count, vectors):  # type: ignore[no-untyped-def]
-            self.solved += theta.shape[1]
-            return solve(pencil, theta, count, vectors)
-
-        monkeypatch.setattr(solver, "solve_dense", counted)
+CASES = Path(__file__).parents[2] / "cases"
+FAMILIES = {
+    *("exact", "exact by others", "Taylor, full", "Taylor, linearised", "1/λ, full"),
+    *("1/λ, linearised", "Taylor, several points", "Taylor, auto", "reduced, 1 point"),
+    *("reduced, 3 points", "reduced, no guard", "fit of given solves", "fit to an accuracy"),
+    *("fit of given solves, one trajectory", "fit to an accuracy, one trajectory"),
+    *("fit of reduced m = 2, 1 point", "stations, linear", "stations, cubic"),
+    *("stations, Chebyshev", "grid, linear", "grid, cubic", "grid, Chebyshev"),
+    *("response surface, quadratic", "response surface, cubic", "RBF, thin plate spline"),
+    "RBF, quintic",
+}
 
 
-def _methods(scene: Scene) -> Iterator[own.Method]:
-    yield from own.series_methods(scene, [2], [3])
-    yield from own.piecewise_methods(scene, [2], [3])
-    yield from own.reduced_methods(scene, [0, 1, 2], [1, 3])
+def test_every_method_has_numbers_and_a_name_of_its_own(compared: Chart) -> None:
+    names = [p.method for p in compared.points]
+    assert len(set(names)) == len(names)
+    assert {p.family for p in compared.points} - {"Kriging"} == FAMILIES
+    for p in compared.points:
+        assert (p.estimate is not None) == p.method.startswith("fit "), p.method
+        assert np.isfinite(p.everywhere.worst_hz), p.method
+        assert p.everywhere.rms_hz <= p.everywhere.worst_hz
+        assert p.online.median_s > 0.0
+        assert p.trajectory is not None or p.solves_online == 1.0
+        if p.family.startswith("fit to an accuracy"):
+            assert p.everywhere.worst_relative <= p.parameters["accuracy"]
+    for why in dict(compared.skipped).values():
+        assert "solves" in why  # fits of too few
 
 
-def _fits(arm: Scene, points: EvaluationPoints) -> Iterator[own.Method]:
-    yield from fit_methods(arm, build_features(arm), points, [1e-3], [(2, 1)], 1000)
+def test_a_chart_shows_what_is_known_of_the_arm(compared: Chart) -> None:
+    by_name = {p.method: p for p in compared.points}
+    worst = {name: p.everywhere.worst_relative for name, p in by_name.items()}
+    assert worst["Taylor 4 full"] < worst["Taylor 2 full"] < worst["Taylor 1 full"] < 0.03
+    assert worst["1/λ 4 full"] < worst["Taylor 4 full"]
+    assert worst["reduced m = 2, 1 point"] < 1e-9
+    assert worst["grid Chebyshev 4"] < worst["grid linear 4"]
+    assert by_name["stations cubic 5"].random is None
+    assert by_name["stations cubic 5"].solves_online == pytest.approx(5 / 152)
+    solves = {
+        "Taylor 2 full": 1, "Taylor 2 at 3 points": 3, "reduced m = 1, 1 point": 2,
+        "reduced m = 2, 3 points": 9, "fit of 9 solves": 9, "grid linear 4": 64,
+    }  # fmt: skip
+    assert {name: by_name[name].solves for name in solves} == solves
+    for name in ("exact dense", "exact sparse", "exact dense, SciPy one by one"):
+        assert by_name[name].everywhere.worst_hz == compared.asked.floor_hz < 1e-8
 
 
-def test_methods_solve_exactly_as_often_as_they_say(
+def test_fronts_and_advice_are_made_of_charted_methods(compared: Chart) -> None:
+    names = {p.method for p in compared.points}
+    assert {f.evaluations for f in compared.fronts} == {152.0, 152000.0, 1e4, None}
+    for each in compared.fronts:
+        assert set(each.methods) <= names
+        if each.evaluations is None:
+            assert not any(name.startswith("stations") for name in each.methods)
+    assert {a.asked for a in compared.advice} == {"accuracy", "budget"}
+    assert all(a.method in names for a in compared.advice if a.method)
+
+
+def test_a_use_gives_the_method_with_the_errors_that_were_charted(
+    arm: Scene, compared: Chart
+) -> None:
+    features = build_features(arm)
+    question = build_question(arm, features, TINY, 1e-6)
+    points = question.points
+    exact = arm.model.frequencies(points.q, points.y, 1)
+    for p in compared.points:
+        how: dict[str, Any] = dict(p.parameters)
+        known = {
+            "ea": ea, "eigassign": eigassign, "model": arm.model, "q": arm.path.q,
+            "lower": features.lower, "upper": features.upper,
+            "q0": how.get("q0", how.get("q")), "y0": how.get("y0", how.get("y")),
+        }  # fmt: skip
+        call = p.use.removeprefix("no argument of ea.reduce: ").partition(", at a pose")[0]
+        if not call or call.startswith("in the case file"):
+            continue
+        parts = question.runs if p.at_once > 1 else (slice(None),)
+        off = []
+        for part in parts:
+            made = eval(call, known | {"y": points.y[part][0]} if p.at_once > 1 else known)
+            made = NearestExpansion(tuple(made)) if isinstance(made, list) else made
+            off.append(np.abs(made.frequencies(points.q[part], points.y[part]) - exact[part]).max())
+        assert max(off) == pytest.approx(p.everywhere.worst_hz, rel=1e-6, abs=1e-10), p.method
+
+
+def test_what_auto_takes_is_that_of_a_run_and_as_accurate_as_promised(
+    compared: Chart, tmp_path: Path
+) -> None:
+    order = next(line for line in SHIPPED.splitlines(True) if line.startswith("  order: 4"))
+    text = SHIPPED.replace(order, "  order: auto\n  accuracy: 1e-4\n")
+    taken = scene_of(tmp_path, text).expansions.order
+    autos = {a.accuracy: a for a in compared.advice if a.auto is not None}
+    assert set(autos) == {1e-2, 1e-4, 1e-6, 1e-8}
+    known = {p.method: p for p in compared.points}
+    for accuracy, advice in autos.items():
+        assert advice.auto is not None
+        point = known[str(advice.auto.method)]
+        assert point.everywhere.worst_relative <= accuracy
+        assert advice.auto.total_s == point.total_s(advice.evaluations)
+        assert f"`expansion.order: auto` takes Taylor {point.parameters['order']}" in advice.words
+    assert known[f"auto 1e-04: Taylor {taken}"].parameters["order"] == taken
+
+
+def test_several_modes_on_several_trajectories_are_charted_too(tmp_path: Path) -> None:
+    text = (CASES / "five_bar.yaml").read_text()
+    scene = scene_of(tmp_path, text.replace("modes: [1]", "modes: [1, 2]"))
+    few = replace(TINY, orders=(2,), half_orders=(1,), expansion_points=(1,), fitted=(), nodes=(4,))
+    made = compare_methods(scene, few, Request(accuracy=1e-3), lambda line: None)
+    assert made.asked.modes == scene.expansions.modes
+    assert {p.family for p in made.points} >= {"exact", "fit to an accuracy", "grid, cubic"}
+    assert min(p.everywhere.worst_relative for p in made.points if not p.ours) < 1e-3
+    for p in made.points:
+        assert p.everywhere.failed == 0, p.method
+
+
+def test_kriging_is_left_out_without_scikit_learn_and_no_set_up_may_take_too_long(
     arm: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for method in _methods(arm):
-        with monkeypatch.context() as patch:
-            spy = Spy(patch)
-            method.build(np.zeros((0, 1)))
-            assert spy.solved == method.solves, method.name
+    monkeypatch.setitem(sys.modules, "sklearn.gaussian_process", None)
+    hasty = replace(TINY, most_s=1e-9, expansion_points=(1,), accuracies=())
+    made = compare_methods(arm, hasty, Request(), lambda line: None)
+    assert "no Kriging: it is charted where scikit-learn is installed" in made.notes
+    assert "no grid or surrogate is trained on over 4 exact solves" in made.notes
+    assert any("have no answer: Taylor 1 full took" in note for note in made.notes)
+    assert made.asked.designs == 3  # at least
+    assert made.asked.random_points == 4
 
 
-def test_evaluating_solves_nothing_exactly(
-    arm: Scene, points: EvaluationPoints, monkeypatch: pytest.MonkeyPatch
+# --- The features that surrogates and grids are functions of
+
+
+def test_features_lead_back_to_samples_and_designs(arm: Scene) -> None:
+    features = build_features(arm)
+    assert features.names == ("place along the trajectory", "m1", "m2")
+    points = build_question(arm, features, TINY, 1e-6).points
+    assert points.u.min() >= 0.0
+    assert points.u.max() <= 1.0
+    back = features.nearest(points.u)
+    np.testing.assert_allclose(back.u, points.u, atol=1e-15)
+    np.testing.assert_allclose(back.y, points.y, atol=1e-15)
+
+
+def test_a_third_of_the_points_and_half_of_the_designs_are_corners_of_the_box(arm: Scene) -> None:
+    question = build_question(arm, build_features(arm), TINY, 1e-6)
+    again = build_question(arm, build_features(arm), TINY, 1e-6)
+    np.testing.assert_array_equal(question.points.q, again.points.q)
+    corners = np.isin(question.points.u[:, 1:], (0.0, 1.0)).all(axis=1)
+    assert corners[: question.n_random].sum() == question.n_random // 3
+    assert [bool(corners[run].all()) for run in question.runs] == [True, False, True]
+
+
+ABSOLUTE = "q2: {joint: elbow, angle: absolute}"
+
+
+@pytest.mark.parametrize("head", [HEAD, HEAD.replace(ABSOLUTE, "q2: {joint: elbow}")])
+def test_a_trajectory_that_stands_still_where_it_matters_is_refused_with_the_joint(
+    head: str, tmp_path: Path
 ) -> None:
-    made = [method.build(np.zeros((0, 1))) for method in _methods(arm)]
-    spy = Spy(monkeypatch)
-    for evaluate in made:
-        assert evaluate(points).shape == (len(points.x), 1)
-    assert spy.solved == 0
-
-
-def test_fits_solve_as_often_as_they_say_and_are_as_accurate_as_asked(
-    arm: Scene, points: EvaluationPoints, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    hz = exact_frequencies(arm, points.x)
-    for method in _fits(arm, points):
-        with monkeypatch.context() as patch:
-            spy = Spy(patch)
-            made: Any = method.build(np.zeros((0, 1)))
-            looked = 9 * sum(
-                f.error_estimate < FINE for f in made.fits
-            )  # round-off: scaled 8 times
-            assert spy.solved == made.solves + looked, method.name
-            asked = points.runs() if method.per_design else points
-            found = made(asked)
-            assert spy.solved == made.solves + looked
-        off = float(np.abs(found / hz[-len(found) :] - 1.0).max())
-        assert off <= method.parameters.get("accuracy", max(f.error_estimate for f in made.fits))
-        assert method.parameters.get("solves", 0) * len(made.fits) in (0, made.solves)
-
-
-def test_all_exact_solvers_agree(arm: Scene, points: EvaluationPoints) -> None:
-    hz = exact_frequencies(arm, points.x)
-    for method in (
-        *own.exact_methods(arm.model, (1,), None),
-        rivals.dense_by_scipy(arm.model, (1,), 9),
+    second = 5.4 if "absolute" in head else 5.3  # the elbow does not turn
+    still = f"trajectory: {{q: [[1.8, 5.3], [1.9, {second}]], duration: 1 s}}\n"
+    scene = scene_of(tmp_path, head + still)
+    with pytest.raises(
+        CaseError, match=r"nothing moves .* \(joints: elbow\).* let it move, or give"
     ):
-        found = method.build(np.zeros((0, 1)))(points)
-        np.testing.assert_allclose(found, hz, rtol=1e-10)
+        build_features(scene)
 
 
-def test_several_modes_have_a_column_each(tmp_path: Path) -> None:
-    scene = scene_of(tmp_path, SHIPPED.replace("modes: [1]", "modes: [1, 2]"))
-    features = build_features(scene)
-    points = build_points(scene, features, 10, 2, 5)
-    exact_hz = exact_frequencies(scene, points.x)
-    assert exact_hz.shape == (20, 2)
-    rivals_too = rivals.surrogate_methods(features, [27])
-    for method in (*_methods(scene), *rivals_too, *rivals.grid_methods(features, [4])):
-        x = np.zeros((0, 4)) if method.train is None else method.train(points)
-        assert method.build(exact_frequencies(scene, x))(points).shape == (20, 2)
-
-
-def _asked(use: str, scene: Scene, how: dict[str, Any], y: np.ndarray) -> Any:
-    """What the call gives, with the names that it uses."""
-    features = build_features(scene)
-    q0 = how.get("q0", how.get("q"))
-    y0 = how.get("y0", how.get("y"))
-    known = {
-        "ea": ea, "eigassign": eigassign, "model": scene.model, "q": scene.path.q, "y": y,
-        "lower": features.lower, "upper": features.upper, "designs": y[None], "q0": q0, "y0": y0,
-    }  # fmt: skip
-    return eval(use, known)
-
-
-def test_calls_give_what_was_charted(tmp_path: Path) -> None:
-    scene = scene_of(tmp_path, SHIPPED.replace("modes: [1]", "modes: [1, 2]"))
-    points = build_points(scene, build_features(scene), 4, 2, 200)
-    y, whole = points.y[4], slice(4, 4 + len(scene.path.q))
-    fits = fit_methods(scene, build_features(scene), points, [1e-2], [(2, 1)], 150)
-    for method in (*_methods(scene), *fits):
-        few = method.parameters.get("solves", 7) not in (7, 120)
-        if few or method.use.startswith("in the case file"):
-            continue
-        wanted = method.build(np.zeros((0, 2)))(points.runs() if method.per_design else points)
-        wanted = wanted[: whole.stop - 4] if method.per_design else wanted[whole]
-        call = method.use.removeprefix("no argument of ea.reduce: ").partition(", at a pose")[0]
-        found = _asked(call, scene, dict(method.parameters), y)
-        if isinstance(found, list):
-            found = NearestExpansion(tuple(found))
-        if not isinstance(found, np.ndarray):
-            found = found.frequencies(scene.path.q, y)
-        np.testing.assert_allclose(found.reshape(wanted.shape), wanted, rtol=1e-9)
-
-
-def test_a_call_allows_as_many_frequencies_as_its_chart_did(
-    arm: Scene, points: EvaluationPoints
-) -> None:
-    made = {
-        most: list(fit_methods(arm, build_features(arm), points, [1e-3], [], most))
-        for most in (1500, 5000)
-    }
-    over = {most: next(m for m in each if m.name == "fit 1e-03") for most, each in made.items()}
-    assert over[1500].parameters == {"accuracy": 1e-3, "most": 1500}
-    assert "most" not in over[1500].use
-    assert over[5000].use.endswith("accuracy=0.001, most=5000).along(designs)")
-    along = next(m for m in made[5000] if m.name == "fit 1e-03 along")
-    assert along.parameters["most"] == 2000
+def test_a_case_in_which_nothing_can_change_a_frequency_says_so(tmp_path: Path) -> None:
+    text = (
+        "title: Pin\nmechanism:\n  space: planar\n"
+        "  materials: {m: {youngs_modulus: 210 GPa, density: 7850}}\n"
+        "  sections: {s: {shape: circle, diameter: 20 mm}}\n"
+        "  links: {l: {length: 0.8, material: m, section: s, elements: 3}}\n"
+        "  joints: {j: {type: revolute, base: ground, follower: l.start}}\n"
+        "coordinates: {q: {joint: j}}\n"
+        "trajectory: {q: [[0], [1]], duration: 1 s}\n"
+    )
+    with pytest.raises(CaseError, match=r"no coordinate changes a frequency, .*; give a design"):
+        build_features(scene_of(tmp_path, text))

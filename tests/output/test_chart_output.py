@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,9 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "study"))
-
-from eigassign.chart.results import (
+from eigassign.chart import (
     Advice,
     Asked,
     AutoTakes,
@@ -22,21 +19,11 @@ from eigassign.chart.results import (
     DesignRun,
     Errors,
     Front,
-    Machine,
     MeshRow,
     Timing,
 )
-from eigassign.output import (
-    FigurePlan,
-    MethodLine,
-    chart_figures,
-    draw,
-    render,
-    scatter,
-    write_chart,
-)
+from eigassign.output import Table, chart_figures, chart_tables, draw, write_chart
 from eigassign.output.figures import screen, style
-from eigassign.output.reports import chart as chart_report
 
 
 def timing(seconds: float, repeats: int = 5) -> Timing:
@@ -65,11 +52,19 @@ CHART = Chart(
     reference=None,
     version="1.0",
     quick=True,
-    machine=Machine("CPU", 2, "Linux x86_64", {"Python": "3.12"}, "blas 1", "1"),
+    machine={
+        "processor": "CPU",
+        "cores": 2,
+        "system": "Linux x86_64",
+        "versions": {"Python": "3.12", "NumPy": "2"},
+        "blas": "blas 1",
+        "threads": "1",
+    },
     asked=Asked((1,), 23, ("place", "m1"), 30, 2, 9, 152, 152.0, 7, 200.0, 1e-10),
     points=(
         point("exact dense", "exact", True, 1e-4, 0.0),
         point("Taylor 4 full", "Taylor, full", True, 1e-7, 1e-1),
+        point("auto 1e-04: Taylor 4", "Taylor, auto", True, 1e-7, 1e-1),
         point("grid linear 4", "grid, linear", False, 2e-7, 1e-2),
         point("hopeless", "grid, linear", False, 2e-7, np.inf),
     ),
@@ -90,7 +85,7 @@ CHART = Chart(
             0.0152,
             "words",
             False,
-            AutoTakes("Taylor 4 full", 5e-5, 0.00304, 0.4, ""),
+            AutoTakes("auto 1e-04: Taylor 4", 5e-5, 0.00304, 0.4, ""),
         ),
         Advice(
             "accuracy",
@@ -118,41 +113,10 @@ CHART = Chart(
 )
 
 
-def test_every_figure_has_a_name_of_its_own_and_is_drawn() -> None:
-    plans = chart_figures(CHART)
-    files = render(plans)
-    names = ("cost_one_trajectory", "online_alone", "mesh", "designs")
-    assert set(files) == {f"{name}.png" for name in names}
-    assert all(data.startswith(b"\x89PNG") for data in files.values())
-    assert render(plans) == files
-
-
 def test_captions_tell_what_is_not_drawn() -> None:
     plans = {plan.name: plan.caption for plan in chart_figures(CHART)}
     assert "1 method is wrong by over 100 %" in plans["cost_one_trajectory"]
     assert "0.06 Hz from the limit" in plans["mesh"]
-
-
-@pytest.mark.parametrize(
-    ("worst", "words"),
-    [
-        (0.1, "line is the error of Taylor 4 full"),
-        (0.0, "line is the error of Taylor 4 full"),
-        (np.inf, "Taylor 4 full is wrong by over 100 %"),
-        (1e9, "Taylor 4 full is wrong by over 100 %"),
-    ],
-)
-def test_the_mesh_is_drawn_beside_a_taylor_polynomial_that_is_right_somehow(
-    worst: float, words: str
-) -> None:
-    wrong = point("Taylor 4 full", "Taylor, full", True, 1e-7, worst)
-    chart = replace(CHART, points=(CHART.points[0], wrong, *CHART.points[2:]))
-    plan = next(p for p in chart_figures(chart) if p.name == "mesh")
-    assert words in plan.caption
-    with style.applied():
-        axes = draw(plan).axes[0]
-    said = [text.get_text() for text in axes.texts]
-    assert said == (["error of Taylor 4 full"] if "dashed" in plan.caption else [])
 
 
 def test_a_chart_without_meshes_or_designs_has_no_such_figures() -> None:
@@ -161,52 +125,53 @@ def test_a_chart_without_meshes_or_designs_has_no_such_figures() -> None:
         "cost_one_trajectory",
         "online_alone",
     }
-    assert "Designs" not in [table.title for table in chart_report.tables(bare)]
+    assert "Designs" not in [table.title for table in chart_tables(bare)]
 
 
-def test_the_json_holds_every_point_and_no_numbers_that_json_has_not(tmp_path: Path) -> None:
-    write_chart(CHART, tmp_path)
+def test_a_folder_holds_every_point_the_tables_and_the_figures(tmp_path: Path) -> None:
+    write_chart(CHART, tmp_path, kind="light")
     data = json.loads((tmp_path / "chart.json").read_text(), parse_constant=pytest.fail)
     assert [p["method"] for p in data["points"]] == [p.method for p in CHART.points]
-    assert data["points"][3]["everywhere"]["worst_hz"] is None
+    assert data["points"][4]["everywhere"]["worst_hz"] is None
     assert data["points"][1]["parameters"] == {"order": 4, "q0": [0.0, 0.0]}
     assert data["schema"] == 4
-
-
-def test_the_page_shows_tables_and_figures_and_escapes_titles(tmp_path: Path) -> None:
-    write_chart(CHART, tmp_path, kind="light")
     page = (tmp_path / "report.html").read_text()
     assert "An &lt;arm&gt; &amp; more" in page
     assert page.count("data:image/png;base64") == 4
     for word in ("What to choose", "Front: one trajectory", "All methods", "Mesh", "Machine"):
         assert word in page
-    assert len(list((tmp_path / "figures").iterdir())) == 4
+    figures = {path.name: path.read_bytes() for path in (tmp_path / "figures").iterdir()}
+    names = ("cost_one_trajectory", "online_alone", "mesh", "designs")
+    assert set(figures) == {f"{name}.png" for name in names}
+    assert all(data.startswith(b"\x89PNG") for data in figures.values())
+
+
+def table(title: str, chart: Chart = CHART) -> Table:
+    (found,) = [each for each in chart_tables(chart) if each.title == title]
+    return found
 
 
 def test_fronts_are_listed_from_the_quickest_with_whose_they_are() -> None:
-    table = chart_report.front(CHART, CHART.fronts[1])
-    assert [row[0] for row in table.rows] == ["Taylor 4 full", "grid linear 4", "exact dense"]
-    assert [row[1] for row in table.rows] == ["yes", "no", "yes"]
+    rows = table("Front: online alone").rows
+    assert [row[0] for row in rows] == ["Taylor 4 full", "grid linear 4", "exact dense"]
+    assert [row[1] for row in rows] == ["yes", "no", "yes"]
 
 
 def test_what_auto_takes_stands_beside_the_choice() -> None:
-    table = chart_report.auto(CHART)
-    taken, refused = table.rows
+    taken, refused = table("What auto takes").rows
     assert taken == (
-        "1e-04", "152", "Taylor 4 full", "5.0e-05", "3.04 ms", "0.2 × as long", "400 ms",
+        "1e-04", "152", "Taylor 4", "5.0e-05", "3.04 ms", "0.2 × as long", "400 ms",
     )  # fmt: skip
     assert refused[2:] == ("refused", "", "", "", "400 ms")
-    assert table.caption.endswith("1e-08 is refused: no expansion reaches 1.0e-08.")
+    caption = table("What auto takes").caption
+    assert caption.endswith("1e-08 is refused: no expansion reaches 1.0e-08.")
+    assert [row[2] for row in table("What to choose").rows] == ["exact dense"] * 2 + ["none"]
 
 
-def test_accuracies_for_which_auto_is_not_asked_any_more_are_named() -> None:
-    known, other = CHART.advice[:2]
-    below = replace(other, accuracy=1e-12, auto=None, is_below_round_off=True)
-    budget = replace(other, accuracy=None, budget_s=1.0, auto=None)
-    left = (replace(other, auto=None), replace(other, auto=None, evaluations=1e6))
-    said = chart_report.auto(replace(CHART, advice=(known, *left, below, budget))).caption
-    assert said.endswith("Not asked for 1e-08: choosing had already taken too long.")
-    assert "Not asked" not in chart_report.auto(replace(CHART, advice=(known, below))).caption
+def test_a_time_measured_once_says_so() -> None:
+    assert [row[1] for row in table("Designs").rows] == ["100 ms (90 ms–110 ms)"] * 2
+    assert [row[-1] for row in table("Mesh").rows] == ["100 µs (90 µs–110 µs)", "200 µs (once)"]
+    assert ("versions", "Python 3.12, NumPy 2") in table("Machine").rows
 
 
 def test_what_auto_takes_is_ringed() -> None:
@@ -215,7 +180,7 @@ def test_what_auto_takes_is_ringed() -> None:
     with style.applied():
         ringed, plain = draw(plan), draw(bare)
     (ring,) = [line for line in ringed.axes[0].get_lines() if line.get_markersize() == 12.0]
-    np.testing.assert_allclose(ring.get_xydata(), [(CHART.points[1].total_s(152.0), 0.1)])
+    np.testing.assert_allclose(ring.get_xydata(), [(CHART.points[2].total_s(152.0), 0.1)])
     assert "taken by order: auto" in words(ringed)
     assert "taken by order: auto" not in words(plain)
 
@@ -264,19 +229,3 @@ def test_every_family_of_methods_has_its_kind_and_a_legend_eight_at_most() -> No
     }
     _, rows = screen.table(shown)
     assert next(row[0] for row in rows).startswith("m ")
-
-
-def test_a_time_measured_once_says_so() -> None:
-    assert chart_report.spread(timing(2.0, 0)) == "2 s (once)"
-    assert chart_report.spread(timing(2.0)) == "2 s (1.8 s–2.2 s)"
-
-
-def test_points_without_a_front_and_a_single_line_can_be_drawn() -> None:
-    with style.applied():
-        lines = [MethodLine("a", np.ones(1), np.ones(1), True)]
-        shown = scatter("t", ("x", "s"), ("y", "Hz"), lines)
-        figure = draw(FigurePlan("", "", "", "", shown))
-        assert style.encoded(figure, "png").startswith(b"\x89PNG")
-    assert words(figure) == ["a"]
-    low, high = figure.axes[0].get_xlim()
-    assert low < 1.0 < high

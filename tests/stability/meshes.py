@@ -14,7 +14,7 @@ from calibration import Drawn, draw
 from wide_draws import FAMILIES
 
 from eigassign.case import CaseFile
-from eigassign.chart.mesh import refined
+from eigassign.chart import refined
 from eigassign.errors import AccuracyError, EigassignError
 from eigassign.mechanism import with_elements
 from eigassign.modal import Model
