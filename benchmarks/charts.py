@@ -36,12 +36,13 @@ def main(names: list[str]) -> None:
             path.write_text(CASES[name](), encoding="utf-8")
             options = Options(use_cache=False, progress=lambda line: print(line, file=sys.stderr))
             chart = chart_case(load_case(path), options, Effort(), Request())
+        machine = common.machine()  # before the results of an earlier run are changed
         target = common.RESULTS / f"chart_{name}"
         shutil.rmtree(target, ignore_errors=True)
         target.mkdir(parents=True)
         write_chart(replace(chart, warnings=()), target, kind="none")
         parts = [f"# {chart.title}", *(_markdown(table) for table in chart_tables(chart))]
-        parts.append("\n".join(f"- {note}" for note in (*chart.notes, common.machine())))
+        parts.append("\n".join(f"- {note}" for note in (*chart.notes, machine)))
         text = "\n\n".join(parts) + "\n"
         (target / "README.md").write_text(text, encoding="utf-8")
 

@@ -44,18 +44,6 @@ def front(
     return replace(made, methods=tuple(able[k].method for k in pareto(cost, error)))
 
 
-def front_notes(points: Sequence[ChartPoint], fronts: Sequence[Front]) -> Iterator[str]:
-    """How many methods of each front are eigassign's, and the others by name."""
-    known = {p.method: p for p in points}
-    for each in fronts:
-        charted = [known[name] for name in each.methods]
-        inside = [p for p in charted if 1e-8 <= p.everywhere.worst_relative <= 1e-2]
-        others = [p.method for p in inside if not p.ours]
-        ours = f"{len(inside) - len(others)} of {len(inside)} methods are eigassign's"
-        named = f"; the others: {', '.join(others)}" if others else ""
-        yield f"front of {each.name}, errors between 1e-2 and 1e-8: {ours}{named}"
-
-
 def advise(
     points: Sequence[ChartPoint],
     asked: Asked,

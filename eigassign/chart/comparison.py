@@ -1,6 +1,5 @@
 """Every method put the same question: built, evaluated, timed, and compared.
 
-All methods run once, which gives their answers and warms caches; then they are timed in turns.
 Evaluations are timed in large batches, as a search over designs asks for them.
 """
 
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign._version import __version__
-from eigassign.chart.advice import advise, front, front_notes
+from eigassign.chart.advice import advise, front
 from eigassign.chart.methods import Method, list_methods, most_solves
 from eigassign.chart.question import (
     SEED,
@@ -25,7 +24,7 @@ from eigassign.chart.question import (
 )
 from eigassign.chart.results import Asked, Chart, ChartPoint, Errors, Request, Timing
 from eigassign.chart.surrogates import surrogate_families
-from eigassign.chart.timing import Effort, Job, machine, take_turns, time_in_words, timed
+from eigassign.chart.timing import Effort, machine, measure, time_in_words, timed
 from eigassign.errors import EigassignError
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.study.scene import Scene
@@ -70,7 +69,7 @@ def compare_methods(
         counts[f"{request.evaluations:g} evaluations"] = request.evaluations
     named = {**counts, "online alone": None}.items()
     fronts = tuple(front(charted, name, n, asked.floor_hz) for name, n in named)
-    notes = [*front_notes(charted, fronts), *skipped_notes(skipped)]
+    notes = list(skipped_notes(skipped))
     most, d = most_solves(effort, solve_s), len(features.names)
     if most < max([*effort.training, *(k**d for k in effort.nodes)]):
         notes.append(f"no grid or surrogate is trained on over {most} exact solves")
@@ -85,7 +84,7 @@ def compare_methods(
         quick=effort.quick,
         machine=machine(),
         asked=asked,
-        points=charted,
+        points=tuple(charted),
         skipped=tuple(skipped.items()),
         fronts=fronts,
         advice=tuple(advise(charted, asked, request, wanted, skipped)),
@@ -116,89 +115,80 @@ def chart_methods(
     asked: Asked,
     effort: Effort,
     progress: Callable[[str], None],
-) -> tuple[tuple[ChartPoint, ...], dict[str, str]]:
+) -> tuple[list[ChartPoint], dict[str, str]]:
     """A point for every method; of those that cannot answer, why.
 
     After a set-up that takes over ``effort.most_s`` no other of its family is made.
     """
-    run: list[tuple[ChartPoint, list[Job], int]] = []
-    skipped, families = dict[str, str](), dict[str, str]()  # why no other is made, or nothing
+    charted, skipped = list[ChartPoint](), dict[str, str]()
+    families = dict[str, str]()  # why no other is made, or nothing
     for method in listed:
         if method.family not in families:
             progress(f"charting {method.family}")
         try:
             if why := families.setdefault(method.family, ""):
                 raise EigassignError(why)
-            run.append(_run_once(method, question, exact_hz, asked))
+            point, set_up_s = _chart_method(method, question, exact_hz, asked, effort)
         except EigassignError as error:
             skipped[method.name] = str(error)
-        else:
-            if (spent := run[-1][1][0][1]) > effort.most_s:
-                families[method.family] = f"{method.name} took {time_in_words(spent)} to set up"
-    progress("timing all methods in turns")
-    timings = take_turns([job for _, jobs, _ in run for job in jobs], effort)
-    charted = []
-    for (point, _, n), set_up, batch in zip(run, timings[::2], timings[1::2], strict=True):
-        offline, online = set_up, batch.times(1.0 / n)
-        if point.at_once > 1:
-            online = online.plus(set_up.times(1.0 / point.at_once))
-        if point.solves_online:
-            offline = NOTHING
-        charted.append(replace(point, offline=offline, online=online))
-    exact_s = min(p.online.median_s for p in charted if p.family.startswith("exact"))
-    for k, p in enumerate(charted):  # from so many: offline + N online < N exact
-        gain = exact_s - p.online.median_s
-        if gain > 0.0 and not p.family.startswith("exact"):
-            charted[k] = replace(p, break_even=p.offline.median_s / gain)
-    return tuple(charted), skipped
+            continue
+        charted.append(point)
+        if set_up_s > effort.most_s:
+            families[method.family] = f"{method.name} took {time_in_words(set_up_s)} to set up"
+    solvers = [p for p in charted if p.family.startswith("exact")]
+    exact_s = min(p.online.median_s for p in solvers)
+    for k, p in enumerate(charted):  # from so many evaluations: offline + N online < N exact
+        if p not in solvers and p.online.median_s < exact_s:
+            count = p.offline.median_s / (exact_s - p.online.median_s)
+            charted[k] = replace(p, break_even=count)
+    return charted, skipped
 
 
-def _run_once(
-    method: Method, question: Question, exact_hz: Floats, asked: Asked
-) -> tuple[ChartPoint, list[Job], int]:
-    """The point without times; set-up and evaluation to be timed, and evaluations in one call."""
-    points, n, first, solver = question.points, question.n_random, 0, "exact" in method.family
-    parts = [points[: method.most]]
+def _chart_method(
+    method: Method, question: Question, exact_hz: Floats, asked: Asked, effort: Effort
+) -> tuple[ChartPoint, float]:
+    """Set up, evaluated, timed and compared; and the seconds of setting up."""
+    points, n, first, samples = question.points, question.n_random, 0, asked.trajectory_samples
+    parts, solver = [points[: method.most]], method.family.startswith("exact")
     if method.per_design:
         parts, first, n = [points[run] for run in question.runs], n, 0
-    made, building_s = timed(lambda: [method.build(part.y[0]) for part in parts])
+    one, set_up = measure(lambda: method.build(parts[0].y[0]), effort)
+    made = [one, *(method.build(part.y[0]) for part in parts[1:])]
     pairs = list(zip(made, parts, strict=True))
     hz, spent = timed(lambda: np.vstack([each.evaluate(part) for each, part in pairs]))
     some = parts[0]
     if not method.most:  # as many as take 20 ms at the pace of the first answers, 32768 at most
         many = max(300, int(min(0.02 * len(hz) / (spent + 1e-9), 32768)))
         some = some[np.resize(np.arange(len(some)), many)]
-    jobs: list[Job] = [
-        (lambda: method.build(parts[0].y[0]), building_s / len(parts)),
-        (lambda: made[0].evaluate(some), spent * len(some) / len(hz)),
-    ]
-    exact, solves, online = exact_hz[first : first + len(hz)], sum(b.solves for b in made), 0.0
-    if solver or method.per_design:  # an error below round-off means nothing
-        online = 1.0 if solver else solves / (asked.trajectory_samples * len(parts))
-        solves = 0
-    everywhere = errors(hz, exact)
-    if solver:
+    online = measure(lambda: one.evaluate(some), effort)[1].times(1.0 / len(some))
+    exact, solves = exact_hz[first : first + len(hz)], sum(each.solves for each in made)
+    everywhere, offline, solves_online, note = errors(hz, exact), set_up, 0.0, ""
+    if solver:  # an error below round-off means nothing
         everywhere = replace(everywhere, worst_hz=max(everywhere.worst_hz, asked.floor_hz))
-    note = "set up anew for every design: answers the runs along the trajectory only"
+        offline, solves, solves_online = NOTHING, 0, 1.0
+    if method.per_design:
+        offline, solves, solves_online = NOTHING, 0, solves / (samples * len(parts))
+        online = online.plus(set_up.times(1.0 / samples))
+        note = "set up anew for every design: answers the runs along the trajectory only"
     point = ChartPoint(
         method=method.name,
         family=method.family,
         ours=method.ours,
         parameters=method.parameters,
-        offline=NOTHING,
-        online=NOTHING,
+        offline=offline,
+        online=online,
         solves=solves,
-        solves_online=online,
+        solves_online=solves_online,
         everywhere=everywhere,
         random=errors(hz[:n], exact[:n]) if n else None,
         trajectory=errors(hz[n:], exact[n:]) if len(hz) > n else None,
         break_even=None,
-        note=note if method.per_design else "",
+        note=note,
         use=method.use,
-        at_once=asked.trajectory_samples if method.per_design else 1,
-        estimate=max((b.estimate for b in made if b.estimate is not None), default=None),
+        at_once=samples if method.per_design else 1,
+        estimate=max((each.estimate for each in made if each.estimate is not None), default=None),
     )
-    return point, jobs, len(some)
+    return point, set_up.median_s
 
 
 def errors(hz: Floats, exact: Floats) -> Errors:

@@ -11,8 +11,8 @@ mean square of f/f_d − 1 with the weights of targets and time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from time import perf_counter
 from typing import Any
@@ -59,97 +59,88 @@ def chart_designs(
     if scene.path.follows_design:
         return (), ("no designs are charted where the coordinates follow the design",)
     rows = scene.path.spread(max(5, int(effort.most_s / 40.0 / solve_s)))
-    path, runs, notes = scene.path.chosen(rows), [], []
+    path, runs, notes = scene.path.chosen(rows), list[DesignRun](), list[str]()
     if len(path.q) < len(scene.path.q):
         few = f"designs are charted on {len(path.q)} of {len(scene.path.q)} samples"
         notes.append(f"{few} of the trajectory, for an exact solve takes long")
-    task = DesignTask(replace(scene, trajectory=path), target_frequencies(scene.file, path))
-    most = max(1, int(effort.most_s / (len(path.q) * solve_s)))
-    for name, run in _ways(task, effort, min(effort.objectives, most)):
+    thinned, targets = replace(scene, trajectory=path), target_frequencies(scene.file, path)
+    posed = variant_of(Task(thinned, targets, 0.0), ())
+    most = min(effort.objectives, max(1, int(effort.most_s / (len(path.q) * solve_s))))
+    ways = {
+        "one shot": partial(_one_shot, thinned, targets, effort),
+        "sequential": partial(_sequential, thinned, posed, effort),
+        "sequential, several starts": partial(_several_starts, thinned, targets),
+        "SLSQP, analytic gradient": partial(_search, thinned, posed, most, partial(_slsqp, True)),
+        "SLSQP, finite differences": partial(_search, thinned, posed, most, partial(_slsqp, False)),
+        "differential evolution": partial(_search, thinned, posed, most, _evolution),
+    }
+    for name, way in ways.items():
         progress(f"designing by {name}")
         try:
-            runs.append(replace(run(), method=name))
+            y, spent, solves, how, more = way()
+            seen = posed.problem.appraise(y)
         except EigassignError as error:
             notes.append(f"no design by {name}: {error}")
+            continue
+        curves = zip(posed.requirements.curves(seen), targets, strict=True)
+        off = max(float(np.abs(hz / own.hz - 1.0).max()) for (hz, _), own in curves)
+        value, rms = posed.problem(y, seen), float(np.linalg.norm(seen.residual))
+        run = DesignRun(
+            name, not more, how, spent, solves, tuple(y.tolist()), value, off, rms, 0.0, **more
+        )
+        runs.append(run)
     best = min((run.objective for run in runs), default=0.0)
     return tuple(replace(r, excess=excess_over(best, r.objective)) for r in runs), tuple(notes)
 
 
-def _ways(
-    task: DesignTask, effort: Effort, most: int
-) -> Iterator[tuple[str, Callable[[], DesignRun]]]:
-    yield "one shot", partial(_one_shot, task, effort)
-    yield "sequential", partial(_sequential, task, effort)
-    yield "sequential, several starts", partial(_several_starts, task)
-    yield "SLSQP, analytic gradient", partial(_search, task, most, partial(_slsqp, True))
-    yield "SLSQP, finite differences", partial(_search, task, most, partial(_slsqp, False))
-    yield "differential evolution", partial(_search, task, most, _evolution)
+# Design, time, exact solves, parameters, and of a search how it went
+_Reached = tuple[Floats, Timing, int, dict[str, Any], dict[str, Any]]
 
 
-@dataclass(frozen=True, eq=False)
-class DesignTask:
-    """The assignment of one case on (perhaps thinned) samples of its trajectory."""
-
-    scene: Scene  # with these samples only
-    wanted: tuple[Wanted, ...]  # at them
-
-    @property
-    def variant(self) -> PosedProblem:
-        """The targets on exact frequencies."""
-        return variant_of(Task(self.scene, self.wanted, 0.0), ())
-
-    def reached(self, spent: Timing, solves: int, y: Floats, **more: Any) -> DesignRun:
-        """What a way to the design y has reached, by exact solves."""
-        variant = self.variant
-        seen = variant.problem.appraise(y)
-        curves = zip(variant.requirements.curves(seen), self.wanted, strict=True)
-        off = max(float(np.abs(hz / own.hz - 1.0).max()) for (hz, _), own in curves)
-        rms, objective = float(np.linalg.norm(seen.residual)), variant.problem(y, seen)
-        how = {"method": "", "ours": True, "excess": 0.0, **more}
-        return DesignRun(
-            seconds=spent, solves=solves, design=tuple(y.tolist()), objective=objective,
-            max_relative=off, rms_relative=rms, **how,
-        )  # fmt: skip
-
-
-def _one_shot(task: DesignTask, effort: Effort) -> DesignRun:
-    scene, full, order = task.scene, task.scene.expansions.full, task.scene.expansions.order
+def _one_shot(scene: Scene, targets: tuple[Wanted, ...], effort: Effort) -> _Reached:
+    full, order = scene.expansions.full, scene.expansions.order
 
     def design() -> Any:
         linear = expand(scene.model.pencil, full.q0, full.y0, full.modes, order, linear_in_y=True)
-        made = Expansions(full, linear, order, order)
-        return assign_design(replace(scene, expansions=made), task.wanted)
+        return assign_design(
+            replace(scene, expansions=Expansions(full, linear, order, order)), targets
+        )
 
     found, spent = measure(design, effort)
-    how = {"order": order, "q0": full.q0, "y0": full.y0}
-    return task.reached(spent, 1, found.y, parameters=how)
+    return found.y, spent, 1, {"order": order, "q0": full.q0, "y0": full.y0}, {}
 
 
-def _sequential(task: DesignTask, effort: Effort) -> DesignRun:
-    start, most = np.clip(task.scene.initial, *task.scene.bounds), task.scene.file.assignment.steps
-    problem = task.variant.problem
-    found, spent = measure(lambda: minimise(problem, start, most), effort)
-    solves, how = found.appraisals * len(task.scene.path.q), {"designs judged": found.appraisals}
-    return task.reached(spent, solves, found.y, parameters=how)
+def _sequential(scene: Scene, posed: PosedProblem, effort: Effort) -> _Reached:
+    start, most = np.clip(scene.initial, *scene.bounds), scene.file.assignment.steps
+    found, spent = measure(lambda: minimise(posed.problem, start, most), effort)
+    how = {"designs judged": found.appraisals}
+    return found.y, spent, found.appraisals * len(scene.path.q), how, {}
 
 
-def _several_starts(task: DesignTask) -> DesignRun:
+def _several_starts(scene: Scene, targets: tuple[Wanted, ...]) -> _Reached:
     """Run once: it takes as long as the others in sum."""
     begun = perf_counter()
-    found = find_optimum(task.scene, task.wanted, (), lambda line: None)
+    found = find_optimum(scene, targets, (), lambda line: None)
+    return found.best.y, _once(begun), found.exact_solves, {"starts": found.starts}, {}
+
+
+def _once(begun: float) -> Timing:
     seconds = perf_counter() - begun
-    spent, how = Timing(seconds, seconds, seconds, 0), {"starts": found.starts}
-    return task.reached(spent, found.exact_solves, found.best.y, parameters=how)
+    return Timing(seconds, seconds, seconds, 0)
 
 
-# --- Searches on exact eigenvalues, over z in [0, 1]^n of the parameters with room
+def _search(scene: Scene, posed: PosedProblem, most: int, search: Callable[..., None]) -> _Reached:
+    """A search on exact eigenvalues over z in [0, 1]^n of the parameters with room.
 
-
-def _search(task: DesignTask, most: int, search: Callable[..., None]) -> DesignRun:
-    """Run once: its trace says how it went. A design counts as the best if it keeps the limits."""
-    variant, q = task.variant, task.scene.path.q
-    problem, asked, box = variant.problem, variant.requirements, UnitBox.of(variant.problem)
-    start = box.z(np.clip(task.scene.initial, problem.lower, problem.upper))
+    Run once: its trace says how it went. A design counts as the best if it keeps the limits.
+    """
+    problem, asked, q, box = (
+        posed.problem,
+        posed.requirements,
+        scene.path.q,
+        UnitBox.of(posed.problem),
+    )
+    start = box.z(np.clip(scene.initial, problem.lower, problem.upper))
     best, trace, calls, begun = (np.inf, start), list[tuple[float, float]](), 0, perf_counter()
 
     def objective(z: Floats, sloped: bool) -> Any:
@@ -162,7 +153,7 @@ def _search(task: DesignTask, most: int, search: Callable[..., None]) -> DesignR
         if sloped:
             seen = problem.appraise(y)
         else:
-            hz = task.scene.model.frequencies(q, y, asked.modes)
+            hz = scene.model.frequencies(q, y, asked.modes)
             seen = asked.appraise(y, Frequencies(hz, np.zeros((*hz.shape, len(y)))))
         value, row = problem(y, seen), box.rows @ inside
         slack = 1e-8 * (1.0 + np.abs(row))  # rounding
@@ -173,19 +164,15 @@ def _search(task: DesignTask, most: int, search: Callable[..., None]) -> DesignR
         slopes = 2.0 * (seen.residual @ seen.slopes)[box.free] * box.width + box.prices
         return (value, slopes) if sloped else value
 
-    limits = LinearConstraint(box.rows, box.row_lower, box.row_upper)
-    note = ""
+    bounds, limits, note = Bounds(np.zeros(box.n), np.ones(box.n)), [], ""
+    if len(box.rows):
+        limits.append(LinearConstraint(box.rows, box.row_lower, box.row_upper))
     try:
-        search(
-            objective, start, bounds=Bounds(np.zeros(box.n), np.ones(box.n)),
-            constraints=(limits,) if len(box.rows) else (),
-        )  # fmt: skip
+        search(objective, start, bounds=bounds, constraints=tuple(limits))
     except SpentError:
         note = "stopped: no evaluation left"
-    seconds, how = perf_counter() - begun, {"evaluations": calls, "most": most}
-    spent, y = Timing(seconds, seconds, seconds, 0), box.y(best[1])
-    more = {"ours": False, "parameters": how, "trace": tuple(trace), "note": note}
-    return task.reached(spent, calls * len(q), y, **more)
+    how, more = {"evaluations": calls, "most": most}, {"trace": tuple(trace), "note": note}
+    return box.y(best[1]), _once(begun), calls * len(q), how, more
 
 
 def _slsqp(analytic: bool, objective: Any, start: Floats, **how: Any) -> None:

@@ -301,14 +301,16 @@ def _fitted(scene: Scene, how: Mapping[str, Any], box: Box | None, *more: Any) -
 # --- What people do without eigassign
 
 
-def _trained(
-    scene: Scene, features: Features, u: Floats, fit_to: FitSurrogate, along: bool, y: Floats
-) -> Built:
-    """Fitted to exact solves near u, at samples of the trajectory; ``along`` it alone at y."""
+def _training(features: Features, u: Floats) -> Points:
+    """The points near u (n, d) that are samples of the trajectory, each once."""
     at = features.nearest(u)
+    return at[np.unique(at.u, axis=0, return_index=True)[1]]
+
+
+def _trained(scene: Scene, at: Points, fit_to: FitSurrogate, along: bool, y: Floats) -> Built:
+    """Fitted to exact solves; ``along`` the trajectory alone, at the design y."""
     if along:
-        at = Points(at.q, np.tile(y, (len(u), 1)), at.u[:, :1])
-    at = at[np.unique(at.u, axis=0, return_index=True)[1]]
+        at = Points(at.q, np.tile(y, (len(at), 1)), at.u[:, :1])
     made = fit_to(at.u, exact_frequencies(scene, at))
     return Built(lambda points: made(points.u[:, :1] if along else points.u), len(at))
 
@@ -319,7 +321,7 @@ def stations(scene: Scene, features: Features, counts: Sequence[int]) -> Iterato
         if kind != "Chebyshev" or k <= 20:  # a polynomial of higher degree is ill-conditioned
             u = np.pad(nodes(kind, k)[:, None], ((0, 0), (0, len(features.names) - 1)))
             fit_to, told = partial(grid_interpolation, kind), {"interpolation": kind, "stations": k}
-            build = partial(_trained, scene, features, u, fit_to, True)
+            build = partial(_trained, scene, _training(features, u), fit_to, True)
             name, family = f"stations {kind} {k}", f"stations, {kind}"
             yield Method(name, family, told, build, ours=False, per_design=True)
 
@@ -331,8 +333,8 @@ def grids(scene: Scene, features: Features, counts: Sequence[int]) -> Iterator[M
             mesh = np.meshgrid(*[nodes(kind, k)] * len(features.names), indexing="ij")
             u = np.stack([axis.ravel() for axis in mesh], axis=1)
             told = {"nodes": k, "features": features.names, "interpolation": kind}
-            fit_to = partial(grid_interpolation, kind)
-            build = partial(_trained, scene, features, u, fit_to, False)
+            fit_to, at = partial(grid_interpolation, kind), _training(features, u)
+            build = partial(_trained, scene, at, fit_to, False)
             yield Method(f"grid {kind} {k}", f"grid, {kind}", told, build, ours=False)
 
 
@@ -340,6 +342,6 @@ def regressions(scene: Scene, features: Features, counts: Sequence[int]) -> Iter
     """Surrogates fitted to ``counts`` spread-out points."""
     for n, (family, fit_to, how) in product(counts, list(surrogate_families())):
         told = {**how, "training_points": n, "features": features.names}
-        u = spread_points(n, len(features.names))
-        build = partial(_trained, scene, features, u, fit_to, False)
+        at = _training(features, spread_points(n, len(features.names)))
+        build = partial(_trained, scene, at, fit_to, False)
         yield Method(f"{family.replace(',', '')} {n}", family, told, build, ours=False)

@@ -1,4 +1,4 @@
-"""How much a chart tries, and how jobs are timed: a first run, repeats in turns, medians.
+"""How much a chart tries, and how jobs are timed: a first run, then repeats, of which the median.
 
 Processor time, which on one thread is the time it takes where nothing else runs.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import platform
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,7 +20,6 @@ from eigassign._version import __version__
 from eigassign.chart.results import Timing
 
 T = TypeVar("T")
-Job = tuple[Callable[[], object], float]  # and the seconds that it took the first time
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class Effort:
     factors: tuple[float, ...] = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # of a mesh's elements
     most_dof: int = 40_000  # of a refined mesh
     objectives: int = 600  # exact evaluations of the objective in a search
-    rounds: int = 7  # in which jobs are repeated, each
+    rounds: int = 5  # in which jobs are repeated, each
     round_s: float = 0.01  # for at least so long in all
     long_s: float = 1.0  # a job whose first run takes longer is not repeated
 
@@ -78,31 +77,20 @@ def timed(job: Callable[[], T]) -> tuple[T, float]:
     return result, time.process_time() - start
 
 
-def take_turns(jobs: Sequence[Job], effort: Effort) -> list[Timing]:
-    """Time each job, all of which have run once.
-
-    The jobs take turns, round after round, so that all see the same machine; within a round a short
-    job is repeated and its quickest run counts, which is the one least disturbed.
-    """
-    spent: list[list[float]] = [[] for _ in jobs]
-    for _ in range(effort.rounds):
-        for (job, first), mine in zip(jobs, spent, strict=True):
-            if first <= effort.long_s:
-                once = [timed(job)[1]]
-                while sum(once) < effort.round_s:
-                    once.append(max(timed(job)[1], 1e-7))
-                mine.append(min(once))
-    made = []
-    for (_, first), mine in zip(jobs, spent, strict=True):
-        median, low, high = np.quantile(mine or [first], (0.5, 0.25, 0.75)).tolist()
-        made.append(Timing(median, low, high, len(mine)))
-    return made
-
-
 def measure(job: Callable[[], T], effort: Effort) -> tuple[T, Timing]:
-    """What one job returns, and how long it takes after a first run."""
+    """What a job returns, and how long it takes after a first run, which warms caches.
+
+    In a round a short job is repeated, and its quickest run counts: the one least disturbed.
+    """
     result, first = timed(job)
-    return result, take_turns([(job, first)], effort)[0]
+    spent = list[float]()
+    for _ in range(effort.rounds if first <= effort.long_s else 0):
+        once = [timed(job)[1]]
+        while sum(once) < effort.round_s:
+            once.append(max(timed(job)[1], 1e-7))
+        spent.append(min(once))
+    median, low, high = np.quantile(spent or [first], (0.5, 0.25, 0.75)).tolist()
+    return result, Timing(median, low, high, len(spent))
 
 
 def time_in_words(seconds: float) -> str:
