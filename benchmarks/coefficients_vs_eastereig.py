@@ -20,7 +20,7 @@ import numpy as np
 
 import eigassign as ea
 from eigassign.modal import Expansion, Model
-from eigassign.series.multi_index import total_degree
+from eigassign.series import total_degree
 
 ORDER = 4
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])

@@ -20,7 +20,7 @@ import numpy as np
 
 import eigassign as ea
 from eigassign.modal import Expansion, Model, modes
-from eigassign.series.multi_index import LowerSet, total_degree
+from eigassign.series import LowerSet, total_degree
 
 ORDER = 4
 Index = tuple[int, ...]
