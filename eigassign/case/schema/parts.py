@@ -231,26 +231,17 @@ ByReference: TypeAlias = Annotated[Mapping[str, T], Frozen]  # values by the nam
 # --- Values of several kinds
 
 
-def _list_tag(value: object) -> str:
-    return "<list>" if isinstance(value, (tuple, list)) else "<one>"
-
-
-def _auto_tag(value: object) -> str:
-    return "<auto>" if isinstance(value, str) else "<number>"
-
-
-def _part_tag(value: object) -> str:
-    return "<part>" if isinstance(value, (Mapping, Part)) else "<value>"
-
-
 OneOrList: TypeAlias = Annotated[
-    Annotated[T, Tag("<one>")] | Annotated[L, Tag("<list>")], Discriminator(_list_tag)
+    Annotated[T, Tag("<one>")] | Annotated[L, Tag("<list>")],
+    Discriminator(lambda value: "<list>" if isinstance(value, (tuple, list)) else "<one>"),
 ]
 NumberOr: TypeAlias = Annotated[  # a number or a word, such as auto
-    Annotated[T, Tag("<number>")] | Annotated[L, Tag("<auto>")], Discriminator(_auto_tag)
+    Annotated[T, Tag("<number>")] | Annotated[L, Tag("<auto>")],
+    Discriminator(lambda value: "<auto>" if isinstance(value, str) else "<number>"),
 ]
 ValueOr: TypeAlias = Annotated[
-    Annotated[T, Tag("<value>")] | Annotated[P, Tag("<part>")], Discriminator(_part_tag)
+    Annotated[T, Tag("<value>")] | Annotated[P, Tag("<part>")],
+    Discriminator(lambda value: "<part>" if isinstance(value, (Mapping, Part)) else "<value>"),
 ]
 
 

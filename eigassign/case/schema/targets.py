@@ -195,6 +195,7 @@ class ModeTarget(AnyTarget):
 
     model_config = needs_one_of(("mode",), ("modes",))
 
+    never_all: ClassVar[str] = ""  # why `modes: all` cannot be meant
     mode: ValueOr[Mode, FollowedMode] | None = None
     modes: OneOrList[Literal["all"], Modes] | None = None
 
@@ -215,6 +216,8 @@ class ModeTarget(AnyTarget):
             raise wrong("required key is missing: the number of a mode (or modes: [...])", "mode")
         if self.mode is not None and self.modes is not None:
             raise wrong("mode is given already: one of them is enough", "modes")
+        if self.modes == "all" and self.never_all:
+            raise wrong(self.never_all, "modes")
         return self
 
 
@@ -226,13 +229,8 @@ class FrequencyTarget(ModeTarget):
     """
 
     kind = "frequency"
+    never_all = "all modes cannot have one frequency: list those that shall"
     frequency: Curve
-
-    @model_validator(mode="after")
-    def _is_of_some(self) -> Self:
-        if self.modes == "all":
-            raise wrong("all modes cannot have one frequency: list those that shall", "modes")
-        return self
 
 
 class AtLeastTarget(ModeTarget):
@@ -254,13 +252,8 @@ class AtMostTarget(ModeTarget):
     """
 
     kind = "at_most"
+    never_all = "there is always a higher mode: list those that are meant"
     at_most: Curve
-
-    @model_validator(mode="after")
-    def _is_of_some(self) -> Self:
-        if self.modes == "all":
-            raise wrong("there is always a higher mode: list those that are meant", "modes")
-        return self
 
 
 class KeepOutTarget(AnyTarget):
