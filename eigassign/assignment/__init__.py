@@ -3,7 +3,7 @@
 Reading order:
 
     checks       refuses input that is not finite or has another shape
-    targets      wanted frequencies at the samples, weights in time, the distance to a target
+    targets      wanted frequencies at the samples, weights in time, λ in Hz
     program      build: the quadratic program of eqs. (13)–(14), and its dimensionless units
     feasibility  which limits contradict each other
     solver       solve: OSQP, then an active-set method that goes to round-off
@@ -19,7 +19,7 @@ __all__, __getattr__, __dir__ = face(
     __name__,
     {
         "assign": "Assignment solve_assignment",
-        "catalogues.branching": "ListedValues SearchLimits hull search_catalogue",
+        "catalogues.branching": "ListedValues hull search_catalogue",
         "catalogues.choosing": "choose",
         "catalogues.linear": "solve_catalogue",
         "exact.design_problem": "Appraisal DesignProblem Objective best_first",
@@ -33,6 +33,6 @@ __all__, __getattr__, __dir__ = face(
             "quadratic_form scaled_program unscaled"
         ),
         "solver": "Status solve_program solve_scaled",
-        "targets": "hz_from_lam lam_from_hz relative_error sample_target trapezoidal_weights",
+        "targets": "hz_from_lam lam_from_hz sample_target trapezoidal_weights",
     },
 )

@@ -94,7 +94,7 @@ def solve_assignment(
         UsageError: shapes that do not fit, values that are not finite, empty ranges.
         InfeasibleError: no design meets all limits; ``constraints`` names those that contradict.
         AccuracyError: the KKT residuals of the best answer found exceed 1e-8; or no combination
-            of the catalogues was found within `branching.SearchLimits`.
+            of the catalogues was found in a minute.
         KeyboardInterrupt: Ctrl-C while the solver runs.
     """
     program = build_program(goals, time_weights, y0, y_initial, bounds, constraints, names)

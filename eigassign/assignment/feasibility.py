@@ -88,19 +88,17 @@ def constraints_agree(rows: Sequence[LinearConstraint], bounds: Bounds) -> bool:
     """True where a design within the bounds meets all linear limits, to 1e-9 of their terms."""
     if not rows:
         return True
-    from scipy.optimize import linprog  # heavy, and few cases have linear limits
-
     C = np.array([row.coefficients for row in rows])
     low, high = np.array([(row.lower, row.upper) for row in rows]).T
-    width = bounds.upper - bounds.lower
+    width, n = bounds.upper - bounds.lower, len(bounds.lower)
     size = np.abs(C) @ np.maximum(np.abs(bounds.lower), np.abs(bounds.upper))
-    size = np.where(size > 0.0, size, 1.0)[:, None]
+    size = np.where(size > 0.0, size, 1.0)
     fixed = C @ bounds.lower
-    G = np.vstack([C * width / size, -C * width / size])
-    h = np.concatenate([high - fixed, fixed - low]) / np.tile(size[:, 0], 2) + TOUCH
-    finite = np.isfinite(h)
-    found = linprog(np.zeros(len(width)), G[finite], h[finite], bounds=(0.0, 1.0), method="highs")
-    return bool(found.status != 2)
+    G = np.vstack([np.eye(n), C * width / size[:, None]])
+    lower = np.append(np.zeros(n), (low - fixed) / size - TOUCH)
+    upper = np.append(np.ones(n), (high - fixed) / size + TOUCH)
+    nothing = np.zeros(n)
+    return feasible_point(ScaledProgram(G[:0], nothing[:0], G, lower, upper, nothing)) is not None
 
 
 def contradiction(program: QuadraticProgram, scaled: ScaledProgram) -> InfeasibleError:

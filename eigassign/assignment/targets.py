@@ -1,22 +1,12 @@
-"""Targets sampled in time, time weights, and the distance to a target in Hz."""
+"""Targets sampled in time, time weights, and λ in Hz."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from eigassign.assignment.checks import Floats, finite, frozen, same_length
 from eigassign.errors import AccuracyError, UsageError
-
-
-@dataclass(frozen=True)
-class RelativeError:
-    """Distance to the target in Hz, relative to the target: fractions, 0.01 is 1 %."""
-
-    max_relative: float
-    rms_relative: float
 
 
 def trapezoidal_weights(time_s: ArrayLike) -> Floats:
@@ -103,25 +93,3 @@ def hz_from_lam(lam: ArrayLike) -> Floats:
             "which no mechanism has: the design is too far from the expansion point"
         )
     return frozen(np.sqrt(values) / (2.0 * np.pi))
-
-
-def relative_error(
-    frequency_hz: ArrayLike, target_hz: ArrayLike, weights: ArrayLike | None = None
-) -> RelativeError:
-    """Largest and root mean square of e = f / f_d − 1 over the samples.
-
-    rms = √(Σ w e² / Σ w), with ``weights`` such as `trapezoidal_weights` (the mean over time) or,
-    if none, equal ones. All arguments (n_t,).
-
-    Raises:
-        UsageError: lengths that differ, no samples, values that are not finite, a target of 0 Hz.
-    """
-    frequency, target = finite("frequency", frequency_hz, 1), positive_hz(target_hz)
-    w = np.ones(target.size) if weights is None else finite("weights", weights, 1)
-    same_length("frequency", frequency.size, target.size, "target samples")
-    same_length("weights", w.size, target.size, "target samples")
-    if target.size == 0 or np.any(w < 0.0) or w.sum() <= 0.0:
-        raise UsageError("weights: must not be negative, and not all be zero")
-    error = frequency / target - 1.0
-    rms = float(np.sqrt(w @ error**2 / w.sum()))
-    return RelativeError(max_relative=float(np.max(np.abs(error))), rms_relative=rms)

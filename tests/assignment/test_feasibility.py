@@ -30,15 +30,15 @@ def test_a_constraint_out_of_reach_is_named_with_what_can_be_reached():
     assert e.value.constraints == ("total",)
 
 
-def test_a_constraint_that_asks_for_too_little_is_named_too():
-    with pytest.raises(InfeasibleError, match=r"'gap' asks for at most -2, .* no less than -1"):
-        solve([row("gap", [1, -1], upper=-2.0)])
-
-
 @pytest.mark.parametrize("short", [1e-3, 1e-6])
 def test_a_constraint_just_out_of_reach_is_still_out_of_reach(short):
     with pytest.raises(InfeasibleError, match="'total' asks for at least"):
         solve([row("total", [1, 1], lower=2.0 + short)])
+
+
+def test_a_constraint_that_asks_for_too_little_is_named_too():
+    with pytest.raises(InfeasibleError, match=r"'gap' asks for at most -2, .* no less than -1"):
+        solve([row("gap", [1, -1], upper=-2.0)])
 
 
 def test_two_constraints_that_just_contradict_each_other_still_do():
@@ -53,33 +53,33 @@ def test_an_open_range_that_a_constraint_does_not_use_does_not_hide_the_contradi
         solve([row("first", [1, 0], lower=2.0)], upper=(1.0, np.inf))
 
 
-def test_several_constraints_out_of_reach_are_all_named():
+@pytest.mark.parametrize(
+    ("constraints", "box", "named"),
+    [
+        (
+            [row("a", [1, 0], lower=2), row("b", [1, 1], upper=1), row("c", [0, 1], upper=-1)],
+            {},
+            ("a", "c"),
+        ),
+        (
+            [
+                row("at_least", [1, 1], lower=1.5),
+                row("innocent", [1, -1], upper=0.9),
+                row("at_most", [2, 2], upper=2.0),
+            ],
+            {},
+            ("at_least", "at_most"),
+        ),
+        ([row("total", [1, 1], upper=0.5)], {"lower": (0.4, 0.4), "upper": (0.4, 0.4)}, ("total",)),
+        ([row("empty", [0, 0], lower=1.0)], {}, ("empty",)),
+    ],
+    ids=["each alone", "together and no third", "of fixed parameters", "without terms"],
+)
+def test_constraints_that_contradict_the_bounds_or_each_other_are_named(constraints, box, named):
     with pytest.raises(InfeasibleError) as e:
-        solve([row("a", [1, 0], lower=2), row("b", [1, 1], upper=1), row("c", [0, 1], upper=-1)])
-    assert e.value.constraints == ("a", "c")
-
-
-def test_two_constraints_that_contradict_each_other_are_named_and_no_third():
-    parts = [
-        row("at_least", [1, 1], lower=1.5),
-        row("innocent", [1, -1], upper=0.9),
-        row("at_most", [2, 2], upper=2.0),
-    ]
-    with pytest.raises(InfeasibleError, match="'at_least' and 'at_most' together") as e:
-        solve(parts)
-    assert e.value.constraints == ("at_least", "at_most")
-
-
-def test_a_contradiction_of_fixed_parameters_is_named():
-    with pytest.raises(InfeasibleError) as e:
-        solve([row("total", [1, 1], upper=0.5)], lower=(0.4, 0.4), upper=(0.4, 0.4))
-    assert e.value.constraints == ("total",)
-
-
-def test_a_constraint_without_terms_is_named_if_it_cannot_hold():
-    with pytest.raises(InfeasibleError) as e:
-        solve([row("empty", [0, 0], lower=1.0)])
-    assert e.value.constraints == ("empty",)
+        solve(constraints, **box)
+    assert e.value.constraints == named
+    assert ("together" in str(e.value)) is (named == ("at_least", "at_most"))
 
 
 def test_open_ranges_reach_everything():
@@ -103,16 +103,19 @@ def possible(constraints):
     return linprog(np.zeros(A.shape[1]), A, b, bounds=(0.0, 1.0)).status == 0
 
 
-@pytest.mark.parametrize("seed", range(40))
-def test_infeasible_is_said_exactly_when_it_is_so_and_the_named_set_is_smallest(seed):
-    rng = np.random.default_rng(seed)
-    problem = random_problem(seed, n_y=3)
-    constraints = []
+def random_rows(seed):
+    """Two to six constraints on three parameters."""
+    rng, rows = np.random.default_rng(seed), []
     for k in range(6):
         low = rng.normal()
-        constraints.append(row(f"c{k}", rng.normal(size=3), low - 0.5, low + rng.random()))
+        rows.append(row(f"c{k}", rng.normal(size=3), low - 0.5, low + rng.random()))
+    return rows[: 2 + seed % 5]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_infeasible_is_said_exactly_when_it_is_so_and_the_named_set_is_smallest(seed):
+    problem, constraints = random_problem(seed, n_y=3), random_rows(seed)
     box = Bounds(np.zeros(3), np.ones(3))
-    constraints = constraints[: 2 + seed % 5]
     arguments = (problem.goals, problem.weights, np.zeros(3), 0.5 * np.ones(3), box, constraints)
     if possible(constraints):
         solve_assignment(*arguments)
@@ -130,13 +133,7 @@ def test_infeasible_is_said_exactly_when_it_is_so_and_the_named_set_is_smallest(
 
 def test_the_random_sets_are_of_all_kinds():
     kinds = {"possible": 0, "alone": 0, "together": 0}
-    for seed in range(40):
-        rng = np.random.default_rng(seed)
-        rows = []
-        for k in range(6):
-            low = rng.normal()
-            rows.append(row(f"c{k}", rng.normal(size=3), low - 0.5, low + rng.random()))
-        rows = rows[: 2 + seed % 5]
+    for rows in map(random_rows, range(40)):
         alone = not all(possible([c]) for c in rows)
         kinds["possible" if possible(rows) else "alone" if alone else "together"] += 1
     assert min(kinds.values()) >= 3, kinds

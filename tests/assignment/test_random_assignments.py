@@ -9,7 +9,11 @@ from random_assignments import CONFIRMATION, DEVELOPMENT, FAMILIES, load_text, r
 
 import eigassign as ea
 
-EACH_FAMILY = DEVELOPMENT[: len(FAMILIES)]
+QUICK = (0, 3, 6)
+EACH_FAMILY = [
+    pytest.param(seed, marks=() if seed in QUICK else pytest.mark.slow)
+    for seed in DEVELOPMENT[: len(FAMILIES)]
+]
 
 
 def problem_of(seed):
@@ -41,7 +45,10 @@ def test_random_cases_are_varied():
     assert max(span) > 50.0
 
 
-@pytest.mark.parametrize("seed", [0, 1, 8, 14])
+@pytest.mark.parametrize(
+    "seed",
+    [0, 8, pytest.param(1, marks=pytest.mark.slow), pytest.param(14, marks=pytest.mark.slow)],
+)
 def test_the_reference_has_the_slopes_of_its_objective(seed):
     """Differences of J err by about (1e-5)² of the third derivative, and by round-off."""
     problem = problem_of(seed)

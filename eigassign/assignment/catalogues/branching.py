@@ -36,6 +36,7 @@ Node = tuple[Rows, ...]  # the rows that every catalogue may still take
 
 # Of the objective: bounds this near to a known one are not looked into. OSQP's tolerance.
 PROVED = 1e-9
+KEEP, SECONDS = 5, 60.0  # the combinations that are told of, and the time to find them in
 
 
 @dataclass(frozen=True)
@@ -89,20 +90,6 @@ class CatalogueSearch:
     def relative_gap(self) -> float:
         """``gap`` over the objective."""
         return self.gap / abs(self.best[0].objective) if self.gap > 0.0 else 0.0
-
-    @property
-    def proved(self) -> bool:
-        """No combination is better than the first by more than 1e-9 of it."""
-        return self.relative_gap <= PROVED
-
-
-@dataclass(frozen=True)
-class SearchLimits:
-    """The number of combinations to keep, and of nodes or seconds after which to stop."""
-
-    keep: int = 5
-    nodes: int = 100_000
-    seconds: float = 60.0
 
 
 # --- The tree
@@ -161,13 +148,17 @@ class _Best:
 
 
 def branch_and_bound(
-    problem: CatalogueProblem, root: Node, limits: SearchLimits, start: Iterable[Combination] = ()
+    problem: CatalogueProblem,
+    root: Node,
+    keep: int,
+    seconds: float,
+    start: Iterable[Combination] = (),
 ) -> CatalogueSearch:
-    """The lowest bound first, knowing some combinations at the start.
+    """Search the lowest bound first for the ``keep`` best, knowing some at the start.
 
-    ``best`` is empty where there is no combination, or none was met before a limit.
+    ``best`` is empty where there is no combination, or none was met in time.
     """
-    best, nodes, end = _Best(limits.keep), 0, time.monotonic() + limits.seconds
+    best, nodes, end = _Best(keep), 0, time.monotonic() + seconds
     best.add(start)
     heap: list[tuple[float, int, Relaxed]] = []
     pending: list[Node] = [root]
@@ -182,7 +173,7 @@ def branch_and_bound(
                 best.add(problem.combinations(rounded, relaxed, best.cutoff))
                 heapq.heappush(heap, (relaxed.bound, nodes, relaxed))
         exhausted = not heap or heap[0][0] >= best.cutoff() - PROVED * abs(best.cutoff())
-        if exhausted or nodes >= limits.nodes or time.monotonic() > end:
+        if exhausted or time.monotonic() > end:
             break
         above = heapq.heappop(heap)[2]
         pending = []
@@ -216,7 +207,7 @@ def _split(problem: CatalogueProblem, relaxed: Relaxed) -> list[Node]:
 
 
 def answered(found: CatalogueSearch) -> CatalogueSearch:
-    """Return what was found; raise AccuracyError where a limit of the search came first."""
+    """Return what was found; raise AccuracyError where time ran out first."""
     if found.best:
         return found
     raise AccuracyError(
@@ -251,7 +242,8 @@ def search_catalogue(
     catalogues: Sequence[ListedValues],
     relax: Callable[[Node, Floats | None], tuple[Floats, float] | None],
     fix: Callable[[Rows], tuple[Floats, float] | None],
-    limits: SearchLimits | None = None,
+    keep: int = KEEP,
+    seconds: float = SECONDS,
     starts: Iterable[Rows] = (),
 ) -> CatalogueSearch:
     """Combinations of a model that need not be linear or convex, by the same tree.
@@ -269,13 +261,12 @@ def search_catalogue(
     Raises:
         UsageError: columns that two catalogues own.
         InfeasibleError: there is no combination.
-        AccuracyError: a limit was reached before any combination was found.
+        AccuracyError: time ran out before any combination was found.
     """
-    limits = limits or SearchLimits()
-    end = time.monotonic() + limits.seconds
+    end = time.monotonic() + seconds
     problem = _AnyProblem(catalogues, relax, fix)
     known = filter(None, map(problem.combination, starts))
-    found = branch_and_bound(problem, problem.root, replace(limits, keep=1), known)
+    found = branch_and_bound(problem, problem.root, 1, seconds, known)
     if not found.best and found.exhausted:
         names = tuple(own.name for own in catalogues)
         listed = ", ".join(map(repr, names))
@@ -288,7 +279,7 @@ def search_catalogue(
             exchanged = filter(None, map(problem.combination, itertools.product(*rows)))
             better = min([better, *exchanged], key=lambda one: one.objective)
     met = filter(None, problem.known.values())
-    best = tuple(sorted(met, key=lambda one: (one.objective, one.rows))[: limits.keep])
+    best = tuple(sorted(met, key=lambda one: (one.objective, one.rows))[:keep])
     return replace(found, best=best, lower_bound=min(found.lower_bound, best[0].objective))
 
 

@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from eigassign.assignment.catalogues.branching import (
+    KEEP,
     CatalogueSearch,
     ListedValues,
     Node,
     Rows,
-    SearchLimits,
     distinct_rows,
     hull,
     search_catalogue,
@@ -30,7 +30,6 @@ from eigassign.assignment.program import Bounds
 from eigassign.errors import AccuracyError, EigassignError, InfeasibleError
 
 RELAXED = 3  # starts of the relaxation of all combinations
-KEPT = SearchLimits().keep
 TOUCH = 1e-7  # of a constraint's terms: what the programs leave of a limit
 STOPPED = (End.SECONDS, End.INTERRUPTED)
 
@@ -75,7 +74,7 @@ def choose(
         raise AccuracyError(
             "catalogues: no combination was met that the mechanism can be solved at"
         )
-    best = best_first(sorted(tree.fixed), lambda rows: worth(tree.fixed[rows]))[:KEPT]
+    best = best_first(sorted(tree.fixed), lambda rows: worth(tree.fixed[rows]))[:KEEP]
     return Chosen(tuple(best), tuple(tree.fixed[r] for r in best), search, tree.appraisals)
 
 
@@ -119,9 +118,8 @@ class _Tree:
             return None if optimum is None or worth is None else (optimum.y, worth)
 
         left = min(max(self.deadline - time.monotonic(), 0.0), 600.0)  # where the case gives none
-        limits = SearchLimits(seconds=left)
         starts = dict.fromkeys(map(self.nearest, self.starts))
-        return search_catalogue(self.catalogues, relax, fix, limits, starts)
+        return search_catalogue(self.catalogues, relax, fix, KEEP, left, starts)
 
     def _relaxed(self, node: Node, near: Floats | None) -> Iterator[Optimum]:
         self.nodes += 1

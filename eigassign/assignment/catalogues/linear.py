@@ -26,13 +26,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.catalogues.branching import (
+    KEEP,
+    SECONDS,
     CatalogueSearch,
     Combination,
     ListedValues,
     Node,
     Relaxed,
     Rows,
-    SearchLimits,
     answered,
     branch_and_bound,
     distinct_rows,
@@ -54,7 +55,7 @@ from eigassign.errors import InfeasibleError
 def solve_catalogue(
     program: QuadraticProgram,
     catalogues: Sequence[ListedValues],
-    limits: SearchLimits | None = None,
+    seconds: float = SECONDS,
 ) -> CatalogueSearch:
     """The combinations of least J(y), the continuous columns at their optimum for each.
 
@@ -65,9 +66,8 @@ def solve_catalogue(
         UsageError: columns that do not exist, or that two catalogues own.
         InfeasibleError: no combination meets all limits (the tree was searched to its end);
             ``constraints`` names a smallest set of them, or the catalogue without admissible row.
-        AccuracyError: a limit of ``limits`` was reached before any combination was found.
+        AccuracyError: time ran out before any combination was found.
     """
-    limits = limits or SearchLimits()
     program, root = _listed(program, catalogues)
     refuse_impossible(program)
     if not program.scales.free:
@@ -75,9 +75,9 @@ def solve_catalogue(
             tuple(rows[0] for rows in root), program.y_start, program.objective(program.y_start)
         )
         return CatalogueSearch((only,), only.objective, 1, True)
-    found = branch_and_bound(_LinearProblem(program, catalogues), root, limits)
+    found = branch_and_bound(_LinearProblem(program, catalogues), root, KEEP, seconds)
     if not found.best and found.exhausted:
-        raise _contradiction(program, catalogues, root, limits)
+        raise _contradiction(program, catalogues, root, seconds)
     return answered(found)
 
 
@@ -137,7 +137,7 @@ def _contradiction(
     program: QuadraticProgram,
     catalogues: Sequence[ListedValues],
     root: Node,
-    limits: SearchLimits,
+    seconds: float,
 ) -> InfeasibleError:
     """The error that names constraints, none of which can be left out of the contradiction."""
     program = replace(program, A=np.zeros_like(program.A), b=np.zeros_like(program.b))
@@ -145,7 +145,7 @@ def _contradiction(
     def contradict(names: list[str]) -> bool:
         kept = [k for k, own in enumerate(program.constraint_names) if own in names]
         only = _within(program, program.lower, program.upper, kept)
-        tried = branch_and_bound(_LinearProblem(only, catalogues), root, replace(limits, keep=1))
+        tried = branch_and_bound(_LinearProblem(only, catalogues), root, 1, seconds)
         return not tried.best and tried.exhausted
 
     needed = smallest(list(dict.fromkeys(program.constraint_names)), contradict)

@@ -18,8 +18,8 @@ from time import monotonic
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.catalogues.branching import ListedValues
-from eigassign.assignment.catalogues.choosing import KEPT, RELAXED, Chosen, choose
+from eigassign.assignment.catalogues.branching import KEEP, ListedValues
+from eigassign.assignment.catalogues.choosing import RELAXED, Chosen, choose
 from eigassign.assignment.exact.design_problem import (
     MET,
     DesignProblem,
@@ -158,7 +158,7 @@ def _search_all(
     possible = (_possible(scene, band) for band in whole.bands)
     for below in itertools.islice(itertools.product(*possible), MOST_BELOW):
         if listed:
-            near = list(starts[: KEPT + 1])
+            near = list(starts[: KEEP + 1])
             variant, chosen = _chosen(whole, below, listed, near, deadline, progress)
             best_of.append((variant, chosen.optima, chosen))
             lost += variant.response.lost

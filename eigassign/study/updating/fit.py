@@ -71,11 +71,6 @@ class ExplainedMeasurement:
     updated_hz: float
 
     @property
-    def initial_residual(self) -> float:
-        """(model − measured)/σ before."""
-        return (self.initial_hz - self.measured_hz) / self.deviation_hz
-
-    @property
     def residual(self) -> float:
         """(model − measured)/σ after."""
         return (self.updated_hz - self.measured_hz) / self.deviation_hz

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares, linprog, minimize
 
-from eigassign.assignment import Bounds, ListedValues, SearchLimits, hull, search_catalogue
+from eigassign.assignment import Bounds, ListedValues, hull, search_catalogue
 from eigassign.errors import AccuracyError, InfeasibleError, UsageError
 
 
@@ -128,9 +128,7 @@ def test_so_it_is_on_many_models_narrow_and_wide(seed):
 
 def test_the_best_few_are_distinct_and_in_order():
     arm, catalogues = Arm(7), lists(7, 7, 1)
-    search = search_catalogue(
-        catalogues, arm.relax(catalogues), arm.fix(catalogues), SearchLimits(8)
-    )
+    search = search_catalogue(catalogues, arm.relax(catalogues), arm.fix(catalogues), keep=8)
     figures = [one.objective for one in search.best]
     assert figures == sorted(figures)
     assert len({one.rows for one in search.best}) == len(figures) == 8
@@ -173,9 +171,7 @@ def test_without_any_possible_combination_the_lists_are_named():
         search_catalogue(catalogues, arm.relax(catalogues), lambda rows: None)
     assert e.value.constraints == ("list0", "list1", "list2")
     with pytest.raises(AccuracyError, match="was found in 1 nodes"):
-        search_catalogue(
-            catalogues, arm.relax(catalogues), lambda rows: None, SearchLimits(nodes=1)
-        )
+        search_catalogue(catalogues, arm.relax(catalogues), lambda rows: None, seconds=0.0)
 
 
 def test_a_column_with_two_owners_is_refused():

@@ -10,7 +10,6 @@ from eigassign.assignment import (
     Bounds,
     LinearConstraint,
     ListedValues,
-    SearchLimits,
     build_program,
     solve_catalogue,
 )
@@ -126,7 +125,7 @@ def found(p, catalogues):
     except InfeasibleError:
         return np.zeros(0)
     assert search.exhausted
-    assert search.proved
+    assert search.relative_gap <= 1e-9
     for one in search.best:  # the design is what the rows say
         assert feasible(p, one.y[np.newaxis])[0]
         for catalogue, row in zip(catalogues, one.rows, strict=True):
@@ -180,11 +179,14 @@ def three_valued(seed, decay):
     return program(l0, slope, -np.ones(12), np.ones(12)), catalogues
 
 
-@pytest.mark.parametrize("decay", [1.0, 0.7, 0.4])
+@pytest.mark.parametrize(
+    "decay",
+    [1.0, pytest.param(0.7, marks=pytest.mark.slow), pytest.param(0.4, marks=pytest.mark.slow)],
+)
 def test_twelve_parameters_of_three_values_need_few_nodes(decay):
     p, catalogues = three_valued(1, decay)
     search = solve_catalogue(p, catalogues)
-    assert search.proved
+    assert search.relative_gap <= 1e-9
     assert search.nodes < 150
     assert search.gap == pytest.approx(0.0, abs=1e-9 * search.best[0].objective)
     want = brute_force(p, catalogues)[:5]  # all 531 441
@@ -194,11 +196,10 @@ def test_twelve_parameters_of_three_values_need_few_nodes(decay):
 def test_a_search_that_is_stopped_states_a_gap_that_holds():
     p, catalogues = three_valued(2, 0.3)
     whole = solve_catalogue(p, catalogues)
-    part = solve_catalogue(p, catalogues, SearchLimits(nodes=5))
+    part = solve_catalogue(p, catalogues, seconds=0.0)
     assert not part.exhausted
     assert part.gap > 0.0
-    assert not part.proved
-    assert part.nodes <= 6
+    assert part.nodes == 1
     assert part.lower_bound <= whole.best[0].objective <= part.best[0].objective
     assert part.relative_gap == part.gap / part.best[0].objective
 
@@ -257,7 +258,7 @@ def test_a_single_combination_is_the_answer():
     only = [ListedValues("rod", (0,), [[0.5]]), ListedValues("hub", (1,), [[0.25]])]
     search = solve_catalogue(program(*BASE, [0, 0], [1, 1]), only)
     np.testing.assert_array_equal(search.best[0].y, [0.5, 0.25])
-    assert search.proved
+    assert search.relative_gap <= 1e-9
     assert search.exhausted
 
 
@@ -269,7 +270,7 @@ def test_a_limit_reached_before_anything_was_found_is_said():
     l0, slope = smooth(1, 12)
     p = program(l0, slope, np.zeros(12), np.ones(12), [total])
     with pytest.raises(AccuracyError, match="found in 1 nodes"):
-        solve_catalogue(p, catalogues, SearchLimits(nodes=1))
+        solve_catalogue(p, catalogues, seconds=0.0)
 
 
 @pytest.mark.parametrize(
