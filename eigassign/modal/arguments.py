@@ -109,20 +109,18 @@ def shown_numbers(x: Floats) -> str:
 
 # --- Chunks of samples, and few of many
 
-CHUNK = 2048  # samples at once, at most
 NUMBERS = 30_000  # of one matrix for each sample at once: some five of them fit the cache
-LEAST = 16
 Array = TypeVar("Array", NDArray[np.float64], NDArray[np.intp])
 
 
 def chunks(rows: Array, numbers: int) -> Iterator[Array]:
     """``rows`` in parts, fewer at once the more ``numbers`` each of them needs."""
-    size = min(CHUNK, max(LEAST, NUMBERS // numbers))
+    size = min(2048, max(16, NUMBERS // numbers))
     return (rows[i : i + size] for i in range(0, max(len(rows), 1), size))
 
 
 def spread(x: Floats, most: int) -> Floats:
-    """At most so many of the rows of x, evenly, the first and the last among them."""
+    """Rows of x, at most so many, spread evenly from the first to the last."""
     keep = np.unique(np.linspace(0, len(x) - 1, min(most, len(x))).round().astype(int))
     return np.asarray(x[keep])
 

@@ -30,12 +30,11 @@ from eigassign.series.multi_index import LowerSet, total_degree
 
 Floats = NDArray[np.float64]
 CLOSE = 1e-8  # relative; round-off is below 2e-10 in all shipped cases
-LEAST = 1e-4
 
 
 @dataclass(frozen=True)
 class ExpansionRequest:
-    """What expansions were asked for: of these modes about x0, of these orders and kinds."""
+    """Expansions as they were asked for: modes, point x0, orders and kinds."""
 
     x0: Floats
     modes: tuple[int, ...]
@@ -119,7 +118,7 @@ def _agree(space: LowerSet, stored: Floats, inner: LowerSet, right: Floats, plan
 def _envelope(space: LowerSet, c: Floats) -> Floats:
     """|c_0| ρ^γ (N,) with the least ρ of each variable that bounds its own coefficients.
 
-    At least LEAST |c_0|: where nothing depends on a variable there is round-off alone.
+    At least 1e-4 |c_0|: where nothing depends on a variable there is round-off alone.
     """
     sizes = np.abs(c).max(axis=1, initial=0.0)
     envelope = np.full(len(space), sizes[0])
@@ -127,4 +126,4 @@ def _envelope(space: LowerSet, c: Floats) -> Floats:
         own = (powers > 0) & (powers == space.degrees)
         growth = (sizes[own] / sizes[0]) ** (1.0 / powers[own])
         envelope *= growth.max(initial=0.0) ** powers
-    return np.asarray(np.maximum(envelope, np.maximum(sizes, LEAST * sizes[0])))
+    return np.asarray(np.maximum(envelope, np.maximum(sizes, 1e-4 * sizes[0])))

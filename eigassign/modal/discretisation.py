@@ -32,7 +32,7 @@ BESIDE = 24  # modes above the highest one asked for; with 6, few elements in sp
 
 @dataclass(frozen=True, eq=False)
 class DiscretisationError:
-    """How much a mesh raises frequencies at most, relative; infinite where nothing can be said."""
+    """Bounds on how much a mesh raises frequencies, relative; infinite where there is none."""
 
     total: Floats  # (n_samples, n_modes)
     links: Mapping[str, Floats]  # what each link alone has in it, about, (n_samples, n_modes)
@@ -41,7 +41,7 @@ class DiscretisationError:
 def discretisation_error(
     parts: MeshedLinks, x: Floats, modes: Sequence[int]
 ) -> DiscretisationError:
-    """At samples x (n_samples, n_x). Each costs an exact solve of the mesh with its modes."""
+    """Bounds at samples x (n_samples, n_x); each costs an exact solve of the mesh."""
     pencil, pick, highest = parts.pencil, np.array(modes) - 1, max(modes)
     total = np.empty((len(x), len(modes)))
     of_links = np.empty((len(parts.links), len(x), len(modes)))

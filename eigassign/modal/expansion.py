@@ -78,7 +78,10 @@ class Expansion:
 
     def eigenvalues(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """λ (n_samples, n_modes) in rad²/s²; q (n_samples, n_q) or (n_q,), y likewise."""
-        w = (samples(q, y, len(self.q0), len(self.y0)) - self.x0) @ self.directions.T
+        return self._at((samples(q, y, len(self.q0), len(self.y0)) - self.x0) @ self.directions.T)
+
+    def _at(self, w: Floats) -> Floats:
+        """λ (n_samples, n_modes) at local variables w (n_samples, n_w)."""
         return np.hstack(
             [
                 _eigenvalues(c, made(w).reshape(len(w), *c.coefficients.shape[:2]), self.modes)
@@ -147,8 +150,7 @@ class Expansion:
     def gradient(self, q: ArrayLike) -> tuple[Floats, Floats]:
         """λ (n_samples, n_modes) and ∂λ/∂x (n_samples, n_modes, n_x) at samples of q, y = y0."""
         w = (samples(q, self.y0, len(self.q0), len(self.y0)) - self.x0) @ self.directions.T
-        powers = monomials(self.space, w)
-        l0 = np.hstack([_evaluate(c, powers, self.modes) for c in self.clusters])
+        l0, powers = self._at(w), monomials(self.space, w)
         slopes = np.zeros((*l0.shape, len(self.directions)))
         for local in range(len(self.directions)):
             derivative = _derivative_powers(self.space, powers, local)
@@ -195,13 +197,8 @@ class Expansion:
         return x_space, values
 
 
-def _evaluate(cluster: Cluster, powers: Floats, wanted: tuple[int, ...]) -> Floats:
-    matrices = np.tensordot(powers, cluster.coefficients, axes=(1, 2))
-    return _eigenvalues(cluster, matrices, wanted)
-
-
 def _eigenvalues(cluster: Cluster, matrices: Floats, wanted: tuple[int, ...]) -> Floats:
-    """Of the small matrices (n, r, r), those of the wanted modes."""
+    """λ of the wanted modes from the small matrices (n, r, r)."""
     if len(cluster.modes) == 1:
         return matrices[:, 0]
     columns = [k for k, mode in enumerate(cluster.modes) if mode in wanted]
@@ -276,7 +273,7 @@ def expand(
 
 
 def notes(groups: Sequence[tuple[int, ...]], local: LocalSpace, pencil: Pencil) -> tuple[str, ...]:
-    """What an expansion has to say of modes expanded together and of variables dropped."""
+    """Sentences on modes expanded together and on variables dropped."""
     lines = [
         f"modes {g[0]}-{g[-1]} lie close together and are expanded as one cluster"
         for g in groups
@@ -316,8 +313,6 @@ def polynomial_error(polynomial: Floats, reduced: Floats, estimate: Floats) -> F
 
 # --- How far the series reaches: its radius of convergence, seen from the coefficients
 
-LEAST_ORDER = 4
-
 
 def radius_share(expansion: Expansion, q: ArrayLike, y: ArrayLike) -> Floats:
     """|w|/R (n_samples, n_clusters): below 1 the series converges at that sample.
@@ -332,7 +327,7 @@ def radius_share(expansion: Expansion, q: ArrayLike, y: ArrayLike) -> Floats:
     """
     x = samples(q, y, len(expansion.q0), len(expansion.y0)) - expansion.x0
     p, starts = expansion.order, expansion.space.degree_starts
-    if p < LEAST_ORDER:
+    if p < 4:
         return np.full((len(x), len(expansion.clusters)), np.nan)
     powers = monomials(expansion.space, x @ expansion.directions.T)
     shares = []
@@ -413,36 +408,36 @@ class NearestExpansion:
         return self.parts[0].modes
 
     def owner(self, q: ArrayLike) -> NDArray[np.intp]:
-        """Which of ``parts`` each of q (n_samples, n_q) or (n_q,) is nearest to, (n_samples,)."""
+        """Index of the part nearest to each of q (n_samples, n_q) or (n_q,), (n_samples,)."""
         rows = np.atleast_2d(np.asarray(q, dtype=np.float64))
         V = self.parts[0].directions[:, : len(self.parts[0].q0)]
         away = [np.square((rows - part.q0) @ V.T).sum(axis=1) for part in self.parts]
         return np.asarray(np.argmin(away, axis=0), dtype=np.intp)
 
     def eigenvalues(self, q: ArrayLike, y: ArrayLike) -> Floats:
-        """As `Expansion.eigenvalues`."""
+        """λ (n_samples, n_modes) in rad²/s²; see `Expansion.eigenvalues`."""
         return self.pick(q, [part.eigenvalues(q, y) for part in self.parts])
 
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
-        """As `Expansion.frequencies`."""
+        """f (n_samples, n_modes) in Hz; see `Expansion.frequencies`."""
         return self.pick(q, [part.frequencies(q, y) for part in self.parts])
 
     def error_estimate(self, q: ArrayLike, y: ArrayLike) -> Floats:
-        """As `Expansion.error_estimate`."""
+        """Relative error (n_samples, n_modes); see `Expansion.error_estimate`."""
         return self.pick(q, [part.error_estimate(q, y) for part in self.parts])
 
     def linear_in_design(self, q: ArrayLike) -> tuple[Floats, Floats]:
-        """As `Expansion.linear_in_design`."""
+        """l_0 and l of eq. (9); see `Expansion.linear_in_design`."""
         l0, slopes = self.gradient(q)
         return l0, slopes[:, :, len(self.parts[0].q0) :]
 
     def gradient(self, q: ArrayLike) -> tuple[Floats, Floats]:
-        """As `Expansion.gradient`."""
+        """λ and ∂λ/∂x; see `Expansion.gradient`."""
         values, slopes = zip(*(part.gradient(q) for part in self.parts), strict=True)
         return self.pick(q, values), self.pick(q, slopes)
 
     def pick(self, q: ArrayLike, values: Sequence[Floats]) -> Floats:
-        """Of values (n_samples, …) for each of ``parts``, the nearest one's at each sample."""
+        """The nearest part's value at each sample, of values (n_samples, …) for each part."""
         if len(values) == 1:
             return values[0]
         owner = np.broadcast_to(self.owner(q), len(values[0]))  # one pose and many designs

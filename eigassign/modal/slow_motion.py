@@ -42,7 +42,6 @@ from eigassign.modal.taylor.recursion import expand_subspace
 from eigassign.series.multi_index import lower_set, total_degree
 
 Floats = NDArray[np.float64]
-INSTANTS = 9  # in the shipped cases their worst is within 7 % of that of 45, in one within 21 %
 MIXED = 0.05  # Σ_j |η_j|² from which on a mode is followed together with its near neighbours
 
 
@@ -65,9 +64,12 @@ def motion_effect(
     motion: Rates,
     y: Floats,
     wanted: tuple[int, ...],
-    instants: int = INSTANTS,
+    instants: int = 9,
 ) -> MotionEffect:
-    """Effect at the fastest instants of a motion at design y."""
+    """Effect at the fastest instants of a motion at design y.
+
+    Of nine instants the worst is within 7 % of that of 45 in the shipped cases, in one within 21 %.
+    """
     chosen = _fastest(motion, instants)
     found = [
         change_at(pencil, terms, motion.q[k], motion.rate[k], motion.acceleration[k], y, wanted)
@@ -110,7 +112,7 @@ def _changes(
     wanted: tuple[int, ...],
     gap: float,
 ) -> dict[int, float]:
-    """Of the wanted modes in clusters by ``gap``; at no gap only of those that do not mix."""
+    """Changes of the wanted modes in clusters by ``gap``; at gap 0 of those that do not mix."""
     found, groups = whole_clusters(pencil, theta[:, :1], wanted, gap)
     changes: dict[int, float] = {}
     for group in groups:
@@ -181,7 +183,7 @@ def theta_in_time(
 
 
 def moving_modes(pencil: Pencil, theta: Floats, lam: Floats, phi: Floats) -> MovingModes:
-    """Those of λ (r,) and Φ (n_dof, r), mass-normalised, for θ of `theta_in_time`."""
+    """The motion of λ (r,) and Φ (n_dof, r), mass-normalised, for θ of `theta_in_time`."""
     found = expand_subspace(pencil, theta, IN_TIME, lam, phi)
     X, L = (found.vectors[0], found.vectors[1], found.vectors[2]), found.values
     N1, N2 = _normality(pencil, theta, X)

@@ -196,7 +196,7 @@ def flatten(arrays: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def unflatten(flat: Mapping[str, Array]) -> dict[str, Array]:
-    """What `flatten` took together; raises UsageError if that is not what it is given."""
+    """The arrays that `flatten` took together; raises UsageError for anything else."""
     try:
         taken = {"f": 0, "i": 0}
         found: dict[str, Array] = {}

@@ -18,10 +18,6 @@ from eigassign.modal.arguments import spread
 from eigassign.modal.model import Model
 
 Floats = NDArray[np.float64]
-FIRST = 2.0  # times the highest frequency that matters
-STEP = 1.5  # from one trial to the next
-MAX_TRIALS = 16  # up to some 900 times the highest frequency that matters
-PAYS = 0.5  # of the dofs of the whole mechanism: a model with more does not pay
 POSES = 30  # poses and designs at which it is judged; each costs an exact solve
 
 
@@ -44,21 +40,20 @@ def choose_reduction(
 ) -> ReductionChoice:
     """The lowest frequency tried whose truncation error is ≤ ``accuracy`` at x (n, n_x).
 
-    The links stay as they are in ``whole`` where the model keeps more than `PAYS` of its dofs.
+    The links stay as they are in ``whole`` where the model keeps more than half of its dofs.
     """
     x = spread(x, POSES)
     q, y = x[:, : len(whole.q_names)], x[:, len(whole.q_names) :]
     reasons: list[str] = []
     modes = modes_at(whole, x)
-    frequency = FIRST * float(whole.frequencies(q[:1], y[:1], max(modes)).max())
+    highest = float(whole.frequencies(q[:1], y[:1], max(modes)).max())
     size = 0
-    for _ in range(MAX_TRIALS):
-        model = build(frequency)
-        if model.reduced is None or model.n_dof > PAYS * whole.n_dof:
+    for frequency in 2.0 * highest * 1.5 ** np.arange(16):
+        model = build(float(frequency))
+        if model.reduced is None or model.n_dof > 0.5 * whole.n_dof:
             reasons.append(f"reduced to {frequency:.4g} Hz: {model.n_dof} of {whole.n_dof} dofs")
             break
         if model.n_dof == size:  # no mode in between
-            frequency *= STEP
             continue
         size = model.n_dof
         error = model.truncation_error(q, y, modes).max(axis=0)
@@ -66,7 +61,6 @@ def choose_reduction(
         stated = f"truncation error at most {100 * worst:.2g} %" if worst < np.inf else "no bound"
         reasons.append(f"reduced to {frequency:.4g} Hz: {size} of {whole.n_dof} dofs, {stated}")
         if error.max() <= accuracy:
-            return ReductionChoice(dict.fromkeys(names, frequency), error, tuple(reasons))
-        frequency *= STEP
+            return ReductionChoice(dict.fromkeys(names, float(frequency)), error, tuple(reasons))
     reasons.append(f"not reduced, it does not pay: {', '.join(names)}")
     return ReductionChoice(dict.fromkeys(names), np.zeros(len(modes)), tuple(reasons))

@@ -14,7 +14,6 @@ from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.model import Model
 
 Floats = NDArray[np.float64]
-START = 2  # elements of a link at first
 MAX_ELEMENTS = 256  # of a link; with more round-off, which grows as n⁴, is the larger error
 MAX_MESHES = 8  # tried at most; the paper's arm needs three at most, down to 1e-6
 Build = Callable[[Mapping[str, int]], Model]
@@ -44,7 +43,7 @@ def choose_mesh(
     Raises AccuracyError where `MAX_ELEMENTS` do not suffice or round-off is in the way.
     """
     free = [name for name, n in elements.items() if n is None]
-    now = {name: START if n is None else n for name, n in elements.items()}
+    now = {name: n or 2 for name, n in elements.items()}
     reasons: list[str] = []
     before: dict[str, tuple[int, float]] = {}
     for _ in range(MAX_MESHES):

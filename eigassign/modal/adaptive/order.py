@@ -44,10 +44,6 @@ MAX_POINTS = 32
 # With several points only where one will not do, four of the 36 choices for the shipped cases to
 # 1e-3, 1e-5 and 1e-7 have three to five times as many coefficients.
 SEVERAL = 3.0
-MOST_IN_ALL = 10 * MOST_TERMS  # what several points may cost where one will not do
-FINER = 0.05  # part of the accuracy that the reduced model beside them should reach
-TOLERABLE = 0.5  # the same where round-off does not allow that
-WIDEST_CLUSTER = 0.7  # relative gap in λ up to which two neighbours are tried as one cluster
 # Orders from which a cluster must halve the error of the modes alone. Followed on, the search of
 # stress/wide_motion to 1e-5 takes four times as long, for the same choice.
 FAIR_ORDERS = 4
@@ -123,8 +119,8 @@ def choose_expansion(
     of over `MOST_TERMS` coefficients is tried. ``place`` says in words what row k of x is. Raises
     AccuracyError, naming the sample, where nothing meets the accuracy.
     """
-    beside = reduce_adaptively(
-        pencil, x, FINER * accuracy, modes, place=place, tolerable=TOLERABLE * accuracy
+    beside = reduce_adaptively(  # half of the accuracy where round-off allows no more
+        pencil, x, 0.05 * accuracy, modes, place=place, tolerable=0.5 * accuracy
     )
     q, y = x[:, : pencil.n_q], x[:, pencil.n_q :]
     reduced_hz = beside.reduced.frequencies(q, y)
@@ -158,7 +154,7 @@ def choose_expansion(
         errors, further = (*trial.errors, error), np.append(q[worst], part.y0)
         more = replace(trial, parts=parts, hz=hz, errors=errors, point=further)
         is_new = not any(np.array_equal(each.x0, further) for each in parts)
-        if is_new and more.cost < MOST_IN_ALL and _more_points_help(errors):
+        if is_new and more.cost < 10 * MOST_TERMS and _more_points_help(errors):
             waiting.append(more)
     where = f"at {place(at)}, (q, y) = {shown_numbers(x[at])}"
     none = f"none has a number that it vouches for {where}"
@@ -181,7 +177,7 @@ def _first_trials(
         for k, (below, above) in enumerate(itertools.pairwise(lam), 1)
         if {k, k + 1} & wanted
     ]
-    wider = [gap for gap in near if CLUSTER_GAP <= gap < WIDEST_CLUSTER]
+    wider = [gap for gap in near if CLUSTER_GAP <= gap < 0.7]  # in λ: a fifth in frequency
     trials = []
     for gap in (CLUSTER_GAP, *sorted(wider)[:1]):
         groups = whole_clusters(pencil, theta0, modes, gap)[1]

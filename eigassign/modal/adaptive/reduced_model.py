@@ -19,7 +19,6 @@ from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.reduce import reduce
 
 Floats = NDArray[np.float64]
-MAX_SIZE = 200  # basis vectors
 MAX_POINTS = 12  # expansion points; the shipped cases need 6 at most, to 1e-7
 HALF_ORDERS = (1, 2, 3)
 
@@ -53,7 +52,7 @@ def reduce_adaptively(
     x: Floats,
     accuracy: float,
     modes: Sequence[int] = (1,),
-    max_size: int = MAX_SIZE,
+    max_size: int = 200,
     half_orders: Sequence[int] = HALF_ORDERS,
     place: Callable[[int], str] = row_in_words,
     tolerable: float | None = None,

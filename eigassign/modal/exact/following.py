@@ -32,7 +32,6 @@ from eigassign.modal.exact.tracking import CLEAR, COINCIDENT, HALVINGS, NEAR, li
 
 Floats = NDArray[np.float64]
 ALIKE = 1e-3  # of the frequency: modes that share a shape and differ by less may both stand for it
-LEAST = 0.01  # share of a mode that is named as a candidate
 
 
 class MoreModesError(Exception):
@@ -74,7 +73,7 @@ class FollowedShape:
 
     @property
     def is_shared(self) -> bool:
-        """Whether it is too much of other modes, whose frequencies are not the same either."""
+        """True where too much of it is other modes, whose frequencies differ too."""
         away = np.abs(np.sqrt(self.at.lam / self.lam) - 1.0)
         return bool((self.a**2)[self._same].sum() < CLEAR and self.a**2 @ away > ALIKE)
 
@@ -92,7 +91,7 @@ def candidates(at: ModesAtPoint, shares: Floats, most: int = 3) -> tuple[Candida
     """The modes of the largest shares, the largest first; none that have hardly any."""
     order = np.argsort(-shares, kind="stable")[:most]
     hz = np.sqrt(at.lam) / (2.0 * np.pi)
-    kept = (int(j) for j in order if shares[j] > LEAST)
+    kept = (int(j) for j in order if shares[j] > 0.01)
     return tuple(Candidate(j + 1, float(hz[j]), float(shares[j])) for j in kept)
 
 
@@ -174,12 +173,12 @@ def _carried(
 
 
 def _near(at: ModesAtPoint, best: int) -> NDArray[np.bool_]:
-    """Which modes are near one, in the logarithm of the frequency: then it is near them too."""
+    """Flags of the modes near one, in the logarithm of the frequency, which is symmetric."""
     return np.asarray(np.abs(np.log(at.lam / at.lam[best])) < 2.0 * NEAR)
 
 
 def _is_met(here: FollowedShape, best: int, near: NDArray[np.bool_]) -> bool:
-    """Whether all modes passed on the way to number ``best`` are near it at both ends."""
+    """True where all modes passed on the way to number ``best`` are near it at both ends."""
     before = here.number - 1
     passed = slice(min(before, best), max(before, best) + 1)
     return bool(near[passed].all() and _near(here.at, before)[passed].all())

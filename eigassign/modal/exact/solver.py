@@ -54,7 +54,7 @@ def _solve(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
 
 
 def lowest_modes(pencil: Pencil, theta: Floats, least: int, extra: int) -> Modes:
-    """At least the lowest ``least`` modes, and up to ``extra`` more where so many have mass."""
+    """The lowest ``least`` modes, and up to ``extra`` more where so many have mass."""
     count = max(min(least + extra, len(pencil.elastic)), least)
     while True:
         try:

@@ -36,7 +36,7 @@ samples. A sample where this fails is solved by itself.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +50,7 @@ from eigassign.modal.exact.condensation import Modes, condense_blocks
 from eigassign.modal.exact.dense import inverse_factor
 from eigassign.modal.exact.inertia import negative_pivots
 from eigassign.modal.exact.massless import mass_sizes, may_be_roundoff
-from eigassign.modal.exact.sparse import lanczos, positive_at_top, principal, solve_sparse
+from eigassign.modal.exact.sparse import block, lanczos, positive_at_top, principal, solve_sparse
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -64,7 +64,7 @@ MOST_VARYING = 150  # unknowns S: beyond, a sample's own matrices are as large a
 
 
 def varying_unknowns(pencil: Pencil, theta: Floats) -> Ints | None:
-    """S without the free coordinates: few unknowns, one in each entry that varies; None if many.
+    """Unknowns S without the free coordinates, one in each entry that varies; None if many.
 
     A vertex cover: always the unknown with most varying entries that are not covered yet.
     """
@@ -197,7 +197,7 @@ class Inner:
 
     @classmethod
     def empty(cls, K: sparse.csc_array, M: sparse.csc_array, factor: linalg.SuperLU) -> Inner:
-        """Without a vector."""
+        """The operator without a vector."""
         none, long = np.zeros((0, 0)), np.zeros((K.shape[0], 0))
         return cls(K.T, M.T, factor, long, none, none, long, none)
 
@@ -206,7 +206,7 @@ class Inner:
         return self.factor.solve(forces) if forces.size else forces
 
     def spanning(self, vectors: Floats) -> tuple[Inner, Floats]:
-        """With Q grown to hold ``vectors`` (n_I, r), and these in its coordinates (q, r)."""
+        """The same with Q grown to hold ``vectors`` (n_I, r), and these in its coordinates."""
         Q, parts = self.Q, [np.zeros((self.Q.shape[1], 0))]
         for i in range(0, vectors.shape[1], BLOCK):
             Q, coordinates = _grown(self.K, Q, vectors[:, i : i + BLOCK])
@@ -216,7 +216,7 @@ class Inner:
         return replace(self, Q=Q, W=W, TW=TW), found
 
     def with_vectors(self, coordinates: Floats) -> Inner:
-        """With W grown by vectors given in coordinates of Q (q, r)."""
+        """The same with W grown by vectors given in coordinates of Q (q, r)."""
         k = self.W.shape[1]
         W = np.linalg.qr(np.hstack([self.W, coordinates]))[0]
         new = W[:, k:]
@@ -233,7 +233,7 @@ class Inner:
         )
 
     def above(self, nu: float) -> int:
-        """How many eigenvalues of T lie above ν; UNCERTAIN where one is too near."""
+        """Number of eigenvalues of T above ν; UNCERTAIN where one is too near."""
         scale = 1.0 / np.sqrt(self.K.diagonal() + self.M.diagonal() / nu)
         S = sparse.diags_array(scale)
         return negative_pivots(sparse.csc_array(S @ (self.K - self.M / nu) @ S))
@@ -295,7 +295,7 @@ def _remainder(
 
 @dataclass(frozen=True, eq=False)
 class Outer:
-    """What each of n samples brings: arrays over samples, S with its f free coordinates last."""
+    """Arrays over n samples of what differs; S with its f free coordinates last."""
 
     inverse: Floats  # (n, s − f, s − f): L⁻¹ with Σ = L Lᵀ
     mass: Floats  # (n, s, s): M_SS after the change of unknowns
@@ -304,9 +304,8 @@ class Outer:
     follow: Floats  # (n, h, s): u_I = w − X follow u_S
 
     def at(self, some: Ints) -> Outer:
-        """Of some samples."""
-        parts = (self.inverse, self.mass, self.drive, self.b, self.follow)
-        return Outer(*(part[some] for part in parts))
+        """The arrays of some samples."""
+        return Outer(*(getattr(self, each.name)[some] for each in fields(self)))
 
 
 def _prepared(
@@ -337,7 +336,7 @@ def _prepared(
 
 @dataclass(frozen=True, eq=False)
 class RitzPairs:
-    """All Ritz pairs of n samples, μ̂ descending: (n, p), a (n, k, p), u_S (n, s, p)."""
+    """Ritz pairs of n samples, μ̂ descending: (n, p), a (n, k, p), u_S (n, s, p)."""
 
     mu: Floats
     a: Floats
@@ -375,28 +374,18 @@ def _residuals(inner: Inner, outer: Outer, pairs: RitzPairs) -> Floats:
 
 # --- The whole
 
-AT_ONCE = 256  # samples, for memory
-FEWEST = (
-    20  # samples that repay what they share, at 300 to 10⁴ unknowns (benchmarks/many_samples.py)
-)
+# Samples that repay what they share, at 300 to 10⁴ unknowns (benchmarks/many_samples.py).
+FEWEST = 20
 CONVERGED = 1e-9  # |ρ|/μ̂: the vectors' error; that of λ is of second order in it
-ROUNDS = 25
-FIRST = 16  # samples that W is first made for
-LEADING = 0.02  # of the largest residual: directions that join W, at most MOST_NEW at once
-MOST_NEW = 24
 MOST_VECTORS = 250  # of W: beyond, a sample's own matrices are as large as a sparse solve
 BESIDE = 4  # modes above the highest wanted one that the cut may take in
-APART = 0.8  # ratio of μ̂ at which a cut is good enough
-INSIDE = 0.5  # ν, of the least μ̂ that counts
 NEGLIGIBLE = 1e-12  # relative error of λ: below the round-off of any solver
-MOST_INNER = 64  # modes of the inner rows above ν
 
 
 def solve_large(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
     """Modes at θ (n_theta, n_samples): together where that is proved, the others one by one."""
-    every = np.arange(theta.shape[1])
-    parts = [every[i : i + AT_ONCE] for i in range(0, len(every), AT_ONCE)]
-    found = [_large(pencil, theta[:, part], count, vectors) for part in parts]
+    parts = range(0, theta.shape[1], 256)  # so many at once, for memory
+    found = [_large(pencil, theta[:, i : i + 256], count, vectors) for i in parts]
     return Modes(np.concatenate([f.lam for f in found]), np.concatenate([f.phi for f in found]))
 
 
@@ -457,9 +446,9 @@ def _converged(
     inner, seeds = inner.spanning(inner.solve(inner.M @ start))
     inner = inner.with_vectors(seeds)
     every = np.arange(n)
-    some = np.unique(np.linspace(0, n - 1, min(n, FIRST)).round().astype(int))
+    some = np.unique(np.linspace(0, n - 1, min(n, 16)).round().astype(int))  # W is for these first
     looked_inside = False
-    for _ in range(ROUNDS):
+    for _ in range(25):
         part = outer.at(some)
         pairs = _ritz(inner, part, A)
         if pairs.mu.shape[1] < count or (pairs.mu[:, :count] <= 0.0).any():
@@ -469,17 +458,20 @@ def _converged(
         counts = np.arange(pairs.mu.shape[1]) < cut[:, None]
         relative = np.where(counts[:, None], rho / pairs.mu[:, None], 0.0)
         if np.sqrt(np.square(relative).sum(axis=1).max(initial=0.0)) > CONVERGED:
-            new = _leading(relative.transpose(1, 0, 2).reshape(len(inner.W), -1))
+            leftover = relative.transpose(1, 0, 2).reshape(len(inner.W), -1)
+            U, size, _ = np.linalg.svd(leftover, full_matrices=False)
+            # what is below a fiftieth of the largest is left to later rounds, as more than 24 are
+            new = U[:, : min(int((size > 0.02 * size[0]).sum()), 24)]
         elif len(some) < n:
             some = every
             continue
         else:
-            nu = INSIDE * float(np.take_along_axis(pairs.mu, cut[:, None] - 1, axis=1).min())
+            nu = 0.5 * float(np.take_along_axis(pairs.mu, cut[:, None] - 1, axis=1).min())
             outside = inner.largest_outside(nu)
             if outside is not None:
                 return inner, pairs, proved(pairs.mu, rho, cut, outside)
             inside = inner.above(nu)
-            if looked_inside or not 0 < inside <= MOST_INNER:
+            if looked_inside or not 0 < inside <= 64:
                 return None
             looked_inside = True
             inner, new = inner.spanning(inner.modes(inside))
@@ -490,24 +482,18 @@ def _converged(
 
 
 def _cuts(mu: Floats, count: int) -> Ints:
-    """c (n,) ≥ count: how many pairs of each sample count, so that the next one lies apart."""
+    """Number c (n,) ≥ count of pairs of each sample that count: the next one lies apart."""
     beyond = np.hstack([mu, np.zeros((len(mu), 1))])
     last = min(count + BESIDE, mu.shape[1])
     ratio = beyond[:, count : last + 1] / mu[:, count - 1 : last]
-    apart = ratio <= APART
+    apart = ratio <= 0.8  # no need to look further
     return np.asarray(
         count + np.where(apart.any(axis=1), apart.argmax(axis=1), ratio.argmin(axis=1))
     )
 
 
-def _leading(residuals: Floats) -> Floats:
-    """The directions (q, r) in which most of the residuals (q, n) lie."""
-    U, size, _ = np.linalg.svd(residuals, full_matrices=False)
-    return np.asarray(U[:, : min(int((size > LEADING * size[0]).sum()), MOST_NEW)])
-
-
 def proved(mu: Floats, rho: Floats, cut: Ints, nu: float) -> Flags:
-    """Where the first ``cut`` pairs are those of the lowest modes, to round-off; ν' is ``nu``."""
+    """True where the first ``cut`` pairs are those of the lowest modes; ν' is ``nu``."""
     sure = np.zeros(len(mu), dtype=bool)
     for k, c in enumerate(cut):
         last, beyond = mu[k, c - 1], mu[k, c:]
@@ -523,8 +509,6 @@ def proved(mu: Floats, rho: Floats, cut: Ints, nu: float) -> Flags:
 
 # --- The modes of the whole model
 
-NUMBERS = 2_000_000  # of shapes at once
-
 
 def _shapes(
     pencil: Pencil,
@@ -537,7 +521,7 @@ def _shapes(
 ) -> Iterator[tuple[slice, Floats]]:
     """φ (n, n_dof, count) with φᵀMφ = 1, of some samples at a time."""
     columns = np.hstack([inner.vectors, X])
-    step = max(1, NUMBERS // (pencil.n_dof * count))
+    step = max(1, 2_000_000 // (pencil.n_dof * count))  # 16 MB of shapes at once
     for i in range(0, len(pairs.mu), step):
         part = slice(i, i + step)
         scale = 1.0 / np.sqrt(pairs.mu[part, None, :count])
@@ -551,16 +535,11 @@ def _shapes(
 
 
 def _have_mass(pencil: Pencil, theta: Floats, phi: Floats, mu: Floats) -> Flags:
-    """At which samples (n,) no μ may be round-off."""
+    """True at the samples (n,) where no μ may be round-off."""
     E, F = pencil.elastic, pencil.rigid
     coupling = np.zeros((len(phi), len(F), len(E)))
     if len(F):
-        slot = np.full(pencil.n_dof, -1, dtype=np.intp)
-        slot[F] = np.arange(len(F))
-        entries = np.flatnonzero(slot[pencil.rows] >= 0)
-        M_F = np.zeros((len(phi), len(F), pencil.n_dof))
-        at = slot[pencil.rows[entries]], pencil.columns[entries]
-        M_F[:, *at] = (pencil.mass[entries] @ theta).T
+        M_F = np.array([block(pencil, pencil.mass @ each, F) for each in theta.T])
         coupling = np.asarray(np.linalg.solve(M_F[:, :, F], M_F[:, :, E]))
     sizes = mass_sizes(pencil, theta, coupling)
     noise = mu * np.einsum("ki,kic->kc", sizes, np.square(phi[:, E]))

@@ -65,7 +65,7 @@ class Tracked(Brief):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a reader has to know, one line each."""
+        """Sentences for a reader: encounters, and where identity was lost."""
         lines = [e.line for e in self.encounters]
         for column in np.flatnonzero(~self.certain.all(axis=0)):
             first = int(np.argmin(self.certain[:, column]))
@@ -194,7 +194,6 @@ def _rotation(across: Floats) -> Floats:
 NEAR = 0.15  # relative distance in frequency above which two modes do not meet
 EXCHANGED = 0.1  # share of identity given away from which a veering is reported
 CROSSES = 1e-9  # least relative distance in frequency that is taken for zero
-SECTIONS = 60  # of the golden-section search for the least distance
 
 
 @dataclass(frozen=True)
@@ -232,7 +231,7 @@ class Encounter:
 def find_encounters(
     pencil: Pencil, x: Floats, found: Modes, ordinals: Ints
 ) -> tuple[Encounter, ...]:
-    """All encounters of tracked modes (``ordinals`` (n, m), 0-based) with their neighbours."""
+    """Encounters of tracked modes (``ordinals`` (n, m), 0-based) with their neighbours."""
     if len(x) < 2:
         return ()
     met: list[Encounter] = []
@@ -293,7 +292,7 @@ def _closest(pencil: Pencil, x: Floats, left: int, right: int, lower: int) -> tu
     ratio = (np.sqrt(5.0) - 1.0) / 2.0
     c, d = b - ratio * (b - a), a + ratio * (b - a)
     at_c, at_d = distance(c), distance(d)
-    for _ in range(SECTIONS):
+    for _ in range(60):  # golden sections down to 3e-13: at a crossing the minimum is a kink
         if at_c < at_d:
             b, d, at_d = d, c, at_c
             c = b - ratio * (b - a)

@@ -109,7 +109,7 @@ def added_mass(
 
 
 def _entries(terms: sparse.csc_array, t: int) -> Ints:
-    """Which non-zeros of the pattern a term has."""
+    """Places of a term's non-zeros in the pattern."""
     return np.asarray(terms.indices[terms.indptr[t] : terms.indptr[t + 1]], dtype=np.intp)
 
 

@@ -99,7 +99,7 @@ def ritz_basis(
 
 
 def _represented(lam: Floats, highest: int) -> int:
-    """How many modes join the basis at least as they are: a guard, and probes up to DISTANT."""
+    """Number of modes that join the basis as they are: a guard, and probes up to DISTANT."""
     near = (lam < DISTANT * lam[:, [highest - 1]]).any(axis=0)
     wished = max(int(near.sum()), highest + 1)
     return int(min(wished, highest + 1 + PROBES, lam.shape[1]))
@@ -185,7 +185,7 @@ def _theta_at(pencil: Pencil, z: Floats) -> Floats:
 
 
 def _is_angle(pencil: Pencil, z: Floats, k: int) -> bool:
-    """Whether joint coordinate k is one: a full turn changes nothing but round-off."""
+    """True where joint coordinate k is an angle: a full turn changes nothing but round-off."""
     turned = np.array([z, z])
     turned[1, k] += 2.0 * np.pi
     here, there = _theta_at(pencil, turned).T

@@ -56,7 +56,7 @@ CLOSURE = 2.0  # on that, where loops close: θ carries the round-off of passive
 
 @dataclass(frozen=True, eq=False)
 class ErrorTerms:
-    """What the estimate needs beside the reduced pencil: small arrays only. Immutable."""
+    """Small arrays that the estimate needs beside the reduced pencil. Immutable."""
 
     residual: ResidualTerms
     joints: JointCorrection
@@ -271,7 +271,7 @@ def _forms(A: Floats, z: Floats) -> Floats:
 
 
 def error_terms(basis: RitzBasis) -> ErrorTerms:
-    """All of it, from one factorisation of K0."""
+    """The arrays of the estimate, from one factorisation of K0."""
     pencil, wide, k = basis.pencil, basis.wide, basis.V.shape[1]
     factor = factorise(basis.K0)
     theta0 = basis.theta0[:, 0]

@@ -44,7 +44,7 @@ class ReducedModel(ReducedPencil):
 
     @cached_property
     def error_terms(self) -> ErrorTerms:
-        """What the error estimate needs, made when it is first asked for."""
+        """The arrays of the error estimate, made when they are first asked for."""
         return self.certified() if callable(self.certified) else self.certified
 
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:

@@ -130,7 +130,7 @@ class SymmetricTerms:
         return np.asarray(theta[self.terms].T @ self.triangles)
 
     def chosen(self, terms: NDArray[np.bool_]) -> SymmetricTerms:
-        """Of the terms those marked alone."""
+        """The marked terms alone."""
         return SymmetricTerms(self.terms[terms], self.triangles[terms], self.place)
 
     def forms(self, phi: Floats, rates: Floats) -> Floats:
@@ -148,7 +148,7 @@ class SymmetricTerms:
 
 
 def symmetric_terms(terms: Ints, matrices: Floats) -> SymmetricTerms:
-    """From whole matrices (n_terms, k, k), of which the lower triangle is read."""
+    """Terms from whole matrices (n_terms, k, k), of which the lower triangle is read."""
     k = matrices.shape[1]
     i, j = np.tril_indices(k)
     place = np.empty((k, k), dtype=np.intp)

@@ -17,7 +17,6 @@ from eigassign.modal.reduced.error_estimate import error_terms
 from eigassign.modal.reduced.model import ReducedModel
 
 Floats = NDArray[np.float64]
-MAX_HALF_ORDER = 10
 
 
 def reduce(
@@ -41,7 +40,7 @@ def reduce(
     Raises UsageError for impossible arguments, AccuracyError where no basis can be made.
     """
     wanted = mode_numbers(modes)
-    half_order = whole_within(half_order, "half_order", 0, MAX_HALF_ORDER)
+    half_order = whole_within(half_order, "half_order", 0, 10)
     n_y = pencil.to_program.shape[1] - pencil.n_q
     points = samples(q0, y0, pencil.n_q, n_y)
     widths = None if span is None else half_widths(span, pencil.n_q, n_y, accuracy)

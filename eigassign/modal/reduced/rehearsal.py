@@ -42,7 +42,7 @@ def answers(model: ReducedModel) -> Floats:
 
 
 def same_answers(given: Floats, stored: Floats, count: int) -> bool:
-    """Whether ``given`` and ``stored`` are the same for a model of ``count`` modes."""
+    """True where ``given`` and ``stored`` are the same for a model of ``count`` modes."""
     if given.shape != stored.shape or not np.isfinite(stored[0, : count + 4]).all():
         return False
     hz, forms, estimates = np.split(np.stack([given, stored]), [count, count + 4], axis=2)

@@ -141,7 +141,7 @@ def half_solve(factor: linalg.SuperLU, A: Floats) -> Floats:
 
 
 def _blocks(pencil: Pencil, columns: sparse.csc_array, basis: Floats) -> list[_Block]:
-    """Every term of one matrix applied to ``basis``, elastic rows only."""
+    """Elastic rows of every term of one matrix applied to ``basis``."""
     position = np.full(pencil.n_dof, -1, dtype=np.intp)
     position[pencil.elastic] = np.arange(len(pencil.elastic))
     blocks = []

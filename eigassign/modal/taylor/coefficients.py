@@ -75,7 +75,7 @@ class ProductPairs:
 
 @lru_cache(maxsize=64)
 def pairs(space: LowerSet, stored: bytes) -> tuple[tuple[ProductPairs, ...], ...]:
-    """For every degree the pairs with δ among the ``stored`` positions, by ascending |δ|."""
+    """Pairs of every degree with δ among the ``stored`` positions, by ascending |δ|."""
     present = np.frombuffer(stored, dtype=np.intp)
     slot = np.full(len(space), -1, dtype=np.intp)
     slot[present] = np.arange(len(present))
@@ -248,7 +248,7 @@ def _sparse_series(pencil: Pencil, theta: Floats, space: LowerSet) -> SparseSeri
 
 
 def _sparse_terms(pencil: Pencil, columns: sparse.csc_array, theta: Floats) -> SparseTerms:
-    """All but the first of the stored coefficients, θ (n_theta, n_stored)."""
+    """The stored coefficients but the first, θ (n_theta, n_stored)."""
     slot, entries, values = _entries(columns, theta)
     rows, cols = pencil.rows[entries], pencil.columns[entries]
     inside = (rows < pencil.n_u) & (cols < pencil.n_u)

@@ -51,7 +51,7 @@ def eigenvalue_series(
 
 @dataclass(frozen=True)
 class _Products:
-    """Which products of two vectors meet in which coefficient: a ≤ b, sorted by the result."""
+    """Products of two vectors a ≤ b by the coefficient that they meet in."""
 
     a: Ints
     b: Ints
@@ -102,7 +102,7 @@ def _products(space: LowerSet, slot: Ints, stop: int) -> tuple[_Products, Ints]:
 
 
 def _slots(space: LowerSet, positions: Ints) -> Ints:
-    """For every member its place among ``positions``, -1 where it is not one of them."""
+    """Place of every member among ``positions``, -1 where it is not one of them."""
     slots = np.full(len(space), -1, dtype=np.intp)
     slots[positions] = np.arange(len(positions))
     return slots
