@@ -91,7 +91,7 @@ def fitted(drawn: Drawn) -> tuple[Floats, Floats]:
 
 
 def test_no_answer_of_decoupled_parts_is_below_its_estimate():
-    none_below(tally(range(60), 4, reduced_model, decoupled))
+    none_below(tally(range(30), 4, reduced_model, decoupled))
 
 
 @pytest.mark.slow

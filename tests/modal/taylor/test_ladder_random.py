@@ -58,7 +58,7 @@ def apart(pencil: Pencil, e: Expansion, span: np.ndarray, floor: float) -> float
 
 @pytest.mark.parametrize("family", EVERY)
 def test_random_mechanisms_are_expanded_to_their_order(family: str) -> None:
-    beyond = [b for seed in range(60_000, 60_003) for b in climb(family, seed)]
+    beyond = [b for seed in range(60_000, 60_002) for b in climb(family, seed)]
     assert len(beyond) >= 4
     assert np.median(beyond) == pytest.approx(0.0, abs=0.1)
 
