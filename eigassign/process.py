@@ -11,7 +11,7 @@ import signal
 import sys
 import threading
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from types import FrameType
@@ -23,9 +23,6 @@ from eigassign.files import CASE, printable, read_bytes
 # --- Errors as people read them on stderr, and the exit code of each
 
 BUG, STORAGE, INTERRUPTED = EigassignError.exit_code, StorageError.exit_code, 130
-_SNIPPETS = 3  # problems shown with their line of the file
-_WIDEST = 120
-_NARROWEST = 58  # columns of a line that is written over: wrapped, it could not be
 
 
 @dataclass(frozen=True)
@@ -50,13 +47,17 @@ def failure_of(error: BaseException) -> Failure:
         case Terminated():
             return Failure(error.exit_code, str(error))
         case CaseError():
-            return Failure(error.exit_code, problem_count(error.problems), error.problems)
+            files = Counter(problem.file for problem in error.problems)
+            counts = (f"{n} problem{'s' if n > 1 else ''} in {file}" for file, n in files.items())
+            return Failure(error.exit_code, "; ".join(counts), error.problems)
         case EigassignError() if error.exit_code != BUG:
             return Failure(error.exit_code, f"error: {error}")
         case BrokenPipeError():
             return Failure(STORAGE, "")
         case OSError():
-            return Failure(STORAGE, f"error: {_os_error(error)}")
+            reason = error.strerror or str(error) or type(error).__name__
+            named = f"{error.filename}: {reason}" if error.filename else reason
+            return Failure(STORAGE, f"error: {named}")
         case MemoryError():
             return Failure(STORAGE, "error: out of memory")
         case _:
@@ -70,7 +71,8 @@ def report(error: BaseException, debug: bool = False) -> int:
         import traceback
 
         say("".join(traceback.format_exception(error)).splitlines())
-    say(problem_lines(failure.problems))
+    for k, problem in enumerate(failure.problems):
+        say([str(problem), *(_snippet(problem) if k < 3 else ())])
     say([f"eigassign: {failure.summary}"] if failure.summary else [])
     return failure.exit_code
 
@@ -81,21 +83,19 @@ def say(lines: Iterable[str], passing: bool = False) -> None:
     On a terminal the next line is written over those that are ``passing``.
     """
     with suppress(OSError, AttributeError, ValueError):
-        colours, clears = shows_colours(sys.stderr), _rewrites(sys.stderr)
+        colours = shows_colours(sys.stderr)
+        clears = sys.stderr.isatty() and os.environ.get("TERM", "dumb") != "dumb"
         for line in map(printable, lines):
             shown = _coloured(line) if colours else line
             if clears:
-                shown = f"\r{line[:_NARROWEST]}\x1b[K\r" if passing else f"{shown}\x1b[K\n"
+                # 58 columns: a line that wraps cannot be written over
+                shown = f"\r{line[:58]}\x1b[K\r" if passing else f"{shown}\x1b[K\n"
             sys.stderr.write(shown if clears else f"{shown}\n")
         sys.stderr.flush()
 
 
-def _rewrites(stream: TextIO) -> bool:
-    return stream.isatty() and os.environ.get("TERM", "dumb") != "dumb"
-
-
 def shows_colours(stream: TextIO) -> bool:
-    """Whether it is a terminal that shows them, and nobody set NO_COLOR (no-color.org)."""
+    """True for a terminal that shows them, unless somebody set NO_COLOR (no-color.org)."""
     dull = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
     return stream.isatty() and not dull
 
@@ -113,40 +113,17 @@ def _coloured(line: str) -> str:
     return f"{bold}{kind}{line[len(place + word) :]}"
 
 
-def problem_lines(problems: Sequence[Problem]) -> list[str]:
-    """``file:line:column: path: message`` for each, the first few with their line of the file."""
-    lines = []
-    for k, problem in enumerate(problems):
-        lines.append(str(problem))
-        lines.extend(_snippet(problem) if k < _SNIPPETS else ())
-    return lines
-
-
 def _snippet(problem: Problem) -> Iterator[str]:
-    """The line and a caret below its column, where that can be shown faithfully."""
-    line = _line(problem).replace("\t", " ")
-    if line.strip() and line.isprintable() and len(line) <= _WIDEST >= problem.column:
+    """The line of the file and a caret below its column, where that can be shown faithfully."""
+    try:
+        text = io.StringIO(read_bytes(problem.file, CASE).decode(), newline=None)
+    except (OSError, ValueError):
+        return
+    line = next((t for k, t in enumerate(text, 1) if k == problem.line), "")
+    line = line.rstrip("\n").replace("\t", " ")
+    if line.strip() and line.isprintable() and len(line) <= 120 >= problem.column:
         yield f"{problem.line:>6} | {line}"
         yield f"{'':>6} | {'^':>{problem.column}}"
-
-
-def _line(problem: Problem) -> str:
-    try:
-        lines = io.StringIO(read_bytes(problem.file, CASE).decode(), newline=None)
-        return next((t.rstrip("\n") for k, t in enumerate(lines, 1) if k == problem.line), "")
-    except (OSError, ValueError):
-        return ""
-
-
-def problem_count(problems: Sequence[Problem]) -> str:
-    """``3 problems in case.yaml``."""
-    files = Counter(problem.file for problem in problems)
-    return "; ".join(f"{n} problem{'s' if n > 1 else ''} in {file}" for file, n in files.items())
-
-
-def _os_error(error: OSError) -> str:
-    reason = error.strerror or str(error) or type(error).__name__
-    return f"{error.filename}: {reason}" if error.filename else reason
 
 
 def _internal(error: BaseException) -> str:
@@ -257,7 +234,7 @@ def environment(changes: Mapping[str, str]) -> Iterator[None]:
 
 
 class _ClosedOutput(io.TextIOBase):
-    """In place of a stdout that was closed before the process began: writing to it fails."""
+    """A stdout that was closed before the process began: writing to it fails."""
 
     def write(self, _text: str) -> int:
         raise OSError(errno.EBADF, "standard output is closed")

@@ -35,8 +35,6 @@ from eigassign.cli.runs import chart, expand, optimize, update, validate
 from eigassign.cli.start import complete, completion, docs, init
 from eigassign.errors import UsageError
 
-_CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
-
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the command line on ``args`` (default: those of the process); returns the exit code."""
@@ -65,7 +63,7 @@ def _reported(error: BaseException, arguments: list[str]) -> int:
 
 
 def _invoke(arguments: list[str]) -> int:
-    """Not click's own ``main``, which would exit with codes of its own."""
+    """Run the command as click's ``main`` would, which has exit codes of its own."""
     try:
         with cli.make_context("eigassign", arguments) as context:
             return int(cli.invoke(context) or 0)
@@ -99,7 +97,7 @@ class _InOrder(click.Group):
 
 @click.group(
     cls=_InOrder,
-    context_settings=_CONTEXT,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog=arguments.examples(
         "eigassign init",
         "eigassign check planar_arm.yaml --draw",

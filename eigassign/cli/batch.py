@@ -118,7 +118,7 @@ def batch(
         with _workers(how["scheduler"], jobs, how["case_memory"] is not None) as workers:
             if dry_run:
                 return _tell(asked, workers, reporter)
-            since = _since(how)
+            since = _comparison(how)
             ends = _watched(asked, workers, reporter, join)
         return _told(asked.folder, ends, since, reporter)
 
@@ -179,12 +179,12 @@ def merge(folder: Path, shards: tuple[Path, ...], **how: Any) -> int:
     from eigassign.batch.merge import merge_shards
 
     with reporting(how) as reporter:
-        since = _since(how)
+        since = _comparison(how)
         return _told(folder, merge_shards(folder, shards), since, reporter)
 
 
-def _since(how: Mapping[str, Any]) -> Comparison | None:
-    """What --against names: read before it may be written over."""
+def _comparison(how: Mapping[str, Any]) -> Comparison | None:
+    """Read what --against names, before it may be written over."""
     from eigassign.output.previous import Comparison
 
     against = how["against"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,9 +21,8 @@ if TYPE_CHECKING:
     from eigassign.pipeline.queries import CheckAnswer, ModesAnswer
 
 
-_VARIANTS = 100  # of a sweep that are checked: half a second
-_SHOWN = 10  # problems of variants
 _DRAWING = ("out", "force", "figures", "allow_outside")
+_STATED = ("discretisation_error", "truncation_error")  # where there are such
 
 
 @click.command(
@@ -77,18 +75,18 @@ def check(cases: tuple[Path, ...], draw: bool, as_json: bool, **how: Any) -> int
 
 
 def _sweep(case: Path, allow_outside: bool) -> list[str]:
-    """What is said of its variants, if any; raises CaseError where one of the first is wrong."""
+    """Describe its variants, if any; raises CaseError where one of the first 100 is wrong."""
     from eigassign.batch.plan import plan_of, variant_problem
     from eigassign.batch.work import CaseOptions, check_cases
 
     plan = plan_of([case])
     if not plan.is_swept:
         return []
-    count = min(len(plan), _VARIANTS)
+    count = min(len(plan), 100)  # half a second
     first = [plan[k] for k in range(count)]
     if wrong := check_cases(first, CaseOptions("", allow_outside=allow_outside)):
         found = [(index, problem) for index, problems in wrong for problem in problems]
-        raise CaseError(tuple(variant_problem(plan, *each) for each in found[:_SHOWN]))
+        raise CaseError(tuple(variant_problem(plan, *each) for each in found[:10]))
     seen = "all of them valid" if count == len(plan) else f"the first {count} of them valid"
     command = f"eigassign batch {quoted(case)} --dry-run"
     return [f"sweep: {len(plan)} variants, {seen}; what they take: {command}"]
@@ -131,7 +129,7 @@ def _expected(of: Outlook) -> list[str]:
 
 
 def _about(seconds: float) -> str:
-    """In words that promise no more than an estimate can."""
+    """Seconds in words that promise no more than an estimate can."""
     if seconds < 1.0:
         return "less than a second"
     rough = float(f"{seconds:.1g}")
@@ -189,26 +187,12 @@ def modes(
         if as_json and folder is not None:
             reporter.stage(f"{folder} written")
     if as_json:
-        stated = {
-            "discretisation_error": answer.discretisation_error,
-            "truncation_error": answer.truncation_error,
-        }
-        print_json(
-            {
-                "rigid_modes": answer.rigid_modes,
-                "frequencies_hz": answer.frequencies_hz,
-                "round_off": _finite(answer.round_off),
-                **{k: list(map(_finite, v)) for k, v in stated.items() if v is not None},
-            }
-        )
+        names = ("rigid_modes", "frequencies_hz", "round_off", *_STATED)
+        values = {name: getattr(answer, name) for name in names}
+        print_json({k: v for k, v in values.items() if v is not None})  # infinite ones are null
     else:
         _show_modes(answer, folder)
     return 0
-
-
-def _finite(error: float) -> float | None:
-    """None for what cannot be bounded."""
-    return error if math.isfinite(error) else None
 
 
 def _show_modes(answer: ModesAnswer, folder: Path | None) -> None:

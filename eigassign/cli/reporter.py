@@ -48,7 +48,7 @@ class Reporter:
         say([f"eigassign: {line}"])
 
     def stream(self) -> TextIO:
-        """Where progress bars may go: stderr, or nowhere."""
+        """The stream of progress bars: stderr, or nowhere."""
         return sys.stderr if self.level > 0 and sys.stderr is not None else io.StringIO()
 
 

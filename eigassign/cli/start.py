@@ -120,7 +120,7 @@ def _part(topic: str) -> str:
 
 
 def _is_about(title: str, wanted: str) -> bool:
-    """Whether a heading is that of the topic, or of a part that is told apart by it."""
+    """True for the heading of the topic, or of a part that is told apart by it."""
     return title == wanted or title.endswith(f" with {wanted}")
 
 
@@ -143,7 +143,7 @@ def _mentions(topic: str) -> list[str]:
 
 
 def _folded(text: str) -> str:
-    """As links spell headings: lower case, no punctuation; blanks instead of dashes."""
+    """The text as links spell headings, in lower case without punctuation; blanks for dashes."""
     return re.sub(r"[^\w ]", "", text.lower().replace("-", " "))
 
 
@@ -200,7 +200,7 @@ def completion(shell: str | None, install: bool) -> int:
 
 
 def complete(cli: click.Command) -> int | None:
-    """What the shell asks for behind a tab, on stdout; its exit code, None if it asks nothing."""
+    """Print what the shell asks for behind a tab; its exit code, None if it asks nothing."""
     if (asked := os.environ.get(VARIABLE)) is None:
         return None
     from click.shell_completion import shell_complete
@@ -225,7 +225,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _add_line(path: Path, line: str) -> None:
-    """At the end of a file, unless it has that line."""
+    """Add a line at the end of a file, unless it has that line."""
     before = read_bytes(path, CASE).decode() if path.exists() else ""
     if line not in before.splitlines():
         apart = "" if before.endswith("\n") or not before else "\n"

@@ -50,7 +50,7 @@ def coefficient_files(scene: Scene, linear_only: bool) -> dict[str, bytes]:
 
 
 def _table(expansion: Expansion) -> dict[str, Array]:
-    """What an expansion is, by the names of the Python face."""
+    """The arrays of an expansion, by the names of the Python face."""
     modes = {
         "modes": np.array(expansion.modes),
         "order": np.array(expansion.order),
@@ -58,11 +58,7 @@ def _table(expansion: Expansion) -> dict[str, Array]:
         "y0": expansion.y0,
     }
     if all(len(cluster.modes) == 1 for cluster in expansion.clusters):
-        return {
-            **modes,
-            "indices": expansion.indices,
-            "coefficients": expansion.coefficients,
-        }
+        return {**modes, "indices": expansion.indices, "coefficients": expansion.coefficients}
     series: dict[str, Array] = {}
     for k, cluster in enumerate(expansion.clusters):
         series[f"cluster_{k}_modes"] = np.array(cluster.modes)

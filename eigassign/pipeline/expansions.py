@@ -98,7 +98,7 @@ def expansion_size(model: Model, plan: Plan) -> ExpansionSize:
 def _expansions(
     model: Model, plan: Plan, full_order: int, cache: Cache | None
 ) -> tuple[Expansions, bool]:
-    """Both expansions, and whether they were known."""
+    """Both expansions, and True where they come from the cache."""
     if cache is None:
         return _computed(model, plan, full_order), False
     entry = expansion_key(model, plan, full_order)
@@ -157,7 +157,7 @@ def expansion_key(model: Model, plan: Plan, full_order: int) -> str:
 
 
 def _meta(plan: Plan) -> dict[str, str]:
-    """For people who list the cache."""
+    """Words for those who list the cache."""
     return {
         "what": f"expansion of order {plan.order}",
         "modes": ", ".join(map(str, plan.modes)),

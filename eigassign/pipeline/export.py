@@ -19,14 +19,11 @@ from eigassign.study.built_case import Case
 from eigassign.study.drawing import spread_samples
 
 Floats = NDArray[np.float64]
-POSES = 20  # of the trajectory, with every design but the initial one
-MOST_CORNERS = 6  # design parameters of which all corners of the bounds are taken
-DRAWN = 64  # designs drawn in the bounds of more parameters
 
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written, and how good it is where that was looked at."""
+    """A reduced model that was written, and its error where that was estimated."""
 
     files: tuple[Path, ...]
     modes: tuple[int, ...]
@@ -62,13 +59,13 @@ def export(
 
 
 def _samples(case: Case) -> Floats:
-    """(q, y) where the model is to be good, (n, n_x)."""
+    """(q, y) where the model is to be good, (n, n_x): of other designs at 20 poses each."""
     initial, designs = case.initial_design, _designs(case)
     if case.file.trajectory is None:
         q = pose_and_design(case)[0]
         return case.model().x(np.tile(q, (1 + len(designs), 1)), np.vstack([initial, designs]))
     path = case.trajectory
-    chosen = spread_samples(path.q, POSES)
+    chosen = spread_samples(path.q, 20)
     parts = [case.model().x(path.q, initial)]
     for y in designs:
         try:
@@ -79,10 +76,10 @@ def _samples(case: Case) -> Floats:
 
 
 def _designs(case: Case) -> Floats:
-    """Corners of the bounds, or designs drawn within them, (n, n_y)."""
+    """Corners of the bounds, (n, n_y); of over six parameters, as many drawn designs as six have."""
     columns = case.file.design.parameters.values()
     bounds = np.array([(column.min, column.max) for column in columns]).reshape(-1, 2)
-    if len(bounds) <= MOST_CORNERS:
+    if len(bounds) <= 6:
         return np.array(list(product(*bounds))).reshape(-1, len(bounds))
-    share = np.random.default_rng(0).random((DRAWN, len(bounds)))
+    share = np.random.default_rng(0).random((2**6, len(bounds)))
     return np.asarray(bounds[:, 0] + share * np.ptp(bounds, axis=1))

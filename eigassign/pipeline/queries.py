@@ -30,7 +30,6 @@ from eigassign.study.updating.measured import read_measurements
 from eigassign.study.wanted import target_frequencies
 
 Floats = NDArray[np.float64]
-ROUND_OFF = 1e-9  # of a bound: a design this far beyond it is on it
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ class ModesAnswer:
     frequencies_hz: list[float]
     q: tuple[tuple[str, float], ...]  # where: name and value, SI
     y: tuple[tuple[str, float], ...]
-    where: str  # the same in words, with units
+    where: str  # "q1 = 1.8 rad, m1 = 0.125 kg"
     truncation_error: list[float] | None = None  # of reduced links: relative, too high by at most
     discretisation_error: list[float] | None = None  # of the mesh: likewise; infinite: too coarse
     round_off: float = 0.0  # of all of these, relative, at most; infinite: not known
@@ -49,7 +48,7 @@ class ModesAnswer:
 
 @dataclass(frozen=True)
 class CheckAnswer:
-    """What a case amounts to; ``warnings`` are plausibility problems that do not stop a run."""
+    """A case in figures; ``warnings`` are plausibility problems that do not stop a run."""
 
     title: str
     n_dof: int
@@ -122,7 +121,7 @@ def pose_and_design(
     y: Sequence[float] | str | None = None,
     beyond: bool = False,
 ) -> tuple[Floats, Floats]:
-    """Where modes are asked for, in SI; see `modes`. Raises UsageError."""
+    """The q and y of modes that are asked for, in SI; see `modes`. Raises UsageError."""
     q = coordinates(case.file, q) if isinstance(q, str) else q
     y = design(case.file, y) if isinstance(y, str) else y
     with case.located():
@@ -140,7 +139,7 @@ def _refuse_beyond_bounds(case: Case, y: Floats) -> None:
     for (name, column), unit, value, initial in zip(
         columns, units, y, case.initial_design, strict=True
     ):
-        slack = ROUND_OFF * max(abs(column.min), abs(column.max))
+        slack = 1e-9 * max(abs(column.min), abs(column.max))
         if not column.min - slack <= value <= column.max + slack and value != initial:
             raise UsageError(
                 f"{name} = {value:g} {unit} is outside its bounds, {column.min:g} to "
@@ -150,7 +149,8 @@ def _refuse_beyond_bounds(case: Case, y: Floats) -> None:
 
 
 def _answer(case: Case, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
-    model = case.model()
+    model, file = case.model(), case.file
+    named = ((model.q_names, q, file.q_units), (model.y_names, y, file.design_units))
     every = tuple(range(1, len(hz) + 1))
     lost = model.truncation_error(q, y, every)[0] if model.reduced else None
     coarse = model.discretisation_error(q, y, every)[0] if model.meshed else None
@@ -159,18 +159,11 @@ def _answer(case: Case, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
         [float(value) for value in hz],
         _pairs(model.q_names, q),
         _pairs(model.y_names, y),
-        _where(case, q, y),
+        ", ".join(shown_point(*point) for point in named if point[0]),
         None if lost is None else [float(value) for value in lost],
         None if coarse is None else [float(value) for value in coarse],
         rounding_error(model.pencil, model.x(q, y)[0], len(hz)),
     )
-
-
-def _where(case: Case, q: Floats, y: Floats) -> str:
-    """``"q1 = 1.8 rad, m1 = 0.125 kg"``."""
-    model, file = case.model(), case.file
-    named = ((model.q_names, q, file.q_units), (model.y_names, y, file.design_units))
-    return ", ".join(shown_point(*point) for point in named if point[0])
 
 
 def _pairs(names: Sequence[str], numbers: Floats) -> tuple[tuple[str, float], ...]:

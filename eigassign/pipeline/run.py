@@ -7,7 +7,7 @@ commands ``optimize``, ``expand`` and ``validate`` do.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +51,7 @@ from eigassign.study.design.judgement import SolvedDesigns, study_targets
 from eigassign.study.meaning.overall import Studies, study_meaning
 from eigassign.study.moving import moving_modes
 from eigassign.study.planning import plan_expansion
-from eigassign.study.results import DesignRow, MovingMode, RunResults, TargetStudy
+from eigassign.study.results import MovingMode, RunResults, TargetStudy
 from eigassign.study.scene import Expansions, Scene
 from eigassign.study.wanted import target_frequencies
 
@@ -60,7 +60,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Options:
-    """How a case is run, never what: nothing in it changes a number."""
+    """Options of a run, none of which changes a number."""
 
     out: Path | None = None  # the run folder; results/<stem of the case file> if None
     cache_dir: Path | None = None  # the user's cache folder if None
@@ -70,9 +70,7 @@ class Options:
     report: str = "full"  # full, light or none
     study: str = "cheap"  # of what the answer means: none, cheap or all
     allow_outside: bool = False  # the case may name files outside its own folder
-    progress: Callable[[str], None] = field(
-        default=silent
-    )  # called with a line as each stage begins
+    progress: Callable[[str], None] = silent  # called with a line as each stage begins
 
 
 @dataclass(frozen=True, repr=False)
@@ -97,7 +95,8 @@ class Result(Pictured):
     assignment: Assignment | None  # the paper's one shot, where the case has one
 
     def __repr__(self) -> str:
-        design = ", ".join(f"{row.name} = {_with_unit(row)}" for row in self.results.design)
+        rows = self.results.design
+        design = ", ".join(f"{r.name} = {number(r.optimal)} {r.unit}".rstrip() for r in rows)
         return f"<Result: {design}. {tables.headline(self.results)}>"
 
     def _repr_html_(self) -> str:
@@ -118,10 +117,6 @@ class Result(Pictured):
         at the initial design, as predicted, and exact; NaN where a target does not hold.
         """
         return {name: np.array(values) for name, values in frequency_columns(self.results)}
-
-
-def _with_unit(row: DesignRow) -> str:
-    return f"{number(row.optimal)} {row.unit}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -230,7 +225,7 @@ def prepare(
 
 
 def _with_accuracy(scene: Scene, optimum: Floats | None = None) -> Scene:
-    """With what mesh, reduction, expansion and round-off leave; at the optimum if there is one."""
+    """The scene with what mesh, reduction, expansion and round-off leave at the optimum or y0."""
     y, design = (scene.initial, "initial") if optimum is None else (optimum, "optimal")
     modes = scene.expansions.modes
     mesh = judged_mesh(scene.model, modes, scene.trajectory, scene.q0, y, design)
@@ -296,7 +291,7 @@ def expand_case(
 
 
 def validate(path: str | Path, options: Options = DEFAULT) -> Validation:
-    """Both expansions of a case against exact; see `eigassign.study.comparison` for where."""
+    """Compare both expansions of a case with exact, where `eigassign.study.comparison` says."""
     stages = Stages(options.progress)
     case = load_case(path, options.allow_outside)
     with case.located():

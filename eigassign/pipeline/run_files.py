@@ -57,7 +57,7 @@ def new_run_folder(file: CaseFile, out: Path | None, force: bool) -> Iterator[Ru
 
 
 def log_text(results: RunResults) -> str:
-    """What was run, chosen, warned of and how long it took, one line each."""
+    """Lines of what was run, chosen and warned of, and how long it took."""
     lines = [
         f"eigassign {results.version}",
         f"case      {results.case_name}: {results.title}",

@@ -30,7 +30,7 @@ _LEVEL = 1e-9  # m: a joint this near to another one is at its place
 
 @dataclass(frozen=True)
 class _Frame:
-    """What of a link's own frame differs from the URDF's: a beam runs along its own x axis."""
+    """A link's frame where it differs from the URDF's: a beam runs along its own x axis."""
 
     turn: Floats  # (3, 3), from the case's axes of the link to those of the URDF
     end: str | None = None  # the joint at the end of the beam
@@ -63,7 +63,11 @@ def urdf_mapping(
     frames = {n: _beam_frame(n, carried[n], path) if n in beams else _RIGID for n in links}
     (root,) = set(links) - {joint.child for joint in joints}
     written: dict[str, Any] = {
-        names[name]: _beam(carried[name][0], beams[name])
+        names[name]: {
+            "type": "beam",
+            "length": float(np.linalg.norm(_place(carried[name][0]))),
+            **beams[name],
+        }
         if name in beams
         else _rigid(link, carried[name], names, path)
         for name, link in links.items()
@@ -140,10 +144,6 @@ def _beam_frame(name: str, carried: list[Any], path: str | Path) -> _Frame:
     other = np.eye(3)[int(np.argmin(np.abs(x)))]
     z = np.cross(x, other) / np.linalg.norm(np.cross(x, other))
     return _Frame(np.column_stack([x, np.cross(z, x), z]), carried[0].name)
-
-
-def _beam(joint: Any, given: Mapping[str, Any]) -> dict[str, Any]:
-    return {"type": "beam", "length": float(np.linalg.norm(_place(joint))), **given}
 
 
 def _rigid(
