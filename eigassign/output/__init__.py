@@ -40,6 +40,7 @@ __all__, __getattr__, __dir__ = face(
         "exchange.reduced_file": "load_reduced",
         "reports.page": "write_modes write_run",
         "result_files": "dumps frequencies_csv results_document sample_files to_json",
+        "store.run_folder": "run_folder",
         "store.run_record": "MARKER RunStatus changes read_record run_status",
         "store.atomic": "lock replace_synced",
         "console": "print_assignment print_tables print_verdict progress wrapped",

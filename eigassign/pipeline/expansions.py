@@ -98,7 +98,7 @@ def expansion_size(model: Model, plan: Plan) -> ExpansionSize:
 def _expansions(
     model: Model, plan: Plan, full_order: int, cache: Cache | None
 ) -> tuple[Expansions, bool]:
-    """Both expansions, and True where they come from the cache."""
+    """The expansions, and True where they come from the cache."""
     if cache is None:
         return _computed(model, plan, full_order), False
     entry = expansion_key(model, plan, full_order)

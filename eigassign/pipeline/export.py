@@ -76,7 +76,7 @@ def _samples(case: Case) -> Floats:
 
 
 def _designs(case: Case) -> Floats:
-    """Corners of the bounds, (n, n_y); of over six parameters, as many drawn designs as six have."""
+    """Corners of the bounds, (n, n_y); of over six parameters, drawn ones, as many as six have."""
     columns = case.file.design.parameters.values()
     bounds = np.array([(column.min, column.max) for column in columns]).reshape(-1, 2)
     if len(bounds) <= 6:

@@ -7,7 +7,7 @@ from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from pathlib import Path
 
-from eigassign.batch import Batch, CaseOptions, Variant, Workers, check_cases, outcome_of, plan_of
+from eigassign.batch import Batch, CaseOptions, Variant, Workers, outcome_of, plan_of
 
 TEXT = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
 MASS = "mechanism.bodies.tool_mass.mass"
@@ -38,7 +38,7 @@ class Instant(Executor):
 
     def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
         future: Future[object] = Future()
-        if fn.func is check_cases:
+        if fn.func.__name__ == "check_cases":
             future.set_result(fn(*args))
         else:
             future.set_result([self.ended(variant) for variant in args[0]])

@@ -8,7 +8,7 @@ import shutil
 import signal
 import time
 from collections.abc import Iterator
-from concurrent.futures import Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import replace
@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 from instant import MASS, Instant, batch_of, case, instant, names
 
-from eigassign.batch import Batch, Workers, merge_shards, run
+from eigassign.batch import Batch, Variant, Workers, merge_shards, run
 from eigassign.errors import CaseError, StorageError
 
 
@@ -153,32 +153,74 @@ def test_nothing_runs_where_one_variant_is_no_case(tmp_path: Path) -> None:
     assert not batch.folder.exists()
 
 
-class Breaking(Instant):
-    """A pool whose process dies with the case of mass 0.5, and has two cases in flight then."""
+class Failing(Instant):
+    """What dies with the case of mass 0.5, and with what is in flight then."""
 
-    broken = False
+    def __init__(self, out: Path, error: BaseException) -> None:
+        super().__init__(out, lambda _name: None)
+        self.error, self.broken = error, False
 
     def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
-        (variant, *_) = args[0]
-        if isinstance(variant.values.get(MASS), float) and variant.values[MASS] == 0.5:
-            self.broken = True
-        if self.broken:
-            future: Future[object] = Future()
-            future.set_exception(BrokenProcessPool())
-            return future
-        return super().submit(fn, *args, **kwargs)
+        (variant, *_), future = args[0], Future[object]()
+        hit = variant.values[MASS] == 0.5
+        if hit and not isinstance(self.error, Exception):
+            raise self.error
+        self.broken |= hit and isinstance(self.error, BrokenExecutor)
+        if not (hit or self.broken):
+            return super().submit(fn, *args, **kwargs)
+        future.set_exception(self.error)
+        return future
 
 
-def test_of_a_broken_pool_the_culprit_is_told_and_nobody_else_loses(tmp_path: Path) -> None:
+def failing(batch: Batch, error: BaseException) -> Workers:
+    @contextmanager
+    def opened(_slots: int) -> Iterator[Executor]:
+        yield Failing(batch.folder, error)
+
+    return Workers(3, opened)
+
+
+@pytest.mark.parametrize("error", [BrokenProcessPool(), RuntimeError("worker lost")], ids=type)
+def test_of_what_breaks_the_culprit_is_told_and_nobody_else_loses(
+    error: Exception, tmp_path: Path
+) -> None:
+    """A pool of processes breaks with all that it has in flight, a cluster loses one case."""
     case(tmp_path)
     batch = batch_of(tmp_path, "0,0.5,1,2")
+    assert sorted(ran(batch, failing(batch, error))) == names(batch, range(4))
+    assert [*summary(batch).values()] == ["ok", "error", "ok", "ok"]
+    found = (batch.folder / "summary.csv").read_text()
+    assert "the process that ran it was killed" in found
+
+
+def test_an_interrupt_leaves_a_summary_of_what_was_finished(tmp_path: Path) -> None:
+    case(tmp_path)
+    batch = batch_of(tmp_path, "0,0.5,1")
+    with pytest.raises(KeyboardInterrupt):
+        ran(batch, replace(failing(batch, KeyboardInterrupt()), slots=1))
+    assert summary(batch) == {"mass=0": "ok"}
+
+
+def test_tasks_take_as_many_cases_as_fill_their_seconds(tmp_path: Path) -> None:
+    case(tmp_path)
+    batch = batch_of(tmp_path, "1..2:60")
+    sizes: list[int] = []
+
+    class Tasks(Instant):
+        def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
+            if isinstance(args[0][0].values[MASS], (int, float)):
+                sizes.append(len(args[0]))
+            return super().submit(fn, *args, **kwargs)
+
+        def ended(self, variant: Variant):  # type: ignore[no-untyped-def]
+            return replace(super().ended(variant), seconds=0.4)
 
     @contextmanager
     def opened(_slots: int) -> Iterator[Executor]:
-        yield Breaking(batch.folder, lambda _name: None)
+        yield Tasks(batch.folder, lambda _name: None)
 
-    assert sorted(ran(batch, Workers(3, opened))) == names(batch, range(4))
-    assert [*summary(batch).values()] == ["ok", "error", "ok", "ok"]
+    ran(batch, Workers(1, opened, task_s=5.0))
+    assert sizes == [1, 12, 12, 12, 12, 11]
 
 
 needs_locks = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fcntl and fork")

@@ -16,13 +16,9 @@ import pytest
 from eigassign.batch import (
     CaseOptions,
     OutOfTimeError,
-    in_this_process,
     limited,
     plan_of,
-    process_pool,
     run_cases,
-    this_machine,
-    work,
 )
 from eigassign.output import CaseOutcome
 
@@ -81,13 +77,16 @@ def test_a_case_that_was_changed_since_the_batch_began_does_not_run(
     assert "changed since the batch began" in found.message
 
 
-def test_a_case_that_takes_too_long_is_ended(
-    options: CaseOptions, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(work, "solve_case", lambda _case, _how: time.sleep(20))
-    (found,) = run_cases([plan_of([SMALL])[0]], replace(options, seconds=0.1))
-    assert (found.status, found.message) == ("error", "takes longer than the 0.1 s of --case-time")
+def test_a_case_that_takes_too_long_is_ended(options: CaseOptions) -> None:
+    (found,) = run_cases([plan_of([SMALL])[0]], replace(options, seconds=0.01))
+    assert (found.status, found.message) == ("error", "takes longer than the 0.01 s of --case-time")
     assert found.seconds < 10
+
+
+def test_a_bug_in_one_case_is_an_outcome_and_not_an_end(options: CaseOptions) -> None:
+    (found,) = run_cases([plan_of([SMALL])[0]], replace(options, cache_dir=5, use_cache=True))
+    assert found.status == "error"
+    assert found.message.startswith("internal error: TypeError")
 
 
 def test_a_case_in_a_thread_is_ended_too() -> None:
@@ -120,11 +119,6 @@ def test_a_case_in_a_thread_is_ended_too() -> None:
     assert ended == ["after 0.01 s", "not ended", "at the end"]
 
 
-def test_a_case_that_may_end_its_process_does_not_run_in_ours() -> None:
-    assert this_machine(1).open is in_this_process
-    assert this_machine(1, apart=True).open is process_pool
-
-
 def test_limits_are_lifted_behind_a_case() -> None:
     before = resource.getrlimit(resource.RLIMIT_AS)
     with pytest.raises(MemoryError), limited(None, 100.0):
@@ -137,9 +131,10 @@ def test_limits_are_lifted_behind_a_case() -> None:
     time.sleep(0.1)
 
 
-def test_a_case_that_takes_too_much_memory_is_ended(
-    options: CaseOptions, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(work, "solve_case", lambda _case, _how: np.ones(100_000_000))
-    (found,) = run_cases([plan_of([SMALL])[0]], replace(options, megabytes=100.0))
-    assert (found.status, found.message) == ("error", "out of memory (--case-memory is 100 MB)")
+def test_a_case_that_takes_too_much_memory_is_ended(options: CaseOptions, tmp_path: Path) -> None:
+    file = tmp_path / "large.yaml"
+    file.write_text(SMALL.read_text().replace("elements: 2", "elements: 3000"))
+    small, large = plan_of([SMALL])[0], plan_of([file])[0]
+    run_cases([small], options)  # OpenBLAS, which would end this process, has its memory then
+    (found,) = run_cases([large], replace(options, megabytes=5.0))
+    assert (found.status, found.message) == ("error", "out of memory (--case-memory is 5 MB)")

@@ -1,63 +1,20 @@
-"""Many cases: one folder each, a summary, and nothing lost to cases that fail or kill."""
+"""Many cases on the command line: one folder each, a summary, and nothing lost to what fails."""
 
 from __future__ import annotations
 
 import csv
-import multiprocessing
-import os
-import signal
-import sys
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
-from concurrent.futures import Executor, Future
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from commands import python
 from wrong_inputs import GOOD
 
-from eigassign.batch import (
-    Batch,
-    CaseOptions,
-    Workers,
-    cases_in,
-    folder_names,
-    plan_of,
-    process_pool,
-    run,
-    work,
-)
+from eigassign.batch import cases_in, folder_names
 from eigassign.cli import main
-from eigassign.output import CaseOutcome
-from eigassign.process import Terminated
 
 STRICT = GOOD.replace("50 %", "1e-9") + "assignment: {method: one_shot}\n"
 BOUND = "max: 1}\n  constraints: {heavy: {terms: {m: 1}, min: 3}}"
 INFEASIBLE = GOOD.replace("max: 1}", BOUND)
-
-# A program like eigassign, whose cases named kill* take their process with them, and whose cases
-# named slow* are at work meanwhile. Worker processes import this file too, so that they behave so
-# as well.
-KILLING = """
-import os, signal, sys, time
-import eigassign.batch.work
-
-solved = eigassign.batch.work.solve_case
-
-def solve_case(case, options):
-    if case.file.path.stem.startswith("kill"):
-        time.sleep(0.5)
-        os.kill(os.getpid(), signal.SIGKILL)
-    if case.file.path.stem.startswith("slow"):
-        time.sleep(1.5)
-    return solved(case, options)
-
-eigassign.batch.work.solve_case = solve_case
-if __name__ == "__main__":
-    from eigassign.cli import main
-    sys.exit(main())
-"""
 
 
 @pytest.fixture(autouse=True)
@@ -86,7 +43,7 @@ def test_a_batch_keeps_going_past_every_kind_of_failure(
     texts = {"good": GOOD, "strict": STRICT, "infeasible": INFEASIBLE, "wrong": "title: x"}
     for name, text in texts.items():
         write(f"cases/{name}.yaml", text)
-    assert main(["batch", "cases", "--jobs", "2"]) == 1
+    assert main(["batch", "cases", "--jobs", "1", "--reports", "none"]) == 1
     out, err = capsys.readouterr()
     rows = summary()
     assert {name: row["status"] for name, row in rows.items()} == {
@@ -108,6 +65,42 @@ def test_a_batch_keeps_going_past_every_kind_of_failure(
     assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("4", "2", "1")
 
 
+@pytest.mark.slow
+def test_a_case_with_a_limit_of_memory_runs_in_a_process_of_its_own() -> None:
+    write("a.yaml")
+    asked = ["--jobs", "1", "--case-memory", "4000", "--reports", "none", "--quiet"]
+    assert main(["batch", "a.yaml", "--out", "runs", *asked]) == 0
+    assert Path("runs/a/results.json").exists()
+
+
+def test_a_batch_writes_figures_in_the_formats_asked_for() -> None:
+    write("a.yaml")
+    assert main(["batch", "a.yaml", "--jobs", "1", "--figures", "none"]) == 0
+    assert Path("results/a/report.html").exists()
+    assert not Path("results/a/figures").exists()
+
+
+def test_a_dry_run_lists_what_would_run_and_says_what_it_takes(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    write("a.yaml")
+    sweep = ["batch", "a.yaml", "--jobs", "1", "--set", "targets.0.frequency=176 Hz..184 Hz:9"]
+    assert main([*sweep, "--dry-run"]) == 0
+    out = capsys.readouterr().out
+    assert [line.split()[0] for line in out.splitlines()[3:11]] == list("12345…89")
+    assert "9 cases would run, 0 are done and current\ntime     about " in out
+    assert "a case, estimated from the first\nmemory   about 150 MB in each of 1 process\n" in out
+    assert "files    189 more, about 6.58 MB, in results/a_sweep\n" in out
+    assert not Path("results").exists()
+    one = ["--set", "targets.0.frequency=180 Hz", "--reports", "none", "--jobs", "1"]
+    assert main(["batch", "a.yaml", *one]) == 0
+    capsys.readouterr()
+    assert main([*sweep, "--dry-run"]) == 0
+    out = capsys.readouterr().out
+    assert "8 cases would run, 1 are done and current" in out
+    assert "a case, as those that are done took" in out
+
+
 @pytest.mark.parametrize(
     ("values", "said"),
     [
@@ -124,114 +117,6 @@ def test_check_sees_a_wrong_sweep(
     write("a.yaml", f"{GOOD}sweep: {{parameters: {{mechanism.bodies.tool.mass: [0.1, 0.2]}}}}\n")
     assert main(["check", "a.yaml"]) == 0
     assert "sweep: 2 variants, all of them valid" in " ".join(capsys.readouterr().out.split())
-
-
-def test_a_batch_in_which_all_is_well_ends_with_0() -> None:
-    write("a.yaml")
-    assert main(["batch", "a.yaml", "--out", "runs", "--quiet"]) == 0
-    assert Path("runs/a/results.json").exists()
-
-
-def test_a_killed_worker_costs_its_own_case_only() -> None:
-    write("killing.py", KILLING)
-    for name in ("a", "b", "c", "kill_1", "kill_2"):
-        write(f"cases/{name}.yaml")
-    done = python("killing.py", "batch", "cases", "--jobs", "2", "--no-cache")
-    assert done.returncode == 1, done.stderr
-    rows = summary()
-    assert [name for name, row in rows.items() if row["status"] == "ok"] == ["a", "b", "c"]
-    assert all("killed" in rows[name]["message"] for name in ("kill_1", "kill_2"))
-
-
-def test_a_case_at_work_when_another_worker_is_killed_is_run_again() -> None:
-    """The pool tells the other worker to end: it must, though it is in the middle of its case."""
-    write("killing.py", KILLING)
-    for name in ("kill", "slow"):
-        write(f"cases/{name}.yaml")
-    done = python("killing.py", "batch", "cases", "--jobs", "2", "--no-cache")
-    assert done.returncode == 1, done.stderr
-    assert {name: row["status"] for name, row in summary().items()} == {
-        "kill": "error",
-        "slow": "ok",
-    }
-    assert "Traceback" not in done.stderr
-
-
-def test_workers_have_one_blas_thread_each_and_no_numpy_from_the_start(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "7")
-    asked = "__import__('os').environ['OPENBLAS_NUM_THREADS'], 'numpy' in __import__('sys').modules"
-    with process_pool(1) as pool:
-        assert pool.submit(eval, f"({asked})").result() == ("1", False)
-    assert os.environ["OPENBLAS_NUM_THREADS"] == "7"
-
-
-@pytest.mark.parametrize("_again", range(20))  # two threads wait for the same processes
-def test_an_interrupt_stops_the_workers_and_is_passed_on(_again: int) -> None:
-    before = set(multiprocessing.active_children())
-
-    def interrupted() -> None:
-        with process_pool(2) as pool:
-            pool.submit(eval, "__import__('time').sleep(600)")
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
-    assert set(multiprocessing.active_children()) == before
-
-
-class InThisProcess(Executor):
-    """An executor that is not a process pool: what a cluster's would look like."""
-
-    def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
-        future: Future[list[CaseOutcome]] = Future()
-        names = [variant.name for variant in args[0]]
-        if "interrupt" in names:
-            raise Terminated(signal.SIGTERM)
-        if "poison" in names:
-            future.set_exception(RuntimeError("worker lost"))
-        else:
-            future.set_result(fn(*args, **kwargs))
-        return future
-
-
-@contextmanager
-def in_this_process(_slots: int) -> Iterator[Executor]:
-    with InThisProcess() as pool:
-        yield pool
-
-
-def batch_of(*names: str) -> Batch:
-    cases = [write(f"{name}.yaml") for name in names]
-    return Batch(plan_of(cases), Path("runs"), CaseOptions("runs", reports="none"))
-
-
-def test_an_interrupt_leaves_a_summary_of_what_was_finished() -> None:
-    with pytest.raises(Terminated):
-        run(batch_of("a", "interrupt", "b"), Workers(1, in_this_process), print, print)
-    assert {name: row["status"] for name, row in summary("runs").items()} == {"a": "ok"}
-
-
-def test_any_executor_will_do_and_may_lose_a_case() -> None:
-    heard: list[str] = []
-    ends = run(
-        batch_of("a", "poison"),
-        Workers(3, in_this_process),
-        lambda _progress: None,
-        lambda found: heard.append(found.name),
-    )
-    assert ends == {"ok": 1, "error": 1}
-    assert sorted(heard) == ["a", "poison"]
-    assert "killed" in summary("runs")["poison"]["message"]
-
-
-def test_a_bug_in_one_case_is_an_outcome_and_not_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(work, "solve_case", lambda _case, _options: 1 / 0)
-    batch = batch_of("a")
-    (found,) = work.run_cases([batch.plan[0]], batch.options)
-    assert found.status == "error"
-    assert "ZeroDivisionError" in found.message
 
 
 def test_stems_that_collide_get_folders_that_tell_them_apart() -> None:
@@ -255,25 +140,3 @@ def test_folders_are_searched_but_not_their_runs_and_nothing_comes_twice() -> No
     write("cases/results/a/run.json", "{}")
     found = cases_in([Path("cases"), Path("cases/a.yaml"), Path("cases/../cases")])
     assert found == kept
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
-def test_workers_end_when_their_parent_is_killed() -> None:
-    code = (
-        "import os, signal\nfrom eigassign.batch.workers import process_pool\n"
-        "if __name__ == '__main__':\n"
-        "    with process_pool(1) as pool:\n"
-        "        print(pool.submit(os.getpid).result(), flush=True)\n"
-        "        os.kill(os.getpid(), signal.SIGKILL)\n"
-    )
-    write("parent.py", code)
-    done = python("parent.py")  # returns once every holder of its stdout, the worker too, is gone
-    assert done.returncode == -signal.SIGKILL
-    assert done.stdout.strip().isdigit()
-
-
-def test_a_batch_writes_figures_in_the_formats_asked_for() -> None:
-    write("a.yaml")
-    assert main(["batch", "a.yaml", "--jobs", "1", "--figures", "none"]) == 0
-    assert Path("results/a/report.html").exists()
-    assert not Path("results/a/figures").exists()

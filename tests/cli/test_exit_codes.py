@@ -5,20 +5,21 @@ from __future__ import annotations
 import errno
 import io
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import click
 import pytest
 from commands import SECONDS, TWO_LINK, eigassign_process, environment, python
 from wrong_inputs import GOOD
 
-from eigassign.cli import main
+import eigassign as ea
+from eigassign.cli import cli, main
 from eigassign.errors import AccuracyError, EigassignError, InfeasibleError, StorageError
-from eigassign.pipeline import queries, run
-from eigassign.process import Terminated, failure_of, say
 
 ERRORS: list[tuple[BaseException, int, str]] = [
     (InfeasibleError("limits contradict each other", ("a", "b")), 1, "limits contradict"),
@@ -26,11 +27,12 @@ ERRORS: list[tuple[BaseException, int, str]] = [
     (StorageError("no space"), 3, "error: no space"),
     (OSError(errno.ENOSPC, "No space left on device", "x.h5"), 3, "x.h5: No space left on device"),
     (MemoryError(), 3, "out of memory"),
+    (BrokenPipeError(errno.EPIPE, "Broken pipe"), 3, ""),
     (ZeroDivisionError("division by zero"), 4, "please report it"),
     (EigassignError("a state that cannot be"), 4, "please report it"),
     (KeyboardInterrupt(), 130, "interrupted"),
-    (Terminated(signal.SIGTERM), 143, "SIGTERM"),
 ]
+LITTLE = ("--study", "none", "--report", "none", "--figures", "none", "--no-cache")
 
 
 @pytest.fixture(autouse=True)
@@ -49,32 +51,49 @@ def test_every_error_has_its_exit_code_and_one_line(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    def fail(*_args: object, **_how: object) -> None:
+    @click.command()
+    def fail() -> None:
         raise error
 
-    monkeypatch.setattr(run, "optimize", fail)
-    assert main(["optimize", "good.yaml"]) == code
+    monkeypatch.setitem(cli.commands, "fail", fail)
+    assert main(["fail"]) == code
     out, err = capsys.readouterr()
     assert out == ""
     assert says in err
-    assert len(err.splitlines()) == 1
+    assert len(err.splitlines()) == bool(says)
+
+
+def test_a_signal_ends_a_command_with_its_code(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    @click.command()
+    def die() -> None:
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    monkeypatch.setitem(cli.commands, "die", die)
+    assert main(["die"]) == 143
+    assert capsys.readouterr().err == "eigassign: ended by SIGTERM\n"
 
 
 def test_a_bug_is_told_with_its_place_and_with_a_traceback_only_when_asked(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(queries, "load_case", lambda *_: 1 / 0)
-    assert main(["modes", "good.yaml"]) == 4
+    class Odd(os.PathLike[str]):
+        def __fspath__(self) -> str:
+            raise ZeroDivisionError("division by zero")
+
+    @click.command()
+    @click.option("--debug", is_flag=True)
+    def fail(debug: bool) -> None:
+        ea.load_case(Odd())  # type: ignore[arg-type]
+
+    monkeypatch.setitem(cli.commands, "fail", fail)
+    assert main(["fail"]) == 4
     err = capsys.readouterr().err
-    assert "ZeroDivisionError: division by zero (eigassign.pipeline.queries:" in err
+    assert re.search(r"ZeroDivisionError: division by zero \(eigassign\.[\w.]+:\d+\)", err)
     assert "Traceback" not in err
-    assert main(["modes", "good.yaml", "--debug"]) == 4
+    assert main(["fail", "--debug"]) == 4
     assert "Traceback (most recent call last)" in capsys.readouterr().err
-
-
-def test_a_case_error_is_no_bug_even_where_it_wraps_another() -> None:
-    assert failure_of(StorageError("x")).exit_code == 3
-    assert failure_of(BrokenPipeError(errno.EPIPE, "Broken pipe")).summary == ""
 
 
 class Terminal(io.StringIO):
@@ -87,41 +106,39 @@ def test_errors_and_warnings_have_colours_on_a_terminal_only(
 ) -> None:
     monkeypatch.setenv("TERM", "xterm-256color")
     monkeypatch.delenv("NO_COLOR", raising=False)
-    lines = ["eigassign: error: no", "a.yaml:3:1: warning: thin", "a.yaml:4:2: title: missing"]
+    thin = GOOD.replace("{shape: circle, diameter: 20 mm}", "{area: 3e-4, bending_inertia: 8e-5}")
+    Path("thin.yaml").write_text(thin)
+    Path("wrong.yaml").write_text(GOOD.replace("title: A small arm", "titel: A small arm"))
 
     def said(stream: io.StringIO) -> list[str]:
         monkeypatch.setattr(sys, "stderr", stream)
-        say(lines)
-        return stream.getvalue().splitlines()
+        assert main(["check", "thin.yaml", "wrong.yaml"]) == 2
+        lines = stream.getvalue().splitlines()
+        return [line for line in lines if "igassign: " in line or ".yaml:" in line]
 
-    error, warning, problem = said(Terminal())
-    assert error == "\x1b[1;31meigassign: \x1b[0merror: no\x1b[K"
-    assert warning == "\x1b[1ma.yaml:3:1: \x1b[0m\x1b[1;33mwarning: \x1b[0mthin\x1b[K"
-    assert problem == "\x1b[1ma.yaml:4:2: \x1b[0mtitle: missing\x1b[K"
-    assert said(io.StringIO()) == lines
+    plain = said(io.StringIO())
+    warning, *_, error = said(Terminal())
+    place, _, text = plain[0].partition("warning: ")
+    assert warning == f"\x1b[1m{place}\x1b[0m\x1b[1;33mwarning: \x1b[0m{text}\x1b[K"
+    assert error == f"\x1b[1;31meigassign: \x1b[0m{plain[-1].removeprefix('eigassign: ')}\x1b[K"
     monkeypatch.setenv("NO_COLOR", "1")
-    assert said(Terminal()) == [f"{line}\x1b[K" for line in lines]
+    assert said(Terminal()) == [f"{line}\x1b[K" for line in plain]
     monkeypatch.setenv("TERM", "dumb")
-    assert said(Terminal()) == lines
+    assert said(Terminal()) == plain
 
 
-def test_help_imports_click_and_nothing_heavy() -> None:
+def test_help_imports_click_and_nothing_heavy_and_blas_gets_one_thread_before_numpy() -> None:
+    """One thread unless the user chose."""
     heavy = ["numpy", "scipy", "yaml", "pydantic", "osqp", "h5py", "matplotlib", "rich", "jinja2"]
     code = (
-        "import sys; from eigassign.cli import main; main(['--help']); main(['optimize', '-h'])\n"
+        "import os, sys; from eigassign.cli import main\n"
+        "main(['--help']); main(['optimize', '-h'])\n"
+        "print(os.environ['OPENBLAS_NUM_THREADS'], os.environ['OMP_NUM_THREADS'])\n"
         f"sys.exit(repr([name for name in {heavy} if name in sys.modules] or 0))"
     )
-    done = python("-c", code)
+    ours = {k: v for k, v in environment(OMP_NUM_THREADS="2").items() if "OPENBLAS" not in k}
+    done = python("-c", code, env=ours)
     assert done.stderr.strip() == "0"
-
-
-def test_blas_gets_one_thread_before_numpy_unless_the_user_chose(tmp_path: Path) -> None:
-    code = (
-        "import os, sys; from eigassign.cli import main\n"
-        "main(['modes', 'good.yaml', '--json'])\n"
-        "print(os.environ['OPENBLAS_NUM_THREADS'], os.environ['OMP_NUM_THREADS'])"
-    )
-    done = python("-c", code, env=environment(OMP_NUM_THREADS="2"), cwd=tmp_path)
     assert done.stdout.splitlines()[-1] == "1 2"
 
 
@@ -131,7 +148,10 @@ def test_the_module_and_its_json_work_as_a_process() -> None:
     assert done.stdout.startswith('{"rigid_modes": 2, "frequencies_hz": [202.2195')
 
 
-@pytest.mark.parametrize("command", [["schema"], ["modes", str(TWO_LINK)]], ids=lambda c: c[0])
+PRINTING = (["schema"], ["cache", "list", "--cache-dir", "."])  # as text, and as a table
+
+
+@pytest.mark.parametrize("command", PRINTING, ids=lambda command: command[0])
 def test_a_closed_pipe_ends_in_silence(command: list[str]) -> None:
     reader, writer = os.pipe()
     os.close(reader)
@@ -141,10 +161,9 @@ def test_a_closed_pipe_ends_in_silence(command: list[str]) -> None:
     assert done.returncode == 3
 
 
-@pytest.mark.parametrize("args", [["--json"], []], ids=["json", "text"])
-def test_a_stdout_that_is_closed_from_the_start_is_told(args: list[str]) -> None:
-    command = [sys.executable, "-m", "eigassign", "modes", str(TWO_LINK), *args]
-    shell = ["sh", "-c", 'exec "$@" >&-', "sh", *command]
+@pytest.mark.parametrize("command", PRINTING, ids=lambda command: command[0])
+def test_a_stdout_that_is_closed_from_the_start_is_told(command: list[str]) -> None:
+    shell = ["sh", "-c", 'exec "$@" >&-', "sh", sys.executable, "-m", "eigassign", *command]
     done = subprocess.run(
         shell, env=environment(), stderr=subprocess.PIPE, text=True, timeout=SECONDS, check=False
     )
@@ -161,30 +180,33 @@ def test_a_full_disk_behind_stdout_is_told() -> None:
     assert "Traceback" not in done.stderr
 
 
+LOCALES = {
+    "ascii": {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+    "coerced": {"LC_ALL": "C"},
+    "latin-1": {"PYTHONIOENCODING": "latin-1"},
+}
+
+
 @pytest.mark.parametrize(
-    "locale",
-    [
-        {"LC_ALL": "C"},
-        {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
-        {"PYTHONIOENCODING": "latin-1"},
-    ],
-    ids=["coerced", "ascii", "latin-1"],
+    "name", [n if n == "ascii" else pytest.param(n, marks=pytest.mark.slow) for n in LOCALES]
 )
-def test_any_character_set_is_enough(locale: dict[str, str], tmp_path: Path) -> None:
+def test_any_character_set_is_enough(name: str, tmp_path: Path) -> None:
     title = "Kraftfahrzeug-Übergröße → ω"
-    for name in ("ω.yaml", "omega.yaml"):
-        Path(name).write_text(GOOD.replace("A small arm", title), encoding="utf-8")
-    env = environment(**locale)
-    for args in (
-        ["check", "ω.yaml"],
-        ["check", "ω.yaml", "--json"],
-        ["optimize", "omega.yaml", "--figures", "none"],
-    ):
-        done = eigassign_process(*args, env=env, cwd=tmp_path)
-        assert done.returncode == 0, done.stderr
-    wrong = eigassign_process("modes", "ω.yaml", "--q", "ω", env=env, cwd=tmp_path)
-    assert wrong.returncode == 2
-    assert "Traceback" not in wrong.stderr
+    for file in ("ω.yaml", "omega.yaml"):
+        Path(file).write_text(GOOD.replace("A small arm", title), encoding="utf-8")
+    optimize = ["optimize", "omega.yaml", "--figures", "none", "--study", "none"]
+    wrong = ["modes", "ω.yaml", "--q", "ω"]
+    code = (
+        "import sys; from eigassign.cli import main; args, codes = sys.argv[1:], []\n"
+        "while args:\n    end = args.index('end'); codes.append(main(args[:end]))\n"
+        "    del args[: end + 1]\n"
+        "sys.exit(repr(codes))"
+    )
+    words = ["check", "ω.yaml", "end", "check", "ω.yaml", "--json", "end"]
+    words += [*optimize, "end", *wrong, "end"]
+    done = python("-c", code, *words, env=environment(**LOCALES[name]), cwd=tmp_path)
+    assert done.stderr.splitlines()[-1] == "[0, 0, 0, 2]"
+    assert "Traceback" not in done.stderr
 
 
 INTERRUPTED_IMPORT = """
@@ -221,38 +243,49 @@ def test_a_run_folder_that_cannot_be_is_an_io_error(
 def test_a_cache_that_cannot_be_written_costs_a_warning_and_no_result(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert main(["optimize", "good.yaml", "--cache-dir", "good.yaml"]) == 0
+    assert main(["optimize", "good.yaml", *LITTLE[:-1], "--cache-dir", "good.yaml"]) == 0
     assert "warning: the cache cannot be" in capsys.readouterr().err
 
 
+# The command, which lasts as soon as it begins to write its results. Worker processes import this
+# file too.
 SLOW = """
 import sys, time
 from pathlib import Path
-from eigassign.output.reports import page as report
 
-def write_run(results, folder, formats, kind):
-    (folder / "half").touch()
-    Path(f"{results.case_name}.ready").touch()
-    time.sleep(600)
+def last(event, args):
+    if event == "open" and str(args[0]).endswith("results.json") and "w" in str(args[1]):
+        Path("ready").touch()
+        time.sleep(600)
 
-report.write_run = write_run  # in worker processes too: they import this file
+sys.addaudithook(last)
 if __name__ == "__main__":
     from eigassign.cli import main
     sys.exit(main())
 """
+SIGNALS = [
+    ("optimize", signal.SIGINT, 130),
+    ("batch", signal.SIGTERM, 143),
+    pytest.param("optimize", signal.SIGTERM, 143, marks=pytest.mark.slow),
+    pytest.param("batch", signal.SIGINT, 130, marks=pytest.mark.slow),
+]
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-@pytest.mark.parametrize("command", ["optimize", "batch"])
+@pytest.mark.parametrize(("command", "number", "code"), SIGNALS)
 def test_a_signal_during_a_run_cleans_up_and_ends_with_its_code(
-    command: str, number: signal.Signals, code: int, tmp_path: Path
+    command: str, number: signal.Signals, code: int
 ) -> None:
     Path("slow.py").write_text(SLOW)
-    args = [sys.executable, "slow.py", command, "good.yaml", "--no-cache"]
+    how = (
+        LITTLE
+        if command == "optimize"
+        else ("--reports", "none", "--jobs", "1", "--case-memory", "4000")
+    )
+    args = [sys.executable, "slow.py", command, "good.yaml", *how]
     with subprocess.Popen(
         args, env=environment(), stderr=subprocess.PIPE, text=True, preexec_fn=_heed_signals
     ) as process:
-        _wait_for(tmp_path / "good.ready", process)
+        _wait_for(Path("ready"), process)
         process.send_signal(number)
         _, err = process.communicate(timeout=SECONDS)
     assert process.returncode == code, err
@@ -269,11 +302,12 @@ def _heed_signals() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def test_nohup_is_respected(tmp_path: Path) -> None:
+def test_nohup_is_respected() -> None:
     code = (
         "import os, signal, sys; signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
-        "from eigassign.process import terminable\n"
-        "with terminable():\n    os.kill(os.getpid(), signal.SIGHUP)\n"
+        "import click; from eigassign.cli import cli, main\n"
+        "cli.add_command(click.command('hang-up')(lambda: os.kill(os.getpid(), signal.SIGHUP)))\n"
+        "sys.exit(main(['hang-up']))\n"
     )
     assert python("-c", code).returncode == 0
 

@@ -10,12 +10,14 @@ from pathlib import Path
 
 import click
 import pytest
-from commands import TWO_LINK, eigassign_process, environment
+from commands import TWO_LINK
 
+import eigassign as ea
 from eigassign.cli import cli, main
-from eigassign.cli.start import STARTERS, TEMPLATES
 
 CASES = TWO_LINK.parent
+STARTERS = Path(ea.__file__).parent / "starters"
+TEMPLATES = cli.commands["init"].params[0].type.choices  # type: ignore[attr-defined]
 Captured = pytest.CaptureFixture[str]
 
 
@@ -123,15 +125,18 @@ def test_completion_is_installed_by_one_command_once(shell: str, capsys: Capture
         ("eigassign check a", ["file,a"]),
     ],
 )
-def test_tab_completes_commands_options_templates_and_files(words: str, offered: list[str]) -> None:
+def test_tab_completes_commands_options_templates_and_files(
+    words: str, offered: list[str], monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
     asked = {
         "_EIGASSIGN_COMPLETE": "bash_complete",
         "COMP_WORDS": words,
         "COMP_CWORD": str(words.count(" ")),
     }
-    done = eigassign_process(env=environment(**asked))
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.splitlines() == offered
+    for name, value in asked.items():
+        monkeypatch.setenv(name, value)
+    assert main([]) == 0
+    assert capsys.readouterr().out.splitlines() == offered
 
 
 # --- Help

@@ -9,8 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from eigassign.output import changes, read_record
-from eigassign.output.store.run_folder import run_folder
+from eigassign.output import changes, read_record, run_folder
 
 Write = Callable[[Path, Path, bool], int]  # a whole run of a case file at a target; force
 

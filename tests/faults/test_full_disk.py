@@ -16,7 +16,6 @@ from kill_runs import case_text, optimize
 from run_scenes import Scene, Stage, added, faults, write_a_few_files
 
 from eigassign.errors import StorageError
-from eigassign.process import failure_of
 
 _NEW_MOUNTS, _NEW_USER, _PRIVATE = 0x20000, 0x10000000, 0x44000
 PAGE = resource.getpagesize()
@@ -27,7 +26,7 @@ def code_of(job: Callable[[], int]) -> int:
     try:
         return job()
     except StorageError as error:
-        return failure_of(error).exit_code
+        return error.exit_code
 
 
 def in_a_process(job: Callable[[], int]) -> int:

@@ -61,7 +61,15 @@ def case_of(folder: Path, text: str) -> Case:
 
 
 def solved(folder: Path, text: str) -> Result:
-    return solve_case(case_of(folder, text), UNCACHED)
+    """The solution of a case, computed once for each text that names no other files."""
+    if "file:" in text:
+        return solve_case(case_of(folder, text), UNCACHED)
+    if text not in _SOLVED:
+        _SOLVED[text] = solve_case(case_of(folder, text), UNCACHED)
+    return _SOLVED[text]
+
+
+_SOLVED: dict[str, Result] = {}
 
 
 def chain(n: int, drive: str = "free", angle: str = "relative", target: float = 200.0) -> str:

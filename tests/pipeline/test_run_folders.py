@@ -17,8 +17,8 @@ from eigassign.pipeline import Options, Outcome, expand_case, optimize, solve_ca
 
 
 def in_folder(path: Path) -> Options:
-    """Without figures, which take longest."""
-    return Options(out=path, use_cache=False, figures=())
+    """Without figures and report, which take longest."""
+    return Options(out=path, use_cache=False, figures=(), report="none")
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +119,8 @@ def test_the_default_folder_is_named_after_the_case_below_the_current_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    outcome = optimize(written(tmp_path, chain(2), "arm.yaml"), UNCACHED)
+    little = Options(use_cache=False, figures=(), report="none")
+    outcome = optimize(written(tmp_path, chain(2), "arm.yaml"), little)
     assert outcome.folder == Path("results/arm")
     assert (tmp_path / "results" / "arm" / "results.json").is_file()
 
@@ -149,7 +150,7 @@ def test_an_expansion_run_holds_its_coefficients_as_json_and_hdf5(tmp_path: Path
                 np.testing.assert_array_equal(document[part][name], expected)
     assert outcome.results.targets == ()
     assert outcome.shortcoming is None
-    assert {path.name for path in (tmp_path / "out").iterdir()} >= {"report.html", "results.json"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} >= {"log.txt", "results.json"}
 
 
 def test_order_modes_and_set_can_be_asked_for(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -324,27 +325,23 @@ def numbers(folder: Path) -> dict[str, object]:
 
 
 def test_the_run_folder_reruns_from_its_case_and_from_its_csv_files(tmp_path: Path) -> None:
-    first = optimize(
-        written(tmp_path, PAIR), Options(out=tmp_path / "one", use_cache=False, figures=())
-    )
-    assert first.folder is not None
-    second = Options(out=tmp_path / "two", use_cache=False, figures=())
-    optimize(tmp_path / "one" / "case.yaml", second)
+    little = Options(out=tmp_path / "one", use_cache=False, figures=(), report="none")
+    optimize(written(tmp_path, PAIR), little)
+    optimize(tmp_path / "one" / "case.yaml", replace(little, out=tmp_path / "two"))
     assert numbers(tmp_path / "two") == numbers(tmp_path / "one")
     files = [f"{{name: {n}, file: one/trajectory_{n}.csv}}" for n in ("pick", "return")]
-    optimize(
-        written(tmp_path, several(*files), "files.yaml"),
-        Options(out=tmp_path / "three", use_cache=False, figures=()),
-    )
+    path = written(tmp_path, several(*files), "files.yaml")
+    optimize(path, replace(little, out=tmp_path / "three"))
     assert numbers(tmp_path / "three") == numbers(tmp_path / "one")
 
 
 def test_figures_and_files_of_each_trajectory_carry_its_name(tmp_path: Path) -> None:
-    optimize(written(tmp_path, PAIR), Options(out=tmp_path / "run", use_cache=False))
+    how = Options(out=tmp_path / "run", use_cache=False, figures=("svg",), report="light")
+    optimize(written(tmp_path, PAIR), how)
     names = {p.relative_to(tmp_path / "run").as_posix() for p in (tmp_path / "run").rglob("*.*")}
     for stem in ("coordinates", "assignment_mode_1", "approximation_mode_1_time", "other_modes"):
-        assert {f"figures/{stem}_pick.png", f"figures/{stem}_return.png"} <= names
-        assert f"figures/{stem}.png" not in names
+        assert {f"figures/{stem}_pick.svg", f"figures/{stem}_return.svg"} <= names
+        assert f"figures/{stem}.svg" not in names
     assert {"trajectory_pick.csv", "trajectory_return.csv", "frequencies.csv"} <= names
     page = (tmp_path / "run" / "report.html").read_text()
     assert "mode 1 at 194 Hz along &#39;pick&#39;" in page

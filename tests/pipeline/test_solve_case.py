@@ -21,7 +21,7 @@ from run_cases import (
 
 import eigassign as ea
 from eigassign.errors import CaseError
-from eigassign.pipeline import Result, solve_case
+from eigassign.pipeline import Options, Result, solve_case
 
 ROD = "{area: 7.06317856e-4, bending_inertia: 3.97e-8}"
 SHOULDER = "{joint: shoulder}"
@@ -289,8 +289,6 @@ def test_solving_twice_gives_the_same_bits(tmp_path: Path) -> None:
 
 
 def test_stages_are_announced_in_order_and_timed(tmp_path: Path) -> None:
-    from eigassign.pipeline import Options
-
     told: list[str] = []
     result = solve_case(
         case_of(tmp_path, shipped()), Options(use_cache=False, progress=told.append)
