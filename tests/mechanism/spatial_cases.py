@@ -11,21 +11,19 @@ from typing import Any
 
 import numpy as np
 
+from eigassign import Case
 from eigassign.case import CaseFile, parse
 from eigassign.mechanism import (
-    Kinematics,
-    LinkFrames,
-    ModelParameters,
     Pencil,
     build_link_frames,
     build_pencil,
-    initial_design,
+    erls_motion,
     parameters,
 )
-from eigassign.mechanism.assembly.build import kinematics
 from eigassign.modal import eigenvalues
 
 Tree = dict[str, Any]
+CASES = Path(__file__).parents[2] / "cases"
 STEEL = {"youngs_modulus": 210e9, "density": 7850.0, "poissons_ratio": 0.3}
 ALLOY = {"youngs_modulus": 70e9, "density": 2700.0, "shear_modulus": 26e9}
 
@@ -40,20 +38,20 @@ class Built:
     """A case with everything the mechanism layer makes of it."""
 
     case: CaseFile
-    numbers: ModelParameters
-    motion: Kinematics
+    numbers: Any  # its variables
+    motion: Any  # its rigid links
 
     @cached_property
     def pencil(self) -> Pencil:
         return build_pencil(self.case, self.numbers, self.motion)
 
     @cached_property
-    def poses(self) -> LinkFrames:
+    def poses(self) -> Any:
         return build_link_frames(self.case, self.numbers, self.motion)
 
     @cached_property
     def y(self) -> np.ndarray:
-        return initial_design(self.case)
+        return Case(self.case).initial_design
 
     def x(self, q: Any) -> np.ndarray:
         q = np.atleast_2d(np.asarray(q, float))
@@ -69,9 +67,21 @@ class Built:
 
 
 def built(tree: Tree, path: Path = Path("test.yaml")) -> Built:
-    case = case_of(tree, path)
+    return of_case(case_of(tree, path))
+
+
+def of_case(case: CaseFile) -> Built:
     numbers = parameters(case)
-    return Built(case, numbers, kinematics(case, numbers))
+    return Built(case, numbers, erls_motion(case, numbers))
+
+
+def shipped(name: str, *changes: tuple[str, str]) -> Built:
+    """A shipped case with some of its text replaced."""
+    text = (CASES / f"{name}.yaml").read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    return of_case(parse(text.encode(), CASES / f"{name}.yaml"))
 
 
 def changed(tree: Tree, path: str, value: Any) -> Tree:

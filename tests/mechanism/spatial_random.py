@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -265,6 +266,14 @@ def random_closed(
 
     ``kinds`` are those of the links in the loops; loops of rigid links alone hang on a beam.
     """
+    return copy.deepcopy(_random_closed(seed, space, loops, swap, kinds))
+
+
+@cache
+def _random_closed(
+    seed: int, space: str, loops: int, swap: bool, kinds: tuple[str, ...]
+) -> tuple[Tree, np.ndarray, np.ndarray]:
+    """The same, found once: of some hundred attempts one closes."""
     for attempt in range(3000):
         rng = np.random.default_rng([seed, space == "spatial", loops, attempt])
         tree, values = empty(space, rng), {}

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.interpolate import CubicSpline
 from spatial_cases import Built
 
-from eigassign.mechanism import Rates, Trajectory, rates, velocity_terms
+from eigassign.mechanism import Trajectory, rates, velocity_terms
 from eigassign.modal import modes
 
 ROOT = np.sqrt(15.0)
@@ -25,7 +25,7 @@ STAGES = np.array(
 WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18
 
 
-def timed(time_s: np.ndarray, q: np.ndarray) -> Rates:
+def timed(time_s: np.ndarray, q: np.ndarray) -> Any:
     """The rates of plain samples."""
     return rates(Trajectory(np.array(time_s, float), np.array(q, float), None))
 

@@ -11,7 +11,6 @@ from scipy.linalg import eigh
 from stress import ATLAS, case
 
 from eigassign.errors import MissingMassError
-from eigassign.mechanism import initial_design
 from eigassign.modal import Model, expand, lowest_modes, reduce, solve_sparse
 
 POSE = [0.3, 0.9]
@@ -124,7 +123,7 @@ def highest(model: Model, q: Any, y: Any, count: int) -> np.ndarray:
 @pytest.mark.parametrize("name", sorted(path.stem for path in ATLAS.glob("*.yaml")))
 def test_no_stiff_mode_of_a_stress_case_is_lost(name: str) -> None:
     given = case(name)
-    model, y = given.model(), initial_design(given.file)
+    model, y = given.model(), given.initial_design
     q = np.full(len(model.q_names), 0.4)
     n = len(model.pencil.elastic)
     if n > 400:

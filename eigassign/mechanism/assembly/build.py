@@ -34,7 +34,7 @@ from eigassign.series.compiler import compile_program
 LocalLinks: TypeAlias = tuple[list[LocalLink], NodeMotions]
 
 
-def kinematics(case: CaseFile, parameters: ModelParameters) -> Kinematics:
+def erls_motion(case: CaseFile, parameters: ModelParameters) -> Kinematics:
     """ERLS motion of a case: the tree walked, loops closed, rigid-body motions among the columns.
 
     Raises MechanismError for what cannot be placed, moved or closed.
@@ -98,7 +98,7 @@ class WholeLinks:
 def whole_links(case: CaseFile) -> WholeLinks:
     """Variables, kinematics and the mesh of every link with all its dofs."""
     numbers = variables(case)
-    motion = kinematics(case, numbers)
+    motion = erls_motion(case, numbers)
     return WholeLinks(case, numbers, motion, _meshes(case, numbers, motion))
 
 

@@ -26,7 +26,6 @@ Ints = NDArray[np.intp]
 DENSE_LIMIT = 220  # n_dof up to which matrices are kept dense (benchmarks/dense_or_sparse.py)
 STACK_LIMIT = 500_000  # numbers: 4 MB
 TINY_STACK = 20_000
-MANY = 200  # coefficients from which it pays to know which of them are zero
 
 
 class TravelRanges(Protocol):
@@ -168,7 +167,8 @@ class Pencil(Brief):
 
     def theta_series(self, space: LowerSet, x0: Floats, directions: Floats) -> Floats:
         """Coefficients of θ (n_theta, N) about x0 in w, where z = z0 + ``directions`` w."""
-        inner, where = self._needed(space, directions)
+        # the members that θ may have coefficients of, and their places
+        inner, where = on_faces(space, (self.program.faces @ (directions != 0.0)).tobytes())
         z = np.zeros((len(self.shift), len(inner)))
         z[:, 0] = self.to_program @ x0 + self.shift
         if self.limits is not None:
@@ -181,12 +181,6 @@ class Pencil(Brief):
         theta[0, 0] = 1.0
         theta[1:, where] = self.program.run(Truncated(inner), z)
         return theta
-
-    def _needed(self, space: LowerSet, directions: Floats) -> tuple[LowerSet, Ints | slice]:
-        """The members that θ may have coefficients of, and their places; all of a small set."""
-        if len(space) < MANY:
-            return space, slice(None)
-        return on_faces(space, (self.program.faces @ (directions != 0.0)).tobytes())
 
     def matrices(self, theta: Floats) -> tuple[Floats, Floats]:
         """Dense K, M (n_samples, n_dof, n_dof) for θ (n_theta, n_samples)."""

@@ -53,7 +53,6 @@ from eigassign.series.expression import Scalar
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Matrix = Any  # sparse, or dense where that is quicker
-STEP = 1e-4  # of the time in which the fastest coordinate or spin moves, or would, by 1 rad or m
 IMAGINARY = 1e-30  # step of derivatives along the imaginary axis, which lose no digits
 # entries (i, j) of ω̃: which component of ω, and its sign
 CROSS = ((0, 1, 2, -1.0), (0, 2, 1, 1.0), (1, 0, 2, 1.0), (1, 2, 0, -1.0), (2, 0, 1, -1.0),
@@ -68,6 +67,9 @@ class VelocityTerms:
     stack: StackedLinks
     table: CompiledTable
     parameters: ModelParameters
+    # Of the differences, in the time in which the fastest coordinate or spin moves, or would, by
+    # 1 rad or m: they err by its square, 1e-8, and by round-off over it, 1e-12.
+    step: float = 1e-4
 
     def at(
         self, q: Floats, y: Floats, rate: Floats, acceleration: Floats
@@ -94,7 +96,7 @@ class VelocityTerms:
         return sparse.csr_array(C), sparse.csr_array(K)
 
     def _step(self, q: Floats, y: Floats, rate: Floats, acceleration: Floats) -> float:
-        """Interval of the differences, s: a screw turns much faster than its nut travels."""
+        """The interval of the differences, s: a screw turns much faster than its nut travels."""
         (z,) = self.values(q[None], y)
         spins = self.stack.spins.at(z)
         turned = (spins @ self._joints(rate), spins @ self._joints(acceleration))
@@ -103,7 +105,7 @@ class VelocityTerms:
             for both in zip((rate, acceleration), turned, strict=True)
         )
         speed = max(float(fastest), float(np.sqrt(hardest)))
-        return STEP / speed if speed > 0.0 else STEP
+        return self.step / speed if speed > 0.0 else self.step
 
     def values(self, q: Floats, y: Floats) -> Floats:
         """All scalars at each of several poses q (n, n_q), and a 1: (n, n_scalars + 1)."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from spatial_cases import Built, built
@@ -9,7 +11,7 @@ from spatial_examples import arm3r, four_bar
 from spatial_oracle import Tree
 from spatial_random import random_closed, random_open
 
-from eigassign.mechanism import LocalLink, local_links, motion_matrix, motion_scalars, total
+from eigassign.mechanism import local_links, motion_matrix, motion_scalars, total
 
 
 def products(model: Built, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -26,7 +28,7 @@ def products(model: Built, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return K, M
 
 
-def numbers(model: Built, link: LocalLink, q: np.ndarray) -> list[np.ndarray]:
+def numbers(model: Built, link: Any, q: np.ndarray) -> list[np.ndarray]:
     scalars = [*motion_scalars(link)]
     scalars += [[t.coefficient for t in terms] for terms in (link.stiffness, link.mass)]
     arrays = [np.array(group, dtype=object) for group in scalars]

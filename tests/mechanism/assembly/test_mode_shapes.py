@@ -17,8 +17,6 @@ from eigassign.mechanism import (
     all_moving,
     bending_mass,
     bending_shapes,
-    cross,
-    multiply,
     node_position,
     shapes,
     with_elements,
@@ -164,8 +162,8 @@ def velocities(case: Any, x: np.ndarray, link: str, node: str) -> np.ndarray:
     poses, motion = case.model().poses, case.model().motion
     p = all_moving(case.file, poses.parameters, motion).placement(link)
     X = node_position(case.file, poses.parameters, motion.tree, (link, node))
-    velocity = multiply(p.world_rotation, p.twist[:3] + cross(p.twist[3:], X))
-    return np.asarray(poses.values(x, [velocity])[0][0])
+    R, twist, place = (found[0] for found in poses.values(x, [p.world_rotation, p.twist, X]))
+    return np.asarray(R @ (twist[:3] + np.cross(twist[3:].T, place).T))
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -189,7 +187,9 @@ def test_both_sides_of_every_joint_stay_together(name: str) -> None:
 
 
 @pytest.mark.parametrize("space", ["planar", "spatial"])
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(
+    "seed", [0, 2, 3, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 4, 5, 6, 7))]
+)
 def test_any_motion_of_any_loops_keeps_their_joints_together(seed: int, space: str) -> None:
     # beams, frames and rigid links, joints written from either side, loops of rigid links alone
     kinds = ("rigid",) if seed % 4 == 3 else ("beam", "rigid", "frame")

@@ -2,37 +2,27 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from spatial_cases import ALLOY, Built, built
+from spatial_cases import ALLOY, Built, built, shipped
 from spatial_examples import four_bar
 from timed_motions import RestToRest, integrated
 
-from eigassign.case import parse
-from eigassign.mechanism import parameters, velocity_terms
-from eigassign.mechanism.assembly.build import kinematics
+from eigassign.mechanism import velocity_terms
 from eigassign.modal import change_at, eigenvalues, modes, moving_modes, theta_in_time
-
-CASE = Path(__file__).parents[3] / "cases" / "two_link.yaml"
 
 
 def paper_arm() -> Built:
     """The paper's arm with an element a link and masses on it: eight unknowns."""
-    text = CASE.read_text(encoding="utf-8")
-    for old, new in (
+    return shipped(
+        "two_link",
         ("elements: 4", "elements: 1"),
         ("elements: 3", "elements: 1"),
         ("upper_arm.end, mass: 0", "upper_arm.end, mass: 0.05"),
         ("forearm.end, mass: 0", "forearm.end, mass: 0.1"),
-    ):
-        assert old in text
-        text = text.replace(old, new)
-    case = parse(text.encode(), CASE)
-    numbers = parameters(case)
-    return Built(case, numbers, kinematics(case, numbers))
+    )
 
 
 def coarse_loop() -> Built:

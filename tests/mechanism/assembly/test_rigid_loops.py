@@ -127,7 +127,9 @@ def test_a_linkage_on_a_flexible_mast_moves_with_it() -> None:
 
 
 @pytest.mark.parametrize("space", ["planar", "spatial"])
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize(
+    "seed", [*range(4), *(pytest.param(k, marks=pytest.mark.slow) for k in range(4, 12))]
+)
 def test_random_loops_of_rigid_links_have_the_spectrum_of_the_plain_frame(
     seed: int, space: str
 ) -> None:

@@ -14,9 +14,11 @@ from spatial_random import random_closed, random_open
 
 from eigassign.modal import eigenvalues
 
+SPACES = pytest.mark.parametrize("space", ["planar", "spatial"])
 
-@pytest.mark.parametrize("space", ["planar", "spatial"])
-@pytest.mark.parametrize("seed", range(80))
+
+@SPACES
+@pytest.mark.parametrize("seed", range(24))
 def test_random_trees_have_the_spectrum_and_places_of_the_plain_frame(
     seed: int, space: str
 ) -> None:
@@ -24,8 +26,8 @@ def test_random_trees_have_the_spectrum_and_places_of_the_plain_frame(
     agree(tree, (q,))
 
 
-@pytest.mark.parametrize("space", ["planar", "spatial"])
-@pytest.mark.parametrize("seed", range(24))
+@SPACES
+@pytest.mark.parametrize("seed", range(8))
 def test_random_trees_with_joints_walked_backwards_have_the_spectrum_of_the_plain_frame(
     seed: int, space: str
 ) -> None:
@@ -33,34 +35,24 @@ def test_random_trees_with_joints_walked_backwards_have_the_spectrum_of_the_plai
     agree(tree, (q,))
 
 
-@pytest.mark.parametrize("space", ["planar", "spatial"])
+@SPACES
 @pytest.mark.parametrize("seed", range(8))
-def test_random_loops_with_joints_walked_backwards_have_the_spectrum_of_the_plain_frame(
-    seed: int, space: str
-) -> None:
-    tree, *poses = random_closed(seed, space, swap=True)
-    agree(tree, tuple(poses))
-
-
-@pytest.mark.parametrize("space", ["planar", "spatial"])
-@pytest.mark.parametrize("seed", range(24))
 def test_random_loops_have_the_spectrum_and_places_of_the_plain_frame(
     seed: int, space: str
 ) -> None:
-    tree, *poses = random_closed(seed, space)
+    tree, *poses = random_closed(seed, space, swap=seed % 4 == 3)
     agree(tree, tuple(poses))
 
 
-@pytest.mark.parametrize("space", ["planar", "spatial"])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("seed", "space"), [(0, "planar"), (2, "planar"), (5, "spatial")])
 def test_random_double_loops_have_the_spectrum_of_the_plain_frame(seed: int, space: str) -> None:
     tree, *poses = random_closed(seed, space, loops=2)
     agree(tree, tuple(poses))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("space", ["planar", "spatial"])
-@pytest.mark.parametrize("seed", range(80, 600))
+@SPACES
+@pytest.mark.parametrize("seed", range(8, 600))
 def test_many_more_random_trees_agree(seed: int, space: str) -> None:
     tree, q = random_open(seed, space, swap=seed % 2 == 0)
     agree(tree, (q,))
@@ -71,15 +63,15 @@ def test_many_more_random_trees_agree(seed: int, space: str) -> None:
     ("space", "loops"),
     [("planar", 1), ("planar", 2), ("planar", 3), ("spatial", 1), ("spatial", 2)],
 )
-@pytest.mark.parametrize("seed", range(24, 64))
+@pytest.mark.parametrize("seed", range(64))
 def test_many_more_random_loops_agree(seed: int, space: str, loops: int) -> None:
     kinds = ("rigid",) if seed % 4 == 1 else ("beam", "rigid", "frame")
     tree, *poses = random_closed(seed, space, loops, seed % 2 == 0, kinds)
     agree(tree, tuple(poses))
 
 
-@pytest.mark.parametrize("space", ["planar", "spatial"])
-@pytest.mark.parametrize("seed", range(6))
+@SPACES
+@pytest.mark.parametrize("seed", range(4))
 def test_every_sample_of_a_batch_is_its_own_pose(seed: int, space: str) -> None:
     tree, q0, near = random_closed(seed, space)
     model = built(tree)
@@ -90,7 +82,7 @@ def test_every_sample_of_a_batch_is_its_own_pose(seed: int, space: str) -> None:
     np.testing.assert_allclose(together, alone, rtol=1e-9)
 
 
-@pytest.mark.parametrize("space", ["planar", "spatial"])
+@SPACES
 @pytest.mark.parametrize("seed", range(12))
 def test_free_coordinates_are_all_the_motions_without_stiffness(seed: int, space: str) -> None:
     tree, q = random_open(seed, space)

@@ -2,30 +2,25 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace as Given
+from typing import Any
 
 import numpy as np
 import pytest
+from chains import bar
 from frame_oracle import element
+from spatial_cases import built
 
-from eigassign.mechanism import LinkMesh, ModelParameters, Topology, link_mesh
-from eigassign.series import Recorder
+from eigassign.mechanism import local_links
 
 E, A, I, RHO, L = 70e9, 3e-4, 5e-9, 2700.0, 0.8  # noqa: E741
 
 
-def chain(n: int, bodies: dict[str, Given] | None = None) -> LinkMesh:
-    """The mesh of one planar beam of n elements."""
-    beam = Given(type="beam", length=L, material="m", section="s", elements=n)
-    mechanism = Given(
-        space="planar",
-        materials={"m": Given(youngs_modulus=E, density=RHO)},
-        sections={"s": Given(shape="bare", area=A, bending_inertia=I)},
-        links={"beam": beam},
-        bodies=bodies or {},
-    )
-    numbers = ModelParameters(Recorder(), (), (), np.zeros((0, 0)), np.zeros(0))
-    return link_mesh(Given(mechanism=mechanism), numbers, Topology((), (), 0, ()), "beam")
+def chain(n: int, bodies: dict[str, Any] | None = None) -> Any:
+    """The matrices of one planar beam of n elements."""
+    tree = bar(n, L, E, RHO, {"area": A, "bending_inertia": I})
+    tree["mechanism"]["bodies"] = bodies or {}
+    model = built(tree)
+    return local_links(model.case, model.numbers, model.motion)[0][0]
 
 
 def stiffness(n: int) -> np.ndarray:
@@ -106,7 +101,7 @@ def test_cubic_deflection_has_its_exact_kinetic_energy(n: int) -> None:
 
 
 def test_a_point_mass_moves_with_both_translations_and_a_rotary_inertia_with_the_rotation() -> None:
-    body = {"b": Given(at="beam.end", mass=5.0, inertia=0.25)}
+    body = {"b": {"at": "bar.end", "mass": 5.0, "inertia": 0.25}}
     heavy = sum(t.coefficient * t.matrix.toarray() for t in chain(2, body).mass)
     added = heavy - mass(2)
     np.testing.assert_allclose(np.diag(added), [0, 0, 0, 0, 0, 0, 5.0, 5.0, 0.25], atol=1e-13)

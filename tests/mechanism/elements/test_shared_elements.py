@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from chains import Tree, case_of, model_of
+from chains import Tree, model_of
+from spatial_cases import built
 
-from eigassign.mechanism import whole_links
+from eigassign.mechanism import local_links
 
 TAPER = {"start": "thick", "end": "thin"}
 
@@ -68,8 +69,9 @@ def twins(second: Tree, bodies: Tree | None = None, design: Tree | None = None) 
 
 
 def shared(tree: Tree) -> bool:
-    meshes = whole_links(case_of(tree).file).meshes
-    return meshes["one"] is meshes["two"]
+    model = built(tree)
+    one, two = local_links(model.case, model.numbers, model.motion)[0]
+    return one.stiffness is two.stiffness and one.mass is two.mass
 
 
 def test_copies_of_a_beam_share_their_mesh_and_nothing_else_does() -> None:

@@ -59,14 +59,21 @@ def mechanism(seed: int, space: str, oriented: bool, closed: bool) -> tuple[Tree
 
 @pytest.mark.parametrize("oriented", [False, True])
 @pytest.mark.parametrize("space", ["planar", "spatial"])
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(
+    "seed", [*range(3), *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 8))]
+)
 def test_open_chains_stay_on_their_paths(seed: int, space: str, oriented: bool) -> None:
     follow_and_judge(*mechanism(seed, space, oriented, closed=False), seed, oriented)
 
 
 @pytest.mark.parametrize("oriented", [False, True])
 @pytest.mark.parametrize(
-    ("seed", "space"), [(0, "planar"), (1, "spatial"), (1, "planar"), (2, "planar")]
+    ("seed", "space"),
+    [
+        (0, "planar"),
+        (1, "spatial"),
+        *(pytest.param(k, "planar", marks=pytest.mark.slow) for k in (1, 2)),
+    ],
 )
 def test_mechanisms_with_loops_stay_on_their_paths(seed: int, space: str, oriented: bool) -> None:
     follow_and_judge(*mechanism(seed, space, oriented, closed=True), seed, oriented)

@@ -15,7 +15,7 @@ from spatial_random import random_closed, random_open
 
 from eigassign.case import FREEDOMS as KNOWN_FREEDOMS
 from eigassign.errors import MechanismError
-from eigassign.mechanism import JointMotion, Kinematics, all_moving, joint_motion, turned
+from eigassign.mechanism import all_moving, joint_motion, turned
 from eigassign.series import Samples, compile_table
 
 H = 1e-5  # central differences: error about H² = 1e-10 times third derivatives of order 1
@@ -34,7 +34,7 @@ JOINTS = [
 KINDS = [j.type for j in JOINTS]
 
 
-def numbers(motion: JointMotion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def numbers(motion: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     R, d, A = (np.asarray(part, float) for part in motion)
     return R, d, A
 
@@ -169,7 +169,7 @@ def test_a_nut_turns_once_while_it_travels_its_lead() -> None:
 
 
 def frames(
-    model: Built, motion: Kinematics, q: np.ndarray
+    model: Built, motion: Any, q: np.ndarray
 ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """World rotation, origin and twist per q̇ of every link, evaluated."""
     n = len(model.numbers.coordinates)
@@ -199,13 +199,13 @@ def twists_agree(tree: Tree, q: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("space", ["planar", "spatial"])
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(10))
 def test_twists_of_trees_are_the_derivatives_of_the_world_frames(seed: int, space: str) -> None:
     twists_agree(*random_open(seed, space, swap=seed % 2 == 0))
 
 
 @pytest.mark.parametrize("space", ["planar", "spatial"])
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(6))
 def test_twists_of_loops_are_the_derivatives_of_the_world_frames(seed: int, space: str) -> None:
     tree, q0, _ = random_closed(seed, space)
     twists_agree(tree, q0)

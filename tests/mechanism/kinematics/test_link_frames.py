@@ -7,8 +7,9 @@ import sys
 import numpy as np
 from chains import model_of, two_link
 from frame_oracle import frame
+from scipy.spatial.transform import Rotation
 
-from eigassign.mechanism import GROUND, JointEdge, Placement, rotation, vector
+from eigassign.mechanism import JointEdge, Placement
 
 
 def test_a_two_link_arm_reaches_where_trigonometry_says() -> None:
@@ -34,12 +35,12 @@ def test_a_designed_length_moves_the_links_it_carries() -> None:
 
 def test_a_chain_may_have_more_links_than_calls_may_nest() -> None:
     count, length, bend = 2 * sys.getrecursionlimit(), 0.1, 1e-3
-    R = rotation(np.array([0.0, 0.0, 1.0]), bend)
-    none, end = vector([0.0]), vector([length])
+    R = Rotation.from_euler("z", bend).as_matrix().astype(object)
+    none, end = np.array([[0.0] * 3, [length, 0.0, 0.0]], dtype=object)
     link: Placement | None = None
     for _ in range(count):
         foot = none if link is None else end
-        edge = JointEdge("", GROUND, ("", "start"))
+        edge = JointEdge("", ("ground", ""), ("", "start"))
         link = Placement("", edge, R, none, np.zeros((6, 0)), np.zeros((6, 0)), link, foot, none)
     assert link is not None
     angles = bend * np.arange(1, count)  # of all links that carry another
