@@ -9,9 +9,12 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from eigassign.process import prefer_one_thread
-
-prefer_one_thread()  # before NumPy is imported: threads of small dense algebra wait for each other
+for library in (
+    "OPENBLAS",
+    "OMP",
+    "MKL",
+):  # before NumPy is imported: small algebra is slower on more
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 for folder in (
     "oracles",
     "assignment",

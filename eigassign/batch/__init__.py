@@ -22,12 +22,12 @@ __all__, __getattr__, __dir__ = face(
     {
         "limits": "OutOfTimeError limited",
         "manifest": "Header InOrder Manifest read_header write_header",
-        "plan": "BatchPlan Variant cases_in folder_names plan_of variant_problem",
+        "plan": "Variant cases_in folder_names plan_of variant_problem",
         "merge": "merge_shards",
         "progress": "Batch summarise",
         "runner": "run",
         "variants": "Variants variants_of",
-        "work": "CaseOptions check_cases outcome_of run_cases",
-        "workers": "Workers in_this_process process_pool this_machine",
+        "work": "CaseOptions outcome_of run_cases",
+        "workers": "Workers process_pool this_machine",
     },
 )

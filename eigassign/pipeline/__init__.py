@@ -24,7 +24,7 @@ __all__, __getattr__, __dir__ = face(
         "chart": "chart chart_case",
         "expansions": "affordable_order expand_plan expansion_key",
         "outlook": "draw",
-        "queries": "check modes split",
+        "queries": "check modes",
         "run": "Options Outcome Result expand_case optimize prepare solve_case validate",
         "stages": "Stages silent",
         "update": "update_case",

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from eigassign.batch import BatchPlan, plan_of, variant_problem
+from eigassign.batch import plan_of, variant_problem
 from eigassign.errors import Problem
 
 TWO_LINK = Path(__file__).parents[2] / "cases" / "two_link.yaml"
@@ -19,11 +20,11 @@ def case(folder: Path, name: str = "arm.yaml", end: str = "") -> Path:
     return file
 
 
-def names(plan: BatchPlan) -> list[str]:
+def names(plan: Any) -> list[str]:
     return [plan[k].name for k in range(len(plan))]
 
 
-def keys(plan: BatchPlan) -> list[str]:
+def keys(plan: Any) -> list[str]:
     return [plan[k].key for k in range(len(plan))]
 
 

@@ -20,7 +20,6 @@ from eigassign.batch import (
     Batch,
     CaseOptions,
     Workers,
-    in_this_process,
     outcome_of,
     plan_of,
     process_pool,
@@ -125,5 +124,5 @@ def test_workers_end_when_their_parent_is_killed(tmp_path: Path) -> None:
 
 
 def test_a_case_that_may_end_its_process_does_not_run_in_ours() -> None:
-    assert this_machine(1).open is in_this_process
+    assert this_machine(1).open is not process_pool
     assert this_machine(1, apart=True).open is process_pool

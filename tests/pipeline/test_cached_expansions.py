@@ -90,14 +90,6 @@ def test_a_whole_solution_from_the_cache_has_the_same_bits(tmp_path: Path) -> No
         np.testing.assert_array_equal(first.exact_hz, other.exact_hz)
 
 
-def test_no_cache_leaves_no_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("EIGASSIGN_CACHE_DIR", str(tmp_path / "cache"))
-    solve_case(case_of(tmp_path, shipped()), Options(use_cache=False))
-    assert not (tmp_path / "cache").exists()
-    solve_case(case_of(tmp_path, shipped()), Options())
-    assert len(list((tmp_path / "cache").glob("*.h5"))) == 1
-
-
 @pytest.mark.parametrize("damage", ["truncated", "flipped"])
 def test_a_damaged_entry_is_set_aside_and_rebuilt_with_a_warning(
     damage: str, tmp_path: Path, caplog: pytest.LogCaptureFixture

@@ -17,12 +17,6 @@ def test_modes_are_taken_where_the_case_says_unless_asked_elsewhere() -> None:
     assert modes(SHIPPED, [1.817, 5.312], [0.0, 0.0]) == answer
 
 
-def test_text_with_units_is_read_as_the_case_file_would() -> None:
-    with_units = modes(SHIPPED, "104 deg, 304 deg", "125 g 0", 2)
-    bare = modes(SHIPPED, list(np.radians([104.0, 304.0])), [0.125, 0.0], 2)
-    np.testing.assert_allclose(with_units.frequencies_hz, bare.frequencies_hz, rtol=1e-12)
-
-
 def test_without_an_expansion_point_the_trajectory_starts_the_pose(tmp_path: Path) -> None:
     answer = modes(written(tmp_path, chain(2)))
     assert answer.q == (("q0", 0.3), ("q1", 0.5))

@@ -95,15 +95,6 @@ def test_the_log_tells_choices_outcome_and_times(outcome: Outcome) -> None:
         assert line in log
 
 
-def test_an_infeasible_case_leaves_the_nearest_compromise(tmp_path: Path) -> None:
-    limits = "    total: {terms: {m1: 1, m2: 1}, min: 450 g}\n    m: {terms: {m1: 1}, max: 100 g}\n"
-    text = shipped(("\nexpansion:", "  constraints:\n" + limits + "\nexpansion:"))
-    outcome = optimize(written(tmp_path, text), in_folder(tmp_path / "out"))
-    assert outcome.shortcoming is not None
-    assert outcome.shortcoming.startswith("infeasible")
-    assert (tmp_path / "out" / "results.json").exists()
-
-
 def test_the_folder_of_another_case_is_refused_before_anything_is_computed(tmp_path: Path) -> None:
     optimize(written(tmp_path, chain(2), "one.yaml"), in_folder(tmp_path / "out"))
     before = (tmp_path / "out" / "results.json").read_bytes()
