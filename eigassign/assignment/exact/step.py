@@ -259,71 +259,52 @@ class _LocalProblem:
         """d (n,), v, and the multipliers of residuals and excesses; None where nothing is found."""
         box, place, r, c = self.box, self.place, self.r, self.c
         n, worst = box.n, self.problem.is_worst_case
-        last = worst or len(cuts.objective) > 0
-        extra = int(len(c) > 0) + int(last)  # v, then t
+        needs_t = worst or len(cuts.objective) > 0
         _, root = self.convex(region.S)
-        A = np.hstack([root, np.zeros((len(root), extra))])
-        cost = np.zeros(n + extra)
-        half = 1.0 if worst else 0.5
-        cost[:n] = half * box.prices
-        if not worst:
-            cost[:n] += place.J.T @ r
-        v, t = (
-            (np.eye(extra)[[k]] for k in (0, -1)) if extra else (np.zeros((1, 0)), np.zeros((1, 0)))
-        )
-        # each: slopes in d, what multiplies v and t, and the upper limit
-        upper_rows: list[tuple[Floats, Floats, Floats]] = []
-        if len(c):
-            cost[n] = region.weight
-            upper_rows += [
-                (place.C, -v, -c - MET),
-                (cuts.excess.slopes, -v, -cuts.excess.value - MET),
-            ]
+        slope = box.prices if worst else 0.5 * box.prices + place.J.T @ r
+        cost = np.append(slope, [region.weight if len(c) else 0.0, 1.0 if needs_t else 0.0])
+        offset, (v, t) = box.rows @ place.z, -np.eye(2)
+        # each: slopes in d, what multiplies v and t, and the limits
+        rows = [
+            (box.rows, 0.0 * v, box.row_lower - offset, box.row_upper - offset),
+            (place.C, v, -np.inf, -c - MET),
+            (cuts.excess.slopes, v, -np.inf, -cuts.excess.value - MET),
+            (cuts.objective.slopes, t, -np.inf, -cuts.objective.value),
+        ]
         if worst:
-            upper_rows += [(place.J, -t, -r), (-place.J, -t, r)]
-        if last:
-            cost[-1] = 1.0
-            upper_rows.append((cuts.objective.slopes, -t, -cuts.objective.value))
-        rows = [np.hstack([box.rows, np.zeros((len(box.rows), extra))])]
-        rows += [np.hstack([a, np.repeat(b, len(a), axis=0)]) for a, b, _ in upper_rows]
-        offset = box.rows @ place.z
-        low = [box.row_lower - offset, *(np.full(len(a), -np.inf) for a, *_ in upper_rows)]
-        high = [box.row_upper - offset, *(limit for *_, limit in upper_rows)]
-        reach = [np.maximum(-place.z, -region.radius), np.minimum(1.0 - place.z, region.radius)]
-        beyond = (np.zeros(extra), np.full(extra, np.inf))
-        G, lower, upper = np.vstack(rows), np.concatenate(low), np.concatenate(high)
+            rows += [(place.J, t, -np.inf, -r), (-place.J, t, -np.inf, r)]
+        G = np.vstack([np.hstack([a, np.tile(b, (len(a), 1))]) for a, b, *_ in rows])
+        lower = np.concatenate([np.full(len(a), low) for a, _, low, _ in rows])
+        upper = np.concatenate([high for *_, high in rows])
         norms = np.linalg.norm(G, axis=1)
         norms = np.where(norms > 0.0, norms, 1.0)
-        scale = max(float(np.abs(cost).max(initial=0.0)), float(np.abs(root).max(initial=0.0)) ** 2)
+        scale = max(float(np.abs(cost).max()), float(np.abs(root).max(initial=0.0)) ** 2)
         if scale == 0.0:
             return None
+        least = np.maximum(-place.z, -region.radius)
+        most = np.minimum(1.0 - place.z, region.radius)
         scaled = ScaledProgram(
-            A=A / np.sqrt(scale),
-            b=np.zeros(len(A)),
-            G=np.vstack([np.eye(n + extra), G / norms[:, None]]),
-            lower=np.concatenate([reach[0], beyond[0], lower / norms]),
-            upper=np.concatenate([reach[1], beyond[1], upper / norms]),
+            A=np.pad(root, ((0, 0), (0, 2))) / np.sqrt(scale),
+            b=np.zeros(len(root)),
+            G=np.vstack([np.eye(n + 2), G / norms[:, None]]),
+            lower=np.concatenate([least, np.zeros(2), lower / norms]),
+            upper=np.concatenate([most, np.full(2, np.inf), upper / norms]),
             cost=cost / scale,
         )
         # No step, with v and t as they are, is feasible: from there limits are walked along in a
         # fraction of the time that OSQP takes, above all where they cannot all be met.
-        stay = np.zeros(n + extra)
+        stay = np.zeros(n + 2)
         if len(c):
-            stay[n] = max(float(np.max(c, initial=0.0)), cuts.excess.at(stay[:n])) + MET
-        if last:
-            largest = float(np.max(np.abs(r), initial=0.0)) if worst else 0.0
-            stay[-1] = max(largest, cuts.objective.at(stay[:n]))
+            stay[n] = max(float(c.max()), cuts.excess.at(stay[:n])) + MET
+        largest = float(np.max(np.abs(r), initial=0.0)) if worst else 0.0
+        stay[-1] = max(largest, cuts.objective.at(stay[:n]))
         found = solve_scaled(scaled, stay)
         if found is None:
             return None
-        x, mu = found
-        d = np.clip(x[:n], reach[0], reach[1])
-        mu = scale * mu[n + extra :] / norms
-        sizes = [len(box.rows), *(len(a) for a, *_ in upper_rows)]
-        parts = iter(np.split(mu, np.cumsum(sizes)[:-1])[1:])
-        on_excess = next(parts) + cuts.excess.owners.T @ next(parts) if len(c) else np.zeros(0)
-        on_residual = np.zeros(0)
+        d, mu = np.clip(found[0][:n], least, most), scale * found[1][n + 2 :] / norms
+        parts = np.split(mu, np.cumsum([len(a) for a, *_ in rows])[:-1])
+        on_excess, on_residual = parts[1] + cuts.excess.owners.T @ parts[2], np.zeros(0)
         if worst:
-            on_residual = next(parts) - next(parts) + cuts.objective.owners.T @ next(parts)
+            on_residual = parts[4] - parts[5] + cuts.objective.owners.T @ parts[3]
         missed = max(float(np.max(c + place.C @ d, initial=0.0)), cuts.excess.at(d))
         return d, missed, on_residual, on_excess
