@@ -6,7 +6,7 @@ from pathlib import Path
 
 import eigassign as ea
 from eigassign.output.figures import style
-from eigassign.output.figures.modes import thumbnail
+from eigassign.output.figures.motion import thumbnail
 from eigassign.study.drawing import draw_modes
 from eigassign.study.planning import with_middle_loads
 

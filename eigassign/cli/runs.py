@@ -164,10 +164,10 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
         print_json({"run_folder": str(done.folder), **document(done.results)})
     else:
         from eigassign.output.console import print_tables, print_verdict
-        from eigassign.output.reports.update import console_tables, headline
+        from eigassign.output.reports.update import headline, update_tables
 
         print_verdict(headline(done.results), done.results.verdict)
-        print_tables(console_tables(done.results))
+        print_tables(update_tables(done.results))
         show(_written(done.folder, sum(done.results.timing_s.values())))
     return 0 if done.results.verdict == "fitted" else 1
 

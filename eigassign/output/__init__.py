@@ -32,7 +32,7 @@ __all__, __getattr__, __dir__ = face(
         "figures.mechanism": (
             "diameters draw_links extent length_label line_widths points_of round_length view_of"
         ),
-        "figures.modes": "mode_figures thumbnail",
+        "figures.motion": "mode_figures thumbnail",
         "figures.paper": "draw render",
         "figures.run": "run_figures",
         "formats": "number percent residual seconds",

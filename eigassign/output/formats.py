@@ -6,7 +6,7 @@ import math
 
 
 def capital(text: str) -> str:
-    """With its first letter as a sentence or a heading has it."""
+    """The text with its first letter as a sentence or a heading has it."""
     return text[:1].upper() + text[1:]
 
 

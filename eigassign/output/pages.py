@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from jinja2 import Environment
-    from markupsafe import Markup
 
 TEMPLATES = Path(__file__).parent / "templates"
 
@@ -25,6 +24,7 @@ def page_of(name: str, **shown: Any) -> bytes:
 def _environment() -> Environment:
     """Templates are compiled once a process."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup, escape
 
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES),
@@ -33,15 +33,13 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["words"] = _words
+
+    def words(text: str) -> Markup:
+        """Text with what stands between backticks as code, and no markup of its own."""
+        return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+
+    environment.filters["words"] = words
     return environment
-
-
-def _words(text: str) -> Markup:
-    """Text with what stands between backticks as code, and no markup of its own."""
-    from markupsafe import Markup, escape
-
-    return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
 def inside(data: Any) -> str:

@@ -23,11 +23,8 @@ from numpy.typing import NDArray
 from eigassign.errors import EigassignError
 from eigassign.mechanism.trajectory.csv import TIME, TIP_COLUMNS
 from eigassign.study.results import (
-    AssignmentRow,
     Comparison,
     ErrorSummary,
-    FollowedRow,
-    MeshError,
     ModeStudy,
     OtherModes,
     RunResults,
@@ -42,13 +39,6 @@ SCHEMA = 1
 _NESTED = (Mapping, list, tuple, str, np.ndarray)
 
 
-def _discretisation(found: MeshError | None) -> dict[str, Any] | None:
-    if found is None:
-        return None
-    error = [e if np.isfinite(e) else None for e in found.error]
-    return {**asdict(found), "error": error}
-
-
 def results_document(results: RunResults) -> dict[str, Any]:
     """Plain values in a fixed order. ``frequencies`` is of the first target, ``error`` of all.
 
@@ -57,26 +47,27 @@ def results_document(results: RunResults) -> dict[str, Any]:
     cannot say: it predicts no frequency where its eigenvalue comes out negative.
     """
     first = results.targets[0] if results.targets else None
+    row, mesh = results.assignment, results.discretisation
     return {
         **origin(results),
-        "design": {
-            row.name: {k: v for k, v in asdict(row).items() if k != "name"}
-            for row in results.design
-        },
+        "design": {row.name: without(row, "name") for row in results.design},
         "mass": asdict(results.mass) if results.mass else None,
         "price": results.price,
         "error": _error(results.error) if results.error else None,
         "frequencies": _frequencies(results, first) if first else None,
         "targets": [_target(results, target) for target in results.targets],
-        "assignment": _assignment(results.assignment) if results.assignment else None,
+        "assignment": {**asdict(row), "finished": row.finished} if row else None,
         **_meaning(results),
         "other_modes": _other_modes(results.others),
-        "discretisation": _discretisation(results.discretisation),
+        "discretisation": {**asdict(mesh), "error": finite(np.array(mesh.error))} if mesh else None,
         "approximation": [_study(study) for study in results.studies],
         "trajectory": {
             "time_s": results.time_s,
             **_named(results, slice(None)),
-            "coordinates": _coordinates(results),
+            "coordinates": {
+                name: {"unit": unit, "values": results.q[:, i]}
+                for i, (name, unit) in enumerate(zip(results.q_names, results.q_units, strict=True))
+            },
         },
         "trajectories": [_trajectory(results, row) for row in results.trajectories],
         "solver": asdict(results.solver) if results.solver else None,
@@ -87,7 +78,7 @@ def results_document(results: RunResults) -> dict[str, Any]:
 
 
 def origin(results: RunResults | UpdateResults) -> dict[str, Any]:
-    """Which case, by its hash, and which version the numbers are of."""
+    """The version and the case, by its hash, that the numbers are of."""
     return {
         "schema": SCHEMA,
         "eigassign_version": results.version,
@@ -108,38 +99,43 @@ def _error(summary: ErrorSummary) -> dict[str, Any]:
         for row in [getattr(summary, name)]
     }
     if found["predicted"] is not None:
-        found["predicted"] = {key: _finite(value) for key, value in found["predicted"].items()}
+        found["predicted"] = {key: finite(value) for key, value in found["predicted"].items()}
     return found
 
 
-def _finite(value: Any) -> Any:
-    """A number, or numbers, of an expansion: null for what is not finite."""
+def finite(value: Any) -> Any:
+    """A number, or a list or array of them, with null for what is not finite."""
     if isinstance(value, np.ndarray):
-        return [_finite(one) for one in value.tolist()]
+        value = value.tolist()
+    if isinstance(value, list):
+        return [finite(one) for one in value]
     return value if math.isfinite(value) else None
 
 
+def without(row: Any, *names: str) -> dict[str, Any]:
+    """The fields of a row but those of these ``names``."""
+    return {name: value for name, value in asdict(row).items() if name not in names}
+
+
 def _frequencies(results: RunResults, target: TargetStudy) -> dict[str, Any]:
+    """Curves of a target; a limit or band has its edges too, null where there is none."""
+    edges = {"lower_hz": target.lower_hz, "upper_hz": target.upper_hz}
+    if target.kind == "frequency":
+        edges = {}
     return {
         "time_s": results.time_s[target.rows],
         **_named(results, target.rows),
         "target_hz": target.target_hz,
-        **(_limits(target) if target.kind != "frequency" else {}),
+        **{name: hz if np.isfinite(hz).all() else None for name, hz in edges.items()},
         "initial_hz": target.initial_hz,
         "one_shot_hz": target.one_shot_hz,
-        "predicted_hz": None if target.predicted_hz is None else _finite(target.predicted_hz),
+        "predicted_hz": None if target.predicted_hz is None else finite(target.predicted_hz),
         "exact_hz": target.exact_hz,
     }
 
 
-def _limits(target: TargetStudy) -> dict[str, Any]:
-    """The edges of what is wanted, or of the band to keep out of; null where there is none."""
-    edges = {"lower_hz": target.lower_hz, "upper_hz": target.upper_hz}
-    return {name: hz if np.isfinite(hz).all() else None for name, hz in edges.items()}
-
-
 def _named(results: RunResults, rows: slice) -> dict[str, Any]:
-    """With several trajectories, the name of the one that each sample belongs to."""
+    """The name of the trajectory that each sample belongs to, where there are several."""
     if len(results.trajectories) < 2:
         return {}
     return {"trajectory": trajectory_names(results, rows)}
@@ -158,12 +154,16 @@ def _trajectory(results: RunResults, row: TrajectoryRow) -> dict[str, Any]:
 
 
 def _target(results: RunResults, target: TargetStudy) -> dict[str, Any]:
+    followed: dict[str, Any] = {}
+    if (row := target.followed) is not None:  # by its shape, and which mode it is at each sample
+        numbers = {"initial_modes": row.initial_numbers, "exact_modes": row.exact_numbers}
+        followed = {"followed": {"name": row.name, "like": row.like, **numbers}}
     return {
         "kind": target.kind,
         "label": target.label,
-        "mode": None if target.followed else target.mode,
+        "mode": None if followed else target.mode,
         "modes": target.modes,
-        **({"followed": _followed(target.followed)} if target.followed else {}),
+        **followed,
         "satisfied": target.satisfied,
         "worst": target.error.exact.max_relative,
         **({"trajectory": target.trajectory} if target.trajectory is not None else {}),
@@ -173,23 +173,13 @@ def _target(results: RunResults, target: TargetStudy) -> dict[str, Any]:
     }
 
 
-def _followed(row: FollowedRow) -> dict[str, Any]:
-    """A mode that is followed by its shape, and which mode it is at each sample."""
-    numbers = {"initial_modes": row.initial_numbers, "exact_modes": row.exact_numbers}
-    return {"name": row.name, "like": row.like, **numbers}
-
-
-def _assignment(row: AssignmentRow) -> dict[str, Any]:
-    return {**asdict(row), "finished": row.finished}
-
-
 def _meaning(results: RunResults) -> dict[str, Any]:
-    """What the answer means; what was not studied is empty or null."""
+    """The meaning of the answer; what was not studied is empty or null."""
     found = results.meaning
     sensitivity: dict[str, Any] = {}
     for row in found.sensitivity:
         own = sensitivity.setdefault(row.parameter, {"unit": row.unit, "targets": []})
-        own["targets"].append(_without(row, "parameter", "unit"))
+        own["targets"].append(without(row, "parameter", "unit"))
     tolerance = found.tolerance
     return {
         "sensitivity": sensitivity,
@@ -199,10 +189,6 @@ def _meaning(results: RunResults) -> dict[str, Any]:
         "tolerance": None if tolerance is None else asdict(tolerance),
         "trade_off": None if found.trade_off is None else asdict(found.trade_off),
     }
-
-
-def _without(row: Any, *names: str) -> dict[str, Any]:
-    return {name: value for name, value in asdict(row).items() if name not in names}
 
 
 def _other_modes(others: OtherModes | None) -> list[dict[str, Any]]:
@@ -232,14 +218,7 @@ def _worst(comparison: Comparison | None) -> dict[str, float | None] | None:
     if comparison is None:
         return None
     taylor, linearised = comparison.worst_taylor, comparison.worst_linearised
-    return {"taylor": _finite(taylor), "linearised": _finite(linearised)}
-
-
-def _coordinates(results: RunResults) -> dict[str, Any]:
-    return {
-        name: {"unit": unit, "values": results.q[:, i]}
-        for i, (name, unit) in enumerate(zip(results.q_names, results.q_units, strict=True))
-    }
+    return {"taylor": finite(taylor), "linearised": finite(linearised)}
 
 
 def to_json(results: RunResults) -> bytes:
@@ -330,7 +309,7 @@ def frequency_columns(results: RunResults) -> list[Column]:
 
 
 def trajectory_names(results: RunResults, rows: slice = slice(None)) -> list[str]:
-    """Which trajectory each sample belongs to."""
+    """The name of each sample's trajectory."""
     names = [row.name for row in results.trajectories for _ in range(row.rows.start, row.rows.stop)]
     return names[rows]
 
@@ -350,20 +329,27 @@ def _assigned(results: RunResults) -> Iterator[Column]:
     for target in results.targets:
         name = target.curve_name if target.kind == "frequency" else target.label
         names = (f"{name} ({k})" if k > 1 else name for k in count(1))
-        free = (n for n in names if not any(_share(target, own) for own in groups.get(n, ())))
+        rows = target.rows
+        free = (
+            name
+            for name in names
+            if all(
+                own.rows.stop <= rows.start or rows.stop <= own.rows.start
+                for own in groups.get(name, ())
+            )
+        )
         groups.setdefault(next(free), []).append(target)
-    for name, own in groups.items():
-        for kind, curves in _curves(own).items():
-            yield f"{name} {kind} [Hz]", _scattered(own, curves, results.time_s.size)
-
-
-def _share(one: TargetStudy, other: TargetStudy) -> bool:
-    """Whether both hold at some sample."""
-    return bool(max(one.rows.start, other.rows.start) < min(one.rows.stop, other.rows.stop))
+    for name, targets in groups.items():
+        for kind, curves in _curves(targets).items():
+            values = np.full(results.time_s.size, np.nan)
+            for target, hz in zip(targets, curves, strict=True):
+                if hz is not None:
+                    values[target.rows] = hz
+            yield f"{name} {kind} [Hz]", values.tolist()
 
 
 def _curves(targets: Sequence[TargetStudy]) -> dict[str, list[Floats | None]]:
-    """By what they are called, of each target: the edges, and the modes before and after."""
+    """The edges, and the modes before and after, of each target; by what they are called."""
     kinds = ["target", "initial", "one shot", "predicted", "exact"]
     if (kind := targets[0].kind) == "keep_out":
         kinds = ["lower", "upper"]
@@ -381,16 +367,6 @@ def _curves(targets: Sequence[TargetStudy]) -> dict[str, list[Floats | None]]:
     return found
 
 
-def _scattered(
-    targets: Sequence[TargetStudy], curves: Sequence[Floats | None], n: int
-) -> list[float]:
-    values = np.full(n, np.nan)
-    for target, hz in zip(targets, curves, strict=True):
-        if hz is not None:
-            values[target.rows] = hz
-    return [float(value) for value in values]
-
-
 def _expanded(results: RunResults) -> Iterator[Column]:
     """Exact frequencies at the initial design, and those of both expansions."""
     for study in results.studies:
@@ -404,13 +380,7 @@ def _number_text(columns: Sequence[Column]) -> bytes:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([heading for heading, _ in columns])
-    writer.writerows(
-        [_cell(value) for value in row] for row in zip(*(v for _, v in columns), strict=True)
-    )
+    for row in zip(*(values for _, values in columns), strict=True):
+        gaps = (isinstance(value, float) and not math.isfinite(value) for value in row)
+        writer.writerow(["" if gap else value for gap, value in zip(gaps, row, strict=True)])
     return text.getvalue().encode()
-
-
-def _cell(value: object) -> str:
-    if isinstance(value, float):
-        return repr(value) if math.isfinite(value) else ""
-    return str(value)

@@ -64,22 +64,11 @@ def run_tables(results: RunResults) -> tuple[Table, ...]:
 
     Those that there is something to show in.
     """
-    made = (
-        design(results),
-        errors(results),
-        required(results),
-        clearances(results),
-        combinations(results),
-        optima(results),
-        sensitivity(results),
-        limits(results),
-        reach(results),
-        tolerance(results),
-        trade_off(results),
-        approximation(results),
-        solver(results),
-    )
-    return tuple(table for table in (*made, timing(results)) if table.rows)
+    kinds = (
+        design, errors, required, clearances, combinations, optima, sensitivity, limits, reach,
+        tolerance, trade_off, approximation, solver, timing,
+    )  # fmt: skip
+    return tuple(table for table in (kind(results) for kind in kinds) if table.rows)
 
 
 def headline(results: RunResults) -> str | None:
@@ -110,7 +99,7 @@ def headline(results: RunResults) -> str | None:
 
 
 def design(results: RunResults) -> Table:
-    """Each design parameter before and after, what it lies on, was chosen or costs; the mass."""
+    """Parameters before and after, what each lies on, was chosen or costs; the mass."""
     active = results.assignment.active if results.assignment else ()
     on = {limit.name: limit.side for limit in active if limit.kind == "bound"}
     chosen = any(row.chosen for row in results.design)
@@ -147,7 +136,7 @@ def _unit(row: DesignRow) -> tuple[str, float]:
 
 
 def _by_name(results: RunResults, y: Floats) -> Iterator[str]:
-    """A design in these units."""
+    """The values of a design in these units."""
     for row, value in zip(results.design, y, strict=True):
         yield number(float(value) / _unit(row)[1])
 
@@ -186,19 +175,20 @@ def errors(results: RunResults) -> Table:
 
 
 def required(results: RunResults) -> Table:
-    """Every limit and band: met, or violated by how much at worst, before and after."""
+    """Limits and bands: met, or violated by how much at worst, before and after."""
     kinds = tuple(kind for kind in _stages(results) if kind != "predicted")
     rows = []
     for target in results.targets:
         if target.kind != "frequency":
             cells = (getattr(target.error, kind.replace(" ", "_")) for kind in kinds)
-            said = ("" if e is None else _violated(e.max_relative) for e in cells)
+            said = ("" if e is None else violated(e.max_relative) for e in cells)
             rows.append((target.label, *said, "met" if target.satisfied else "VIOLATED"))
     caption = f"Relative to the limit, along {results.along}."
     return Table("Limits and bands", ("limit", *kinds, "verdict"), tuple(rows), caption)
 
 
-def _violated(worst: float) -> str:
+def violated(worst: float) -> str:
+    """``violated by 1.55 %``; ``met`` where no more than round-off is left."""
     return f"violated by {percent(worst)}" if worst > MET else "met"
 
 
@@ -207,7 +197,7 @@ def _violation(worst: float) -> str:
 
 
 def clearances(results: RunResults) -> Table:
-    """Each band to keep out of: how many modes are below it, and whether that is proved."""
+    """Bands to keep out of: how many modes are below each, and whether that is proved."""
     rows = tuple(
         (
             row.label,
@@ -232,11 +222,13 @@ def combinations(results: RunResults) -> Table:
     row = results.assignment
     if row is None or row.catalogue is None:
         return Table("Combinations", (), ())
-    best, price = row.catalogue.best, "price" if _by_price(results) else "objective"
+    wanted = any(target.kind == "frequency" for target in results.targets)
+    by_price = results.price is not None and not wanted
+    best, price = row.catalogue.best, "price" if by_price else "objective"
     own = {each.name: each for each in results.design}
     rows = tuple(
         (str(k), *(_choice(own.get(name), choice) for name, choice in one.choices.items()),
-         number(one.objective), _violated(one.violation))
+         number(one.objective), violated(one.violation))
         for k, one in enumerate(best, 1)
     )  # fmt: skip
     columns = ("combination", *best[0].choices, price, "limits")
@@ -251,12 +243,6 @@ def _choice(row: DesignRow | None, choice: str) -> str:
     return f"{number(float(choice) / size)} {unit}".rstrip()
 
 
-def _by_price(results: RunResults) -> bool:
-    """Whether the objective is the price alone."""
-    wanted = any(target.kind == "frequency" for target in results.targets)
-    return results.price is not None and not wanted
-
-
 def optima(results: RunResults) -> Table:
     """The distinct local optima, the best first; none of a single one."""
     row = results.assignment
@@ -264,17 +250,12 @@ def optima(results: RunResults) -> Table:
     if row is None or row.catalogue is not None or len(row.local_optima) < 2:
         return Table("Local optima", columns, ())
     rows = tuple(
-        (
-            str(k),
-            number(each.objective),
-            _violation(each.violation),
-            *_by_name(results, each.design),
-        )
+        (str(k), number(each.objective), _violation(each.violation),
+         *_by_name(results, each.design))
         for k, each in enumerate(row.local_optima, 1)
-    )
-    return Table(
-        "Local optima", columns, rows, f"From {row.starts} starts; the first is the answer."
-    )
+    )  # fmt: skip
+    caption = f"From {row.starts} starts; the first is the answer."
+    return Table("Local optima", columns, rows, caption)
 
 
 def _stages(results: RunResults) -> tuple[str, ...]:
@@ -285,7 +266,7 @@ def _stages(results: RunResults) -> tuple[str, ...]:
 
 
 def _of_target(target: TargetStudy) -> Iterator[tuple[str, ErrorSummary]]:
-    """Along each trajectory if there are several, then in all."""
+    """Errors along each trajectory if there are several, then in all."""
     if len(target.along) > 1:
         for one in target.along:
             yield f"{target.label} along {one.name!r}", one.error
@@ -293,7 +274,7 @@ def _of_target(target: TargetStudy) -> Iterator[tuple[str, ErrorSummary]]:
 
 
 def sensitivity(results: RunResults) -> Table:
-    """What the targeted frequencies hang on, at the answer."""
+    """Slopes of the targeted frequencies at the answer."""
     columns = ("parameter", "target", "Hz per unit", "unit", "% per %", "% per % at most")
     units = {row.name: _unit(row) for row in results.design}
     rows = []
@@ -312,19 +293,19 @@ def sensitivity(results: RunResults) -> Table:
 
 
 def limits(results: RunResults) -> Table:
-    """What a little more room at each limit that the answer lies on gains, to first order."""
+    """Gains from a little more room at each limit that the answer lies on, to first order."""
     rows = tuple((row.name, row.side, row.words) for row in results.meaning.relaxed)
     return Table("Limits", ("limit", "side", "relaxed, to first order"), rows)
 
 
 def reach(results: RunResults) -> Table:
-    """What each target's curve can be within the bounds, over all samples."""
+    """The range of each target's curve within the bounds, over all samples."""
     caption = "Over all designs within the bounds, at any sample; proved."
     return _ranges("Reach", "least error", results.meaning.reach, caption)
 
 
 def tolerance(results: RunResults) -> Table:
-    """Where each target's curve lies while the parameters deviate within their tolerances."""
+    """The range of each target's curve while parameters deviate within their tolerances."""
     found = results.meaning.tolerance
     title, rows = "Tolerance", () if found is None else found.targets
     return _ranges(title, "worst error", rows, "" if found is None else f"{found.words}.")
@@ -358,10 +339,7 @@ def approximation(results: RunResults) -> Table:
     """Worst error of both expansions, along the trajectory and over maps."""
     columns = ("mode", "where", "order", "Taylor", "linearised in y")
     caption = "Worst relative error in Hz against exact eigenvalues."
-    return Table("Approximation", columns, tuple(_approximations(results)), caption)
-
-
-def _approximations(results: RunResults) -> Iterator[tuple[str, ...]]:
+    rows = []
     for study in results.studies:
         places: list[tuple[str, Comparison]] = []
         if study.over_time is not None:
@@ -371,7 +349,8 @@ def _approximations(results: RunResults) -> Iterator[tuple[str, ...]]:
                 places.append((f"over {' and '.join(over.names)}", over.values))
         for where, values in places:
             worst = (percent(values.worst_taylor), percent(values.worst_linearised))
-            yield (f"mode {study.mode}", where, str(study.order), *worst)
+            rows.append((f"mode {study.mode}", where, str(study.order), *worst))
+    return Table("Approximation", columns, tuple(rows), caption)
 
 
 def solver(results: RunResults) -> Table:
@@ -386,13 +365,13 @@ def solver(results: RunResults) -> Table:
 
 
 def timing(results: RunResults) -> Table:
-    """Where the time went."""
+    """Time by stage."""
     rows = tuple((STAGES.get(k, k), seconds(value)) for k, value in results.timing_s.items())
     return Table("Timing", ("stage", "time"), rows)
 
 
 def validation_table(rows: Sequence[ValidationRow]) -> Table:
-    """Both expansions against exact, and whether the full one is within the case's tolerance."""
+    """Errors of both expansions, and whether the full one is within the case's tolerance."""
     columns = ("case", "mode", "where", "points", "order", "Taylor", "linearised in y", "limit",
                "verdict")  # fmt: skip
     shown = tuple(

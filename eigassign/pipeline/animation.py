@@ -30,7 +30,7 @@ def animate(
     """
     path = Path(path)
     kind = path.suffix.lower().removeprefix(".")
-    if kind not in motion.KINDS_OF_FILE:
+    if kind not in ("gif", "png"):
         raise UsageError(f"{path}: an animation is a file that ends in .gif or .png")
     if mode is None:
         if q is not None or y is not None:

@@ -9,7 +9,7 @@ from eigassign.brief import cut
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.update import update_figures
 from eigassign.output.reports.notebook import Pictured, html
-from eigassign.output.reports.update import console_tables, headline, write_update
+from eigassign.output.reports.update import headline, update_tables, write_update
 from eigassign.pipeline.run import DEFAULT, Options
 from eigassign.pipeline.run_files import new_run_folder
 from eigassign.pipeline.stages import Stages
@@ -29,7 +29,7 @@ class Updated(Pictured):
         return cut(f"<Updated: {headline(self.results)}>")
 
     def _repr_html_(self) -> str:
-        return html([headline(self.results)], console_tables(self.results), self.plan())
+        return html([headline(self.results)], update_tables(self.results), self.plan())
 
     def plans(self) -> dict[str, FigurePlan]:
         """The figures of the report: measurements, parameters."""

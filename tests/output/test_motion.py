@@ -42,7 +42,7 @@ def test_a_mode_swings_through_rest_to_the_opposite_and_back(swinging: motion.An
     assert np.linalg.norm(ends[0] - rest) > 0.01
 
 
-@pytest.mark.parametrize("kind", motion.KINDS_OF_FILE)
+@pytest.mark.parametrize("kind", ["gif", "png"])
 def test_every_frame_shows_its_pose(swinging: motion.Animation, kind: str) -> None:
     few = [0, 5, 11, 20]
     moving = replace(

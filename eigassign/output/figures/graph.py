@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Dash = str  # solid | dashed | dotted | dash-dotted | fine
 DASHES: tuple[Dash, ...] = ("solid", "dashed", "dotted", "dash-dotted")
-ERROR_DECADES = 5  # of an error axis: what is smaller is as good as nothing
 
 # Okabe and Ito: can be distinguished with every kind of colour vision
 BLACK, ORANGE, SKY, GREEN = "#1a1a1a", "#E69F00", "#56B4E9", "#009E73"
@@ -32,7 +31,7 @@ SERIES = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
 
 @dataclass(frozen=True)
 class Look:
-    """Of a line and its points: colour, width in points of print, dashes; the points' shape."""
+    """A line and its points: colour, width in points of print, dashes; the points' shape."""
 
     colour: str
     width: float = 1.4
@@ -63,7 +62,7 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Shade:
-    """Between two curves; None where it reaches the panel's edge."""
+    """The area between two curves; None where it reaches the panel's edge."""
 
     low: Floats | None
     high: Floats | None
@@ -103,7 +102,7 @@ class Panel:
     marks: tuple[Mark, ...]
     height: float = 2.0  # inches
     logarithmic: bool = False
-    decades: int | None = ERROR_DECADES
+    decades: int | None = 5  # of errors: what is smaller is as good as nothing
     holds: tuple[Floats, ...] = ()
     from_zero: bool = False
     key: tuple[tuple[str, Look], ...] = ()
@@ -111,12 +110,12 @@ class Panel:
 
     @property
     def curves(self) -> tuple[Curve, ...]:
-        """Its curves alone."""
+        """The curves among the marks."""
         return tuple(mark for mark in self.marks if isinstance(mark, Curve))
 
     @cached_property
     def limits(self) -> tuple[float, float]:
-        """Of the ordinate."""
+        """The ends of the ordinate."""
         values = [*(curve.y for curve in self.curves), *self.holds]
         if self.logarithmic:
             return decades(values, self.decades)
@@ -126,7 +125,7 @@ class Panel:
 
     @cached_property
     def cut(self) -> bool:
-        """Whether values lie below the decades that are shown."""
+        """True where values lie below the decades that are shown."""
         return self.logarithmic and any(bool(np.any(c.y < self.limits[0])) for c in self.curves)
 
     def shown(self, curve: Curve) -> Floats:

@@ -32,7 +32,6 @@ Box = tuple[float, float, float, float]  # left, bottom, width, height in inches
 
 _ELEVATION = np.radians(22.0)
 _AZIMUTHS = np.radians([-60.0, -30.0, -120.0])  # of the viewer
-_ENOUGH = 0.7  # of the area seen from the best side
 
 
 @dataclass(frozen=True)
@@ -47,30 +46,26 @@ class View:
 
     @property
     def spatial(self) -> bool:
-        """Whether it is a view of space."""
+        """True of a view of space."""
         return bool(self.directions.shape[1] == 3)
 
 
 def view_of(points: Floats) -> View:
-    """A plane as it is; space from above, from the first side that hides little."""
+    """A plane as it is; space with z upright, by a viewer far away above the x-y plane.
+
+    From the first azimuth that shows 70 % of the best one's area; what is nearly a line on the
+    sheet counts by its length.
+    """
     if points.shape[1] == 2:
         return View(np.eye(2))
-    views = [View(_axonometry(azimuth)) for azimuth in _AZIMUTHS]
-    seen = [_seen(view.flat(points)) for view in views]
-    return next(v for v, area in zip(views, seen, strict=True) if area >= _ENOUGH * max(seen))
-
-
-def _axonometry(azimuth: float) -> Floats:
-    """What a viewer far away at this azimuth, above the x-y plane, sees with z upright."""
-    c, s = np.cos(azimuth), np.sin(azimuth)
+    views, seen = [], []
     low, high = np.sin(_ELEVATION), np.cos(_ELEVATION)
-    return np.array([[-s, c, 0.0], [-low * c, -low * s, high]])
-
-
-def _seen(flat: Floats) -> float:
-    """About the area that points take on the sheet; what is nearly a line counts by its length."""
-    long, wide = np.linalg.svd(flat - flat.mean(axis=0), compute_uv=False)
-    return float(long * max(wide, 0.2 * long))
+    for c, s in zip(np.cos(_AZIMUTHS), np.sin(_AZIMUTHS), strict=True):
+        views.append(View(np.array([[-s, c, 0.0], [-low * c, -low * s, high]])))
+        flat = views[-1].flat(points)
+        long, wide = np.linalg.svd(flat - flat.mean(axis=0), compute_uv=False)
+        seen.append(long * max(wide, 0.2 * long))
+    return next(v for v, area in zip(views, seen, strict=True) if area >= 0.7 * max(seen))
 
 
 # --- A drawing at one scale in all directions
@@ -162,16 +157,16 @@ class Drawing:
 
 KINDS = ("turning", "sliding", "fixed")
 _GROUND = "#e6e6e6"
-_WIDTHS = (1.3, 4.2)  # points: of the thinnest lines that can be, and of the thickest line
-_PLAIN = 2.6  # points: of lines without a section
-_PIECES = 8  # of one width each, that a tapered line is drawn as
 _DOWN, _ACROSS = np.array([0.0, -1.0]), np.array([1.0, 0.0])
+_TURN = np.linspace(0.0, 4.5 * np.pi, 60)
+_SPIRAL = (0.05 + 0.08 * _TURN / _TURN[-1]) * np.array([np.cos(_TURN), np.sin(_TURN)])
+_SPIRAL = _SPIRAL.T
 
 
 def draw_links(
     drawing: Drawing, poses: DrawnPoses, pose: int, colour: str, scale: float = 1.0
 ) -> None:
-    """All links of one pose; thicker sections are drawn thicker, a taper as one."""
+    """Lines of one pose; thicker sections are drawn thicker, a taper in eight pieces."""
     from matplotlib.collections import LineCollection
 
     pieces: list[Floats] = []
@@ -180,14 +175,10 @@ def draw_links(
         flat = drawing.view.flat(points)
         if len(flat) < 2 or not np.ptp(flat, axis=0).any():
             continue
-        if start == end:
-            pieces.append(flat)
-            widths.append(start)
-            continue
-        ends = np.linspace(0.0, 1.0, _PIECES + 1)
-        for low, high in pairwise(ends):
-            at = np.linspace(low, high, 1 + max(1, len(flat) // _PIECES))
-            pieces.append(_along(flat, at))
+        own, count = np.linspace(0.0, 1.0, len(flat)), 1 if start == end else 8
+        for low, high in pairwise(np.linspace(0.0, 1.0, count + 1)):
+            at = np.linspace(low, high, 1 + max(1, len(flat) // count)) if count > 1 else own
+            pieces.append(np.column_stack([np.interp(at, own, column) for column in flat.T]))
             widths.append(start + (end - start) * 0.5 * (low + high))
     drawing.axes.add_collection(
         LineCollection(
@@ -198,27 +189,21 @@ def draw_links(
     )  # fmt: skip
 
 
-def _along(points: Floats, at: Floats) -> Floats:
-    """Places at the fractions ``at`` of a polyline, by the number of its points."""
-    own = np.linspace(0.0, 1.0, len(points))
-    return np.column_stack([np.interp(at, own, column) for column in points.T])
-
-
 def line_widths(poses: DrawnPoses) -> list[tuple[float, float]]:
-    """Start and end width of each line in points, by the root of its section's size."""
+    """Start and end width of each line in points, by the root of its section's size.
+
+    From 1.3, the thinnest line that can be, to 4.2; 2.6 of lines without a section.
+    """
     largest = max((size for pair in poses.sizes for size in pair), default=0.0)
-    if largest == 0.0:
-        return [(_PLAIN, _PLAIN)] * len(poses.lines[0])
-    return [(_width(a / largest), _width(b / largest)) for a, b in poses.sizes]
 
+    def width(size: float) -> float:
+        return 1.3 + 2.9 * (size / largest) ** 0.5 if size > 0.0 else 2.6
 
-def _width(share: float) -> float:
-    low, high = _WIDTHS
-    return low + (high - low) * share**0.5 if share > 0.0 else _PLAIN
+    return [(width(a), width(b)) for a, b in poses.sizes or ((0.0, 0.0),) * len(poses.lines[0])]
 
 
 def draw_ground(drawing: Drawing, joints: Sequence[DrawnJoint]) -> None:
-    """What the joints on the ground stand on, and the way of those that slide in all poses."""
+    """Feet of the joints on the ground, and the way of those that slide in all poses."""
     for joint in (joint for joint in joints if joint.grounded):
         places = drawing.view.flat(joint.places)
         along = drawing.heading(joint.axes[0])
@@ -228,17 +213,13 @@ def draw_ground(drawing: Drawing, joints: Sequence[DrawnJoint]) -> None:
             drawing.area(drawing.symbol(places[0], foot), GREY, _GROUND)
             _hatched(drawing, drawing.symbol(places[0], 0.14 * _DOWN), _ACROSS, _DOWN, 0.14)
         elif joint.kind == "sliding":
-            _guide(drawing, places, along, across if across[1] < 0.0 else -across)
+            # a hatched line beside all places, somewhat longer than their way
+            behind, way = across if across[1] < 0.0 else -across, (places - places[0]) @ along
+            middle = places[0] + 0.5 * (way.min() + way.max()) * along
+            half = 0.5 * float(np.ptp(way)) / (drawing.per_inch * drawing.grain) + 0.2
+            _hatched(drawing, drawing.symbol(middle, 0.09 * behind), along, behind, half)
         else:
             _hatched(drawing, places[0], across, -along, 0.13)
-
-
-def _guide(drawing: Drawing, places: Floats, along: Floats, behind: Floats) -> None:
-    """A hatched line beside all places, somewhat longer than their way."""
-    way = (places - places[0]) @ along
-    middle = places[0] + 0.5 * (way.min() + way.max()) * along
-    half = 0.5 * float(np.ptp(way)) / (drawing.per_inch * drawing.grain) + 0.2
-    _hatched(drawing, drawing.symbol(middle, 0.09 * behind), along, behind, half)
 
 
 def _hatched(drawing: Drawing, at: Floats, along: Floats, behind: Floats, half: float) -> None:
@@ -287,7 +268,7 @@ def draw_bodies(drawing: Drawing, bodies: Sequence[DrawnBody], pose: int, colour
 
 
 def diameters(bodies: Sequence[DrawnBody]) -> list[float]:
-    """In points."""
+    """Diameter of each body's dot in points."""
     heaviest = max((body.mass for body in bodies), default=0.0)
     if heaviest <= 0.0:
         return [8.0] * len(bodies)
@@ -303,13 +284,7 @@ def draw_springs(drawing: Drawing, springs: Sequence[DrawnSpring], pose: int, co
             _hatched(drawing, end, _ACROSS, _DOWN, 0.09)
         inches = (end - start) / (drawing.per_inch * drawing.grain)
         coiled = spring.turning or float(np.linalg.norm(inches)) < 0.05
-        drawing.line(drawing.symbol(start, _spiral() if coiled else _zigzag(inches)), colour, 1.1)
-
-
-def _spiral() -> Floats:
-    turn = np.linspace(0.0, 4.5 * np.pi, 60)
-    radius = 0.05 + 0.08 * turn / turn[-1]
-    return np.column_stack([radius * np.cos(turn), radius * np.sin(turn)])
+        drawing.line(drawing.symbol(start, _SPIRAL if coiled else _zigzag(inches)), colour, 1.1)
 
 
 def _zigzag(along: Floats) -> Floats:
@@ -356,12 +331,7 @@ def length_label(length: float) -> str:
 
 # --- The poses along the trajectory
 
-_TALLEST_IN, _LOWEST_IN = 4.8, 2.0
-_FOOT_IN = {False: 0.5, True: 0.8}  # in a plane, in space
-_LEFT_IN = {False: 0.75, True: 0.2}
-_ROOM = 1.12  # of the axes, relative to what they hold
 _BODIES = (graph.BLUE, graph.GREEN, graph.PURPLE, graph.SKY)
-_NAMED_BODIES = 6  # in the legend, at most
 
 
 def poses(results: RunResults) -> FigurePlan:
@@ -383,10 +353,11 @@ def draw_poses(results: RunResults) -> Figure:
     title = f"{short(results.title, 70)}: poses along the trajectory"
     figure = style.new_figure(title, 4.0, layout=None)
     key = figure.legend(handles=_entries(shown, colours), loc="upper left")
-    wide = style.WIDTH_IN - _LEFT_IN[spatial] - key.get_window_extent().width / figure.dpi - 0.2
-    tall = float(np.clip(wide * held.size[1] / held.size[0], _LOWEST_IN, _TALLEST_IN))
-    figure.set_size_inches(style.WIDTH_IN, _FOOT_IN[spatial] + tall + 0.42)
-    drawing = held.drawing(figure, (_LEFT_IN[spatial], _FOOT_IN[spatial], wide, tall), _ROOM)
+    left, foot = (0.2, 0.8) if spatial else (0.75, 0.5)  # inches
+    wide = style.WIDTH_IN - left - key.get_window_extent().width / figure.dpi - 0.2
+    tall = float(np.clip(wide * held.size[1] / held.size[0], 2.0, 4.8))
+    figure.set_size_inches(style.WIDTH_IN, foot + tall + 0.42)
+    drawing = held.drawing(figure, (left, foot, wide, tall), room=1.12)
     key.set_bbox_to_anchor((1.02, 1.0), drawing.axes.transAxes)
     if spatial:
         drawing.axes.set_axis_off()
@@ -409,7 +380,7 @@ def draw_poses(results: RunResults) -> Figure:
 
 
 def _colours(count: int) -> list[str]:
-    """From dark to light, one a pose."""
+    """Colours from dark to light, one a pose."""
     import matplotlib
     from matplotlib.colors import to_hex
 
@@ -419,13 +390,13 @@ def _colours(count: int) -> list[str]:
 
 
 def _entries(shown: DrawnPoses, colours: Sequence[str]) -> list[Artist]:
-    """The legend: tip path, bodies, and the time of each pose."""
+    """The legend: tip path, the first six bodies, and the time of each pose."""
     from matplotlib.lines import Line2D
 
     entries = []
     if shown.tip_path is not None:
         entries.append(Line2D([], [], color=graph.VERMILLION, linewidth=1.8, label="tip path"))
-    for at, body in enumerate(shown.bodies[:_NAMED_BODIES]):
+    for at, body in enumerate(shown.bodies[:6]):
         look: Any = {"color": _BODIES[at % len(_BODIES)], "linestyle": "none", "marker": "o"}
         entries.append(Line2D([], [], **look, label=short(body.name, 22)))
     for at, (colour, time) in enumerate(zip(colours, shown.time_s, strict=True)):

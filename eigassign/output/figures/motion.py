@@ -1,4 +1,4 @@
-"""The mechanism by itself, and in motion: along its trajectory, or swinging in one mode.
+"""Mode shapes, the mechanism by itself, and both in motion: along a trajectory or in one mode.
 
 An animation is drawn frame by frame on one canvas and encoded by Pillow, which matplotlib brings:
 GIF, which everything shows, or animated PNG, which has all colours.
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.output.figures import graph, style
-from eigassign.output.figures.graph import BLUE, FigurePlan, short
+from eigassign.output.figures.graph import BLUE, GREY, FigurePlan, short
 from eigassign.output.figures.mechanism import (
     KINDS,
     Drawing,
@@ -29,6 +29,7 @@ from eigassign.output.figures.mechanism import (
     extent,
     points_of,
 )
+from eigassign.output.formats import number
 from eigassign.study.results import DrawnPoses, ModePictures
 
 if TYPE_CHECKING:
@@ -36,13 +37,142 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 Floats = NDArray[np.float64]
+_REST = "#c4c4c4"
 
-KINDS_OF_FILE = ("gif", "png")
-_PAUSE_MS = 40  # between two frames: GIF knows hundredths of a second, and browsers slow 10 ms down
-_PERIOD = 32  # frames of a period of a mode
-_WIDTH_IN, _TALLEST_IN, _LOWEST_IN = 5.0, 4.0, 1.4
-_SIDE_IN, _FOOT_IN, _HEAD_IN = 0.3, 0.75, 0.46
-_GHOST = "#c4c4c4"
+
+def _sheet(
+    title: str,
+    held: Extent,
+    width: float = 5.0,
+    tall: tuple[float, float] = (1.4, 4.0),
+    foot: float = 0.75,
+    room: float = 1.06,
+) -> tuple[Figure, Drawing]:
+    """A figure, inches, with axes that hold everything, the directions of x, y, z, and a scale.
+
+    The axes are as high as ``held`` is at their width, within the bounds ``tall``.
+    """
+    wide = width - 0.6
+    height = float(np.clip(wide * held.size[1] / held.size[0], *tall))
+    figure = style.new_figure(title, foot + height + 0.46, width, layout=None)
+    drawing = held.drawing(figure, (0.3, foot, wide, height), room)
+    drawing.axes.set_axis_off()
+    draw_bearings(figure, drawing, 0.1, 0.08)
+    return figure, drawing
+
+
+def _note(figure: Figure, text: str, y: float = 0.2) -> Any:
+    """Small grey text at the lower right, ``y`` inches from below."""
+    width, height = figure.get_size_inches()
+    return figure.text(
+        1.0 - 0.1 / width, y / height, text,
+        ha="right", va="center", size=style.SMALL_PT, color=GREY,
+    )  # fmt: skip
+
+
+# --- Mode shapes: the rigid links in grey, the deformed mechanism in colour, the other phase thin
+
+
+def mode_figures(pictures: ModePictures) -> tuple[FigurePlan, ...]:
+    """One figure a mode, all at one scale."""
+    held = _held(pictures)
+    caption = (
+        "Grey: the rigid links. Blue: the mode, its largest displacement drawn as "
+        f"{100 * pictures.amplitude:.0f} % of the mechanism's extent; light: half a period later."
+    )
+    return tuple(
+        FigurePlan(
+            f"mode_{k + 1}",
+            f"Mode {k + 1}: {hz:.5g} Hz",
+            caption,
+            f"Mode {k + 1} of the mechanism at {hz:.5g} Hz, deformed over undeformed.",
+            partial(_draw_mode, pictures, held, k),
+        )
+        for k, hz in enumerate(pictures.frequencies_hz)
+    )
+
+
+def _held(pictures: ModePictures) -> Extent:
+    """One extent for all modes, so that they can be compared."""
+    opposite = [
+        2.0 * line - moved
+        for lines in pictures.deformed.lines
+        for line, moved in zip(pictures.rest.lines[0], lines, strict=True)
+    ]
+    return extent(pictures.rest, [points_of(pictures.deformed), *opposite])
+
+
+def _draw_mode(pictures: ModePictures, held: Extent, mode: int) -> Figure:
+    """One mode with its frequency, the axes, a scale, and q and y, cut where the scale begins."""
+    title = f"{short(pictures.title, 60)}: mode {mode + 1}, {pictures.frequencies_hz[mode]:.5g} Hz"
+    foot = 0.95 if held.view.spatial else 0.75  # for the axes and the joints' feet
+    figure, drawing = _sheet(title, held, style.WIDTH_IN, (1.6, 5.2), foot, room=1.0)
+    _draw_shape(drawing, pictures, mode)
+    values = [
+        f"{short(name, 16)} = {number(value)} {unit}".rstrip()
+        for name, value, unit in (*pictures.q, *pictures.y)
+    ]
+    text = _note(figure, ", ".join(values))
+    while len(values) > 1 and text.get_window_extent().x0 < 2.5 * figure.dpi:
+        values = [*values[:-2], "…"]
+        text.set_text(", ".join(values))
+    return figure
+
+
+def _draw_shape(drawing: Drawing, pictures: ModePictures, mode: int) -> None:
+    """One mode over the mechanism at rest."""
+    rest, deformed = pictures.rest, pictures.deformed
+    drawing.axes.set_axis_off()
+    draw_ground(drawing, rest.joints)
+    draw_links(drawing, rest, 0, _REST)
+    draw_joints(drawing, rest.joints, 0, _REST, KINDS)
+    for line, moved in zip(rest.lines[0], deformed.lines[mode], strict=True):
+        drawing.line(drawing.view.flat(2.0 * line - moved), graph.SKY, 1.0)
+    _draw_pose(drawing, deformed, mode)
+
+
+def _draw_pose(drawing: Drawing, poses: DrawnPoses, pose: int) -> None:
+    """One pose in colour; joints that turn lie on top."""
+    if poses.tip_path is not None:
+        drawing.line(drawing.view.flat(poses.tip_path), graph.VERMILLION, 1.2)
+    draw_springs(drawing, poses.springs, pose, graph.GREEN)
+    draw_links(drawing, poses, pose, BLUE)
+    draw_joints(drawing, poses.joints, pose, BLUE, ("sliding", "fixed"))
+    draw_bodies(drawing, poses.bodies, pose, graph.VERMILLION)
+    draw_joints(drawing, poses.joints, pose, BLUE, ("turning",))
+
+
+def thumbnail(pictures: ModePictures, mode: int = 0) -> Figure:
+    """A small picture of one mode, for a gallery."""
+    width, height = 3.2, 2.1
+    figure = style.new_figure("", height, width, layout=None)
+    box = (0.16, 0.42, width - 0.32, height - 0.54)
+    _draw_shape(_held(pictures).drawing(figure, box, grain=0.75), pictures, mode)
+    text = f"mode {mode + 1}: {pictures.frequencies_hz[mode]:.4g} Hz"
+    place = (1.0 - 0.06 / width, 0.11 / height)
+    figure.text(*place, text, ha="right", va="center", size=style.SMALL_PT, color=GREY)
+    return figure
+
+
+# --- The mechanism by itself
+
+
+def mechanism_plan(title: str, poses: DrawnPoses) -> FigurePlan:
+    """The first of these poses, the others behind it in grey, with the path of the tip."""
+    text = f"Line drawing of the mechanism in {len(poses.lines)} poses, the first in colour."
+    return FigurePlan("mechanism", "Mechanism", "", text, partial(_draw_mechanism, title, poses))
+
+
+def _draw_mechanism(title: str, poses: DrawnPoses) -> Figure:
+    figure, drawing = _sheet(short(title, 60), extent(poses))
+    draw_ground(drawing, poses.joints)
+    for pose in range(len(poses.lines) - 1, 0, -1):
+        draw_links(drawing, poses, pose, _REST)
+    _draw_pose(drawing, poses, 0)
+    return figure
+
+
+# --- In motion
 
 
 @dataclass(frozen=True)
@@ -59,140 +189,91 @@ class Animation:
 
 
 def along_trajectory(title: str, poses: DrawnPoses) -> Animation:
-    """Poses evenly spread in time, with the time of each; it takes as long as they have frames."""
+    """Poses evenly spread in time, with the time of each; it takes as long as they have frames.
+
+    The first pose stays, without symbols but for the joints, which stand on the ground.
+    """
     names = poses.of or ("",) * len(poses.lines)
     times = zip(names, poses.time_s, strict=True)
     captions = tuple(f"{short(name, 16)} t = {t:.3g} s".strip() for name, t in times)
-    return Animation(short(title, 60), poses, _one_pose(poses, 0), captions)
+    first = replace(
+        poses,
+        lines=poses.lines[:1],
+        time_s=poses.time_s[:1],
+        joints=tuple(replace(j, places=j.places[:1], axes=j.axes[:1]) for j in poses.joints),
+        bodies=(),
+        springs=(),
+        of=poses.of[:1],
+    )
+    return Animation(short(title, 60), poses, first, captions)
 
 
-def swinging(pictures: ModePictures, mode: int) -> Animation:
+def swinging(pictures: ModePictures, mode: int, frames: int = 32) -> Animation:
     """One period of a mode (0 is the lowest) over the mechanism at rest."""
-    phase = np.linspace(0.0, 2.0 * np.pi, _PERIOD, endpoint=False)
-    hz = pictures.frequencies_hz[mode]
-    return Animation(
-        f"{short(pictures.title, 44)}: mode {mode + 1}, {hz:.5g} Hz",
-        _scaled(pictures.rest, pictures.deformed, mode, np.cos(phase)),
-        pictures.rest,
-        ("",) * _PERIOD,
-    )
-
-
-def _one_pose(poses: DrawnPoses, pose: int) -> DrawnPoses:
-    """That pose alone, without symbols but for the joints, which stand on the ground."""
-    joints = tuple(
-        replace(joint, places=joint.places[[pose]], axes=joint.axes[[pose]])
-        for joint in poses.joints
-    )
-    nothing: dict[str, Any] = {"bodies": (), "springs": (), "of": poses.of[pose : pose + 1]}
-    lines, times = poses.lines[pose : pose + 1], poses.time_s[pose : pose + 1]
-    return replace(poses, lines=lines, time_s=times, joints=joints, **nothing)
-
-
-def _scaled(rest: DrawnPoses, deformed: DrawnPoses, mode: int, factors: Floats) -> DrawnPoses:
-    """Poses that are moved by ``factors`` (n,) of what a mode moves them by."""
+    rest, deformed = pictures.rest, pictures.deformed
+    factors = np.cos(np.linspace(0.0, 2.0 * np.pi, frames, endpoint=False))
 
     def places(still: Floats, moved: Floats) -> Floats:
+        """(n_poses, d) of something that stays in place, and that a mode moves."""
         return np.asarray(still[0] + factors[:, None] * (moved[mode] - still[0]))
 
     lines = [
         still + factors[:, None, None] * (moved - still)
         for still, moved in zip(rest.lines[0], deformed.lines[mode], strict=True)
     ]
-    joints = [
-        replace(a, places=places(a.places, b.places), axes=np.repeat(a.axes, len(factors), axis=0))
-        for a, b in zip(rest.joints, deformed.joints, strict=True)
-    ]
-    bodies = [
-        replace(a, places=places(a.places, b.places))
-        for a, b in zip(rest.bodies, deformed.bodies, strict=True)
-    ]
-    springs = [
-        replace(a, starts=places(a.starts, b.starts), ends=places(a.ends, b.ends))
-        for a, b in zip(rest.springs, deformed.springs, strict=True)
-    ]
-    return replace(
+    moving = replace(
         rest,
-        time_s=np.zeros(len(factors)),
-        lines=tuple(tuple(line[k] for line in lines) for k in range(len(factors))),
-        joints=tuple(joints),
-        bodies=tuple(bodies),
-        springs=tuple(springs),
+        time_s=np.zeros(frames),
+        lines=tuple(tuple(line[k] for line in lines) for k in range(frames)),
+        joints=tuple(
+            replace(a, places=places(a.places, b.places), axes=np.repeat(a.axes, frames, axis=0))
+            for a, b in zip(rest.joints, deformed.joints, strict=True)
+        ),
+        bodies=tuple(
+            replace(a, places=places(a.places, b.places))
+            for a, b in zip(rest.bodies, deformed.bodies, strict=True)
+        ),
+        springs=tuple(
+            replace(a, starts=places(a.starts, b.starts), ends=places(a.ends, b.ends))
+            for a, b in zip(rest.springs, deformed.springs, strict=True)
+        ),
     )
-
-
-# --- Drawing
-
-
-def mechanism_plan(title: str, poses: DrawnPoses) -> FigurePlan:
-    """The first of these poses, the others behind it in grey, with the path of the tip."""
-    text = f"Line drawing of the mechanism in {len(poses.lines)} poses, the first in colour."
-    return FigurePlan("mechanism", "Mechanism", "", text, partial(_drawn, title, poses))
-
-
-def _drawn(title: str, poses: DrawnPoses) -> Figure:
-    figure, drawing = _sheet(short(title, 60), extent(poses))
-    draw_ground(drawing, poses.joints)
-    for pose in range(len(poses.lines) - 1, 0, -1):
-        draw_links(drawing, poses, pose, _GHOST)
-    _draw_pose(drawing, poses, 0)
-    return figure
-
-
-def _sheet(title: str, held: Extent) -> tuple[Figure, Drawing]:
-    """A figure with axes that hold everything, and its scale."""
-    width = _WIDTH_IN - 2.0 * _SIDE_IN
-    tall = float(np.clip(width * held.size[1] / held.size[0], _LOWEST_IN, _TALLEST_IN))
-    figure = style.new_figure(title, _FOOT_IN + tall + _HEAD_IN, _WIDTH_IN, layout=None)
-    drawing = held.drawing(figure, (_SIDE_IN, _FOOT_IN, width, tall), room=1.06)
-    drawing.axes.set_axis_off()
-    draw_bearings(figure, drawing, 0.1, 0.08)
-    return figure, drawing
-
-
-def _draw_pose(drawing: Drawing, poses: DrawnPoses, pose: int) -> None:
-    if poses.tip_path is not None:
-        drawing.line(drawing.view.flat(poses.tip_path), graph.VERMILLION, 1.2)
-    draw_springs(drawing, poses.springs, pose, graph.GREEN)
-    draw_links(drawing, poses, pose, BLUE)
-    draw_joints(drawing, poses.joints, pose, BLUE, ("sliding", "fixed"))
-    draw_bodies(drawing, poses.bodies, pose, graph.VERMILLION)
-    draw_joints(drawing, poses.joints, pose, BLUE, ("turning",))
+    hz = pictures.frequencies_hz[mode]
+    title = f"{short(pictures.title, 44)}: mode {mode + 1}, {hz:.5g} Hz"
+    return Animation(title, moving, rest, ("",) * frames)
 
 
 def encode(animation: Animation, kind: str) -> bytes:
-    """The animation as a file of one of `KINDS_OF_FILE`, the same bytes every time."""
+    """The animation as a file, ``kind`` gif or png, the same bytes every time.
+
+    A frame is shown for 40 ms: GIF knows hundredths of a second, and browsers slow 10 ms down.
+    """
+    from PIL.Image import Dither
+
     frames = _frames(animation)
-    looping: dict[str, Any] = {"save_all": True, "duration": _PAUSE_MS, "loop": 0}
+    looping: dict[str, Any] = {"save_all": True, "duration": 40, "loop": 0}
     data = io.BytesIO()
     if kind == "gif":
         palette = frames[0].quantize(64)
-        frames = [frame.quantize(palette=palette, dither=_PLAIN) for frame in frames]
+        frames = [frame.quantize(palette=palette, dither=Dither.NONE) for frame in frames]
         looping |= {"disposal": 1, "optimize": False}
     frames[0].save(data, format=kind.upper(), append_images=frames[1:], **looping)
     return data.getvalue()
 
 
-_PLAIN: Any = 0  # Pillow's Dither.NONE
-
-
 def _frames(animation: Animation) -> list[Image]:
-    """Each pose drawn over what stays: that is drawn once, and takes longest."""
+    """The pictures of all poses; what stays is drawn once, for it takes longest."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
 
     moving, frames = animation.moving, []
     with style.applied():
-        held = extent(animation.still, [points_of(moving)])
-        figure, drawing = _sheet(animation.title, held)
-        note = figure.text(
-            1.0 - 0.1 / _WIDTH_IN, 0.2 / figure.get_size_inches()[1], "",
-            ha="right", va="center", size=style.SMALL_PT, color=graph.GREY,
-        )  # fmt: skip
+        figure, drawing = _sheet(animation.title, extent(animation.still, [points_of(moving)]))
+        note = _note(figure, "")
         canvas: Any = FigureCanvasAgg(figure)
         draw_ground(drawing, moving.joints)
-        draw_links(drawing, animation.still, 0, _GHOST)
-        draw_joints(drawing, animation.still.joints, 0, _GHOST, KINDS)
+        draw_links(drawing, animation.still, 0, _REST)
+        draw_joints(drawing, animation.still.joints, 0, _REST, KINDS)
         canvas.draw()
         staying, artists = canvas.copy_from_bbox(figure.bbox), drawing.axes.get_children()
         for pose, caption in enumerate(animation.captions):

@@ -35,14 +35,12 @@ _DASHES: dict[str, Any] = {
     "dash-dotted": (0, (6.0, 1.5, 1.4, 1.5)),
     "fine": (0, (3.0, 3.0)),
 }
-_BAR, _TALLEST = 0.16, 6.0  # inches: of a bar, of all bars
-_BESIDE = (4.9, 0.2)  # inches: of a graph whose legend stands beside it, of a line of that
 
 
 def render(
     plans: Sequence[FigurePlan], formats: Sequence[str] = style.FORMATS[:1]
 ) -> dict[str, bytes]:
-    """Each figure in each format of `FORMATS` asked for, by file name."""
+    """Files of each figure in each format of `FORMATS` asked for, by name."""
     files: dict[str, bytes] = {}
     if not plans or not formats:
         return files
@@ -71,8 +69,8 @@ def _graph(shown: Graph) -> Figure:
     heights = [panel.height for panel in shown.panels]
     tall = sum(heights) + 0.15 * len(heights) + 1.1
     if shown.beside:
-        entries = sum(len(_labelled(panel)) for panel in shown.panels)
-        tall = max(_BESIDE[0], _BESIDE[1] * (entries + 3) + 0.4)
+        entries = sum(bool(mark.label) for panel in shown.panels for mark in panel.marks)
+        tall = max(4.9, 0.2 * (entries + 3) + 0.4)  # inches; 0.2 a line of the legend
     figure = style.new_figure(shown.title, tall)
     found = figure.subplots(
         len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights}
@@ -111,10 +109,6 @@ def _ordinate(axes: Axes, panel: Panel) -> None:
     axes.yaxis.set_offset_position("right")  # a power of ten, away from the legend
 
 
-def _labelled(panel: Panel) -> list[Any]:
-    return [mark for mark in panel.marks if mark.label]
-
-
 def _drawn(axes: Axes, panel: Panel, shown: Graph) -> list[tuple[str, Any]]:
     """Draw all marks; the entries of the legend with their groups."""
     from matplotlib.lines import Line2D
@@ -140,7 +134,7 @@ def _drawn(axes: Axes, panel: Panel, shown: Graph) -> list[tuple[str, Any]]:
 
 
 def _line(look: Look) -> dict[str, Any]:
-    """Of matplotlib's."""
+    """The look in matplotlib's words."""
     return {
         "color": look.colour,
         "linewidth": look.width,
@@ -223,7 +217,7 @@ def _logarithmic(axes: Axes, which: str, limits: tuple[float, float], *, cut: bo
 
 def _bars(shown: Bars) -> Figure:
     """A group of bars a name, one colour a group of them."""
-    height = min(max(1.2, _BAR * len(shown.names) * (len(shown.groups) + 1)), _TALLEST)
+    height = float(np.clip(0.16 * len(shown.names) * (len(shown.groups) + 1), 1.2, 6.0))
     figure = style.new_figure(shown.title, height + 1.25)
     axes = figure.subplots()
     axes.set_xlabel(shown.label)
@@ -244,12 +238,6 @@ def _bars(shown: Bars) -> Figure:
 
 # --- Maps
 
-_POINT: dict[str, Any] = {
-    "markersize": 5.5,
-    "markerfacecolor": "white",
-    "markeredgecolor": BLACK,
-}
-
 
 def _maps(shown: Maps) -> Figure:
     figure = style.new_figure(shown.title, 3.2)
@@ -260,7 +248,10 @@ def _maps(shown: Maps) -> Figure:
         axes.set_title("\n".join(field.heading))
         axes.set_xlabel(shown.labels[0], loc="left")  # a power of ten stands at the right
         if shown.point is not None:
-            (dot,) = axes.plot(*shown.point, "o", **_POINT, label=shown.point_label)
+            (dot,) = axes.plot(
+                *shown.point, "o", markersize=5.5, markerfacecolor="white", markeredgecolor=BLACK,
+                label=shown.point_label,
+            )  # fmt: skip
         axes.set(xlim=shown.axes[0][[0, -1]], ylim=shown.axes[1][[0, -1]])
     panels[0].set_ylabel(shown.labels[1])
     panels[0].locator_params(axis="x", nbins=3)

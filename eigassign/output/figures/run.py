@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import count
 
-from eigassign.output.figures import curves, maps, mechanism
+from eigassign.output.figures import approximation, curves, mechanism
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.meaning import meaning_figures
 from eigassign.study.results import RunResults, along_each
 
 
 def run_figures(results: RunResults) -> tuple[FigurePlan, ...]:
-    """What was asked for before and after, the mechanism, each target, what it means, how exact."""
+    """Figures of what was asked, the mechanism, each target, what the answer means, how exact."""
     return tuple(_figures(results))
 
 
@@ -35,17 +35,17 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
         for one in each:
             comparison = one.studies[k].over_time
             if comparison is not None and comparison.exact_hz.size:
-                yield curves.over_time(one, study, comparison)
+                yield approximation.over_time(one, study, comparison)
         loads = results.trajectories[0].loads if results.trajectories else ()
         point = (*results.q_names, *loads)
-        yield from maps.approximation(study, study.over_q, study.q0, point, "q")
+        yield from approximation.over_entries(study, study.over_q, study.q0, point, "q")
         names = tuple(row.name for row in results.design)
-        yield from maps.approximation(study, study.over_design, study.y0, names, "design")
+        yield from approximation.over_entries(study, study.over_design, study.y0, names, "design")
     yield from (curves.coordinates(one) for one in each if one.q.size)
 
 
 def _targets(results: RunResults) -> Iterator[FigurePlan]:
-    """Each target along each trajectory, mode by mode; equal file names get a number."""
+    """Figures of each target along each trajectory, mode by mode; equal names get a number."""
     taken: set[str] = set()
     for target in sorted(results.targets, key=lambda target: (target.mode, target.curve_name)):
         for one in along_each(replace(results, targets=(target,))):

@@ -33,12 +33,7 @@ from eigassign.study.results import MovingMode
 
 Floats = NDArray[np.float64]
 Json = dict[str, Any]
-PIXELS = 78  # of an inch on paper
-_ROOM = 118  # pixels for the legend, the abscissa and its label
-_GAP = 0.07  # between panels
-_DIGITS = 7
-_ROWS = 25  # of a table, at most
-_SAMPLES = 600  # of a curve, about as many as its pixels, and so that a page keeps its size
+_ROOM = 118  # pixels for the legend, the abscissa and its label, by their fonts in Plotly
 _DASHES = {
     "solid": "solid",
     "dashed": "dash",
@@ -61,27 +56,25 @@ def figures(shown: Description) -> list[Json]:
 
 def _numbers(values: Iterable[float]) -> list[float | None]:
     """Seven digits are more than a screen shows; JSON has no other numbers than finite ones."""
-    found = (float(f"{value:.{_DIGITS}g}") for value in values)
+    found = (float(f"{value:.7g}") for value in values)
     return [value if np.isfinite(value) else None for value in found]
 
 
-def _plotted(*ys: Floats) -> NDArray[np.intp]:
-    """Which samples are plotted: all, or of each of many stretches where a ``y`` is at its ends."""
+def _plotted(*ys: Floats, most: int = 600) -> NDArray[np.intp]:
+    """The samples that are plotted, at most about as many as a screen has pixels across.
+
+    All of them, or the first, the last, and of each of many stretches where a ``y`` is at its ends.
+    """
     every = np.arange(len(ys[0]))
-    if every.size <= _SAMPLES:
+    if every.size <= most:
         return every
-    stretches = np.array_split(every, (_SAMPLES - 2) // (2 * len(ys)))
-    low = [
-        part[np.argmin(np.where(np.isnan(y[part]), np.inf, y[part]))]
-        for y in ys
-        for part in stretches
-    ]
-    high = [
-        part[np.argmax(np.where(np.isnan(y[part]), -np.inf, y[part]))]
-        for y in ys
-        for part in stretches
-    ]
-    return np.unique([0, *low, *high, every[-1]])
+    ends = [0, every[-1]]
+    for part in np.array_split(every, (most - 2) // (2 * len(ys))):
+        for y in ys:
+            missing = np.isnan(y[part])
+            ends.append(part[np.argmin(np.where(missing, np.inf, y[part]))])
+            ends.append(part[np.argmax(np.where(missing, -np.inf, y[part]))])
+    return np.unique(ends)
 
 
 # --- Graphs
@@ -89,8 +82,9 @@ def _plotted(*ys: Floats) -> NDArray[np.intp]:
 
 def _graph(shown: Graph) -> Json:
     heights = np.array([panel.height for panel in shown.panels])
-    free = 1.0 - _GAP * (len(heights) - 1)
-    tops = 1.0 - np.cumsum([0.0, *(free * heights / heights.sum() + _GAP)[:-1]])
+    gap = 0.07  # between panels
+    free = 1.0 - gap * (len(heights) - 1)
+    tops = 1.0 - np.cumsum([0.0, *(free * heights / heights.sum() + gap)[:-1]])
     data: list[Json] = []
     shapes: list[Json] = []
     notes: list[Json] = []
@@ -120,7 +114,7 @@ def _graph(shown: Graph) -> Json:
         ]  # fmt: skip
     last = f"y{len(heights)}" if len(heights) > 1 else "y"
     layout["xaxis"] = {"title": {"text": shown.x_label}, "anchor": last, **_abscissa(shown)}
-    tall = PIXELS * (heights.sum() + 0.15 * len(heights)) + _ROOM
+    tall = 78.0 * (heights.sum() + 0.15 * len(heights)) + _ROOM  # pixels an inch on paper
     return {"data": data, "layout": {**layout, "height": round(tall)}}
 
 
@@ -162,11 +156,6 @@ def _line(look: Look) -> Json:
     return {"color": look.colour, "width": look.width * 1.25, "dash": _DASHES[look.dash]}
 
 
-def _mode(look: Look) -> str:
-    parts = [*(("lines",) if look.width else ()), *(("markers",) if look.marker else ())]
-    return "+".join(parts)
-
-
 def _curve(curve: Curve, panel: Panel, shown: Graph, axis: str, names: dict[Look, str]) -> Json:
     """Curves of one look, in several panels, are hidden and shown together."""
     x, y = shown.x if curve.x is None else curve.x, panel.shown(curve)
@@ -174,6 +163,7 @@ def _curve(curve: Curve, panel: Panel, shown: Graph, axis: str, names: dict[Look
     look = curve.look
     name = short(curve.label or curve.end or names.get(look, ""), 60)
     single = x.size == 1 and not look.marker
+    parts = [part for part, there in (("lines", look.width), ("markers", look.marker)) if there]
     marker = {
         "symbol": _MARKERS.get(look.marker, "circle") + ("" if look.filled else "-open"),
         "size": look.size * 1.3,
@@ -181,7 +171,7 @@ def _curve(curve: Curve, panel: Panel, shown: Graph, axis: str, names: dict[Look
     }
     return {
         "type": "scatter",
-        "mode": "markers" if single else _mode(look),
+        "mode": "markers" if single else "+".join(parts),
         "x": _numbers(x[plotted]),
         "y": _numbers(y[plotted]),
         "yaxis": axis,
@@ -209,17 +199,13 @@ def _shade(shade: Shade, panel: Panel, x: Floats, axis: str) -> Json:
     low, high = panel.edges(shade, x)
     plotted = _plotted(low, high)
     x, low, high = x[plotted], low[plotted], high[plotted]
+    red, green, blue = (int(shade.colour[k : k + 2], 16) for k in (1, 3, 5))
     return {
         "type": "scatter", "mode": "lines", "fill": "toself", "line": {"width": 0},
         "x": _numbers([*x, *x[::-1]]), "y": _numbers([*low, *high[::-1]]), "yaxis": axis,
-        "fillcolor": _transparent(shade.colour, shade.opacity), "name": short(shade.label, 60),
-        "showlegend": bool(shade.label), "hoverinfo": "skip",
+        "fillcolor": f"rgba({red},{green},{blue},{shade.opacity})", "hoverinfo": "skip",
+        "name": short(shade.label, 60), "showlegend": bool(shade.label),
     }  # fmt: skip
-
-
-def _transparent(colour: str, opacity: float) -> str:
-    r, g, b = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
-    return f"rgba({r},{g},{b},{opacity})"
 
 
 def _rule(rule: Rule, axis: str) -> Json:
@@ -330,7 +316,7 @@ def _table_of_graph(shown: Graph) -> tuple[tuple[str, ...], list[tuple[str, ...]
     ]
     common = [(label, c.y) for label, c in own if c.x is None]
     if common:
-        rows = _some(shown.x.size, _ROWS)
+        rows = _some(shown.x.size, 25)
         columns = (shown.x_label, *(label for label, _ in common))
         return columns, [
             (number(shown.x[k]), *(number(values[k]) for _, values in common)) for k in rows
@@ -365,25 +351,22 @@ def _some(count: int, most: int) -> list[int]:
 
 
 def moving(modes: Sequence[MovingMode]) -> list[Json]:
-    """What the page needs to draw each: lines, NaN between them as null, and marks."""
-    return [_moving(mode) for mode in modes]
-
-
-def _moving(mode: MovingMode) -> Json:
-    rest = [_joined([line[k] for line in mode.rest]) for k in range(len(mode.time_s))]
-    motions = [_joined([line[k] for line in mode.motions]) for k in range(len(mode.time_s))]
-    return {
-        "name": mode.name,
-        "trajectory": mode.trajectory,
-        "time": _numbers(mode.time_s),
-        "hz": _numbers(mode.hz),
-        "rest": rest,
-        "motion": motions,
-        "marks": [{"name": short(name), "kind": kind} for name, kind in mode.marks],
-        "places": [_columns(places) for places in mode.mark_places],
-        "moves": [_columns(moves) for moves in mode.mark_motions],
-        "tip": None if mode.tip_path is None else _columns(mode.tip_path),
-    }
+    """Everything that the page draws: of each mode its lines, null between them, and marks."""
+    return [
+        {
+            "name": mode.name,
+            "trajectory": mode.trajectory,
+            "time": _numbers(mode.time_s),
+            "hz": _numbers(mode.hz),
+            "rest": [_joined(lines) for lines in zip(*mode.rest, strict=True)],
+            "motion": [_joined(lines) for lines in zip(*mode.motions, strict=True)],
+            "marks": [{"name": short(name), "kind": kind} for name, kind in mode.marks],
+            "places": [_columns(places) for places in mode.mark_places],
+            "moves": [_columns(moves) for moves in mode.mark_motions],
+            "tip": None if mode.tip_path is None else _columns(mode.tip_path),
+        }
+        for mode in modes
+    ]
 
 
 def _joined(lines: Sequence[Floats]) -> list[list[float | None]]:
@@ -393,7 +376,7 @@ def _joined(lines: Sequence[Floats]) -> list[list[float | None]]:
 
 
 def _columns(points: Floats) -> list[list[float | None]]:
-    """Per direction the places in m, to a tenth of a micrometre of a mechanism of metres."""
+    """Places in m, direction by direction, to 10 µm of a mechanism of metres."""
     scale = float(np.nanmax(np.abs(points), initial=0.0)) or 1.0
     digits = max(0, 5 - int(np.floor(np.log10(scale))))
     return [

@@ -18,11 +18,10 @@ _DEVIATION = Look(graph.BLACK, 1.2)
 _STEM = Look(graph.BLUE, 1.2)
 _OUTLIER = Look(graph.GREY, 0.9, "dashed")
 _INTERVAL = Look(graph.SKY, 5.0)
-_BARS = 150  # measurements; the deviations of more are a band
 
 
 def update_figures(results: UpdateResults) -> tuple[FigurePlan, ...]:
-    """What the measurements are explained by, and how narrow that leaves the parameters."""
+    """Measurements against the model, and the intervals of the parameters."""
     after = max((abs(row.residual) for row in results.measurements), default=0.0)
     return (
         FigurePlan(
@@ -78,9 +77,9 @@ def _measurements(results: UpdateResults) -> Graph:
 
 
 def _deviations(at: Floats, bars: Floats) -> Mark:
-    """One standard deviation to either side of each measurement."""
+    """One standard deviation to either side of each measurement: bars, a band where they merge."""
     label = "measured ± standard deviation"
-    if at.size > _BARS:
+    if at.size > 150:
         return Shade(-bars, bars, graph.GREY, label, 0.35)
     return _segments(at, -bars, bars, _DEVIATION, label)
 
@@ -95,14 +94,18 @@ def _segments(
 
 
 def _parameters(results: UpdateResults) -> Graph:
-    """From bound to bound, one line each."""
+    """One line a parameter from bound to bound, with its interval and value."""
     rows = [row for row in results.parameters if row.upper > row.lower]
     at = -np.arange(float(len(rows)))
     low, high, value, initial = (
         np.array([(getattr(row, of) - row.lower) / (row.upper - row.lower) for row in rows])
         for of in ("low", "high", "value", "initial")
     )
-    names = tuple(map(_named, rows))
+    names = tuple(
+        f"{row.name} = {row.value / size:.4g} {unit}".rstrip()  # k1 = 52.47 kN m/rad
+        for row in rows
+        for unit, size in [shown_in(row)]
+    )
     curves = (
         _segments(at, low, high, _INTERVAL, "95 % interval", lying=True),
         Curve(at, _BEFORE, "before", initial, names=names),
@@ -112,12 +115,6 @@ def _parameters(results: UpdateResults) -> Graph:
     panel = Panel("", curves, 0.4 + 0.5 * len(rows), holds=(room,), names=names)
     title, label = "Parameters with their 95 % intervals", "from bound to bound"
     return Graph(title, label, np.zeros(0), (panel,), x_limits=(-0.02, 1.02))
-
-
-def _named(row: UpdatedParameter) -> str:
-    """``k1 = 52.47 kN m/rad``."""
-    unit, size = shown_in(row)
-    return f"{row.name} = {row.value / size:.4g} {unit}".rstrip()
 
 
 def shown_in(row: UpdatedParameter) -> tuple[str, float]:

@@ -155,12 +155,14 @@ def write_chart(
     text = dumps(_finite({"schema": SCHEMA, **asdict(chart)})) + "\n"
     (folder / "chart.json").write_text(text, encoding="utf-8")
     plans = chart_figures(chart)
-    files, shown = report.write_figures(plans, folder, formats), chart_tables(chart)
+    files = report.write_figures(plans, folder, formats)
     line = f"{capital(chart.advice[0].words)}." if chart.advice else None
-    document = ("chart.json", text.encode())
-    report.write_page(
-        folder, kind, chart, shown, plans, files, line=line, tone="good", document=document
-    )
+    if kind != "none":
+        html = report.page(
+            chart, chart_tables(chart), plans, files, line=line, tone="good", full=kind == "full",
+            document=("chart.json", text.encode()),
+        )  # fmt: skip
+        (folder / "report.html").write_bytes(html)
 
 
 def _finite(value: Any) -> Any:

@@ -39,7 +39,7 @@ class Pictured:
 
     @property
     def figures(self) -> tuple[str, ...]:
-        """What `plot` can draw: the figures of the report by name."""
+        """Names that `plot` can draw: the figures of the report."""
         return tuple(self.plans())
 
     def plot(self, name: str | None = None) -> Figure:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from eigassign._version import __version__
 from eigassign.output.figures import screen
 from eigassign.output.figures.graph import FigurePlan
-from eigassign.output.figures.modes import mode_figures
+from eigassign.output.figures.motion import mode_figures
 from eigassign.output.figures.paper import render
 from eigassign.output.figures.run import run_figures
 from eigassign.output.pages import TEMPLATES, inside, page_of
@@ -31,9 +31,6 @@ from eigassign.study.results import ModePictures, RunResults
 if TYPE_CHECKING:
     from eigassign.chart.results import Chart
     from eigassign.study.updating.fit import UpdateResults
-
-LIGHT = 900_000  # bytes of the pictures in a light report, at most
-DOCUMENT = 400_000  # bytes of a results.json that a full report carries, at most
 
 # --- The page
 
@@ -68,14 +65,16 @@ def page(
 
     A run begins with its verdict, another page with its ``line`` in a ``tone`` (good, fair, bad);
     then come the ``first`` figures, and all else below. ``document`` is the file of all numbers,
-    name and content: a full page saves it unless it is long. What a light page cannot hold as a
-    picture is named.
+    name and content: a full page saves it unless it is longer than 400 kB, a tenth of Plotly's
+    script. A light page is at most 1 MB, that it may go by mail: pictures for which there is no
+    room are named.
     """
     name, content = document or ("", b"")
     run = f if isinstance(f, RunResults) else None
     graphs = {p.name: screen.figures(p.shows) for p in plans if full and not callable(p.shows)}
     moving = run.moving if run is not None and full else ()
-    several = len(run.trajectories) > 1 if run is not None else False
+    several = run is not None and len(run.trajectories) > 1
+    kept = full and len(content) <= 400_000
     return page_of(
         "report.html.j2",
         f=f,
@@ -83,14 +82,12 @@ def page(
         headline=line,
         tone=tone,
         tables=[(table, [not number for number in table.numeric]) for table in shown],
-        figures=list(_shown(plans, graphs, files)),
+        figures=list(_shown(plans, graphs, files, 900_000)),
         first=first,
         moving=[(mode.name, mode.trajectory, several) for mode in moving],
         moving_json=inside(screen.moving(moving)) if full else "",
         figures_json=inside(graphs) if full else "",
-        document=content.decode().replace("<", "\\u003c")
-        if full and len(content) <= DOCUMENT
-        else "",
+        document=content.decode().replace("<", "\\u003c") if kept else "",
         document_name=name,
         plotly=_plotly() if full else "",
         script=(TEMPLATES / "report.js").read_text("utf-8") if full else "",
@@ -107,12 +104,12 @@ def _shown(
     plans: Sequence[FigurePlan],
     graphs: Mapping[str, list[dict[str, Any]]],
     files: Mapping[str, bytes],
+    room: int,
 ) -> Iterator[Shown]:
     """Plots where there are any, with some of their numbers; else pictures while there is room.
 
-    Of a figure that was not written nothing is said.
+    Of a figure that was not written nothing is said. ``room`` is in bytes.
     """
-    size = 0
     for plan in plans:
         if plan.name in graphs and not callable(plan.shows):
             heights = tuple(one["layout"]["height"] for one in graphs[plan.name])
@@ -122,9 +119,9 @@ def _shown(
         own = {Path(name).suffix: name for name in files if Path(name).stem == plan.name}
         kind = next((kind for kind in _EMBEDDED if kind in own), None)
         text = "" if kind is None else base64.b64encode(files[own[kind]]).decode()
-        size += len(text)
-        fits = kind is not None and size <= LIGHT
-        image = f"data:{_EMBEDDED[kind]};base64,{text}" if kind is not None and fits else None
+        room -= len(text)
+        shown = kind is not None and room >= 0
+        image = f"data:{_EMBEDDED[kind]};base64,{text}" if kind is not None and shown else None
         if own:
             yield Shown(plan, image=image, files=tuple(own.values()))
 
@@ -146,34 +143,13 @@ def write_run(
         (folder / name).write_bytes(data)
     plans = run_figures(results) if formats or kind != "none" else ()
     files = write_figures(plans, folder, formats)
-    write_page(
-        folder, kind, results, run_tables(results), plans, files,
-        document=("results.json", document),
-        first=sum(plan.name.startswith("frequencies") for plan in plans),
-    )  # fmt: skip
-
-
-def write_page(
-    folder: Path,
-    kind: str,
-    f: RunResults | Chart | UpdateResults,
-    shown: Sequence[Table],
-    plans: Sequence[FigurePlan],
-    files: Mapping[str, bytes],
-    *,
-    document: tuple[str, bytes],
-    line: str | None = None,
-    tone: str = "fair",
-    first: int = 1,
-) -> None:
-    """report.html, full or light, in ``folder``, or none; the rest is that of `page`."""
-    if kind == "none":
-        return
-    html = page(
-        f, shown, plans, files,
-        line=line, tone=tone, first=first, full=kind == "full", document=document,
-    )  # fmt: skip
-    (folder / "report.html").write_bytes(html)
+    if kind != "none":
+        first = sum(plan.name.startswith("frequencies") for plan in plans)
+        html = page(
+            results, run_tables(results), plans, files,
+            first=first, full=kind == "full", document=("results.json", document),
+        )  # fmt: skip
+        (folder / "report.html").write_bytes(html)
 
 
 def write_figures(

@@ -7,36 +7,26 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from eigassign.output.figures.update import shown_in, update_figures
 from eigassign.output.formats import number
 from eigassign.output.reports import page as report
-from eigassign.output.result_files import dumps, origin
+from eigassign.output.result_files import dumps, finite, origin, without
 from eigassign.output.tables import Table
 from eigassign.study.updating.fit import POOR, UpdatedParameter, UpdateResults
-
-_SHOWN = 30  # measurements in a table on the console
 
 # --- The verdict and the tables
 
 
 def headline(results: UpdateResults) -> str:
     """The verdict in a sentence: what the parameters are, and whether that explains anything."""
-    return f"{_verdict(results)}. {', '.join(map(_found, results.parameters))}."
-
-
-def _found(row: UpdatedParameter) -> str:
-    """``k1 = 52.47 kN m/rad (50.75 to 54.27)``."""
-    unit, size = shown_in(row)
-    value, low, high = (f"{each / size:.4g}" for each in (row.value, row.low, row.high))
-    return f"{row.name} = {value} {unit}".rstrip() + f" ({low} to {high})"
-
-
-def _verdict(results: UpdateResults) -> str:
+    found = []
+    for row in results.parameters:  # k1 = 52.47 kN m/rad (50.75 to 54.27)
+        unit, size = shown_in(row)
+        value, low, high = (f"{each / size:.4g}" for each in (row.value, row.low, row.high))
+        found.append(f"{row.name} = {value} {unit}".rstrip() + f" ({low} to {high})")
     chance = "" if results.p_value is None else f", p = {results.p_value:.2g}"
     fit = f"χ² = {results.chi_squared:.3g} with {results.degrees} degrees of freedom{chance}"
-    return {
+    verdict = {
         "fitted": f"Explained: the model fits the measurements ({fit})",
         "poor_fit": f"NOT EXPLAINED: the measurements are further off than their standard "
         f"deviations allow ({fit}, below {POOR:g}); the intervals do not hold",
@@ -44,21 +34,17 @@ def _verdict(results: UpdateResults) -> str:
         f"({fit})",
         "unfinished": f"UNFINISHED: the fit ended before its optimum ({results.ended}; {fit})",
     }[results.verdict]
+    return f"{verdict}. {', '.join(found)}."
 
 
-def tables(results: UpdateResults, most: int | None = None) -> tuple[Table, ...]:
-    """Parameters, what is not identified, the fit, and measurements (``most`` of them)."""
+def update_tables(results: UpdateResults, most: int | None = 30) -> tuple[Table, ...]:
+    """Parameters, what is not identified, the fit, and ``most`` measurements; None: all."""
     made = (parameters(results), directions(results), fit(results), measurements(results, most))
     return tuple(table for table in made if table.rows)
 
 
-def console_tables(results: UpdateResults) -> tuple[Table, ...]:
-    """For the terminal: not more measurements than can be read there."""
-    return tables(results, _SHOWN)
-
-
 def parameters(results: UpdateResults) -> Table:
-    """Each parameter before and after, with its standard deviation and interval."""
+    """Parameters before and after, with standard deviations and intervals."""
     columns = ("name", "parameter", "unit", "before", "after", "deviation", "95 % from", "to", "")
     rows = []
     for row in results.parameters:
@@ -68,7 +54,7 @@ def parameters(results: UpdateResults) -> Table:
         )
         deviation = "" if row.deviation is None else f"{row.deviation / size:.3g}"
         rows.append(
-            (row.name, row.parameter, unit, initial, value, deviation, low, high, remark(row))
+            (row.name, row.parameter, unit, initial, value, deviation, low, high, _remark(row))
         )
     caption = (
         "The deviation is the standard deviation by the linear model; the interval is that of the "
@@ -80,8 +66,8 @@ def parameters(results: UpdateResults) -> Table:
     return Table("Parameters", columns, tuple(rows), caption)
 
 
-def remark(row: UpdatedParameter) -> str:
-    """Where an interval is one-sided, and why."""
+def _remark(row: UpdatedParameter) -> str:
+    """The reason why an interval is one-sided, if it is."""
     ends = [name for name, at in (("lower", row.low_is_bound), ("upper", row.high_is_bound)) if at]
     if row.held:
         return f"held by its {row.held} bound: one-sided"
@@ -91,7 +77,7 @@ def remark(row: UpdatedParameter) -> str:
 
 
 def directions(results: UpdateResults) -> Table:
-    """What the measurements cannot tell."""
+    """Directions that the measurements cannot tell."""
     rows = tuple(
         (each.words, ", ".join(f"{name}: {number(v)}" for name, v in each.change.items()))
         for each in results.unidentified
@@ -104,7 +90,7 @@ def directions(results: UpdateResults) -> Table:
 
 
 def fit(results: UpdateResults) -> Table:
-    """Before and after."""
+    """χ² before and after, and the chance of it."""
     chance = "none" if results.p_value is None else f"{results.p_value:.3g}"
     before, after = results.initial_chi_squared, results.chi_squared
     chi_squared = f"{before:.4g}", f"{after:.4g}"
@@ -117,8 +103,8 @@ def fit(results: UpdateResults) -> Table:
     return Table("Fit", columns, (row,), caption)
 
 
-def measurements(results: UpdateResults, most: int | None = None) -> Table:
-    """Each measurement with its residual; of many those that are worst explained."""
+def measurements(results: UpdateResults, most: int | None) -> Table:
+    """Measurements with their residuals; of many those that are worst explained."""
     shown = list(results.measurements)
     more = most is not None and len(shown) > most
     if more:
@@ -149,11 +135,13 @@ def write_update(
     (folder / "results.json").write_bytes(data)
     plans = update_figures(results)
     files = report.write_figures(plans, folder, formats)
-    report.write_page(
-        folder, kind, results, tables(results), plans, files,
-        line=headline(results), tone="good" if results.verdict == "fitted" else "bad",
-        first=len(plans), document=("results.json", data),
-    )  # fmt: skip
+    if kind != "none":
+        html = report.page(
+            results, update_tables(results, None), plans, files, line=headline(results),
+            tone="good" if results.verdict == "fitted" else "bad", first=len(plans),
+            full=kind == "full", document=("results.json", data),
+        )  # fmt: skip
+        (folder / "report.html").write_bytes(html)
 
 
 def document(results: UpdateResults) -> dict[str, Any]:
@@ -162,12 +150,9 @@ def document(results: UpdateResults) -> dict[str, Any]:
         **origin(results),
         "verdict": results.verdict,
         "headline": headline(results),
-        "parameters": {
-            row.name: {k: v for k, v in asdict(row).items() if k != "name"}
-            for row in results.parameters
-        },
-        "covariance": _finite(results.covariance),
-        "correlation": _finite(results.correlation),
+        "parameters": {row.name: without(row, "name") for row in results.parameters},
+        "covariance": finite(results.covariance),
+        "correlation": finite(results.correlation),
         "not_identified": [asdict(each) for each in results.unidentified],
         "fit": {
             "initial_chi_squared": results.initial_chi_squared,
@@ -185,7 +170,3 @@ def document(results: UpdateResults) -> dict[str, Any]:
         "notes": results.notes,
         "timing_s": dict(results.timing_s),
     }
-
-
-def _finite(matrix: np.ndarray[Any, Any]) -> list[list[float | None]]:
-    return [[float(v) if np.isfinite(v) else None for v in row] for row in matrix]

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from eigassign.case.units import handy_unit
 from eigassign.output.formats import capital, percent
-from eigassign.study.design.judgement import MET
+from eigassign.output.tables import violated
 from eigassign.study.results import RunResults, TargetStudy
 
 Floats = NDArray[np.float64]
-DETAILED = 3  # targets: of more only the worst distance is told
 TONES = {"reached": "good", "improved": "fair"}  # every other verdict is bad
 WORDS = {
     "reached": "Reached",
@@ -64,13 +63,16 @@ class Verdict:
 
 
 def verdict_of(results: RunResults) -> Verdict | None:
-    """That of a run; None where nothing was asked for."""
+    """The verdict of a run; None where nothing was asked for.
+
+    Of more than three targets only the worst distance is told.
+    """
     row = results.assignment
     if row is None or results.error is None:
         return None
     misled = row.method == "one_shot" and not results.within_tolerance
     word = "do_not_use" if misled else row.verdict
-    short, few = results.shortcoming, len(results.targets) <= DETAILED
+    short, few = results.shortcoming, len(results.targets) <= 3
     return Verdict(
         word=WORDS[word],
         tone=TONES.get(word, "bad") if short is None else "bad",
@@ -90,7 +92,9 @@ def _sentence(text: str) -> str:
 def _asked(results: RunResults) -> Iterator[str]:
     row = results.assignment
     for target in results.targets:
-        within = f", within {100 * row.max_error:.3g} %" if row and _is_wanted(target) else ""
+        within = (
+            f", within {100 * row.max_error:.3g} %" if row and target.kind == "frequency" else ""
+        )
         yield f"{capital(target.label)}{within}"
     parameters = [each.name for each in results.design]
     names = ", ".join(parameters[:4]) + (", …" if len(parameters) > 4 else "")
@@ -100,23 +104,20 @@ def _asked(results: RunResults) -> Iterator[str]:
         yield f"mass at most {_few(results.mass.upper)} kg"
 
 
-def _is_wanted(target: TargetStudy) -> bool:
-    return target.kind == "frequency"
-
-
 def _finding(target: TargetStudy, accepted: float, detailed: bool) -> Finding:
     """Worst distances, with rms and frequencies; of a limit by how much it is violated."""
     start, end = target.error.initial, target.error.exact
     before, after = start.max_relative, end.max_relative
-    met = after <= accepted if _is_wanted(target) else target.satisfied
-    tone = "good" if met else "fair" if after < before else "bad"
     more = [f"{_between(target.initial_hz)} → {_between(target.exact_hz)} Hz"]
-    if not _is_wanted(target):
-        said = _violated(before), _violated(after)
-        more *= target.kind in ("at_least", "at_most")
-    else:
+    if target.kind == "frequency":
+        met = after <= accepted
         said = percent(before), f"{percent(after)} off at worst"
         more.insert(0, f"{percent(start.rms_relative)} → {percent(end.rms_relative)} rms")
+    else:
+        met = target.satisfied
+        said = violated(before), violated(after)
+        more *= target.kind in ("at_least", "at_most")
+    tone = "good" if met else "fair" if after < before else "bad"
     return Finding(target.label, *said, tone, tuple(more) if detailed else ())
 
 
@@ -124,10 +125,6 @@ def _between(hz: Floats) -> str:
     """``186.9–192.6``; one number where they are alike."""
     low, high = f"{np.nanmin(hz):.4g}", f"{np.nanmax(hz):.4g}"
     return low if low == high else f"{low}–{high}"
-
-
-def _violated(worst: float) -> str:
-    return "met" if worst <= MET else f"violated by {percent(worst)}"
 
 
 def _trust(results: RunResults) -> Iterator[str]:
