@@ -22,6 +22,7 @@ for folder in (
     "faults",
     "mechanism",
     "modal",
+    "output",
     "stability",
     "study",
 ):

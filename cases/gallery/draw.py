@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import eigassign as ea
-from eigassign.output.figures import style
-from eigassign.output.figures.motion import thumbnail
+from eigassign.output import thumbnail
 from eigassign.study.drawing import draw_modes
 from eigassign.study.planning import with_middle_loads
 
@@ -19,8 +18,7 @@ def main() -> None:
         case = ea.load_case(path)
         q = with_middle_loads(case.file, case.file.expansion.q)
         pictures = draw_modes(case.file, case.model(), q, case.initial_design, 1)
-        with style.applied():
-            (HERE / f"{path.stem}.png").write_bytes(style.encoded(thumbnail(pictures), "png"))
+        (HERE / f"{path.stem}.png").write_bytes(thumbnail(pictures))
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from eigassign.batch.progress import Batch, Progress
     from eigassign.batch.workers import Workers
     from eigassign.output.batch.outcome import CaseOutcome
-    from eigassign.output.previous import Comparison
+    from eigassign.output.previous import EarlierResult
 
 _MANY = 50  # cases: above, only failed ones have figures and a report, and are listed at the end
 _FOLDERS = 10_000  # cases: above, they have no folders
@@ -183,15 +183,15 @@ def merge(folder: Path, shards: tuple[Path, ...], **how: Any) -> int:
         return _told(folder, merge_shards(folder, shards), since, reporter)
 
 
-def _comparison(how: Mapping[str, Any]) -> Comparison | None:
+def _comparison(how: Mapping[str, Any]) -> EarlierResult | None:
     """Read what --against names, before it may be written over."""
-    from eigassign.output.previous import Comparison
+    from eigassign.output.previous import EarlierResult
 
     against = how["against"]
-    return against and Comparison(against, "answers", how["tolerance"])
+    return against and EarlierResult(against, "answers", how["tolerance"])
 
 
-def _told(folder: Path, ends: Counter[str], since: Comparison | None, reporter: Reporter) -> int:
+def _told(folder: Path, ends: Counter[str], since: EarlierResult | None, reporter: Reporter) -> int:
     """Show how the cases of a folder ended, all of them or the first that failed; the exit code."""
     from itertools import islice
 
@@ -200,14 +200,16 @@ def _told(folder: Path, ends: Counter[str], since: Comparison | None, reporter: 
     from eigassign.output.batch.files import write_moves
     from eigassign.output.batch.outcome import from_line, status_of
     from eigassign.output.batch.summary import batch_table, said
-    from eigassign.output.previous import of_outcome
+    from eigassign.output.previous import Known
 
     header, total = read_header(folder), ends.total()
     lines = InOrder(folder, header.indices()) if header else ()
     told = (line for line in lines if total <= _MANY or status_of(line) != "ok")
     listed = [from_line(line) for line in islice(told, _MANY)]
     if since is not None:
-        rows = ((row, [*map(str, since.add(of_outcome(row)))]) for row in map(from_line, lines))
+        rows = (
+            (row, [*map(str, since.add(Known.of_outcome(row)))]) for row in map(from_line, lines)
+        )
         write_moves(folder, rows, folder / LINES)
     console.print_tables([batch_table(listed)] if listed else [])
     console.print_tables([since.table()] if since is not None else [])

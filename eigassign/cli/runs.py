@@ -14,7 +14,7 @@ from eigassign.cli.reporter import Reporter, print_json, reporting, show
 from eigassign.errors import EigassignError
 
 if TYPE_CHECKING:
-    from eigassign.output.previous import Move
+    from eigassign.output.previous import Moved
     from eigassign.pipeline.run import Options, Outcome
     from eigassign.study.results import ValidationRow
 
@@ -215,7 +215,7 @@ def validate(
     tests: list[tuple[str, str, float, str, str]] = []
     codes = [0]
     with reporting(how) as reporter:
-        since = against and previous.Comparison(against, "validations", tolerance)
+        since = against and previous.EarlierResult(against, "validations", tolerance)
         for case in cases_in(cases):
             try:
                 answer = run.validate(case, _options(how, reporter))
@@ -226,7 +226,7 @@ def validate(
                 continue
             reporter.warn(answer.warnings)
             rows.extend(answer.rows)
-            moves = since.add(previous.of_validation(case.stem, answer.rows)) if since else []
+            moves = since.add(previous.Known.of_validation(case.stem, answer.rows)) if since else []
             codes.append(0 if answer.passed and not moves else 1)
             tests.append((case.stem, str(case), answer.seconds, *_judged(answer.rows, moves)))
         if junit:
@@ -243,7 +243,7 @@ def validate(
     return max(codes)
 
 
-def _judged(rows: Sequence[ValidationRow], moves: Sequence[Move]) -> tuple[str, str]:
+def _judged(rows: Sequence[ValidationRow], moves: Sequence[Moved]) -> tuple[str, str]:
     """The status of a validated case, and why it is not ok."""
     from eigassign.output.formats import percent
 

@@ -21,22 +21,32 @@ from eigassign.study.comparison import TRAJECTORY
 from eigassign.study.results import ValidationRow
 
 Kind = Literal["answers", "validations"]
-_SHOWN = 5  # cases that a message names
 _STATISTICS = ("lowest", "mean", "highest")
 
 
 @dataclass(frozen=True)
 class Known:
-    """What a result says of one case: frequencies in Hz by what they are of, and how it ended."""
+    """One case of a result: frequencies in Hz by what they are of, and how it ended."""
 
     case: str
     frequencies: tuple[Range, ...] = ()
     ended: str = ""
 
+    @classmethod
+    def of_outcome(cls, row: CaseOutcome) -> Known:
+        """The answer of a case, from its row in a batch."""
+        return cls(row.name, tuple(row.frequencies), row.verdict or row.status)
+
+    @classmethod
+    def of_validation(cls, case: str, rows: Iterable[ValidationRow]) -> Known:
+        """Exact frequencies of a case where a validation looked."""
+        found = [(_place(r.mode, r.where), r.lowest_hz, r.mean_hz, r.highest_hz) for r in rows]
+        return cls(case, tuple(found))
+
 
 @dataclass(frozen=True)
-class Move:
-    """What is not as it was: how a case ended, or a frequency, which moved by ``hz``."""
+class Moved:
+    """A difference to before: how a case ended, or a frequency, which moved by ``hz``."""
 
     case: str
     what: str
@@ -49,23 +59,25 @@ class Move:
         return f"{self.what}: was {self.before}, is {self.now}{by}"
 
 
-class Comparison:
-    """Cases compared with an earlier result, one by one, and what has moved so far."""
+class EarlierResult:
+    """An earlier result, cases compared with it one by one, and what has moved so far."""
 
     def __init__(self, path: Path, kind: Kind, tolerance_hz: float) -> None:
         """Raises UsageError where ``path`` has nothing of this kind."""
         self._path, self._tolerance = path, tolerance_hz
-        self._before = {known.case: known for known in read_previous(path, kind)}
+        self._before = {known.case: known for known in _read(path, kind)}
         self._compared = self._new = 0
         self._seen: set[str] = set()
-        self.moves: list[Move] = []
+        self.moves: list[Moved] = []
 
-    def add(self, now: Known) -> list[Move]:
-        """What has moved of one case."""
+    def add(self, now: Known) -> list[Moved]:
+        """Compare a case; the differences."""
         self._seen.add(now.case)
         before = self._before.get(now.case, Known(now.case))
         known = {name: hz for name, *hz in before.frequencies}
-        moves = [*_ended(before, now)]
+        moves = []
+        if before.ended and now.ended and before.ended != now.ended:
+            moves.append(Moved(now.case, "verdict", before.ended, now.ended))
         for name, *hz in now.frequencies:
             if name in known:
                 self._compared += 1
@@ -75,20 +87,22 @@ class Comparison:
         self.moves += moves
         return moves
 
-    def _moved(self, case: str, name: str, before: list[float], now: list[float]) -> Iterator[Move]:
+    def _moved(
+        self, case: str, name: str, before: list[float], now: list[float]
+    ) -> Iterator[Moved]:
         """The value that moved most, if it moved too far."""
         by, k = max((abs(a - b), k) for k, (a, b) in enumerate(zip(before, now, strict=True)))
         if by > self._tolerance:
             what, hz = f"{name}, {_STATISTICS[k]}", now[k] - before[k]
-            yield Move(case, what, f"{before[k]:.8g} Hz", f"{now[k]:.8g} Hz", hz)
+            yield Moved(case, what, f"{before[k]:.8g} Hz", f"{now[k]:.8g} Hz", hz)
 
     def table(self) -> Table:
-        """What moved, and below it how much was compared.
+        """The differences, and below them how much was compared.
 
         Raises UsageError where nothing was: the earlier result is of other cases then.
         """
         if not self._compared and not self.moves:
-            some = ", ".join([*self._before][:_SHOWN])
+            some = ", ".join([*self._before][:5])
             raise UsageError(f"{self._path}: has none of these frequencies; its cases are {some}")
         columns = ("case", "what", "before", "now", "moved by")
         rows = [
@@ -98,37 +112,21 @@ class Comparison:
         caption = f"Frequencies compared: {self._compared}, new ones: {self._new}; "
         caption += f"tolerance {self._tolerance:g} Hz."
         if gone := [case for case in self._before if case not in self._seen]:
-            some = ", ".join(gone[:_SHOWN]) + (", …" if len(gone) > _SHOWN else "")
+            some = ", ".join(gone[:5]) + (", …" if len(gone) > 5 else "")
             caption += f" Cases that are not here any more: {len(gone)} ({some})."
         word = "Moved" if rows else "Nothing moved"
         return Table(f"{word} since {self._path}", columns if rows else (), tuple(rows), caption)
 
 
-def _ended(before: Known, now: Known) -> Iterator[Move]:
-    if before.ended and now.ended and before.ended != now.ended:
-        yield Move(now.case, "verdict", before.ended, now.ended)
-
-
-# --- What results say
-
-
-def of_outcome(row: CaseOutcome) -> Known:
-    """What the row of a batch says of its answer."""
-    return Known(row.name, tuple(row.frequencies), row.verdict or row.status)
-
-
-def of_validation(case: str, rows: Iterable[ValidationRow]) -> Known:
-    """What a validation says of the exact frequencies where it looked."""
-    found = [(_place(r.mode, r.where), r.lowest_hz, r.mean_hz, r.highest_hz) for r in rows]
-    return Known(case, tuple(found))
+# --- Reading it
 
 
 def _place(mode: int, where: str) -> str:
     return f"mode {mode}, {where}"
 
 
-def read_previous(path: Path, kind: Kind) -> list[Known]:
-    """What is known of each case in a file or folder; raises UsageError where nothing is."""
+def _read(path: Path, kind: Kind) -> list[Known]:
+    """All cases that a file or folder tells of; raises UsageError where it tells of none."""
     found: list[Known] = []
     files = [path]
     if path.is_dir():
@@ -155,7 +153,7 @@ def _known(document: Any, kind: Kind) -> Iterator[Known]:
             yield from _validations(document)
     elif "cases" in document:
         if kind == "answers":
-            yield from (of_outcome(from_plain(row)) for row in document["cases"])
+            yield from (Known.of_outcome(from_plain(row)) for row in document["cases"])
     else:
         yield _run(document, kind)
 
@@ -170,13 +168,13 @@ def _validations(rows: list[Any]) -> Iterator[Known]:
 
 
 def _run(document: Any, kind: Kind) -> Known:
-    """Of an answer the exact frequencies, of a validation those of modes at the initial design."""
+    """Exact frequencies of an answer; for a validation those of modes at the initial design."""
     case, targets = document["case"]["name"], document["targets"]
     if kind == "answers":
-        curves = [
-            (_curve(t), t["kind"], t.get("trajectory"), t["frequencies"]["exact_hz"])
-            for t in targets
-        ]
+        curves = []
+        for t in targets:
+            name = t["followed"]["name"] if t.get("followed") else f"mode {t['mode']}"
+            curves.append((name, t["kind"], t.get("trajectory"), t["frequencies"]["exact_hz"]))
         return Known(case, ranges(curves), (document["assignment"] or {}).get("verdict", ""))
     samples = {row["name"]: row["samples"] for row in document["trajectories"]}
     found: dict[str, Range] = {}
@@ -188,8 +186,3 @@ def _run(document: Any, kind: Kind) -> Known:
             place = _place(target["mode"], where)
             found[place] = ranges([(place, "frequency", None, hz)])[0]
     return Known(case, tuple(found.values()))
-
-
-def _curve(target: Any) -> str:
-    followed = target.get("followed")
-    return f"mode {target['mode']}" if followed is None else str(followed["name"])

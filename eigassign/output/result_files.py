@@ -35,7 +35,7 @@ from eigassign.study.updating.fit import UpdateResults
 
 # --- results.json
 
-SCHEMA = 1
+SCHEMA = 1  # of results.json: raised when a field goes or means something else
 _NESTED = (Mapping, list, tuple, str, np.ndarray)
 
 

@@ -44,7 +44,7 @@ def animate(
             moving = motion.swinging(
                 drawing.draw_modes(case.file, case.model(), *at, mode), mode - 1
             )
-    data = motion.encode(moving, kind)
+    data = motion.encode_animation(moving, kind)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         replace_synced(path, data)

@@ -37,7 +37,7 @@ __all__, __getattr__, __dir__ = face(
         "design.judgement": "crossing_warnings verdict",
         "design.optimum": "Found Task find_optimum variant_of",
         "design.response": ("DesignResponse ReducedModels reduced_models response_of"),
-        "drawing": "AMPLITUDE draw_modes draw_poses rest_pose spread_samples",
+        "drawing": "AMPLITUDE draw_modes draw_poses moving_poses rest_pose spread_samples",
         "meaning.overall": "Studies study_meaning",
         "meaning.reach": "proved_ranges unreachable",
         "meaning.tolerance": "reduced_ranges study_tolerance",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,6 @@ from PIL import Image
 
 import eigassign as ea
 from eigassign.cli import main
-from eigassign.output.exchange import numpy_reader
 
 PICK = TWO_LINK.with_name("pick_and_place.yaml")
 Captured = pytest.CaptureFixture[str]
@@ -64,12 +64,13 @@ def test_a_reduced_model_is_exported_as_accurate_as_asked_for(capsys: Captured) 
     assert told["files"] == ["arm.npz", "arm_frequencies.py"]
     assert told["modes"] == [1, 2]
     assert told["error_estimate"] <= 1e-8
-    model = numpy_reader.read("arm.npz")
+    reader = runpy.run_path("arm_frequencies.py")
+    model = reader["read"]("arm.npz")
     case = ea.load_case(TWO_LINK)
     for q in case.trajectory.q[::30]:
         for y in ([0.0, 0.25], [0.25, 0.0], [0.1, 0.2]):
             exact = case.model().frequencies(q, y, 2)[0]
-            np.testing.assert_allclose(numpy_reader.frequencies(model, q, y), exact, rtol=1e-8)
+            np.testing.assert_allclose(reader["frequencies"](model, q, y), exact, rtol=1e-8)
 
 
 def test_what_eigassign_reads_itself_is_exported_too(capsys: Captured) -> None:

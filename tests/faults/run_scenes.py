@@ -9,7 +9,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from eigassign.output import changes, read_record, run_folder
+from eigassign.errors import UsageError
+from eigassign.output import run_folder, run_status
 
 Write = Callable[[Path, Path, bool], int]  # a whole run of a case file at a target; force
 
@@ -89,9 +90,10 @@ class Scene:
         """Whether there is at the target what was there before, or a whole new run."""
         if (found := snapshot(self.target)) == self.before:
             return True
-        record = read_record(self.target)
-        kept = record and changes(self.target, record)
-        return bool(found and kept and not (kept.changed or kept.missing or kept.added))
+        status = None
+        with suppress(UsageError):  # no finished run
+            status = run_status(self.target)
+        return bool(found and status and status.intact and not status.changes.added)
 
     def lost(self) -> list[str]:
         """What the user has, and is nowhere to be found."""

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from run_scenes import CASE, TARGET, snapshot, write_a_few_files
 
-from eigassign.output import MARKER, Cache, key, run_status
+from eigassign.output import Cache, key, run_status
 
 WRITERS, KILLED = 16, 6
 KEY = key("shared")
@@ -71,7 +71,9 @@ def test_sixteen_runs_of_one_case_leave_one_whole_run(root: Path) -> None:
     assert not any(side_by_side(run))
     assert run_status(root / TARGET).intact
     pids = {
-        text.split()[-1] for name, text in (snapshot(root / TARGET) or {}).items() if name != MARKER
+        text.split()[-1]
+        for name, text in (snapshot(root / TARGET) or {}).items()
+        if name != "run.json"
     }
     assert len(pids) == 1
     write_a_few_files(root / CASE, root / TARGET, False)

@@ -43,7 +43,7 @@ def test_any_mechanism_survives_as_arrays(seed):
 def test_it_is_evaluated_where_there_is_no_mechanism(reduced, tmp_path):
     api.save_reduced(reduced, tmp_path / "arm.h5")
     code = (
-        "import sys; from eigassign.output.exchange.reduced_file import load_reduced\n"
+        "import sys; from eigassign.output import load_reduced\n"
         "f = load_reduced(sys.argv[1]).frequencies([1.817, 5.4], [0.1, 0.1])\n"
         "assert not any(m.startswith('eigassign.case') for m in sys.modules)\n"
         "print(float(f[0, 0]).hex())"

@@ -22,8 +22,15 @@ from eigassign.chart import (
     MeshRow,
     Timing,
 )
-from eigassign.output import Table, chart_figures, chart_tables, draw, write_chart
-from eigassign.output.figures import screen, style
+from eigassign.output import (
+    Table,
+    chart_figures,
+    chart_tables,
+    draw,
+    screen_figures,
+    screen_table,
+    write_chart,
+)
 
 
 def timing(seconds: float, repeats: int = 5) -> Timing:
@@ -177,8 +184,7 @@ def test_a_time_measured_once_says_so() -> None:
 def test_what_auto_takes_is_ringed() -> None:
     plan = chart_figures(CHART)[0]
     bare = chart_figures(replace(CHART, advice=()))[0]
-    with style.applied():
-        ringed, plain = draw(plan), draw(bare)
+    ringed, plain = draw(plan), draw(bare)
     (ring,) = [line for line in ringed.axes[0].get_lines() if line.get_markersize() == 12.0]
     np.testing.assert_allclose(ring.get_xydata(), [(CHART.points[2].total_s(152.0), 0.1)])
     assert "taken by order: auto" in words(ringed)
@@ -190,8 +196,7 @@ def words(figure: Figure) -> list[str]:
 
 
 def test_points_are_drawn_by_kind_and_the_front_as_steps_through_the_best() -> None:
-    with style.applied():
-        figure = draw(chart_figures(CHART)[1])
+    figure = draw(chart_figures(CHART)[1])
     (axes,) = figure.axes
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("time [s]", "worst error [Hz]")
@@ -223,9 +228,9 @@ def test_every_family_of_methods_has_its_kind_and_a_legend_eight_at_most() -> No
     assert len(labels) == len(set(labels)) <= 8
     looks = {curve.look for curve in shown.panels[0].curves if curve.names}
     assert len(looks) == 7
-    (figure,) = screen.figures(shown)
+    (figure,) = screen_figures(shown)
     assert {name for trace in figure["data"] for name in trace.get("text", ())} == {
         f"m {family}" for family in families
     }
-    _, rows = screen.table(shown)
+    _, rows = screen_table(shown)
     assert next(row[0] for row in rows).startswith("m ")

@@ -13,14 +13,10 @@ from eigassign.output import (
     Table,
     batch_table,
     modes_table,
-    number,
-    percent,
     print_assignment,
     print_tables,
     print_verdict,
     progress,
-    residual,
-    seconds,
     validation_table,
     wrapped,
 )
@@ -191,22 +187,3 @@ def test_progress_counts_in_lines_off_terminal_and_in_place_on_one():
     assert read(log) == "cases 1/2 arm\ncases 2/2 leg\n"
     assert "\n" not in terminal.getvalue()
     assert terminal.getvalue().endswith("\r\x1b[2K")
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        (percent(0.0155), "1.55 %"),
-        (percent(0.0), "0.00 %"),
-        (percent(1.0), "100 %"),
-        (percent(float("inf")), "n/a"),
-        (percent(1.1e-11), "1.10e-09 %"),
-        (number(0.22871234), "0.228712"),
-        (number(-0.0), "0"),
-        (seconds(0.0123), "12.3 ms"),
-        (seconds(4.5678), "4.57 s"),
-        (residual(3.14e-17), "3.1e-17"),
-    ],
-)
-def test_numbers_are_written_as_people_read_them(text, expected):
-    assert text == expected

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import io
 import itertools
+import unicodedata
 import xml.etree.ElementTree as ET
 
 import matplotlib
@@ -14,8 +15,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 from synthetic_results import as_limit, make_results, studied
 
-from eigassign.output import draw, render, run_figures
-from eigassign.output.figures import graph, style
+from eigassign.output import Curve, FigurePlan, Graph, Look, Panel, draw, render, run_figures
 from eigassign.study import OtherModes, RunResults
 
 LONG = "ein_sehr_langer_Name_für_$x_1^2$_中_\x1b[31m_"
@@ -25,13 +25,14 @@ EVERY = {
     "two samples": {"n_t": 2},
     "one parameter": {"n_y": 1, "n_q": 1},
     "many of all": {"n_q": 12, "n_y": 50, "n_links": 12, "n_targets": 3},
-    "long names": {"prefix": LONG, "title": "<script>" * 30},
+    "long names in space": {"prefix": LONG, "title": "<script>" * 30, "spatial": True},
     "huge": {"scale_hz": 1e12, "scale_m": 1e9},
     "tiny": {"scale_hz": 1e-12, "scale_m": 1e-9},
     "nothing varies": {"varies": False},
     "spatial": {"spatial": True},
 }
-BY_DEFAULT = ("one sample", "long names", "spatial")  # of these figures; all of them: a minute
+BY_DEFAULT = "long names in space"  # of these figures; all of them: a minute
+VERMILLION = "#D55E00"
 
 
 @pytest.fixture(scope="module")
@@ -39,53 +40,48 @@ def paper() -> RunResults:
     return make_results()
 
 
-@pytest.fixture(scope="module")
-def files(paper: RunResults) -> dict[str, bytes]:
-    return render(run_figures(paper))
+def plans_of(results: RunResults, *names: str) -> list[FigurePlan]:
+    found = {plan.name: plan for plan in run_figures(results)}
+    return [found[name] for name in names]
 
 
-def drawn(results: RunResults) -> dict[str, Figure]:
-    with style.applied():
-        return {plan.name: draw(plan) for plan in run_figures(results)}
-
-
-def title(figure: Figure) -> str:
-    return figure.get_suptitle()
+def drawn(results: RunResults, name: str) -> Figure:
+    return draw(*plans_of(results, name))
 
 
 def legend(figure: Figure) -> list[str]:
-    owners = [figure, *figure.axes]
-    keys = [each.get_legend() if each is not figure else None for each in owners]
-    return [text.get_text() for key in [*figure.legends, *keys] if key for text in key.get_texts()]
+    keys = [*figure.legends, *(axes.get_legend() for axes in figure.axes)]
+    return [text.get_text() for key in keys if key for text in key.get_texts()]
 
 
 def pixels(data: bytes) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(float)
 
 
-def test_the_paper_s_case_has_all_of_its_figures(files):
-    assert list(files) == [
-        "frequencies.png",
-        "mechanism.png",
-        "assignment_mode_1.png",
-        "other_modes.png",
-        "progress.png",
-        "approximation_mode_1_time.png",
-        "approximation_mode_1_q.png",
-        "approximation_mode_1_design.png",
-        "coordinates.png",
+def with_limits(results: RunResults, *limits) -> RunResults:
+    (target,) = results.targets
+    return dataclasses.replace(results, targets=tuple(as_limit(target, *each) for each in limits))
+
+
+def test_the_paper_s_case_has_all_of_its_figures(paper):
+    assert [plan.name for plan in run_figures(paper)] == [
+        "frequencies",
+        "mechanism",
+        "assignment_mode_1",
+        "other_modes",
+        "progress",
+        "approximation_mode_1_time",
+        "approximation_mode_1_q",
+        "approximation_mode_1_design",
+        "coordinates",
     ]
 
 
 @pytest.mark.parametrize(
-    "options",
-    [
-        pytest.param(EVERY[name], id=name, marks=[] if name in BY_DEFAULT else pytest.mark.slow)
-        for name in EVERY
-    ],
+    "name", [n if n == BY_DEFAULT else pytest.param(n, marks=pytest.mark.slow) for n in EVERY]
 )
-def test_every_kind_of_results_gives_figures_with_nothing_over_their_edge(options):
-    files = render(run_figures(studied(make_results(**options))))
+def test_every_kind_of_results_gives_figures_with_nothing_over_their_edge(name):
+    files = render(run_figures(studied(make_results(**EVERY[name]))))
     assert len(files) >= 11
     for name, data in files.items():
         image = pixels(data)
@@ -98,15 +94,12 @@ def test_every_kind_of_results_gives_figures_with_nothing_over_their_edge(option
 
 
 def test_the_assignment_shows_target_frequencies_and_distances(paper):
-    figure, target = drawn(paper)["assignment_mode_1"], paper.targets[0]
-    assert title(figure) == "Mode 1: assigned frequency"
+    figure, target = drawn(paper, "assignment_mode_1"), paper.targets[0]
+    assert figure.get_suptitle() == "Mode 1: assigned frequency"
     above, below = figure.axes
-    shown = [line.get_ydata() for line in above.get_lines()]
     curves = (target.initial_hz, target.exact_hz, target.predicted_hz, target.one_shot_hz)
-    wanted = (target.target_hz, *curves)
-    for line, hz in zip(shown, wanted, strict=True):
-        np.testing.assert_array_equal(line, hz)
-    np.testing.assert_array_equal(above.get_lines()[0].get_xdata(), paper.time_s)
+    for line, hz in zip(above.get_lines(), (target.target_hz, *curves), strict=True):
+        np.testing.assert_array_equal(line.get_xydata(), np.column_stack([paper.time_s, hz]))
     off = below.get_lines()[2].get_ydata()
     np.testing.assert_allclose(off, 100.0 * (target.exact_hz / target.target_hz - 1.0))
     assert (above.get_ylabel(), below.get_ylabel()) == ("frequency [Hz]", "off target [%]")
@@ -121,60 +114,67 @@ def test_the_assignment_shows_target_frequencies_and_distances(paper):
 
 
 def test_a_limit_is_drawn_with_what_it_forbids_and_equal_names_are_numbered(paper):
-    (target,) = paper.targets
-    endless = np.full(target.lower_hz.size, np.inf)
-    limits = (
-        as_limit(target, "at_least", target.lower_hz, endless),
-        as_limit(target, "at_most", -endless, target.upper_hz),
-        as_limit(target, "keep_out", target.lower_hz, 1.02 * target.lower_hz),
-        as_limit(target, "keep_out", 0.9 * target.lower_hz, 0.95 * target.lower_hz),
-        as_limit(target, "gap", target.lower_hz, endless),
+    lower, upper = paper.targets[0].lower_hz, paper.targets[0].upper_hz
+    endless = np.full(lower.size, np.inf)
+    found = with_limits(
+        paper,
+        ("at_least", lower, endless),
+        ("at_most", -endless, upper),
+        ("keep_out", lower, 1.02 * lower),
+        ("keep_out", 0.9 * lower, 0.95 * lower),
+        ("gap", lower, endless),
     )
-    found = drawn(dataclasses.replace(paper, targets=limits))
-    names = [f"{t.kind}_mode_1" for t in limits]
+    names = [f"{t.kind}_mode_1" for t in found.targets]
     names[3] += "_2"
-    assert [name for name in found if name in names] == names
-    for name, limit in zip(names, limits, strict=True):
-        (axes,) = found[name].axes
-        (shade,) = axes.collections
+    assert [plan.name for plan in run_figures(found) if plan.name in names] == names
+    for name, limit in zip(names, found.targets, strict=True):
+        figure = drawn(found, name)
+        (shade,) = figure.axes[0].collections
         heights = shade.get_paths()[0].get_extents()
-        edges = [hz[0] for hz in (limit.lower_hz, limit.upper_hz) if np.isfinite(hz).all()]
-        for edge in edges:
+        for edge in (hz[0] for hz in (limit.lower_hz, limit.upper_hz) if np.isfinite(hz).all()):
             assert min(abs(edge - heights.y0), abs(edge - heights.y1)) < 1e-9
-        assert legend(found[name])[0] == "forbidden"
+        assert legend(figure)[0] == "forbidden"
+
+
+def test_limits_are_strips_on_their_wrong_side_so_that_other_modes_stay_legible(paper):
+    lower = paper.targets[0].lower_hz
+    endless = np.full(lower.size, np.inf)
+    found = with_limits(paper, ("at_least", lower, endless), ("at_most", -endless, lower))
+    axes = drawn(found, "frequencies").axes[0]
+    below, above = (shade.get_paths()[0].get_extents() for shade in axes.collections)
+    assert below.y1 == pytest.approx(lower[0])
+    assert above.y0 == pytest.approx(lower[0])
+    low, high = axes.get_ylim()
+    assert max(below.height, above.height) < 0.06 * (high - low)
 
 
 def test_the_progress_shows_every_step_and_the_one_shot(paper):
-    (axes,) = drawn(paper)["progress"].axes
-    assert legend(drawn(paper)["progress"]) == ["initial", "taken", "given up", "one shot"]
-    steps = paper.assignment.steps
-    taken = [100.0 * np.sqrt(step.objective) for step in steps if step.taken]
-    shown = next(line for line in axes.get_lines() if line.get_label() == "taken")
+    figure = drawn(paper, "progress")
+    assert legend(figure) == ["initial", "taken", "given up", "one shot"]
+    taken = [100.0 * np.sqrt(step.objective) for step in paper.assignment.steps if step.taken]
+    shown = next(line for line in figure.axes[0].get_lines() if line.get_label() == "taken")
     np.testing.assert_allclose(shown.get_ydata(), taken)
-    limit = as_limit(paper.targets[0], "at_least", paper.targets[0].lower_hz, np.full(152, np.inf))
-    axes, below = drawn(dataclasses.replace(paper, targets=(limit,)))["progress"].axes
+    found = with_limits(paper, ("at_least", paper.targets[0].lower_hz, np.full(152, np.inf)))
+    axes, below = drawn(found, "progress").axes
     assert axes.get_ylabel() == "objective"
     assert below.get_ylabel() == "limits missed [%]"  # by the initial design
 
 
 def test_steps_that_miss_limits_say_by_how_much(paper):
-    steps = [dataclasses.replace(s, violation=v) for s, v in zip(
-        paper.assignment.steps, (0.03, 0.001, 0.0), strict=True)]  # fmt: skip
-    row = dataclasses.replace(paper.assignment, steps=tuple(steps))
-    above, below = drawn(dataclasses.replace(paper, assignment=row))["progress"].axes
+    pairs = zip(paper.assignment.steps, (0.03, 0.001, 0.0), strict=True)
+    steps = tuple(dataclasses.replace(step, violation=missed) for step, missed in pairs)
+    row = dataclasses.replace(paper.assignment, steps=steps)
+    above, below = drawn(dataclasses.replace(paper, assignment=row), "progress").axes
     assert below.get_ylabel() == "limits missed [%]"
-    _, taken = below.get_lines()[:2]
-    assert taken.get_ydata()[0] == pytest.approx(3.0)
+    assert below.get_lines()[1].get_ydata()[0] == pytest.approx(3.0)
     assert above.get_ylabel() == "rms error [%]"
 
 
 def test_a_band_is_drawn_with_all_modes_near_it(paper):
-    (target,) = paper.targets
     near = OtherModes((2, 3), np.full((152, 2), [160.0, 230.0]), np.full((152, 2), [170.0, 240.0]))
-    band = as_limit(target, "keep_out", np.full(152, 180.0), np.full(152, 220.0))
-    figure = drawn(dataclasses.replace(paper, targets=(dataclasses.replace(band, near=near),)))[
-        "keep_out_mode_1"
-    ]
+    found = with_limits(paper, ("keep_out", np.full(152, 180.0), np.full(152, 220.0)))
+    band = dataclasses.replace(found.targets[0], near=near)
+    figure = drawn(dataclasses.replace(found, targets=(band,)), "keep_out_mode_1")
     (axes,) = figure.axes
     shown = {line.get_ydata()[0] for line in axes.get_lines()}
     assert shown == {180.0, 220.0, 160.0, 170.0, 230.0, 240.0}
@@ -182,27 +182,25 @@ def test_a_band_is_drawn_with_all_modes_near_it(paper):
     assert legend(figure) == ["forbidden", "initial design", "optimal design"]
 
 
-def test_sensitivities_are_bars_of_the_largest(paper):
+def test_sensitivities_are_bars_of_the_largest():
     results = studied(make_results(n_y=12, n_targets=2))
-    (axes,) = drawn(results)["sensitivity"].axes
+    figure = drawn(results, "sensitivity")
+    (axes,) = figure.axes
     names = [text.get_text() for text in axes.get_yticklabels()]
     assert len(names) == 10
     rows = [r for r in results.meaning.sensitivity if r.parameter in names]
     assert sorted(bar.get_width() for bar in axes.patches) == pytest.approx(
         sorted(r.percent_per_percent for r in rows)
     )
-    assert legend(drawn(results)["sensitivity"]) == ["mode 1 at 190 Hz", "mode 2 at 380 Hz"]
-    assert (
-        "10 largest of 12"
-        in next(p for p in run_figures(results) if p.name == "sensitivity").caption
-    )
+    assert legend(figure) == ["mode 1 at 190 Hz", "mode 2 at 380 Hz"]
+    (plan,) = plans_of(results, "sensitivity")
+    assert "10 largest of 12" in plan.caption
 
 
 def test_ranges_enclose_the_answer_along_each_trajectory():
     results = studied(make_results(parts=(100, 52)))
-    found = drawn(results)
-    assert {"range_1", "range_2"} <= set(found)
-    (axes,) = found["range_2"].axes
+    assert plans_of(results, "range_1")
+    (axes,) = drawn(results, "range_2").axes
     reach, spread = (shade.get_paths()[0].get_extents() for shade in axes.collections[:2])
     answer = results.targets[0].exact_hz[100:]
     assert reach.y0 == pytest.approx(results.meaning.reach[0].lowest_hz[100:].min())
@@ -212,7 +210,7 @@ def test_ranges_enclose_the_answer_along_each_trajectory():
 
 def test_error_falls_over_mass_to_the_answer(paper):
     results = studied(paper)
-    (axes,) = drawn(results)["trade_off"].axes
+    (axes,) = drawn(results, "trade_off").axes
     curve, end = axes.get_lines()[:2]
     points = results.meaning.trade_off.points
     np.testing.assert_allclose(curve.get_ydata(), [100.0 * p.error for p in points])
@@ -221,32 +219,33 @@ def test_error_falls_over_mass_to_the_answer(paper):
 
 
 def test_the_comparison_shows_both_expansions_and_their_errors(paper):
-    figure, study = drawn(paper)["approximation_mode_1_time"], paper.studies[0]
+    figure = drawn(paper, "approximation_mode_1_time")
     above, below = figure.axes
-    values = study.over_time
-    for line, hz in zip(
-        above.get_lines(), (values.exact_hz, values.taylor_hz, values.linearised_hz), strict=True
-    ):
+    values = paper.studies[0].over_time
+    curves = (values.exact_hz, values.taylor_hz, values.linearised_hz)
+    for line, hz in zip(above.get_lines(), curves, strict=True):
         np.testing.assert_array_equal(line.get_ydata(), hz)
     assert below.get_yscale() == "log"
-    bottom = below.get_ylim()[0]
-    off = np.maximum(100.0 * np.abs(values.taylor_error), bottom)
+    off = np.maximum(100.0 * np.abs(values.taylor_error), below.get_ylim()[0])
     np.testing.assert_array_equal(below.get_lines()[0].get_ydata(), off)
     assert legend(figure)[:2] == ["exact", "Taylor, order 4 (worst 0.0900 %)"]
 
 
-def test_the_coordinates_have_a_panel_for_each_unit():
-    found = make_results(n_q=5)
-    figure = drawn(found)["coordinates"]
+def test_the_coordinates_have_a_panel_for_each_unit_and_no_two_neighbours_are_alike():
+    found = make_results(n_q=12)
+    figure = drawn(found, "coordinates")
     angles, strokes = figure.axes
     assert (angles.get_ylabel(), strokes.get_ylabel()) == ("joint angle [rad]", "joint stroke [m]")
-    (stroke,) = strokes.get_lines()
-    np.testing.assert_array_equal(stroke.get_ydata(), found.q[:, 3])
-    assert sorted(legend(figure)) == ["q1", "q2", "q3", "q4", "q5"]
+    np.testing.assert_array_equal(strokes.get_lines()[0].get_ydata(), found.q[:, 3])
+    (plan,) = plans_of(found, "coordinates")
+    looks = {curve.label: curve.look for panel in plan.shows.panels for curve in panel.curves}
+    ordered = [looks[f"q{k + 1}"] for k in range(12)]
+    assert len(set(ordered)) == 12
+    assert all(first.dash != second.dash for first, second in itertools.pairwise(ordered))
 
 
 def test_next_modes_are_named_at_the_end_of_their_curves(paper):
-    (axes,) = drawn(paper)["other_modes"].axes
+    (axes,) = drawn(paper, "other_modes").axes
     assert [text.get_text() for text in axes.texts] == ["mode 2", "mode 3", "mode 4"]
     solid = [line for line in axes.get_lines() if line.get_linestyle() == "-"]
     for line, text, hz in zip(solid, axes.texts, paper.others.optimal_hz.T, strict=True):
@@ -255,7 +254,7 @@ def test_next_modes_are_named_at_the_end_of_their_curves(paper):
 
 
 def test_maps_stand_side_by_side_with_the_expansion_point(paper):
-    figure = drawn(paper)["approximation_mode_1_design"]
+    figure = drawn(paper, "approximation_mode_1_design")
     maps = [axes for axes in figure.axes if axes.get_title(loc="left")]
     assert [axes.get_title(loc="left").splitlines()[0] for axes in maps] == [
         "exact",
@@ -275,64 +274,59 @@ def test_maps_stand_side_by_side_with_the_expansion_point(paper):
 
 
 @pytest.mark.parametrize("spatial", [False, True])
-def test_the_mechanism_is_drawn_at_one_scale_in_all_directions(spatial):
+def test_the_mechanism_is_drawn_whole_at_one_scale_in_all_directions(spatial):
     found = make_results(spatial=spatial)
-    figure = drawn(found)["mechanism"]
+    figure = drawn(found, "mechanism")
     axes = figure.axes[0]
     assert axes.get_aspect() == 1.0
     box = axes.get_position()
     width, height = figure.get_size_inches() * (box.width, box.height)
-    x, y = np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())
-    assert width / x == pytest.approx(height / y)
+    low, high = np.transpose([axes.get_xlim(), axes.get_ylim()])
+    assert width / (high - low)[0] == pytest.approx(height / (high - low)[1])
     assert legend(figure)[:3] == ["tip path", "elbow_mass", "tool_mass"]
     assert len(legend(figure)) == 3 + len(found.poses.lines)
+    links = [c for c in axes.collections if hasattr(c, "get_segments")]
+    assert len(links) == len(found.poses.lines)
+    for points in (piece for pose in links for piece in pose.get_segments()):
+        assert ((points >= low) & (points <= high)).all()
     if not spatial:
-        tip = next(line for line in axes.get_lines() if line.get_color() == graph.VERMILLION)
+        tip = next(line for line in axes.get_lines() if line.get_color() == VERMILLION)
         np.testing.assert_array_equal(tip.get_xydata(), found.poses.tip_path)
 
 
-def test_several_formats_write_each_figure_in_each(paper):
-    plans = run_figures(paper)[:2]
-    files = render(plans, ("png", "svg", "pdf"))
-    assert list(files) == [
-        f"{name}.{kind}" for name in ("frequencies", "mechanism") for kind in style.FORMATS
-    ]
+# --- Files
+
+
+def test_figures_are_written_in_several_formats_the_same_every_time(paper):
+    plans, kinds = plans_of(paper, "mechanism", "other_modes"), ("png", "svg", "pdf")
+    files = render(plans, kinds)
+    assert list(files) == [f"{plan.name}.{kind}" for plan in plans for kind in kinds]
     assert files["mechanism.png"].startswith(b"\x89PNG")
     assert files["mechanism.pdf"].startswith(b"%PDF")
     assert ET.fromstring(files["mechanism.svg"]).tag.endswith("svg")
+    assert render(plans, kinds) == files
+    for word in (b"CreationDate", b"dc:date"):
+        assert not any(word in data for data in files.values())
     assert render(plans, ()) == {}
 
 
-@pytest.mark.parametrize("kind", style.FORMATS)
-def test_drawing_twice_gives_the_same_bytes(paper, kind):
-    plans = run_figures(paper)[::3]
-    files = render(plans, (kind,))
-    assert render(plans, (kind,)) == files
-    for word in (b"CreationDate", b"dc:date"):
-        assert not any(word in data for data in files.values())
-
-
-def test_the_user_s_matplotlib_settings_change_nothing(paper, files):
+def test_the_user_s_matplotlib_settings_change_nothing_and_are_left_alone(paper):
+    plans = plans_of(paper, "assignment_mode_1")
+    before, files = dict(matplotlib.rcParams), render(plans)
+    assert dict(matplotlib.rcParams) == before
     theirs = {"font.size": 30, "font.family": "monospace", "path.simplify": False}
     with matplotlib.rc_context({**theirs, "text.hinting": "force_autohint", "axes.grid": False}):
-        assert render(run_figures(paper)) == files
+        assert render(plans) == files
 
 
-def test_drawing_leaves_the_user_s_settings_alone(paper):
-    before = dict(matplotlib.rcParams)
-    render(run_figures(paper)[:1])
-    assert dict(matplotlib.rcParams) == before
-
-
-def test_another_answer_gives_another_picture(paper, files):
-    target = paper.targets[0]
-    moved = dataclasses.replace(target, exact_hz=target.exact_hz * 1.01)
-    other = dataclasses.replace(paper, targets=(moved,))
-    changed = render(run_figures(other))
-    assert [name for name in files if changed[name] != files[name]] == [
-        "frequencies.png",
-        "assignment_mode_1.png",
-    ]
+def test_another_answer_gives_another_picture(paper):
+    moved = dataclasses.replace(paper.targets[0], exact_hz=paper.targets[0].exact_hz * 1.01)
+    names = ("assignment_mode_1", "other_modes")
+    before, after = (
+        render(plans_of(results, *names))
+        for results in (paper, dataclasses.replace(paper, targets=(moved,)))
+    )
+    assert [name for name in before if before[name] != after[name]] == ["assignment_mode_1.png"]
 
 
 def test_results_without_a_trajectory_plan_only_what_they_have():
@@ -351,23 +345,48 @@ def test_an_expansion_that_fails_somewhere_is_still_drawn(paper):
     target = dataclasses.replace(paper.targets[0], predicted_hz=np.full(paper.time_s.size, np.nan))
     studies = (dataclasses.replace(study, over_design=over),)
     found = dataclasses.replace(paper, studies=studies, targets=(target,))
-    assert len(render(run_figures(found))) == 9
+    for name in ("assignment_mode_1", "approximation_mode_1_design"):
+        drawn(found, name).canvas.draw()
 
 
 def test_a_map_on_which_nothing_varies_is_filled_and_not_left_blank():
     found = make_results(varies=False)
-    plans = [p for p in run_figures(found) if p.name.endswith("_design")]
-    (image,) = map(pixels, render(plans).values())
+    (data,) = render(plans_of(found, "approximation_mode_1_design")).values()
+    image = pixels(data)
     middle = image[image.shape[0] // 2]
     assert (middle < 200).all(axis=1).mean() > 0.5
 
 
-SPANS = [(0.0, 1.0), (-3.0, 5.0), (190.0, 190.0), (0.0, 0.0), (123456.0, 123456.0001)]
+def test_numbers_beside_maps_never_run_into_each_other(paper):
+    study = paper.studies[0]
+    wide = dataclasses.replace(study.over_design, axes=(np.linspace(1.2e5, 1.8e5, 21),) * 2)
+    flat = dict.fromkeys(("exact_hz", "taylor_hz", "linearised_hz"), np.ones((21, 21)))
+    over = dataclasses.replace(wide, values=dataclasses.replace(wide.values, **flat))
+    found = dataclasses.replace(paper, studies=(dataclasses.replace(study, over_design=over),))
+    figure = drawn(found, "approximation_mode_1_design")
+    figure.canvas.draw()
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = axis.get_view_interval()
+            boxes = [
+                tick.label1.get_window_extent()
+                for tick in axis.get_major_ticks()
+                if low <= tick.get_loc() <= high and tick.label1.get_visible()
+            ]
+            boxes = [box for box in boxes if box.width > 1.0]
+            assert not any(a.overlaps(b) for a, b in itertools.pairwise(boxes))
 
 
-@pytest.mark.parametrize("span", SPANS)
-def test_bounds_enclose_all_values_and_are_never_one(span):
-    low, high = graph.bounds([np.array([np.nan, *span])])
+# --- What a panel holds
+
+PLAIN = Look("#000000")
+
+
+@pytest.mark.parametrize(
+    "span", [(0.0, 1.0), (-3.0, 5.0), (190.0, 190.0), (0.0, 0.0), (123456.0, 123456.0001)]
+)
+def test_an_ordinate_encloses_all_values_and_is_never_empty(span):
+    low, high = Panel("", (Curve(np.array([np.nan, *span]), PLAIN),)).limits
     assert low <= span[0] <= span[1] <= high
     assert high - low > 1e-6 * abs(high)
 
@@ -384,87 +403,42 @@ def test_bounds_enclose_all_values_and_are_never_one(span):
     ],
 )
 def test_decades_hold_all_values_or_the_highest(values, most, limits):
-    assert graph.decades([np.array(values)], most) == pytest.approx(limits, abs=0.0)
+    curve = Curve(np.array(values), PLAIN)
+    panel = Panel("", (curve,), logarithmic=True, decades=most)
+    assert panel.limits == pytest.approx(limits, abs=0.0)
 
 
 def test_the_lowest_label_of_a_logarithmic_axis_owns_up_to_what_it_cuts():
-    errors = graph.Curve(np.array([0.0, 0.02, 0.5]), graph.Look(graph.BLUE))
-    panel = graph.Panel("error", (errors,), logarithmic=True)
-    shown = graph.Graph("", "", np.arange(3.0), (panel,))
-    with style.applied():
-        (axes,) = draw(graph.FigurePlan("", "", "", "", shown)).axes
-    show = axes.yaxis.get_major_formatter()
+    panel = Panel("error", (Curve(np.array([0.0, 0.02, 0.5]), PLAIN),), logarithmic=True)
+    shown = Graph("", "", np.arange(3.0), (panel,))
+    (axes,) = draw(FigurePlan("", "", "", "", shown)).axes
     assert axes.get_ylim() == (0.01, 1.0)
-    assert [show(at) for at in (0.01, 0.1, 1.0)] == ["≤0.01", "0.1", "1"]
+    show = axes.yaxis.get_major_formatter()
+    labels = [show(at) for at in (0.01, 0.1, 1.0, 1e4, 1e5)]
+    assert labels == ["≤0.01", "0.1", "1", "10000", "10⁵"]
     np.testing.assert_array_equal(axes.get_lines()[0].get_ydata(), [0.01, 0.02, 0.5])
 
 
-def test_powers_of_ten_are_written_as_people_read_them():
-    assert [graph.power(at) for at in (1e-7, 1e-3, 1.0, 1e4, 1e5)] == [
-        "10⁻⁷",
-        "0.001",
-        "1",
-        "10000",
-        "10⁵",
-    ]
-
-
-def test_labels_at_curve_ends_are_moved_apart_and_no_further():
-    assert graph.spread([0.0, 1.0], 0.2) == [0.0, 1.0]
-    np.testing.assert_allclose(graph.spread([0.5, 0.5, 0.5], 0.2), [0.3, 0.5, 0.7])
-    np.testing.assert_allclose(graph.spread([0.0, 0.1, 0.25], 0.2), [-1 / 12, 7 / 60, 19 / 60])
-    assert graph.spread([], 0.2) == []
-
-
-def test_neighbouring_curves_never_differ_by_colour_alone():
-    looks = [graph.series(i) for i in range(12)]
-    assert len({str(look) for look in looks}) == 12
-    for first, second in itertools.pairwise(looks):
-        assert first.dash != second.dash
+@pytest.mark.parametrize(
+    ("ends", "places"),
+    [
+        ([0.0, 1.0], [0.0, 1.0]),
+        ([0.5, 0.5, 0.5], [0.3, 0.5, 0.7]),
+        ([0.0, 0.1, 0.25], [-1 / 12, 7 / 60, 19 / 60]),
+        ([], []),
+    ],
+)
+def test_labels_at_curve_ends_are_moved_apart_and_no_further(ends, places):
+    curves = tuple(Curve(np.array([end]), PLAIN, end="a") for end in ends)
+    scale = (Curve(np.array([0.0, 1.0]), PLAIN),)
+    panel = Panel("", (*curves, *scale), height=0.15 * 1.1 / 0.2)  # a label is 0.2 high then
+    np.testing.assert_allclose([at for _, at, _ in panel.ends()], places)
 
 
 def test_names_lose_their_control_characters_and_their_middle():
-    assert graph.short("a\x1b[31mb\n") == "a [31mb"
-    assert len(graph.short("x" * 500)) == 34
-    assert graph.short("begin" + "x" * 50 + "end").endswith("end")
-
-
-def test_numbers_beside_maps_never_run_into_each_other(paper):
-    study = paper.studies[0]
-    wide = dataclasses.replace(study.over_design, axes=(np.linspace(1.2e5, 1.8e5, 21),) * 2)
-    values = dataclasses.replace(
-        wide.values,
-        exact_hz=np.ones((21, 21)),
-        taylor_hz=np.ones((21, 21)),
-        linearised_hz=np.ones((21, 21)),
-    )
-    over = dataclasses.replace(wide, values=values)
-    found = dataclasses.replace(paper, studies=(dataclasses.replace(study, over_design=over),))
-    figure = drawn(found)["approximation_mode_1_design"]
-    figure.canvas.draw()
-    for axes in figure.axes:
-        for axis in (axes.xaxis, axes.yaxis):
-            low, high = axis.get_view_interval()
-            boxes = [
-                tick.label1.get_window_extent()
-                for tick in axis.get_major_ticks()
-                if low <= tick.get_loc() <= high and tick.label1.get_visible()
-            ]
-            boxes = [box for box in boxes if box.width > 1.0]
-            assert not any(a.overlaps(b) for a, b in itertools.pairwise(boxes))
-
-
-def test_limits_are_strips_on_their_wrong_side_so_that_other_modes_stay_legible(paper):
-    (target,) = paper.targets
-    endless = np.full(target.lower_hz.size, np.inf)
-    limits = (
-        as_limit(target, "at_least", target.lower_hz, endless),
-        as_limit(target, "at_most", -endless, target.lower_hz),
-    )
-    axes = drawn(dataclasses.replace(paper, targets=limits))["frequencies"].axes[0]
-    below, above = (shade.get_paths()[0].get_extents() for shade in axes.collections)
-    edge = target.lower_hz[0]
-    assert below.y1 == pytest.approx(edge)
-    assert above.y0 == pytest.approx(edge)
-    low, high = axes.get_ylim()
-    assert max(below.height, above.height) < 0.06 * (high - low)
+    found = make_results(prefix=LONG + "x" * 50)
+    names = legend(drawn(found, "coordinates"))
+    assert all(name.startswith("ein_sehr") and name[-2:] in ("q1", "q2") for name in names)
+    assert all(len(name) == 34 and "…" in name for name in names)
+    shown = legend(drawn(make_results(prefix="a\x1b[31mb\n"), "coordinates"))
+    assert not any(unicodedata.category(c)[0] == "C" for name in shown for c in name)

@@ -6,25 +6,25 @@ import io
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
 import eigassign as ea
-from eigassign.output.figures import motion
-from eigassign.study import drawing
+from eigassign.output import along_trajectory, encode_animation
+from eigassign.output import swinging as swinging_mode
+from eigassign.study import draw_modes, moving_poses
 
 CASES = Path(__file__).parents[2] / "cases"
 
 
 @pytest.fixture(scope="module")
-def swinging() -> motion.Animation:
+def swinging() -> Any:
     case = ea.load_case(CASES / "two_link.yaml")
-    pictures = drawing.draw_modes(
-        case.file, case.model(), np.array([1.8, 5.3]), case.initial_design, 1
-    )
-    return motion.swinging(pictures, 0)
+    pictures = draw_modes(case.file, case.model(), np.array([1.8, 5.3]), case.initial_design, 1)
+    return swinging_mode(pictures, 0)
 
 
 def frames(data: bytes) -> list[np.ndarray]:
@@ -33,7 +33,7 @@ def frames(data: bytes) -> list[np.ndarray]:
     return [np.asarray(frame.convert("RGB")).astype(int) for frame in ImageSequence.Iterator(image)]
 
 
-def test_a_mode_swings_through_rest_to_the_opposite_and_back(swinging: motion.Animation) -> None:
+def test_a_mode_swings_through_rest_to_the_opposite_and_back(swinging: Any) -> None:
     ends = [lines[-1][-1] for lines in swinging.moving.lines]  # the tip of the last link
     rest, n = swinging.still.lines[0][-1][-1], len(ends)
     np.testing.assert_allclose(ends[n // 4], rest, atol=1e-12)
@@ -43,14 +43,14 @@ def test_a_mode_swings_through_rest_to_the_opposite_and_back(swinging: motion.An
 
 
 @pytest.mark.parametrize("kind", ["gif", "png"])
-def test_every_frame_shows_its_pose(swinging: motion.Animation, kind: str) -> None:
+def test_every_frame_shows_its_pose(swinging: Any, kind: str) -> None:
     few = [0, 5, 11, 20]
     moving = replace(
         swinging.moving,
         lines=tuple(swinging.moving.lines[k] for k in few),
         time_s=np.zeros(4),
     )
-    data = motion.encode(replace(swinging, moving=moving, captions=("a", "b", "c", "d")), kind)
+    data = encode_animation(replace(swinging, moving=moving, captions=("a", "b", "c", "d")), kind)
     shown = frames(data)
     assert len(shown) == len(few)
     for one, other in pairwise(shown):
@@ -59,23 +59,23 @@ def test_every_frame_shows_its_pose(swinging: motion.Animation, kind: str) -> No
     assert all(np.abs(frame[0, 0] - white).max() <= 8 for frame in shown)
 
 
-def test_what_moved_leaves_no_trace(swinging: motion.Animation) -> None:
-    shown = frames(motion.encode(swinging, "png"))
+def test_what_moved_leaves_no_trace(swinging: Any) -> None:
+    shown = frames(encode_animation(swinging, "png"))
     assert np.abs(shown[3] - shown[-3]).max() <= 2  # equal poses but for round-off
     assert np.abs(shown[3] - shown[4]).max() > 100
 
 
-def test_the_same_animation_is_the_same_file(swinging: motion.Animation) -> None:
+def test_the_same_animation_is_the_same_file(swinging: Any) -> None:
     brief = replace(swinging, captions=("", ""))  # two frames
-    assert motion.encode(brief, "gif") == motion.encode(brief, "gif")
+    assert encode_animation(brief, "gif") == encode_animation(brief, "gif")
 
 
 def test_poses_along_the_trajectory_are_evenly_spread_in_time() -> None:
     case = ea.load_case(CASES / "arm_3r.yaml")  # in space
     path = case.trajectories[0]
-    poses = drawing.moving_poses(case.file, case.model(), path, case.initial_design)
-    made = motion.along_trajectory(case.file.title, poses)
-    assert len(made.captions) == len(poses.lines) <= drawing.FRAMES
+    poses = moving_poses(case.file, case.model(), path, case.initial_design)
+    made = along_trajectory(case.file.title, poses)
+    assert len(made.captions) == len(poses.lines) <= 75  # three seconds
     spacing = np.diff(poses.time_s)
     step = float(np.diff(path.trajectory.time_s).max())
     assert np.ptp(spacing) <= 2 * step + 1e-12

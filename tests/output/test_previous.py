@@ -12,13 +12,10 @@ from synthetic_results import make_results
 from eigassign.errors import UsageError
 from eigassign.output import (
     CaseOutcome,
-    Comparison,
+    EarlierResult,
     Known,
-    console,
     frequency_ranges,
-    of_outcome,
-    of_validation,
-    read_previous,
+    print_tables,
     to_json,
     to_line,
 )
@@ -36,7 +33,7 @@ def summary(path, *rows):
 
 
 def compared(path, now, tolerance_hz=0.01, kind="answers"):
-    found = Comparison(path, kind, tolerance_hz)
+    found = EarlierResult(path, kind, tolerance_hz)
     found.add(now)
     return found
 
@@ -47,33 +44,33 @@ def with_hz(*hz):
 
 def test_the_value_that_moved_most_is_named_and_small_moves_are_not(tmp_path):
     before = summary(tmp_path / "summary.json", ROW)
-    assert compared(before, of_outcome(with_hz(180.0, 190.009, 200.0))).moves == []
-    (move,) = compared(before, of_outcome(with_hz(180.0, 189.9, 199.5))).moves
+    assert compared(before, Known.of_outcome(with_hz(180.0, 190.009, 200.0))).moves == []
+    (move,) = compared(before, Known.of_outcome(with_hz(180.0, 189.9, 199.5))).moves
     assert str(move) == "mode 1, highest: was 200 Hz, is 199.5 Hz, moved by -0.5 Hz"
-    assert compared(before, of_outcome(with_hz(180.0, 189.9, 199.5)), 0.6).moves == []
+    assert compared(before, Known.of_outcome(with_hz(180.0, 189.9, 199.5)), 0.6).moves == []
 
 
 def test_a_case_that_ends_otherwise_has_moved(tmp_path):
     before = summary(tmp_path / "summary.json", ROW)
     failed = replace(ROW, status="error", verdict="", frequencies=())
-    (move,) = compared(before, of_outcome(failed)).moves
+    (move,) = compared(before, Known.of_outcome(failed)).moves
     assert str(move) == "verdict: was reached, is error"
 
 
 def test_new_cases_and_frequencies_are_counted_and_do_not_count_as_moved(tmp_path):
     before = summary(tmp_path / "summary.json", ROW)
     found = compared(before, Known("arm", (*ROW.frequencies, ("mode 2", 1.0, 1.0, 1.0))))
-    found.add(of_outcome(replace(ROW, name="leg")))
+    found.add(Known.of_outcome(replace(ROW, name="leg")))
     assert found.table().rows == ()
     assert found.table().caption.endswith("compared: 1, new ones: 2; tolerance 0.01 Hz.")
     text = io.StringIO()
-    console.print_tables([found.table()], stream=text)
+    print_tables([found.table()], stream=text)
     assert text.getvalue().startswith("Nothing moved since")
 
 
 def test_cases_that_are_gone_are_named_and_do_not_count_as_moved(tmp_path):
     rows = [replace(ROW, name=name) for name in ("arm", *"abcdef")]
-    found = compared(summary(tmp_path / "summary.json", *rows), of_outcome(ROW))
+    found = compared(summary(tmp_path / "summary.json", *rows), Known.of_outcome(ROW))
     assert found.moves == []
     assert "Cases that are not here any more: 6 (a, b, c, d, e, …)." in found.table().caption
 
@@ -105,11 +102,13 @@ def test_a_validation_compares_with_the_initial_design_of_a_run_and_with_its_own
     run.write_bytes(to_json(results))
     own.write_text(json.dumps([vars(row), {"case": "broken", "error": "CaseError"}]))
     for path in (run, own):
-        same = compared(path, of_validation(results.case_name, [row]), 1e-9, "validations")
+        same = compared(path, Known.of_validation(results.case_name, [row]), 1e-9, "validations")
         assert same.moves == []
         assert "compared: 1, new ones: 0" in same.table().caption
         off = [replace(row, highest_hz=row.highest_hz + 0.1)]
-        assert len(compared(path, of_validation(results.case_name, off), 0.05, "validations").moves)
+        assert len(
+            compared(path, Known.of_validation(results.case_name, off), 0.05, "validations").moves
+        )
 
 
 @pytest.mark.parametrize(
@@ -127,7 +126,7 @@ def test_a_validation_compares_with_the_initial_design_of_a_run_and_with_its_own
 def test_what_is_no_earlier_result_is_refused(tmp_path, text, said):
     (tmp_path / "x.json").write_text(text)
     with pytest.raises(UsageError, match=said):
-        read_previous(tmp_path / "x.json", "answers")
+        EarlierResult(tmp_path / "x.json", "answers", 0.01)
 
 
 def test_results_of_other_cases_are_refused(tmp_path):
@@ -138,6 +137,6 @@ def test_results_of_other_cases_are_refused(tmp_path):
 
 def test_a_folder_without_results_and_a_file_that_is_not_there_are_refused(tmp_path):
     with pytest.raises(UsageError, match="has no frequencies"):
-        read_previous(tmp_path, "answers")
+        EarlierResult(tmp_path, "answers", 0.01)
     with pytest.raises(UsageError, match="No such file"):
-        read_previous(tmp_path / "gone.json", "answers")
+        EarlierResult(tmp_path / "gone.json", "answers", 0.01)

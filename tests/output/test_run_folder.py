@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import stat
 import subprocess
@@ -13,10 +14,9 @@ from pathlib import Path
 import pytest
 
 from eigassign.errors import StorageError
-from eigassign.output import MARKER
-from eigassign.output.store import atomic as storage
-from eigassign.output.store import run_folder as module
-from eigassign.output.store.run_folder import run_folder
+from eigassign.output import run_folder
+
+MARKER = "run.json"
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def hidden(target: Path) -> list[str]:
 @pytest.fixture(params=["exchange", "two renames"])
 def any_system(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     if request.param == "two renames":
-        monkeypatch.setattr(storage, "exchange", lambda first, second: False)
+        monkeypatch.setattr(sys, "platform", "darwin")
 
 
 def test_a_first_run_appears_with_its_marker_and_leaves_nothing_hidden(target, case):
@@ -180,47 +180,42 @@ def test_a_full_disk_is_a_storage_error_and_leaves_the_earlier_run(target, case)
     assert hidden(target) == []
 
 
-@pytest.mark.parametrize("step", ["sync_tree", "put_in_place", "write_record"])
-def test_a_failure_while_publishing_leaves_the_earlier_run(target, case, step, monkeypatch):
+def failing(call: Callable[..., object], ours: Callable[..., bool]) -> Callable[..., object]:
+    """A function of the system that fails where it is called so by us."""
+
+    def attempt(*arguments: object) -> object:
+        if ours(*arguments):
+            raise OSError(errno.EIO, "input/output error")
+        return call(*arguments)
+
+    return attempt
+
+
+@pytest.mark.parametrize(
+    ("name", "ours"),
+    [
+        ("fsync", lambda descriptor: stat.S_ISREG(os.fstat(descriptor).st_mode)),
+        ("rename", lambda source, _: str(source).endswith(".tmp")),
+        ("walk", lambda *_: True),
+    ],
+)
+def test_a_failure_while_publishing_leaves_the_earlier_run(target, case, name, ours, monkeypatch):
     write(target, case, "one")
     (target / "notes.md").write_text("mine")
     before = snapshot(target)
-
-    def fail(*_args: object) -> None:
-        raise OSError(errno.EIO, "input/output error")
-
-    monkeypatch.setattr(module, step, fail)
-    with pytest.raises(StorageError, match="input/output error"):
-        write(target, case, "two")
+    with monkeypatch.context() as patch:
+        patch.setattr(os, name, failing(getattr(os, name), ours))
+        with pytest.raises(StorageError, match="input/output error"):
+            write(target, case, "two")
     assert snapshot(target) == before
     assert [p.name for p in target.parent.iterdir()] == ["arm"]
 
 
-def test_a_file_that_does_not_reach_the_disk_leaves_the_earlier_run(target, case, monkeypatch):
-    write(target, case, "one")
-
-    def fail(descriptor: int) -> None:
-        if stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(os, "fsync", fail)
-    with pytest.raises(StorageError, match="No space left"):
-        write(target, case, "two")
-    assert (target / "results.json").read_text() == "one"
-    assert hidden(target) == []
-
-
 def test_a_second_rename_that_fails_brings_the_earlier_run_back(target, case, monkeypatch):
     write(target, case, "one")
-    real = os.rename
-
-    def rename(source: Path, destination: Path) -> None:
-        if str(source).endswith(".new"):
-            raise OSError(errno.EIO, "input/output error")
-        real(source, destination)
-
-    monkeypatch.setattr(storage, "exchange", lambda first, second: False)
-    monkeypatch.setattr(os, "rename", rename)
+    monkeypatch.setattr(sys, "platform", "darwin")
+    ours = lambda source, _: str(source).endswith(".new")  # noqa: E731
+    monkeypatch.setattr(os, "rename", failing(os.rename, ours))
     with pytest.raises(StorageError):
         write(target, case, "two")
     assert (target / "results.json").read_text() == "one"
@@ -256,9 +251,10 @@ def test_the_folder_of_a_killed_run_is_removed_by_the_next_but_not_that_of_a_liv
     )
     for folder in (dead, other, alive):
         (folder / "figures").mkdir(parents=True)
-    with storage.lock(alive) as held:
-        assert held
-        write(target, case)
+    held = os.open(alive, os.O_RDONLY)
+    fcntl.flock(held, fcntl.LOCK_EX)
+    write(target, case)
+    os.close(held)
     assert hidden(target) == [alive.name]
 
 
@@ -286,7 +282,7 @@ def test_what_a_killed_swap_had_moved_away_comes_back(target, case):
 WRITER = """
 import sys
 from pathlib import Path
-from eigassign.output.store.run_folder import run_folder
+from eigassign.output import run_folder
 target, case, me = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3]
 for turn in range(20):
     with run_folder(target, case_path=case, case_sha256="a") as folder:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import io
+import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from synthetic_results import as_limit, make_results
 
-from eigassign.output import Table, headline, run_tables
+from eigassign.output import CaseOutcome, Table, batch_table, print_assignment, run_tables
 from eigassign.study import (
     CatalogueRow,
     ClearanceRow,
@@ -96,9 +99,9 @@ def test_the_headline_says_what_the_initial_design_violated_and_round_off_is_met
         limit.error, initial=ErrorRow(0.681, 0.5), exact=ErrorRow(6e-11, 1e-11), one_shot=None
     )
     both = replace(results, targets=(target, replace(limit, error=error)))
-    said = headline(both)
-    assert said is not None
-    assert said.endswith("Worst violation of a limit: 68.1 % before, 0.00 % after.")
+    said = io.StringIO()
+    print_assignment(both, stream=said)
+    assert "Worst violation of a limit: 68.1 % before, 0.00 % after.\n" in said.getvalue()
     found = table(both, "Limits and bands")
     assert found is not None
     assert found.rows[0][-2] == "met"
@@ -143,3 +146,31 @@ def test_values_of_a_catalogue_have_their_unit_and_names_stand_for_themselves() 
     assert design is not None
     at = design.columns.index("choice")
     assert [row[at] for row in design.rows[:2]] == ["", "light"]
+
+
+@pytest.mark.parametrize(
+    ("error", "text"),
+    [
+        (0.0155, "1.55 %"),
+        (0.0, "0.00 %"),
+        (1.0, "100 %"),
+        (math.inf, "n/a"),
+        (1.1e-11, "1.10e-09 %"),
+    ],
+)
+def test_errors_are_written_as_people_read_them(error: float, text: str) -> None:
+    row = CaseOutcome("arm", "arm.yaml", "ok", 1.0, exact_max_relative=error)
+    assert batch_table([row]).rows[0][3] == text
+
+
+def test_times_residuals_and_zeros_are_written_as_people_read_them() -> None:
+    results = replace(make_results(), timing_s={"model": 0.0123, "expansion": 4.5678})
+    results = replace(results, design=(replace(results.design[0], initial=-0.0), results.design[1]))
+    times, solver = table(results, "Timing"), table(results, "Solver")
+    design = table(results, "Design")
+    assert times is not None
+    assert solver is not None
+    assert design is not None
+    assert [row[1] for row in times.rows] == ["12.3 ms", "4.57 s"]
+    assert solver.rows[0][2] == "3.1e-17"
+    assert design.rows[0][3:5] == ("0", "228.7")

@@ -15,7 +15,7 @@ from rail_and_mast import HEIGHT, LAMP, OUT, alone, case, tree
 from scipy.optimize import brentq, minimize_scalar
 
 from eigassign.errors import CaseError, LostModeError
-from eigassign.output import frequencies_csv, results_document
+from eigassign.output import results_document, sample_files
 from eigassign.pipeline import Options, check, expand_case, optimize, solve_case, validate
 from eigassign.study import RunResults
 
@@ -83,7 +83,7 @@ def test_every_file_tells_followed_from_numbered_modes(found: RunResults) -> Non
     assert (rail["mode"], rail["modes"], numbered["mode"]) == (None, (), 2)
     assert rail["followed"]["name"] == "the mode like mode 1 (t = 0 s)"
     assert set(mast["followed"]["exact_modes"].tolist()) == {1, 2}
-    rows = list(csv.DictReader(io.StringIO(frequencies_csv(found).decode())))
+    rows = list(csv.DictReader(io.StringIO(sample_files(found)["frequencies.csv"].decode())))
     columns = {
         "the mode like mode 1 (t = 0 s)": found.targets[0],
         "the mode like mode 2 (t = 0 s)": found.targets[1],

@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.output import HEADER_BYTES, header, pack
+from eigassign.output import header, pack
+
+HEADER = 512  # bytes of a cache file before its HDF5
 
 Arrays = dict[str, NDArray[Any]]
 Damage = Callable[[Arrays, np.random.Generator], None]
@@ -93,6 +95,6 @@ def damaged(key: str, arrays: Mapping[str, NDArray[Any]], rng: np.random.Generat
         return pack(key, copies, {})
     data = bytearray(pack(key, copies, {}))
     for _ in range(rng.integers(1, 6)):
-        data[rng.integers(HEADER_BYTES, len(data))] = rng.integers(256)
-    data[:HEADER_BYTES] = header(key, memoryview(data)[HEADER_BYTES:])
+        data[rng.integers(HEADER, len(data))] = rng.integers(256)
+    data[:HEADER] = header(key, memoryview(data)[HEADER:])
     return bytes(data)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from functools import lru_cache
 from pathlib import Path
@@ -23,21 +23,21 @@ from eigassign.case.units import QuantityError, read_quantity
 from eigassign.output.batch.outcome import CaseOutcome
 from eigassign.output.batch.summary import cell
 
-FORMAT = 1
-ROWS = 8192  # held at a time, and in a chunk of the file
+FORMAT = 1  # of columns.h5
+ROWS = 8192  # held at a time, and in a chunk of the file: 64 kB of numbers
 _TEXTS = ("name", "status", "verdict", "message", "path")
 _NUMBERS = (
     "seconds", "initial_max_relative", "predicted_max_relative", "exact_max_relative",
 )  # fmt: skip
-_OF_RANGE = ("lowest_hz", "mean_hz", "highest_hz")
 
 
 class Columns:
-    """columns.h5, row by row."""
+    """columns.h5, row by row, of which ``rows`` are held at a time."""
 
-    def __init__(self, path: Path, total: int) -> None:
+    def __init__(self, path: Path, total: int, rows: int = ROWS) -> None:
         import h5py
 
+        self._most = rows
         self._file, self._total, self._start = h5py.File(path, "w", locking=False), total, 0
         self._rows: list[CaseOutcome] = []
         self._file.attrs.update({"format": FORMAT, "version": __version__, "cases": total})
@@ -45,7 +45,7 @@ class Columns:
     def add(self, row: CaseOutcome) -> None:
         """Keep it, and write what there is once it is enough."""
         self._rows.append(row)
-        if len(self._rows) == ROWS:
+        if len(self._rows) == self._most:
             self._flush()
 
     def end(self) -> None:
@@ -136,14 +136,9 @@ def quantity(value: float | str) -> float | None:
         return None
 
 
-def _design(row: CaseOutcome) -> Iterator[tuple[str, float]]:
-    for name, value in row.design:
-        yield _level(name), value
-
-
 def _ranges(row: CaseOutcome) -> Iterator[tuple[str, float]]:
     for name, *hz in row.frequencies:
-        for what, value in zip(_OF_RANGE, hz, strict=True):
+        for what, value in zip(("lowest_hz", "mean_hz", "highest_hz"), hz, strict=True):
             yield f"{_level(name)}/{what}", value
 
 
@@ -152,7 +147,11 @@ def _level(name: str) -> str:
     return name.replace("/", "|")
 
 
-_GROUPS = {"values": _values, "design": _design, "frequencies": _ranges}
+_GROUPS: dict[str, Callable[[CaseOutcome], Iterable[tuple[str, Any]]]] = {
+    "values": _values,
+    "design": lambda row: ((_level(name), value) for name, value in row.design),
+    "frequencies": _ranges,
+}
 
 
 def write_csv(columns: Path, file: TextIO) -> None:

@@ -27,7 +27,7 @@ NAMES = (*_ALWAYS, *_COLUMNS)
 
 
 def are_current(folder: Path, columns: bool, since: Path) -> bool:
-    """Whether all files are there and none is older than the file ``since``."""
+    """True where all files are there and none is older than the file ``since``."""
     try:
         made = [(folder / name).stat().st_mtime_ns for name in (NAMES if columns else _ALWAYS)]
         return min(made) >= since.stat().st_mtime_ns

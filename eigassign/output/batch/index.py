@@ -15,16 +15,19 @@ from eigassign.output.batch.outcome import CaseOutcome, from_line
 from eigassign.output.formats import number, percent, seconds
 from eigassign.output.pages import TEMPLATES, inside, page_of
 
-MOST = 10_000  # rows shown: more would keep a browser busy
 _STATUS = {"ok": "good", "tolerance": "fair", "failed": "bad", "error": "bad"}  # and its tone
 _TAIL = re.compile(r"(?:[^.]*[^.0-9][^.]*(?:\.[0-9]+)*\.)?[^.]*$")
 _ERRORS = {"worst before": "initial_max_relative", "worst after": "exact_max_relative"}
 
 
 class Index:
-    """The rows that the page shows; those that are not ok are the first to find a place."""
+    """The rows that the page shows; those that are not ok are the first to find a place.
 
-    def __init__(self) -> None:
+    At most ``most``: a browser takes a second to sort so many.
+    """
+
+    def __init__(self, most: int = 10_000) -> None:
+        self._most = most
         self._good: list[str] = []
         self._bad: list[str] = []
         self._counts = Counter[str]()
@@ -33,12 +36,12 @@ class Index:
         """Keep the line of a row while there is a place for it."""
         self._counts[status] += 1
         lines = self._good if status == "ok" else self._bad
-        if len(lines) < MOST:
+        if len(lines) < self._most:
             lines.append(line)
 
     def page(self, folder: Path, title: str, keys: Sequence[str] = ()) -> bytes:
         """The page of the batch in ``folder``; ``keys`` are those of its sweep."""
-        lines = [*self._bad, *self._good][:MOST]
+        lines = [*self._bad, *self._good][: self._most]
         rows = sorted(map(from_line, lines), key=lambda row: row.index)
         columns = _columns(rows, keys)
         data = {
@@ -63,31 +66,35 @@ Cell = tuple[str, float | None] | str  # as it is shown, and the number to sort 
 def _columns(
     rows: Sequence[CaseOutcome], keys: Sequence[str]
 ) -> list[tuple[str, Callable[[CaseOutcome], Cell]]]:
-    """What each column is called, and its cell in a row; columns without a cell are left out."""
+    """Name and cell of each column in a row; columns without a cell are left out."""
     designs = dict.fromkeys(name for row in rows for name, _ in row.design)
     found: list[tuple[str, Callable[[CaseOutcome], Cell]]] = [
         ("case", lambda row: row.name),
         *((n, lambda row, key=key: _value(row.values.get(key))) for n, key in _short(keys).items()),
         ("status", lambda row: row.status),
         ("verdict", lambda row: row.verdict.replace("_", " ")),
-        *((name, lambda row, of=of: _error(getattr(row, of))) for name, of in _ERRORS.items()),
+        *(
+            (name, lambda row, of=of: _cell(getattr(row, of), percent))
+            for name, of in _ERRORS.items()
+        ),
         ("message", lambda row: row.message),
-        *((name, lambda row, name=name: _optimum(dict(row.design).get(name))) for name in designs),
+        *((n, lambda row, n=n: _cell(dict(row.design).get(n), number)) for n in designs),
         ("time", lambda row: (seconds(row.seconds), row.seconds)),
     ]
     kept = ("case", "status")
-    return [(n, cell) for n, cell in found if n in kept or any(map(_is_there, map(cell, rows)))]
+    return [
+        (name, cell)
+        for name, cell in found
+        if name in kept
+        or any(shown if isinstance(shown, str) else shown[0] for shown in map(cell, rows))
+    ]
 
 
 def _short(keys: Sequence[str]) -> dict[str, str]:
-    """Each key by its last two names, and numbers between them, where that tells it from others."""
+    """Keys by their last two names, and numbers between them, where that tells them apart."""
     tails = {key: _TAIL.findall(key)[0] for key in keys}
     several = {tail for tail, n in Counter(tails.values()).items() if n > 1}
     return {key if tail in several else tail: key for key, tail in tails.items()}
-
-
-def _is_there(cell: Cell) -> bool:
-    return bool(cell if isinstance(cell, str) else cell[0])
 
 
 def _value(value: Any) -> Cell:
@@ -97,12 +104,8 @@ def _value(value: Any) -> Cell:
     return str(value) if amount is None else (str(value), amount)
 
 
-def _error(fraction: float | None) -> Cell:
-    return ("", None) if fraction is None else (percent(fraction), fraction)
-
-
-def _optimum(value: float | None) -> Cell:
-    return ("", None) if value is None else (number(value), value)
+def _cell(value: float | None, words: Callable[[float], str]) -> Cell:
+    return ("", None) if value is None else (words(value), value)
 
 
 def _links(row: CaseOutcome, folder: Path) -> list[str]:

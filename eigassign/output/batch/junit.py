@@ -13,7 +13,7 @@ from eigassign.output.store.atomic import replacing
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _PLAIN = re.compile(r"[\w .,:;/%=+()\[\]-]*", re.ASCII)
 _MARKUP = re.compile('[&<>"\t\n\r]')
-_HEADER = 320  # characters, of which the counts fill as many as they need at the end
+_HEADER = 320  # characters: its text, and twice four counts of up to 20 digits
 SUITE = "eigassign"
 _NONE: dict[str, float] = {"tests": 0, "failures": 0, "errors": 0, "time": 0.0}
 
@@ -58,7 +58,8 @@ class Junit:
     def end(self) -> None:
         """Close the suite, and write the counts at the beginning."""
         self._file.write("</testsuite></testsuites>\n")
-        counts = f'name="{SUITE}" ' + " ".join(f'{k}="{_count(v)}"' for k, v in self.totals.items())
+        told = {k: f"{v:.3f}" if k == "time" else v for k, v in self.totals.items()}
+        counts = f'name="{SUITE}" ' + " ".join(f'{k}="{v}"' for k, v in told.items())
         header = f'<?xml version="1.0" encoding="utf-8"?><testsuites {counts}><testsuite {counts} '
         self._file.seek(0)
         self._file.write((header + 'skipped="0"').ljust(_HEADER - 1) + ">")
@@ -77,10 +78,6 @@ def write_junit(path: Path, tests: Iterable[tuple[str, str, float, str, str]]) -
             suite.end()
     except OSError as error:
         raise StorageError(f"{path}: cannot be written: {error.strerror}") from error
-
-
-def _count(value: float) -> str:
-    return f"{value:.3f}" if isinstance(value, float) else str(value)
 
 
 def _escaped(text: str) -> str:

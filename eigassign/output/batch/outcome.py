@@ -45,7 +45,6 @@ class CaseOutcome:
 
 
 _STATUSES = get_args(Status)
-_SHOWN = 40  # characters of a damaged line
 _ORDER = (
     "index", "name", "key", "values", "status", "verdict", "message", "initial_max_relative",
     "predicted_max_relative", "exact_max_relative", "design", "frequencies", "seconds", "path",
@@ -55,16 +54,19 @@ _ORDER = (
 
 def to_line(outcome: CaseOutcome) -> str:
     """One line of JSON, ``index`` first; a number that is not finite is null."""
-    plain = {name: _finite(getattr(outcome, name)) for name in _ORDER}
+    plain = {name: getattr(outcome, name) for name in _ORDER}
+    for name, value in plain.items():
+        if isinstance(value, float) and not math.isfinite(value):
+            plain[name] = None
     return json.dumps(plain, allow_nan=False)
 
 
 def from_line(line: str | bytes) -> CaseOutcome:
-    """What `to_line` wrote, lists in the place of tuples; raises StorageError else."""
+    """The outcome that `to_line` wrote, with lists for tuples; raises StorageError else."""
     try:
         return from_plain(json.loads(line))
     except (ValueError, TypeError):
-        begin = line[:_SHOWN].decode(errors="replace") if isinstance(line, bytes) else line[:_SHOWN]
+        begin = line[:40].decode(errors="replace") if isinstance(line, bytes) else line[:40]
         message = f"manifest.jsonl has a damaged line, {begin}…: delete it and run the batch again"
         raise StorageError(message) from None
 
@@ -91,10 +93,6 @@ def from_plain(row: Any) -> CaseOutcome:
 def status_of(line: str) -> str:
     """The status in a line; quotes in what stands before it are escaped, so it is the first."""
     return line.partition('"status": "')[2].partition('"')[0]
-
-
-def _finite(value: object) -> object:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def frequency_ranges(results: RunResults) -> tuple[Range, ...]:

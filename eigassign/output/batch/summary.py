@@ -14,7 +14,7 @@ from eigassign.output.batch.outcome import CaseOutcome
 from eigassign.output.formats import percent
 from eigassign.output.tables import Table
 
-FORMAT = 1
+FORMAT = 1  # of summary.json
 COLUMNS = (
     "name", "status", "verdict", "seconds", "initial_max_relative", "predicted_max_relative",
     "exact_max_relative", "design", "message", "path", "run_folder",
@@ -58,7 +58,7 @@ class SummaryCsv:
 
 
 def cell(value: object) -> object:
-    """As a cell that stays on its line, and that no spreadsheet takes for a formula."""
+    """The value as a cell that stays on its line, and that no spreadsheet takes for a formula."""
     if value is None or isinstance(value, (bool, int, float)):
         return value
     text = value if isinstance(value, str) else json.dumps(value)

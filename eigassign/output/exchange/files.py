@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -41,12 +40,20 @@ def write_exchange(reduced: ReducedModel, path: Path, title: str = "") -> tuple[
     elif path.suffix == ".npz":
         reader = path.with_name(f"{name}_frequencies.py")
         text = (_HERE / "numpy_reader.py").read_text(encoding="utf-8")
-        data = _npz({**tape, "about": np.array(about), "format": np.array(FORMAT)})
+        stream: Any = io.BytesIO()
+        arrays: dict[str, Any] = {**tape, "about": np.array(about), "format": np.array(FORMAT)}
+        np.savez_compressed(stream, **arrays)
+        data = stream.getvalue()
     else:
         reader = path.with_name(f"{name}_frequencies.m")
         text = (_HERE / "reader.m").read_text(encoding="ascii").replace("@NAME@", reader.stem)
         text = text.replace("@FILE@", path.name).replace("@ABOUT@", about)
-        data = _mat({**tape, "about": about, "format": FORMAT})
+        from scipy.io import savemat
+
+        stream = io.BytesIO()
+        named = {**tape, "about": about, "format": FORMAT}
+        savemat(stream, named, do_compression=True, oned_as="row")
+        data = stream.getvalue()
     try:
         if reader.exists() and _OURS not in read_bytes(reader, CASE):
             raise StorageError(f"{reader} is in the way: it reads no reduced model")
@@ -58,7 +65,7 @@ def write_exchange(reduced: ReducedModel, path: Path, title: str = "") -> tuple[
 
 
 def _about(reduced: ReducedModel, title: str) -> str:
-    """What it is, as a comment in any language."""
+    """The model in a line that is a comment in any language."""
     points = len(reduced.points)
     text = (
         f"{title}: modes {', '.join(map(str, reduced.modes))}, {reduced.size} unknowns, {points} "
@@ -66,17 +73,3 @@ def _about(reduced: ReducedModel, title: str) -> str:
     )
     words = text.encode("ascii", "replace").decode().replace("*/", "* /").replace("\\", "/")
     return " ".join(words.split())
-
-
-def _npz(arrays: Mapping[str, Any]) -> bytes:
-    stream = io.BytesIO()
-    np.savez_compressed(stream, **arrays)
-    return stream.getvalue()
-
-
-def _mat(arrays: Mapping[str, Any]) -> bytes:
-    from scipy.io import savemat
-
-    stream: Any = io.BytesIO()
-    savemat(stream, dict(arrays), do_compression=True, oned_as="row")
-    return bytes(stream.getvalue())

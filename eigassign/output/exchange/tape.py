@@ -77,7 +77,11 @@ class _Tape:
         """Append a program, those that it calls before it; its number, 0 of the first."""
         number = len(self.functions)
         self.functions.append(([], [], []))
-        inner = {id(s.function): self._inner(s) for s in program.steps if s.function is not None}
+        inner = {}
+        for called in (step.function for step in program.steps if step.function is not None):
+            if not isinstance(called, ImplicitFunction):
+                raise UsageError(f"a {type(called).__name__} cannot be exported")
+            inner[id(called)] = self.function(called.program, called)
         begin, place = len(self.kinds), {}
         for atom, variable in zip(program.inputs, program.input_variables, strict=True):
             place[int(atom)] = int(variable)
@@ -92,11 +96,6 @@ class _Tape:
         about = [begin, len(self.kinds), program.n_variables, count, *sizes]
         self.functions[number] = (about, [place[int(a)] for a in program.outputs], known)
         return number
-
-    def _inner(self, step: Instruction) -> int:
-        if not isinstance(step.function, ImplicitFunction):
-            raise UsageError(f"a {type(step.function).__name__} cannot be exported")
-        return self.function(step.function.program, step.function)
 
     def _step(
         self, step: Instruction, place: dict[int, int], count: int, inner: dict[int, int]

@@ -142,16 +142,17 @@ def _draw_pose(drawing: Drawing, poses: DrawnPoses, pose: int) -> None:
     draw_joints(drawing, poses.joints, pose, BLUE, ("turning",))
 
 
-def thumbnail(pictures: ModePictures, mode: int = 0) -> Figure:
-    """A small picture of one mode, for a gallery."""
+def thumbnail(pictures: ModePictures) -> bytes:
+    """A small picture of the first mode, for a gallery; PNG."""
     width, height = 3.2, 2.1
-    figure = style.new_figure("", height, width, layout=None)
-    box = (0.16, 0.42, width - 0.32, height - 0.54)
-    _draw_shape(_held(pictures).drawing(figure, box, grain=0.75), pictures, mode)
-    text = f"mode {mode + 1}: {pictures.frequencies_hz[mode]:.4g} Hz"
-    place = (1.0 - 0.06 / width, 0.11 / height)
-    figure.text(*place, text, ha="right", va="center", size=style.SMALL_PT, color=GREY)
-    return figure
+    with style.applied():
+        figure = style.new_figure("", height, width, layout=None)
+        box = (0.16, 0.42, width - 0.32, height - 0.54)
+        _draw_shape(_held(pictures).drawing(figure, box, grain=0.75), pictures, 0)
+        text = f"mode 1: {pictures.frequencies_hz[0]:.4g} Hz"
+        place = (1.0 - 0.06 / width, 0.11 / height)
+        figure.text(*place, text, ha="right", va="center", size=style.SMALL_PT, color=GREY)
+        return style.encoded(figure, "png")
 
 
 # --- The mechanism by itself
@@ -243,7 +244,7 @@ def swinging(pictures: ModePictures, mode: int, frames: int = 32) -> Animation:
     return Animation(title, moving, rest, ("",) * frames)
 
 
-def encode(animation: Animation, kind: str) -> bytes:
+def encode_animation(animation: Animation, kind: str) -> bytes:
     """The animation as a file, ``kind`` gif or png, the same bytes every time.
 
     A frame is shown for 40 ms: GIF knows hundredths of a second, and browsers slow 10 ms down.

@@ -46,14 +46,19 @@ def render(
         return files
     with style.applied():
         for plan in plans:
-            figure = draw(plan)
+            figure = _drawn_plan(plan)
             for kind in formats:
                 files[f"{plan.name}.{kind}"] = style.encoded(figure, kind)
     return files
 
 
 def draw(plan: FigurePlan) -> Figure:
-    """One figure."""
+    """The figure of a plan, in `STYLE`."""
+    with style.applied():
+        return _drawn_plan(plan)
+
+
+def _drawn_plan(plan: FigurePlan) -> Figure:
     shown = plan.shows
     if isinstance(shown, Graph):
         return _graph(shown)

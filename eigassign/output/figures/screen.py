@@ -45,7 +45,7 @@ _NAMED = "%{text}<br>%{y:.3~g} at %{x:.3~g}<extra></extra>"
 _MARKERS = {"o": "circle", "s": "square", "D": "diamond", "^": "triangle-up", "p": "pentagon"}
 
 
-def figures(shown: Description) -> list[Json]:
+def screen_figures(shown: Description) -> list[Json]:
     """``data`` and ``layout`` of each figure that a description is on screen."""
     if isinstance(shown, Graph):
         return [_graph(shown)]
@@ -288,7 +288,7 @@ def _field(shown: Maps, field: Field) -> Json:
 # --- Tables
 
 
-def table(shown: Description) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def screen_table(shown: Description) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Columns, and some rows of what a description shows, as text."""
     if isinstance(shown, Graph):
         return _table_of_graph(shown)
@@ -350,7 +350,7 @@ def _some(count: int, most: int) -> list[int]:
 # --- A mode that moves
 
 
-def moving(modes: Sequence[MovingMode]) -> list[Json]:
+def moving_modes(modes: Sequence[MovingMode]) -> list[Json]:
     """Everything that the page draws: of each mode its lines, null between them, and marks."""
     return [
         {

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 def drawn(plan: FigurePlan) -> Figure:
     """The figure of a plan; a notebook shows it, though pyplot never hears of it."""
-    with applied():
-        figure = draw(plan)
+    figure = draw(plan)
 
     def png() -> bytes:
         with applied():

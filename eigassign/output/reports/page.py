@@ -17,11 +17,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eigassign._version import __version__
-from eigassign.output.figures import screen
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.motion import mode_figures
 from eigassign.output.figures.paper import render
 from eigassign.output.figures.run import run_figures
+from eigassign.output.figures.screen import moving_modes, screen_figures, screen_table
 from eigassign.output.pages import TEMPLATES, inside, page_of
 from eigassign.output.reports.verdict import verdict_of
 from eigassign.output.result_files import sample_files, to_json
@@ -71,7 +71,7 @@ def page(
     """
     name, content = document or ("", b"")
     run = f if isinstance(f, RunResults) else None
-    graphs = {p.name: screen.figures(p.shows) for p in plans if full and not callable(p.shows)}
+    graphs = {p.name: screen_figures(p.shows) for p in plans if full and not callable(p.shows)}
     moving = run.moving if run is not None and full else ()
     several = run is not None and len(run.trajectories) > 1
     kept = full and len(content) <= 400_000
@@ -85,7 +85,7 @@ def page(
         figures=list(_shown(plans, graphs, files, 900_000)),
         first=first,
         moving=[(mode.name, mode.trajectory, several) for mode in moving],
-        moving_json=inside(screen.moving(moving)) if full else "",
+        moving_json=inside(moving_modes(moving)) if full else "",
         figures_json=inside(graphs) if full else "",
         document=content.decode().replace("<", "\\u003c") if kept else "",
         document_name=name,
@@ -113,7 +113,7 @@ def _shown(
     for plan in plans:
         if plan.name in graphs and not callable(plan.shows):
             heights = tuple(one["layout"]["height"] for one in graphs[plan.name])
-            columns, rows = screen.table(plan.shows)
+            columns, rows = screen_table(plan.shows)
             yield Shown(plan, heights, columns=columns, rows=rows)
             continue
         own = {Path(name).suffix: name for name in files if Path(name).stem == plan.name}

@@ -82,7 +82,6 @@ def replacing(path: Path) -> Iterator[Path]:
 # --- What is being written, and what killed writers left
 
 _HIDDEN = re.compile(r"\.(?P<name>.+)\.(?P<token>\d+-[0-9a-f]{8})(\.[a-z0-9]+)+", re.DOTALL)
-_LONG_DEAD_S = 7 * 86400.0  # where nothing can be locked, a writer this old is taken for dead
 
 
 @contextlib.contextmanager
@@ -101,7 +100,7 @@ def temporary(target: Path, make: Callable[[Path], None]) -> Iterator[Path]:
 
 
 def token_of(hidden: Path) -> str:
-    """What tells the names that one writer uses from all others."""
+    """The part of a hidden name that only its writer uses."""
     found = _HIDDEN.fullmatch(hidden.name)
     return found["token"] if found else ""
 
@@ -114,7 +113,7 @@ def remove(path: Path) -> None:
 
 
 def abandoned(folder: Path) -> Iterator[tuple[Path, Path]]:
-    """What dead writers left in ``folder``, locked while it is looked at, and its target."""
+    """Hidden names of dead writers in ``folder``, locked while looked at, each with its target."""
     with contextlib.suppress(OSError):
         names = [name for name in os.listdir(folder) if name.startswith(".")]
         for path, found in ((folder / name, _HIDDEN.fullmatch(name)) for name in sorted(names)):
@@ -135,8 +134,9 @@ def sweep_files(folder: Path, names: Callable[[str], bool]) -> int:
 
 
 def _is_long_dead(path: Path) -> bool:
+    """True after a week without a change: no run takes so long."""
     try:
-        return time.time() - path.lstat().st_mtime > _LONG_DEAD_S
+        return time.time() - path.lstat().st_mtime > 7 * 86400.0
     except OSError:
         return False
 
@@ -170,9 +170,7 @@ def lock(path: Path, wait: bool = False) -> Iterator[bool | None]:
 
 # --- Folders
 
-_RENAME_EXCHANGE = 2
-_AT_FDCWD = -100
-_ATTEMPTS = 20
+_ATTEMPTS = 20  # to get between other writers: of two that go on and on, one waits a few
 
 
 def put_in_place(new: Path, target: Path) -> None:
@@ -211,8 +209,8 @@ def exchange(first: Path, second: Path) -> bool:
     rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
     if rename is None:
         return False
-    paths = (_AT_FDCWD, os.fsencode(first), _AT_FDCWD, os.fsencode(second))
-    if rename(*paths, _RENAME_EXCHANGE) == 0:
+    here, swap = -100, 2  # AT_FDCWD and RENAME_EXCHANGE of <fcntl.h> and <linux/fs.h>
+    if rename(here, os.fsencode(first), here, os.fsencode(second), swap) == 0:
         return True
     code = ctypes.get_errno()
     if code in (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP, errno.EPERM):

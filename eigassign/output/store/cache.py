@@ -39,7 +39,7 @@ Array = NDArray[Any]
 Part = Array | np.generic | bool | int | float | complex | str | bytes | None | Sequence["Part"]
 
 SCHEMA = 1  # raise it when the layout of the file or the encoding of the key changes
-HEADER_BYTES = 512
+HEADER_BYTES = 512  # the least user block of HDF5
 MARKER = "complete"
 _NAME = re.compile(r"[A-Za-z0-9_]+\Z")
 _KINDS = {"b": (1,), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8), "f": (2, 4, 8), "c": (8, 16)}
@@ -84,16 +84,12 @@ def _content(part: object) -> tuple[bytes, bytes]:
         case bytes():
             return b"y", part
         case np.ndarray():
-            return b"a", _array_content(part)
+            _require_plain("a cache key", part)
+            little = part.astype(part.dtype.newbyteorder("<"), copy=False)
+            return b"a", _encode((little.dtype.str, part.shape)) + little.tobytes(order="C")
         case tuple() | list():
             return b"t", b"".join(map(_encode, part))
     raise UsageError(f"a cache key cannot be made from a {type(part).__name__}")
-
-
-def _array_content(array: Array) -> bytes:
-    _require_plain("a cache key", array)
-    little = array.astype(array.dtype.newbyteorder("<"), copy=False)
-    return _encode((little.dtype.str, array.shape)) + little.tobytes(order="C")
 
 
 def _require_plain(name: str, array: Array) -> None:
@@ -257,7 +253,7 @@ class Cache:
             self._warn(f"the cache cannot be written ({error}); going on without it")
 
     def entries(self) -> tuple[CacheEntry, ...]:
-        """Every file of the cache, oldest first, each read and checked; changes none of them."""
+        """Files of the cache, oldest first, each read and checked; none of them is changed."""
         found = [entry for path in self._files(f"*{_SUFFIX}") for entry in _read_entry(path)]
         return tuple(sorted(found, key=lambda entry: (entry.modified_s, entry.key)))
 

@@ -69,29 +69,20 @@ def run_folder(
     target = Path(os.path.realpath(target))
     run = RunOf(relative_path(case_path, target), case_sha256, dict(case_files))
     with _storage_errors(target):
-        _sweep(target.parent)
+        for hidden, dead in abandoned(target.parent):  # what killed runs left
+            if hidden.is_dir() or hidden.suffix != ".tmp":
+                _settle(hidden, dead)
         require_replaceable(target, run, force=force, case_path=case_path)
-        made = _make_parents(target.parent)
+        made = [path for path in (target.parent, *target.parent.parents) if not path.exists()]
+        target.parent.mkdir(parents=True, exist_ok=True)
         try:
             with temporary(target, Path.mkdir) as folder:
                 yield folder
                 _publish(folder, target, run, force=force)
         finally:
-            _remove_empty(made)
-
-
-def _make_parents(folder: Path) -> list[Path]:
-    """Create a folder with what is missing above it; the created ones, deepest first."""
-    missing = [path for path in (folder, *folder.parents) if not path.exists()]
-    folder.mkdir(parents=True, exist_ok=True)
-    return missing
-
-
-def _remove_empty(folders: list[Path]) -> None:
-    """Remove the folders that were made for a run that failed, if they are empty."""
-    for folder in folders:
-        with contextlib.suppress(OSError):
-            folder.rmdir()
+            for parent in made:  # of a run that failed they are empty
+                with contextlib.suppress(OSError):
+                    parent.rmdir()
 
 
 @contextlib.contextmanager
@@ -142,7 +133,8 @@ def _publish(folder: Path, target: Path, run: RunOf, *, force: bool) -> None:
     """Mark ``folder`` finished and exchange it with ``target``."""
     write_record(folder, run, token_of(folder))
     sync_tree(folder)
-    _require_still_ours(target, run, force=force)
+    if (reason := _objection(target, run)) and not force:
+        raise StorageError(f"{target} {reason}: it appeared during this run and was left alone")
     new = folder.with_suffix(".new")
     try:
         os.rename(folder, new)
@@ -152,12 +144,6 @@ def _publish(folder: Path, target: Path, run: RunOf, *, force: bool) -> None:
         with contextlib.ExitStack() as rest:  # whatever becomes of one of them
             for hidden in names_of(new):
                 rest.callback(_settle, hidden, target)
-
-
-def _require_still_ours(target: Path, run: RunOf, *, force: bool) -> None:
-    reason = _objection(target, run)
-    if reason and not force:
-        raise StorageError(f"{target} {reason}: it appeared during this run and was left alone")
 
 
 def _settle(hidden: Path, target: Path) -> None:
@@ -203,10 +189,3 @@ def _free_sibling(target: Path) -> Path:
     while os.path.lexists(target.with_name(f"{target.name}.{number}")):
         number += 1
     return target.with_name(f"{target.name}.{number}")
-
-
-def _sweep(folder: Path) -> None:
-    """Settle what killed runs left in ``folder``."""
-    for hidden, target in abandoned(folder):
-        if hidden.is_dir() or hidden.suffix != ".tmp":
-            _settle(hidden, target)

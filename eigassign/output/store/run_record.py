@@ -20,7 +20,7 @@ from eigassign.files import CASE, MATRIX, pieces, read_bytes
 from eigassign.output.store.atomic import write_synced
 
 MARKER = "run.json"
-_SCHEMA = 2
+_SCHEMA = 2  # of run.json: since 2 the files have hashes
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class RunOf:
 
 @dataclass(frozen=True)
 class FileMark:
-    """What a file was when its run wrote it."""
+    """Size and hash of a file as its run wrote it."""
 
     bytes: int
     sha256: str
@@ -73,12 +73,11 @@ class RunRecord:
 
 def write_record(folder: Path, run: RunOf, token: str) -> None:
     """Mark ``folder`` finished, with all that is in it."""
-    files = {name: _marked(folder / name) for name in sorted(_contents(folder))}
+    files = {name: _mark((folder / name).read_bytes()) for name in sorted(_contents(folder))}
     write_synced(folder / MARKER, RunRecord(run, __version__, token, files).encoded())
 
 
-def _marked(path: Path) -> FileMark:
-    data = path.read_bytes()
+def _mark(data: bytes) -> FileMark:
     return FileMark(len(data), hashlib.sha256(data).hexdigest())
 
 
@@ -113,7 +112,7 @@ def relative_path(path: Path, folder: Path) -> str:
 
 @dataclass(frozen=True)
 class Changes:
-    """What differs in a folder from what its run wrote, by path in the folder."""
+    """Differences of a folder from what its run wrote, by path in the folder."""
 
     changed: tuple[str, ...]
     missing: tuple[str, ...]
@@ -121,9 +120,8 @@ class Changes:
 
 
 def changes(folder: Path, record: RunRecord) -> Changes:
-    """By size and hash of every file; a link or device in the place of one is a change."""
-    data = record.encoded()
-    marks = {**record.files, MARKER: FileMark(len(data), hashlib.sha256(data).hexdigest())}
+    """Compare size and hash of every file; a link or device in the place of one is a change."""
+    marks = {**record.files, MARKER: _mark(record.encoded())}
     found, known = _contents(folder), set(marks)
     changed = {name for name in found & known if not _is_as_marked(folder / name, marks[name])}
     emptied = {above.as_posix() for name in known for above in PurePosixPath(name).parents}
@@ -132,7 +130,7 @@ def changes(folder: Path, record: RunRecord) -> Changes:
 
 
 def _contents(folder: Path) -> set[str]:
-    """Every file, link and empty folder below ``folder``."""
+    """Paths of all files, links and empty folders below ``folder``."""
     found = set()
     for root, folders, files in os.walk(folder):
         below = Path(root).relative_to(folder)
@@ -171,7 +169,7 @@ State = Literal["same", "changed", "missing"]
 
 @dataclass(frozen=True)
 class RunStatus:
-    """Whether a run folder is as it was written, and still of its case, by this version."""
+    """State of a run folder: is it as it was written, and still of its case, by this version?"""
 
     case: str  # path of the case file
     case_state: State
@@ -183,7 +181,7 @@ class RunStatus:
 
     @property
     def intact(self) -> bool:
-        """Every file of the run is there and as it was written."""
+        """True where all files of the run are there and as they were written."""
         return not self.changes.changed and not self.changes.missing
 
     @property

@@ -12,10 +12,18 @@ import h5py
 import numpy as np
 import pytest
 
-from eigassign.output import NAMES, CaseOutcome, are_current, merge_files, to_line, write_files
-from eigassign.output.batch import columns, index
+from eigassign.output import (
+    CaseOutcome,
+    Columns,
+    Index,
+    are_current,
+    merge_files,
+    to_line,
+    write_files,
+)
 
 KEYS = ("body.mass", "kind")
+NAMES = ("summary.csv", "summary.json", "junit.xml", "index.html", "columns.h5", "columns.csv")
 
 
 def row(k: int) -> CaseOutcome:
@@ -55,13 +63,15 @@ def test_every_file_is_there_and_the_same_rows_give_the_same_bytes(tmp_path):
     assert made[0] == made[1]
 
 
-def test_columns_hold_every_number_in_si_and_nan_where_there_is_none(tmp_path, monkeypatch):
-    monkeypatch.setattr(columns, "ROWS", 3)  # several pieces
-    write_files(tmp_path, lines(8), 8, KEYS, columns=True)
+def test_columns_hold_every_number_in_si_and_nan_where_there_is_none(tmp_path):
+    made = Columns(tmp_path / "columns.h5", 8, rows=3)  # several pieces
+    for k in range(8):
+        made.add(row(k))
+    made.end()
     with h5py.File(tmp_path / "columns.h5") as found:
         mass, lowest = found["values/body.mass"][:], found["frequencies/mode 1|2/lowest_hz"][:]
         assert found["message"].asstr()[2] == "no such link"
-        assert found["values/kind (text)"].asstr()[1] == "steel"
+        assert list(found["values/kind (text)"].asstr()[1:4]) == ["steel", "", "steel"]
         assert found["design/m1"][7] == 7 / 3
     there = np.arange(8) != 2
     np.testing.assert_array_equal(mass[there], [0.0, 0.001, 0.003, 0.004, 0.005, 0.006, 0.007])
@@ -88,14 +98,16 @@ def test_a_shard_may_be_empty(tmp_path, n):
     assert len((tmp_path / "summary.csv").read_text().splitlines()) == 1 + n
 
 
-def test_the_page_shows_what_is_not_ok_first_of_all_and_links_what_there_is(tmp_path, monkeypatch):
-    monkeypatch.setattr(index, "MOST", 3)
+def test_the_page_shows_what_is_not_ok_first_of_all_and_links_what_there_is(tmp_path):
     (tmp_path / "run 1" / "figures").mkdir(parents=True)
     for name in ("report.html", "figures/frequencies.png"):
         (tmp_path / "run 1" / name).touch()
     made = lines(6)
     made[1] = to_line(CaseOutcome("c=1", "arm.yaml", "ok", 0.5, run_folder="run 1", index=1))
-    write_files(tmp_path, made, 6, KEYS)
+    index = Index(most=3)
+    for k, line in enumerate(made):
+        index.add("error" if k == 2 else "ok", line)
+    (tmp_path / "index.html").write_bytes(index.page(tmp_path, "batch", KEYS))
     found = page_data(tmp_path)
     assert [each[1] for each in found["rows"]] == ["c=0", "c=1", "c=2"]
     assert found["rows"][1][0] == ["run%201/report.html", "run%201/figures/frequencies.png"]
@@ -147,13 +159,6 @@ def test_files_are_current_until_the_manifest_is_newer_or_one_is_gone(tmp_path):
     later = manifest.stat().st_mtime_ns + 10**9
     os.utime(manifest, ns=(later, later))
     assert not are_current(tmp_path, False, manifest)
-
-
-def test_a_column_of_text_may_have_gaps(tmp_path, monkeypatch):
-    monkeypatch.setattr(columns, "ROWS", 1)
-    write_files(tmp_path, lines(4), 4, KEYS, columns=True)
-    with h5py.File(tmp_path / "columns.h5") as found:
-        assert list(found["values/kind (text)"].asstr()) == ["steel", "steel", "", "steel"]
 
 
 def test_columns_of_a_batch_that_has_folders_now_do_not_stay(tmp_path):

@@ -6,10 +6,12 @@ import json
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from synthetic_results import make_results
 
 from eigassign.errors import StorageError
-from eigassign.output import CaseOutcome, from_line, ranges, to_line
+from eigassign.output import CaseOutcome, frequency_ranges, from_line, to_line
 
 ROW = CaseOutcome(
     name="tool=0.1",
@@ -44,13 +46,12 @@ def test_a_torn_line_is_an_error():
 
 
 def test_every_range_has_a_name_of_its_own():
-    curves = [
-        ("mode 1", "frequency", None, [3.0, 1.0, 2.0]),
-        ("mode 1", "frequency", None, [5.0]),
-        ("mode 1", "at_least", "pick", [4.0]),
-    ]
-    assert ranges(curves) == (
-        ("mode 1", 1.0, 2.0, 3.0),
-        ("mode 1 (2)", 5.0, 5.0, 5.0),
-        ("mode 1 at least along 'pick'", 4.0, 4.0, 4.0),
+    results = make_results()
+    (target,) = results.targets
+    hz = target.exact_hz
+    limit = replace(target, kind="at_least", trajectory="pick", exact_hz=np.array([3.0, 1.0, 2.0]))
+    assert frequency_ranges(replace(results, targets=(target, target, limit))) == (
+        ("mode 1", hz.min(), math.fsum(hz) / 152, hz.max()),
+        ("mode 1 (2)", hz.min(), math.fsum(hz) / 152, hz.max()),
+        ("mode 1 at least along 'pick'", 1.0, 2.0, 3.0),
     )

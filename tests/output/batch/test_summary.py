@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import csv
-import io
 import json
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
+from pathlib import Path
 
-from eigassign.output import COLUMNS, CaseOutcome, Junit, SummaryCsv, SummaryJson, to_line
+import pytest
 
+from eigassign.output import CaseOutcome, to_line, write_files
+
+COLUMNS = [
+    "name", "status", "verdict", "seconds", "initial_max_relative", "predicted_max_relative",
+    "exact_max_relative", "design", "message", "path", "run_folder",
+]  # fmt: skip
 GOOD = CaseOutcome(
     name="two_link",
     path="cases/two_link.yaml",
@@ -30,62 +36,52 @@ WRONG = CaseOutcome(
 ALL = (GOOD, LOOSE, STUCK, WRONG)
 
 
-def summary_csv(rows: Sequence[CaseOutcome], keys: Sequence[str] = ()) -> str:
-    text = io.StringIO()
-    made = SummaryCsv(text, keys)
-    for row in rows:
-        made.add(row)
-    return text.getvalue()
+def summary(folder: Path, rows: Sequence[CaseOutcome], keys: Sequence[str] = ()) -> list[dict]:
+    """The rows of summary.csv; the other files are beside it."""
+    write_files(folder, map(to_line, rows), len(rows), keys)
+    with open(folder / "summary.csv", encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
 
 
-def junit_xml(rows: Sequence[CaseOutcome]) -> str:
-    text = io.StringIO()
-    made = Junit(text)
-    for row in rows:
-        made.add(row.name, row.path, row.seconds, row.status, row.message, row.run_folder or "")
-    made.end()
-    return text.getvalue()
+@pytest.fixture
+def suite(tmp_path: Path) -> ET.Element:
+    summary(tmp_path, ALL)
+    return ET.parse(tmp_path / "junit.xml").getroot()[0]
 
 
-def test_the_summary_has_one_line_a_case_that_reads_back():
-    rows = list(csv.DictReader(io.StringIO(summary_csv(ALL[:3]))))
+def test_the_summary_has_one_line_a_case_that_reads_back(tmp_path):
+    rows = summary(tmp_path, ALL[:3])
     assert [row["status"] for row in rows] == ["ok", "tolerance", "failed"]
-    assert tuple(rows[0]) == COLUMNS
+    assert list(rows[0]) == COLUMNS
     assert float(rows[0]["exact_max_relative"]) == 0.1 + 0.2
     assert rows[0]["design"] == "m1=0.2287; m2=0.0"
     assert rows[1]["exact_max_relative"] == ""
 
 
-def test_swept_keys_have_a_column_each():
-    (row,) = csv.DictReader(io.StringIO(summary_csv((GOOD,), tuple(GOOD.values))))
+def test_swept_keys_have_a_column_each(tmp_path):
+    (row,) = summary(tmp_path, (GOOD,), tuple(GOOD.values))
     assert (row["title"], row["targets.0.frequency"], row["load"]) == ("'=A1", "190 Hz", "[1, 2]")
     assert list(row)[:2] == ["name", "title"]
 
 
-def test_a_summary_s_message_stays_on_its_line_and_is_no_formula():
+def test_a_summary_s_message_stays_on_its_line_and_is_no_formula(tmp_path):
     cases = (CaseOutcome("=1+1", "a.yaml", "error", 0.1, 'two\nlines, "quoted"'), WRONG)
-    row, other = csv.DictReader(io.StringIO(summary_csv(cases)))
+    row, other = summary(tmp_path, cases)
     assert row["name"] == "'=1+1"
     assert row["message"] == 'two lines, "quoted"'
     assert other["message"] == "a,b \\x1b[31m\\x00 & <tag> \\ud800\\ufffe"
-    assert len(summary_csv(cases).splitlines()) == 3
+    assert len((tmp_path / "summary.csv").read_text().splitlines()) == 3
 
 
-def test_the_summary_for_programs_has_the_rows_of_the_manifest_and_counts():
-    text = io.StringIO()
-    made = SummaryJson(text)
-    for row in ALL:
-        made.add(row.status, to_line(row))
-    made.end()
-    found = json.loads(text.getvalue())
+def test_the_summary_for_programs_has_the_rows_of_the_manifest_and_counts(tmp_path):
+    summary(tmp_path, ALL)
+    found = json.loads((tmp_path / "summary.json").read_text())
     assert found["cases"] == [json.loads(to_line(row)) for row in ALL]
     assert found["counts"] == {"error": 1, "failed": 1, "ok": 1, "tolerance": 1}
 
 
-def test_junit_counts_and_names_what_happened():
-    root = ET.fromstring(junit_xml(ALL))
-    (suite,) = root
-    assert (root.tag, suite.tag) == ("testsuites", "testsuite")
+def test_junit_counts_and_names_what_happened(suite):
+    assert suite.tag == "testsuite"
     assert [suite.get(k) for k in ("tests", "failures", "errors")] == ["4", "2", "1"]
     assert float(suite.get("time")) == 1.513
     kinds = [[child.tag for child in case if child.tag != "system-out"] for case in suite]
@@ -95,14 +91,14 @@ def test_junit_counts_and_names_what_happened():
     assert suite[0].get("file") == "cases/two_link.yaml"
 
 
-def test_junit_has_a_line_a_case_and_shows_characters_that_xml_cannot_hold():
-    suite = ET.fromstring(junit_xml((WRONG,)))[0]
-    assert suite[0].get("name") == "wrong <b>"
-    assert suite[0][0].text == "a,b\n\\x1b[31m\\x00 & <tag> \\ud800\\ufffe"
-    assert suite[0][0].get("message") == "a,b"
-    assert len(junit_xml(ALL).splitlines()) == 6
+def test_junit_has_a_line_a_case_and_shows_characters_that_xml_cannot_hold(tmp_path, suite):
+    assert suite[3].get("name") == "wrong <b>"
+    assert suite[3][0].text == "a,b\n\\x1b[31m\\x00 & <tag> \\ud800\\ufffe"
+    assert suite[3][0].get("message") == "a,b"
+    assert len((tmp_path / "junit.xml").read_text().splitlines()) == 6
 
 
-def test_an_empty_batch_is_still_valid():
-    assert ET.fromstring(junit_xml(()))[0].get("tests") == "0"
-    assert summary_csv(()) == ",".join(COLUMNS) + "\n"
+def test_an_empty_batch_is_still_valid(tmp_path):
+    assert summary(tmp_path, ()) == []
+    assert ET.parse(tmp_path / "junit.xml").getroot()[0].get("tests") == "0"
+    assert (tmp_path / "summary.csv").read_text() == ",".join(COLUMNS) + "\n"
