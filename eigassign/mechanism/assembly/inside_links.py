@@ -43,7 +43,7 @@ class _ScalarRows:
 
 
 def _values(table: CompiledTable, pencil: Pencil, x: Floats) -> Floats:
-    """All scalars of a table at x = (q, y) (n_x,)."""
+    """Scalars of a table at x = (q, y) (n_x,)."""
     z = pencil.to_program @ x + pencil.shift
     return table.evaluate(Samples(), z[:, None])[:, 0]
 

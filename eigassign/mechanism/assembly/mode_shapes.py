@@ -81,7 +81,7 @@ def shapes(poses: LinkFrames, x: Floats, phi: Floats) -> tuple[Shapes, ...]:
 
 @dataclass(frozen=True)
 class _Symbols:
-    """What of one link has to be evaluated at x, as arrays of scalars in a fixed order."""
+    """Values of one link that have to be evaluated at x, as arrays of scalars in a fixed order."""
 
     name: str
     local: LocalLink
@@ -147,7 +147,7 @@ class _LinkMotion:
         return motion
 
     def nodes(self) -> dict[tuple[str, str], NodeShape]:
-        """All named nodes."""
+        """Shapes of the named nodes."""
         found = {}
         for name, X in zip(self.part.mesh.positions, self.positions, strict=True):
             motion = self.at(_slots(self.part.mesh, name), X)
@@ -156,7 +156,7 @@ class _LinkMotion:
         return found
 
     def strands(self, d: int) -> list[StrandShape]:
-        """All lines, as points in world axes."""
+        """Lines of the drawing, as points in world axes."""
         found = []
         for strand, X, shear in self.lines:
             at_nodes = np.stack(

@@ -108,12 +108,12 @@ class VelocityTerms:
         return self.step / speed if speed > 0.0 else self.step
 
     def values(self, q: Floats, y: Floats) -> Floats:
-        """All scalars at each of several poses q (n, n_q), and a 1: (n, n_scalars + 1)."""
+        """Scalars at each of several poses q (n, n_q), and a 1: (n, n_scalars + 1)."""
         z = self.parameters.z(np.hstack([q, np.tile(y, (len(q), 1))]))
         return np.column_stack([self.table.evaluate(Samples(), z).T, np.ones(len(q))])
 
     def _joints(self, rates: Floats) -> Floats:
-        """Those of the coordinates alone, of rates (…, n_q)."""
+        """Rates of the coordinates alone, of rates (…, n_q)."""
         return rates[..., : len(self.parameters.coordinates)]
 
 
@@ -220,7 +220,7 @@ def riding(mesh: LinkMesh) -> Riding:
 
 
 def mesh_scalars(mesh: LinkMesh) -> list[Scalar]:
-    """What varies in a `Riding`: its nodes' places, and shear and inertia of its elements."""
+    """Scalars of a `Riding`: its nodes' places, and shear and inertia of its elements."""
     (strand,) = mesh.strands
     places = [X[0] for X in strand.points]
     shear = [value for pair in strand.shear for bent in pair for value in bent]
@@ -305,7 +305,7 @@ class _PatternEntries:
 
 @dataclass(frozen=True)
 class ScalarRows:
-    """Which rows of a table of scalars are a link's: see `velocity_terms`."""
+    """Rows of a table of scalars that are a link's: see `velocity_terms`."""
 
     spin: slice
     carries: slice
@@ -326,7 +326,7 @@ class Rider:
 
 @dataclass(frozen=True, eq=False)
 class StackedLinks:
-    """All links with mass; z are the values of a table of scalars, followed by a 1."""
+    """Links with mass; z are the values of a table of scalars, followed by a 1."""
 
     joined: Pattern  # U (n_local, n_dof)
     spread: Pattern  # N (n_local, Σ n_twist)
@@ -384,7 +384,7 @@ def stack(
     n_u: int,
     n_dof: int,
 ) -> StackedLinks:
-    """Those of the links that have mass; ``rows`` are where each has its scalars."""
+    """Stack of the links that have mass; ``rows`` are where each has its scalars."""
     joined, spread, twist, masses, spins, turns = (_PatternEntries() for _ in range(6))
     riders, bases = [], []
     local = whole = turned = spun = 0

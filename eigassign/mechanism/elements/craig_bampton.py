@@ -228,7 +228,7 @@ LOOSE = 1e-3  # relative accuracy of the largest μ left out
 def fixed_modes(
     K: sparse.csc_array, M: sparse.csc_array, factor: linalg.SuperLU, lam: float
 ) -> Floats:
-    """All modes (n, k) with λ ≤ ``lam``, φᵀ K φ = I; ``factor`` is that of K."""
+    """Modes (n, k) with λ ≤ ``lam``, φᵀ K φ = I; ``factor`` is that of K."""
     n, least = K.shape[0], 1.0 / lam
     rows, count = M.T, FIRST  # M is symmetric: products run faster row by row
     mass = linalg.LinearOperator(M.shape, matvec=lambda v: rows @ v, dtype=np.float64)

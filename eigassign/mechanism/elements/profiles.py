@@ -174,7 +174,7 @@ def _one_atom(x: Scalar) -> Scalar:
 
 
 def _has_series(case: CaseFile, beam: Any) -> bool:
-    """Whether the torsion constant counts and is no polynomial along a taper."""
+    """True where the torsion constant counts and is no polynomial along a taper."""
     shape = case.mechanism.sections[beam.section.start].shape
     return case.mechanism.space == "spatial" and shape == "rectangle"
 
@@ -204,7 +204,7 @@ def _tapered_values(
 
 
 def each_element(profile: Profile, n: int) -> list[Profile]:
-    """Those of n elements, from one of all whose values may be arrays (n,)."""
+    """Profiles of n elements, from one of all whose values may be arrays (n,)."""
 
     def of(values: BeamValues, k: int) -> BeamValues:
         rows: Any = values

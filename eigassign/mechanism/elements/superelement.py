@@ -66,7 +66,7 @@ def weights(case: CaseFile) -> tuple[str, ...]:
 
 
 def _weight(name: str, mesh: LinkMesh, space: str) -> str:
-    """From NᵀMN = [[m 1, −m[c]×], …]: the mass, and where its centre c is."""
+    """The mass, and where its centre c is, from NᵀMN = [[m 1, −m[c]×], …]."""
     N = np.sum([t.matrix.toarray() for t in mesh.rigid], axis=0)
     J = N.T @ (mesh.mass[0].matrix @ N)
     m = J[0, 0]

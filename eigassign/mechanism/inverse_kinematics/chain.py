@@ -46,7 +46,7 @@ class TipEvaluation(NamedTuple):
 
 @dataclass(frozen=True)
 class LoopAssembly:
-    """How the loops of a chain are put together."""
+    """Solution of a chain's loop equations, on the branch that the case chooses."""
 
     reference: Floats  # q (n_q,) at which the assembly is chosen
     passive: Callable[[Floats], Floats]  # q (n, n_q) -> p (n, n_p); raises SingularityError
@@ -71,11 +71,11 @@ class TipChain:
 
     @property
     def n_q(self) -> int:
-        """How many coordinates there are."""
+        """Number of coordinates."""
         return len(self.joints)
 
     def of_kind(self, kind: str) -> Bools:
-        """Which entries of a state are of this kind, (n_q + n_p,)."""
+        """True for entries of a state that are of this kind, (n_q + n_p,)."""
         return np.array([k == kind for k in self.kinds], dtype=bool)
 
 
@@ -226,7 +226,7 @@ class _TipTables:
         return _Table.of(recorder, shaped, self._n_variables)
 
     def evaluate(self, z: Floats, y: Floats) -> TipEvaluation:
-        """What a chain's ``evaluate`` gives, z (n, n_z), at design y."""
+        """Place, turn and closure at states z (n, n_z) and design y."""
         point, turned, J, F, dF = self._state_table(self._variables(z, y))
         R = turned.reshape(len(z), 3, 3) if self.turns else None
         return TipEvaluation(point, R, J, F, dF)
@@ -274,7 +274,7 @@ class _Table:
         return _Table(table.program, table.weights.toarray(), table.constants[:, None], shapes)
 
     def __call__(self, variables: Floats) -> list[Floats]:
-        """Each array at variables (n_variables, n), (n, *shape)."""
+        """The arrays at variables (n_variables, n), each (n, *shape)."""
         values = (self.weights @ self.program.run(Samples(), variables) + self.constants).T
         cuts = np.cumsum([prod(shape) for shape in self.shapes])[:-1]
         parts = zip(np.split(values, cuts, axis=1), self.shapes, strict=True)
@@ -304,7 +304,7 @@ def _closure(motion: Kinematics, planar: bool, n: int, A: Floats) -> tuple[Objec
 
 
 def _kinds(case: CaseFile, tree: Topology) -> tuple[str, ...]:
-    """What each freedom is; where a loop is closed over a screw, no turn leads back."""
+    """Kind of each freedom; where a loop is closed over a screw, no turn leads back."""
     types = [case.mechanism.joints[f.joint].type for f in tree.freedoms]
     advancing = any(j.type in ADVANCING for j in case.mechanism.joints.values())
     kinds = []

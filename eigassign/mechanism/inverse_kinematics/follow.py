@@ -97,7 +97,7 @@ def follow(
 
 
 def _along(ik: TipProblem, course: Course, u0: Floats) -> Floats:
-    """All samples (n, n_z) of the solution that begins with u0; TrajectoryError where it ends."""
+    """Samples (n, n_z) of the solution that begins with u0; TrajectoryError where it ends."""
     target = course.target(course.s)
     for turn in _TURNS if ik.rank == ik.n_q else _REDUNDANT:
         path = trace(ik, course, u0, turn)
@@ -130,7 +130,7 @@ def require_reached(ik: TipProblem, course: Course, u: Floats, target: TipTarget
 
 
 def _off(ik: TipProblem, u: Floats, target: TipTarget, tolerance: float) -> Bools:
-    """Whether tips are off their points or their orientations, (n,)."""
+    """True where tips are off their points or their orientations, (n,)."""
     distance, turn = ik.misses(ik.error(ik.evaluate(u), target))
     return np.asarray((distance > tolerance * ik.lever) | (turn > tolerance))
 
@@ -178,7 +178,7 @@ def _blocked(ik: TipProblem, course: Course, k: int, path: Trace) -> TrajectoryE
 
 
 def _notes(ik: TipProblem, candidates: Sequence[Floats]) -> tuple[str, ...]:
-    """What was chosen where the case leaves a choice."""
+    """Choices that were made where the case leaves them open."""
     if ik.rank < ik.n_q:
         slides = ik.chain.of_kind("slide")[: ik.n_q].any()
         measure = f" (a slide of {ik.lever:.3g} m counting as 1 rad)" if slides else ""

@@ -92,7 +92,7 @@ class PathOfDesign:
 
     @property
     def said(self) -> str:
-        """What follows what, in words."""
+        """The sentence that the joint coordinates follow the design, and which of it."""
         return (
             f"the tip keeps its path whatever {', '.join(self.moving)} will be: the joint "
             "coordinates follow the design"

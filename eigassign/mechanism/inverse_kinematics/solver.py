@@ -94,12 +94,12 @@ def newton(
 
 
 def within(motion: Reduced, directions: Floats | None) -> Reduced:
-    """With J V (n, m, rank) in place of J, where the coordinates move in directions V only."""
+    """Motion with J V (n, m, rank) in place of J: coordinates move in directions V only."""
     return motion if directions is None else replace(motion, J=motion.J @ directions)
 
 
 def _settled(ik: TipProblem, error: Floats, motion: Reduced, tolerance: float) -> Bools:
-    """Whether distance, turn and loops are each within the tolerance."""
+    """True where distance, turn and loops are each within the tolerance."""
     distance, turn = ik.misses(error)
     open_by = np.abs(motion.closing).max(axis=1, initial=0.0)
     return np.asarray(
@@ -229,12 +229,12 @@ def _step(
 
 
 def crossed(ik: TipProblem, seen: TipEvaluation, motion: Reduced, sense: Floats) -> Floats:
-    """Whether a branch other than that of ``sense`` has been met, (n,)."""
+    """True where a branch other than that of ``sense`` has been met, (n,)."""
     return np.asarray((handedness(ik, seen, motion) * sense < 0.0).any(axis=1))
 
 
 def singular(ik: TipProblem, seen: TipEvaluation, motion: Reduced) -> Bools:
-    """Whether the chain is stretched or folded, or its loops at a dead point, (n,)."""
+    """True where the chain is stretched or folded, or its loops at a dead point, (n,)."""
     return (regularity(ik, motion) < _SINGULAR) | (loop_regularity(ik, seen) < DEAD)
 
 

@@ -51,7 +51,7 @@ class TipProblem:
 
     @property
     def n_q(self) -> int:
-        """How many coordinates there are."""
+        """Number of coordinates."""
         return self.chain.n_q
 
     def evaluate(self, u: Floats) -> TipEvaluation:
@@ -99,7 +99,7 @@ class TipProblem:
         return np.asarray((u * self.scale)[:, : self.n_q] @ matrix.T + offset)
 
     def inside(self, u: Floats) -> Bools:
-        """Whether each ranged joint is in its range, angles modulo 2π, (n, n_branch)."""
+        """True where a ranged joint is in its range, angles modulo 2π, (n, n_branch)."""
         rows = list(self.rows)
         above = self.joint_coordinates(u)[:, rows] - self.low + _SLACK
         turns = self.chain.of_kind("turn")[rows]
@@ -253,7 +253,7 @@ def _ranges(chain: TipChain, course: Course, middle: Floats) -> tuple[Floats, Fl
 
 
 def _closed(chain: TipChain, z: Floats, size: float) -> Floats:
-    """Those of the states whose loops close by moving the passive freedoms alone."""
+    """States whose loops close by moving the passive freedoms alone."""
     n_q = chain.n_q
     if len(chain.kinds) == n_q:
         return z

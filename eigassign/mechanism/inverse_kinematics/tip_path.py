@@ -215,7 +215,7 @@ def _matrices(turning: Callable[[Floats], Any], s: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class TipTarget:
-    """Where n tips should be: ``point`` (n, d) in m, and ``rotation`` (n, 3, 3) where asked for."""
+    """Places wanted of n tips: ``point`` (n, d) in m, and ``rotation`` (n, 3, 3) or None."""
 
     point: Floats
     rotation: Floats | None = None
@@ -231,7 +231,7 @@ class Course:
     attitude: Attitude | None = None
 
     def target(self, s: Floats) -> TipTarget:
-        """Where the tip should be at parameters s (n,)."""
+        """Wanted places of the tip at parameters s (n,)."""
         rotation = None if self.attitude is None else self.attitude.rotation(np.atleast_1d(s))
         return TipTarget(self.path.point(s), rotation)
 

@@ -54,7 +54,7 @@ class Placement:
 
     @property
     def world_rotation(self) -> Objects:
-        """From the link's axes to those of the world, (3, 3)."""
+        """Rotation from the link's axes to those of the world, (3, 3)."""
         return self._world[0]
 
     @property
@@ -153,7 +153,7 @@ def walk(
 
 @dataclass(frozen=True, eq=False)
 class _Walk:
-    """What is known on the way from the ground to the tips; each joint and each node once."""
+    """Frames known on the way from the ground to the tips; each joint and each node once."""
 
     case: CaseFile
     parameters: ModelParameters
@@ -181,7 +181,7 @@ class _Walk:
         )
 
     def loop(self, edge: JointEdge) -> Loop:
-        """Both ways to the follower of a joint that closes a loop."""
+        """The two ways to the follower of a joint that closes a loop."""
         motion = self._motion(edge)
         R_base, x_base = self._stands(edge.base)
         R_end, x_end = self._stands(edge.follower)

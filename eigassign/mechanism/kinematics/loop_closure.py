@@ -115,7 +115,7 @@ def _bind_passive(
 
 
 def _joint_names(case: CaseFile, coords: CoordinateMap) -> list[str]:
-    """What the joint coordinates s are called: q's names, but where q counts absolute angles."""
+    """Names of the joint coordinates s: q's, but where q counts absolute angles."""
     plain = (coords.relative == np.eye(len(coords.relative))).all(axis=1) & (coords.offset == 0.0)
     return [
         name if same else f"{name} relative to the base of {c.joint!r}"
@@ -182,7 +182,7 @@ def _spelt(gap: tuple[float, float]) -> str:
 
 
 def _used_variables(recorder: Recorder, scalars: Sequence[Scalar], n: int, n_p: int) -> list[int]:
-    """Which of the first n variables the closure depends on; n_p passive ones follow them."""
+    """Variables among the first n that the closure depends on; n_p passive ones follow them."""
     atoms = sorted({a for s in scalars if isinstance(s, Expression) for a in s.terms})
     depends = compile_program(recorder, atoms, n + n_p).dependence
     return [v for v in range(n) if depends[:, v].any()]
@@ -313,13 +313,13 @@ def kronecker(count: int, n: int) -> Floats:
 
 
 def _turning(case: CaseFile, tree: Topology) -> NDArray[np.bool_]:
-    """Which passive freedoms are angles, the same after a full turn."""
+    """True for passive freedoms that are angles, the same after a full turn."""
     kinds = [FREEDOMS[case.mechanism.joints[f.joint].type][f.component] for f in tree.passive]
     return np.array([kind != "translation" for kind in kinds], dtype=bool)
 
 
 def _balls(case: CaseFile, tree: Topology) -> list[int]:
-    """Where the three angles of each spherical joint begin, if all of them are passive."""
+    """First of the three angles of each spherical joint, if all of them are passive."""
     found = [k for k, f in enumerate(tree.passive) if f.component == 0]
     joints = case.mechanism.joints
     return [
@@ -388,7 +388,7 @@ def _check_determined(tree: Topology, function: ImplicitFunction, a0: Floats, p0
 def _check_movable(
     case: CaseFile, function: ImplicitFunction, used: Sequence[int], a0: Floats, p0: Floats
 ) -> None:
-    """Every argument of p can change: ∂F/∂p ṗ = −∂F/∂a has a solution, rows beyond p's included."""
+    """Refuse loops in which an argument of p cannot change: ∂F/∂p ṗ = −∂F/∂a needs a solution."""
     J = function.equations(a0[:, None], p0[:, None])[2][0]
     steps = np.repeat(a0[:, None], 2 * len(a0), axis=1)
     steps += CHANGE * np.hstack([np.eye(len(a0)), -np.eye(len(a0))])
@@ -460,7 +460,7 @@ def _at(names: Sequence[str], a: Floats) -> str:
 def _ambiguous(
     case: CaseFile, tree: Topology, names: Sequence[str], a0: Floats, found: Floats
 ) -> str:
-    """All branches in words, each as it is to be given."""
+    """Branches in words, each as it is to be given."""
     listed = " | ".join(_as_guess(tree, p) for p in found)
     at = ", ".join(
         f"{name}: {value:.6g}"

@@ -81,7 +81,7 @@ class Topology:
 
     @cached_property
     def _riders(self) -> dict[str, list[str]]:
-        """All of them by link: asked for once a link, of which there may be a thousand."""
+        """Riders by link: asked for once a link, of which there may be a thousand."""
         found: dict[str, list[str]] = {}
         for edge in (*self.edges, *self.loops):
             link, node = edge.written.base
@@ -113,7 +113,7 @@ def freedoms(case: CaseFile) -> tuple[Freedom, ...]:
 
 
 def component_index(case: CaseFile, coordinate: object) -> int:
-    """Which freedom of its joint a coordinate drives, from 0."""
+    """Number of the freedom of its joint that a coordinate drives, from 0."""
     names = FREEDOMS[case.mechanism.joints[coordinate.joint].type]  # type: ignore[attr-defined]
     component = getattr(coordinate, "component", None)
     return 0 if component is None else names.index(str(component))
@@ -200,7 +200,7 @@ def _sorted(tree: list[JointEdge], loops: Sequence[JointEdge], rigid: set[str]) 
 def _free(
     edge: JointEdge, carriers: dict[NodeName, NodeName], roots: dict[str, NodeName], rigid: set[str]
 ) -> bool:
-    """Whether nothing carries the follower node yet, and it does not carry the base node itself."""
+    """True where nothing carries the follower node yet, and it does not carry the base node."""
     node = edge.base
     while node != edge.follower:
         if node in carriers:

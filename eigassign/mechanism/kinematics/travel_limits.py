@@ -31,7 +31,7 @@ FINER = 0.1  # of an element's share of it
 
 @dataclass(frozen=True, eq=False)
 class Rails:
-    """Where every rider stands and how long its beam is, as functions of z = (s, y)."""
+    """Places of riders and lengths of their beams, as functions of z = (s, y)."""
 
     joints: tuple[str, ...]
     links: tuple[str, ...]

@@ -34,7 +34,7 @@ class SampleTable:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was ignored."""
+        """Notes on what was ignored."""
         return self.table.notes
 
     def where(self, k: int) -> str:

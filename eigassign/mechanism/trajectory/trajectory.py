@@ -309,12 +309,12 @@ class Trajectories:
 
     @property
     def whole(self) -> Trajectories:
-        """All samples, where these are some of them."""
+        """Trajectories with all samples, where these are some of them."""
         return self if self.origin is None else self.origin
 
     @property
     def follows_design(self) -> bool:
-        """Whether q depends on the design: along a path of a tip that the design moves."""
+        """True where q depends on the design: along a path of a tip that the design moves."""
         return any(part.trajectory.of_design is not None for part in self.parts)
 
     def at(self, y: Floats) -> tuple[Floats, Floats]:
@@ -342,7 +342,7 @@ class Trajectories:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Those of every trajectory, with its name where there are several."""
+        """Notes of every trajectory, with its name where there are several."""
         return tuple(
             f"trajectory {part.name!r}: {note}" if self.several else note
             for part in self.parts
@@ -351,12 +351,12 @@ class Trajectories:
 
     @property
     def several(self) -> bool:
-        """Whether there is more than one, so that a sample needs more than its number."""
+        """True for more than one, so that a sample needs more than its number."""
         return len(self.parts) > 1
 
     @cached_property
     def rows(self) -> tuple[slice, ...]:
-        """Which samples belong to each trajectory."""
+        """Samples that belong to each trajectory."""
         ends = np.cumsum([0, *(len(part.trajectory.time_s) for part in self.parts)])
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
@@ -438,7 +438,7 @@ class Rates:
 
 
 def rates(trajectory: Trajectory) -> Rates:
-    """By differences within each smooth part; of a part with one sample nothing is known."""
+    """Rates by differences within each smooth part; of a part with one sample nothing is known."""
     parts = [part for part in _smooth_parts(trajectory) if len(part) > 1]
     samples = np.concatenate([np.zeros(0, dtype=np.intp), *parts])
     q, time_s = trajectory.q, trajectory.time_s
@@ -459,7 +459,7 @@ def _smooth_parts(trajectory: Trajectory) -> list[Ints]:
 
 
 def _differences(time_s: Floats, q: Floats) -> tuple[Floats, Floats]:
-    """Of second order; of two samples their difference, and no acceleration."""
+    """Differences of second order; of two samples their difference, and no acceleration."""
     order: Literal[1, 2] = 2 if len(time_s) > 2 else 1
     rate = np.gradient(q, time_s, axis=0, edge_order=order)
     return rate, np.gradient(rate, time_s, axis=0, edge_order=order)
