@@ -42,11 +42,8 @@ Response = Callable[[Floats], tuple[Floats, Floats]]  # y → f (m,) in Hz, ∂f
 NOTICED = 1.959963984540054  # standard deviations: 95 % of a normal distribution
 SINGULAR = 1e-8  # of the largest singular value: what is below it is round-off of slopes
 PRECISION = 1e-3  # of the distance from ŷ to the end of an interval
-STEPS = 40  # to the end of an interval; three or four suffice but for wild models
-SECANTS = 6  # of these by secants, once the end is enclosed; then by halves
 SLIGHT = 1e-2  # entry of a direction, of its largest, that no bound need stop
 FAR = 100.0  # standard deviations: what is further, or has no answer, is only known to be outside
-BETTER = 1e-3  # of χ²: so much lower is another minimum, not round-off
 ROUNDS = 5  # of fitting anew from a better minimum that a profile has come upon
 
 
@@ -305,7 +302,7 @@ class _Profile:
         inside, outside = float(near.y[j] - centre) / room, np.inf
         last = (inside, self._over(near))
         share = min(1.0, max(self._first(j) / abs(room), 1.1 * inside))
-        for step in range(STEPS):
+        for step in range(40):  # three or four suffice but for wild models
             if inside >= 1.0:
                 return bound, True
             found = self._refitted(j, bound if share == 1.0 else centre + share * room, near)
@@ -325,7 +322,7 @@ class _Profile:
                 share = min(1.0, max(1.1 * inside, min(share, 4.0 * inside)))
             elif outside - inside <= PRECISION * outside:
                 share = outside
-            elif step >= SECANTS or not inside < share < outside:
+            elif step >= 6 or not inside < share < outside:  # secants have not met: by halves
                 share = 0.5 * (inside + outside)
         return (bound, True) if inside >= 1.0 else (centre + inside * room, False)
 
@@ -358,7 +355,8 @@ class _Profile:
             return None
         if self._over(found) <= 0.0:
             self.allowed.append(found)
-        if found.objective < self.best.objective - BETTER * max(self.fit.objective, 1.0):
+        # another minimum, not round-off: lower by more than a thousandth of χ²
+        if found.objective < self.best.objective - 1e-3 * max(self.fit.objective, 1.0):
             self.best = found
         return found
 

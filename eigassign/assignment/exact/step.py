@@ -32,9 +32,6 @@ from eigassign.assignment.program import ScaledProgram
 from eigassign.assignment.solver import solve_scaled
 
 SMALLEST = 1e-10  # trust region, of the bounds
-HEAVIER = 6  # tenfold rises of ν in one step, while v falls
-CUTS = 12  # programs in one step, while they miss a kink
-MISSED = 0.1  # of the promised fall that may be lost at kinks
 FLAT = 1e-13  # of the merit: a promised fall below it is round-off
 
 
@@ -193,7 +190,7 @@ class _LocalProblem:
         problem, place = self.problem, self.place
         cuts = _Kinks(_Cuts.none(self.box.n, len(self.c)), _Cuts.none(self.box.n, len(self.r)))
         solved, heavier = self.solved(region, cuts), region
-        for _ in range(HEAVIER):
+        for _ in range(6):  # tenfold rises of ν, while v falls
             if solved is None or solved[1] <= MET:
                 break
             heavier = replace(heavier, weight=10.0 * heavier.weight)
@@ -203,7 +200,7 @@ class _LocalProblem:
         before = merit(problem, place.value, place.seen.violation, region.weight)
         curved = self.convex(region.S)[0]
         best: ProposedStep | None = None
-        for _ in range(CUTS):
+        for _ in range(12):  # programs, while they miss a kink
             if solved is None:
                 break
             d, v, on_residual, on_excess = solved
@@ -221,7 +218,8 @@ class _LocalProblem:
             else:
                 hoped += 2.0 * t
             hoped = before - here - merit(problem, hoped, v, region.weight)
-            if not model.kinked.any() or hoped <= 0.0 or best.promised >= (1.0 - MISSED) * hoped:
+            # a step is taken for a tenth of its promise: as little may be lost at kinks
+            if not model.kinked.any() or hoped <= 0.0 or best.promised >= 0.9 * hoped:
                 break
             cuts = cuts.with_model(self, d, model)
             solved = self.solved(region, cuts)

@@ -30,7 +30,6 @@ from eigassign.modal.model import Model
 from eigassign.study.accuracy import judged_poses
 
 Floats = NDArray[np.float64]
-DEEPEST = 9  # halvings of an interval between two samples
 
 
 @dataclass(frozen=True)
@@ -122,7 +121,7 @@ def _least_room(model: Model, band: Band, y: Floats, above: int | None, raised: 
     if least <= 0.0 or len(at) < 2:
         return least
     start, end, g_start, g_end = at[:-1], at[1:], g[:-1], g[1:]
-    for _ in range(DEEPEST):
+    for _ in range(9):  # halvings: 512 points between two samples
         middle = 0.5 * (start + end)
         g_middle = room(middle)
         ends = np.minimum(np.minimum(g_start, g_end), g_middle)

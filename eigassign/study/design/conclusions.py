@@ -29,7 +29,6 @@ from eigassign.study.design.optimum import Found, PosedProblem
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
-LONGEST = 10.0  # s that catalogues are searched for each of these limits
 MOST = 12  # limits of which the smallest contradiction is looked for
 AFFINE = 1e-10  # relative change of a slope over the bounds that is round-off
 WITHOUT = 1e-9  # of the largest: a singular value of the slopes that is none
@@ -132,7 +131,7 @@ def _can_be_met(
     try:
         if not listed:
             return minimise(problem, start, steps).seen.violation <= MET
-        chosen = choose(problem, listed, [start], steps, monotonic() + LONGEST)
+        chosen = choose(problem, listed, [start], steps, monotonic() + 10.0)  # s for each limit
     except EigassignError:
         return True
     if chosen.search is None and chosen.optima[0].seen.violation > MET:

@@ -56,18 +56,12 @@ from eigassign.study.scene import Scene
 from eigassign.study.wanted import Wanted, followed_modes, target_frequencies, time_weights
 
 Floats = NDArray[np.float64]
-MOST_BELOW = 24  # combinations of numbers of modes below the bands that are tried
 MASS = "design.mass"  # what the limit of the whole mechanism's mass is called
 STARTS = 12  # with `starts: auto`, at most
 MARGIN = 1e-5  # relative, by which modes keep off a band at the samples at least
-WIDENED = 5  # times that the margin is widened at most
 FEW = 24  # samples on which starts are followed, of more than twice as many
-FEWEST = 8  # samples at which designs are screened, of more than twice as many
 SCREENED, MOST_SCREENED = 7, 48  # designs for each parameter of which the best are starts
-APART = 0.2  # of the bounds: two starts differ by more in some parameter
 BEHIND, FAR_BEHIND = 3, 2.0  # starts of a variant, and how much worse than the best it may be then
-REFINED = 3  # optima on few samples that are followed on all
-AGREED = 3  # starts, and half the parameters more, for each optimum seen that lead to the best
 SAME = 1e-4  # relative, in F: optima of the same worth
 NOTHING = 1e-14  # of F: no error
 
@@ -120,7 +114,7 @@ def find_optimum(
     most = STARTS if isinstance(keys.starts, str) else keys.starts
     designs = [scene.initial, *starts][:most]
     models = None if followed_modes(scene.file) else reduced_models(scene)
-    for _ in range(WIDENED):
+    for _ in range(5):  # the lack of room at most is added each time
         found = _search_all(scene, wanted, designs, margin, models, deadline, progress)
         lacking = wanting(found.clearances)
         met = found.best.seen.violation <= MET
@@ -156,7 +150,7 @@ def _search_all(
     ended: End | None = None
     lost: list[str] = []
     possible = (_possible(scene, band) for band in whole.bands)
-    for below in itertools.islice(itertools.product(*possible), MOST_BELOW):
+    for below in itertools.islice(itertools.product(*possible), 24):
         if listed:
             near = list(starts[: KEEP + 1])
             variant, chosen = _chosen(whole, below, listed, near, deadline, progress)
@@ -239,7 +233,7 @@ def _refined(variant: PosedProblem, coarse: _Search, initial: Floats) -> _Search
     nowhere.
     """
     fine = _Search(variant, coarse.steps, coarse.deadline, coarse.ended)
-    for optimum in distinct(coarse.optima, variant.problem)[:REFINED]:
+    for optimum in distinct(coarse.optima, variant.problem)[:3]:  # the best few
         with suppress(EigassignError):
             fine.run(optimum.y, optimum)
         if fine.ended:
@@ -328,7 +322,7 @@ class _Search:
         same = [
             o for o in self.optima if o.seen.violation <= violation + MET and o.objective <= least
         ]
-        enough = AGREED + len(problem.lower) // 2
+        enough = 3 + len(problem.lower) // 2
         return len(same) >= enough * len(distinct(self.optima, problem))
 
 
@@ -355,7 +349,7 @@ def _in_turn(
     if task.models is not None or task.followers:
         yield from _spread_designs(task.scene, most, 0)
         return
-    box, fewest = UnitBox.of(variant.problem), _thinned(task, FEWEST) or task
+    box, fewest = UnitBox.of(variant.problem), _thinned(task, 8) or task
     asked = variant_of(fewest, tuple(k for _, k in variant.below))
     ranked: list[tuple[tuple[float, float], Floats]] = []
     for y in _spread_designs(task.scene, max(most, min(SCREENED * box.n, MOST_SCREENED)), 0):
@@ -367,7 +361,7 @@ def _in_turn(
     apart: list[Floats] = []
     near: list[Floats] = []
     for _, z in sorted(ranked, key=lambda one: one[0]):
-        alone = all(np.abs(z - other).max(initial=0.0) > APART for other in apart)
+        alone = all(np.abs(z - other).max(initial=0.0) > 0.2 for other in apart)  # of the bounds
         (apart if alone else near).append(z)
     yield from (box.y(z) for z in [*apart, *near][:most])
 

@@ -144,14 +144,15 @@ def response_of(
 
 # --- Reduced models
 
-POSES = 3  # at which modes and their derivatives make a reduced model
-WATCHED = 5  # samples at which its error is estimated
 TRUSTED = 1e-3  # relative, of the estimate; the errors themselves were below 1e-5
 
 
 @dataclass
 class ReducedModels:
-    """Reduced models about designs that a search came by, made as they are needed."""
+    """Reduced models about designs that a search came by, made as they are needed.
+
+    Modes and their derivatives at three poses make one; its error is estimated at five samples.
+    """
 
     model: Model
     path: Trajectories
@@ -160,7 +161,7 @@ class ReducedModels:
 
     def at(self, y: Floats, count: int) -> ReducedModel | None:
         """One whose lowest ``count`` modes hold at y (n_y,); None where no more shall be made."""
-        watched = self.path.chosen(self.path.spread(WATCHED)).at(y)[0]
+        watched = self.path.chosen(self.path.spread(5)).at(y)[0]
         for k in range(len(self.made) - 1, -1, -1):
             if len(self.made[k].modes) >= count and self._holds(self.made[k], watched, y):
                 self.made.append(self.made.pop(k))
@@ -168,7 +169,7 @@ class ReducedModels:
         if self.left <= 0:
             return None
         self.left -= 1
-        poses = self.path.chosen(self.path.spread(POSES)).at(y)[0]
+        poses = self.path.chosen(self.path.spread(3)).at(y)[0]
         modes = tuple(range(1, count + 1))
         try:
             one = reduce(self.model.pencil, poses, np.tile(y, (len(poses), 1)), modes, 1)

@@ -29,10 +29,6 @@ from eigassign.study.updating.measured import PosedMeasurement, read_measurement
 Floats = NDArray[np.float64]
 POOR = 0.01  # p-value below which the model does not explain the measurements
 OUTLIER = 3.0  # standard deviations
-FINE = 0.5  # standard deviations that the mesh's own error may make up
-NAMED = 1e-2  # share in a direction below which a parameter is not named
-SHOWN = 10.0  # per cent: the largest change of a direction, in words
-ALIKE = 1e-2  # of each other: changes in per cent that are called the same
 
 # --- Results
 
@@ -297,7 +293,7 @@ def _parameters(
 def _direction(change: Floats, y: Floats, problem: UpdateProblem) -> UnidentifiedDirection:
     width = problem.upper - problem.lower
     share = np.abs(change) / np.where(width > 0.0, width, 1.0)
-    taking = [int(k) for k in np.flatnonzero(share > NAMED * share.max())]
+    taking = [int(k) for k in np.flatnonzero(share > 1e-2 * share.max())]
     names = problem.model.y_names
     by_name = {names[k]: float(change[k]) for k in taking}
     units = {problem.case.file.design_units[k] for k in taking}
@@ -314,7 +310,7 @@ def _in_words(change: Mapping[str, float], relative: Floats | None, one_unit: bo
         return f"{next(iter(change))} has no effect on what was measured"
     *most, last = change
     together = f"{', '.join(most)} and {last} can change together unnoticed"
-    if relative is not None and np.ptp(relative) <= ALIKE * np.abs(relative).max():
+    if relative is not None and np.ptp(relative) <= 1e-2 * np.abs(relative).max():
         return f"{together}, all by the same per cent"
     if len(change) == 2 and (one_unit or relative is None):
         (a, along_a), (b, along_b) = change.items()
@@ -325,7 +321,7 @@ def _in_words(change: Mapping[str, float], relative: Floats | None, one_unit: bo
     if relative is None:
         sizes = [f"{value:.3g} (SI)" for value in change.values()]
     else:
-        sizes = [f"{v:.3g} %" for v in SHOWN * relative / np.abs(relative).max()]
+        sizes = [f"{v:.3g} %" for v in 10.0 * relative / np.abs(relative).max()]
     each = (f"{name} by {s.replace('-', '−')}" for name, s in zip(change, sizes, strict=True))
     return f"{together}: {', '.join(each)}"
 
@@ -361,7 +357,7 @@ def _warnings(problem: UpdateProblem, found: Identified) -> Iterator[str]:
     at = [modes.index(each.mode) for each in problem.measured]
     share = error[problem.rows, at] * found.hz / problem.frequencies.deviation
     worst = int(np.argmax(share))
-    if share[worst] > FINE:
+    if share[worst] > 0.5:  # half of what the measurement itself leaves open
         yield (
             f"the mesh makes the frequency of {problem.measured[worst].label} wrong by about "
             f"{share[worst]:.2g} of its standard deviations, and the parameters take that up: "

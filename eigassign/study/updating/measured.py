@@ -27,7 +27,6 @@ from eigassign.study.built_case import Case
 
 Floats = NDArray[np.float64]
 _KEY = "measurements.file"
-_HIGHEST = 1000  # mode, as in a case file
 
 
 @dataclass(frozen=True)
@@ -126,7 +125,7 @@ def _rows(
     for k in range(len(table.lines)):
         where = f"{table.where(k)}: "
         mode, hz = table.numbers["mode"][k], table.numbers["frequency"][k]
-        if not (mode.is_integer() and 1 <= mode <= _HIGHEST):
+        if not (mode.is_integer() and 1 <= mode <= 1000):
             raise MechanismError(_KEY, f"{where}column mode: {mode:g} is not a mode (1, 2, …)")
         if not hz > 0.0:
             raise MechanismError(_KEY, f"{where}column frequency: must be > 0 Hz, got {hz:g}")
