@@ -75,12 +75,12 @@ def _header(folder: Path) -> Header:
 def _problems(shards: Sequence[_Shard]) -> Iterator[str]:
     """Yield what is wrong with the shards."""
     first = shards[0]
-    of, n = first.header.plan, first.header.shard[1]
+    n = first.header.shard[1]
     found: dict[int, Path] = {}
     for shard in shards:
         header, (i, count) = shard.header, shard.header.shard
         alike = (header.plan, count, header.version, header.columns)
-        if alike != (of, n, first.header.version, first.header.columns):
+        if alike != (first.header.plan, n, first.header.version, first.header.columns):
             yield f"{shard.folder} is a shard of another batch than {first.folder}"
         elif i in found:
             yield f"{shard.folder} and {found[i]} are the same shard, {i}/{n}"

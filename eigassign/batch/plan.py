@@ -246,14 +246,14 @@ def cases_in(paths: Sequence[Path]) -> list[Path]:
     for path in paths:
         if not path.exists():
             raise UsageError(f"{path}: no such file or folder")
-    found = [each for path in paths for each in (_in(path) if path.is_dir() else [path])]
+    found = [each for path in paths for each in (_cases_below(path) if path.is_dir() else [path])]
     if not found:
         raise UsageError(f"no case files (*.yaml, *.yml) in {', '.join(map(str, paths))}")
     first = {os.path.realpath(path): path for path in reversed(found)}
     return [path for path in found if first.pop(os.path.realpath(path), None)]
 
 
-def _in(folder: Path) -> Iterator[Path]:
+def _cases_below(folder: Path) -> Iterator[Path]:
     def refuse(error: OSError) -> None:
         raise StorageError(f"{error.filename}: cannot be read: {error.strerror}") from error
 

@@ -116,16 +116,18 @@ def _described(name: str, answer: CheckAnswer) -> list[str]:
     return [*lines, f"  next: {answer.next}"]
 
 
-def _expected(of: Outlook) -> list[str]:
-    size = of.expansion
-    modes = f"mode{'s' if len(of.modes) > 1 else ''} {', '.join(map(str, of.modes))}"
+def _expected(outlook: Outlook) -> list[str]:
+    size = outlook.expansion
+    modes = f"mode{'s' if len(outlook.modes) > 1 else ''} {', '.join(map(str, outlook.modes))}"
     mb = size.memory_mb
     memory = "1 MB" if mb < 1.0 else f"{float(f'{mb:.1g}'):.0f} MB"
     lines = [
         f"expansion of {modes} to order {size.order}: {size.coefficients} coefficients, "
         f"{'less than' if mb < 1.0 else 'about'} {memory}, {_about(size.seconds)}"
     ]
-    return lines if of.optimize_s is None else [*lines, f"optimize: {_about(of.optimize_s)}"]
+    if outlook.optimize_s is not None:
+        lines.append(f"optimize: {_about(outlook.optimize_s)}")
+    return lines
 
 
 def _about(seconds: float) -> str:
