@@ -157,8 +157,10 @@ def _carried(
     near = _near(there, best)
     if near[-1] and not there.complete:
         raise MoreModesError
-    is_clear = shares[near].sum() >= CLEAR
-    if is_clear and (depth == HALVINGS or _is_met(here, best, near)):
+    before = here.number - 1
+    passed = slice(min(before, best), max(before, best) + 1)
+    is_met = bool(near[passed].all() and _near(here.at, before)[passed].all())
+    if shares[near].sum() >= CLEAR and (depth == HALVINGS or is_met):
         a = np.where(near, c, 0.0)
         return FollowedShape(there, a / np.linalg.norm(a))
     if depth == HALVINGS:
@@ -175,10 +177,3 @@ def _carried(
 def _near(at: ModesAtPoint, best: int) -> NDArray[np.bool_]:
     """Flags of the modes near one, in the logarithm of the frequency, which is symmetric."""
     return np.asarray(np.abs(np.log(at.lam / at.lam[best])) < 2.0 * NEAR)
-
-
-def _is_met(here: FollowedShape, best: int, near: NDArray[np.bool_]) -> bool:
-    """True where all modes passed on the way to number ``best`` are near it at both ends."""
-    before = here.number - 1
-    passed = slice(min(before, best), max(before, best) + 1)
-    return bool(near[passed].all() and _near(here.at, before)[passed].all())

@@ -242,7 +242,8 @@ def find_encounters(
         for k in _swaps(ordinals, lower):
             at, least = _closest(pencil, x, k - 1, k, lower)
             met.append(Encounter(at, lower + 1, least, True, 0.0))
-        for k in _minima(gap, tracked):
+        least_here = (gap[1:-1] <= gap[:-2]) & (gap[1:-1] < gap[2:]) & (gap[1:-1] < NEAR)
+        for k in (np.flatnonzero(least_here & tracked[1:-1]) + 1).tolist():
             if not any(e.lower == lower + 1 and abs(e.sample - k) <= 1.0 for e in met):
                 met += _veering(pencil, x, found, gap, k, lower)
     return tuple(sorted(met, key=lambda e: (e.sample, e.lower)))
@@ -254,12 +255,6 @@ def _swaps(ordinals: Ints, lower: int) -> list[int]:
     up = (before <= lower) & (after > lower)
     down = (before > lower) & (after <= lower)
     return (np.flatnonzero((up | down).any(axis=1)) + 1).tolist()
-
-
-def _minima(gap: Floats, tracked: NDArray[np.bool_]) -> list[int]:
-    """Interior samples where two modes are nearest, near enough, and one of them is tracked."""
-    inner = (gap[1:-1] <= gap[:-2]) & (gap[1:-1] < gap[2:]) & (gap[1:-1] < NEAR) & tracked[1:-1]
-    return (np.flatnonzero(inner) + 1).tolist()
 
 
 def _veering(

@@ -146,16 +146,11 @@ def orthonormal(K: sparse.csc_array | Floats, vectors: Floats) -> Floats:
             rank += 1
     Q, KQ = Q[:, :rank], KQ[:, :rank]
     lost = float(np.abs(Q.T @ KQ - np.eye(rank)).max(initial=0.0))
-    if lost > ORTHONORMAL + _rounding(K, Q):
+    size = np.abs(Q)  # QᵀKQ of a fine mesh is a small difference of large terms, which round off
+    terms = np.einsum("ij,ij->j", size, abs(K) @ size).max(initial=0.0)
+    if lost > ORTHONORMAL + 10.0 * float(np.finfo(np.float64).eps * terms):
         raise AccuracyError(f"the basis is orthonormal only to {lost:.1e}")
     return Q
-
-
-def _rounding(K: sparse.csc_array | Floats, Q: Floats) -> float:
-    """Round-off of QᵀKQ itself: in a fine mesh it is a small difference of large terms."""
-    size = np.abs(Q)
-    terms = np.einsum("ij,ij->j", size, abs(K) @ size)
-    return 10.0 * float(np.finfo(np.float64).eps * terms.max(initial=0.0))
 
 
 # --- θ averaged over turned poses
