@@ -220,7 +220,7 @@ def _line(parts: Sequence[Expansion], error: float, where: str) -> str:
 
 
 def _reach(part: Expansion, x: Floats, estimate: Floats) -> str:
-    """Share of the radius of convergence in words, from the 32 samples where the error is largest."""
+    """Share of the radius of convergence in words, at the 32 samples of largest error."""
     farthest = np.argsort(-estimate.max(axis=1), kind="stable")[:32]
     q, y = np.split(x[farthest], [len(part.q0)], axis=1)
     share = float(radius_share(part, q, y).max())

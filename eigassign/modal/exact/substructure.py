@@ -121,11 +121,11 @@ def _coupling(
 ) -> tuple[Floats, Floats]:
     """G (n_I, g) and H (n_samples, g, s) with K_IS or M_IS = G H(θ).
 
-    G holds the columns of all terms, unit vectors of the same direction once.
+    G holds the columns of all terms, unit vectors of the same direction once: solved twice, they
+    would differ by the round-off of K_II alone, and Q would take that for a direction.
     """
     entries = np.flatnonzero(~split.is_outer[pencil.rows] & split.is_outer[pencil.columns])
-    merged, theta = _merged(theta)
-    terms = sparse.csr_array(weights[entries] @ merged).tocoo()
+    terms = weights[entries].tocoo()
     terms.eliminate_zeros()
     entry, term = terms.coords
     row, column = (split.place[a[entries[entry]]] for a in (pencil.rows, pencil.columns))
@@ -153,22 +153,6 @@ def _coupling(
     shape = (len(directions) * s, len(theta))
     table = sparse.csr_array((np.array(scales), (at, labels // s)), shape=shape)
     return G, (table @ theta).T.reshape(theta.shape[1], len(directions), s)
-
-
-def _merged(theta: Floats) -> tuple[sparse.csr_array, Floats]:
-    """Coefficients of one direction over the samples as one: C and θ' with θ = C θ'.
-
-    One design has many that differ by a factor only: what sections and materials multiply.
-    """
-    used = np.flatnonzero(np.abs(theta).max(axis=1) > 0.0)
-    scale = theta[used, np.abs(theta[used]).argmax(axis=1)]
-    shapes = theta[used] / scale[:, None]
-    known: dict[bytes, int] = {}
-    keys = (row.tobytes() for row in np.round(shapes, 13) + 0.0)
-    group = [known.setdefault(key, len(known)) for key in keys]
-    first = np.unique(group, return_index=True)[1]
-    shape = (len(theta), len(first))
-    return sparse.csr_array((scale, (used, group)), shape=shape), shapes[first]
 
 
 # --- What is the same at every sample: T on a growing basis
