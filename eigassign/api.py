@@ -51,7 +51,7 @@ __all__ = [
 ]
 
 
-class Case(built_case.Case):
+class Case(built_case.BuiltCase):
     """A validated case with what is built from it, each part once and when it is asked for.
 
     ``model()`` is the mechanism: ``.frequencies(q, y)`` in Hz at q (n, n_q) in rad or m and y
@@ -173,7 +173,7 @@ def reduce(
     )
 
 
-def assign(case: built_case.Case) -> Result:
+def assign(case: built_case.BuiltCase) -> Result:
     """The whole job of ``eigassign optimize``, without writing anything.
 
         min over y of Σ w (f(t)/f_d(t) − 1)² / Σ w  within the bounds, limits and bands of the case
@@ -188,7 +188,7 @@ def assign(case: built_case.Case) -> Result:
     return solve_case(_loaded(case))
 
 
-def update(case: built_case.Case) -> Updated:
+def update(case: built_case.BuiltCase) -> Updated:
     """The whole job of ``eigassign update``, without writing anything.
 
         min over y of Σ ((f(q, y) − f_measured) / σ)²
@@ -201,9 +201,9 @@ def update(case: built_case.Case) -> Updated:
     return replace(found, case=Case(found.case.file))
 
 
-def _loaded(case: object) -> built_case.Case:
+def _loaded(case: object) -> built_case.BuiltCase:
     """Raises UsageError for what is none, such as the name of its file."""
-    if not isinstance(case, built_case.Case):
+    if not isinstance(case, built_case.BuiltCase):
         raise UsageError(f"expected a case, got {type(case).__name__}: ea.load_case(...) makes one")
     return case
 

@@ -18,7 +18,7 @@ from eigassign.output.batch.outcome import CaseOutcome, Status, frequency_ranges
 from eigassign.pipeline.run import Options, solve_case
 from eigassign.pipeline.run_files import new_run_folder
 from eigassign.process import failure_of
-from eigassign.study.built_case import Case
+from eigassign.study.built_case import BuiltCase
 from eigassign.study.results import RunResults
 
 
@@ -61,9 +61,9 @@ def check_cases(
     return found
 
 
-def load(variant: Variant, options: CaseOptions) -> Case:
+def load(variant: Variant, options: CaseOptions) -> BuiltCase:
     """The case of a variant; raises CaseError."""
-    return Case(checked(_written(variant.path), options.allow_outside, variant.values))
+    return BuiltCase(checked(_written(variant.path), options.allow_outside, variant.values))
 
 
 def _written(path: str) -> Unchecked:
@@ -137,7 +137,7 @@ def _solved(variant: Variant, options: CaseOptions) -> dict[str, Any]:
     return {"run_folder": variant.name, **_found(results)}
 
 
-def _uninterrupted(case: Case, how: Options) -> RunResults:
+def _uninterrupted(case: BuiltCase, how: Options) -> RunResults:
     """The answer; Ctrl-C ends a batch, and makes no answer of the best design so far."""
     results = solve_case(case, how).results
     if results.assignment is not None and results.assignment.ended == "interrupted":

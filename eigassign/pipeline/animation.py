@@ -10,11 +10,11 @@ from eigassign.output.figures import motion
 from eigassign.output.store.atomic import replace_synced
 from eigassign.pipeline.queries import pose_and_design
 from eigassign.study import drawing
-from eigassign.study.built_case import Case
+from eigassign.study.built_case import BuiltCase
 
 
 def animate(
-    case: Case,
+    case: BuiltCase,
     path: str | Path,
     mode: int | None = None,
     q: Sequence[float] | str | None = None,
@@ -52,7 +52,7 @@ def animate(
         raise StorageError(f"cannot write {path}: {error.strerror}") from error
 
 
-def _along(case: Case, name: str | None) -> motion.Animation:
+def _along(case: BuiltCase, name: str | None) -> motion.Animation:
     """Raises UsageError without a trajectory, or one of that name."""
     if case.file.trajectory is None:
         raise UsageError("the case has no trajectory to animate: ask for a mode (--mode 1)")

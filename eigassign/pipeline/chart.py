@@ -16,7 +16,7 @@ from eigassign.pipeline.run import Options, prepare
 from eigassign.pipeline.run_files import new_run_folder
 from eigassign.pipeline.stages import Stages
 from eigassign.study.accuracy import truncation_notes
-from eigassign.study.built_case import Case, load_case
+from eigassign.study.built_case import BuiltCase, load_case
 
 
 def chart(
@@ -32,7 +32,7 @@ def chart(
     return folder.path, made
 
 
-def chart_case(case: Case, options: Options, effort: Effort, request: Request) -> Chart:
+def chart_case(case: BuiltCase, options: Options, effort: Effort, request: Request) -> Chart:
     """Time against accuracy of every method on this case; nothing written.
 
     Raises CaseError where the case has no trajectory, or nothing that changes a frequency.

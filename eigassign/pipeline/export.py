@@ -15,7 +15,7 @@ from eigassign.modal.adaptive.reduced_model import reduce_adaptively
 from eigassign.output.exchange.files import ENDINGS, write_exchange
 from eigassign.output.exchange.reduced_file import save_reduced
 from eigassign.pipeline.queries import pose_and_design
-from eigassign.study.built_case import Case
+from eigassign.study.built_case import BuiltCase
 from eigassign.study.drawing import spread_samples
 
 Floats = NDArray[np.float64]
@@ -34,7 +34,7 @@ class Exported:
 
 
 def export(
-    case: Case, path: str | Path, modes: Sequence[int] = (1,), accuracy: float = 1e-6
+    case: BuiltCase, path: str | Path, modes: Sequence[int] = (1,), accuracy: float = 1e-6
 ) -> Exported:
     """Write the smallest reduced model found whose error estimate is at most ``accuracy``.
 
@@ -58,7 +58,7 @@ def export(
     return Exported(files, reduced.modes, reduced.size, len(reduced.points), made.error, len(x))
 
 
-def _samples(case: Case) -> Floats:
+def _samples(case: BuiltCase) -> Floats:
     """(q, y) where the model is to be good, (n, n_x): of other designs at 20 poses each."""
     initial, designs = case.initial_design, _designs(case)
     if case.file.trajectory is None:
@@ -75,7 +75,7 @@ def _samples(case: Case) -> Floats:
     return np.concatenate(parts)
 
 
-def _designs(case: Case) -> Floats:
+def _designs(case: BuiltCase) -> Floats:
     """Corners of the bounds, (n, n_y); of over six parameters, drawn ones, as many as six have."""
     columns = case.file.design.parameters.values()
     bounds = np.array([(column.min, column.max) for column in columns]).reshape(-1, 2)

@@ -20,7 +20,7 @@ from eigassign.output.figures.motion import mechanism_plan
 from eigassign.output.reports.page import write_figures
 from eigassign.pipeline.expansions import ExpansionSize, expansion_size
 from eigassign.pipeline.run_files import RESULTS, new_run_folder
-from eigassign.study.built_case import Case, load_case
+from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.drawing import draw_poses, rest_pose
 from eigassign.study.planning import Plan
 
@@ -37,7 +37,7 @@ class Outlook:
     optimize_s: float | None
 
 
-def outlook(case: Case, plan: Plan, trajectory: Trajectories | None) -> Outlook:
+def outlook(case: BuiltCase, plan: Plan, trajectory: Trajectories | None) -> Outlook:
     """Estimated from sizes, and from one exact solve of some samples, which is timed.
 
     `optimize` solves all samples exactly some 100 times for up to four starts: 26 to 165 times on
@@ -90,7 +90,7 @@ def draw(
     return target
 
 
-def picture(case: Case) -> FigurePlan:
+def picture(case: BuiltCase) -> FigurePlan:
     """The mechanism along its trajectory, or in one pose; raises CaseError where it has none."""
     file, y = case.file, case.initial_design
     with case.located():
@@ -102,7 +102,7 @@ def picture(case: Case) -> FigurePlan:
     return mechanism_plan(file.title, poses)
 
 
-def some_pose(case: Case) -> Floats:
+def some_pose(case: BuiltCase) -> Floats:
     """q (n_q,) of a case without a trajectory: its expansion point, else where it may rest."""
     given = case.file.expansion.q
     pose = resting_pose(case.file) if given == "auto" else given

@@ -23,7 +23,7 @@ from eigassign.pipeline.outlook import Outlook, next_step, outlook, some_pose
 from eigassign.pipeline.run_files import RESULTS, new_run_folder
 from eigassign.study import drawing
 from eigassign.study.accuracy import judged_mesh, mesh_lines, truncation_lines
-from eigassign.study.built_case import Case, load_case
+from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.design.followed import named_notes
 from eigassign.study.planning import plan_expansion, shown_point
 from eigassign.study.updating.measured import read_measurements
@@ -116,7 +116,7 @@ def draw_modes(
 
 
 def pose_and_design(
-    case: Case,
+    case: BuiltCase,
     q: Sequence[float] | str | None = None,
     y: Sequence[float] | str | None = None,
     beyond: bool = False,
@@ -134,7 +134,7 @@ def pose_and_design(
     return at_q, at_y
 
 
-def _refuse_beyond_bounds(case: Case, y: Floats) -> None:
+def _refuse_beyond_bounds(case: BuiltCase, y: Floats) -> None:
     columns, units = case.file.design.parameters.items(), case.file.design_units
     for (name, column), unit, value, initial in zip(
         columns, units, y, case.initial_design, strict=True
@@ -148,7 +148,7 @@ def _refuse_beyond_bounds(case: Case, y: Floats) -> None:
             )
 
 
-def _answer(case: Case, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
+def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
     model, file = case.model(), case.file
     named = ((model.q_names, q, file.q_units), (model.y_names, y, file.design_units))
     every = tuple(range(1, len(hz) + 1))
@@ -170,7 +170,7 @@ def _pairs(names: Sequence[str], numbers: Floats) -> tuple[tuple[str, float], ..
     return tuple((name, float(number)) for name, number in zip(names, numbers, strict=True))
 
 
-def _default_q(case: Case) -> Sequence[float]:
+def _default_q(case: BuiltCase) -> Sequence[float]:
     file = case.file
     if file.expansion.q != "auto":
         return [float(value) for value in file.expansion.q]
@@ -194,7 +194,7 @@ def check(path: str | Path, allow_outside: bool = False) -> CheckAnswer:
         return _checked(case)
 
 
-def _checked(case: Case) -> CheckAnswer:
+def _checked(case: BuiltCase) -> CheckAnswer:
     file, model = case.file, case.model()
     trajectory = case.trajectory if file.trajectory is not None else None
     notes = weights(file)
@@ -235,7 +235,7 @@ def _checked(case: Case) -> CheckAnswer:
     )
 
 
-def _require_regular(case: Case, q: Floats | None) -> None:
+def _require_regular(case: BuiltCase, q: Floats | None) -> None:
     """One exact solve: a mechanism without mass or stiffness is found here, at its line."""
     if q is None:
         q = some_pose(case)[None]

@@ -31,7 +31,7 @@ from eigassign.pipeline.expansions import expand_plan
 from eigassign.pipeline.run_files import RunFolder, new_run_folder
 from eigassign.pipeline.stages import Stages, silent
 from eigassign.study.accuracy import accuracy_notes, judged_mesh, truncation_notes
-from eigassign.study.built_case import Case, load_case
+from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.collect import VerifiedAssignment, collect_results
 from eigassign.study.comparison import (
     TRAJECTORY,
@@ -134,7 +134,7 @@ class Outcome:
 DEFAULT = Options()
 
 
-def solve_case(case: Case, options: Options = DEFAULT) -> Result:
+def solve_case(case: BuiltCase, options: Options = DEFAULT) -> Result:
     """The paper's flowchart: case → model → trajectory → expansion → assignment → verification.
 
     Raises CaseError for what the case lacks, InfeasibleError for limits that contradict each
@@ -201,7 +201,7 @@ def _moving(
 
 
 def prepare(
-    case: Case,
+    case: BuiltCase,
     stages: Stages,
     cache: Cache | None,
     order: int | None = None,

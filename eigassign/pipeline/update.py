@@ -13,7 +13,7 @@ from eigassign.output.reports.update import headline, update_tables, write_updat
 from eigassign.pipeline.run import DEFAULT, Options
 from eigassign.pipeline.run_files import new_run_folder
 from eigassign.pipeline.stages import Stages
-from eigassign.study.built_case import Case, load_case
+from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.updating.fit import UpdateResults, collect_update, solve_update, update_problem
 
 
@@ -22,7 +22,7 @@ class Updated(Pictured):
     """A finished update: what it found, the case with the values found, and its folder if any."""
 
     results: UpdateResults
-    case: Case
+    case: BuiltCase
     folder: Path | None = None
 
     def __repr__(self) -> str:
@@ -61,7 +61,7 @@ def update(path: str | Path, options: Options) -> Updated:
     return replace(found, folder=folder.path)
 
 
-def update_case(case: Case, options: Options = DEFAULT) -> Updated:
+def update_case(case: BuiltCase, options: Options = DEFAULT) -> Updated:
     """The parameters that explain the measurements, and the case with them; nothing written.
 
     Raises CaseError for what the case lacks and for wrong measurements.
@@ -76,4 +76,4 @@ def update_case(case: Case, options: Options = DEFAULT) -> Updated:
             found = solve_update(problem)
         with stages("checks", "checking mesh and neighbouring modes"):
             results = collect_update(problem, found, stages.timing_s)
-    return Updated(results, Case(case.file.with_design(found.y)))
+    return Updated(results, BuiltCase(case.file.with_design(found.y)))

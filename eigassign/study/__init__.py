@@ -26,7 +26,7 @@ __all__, __getattr__, __dir__ = face(
     {
         "accuracy": "least_gap",
         "build": "build_model",
-        "built_case": "Case load_case",
+        "built_case": "BuiltCase load_case",
         "comparison": (
             "COARSE DESIGN_BOX RANDOM_BOX TRAJECTORY box_points compare grid_over q_grid "
             "random_q reach_warnings study_modes validate_expansions"

@@ -17,7 +17,6 @@ from eigassign.case.schema.trajectory import TrajectoryForm
 from eigassign.errors import (
     CaseError,
     MechanismError,
-    Problem,
     SingularityError,
     TrajectoryError,
 )
@@ -59,18 +58,15 @@ def located(file: CaseFile, trajectory: str = "trajectory") -> Iterator[None]:
         path = error.path
         if path.split(".")[0] == "trajectory":
             path = trajectory + path.removeprefix("trajectory")
-        doubts = _doubts(file) if isinstance(error, TrajectoryError) else ()
-        raise CaseError((file.problem(path, error.message), *doubts)) from error
-
-
-_MAY_BE = "this may be why the trajectory cannot be followed"
-
-
-def _doubts(file: CaseFile) -> Iterator[Problem]:
-    """Warnings of dimensions, which may be why a trajectory cannot be followed."""
-    for warning in file.warnings:
-        if warning.path.startswith(("mechanism.links", "mechanism.joints", "trajectory")):
-            yield replace(warning, message=f"{_MAY_BE}: {warning.message}")
+        problems = [file.problem(path, error.message)]
+        if isinstance(error, TrajectoryError):
+            may_be = "this may be why the trajectory cannot be followed"
+            problems += [
+                replace(warning, message=f"{may_be}: {warning.message}")
+                for warning in file.warnings
+                if warning.path.startswith(("mechanism.links", "mechanism.joints", "trajectory"))
+            ]
+        raise CaseError(tuple(problems)) from error
 
 
 def build_links(file: CaseFile) -> WholeLinks:

@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Case:
+class BuiltCase:
     """A validated case file with what is built from it; frozen."""
 
     file: CaseFile
@@ -84,12 +84,12 @@ class Case:
         return located(self.file)
 
 
-def load_case(given: str | Path | Mapping[str, Any], allow_outside: bool = False) -> Case:
+def load_case(given: str | Path | Mapping[str, Any], allow_outside: bool = False) -> BuiltCase:
     """Read and validate a case file, or a mapping like one; CaseError with every problem found.
 
     ``allow_outside``: the case may name files that do not lie below its own folder, or below the
     current one where it is a mapping.
     """
     if isinstance(given, Mapping):
-        return Case(from_mapping(given, allow_outside=allow_outside))
-    return Case(load(given, allow_outside))
+        return BuiltCase(from_mapping(given, allow_outside=allow_outside))
+    return BuiltCase(load(given, allow_outside))

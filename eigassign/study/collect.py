@@ -26,7 +26,6 @@ from eigassign.study.results import (
     ModeStudy,
     OtherModes,
     RunResults,
-    SolverRow,
     TargetStudy,
     TrajectoryRow,
 )
@@ -60,6 +59,7 @@ def collect_results(
     along = [(s.over_time.worst_taylor, s.mode) for s in studies if s.over_time is not None]
     followed = assigned is not None and assigned.answer.found is not None  # by exact frequencies
     reach = () if followed else reach_warnings(scene, along)
+    one_shot = None if assigned is None else assigned.answer.one_shot
     n = len(file.coordinates)
     meaning = Meaning() if assigned is None else assigned.meaning
     return RunResults(
@@ -80,7 +80,7 @@ def collect_results(
         targets=() if assigned is None else assigned.targets,
         others=None if assigned is None else _others(scene, assigned),
         spectrum=None if assigned is None else _spectrum(scene, assigned),
-        solver=_solver(assigned),
+        solver=None if one_shot is None else solver_row(one_shot),
         assignment=row,
         warnings=(*scene.warnings, *_warnings(scene, assigned), *reach, *motion[1]),
         notes=(*scene.notes, *_notes(scene, assigned, row), *motion[0], *meaning.notes),
@@ -96,11 +96,6 @@ def _mass(scene: Scene, y: Floats) -> MassRow:
     limits, mass = scene.file.design.mass, scene.model.mass
     low, high = (None, None) if limits is None else (limits.min, limits.max)
     return MassRow(mass(scene.initial), mass(y), low, high)
-
-
-def _solver(assigned: VerifiedAssignment | None) -> SolverRow | None:
-    one_shot = None if assigned is None else assigned.answer.one_shot
-    return None if one_shot is None else solver_row(one_shot)
 
 
 def _assignment(scene: Scene, assigned: VerifiedAssignment | None) -> AssignmentRow | None:

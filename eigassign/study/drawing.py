@@ -273,15 +273,13 @@ def bodies(file: CaseFile, mass: Callable[[str, float], float], at: At) -> tuple
         found.append(DrawnBody(name, mass(f"bodies.{name}.mass", body.mass), at(split(body.at))))
     links: Mapping[str, Any] = file.mechanism.links
     for name, link in links.items():
-        if link_type(file, name) == "rigid" and not _has_extent(link):
+        if link_type(file, name) != "rigid":
+            continue
+        places = [tuple(map(float, X)) for X in (link.nodes or {}).values()]
+        if link.length is None and not any(map(any, places)):
             node = next(iter(link.nodes or {"start": None}))
             found.append(DrawnBody(name, mass(f"links.{name}.mass", link.mass), at((name, node))))
     return tuple(found)
-
-
-def _has_extent(link: Any) -> bool:
-    places = {tuple(map(float, X)) for X in (link.nodes or {}).values()}
-    return link.length is not None or any(map(any, places))
 
 
 def springs(file: CaseFile, at: At) -> tuple[DrawnSpring, ...]:
@@ -311,11 +309,8 @@ def sizes(
 def _line_sizes(file: CaseFile, section: Any) -> tuple[float, float]:
     if section is None:
         return 0.0, 0.0
-    names = (section, section) if isinstance(section, str) else (section.start, section.end)
-    start, end = (_gyration(file.mechanism.sections[name]) for name in names)
-    return start, end
-
-
-def _gyration(section: Any) -> float:
-    values: Any = section_values(section, lambda _key, value: value)
-    return float(np.sqrt(max(values.inertia_z, values.inertia_y) / values.area))
+    found = []
+    for name in (section, section) if isinstance(section, str) else (section.start, section.end):
+        values: Any = section_values(file.mechanism.sections[name], lambda _key, value: value)
+        found.append(float(np.sqrt(max(values.inertia_z, values.inertia_y) / values.area)))
+    return found[0], found[1]

@@ -64,7 +64,8 @@ def _along(
     d = found[0].strands[0].places.shape[1]
     nodes = _marked(file)
     scales = _scales(found, modes)
-    lines = [_few(len(strand.places)) for strand in found[0].strands]
+    counts = [len(strand.places) for strand in found[0].strands]
+    lines = [np.unique(np.linspace(0, n - 1, min(n, POINTS)).round().astype(int)) for n in counts]
     rest = [
         np.stack([one.strands[k].places[points] for one in found]) for k, points in enumerate(lines)
     ]
@@ -87,11 +88,6 @@ def _along(
         mark_motions=frozen(np.array(moved).reshape(len(found), len(nodes), d)),
         tip_path=tip,
     )
-
-
-def _few(count: int) -> NDArray[np.intp]:
-    """The points that are drawn of so many."""
-    return np.unique(np.linspace(0, count - 1, min(count, POINTS)).round().astype(np.intp))
 
 
 def _scales(found: Sequence[ModeShapes], modes: NDArray[np.intp]) -> Floats:

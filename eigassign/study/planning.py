@@ -22,7 +22,7 @@ from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, CaseError, TrajectoryError, UsageError
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.modal.adaptive.link_reduction import POSES, ReductionChoice, choose_reduction
+from eigassign.modal.adaptive.link_reduction import POSES
 from eigassign.modal.adaptive.mesh import MeshChoice, ModesAt, choose_mesh
 from eigassign.modal.adaptive.order import ExpansionChoice, choose_expansion
 from eigassign.modal.arguments import spread
@@ -320,18 +320,6 @@ def _reduced_to(file: CaseFile) -> dict[str, float | str]:
 def truncation_share(file: CaseFile) -> float:
     """The part of the accuracy asked for that reduced links may use; 0 without any."""
     return TRUNCATION * asked_accuracy(file) if _reduced_to(file) else 0.0
-
-
-def settle_reduction(
-    file: CaseFile,
-    names: tuple[str, ...],
-    whole: Model,
-    build: Callable[[float], Model],
-    x: Floats,
-    modes_at: ModesAt,
-) -> ReductionChoice:
-    """The lowest frequency to which links may be reduced at x (n, n_x), if it pays."""
-    return choose_reduction(names, whole, build, x, truncation_share(file), modes_at)
 
 
 def require_little_truncation(file: CaseFile, model: Model, x: Floats) -> None:

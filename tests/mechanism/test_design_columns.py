@@ -7,7 +7,7 @@ import pytest
 from small_case import edited
 
 from eigassign.case import CaseFile, parse
-from eigassign.study import Case
+from eigassign.study import BuiltCase
 
 D = "  d: {parameter: sections.rod.diameter, min: 20 mm, max: 40 mm}\n"
 ENTRIES = """\
@@ -34,8 +34,8 @@ def test_the_columns_of_choices_are_ordinary_parameters(
     text = edited(
         "area: 7.0632e-4, bending_inertia: 3.97e-8", f"area: {area}, bending_inertia: {inertia}"
     )
-    written = Case(read(text.replace("diameter: 30 mm", "diameter: 35 mm")))
+    written = BuiltCase(read(text.replace("diameter: 30 mm", "diameter: 35 mm")))
     q = np.array([[0.3, 1.1], [0.4, 2.0]])
-    chosen = Case(file).model().frequencies(q, y, 3)
+    chosen = BuiltCase(file).model().frequencies(q, y, 3)
     expected = written.model().frequencies(q, written.initial_design, 3)
     np.testing.assert_allclose(chosen, expected, rtol=1e-9)  # round-off of the eigensolver

@@ -10,7 +10,7 @@ import pytest
 
 from eigassign.case import parse
 from eigassign.pipeline import Result, solve_case
-from eigassign.study import AssignmentRow, Case, CatalogueRow
+from eigassign.study import AssignmentRow, BuiltCase, CatalogueRow
 
 TEXT = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
 HEAD, REST = TEXT.replace("samples: 152", "samples: 11").split("design: #")
@@ -26,7 +26,7 @@ HELD = HEAD.replace("{joint: shoulder}", "{joint: shoulder, drive: {stiffness: 2
 
 
 def solved(design: str, targets: str, head: str = HEAD) -> tuple[Result, AssignmentRow]:
-    result = solve_case(Case(parse((head + design + TAIL + targets).encode(), "case.yaml")))
+    result = solve_case(BuiltCase(parse((head + design + TAIL + targets).encode(), "case.yaml")))
     assert result.results.assignment is not None
     return result, result.results.assignment
 
@@ -78,7 +78,7 @@ SECTIONS = {
 
 def with_lists(
     masses: str, diameters: str, more: str = "", hz: float = 190.0, limits: str = ""
-) -> Case:
+) -> BuiltCase:
     """The arm with lists of one mass, one diameter and three sections."""
     head = HEAD.replace(
         "rod: {area: 7.06317856e-4, bending_inertia: 3.97e-8}",
@@ -95,10 +95,10 @@ def with_lists(
         f"  fore:\n    choices:\n{choices}{limits}"
     )
     targets = f"  - {{mode: 1, frequency: {hz} Hz}}\n"
-    return Case(parse((head + design + TAIL + targets + more).encode(), "case.yaml"))
+    return BuiltCase(parse((head + design + TAIL + targets + more).encode(), "case.yaml"))
 
 
-def exact_objectives(case: Case, hz: float = 190.0) -> dict[tuple[str, ...], float]:
+def exact_objectives(case: BuiltCase, hz: float = 190.0) -> dict[tuple[str, ...], float]:
     """The weighted mean square error of every combination, by its labels."""
     model, q = case.model(), case.trajectory.q
     weights = np.convolve(np.diff(case.trajectory.time_s), [0.5, 0.5])
@@ -112,7 +112,7 @@ def exact_objectives(case: Case, hz: float = 190.0) -> dict[tuple[str, ...], flo
     return found
 
 
-def searched(case: Case) -> tuple[Result, CatalogueRow]:
+def searched(case: BuiltCase) -> tuple[Result, CatalogueRow]:
     result = solve_case(case)
     row = result.results.assignment
     assert row is not None

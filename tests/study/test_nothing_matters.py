@@ -6,7 +6,7 @@ import numpy as np
 
 from eigassign.case import parse
 from eigassign.modal import choose_expansion, discretisation_error
-from eigassign.study import Case
+from eigassign.study import BuiltCase
 
 TEXT = """
 title: A locked arm and a material that no link is made of
@@ -27,7 +27,7 @@ targets: [{mode: 1, frequency: 60 Hz}]
 
 
 def test_the_order_is_at_least_one() -> None:
-    case = Case(parse(TEXT.encode(), "case.yaml"))
+    case = BuiltCase(parse(TEXT.encode(), "case.yaml"))
     model = case.model()
     x = model.x(case.trajectory.q, case.initial_design)
     chosen = choose_expansion(model.pencil, x, 1e-3)
@@ -41,7 +41,7 @@ def test_a_link_at_rest_has_no_share_in_the_error_of_the_mesh() -> None:
     foot = "foot: {type: fixed, base: ground, follower: post.start}"
     text = TEXT.replace("elements: 4}}", f"elements: 4}}, {post}}}")
     text = text.replace("follower: arm.start}}", f"follower: arm.start}}, {foot}}}")
-    case = Case(parse(text.encode(), "case.yaml"))
+    case = BuiltCase(parse(text.encode(), "case.yaml"))
     model = case.model()
     x = model.x(case.trajectory.q, case.initial_design)
     for mode in (1, 2, 3, 4):

@@ -85,9 +85,12 @@ def relaxed_limits(
         while row.multiplier * amount > MOST * abs(F) > 0.0:
             amount = _rounded(0.5 * amount)
         before, after = as_error(kind, F), as_error(kind, F - row.multiplier * amount)
+        change = f"{before:.4g} → {after:.4g}"
+        if kind.endswith("error"):
+            change = f"{100 * before:#.3g} → {100 * after:#.3g} %"
         yield RelaxedRow(
             row.name, row.kind, row.side, amount, unit, kind, before, after,
-            f"{_room(file, row, amount, unit)}: {kind} {_from_to(kind, before, after)}",
+            f"{_room(file, row, amount, unit)}: {kind} {change}",
         )  # fmt: skip
 
 
@@ -130,9 +133,3 @@ def _room(file: CaseFile, row: ActiveRow, amount: float, unit: str) -> str:
     if limit is None:
         return f"the limit of the mass, relaxed by {100 * amount:g} %"
     return f"{handy(amount * limit, 'kg')} {more} mass"
-
-
-def _from_to(kind: str, before: float, after: float) -> str:
-    if not kind.endswith("error"):
-        return f"{before:.4g} → {after:.4g}"
-    return f"{100 * before:#.3g} → {100 * after:#.3g} %"

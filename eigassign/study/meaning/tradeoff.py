@@ -41,11 +41,19 @@ def trade_off(scene: Scene, found: Found) -> TradeOff | None:
         return None
     priced = variant.problem.prices is not None
     problem = replace(variant.problem, prices=None)
-    quantity: Quantity = _price(scene) if priced else scene.model.total_mass
+    prices = np.array([column.price or 0.0 for column in scene.file.design.parameters.values()])
+
+    def price(y: Floats) -> tuple[float, Floats]:  # of the change, in the file's units
+        return float(prices @ (y - scene.initial)), prices
+
+    quantity: Quantity = price if priced else scene.model.total_mass
     high, first = quantity(best.y)[0], quantity(scene.initial)[0]
     low = min(first, high)
     if high - low <= SAME * abs(high):
-        lightest = _limited(_nothing(problem), quantity, 0.0, 1.0)
+        n = len(best.y)  # the limits of the design alone
+        empty = Appraisal(np.zeros(0), np.zeros((0, n)), np.zeros(0), np.zeros((0, n)))
+        alone = replace(problem, appraise=lambda y: empty)
+        lightest = _limited(alone, quantity, 0.0, 1.0)
         low = quantity(minimise(lightest, best.y, STEPS).y)[0]
     if high - low <= SAME * abs(high):
         return None
@@ -66,19 +74,6 @@ def trade_off(scene: Scene, found: Found) -> TradeOff | None:
         kind,
         tuple(kept(points)),
     )
-
-
-def _price(scene: Scene) -> Quantity:
-    """p·(y − y_initial), in the units of the case file's prices."""
-    prices = np.array([column.price or 0.0 for column in scene.file.design.parameters.values()])
-    return lambda y: (float(prices @ (y - scene.initial)), prices)
-
-
-def _nothing(problem: DesignProblem) -> DesignProblem:
-    """The limits of the design alone."""
-    n = len(problem.lower)
-    empty = Appraisal(np.zeros(0), np.zeros((0, n)), np.zeros(0), np.zeros((0, n)))
-    return replace(problem, appraise=lambda y: empty)
 
 
 def _limited(

@@ -21,7 +21,7 @@ from eigassign.assignment.exact.sequential import End
 from eigassign.brief import Brief
 from eigassign.case.case_file import CaseFile
 from eigassign.modal.model import Model
-from eigassign.study.built_case import Case
+from eigassign.study.built_case import BuiltCase
 from eigassign.study.design.judgement import NEAR
 from eigassign.study.design.response import exact_slopes
 from eigassign.study.updating.measured import PosedMeasurement, read_measurements
@@ -150,7 +150,7 @@ def require_updatable(file: CaseFile) -> None:
 class UpdateProblem:
     """A case with its measurements, each pose once: what is solved."""
 
-    case: Case
+    case: BuiltCase
     measured: tuple[PosedMeasurement, ...]
     notes: tuple[str, ...]
     q: Floats  # (n_p, n_q) poses
@@ -178,7 +178,7 @@ class UpdateProblem:
         return hz[self.rows, self.columns], slopes[self.rows, self.columns, n_q:]
 
 
-def update_problem(case: Case) -> UpdateProblem:
+def update_problem(case: BuiltCase) -> UpdateProblem:
     """Read what is to be solved; raises CaseError for wrong measurements."""
     require_updatable(case.file)
     measured, notes = read_measurements(case)

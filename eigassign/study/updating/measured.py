@@ -23,7 +23,7 @@ from eigassign.case.units import DIMENSIONS
 from eigassign.errors import MechanismError
 from eigassign.mechanism.trajectory.csv import TIME, coordinate_columns
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.study.built_case import Case
+from eigassign.study.built_case import BuiltCase
 
 Floats = NDArray[np.float64]
 _KEY = "measurements.file"
@@ -42,7 +42,7 @@ class PosedMeasurement:
     deviation_hz: float
 
 
-def read_measurements(case: Case) -> tuple[tuple[PosedMeasurement, ...], tuple[str, ...]]:
+def read_measurements(case: BuiltCase) -> tuple[tuple[PosedMeasurement, ...], tuple[str, ...]]:
     """All measurements in the order given, and notes on what was ignored.
 
     Raises CaseError for a file that cannot be read or holds what is no measurement (with its line),
@@ -55,7 +55,7 @@ def read_measurements(case: Case) -> tuple[tuple[PosedMeasurement, ...], tuple[s
     return tuple(_posed(case, f"measurements[{k}]", each) for k, each in enumerate(given)), ()
 
 
-def _posed(case: Case, label: str, given: Measurement) -> PosedMeasurement:
+def _posed(case: BuiltCase, label: str, given: Measurement) -> PosedMeasurement:
     with case.located():
         if given.time is not None:
             q = _at_time(case.trajectory, given.time, given.trajectory, f"{label}.time", "")
@@ -90,7 +90,7 @@ def _with_loads(file: CaseFile, coordinates: ArrayLike, name: str | None) -> Flo
 
 
 def _from_file(
-    case: Case, given: MeasurementFile
+    case: BuiltCase, given: MeasurementFile
 ) -> tuple[tuple[PosedMeasurement, ...], tuple[str, ...]]:
     file, hz = case.file, DIMENSIONS["frequency"]
     names = list(file.coordinates)
@@ -119,7 +119,7 @@ def _from_file(
 
 
 def _rows(
-    case: Case, table: CsvTable, default: Tolerance | None, names: list[str]
+    case: BuiltCase, table: CsvTable, default: Tolerance | None, names: list[str]
 ) -> Iterator[PosedMeasurement]:
     known = [name for _, name, _ in case.file.trajectories]
     for k in range(len(table.lines)):

@@ -11,7 +11,7 @@ from small_case import edited
 
 from eigassign.case import parse
 from eigassign.errors import UsageError
-from eigassign.study import Case, load_case
+from eigassign.study import BuiltCase, load_case
 
 CASES = Path(__file__).parents[3] / "cases"
 
@@ -54,7 +54,7 @@ def test_the_slope_is_that_of_a_curved_dependence() -> None:
     )
     text = text.replace("drive: {stiffness: 100}", "drive: {stiffness: 100, inertia: 0.5}")
     text = text.replace("max: 250 g", "max: 1").replace("max: 200 g", "max: 1")
-    case = Case(parse(text.encode(), "case.yaml"))
+    case = BuiltCase(parse(text.encode(), "case.yaml"))
     model = case.model()
     pipe, bar = pi / 4 * (0.04**2 - 0.036**2), 7.0632e-4
     for d in (0.02, 0.035):
@@ -73,7 +73,7 @@ def test_reduced_links_keep_their_mass() -> None:
         .read_text()
         .replace("elements: 4}", "elements: 9, reduce_to: 3 kHz}")
     )
-    assert Case(parse(text.encode(), "c.yaml")).model().mass([0.1, 0.2]) == pytest.approx(
+    assert BuiltCase(parse(text.encode(), "c.yaml")).model().mass([0.1, 0.2]) == pytest.approx(
         whole, rel=1e-12
     )
 

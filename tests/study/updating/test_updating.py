@@ -12,7 +12,7 @@ from eigassign.case import Measurement, MeasurementFile
 from eigassign.errors import CaseError
 from eigassign.pipeline import update_case
 from eigassign.study import (
-    Case,
+    BuiltCase,
     UpdateResults,
     load_case,
     read_measurements,
@@ -24,7 +24,7 @@ CASES = Path(__file__).parents[3] / "cases"
 NOISE = 0.005
 
 
-def shipped(name: str, poses: int, modes: int, truth: np.ndarray, **how: object) -> Case:
+def shipped(name: str, poses: int, modes: int, truth: np.ndarray, **how: object) -> BuiltCase:
     """A shipped case with frequencies measured on the same mechanism with the design ``truth``."""
     case = load_case(CASES / f"{name}.yaml")
     q = case.trajectory.q[:: len(case.trajectory.q) // poses][:poses]
@@ -32,17 +32,19 @@ def shipped(name: str, poses: int, modes: int, truth: np.ndarray, **how: object)
     return measuring(case, q, hz, **how)
 
 
-def measuring(case: Case, q: np.ndarray, hz: np.ndarray, deviation: object = "0.5 %") -> Case:
+def measuring(
+    case: BuiltCase, q: np.ndarray, hz: np.ndarray, deviation: object = "0.5 %"
+) -> BuiltCase:
     """The case with ``hz`` (n, modes) measured at ``q`` (n, n_q)."""
     listed = tuple(
         Measurement(q=tuple(map(float, pose)), mode=k, frequency=float(f), deviation=deviation)
         for pose, row in zip(q, hz, strict=True)
         for k, f in enumerate(row, start=1)
     )
-    return Case(replace(case.file, measurements=listed))
+    return BuiltCase(replace(case.file, measurements=listed))
 
 
-def updated(case: Case) -> UpdateResults:
+def updated(case: BuiltCase) -> UpdateResults:
     return update_case(case).results
 
 
@@ -162,7 +164,7 @@ def test_a_wrong_measurement_is_an_outlier_and_the_fit_poor() -> None:
     case = shipped("two_link", 6, 2, truth)
     given = list(case.file.measurements)  # type: ignore[arg-type]
     given[3] = given[3].model_copy(update={"frequency": given[3].frequency * 1.05})
-    results = updated(Case(replace(case.file, measurements=tuple(given))))
+    results = updated(BuiltCase(replace(case.file, measurements=tuple(given))))
     assert results.verdict == "poor_fit"
     assert results.outliers[0].label == "measurements[3]"
 
@@ -183,16 +185,16 @@ def test_a_measured_mode_whose_neighbour_is_near_is_warned_of() -> None:
 # --- Measurements as they are given
 
 
-def case_of(text: str, folder: Path = CASES) -> Case:
+def case_of(text: str, folder: Path = CASES) -> BuiltCase:
     from eigassign.case import parse
 
-    return Case(parse(text.encode(), folder / "two_link.yaml"))
+    return BuiltCase(parse(text.encode(), folder / "two_link.yaml"))
 
 
-def from_file(folder: Path, content: str, name: str = "two_link", **keys: object) -> Case:
+def from_file(folder: Path, content: str, name: str = "two_link", **keys: object) -> BuiltCase:
     (folder / "m.csv").write_text(content)
     given = MeasurementFile(file=str(folder / "m.csv"), **keys)  # type: ignore[arg-type]
-    return Case(replace(load_case(CASES / f"{name}.yaml").file, measurements=given))
+    return BuiltCase(replace(load_case(CASES / f"{name}.yaml").file, measurements=given))
 
 
 def test_measurements_are_read_in_si_and_placed(tmp_path: Path) -> None:
