@@ -309,9 +309,9 @@ def _rates(space: LowerSet, sizes: Floats) -> list[float]:
 
 
 def decay(layers: Sequence[float]) -> float:
-    """The factor by which coefficients fall from one degree to the next; 0 if the last vanish."""
+    """The factor by which coefficients fall from one degree to the next; 0 if all vanish."""
     first, others = layers[0], layers[1:]
-    if max(others[-2:], default=0.0) <= IDLE * first:
+    if max(others, default=0.0) <= IDLE * first:
         return 0.0
     if len(others) < 3:
         found = (max(others) / min(first, 1.0)) ** 0.5
