@@ -114,7 +114,7 @@ def _beside_auto(
 
 
 def _explained(family: str) -> str:
-    """What the methods of a family do: the first whose name it begins with."""
+    """The work of a family's methods in words: the first whose name it begins with."""
     known = (
         ("Taylor", "power series of λ about one pose and design, or several"),
         ("1/λ", "power series of 1/λ about one pose and design"),

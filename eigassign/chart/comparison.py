@@ -102,7 +102,7 @@ def _solve_cost(scene: Scene) -> float:
 
 
 def skipped_notes(skipped: Mapping[str, str]) -> Iterator[str]:
-    """Each reason once, with the methods that it kept from an answer."""
+    """A note for each reason, with the methods that it kept from an answer."""
     for why in dict.fromkeys(skipped.values()):
         names = [name for name, own in skipped.items() if own == why]
         yield f"{', '.join(names)} {'has' if len(names) == 1 else 'have'} no answer: {why}"

@@ -181,6 +181,6 @@ def _slsqp(analytic: bool, objective: Any, start: Floats, **how: Any) -> None:
 
 
 def _evolution(objective: Any, start: Floats, **how: Any) -> None:
-    """Until the evaluations are used up, without polishing."""
+    """Search until the evaluations are used up, without polishing."""
     how |= {"seed": SEED, "popsize": 8, "tol": 1e-10, "polish": False}
     differential_evolution(objective, args=(False,), x0=start, **how)

@@ -82,7 +82,7 @@ class Method:
 def list_methods(
     scene: Scene, features: Features, effort: Effort, accuracies: Sequence[float], solve_s: float
 ) -> Iterator[Method]:
-    """All methods; no training takes more exact solves than are done in the time there is."""
+    """The list of all methods; no training takes more exact solves than the time allows."""
     most = most_solves(effort, solve_s)
     yield from exact_methods(scene, effort, solve_s)
     yield from expansions(scene, effort)
@@ -240,12 +240,11 @@ def reduced_models(scene: Scene, effort: Effort) -> Iterator[Method]:
         name = f"reduced m = {m}, {where}{'' if guard else ', no guard'}"
         family = f"reduced, {where if guard else 'no guard'}"
         told = {"half_order": m, "guard": guard, "q": q, "y": y}
-        build = partial(_reduced_alone, scene, m, q, y, guard)
+
+        def build(_: Floats, how: Any = (m, q, y, guard)) -> Built:
+            return _answering(*_reduced(scene, *how))
+
         yield Method(name, family, told, build, use)
-
-
-def _reduced_alone(*how: Any) -> Built:
-    return _answering(*_reduced(*how[:-1]))
 
 
 def _where(count: int) -> str:

@@ -16,7 +16,7 @@ SCHEMA = 4  # of chart.json
 
 @dataclass(frozen=True)
 class Request:
-    """What advice is asked for."""
+    """The advice that is asked for."""
 
     accuracy: float | None = None  # worst relative error in Hz; several if None
     budget_s: float | None = None  # advice for this time, too
@@ -24,7 +24,7 @@ class Request:
 
     @property
     def accuracies(self) -> tuple[float, ...]:
-        """Those for which advice is given."""
+        """The accuracies for which advice is given."""
         return (1e-2, 1e-4, 1e-6, 1e-8) if self.accuracy is None else (self.accuracy,)
 
 

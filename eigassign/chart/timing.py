@@ -71,14 +71,14 @@ QUICK = Effort(
 
 
 def timed(job: Callable[[], T]) -> tuple[T, float]:
-    """What the job returns, and the seconds it took."""
+    """The result of a job, and the seconds it took."""
     start = time.process_time()
     result = job()
     return result, time.process_time() - start
 
 
 def measure(job: Callable[[], T], effort: Effort) -> tuple[T, Timing]:
-    """What a job returns, and how long it takes after a first run, which warms caches.
+    """The result of a job, and how long it takes after a first run, which warms caches.
 
     In a round a short job is repeated, and its quickest run counts: the one least disturbed.
     """

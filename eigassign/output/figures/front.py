@@ -43,7 +43,7 @@ def chart_figures(chart: Chart) -> tuple[FigurePlan, ...]:
 
 
 def _front(chart: Chart, front: Front) -> FigurePlan:
-    """Every method by family, eigassign's first, and the front through the best."""
+    """The methods by family, and the front through the best."""
     asked, single = chart.asked, front.evaluations is None
     words = "".join(c if c.isalnum() else "_" for c in front.name)
     name, what = words, "time of one evaluation"
@@ -180,7 +180,7 @@ def scatter(
 
 
 def _steps(band: Curve, top: float, right: float) -> Curve:
-    """From the top down through the points of a front, and on to the right edge."""
+    """A line from the top down through the points of a front, and on to the right edge."""
     assert band.x is not None
     order = np.argsort(band.x)
     y = np.insert(np.repeat(band.y[order], 2), 0, top)

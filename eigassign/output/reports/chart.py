@@ -18,14 +18,14 @@ from eigassign.output.tables import Table
 
 
 def chart_tables(chart: Chart) -> tuple[Table, ...]:
-    """What to choose, the fronts, all methods, the mesh, the designs: those there are."""
+    """The tables that have rows: the choice, the fronts, all methods, the mesh, the designs."""
     made = (*_advice(chart, how=True), *_fronts(chart), _methods(chart), _mesh(chart),
             _designs(chart), _machine(chart))  # fmt: skip
     return tuple(table for table in made if table.rows)
 
 
 def main_tables(chart: Chart) -> tuple[Table, ...]:
-    """For the terminal: the fronts, the ways to a design and what to choose."""
+    """The tables for a terminal: the fronts, the ways to a design and what to choose."""
     made = (*_fronts(chart), _designs(chart), *_advice(chart))
     return tuple(table for table in made if table.rows)
 
@@ -92,7 +92,7 @@ def _fronts(chart: Chart) -> Iterator[Table]:
 
 
 def _methods(chart: Chart) -> Table:
-    """Every method, the most accurate first."""
+    """The table of all methods, the most accurate first."""
     rows = []
     for p in sorted(chart.points, key=lambda p: p.everywhere.worst_hz):
         solves = f"{p.solves}" + (f" + {p.solves_online:.2g} each" if p.solves_online else "")
