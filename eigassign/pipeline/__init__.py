@@ -21,7 +21,7 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "chart": "chart chart_case",
+        "chart": "chart_case",
         "expansions": "affordable_order expand_plan expansion_key",
         "outlook": "draw",
         "queries": "check modes",
