@@ -1,7 +1,8 @@
 """Time against accuracy of every method, and ways to a design: the chart of the paper's arm.
 
 What `eigassign chart` writes goes to ``results/chart_<case>/``; its tables are there as Markdown.
-Other names of `CASES` may be given; those of the larger ones take half an hour.
+That one is made as with ``--quick``; with names of `CASES`, these are charted with all methods,
+which takes some minutes for the arms and half an hour for the large one.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from pathlib import Path
 import chart_cases
 
 from eigassign import load_case
-from eigassign.chart import Effort, Request
+from eigassign.chart import QUICK, Effort, Request
 from eigassign.output import Table, chart_tables, write_chart
 from eigassign.pipeline import Options, chart_case
 
@@ -30,12 +31,13 @@ CASES = {
 
 
 def main(names: list[str]) -> None:
+    effort = Effort() if names else QUICK
     for name in names or ["two_link"]:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"{name}.yaml"
             path.write_text(CASES[name](), encoding="utf-8")
             options = Options(use_cache=False, progress=lambda line: print(line, file=sys.stderr))
-            chart = chart_case(load_case(path), options, Effort(), Request())
+            chart = chart_case(load_case(path), options, effort, Request())
         machine = common.machine()  # before the results of an earlier run are changed
         target = common.RESULTS / f"chart_{name}"
         shutil.rmtree(target, ignore_errors=True)

@@ -1,12 +1,14 @@
 """Every method put the same question: built, evaluated, timed, and compared.
 
-Evaluations are timed in large batches, as a search over designs asks for them.
+Evaluations are timed in large batches, as a search over designs asks for them: point by point, and
+of fits by whole trajectories, which they answer in one product of matrices.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -160,7 +162,12 @@ def _chart_method(
     if not method.most:  # as many as take 20 ms at the pace of the first answers, 32768 at most
         many = max(300, int(min(0.02 * len(hz) / (spent + 1e-9), 32768)))
         some = some[np.resize(np.arange(len(some)), many)]
-    online = measure(lambda: one.evaluate(some), effort)[1].times(1.0 / len(some))
+    job, count = partial(one.evaluate, some), len(some)
+    if one.along is not None:
+        y = points.y[[run.start for run in question.runs]]
+        y = y[np.resize(np.arange(len(y)), 1 + 32768 // samples)]
+        job, count = partial(one.along, y), len(y) * samples
+    online = measure(job, effort)[1].times(1.0 / count)
     exact, solves = exact_hz[first : first + len(hz)], sum(each.solves for each in made)
     everywhere, offline, solves_online, note = errors(hz, exact), set_up, 0.0, ""
     if solver:  # an error below round-off means nothing

@@ -59,6 +59,7 @@ class Built:
     evaluate: Callable[[Points], Floats]
     solves: int = 0  # exact ones of the set-up
     estimate: float | None = None  # of its error by the method itself, relative in Hz
+    along: Callable[[Floats], Floats] | None = None  # of fits: many designs on whole trajectories
 
 
 @dataclass(frozen=True)
@@ -276,14 +277,14 @@ def fits(scene: Scene, features: Features, effort: Effort, most: int) -> Iterato
             family = f"fit {kind}, one trajectory"
             yield Method(f"fit {name} along", family, how, build, use, per_design=True)
         if k is None or k >= 9:
-            use = f"ea.fit(model, q, ea.Box(lower, upper){modes}, {call})"
+            use = f"ea.fit(model, q, ea.Box(lower, upper){modes}, {call}).along(designs)"
             build = partial(_fitted, scene, how, box)
             yield Method(f"fit {name}", f"fit {kind}", how, build, use)
     for (m, count), accuracy in product(effort.fitted, effort.accuracies):
         q, y = _points_along(scene, count)
         of, asked = f"reduced m = {m}, {_where(len(q))}", {"accuracy": accuracy}
         call = f"ea.reduce(model, q0, y0{modes}, half_order={m})"
-        use = f"ea.fit({call}, q, ea.Box(lower, upper), accuracy={accuracy:g})"
+        use = f"ea.fit({call}, q, ea.Box(lower, upper), accuracy={accuracy:g}).along(designs)"
         told = {**asked, "half_order": m, "q": q, "y": y}
         build = partial(_fitted, scene, asked, box, (m, q, y))
         yield Method(f"fit {accuracy:.0e} of {of}", f"fit of {of}", told, build, use)
@@ -294,7 +295,8 @@ def _fitted(scene: Scene, how: Mapping[str, Any], box: Box | None, *more: Any) -
     *reduced, y = more
     source, solves = _reduced(scene, *reduced[0]) if reduced else (scene.model, 0)
     made = fit(source, scene.path, y if box is None else box, scene.expansions.modes, **how)
-    return _answering(made, solves if reduced else made.solves, made.error_estimate)
+    built = _answering(made, solves if reduced else made.solves, made.error_estimate)
+    return built if box is None else replace(built, along=made.along)
 
 
 # --- What people do without eigassign

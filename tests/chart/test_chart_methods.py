@@ -92,6 +92,7 @@ def test_a_use_gives_the_method_with_the_errors_that_were_charted(
             "q0": how.get("q0", how.get("q")), "y0": how.get("y0", how.get("y")),
         }  # fmt: skip
         call = p.use.removeprefix("no argument of ea.reduce: ").partition(", at a pose")[0]
+        call = call.removesuffix(".along(designs)")
         if not call or call.startswith("in the case file"):
             continue
         parts = question.runs if p.at_once > 1 else (slice(None),)
