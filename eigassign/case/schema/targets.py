@@ -147,15 +147,12 @@ class FollowedMode(Part):
     @property
     def name(self) -> str:
         """The mode in words, and where it is named, in SI units."""
-        where = [f"t = {self.at.time:g} s" if self.at.q is None else _listed("q", self.at.q)]
+        q = " ".join(f"{value:.6g}" for value in self.at.q or ())
+        where = [f"t = {self.at.time:g} s" if self.at.q is None else f"q = {q}"]
         where[0] += f" of {self.at.trajectory!r}" if self.at.trajectory else ""
         for key, value in self.design.items():
             where.append(f"{key} = {value}" if isinstance(value, str) else f"{key} = {value:g}")
         return f"the mode like mode {self.like} ({', '.join(where)})"
-
-
-def _listed(name: str, values: Iterable[float]) -> str:
-    return f"{name} = {' '.join(f'{value:.6g}' for value in values)}"
 
 
 # --- Targets
