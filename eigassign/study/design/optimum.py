@@ -114,7 +114,7 @@ def find_optimum(
     most = STARTS if isinstance(keys.starts, str) else keys.starts
     designs = [scene.initial, *starts][:most]
     models = None if followed_modes(scene.file) else reduced_models(scene)
-    for _ in range(5):  # the lack of room at most is added each time
+    for _ in range(5):  # each time drawn in by twice the room that was lacking
         found = _search_all(scene, wanted, designs, margin, models, deadline, progress)
         lacking = wanting(found.clearances)
         met = found.best.seen.violation <= MET
