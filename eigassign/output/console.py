@@ -150,7 +150,7 @@ def _console(out: TextIO, columns: int) -> Console:
 
 
 def _written(console: Console) -> str:
-    """What the console holds, without blanks at the ends of lines."""
+    """The text in the console, without blanks at the ends of lines."""
     console.file.seek(0)
     return "".join(f"{line.rstrip()}\n" for line in console.file)
 

@@ -126,7 +126,7 @@ def _place(mode: int, where: str) -> str:
 
 
 def _read(path: Path, kind: Kind) -> list[Known]:
-    """All cases that a file or folder tells of; raises UsageError where it tells of none."""
+    """Read the cases of a file or folder; raises UsageError where there are none."""
     found: list[Known] = []
     files = [path]
     if path.is_dir():

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.output.exchange.tape import CLOSE, SOLVE
+from eigassign.output.exchange.tape import SOLVE
 
 Array = NDArray[Any]
 _HERE = Path(__file__).parent
@@ -58,7 +58,6 @@ def _sizes(tape: Mapping[str, Array]) -> str:
     arguments = np.diff(tape["first_atom"])
     systems = [1, *(unknowns**2)]
     systems += [n for n, kind in zip(arguments, tape["kinds"], strict=True) if kind >= SOLVE]
-    assert CLOSE > SOLVE
     sizes = {
         "N_Q": tape["n_q"][0],
         "N_Y": tape["n_y"][0],

@@ -77,7 +77,7 @@ def coordinates(results: RunResults) -> FigurePlan:
 
 
 def overview(results: RunResults, spectrum: OtherModes) -> FigurePlan:
-    """All modes up to the one above the highest asked for, with targets, limits and bands."""
+    """The modes up to the one above the highest asked for, with targets, limits and bands."""
     wanted = [t for t in results.targets if t.kind == "frequency"]
     limits = [t for t in results.targets if t.kind not in ("frequency", "gap")]
     modes = sorted(before_and_after(spectrum), key=lambda curve: bool(curve.end))  # after on top
@@ -218,7 +218,7 @@ def _curves(results: RunResults, target: TargetStudy) -> tuple[Curve, ...]:
 
 
 def _limited(results: RunResults, target: TargetStudy) -> Panel:
-    """What is forbidden, shaded, and the frequencies of a limit, a gap, or all modes by a band."""
+    """Frequencies of a limit, a gap, or all modes by a band; the forbidden ones are shaded."""
     near = target.near
     curves = _curves(results, target) if near is None else before_and_after(near)
     edges = [hz for hz in (target.lower_hz, target.upper_hz) if np.isfinite(hz).all()]
