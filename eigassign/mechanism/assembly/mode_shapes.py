@@ -25,7 +25,6 @@ from eigassign.mechanism.kinematics.rotations import Objects
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-POINTS = 24  # intervals drawn of a beam, at least; an element has one or more
 
 
 @dataclass(frozen=True, repr=False)
@@ -81,7 +80,7 @@ def shapes(poses: LinkFrames, x: Floats, phi: Floats) -> tuple[Shapes, ...]:
 
 @dataclass(frozen=True)
 class _Symbols:
-    """Values of one link that have to be evaluated at x, as arrays of scalars in a fixed order."""
+    """The arrays of scalars of one link that are evaluated at x, in a fixed order."""
 
     name: str
     local: LocalLink
@@ -147,7 +146,7 @@ class _LinkMotion:
         return motion
 
     def nodes(self) -> dict[tuple[str, str], NodeShape]:
-        """Shapes of the named nodes."""
+        """The shapes of all named nodes."""
         found = {}
         for name, X in zip(self.part.mesh.positions, self.positions, strict=True):
             motion = self.at(_slots(self.part.mesh, name), X)
@@ -156,7 +155,7 @@ class _LinkMotion:
         return found
 
     def strands(self, d: int) -> list[StrandShape]:
-        """Lines of the drawing, as points in world axes."""
+        """The shapes of all lines, as points in world axes."""
         found = []
         for strand, X, shear in self.lines:
             at_nodes = np.stack(
@@ -185,7 +184,8 @@ def along(X: Floats, motion: Floats, shear: Floats, turn: Floats | None) -> tupl
     if not h.all():  # a spoke of no length
         return X, motion[:, :3].transpose(2, 0, 1)
     turn = axes(step[0]) if turn is None else turn
-    n, count = len(h), max(1, -(-POINTS // len(h)))
+    # at least 24 intervals drawn of a beam, and one of each element
+    n, count = len(h), max(1, -(-24 // len(h)))
     xi = np.arange(count) / count
     local = np.concatenate([turn @ motion[:, :3], turn @ motion[:, 3:]], axis=1)
     inner = _between(local, h, shear, xi) @ turn  # (count, n, n_xi, 3)

@@ -97,7 +97,7 @@ class NodeMotions:
         return rows
 
     def closed(self, edge: JointEdge) -> MotionRows:
-        """Motion that a loop's joint demands of its follower node."""
+        """The motion that a loop's joint demands of its follower node."""
         loop = next(one for one in self.motion.loops if one.edge == edge)
         return self.joined(edge, carried(loop.rotation, loop.lever), loop.freedoms)
 

@@ -53,7 +53,7 @@ def theta_slopes(
 
 
 class PossibleValues(Protocol):
-    """Values that the properties that vary may have: see `kinematics.property_limits`."""
+    """The possible values of the properties that vary: see `kinematics.property_limits`."""
 
     def require(self, x: Floats) -> None:
         """Raise UsageError for the first sample that no mechanism can have."""
@@ -101,7 +101,7 @@ class Pencil(Brief):
 
     @cached_property
     def active(self) -> NDArray[np.bool_]:
-        """Variables z on which anything depends: the others are dropped from every expansion."""
+        """Mask of the variables z that anything depends on: expansions drop the others."""
         return np.asarray(self.program.dependence.any(axis=0))
 
     @cached_property
@@ -111,7 +111,7 @@ class Pencil(Brief):
 
     @cached_property
     def term_stacks(self) -> Floats | None:
-        """K_j and M_j dense, as (row, 2, n_theta, column), where that is small."""
+        """Dense K_j and M_j, as (row, 2, n_theta, column), where that is small."""
         if not self.is_dense or self.n_theta * self.n_dof**2 > STACK_LIMIT:
             return None
         dense = self._pair(np.stack([self.stiffness.toarray(), self.mass.toarray()]))
@@ -119,7 +119,7 @@ class Pencil(Brief):
 
     @cached_property
     def elastic_first(self) -> Ints | None:
-        """Order of the dofs with the rigid ones last; None where they are in this order anyway."""
+        """The order of dofs with the rigid ones last; None where they are in this order anyway."""
         order = np.concatenate([self.elastic, self.rigid])
         return None if (order == np.arange(self.n_dof)).all() else order
 
@@ -213,7 +213,7 @@ class Pencil(Brief):
 
     @cached_property
     def _stack(self) -> Floats | None:
-        """K_j and M_j dense, (2, n_theta, n_dof²), where products with zeros cost nothing."""
+        """Dense K_j and M_j, (2, n_theta, n_dof²), where products with zeros cost nothing."""
         if not self.is_dense or self.n_theta * self.n_dof**2 > TINY_STACK:
             return None
         dense = self._pair(np.stack([self.stiffness.toarray(), self.mass.toarray()]))

@@ -27,7 +27,6 @@ from eigassign.series.algebra import Samples
 from eigassign.series.compiler import CompiledTable, compile_table
 
 Floats = NDArray[np.float64]
-POSES = 6
 REACH = (0.4, 0.1, 0.02)  # rad or m about the reference, smaller where a loop cannot follow
 RESISTED = 1e-9  # relative motion of a spring's ends, scaled to 1, that is not round-off
 ROUND_OFF = 1e-12  # of an entry of W, whose largest is about 1, and of m or rad per rad or m
@@ -90,7 +89,8 @@ def _rows(
 def _at_poses(table: CompiledTable, z: Floats, span: Floats) -> Floats:
     """Values (n, n_poses) at the reference and at random places about it."""
     rng = np.random.default_rng(0)
-    directions = rng.uniform(-1.0, 1.0, (len(z), POSES)) * span[:, None]
+    # six poses tell what a direction that changes with the pose resists
+    directions = rng.uniform(-1.0, 1.0, (len(z), 6)) * span[:, None]
     for reach in REACH:
         try:
             return table.evaluate(Samples(), z[:, None] + reach * directions)

@@ -28,7 +28,6 @@ from eigassign.series.algebra import Samples
 from eigassign.series.compiler import compile_table
 
 Floats = NDArray[np.float64]
-CONSISTENT = 1e-8  # of the largest entry: round-off of the closure, of its solution and of a turn
 
 
 def close_rigid_loops(nodes: NodeMotions, parameters: ModelParameters, reference: Floats) -> None:
@@ -43,7 +42,11 @@ def close_rigid_loops(nodes: NodeMotions, parameters: ModelParameters, reference
     for k, key in enumerate(keys):  # told apart from the unknowns by their sign
         nodes.passive[key] = {-1 - k: 1.0}
     loops = tree.loops[tree.n_elastic :]
-    gaps = [row for edge in loops for row in _gap(nodes, edge)]
+    gaps = []  # motion of each closing joint's follower: its own minus what the joint demands
+    for edge in loops:
+        pairs = zip(nodes.rows(edge.follower), nodes.closed(edge), strict=True)
+        rows = [combined(own, demanded, -1.0) for own, demanded in pairs]
+        gaps += [rows[a] for a in DOFS[nodes.space]]
     labels = [-1 - k for k in range(len(passive))]
     unknowns = sorted({u for row in gaps for u in row if u >= 0})
     J, G = _matrix(gaps, labels), _matrix(gaps, unknowns)
@@ -58,13 +61,6 @@ def close_rigid_loops(nodes: NodeMotions, parameters: ModelParameters, reference
     for k, row in zip(dependent, solved, strict=True):
         nodes.passive[keys[k]] = dict(zip(masters, row, strict=True))
     nodes.forget()
-
-
-def _gap(nodes: NodeMotions, edge: JointEdge) -> list[MotionRow]:
-    """Motion of the closing joint's follower node: its own minus what the joint demands."""
-    pairs = zip(nodes.rows(edge.follower), nodes.closed(edge), strict=True)
-    rows = [combined(own, demanded, -1.0) for own, demanded in pairs]
-    return [rows[a] for a in DOFS[nodes.space]]
 
 
 def _matrix(rows: Sequence[MotionRow], unknowns: Sequence[int]) -> Objects:
@@ -87,7 +83,8 @@ def require_consistent(J: Floats, G: Floats, loops: Sequence[JointEdge], space: 
         return
     left = G - (J @ np.linalg.lstsq(J, G, rcond=None)[0] if J.shape[1] else 0.0)
     worst = np.abs(left).max(axis=1)
-    if worst.max() > CONSISTENT * np.abs(G).max():
+    # 1e-8 of the largest entry is round-off of the closure, of its solution and of a turn
+    if worst.max() > 1e-8 * np.abs(G).max():
         edge = loops[int(worst.argmax()) // len(DOFS[space])]
         raise MechanismError(
             f"mechanism.joints.{edge.joint}",

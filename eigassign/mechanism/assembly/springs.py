@@ -48,7 +48,7 @@ def add_springs(
 
 
 def resists(stiffness: Scalar) -> bool:
-    """True for more than a plain zero."""
+    """True where it is more than a plain zero."""
     return not is_constant(stiffness) or stiffness != 0.0
 
 

@@ -46,7 +46,7 @@ class TotalMass:
 def total_mass(
     case: CaseFile, parameters: ModelParameters, meshes: Iterable[LinkMesh]
 ) -> TotalMass:
-    """Mass of the links of a mechanism, each with all its dofs and its bodies."""
+    """The mass of the links of a mechanism, each with all its dofs and its bodies."""
     mass: Scalar = 0.0
     for mesh in meshes:
         # Translation does not depend on y: the first column of all terms of N is one of numbers.

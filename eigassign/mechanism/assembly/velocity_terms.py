@@ -57,7 +57,6 @@ IMAGINARY = 1e-30  # step of derivatives along the imaginary axis, which lose no
 # entries (i, j) of ω̃: which component of ω, and its sign
 CROSS = ((0, 1, 2, -1.0), (0, 2, 1, 1.0), (1, 0, 2, 1.0), (1, 2, 0, -1.0), (2, 0, 1, -1.0),
          (2, 1, 0, 1.0))  # fmt: skip
-SMALL = 128  # rows and columns of a matrix up to which dense is quicker
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,12 +107,12 @@ class VelocityTerms:
         return self.step / speed if speed > 0.0 else self.step
 
     def values(self, q: Floats, y: Floats) -> Floats:
-        """Scalars at each of several poses q (n, n_q), and a 1: (n, n_scalars + 1)."""
+        """The values of all scalars at poses q (n, n_q), and a 1: (n, n_scalars + 1)."""
         z = self.parameters.z(np.hstack([q, np.tile(y, (len(q), 1))]))
         return np.column_stack([self.table.evaluate(Samples(), z).T, np.ones(len(q))])
 
     def _joints(self, rates: Floats) -> Floats:
-        """Rates of the coordinates alone, of rates (…, n_q)."""
+        """The rates of the coordinates alone, of rates (…, n_q) of loads too."""
         return rates[..., : len(self.parameters.coordinates)]
 
 
@@ -220,7 +219,7 @@ def riding(mesh: LinkMesh) -> Riding:
 
 
 def mesh_scalars(mesh: LinkMesh) -> list[Scalar]:
-    """Scalars of a `Riding`: its nodes' places, and shear and inertia of its elements."""
+    """The scalars of a `Riding`: its nodes' places, and shear and inertia of its elements."""
     (strand,) = mesh.strands
     places = [X[0] for X in strand.points]
     shear = [value for pair in strand.shear for bent in pair for value in bent]
@@ -264,7 +263,8 @@ class Pattern:
     def at(self, z: Floats) -> Matrix:
         """The matrix for scalars z."""
         data = np.bincount(self.slots, self.values * z[self.scalars], len(self.places))
-        if max(self.shape) <= SMALL:
+        # up to 128 rows and columns dense is quicker
+        if max(self.shape) <= 128:
             out = np.zeros(self.shape)
             out.flat[self.places] = data
             return out
@@ -305,7 +305,7 @@ class _PatternEntries:
 
 @dataclass(frozen=True)
 class ScalarRows:
-    """Rows of a table of scalars that are a link's: see `velocity_terms`."""
+    """The rows of a link in a table of scalars: see `velocity_terms`."""
 
     spin: slice
     carries: slice
@@ -326,7 +326,7 @@ class Rider:
 
 @dataclass(frozen=True, eq=False)
 class StackedLinks:
-    """Links with mass; z are the values of a table of scalars, followed by a 1."""
+    """The links with mass; z are the values of a table of scalars, followed by a 1."""
 
     joined: Pattern  # U (n_local, n_dof)
     spread: Pattern  # N (n_local, Σ n_twist)
@@ -384,7 +384,7 @@ def stack(
     n_u: int,
     n_dof: int,
 ) -> StackedLinks:
-    """Stack of the links that have mass; ``rows`` are where each has its scalars."""
+    """The links that have mass, stacked; ``rows`` are where each has its scalars."""
     joined, spread, twist, masses, spins, turns = (_PatternEntries() for _ in range(6))
     riders, bases = [], []
     local = whole = turned = spun = 0

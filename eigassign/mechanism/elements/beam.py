@@ -61,7 +61,7 @@ class Shear(NamedTuple):
 
 
 def shear(profile: Profile, h: Scalar) -> tuple[Shear, Shear]:
-    """Shear of bending in the element's x-y and x-z plane."""
+    """The shear numbers of bending in the element's x-y and x-z plane."""
     kGA = profile[0].shear
     if kGA is None:
         return Shear(0.0, 0.0), Shear(0.0, 0.0)
@@ -299,7 +299,7 @@ def rotary_mass(plane: str, degree: int = 0) -> tuple[tuple[Floats, ...], ...]:
 
 
 def _mass(shapes: tuple[Floats, ...], plane: str, degree: int) -> tuple[tuple[Floats, ...], ...]:
-    """Masses of the products that go with 1, Φ, Φ², s, Φ s, s²."""
+    """The integrals of the products that go with 1, Φ, Φ², s, Φ s, s²."""
     plain, sheared, skewed = shapes
     pairs = ((plain, plain), (plain, sheared), (sheared, sheared), (plain, skewed),
              (sheared, skewed), (skewed, skewed))  # fmt: skip

@@ -35,8 +35,6 @@ from eigassign.series.compiler import compile_table
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 EXACT = 1e-10  # part of a rigid motion, relative, that may be lost to round-off
-ROUND_OFF = 1e-14  # of the squares of lengths
-CLEAN = 1e-15  # entries this small beside their diagonal are zeros
 NEW = 1e-4  # part of a vector of another design, relative, that is worth a dof of its own
 
 
@@ -68,7 +66,7 @@ def reduce_mesh(
     if not len(i):
         return mesh
     lam = (2.0 * np.pi * frequency_hz) ** 2
-    parts = [_Interior(K, M, b, i, path) for K, M in _matrices(case, parameters, mesh)]
+    parts = [_DesignBlocks(K, M, b, i, path) for K, M in _matrices(case, parameters, mesh)]
     central = coefficients(parameters, mesh.rigid, _designs(case)[:1])[:, 0]
     N, Psi = total(mesh.rigid, central).toarray(), parts[0].Psi
     Psi = Psi + (N[i] - Psi @ N[b]) @ np.linalg.pinv(N[b])  # Ψ N_b = N_i to the last digit
@@ -94,7 +92,7 @@ def interface(case: CaseFile, name: str) -> set[str]:
     return {node for link, _, node in pairs if link == name}
 
 
-class _Interior:
+class _DesignBlocks:
     """The blocks of K and M of one design, and the factor of K_ii."""
 
     def __init__(
@@ -146,7 +144,7 @@ def coefficients(parameters: ModelParameters, terms: Sequence[Term], p: Floats) 
 
 
 def _span(
-    parts: Sequence[_Interior], Psi: Floats, rigid: Sequence[Term], b: Ints, i: Ints, lam: float
+    parts: Sequence[_DesignBlocks], Psi: Floats, rigid: Sequence[Term], b: Ints, i: Ints, lam: float
 ) -> Floats:
     """W (n_i, k), K_ii-orthonormal: rigid remainders, fixed-interface modes, other designs."""
     first = parts[0]
@@ -177,7 +175,8 @@ def _extended(
     for _ in range(2):
         new = new - W @ (W.T @ np.asarray(K @ new))
     values, turns = np.linalg.eigh(new.T @ np.asarray(K @ new))
-    keep = values > max(least**2, ROUND_OFF * values.max(initial=0.0))
+    # 1e-14 is the round-off of squares of lengths
+    keep = values > max(least**2, 1e-14 * values.max(initial=0.0))
     return np.hstack([W, new @ (turns[:, keep] / np.sqrt(values[keep]))])
 
 
@@ -214,23 +213,24 @@ def project(A: sparse.csr_array, T: Floats) -> sparse.csr_array:
     out = T.T @ np.asarray(A @ T)
     out = 0.5 * (out + out.T)
     scale = np.sqrt(np.abs(np.diag(out)))
-    out[np.abs(out) < CLEAN * np.outer(scale, scale)] = 0.0
+    # entries of 1e-15 beside their diagonal are zeros
+    out[np.abs(out) < 1e-15 * np.outer(scale, scale)] = 0.0
     return sparse.csr_array(out)
 
 
 # --- fixed-interface modes: K_ii φ = λ M_ii φ, solved as M_ii φ = μ K_ii φ
 
 DENSE = 400  # interior dofs up to which all eigenvalues are computed
-FIRST = 16  # modes that Lanczos is asked for first
 LOOSE = 1e-3  # relative accuracy of the largest μ left out
 
 
 def fixed_modes(
     K: sparse.csc_array, M: sparse.csc_array, factor: linalg.SuperLU, lam: float
 ) -> Floats:
-    """Modes (n, k) with λ ≤ ``lam``, φᵀ K φ = I; ``factor`` is that of K."""
+    """The modes (n, k) with λ ≤ ``lam``, φᵀ K φ = I; ``factor`` is that of K."""
     n, least = K.shape[0], 1.0 / lam
-    rows, count = M.T, FIRST  # M is symmetric: products run faster row by row
+    # Lanczos is asked for 16 modes first, then for twice as many
+    rows, count = M.T, 16  # M is symmetric: products run faster row by row
     mass = linalg.LinearOperator(M.shape, matvec=lambda v: rows @ v, dtype=np.float64)
     while n > DENSE and count < n // 2:
         mu, phi = _lanczos(K, mass, factor, count, 0.0)

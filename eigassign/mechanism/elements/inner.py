@@ -85,7 +85,7 @@ def _slender(axis: str) -> tuple[list[_Energy], list[_Energy]]:
 
 
 def _sheared(axis: str, phi: Any, skew: Any) -> tuple[list[_Energy], list[_Energy]]:
-    """Energies with t = h × rotation: EI t'²/h³ + κGA (w' − t)²/h and ρA h w² + ρI t²/h."""
+    """The energies EI t'²/h³ + κGA (w' − t)²/h and ρA h w² + ρI t²/h, t = h × rotation."""
 
     of_phi, of_skew = np.asarray(phi)[:, None, None], np.atleast_1d(skew)[:, None, None]
 

@@ -72,7 +72,7 @@ class LinkMesh:
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """Origin of a reduced link: motion of ``mesh`` = ``basis`` × reduced local motion."""
+    """The origin of a reduced link: motion of ``mesh`` = ``basis`` × reduced local motion."""
 
     mesh: LinkMesh
     basis: Floats  # (mesh.n_local, n_reduced)
@@ -123,7 +123,7 @@ def node_dofs(first: int, space: str) -> Ints:
 
 
 def chain_dofs(count: int, space: str) -> Ints:
-    """Dofs of ``count`` nodes one after the other, (count, 6)."""
+    """The slots of ``count`` nodes one after the other, (count, 6)."""
     first = len(DOFS[space]) * np.arange(count)[:, None]
     return np.where(_PLACES[space] >= 0, first + _PLACES[space], -1)
 

@@ -127,18 +127,17 @@ def beam_profiles(
 
     weights = _legendre_weights(n)
     table = [_combined(v, weights) for v in zip(*map(at, STATIONS.tolist()), strict=True)]
-    if _has_series(case, beam):
+    shape = case.mechanism.sections[beam.section.start].shape
+    if case.mechanism.space == "spatial" and shape == "rectangle":  # no polynomial along a taper
         table[BeamValues._fields.index("GJ")] = _torsion(at, n)
     if together and all(each is None or isinstance(each, np.ndarray) for each in table):
         rows: Any = [[None if each is None else each.T for each in table]]
     else:
         rows = zip(*([None] * n if each is None else each for each in table), strict=True)
-    return [[_at(row, k) for k in range(TERMS)] for row in rows]
-
-
-def _at(row: Sequence[Any], k: int) -> BeamValues:
-    values: Any = (None if each is None else each[k] for each in row)
-    return BeamValues(*values)
+    return [
+        [BeamValues._make(None if each is None else each[k] for each in row) for k in range(TERMS)]
+        for row in rows
+    ]
 
 
 def _legendre_weights(n: int) -> Floats:
@@ -173,12 +172,6 @@ def _one_atom(x: Scalar) -> Scalar:
     return Expression(x.recorder, 0.0, {atom: factor})
 
 
-def _has_series(case: CaseFile, beam: Any) -> bool:
-    """True where the torsion constant counts and is no polynomial along a taper."""
-    shape = case.mechanism.sections[beam.section.start].shape
-    return case.mechanism.space == "spatial" and shape == "rectangle"
-
-
 def _torsion(at: Callable[[float], BeamValues], n: int) -> Any:
     """GJ over each of n elements, (n, 5) as of `_combined`, from values of its own in each."""
     legendre = np.polynomial.legendre
@@ -204,7 +197,7 @@ def _tapered_values(
 
 
 def each_element(profile: Profile, n: int) -> list[Profile]:
-    """Profiles of n elements, from one of all whose values may be arrays (n,)."""
+    """The profiles of n elements, from one of all whose values may be arrays (n,)."""
 
     def of(values: BeamValues, k: int) -> BeamValues:
         rows: Any = values

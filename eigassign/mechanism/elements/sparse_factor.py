@@ -12,8 +12,6 @@ from scipy import sparse
 from scipy.sparse import linalg
 
 Floats = NDArray[np.float64]
-KEPT = 4  # factors kept: few, for those of large parts are large
-PIVOT = 1e-15  # smallest pivot of a definite matrix, relative to its diagonal entry
 
 
 def factorise(matrix: sparse.csc_array) -> linalg.SuperLU:
@@ -33,7 +31,8 @@ def definite_factor(matrix: sparse.csc_array) -> linalg.SuperLU | None:
         return None
     diagonal = np.asarray(matrix.diagonal())[np.argsort(factor.perm_c)]
     pivots = np.asarray(factor.U.diagonal())
-    return factor if (pivots > PIVOT * np.abs(diagonal)).all() else None
+    # a pivot of a definite matrix is more than the round-off of its diagonal entry
+    return factor if (pivots > 1e-15 * np.abs(diagonal)).all() else None
 
 
 @dataclass(frozen=True)
@@ -55,7 +54,7 @@ def kept_factor(matrix: sparse.csc_array) -> linalg.SuperLU | None:
     return _kept(_Matrix(digest, matrix))
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=4)  # few, for factors of large parts are large
 def _kept(asked: _Matrix) -> linalg.SuperLU | None:
     return definite_factor(asked.matrix)
 

@@ -26,7 +26,6 @@ from eigassign.mechanism.kinematics.rotations import DOFS, vector
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 STRAIN_FREE = 1e-6  # largest |K N|_i relative to √K_ii ‖√K_jj N_j‖ that passes for none
-ALIKE = 1e-3  # relative difference of a part's mass by direction that passes for round-off
 
 
 def superelement_mesh(case: CaseFile, parameters: ModelParameters, name: str) -> LinkMesh:
@@ -66,7 +65,7 @@ def weights(case: CaseFile) -> tuple[str, ...]:
 
 
 def _weight(name: str, mesh: LinkMesh, space: str) -> str:
-    """The mass, and where its centre c is, from NᵀMN = [[m 1, −m[c]×], …]."""
+    """Mass, and place of its centre c, from NᵀMN = [[m 1, −m[c]×], …]."""
     N = np.sum([t.matrix.toarray() for t in mesh.rigid], axis=0)
     J = N.T @ (mesh.mass[0].matrix @ N)
     m = J[0, 0]
@@ -103,7 +102,8 @@ def _check_mass(M: sparse.csr_array, rigid: list[Term], space: str, path: str) -
     N = np.sum([t.matrix.toarray() for t in rigid], axis=0)
     moving = DOFS[space].index(5) if space == "planar" else 3
     masses = np.einsum("ij,ij->j", N[:, :moving], np.asarray(M @ N[:, :moving]))
-    if np.ptp(masses) > ALIKE * masses.max():
+    # a part's mass may differ by direction by 1e-3: files have few digits
+    if np.ptp(masses) > 1e-3 * masses.max():
         shown = ", ".join(f"{m:.4g}" for m in masses)
         raise MechanismError(
             f"{path}.mass",
@@ -122,7 +122,6 @@ def _boundary(link: Any, n: int, path: str) -> Ints:
 
 # --- K and M: what they must be
 
-SYMMETRY = 1e-8  # relative asymmetry of K or M that is taken for round-off
 ROUNDED = 1e-6  # of the diagonal: files of six digits make eigenvalues that small negative
 
 
@@ -137,7 +136,8 @@ def read_pair(stiffness: Path, mass: Path, path: str) -> tuple[sparse.csr_array,
 
 def _checked(A: sparse.csr_array, key: str, name: str) -> sparse.csr_array:
     lost = abs(A - A.T).max() if A.nnz else 0.0
-    if lost > SYMMETRY * abs(A).max():
+    # an asymmetry of 1e-8 is taken for round-off
+    if lost > 1e-8 * abs(A).max():
         only = sparse.tril(A, -1).nnz == 0 or sparse.triu(A, 1).nnz == 0
         hint = (
             f"{name} holds one triangle only: say 'symmetric' in its header, or write both"

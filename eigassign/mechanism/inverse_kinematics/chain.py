@@ -46,7 +46,7 @@ class TipEvaluation(NamedTuple):
 
 @dataclass(frozen=True)
 class LoopAssembly:
-    """Solution of a chain's loop equations, on the branch that the case chooses."""
+    """The assembly of a chain's loops."""
 
     reference: Floats  # q (n_q,) at which the assembly is chosen
     passive: Callable[[Floats], Floats]  # q (n, n_q) -> p (n, n_p); raises SingularityError
@@ -75,7 +75,7 @@ class TipChain:
         return len(self.joints)
 
     def of_kind(self, kind: str) -> Bools:
-        """True for entries of a state that are of this kind, (n_q + n_p,)."""
+        """Mask of the entries of a state that are of this kind, (n_q + n_p,)."""
         return np.array([k == kind for k in self.kinds], dtype=bool)
 
 
@@ -142,7 +142,9 @@ def tip_chain(
     points, turns = (2, (2,)) if case.mechanism.space == "planar" else (3, (0, 1, 2))
     set_ = np.zeros(0) if loads is None else loads / parameters.scales
     tables = _TipTables(case, parameters, motion, tip, points, turns if oriented else (), set_)
-    passive = _passive_table(parameters, motion)
+    passive = None  # the passive freedoms of the model itself
+    if motion.passive:
+        passive = compile_table(parameters.recorder, motion.passive, parameters.count)
 
     def at(y: Floats) -> TipChain:
         return TipChain(
@@ -226,7 +228,7 @@ class _TipTables:
         return _Table.of(recorder, shaped, self._n_variables)
 
     def evaluate(self, z: Floats, y: Floats) -> TipEvaluation:
-        """Place, turn and closure at states z (n, n_z) and design y."""
+        """Evaluate the tip at states z (n, n_z) and design y."""
         point, turned, J, F, dF = self._state_table(self._variables(z, y))
         R = turned.reshape(len(z), 3, 3) if self.turns else None
         return TipEvaluation(point, R, J, F, dF)
@@ -274,7 +276,7 @@ class _Table:
         return _Table(table.program, table.weights.toarray(), table.constants[:, None], shapes)
 
     def __call__(self, variables: Floats) -> list[Floats]:
-        """The arrays at variables (n_variables, n), each (n, *shape)."""
+        """The values of each array at variables (n_variables, n), (n, *shape)."""
         values = (self.weights @ self.program.run(Samples(), variables) + self.constants).T
         cuts = np.cumsum([prod(shape) for shape in self.shapes])[:-1]
         parts = zip(np.split(values, cuts, axis=1), self.shapes, strict=True)
@@ -304,7 +306,7 @@ def _closure(motion: Kinematics, planar: bool, n: int, A: Floats) -> tuple[Objec
 
 
 def _kinds(case: CaseFile, tree: Topology) -> tuple[str, ...]:
-    """Kind of each freedom; where a loop is closed over a screw, no turn leads back."""
+    """The kind of each freedom; where a loop is closed over a screw, no turn leads back."""
     types = [case.mechanism.joints[f.joint].type for f in tree.freedoms]
     advancing = any(j.type in ADVANCING for j in case.mechanism.joints.values())
     kinds = []
@@ -313,13 +315,6 @@ def _kinds(case: CaseFile, tree: Topology) -> tuple[str, ...]:
         turn = "screw" if kind == "screw" or (tree.loops and advancing) else "turn"
         kinds.append("slide" if slides else turn)
     return tuple(kinds)
-
-
-def _passive_table(parameters: ModelParameters, motion: Kinematics) -> CompiledTable | None:
-    """The passive freedoms of the model itself; None without any."""
-    if not motion.passive:
-        return None
-    return compile_table(parameters.recorder, motion.passive, parameters.count)
 
 
 def _assembly(

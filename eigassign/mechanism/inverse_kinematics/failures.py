@@ -11,8 +11,6 @@ from eigassign.mechanism.inverse_kinematics.chain import Floats
 from eigassign.mechanism.inverse_kinematics.state import TipProblem
 from eigassign.mechanism.inverse_kinematics.tip_path import WAYPOINTS, Course
 
-_NEAR = 1e-6  # of L: what counts as reached when blame is shared between position and turn
-
 
 def pose(ik: TipProblem, u: Floats) -> str:
     """The coordinates of a state in words."""
@@ -27,7 +25,8 @@ def out_of_reach(ik: TipProblem, course: Course, k: int, u: Floats) -> Trajector
     near = "(" + ", ".join(f"{x:.6g}" for x in seen.point[0]) + ") m"
     if ik.chain.assembly is not None:
         near += f", at {pose(ik, u)}"
-    if course.attitude is None or turn[0] <= _NEAR:
+    # a turn within 1e-6 rad is reached: the blame is the position's
+    if course.attitude is None or turn[0] <= 1e-6:
         message = f"is {distance[0]:.3g} m out of reach; the tip comes to {near}"
         return TrajectoryError(WAYPOINTS, f"{course.label(k)} {message}{_bound(ik, course)}", k)
     key = f"trajectory.{course.attitude.key}"

@@ -38,12 +38,8 @@ from eigassign.mechanism.inverse_kinematics.state import TipProblem, prepare
 from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipTarget
 
 RESIDUAL = 1e-10  # largest miss of a sample: of L in m, and in rad
-_SAME = 1e-4  # rad, or of L: solutions nearer than this are one solution
-_FULL_TURN_SLACK = 1e-9  # rad below 2π, taken for round-off below 0
 _TURNS = (0.2, 0.02)  # rad: largest step of the trace, and of a second try where that was too bold
 _REDUNDANT = (0.05, 0.01)  # the same where the least motion is wanted, which large steps miss
-_DOUBLE_ROOT = 1e-6  # of L: as near as a dead point can be come to, where two assemblies meet
-_ATTEMPTS = 8  # first solutions that are followed before giving up
 
 
 @dataclass(frozen=True)
@@ -79,7 +75,8 @@ def follow(
     ik = prepare(chain, course, branch or {}, start)
     candidates = first_solutions(ik, course)
     failures = []
-    for candidate in candidates[:_ATTEMPTS]:
+    # eight first solutions are followed before giving up
+    for candidate in candidates[:8]:
         u0 = assembled(ik, course.target(course.s[:1]), candidate)
         if u0 is None:
             continue
@@ -97,7 +94,7 @@ def follow(
 
 
 def _along(ik: TipProblem, course: Course, u0: Floats) -> Floats:
-    """Samples (n, n_z) of the solution that begins with u0; TrajectoryError where it ends."""
+    """The states (n, n_z) of the solution that begins with u0; TrajectoryError where it ends."""
     target = course.target(course.s)
     for turn in _TURNS if ik.rank == ik.n_q else _REDUNDANT:
         path = trace(ik, course, u0, turn)
@@ -172,13 +169,14 @@ def _blocked(ik: TipProblem, course: Course, k: int, path: Trace) -> TrajectoryE
     u, miss = levenberg(ik, np.vstack([last, ik.seeds]), course.target(course.s[[k]]), 115)
     best = int(np.argmin(miss))
     dead = bool(loop_regularity(ik, ik.evaluate(last[None]))[0] < 10.0 * DEAD)
-    if miss[best] > (_DOUBLE_ROOT if dead else RESIDUAL) * ik.lever:
+    # a dead point, where two assemblies meet, can be come as near to as 1e-6 of L
+    if miss[best] > (1e-6 if dead else RESIDUAL) * ik.lever:
         return out_of_reach(ik, course, k, u[best])
     return blocked(ik, course, k, float(path.s[-1]), last, dead)
 
 
 def _notes(ik: TipProblem, candidates: Sequence[Floats]) -> tuple[str, ...]:
-    """Choices that were made where the case leaves them open."""
+    """Notes on what was chosen where the case leaves a choice."""
     if ik.rank < ik.n_q:
         slides = ik.chain.of_kind("slide")[: ik.n_q].any()
         measure = f" (a slide of {ik.lever:.3g} m counting as 1 rad)" if slides else ""
@@ -232,13 +230,11 @@ def _distinct(ik: TipProblem, u: Floats) -> list[Floats]:
     turns = ik.chain.of_kind("turn")
     distinct: list[Floats] = []
     for candidate in sorted(_normalised(ik, u, turns), key=preference):
-        if all(_apart(candidate - other, turns) > _SAME for other in distinct):
+        apart = (candidate - other for other in distinct)
+        # solutions nearer than 1e-4 rad, or of L, are one
+        if all(np.abs(np.where(turns, _wrapped(d), d)).max() > 1e-4 for d in apart):
             distinct.append(candidate)
     return distinct
-
-
-def _apart(difference: Floats, turns: Bools) -> float:
-    return float(np.abs(np.where(turns, _wrapped(difference), difference)).max())
 
 
 def _wrapped(angle: Floats) -> Floats:
@@ -251,7 +247,8 @@ def _normalised(ik: TipProblem, u: Floats, turns: Bools) -> Floats:
     if ik.start is not None:
         return np.where(turns, ik.start + _wrapped(u - ik.start), u)
     turned = np.mod(u, 2.0 * np.pi)
-    turned = np.where(turned >= 2.0 * np.pi - _FULL_TURN_SLACK, turned - 2.0 * np.pi, turned)
+    # 1e-9 rad below 2π is taken for round-off below 0
+    turned = np.where(turned >= 2.0 * np.pi - 1e-9, turned - 2.0 * np.pi, turned)
     return np.where(turns, turned, u)
 
 

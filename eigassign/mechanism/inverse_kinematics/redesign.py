@@ -50,10 +50,6 @@ from eigassign.mechanism.inverse_kinematics.solver import (
 from eigassign.mechanism.inverse_kinematics.state import TipProblem
 from eigassign.mechanism.inverse_kinematics.tip_path import Course
 
-_STRAY = 0.1  # rad, or of L: a corrector that moves further may have left the branch, as in tracing
-_LEAST_STEP = 1.0 / 256.0  # of the way from y0 to y
-_OFF = 1e-6  # of L, per relative change of a parameter: what a tip cannot make up for
-
 
 @dataclass(frozen=True, eq=False)
 class PathOfDesign:
@@ -92,7 +88,7 @@ class PathOfDesign:
 
     @property
     def said(self) -> str:
-        """The sentence that the joint coordinates follow the design, and which of it."""
+        """The sentence that says what follows what."""
         return (
             f"the tip keeps its path whatever {', '.join(self.moving)} will be: the joint "
             "coordinates follow the design"
@@ -124,12 +120,14 @@ class PathOfDesign:
             slopes = self._slopes(y0 + done * (y - y0), u)
             guess = u + (ahead - done) * (slopes @ (y - y0))
             found, seen, motion, settled = newton(ik, guess, target, ROUND_OFF, self.directions)
-            strayed = ~settled | (np.abs(found - guess).max(axis=1) > _STRAY)
+            # a corrector that moves by 0.1 rad, or of L, may have left the branch, as in tracing
+            strayed = ~settled | (np.abs(found - guess).max(axis=1) > 0.1)
             strayed |= crossed(ik, seen, motion, sense)
             strayed |= singular(ik, seen, motion)
             if not strayed.any():
                 u, done, step = found, ahead, 2.0 * step
-            elif (step := 0.5 * min(step, 1.0 - done)) < _LEAST_STEP:
+            # steps below 1/256 of the way from y0 to y are given up
+            elif (step := 0.5 * min(step, 1.0 - done)) < 1.0 / 256.0:
                 raise self._lost(y, u, strayed)
         require_reached(ik, self.course, u, target)
         return as_assembled(ik, self.course, u, target)
@@ -178,7 +176,8 @@ def _require_within_reach(path: PathOfDesign) -> None:
     left = moved[:, :, n_q:] + moved[:, :, :n_q] @ path._slopes(design.y, path.u)[:, :n_q]
     off = np.linalg.norm(left, axis=1).max(axis=0) * np.abs(design.y)
     for name, length in zip(design.names, off, strict=True):
-        if length > _OFF * ik.lever:
+        # 1e-6 of L, per relative change of the parameter, is round-off
+        if length > 1e-6 * ik.lever:
             raise MechanismError(
                 f"design.{name}.parameter",
                 f"moves the tip where no coordinate can bring it back: they move {ik.rank} of the "

@@ -94,7 +94,7 @@ def newton(
 
 
 def within(motion: Reduced, directions: Floats | None) -> Reduced:
-    """Motion with J V (n, m, rank) in place of J: coordinates move in directions V only."""
+    """The motion with J V (n, m, rank) in place of J: coordinates move in directions V only."""
     return motion if directions is None else replace(motion, J=motion.J @ directions)
 
 
@@ -162,7 +162,6 @@ _SINGULAR = 1e-3  # of L: a smaller singular value of J is a chain stretched or 
 DEAD = 1e-3  # smallest over largest singular value of ∂F/∂p: as near a dead point, for that reason
 _STRAY = 0.5  # of a trace's largest step: a corrector that moves further has left the branch
 _MAX_ADVANCE = 0.125  # of the path, a trace step
-_MIN_ADVANCE = 1e-8  # below, the joints turn faster and faster without advancing
 
 
 @dataclass(frozen=True)
@@ -195,7 +194,8 @@ def trace(ik: TipProblem, course: Course, u0: Floats, turn: float) -> Trace:
     sense = handedness(ik, seen, motion)[0]
     here = _pose(ik, course, float(course.s[0]), u0[None], motion)
     poses, advance, bend = [here], _MAX_ADVANCE, np.zeros_like(here.u)
-    while here.s < stops[-1] and advance >= _MIN_ADVANCE:
+    # below 1e-8 of the path the joints turn faster and faster without advancing
+    while here.s < stops[-1] and advance >= 1e-8:
         fastest = float(np.abs(here.slope[:, : ik.n_q]).max())
         advance = min(advance, turn / max(fastest, turn))
         stop = float(stops[np.searchsorted(stops, here.s, side="right")])

@@ -31,7 +31,6 @@ from eigassign.mechanism.kinematics.loop_closure import kronecker
 
 _SLACK = 1e-9  # rad: round-off at the end of a branch's range
 _STRUCTURAL = 1e-6  # of L: a smaller singular value everywhere is round-off
-_GAP = 100.0  # weight of open loops against a missed point: what is nearest must be closed
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,8 @@ class TipProblem:
             J[:, -r:] *= self.lever
         if chain.assembly is None:
             return seen._replace(jacobian=J)
-        weight = _GAP * np.where(chain.assembly.turning, self.lever, 1.0)
+        # open loops weigh 100 times a missed point: what is nearest must be closed
+        weight = 100.0 * np.where(chain.assembly.turning, self.lever, 1.0)
         closure = seen.closure * scale * weight[:, None]
         return TipEvaluation(seen.point, seen.rotation, J, seen.gap * weight, closure)
 
@@ -204,9 +204,6 @@ def _check_idle(J: Floats, lever: float, start: Floats | None) -> None:
 
 # --- first guesses
 
-_CLOSED = 1e-9  # of the path's size: gaps of loops that are closed
-_TURNS_OF_A_SCREW = 500.0  # rad: as far as first guesses go
-
 
 def first_guesses(
     chain: TipChain, course: Course, rows: tuple[int, ...], limits: Floats, near: Floats | None
@@ -246,14 +243,15 @@ def _ranges(chain: TipChain, course: Course, middle: Floats) -> tuple[Floats, Fl
     seen = chain.evaluate(state)
     reach = course.size + float(np.linalg.norm(seen.point))
     pitch = np.abs(seen.jacobian[0, : seen.point.shape[1], :n_q]).max(axis=0)
-    turns = np.clip(reach / np.maximum(pitch, 1e-12), 2.0 * np.pi, _TURNS_OF_A_SCREW)
+    # a screw's first guesses go as far as 500 rad
+    turns = np.clip(reach / np.maximum(pitch, 1e-12), 2.0 * np.pi, 500.0)
     half = np.where(chain.of_kind("slide")[:n_q], reach, turns)
     free = ~chain.of_kind("turn")[:n_q]
     return np.where(free, middle - half, low), np.where(free, 2.0 * half, width)
 
 
 def _closed(chain: TipChain, z: Floats, size: float) -> Floats:
-    """States whose loops close by moving the passive freedoms alone."""
+    """The states whose loops close by moving the passive freedoms alone."""
     n_q = chain.n_q
     if len(chain.kinds) == n_q:
         return z
@@ -261,6 +259,7 @@ def _closed(chain: TipChain, z: Floats, size: float) -> Floats:
     for _ in range(20):
         step = reduced(chain.evaluate(z), n_q).closing
         z[:, n_q:] += np.clip(step, -0.5, 0.5)
-    good = np.abs(chain.evaluate(z).gap).max(axis=1) <= _CLOSED * max(size, 1.0)
+    # loops are closed to 1e-9 of the path's size
+    good = np.abs(chain.evaluate(z).gap).max(axis=1) <= 1e-9 * max(size, 1.0)
     good[0] = True  # the pose at which the loops are known to close
     return np.asarray(z[good])

@@ -23,10 +23,7 @@ from eigassign.errors import MechanismError, UsageError
 Floats = NDArray[np.float64]
 
 WAYPOINTS = "trajectory.waypoints"  # key path in the case file
-_COINCIDENT = 1e-12  # of the chord length: round-off of coordinates, no distance anybody means
 _SMOOTH = 1e-9  # of the slope: a change of direction nobody sees
-_SAME_TURN = 1e-9  # rad: two orientations that do not differ
-_AMBIGUOUS = 1e-6  # rad from half a turn: which way round cannot be told
 _ROUND_OFF = 1e-12  # how far outside [0, 1] a parameter is still taken for its end
 
 
@@ -115,7 +112,8 @@ def _measure(waypoints: ArrayLike) -> tuple[Floats, Floats, float]:
     points = _checked(waypoints)
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     length = float(chords.sum())
-    for i in np.flatnonzero(chords <= _COINCIDENT * length):
+    # 1e-12 of the length is round-off of coordinates, no distance anybody means
+    for i in np.flatnonzero(chords <= 1e-12 * length):
         message = f"the same point as the one before it, {points[i].tolist()}; drop one of them"
         raise MechanismError(f"{WAYPOINTS}[{i + 1}]", message)
     knots = np.concatenate([[0.0], np.cumsum(chords)]) / length
@@ -183,10 +181,12 @@ def spatial_attitude(path: TipPath, orientation: ArrayLike, kind: str) -> Attitu
     R = Rotation.from_euler("xyz", angles)
     steps = (R[1:] * R[:-1].inv()).as_rotvec()
     size = np.linalg.norm(steps, axis=1)
-    for k in np.flatnonzero(size > np.pi - _AMBIGUOUS):
+    # within 1e-6 rad of half a turn the way round cannot be told
+    for k in np.flatnonzero(size > np.pi - 1e-6):
         message = "half a turn from the one before it: say which way by a waypoint in between"
         raise MechanismError(f"trajectory.orientation[{k + 1}]", message)
-    if kind == "spline" and len(knots) > 2 and size.max() > _SAME_TURN:
+    # orientations within 1e-9 rad do not differ
+    if kind == "spline" and len(knots) > 2 and size.max() > 1e-9:
         spline = RotationSpline(knots, R)
 
         def spin(s: Floats) -> Floats:
@@ -215,7 +215,7 @@ def _matrices(turning: Callable[[Floats], Any], s: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class TipTarget:
-    """Places wanted of n tips: ``point`` (n, d) in m, and ``rotation`` (n, 3, 3) or None."""
+    """The target of n tips: ``point`` (n, d) in m, and ``rotation`` (n, 3, 3) where asked for."""
 
     point: Floats
     rotation: Floats | None = None
@@ -231,7 +231,7 @@ class Course:
     attitude: Attitude | None = None
 
     def target(self, s: Floats) -> TipTarget:
-        """Wanted places of the tip at parameters s (n,)."""
+        """The target at parameters s (n,)."""
         rotation = None if self.attitude is None else self.attitude.rotation(np.atleast_1d(s))
         return TipTarget(self.path.point(s), rotation)
 

@@ -54,7 +54,7 @@ class Placement:
 
     @property
     def world_rotation(self) -> Objects:
-        """Rotation from the link's axes to those of the world, (3, 3)."""
+        """The rotation from the link's axes to those of the world, (3, 3)."""
         return self._world[0]
 
     @property
@@ -144,7 +144,7 @@ def walk(
     rates: Objects,
 ) -> Kinematics:
     """Place every link for the freedoms' ``values``, moving at ċ = ``rates`` (n_freedoms, n)."""
-    way = _Walk(case, parameters, tree, values, rates)
+    way = _Placing(case, parameters, tree, values, rates)
     for edge in tree.edges:
         way.placed[edge.follower[0]] = way.place(edge)
     loops = tuple(way.loop(edge) for edge in tree.loops)
@@ -152,8 +152,8 @@ def walk(
 
 
 @dataclass(frozen=True, eq=False)
-class _Walk:
-    """Frames known on the way from the ground to the tips; each joint and each node once."""
+class _Placing:
+    """The links placed on the way from the ground to the tips; each joint and each node once."""
 
     case: CaseFile
     parameters: ModelParameters
@@ -181,7 +181,7 @@ class _Walk:
         )
 
     def loop(self, edge: JointEdge) -> Loop:
-        """The two ways to the follower of a joint that closes a loop."""
+        """The loop of a joint that closes one: both ways to its follower."""
         motion = self._motion(edge)
         R_base, x_base = self._stands(edge.base)
         R_end, x_end = self._stands(edge.follower)

@@ -66,7 +66,7 @@ class LinkFrames:
         return self.motion.placement(link).at(X)[1]
 
     def segments(self, x: Floats) -> tuple[Floats, ...]:
-        """Straight lines of each link, (n, n_lines, 2 ends, 3) in m."""
+        """The straight lines of each link, (n, n_lines, 2 ends, 3) in m."""
         values = self._evaluate(self._ends, x)
         points = values.reshape(len(values), -1, 2, 3)
         cuts = np.cumsum([len(pairs) for pairs in self.drawn])[:-1]
@@ -93,7 +93,7 @@ def build_link_frames(
 
 
 def _lines(case: CaseFile, motion: Kinematics, link: str) -> tuple[tuple[str, str], ...]:
-    """Lines to draw of a link: its axis, its beams, or spokes from its joint node."""
+    """The lines drawn of a link: its axis, its beams, or spokes from its joint node."""
     data: Any = case.mechanism.links[link]
     kind = link_type(case, link)
     if kind == "beam":
@@ -109,7 +109,7 @@ def _lines(case: CaseFile, motion: Kinematics, link: str) -> tuple[tuple[str, st
 
 
 def design_dependence(poses: LinkFrames, tip: str, oriented: bool = False) -> NDArray[np.bool_]:
-    """Design parameters that a node's place, and its turning, depend on (n_y,): structural."""
+    """Masks (n_y,) of the design parameters that a node's place, and its turning, depend on."""
     link, node = split(tip)
     scalars = list(poses.world(link, node))
     if oriented:

@@ -93,7 +93,9 @@ def _bind_passive(
     trial = parameters.rerecorded(recorder, n_p)
     F, check = _equations(case, trial, tree, coords)
     J = [[derivative(f, n_q + n_y + k) for k in range(n_p)] for f in F]
-    used = _used_variables(recorder, [*F, *check], n_q + n_y, n_p)
+    atoms = sorted({a for s in (*F, *check) if isinstance(s, Expression) for a in s.terms})
+    depends = compile_program(recorder, atoms, n_q + n_y + n_p).dependence
+    used = [v for v in range(n_q + n_y) if depends[:, v].any()]
     scalars = [*F, *check, *(entry for row in J for entry in row)]
     program = _reordered(recorder, scalars, used, n_q + n_y, n_p)
     names = (*_joint_names(case, coords), *parameters.varied)
@@ -115,7 +117,7 @@ def _bind_passive(
 
 
 def _joint_names(case: CaseFile, coords: CoordinateMap) -> list[str]:
-    """Names of the joint coordinates s: q's, but where q counts absolute angles."""
+    """The names of the joint coordinates s: those of q, but where q counts absolute angles."""
     plain = (coords.relative == np.eye(len(coords.relative))).all(axis=1) & (coords.offset == 0.0)
     return [
         name if same else f"{name} relative to the base of {c.joint!r}"
@@ -181,13 +183,6 @@ def _spelt(gap: tuple[float, float]) -> str:
     return f"{gap[0]:.2g} m and {gap[1]:.2g} rad"
 
 
-def _used_variables(recorder: Recorder, scalars: Sequence[Scalar], n: int, n_p: int) -> list[int]:
-    """Variables among the first n that the closure depends on; n_p passive ones follow them."""
-    atoms = sorted({a for s in scalars if isinstance(s, Expression) for a in s.terms})
-    depends = compile_program(recorder, atoms, n + n_p).dependence
-    return [v for v in range(n) if depends[:, v].any()]
-
-
 def _reordered(
     recorder: Recorder, scalars: Sequence[Scalar], used: list[int], n: int, n_p: int
 ) -> Program:
@@ -211,10 +206,7 @@ def passive_motion(recorder: Recorder, J: Objects, right: Objects) -> Objects:
 
 # --- the assembly branch
 
-TRIES = 64  # starting points where no guess is given
-SAME = 1e-6  # rad or m
 MEETS = 1e-5  # m and rad: a loop without passive joints closes, its dimensions have six digits
-ROUNDED = 1e-3  # m and rad: what rounded dimensions of a loop with passive joints may leave
 CHANGE = 1e-5  # rad or m, for central differences of F
 IMMOBILE = 1e-5  # share of ∂F/∂a beyond what ∂F/∂p can meet; differences leave some 1e-9 of it
 RANK = 1e-7  # of the largest singular value of ∂F/∂p: those below do not count
@@ -236,10 +228,13 @@ def choose_branch(
     a0 = reference(case, parameters)[list(used)]
     guess = _guess(tree, assembly)
     drawn = np.zeros(function.size)
-    if guess is None and _is_closed(function, a0, drawn):  # as the file places the joints
-        guess = drawn
+    if guess is None:  # as the file places the joints, where that closes the loops
+        F, check, _ = function.equations(a0[:, None], drawn[:, None])
+        guess = drawn if np.abs(np.concatenate([F, check])).max() < ACCEPT else None
     starts = guess[None] if guess is not None else _starts(function.size)
-    angles = _turning(case, tree), _balls(case, tree)
+    kinds = [FREEDOMS[case.mechanism.joints[f.joint].type][f.component] for f in tree.passive]
+    turning = np.array([kind != "translation" for kind in kinds], dtype=bool)
+    angles = turning, _balls(case, tree)  # the same after a full turn
     found = _solutions(function, a0, starts, *angles)
     if not len(found):
         others = _solutions(function, a0, _starts(function.size), *angles)
@@ -255,11 +250,6 @@ def choose_branch(
     if guess is None and len(found) > 1:
         raise MechanismError("mechanism.joints", _ambiguous(case, tree, function.names, a0, found))
     return a0, found[0]
-
-
-def _is_closed(function: ImplicitFunction, a: Floats, p: Floats) -> bool:
-    F, check, _ = function.equations(a[:, None], p[:, None])
-    return bool(np.abs(np.concatenate([F, check])).max() < ACCEPT)
 
 
 def reference(case: CaseFile, parameters: ModelParameters) -> Floats:
@@ -298,7 +288,7 @@ def _guess(tree: Topology, assembly: object) -> Floats | None:
 
 def _starts(n: int) -> Floats:
     """Evenly spread starting points over a turn, or π metres, each way."""
-    return np.pi * (2.0 * kronecker(TRIES, n) - 1.0)
+    return np.pi * (2.0 * kronecker(64, n) - 1.0)
 
 
 def kronecker(count: int, n: int) -> Floats:
@@ -312,14 +302,8 @@ def kronecker(count: int, n: int) -> Floats:
     return np.mod(0.5 + np.arange(count)[:, None] * x ** -np.arange(1.0, n + 1.0), 1.0)
 
 
-def _turning(case: CaseFile, tree: Topology) -> NDArray[np.bool_]:
-    """True for passive freedoms that are angles, the same after a full turn."""
-    kinds = [FREEDOMS[case.mechanism.joints[f.joint].type][f.component] for f in tree.passive]
-    return np.array([kind != "translation" for kind in kinds], dtype=bool)
-
-
 def _balls(case: CaseFile, tree: Topology) -> list[int]:
-    """First of the three angles of each spherical joint, if all of them are passive."""
+    """The first angle of each spherical joint whose three angles are all passive."""
     found = [k for k, f in enumerate(tree.passive) if f.component == 0]
     joints = case.mechanism.joints
     return [
@@ -360,15 +344,11 @@ def _solutions(
                 ]
                 turned[k : k + 3] = np.mod(turned[k : k + 3] + np.pi, 2.0 * np.pi) - np.pi
         near = np.where(turning & (n > 1), turned, candidate)
-        if all(_apart(near - d, turning) > SAME for d in distinct):
+        apart = (near - d for d in distinct)  # full turns not counted
+        # solutions within 1e-6 rad or m are one: Newton settles at round-off
+        if all(np.abs(np.where(turning, 2.0 * np.sin(d / 2.0), d)).max() > 1e-6 for d in apart):
             distinct.append(near)
     return np.array(distinct).reshape(-1, function.size)
-
-
-def _apart(difference: Floats, turning: NDArray[np.bool_]) -> float:
-    """Largest difference of two solutions, rad or m, full turns not counted."""
-    turned = 2.0 * np.sin(difference / 2.0)
-    return float(np.abs(np.where(turning, turned, difference)).max())
 
 
 def _check_determined(tree: Topology, function: ImplicitFunction, a0: Floats, p0: Floats) -> None:
@@ -388,7 +368,7 @@ def _check_determined(tree: Topology, function: ImplicitFunction, a0: Floats, p0
 def _check_movable(
     case: CaseFile, function: ImplicitFunction, used: Sequence[int], a0: Floats, p0: Floats
 ) -> None:
-    """Refuse loops in which an argument of p cannot change: ∂F/∂p ṗ = −∂F/∂a needs a solution."""
+    """Refuse arguments of p that cannot change: ∂F/∂p ṗ = −∂F/∂a has no solution in all rows."""
     J = function.equations(a0[:, None], p0[:, None])[2][0]
     steps = np.repeat(a0[:, None], 2 * len(a0), axis=1)
     steps += CHANGE * np.hstack([np.eye(len(a0)), -np.eye(len(a0))])
@@ -427,7 +407,8 @@ def _unclosable(tree: Topology, function: ImplicitFunction, a0: Floats, n: int) 
         )
     joints = ", ".join(dict.fromkeys(f.joint for f in tree.passive))
     left = _nearest(function, a0, n)
-    if max(left) < ROUNDED:
+    # rounded dimensions of a loop with passive joints leave less than 1e-3 m and rad
+    if max(left) < 1e-3:
         return (
             f"{message}, but nearly: {_spelt(left)} are left, where {ACCEPT:g} are accepted. They "
             f"pose {function.n_equations} conditions, of which {joints} can meet "
@@ -460,7 +441,7 @@ def _at(names: Sequence[str], a: Floats) -> str:
 def _ambiguous(
     case: CaseFile, tree: Topology, names: Sequence[str], a0: Floats, found: Floats
 ) -> str:
-    """Branches in words, each as it is to be given."""
+    """The sentence that lists all branches, each as it is to be given."""
     listed = " | ".join(_as_guess(tree, p) for p in found)
     at = ", ".join(
         f"{name}: {value:.6g}"

@@ -79,12 +79,12 @@ def _combined(
 
 
 def present(a: Objects | Floats) -> NDArray[np.bool_]:
-    """True for entries that are not the plain number zero."""
+    """Mask of the entries that are not the plain number zero."""
     return np.array([some(value) for value in a.ravel().tolist()], dtype=bool).reshape(a.shape)
 
 
 def some(value: Scalar) -> bool:
-    """True for anything but the plain number zero."""
+    """True where it is not the plain number zero."""
     return isinstance(value, Expression) or value != 0.0
 
 

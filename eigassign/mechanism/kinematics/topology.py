@@ -81,7 +81,7 @@ class Topology:
 
     @cached_property
     def _riders(self) -> dict[str, list[str]]:
-        """Riders by link: asked for once a link, of which there may be a thousand."""
+        """The riders of every link: asked for once a link, of which there may be a thousand."""
         found: dict[str, list[str]] = {}
         for edge in (*self.edges, *self.loops):
             link, node = edge.written.base
@@ -113,7 +113,7 @@ def freedoms(case: CaseFile) -> tuple[Freedom, ...]:
 
 
 def component_index(case: CaseFile, coordinate: object) -> int:
-    """Number of the freedom of its joint that a coordinate drives, from 0."""
+    """Index, from 0, of the freedom of its joint that a coordinate drives."""
     names = FREEDOMS[case.mechanism.joints[coordinate.joint].type]  # type: ignore[attr-defined]
     component = getattr(coordinate, "component", None)
     return 0 if component is None else names.index(str(component))
@@ -122,7 +122,7 @@ def component_index(case: CaseFile, coordinate: object) -> int:
 # --- the spanning tree
 
 
-class _Walk(NamedTuple):
+class _SpanningTree(NamedTuple):
     """Tree edges, and the other joints sorted: ending in a free node that deforms, or not."""
 
     edges: list[JointEdge]
@@ -163,7 +163,7 @@ def _require_connected(case: CaseFile, edges: Sequence[JointEdge]) -> None:
             raise MechanismError(f"mechanism.links.{link}", message)
 
 
-def _walk(joints: Sequence[JointEdge], closing: frozenset[str], rigid: set[str]) -> _Walk:
+def _walk(joints: Sequence[JointEdge], closing: frozenset[str], rigid: set[str]) -> _SpanningTree:
     """Hang link after link, keeping the joints ``closing`` for loops."""
     placed, tree = {"ground"}, list[JointEdge]()
     waiting = [e for e in joints if e.joint not in closing]
@@ -181,11 +181,11 @@ def _steps(waiting: Sequence[JointEdge], placed: set[str]) -> Iterator[JointEdge
         yield from (e for e in edges if e.base[0] in placed and e.follower[0] not in placed)
 
 
-def _sorted(tree: list[JointEdge], loops: Sequence[JointEdge], rigid: set[str]) -> _Walk:
+def _sorted(tree: list[JointEdge], loops: Sequence[JointEdge], rigid: set[str]) -> _SpanningTree:
     """Loop edges towards a node of their own that deforms, and those that have none."""
     carriers = {edge.follower: edge.base for edge in tree}
     roots = {edge.follower[0]: edge.follower for edge in tree}
-    walk = _Walk(tree, [], [])
+    walk = _SpanningTree(tree, [], [])
     for edge in loops:
         ends = (e for e in (edge, edge.reversed()) if e.follower[0] not in {"ground", *rigid})
         closed = next((e for e in ends if _free(e, carriers, roots, rigid)), None)
@@ -200,7 +200,7 @@ def _sorted(tree: list[JointEdge], loops: Sequence[JointEdge], rigid: set[str]) 
 def _free(
     edge: JointEdge, carriers: dict[NodeName, NodeName], roots: dict[str, NodeName], rigid: set[str]
 ) -> bool:
-    """True where nothing carries the follower node yet, and it does not carry the base node."""
+    """True where nothing carries the follower node, and it does not carry the base node itself."""
     node = edge.base
     while node != edge.follower:
         if node in carriers:
@@ -212,7 +212,9 @@ def _free(
     return False
 
 
-def _better(joints: Sequence[JointEdge], walk: _Walk, rigid: set[str]) -> _Walk | None:
+def _better(
+    joints: Sequence[JointEdge], walk: _SpanningTree, rigid: set[str]
+) -> _SpanningTree | None:
     """The walk with one more loop closed at a node that deforms, by exchanging two joints."""
     closing = frozenset(e.joint for e in (*walk.elastic, *walk.rigid))
     for edge in walk.rigid:

@@ -25,13 +25,11 @@ from eigassign.series.expression import Scalar
 
 Floats = NDArray[np.float64]
 Label = Callable[[int], str]
-SHORTEST = 1e-4  # of the beam's length
-FINER = 0.1  # of an element's share of it
 
 
 @dataclass(frozen=True, eq=False)
 class Rails:
-    """Places of riders and lengths of their beams, as functions of z = (s, y)."""
+    """The place of every rider and the length of its beam, as functions of z = (s, y)."""
 
     joints: tuple[str, ...]
     links: tuple[str, ...]
@@ -89,7 +87,8 @@ def _margins(case: CaseFile, link: str) -> tuple[float, float]:
     data: Any = case.mechanism.links[link]
     n = data.elements
     first = max(1, n // 2)
-    shortest = min(SHORTEST, FINER / n)
+    # 1e-4 of the beam's length, or a tenth of an element's share of it
+    shortest = min(1e-4, 0.1 / n)
     return first * shortest, max(1, n - first) * shortest
 
 

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from eigassign.errors import MechanismError, UsageError
 
 Floats = NDArray[np.float64]
-SHARE = 1.0 / 3.0  # of the time in which a trapezoidal motion accelerates, and as much it brakes
 
 
 @dataclass(frozen=True)
@@ -88,7 +87,7 @@ def trapezoidal(share: float) -> TimingLaw:
     return TimingLaw("trapezoidal", pieces, (a, 1.0 - a))
 
 
-def timing_law(name: str, acceleration_share: float = SHARE) -> TimingLaw:
+def timing_law(name: str, acceleration_share: float = 1.0 / 3.0) -> TimingLaw:
     """The law called ``name``: linear s = τ, cubic 3τ² − 2τ³, quintic 10τ³ − 15τ⁴ + 6τ⁵, or
     trapezoidal with the share of its time that it accelerates.
 

@@ -44,8 +44,6 @@ from eigassign.mechanism.inverse_kinematics.tip_path import (
 from eigassign.mechanism.trajectory.csv import read_samples
 from eigassign.mechanism.trajectory.timing import point_to_point, shared_times, timing_law
 
-SAME = 1e-9  # of the duration: a sample this near to a corner is on it, and ends both parts
-SPARSE = 0.5  # rad between listed samples: more looks like points of a motion
 _BACKWARDS = "time must increase, and goes from {:g} s to {:g} s"
 _PATHS: dict[str, Callable[[ArrayLike], TipPath]] = {"spline": spline, "straight": straight}
 
@@ -147,7 +145,9 @@ def _from_tip_path(
     elif spec.orientation is not None:
         attitude = spatial_attitude(path, spec.orientation, spec.path)
     chain = tip_chain(spec.tip, attitude is not None)
-    _check_dimension(chain, path)
+    d = chain.evaluate(np.zeros((1, len(chain.kinds)))).point.shape[1]
+    if path.coefficients.shape[2] != d:
+        raise MechanismError(WAYPOINTS, f"the tip moves in {d} dimensions: give {d} coordinates")
     tau = np.linspace(0.0, 1.0, spec.samples)
     s = timing_law(spec.timing, spec.acceleration_share).position(tau)
     s = np.maximum.accumulate(np.clip(s, 0.0, 1.0))  # round-off at the ends
@@ -161,12 +161,6 @@ def _from_tip_path(
     return Trajectory(
         course.time_s, followed.q, followed.tip, notes, tuple(corners.tolist()), of_design
     )
-
-
-def _check_dimension(chain: TipChain, path: TipPath) -> None:
-    d = chain.evaluate(np.zeros((1, len(chain.kinds)))).point.shape[1]
-    if path.coefficients.shape[2] != d:
-        raise MechanismError(WAYPOINTS, f"the tip moves in {d} dimensions: give {d} coordinates")
 
 
 def _from_file(spec: FileTrajectory, q_names: Sequence[str], q_units: Sequence[str]) -> Trajectory:
@@ -255,7 +249,8 @@ def _sparse(q: Floats, q_names: Sequence[str], q_units: Sequence[str]) -> tuple[
     """A note where listed samples are so far apart that a motion between them seems to be meant."""
     steps = np.abs(np.diff(q, axis=0))
     steps[:, [unit != "rad" for unit in q_units or ["rad"] * len(q_names)]] = 0.0
-    if not np.any(steps > SPARSE):
+    # more than 0.5 rad between listed samples looks like points of a motion
+    if not np.any(steps > 0.5):
         return ()
     k, i = divmod(int(np.argmax(steps)), steps.shape[1])
     return (
@@ -309,7 +304,7 @@ class Trajectories:
 
     @property
     def whole(self) -> Trajectories:
-        """Trajectories with all samples, where these are some of them."""
+        """The trajectories with all samples, where these are some of them."""
         return self if self.origin is None else self.origin
 
     @property
@@ -342,7 +337,7 @@ class Trajectories:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes of every trajectory, with its name where there are several."""
+        """The notes of every trajectory, with its name where there are several."""
         return tuple(
             f"trajectory {part.name!r}: {note}" if self.several else note
             for part in self.parts
@@ -351,12 +346,12 @@ class Trajectories:
 
     @property
     def several(self) -> bool:
-        """True for more than one, so that a sample needs more than its number."""
+        """True where there is more than one, so that a sample needs more than its number."""
         return len(self.parts) > 1
 
     @cached_property
     def rows(self) -> tuple[slice, ...]:
-        """Samples that belong to each trajectory."""
+        """The samples of each trajectory."""
         ends = np.cumsum([0, *(len(part.trajectory.time_s) for part in self.parts)])
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
@@ -453,7 +448,8 @@ def rates(trajectory: Trajectory) -> Rates:
 def _smooth_parts(trajectory: Trajectory) -> list[Ints]:
     """The samples from each corner to the next."""
     time_s = trajectory.time_s
-    near = SAME * float(np.ptp(time_s))
+    # a sample within 1e-9 of the duration of a corner is on it, and ends both parts
+    near = 1e-9 * float(np.ptp(time_s))
     cuts = [time_s[0], *trajectory.corners_s, time_s[-1]]
     return [np.flatnonzero((time_s >= a - near) & (time_s <= b + near)) for a, b in pairwise(cuts)]
 
