@@ -40,7 +40,6 @@ __all__, __getattr__, __dir__ = face(
         "expansion": (
             "Expansion NearestExpansion companion_order expand polynomial_error radius_share"
         ),
-        "fit.fit": "fit",
         "fit.interpolation": "Interpolant Nodes basis_at interpolate interval_nodes sample_nodes",
         "fit.path": "smooth_parts",
         "fit.region": "Box",

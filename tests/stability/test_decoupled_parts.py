@@ -12,8 +12,9 @@ from decoupled import comb, decoupled
 from stress import answered, judged
 from test_calibration import polynomial, reduced_model
 
+from eigassign import fit
 from eigassign.errors import AccuracyError, UsageError
-from eigassign.modal import Box, expand, fit, reduce, reduce_adaptively
+from eigassign.modal import Box, expand, reduce, reduce_adaptively
 
 TIP = np.linspace(0.0, 0.1, 21)[:, None]  # kg
 

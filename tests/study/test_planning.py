@@ -89,11 +89,14 @@ def test_a_plan_that_cannot_be_is_refused_at_its_key(
 def test_an_order_that_fills_the_memory_is_refused_before_the_expansion(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("eigassign.series.multi_index.MOST_PAIRS", 20)
+    path = tmp_path / "arm.yaml"
+    path.write_text(SHIPPED)
+    case, model = load_case(path), load_case(path).model()
+    monkeypatch.setenv("EIGASSIGN_LIMITS", "2e-6")  # a memory for 20 pairs of coefficients
     with pytest.raises(CaseError, match=r"expansion.order: order 4 in 3 .*EIGASSIGN_LIMITS="):
-        plan_of(tmp_path, SHIPPED)
+        plan_expansion(case.file, model, None)
     with pytest.raises(UsageError, match="lower the order"):
-        plan_of(tmp_path, SHIPPED, order=6)
+        plan_expansion(case.file, model, None, order=6)
 
 
 def test_without_a_design_only_q_is_planned(tmp_path: Path) -> None:
