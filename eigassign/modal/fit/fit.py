@@ -131,7 +131,7 @@ class Fit:
         (n_designs, n_t, n_modes) for many (n_designs, n_y); without y at that of the fit. Raises
         UsageError for a fit over a box of q, for y outside the region, or missing.
         """
-        region, n_q, indices = self.region, self.region.n_q, self.indices
+        region, n_q = self.region, self.region.n_q
         if region.path is None:
             raise UsageError("the fit is over a box of q: it has no trajectory to go along")
         if y is None and (region.place is None or region.d > 1):
@@ -140,16 +140,26 @@ class Fit:
         if region.place is None:
             hz = np.repeat(self._values(v)[:, None], len(region.path), axis=1)
         else:  # one product of matrices for all designs
-            others, row = np.unique(indices[:, 1:], axis=0, return_inverse=True)
-            table = np.zeros((len(self.modes), len(others), int(indices[:, 0].max()) + 1))
-            table[:, row.reshape(-1), indices[:, 0]] = self.coefficients
-            left = newton_basis(region.nodes[0].v[: table.shape[2]], region.place)
+            others, curves = self._curves
             right = basis_at(region.nodes[1:], others, v[:, 1:])
-            g = np.empty((len(v), len(left), len(self.modes)))
-            for k, each in enumerate(table @ left.T):
+            g = np.empty((len(v), curves.shape[2], len(self.modes)))
+            for k, each in enumerate(curves):
                 np.matmul(right, each, out=g[:, :, k])
             hz = self._hz(g)
         return hz if y is not None and np.ndim(y) == 2 else hz[0]
+
+    @cached_property
+    def _curves(self) -> tuple[Ints, Floats]:
+        """Members (M, d − 1) on the axes of y, and what each is times along the path.
+
+        These are Σ_k c_kγ h_k at every sample, (n_modes, M, n_t).
+        """
+        indices, region = self.indices, self.region
+        assert region.place is not None  # there is a trajectory
+        others, row = np.unique(indices[:, 1:], axis=0, return_inverse=True)
+        table = np.zeros((len(self.modes), len(others), int(indices[:, 0].max()) + 1))
+        table[:, row.reshape(-1), indices[:, 0]] = self.coefficients
+        return others, table @ newton_basis(region.nodes[0].v[: table.shape[2]], region.place)
 
     def _values(self, v: Floats, block: int = 512) -> Floats:
         """f in Hz (n, n_modes) at v (n, d), in blocks that stay in the processor's cache."""

@@ -57,18 +57,20 @@ def leja(candidates: Floats, count: int) -> Floats:
 
 
 def newton_basis(nodes: Floats, v: Floats) -> Floats:
-    """h_k(v_i) (n, K) for the nodes (K,) in their order."""
-    table = np.ones((len(v), len(nodes)))
-    np.cumprod(v[:, None] - nodes[:-1], axis=1, out=table[:, 1:])
-    return np.asarray(table / [np.prod(nodes[k] - nodes[:k]) for k in range(len(nodes))])
+    """h_k(v_i) (K, n) for the nodes (K,) in their order."""
+    table = np.ones((len(nodes), len(v)))
+    np.cumprod(v - nodes[:-1, None], axis=0, out=table[1:])
+    below = np.tri(len(nodes), k=-1, dtype=bool)
+    scale = np.where(below, nodes[:, None] - nodes, 1.0).prod(axis=1)
+    return np.asarray(table / scale[:, None])
 
 
 def basis_at(axes: Sequence[Nodes], members: Ints, v: Floats) -> Floats:
     """h_γ(v_i) (n, N) for members (N, d) at places v (n, d)."""
-    out = np.ones((len(v), len(members)))
+    out = np.ones((len(members), len(v)))
     for axis, degrees, places in zip(axes, members.T, v.T, strict=True):
-        out *= newton_basis(axis.v[: int(degrees.max()) + 1], places)[:, degrees]
-    return out
+        out *= newton_basis(axis.v[: int(degrees.max()) + 1], places)[degrees]
+    return out.T
 
 
 @dataclass(frozen=True, eq=False)

@@ -157,8 +157,8 @@ class Region:
         nodes = self.nodes[0].v[:count]
         reach = (self.path - self.path[0]) @ moving_joints(self.directions, self.n_q).T
         at = [int(np.flatnonzero(self.place == v)[0]) for v in nodes]
-        c = np.linalg.solve(newton_basis(nodes, nodes), reach[at])
-        missed = np.abs(newton_basis(nodes, self.place) @ c - reach).max() / np.abs(reach).max()
+        c = np.linalg.solve(newton_basis(nodes, nodes).T, reach[at])
+        missed = np.abs(newton_basis(nodes, self.place).T @ c - reach).max() / np.abs(reach).max()
         if missed > MOST_MISSED:
             raise AccuracyError(
                 f"{len(nodes)} solves do not follow the path: between them it is missed by "
