@@ -103,7 +103,11 @@ def machine() -> str:
 
 
 def _commit() -> str:
-    """The commit that is measured, with a + if files of it have been changed since."""
-    command = ["git", "describe", "--always", "--dirty=+", "--exclude=*"]
-    done = subprocess.run(command, cwd=CASES, capture_output=True, text=True, check=False)
-    return done.stdout.strip() or "unknown"
+    """The commit that is measured, with a + if anything but results has changed since."""
+
+    def git(*words: str) -> str:
+        done = subprocess.run(["git", *words], cwd=RESULTS, capture_output=True, text=True)
+        return done.stdout.strip()
+
+    changed = git("status", "--porcelain", "--untracked-files=no", "--", ":/", ":!.")
+    return (git("rev-parse", "--short", "HEAD") or "unknown") + ("+" if changed else "")

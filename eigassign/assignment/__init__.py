@@ -24,7 +24,7 @@ __all__, __getattr__, __dir__ = face(
         "catalogues.linear": "solve_catalogue",
         "exact.design_problem": "Appraisal DesignProblem Objective best_first",
         "exact.identification": "Identified MeasuredFrequencies identify",
-        "exact.requirements": "Frequencies FrequencyLimit ModeTarget QuantityLimit Requirements",
+        "exact.requirements": "Frequencies FrequencyLimit FrequencyGoal QuantityLimit Requirements",
         "exact.sequential": "End Optimum minimise",
         "exact.stationarity": "stationarity",
         "optimality": "Certificate best_candidate judge",

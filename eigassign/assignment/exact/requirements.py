@@ -45,7 +45,7 @@ Response = Callable[[Floats], Frequencies]
 
 
 @dataclass(frozen=True)
-class ModeTarget:
+class FrequencyGoal:
     """A mode is to be near ``hz`` (n,) at ``rows`` of all samples."""
 
     mode: int
@@ -79,7 +79,7 @@ class QuantityLimit:
 class Requirements:
     """Targets and limits, with the weights ω (n_t,) in s of the integral over time."""
 
-    targets: tuple[ModeTarget, ...]
+    targets: tuple[FrequencyGoal, ...]
     limits: tuple[FrequencyLimit, ...]
     quantities: tuple[QuantityLimit, ...]
     time_weights: Floats
@@ -191,7 +191,7 @@ class Requirements:
         ]
         return bounds[index]
 
-    def _factor(self, target: ModeTarget) -> Floats:
+    def _factor(self, target: FrequencyGoal) -> Floats:
         """The factors (n,) of f / f_d − 1."""
         if self.objective is Objective.WORST_CASE:
             return np.full(len(target.hz), target.weight)

@@ -78,7 +78,7 @@ class Fit:
 
     @property
     def error_estimate(self) -> float:
-        """Of frequencies anywhere in the region, relative in Hz."""
+        """The error of frequencies anywhere in the region, relative in Hz."""
         return self.interpolant.error + self.floor
 
     @property
@@ -103,7 +103,7 @@ class Fit:
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """What was chosen and why, as lines of text."""
+        """The choices and their reasons, as lines of text."""
         found = self.interpolant
         degrees = " x ".join(map(str, found.members.max(axis=0)))
         idle = sum(rate == 0.0 for rate in found.rates)
@@ -118,7 +118,7 @@ class Fit:
 
     @property
     def quantity(self) -> str:
-        """What is a polynomial: "f", "λ" or "1/λ"."""
+        """The quantity that is a polynomial: "f", "λ" or "1/λ"."""
         return QUANTITIES[self.power]
 
     def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
@@ -204,7 +204,7 @@ class PathFit:
 
     @property
     def error_estimate(self) -> float:
-        """Of frequencies anywhere in the region, relative in Hz: the largest of all parts."""
+        """The largest error of all parts, relative in Hz."""
         return max(part.error_estimate for part in self.parts)
 
     @property
@@ -214,7 +214,7 @@ class PathFit:
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """What was chosen and why, as lines of text, for each part."""
+        """The choices and their reasons, as lines of text, for each part."""
         return tuple(
             f"samples {rows.start} to {rows.stop - 1}: {line}"
             for part, rows in zip(self.parts, self.rows, strict=True)
@@ -235,7 +235,7 @@ class PathFit:
         return hz
 
     def along(self, y: ArrayLike | None = None) -> Floats:
-        """As `Fit.along`, at the samples of all parts in their order."""
+        """Frequencies as of `Fit.along`, at the samples of all parts in their order."""
         return np.concatenate([part.along(y) for part in self.parts], axis=-2)
 
 

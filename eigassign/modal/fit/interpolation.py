@@ -88,7 +88,7 @@ class Nodes:
 
     @cached_property
     def points(self) -> Floats:
-        """All places that can be asked for: the nodes, then the checks."""
+        """The places that can be asked for: the nodes, then the checks."""
         return np.concatenate([self.v, self.checks])
 
 
@@ -324,7 +324,7 @@ def decay(layers: Sequence[float]) -> float:
 
 
 def _tail(rates: Floats) -> float:
-    """From the first missing coefficients to the sum over all, with a safety."""
+    """The factor from the first missing coefficients to the sum over all, with a safety."""
     return float(SAFETY / (1.0 - rates.max()))
 
 

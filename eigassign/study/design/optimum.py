@@ -29,8 +29,8 @@ from eigassign.assignment.exact.design_problem import (
 )
 from eigassign.assignment.exact.requirements import (
     Frequencies,
+    FrequencyGoal,
     FrequencyLimit,
-    ModeTarget,
     QuantityLimit,
     Requirements,
 )
@@ -429,7 +429,7 @@ def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Pose
     scene, wanted = task.scene, task.wanted
     lower, upper = scene.bounds
     targets = tuple(
-        ModeTarget(w.mode, w.hz, w.rows, w.weight)
+        FrequencyGoal(w.mode, w.hz, w.rows, w.weight)
         for w in wanted
         if w.requirement.kind == "frequency"
     )

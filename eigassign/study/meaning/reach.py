@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem
-from eigassign.assignment.exact.requirements import ModeTarget, Requirements
+from eigassign.assignment.exact.requirements import FrequencyGoal, Requirements
 from eigassign.assignment.exact.sequential import minimise
 from eigassign.errors import EigassignError
 from eigassign.study.design.followed import Solved, followers, solve_design
@@ -122,7 +122,7 @@ def _nearest(scene: Scene, wanted: Wanted, k: int, y: Floats, allowed: float) ->
     The search ends with the first start that leads within ``allowed`` of it.
     """
     at, goal = wanted.rows.start + k, _goal(wanted, k)
-    target = ModeTarget(wanted.mode, np.array([goal]), slice(0, 1))
+    target = FrequencyGoal(wanted.mode, np.array([goal]), slice(0, 1))
     asked = Requirements((target,), (), (), np.ones(1))
     alone = replace(scene, trajectory=scene.path.chosen([at]))
     own = followers(alone, [replace(wanted, rows=slice(0, 1))])

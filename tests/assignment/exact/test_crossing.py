@@ -12,9 +12,9 @@ from eigassign.assignment import (
     DesignProblem,
     End,
     Frequencies,
+    FrequencyGoal,
     FrequencyLimit,
     LinearConstraint,
-    ModeTarget,
     Objective,
     Optimum,
     Requirements,
@@ -68,7 +68,7 @@ def frequencies(matrices: Matrices) -> Callable[[np.ndarray], Frequencies]:
 
 def problem(
     matrices: Matrices,
-    targets: tuple[ModeTarget, ...],
+    targets: tuple[FrequencyGoal, ...],
     limits: tuple[FrequencyLimit, ...] = (),
     objective: Objective = Objective.LEAST_SQUARES,
     constraints: tuple[LinearConstraint, ...] = (),
@@ -85,8 +85,8 @@ def problem(
     )
 
 
-def first(hz: float, mode: int = 1) -> ModeTarget:
-    return ModeTarget(mode, np.full(N, hz), EVERY)
+def first(hz: float, mode: int = 1) -> FrequencyGoal:
+    return FrequencyGoal(mode, np.full(N, hz), EVERY)
 
 
 BUDGET = (LinearConstraint("budget", np.array([1.0, 1.2, 1.5]), upper=1.0),)
