@@ -47,7 +47,7 @@ def main() -> None:
     warnings.simplefilter("ignore")
     scene = prepare(ea.load_case(common.CASES / "two_link.yaml"), Stages(lambda line: None), None)
     features, model = build_features(scene), scene.model
-    points = build_question(scene, features, Effort(designs=5), 0.0).points
+    points = build_question(scene, features, Effort(designs=5), 1e-5).points
     exact = model.frequencies(points.q, points.y, 1)[:, 0]
     many = points[np.tile(np.arange(len(exact)), 3)]
     solve = common.once(lambda: model.frequencies(points.q, points.y, 1)) / len(exact)
