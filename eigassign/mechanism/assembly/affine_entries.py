@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,9 @@ from eigassign.series.expression import Expression, Scalar
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Row = Sequence[tuple[int, Scalar]]  # one row of a matrix: unknown and coefficient
-Block = tuple[Ints, Ints, int, Floats]  # rows, columns, the atom of all (−1: the number 1), values
+Entries = tuple[Ints, Ints, Ints, Floats]  # row, column, atom (−1: the number 1) and value of each
+# Rows, columns or the column of all, values; atom and factor of all.
+Block = tuple[Ints, Ints | int, Floats, int, float]
 
 
 @dataclass
@@ -33,6 +36,7 @@ class AffineEntries:
     """
 
     blocks: list[Block] = field(default_factory=list)
+    couplings: list[Block] = field(default_factory=list)  # to one unknown, without transposes
     sums: dict[tuple[int, int], Scalar] = field(default_factory=dict)
 
     def add_block(self, coefficient: Scalar, matrix: sparse.csr_array, places: Ints) -> None:
@@ -40,16 +44,17 @@ class AffineEntries:
         i = places[np.repeat(np.arange(len(places)), np.diff(matrix.indptr))]
         j = places[matrix.indices]
         inner = (i >= 0) & (j >= 0)
-        self._add(coefficient, i[inner], j[inner], matrix.data[inner])
+        entries = i[inner], j[inner], matrix.data[inner]
+        self.blocks += [(*entries, *part) for part in _parts(coefficient)]
 
     def add_coupling(self, coefficient: Scalar, v: Floats, places: Ints, r: Row) -> None:
         """coefficient × (Pᵀ v r + rᵀ vᵀ P)."""
         present = (places >= 0) & (v != 0.0)
         rows, values = places[present], v[present]
         for unknown, factor in r if len(rows) else ():
-            columns = np.full(len(rows), unknown)
-            both = np.concatenate([rows, columns]), np.concatenate([columns, rows])
-            self._add(coefficient * factor, *both, np.concatenate([values, values]))
+            self.couplings += [
+                (rows, unknown, values, *part) for part in _parts(coefficient * factor)
+            ]
 
     def add_square(self, coefficient: Scalar, r: Row) -> None:
         """coefficient × rᵀ r."""
@@ -75,25 +80,33 @@ class AffineEntries:
         if some(value):
             self.sums[row, column] = self.sums.get((row, column), 0.0) + value
 
-    def _add(self, coefficient: Scalar, rows: Ints, columns: Ints, values: Floats) -> None:
-        for atom, factor in _parts(coefficient):
-            self.blocks.append((rows, columns, atom, factor * values))
-
-    def finish(self, n_u: int) -> tuple[Ints, Ints, Ints, Floats]:
-        """Row, column, atom and value of all entries; sums among the q̇ become one atom each."""
+    def finish(self, n_u: int) -> Entries:
+        """All entries; sums among the q̇ become one atom each."""
         sums = [
             (row, column, atom, factor)
             for (row, column), value in self.sums.items()
             for atom, factor in _parts(_whole(value) if min(row, column) >= n_u else value)
         ]
-        single = np.array(sums, dtype=object).reshape(-1, 4).T
-        several = list(zip(*self.blocks, strict=True)) or [()] * 4
-        several[2] = tuple(np.full(len(rows), atom) for rows, _, atom, _ in self.blocks)
-        i, j, atom = (
-            np.concatenate([own.astype(np.intp), *parts])
-            for own, parts in zip(single[:3], several, strict=False)
-        )
-        return i, j, atom, np.concatenate([single[3].astype(np.float64), *several[3]])
+        rows, columns, *what = _spread(self.couplings)
+        parts = [
+            list(zip(*sums, strict=True)) or [()] * 4,
+            _spread(self.blocks),
+            (rows, columns, *what),
+            (columns, rows, *what),
+        ]
+        i, j, atom, value = (np.concatenate(own) for own in zip(*parts, strict=True))
+        return i.astype(np.intp), j.astype(np.intp), atom.astype(np.intp), value
+
+
+def _spread(blocks: Sequence[Block]) -> tuple[Any, ...]:
+    """Row, column, atom and value of each entry of all blocks."""
+    if not blocks:
+        return ((),) * 4
+    rows, columns, values, atoms, factors = zip(*blocks, strict=True)
+    sizes = [len(each) for each in rows]
+    column = np.concatenate(columns) if np.ndim(columns[0]) else np.repeat(columns, sizes)
+    value = np.concatenate(values) * np.repeat(factors, sizes)
+    return np.concatenate(rows), column, np.repeat(atoms, sizes), value
 
 
 def _whole(value: Scalar) -> Scalar:
@@ -112,7 +125,7 @@ def _parts(value: Scalar) -> list[tuple[int, float]]:
 
 
 def pattern(
-    entries: Sequence[tuple[Ints, Ints, Ints, Floats]], n_dof: int, n_theta: int
+    entries: Sequence[Entries], n_dof: int, n_theta: int
 ) -> tuple[Ints, Ints, list[sparse.csr_array]]:
     """Common pattern of several matrices and their weights (n_nonzeros, n_theta) on it."""
     keys = np.concatenate([rows * n_dof + columns for rows, columns, _, _ in entries])
