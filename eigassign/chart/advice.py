@@ -38,7 +38,7 @@ def front(
     the front of single evaluations.
     """
     made = Front(name, evaluations, ())
-    able = [p for p in points if p.at_once == 1 or evaluations is not None]
+    able = [p for p in _rivals(points) if p.at_once == 1 or evaluations is not None]
     cost = np.array([made.cost_s(p) for p in able])
     error = np.array([max(p.everywhere.worst_hz, floor_hz) for p in able])
     return replace(made, methods=tuple(able[k].method for k in pareto(cost, error)))
@@ -59,6 +59,7 @@ def advise(
     accurate. For a time, which counts the set-up, the most accurate method, the quicker of equals.
     """
     floor = asked.floor_hz / asked.typical_hz
+    rivals = _rivals(points)
     for n in counts:
         words = f"for {n:,.0f} evaluations within"
         for a in request.accuracies:
@@ -67,15 +68,20 @@ def advise(
                 said = f"nothing, for round-off moves even exact solves by {floor:.1e}"
                 yield replace(within, words=f"{within.words}: {said}", is_below_round_off=True)
                 continue
-            good = [p for p in points if p.everywhere.worst_relative <= a]
+            good = [p for p in rivals if p.everywhere.worst_relative <= a]
             good = [p for p in good if (p.estimate or 0.0) <= 100.0 * a]
             best = min(good, key=lambda p: p.total_s(n), default=None)
             yield _beside_auto(_chosen(within, "quickest", best), points, skipped)
         if (seconds := request.budget_s) is not None:
             within = Advice("budget", None, seconds, n, words=f"{words} {time_in_words(seconds)}")
-            in_time = [p for p in points if p.total_s(n) <= seconds]
+            in_time = [p for p in rivals if p.total_s(n) <= seconds]
             best = min(in_time, key=lambda p: (p.everywhere.worst_hz, p.total_s(n)), default=None)
             yield _chosen(within, "most accurate", best)
+
+
+def _rivals(points: Sequence[ChartPoint]) -> list[ChartPoint]:
+    """The points without those that ``order: auto`` takes, whose time lacks that of choosing."""
+    return [p for p in points if not p.method.startswith("auto ")]
 
 
 def _chosen(within: Advice, superlative: str, found: ChartPoint | None) -> Advice:

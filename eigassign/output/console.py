@@ -13,7 +13,6 @@ from typing import TextIO
 from rich import box
 from rich.cells import cell_len
 from rich.console import Console
-from rich.markdown import Markdown
 from rich.table import Table as Drawn
 from rich.text import Text
 
@@ -53,6 +52,8 @@ def wrapped(lines: Iterable[str], room: int) -> list[str]:
 def markdown(text: str, out: TextIO) -> str:
     """A page of the manual as ``out`` shows it, in lines of at most 100 columns."""
     console = _console(out, min(width(), 100))
+    from rich.markdown import Markdown  # takes 0.15 s, and only the manual needs it
+
     console.print(Markdown(text, hyperlinks=False))
     return _written(console)
 

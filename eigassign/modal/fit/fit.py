@@ -163,7 +163,7 @@ class Fit:
 
     def _values(self, v: Floats, block: int = 512) -> Floats:
         """f in Hz (n, n_modes) at v (n, d), in blocks that stay in the processor's cache."""
-        parts = [v[i : i + block] for i in range(0, len(v), block)]
+        parts = [v[i : i + block] for i in range(0, max(len(v), 1), block)]
         g = [
             basis_at(self.region.nodes, self.indices, each) @ self.coefficients.T for each in parts
         ]

@@ -168,7 +168,7 @@ def interpolate(
     rounds: list[tuple[int, float]] = []
 
     def refuse(why: str) -> None:
-        count, error = rounds[-1] if rounds else (0, np.inf)
+        count, error = len(hz) + len(held), rounds[-1][1] if rounds else np.inf
         wanted = "" if accuracy is None else f", not {accuracy:.1e}, and {why}"
         raise AccuracyError(
             f"{count} values leave an estimated error of {error:.1e}{wanted}"
