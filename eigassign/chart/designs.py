@@ -30,7 +30,8 @@ from eigassign.chart.timing import Effort, measure
 from eigassign.errors import EigassignError
 from eigassign.modal.expansion import expand
 from eigassign.study.design.one_shot import assign_design
-from eigassign.study.design.optimum import PosedProblem, Task, find_optimum, variant_of
+from eigassign.study.design.optimum import find_optimum
+from eigassign.study.design.variants import PosedProblem, Task, variant_of
 from eigassign.study.scene import Expansions, Scene
 from eigassign.study.wanted import Wanted, target_frequencies
 

@@ -7,6 +7,7 @@ Reading order:
     response     frequencies along the trajectory and their slopes in the design
     judgement    what a design does to the targets, and the verdict
     clearance    proof that a band stays clear of modes all along a trajectory
+    variants     the problems that the targets make, one for each choice that bands leave
     optimum      the design that meets the targets best, by the sequential method
     conclusions  what may be said of an optimum: proved, conflicting limits, what changes nothing
     answer       the answer by either method, and what it rests on

@@ -30,7 +30,8 @@ from eigassign.study.design.conclusions import (
 )
 from eigassign.study.design.judgement import verdict
 from eigassign.study.design.one_shot import assign_design, catalogues
-from eigassign.study.design.optimum import MASS, Found, Task, find_optimum, variant_of
+from eigassign.study.design.optimum import Found, find_optimum
+from eigassign.study.design.variants import MASS, Task, variant_of
 from eigassign.study.results import (
     ActiveRow,
     AssignmentRow,

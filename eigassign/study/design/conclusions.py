@@ -25,7 +25,8 @@ from eigassign.assignment.exact.sequential import OPTIMAL, End, minimise
 from eigassign.assignment.exact.stationarity import active_limits, stationarity
 from eigassign.assignment.feasibility import smallest
 from eigassign.errors import EigassignError
-from eigassign.study.design.optimum import Found, PosedProblem
+from eigassign.study.design.optimum import Found
+from eigassign.study.design.variants import PosedProblem
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]

@@ -17,7 +17,8 @@ from eigassign.assignment.exact.requirements import Requirements
 from eigassign.errors import EigassignError
 from eigassign.study.design.answer import Answer, active_rows
 from eigassign.study.design.followed import Solved
-from eigassign.study.design.optimum import Found, Task, variant_of
+from eigassign.study.design.optimum import Found
+from eigassign.study.design.variants import Task, variant_of
 from eigassign.study.meaning.reach import misses, proved_ranges, reach_rows, unreachable
 from eigassign.study.meaning.sensitivity import error_kind, relaxed_limits, sensitivities
 from eigassign.study.meaning.tolerance import study_tolerance

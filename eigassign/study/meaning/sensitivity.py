@@ -16,7 +16,7 @@ from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, 
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy
-from eigassign.study.design.optimum import MASS
+from eigassign.study.design.variants import MASS
 from eigassign.study.results import ActiveRow, RelaxedRow, SensitivityRow
 from eigassign.study.wanted import Wanted
 
