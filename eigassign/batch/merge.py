@@ -12,7 +12,7 @@ from pathlib import Path
 from eigassign.batch.manifest import LINES, Header, InOrder, read_header, write_header
 from eigassign.batch.progress import summarise
 from eigassign.errors import UsageError
-from eigassign.output.batch.files import merge_files, write_files
+from eigassign.output.batch.files import write_files
 from eigassign.output.batch.outcome import from_line, status_of, to_line
 from eigassign.output.store.atomic import replacing
 from eigassign.output.store.run_record import relative_path
@@ -54,13 +54,7 @@ def merge_shards(out: Path, folders: Sequence[Path]) -> Counter[str]:
         parts = [shard.lines if header.columns else _seen_from(place, shard) for shard in shards]
         file.writelines(chain.from_iterable(zip_longest(*parts, fillvalue="")))
     with open(out / LINES, encoding="utf-8") as lines:
-        if header.columns:
-            for shard in shards:
-                summarise(shard.folder, shard.header)
-            folders, counts = [s.folder for s in shards], [len(s.lines) for s in shards]
-            merge_files(out, lines, folders, counts, header.keys)
-        else:
-            write_files(out, lines, header.cases, header.keys)
+        write_files(out, lines, header.cases, header.keys, header.columns)
     write_header(out, header)
     with open(out / LINES, encoding="utf-8") as lines:
         return Counter(map(status_of, lines))

@@ -10,6 +10,7 @@ import math
 import re
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 
 from eigassign.case.suggestions import shown, suggestion
 
@@ -278,6 +279,7 @@ def _spelt(exponents: Exponents) -> str:
     return " ".join(f"{n}^{e}" for n, e in names if e) or "1"
 
 
+@lru_cache(maxsize=256)  # the same few units in every row of a sweep or table: 0.1 ms each
 def parse_unit(text: str, dimension: Dimension | None = None) -> Unit:
     """Unit of ``factor [factor...][/factor...]``: `N m/rad`, `kg/m3`, `cm^2`, `g·cm²`.
 

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import re
 import xml.etree.ElementTree as ET
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
+import numpy as np
 import pytest
 
 from eigassign.batch import Header, Manifest, merge_shards, read_header, summarise, write_header
@@ -56,6 +60,51 @@ def test_shards_in_any_order_become_what_one_batch_is(tmp_path: Path, columns: b
     header = read_header(out)
     assert header is not None
     assert (header.shard, header.files) == ((1, 1), ("../arm.yaml",))
+
+
+def external(path: Path) -> None:
+    secret = path.with_name("secret")
+    secret.write_bytes(b"a password" + bytes(100))
+    with h5py.File(path, "r+") as file:
+        (count,) = file["seconds"].shape
+        del file["seconds"]
+        raw = [(str(secret), 0, 8 * count)]
+        file.create_dataset("seconds", (count,), np.float64, external=raw)
+
+
+def bomb(path: Path) -> None:
+    with h5py.File(path, "r+") as file:
+        file.create_dataset("design/m1", (10**8,), np.float64, compression="gzip")[:] = 0.0
+
+
+def pipe(path: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("columns.h5", external),
+        pytest.param("columns.h5", bomb, marks=pytest.mark.slow),
+        ("columns.h5", pipe),
+        ("columns.csv", pipe),
+        ("junit.xml", lambda path: path.write_text("<testsuites ")),
+        ("summary.csv", lambda path: path.write_text("name,\nanother,\n")),
+    ],
+)
+def test_what_others_made_of_a_shards_summaries_is_not_read(
+    tmp_path: Path, name: str, change: Callable[[Path], object]
+) -> None:
+    shards = [shard(tmp_path / str(i), i, 2, columns=True) for i in (1, 2)]
+    merge_shards(tmp_path / "before", shards)
+    for folder in shards:
+        merge_shards(folder, [])
+    change(shards[0] / name)
+    merge_shards(tmp_path / "out", shards)
+    for name in ("summary.csv", "junit.xml", "columns.h5", "columns.csv"):
+        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "before" / name).read_bytes()
+    assert b"a password" not in (tmp_path / "out" / "columns.h5").read_bytes()
 
 
 def test_the_folders_of_cases_stay_and_are_found_from_the_new_place(tmp_path: Path) -> None:

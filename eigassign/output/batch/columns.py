@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TextIO
@@ -68,19 +67,17 @@ class Columns:
     def _write(self, name: str, cells: list[Any]) -> None:
         """The cells of the rows held, of a column that is made where it is new."""
         if name not in self._file:
-            text = any(isinstance(cell, str) for cell in cells)
-            _create(self._file, name, self._total, text)
+            self._create(name, text=any(isinstance(cell, str) for cell in cells))
         column = self._file[name]
         made = [cell or "" for cell in cells] if _is_text(column) else np.array(cells, np.float64)
         column[self._start : self._start + len(cells)] = made
 
+    def _create(self, name: str, text: bool) -> None:
+        import h5py
 
-def _create(file: Any, name: str, total: int, text: bool) -> Any:
-    import h5py
-
-    kind, empty = (h5py.string_dtype(), None) if text else (np.float64, np.nan)
-    chunks = (min(ROWS, total),)
-    return file.create_dataset(name, (total,), kind, fillvalue=empty, chunks=chunks)
+        kind, empty = (h5py.string_dtype(), None) if text else (np.float64, np.nan)
+        chunks = (min(ROWS, self._total),)
+        self._file.create_dataset(name, (self._total,), kind, fillvalue=empty, chunks=chunks)
 
 
 def _is_text(column: Any) -> bool:
@@ -97,24 +94,6 @@ def _names(file: Any) -> list[str]:
     groups = ["", *_GROUPS]
     found.sort(key=lambda name: groups.index(name.rpartition("/")[0].partition("/")[0]))
     return [*(name for name in first if name in found), *(name for name in found if "/" in name)]
-
-
-def merge_columns(path: Path, parts: Sequence[Path]) -> None:
-    """columns.h5 of the shards of a batch: row k is row k // n of ``parts[k % n]``."""
-    import h5py
-
-    with ExitStack() as stack:
-        files = [stack.enter_context(h5py.File(part, locking=False)) for part in parts]
-        total, n = sum(int(file.attrs["cases"]) for file in files), len(files)
-        made = stack.enter_context(h5py.File(path, "w", locking=False))
-        made.attrs.update({"format": FORMAT, "version": __version__, "cases": total})
-        for name in dict.fromkeys(name for file in files for name in _names(file)):
-            having = [(k, file[name]) for k, file in enumerate(files) if name in file]
-            text = _is_text(having[0][1])
-            whole = np.full(total, b"" if text else np.nan, object if text else np.float64)
-            for k, column in having:
-                whole[k::n] = column[:]
-            _create(made, name, total, text)[:] = whole
 
 
 def _values(row: CaseOutcome) -> Iterator[tuple[str, float | str]]:

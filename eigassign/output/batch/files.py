@@ -1,23 +1,21 @@
 """All files of a batch in one pass over its rows, so that memory does not grow with them.
 
-Those of a batch in shards are copied from those of the shards, and no row is read but for the page:
-row k of the whole is row k // n of shard k % n, counted from 0, so that a file with a line a row is
-merged by a line of each shard in turn, and a column by steps of n.
+So are those of a batch in shards, of its shards' rows: summaries of shards are not read, which
+would be files of others, and may say something else than the rows.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
-from itertools import chain, islice, zip_longest
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TextIO
 
-from eigassign.output.batch.columns import Columns, merge_columns, write_csv
+from eigassign.output.batch.columns import Columns, write_csv
 from eigassign.output.batch.index import Index
 from eigassign.output.batch.junit import Junit
-from eigassign.output.batch.outcome import CaseOutcome, from_line, status_of
+from eigassign.output.batch.outcome import CaseOutcome, from_line
 from eigassign.output.batch.summary import SummaryCsv, SummaryJson
 from eigassign.output.store.atomic import replace_synced, replacing
 
@@ -94,55 +92,7 @@ def _test(junit: Junit, row: CaseOutcome, moves: Sequence[str] = ()) -> None:
     junit.add(row.name, row.path, row.seconds, status, message, output)
 
 
-def merge_files(
-    folder: Path,
-    lines: Iterable[str],
-    shards: Sequence[Path],
-    counts: Sequence[int],
-    keys: Sequence[str],
-) -> None:
-    """The same of a batch with columns, of the files of its ``shards``, which hold ``counts`` rows.
-
-    ``lines`` are those of all rows in their order.
-    """
-    with ExitStack() as stack:
-        with _in_turn(shards, "summary.csv", counts) as (heads, rows):
-            _opened(stack, folder / "summary.csv").writelines(chain(heads[:1], rows))
-        with _in_turn(shards, "junit.xml", counts) as (heads, rows):
-            junit = Junit(_opened(stack, folder / "junit.xml"))
-            junit.copy(rows, heads)
-            junit.end()
-        plain, index = SummaryJson(_opened(stack, folder / "summary.json")), Index()
-        for line in map(str.rstrip, lines):
-            status = status_of(line)
-            plain.add(status, line)
-            index.add(status, line)
-        plain.end()
-        stored = stack.enter_context(replacing(folder / "columns.h5"))
-        merge_columns(stored, [shard / "columns.h5" for shard in shards])
-        with _in_turn(shards, "columns.csv", counts) as (heads, rows):
-            file = _opened(stack, folder / "columns.csv")
-            if len(set(heads)) == 1:
-                file.writelines(chain(heads[:1], rows))
-            else:  # a shard without a design, say, where every case has failed
-                write_csv(stored, file)
-    replace_synced(folder / "index.html", index.page(folder, folder.resolve().name, keys))
-
-
 def _opened(stack: ExitStack, path: Path) -> TextIO:
     """A file that takes the place of ``path`` when the stack is left without an error."""
     made = stack.enter_context(replacing(path))
     return stack.enter_context(open(made, "w", encoding="utf-8", newline=""))
-
-
-@contextmanager
-def _in_turn(
-    shards: Sequence[Path], name: str, counts: Sequence[int]
-) -> Iterator[tuple[list[str], Iterator[str]]]:
-    """The first line of each shard's file, and then a line of each in turn."""
-    with ExitStack() as stack:
-        places = [shard / name for shard in shards]
-        files = [stack.enter_context(open(p, encoding="utf-8", newline="")) for p in places]
-        heads = [next(file) for file in files]
-        parts = (islice(file, count) for file, count in zip(files, counts, strict=True))
-        yield heads, chain.from_iterable(zip_longest(*parts, fillvalue=""))

@@ -47,14 +47,6 @@ class Junit:
             line += f"<system-out>{_escaped(output)}</system-out>"
         self._file.write(f"{line}</testcase>\n")
 
-    def copy(self, lines: Iterable[str], heads: Iterable[str]) -> None:
-        """Test cases of other files: their lines, and the first line of each file."""
-        self._file.writelines(lines)
-        for head in heads:
-            suite = head.partition("<testsuites ")[2].partition(">")[0]
-            for name, value in re.findall(r'(\w+)="([\d.]+)"', suite):
-                self.totals[name] += float(value) if name == "time" else int(value)
-
     def end(self) -> None:
         """Close the suite, and write the counts at the beginning."""
         self._file.write("</testsuite></testsuites>\n")

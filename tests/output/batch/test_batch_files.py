@@ -17,7 +17,6 @@ from eigassign.output import (
     Columns,
     Index,
     are_current,
-    merge_files,
     to_line,
     write_files,
 )
@@ -121,32 +120,6 @@ def test_a_name_is_no_markup_in_the_page(tmp_path):
     write_files(tmp_path, [to_line(hostile)], 1)
     assert page_data(tmp_path)["rows"][0][1] == "</script><b>"
     assert "<img onerror" not in (tmp_path / "index.html").read_text("utf-8")
-
-
-def datasets(path: Path) -> dict[str, list]:
-    found = {}
-    with h5py.File(path) as file:
-        file.visititems(
-            lambda n, d: found.update({n: d[:].tolist()}) if hasattr(d, "shape") else None
-        )
-    return found
-
-
-@pytest.mark.parametrize(("total", "n"), [(10, 3), (3, 3), (2, 4), (9, 1)])
-def test_merged_shards_are_what_one_batch_writes(tmp_path, total, n):
-    whole, merged = tmp_path / "a" / "batch", tmp_path / "b" / "batch"
-    shards = [tmp_path / f"{k}" for k in range(n)]
-    for folder in (whole, merged, *shards):
-        folder.mkdir(parents=True)
-    every = lines(total)
-    write_files(whole, every, total, KEYS, columns=True)
-    parts = [every[k::n] for k in range(n)]
-    for shard, part in zip(shards, parts, strict=True):
-        write_files(shard, part, len(part), KEYS, columns=True)
-    merge_files(merged, every, shards, list(map(len, parts)), KEYS)
-    for name in ("summary.csv", "summary.json", "junit.xml", "index.html", "columns.csv"):
-        assert (merged / name).read_text() == (whole / name).read_text(), name
-    assert str(datasets(merged / "columns.h5")) == str(datasets(whole / "columns.h5"))
 
 
 def test_files_are_current_until_the_manifest_is_newer_or_one_is_gone(tmp_path):
