@@ -33,7 +33,7 @@ from scipy.sparse import linalg
 import eigassign as ea
 from eigassign.assignment import Optimum, minimise
 from eigassign.pipeline import Stages, prepare
-from eigassign.study import DesignResponse, Task, find_optimum, target_frequencies, variant_of
+from eigassign.study import DesignResponse, Task, find_optimum, requirements_of, variant_of
 
 NEAR = 1e-3  # of the best rms: there a search has arrived
 ELEMENTS = 230  # a link
@@ -154,7 +154,7 @@ class FirstSolve:
 def our_search(case: ea.Case) -> dict[str, Any]:
     """The search of `optimize`, and how far it was before it solved anything exactly."""
     scene = prepare(case, Stages(lambda line: None), None)
-    wanted = target_frequencies(case.file, scene.path)
+    wanted = requirements_of(case.file, scene.path)
     with FirstSolve() as first:
         found = find_optimum(scene, wanted, (), lambda line: None)
         seconds = time.process_time() - first.begun
@@ -215,7 +215,7 @@ def same_start() -> Iterator[common.Row]:
         if len(problem.C):
             continue
         scene = prepare(case, Stages(lambda line: None), None)
-        task = Task(scene, target_frequencies(case.file, scene.path), 0.0)
+        task = Task(scene, requirements_of(case.file, scene.path), 0.0)
         search = partial(_sequential, task)
         found = search()
         y = scipy_search(Timed, case)

@@ -47,7 +47,7 @@ def shipped() -> Iterator[Named]:
     for path in sorted(common.CASES.glob("*.yaml")):
         text = path.read_text(encoding="utf-8")
         case = ea.load_case(path)
-        kinds = {one.kind for one in case.file.requirements}
+        kinds = {target.kind for target in case.file.targets}
         own = case.file.assignment.objective == "least_squares" and not case.file.design.catalogues
         if kinds == {"frequency"} and own and not case.trajectory.follows_design:
             yield Named(path.stem, text, case)

@@ -20,7 +20,7 @@ from eigassign.case.schema.mechanism import Coordinate, Mechanism
 from eigassign.case.schema.parts import FrozenDict, Quantity
 from eigassign.case.schema.study import AssignmentKeys, ExpansionKeys, Measurements, ValidationKeys
 from eigassign.case.schema.sweep import Sweep
-from eigassign.case.schema.targets import Requirement, TargetForm, requirements
+from eigassign.case.schema.targets import TargetForm
 from eigassign.case.schema.trajectory import TrajectoryForm, named_trajectories
 from eigassign.errors import CaseError, Problem
 
@@ -160,11 +160,6 @@ class CaseFile:
         for key in keys:
             value = getattr(value, key)
         return float(value)
-
-    @cached_property
-    def requirements(self) -> tuple[Requirement, ...]:
-        """The targets, one for each mode that they name."""
-        return requirements(self.targets)
 
     @property
     def trajectories(self) -> tuple[tuple[str, str, TrajectoryForm], ...]:

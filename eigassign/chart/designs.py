@@ -24,6 +24,7 @@ from scipy.optimize import Bounds, LinearConstraint, differential_evolution, min
 from eigassign.assignment.exact.design_problem import UnitBox
 from eigassign.assignment.exact.requirements import Frequencies
 from eigassign.assignment.exact.sequential import minimise
+from eigassign.case.schema.targets import FrequencyTarget
 from eigassign.chart.question import SEED
 from eigassign.chart.results import DesignRun, Timing, excess_over
 from eigassign.chart.timing import Effort, measure
@@ -32,8 +33,9 @@ from eigassign.modal.expansion import expand
 from eigassign.study.design.one_shot import assign_design
 from eigassign.study.design.optimum import find_optimum
 from eigassign.study.design.variants import PosedProblem, Task, variant_of
+from eigassign.study.requirements.requirement import Requirement
+from eigassign.study.requirements.sampling import requirements_of
 from eigassign.study.scene import Expansions, Scene
-from eigassign.study.wanted import Wanted, target_frequencies
 
 Floats = NDArray[np.float64]
 
@@ -52,8 +54,8 @@ def chart_designs(
     takes about a fortieth of a search.
     """
     lower, upper = scene.bounds
-    wanted, design = scene.file.requirements, scene.file.design
-    plain = (r.kind == "frequency" and not r.followed and not r.target.during for r in wanted)
+    wanted, design = scene.file.targets, scene.file.design
+    plain = (isinstance(t, FrequencyTarget) and not (t.followed or t.during) for t in wanted)
     limited = design.catalogues or design.mass or scene.file.assignment.objective != "least_squares"
     if not (wanted and all(plain) and len(lower) and np.isfinite(upper - lower).all()) or limited:
         return (), ()
@@ -64,7 +66,7 @@ def chart_designs(
     if len(path.q) < len(scene.path.q):
         few = f"designs are charted on {len(path.q)} of {len(scene.path.q)} samples"
         notes.append(f"{few} of the trajectory, for an exact solve takes long")
-    thinned, targets = replace(scene, trajectory=path), target_frequencies(scene.file, path)
+    thinned, targets = replace(scene, trajectory=path), requirements_of(scene.file, path)
     posed = variant_of(Task(thinned, targets, 0.0), ())
     most = min(effort.objectives, max(1, int(effort.most_s / (len(path.q) * solve_s))))
     ways = {
@@ -98,7 +100,7 @@ def chart_designs(
 _Reached = tuple[Floats, Timing, int, dict[str, Any], dict[str, Any]]
 
 
-def _one_shot(scene: Scene, targets: tuple[Wanted, ...], effort: Effort) -> _Reached:
+def _one_shot(scene: Scene, targets: tuple[Requirement, ...], effort: Effort) -> _Reached:
     full, order = scene.expansions.full, scene.expansions.order
 
     def design() -> Any:
@@ -118,7 +120,7 @@ def _sequential(scene: Scene, posed: PosedProblem, effort: Effort) -> _Reached:
     return found.y, spent, found.appraisals * len(scene.path.q), how, {}
 
 
-def _several_starts(scene: Scene, targets: tuple[Wanted, ...]) -> _Reached:
+def _several_starts(scene: Scene, targets: tuple[Requirement, ...]) -> _Reached:
     """Run once: it takes as long as the others in sum."""
     begun = perf_counter()
     found = find_optimum(scene, targets, (), lambda line: None)

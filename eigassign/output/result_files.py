@@ -119,12 +119,11 @@ def without(row: Any, *names: str) -> dict[str, Any]:
 
 def _frequencies(results: RunResults, target: TargetStudy) -> dict[str, Any]:
     """Curves of a target; a limit or band has its edges too, null where there is none."""
-    edges = {"lower_hz": target.lower_hz, "upper_hz": target.upper_hz}
-    if target.kind == "frequency":
-        edges = {}
+    asked = target.asked
+    edges = {} if asked.is_goal else {"lower_hz": asked.lower_hz, "upper_hz": asked.upper_hz}
     return {
-        "time_s": results.time_s[target.rows],
-        **_named(results, target.rows),
+        "time_s": results.time_s[asked.rows],
+        **_named(results, asked.rows),
         "target_hz": target.target_hz,
         **{name: hz if np.isfinite(hz).all() else None for name, hz in edges.items()},
         "initial_hz": target.initial_hz,
@@ -154,19 +153,19 @@ def _trajectory(results: RunResults, row: TrajectoryRow) -> dict[str, Any]:
 
 
 def _target(results: RunResults, target: TargetStudy) -> dict[str, Any]:
-    followed: dict[str, Any] = {}
+    asked, followed = target.asked, dict[str, Any]()
     if (row := target.followed) is not None:  # by its shape, and which mode it is at each sample
         numbers = {"initial_modes": row.initial_numbers, "exact_modes": row.exact_numbers}
         followed = {"followed": {"name": row.name, "like": row.like, **numbers}}
     return {
-        "kind": target.kind,
-        "label": target.label,
-        "mode": None if followed else target.mode,
-        "modes": target.modes,
+        "kind": asked.kind,
+        "label": asked.label,
+        "mode": None if followed else asked.mode,
+        "modes": asked.modes,
         **followed,
         "satisfied": target.satisfied,
         "worst": target.error.exact.max_relative,
-        **({"trajectory": target.trajectory} if target.trajectory is not None else {}),
+        **({"trajectory": asked.trajectory} if asked.trajectory is not None else {}),
         "error": _error(target.error),
         "frequencies": _frequencies(results, target),
         **({} if target.near is None else {"near": _other_modes(target.near)}),
@@ -327,14 +326,14 @@ def _assigned(results: RunResults) -> Iterator[Column]:
     """
     groups: dict[str, list[TargetStudy]] = {}
     for target in results.targets:
-        name = target.curve_name if target.kind == "frequency" else target.label
+        name = target.asked.curve_name if target.asked.is_goal else target.label
         names = (f"{name} ({k})" if k > 1 else name for k in count(1))
-        rows = target.rows
+        rows = target.asked.rows
         free = (
             name
             for name in names
             if all(
-                own.rows.stop <= rows.start or rows.stop <= own.rows.start
+                own.asked.rows.stop <= rows.start or rows.stop <= own.asked.rows.start
                 for own in groups.get(name, ())
             )
         )
@@ -344,18 +343,15 @@ def _assigned(results: RunResults) -> Iterator[Column]:
             values = np.full(results.time_s.size, np.nan)
             for target, hz in zip(targets, curves, strict=True):
                 if hz is not None:
-                    values[target.rows] = hz
+                    values[target.asked.rows] = hz
             yield f"{name} {kind} [Hz]", values.tolist()
 
 
 def _curves(targets: Sequence[TargetStudy]) -> dict[str, list[Floats | None]]:
     """The edges, and the modes before and after, of each target; by what they are called."""
-    kinds = ["target", "initial", "one shot", "predicted", "exact"]
-    if (kind := targets[0].kind) == "keep_out":
-        kinds = ["lower", "upper"]
-    elif kind != "frequency":
-        kinds = ["target", "initial", "one shot", "exact"]
-    found = {k: [getattr(t, f"{k.replace(' ', '_')}_hz") for t in targets] for k in kinds}
+    found: dict[str, list[Floats | None]] = {
+        name: [_column(target, name) for target in targets] for name in targets[0].asked.columns
+    }
     for mode in sorted({mode for t in targets if t.near for mode in t.near.modes}):
         for when in ("initial", "optimal"):
             found[f"mode {mode} {'exact' if when == 'optimal' else when}"] = [
@@ -365,6 +361,13 @@ def _curves(targets: Sequence[TargetStudy]) -> dict[str, list[Floats | None]]:
                 for t in targets
             ]
     return found
+
+
+def _column(target: TargetStudy, name: str) -> Floats | None:
+    """A curve of a target, or an edge of what it asks."""
+    field = f"{name.replace(' ', '_')}_hz"
+    hz: Floats | None = getattr(target if hasattr(target, field) else target.asked, field)
+    return hz
 
 
 def _expanded(results: RunResults) -> Iterator[Column]:

@@ -79,7 +79,7 @@ def headline(results: RunResults) -> str | None:
     error, row = results.error, results.assignment
     if error is None:
         return None
-    limits = [target.error for target in results.targets if target.kind != "frequency"]
+    limits = [target.error for target in results.targets if not target.asked.is_goal]
     alone = len(limits) == len(results.targets)
     what = "Worst violation of a limit" if alone else "Worst distance to the target"
     said = _violation if alone else percent
@@ -152,7 +152,7 @@ def errors(results: RunResults) -> Table:
     """Distance to the wanted frequencies before, as predicted, and exact, side by side."""
     kinds = _stages(results)
     columns = ("target", "error", *kinds)
-    wanted = [target for target in results.targets if target.kind == "frequency"]
+    wanted = [target for target in results.targets if target.asked.is_goal]
     if not wanted:
         return Table("Distance to the target", columns, ())
     summaries = [pair for target in wanted for pair in _of_target(target)]
@@ -169,7 +169,7 @@ def errors(results: RunResults) -> Table:
             rows.append((label, what, *cells))
     caption = "Frequency against its target in Hz, relative to the target, along "
     caption += f"{results.along}."
-    if len({target.weight for target in wanted}) > 1:
+    if len({target.asked.weight for target in wanted}) > 1:
         caption += " All: every target alike, without the weights."
     return Table("Distance to the target", columns, tuple(rows), caption)
 
@@ -179,7 +179,7 @@ def required(results: RunResults) -> Table:
     kinds = tuple(kind for kind in _stages(results) if kind != "predicted")
     rows = []
     for target in results.targets:
-        if target.kind != "frequency":
+        if not target.asked.is_goal:
             cells = (getattr(target.error, kind.replace(" ", "_")) for kind in kinds)
             said = ("" if e is None else violated(e.max_relative) for e in cells)
             rows.append((target.label, *said, "met" if target.satisfied else "VIOLATED"))
@@ -222,7 +222,7 @@ def combinations(results: RunResults) -> Table:
     row = results.assignment
     if row is None or row.catalogue is None:
         return Table("Combinations", (), ())
-    wanted = any(target.kind == "frequency" for target in results.targets)
+    wanted = any(target.asked.is_goal for target in results.targets)
     by_price = results.price is not None and not wanted
     best, price = row.catalogue.best, "price" if by_price else "objective"
     own = {each.name: each for each in results.design}

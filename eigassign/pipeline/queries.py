@@ -26,8 +26,8 @@ from eigassign.study.accuracy import judged_mesh, mesh_lines, truncation_lines
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.design.followed import named_notes
 from eigassign.study.planning import plan_expansion, shown_point
+from eigassign.study.requirements.sampling import requirements_of
 from eigassign.study.updating.measured import read_measurements
-from eigassign.study.wanted import target_frequencies
 
 Floats = NDArray[np.float64]
 
@@ -204,7 +204,7 @@ def _checked(case: BuiltCase) -> CheckAnswer:
     parts = () if trajectory is None else trajectory.parts
     each = tuple((p.name, len(p.trajectory.q), float(np.ptp(p.trajectory.time_s))) for p in parts)
     if trajectory is not None:
-        target_frequencies(file, trajectory)
+        requirements_of(file, trajectory)
     notes += read_measurements(case)[1]
     plan = None
     if trajectory is not None or file.expansion.q != "auto":

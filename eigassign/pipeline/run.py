@@ -42,7 +42,6 @@ from eigassign.study.comparison import (
 )
 from eigassign.study.design.answer import MAX_ERROR, Answer, find_answer, require_assignable
 from eigassign.study.design.followed import (
-    Solved,
     followers,
     require_one_shape,
     solve_design,
@@ -51,9 +50,10 @@ from eigassign.study.design.judgement import SolvedDesigns, study_targets
 from eigassign.study.meaning.overall import Studies, study_meaning
 from eigassign.study.moving import moving_modes
 from eigassign.study.planning import plan_expansion
+from eigassign.study.requirements.requirement import Solved
+from eigassign.study.requirements.sampling import requirements_of
 from eigassign.study.results import MovingMode, RunResults, TargetStudy
 from eigassign.study.scene import Expansions, Scene
-from eigassign.study.wanted import target_frequencies
 
 Floats = NDArray[np.float64]
 
@@ -144,7 +144,7 @@ def solve_case(case: BuiltCase, options: Options = DEFAULT) -> Result:
     require_assignable(file)
     with case.located():
         scene = prepare(case, stages, _cache(options))
-        wanted = target_frequencies(file, scene.path)
+        wanted = requirements_of(file, scene.path)
         with stages("assignment", "assigning the frequencies"):
             require_one_shape(scene, wanted)
             answer = find_answer(scene, wanted, options.progress)
@@ -190,13 +190,13 @@ def _moving(
     if options.report != "full" or scene.trajectory is None:
         return ()
     numbers = np.full(len(scene.path.q), np.nan)
-    target = next((t for t in targets if t.kind == "frequency"), next(iter(targets), None))
+    target = next((t for t in targets if t.asked.is_goal), next(iter(targets), None))
     if target is None:
         name, numbers[:] = f"mode {scene.expansions.modes[0]}", scene.expansions.modes[0]
-    elif target.followed is None:
-        name, numbers[target.rows] = target.curve_name, target.mode
     else:
-        name, numbers[target.rows] = target.curve_name, target.followed.exact_numbers
+        asked, row = target.asked, target.followed
+        name = asked.curve_name
+        numbers[asked.rows] = asked.mode if row is None else row.exact_numbers
     return moving_modes(scene.file, scene.model, scene.path, y, name, numbers)
 
 
@@ -237,7 +237,7 @@ def _result(results: RunResults, expansions: Expansions, assignment: Assignment 
     first = results.targets[0]
     return Result(
         design={row.name: row.optimal for row in results.design},
-        time_s=results.time_s[first.rows],
+        time_s=results.time_s[first.asked.rows],
         target_hz=first.target_hz,
         initial_hz=first.initial_hz,
         predicted_hz=first.predicted_hz,

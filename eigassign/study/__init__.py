@@ -2,9 +2,9 @@
 
 Reading order:
 
-    results     what a run found, as plain numbers and names: all that the output is given to show
     build       from a case file in which every number is given to its model and trajectories
-    wanted      what the targets ask for, at the samples of the trajectories
+    requirements  what a case asks for: one type from the case file to the report
+    results     what a run found, as plain numbers and names: all that the output is given to show
     planning    expansion point, order and modes; what is left to auto, and where it is judged
     settling    chooses elements and reduced links left to auto, and builds the model
     built_case  a case with its model and trajectories, each built once
@@ -33,7 +33,7 @@ __all__, __getattr__, __dir__ = face(
         ),
         "design.answer": "Answer find_answer",
         "design.clearance": "Band prove_clear",
-        "design.followed": "Solved followers require_one_shape solve_design",
+        "design.followed": "followers require_one_shape solve_design",
         "design.judgement": "crossing_warnings verdict",
         "design.optimum": "Found find_optimum",
         "design.response": ("DesignResponse ReducedModels reduced_models response_of"),
@@ -48,6 +48,9 @@ __all__, __getattr__, __dir__ = face(
             "mesh_share plan_expansion series_share shown_point truncation_share "
             "with_middle_loads with_worse_designs"
         ),
+        "requirements.named_modes": "followed_modes named_design named_pose",
+        "requirements.requirement": "Requirement Solved",
+        "requirements.sampling": "KINDS requirements_of time_weights",
         "results": (
             "ActiveRow AssignmentRow CatalogueRow ClearanceRow CombinationRow Comparison "
             "DesignMap DesignRow DrawnBody DrawnJoint DrawnPoses DrawnSpring ErrorRow "
@@ -59,6 +62,5 @@ __all__, __getattr__, __dir__ = face(
         "settling": "settle_model",
         "updating.fit": "UpdateResults solve_update update_problem",
         "updating.measured": "read_measurements",
-        "wanted": "Wanted named_design named_pose target_frequencies time_weights",
     },
 )

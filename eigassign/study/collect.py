@@ -14,10 +14,10 @@ from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.accuracy import study_motion
 from eigassign.study.comparison import reach_warnings
 from eigassign.study.design.answer import Answer, assignment_row, limit_notes
-from eigassign.study.design.followed import Solved
 from eigassign.study.design.judgement import crossing_warnings, swap_notes
 from eigassign.study.design.one_shot import design_rows, solver_row
 from eigassign.study.drawing import draw_poses, rest_pose
+from eigassign.study.requirements.requirement import Requirement, Solved
 from eigassign.study.results import (
     AssignmentRow,
     DrawnPoses,
@@ -30,7 +30,6 @@ from eigassign.study.results import (
     TrajectoryRow,
 )
 from eigassign.study.scene import Scene
-from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 
@@ -40,7 +39,7 @@ class VerifiedAssignment:
     """An answer with exact frequencies before and after."""
 
     answer: Answer
-    wanted: tuple[Wanted, ...]
+    wanted: tuple[Requirement, ...]
     targets: tuple[TargetStudy, ...]
     initial: Solved
     exact: Solved
@@ -169,14 +168,16 @@ def _spectrum(scene: Scene, assigned: VerifiedAssignment) -> OtherModes:
 
 def _modes(target: TargetStudy) -> set[int]:
     """The modes that it names, and those that a followed one is."""
-    return set(target.modes if target.followed is None else target.followed.exact_numbers.tolist())
+    return set(
+        target.asked.modes if target.followed is None else target.followed.exact_numbers.tolist()
+    )
 
 
 def _warnings(scene: Scene, assigned: VerifiedAssignment | None) -> Iterator[str]:
     """Warnings of results that may mislead: crossing modes, a poor prediction, a worse design."""
     if assigned is None:
         return
-    modes = tuple(sorted({mode for target in assigned.targets for mode in target.modes}))
+    modes = tuple(sorted({mode for target in assigned.targets for mode in target.asked.modes}))
     for solved, design in ((assigned.initial, "initial"), (assigned.exact, "optimal")):
         yield from crossing_warnings(solved.hz, modes, scene.path.where, design)
     if assigned.answer.found is None:
@@ -189,8 +190,8 @@ def _accuracy_warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[s
     limit, y = scene.file.validation.max_error, assigned.answer.y
     off = [t for t in assigned.targets if not t.approximation_error <= limit]
     for target in off:
-        taylor = scene.expansions.taylor_hz(scene.path.at(y)[0][target.rows], y)
-        taylor_hz = taylor[:, scene.expansions.column(target.mode)]
+        taylor = scene.expansions.taylor_hz(scene.path.at(y)[0][target.asked.rows], y)
+        taylor_hz = taylor[:, scene.expansions.column(target.asked.mode)]
         enough = np.all(np.abs(taylor_hz / target.exact_hz - 1.0) <= limit)
         point = ", ".join(f"{value:.4g}" for value in y)
         advice = (
@@ -210,7 +211,7 @@ def _worsening(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
     """A warning where, solved exactly, the initial design is nearer to the targets."""
     before, after = (
         sum(
-            target.weight * target.weight_s * getattr(target.error, when).rms_relative ** 2
+            target.asked.weight * target.weight_s * getattr(target.error, when).rms_relative ** 2
             for target in assigned.targets
         )
         for when in ("initial", "exact")

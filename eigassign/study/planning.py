@@ -169,7 +169,9 @@ def _modes(file: CaseFile, override: Sequence[int] | None) -> tuple[tuple[int, .
 
 def _check_modes(file: CaseFile, model: Model, modes: Sequence[int]) -> None:
     available = model.n_dof - model.n_rigid
-    places = {m: f"{each.place}.mode" for each in file.requirements for m in each.modes}
+    places = {
+        m: f"targets[{k}].mode" for k, each in enumerate(file.targets) for m in sum(each.named, ())
+    }
     for mode in modes:
         if mode > available:
             where = places.get(mode, "expansion.modes")
@@ -221,7 +223,7 @@ def asked_accuracy(file: CaseFile) -> float:
 
 def target_modes(file: CaseFile) -> set[int]:
     """The modes that a target names."""
-    return {mode for each in file.requirements for mode in each.modes}
+    return {mode for target in file.targets for modes in target.named for mode in modes}
 
 
 def wanted_modes(file: CaseFile) -> tuple[int, ...]:

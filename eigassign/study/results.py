@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from eigassign.brief import Brief
 from eigassign.case.units import is_bare
+from eigassign.study.requirements.requirement import Requirement
 
 Floats = NDArray[np.float64]
 
@@ -214,50 +215,33 @@ class OtherModes(Brief):
 class TargetStudy(Brief):
     """One target along the trajectory (the paper's Figure 4); arrays (n,) in Hz.
 
-    They belong to the ``rows`` of all samples at which the target holds. What is wanted lies from
-    ``lower_hz`` to ``upper_hz``: a frequency where both are equal, a limit where one is infinite; a
-    band to keep out of lies between them. The curves are of its mode, of a gap the distance of its
-    two, of a band the frequency nearest to its middle; a ``followed`` mode is none of ``modes``.
+    They belong to the rows of all samples at which what is ``asked`` holds, and are its curve: of
+    its mode, of a gap the distance of its two, of a band the frequency nearest to its middle.
     Errors of limits and bands are relative violations, 0 where they are met. ``weight_s`` is the
     time that it stands for, weighted. ``near`` are the modes about a band; None of other kinds.
     """
 
-    kind: str  # frequency | at_least | at_most | keep_out | gap
-    label: str  # "mode 1", "mode 2 at least 320 Hz"
-    modes: tuple[int, ...]
-    lower_hz: Floats
-    upper_hz: Floats
+    asked: Requirement
     initial_hz: Floats
     exact_hz: Floats
     predicted_hz: Floats | None
     one_shot_hz: Floats | None
     error: ErrorSummary
     satisfied: bool
-    trajectory: str | None
-    rows: slice
     weight_s: float
-    weight: float
     along: tuple[TargetAlong, ...]
     followed: FollowedRow | None = None
     near: OtherModes | None = None
 
     @property
-    def curve_name(self) -> str:
-        """The name of the mode whose frequency its curves are, to tell columns and files apart."""
-        return f"mode {self.mode}" if self.followed is None else self.followed.name
-
-    @property
-    def mode(self) -> int:
-        """Its mode, of several the lowest; 1 of a band for all modes.
-
-        Of a followed one the number that it is named by.
-        """
-        return min(self.modes, default=1) if self.followed is None else self.followed.like
+    def label(self) -> str:
+        """What is asked in words: "mode 2 at least 320 Hz"."""
+        return self.asked.label
 
     @property
     def target_hz(self) -> Floats:
         """The wanted frequency, or the limit (n,); the lower edge of a band."""
-        return self.upper_hz if self.kind == "at_most" else self.lower_hz
+        return self.asked.hz
 
     @property
     def approximation_error(self) -> float:
@@ -700,7 +684,7 @@ class RunResults(Brief):
     @property
     def counted(self) -> tuple[TargetStudy, ...]:
         """The targets that ``error`` is of: wanted frequencies, or all where there are none."""
-        wanted = tuple(target for target in self.targets if target.kind == "frequency")
+        wanted = tuple(target for target in self.targets if target.asked.is_goal)
         return wanted or self.targets
 
     def error_along(self, name: str) -> ErrorSummary | None:
@@ -773,18 +757,16 @@ def _target(target: TargetStudy, row: TrajectoryRow) -> TargetStudy | None:
     along = next((one for one in target.along if one.name == row.name), None)
     if along is None:
         return None
-    rows, first = along.rows, target.rows.start + along.rows.start - row.rows.start
-    length = rows.stop - rows.start
+    rows, asked = along.rows, target.asked.part(along.name, along.rows)
+    first, length = asked.rows.start - row.rows.start, rows.stop - rows.start
     return replace(
         target,
-        lower_hz=target.lower_hz[rows],
-        upper_hz=target.upper_hz[rows],
+        asked=replace(asked, rows=slice(first, first + length)),
         initial_hz=target.initial_hz[rows],
         exact_hz=target.exact_hz[rows],
         predicted_hz=None if target.predicted_hz is None else target.predicted_hz[rows],
         one_shot_hz=None if target.one_shot_hz is None else target.one_shot_hz[rows],
         error=along.error,
-        rows=slice(first, first + length),
         followed=None if target.followed is None else target.followed.part(rows),
         along=(replace(along, rows=slice(0, length)),),
         near=None if target.near is None else target.near.part(rows),

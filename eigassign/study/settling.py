@@ -31,7 +31,7 @@ from eigassign.study.planning import (
     truncation_share,
     with_middle_loads,
 )
-from eigassign.study.wanted import target_frequencies
+from eigassign.study.requirements.sampling import requirements_of
 
 Floats = NDArray[np.float64]
 TRIAL = 2  # elements of a link left to auto, in the model whose trajectory choices are judged on
@@ -93,9 +93,8 @@ def _bands_hz(file: CaseFile, path: Trajectories | None) -> Floats:
     """The highest edges of the bands that every mode shall keep out of, (k,) in Hz."""
     if path is None:
         return np.empty(0)
-    wanted = target_frequencies(file, path)
-    bands = [w for w in wanted if w.requirement.kind == "keep_out" and not w.requirement.modes]
-    return np.array([w.upper_hz.max() for w in bands])
+    bands = (one for w in requirements_of(file, path) for _, one in w.bands if not one.modes)
+    return np.array([band.upper_hz.max() for band in bands])
 
 
 def _path(file: CaseFile, trial: Model) -> tuple[Trajectories | None, Floats]:

@@ -10,6 +10,7 @@ import pytest
 
 from eigassign import Case, load_case
 from eigassign.mechanism import with_elements, with_reduction
+from eigassign.study import requirements_of
 
 CASES = Path(__file__).parents[2] / "cases"
 SHIPPED = sorted(path.stem for path in CASES.glob("*.yaml"))
@@ -55,16 +56,17 @@ def test_a_shipped_case_can_be_followed_and_its_targets_reached(name: str) -> No
     case = shipped(name)
     model, q = case.model(), case.trajectory.q
     y = np.tile(case.initial_design, (len(q), 1))
-    for one in case.file.requirements:
-        rows = case.trajectory.rows_of(one.target.trajectory)
+    for one in requirements_of(case.file, case.trajectory):
+        rows = case.trajectory.rows_of(one.trajectory)
         mode = max(one.modes, default=1)
+        target = case.file.targets[int(one.place.removeprefix("targets[").removesuffix("]"))]
         found = model.frequencies(q[rows], y[rows], count=mode)[:, mode - 1]
         assert np.isfinite(found).all()
         wanted = {  # the middle of a band
             "frequency": lambda target: target.frequency,
             "at_least": lambda target: target.at_least,
             "keep_out": lambda target: target.keep_out.harmonic * target.keep_out.of,
-        }[one.kind](one.target)
+        }[one.kind](target)
         near = found.max() if one.kind == "keep_out" else found.mean()
         assert 0.8 < wanted / near < 1.25
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.study import (
+    KINDS,
     ActiveRow,
     AssignmentRow,
     Comparison,
@@ -211,24 +212,24 @@ def _target(mode: int, time: Floats, scale: float, parts: tuple[int, ...]) -> Ta
         return ErrorSummary(**found)
 
     whole = slice(0, time.size)
-    along = tuple(
-        TargetAlong(f"part{k}" if len(parts) > 1 else "1", rows, errors(rows))
-        for k, rows in enumerate(_slices(parts))
-    )
-    return TargetStudy(
-        kind="frequency",
+    rows_of = {f"part{k}" if len(parts) > 1 else "1": rows for k, rows in enumerate(_slices(parts))}
+    asked = KINDS["frequency"](
         label=f"mode {mode} at {190.0 * scale * mode:g} Hz",
+        place=f"targets[{mode - 1}]",
         modes=(mode,),
+        terms=((mode, 1.0),),
+        rows=whole,
         lower_hz=target,
         upper_hz=target,
+        along=tuple(rows_of.items()),
+    )
+    return TargetStudy(
+        asked=asked,
         **{f"{name}_hz": hz for name, hz in curves.items()},
         error=errors(whole),
         satisfied=True,
-        trajectory=None,
-        rows=whole,
         weight_s=max(1.0, time.size),
-        weight=1.0,
-        along=along,
+        along=tuple(TargetAlong(name, rows, errors(rows)) for name, rows in rows_of.items()),
     )
 
 
@@ -239,10 +240,14 @@ def as_limit(target: TargetStudy, kind: str, lower_hz: Floats, upper_hz: Floats)
     violated = np.minimum(below, above) if kind == "keep_out" else np.maximum(below, above)
     error = ErrorSummary(target.error.initial, _error(violated), one_shot=target.error.one_shot)
     along = tuple(replace(one, error=error) for one in target.along)
-    return replace(
-        target, kind=kind, label=f"mode 1 {kind}", lower_hz=lower_hz, upper_hz=upper_hz,
-        predicted_hz=None, error=error, satisfied=False, along=along,
+    modes = (1, 2) if kind == "gap" else (1,)
+    asked = KINDS[kind](
+        label=f"mode 1 {kind}", place="targets[0]", modes=(1,), terms=KINDS[kind].terms_of(modes),
+        rows=target.asked.rows, lower_hz=lower_hz, upper_hz=upper_hz, along=target.asked.along,
     )  # fmt: skip
+    return replace(
+        target, asked=asked, predicted_hz=None, error=error, satisfied=False, along=along
+    )
 
 
 def studied(results: RunResults) -> RunResults:
@@ -252,7 +257,7 @@ def studied(results: RunResults) -> RunResults:
         SensitivityRow(name, "kg", target.label, -30.0, -35.0, share, 1.3 * share)
         for k, name in enumerate(names)
         for target in results.targets
-        for share in [0.3 - 0.4 * (k / len(names)) - 0.05 * target.mode]
+        for share in [0.3 - 0.4 * (k / len(names)) - 0.05 * target.asked.mode]
     )
 
     def around(share: float) -> tuple[RangeRow, ...]:

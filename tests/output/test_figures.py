@@ -93,7 +93,7 @@ def test_every_kind_of_results_gives_figures_with_nothing_over_their_edge(name):
         assert not any(edge.any() for edge in edges), f"{name} runs over its edge"
 
 
-def test_the_assignment_shows_target_frequencies_and_distances(paper):
+def test_the_assignment_shows_requirements_of_and_distances(paper):
     figure, target = drawn(paper, "assignment_mode_1"), paper.targets[0]
     assert figure.get_suptitle() == "Mode 1: assigned frequency"
     above, below = figure.axes
@@ -114,7 +114,7 @@ def test_the_assignment_shows_target_frequencies_and_distances(paper):
 
 
 def test_a_limit_is_drawn_with_what_it_forbids_and_equal_names_are_numbered(paper):
-    lower, upper = paper.targets[0].lower_hz, paper.targets[0].upper_hz
+    lower, upper = paper.targets[0].asked.lower_hz, paper.targets[0].asked.upper_hz
     endless = np.full(lower.size, np.inf)
     found = with_limits(
         paper,
@@ -124,20 +124,22 @@ def test_a_limit_is_drawn_with_what_it_forbids_and_equal_names_are_numbered(pape
         ("keep_out", 0.9 * lower, 0.95 * lower),
         ("gap", lower, endless),
     )
-    names = [f"{t.kind}_mode_1" for t in found.targets]
+    names = [f"{t.asked.kind}_mode_1" for t in found.targets]
     names[3] += "_2"
     assert [plan.name for plan in run_figures(found) if plan.name in names] == names
     for name, limit in zip(names, found.targets, strict=True):
         figure = drawn(found, name)
         (shade,) = figure.axes[0].collections
         heights = shade.get_paths()[0].get_extents()
-        for edge in (hz[0] for hz in (limit.lower_hz, limit.upper_hz) if np.isfinite(hz).all()):
+        for edge in (
+            hz[0] for hz in (limit.asked.lower_hz, limit.asked.upper_hz) if np.isfinite(hz).all()
+        ):
             assert min(abs(edge - heights.y0), abs(edge - heights.y1)) < 1e-9
         assert legend(figure)[0] == "forbidden"
 
 
 def test_limits_are_strips_on_their_wrong_side_so_that_other_modes_stay_legible(paper):
-    lower = paper.targets[0].lower_hz
+    lower = paper.targets[0].asked.lower_hz
     endless = np.full(lower.size, np.inf)
     found = with_limits(paper, ("at_least", lower, endless), ("at_most", -endless, lower))
     axes = drawn(found, "frequencies").axes[0]
@@ -154,7 +156,7 @@ def test_the_progress_shows_every_step_and_the_one_shot(paper):
     taken = [100.0 * np.sqrt(step.objective) for step in paper.assignment.steps if step.taken]
     shown = next(line for line in figure.axes[0].get_lines() if line.get_label() == "taken")
     np.testing.assert_allclose(shown.get_ydata(), taken)
-    found = with_limits(paper, ("at_least", paper.targets[0].lower_hz, np.full(152, np.inf)))
+    found = with_limits(paper, ("at_least", paper.targets[0].asked.lower_hz, np.full(152, np.inf)))
     axes, below = drawn(found, "progress").axes
     assert axes.get_ylabel() == "objective"
     assert below.get_ylabel() == "limits missed [%]"  # by the initial design

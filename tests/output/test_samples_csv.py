@@ -62,7 +62,7 @@ def test_frequencies_stand_beside_time_and_pose() -> None:
     assert [row["trajectory"] for row in rows] == ["part0"] * 100 + ["part1"] * 52
     for target in results.targets:
         for kind in ("target", "initial", "predicted", "exact"):
-            column = [float(row[f"mode {target.mode} {kind} [Hz]"]) for row in rows]
+            column = [float(row[f"mode {target.asked.mode} {kind} [Hz]"]) for row in rows]
             np.testing.assert_array_equal(column, getattr(target, f"{kind}_hz"))
     np.testing.assert_array_equal([float(row["q2 [rad]"]) for row in rows], results.q[:, 1])
     assert "trajectory" not in rows_of(sample_files(make_results())["frequencies.csv"])[0]
@@ -72,8 +72,12 @@ def test_a_target_on_one_trajectory_leaves_the_others_empty() -> None:
     results = make_results(parts=(100, 52))
     (target,) = results.targets
     rows = slice(100, 152)
-    names = [f"{k}_hz" for k in ("lower", "upper", "initial", "one_shot", "predicted", "exact")]
-    narrow = replace(target, rows=rows, **{name: getattr(target, name)[rows] for name in names})
+    names = [f"{k}_hz" for k in ("initial", "one_shot", "predicted", "exact")]
+    narrow = replace(
+        target,
+        asked=target.asked.part("part1", rows),
+        **{name: getattr(target, name)[rows] for name in names},
+    )
     lines = rows_of(sample_files(replace(results, targets=(narrow,)))["frequencies.csv"])
     assert [line["mode 1 exact [Hz]"] for line in lines[:100]] == [""] * 100
     assert float(lines[100]["mode 1 exact [Hz]"]) == target.exact_hz[100]
@@ -83,7 +87,8 @@ def test_a_limit_beside_a_target_of_the_same_mode_overwrites_nothing() -> None:
     results = make_results()
     (target,) = results.targets
     limit = as_limit(target, "at_most", np.full(152, -np.inf), np.full(152, 205.0))
-    twice = replace(target, lower_hz=np.full(152, 180.0), upper_hz=np.full(152, 180.0))
+    other = np.full(152, 180.0)
+    twice = replace(target, asked=replace(target.asked, lower_hz=other, upper_hz=other))
     band = as_limit(target, "keep_out", np.full(152, 150.0), np.full(152, 160.0))
     near = OtherModes((1, 2), np.full((152, 2), 140.0), np.full((152, 2), 170.0))
     band = replace(band, near=near)

@@ -202,7 +202,7 @@ def test_targets_of_trajectories_with_other_numbers_of_samples_are_each_solved_o
     np.testing.assert_allclose(y, found.x, rtol=1e-9, atol=1e-12)
     model = case_of(tmp_path, text).model()
     for target, q in zip(both.results.targets, (short, PICK), strict=True):
-        exact = model.frequencies(q, y, target.mode)[:, -1]
+        exact = model.frequencies(q, y, target.asked.mode)[:, -1]
         np.testing.assert_allclose(target.exact_hz, exact, rtol=1e-12)
     kept = results_document(both.results)
     assert [len(t["frequencies"]["time_s"]) for t in kept["targets"]] == [6, 21]

@@ -73,9 +73,9 @@ def test_what_a_result_says_is_what_its_parts_compute(name: str, tmp_path: Path)
     case = case_of(tmp_path, text)
     q, y = case.trajectory.q, list(result.design.values())
     for k, target in enumerate(result.results.targets):
-        column = result.linearised.modes.index(target.mode)
-        exact = case.model().frequencies(q, y, target.mode)[:, -1]
-        before = case.model().frequencies(q, case.initial_design, target.mode)[:, -1]
+        column = result.linearised.modes.index(target.asked.mode)
+        exact = case.model().frequencies(q, y, target.asked.mode)[:, -1]
+        before = case.model().frequencies(q, case.initial_design, target.asked.mode)[:, -1]
         predicted = result.linearised.frequencies(q, y)[:, column]
         np.testing.assert_allclose(target.exact_hz, exact, rtol=1e-12)
         np.testing.assert_allclose(target.initial_hz, before, rtol=1e-12)
@@ -125,12 +125,12 @@ def test_no_random_design_within_the_limits_is_better_nor_is_the_start_or_the_on
     assert result.results.within_tolerance
     assert result.results.warnings == ()
     model, targets = case.model(), result.results.targets
-    times = [target.weight * target.weight_s for target in targets]
+    times = [target.asked.weight * target.weight_s for target in targets]
 
     def rms(y: np.ndarray | list[float]) -> float:
-        hz = model.frequencies(case.trajectory.q, y, max(t.mode for t in targets))
+        hz = model.frequencies(case.trajectory.q, y, max(t.asked.mode for t in targets))
         ours = np.trapezoid(
-            [(hz[:, t.mode - 1] / t.target_hz - 1.0) ** 2 for t in targets], result.time_s
+            [(hz[:, t.asked.mode - 1] / t.target_hz - 1.0) ** 2 for t in targets], result.time_s
         )
         span = np.ptp(result.time_s)
         return float(np.sqrt(np.array(times) @ ours / span / sum(times)))
@@ -198,7 +198,7 @@ def test_the_highest_mode_of_all_can_be_assigned(tmp_path: Path) -> None:
     text = automatic((TARGET, "{mode: 21, frequency: 19 kHz}"))
     results = solved(tmp_path, text).results
     assert results.others is None
-    assert results.targets[0].mode == 21
+    assert results.targets[0].asked.mode == 21
 
 
 def test_the_three_modes_above_the_assigned_one_are_shown(tmp_path: Path) -> None:

@@ -56,13 +56,17 @@ class FrequencyGoal:
 
 @dataclass(frozen=True)
 class FrequencyLimit:
-    """Σ c_i f_i ≥ ``hz`` (n,), or ≤, at ``rows`` of all samples; ``terms`` are (mode, c) pairs."""
+    """Σ c_i f_i ≥ ``hz`` (n,), or ≤, at ``rows`` of all samples; ``terms`` are (mode, c) pairs.
+
+    ``curve`` is that sum in words, where the limit's ``name`` does not say it.
+    """
 
     name: str
     terms: tuple[tuple[int, float], ...]
     hz: Floats
     rows: slice
     at_least: bool
+    curve: str = ""
 
 
 @dataclass(frozen=True)

@@ -348,13 +348,13 @@ def goals_can_be_meant(document: Document) -> Iterator[Finding]:
 def limits_leave_room(document: Document) -> Iterator[Finding]:
     """No mode is to lie above one frequency and, or a higher one, below a lesser one."""
     limits = [
-        (k, target.kind, mode, target.curve, (target.trajectory, target.during))
+        (k, type(target), mode, target.curve, (target.trajectory, target.during))
         for k, target in enumerate(document.targets)
         if isinstance(target, (AtLeastTarget, AtMostTarget)) and isinstance(target.curve, float)
         for mode in _numbers(target)
     ]
-    for k, _, upper, most, when in (one for one in limits if one[1] == "at_most"):
-        for _, _, lower, least, also in (one for one in limits if one[1] == "at_least"):
+    for k, _, upper, most, when in (one for one in limits if one[1] is AtMostTarget):
+        for _, _, lower, least, also in (one for one in limits if one[1] is AtLeastTarget):
             if lower <= upper and least > most and (when == also or (None, None) in (when, also)):
                 other = "" if lower == upper else f"mode {lower} below it "
                 message = f"mode {upper} is to be at most {most:g} Hz and {other}at least {least:g}"

@@ -10,7 +10,7 @@ In reading order, each importing only from those above it:
     mechanism   bodies, springs, drives, coordinates, and the mechanism as a whole
     trajectory  the key `trajectory`
     design      the key `design`: parameters, catalogues, limits, and the one vector y they make
-    targets     the key `targets`, and the requirements that they come to
+    targets     the key `targets`
     study       the keys `assignment`, `expansion`, `validation` and `measurements`
     sweep       the key `sweep`
     document    the whole case file, its errors as readable findings, its JSON Schema

@@ -1,13 +1,12 @@
 """The key `targets`: wanted frequencies, limits, bands to keep out of, gaps between modes.
 
 A target has exactly one of the keys in `TARGETS`, which say what kind it is. What the rest of the
-program goes through are `requirements`: one for each mode that a target names.
+program goes through are requirements (`study.requirements`): one for each of a target's `named`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
@@ -173,6 +172,21 @@ class AnyTarget(Part):
     trajectory: str | None = None
     during: tuple[Annotated[float, TIME], Annotated[float, TIME]] | None = None
 
+    @property
+    def frequencies(self) -> tuple[tuple[KeyPath, Curve], ...]:
+        """Frequencies that the file gives, each with its keys below the target."""
+        raise NotImplementedError
+
+    @property
+    def named(self) -> tuple[tuple[int, ...], ...]:
+        """The modes of each of its requirements; none where every mode is meant."""
+        raise NotImplementedError
+
+    @property
+    def followed(self) -> FollowedMode | None:
+        """The mode that it follows by its shape."""
+        return None
+
     @model_validator(mode="after")
     def _lasts(self) -> Self:
         if self.during is not None and self.during[0] >= self.during[1]:
@@ -204,8 +218,20 @@ class ModeTarget(AnyTarget):
 
     @property
     def frequencies(self) -> tuple[tuple[KeyPath, Curve], ...]:
-        """The same, as `KeepOutTarget.frequencies`."""
+        """The same with its key."""
         return (((self.kind,), self.curve),)
+
+    @property
+    def named(self) -> tuple[tuple[int, ...], ...]:
+        """One mode each; all modes are at least f if and only if mode 1 is."""
+        if self.modes is None:
+            return ((self.mode.like if isinstance(self.mode, FollowedMode) else self.mode or 1,),)
+        return ((1,),) if self.modes == "all" else tuple((mode,) for mode in self.modes)
+
+    @property
+    def followed(self) -> FollowedMode | None:
+        """The mode that it follows by its shape."""
+        return self.mode if isinstance(self.mode, FollowedMode) else None
 
     @model_validator(mode="after")
     def _names_modes(self) -> Self:
@@ -274,6 +300,12 @@ class KeepOutTarget(AnyTarget):
             return ((("keep_out", "of"), self.keep_out.of),)
         return tuple((("keep_out", k), edge) for k, edge in enumerate(self.keep_out))
 
+    @property
+    def named(self) -> tuple[tuple[int, ...], ...]:
+        """All of them together."""
+        modes = () if self.mode is None else (self.mode,)
+        return (modes if self.modes is None else () if self.modes == "all" else self.modes,)
+
     @field_validator("keep_out", mode="before")
     @classmethod
     def _has_two_edges(cls, value: Any) -> Any:
@@ -324,8 +356,13 @@ class GapTarget(AnyTarget):
 
     @property
     def frequencies(self) -> tuple[tuple[KeyPath, Curve], ...]:
-        """The same, as `KeepOutTarget.frequencies`."""
+        """The distance."""
         return ((("gap", "at_least"), self.gap.at_least),)
+
+    @property
+    def named(self) -> tuple[tuple[int, ...], ...]:
+        """Both together."""
+        return (self.gap.between,)
 
 
 TARGETS: dict[str, type[AnyTarget]] = {
@@ -349,73 +386,3 @@ TargetForm: TypeAlias = Annotated[
     | Annotated[GapTarget, Tag("<gap>")],
     Discriminator(_target_tag, "no_target", "no key names a kind of target"),
 ]
-
-
-# --- One requirement for each mode that a target names
-
-
-@dataclass(frozen=True)
-class Requirement:
-    """One target on one mode; a keep-out on all the modes it names, a gap on its two.
-
-    ``place`` is the key path of its target. ``modes`` are one, the two of a gap, or those of a
-    keep-out (none: all there are); of a ``followed`` mode the number at the pose that names it.
-    """
-
-    place: str
-    kind: str  # of TARGETS
-    modes: tuple[int, ...]
-    target: TargetForm
-    followed: FollowedMode | None = None
-
-    @property
-    def label(self) -> str:
-        """The requirement in words: "mode 2 at least 320 Hz"."""
-        who = f"mode {self.modes[0]}" if self.modes else "every mode"
-        if self.followed is not None:
-            who = self.followed.name
-        if len(self.modes) > 1:
-            who = f"modes {', '.join(map(str, self.modes[:-1]))} and {self.modes[-1]}"
-        where = f" along {self.target.trajectory!r}" if self.target.trajectory else ""
-        if self.target.during:
-            where += " from {:g} to {:g} s".format(*self.target.during)
-        return f"{who} {_asked(self.target)}{where}"
-
-
-def _asked(target: TargetForm) -> str:
-    if isinstance(target, GapTarget):
-        return f"at least {target.gap.at_least:g} Hz apart"
-    if isinstance(target, KeepOutTarget):
-        if isinstance(target.keep_out, tuple):
-            return "clear of {:g} … {:g} Hz".format(*target.keep_out)
-        band = target.keep_out
-        times = "" if band.harmonic == 1.0 else f"{band.harmonic:g} times "
-        return f"clear of {times}{_in_hz(band.of)} ± {100 * band.margin:g} %"
-    words = {"frequency": "at", "at_least": "at least", "at_most": "at most"}
-    return f"{words[target.kind]} {_in_hz(target.curve)}"
-
-
-def _in_hz(curve: float | FrequencyProfile | FrequencyFile) -> str:
-    return f"{curve:g} Hz" if isinstance(curve, (int, float)) else "its profile"
-
-
-def requirements(targets: Iterable[TargetForm]) -> tuple[Requirement, ...]:
-    """One for each mode that a target names, in the order of the file.
-
-    All modes are at least f if and only if mode 1 is.
-    """
-    found = []
-    for k, target in enumerate(targets):
-        place, kind = f"targets[{k}]", target.kind
-        if isinstance(target, GapTarget):
-            found.append(Requirement(place, kind, target.gap.between, target))
-        elif isinstance(target, KeepOutTarget):
-            named = (target.mode,) if target.mode is not None else target.modes or ()
-            found.append(Requirement(place, kind, () if named == "all" else named, target))
-        elif isinstance(target.mode, FollowedMode):
-            found.append(Requirement(place, kind, (target.mode.like,), target, target.mode))
-        else:
-            modes: tuple[int, ...] = () if target.mode is None else (target.mode,)
-            modes = (1,) if target.modes == "all" else target.modes or modes
-            found += [Requirement(place, kind, (mode,), target) for mode in modes]
-    return tuple(found)

@@ -101,7 +101,8 @@ def frequency_ranges(results: RunResults) -> tuple[Range, ...]:
     What is wanted is not in the names: it may be swept.
     """
     return ranges(
-        (t.curve_name, t.kind, t.trajectory, t.exact_hz.tolist()) for t in results.targets
+        (t.asked.curve_name, t.asked.kind, t.asked.trajectory, t.exact_hz.tolist())
+        for t in results.targets
     )
 
 

@@ -27,6 +27,7 @@ from eigassign.output.figures.graph import (
     short,
 )
 from eigassign.output.formats import capital, percent
+from eigassign.study.requirements.requirement import Requirement
 from eigassign.study.results import AssignmentRow, OtherModes, RunResults, TargetStudy
 
 Floats = NDArray[np.float64]
@@ -78,13 +79,13 @@ def coordinates(results: RunResults) -> FigurePlan:
 
 def overview(results: RunResults, spectrum: OtherModes) -> FigurePlan:
     """The modes up to the one above the highest asked for, with targets, limits and bands."""
-    wanted = [t for t in results.targets if t.kind == "frequency"]
-    limits = [t for t in results.targets if t.kind not in ("frequency", "gap")]
+    wanted = [t for t in results.targets if t.asked.is_goal]
+    limits = [t.asked for t in results.targets if not t.asked.is_goal and len(t.asked.terms) < 2]
     modes = sorted(before_and_after(spectrum), key=lambda curve: bool(curve.end))  # after on top
     time_s = results.time_s
     low, high = graph.bounds([curve.y for curve in modes])
-    asked = [mark for t in limits for mark in _asked(t, time_s[t.rows], 0.05 * (high - low))]
-    targets = (Curve(t.target_hz, TARGET, capital(t.label), time_s[t.rows]) for t in wanted)
+    asked = [mark for one in limits for mark in _asked(one, time_s[one.rows], 0.05 * (high - low))]
+    targets = (Curve(t.target_hz, TARGET, capital(t.label), time_s[t.asked.rows]) for t in wanted)
     marks: tuple[Mark, ...] = (*asked, *modes, *targets)
     panels = [Panel("frequency [Hz]", marks, 2.8, key=BEFORE_AND_AFTER)]
     if wanted:
@@ -102,28 +103,29 @@ def overview(results: RunResults, spectrum: OtherModes) -> FigurePlan:
     )
 
 
-def _asked(target: TargetStudy, x: Floats, width: float) -> Iterator[Mark]:
+def _asked(asked: Requirement, x: Floats, width: float) -> Iterator[Mark]:
     """A band; of a limit a strip on its wrong side in its mode's colour, for others may lie there.
 
     ``width`` is that of the strip in Hz.
     """
-    if target.kind == "keep_out":
-        yield replace(forbidden(target, target.label), x=x)
+    low, high = asked.forbidden_hz
+    if low is not None and high is not None:
+        yield Shade(low, high, graph.VERMILLION, asked.label, x=x)
         return
-    upper, colour = target.kind == "at_most", mode_colour(target.mode)
-    edge = target.upper_hz if upper else target.lower_hz
-    low, high = (edge, edge + width) if upper else (edge - width, edge)
-    yield Shade(low, high, colour, target.label, 0.25, x)
+    edge, colour = asked.hz, mode_colour(asked.mode)
+    low, high = (edge - width, edge) if low is None else (edge, edge + width)
+    yield Shade(low, high, colour, asked.label, 0.25, x)
     yield Curve(edge, Look(colour, 1.0, "fine"), x=x)
 
 
 def _off_target(results: RunResults, target: TargetStudy) -> Iterator[Curve]:
     """f/f_target − 1 before and after, in the colour of the mode."""
-    colour = mode_colour(target.mode)
-    stages = ((target.initial_hz, _BEFORE, ""), (target.exact_hz, _AFTER, target.curve_name))
+    asked = target.asked
+    colour = mode_colour(asked.mode)
+    stages = ((target.initial_hz, _BEFORE, ""), (target.exact_hz, _AFTER, asked.curve_name))
     for hz, look, end in stages:
         off = 100.0 * (hz / target.target_hz - 1.0)
-        x = results.time_s[target.rows]
+        x = results.time_s[asked.rows]
         yield Curve(off, replace(look, colour=colour), x=x, end=end)
 
 
@@ -161,17 +163,18 @@ def before_and_after(shown: OtherModes) -> tuple[Curve, ...]:
 
 def assignment(results: RunResults, target: TargetStudy) -> FigurePlan:
     """A target in time: frequencies before and after, and their distance or what is forbidden."""
-    modes = "_".join(map(str, target.modes)) or "all"
-    if target.followed is not None:
-        modes = f"like_{target.mode}"
-    place, name, label = where(results), capital(target.curve_name), capital(target.label)
-    if target.kind == "frequency":
+    asked = target.asked
+    modes = "_".join(map(str, asked.modes)) or "all"
+    if asked.followed is not None:
+        modes = f"like_{asked.mode}"
+    place, name, label = where(results), capital(asked.curve_name), capital(asked.label)
+    if asked.is_goal:
         kind, what = "assignment", "distance to the target"
         heading = f"{name}: initial, optimal and target frequency"
-        alt = f"Frequency of {target.curve_name} over time before and after, with its target."
+        alt = f"Frequency of {asked.curve_name} over time before and after, with its target."
         title, panels = f"{name}: assigned frequency", _assigned(results, target)
     else:
-        kind, what, heading, title = target.kind, "violation", label, label
+        kind, what, heading, title = asked.kind, "violation", label, label
         alt = f"{label}: frequencies over time before and after."
         panels = (_limited(results, target),)
     return FigurePlan(
@@ -180,7 +183,7 @@ def assignment(results: RunResults, target: TargetStudy) -> FigurePlan:
         f"Worst {what} {percent(target.error.initial.max_relative)} before and "
         f"{percent(target.error.exact.max_relative)} after.",
         alt,
-        Graph(f"{title}{place}", "time [s]", results.time_s[target.rows], panels),
+        Graph(f"{title}{place}", "time [s]", results.time_s[asked.rows], panels),
     )
 
 
@@ -210,7 +213,7 @@ def _curves(results: RunResults, target: TargetStudy) -> tuple[Curve, ...]:
     found = []
     for hz, look, name, e in stages:
         if hz is not None and e:
-            met = target.kind != "frequency" and e.max_relative == 0.0
+            met = not target.asked.is_goal and e.max_relative == 0.0
             found.append(
                 Curve(hz, look, f"{name} ({'met' if met else f'worst {percent(e.max_relative)}'})")
             )
@@ -219,25 +222,16 @@ def _curves(results: RunResults, target: TargetStudy) -> tuple[Curve, ...]:
 
 def _limited(results: RunResults, target: TargetStudy) -> Panel:
     """Frequencies of a limit, a gap, or all modes by a band; the forbidden ones are shaded."""
-    near = target.near
+    asked, near = target.asked, target.near
     curves = _curves(results, target) if near is None else before_and_after(near)
-    edges = [hz for hz in (target.lower_hz, target.upper_hz) if np.isfinite(hz).all()]
+    low, high = asked.forbidden_hz
     marks: tuple[Mark, ...] = (
-        forbidden(target, "forbidden"),
-        *(Curve(hz, EDGE) for hz in edges),
+        Shade(low, high, graph.VERMILLION, "forbidden"),
+        *(Curve(hz, EDGE) for hz in (low, high) if hz is not None),
         *curves,
     )
-    label = "distance of the modes [Hz]" if target.kind == "gap" else "frequency [Hz]"
-    return Panel(label, marks, 2.9, key=() if near is None else BEFORE_AND_AFTER)
-
-
-def forbidden(target: TargetStudy, label: str) -> Shade:
-    """The frequencies that a limit or band excludes."""
-    low, high = {
-        "at_most": (target.upper_hz, None),
-        "keep_out": (target.lower_hz, target.upper_hz),
-    }.get(target.kind, (None, target.lower_hz))
-    return Shade(low, high, graph.VERMILLION, label)
+    key = () if near is None else BEFORE_AND_AFTER
+    return Panel(f"{asked.axis} [Hz]", marks, 2.9, key=key)
 
 
 # --- The steps of the sequential method
@@ -252,17 +246,17 @@ def progress(results: RunResults, row: AssignmentRow) -> FigurePlan:
     """
     values = np.array([row.objective_initial, *(step.objective for step in row.steps)])
     taken = np.array([step.taken for step in row.steps])
-    limits = [t.error.initial.max_relative for t in results.targets if t.kind != "frequency"]
+    limits = [t.error.initial.max_relative for t in results.targets if not t.asked.is_goal]
     violations = [max(limits, default=0.0), *(step.violation for step in row.steps)]
     missed = 100.0 * np.array(violations)
     several = bool((missed > 1e-6).any())  # %; less is round-off
     kind = "rms" if row.objective == "least_squares" else "worst"
-    wanted = [t for t in results.targets if t.kind == "frequency"]
+    wanted = [t for t in results.targets if t.asked.is_goal]
     error = results.error if wanted else None
     label = "objective"
     if error is not None:
         values = 100.0 * (np.sqrt(np.maximum(values, 0.0)) if kind == "rms" else np.abs(values))
-        uneven = any(t.weight != 1.0 for t in wanted)
+        uneven = any(t.asked.weight != 1.0 for t in wanted)
         label = f"{'weighted ' if uneven else ''}{kind} error [%]"
     marks: list[Mark] = [*_steps(values, taken, named=True)]
     if error is not None and error.one_shot is not None:
@@ -292,7 +286,7 @@ def progress(results: RunResults, row: AssignmentRow) -> FigurePlan:
 def _one_shot_error(wanted: list[TargetStudy], kind: str) -> float:
     """Rms or worst error of the one shot, weighted as the objective is."""
     own = [
-        (t.weight, t.weight * t.weight_s, t.error.one_shot)
+        (t.asked.weight, t.asked.weight * t.weight_s, t.error.one_shot)
         for t in wanted
         if t.error.one_shot is not None
     ]

@@ -45,7 +45,7 @@ def meaning_figures(results: RunResults) -> Iterator[FigurePlan]:
     number = 0
     for target in results.targets:
         shown = reach.get(target.label), spread.get(target.label)
-        for along in target.along if any(shown) and target.kind != "keep_out" else ():
+        for along in target.along if any(shown) and target.asked.terms else ():
             number += 1
             yield ranges(results, target, along, shown, number)
     if found.trade_off is not None and len(found.trade_off.points) > 1:
@@ -111,9 +111,8 @@ def ranges(
         Curve(target.target_hz[along.rows], TARGET, "wanted"),
     )
     edges = tuple(e for shade in shades for e in (shade.low, shade.high) if e is not None)
-    label = "distance of the modes [Hz]" if target.kind == "gap" else "frequency [Hz]"
-    panel = Panel(label, (*shades, *curves), 2.4, holds=edges)
-    time_s = results.time_s[target.rows][along.rows]
+    panel = Panel(f"{target.asked.axis} [Hz]", (*shades, *curves), 2.4, holds=edges)
+    time_s = results.time_s[target.asked.rows][along.rows]
     return FigurePlan(
         f"range_{number}",
         f"{capital(target.label)}: reach and tolerance{place}",

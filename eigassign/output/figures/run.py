@@ -47,7 +47,7 @@ def _figures(results: RunResults) -> Iterator[FigurePlan]:
 def _targets(results: RunResults) -> Iterator[FigurePlan]:
     """Figures of each target along each trajectory, mode by mode; equal names get a number."""
     taken: set[str] = set()
-    for target in sorted(results.targets, key=lambda target: (target.mode, target.curve_name)):
+    for target in sorted(results.targets, key=lambda one: (one.asked.mode, one.asked.curve_name)):
         for one in along_each(replace(results, targets=(target,))):
             for plan in (curves.assignment(one, own) for own in one.targets if own.exact_hz.size):
                 names = (f"{plan.name}_{k}" if k > 1 else plan.name for k in count(1))

@@ -92,9 +92,7 @@ def _sentence(text: str) -> str:
 def _asked(results: RunResults) -> Iterator[str]:
     row = results.assignment
     for target in results.targets:
-        within = (
-            f", within {100 * row.max_error:.3g} %" if row and target.kind == "frequency" else ""
-        )
+        within = f", within {100 * row.max_error:.3g} %" if row and target.asked.is_goal else ""
         yield f"{capital(target.label)}{within}"
     parameters = [each.name for each in results.design]
     names = ", ".join(parameters[:4]) + (", …" if len(parameters) > 4 else "")
@@ -109,14 +107,14 @@ def _finding(target: TargetStudy, accepted: float, detailed: bool) -> Finding:
     start, end = target.error.initial, target.error.exact
     before, after = start.max_relative, end.max_relative
     more = [f"{_between(target.initial_hz)} → {_between(target.exact_hz)} Hz"]
-    if target.kind == "frequency":
+    if target.asked.is_goal:
         met = after <= accepted
         said = percent(before), f"{percent(after)} off at worst"
         more.insert(0, f"{percent(start.rms_relative)} → {percent(end.rms_relative)} rms")
     else:
         met = target.satisfied
         said = violated(before), violated(after)
-        more *= target.kind in ("at_least", "at_most")
+        more *= len(target.asked.terms) == 1
     tone = "good" if met else "fair" if after < before else "bad"
     return Finding(target.label, *said, tone, tuple(more) if detailed else ())
 

@@ -32,6 +32,7 @@ from eigassign.study.design.judgement import verdict
 from eigassign.study.design.one_shot import assign_design, catalogues
 from eigassign.study.design.optimum import Found, find_optimum
 from eigassign.study.design.variants import MASS, Task, variant_of
+from eigassign.study.requirements.requirement import Requirement
 from eigassign.study.results import (
     ActiveRow,
     AssignmentRow,
@@ -44,7 +45,6 @@ from eigassign.study.results import (
     TargetStudy,
 )
 from eigassign.study.scene import Scene
-from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 MAX_ERROR = 0.02  # of a wanted frequency, where the case says nothing
@@ -81,16 +81,18 @@ class Answer:
         return 1 if self.found is None else self.found.variant.requirements.modes
 
 
-def find_answer(scene: Scene, wanted: Sequence[Wanted], progress: Callable[[str], None]) -> Answer:
+def find_answer(
+    scene: Scene, wanted: Sequence[Requirement], progress: Callable[[str], None]
+) -> Answer:
     """The design asked for by the case's method.
 
     Under `method: one_shot` raises InfeasibleError where bounds, lists and linear constraints
     contradict each other, AccuracyError where it cannot be vouched for.
     """
     sequential = scene.file.assignment.method == "sequential"
-    one_shot, notes, asked = None, [], scene.file.requirements
-    plain = all(one.kind == "frequency" and one.followed is None for one in asked)
-    if asked and plain and scene.file.design.mass is None:  # eqs. (13)–(14) take all of it
+    one_shot, notes = None, []
+    plain = all(one.is_goal and one.followed is None for one in wanted)
+    if wanted and plain and scene.file.design.mass is None:  # eqs. (13)–(14) take all of it
         try:
             one_shot = assign_design(scene, wanted)
         except (AccuracyError, InfeasibleError) as error:
@@ -126,13 +128,13 @@ def _band_notes(found: Found) -> Iterator[str]:
 
 
 def _in_words(
-    scene: Scene, wanted: Sequence[Wanted], contradiction: Conflict | None, proved: bool
+    scene: Scene, wanted: Sequence[Requirement], contradiction: Conflict | None, proved: bool
 ) -> str:
     """Name the limits that contradict, with their lines in the case file; empty where none do."""
     if contradiction is None:
         return ""
     file = scene.file
-    places = {w.requirement.label: w.requirement.place for w in wanted} | {MASS: MASS}
+    places = {w.label: w.place for w in wanted} | {MASS: MASS}
     places |= {name: f"design.constraints.{name}" for name in file.design.constraints}
     lines = (file.problem(places[name], "").line for name in contradiction.names)
     listed = " and ".join(
@@ -146,19 +148,19 @@ def _in_words(
     return f"no design within the bounds {meets} {listed}{together}"
 
 
-def _predicted(found: Found, wanted: Sequence[Wanted]) -> Iterator[Floats | None]:
+def _predicted(found: Found, wanted: Sequence[Requirement]) -> Iterator[Floats | None]:
     """Frequencies that the last program promised; where no step was taken those of the design."""
     best, asked = found.best, found.variant.requirements
     residual = best.seen.residual if best.predicted is None else best.predicted
     curves = iter(asked.promised(residual))
     for one in wanted:
-        yield next(curves) if one.requirement.kind == "frequency" else None
+        yield next(curves) if one.is_goal else None
 
 
 def assignment_row(
     scene: Scene,
     answer: Answer,
-    wanted: Sequence[Wanted],
+    wanted: Sequence[Requirement],
     targets: Sequence[TargetStudy],
     unreachable: Sequence[str] = (),
 ) -> AssignmentRow:
@@ -178,10 +180,11 @@ def assignment_row(
     merits = initial, optimal
     word, reason = verdict(targets, merits, trusted, unreachable, contradiction)
     unproved = [_why_unproved(row) for row in clearances if not row.clear]
-    of_model = {m for t in targets if t.kind in RAISED for m in t.modes}
+    of_model = {m for one in wanted if one.of_soft_model for m in one.modes}
     raised = model_error(scene, answer.y, of_model)
     largest = MAX_ERROR if keys.max_error is None else keys.max_error
-    if word == "reached" and any(_stake(target, raised) > largest for target in targets):
+    at_stake = (t.asked.stake(t.exact_hz, raised) for t in targets)
+    if word == "reached" and any(stake > largest for stake in at_stake):
         word, reason = "do_not_use", _too_coarse(raised, largest)
     if word == "reached" and unproved:
         word, reason = "do_not_use", f"not proved clear along the motion: {'; '.join(unproved)}"
@@ -230,18 +233,7 @@ def _clearance(found: Clearance) -> ClearanceRow:
     )
 
 
-RAISED = ("frequency", "at_least", "gap")  # what a model that is too stiff may seem to meet
 FINER = "give the links more elements, raise reduce_to, or write auto"
-
-
-def _stake(target: TargetStudy, raised: float) -> float:
-    """How far off a target may be, relative, for a model whose frequencies are ``raised`` at most.
-
-    A lower limit that is met with room may lose that first.
-    """
-    if target.kind == "at_least":
-        return float((1.0 - target.exact_hz / (1.0 + raised) / target.lower_hz).max())
-    return raised if target.kind in RAISED else 0.0
 
 
 def _too_coarse(raised: float, accepted: float) -> str:
@@ -260,7 +252,7 @@ def _why_unproved(row: ClearanceRow) -> str:
     return f"{row.label} (what mesh and reduced links do to the mode above it: {how}; {FINER})"
 
 
-def _catalogue(scene: Scene, answer: Answer, wanted: Sequence[Wanted]) -> CatalogueRow | None:
+def _catalogue(scene: Scene, answer: Answer, wanted: Sequence[Requirement]) -> CatalogueRow | None:
     """The search of the catalogues; of the one shot's best few what they are exactly worth."""
     own, found, one_shot = scene.file.design.catalogues, answer.found, answer.one_shot
     if found is not None and found.chosen is not None:
@@ -290,7 +282,7 @@ def _merits(
     if answer.found is not None:
         best = answer.found.best
         return answer.found.initial, (best.seen.violation, best.objective)
-    weights = np.array([target.weight * target.weight_s for target in targets])
+    weights = np.array([target.asked.weight * target.weight_s for target in targets])
     weights = weights / weights.sum()
     before, after = (
         float(weights @ [getattr(t.error, when).rms_relative ** 2 for t in targets])

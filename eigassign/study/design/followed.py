@@ -31,8 +31,9 @@ from eigassign.modal.exact.following import (
 from eigassign.modal.exact.tracking import COINCIDENT, EXTRA
 from eigassign.modal.model import Model
 from eigassign.study.planning import shown_point
+from eigassign.study.requirements.named_modes import followed_modes, named_design, named_pose
+from eigassign.study.requirements.requirement import Requirement, Solved
 from eigassign.study.scene import AT_LEAST, BLOCK, Scene
-from eigassign.study.wanted import Wanted, followed_modes, named_design, named_pose
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -137,13 +138,13 @@ class Follower:
         yield Route(tuple(range(nearest + 1, last + 1)), nearest)
 
 
-def followers(scene: Scene, wanted: Sequence[Wanted]) -> tuple[Follower, ...]:
+def followers(scene: Scene, wanted: Sequence[Requirement]) -> tuple[Follower, ...]:
     """One for each mode that the case's targets follow, needed where ``wanted`` ask for it."""
     file, path, found = scene.file, scene.path, []
     for mode in followed_modes(file):
         needed = np.zeros(len(path.q), dtype=np.bool_)
         for one in wanted:
-            if one.requirement.followed == mode:
+            if one.followed == mode:
                 needed[one.rows] = True
         y = named_design(file, mode)
         pose = partial(named_pose, file, mode, path)
@@ -159,7 +160,7 @@ def named_notes(file: CaseFile, model: Model, path: Trajectories) -> Iterator[st
         yield f"{mode.name} has {hz:.6g} Hz there, and is followed from there by its shape"
 
 
-def require_one_shape(scene: Scene, wanted: Sequence[Wanted]) -> None:
+def require_one_shape(scene: Scene, wanted: Sequence[Requirement]) -> None:
     """Raise CaseError where a mode coincides with another at the pose that names it by chance.
 
     Modes that coincide everywhere, by symmetry, have a common frequency that can be followed.
@@ -168,11 +169,7 @@ def require_one_shape(scene: Scene, wanted: Sequence[Wanted]) -> None:
         like, lam = follower.mode.like, follower.start.at.lam
         twins = np.flatnonzero(_alike(lam, lam[like - 1])) + 1
         if len(twins) > 1 and not _always(scene, follower, len(twins)):
-            places = (
-                f"{one.requirement.place}.mode"
-                for one in wanted
-                if one.requirement.followed == follower.mode
-            )
+            places = (f"{one.place}.mode" for one in wanted if one.followed == follower.mode)
             message = (
                 f"modes {' and '.join(map(str, twins))} coincide there, so that mode {like} has "
                 "no shape of its own: name it at another pose or design"
@@ -235,23 +232,6 @@ def follow_all(
 
 
 # --- Exact frequencies of a design
-
-
-@dataclass(frozen=True, eq=False)
-class Solved:
-    """Exact frequencies of a design at all samples, in Hz.
-
-    ``hz`` (n_t, n_modes) are the lowest; ``followed`` (n_t, n_followed) those of followed modes,
-    NaN where no target needs them, and ``numbers`` say which modes these are.
-    """
-
-    hz: Floats
-    followed: Floats
-    numbers: Ints
-
-    def curve(self, mode: int) -> Floats:
-        """The curve (n_t,) of one mode, numbered as in `wanted`."""
-        return np.asarray(self.hz[:, mode - 1] if mode > 0 else self.followed[:, mode])
 
 
 def solve_design(

@@ -1,11 +1,4 @@
-"""What a design does to the targets: the distance to each, and the verdict over all.
-
-Of a wanted frequency the error is |f/f_d − 1|. Of a limit it is the relative violation, 0 where it
-is met: (b − f)/b below "at least b", (f − b)/b above "at most b", the same with a gap's f_j − f_i,
-and in a band from a to b the way out of it, relative to the edge that is passed. A band is not
-clear either where the number of modes below it changes along a trajectory; the error there is the
-way that the wrong modes have to the other edge.
-"""
+"""What a design does to the targets: the distance to each, as it says itself, and the verdict."""
 
 from __future__ import annotations
 
@@ -16,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.study.design.followed import Solved
+from eigassign.study.requirements.requirement import Requirement, Solved
+from eigassign.study.requirements.sampling import time_weights
 from eigassign.study.results import (
     ErrorRow,
     ErrorSummary,
@@ -25,7 +19,6 @@ from eigassign.study.results import (
     TargetAlong,
     TargetStudy,
 )
-from eigassign.study.wanted import Wanted, time_weights
 
 Floats = NDArray[np.float64]
 MET = 1e-8  # a violation below it is round-off
@@ -42,7 +35,7 @@ class SolvedDesigns:
 
 def study_targets(
     path: Trajectories,
-    wanted: Sequence[Wanted],
+    wanted: Sequence[Requirement],
     solved: SolvedDesigns,
     predicted: Sequence[Floats | None],
     max_error: float,
@@ -53,71 +46,58 @@ def study_targets(
     """
     weights = time_weights(path)
     return tuple(
-        _studied(path, one, solved, curve, weights[one.rows], max_error)
+        _studied(one, solved, curve, weights[one.rows], max_error)
         for one, curve in zip(wanted, predicted, strict=True)
     )
 
 
 def _studied(
-    path: Trajectories,
-    wanted: Wanted,
+    asked: Requirement,
     solved: SolvedDesigns,
     predicted: Floats | None,
     weights: Floats,
     max_error: float,
 ) -> TargetStudy:
-    one_shot, kind = solved.one_shot, wanted.requirement.kind
+    before, after, one_shot = solved.initial, solved.exact, solved.one_shot
     errors = _Errors(
-        initial=errors_of(wanted, solved.initial),
-        exact=errors_of(wanted, solved.exact),
-        predicted=None if predicted is None else np.asarray(predicted / wanted.hz - 1.0),
-        one_shot=None if one_shot is None else errors_of(wanted, one_shot),
+        initial=asked.errors(before),
+        exact=asked.errors(after),
+        predicted=None if predicted is None else np.asarray(predicted / asked.hz - 1.0),
+        one_shot=None if one_shot is None else asked.errors(one_shot),
     )
     summary = _summary(errors, weights)
-    allowed = max_error if kind == "frequency" else MET
     return TargetStudy(
-        kind=kind,
-        label=wanted.requirement.label,
-        modes=() if wanted.mode < 0 else wanted.requirement.modes,
-        lower_hz=wanted.lower_hz,
-        upper_hz=wanted.upper_hz,
-        initial_hz=_curve(wanted, solved.initial),
-        exact_hz=_curve(wanted, solved.exact),
+        asked=asked,
+        initial_hz=asked.curve(before),
+        exact_hz=asked.curve(after),
         predicted_hz=predicted,
-        one_shot_hz=None if one_shot is None else _curve(wanted, one_shot),
+        one_shot_hz=None if one_shot is None else asked.curve(one_shot),
         error=summary,
-        satisfied=bool(summary.exact.max_relative <= allowed),
-        trajectory=wanted.requirement.target.trajectory,
-        rows=wanted.rows,
+        satisfied=bool(summary.exact.max_relative <= (max_error if asked.is_goal else MET)),
         weight_s=float(weights.sum()),
-        weight=wanted.weight,
-        along=tuple(_along(path, wanted, errors, weights)),
-        followed=_followed(wanted, solved),
-        near=_near(wanted, solved) if kind == "keep_out" else None,
+        along=tuple(
+            TargetAlong(name, own, _summary(errors.part(own), weights[own]))
+            for name, own in asked.along
+        ),
+        followed=_followed(asked, before, after),
+        near=_near(asked, before, after),
     )
 
 
-def _followed(wanted: Wanted, solved: SolvedDesigns) -> FollowedRow | None:
-    mode, rows = wanted.requirement.followed, wanted.rows
+def _followed(asked: Requirement, before: Solved, after: Solved) -> FollowedRow | None:
+    mode = asked.followed
     if mode is None:
         return None
-    before, after = (s.numbers[rows, wanted.mode] for s in (solved.initial, solved.exact))
-    return FollowedRow(mode.name, mode.like, before, after)
+    numbers = (solved.numbers[asked.rows, asked.terms[0][0]] for solved in (before, after))
+    return FollowedRow(mode.name, mode.like, *numbers)
 
 
-NEAR_BAND = 0.5  # of an edge: modes this near to a band are shown with it
-
-
-def _near(wanted: Wanted, solved: SolvedDesigns) -> OtherModes:
-    """The modes near a band before or after, and at least those on either side of it."""
-    both = np.stack([solved.initial.hz[wanted.rows], solved.exact.hz[wanted.rows]])
-    low, high = wanted.lower_hz.min(), wanted.upper_hz.max()
-    inside = (both > low * (1.0 - NEAR_BAND)) & (both < high * (1.0 + NEAR_BAND))
-    shown = inside.any(axis=(0, 1))
-    below = int((both[1].max(axis=0) < high).sum())  # as many modes are below
-    shown[max(below - 1, 0) : below + 1] = True
-    columns = np.flatnonzero(shown)
-    return OtherModes(tuple((columns + 1).tolist()), *(hz[:, columns] for hz in both))
+def _near(asked: Requirement, before: Solved, after: Solved) -> OtherModes | None:
+    modes = asked.near(before, after)
+    if modes is None:
+        return None
+    columns = [mode - 1 for mode in modes]
+    return OtherModes(modes, *(solved.hz[asked.rows][:, columns] for solved in (before, after)))
 
 
 @dataclass(frozen=True)
@@ -136,72 +116,6 @@ class _Errors:
         return _Errors(self.initial[own], self.exact[own], predicted, one_shot)
 
 
-def errors_of(wanted: Wanted, solved: Solved) -> Floats:
-    """The errors (n,) of a target at its rows."""
-    if wanted.requirement.kind == "frequency":
-        return np.asarray(_curve(wanted, solved) / wanted.hz - 1.0)
-    return worst_errors(wanted, solved, solved)
-
-
-def worst_errors(wanted: Wanted, lowest: Solved, highest: Solved) -> Floats:
-    """The largest errors (n,), in magnitude, of frequencies between two."""
-    kind = wanted.requirement.kind
-    if kind == "keep_out":
-        return _inside(wanted, lowest.hz[wanted.rows], highest.hz[wanted.rows])
-    low, high = curve_range(wanted, lowest, highest)
-    if kind == "frequency":
-        return np.maximum(np.abs(low / wanted.hz - 1.0), np.abs(high / wanted.hz - 1.0))
-    if kind == "at_most":
-        return np.asarray(np.maximum(high / wanted.upper_hz - 1.0, 0.0))
-    return np.asarray(np.maximum(1.0 - low / wanted.lower_hz, 0.0))
-
-
-def least_errors(wanted: Wanted, lowest: Solved, highest: Solved) -> Floats:
-    """The errors (n,) that no frequency between two avoids; 0 of a band."""
-    kind = wanted.requirement.kind
-    if kind == "keep_out":
-        return np.zeros(len(wanted.lower_hz))
-    low, high = curve_range(wanted, lowest, highest)
-    above = np.maximum(low / wanted.upper_hz - 1.0, 0.0)
-    return np.asarray(np.maximum(above, 1.0 - high / wanted.lower_hz if kind != "at_most" else 0.0))
-
-
-def curve_range(wanted: Wanted, lowest: Solved, highest: Solved) -> tuple[Floats, Floats]:
-    """The range (n,) of a target's curve where each mode is between two frequencies."""
-    if wanted.requirement.kind == "gap":
-        low, high = (m - 1 for m in wanted.requirement.modes)
-        least, most = lowest.hz[wanted.rows], highest.hz[wanted.rows]
-        return least[:, high] - most[:, low], most[:, high] - least[:, low]
-    return _curve(wanted, lowest), _curve(wanted, highest)
-
-
-def _inside(wanted: Wanted, lowest: Floats, highest: Floats) -> Floats:
-    """The way that the modes lack to be clear, with the best constant number of them below."""
-    named = [m - 1 for m in sorted(wanted.requirement.modes)]
-    lowest, highest = (hz[:, named] if named else hz for hz in (lowest, highest))
-    low, high = wanted.lower_hz[:, None], wanted.upper_hz[:, None]
-    down, up = np.maximum(highest / low - 1.0, 0.0), np.maximum(1.0 - lowest / high, 0.0)
-    choices = [
-        np.maximum(down[:, :k].max(axis=1, initial=0.0), up[:, k:].max(axis=1, initial=0.0))
-        for k in range(lowest.shape[1] + 1)
-    ]
-    return np.asarray(min(choices, key=lambda errors: float(errors.max())))
-
-
-def _curve(wanted: Wanted, solved: Solved) -> Floats:
-    """The curve (n,) that stands for a target."""
-    own, modes = solved.hz[wanted.rows], wanted.requirement.modes
-    if wanted.requirement.kind == "gap":
-        low, high = modes
-        return np.asarray(own[:, high - 1] - own[:, low - 1])
-    if wanted.requirement.kind == "keep_out":
-        own = own[:, [m - 1 for m in modes]] if modes else own
-        middle = 0.5 * (wanted.lower_hz + wanted.upper_hz)
-        nearest = np.abs(own - middle[:, None]).argmin(axis=1)
-        return np.asarray(own[np.arange(len(own)), nearest])
-    return solved.curve(wanted.mode)[wanted.rows]
-
-
 def _summary(errors: _Errors, weights: Floats) -> ErrorSummary:
     return ErrorSummary(
         initial=_row(errors.initial, weights),
@@ -215,17 +129,6 @@ def _row(errors: Floats, weights: Floats) -> ErrorRow:
     """Largest magnitude and root of the weighted mean square."""
     rms = float(np.sqrt(weights @ errors**2 / weights.sum()))
     return ErrorRow(float(np.abs(errors).max()), rms)
-
-
-def _along(
-    path: Trajectories, wanted: Wanted, errors: _Errors, weights: Floats
-) -> Iterator[TargetAlong]:
-    """The errors along each trajectory that the target holds on."""
-    for part, rows in zip(path.parts, path.rows, strict=True):
-        first, last = max(wanted.rows.start, rows.start), min(wanted.rows.stop, rows.stop)
-        if first < last:
-            own = slice(first - wanted.rows.start, last - wanted.rows.start)
-            yield TargetAlong(part.name, own, _summary(errors.part(own), weights[own]))
 
 
 # --- The verdict
@@ -270,7 +173,7 @@ def verdict(
 def _far(target: TargetStudy) -> str:
     """The target and how far it is missed: ``mode 1 at 48 Hz: 6.02 % off at worst``."""
     worst = f"{100 * target.error.exact.max_relative:.3g} %"
-    if target.kind == "frequency":
+    if target.asked.is_goal:
         return f"{target.label}: {worst} off at worst"
     return f"{target.label}: violated by {worst} at worst"
 
@@ -278,7 +181,7 @@ def _far(target: TargetStudy) -> str:
 def _though(target: TargetStudy) -> str:
     """Say that the largest error has grown, where the mean one is what has fallen."""
     before, after = target.error.initial, target.error.exact
-    if target.kind != "frequency" or after.max_relative <= before.max_relative:
+    if not target.asked.is_goal or after.max_relative <= before.max_relative:
         return ""
     fell = "" if after.rms_relative >= before.rms_relative else (
         f", while the rms error fell from {100 * before.rms_relative:.3g} to "
@@ -312,13 +215,14 @@ def _runs(path: Trajectories, target: TargetStudy, numbers: NDArray[np.intp]) ->
     """Write ``swaps its number: mode 2 from sample 0 (t = 0 s), mode 3 from sample 4 …``."""
     if (numbers == numbers[0]).all():
         return f"is mode {numbers[0]} throughout"
-    first = {rows.start for rows in path.rows} | {target.rows.start}
+    start = target.asked.rows.start
+    first = {rows.start for rows in path.rows} | {start}
     changes = [
         k
         for k, number in enumerate(numbers)
-        if k == 0 or number != numbers[k - 1] or target.rows.start + k in first
+        if k == 0 or number != numbers[k - 1] or start + k in first
     ]
-    listed = [f"mode {numbers[k]} from {path.where(target.rows.start + k)}" for k in changes]
+    listed = [f"mode {numbers[k]} from {path.where(start + k)}" for k in changes]
     more = f" and {len(changes) - SHOWN} more changes" if len(changes) > SHOWN else ""
     return f"swaps its number: {', '.join(listed[:SHOWN])}{more}"
 

@@ -16,14 +16,15 @@ from eigassign.assignment.catalogues.branching import ListedValues
 from eigassign.assignment.program import Bounds, Goal, LinearConstraint, LinearModel
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError
+from eigassign.study.requirements.requirement import Requirement
+from eigassign.study.requirements.sampling import time_weights
 from eigassign.study.results import DesignRow, SolverRow
 from eigassign.study.scene import Scene
-from eigassign.study.wanted import Wanted, time_weights
 
 Floats = NDArray[np.float64]
 
 
-def assign_design(scene: Scene, targets: Sequence[Wanted]) -> Assignment:
+def assign_design(scene: Scene, targets: Sequence[Requirement]) -> Assignment:
     """Build and solve the quadratic program of eqs. (13)–(14) on the linearised expansion.
 
     Raises InfeasibleError with the names of the constraints that contradict each other.
@@ -33,14 +34,10 @@ def assign_design(scene: Scene, targets: Sequence[Wanted]) -> Assignment:
     _require_near(scene, l0)
     column = scene.expansions.column
     goals = [
-        Goal(
-            LinearModel(l0[wanted.rows, k], slope[wanted.rows, k]),
-            wanted.hz,
-            wanted.weight,
-            wanted.rows,
-        )
+        Goal(LinearModel(l0[own.rows, k], slope[own.rows, k]), own.hz, own.weight, own.rows)
         for wanted in targets
-        for k in [column(wanted.mode)]
+        for own in wanted.goals()
+        for k in [column(own.mode)]
     ]
     return solve_assignment(
         goals,

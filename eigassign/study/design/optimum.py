@@ -31,8 +31,9 @@ from eigassign.study.design.variants import (
     thinned,
     variant_of,
 )
+from eigassign.study.requirements.named_modes import followed_modes
+from eigassign.study.requirements.requirement import Requirement
 from eigassign.study.scene import Scene
-from eigassign.study.wanted import Wanted, followed_modes
 
 Floats = NDArray[np.float64]
 STARTS = 12  # with `starts: auto`, at most
@@ -62,7 +63,7 @@ class Found:
 
 def find_optimum(
     scene: Scene,
-    wanted: Sequence[Wanted],
+    wanted: Sequence[Requirement],
     starts: Sequence[Floats],
     progress: Callable[[str], None],
 ) -> Found:
@@ -89,7 +90,7 @@ def find_optimum(
 
 def _search_all(
     scene: Scene,
-    wanted: Sequence[Wanted],
+    wanted: Sequence[Requirement],
     starts: Sequence[Floats],
     margin: float,
     models: ReducedModels | None,
@@ -112,7 +113,7 @@ def _search_all(
     made, solves = 0, 0
     ended: End | None = None
     lost: list[str] = []
-    counts = (possible_counts(scene, band) for band in whole.bands)
+    counts = (possible_counts(scene, band) for _, band in whole.bands)
     for below in itertools.islice(itertools.product(*counts), 24):
         if listed:
             near = list(starts[: KEEP + 1])
@@ -183,9 +184,8 @@ def _chosen(
 
 def _clearances(task: Task, variant: PosedProblem, y: Floats) -> Iterator[Clearance]:
     q = task.scene.path.at(y)[0]
-    for band, (label, below) in zip(task.bands, variant.below, strict=True):
-        named = tuple(sorted(band.wanted.requirement.modes))
-        own = Band(label, q[band.rows], band.lower_hz, band.upper_hz, below, named)
+    for (label, band), (_, below) in zip(task.bands, variant.below, strict=True):
+        own = Band(label, q[band.rows], band.lower_hz, band.upper_hz, below, band.counted)
         yield prove_clear(task.scene.model, own, y)
 
 

@@ -7,7 +7,7 @@ modes below it is the same everywhere, so each k that the bounds may allow is on
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -16,12 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import DesignProblem, Objective
-from eigassign.assignment.exact.requirements import (
-    FrequencyGoal,
-    FrequencyLimit,
-    QuantityLimit,
-    Requirements,
-)
+from eigassign.assignment.exact.requirements import QuantityLimit, Requirements
 from eigassign.assignment.feasibility import constraints_agree
 from eigassign.assignment.program import Bounds, LinearConstraint
 from eigassign.errors import CaseError, EigassignError, MissingMassError
@@ -29,8 +24,10 @@ from eigassign.study.design.clearance import mode_above
 from eigassign.study.design.followed import Follower, followers
 from eigassign.study.design.one_shot import linear_constraints
 from eigassign.study.design.response import DesignResponse, ReducedModels, response_of
+from eigassign.study.requirements.band import ForbiddenBand
+from eigassign.study.requirements.requirement import Requirement
+from eigassign.study.requirements.sampling import requirements_of, time_weights
 from eigassign.study.scene import Scene
-from eigassign.study.wanted import Wanted, target_frequencies, time_weights
 
 Floats = NDArray[np.float64]
 MASS = "design.mass"  # what the limit of the whole mechanism's mass is called
@@ -56,14 +53,14 @@ class Task:
     """Targets on the samples of a scene."""
 
     scene: Scene
-    wanted: tuple[Wanted, ...]
+    wanted: tuple[Requirement, ...]
     margin: float  # by which the limits of bands are drawn in, relative
     models: ReducedModels | None = None  # that stand for exact solves
 
     @cached_property
-    def bands(self) -> tuple[_Band, ...]:
-        """The bands along each trajectory for itself."""
-        return tuple(_bands(self.scene, self.wanted))
+    def bands(self) -> tuple[tuple[str, ForbiddenBand], ...]:
+        """The bands along each trajectory for itself, in words."""
+        return tuple(band for one in self.wanted for band in one.bands)
 
     @cached_property
     def followers(self) -> tuple[Follower, ...]:
@@ -78,10 +75,10 @@ def thinned(whole: Task, few: int) -> Task | None:
         return None
     scene = replace(whole.scene, trajectory=path.chosen(path.spread(few)))
     try:
-        task = replace(whole, scene=scene, wanted=target_frequencies(scene.file, scene.path))
+        task = replace(whole, scene=scene, wanted=requirements_of(scene.file, scene.path))
     except CaseError:
         return None
-    return task if len(task.bands) == len(tuple(_bands(scene, whole.wanted))) else None
+    return task if len(task.bands) == len(whole.bands) else None
 
 
 def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> PosedProblem:
@@ -91,25 +88,21 @@ def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Pose
     """
     scene, wanted = task.scene, task.wanted
     lower, upper = scene.bounds
-    targets = tuple(
-        FrequencyGoal(w.mode, w.hz, w.rows, w.weight)
-        for w in wanted
-        if w.requirement.kind == "frequency"
-    )
+    targets = tuple(goal for one in wanted for goal in one.goals())
     objective = Objective(scene.file.assignment.objective)
     prices = np.array([column.price or 0.0 for column in scene.file.design.parameters.values()])
     if targets:  # F is errors, and prices are in %² of them, in the worst case in %
         prices = prices / (1e2 if objective is Objective.WORST_CASE else 1e4)
-    of_bands = [
-        limit
-        for band, k in zip(task.bands, below, strict=True)
-        for limit in _beside(scene, band, k, task.margin)
-    ]
+    limits = [limit for one in wanted for limit in one.limits()]
+    for (_, band), k in zip(task.bands, below, strict=True):
+        q = scene.path.at(scene.initial)[0][band.rows]
+        above = mode_above(scene.model, k, band.counted, q, scene.initial)
+        limits += band.kept_clear(k, above, task.margin)
     constraints, elastic = _linear(scene, missed)
     width = np.where(upper > lower, upper - lower, 1.0)
     asked = Requirements(
         targets=targets,
-        limits=(*_limits(wanted), *of_bands),
+        limits=tuple(limits),
         quantities=(*_mass(scene), *elastic),
         time_weights=time_weights(scene.path),
         objective=objective,
@@ -125,7 +118,7 @@ def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Pose
         reference=scene.initial,
         objective=objective if targets else Objective.LEAST_SQUARES,
     )
-    named = zip((band.label for band in task.bands), below, strict=True)
+    named = zip((words for words, _ in task.bands), below, strict=True)
     return PosedProblem(tuple(named), asked, problem, response)
 
 
@@ -152,49 +145,12 @@ def _sum(row: LinearConstraint, y: Floats) -> tuple[float, Floats]:
     return float(row.coefficients @ y), row.coefficients
 
 
-def _limits(wanted: Sequence[Wanted]) -> Iterator[FrequencyLimit]:
-    for w in wanted:
-        kind, label = w.requirement.kind, w.requirement.label
-        if kind == "at_least":
-            yield FrequencyLimit(label, ((w.mode, 1.0),), w.lower_hz, w.rows, True)
-        elif kind == "at_most":
-            yield FrequencyLimit(label, ((w.mode, 1.0),), w.upper_hz, w.rows, False)
-        elif kind == "gap":
-            low, high = w.requirement.modes
-            yield FrequencyLimit(label, ((high, 1.0), (low, -1.0)), w.lower_hz, w.rows, True)
-
-
-@dataclass(frozen=True)
-class _Band:
-    """A band to keep out of along one trajectory."""
-
-    wanted: Wanted
-    label: str  # with the trajectory, of several
-    rows: slice  # of all samples
-    lower_hz: Floats
-    upper_hz: Floats
-
-
-def _bands(scene: Scene, wanted: Sequence[Wanted]) -> Iterator[_Band]:
-    """Yield every band along each trajectory for itself: only there k must not change."""
-    for w in wanted:
-        if w.requirement.kind != "keep_out":
-            continue
-        for part, rows in zip(scene.path.parts, scene.path.rows, strict=True):
-            label = w.requirement.label
-            label = f"{label} along {part.name!r}" if scene.path.several else label
-            first, last = max(rows.start, w.rows.start), min(rows.stop, w.rows.stop)
-            if first < last:
-                own = slice(first - w.rows.start, last - w.rows.start)
-                yield _Band(w, label, slice(first, last), w.lower_hz[own], w.upper_hz[own])
-
-
-def possible_counts(scene: Scene, band: _Band) -> list[int]:
+def possible_counts(scene: Scene, band: ForbiddenBand) -> list[int]:
     """Each k that may be, from the fewest modes below the band to the most, at designs all over.
 
     The likeliest comes first.
     """
-    named, (lower, upper) = sorted(band.wanted.requirement.modes), scene.bounds
+    lower, upper = scene.bounds
     designs = [scene.initial, lower, upper, 0.5 * (lower + upper)]
     if len(lower):
         designs += list(spread_designs(scene, 8, 1))
@@ -202,25 +158,10 @@ def possible_counts(scene: Scene, band: _Band) -> list[int]:
     for y in designs:
         with suppress(EigassignError):
             q = scene.path.at(y)[0][band.rows]
-            hz = _all_below(scene, q, y, float(band.upper_hz.max()))
-            hz = hz[:, [m - 1 for m in named if m <= hz.shape[1]]] if named else hz
-            edges = (band.lower_hz, band.upper_hz)
-            found.append(np.concatenate([(hz < e[:, None]).sum(axis=1) for e in edges]))
+            found.append(band.below(_all_below(scene, q, y, float(band.upper_hz.max()))))
     first, counts = int(np.median(found[0])), np.array(found)
     possible = range(int(counts.min()), int(counts.max()) + 1)
     return sorted(possible, key=lambda k: (abs(k - first), k))
-
-
-def _beside(scene: Scene, band: _Band, k: int, margin: float) -> Iterator[FrequencyLimit]:
-    """The limits that say: k of the named modes (of all, if none is named) are below the band."""
-    lower, upper = band.lower_hz * (1.0 - margin), band.upper_hz * (1.0 + margin)
-    label, named = band.wanted.requirement.label, tuple(sorted(band.wanted.requirement.modes))
-    if k:
-        below = named[k - 1] if named else k
-        yield FrequencyLimit(label, ((below, 1.0),), lower, band.rows, False)
-    q = scene.path.at(scene.initial)[0][band.rows]
-    if above := mode_above(scene.model, k, named, q, scene.initial):
-        yield FrequencyLimit(label, ((above, 1.0),), upper, band.rows, True)
 
 
 def _all_below(scene: Scene, q: Floats, y: Floats, hz: float) -> Floats:

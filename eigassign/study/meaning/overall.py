@@ -16,16 +16,15 @@ from eigassign.assignment.exact.design_problem import MET, Appraisal
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.errors import EigassignError
 from eigassign.study.design.answer import Answer, active_rows
-from eigassign.study.design.followed import Solved
 from eigassign.study.design.optimum import Found
 from eigassign.study.design.variants import Task, variant_of
 from eigassign.study.meaning.reach import misses, proved_ranges, reach_rows, unreachable
 from eigassign.study.meaning.sensitivity import error_kind, relaxed_limits, sensitivities
 from eigassign.study.meaning.tolerance import study_tolerance
 from eigassign.study.meaning.tradeoff import trade_off
+from eigassign.study.requirements.requirement import Requirement, Solved
 from eigassign.study.results import Meaning, RelaxedRow, ToleranceRows
 from eigassign.study.scene import Scene
-from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +40,7 @@ class Studies(StrEnum):
 def study_meaning(
     scene: Scene,
     answer: Answer,
-    wanted: Sequence[Wanted],
+    wanted: Sequence[Requirement],
     exact: Solved,
     max_error: float,
     studies: Studies,
@@ -73,7 +72,7 @@ def study_meaning(
 
 
 def _tolerance(
-    scene: Scene, answer: Answer, wanted: Sequence[Wanted], exact: Solved, notes: list[str]
+    scene: Scene, answer: Answer, wanted: Sequence[Requirement], exact: Solved, notes: list[str]
 ) -> ToleranceRows | None:
     """The spread within the tolerances; where it cannot be had, why not among the notes."""
     try:
@@ -96,7 +95,7 @@ def _relaxed(scene: Scene, answer: Answer, found: Found) -> Iterator[RelaxedRow]
 
 
 def _judged(
-    scene: Scene, answer: Answer, wanted: Sequence[Wanted]
+    scene: Scene, answer: Answer, wanted: Sequence[Requirement]
 ) -> tuple[Requirements, Appraisal]:
     """The studies asked for, with their results; solved only where they were not before."""
     if answer.found is not None:

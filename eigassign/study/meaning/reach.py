@@ -19,14 +19,13 @@ from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem
 from eigassign.assignment.exact.requirements import FrequencyGoal, Requirements
 from eigassign.assignment.exact.sequential import minimise
 from eigassign.errors import EigassignError
-from eigassign.study.design.followed import Solved, followers, solve_design
-from eigassign.study.design.judgement import curve_range, errors_of, least_errors
+from eigassign.study.design.followed import followers, solve_design
 from eigassign.study.design.one_shot import linear_constraints
 from eigassign.study.design.response import response_of
 from eigassign.study.meaning.monotone import corners, effects
+from eigassign.study.requirements.requirement import Requirement, Solved
 from eigassign.study.results import RangeRow
 from eigassign.study.scene import Scene
-from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 LIMIT = 1e-4  # of a limit: by so much it must be missed to be called out of reach
@@ -48,26 +47,26 @@ def proved_ranges(scene: Scene) -> tuple[Solved, Solved] | None:
         return None
 
 
-def reach_rows(wanted: Sequence[Wanted], ranges: tuple[Solved, Solved]) -> Iterator[RangeRow]:
+def reach_rows(wanted: Sequence[Requirement], ranges: tuple[Solved, Solved]) -> Iterator[RangeRow]:
     """The range of each target's curve at every sample, and the least error that is left."""
     for w in wanted:
-        if w.requirement.kind != "keep_out" and w.requirement.followed is None:
-            error = float(least_errors(w, *ranges).max())
-            yield RangeRow(w.requirement.label, *curve_range(w, *ranges), "proved", error)
+        if w.terms and w.followed is None:
+            error = float(w.least_errors(*ranges).max())
+            yield RangeRow(w.label, *w.curve_range(*ranges), "proved", error)
 
 
-def misses(wanted: Wanted, exact: Solved, max_error: float) -> bool:
+def misses(wanted: Requirement, exact: Solved, max_error: float) -> bool:
     """True if a target is missed by more than is allowed, ``max_error`` of a wanted frequency."""
-    return bool(np.abs(errors_of(wanted, exact)).max() > _allowed(wanted, max_error))
+    return bool(np.abs(wanted.errors(exact)).max() > _allowed(wanted, max_error))
 
 
-def _allowed(wanted: Wanted, max_error: float) -> float:
-    return max_error if wanted.requirement.kind == "frequency" else LIMIT
+def _allowed(wanted: Requirement, max_error: float) -> float:
+    return max_error if wanted.is_goal else LIMIT
 
 
 def unreachable(
     scene: Scene,
-    wanted: Sequence[Wanted],
+    wanted: Sequence[Requirement],
     y: Floats,
     exact: Solved,
     max_error: float,
@@ -77,52 +76,44 @@ def unreachable(
     for w in wanted:
         if not misses(w, exact, max_error):
             continue
-        allowed, errors = _allowed(w, max_error), errors_of(w, exact)
-        if ranges is not None and w.requirement.followed is None:
-            left = least_errors(w, *ranges)
+        allowed, errors = _allowed(w, max_error), w.errors(exact)
+        if ranges is not None and w.followed is None:
+            left = w.least_errors(*ranges)
             k = int(left.argmax())
             if left[k] > allowed:
-                low, high = (values[k] for values in curve_range(w, *ranges))
+                low, high = (values[k] for values in w.curve_range(*ranges))
                 yield (
-                    f"{w.requirement.label} is out of reach at "
+                    f"{w.label} is out of reach at "
                     f"{scene.path.where(w.rows.start + k)}: within the bounds it lies between "
                     f"{low:.4g} and {high:.4g} Hz there (proved)"
                 )
-        elif w.requirement.kind in ("frequency", "at_least", "at_most"):
+        elif len(w.terms) == 1:
             yield from _searched(scene, w, y, errors, allowed)
 
 
 def _searched(
-    scene: Scene, wanted: Wanted, y: Floats, errors: Floats, allowed: float
+    scene: Scene, wanted: Requirement, y: Floats, errors: Floats, allowed: float
 ) -> Iterator[str]:
     """The first of the samples missed most, above and below, at which no design is near enough."""
-    if wanted.requirement.kind == "frequency":
-        missed = [int(errors.argmax()), int(errors.argmin())]
-    else:
-        missed = [int(errors.argmax())]
+    missed = [int(errors.argmax()), *([int(errors.argmin())] if wanted.is_goal else [])]
     for k in dict.fromkeys(k for k in missed if abs(errors[k]) > allowed):
         nearest = _nearest(scene, wanted, k, y, allowed)
-        if nearest is not None and abs(nearest / _goal(wanted, k) - 1.0) > allowed:
+        if nearest is not None and abs(nearest / wanted.hz[k] - 1.0) > allowed:
             yield (
-                f"{wanted.requirement.label} is out of reach at "
+                f"{wanted.label} is out of reach at "
                 f"{scene.path.where(wanted.rows.start + k)}: no design found within the limits "
                 f"comes nearer than {nearest:.4g} Hz there"
             )
             return
 
 
-def _goal(wanted: Wanted, k: int) -> float:
-    upper = wanted.requirement.kind == "at_most"
-    return float((wanted.upper_hz if upper else wanted.lower_hz)[k])
-
-
-def _nearest(scene: Scene, wanted: Wanted, k: int, y: Floats, allowed: float) -> float | None:
+def _nearest(scene: Scene, wanted: Requirement, k: int, y: Floats, allowed: float) -> float | None:
     """The frequency nearest to the one wanted at sample k of the target, by a search of its own.
 
     The search ends with the first start that leads within ``allowed`` of it.
     """
-    at, goal = wanted.rows.start + k, _goal(wanted, k)
-    target = FrequencyGoal(wanted.mode, np.array([goal]), slice(0, 1))
+    at, goal = wanted.rows.start + k, float(wanted.hz[k])
+    target = FrequencyGoal(wanted.terms[0][0], wanted.hz[k : k + 1], slice(0, 1))
     asked = Requirements((target,), (), (), np.ones(1))
     alone = replace(scene, trajectory=scene.path.chosen([at]))
     own = followers(alone, [replace(wanted, rows=slice(0, 1))])

@@ -17,8 +17,8 @@ from eigassign.assignment.exact.requirements import Requirements
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy
 from eigassign.study.design.variants import MASS
+from eigassign.study.requirements.requirement import Requirement
 from eigassign.study.results import ActiveRow, RelaxedRow, SensitivityRow
-from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 STEP = 0.04  # of the range of a bound, or of a limit: how far it is relaxed, to one digit
@@ -26,7 +26,7 @@ MOST = 0.3  # of F: a larger fall is beyond what first order can tell
 
 
 def sensitivities(
-    file: CaseFile, wanted: Sequence[Wanted], asked: Requirements, y: Floats, seen: Appraisal
+    file: CaseFile, wanted: Sequence[Requirement], asked: Requirements, y: Floats, seen: Appraisal
 ) -> Iterator[SensitivityRow]:
     """One row for each parameter and curve that a target or limit is about."""
     curves = list(zip(_labels(wanted, asked), asked.curves(seen), strict=True))
@@ -49,12 +49,10 @@ def _largest(values: Floats) -> float:
     return float(values[np.abs(values).argmax()])
 
 
-def _labels(wanted: Sequence[Wanted], asked: Requirements) -> Iterator[str]:
+def _labels(wanted: Sequence[Requirement], asked: Requirements) -> Iterator[str]:
     """The name of each curve: as its target, and at the edge of a band by its mode."""
-    yield from (w.requirement.label for w in wanted if w.requirement.kind == "frequency")
-    bands = {w.requirement.label for w in wanted if w.requirement.kind == "keep_out"}
-    for limit in asked.limits:
-        yield f"{limit.name}: mode {limit.terms[0][0]}" if limit.name in bands else limit.name
+    yield from (w.label for w in wanted if w.is_goal)
+    yield from (limit.curve or limit.name for limit in asked.limits)
 
 
 # --- Limits

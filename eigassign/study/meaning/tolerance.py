@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 
 from eigassign.errors import AccuracyError
 from eigassign.modal.reduced.reduce import reduce
-from eigassign.study.design.followed import Follower, Solved, followers, solve_design
-from eigassign.study.design.judgement import curve_range, errors_of, worst_errors
+from eigassign.study.design.followed import Follower, followers, solve_design
 from eigassign.study.meaning.monotone import corners, effects
+from eigassign.study.requirements.requirement import Requirement, Solved
 from eigassign.study.results import RangeRow, ToleranceRows
 from eigassign.study.scene import Scene
-from eigassign.study.wanted import Wanted
 
 Floats = NDArray[np.float64]
 DRAWS = 64  # a power of two, as Sobol's points want
@@ -32,7 +31,7 @@ Ranges = Callable[[Floats], tuple[Solved, Solved]]  # of a design: between what 
 
 
 def study_tolerance(
-    scene: Scene, wanted: Sequence[Wanted], y: Floats, exact: Solved
+    scene: Scene, wanted: Sequence[Requirement], y: Floats, exact: Solved
 ) -> ToleranceRows | None:
     """The spread of every target about the answer ``y``; None where no tolerance is stated.
 
@@ -78,21 +77,16 @@ def _combined(pick: Callable[[Floats, Floats], Floats], a: Solved, b: Solved) ->
 
 
 def _rows(
-    wanted: Sequence[Wanted], exact: Solved, lowest: Solved, highest: Solved, how: str
+    wanted: Sequence[Requirement], exact: Solved, lowest: Solved, highest: Solved, how: str
 ) -> ToleranceRows:
-    errors = [float(worst_errors(w, lowest, highest).max()) for w in wanted]
+    errors = [float(w.worst_errors(lowest, highest).max()) for w in wanted]
     rows = tuple(
-        RangeRow(w.requirement.label, *curve_range(w, lowest, highest), how, error)
+        RangeRow(w.label, *w.curve_range(lowest, highest), how, error)
         for w, error in zip(wanted, errors, strict=True)
     )
-    counted = [w.requirement.kind == "frequency" for w in wanted]
-    counted = counted if any(counted) else [True] * len(counted)
-    own = [
-        pair
-        for pair, counts in zip(zip(wanted, errors, strict=True), counted, strict=True)
-        if counts
-    ]
-    before = max(float(np.abs(errors_of(w, exact)).max()) for w, _ in own)
+    pairs = list(zip(wanted, errors, strict=True))
+    own = [pair for pair in pairs if pair[0].is_goal] or pairs
+    before = max(float(np.abs(w.errors(exact)).max()) for w, _ in own)
     after = max(error for _, error in own)
     tried = {"proved": "proved", "followed": "the worst of both corners"}.get(
         how, f"the worst of {DRAWS} draws"

@@ -17,14 +17,14 @@ from eigassign.case import parse
 from eigassign.errors import CaseError, LostModeError
 from eigassign.pipeline import Stages, prepare
 from eigassign.study import (
+    Requirement,
     Scene,
     Solved,
-    Wanted,
     followers,
     require_one_shape,
+    requirements_of,
     response_of,
     solve_design,
-    target_frequencies,
 )
 
 RAIL_LIKE = {"like": 1, "at": {"time": 0.0}}
@@ -39,8 +39,8 @@ def scene_of(given: Case) -> Scene:
     return prepare(given, Stages(lambda line: None), None)
 
 
-def asked(scene: Scene) -> tuple[Wanted, ...]:
-    return target_frequencies(scene.file, scene.path)
+def asked(scene: Scene) -> tuple[Requirement, ...]:
+    return requirements_of(scene.file, scene.path)
 
 
 def solved(scene: Scene, y: tuple[float, ...] | np.ndarray) -> Solved:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from eigassign.study import ErrorRow, ErrorSummary, TargetStudy, verdict
+from eigassign.study import KINDS, ErrorRow, ErrorSummary, TargetStudy, verdict
 
 
 def missed(kind: str, initial: ErrorRow, exact: ErrorRow) -> TargetStudy:
     hz = np.full(3, 48.0)
+    asked = KINDS[kind](
+        label="mode 1 at 48 Hz", place="targets[0]", modes=(1,), terms=((1, 1.0),),
+        rows=slice(0, 3), lower_hz=hz, upper_hz=hz, along=(("1", slice(0, 3)),),
+    )  # fmt: skip
     return TargetStudy(
-        kind=kind, label="mode 1 at 48 Hz", modes=(1,), lower_hz=hz, upper_hz=hz, initial_hz=hz,
-        exact_hz=hz, predicted_hz=None, one_shot_hz=None, error=ErrorSummary(initial, exact),
-        satisfied=False, trajectory=None, rows=slice(0, 3), weight_s=1.0, weight=1.0, along=(),
+        asked=asked, initial_hz=hz, exact_hz=hz, predicted_hz=None, one_shot_hz=None,
+        error=ErrorSummary(initial, exact), satisfied=False, weight_s=1.0, along=(),
     )  # fmt: skip
 
 

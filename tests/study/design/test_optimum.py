@@ -12,12 +12,12 @@ from scenes import SHIPPED, scene_of
 
 from eigassign.assignment import End
 from eigassign.modal import Model
-from eigassign.study import Found, find_optimum, target_frequencies
+from eigassign.study import Found, find_optimum, requirements_of
 
 
 def found_of(folder: Path, text: str, starts: list[str]) -> Found:
     scene = scene_of(folder, text)
-    wanted = target_frequencies(scene.file, scene.path)
+    wanted = requirements_of(scene.file, scene.path)
     return find_optimum(scene, wanted, [], starts.append)
 
 
@@ -41,7 +41,7 @@ class PressedModel:
 def test_ctrl_c_ends_the_whole_search_and_not_one_start_of_it(call: int, tmp_path: Path) -> None:
     scene = scene_of(tmp_path, SHIPPED)
     pressed, starts = PressedModel(scene.model, call), []
-    wanted = target_frequencies(scene.file, scene.path)
+    wanted = requirements_of(scene.file, scene.path)
     found = find_optimum(replace(scene, model=pressed), wanted, [], starts.append)
     assert found.best.end is End.INTERRUPTED
     assert len(starts) <= 3

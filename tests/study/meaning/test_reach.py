@@ -15,9 +15,9 @@ from eigassign.study import (
     Scene,
     proved_ranges,
     reduced_ranges,
+    requirements_of,
     solve_design,
     study_tolerance,
-    target_frequencies,
     unreachable,
 )
 
@@ -30,7 +30,7 @@ def grid(lower: np.ndarray, upper: np.ndarray, n: int = 4) -> list[np.ndarray]:
 
 
 def said(scene: Scene, y: np.ndarray) -> list[str]:
-    wanted = target_frequencies(scene.file, scene.path)
+    wanted = requirements_of(scene.file, scene.path)
     return list(
         unreachable(scene, wanted, y, solve_design(scene, (), y), 0.02, proved_ranges(scene))
     )
@@ -86,7 +86,7 @@ TOLERANT = (
 def test_tolerances_of_masses_are_bounded_by_two_corners(tmp_path: Path) -> None:
     scene, y = scene_of(tmp_path, changed(SHORT, *TOLERANT)), np.array([0.2, 0.1])
     found = study_tolerance(
-        scene, target_frequencies(scene.file, scene.path), y, solve_design(scene, (), y)
+        scene, requirements_of(scene.file, scene.path), y, solve_design(scene, (), y)
     )
     assert found is not None
     (row,) = found.targets
@@ -102,7 +102,7 @@ def test_tolerances_of_masses_are_bounded_by_two_corners(tmp_path: Path) -> None
 def test_no_mass_deviates_below_nothing(tmp_path: Path) -> None:
     scene, y = scene_of(tmp_path, changed(SHORT, *TOLERANT)), np.array([0.0, 0.1])
     found = study_tolerance(
-        scene, target_frequencies(scene.file, scene.path), y, solve_design(scene, (), y)
+        scene, requirements_of(scene.file, scene.path), y, solve_design(scene, (), y)
     )
     assert found is not None
     np.testing.assert_allclose(found.targets[0].highest_hz, scene.exact([0.0, 0.09])[:, 0])
@@ -120,7 +120,7 @@ def test_other_tolerances_are_drawn_beside_the_corners_of_the_masses(tmp_path: P
         np.array([0.2, 7e-4]),
     )
     found = study_tolerance(
-        scene, target_frequencies(scene.file, scene.path), y, solve_design(scene, (), y)
+        scene, requirements_of(scene.file, scene.path), y, solve_design(scene, (), y)
     )
     assert found is not None
     (row,) = found.targets
@@ -145,5 +145,5 @@ def test_ranges_of_a_reduced_model_hold_the_exact_frequencies(tmp_path: Path) ->
 
 def test_without_tolerances_there_is_nothing_to_say(tmp_path: Path) -> None:
     scene = scene_of(tmp_path, changed(SHORT))
-    wanted, y = target_frequencies(scene.file, scene.path), scene.initial
+    wanted, y = requirements_of(scene.file, scene.path), scene.initial
     assert study_tolerance(scene, wanted, y, solve_design(scene, (), y)) is None

@@ -14,9 +14,9 @@ from eigassign.study import (
     Scene,
     Studies,
     find_answer,
+    requirements_of,
     solve_design,
     study_meaning,
-    target_frequencies,
 )
 
 
@@ -24,7 +24,7 @@ def answered(
     folder: Path, text: str, studies: Studies = Studies.CHEAP
 ) -> tuple[Scene, Answer, Meaning]:
     scene = scene_of(folder, text)
-    wanted = target_frequencies(scene.file, scene.path)
+    wanted = requirements_of(scene.file, scene.path)
     answer = find_answer(scene, wanted, lambda line: None)
     exact = solve_design(scene, (), answer.y)
     return scene, answer, study_meaning(scene, answer, wanted, exact, 0.02, studies)

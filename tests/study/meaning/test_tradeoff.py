@@ -16,7 +16,7 @@ from eigassign.study import (
     TradeOffPoint,
     find_answer,
     kept,
-    target_frequencies,
+    requirements_of,
     trade_off,
 )
 
@@ -27,7 +27,7 @@ WORST = ("validation:", "assignment: {objective: worst_case}\nvalidation:")
 
 def curve_of(folder: Path, *changes: tuple[str, str]) -> tuple[Scene, Found, TradeOff | None]:
     scene = scene_of(folder, changed(FEW, *changes))
-    answer = find_answer(scene, target_frequencies(scene.file, scene.path), lambda line: None)
+    answer = find_answer(scene, requirements_of(scene.file, scene.path), lambda line: None)
     assert answer.found is not None
     return scene, answer.found, trade_off(scene, answer.found)
 

@@ -12,7 +12,13 @@ from small_case import TEXT
 from eigassign.case import load
 from eigassign.errors import CaseError
 from eigassign.mechanism import NamedTrajectory, Trajectories, Trajectory
-from eigassign.study import Wanted, named_design, named_pose, target_frequencies
+from eigassign.study import (
+    Requirement,
+    followed_modes,
+    named_design,
+    named_pose,
+    requirements_of,
+)
 
 MOTION = TEXT[TEXT.index("trajectory:\n") : TEXT.index("design:\n")]
 SEVERAL = "trajectory:\n  - {name: a, file: a.csv}\n  - {name: b, file: b.csv}\n"
@@ -39,16 +45,16 @@ def path() -> Trajectories:
 
 
 @pytest.fixture
-def wanted(folder: Path, path: Trajectories) -> Callable[[str], tuple[Wanted, ...]]:
-    def read(target: str) -> tuple[Wanted, ...]:
+def wanted(folder: Path, path: Trajectories) -> Callable[[str], tuple[Requirement, ...]]:
+    def read(target: str) -> tuple[Requirement, ...]:
         text = TEXT.replace(MOTION, SEVERAL).replace(TARGETS, f"targets:\n  - {target}\n")
         (folder / "case.yaml").write_text(text)
-        return target_frequencies(load(folder / "case.yaml"), path)
+        return requirements_of(load(folder / "case.yaml"), path)
 
     return read
 
 
-Read = Callable[[str], tuple[Wanted, ...]]
+Read = Callable[[str], tuple[Requirement, ...]]
 
 
 def test_a_frequency_is_both_limits_and_a_limit_is_one(wanted: Read) -> None:
@@ -58,7 +64,12 @@ def test_a_frequency_is_both_limits_and_a_limit_is_one(wanted: Read) -> None:
         ("at_most", -np.inf, 9.0),
     ):
         (one,) = wanted(f"{{mode: 2, {key}: 9 Hz, weight: 3}}")
-        assert (one.mode, one.weight, one.rows) == (2, 3.0, slice(0, 17))
+        assert (one.modes, one.terms, one.weight, one.rows) == (
+            (2,),
+            ((2, 1.0),),
+            3.0,
+            slice(0, 17),
+        )
         np.testing.assert_array_equal(one.lower_hz, np.full(17, low))
         np.testing.assert_array_equal(one.upper_hz, np.full(17, high))
 
@@ -79,7 +90,7 @@ def test_a_band_lies_between_its_edges_and_follows_the_harmonic(wanted: Read) ->
 
 def test_a_gap_is_a_width(wanted: Read) -> None:
     (gap,) = wanted("{gap: {between: [1, 2], at_least: 20 Hz}}")
-    assert gap.requirement.modes == (1, 2)
+    assert (gap.modes, gap.terms) == ((1, 2), ((2, 1.0), (1, -1.0)))
     assert set(gap.lower_hz) == {20.0}
 
 
@@ -141,11 +152,11 @@ def test_a_followed_mode_is_named_at_a_pose_and_design(
     text = text.replace("  constraints:\n", f"  pipe: {{choices: {{{choices}}}}}\n  constraints:\n")
     (folder / "case.yaml").write_text(text)
     file = load(folder / "case.yaml")
-    (requirement,) = file.requirements
-    assert requirement.followed is not None
-    named = named_design(file, requirement.followed)
+    (followed,) = followed_modes(file)
+    named = named_design(file, followed)
     np.testing.assert_allclose(named, y, rtol=1e-14)
     for some in (path, path.chosen([0, 10, 11])):  # the pose is one of the whole trajectory
-        found = named_pose(file, requirement.followed, some, named)
+        found = named_pose(file, followed, some, named)
         np.testing.assert_allclose(found, q, rtol=1e-14)
-    assert target_frequencies(file, path)[0].mode == -1
+    (one,) = requirements_of(file, path)
+    assert (one.followed, one.modes, one.terms) == (followed, (), ((-1, 1.0),))

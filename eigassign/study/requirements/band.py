@@ -1,0 +1,150 @@
+"""No mode is in a band, or none of those named.
+
+Along one trajectory a band is clear if and only if the number k of modes below both of its edges is
+the same everywhere. Whatever k is, that is two limits: mode k is at most the lower edge, and mode
+k + 1 at least the upper one. From one trajectory to another k may change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from eigassign.assignment.exact.requirements import FrequencyLimit
+from eigassign.case.schema.targets import Harmonic, KeepOutTarget
+from eigassign.study.requirements.requirement import (
+    Edges,
+    Floats,
+    Ints,
+    Requirement,
+    Solved,
+    Terms,
+    in_hz,
+)
+
+NEAR = 0.5  # of an edge: modes this near to a band are shown with it
+
+
+class ForbiddenBand(Requirement):
+    """The modes keep out of what lies between both edges.
+
+    The error is the way that they lack to be clear, with the best constant number of them below
+    along each trajectory: the way out of the band, relative to the edge that is passed, and that
+    of modes on the wrong side to the other edge. For its curve stands the frequency nearest to the
+    middle of the band.
+    """
+
+    form = KeepOutTarget
+    columns = ("lower", "upper")
+
+    @staticmethod
+    def asked(target: KeepOutTarget) -> str:
+        """What is asked of the modes, in words."""
+        band = target.keep_out
+        if not isinstance(band, Harmonic):
+            return "clear of {:g} … {:g} Hz".format(*band)
+        times = "" if band.harmonic == 1.0 else f"{band.harmonic:g} times "
+        return f"clear of {times}{in_hz(band.of)} ± {100 * band.margin:g} %"
+
+    @staticmethod
+    def edges(target: KeepOutTarget, *hz: Floats) -> Edges:
+        """Both edges as they are given, or about a multiple of a frequency."""
+        band = target.keep_out
+        if not isinstance(band, Harmonic):
+            return hz[0], hz[1]
+        middle = band.harmonic * hz[0]
+        return middle * (1.0 - band.margin), middle * (1.0 + band.margin)
+
+    @staticmethod
+    def terms_of(modes: tuple[int, ...]) -> Terms:
+        """None: which mode is at an edge depends on k."""
+        return ()
+
+    @property
+    def bands(self) -> tuple[tuple[str, ForbiddenBand], ...]:
+        """The band along each trajectory for itself, in words: only there k must not change."""
+        words = (f"{self.label} along {name!r}" for name, _ in self.along)
+        each = words if len(self.along) > 1 else (self.label,)
+        return tuple(zip(each, self.parts, strict=True))
+
+    @property
+    def counted(self) -> tuple[int, ...]:
+        """The only modes that count, ascending; none where all do."""
+        return tuple(sorted(self.modes))
+
+    def below(self, hz: Floats) -> Ints:
+        """How many modes are below each edge (2, n); of ``hz`` (n, count), all that matter."""
+        hz = hz[:, [m - 1 for m in self.counted if m <= hz.shape[1]]] if self.modes else hz
+        edges = (self.lower_hz, self.upper_hz)
+        return np.array([(hz < edge[:, None]).sum(axis=1) for edge in edges])
+
+    def kept_clear(self, k: int, above: int | None, margin: float) -> Iterator[FrequencyLimit]:
+        """The limits that say: k of the modes that count are below, and mode ``above`` is above.
+
+        ``above`` is 0 or None where there is no such mode; by ``margin`` (relative) modes keep off.
+        """
+        lower, upper = self.lower_hz * (1.0 - margin), self.upper_hz * (1.0 + margin)
+        if k:
+            highest = self.counted[k - 1] if self.modes else k
+            yield self._limit(highest, lower, False)
+        if above:
+            yield self._limit(above, upper, True)
+
+    def _limit(self, mode: int, hz: Floats, at_least: bool) -> FrequencyLimit:
+        terms, curve = ((mode, 1.0),), f"{self.label}: mode {mode}"
+        return FrequencyLimit(self.label, terms, hz, self.rows, at_least, curve)
+
+    def limits(self) -> Iterator[FrequencyLimit]:
+        """Yield nothing: they depend on k."""
+        yield from ()
+
+    def curve(self, solved: Solved) -> Floats:
+        """The frequency (n,) nearest to the middle of the band."""
+        own = self._counted(solved)
+        middle = 0.5 * (self.lower_hz + self.upper_hz)
+        nearest = np.abs(own - middle[:, None]).argmin(axis=1)
+        return np.asarray(own[np.arange(len(own)), nearest])
+
+    def curve_range(self, lowest: Solved, highest: Solved) -> Edges:
+        """The curve of either: no range, for another mode may be nearest."""
+        return self.curve(lowest), self.curve(highest)
+
+    def worst_errors(self, lowest: Solved, highest: Solved) -> Floats:
+        """The way (n,) that modes between two frequencies lack to be clear."""
+        least, most = self._counted(lowest), self._counted(highest)
+        low, high = self.lower_hz[:, None], self.upper_hz[:, None]
+        down, up = np.maximum(most / low - 1.0, 0.0), np.maximum(1.0 - least / high, 0.0)
+        return np.concatenate([_fewest(down[own], up[own]) for _, own in self.along])
+
+    def least_errors(self, lowest: Solved, highest: Solved) -> Floats:
+        """No errors (n,): which mode is where is not known."""
+        return np.zeros(len(self.lower_hz))
+
+    def _counted(self, solved: Solved) -> Floats:
+        own = solved.hz[self.rows]
+        return own[:, [m - 1 for m in self.counted]] if self.modes else own
+
+    def near(self, initial: Solved, exact: Solved) -> tuple[int, ...]:
+        """The modes near the band before or after, and at least those on either side of it."""
+        both = np.stack([initial.hz[self.rows], exact.hz[self.rows]])
+        low, high = self.lower_hz.min(), self.upper_hz.max()
+        inside = (both > low * (1.0 - NEAR)) & (both < high * (1.0 + NEAR))
+        shown = inside.any(axis=(0, 1))
+        below = int((both[1].max(axis=0) < high).sum())  # as many modes are below
+        shown[max(below - 1, 0) : below + 1] = True
+        return tuple((np.flatnonzero(shown) + 1).tolist())
+
+    @property
+    def forbidden_hz(self) -> Edges:
+        """Both edges."""
+        return self.lower_hz, self.upper_hz
+
+
+def _fewest(down: Floats, up: Floats) -> Floats:
+    """The errors (n,) with the best k: of modes (n, count) the ways below, and above, the band."""
+    choices = [
+        np.maximum(down[:, :k].max(axis=1, initial=0.0), up[:, k:].max(axis=1, initial=0.0))
+        for k in range(down.shape[1] + 1)
+    ]
+    return np.asarray(min(choices, key=lambda errors: float(errors.max())))

@@ -1,0 +1,42 @@
+"""A mode has a frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from eigassign.assignment.exact.requirements import FrequencyGoal, FrequencyLimit
+from eigassign.case.schema.targets import FrequencyTarget
+from eigassign.study.requirements.requirement import Edges, Floats, Requirement, Solved, in_hz
+
+
+class AssignedFrequency(Requirement):
+    """The frequency of a mode is ``hz``; the error is the distance to it, of either sign."""
+
+    form = FrequencyTarget
+    is_goal = True
+    of_soft_model = True
+    columns = ("target", "initial", "one shot", "predicted", "exact")
+
+    @staticmethod
+    def asked(target: FrequencyTarget) -> str:
+        """What is asked of the mode, in words."""
+        return f"at {in_hz(target.frequency)}"
+
+    @staticmethod
+    def edges(target: FrequencyTarget, *hz: Floats) -> Edges:
+        """Both the frequency."""
+        return hz[0], hz[0]
+
+    def errors(self, solved: Solved) -> Floats:
+        """The errors f / f_d − 1 (n,)."""
+        return np.asarray(self.curve(solved) / self.hz - 1.0)
+
+    def goals(self) -> Iterator[FrequencyGoal]:
+        """Yield the frequency itself."""
+        yield FrequencyGoal(self.terms[0][0], self.hz, self.rows, self.weight)
+
+    def limits(self) -> Iterator[FrequencyLimit]:
+        """Yield nothing: to miss it violates no limit."""
+        yield from ()

@@ -1,0 +1,143 @@
+"""The targets of a case as requirements at the samples of its trajectories.
+
+A requirement is at all samples, those of one trajectory, or a part of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from eigassign.assignment.checks import frozen
+from eigassign.assignment.targets import sample_target, trapezoidal_weights
+from eigassign.case.case_file import CaseFile
+from eigassign.case.reader import dotted
+from eigassign.case.schema.targets import AnyTarget, FrequencyFile, FrequencyProfile
+from eigassign.case.table import CsvColumn, read_table
+from eigassign.case.units import DIMENSIONS
+from eigassign.errors import CaseError, UsageError
+from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.study.build import located
+from eigassign.study.requirements.band import ForbiddenBand
+from eigassign.study.requirements.frequency import AssignedFrequency
+from eigassign.study.requirements.gap import ModeGap
+from eigassign.study.requirements.lower_limit import LowerLimit
+from eigassign.study.requirements.named_modes import followed_modes
+from eigassign.study.requirements.requirement import Requirement
+from eigassign.study.requirements.upper_limit import UpperLimit
+
+Floats = NDArray[np.float64]
+_Curve = float | FrequencyProfile | FrequencyFile
+KINDS: dict[str, type[Requirement]] = {
+    one.form.kind: one
+    for one in (AssignedFrequency, LowerLimit, UpperLimit, ForbiddenBand, ModeGap)
+}  # by the key that only their targets have
+
+
+def requirements_of(file: CaseFile, path: Trajectories) -> tuple[Requirement, ...]:
+    """The requirements of all targets, one for each mode, in the order of the file.
+
+    Raises CaseError where a profile ends before a trajectory does, a part of a trajectory has no
+    sample, or a file cannot be read.
+    """
+    return tuple(
+        one for k, target in enumerate(file.targets) for one in _of_target(file, k, target, path)
+    )
+
+
+def time_weights(path: Trajectories) -> Floats:
+    """ω (n_t,) in s of the integral over every trajectory for itself, by the trapezoidal rule."""
+    return path.weights(trapezoidal_weights)
+
+
+def _of_target(
+    file: CaseFile, k: int, target: AnyTarget, path: Trajectories
+) -> Iterator[Requirement]:
+    kind, place = KINDS[target.kind], f"targets[{k}]"
+    rows = _rows(file, place, target, path)
+    along = tuple(_along(path, rows))
+    sampled = (
+        _sampled(file, curve, f"{place}.{dotted(keys)}", rows, path)
+        for keys, curve in target.frequencies
+    )
+    lower, upper = map(frozen, kind.edges(target, *sampled))
+    for modes in target.named:
+        who, terms = _who(modes), kind.terms_of(modes)
+        if target.followed is not None:
+            own = followed_modes(file)
+            who = target.followed.name
+            modes, terms = (), ((own.index(target.followed) - len(own), 1.0),)
+        yield kind(
+            label=f"{who} {kind.asked(target)}{_where(target)}",
+            place=place,
+            modes=modes,
+            terms=terms,
+            rows=rows,
+            lower_hz=lower,
+            upper_hz=upper,
+            along=along,
+            weight=target.weight,
+            trajectory=target.trajectory,
+            followed=target.followed,
+        )
+
+
+def _who(modes: tuple[int, ...]) -> str:
+    if not modes:
+        return "every mode"
+    *first, last = map(str, modes)
+    return f"modes {', '.join(first)} and {last}" if first else f"mode {last}"
+
+
+def _where(target: AnyTarget) -> str:
+    where = f" along {target.trajectory!r}" if target.trajectory else ""
+    return where + (" from {:g} to {:g} s".format(*target.during) if target.during else "")
+
+
+def _rows(file: CaseFile, place: str, target: AnyTarget, path: Trajectories) -> slice:
+    rows = path.rows_of(target.trajectory)
+    if target.during is None:
+        return rows
+    time_s, (first, last) = path.time_s[rows], target.during
+    slack = 1e-9 * float(np.ptp(time_s))  # rounding of a time grid, far below a step
+    inside = np.flatnonzero((time_s >= first - slack) & (time_s <= last + slack))
+    if not len(inside):
+        message = f"no sample of the trajectory is between {first:g} and {last:g} s"
+        raise CaseError((file.problem(f"{place}.during", message),))
+    return slice(rows.start + int(inside[0]), rows.start + int(inside[-1]) + 1)
+
+
+def _along(path: Trajectories, rows: slice) -> Iterator[tuple[str, slice]]:
+    """Yield the trajectories that have some of these rows, each with its part of them."""
+    for part, own in zip(path.parts, path.rows, strict=True):
+        first, last = max(own.start, rows.start), min(own.stop, rows.stop)
+        if first < last:
+            yield part.name, slice(first - rows.start, last - rows.start)
+
+
+def _sampled(file: CaseFile, curve: _Curve, key: str, rows: slice, path: Trajectories) -> Floats:
+    """The frequency (n,) in Hz at ``rows``, each trajectory by its own time."""
+    knots = _knots(file, curve, key)
+    found = []
+    for name, own in _along(path, rows):
+        try:
+            found.append(sample_target(path.time_s[rows][own], *knots))
+        except UsageError as error:
+            which = f" (trajectory {name!r})" if path.several else ""
+            raise CaseError((file.problem(key, f"{error}{which}"),)) from error
+    return np.concatenate(found)
+
+
+def _knots(file: CaseFile, curve: _Curve, key: str) -> tuple[ArrayLike, ArrayLike | None]:
+    """Frequency in Hz, and the times in s that it is given at."""
+    if isinstance(curve, FrequencyProfile):
+        return curve.frequency, curve.time
+    if isinstance(curve, FrequencyFile):
+        columns = [CsvColumn(name, (DIMENSIONS[name],)) for name in ("time", "frequency")]
+        with located(file):
+            numbers = read_table(Path(curve.file), f"{key}.file", columns).numbers
+        return numbers["frequency"], numbers["time"]
+    return float(curve), None

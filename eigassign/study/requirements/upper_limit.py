@@ -1,0 +1,24 @@
+"""A mode does not exceed a frequency."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from eigassign.case.schema.targets import AtMostTarget
+from eigassign.study.requirements.requirement import Edges, Floats, Requirement, in_hz
+
+
+class UpperLimit(Requirement):
+    """The frequency of a mode is at most ``hz``; too stiff a model is on the safe side."""
+
+    form = AtMostTarget
+
+    @staticmethod
+    def asked(target: AtMostTarget) -> str:
+        """What is asked of the mode, in words."""
+        return f"at most {in_hz(target.at_most)}"
+
+    @staticmethod
+    def edges(target: AtMostTarget, *hz: Floats) -> Edges:
+        """No lower edge, and the limit."""
+        return np.full_like(hz[0], -np.inf), hz[0]
