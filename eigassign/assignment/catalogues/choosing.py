@@ -154,11 +154,8 @@ class _Tree:
         return found
 
     def _minimised(self, problem: DesignProblem, start: Floats) -> Optimum | None:
-        def stop() -> End | None:
-            return End.SECONDS if time.monotonic() > self.deadline else None
-
         try:
-            found = minimise(problem, start, self.steps, stop)
+            found = minimise(problem, start, self.steps, self.deadline)
         except EigassignError:
             return None
         self.appraisals += found.appraisals

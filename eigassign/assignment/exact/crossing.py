@@ -43,6 +43,12 @@ class NeighbourPairs:
     gap: Floats  # (p,), relative distance of both frequencies
     larger: NDArray[np.bool_]  # (p,), whether the row is the larger eigenvalue
 
+    @classmethod
+    def none(cls, n: int) -> NeighbourPairs:
+        """No pairs, of n parameters."""
+        rows, slopes = np.zeros(0), np.zeros((0, n))
+        return cls(rows.astype(np.intp), rows, slopes, slopes, rows, rows.astype(bool))
+
     def scaled(self, free: list[int], width: Floats) -> NeighbourPairs:
         """The same with slopes in units ``width`` of the design parameters ``free``."""
         return replace(self, others=self.others[:, free] * width, mixed=self.mixed[:, free] * width)
@@ -52,35 +58,32 @@ class NeighbourPairs:
         return NeighbourPairs(*(getattr(self, name)[mask] for name in self.__dataclass_fields__))
 
     def along(
-        self, values: Floats, slopes: Floats, shift: Floats, d: Floats
+        self, own: Floats, slopes: Floats, d: Floats
     ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """The rows' eigenvalues (p,) at a change d, their slopes, and whether the mode has turned.
 
-        ``values`` and ``slopes`` are those of all rows, ``shift`` is added to both modes' rows.
+        ``own`` (p,) are the rows at d, with their ``slopes`` (p, n).
         """
-        own = values[self.row] + slopes[self.row] @ d
-        other = self.other + shift[self.row] + self.others @ d
+        other = self.other + self.others @ d
         half, off, sign = 0.5 * (own - other), self.mixed @ d, np.where(self.larger, 1.0, -1.0)
         size = np.hypot(half, off)
         cos = np.divide(sign * half, size, out=np.ones_like(size), where=size > 0.0)
         sin = np.divide(sign * off, size, out=np.zeros_like(size), where=size > 0.0)
         return 0.5 * (own + other) + sign * size, self._mixture(slopes, cos, sin), cos < TURNED
 
+    def branches(self, slopes: Floats) -> Floats:
+        """Slopes (7 p, n) of mixtures of both modes where they meet, beside the rows' own (p, n).
+
+        Any convex combination of them and the row's own is a generalised slope of the row (Clarke).
+        """
+        ones = np.ones(len(self.row))
+        mixtures = [self._mixture(slopes, np.cos(a) * ones, np.sin(a) * ones) for a in ANGLES]
+        return np.concatenate(mixtures)
+
     def _mixture(self, slopes: Floats, cos: Floats, sin: Floats) -> Floats:
         """Slopes of the form of both modes' mixture at half the angle."""
-        a, b = slopes[self.row], self.others
+        a, b = slopes, self.others
         return np.asarray(0.5 * (a + b) + 0.5 * cos[:, None] * (a - b) + sin[:, None] * self.mixed)
-
-    def branches(self, slopes: Floats) -> tuple[NDArray[np.intp], Floats]:
-        """Slopes (b, n_y) of mixtures of two modes that meet, and the rows (b,) whose they are.
-
-        ``slopes`` are those of all rows. Any convex combination of them and the row's own is a
-        generalised slope of the row (Clarke).
-        """
-        here = self.chosen(self.gap <= MEET)
-        ones = np.ones(len(here.row))
-        mixtures = [here._mixture(slopes, np.cos(a) * ones, np.sin(a) * ones) for a in ANGLES]
-        return np.tile(here.row, len(ANGLES)), np.concatenate(mixtures)
 
 
 def joined(parts: Sequence[NeighbourPairs]) -> NeighbourPairs | None:

@@ -17,7 +17,6 @@ from enum import StrEnum
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eigassign.assignment.checks import Floats
 from eigassign.assignment.exact.crossing import NeighbourPairs
@@ -164,34 +163,6 @@ class UnitBox:
             )
         )
         return z if found is None else np.clip(found[0], 0.0, 1.0)
-
-
-@dataclass(frozen=True)
-class DesignPoint:
-    """A design in units of the bounds, with its slopes in these units."""
-
-    z: Floats
-    seen: Appraisal
-    J: Floats
-    C: Floats
-    value: float  # F
-    pairs: NeighbourPairs | None
-
-    def smooth_slopes(self, kinked: NDArray[np.bool_]) -> Floats:
-        """Slopes of all rows (m + k, n); of those at kinks the mean of both branches."""
-        slopes = np.vstack([self.J, self.C])
-        if self.pairs is not None:
-            on = kinked[self.pairs.row]
-            rows = self.pairs.row[on]
-            slopes[rows] = 0.5 * (slopes[rows] + self.pairs.others[on])
-        return slopes
-
-    @classmethod
-    def of(cls, problem: DesignProblem, box: UnitBox, z: Floats, seen: Appraisal) -> DesignPoint:
-        """The design at z with what was ``seen`` of it."""
-        J, C = (slopes[:, box.free] * box.width for slopes in (seen.slopes, seen.excess_slopes))
-        pairs = None if seen.pairs is None else seen.pairs.scaled(box.free, box.width)
-        return cls(z, seen, J, C, problem(box.y(z), seen), pairs)
 
 
 def best_first(found: Iterable[T], worth: Callable[[T], tuple[float, float]]) -> list[T]:

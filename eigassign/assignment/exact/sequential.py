@@ -10,24 +10,25 @@ how well promises are kept. The answer is judged by first-order optimality of th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from time import monotonic
 
 import numpy as np
 
 from eigassign.assignment.checks import Floats, frozen
+from eigassign.assignment.exact.design_point import DesignPoint
 from eigassign.assignment.exact.design_problem import (
     MET,
     ON,
     Appraisal,
-    DesignPoint,
     DesignProblem,
     UnitBox,
     best_first,
     merit,
 )
-from eigassign.assignment.exact.stationarity import BindingLimit, active_limits, stationarity
+from eigassign.assignment.exact.stationarity import BindingLimit, first_order
 from eigassign.assignment.exact.step import SMALLEST, ProposedStep, TrustRegion, step_program
 from eigassign.assignment.program import SNAP
 from eigassign.errors import EigassignError
@@ -65,7 +66,7 @@ class StepRecord:
 class Optimum:
     """The best design found: by violation first, then by F.
 
-    ``stationarity`` as `stationarity` recomputes it. ``predicted`` is what the last program that
+    ``stationarity`` as `first_order` recomputes it. ``predicted`` is what the last program that
     was taken promised of the residuals (m,) here, None if none was.
     """
 
@@ -81,15 +82,12 @@ class Optimum:
 
 
 def minimise(
-    problem: DesignProblem,
-    start: Floats,
-    steps: int = 100,
-    stop: Callable[[], End | None] = lambda: None,
+    problem: DesignProblem, start: Floats, steps: int = 100, deadline: float = np.inf
 ) -> Optimum:
     """The local optimum that steps from ``start`` (n_y,) lead to; start is put within its limits.
 
-    ``stop`` is asked between steps; Ctrl-C ends them too, and the best design so far is returned.
-    Raises what ``appraise`` raises at the start.
+    ``deadline`` is a time of `time.monotonic`, looked at between steps; Ctrl-C ends them too, and
+    the best design so far is returned. Raises what ``appraise`` raises at the start.
     """
     run = _Run(problem)
     place = best = run.placed(run.box.inside(run.box.z(start)))
@@ -102,8 +100,8 @@ def minimise(
             if not beyond and run.unbalanced(place) <= OPTIMAL:
                 end = End.OPTIMAL
                 break
-            if (asked := stop()) is not None:
-                end = asked
+            if monotonic() > deadline:
+                end = End.SECONDS
                 break
             move = run.proposed(place)
             if move is None or run.region.radius < SMALLEST:
@@ -112,7 +110,7 @@ def minimise(
             reached = run.taken(place, move)
             if reached is not None:
                 last = place is best and move.promised == 0.0
-                place, predicted = reached, move.model.residual
+                place, predicted = reached, move.expected.values[: reached.m]
                 both = [place] if last else [best, place]
                 best = best_first(both, lambda p: (p.seen.violation, p.value))[0]
             elif move.promised == 0.0 and np.abs(move.d).max() < NEAR:
@@ -120,13 +118,14 @@ def minimise(
                 break
     except KeyboardInterrupt:
         end = End.INTERRUPTED
-    y, left = run.box.y(best.z), run.unbalanced(best)
+    y = run.box.y(best.z)
+    left, limits = first_order(problem, y, best.seen)
     return Optimum(
         y=frozen(y),
         seen=best.seen,
         objective=best.value,
         stationarity=left,
-        limits=tuple(active_limits(problem, y, best.seen)),
+        limits=limits,
         predicted=predicted if best is place else None,
         end=End.OPTIMAL if left <= OPTIMAL else end,
         steps=tuple(run.steps),
@@ -150,7 +149,7 @@ class _Run:
 
     def unbalanced(self, place: DesignPoint) -> float:
         """The stationarity of a place."""
-        return stationarity(self.problem, self.box.y(place.z), place.seen)
+        return first_order(self.problem, self.box.y(place.z), place.seen)[0]
 
     def proposed(
         self, place: DesignPoint, spoilt: tuple[DesignPoint, ProposedStep] | None = None
@@ -182,7 +181,11 @@ class _Run:
                 radius = min(2.0 * radius, LARGEST)
             elif fall < 0.25 * move.promised:
                 radius = max(0.5 * length, SMALLEST)
-        S = self.region.S if reached is None else _updated(self.region.S, place, reached, move)
+        S = (
+            self.region.S
+            if reached is None
+            else _with_curvature(self.region.S, place, reached, move)
+        )
         self.region = replace(self.region, radius=radius, S=S)
         return reached if taken else None
 
@@ -211,19 +214,24 @@ class _Run:
         if reached.seen.violation > max(place.seen.violation, MET):
             return False
         # the program keeps off limits by `MET`, which may cost this much
-        paid = ROUND_OFF * abs(place.value) + MET * float(np.abs(move.on_excess).sum())
+        on_limits = float(np.abs(move.multipliers[place.m :]).sum())
+        paid = ROUND_OFF * abs(place.value) + MET * on_limits
         return fall >= -paid and self.unbalanced(reached) <= 0.5 * self.unbalanced(place)
 
 
-def _updated(S: Floats, place: DesignPoint, reached: DesignPoint, move: ProposedStep) -> Floats:
+def _with_curvature(
+    S: Floats, place: DesignPoint, reached: DesignPoint, move: ProposedStep
+) -> Floats:
     """S with S d = (J⁺ − J)ᵀ w + (C⁺ − C)ᵀ μ, by a symmetric rank-one update.
 
-    Of rows at kinks the mean of both branches is taken, which is smooth.
+    w are the multipliers of the residuals, or of squares these themselves. Of rows at kinks the
+    mean of both branches is taken, which is smooth.
     """
-    d = reached.z - place.z
-    w = reached.seen.residual if move.on_residual.size == 0 else move.on_residual
-    before, after = (p.smooth_slopes(move.model.kinked) for p in (place, reached))
-    rest = (after - before).T @ np.append(w, move.on_excess) - S @ d
+    d, weights = reached.z - place.z, move.multipliers
+    if reached.squared:
+        weights = np.append(reached.seen.residual, weights[reached.m :])
+    before, after = (p.smooth_slopes(move.expected.behind) for p in (place, reached))
+    rest = (after - before).T @ weights - S @ d
     along = float(rest @ d)
     if abs(along) <= 1e-8 * np.linalg.norm(rest) * np.linalg.norm(d):
         return S

@@ -5,23 +5,17 @@ Where modes meet it is that of Clarke: some share of the branches at each kink m
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from eigassign.assignment.checks import Floats
-from eigassign.assignment.exact.design_problem import (
-    ON,
-    TINY,
-    Appraisal,
-    DesignPoint,
-    DesignProblem,
-    Objective,
-    UnitBox,
-)
+from eigassign.assignment.exact.design_point import DesignPoint, Indices
+from eigassign.assignment.exact.design_problem import ON, TINY, Appraisal, DesignProblem, UnitBox
+
+_Held = tuple[Floats, str, int, bool]  # a limit that the design lies on: its outward normal, which
 
 
 @dataclass(frozen=True)
@@ -45,122 +39,93 @@ def stationarity(problem: DesignProblem, y: Floats, seen: Appraisal) -> float:
     on which y lies can balance, in units of the bounds, relative to the largest slope that the
     residuals could give: for least squares the largest cosine between Jᵀ's rows and r.
     """
-    return _balance(problem, y, seen)[0]
+    return first_order(problem, y, seen)[0]
 
 
-def active_limits(problem: DesignProblem, y: Floats, seen: Appraisal) -> Iterator[BindingLimit]:
-    """The limits that y lies on, with what F falls by per unit relaxed."""
-    yield from _balance(problem, y, seen)[1]
-
-
-def _balance(
+def first_order(
     problem: DesignProblem, y: Floats, seen: Appraisal
 ) -> tuple[float, tuple[BindingLimit, ...]]:
+    """The stationarity, and the limits that y lies on with what F falls by per unit relaxed."""
     box = UnitBox.of(problem)
     if box.n == 0:
         return 0.0, ()
     place = DesignPoint.of(problem, box, box.z(y), seen)
-    J, r, m = place.J, seen.residual, len(seen.residual)
-    rows, branches = _branches(place)
-    own = rows < m
-    kinks, meeting = rows[own], branches[own]
-    normals, owners, units = _normals(box, place, seen.excess)
-    worst = problem.objective is Objective.WORST_CASE
-    size = float(np.abs(box.prices).max())
-    if worst and m:
+    J, r, m = place.slopes[: place.m], seen.residual, place.m
+    held = list(_box_normals(box, place.z))
+    violated = _unbalanced_violation(held, place) if seen.violation > ON else 0.0
+    rows, slopes = _with_branches(place, m + np.flatnonzero(seen.excess >= -ON))
+    held += [(one, "excess", int(k) - m, True) for k, one in zip(rows, slopes, strict=True)]
+    slope, size = box.prices, float(np.abs(box.prices).max())
+    if m and not place.squared:
         top = np.abs(r).max()
-        on = np.abs(r) >= top - ON * max(top, TINY)
-        epigraph = np.vstack([J[on], meeting[on[kinks]]])
-        epigraph = epigraph * np.sign(np.append(r[on], r[kinks[on[kinks]]]))[:, None]
-        slope = np.append(box.prices, 1.0)
-        system = _columns((normals, 0.0), (epigraph, -1.0))
-        size += float(np.abs(epigraph).max(initial=0.0))
+        rows, slopes = _with_branches(place, np.flatnonzero(np.abs(r) >= top - ON * max(top, TINY)))
+        steepest, kink, unit = np.sign(r[rows])[:, None] * slopes, np.zeros_like(rows), 1.0
+        size += float(np.abs(steepest).max(initial=0.0))
     else:
-        slope = 2.0 * J.T @ r + box.prices
+        slope = slope + 2.0 * J.T @ r
         largest = float(np.linalg.norm(r)) if np.linalg.norm(r) > TINY else 0.0
         size += 2.0 * float(np.linalg.norm(J, axis=0).max(initial=0.0)) * largest
-        # shares of the other branches at each kink, ≤ 1 together
-        turns = 2.0 * r[kinks, None] * (meeting - J[kinks])
-        at, group = np.unique(kinks, return_inverse=True)
-        shares = size * np.eye(len(at))
-        slope = np.append(slope, -np.full(len(at), size))
-        left_over = np.hstack([np.zeros((len(at), box.n)), shares])
-        system = np.hstack(
-            [
-                _columns((normals, np.zeros(len(at)))),
-                np.hstack([turns, shares[group]]).T,
-                left_over.T,
-            ]
-        )
-    violated = seen.violation > ON
+        rows, slopes = _with_branches(place, np.unique(place.branches(np.arange(m))[0]))
+        steepest, unit = 2.0 * r[rows, None] * (slopes - J[rows]), size
+        kink = np.unique(rows, return_inverse=True)[1]
     if size == 0.0:
-        return (_unbalanced_violation(box, place) if violated else 0.0), ()
-    mu = nnls(system, -slope, maxiter=50 * max(system.shape))[0] if system.size else np.zeros(0)
-    left = slope + (system @ mu if system.size else 0.0)
+        return violated, ()
+    left, mu = _left_over(slope, held, steepest, kink, unit)
     found = tuple(
-        BindingLimit(kind, index, upper, float(m / unit))
-        for (kind, index, upper), unit, m in zip(owners, units, mu, strict=False)
+        BindingLimit(kind, j, upper, float(share / (box.all_width[j] if kind == "bound" else 1.0)))
+        for (_, kind, j, upper), share in zip(held, mu, strict=False)
     )
-    rest = float(np.abs(left).max()) / size
-    if violated:
-        rest = max(rest, _unbalanced_violation(box, place))
-    return rest, found
+    return max(left / size, violated), found
 
 
-def _columns(*parts: tuple[Floats, float | Floats]) -> Floats:
-    """Slopes (k, n), each with more rows below, as the columns of one matrix."""
-    return np.hstack([np.hstack([a, np.tile(np.atleast_1d(b), (len(a), 1))]).T for a, b in parts])
-
-
-def _branches(place: DesignPoint) -> tuple[NDArray[np.intp], Floats]:
-    """Where a row has a kink that the design may lie in: its rows, and slopes of other branches.
-
-    Behind other kinks the row is better than its own branch says: no optimum lies there.
-    """
-    if place.pairs is None:
-        return np.zeros(0, dtype=np.intp), np.zeros((0, place.J.shape[1]))
-    worse = np.append(np.sign(place.seen.residual), np.ones(len(place.C)))[place.pairs.row]
-    worse_larger = np.where(place.pairs.larger, worse > 0.0, worse < 0.0)
-    return place.pairs.chosen(worse_larger).branches(np.vstack([place.J, place.C]))
-
-
-def _normals(
-    box: UnitBox, place: DesignPoint, excess: Floats
-) -> tuple[Floats, list[tuple[str, int, bool]], list[float]]:
-    """Outward normals of the limits that z lies on, which they are, and their units."""
-    z, normals, owners, units = place.z, [], [], []
+def _box_normals(box: UnitBox, z: Floats) -> Iterator[_Held]:
+    """The bounds and linear constraints that z lies on."""
+    sides = ((False, -1.0), (True, 1.0))
     for i, j in enumerate(box.free):
-        for upper, on in ((False, z[i] <= ON), (True, z[i] >= 1.0 - ON)):
-            if on:
-                normals.append((1.0 if upper else -1.0) * np.eye(box.n)[i])
-                owners.append(("bound", j, upper))
-                units.append(float(box.width[i]))
-    row, norms = box.rows @ z, np.abs(box.rows).sum(axis=1)
-    for k in range(len(box.rows)):
-        for upper, limit in ((False, box.row_lower[k]), (True, box.row_upper[k])):
-            if np.isfinite(limit) and abs(row[k] - limit) <= ON * max(norms[k], 1e-300):
-                normals.append((1.0 if upper else -1.0) * box.rows[k])
-                owners.append(("constraint", k, upper))
-                units.append(1.0)
-    rows, branches = _branches(place)
-    for at in np.flatnonzero(excess >= -ON):
-        for normal in (place.C[at], *branches[rows == len(place.J) + at]):
-            normals.append(normal)
-            owners.append(("excess", int(at), True))
-            units.append(1.0)
-    return np.array(normals).reshape(-1, box.n), owners, units
+        for upper, sign in sides:
+            if (z[i] >= 1.0 - ON) if upper else (z[i] <= ON):
+                yield sign * np.eye(box.n)[i], "bound", j, upper
+    value, norms = box.rows @ z, np.abs(box.rows).sum(axis=1)
+    for k, row in enumerate(box.rows):
+        for upper, sign in sides:
+            limit = box.row_upper[k] if upper else box.row_lower[k]
+            if np.isfinite(limit) and abs(value[k] - limit) <= ON * max(norms[k], 1e-300):
+                yield sign * row, "constraint", k, upper
 
 
-def _unbalanced_violation(box: UnitBox, place: DesignPoint) -> float:
+def _unbalanced_violation(held: Sequence[_Held], place: DesignPoint) -> float:
     """The same of the largest excess: 0 where no direction within the limits lowers it."""
     excess = place.seen.excess
-    normals = _normals(box, place, np.full(len(excess), -np.inf))[0]
-    on = excess >= excess.max() - ON
-    rows, branches = _branches(place)
-    own = rows >= len(place.J)
-    steepest = np.vstack([place.C[on], branches[own][on[rows[own] - len(place.J)]]])
-    slope = np.append(np.zeros(box.n), 1.0)
-    system = _columns((normals, 0.0), (steepest, -1.0))
+    _, steepest = _with_branches(place, place.m + np.flatnonzero(excess >= excess.max() - ON))
+    together = np.zeros(len(steepest), dtype=np.intp)
+    left, _ = _left_over(np.zeros(len(place.z)), held, steepest, together, 1.0)
+    return left / max(float(np.abs(steepest).max()), 1.0)
+
+
+def _with_branches(place: DesignPoint, on: Indices) -> tuple[Indices, Floats]:
+    """The rows ``on`` and their slopes, then those of their other branches at kinks."""
+    rows, slopes = place.branches(on)
+    return np.append(on, rows), np.vstack([place.slopes[on], slopes])
+
+
+def _left_over(
+    slope: Floats, held: Sequence[_Held], branches: Floats, kink: Indices, unit: float
+) -> tuple[float, Floats]:
+    """The largest entry that is left of a slope, and the multipliers ≥ 0 that balance the rest.
+
+    Those of the limits ``held``, then the shares of ``branches``, which are 1 together at each
+    ``kink`` (in units of ``unit``).
+    """
+    kinks = int(kink.max(initial=-1)) + 1
+    normals = np.array([one[0] for one in held]).reshape(-1, len(slope))
+    system = np.block(
+        [
+            [normals, np.zeros((len(normals), kinks))],
+            [branches, unit * np.eye(kinks)[kink]],
+        ]
+    ).T
+    slope = np.append(slope, -np.full(kinks, unit))
+    if not system.size:
+        return float(np.abs(slope).max()), np.zeros(0)
     mu = nnls(system, -slope, maxiter=50 * max(system.shape))[0]
-    size = max(float(np.abs(steepest).max()), 1e-300)
-    return float(np.abs(slope + system @ mu).max()) / max(size, 1.0)
+    return float(np.abs(slope + system @ mu).max()), mu

@@ -22,7 +22,7 @@ from eigassign.assignment.catalogues.choosing import choose
 from eigassign.assignment.exact.design_problem import MET, Appraisal, DesignProblem
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import OPTIMAL, End, minimise
-from eigassign.assignment.exact.stationarity import active_limits, stationarity
+from eigassign.assignment.exact.stationarity import first_order
 from eigassign.assignment.feasibility import smallest
 from eigassign.errors import EigassignError
 from eigassign.study.design.optimum import Found
@@ -203,12 +203,6 @@ def least_changed(found: Found, initial: Floats) -> Found:
     limit = best.objective + SAME * abs(best.objective) + 1e-20
     if value > limit or seen.violation > max(best.seen.violation * (1.0 + SAME), MET):
         return found
-    moved = replace(
-        best,
-        y=y,
-        seen=seen,
-        objective=value,
-        stationarity=stationarity(problem, y, seen),
-        limits=tuple(active_limits(problem, y, seen)),
-    )
+    left, limits = first_order(problem, y, seen)
+    moved = replace(best, y=y, seen=seen, objective=value, stationarity=left, limits=limits)
     return replace(found, best=moved, optima=(moved, *found.optima[1:]))

@@ -253,13 +253,11 @@ class _Search:
             return
         self.optima.append(found if before is None else _continued(before, found))
         if found.end in (End.SECONDS, End.INTERRUPTED):
-            self.ended = found.end
+            self.ended = self.ended or found.end
 
     def _follow(self, start: Floats) -> Optimum:
-        def stop() -> End | None:
-            return self.ended or (End.SECONDS if monotonic() > self.deadline else None)
-
-        return minimise(self.variant.problem, start, self.steps, stop)
+        deadline = -np.inf if self.ended else self.deadline
+        return minimise(self.variant.problem, start, self.steps, deadline)
 
     def falls_behind(self, others: Sequence[Optimum]) -> bool:
         """True where some starts came nowhere near what ``others`` have: more would not either."""
