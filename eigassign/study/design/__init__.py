@@ -8,6 +8,7 @@ Reading order:
     judgement    what a design does to the targets, and the verdict
     clearance    proof that a band stays clear of modes all along a trajectory
     variants     the problems that the targets make, one for each choice that bands leave
+    starts       the local optima of one of them, from several starts
     optimum      the design that meets the targets best, by the sequential method
     conclusions  what may be said of an optimum: proved, conflicting limits, what changes nothing
     answer       the answer by either method, and what it rests on

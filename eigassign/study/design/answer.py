@@ -120,9 +120,9 @@ def find_answer(
 
 def _band_notes(found: Found) -> Iterator[str]:
     """Say what came of each number of modes below the bands, where there was a choice."""
-    for variant, best in found.variants if len(found.variants) > 1 else ():
-        choice = ", ".join(f"{band} with {k} below it" for band, k in variant.below)
-        missed = best.seen.violation
+    for one in found.variants if len(found.variants) > 1 else ():
+        choice = ", ".join(f"{band} with {k} below it" for band, k in one.variant.below)
+        best, missed = one.optima[0], one.optima[0].seen.violation
         how = f"missed by {100 * missed:.2g} %" if missed > MET else f"met at {best.objective:.6g}"
         yield f"{choice}: {how}"
 

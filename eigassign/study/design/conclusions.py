@@ -205,4 +205,4 @@ def least_changed(found: Found, initial: Floats) -> Found:
         return found
     left, limits = first_order(problem, y, seen)
     moved = replace(best, y=y, seen=seen, objective=value, stationarity=left, limits=limits)
-    return replace(found, best=moved, optima=(moved, *found.optima[1:]))
+    return replace(found, optima=(moved, *found.optima[1:]))

@@ -1,0 +1,221 @@
+"""The optima of one choice of what bands leave open: start after start, on few samples first.
+
+Starts are followed on few samples of a long trajectory, of large models by reduced ones; what they
+lead to is then optimised on all samples, and by exact solves last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.assignment.catalogues.choosing import Chosen
+from eigassign.assignment.exact.design_problem import MET, UnitBox, best_first
+from eigassign.assignment.exact.requirements import Frequencies
+from eigassign.assignment.exact.sequential import End, Optimum, distinct, minimise, worth
+from eigassign.case.case_file import CaseFile
+from eigassign.errors import EigassignError
+from eigassign.study.design.response import ReducedModels
+from eigassign.study.design.variants import (
+    PosedProblem,
+    Task,
+    spread_designs,
+    thinned,
+    variant_of,
+)
+
+Floats = NDArray[np.float64]
+STARTS = 12  # with `starts: auto`, at most
+FEW = 24  # samples on which starts are followed, of more than twice as many
+SCREENED, MOST_SCREENED = 7, 48  # designs for each parameter of which the best are starts
+BEHIND, FAR_BEHIND = 3, 2.0  # starts of a variant, and how much worse than the best it may be then
+SAME = 1e-4  # relative, in F: optima of the same worth
+NOTHING = 1e-14  # of F: no error
+
+
+@dataclass(frozen=True)
+class Searched:
+    """What has been found of one variant, and how much work that was."""
+
+    variant: PosedProblem
+    optima: tuple[Optimum, ...] = ()
+    starts: int = 0
+    ended: End | None = None  # by the clock or by Ctrl-C
+    exact_solves: int = 0
+    lost: tuple[str, ...] = ()  # designs passed over because a followed mode is lost there
+    chosen: Chosen | None = None  # from the catalogues, where there are any; then of `optima`
+
+
+def coarse_to_fine(whole: Task, models: ReducedModels | None) -> tuple[Task, ...]:
+    """The levels on which optima are sought one after the other, the whole task last."""
+    few = thinned(whole, FEW)
+    coarse = ([] if few is None else [few]) + ([] if models is None else [whole])
+    return (*(replace(task, models=models) for task in coarse), whole)
+
+
+def most_starts(file: CaseFile) -> int:
+    """The number of designs to start from."""
+    asked = file.assignment.starts
+    return STARTS if isinstance(asked, str) else asked
+
+
+def search_starts(
+    levels: Sequence[Task],
+    below: tuple[int, ...],
+    starts: Sequence[Floats],
+    tried: Sequence[Searched],
+    deadline: float,
+    progress: Callable[[str], None],
+) -> Searched:
+    """The local optima of a variant that ``starts`` and spread designs lead to.
+
+    One that comes nowhere near the variants ``tried`` before is given up.
+    ``deadline`` is a time of `time.monotonic`. Raises EigassignError where the first start has no
+    answer.
+    """
+    first, keys = levels[0], levels[0].scene.file.assignment
+    others, made = [one.optima[0] for one in tried], sum(one.starts for one in tried)
+    search = Searched(variant_of(first, below))
+    for start in _in_turn(first, search.variant, starts):
+        progress(f"  from start {made + search.starts + 1}")
+        search = replace(_after(search, start, keys.steps, deadline), starts=search.starts + 1)
+        enough = _agree(search) or _falls_behind(search, others)
+        if search.ended or (keys.starts == "auto" and enough):
+            break
+    responses = [search.variant.response]
+    for level in levels[1:]:
+        if not search.ended:
+            progress("  from what was found, on all samples and exactly")
+        refined = replace(search, variant=variant_of(level, below), optima=())
+        search = _refined(refined, search.optima, first.scene.initial, keys.steps, deadline)
+        responses.append(search.variant.response)
+    return replace(
+        search,
+        optima=distinct(search.optima, search.variant.problem),
+        exact_solves=sum(response.exact_solves for response in responses),
+        lost=tuple(line for response in responses for line in response.lost),
+    )
+
+
+def _after(
+    search: Searched, start: Floats, steps: int, deadline: float, before: Optimum | None = None
+) -> Searched:
+    """The search with what ``start`` leads to, the optimum ``before`` of a rougher level, if any.
+
+    Once it has ended, a start is only judged. Where Ctrl-C hits before the start itself is judged,
+    it is judged only if nothing is known. A start without an answer leads nowhere; the first one of
+    all raises EigassignError.
+    """
+    problem, optima = search.variant.problem, search.optima
+    try:
+        found = minimise(problem, start, 0 if search.ended else steps, deadline)
+    except KeyboardInterrupt:
+        if search.ended:  # pressed again
+            raise
+        search = replace(search, ended=End.INTERRUPTED)
+        return search if optima else _after(search, start, steps, deadline, before)
+    except EigassignError:
+        if not optima and before is None:
+            raise
+        return search
+    stopped = found.end if found.end in (End.SECONDS, End.INTERRUPTED) else None
+    found = found if before is None else _continued(before, found)
+    return replace(search, optima=(*optima, found), ended=search.ended or stopped)
+
+
+def _refined(
+    search: Searched, coarse: Sequence[Optimum], initial: Floats, steps: int, deadline: float
+) -> Searched:
+    """What ``coarse`` optima lead to on a finer level; or the initial design, if that is better."""
+    problem = search.variant.problem
+    for optimum in distinct(coarse, problem)[:3]:  # the best few
+        search = _after(search, optimum.y, steps, deadline, optimum)
+        if search.ended:
+            break
+    seen = problem.appraise(initial)
+    inside = np.all((initial >= problem.lower) & (initial <= problem.upper))
+    own, known = (seen.violation, problem(initial, seen)), map(worth, search.optima)
+    if not search.optima or (inside and best_first([*known, own], lambda each: each)[0] is own):
+        search = _after(search, initial, steps, deadline)
+    return search
+
+
+def _continued(before: Optimum, found: Optimum) -> Optimum:
+    """An optimum with the steps that led to its start; what was said there is its prediction."""
+    said = before.seen.residual
+    if found.predicted is None and said.shape == found.seen.residual.shape:
+        found = replace(found, predicted=said)
+    return replace(found, steps=(*before.steps, *found.steps))
+
+
+# --- Whether more starts would help
+
+
+def _falls_behind(search: Searched, others: Sequence[Optimum]) -> bool:
+    """True where some starts came nowhere near what ``others`` have: more would not either."""
+    if len(search.optima) < BEHIND or not others:
+        return False
+    own, best = (worth(best_first(optima, worth)[0]) for optima in (search.optima, others))
+    if own[0] > FAR_BEHIND * max(best[0], MET):
+        return True
+    return own[0] >= best[0] - MET and own[1] > best[1] + (FAR_BEHIND - 1.0) * abs(best[1])
+
+
+def _agree(search: Searched) -> bool:
+    """True where enough starts led to the best optimum: more where others were seen.
+
+    No errors at all cannot be improved; a price, which may be negative, can.
+    """
+    if not search.optima:
+        return False
+    optima, problem = search.optima, search.variant.problem
+    violation, value = worth(best_first(optima, worth)[0])
+    if problem.prices is None and violation <= MET and value <= NOTHING:
+        return True
+    least = value + SAME * abs(value) + NOTHING
+    same = [o for o in optima if o.seen.violation <= violation + MET and o.objective <= least]
+    return len(same) >= (3 + len(problem.lower) // 2) * len(distinct(optima, problem))
+
+
+# --- Starts
+
+
+def _in_turn(task: Task, variant: PosedProblem, starts: Sequence[Floats]) -> Iterator[Floats]:
+    """The first starts, then spread designs, those that promise most first.
+
+    Of a design only frequencies at fewest samples are solved to judge it: all of them are less work
+    than a start. Where modes are followed or reduced models lead, it is more: there none is judged.
+    """
+    yield from starts
+    most = most_starts(task.scene.file) - len(starts)
+    if most <= 0:
+        return
+    if task.models is not None or task.followers:
+        yield from spread_designs(task.scene, most, 0)
+        return
+    box, fewest = UnitBox.of(variant.problem), thinned(task, 8) or task
+    asked = variant_of(fewest, tuple(k for _, k in variant.below))
+    ranked: list[tuple[tuple[float, float], Floats]] = []
+    for y in spread_designs(task.scene, max(most, min(SCREENED * box.n, MOST_SCREENED)), 0):
+        z = box.inside(box.z(y))
+        try:
+            ranked.append((_worth_by_frequencies(fewest, asked, box.y(z)), z))
+        except EigassignError:
+            ranked.append(((np.inf, np.inf), z))
+    apart: list[Floats] = []
+    near: list[Floats] = []
+    for _, z in sorted(ranked, key=lambda one: one[0]):
+        alone = all(np.abs(z - other).max(initial=0.0) > 0.2 for other in apart)  # of the bounds
+        (apart if alone else near).append(z)
+    yield from (box.y(z) for z in [*apart, *near][:most])
+
+
+def _worth_by_frequencies(task: Task, variant: PosedProblem, y: Floats) -> tuple[float, float]:
+    """Violation and F of a design, without slopes."""
+    asked, scene = variant.requirements, task.scene
+    hz = scene.model.frequencies(scene.path.at(y)[0], y, asked.modes)
+    seen = asked.appraise(y, Frequencies(hz, np.zeros((*hz.shape, len(y)))))
+    return max(seen.violation, MET), variant.problem(y, seen)
