@@ -13,7 +13,8 @@ from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.accuracy import study_motion
 from eigassign.study.comparison import reach_warnings
-from eigassign.study.design.answer import Answer, assignment_row, limit_notes
+from eigassign.study.design.account import assignment_row, limit_notes
+from eigassign.study.design.answer import Answer
 from eigassign.study.design.judgement import crossing_warnings, swap_notes
 from eigassign.study.design.one_shot import design_rows, solver_row
 from eigassign.study.drawing import draw_poses, rest_pose

@@ -11,5 +11,6 @@ Reading order:
     starts       the local optima of one of them, from several starts
     optimum      the design that meets the targets best, by the sequential method
     conclusions  what may be said of an optimum: proved, conflicting limits, what changes nothing
-    answer       the answer by either method, and what it rests on
+    answer       the answer by either method
+    account      it in numbers and words: the verdict, how it was found, and what holds it back
 """

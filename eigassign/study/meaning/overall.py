@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from eigassign.assignment.exact.design_problem import MET, Appraisal
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.errors import EigassignError
-from eigassign.study.design.answer import Answer, active_rows
+from eigassign.study.design.account import active_rows
+from eigassign.study.design.answer import Answer
 from eigassign.study.design.optimum import Found
 from eigassign.study.design.variants import Task, variant_of
 from eigassign.study.meaning.reach import misses, proved_ranges, reach_rows, unreachable

@@ -1,0 +1,265 @@
+"""The answer in numbers and words: the verdict, how it was found, and what holds it back."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+
+import numpy as np
+
+from eigassign.assignment.exact.design_problem import MET
+from eigassign.assignment.exact.sequential import End
+from eigassign.study.accuracy import model_error
+from eigassign.study.design.answer import MAX_ERROR, Answer
+from eigassign.study.design.clearance import Clearance
+from eigassign.study.design.conclusions import Conflict, is_proved
+from eigassign.study.design.judgement import verdict
+from eigassign.study.design.variants import MASS, Task, variant_of
+from eigassign.study.requirements.requirement import Requirement
+from eigassign.study.results import (
+    ActiveRow,
+    AssignmentRow,
+    CatalogueRow,
+    ClearanceRow,
+    CombinationRow,
+    LocalOptimum,
+    OptimalityRow,
+    StepRow,
+    TargetStudy,
+)
+from eigassign.study.scene import Scene
+
+FINER = "give the links more elements, raise reduce_to, or write auto"
+
+
+def assignment_row(
+    scene: Scene,
+    answer: Answer,
+    wanted: Sequence[Requirement],
+    targets: Sequence[TargetStudy],
+    unreachable: Sequence[str] = (),
+) -> AssignmentRow:
+    """How the answer was found and what it is worth, as plain numbers.
+
+    ``unreachable`` says in words which targets are out of reach within the bounds.
+    """
+    keys, found = scene.file.assignment, answer.found
+    initial, optimal = _merits(answer, targets)
+    accepted = scene.file.validation.max_error
+    # The exact optimum rests on exact frequencies, the one shot on its prediction.
+    trusted = found is not None or all(t.approximation_error <= accepted for t in targets)
+    clearances = () if found is None else tuple(map(_clearance, found.clearances))
+    optimality = _optimality(scene, answer)
+    proved = optimality.kind == "proved"
+    contradiction = _in_words(scene, wanted, answer.conflict, proved)
+    merits = initial, optimal
+    word, reason = verdict(targets, merits, trusted, unreachable, contradiction)
+    unproved = [_why_unproved(row) for row in clearances if not row.clear]
+    of_model = {m for one in wanted if one.of_soft_model for m in one.modes}
+    raised = model_error(scene, answer.y, of_model)
+    largest = MAX_ERROR if keys.max_error is None else keys.max_error
+    at_stake = (t.asked.stake(t.exact_hz, raised) for t in targets)
+    if word == "reached" and any(stake > largest for stake in at_stake):
+        word, reason = "do_not_use", _too_coarse(raised, largest)
+    if word == "reached" and unproved:
+        word, reason = "do_not_use", f"not proved clear along the motion: {'; '.join(unproved)}"
+    if found is not None and found.best.end in (End.SECONDS, End.STEPS, End.INTERRUPTED):
+        reason = f"{reason}; unfinished: {found.best.end.value}"
+    return AssignmentRow(
+        method=keys.method,
+        objective=keys.objective,
+        objective_initial=initial[1],
+        objective_optimal=optimal[1],
+        optimality=optimality,
+        verdict=word,
+        reason=reason,
+        steps=()
+        if found is None
+        else tuple(
+            StepRow(step.y, step.objective, step.violation, step.radius, bool(step.taken))
+            for step in found.best.steps
+        ),
+        starts=0 if found is None else found.starts,
+        local_optima=()
+        if found is None
+        else tuple(LocalOptimum(o.y, o.objective, o.seen.violation) for o in found.optima),
+        exact_solves=0 if found is None else found.exact_solves,
+        ended="one program" if found is None else found.best.end.value,
+        finished=found is None or found.best.end in (End.OPTIMAL, End.STALLED),
+        active=tuple(active_rows(scene, answer)),
+        one_shot=None if answer.one_shot is None else answer.one_shot.y,
+        max_error=largest,
+        max_error_given=keys.max_error is not None,
+        clearances=clearances,
+        model_error=raised if np.isfinite(raised) else None,
+        conflict=() if answer.conflict is None else answer.conflict.names,
+        catalogue=_catalogue(scene, answer, wanted),
+    )
+
+
+def _in_words(
+    scene: Scene, wanted: Sequence[Requirement], contradiction: Conflict | None, proved: bool
+) -> str:
+    """Name the limits that contradict, with their lines in the case file; empty where none do."""
+    if contradiction is None:
+        return ""
+    file = scene.file
+    places = {w.label: w.place for w in wanted} | {MASS: MASS}
+    places |= {name: f"design.constraints.{name}" for name in file.design.constraints}
+    lines = (file.problem(places[name], "").line for name in contradiction.names)
+    listed = " and ".join(
+        f"{'the limit of the mass' if name == MASS else name} (line {line})"
+        for name, line in zip(contradiction.names, lines, strict=True)
+    )
+    meets = "meets" if proved else "was found that meets"
+    if not contradiction.smallest:
+        return f"no design {meets} all limits; the nearest one misses {listed}"
+    together = " together" if len(contradiction.names) > 1 else ""
+    return f"no design within the bounds {meets} {listed}{together}"
+
+
+def _clearance(found: Clearance) -> ClearanceRow:
+    return ClearanceRow(
+        found.label,
+        found.below,
+        found.clear,
+        found.room,
+        found.counted,
+        found.raised if np.isfinite(found.raised) else None,
+    )
+
+
+def _too_coarse(raised: float, accepted: float) -> str:
+    how = f"by up to {100 * raised:.2g} %" if np.isfinite(raised) else "by more than can be told"
+    return (
+        f"mesh and reduced links raise the frequencies {how}, and {100 * accepted:.2g} % are "
+        f"accepted: {FINER}"
+    )
+
+
+def _why_unproved(row: ClearanceRow) -> str:
+    """Its label; and what to do where it is for what the model is too high by."""
+    if row.raised is not None and row.room + row.raised <= 0.0:
+        return row.label
+    how = "not bounded" if row.raised is None else f"{100 * row.raised:.2g} % too high at most"
+    return f"{row.label} (what mesh and reduced links do to the mode above it: {how}; {FINER})"
+
+
+def _catalogue(scene: Scene, answer: Answer, wanted: Sequence[Requirement]) -> CatalogueRow | None:
+    """The search of the catalogues; of the one shot's best few what they are exactly worth."""
+    own, found, one_shot = scene.file.design.catalogues, answer.found, answer.one_shot
+    if found is not None and found.chosen is not None:
+        search = found.chosen.search
+        of_rows = found.chosen.rows
+        worth = [(o.y, o.objective, o.seen.violation) for o in found.chosen.optima]
+    elif found is None and one_shot is not None and one_shot.search is not None:
+        search = one_shot.search
+        of_rows = tuple(one.rows for one in search.best)
+        exact = variant_of(Task(scene, tuple(wanted), 0.0), ()).problem
+        worth = [(one.y, exact(one.y, exact.appraise(one.y)), 0.0) for one in search.best]
+    else:
+        return None
+    best = tuple(
+        CombinationRow({c.name: c.choices[k] for c, k in zip(own, rows, strict=True)}, *each)
+        for rows, each in zip(of_rows, worth, strict=True)
+    )
+    if search is None:
+        return CatalogueRow(None, None, best)
+    return CatalogueRow(search.nodes, search.relative_gap, best)
+
+
+def _merits(
+    answer: Answer, targets: Sequence[TargetStudy]
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Violation and objective of the initial design and of the answer."""
+    if answer.found is not None:
+        best = answer.found.best
+        return answer.found.initial, (best.seen.violation, best.objective)
+    weights = np.array([target.asked.weight * target.weight_s for target in targets])
+    weights = weights / weights.sum()
+    before, after = (
+        float(weights @ [getattr(t.error, when).rms_relative ** 2 for t in targets])
+        for when in ("initial", "exact")
+    )
+    return (0.0, before), (0.0, after)
+
+
+def _optimality(scene: Scene, answer: Answer) -> OptimalityRow:
+    found, one_shot = answer.found, answer.one_shot
+    if found is None:
+        search = one_shot and one_shot.search
+        if not search:
+            return OptimalityRow("local", None, None, "the optimum of the linearised problem only")
+        gap = search.relative_gap
+        words = (
+            f"the best of the catalogues to {100 * gap:.2g} % of the objective of the linearised "
+            f"problem only, by branch and bound in {search.nodes} nodes"
+        )
+        return OptimalityRow("bounded", None, gap, words)
+    best, chosen = found.best, found.chosen
+    many = f"{found.starts} start{'s' if found.starts > 1 else ''}"
+    if chosen is not None and chosen.search is not None:
+        gap = chosen.search.relative_gap
+        better = f"better by more than {100 * gap:.2g} % of the objective" if gap else "better"
+        words = (
+            f"the best combination of the catalogues, by branch and bound in {chosen.search.nodes} "
+            f"nodes: none is {better}, if the optima of the relaxed problems (the first from "
+            f"{many}) are global"
+        )
+        return OptimalityRow("bounded", best.stationarity, gap, words)
+    if chosen is None and is_proved(scene, found):
+        met = best.seen.violation <= MET
+        words = "the problem is convex: " + (
+            "no design is better" if met else "no design meets all limits, or misses them by less"
+        )
+        return OptimalityRow("proved", best.stationarity, None, words)
+    count = len(found.optima)
+    which = f"best of {count} local optima" if count > 1 else "only local optimum"
+    words = f"the {which} from {many}"
+    if best.end is not End.OPTIMAL:
+        words = f"{words}; {best.end.value}"
+    return OptimalityRow("local", best.stationarity, None, words)
+
+
+def active_rows(scene: Scene, answer: Answer) -> Iterator[ActiveRow]:
+    """The limits that the answer lies on; of the one shot with the multipliers of its program."""
+    found = answer.found
+    if found is None:
+        for one in () if answer.one_shot is None else answer.one_shot.active:
+            yield ActiveRow(one.name, one.kind, one.side, one.multiplier)
+        return
+    names = tuple(scene.file.design.parameters)
+    constraints = tuple(scene.file.design.constraints)
+    for limit in found.best.limits:
+        side = "upper" if limit.upper else "lower"
+        if limit.kind == "bound":
+            yield ActiveRow(names[limit.index], "bound", side, limit.multiplier)
+        elif limit.kind == "constraint":
+            yield ActiveRow(constraints[limit.index], "constraint", side, limit.multiplier)
+    asked = found.variant.requirements
+    shares: dict[tuple[str, str], float] = {}
+    for limit in found.best.limits:
+        if limit.kind == "excess":
+            own = asked.owner(limit.index)
+            shares[own] = shares.get(own, 0.0) + limit.multiplier
+    for (name, side), multiplier in shares.items():
+        yield ActiveRow(name, "target", side, multiplier)
+
+
+def limit_notes(answer: Answer, row: AssignmentRow, missed: Collection[str]) -> list[str]:
+    """What holds the answer back, and what the one shot's program does not depend on.
+
+    ``missed`` are the labels of the targets that the answer does not meet.
+    """
+    grouped: dict[str, list[str]] = {}
+    for limit in row.active:
+        on = f"lies on its {limit.side} {limit.kind} of"
+        if limit.kind == "target":
+            on = "misses, by as little as was found," if limit.name in missed else "just meets"
+        grouped.setdefault(on, []).append(limit.name)
+    notes = [f"the optimum {on} {', '.join(dict.fromkeys(n))}" for on, n in grouped.items()]
+    if answer.found is None and answer.one_shot is not None and answer.one_shot.undetermined:
+        notes.append(
+            f"{answer.one_shot.undetermined} direction(s) of the design change no target: there "
+            "the initial design is kept as nearly as the limits allow"
+        )
+    return notes
