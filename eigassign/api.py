@@ -220,5 +220,9 @@ def save_reduced(reduced: ReducedModel, path: str | Path) -> None:
 
 
 def load_reduced(path: str | Path) -> ReducedModel:
-    """Read a reduced model, checked before use; raises StorageError for a damaged file."""
+    """Read a reduced model; raises StorageError for a file that is damaged or of another version.
+
+    A file of somebody else is believed as far as its hash and shapes go: its numbers are its
+    author's.
+    """
     return reduced_file.load_reduced(path)

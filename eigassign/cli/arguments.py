@@ -115,7 +115,13 @@ cache_dir = click.option(
     help="Cache folder (default: $EIGASSIGN_CACHE_DIR, else the user's cache folder).",
 )
 caching = several(
-    click.option("--no-cache", is_flag=True, help="Neither read nor write the cache."), cache_dir
+    click.option(
+        "--no-cache",
+        is_flag=True,
+        help="Neither read nor write the cache. $EIGASSIGN_CACHE says what is cached: always, "
+        "never, or auto, what takes more than 0.1 s to compute (the default).",
+    ),
+    cache_dir,
 )
 force = click.option(
     "--force",

@@ -9,7 +9,6 @@ In reading order:
     taylor       Taylor coefficients of eigenvalues and eigenvectors (eqs. (4)-(6))
     reduced      Ritz on the Taylor vectors, with an error estimate
     expansion    the Taylor polynomial of eigenvalues (eqs. (7)-(9)), judged by a reduced model
-    confirmation  whether stored coefficients are those of a model
     storage      expansions and reduced models as plain arrays
     truncation   what the reduction of links leaves out, bounded
     discretisation  what a mesh leaves out, bounded
@@ -27,7 +26,6 @@ __all__, __getattr__, __dir__ = face(
         "adaptive.mesh": "choose_mesh",
         "adaptive.order": "choose_expansion",
         "adaptive.reduced_model": "reduce_adaptively",
-        "confirmation": "ExpansionRequest unlike",
         "discretisation": "discretisation_error",
         "exact.clusters": "clusters",
         "exact.following": "FollowedShape ModesAtPoint MoreModesError follow places",
@@ -56,8 +54,7 @@ __all__, __getattr__, __dir__ = face(
         "slopes": "eigenvalue_slopes mixed_slopes",
         "slow_motion": "change_at motion_effect moving_modes theta_in_time",
         "storage": (
-            "expansion_arrays expansions_from_arrays flatten pencil_parts reduced_arrays "
-            "reduced_from_arrays"
+            "FORMAT expansion_arrays reduced_arrays reduced_from_arrays stored_series tree_arrays"
         ),
         "taylor.bordered": "factor_dense factor_sparse",
         "taylor.local_coordinates": "substitute",

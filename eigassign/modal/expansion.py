@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import comb
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,7 +27,12 @@ from eigassign.modal.arguments import mode_numbers, point, relative_gap, samples
 from eigassign.modal.exact.clusters import CLUSTER_GAP
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.reduce import reduce
-from eigassign.modal.taylor.local_coordinates import LocalSpace, local_space, substitute
+from eigassign.modal.taylor.local_coordinates import (
+    LocalSpace,
+    local_space,
+    substitute,
+    vector_set,
+)
 from eigassign.modal.taylor.rayleigh import eigenvalue_series
 from eigassign.modal.taylor.vectors import as_columns, taylor_vectors
 from eigassign.series.multi_index import LowerSet
@@ -43,6 +49,14 @@ class Cluster(Brief):
 
     modes: tuple[int, ...]
     coefficients: Floats  # rad²/s² over units of w
+
+
+class ClusterSeries(NamedTuple):
+    """What takes long to compute of an expansion, for the neighbouring ``modes`` of a cluster."""
+
+    modes: tuple[int, ...]
+    coefficients: Floats  # Λ (r, r, N)
+    vectors: Floats  # X (N_H, n_dof, r)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +102,12 @@ class Expansion:
                 for c, made in zip(self.clusters, self._prepared, strict=True)
             ]
         )
+
+    @property
+    def series(self) -> list[ClusterSeries]:
+        """The series of each cluster, of which `expand` makes the expansion again."""
+        parts = zip(self.clusters, self.vectors, strict=True)
+        return [ClusterSeries(c.modes, c.coefficients, X) for c, X in parts]
 
     @cached_property
     def _prepared(self) -> tuple[Polynomials, ...]:
@@ -238,13 +258,15 @@ def expand(
     space: LowerSet | None = None,
     vector_order: int | None = None,
     cluster_gap: float = CLUSTER_GAP,
+    known: Sequence[ClusterSeries] | None = None,
 ) -> Expansion:
     """Expand the eigenvalues of ``modes`` (1 is the lowest elastic one) to total ``order``.
 
     ``linear_in_y`` keeps |β| ≤ 1, the terms of eqs. (7)-(9). ``space`` is any other lower set over
     (q, y). Eigenvectors are expanded to half the order, which suffices (2m + 1), or to
     ``vector_order``. Modes closer than ``cluster_gap`` (relative in λ) are expanded together.
-    Raises UsageError for impossible arguments.
+    ``known`` series of the same expansion (`Expansion.series`) are not computed again.
+    Raises UsageError for impossible arguments, and for known series of other shapes.
     """
     wanted = mode_numbers(modes)
     order = whole_within(order, "order", 1, MAX_ORDER)
@@ -253,26 +275,36 @@ def expand(
     cluster_gap = relative_gap(cluster_gap)
     x0 = point(q0, y0, pencil.n_q, pencil.to_program.shape[1] - pencil.n_q)
     local = local_space(pencil, order, linear_in_y, space)
-    found = taylor_vectors(pencil, x0, wanted, local, vector_order, cluster_gap)
-    series = [
-        eigenvalue_series(pencil, found.theta, local.space, found.space, X) for X in found.vectors
-    ]
+    half = vector_set(local.space, local.n_linear, vector_order)[0]
+    if known is None:
+        found = taylor_vectors(pencil, x0, wanted, local, vector_order, cluster_gap)
+        known = [
+            ClusterSeries(g, eigenvalue_series(pencil, found.theta, local.space, half, X), X)
+            for g, X in zip(found.groups, found.vectors, strict=True)
+        ]
+    for of, c, X in known:
+        r = len(of)
+        if (c.shape, X.shape) != ((r, r, len(local.space)), (len(half), pencil.n_dof, r)):
+            raise UsageError("these series are not of this expansion: their shapes do not fit")
+    groups = tuple(one.modes for one in known)
+    if not set(wanted) <= {mode for group in groups for mode in group}:
+        raise UsageError("these series are not of this expansion: a mode is missing")
     return Expansion(
-        modes=tuple(m for g in found.groups for m in g if m in wanted),
-        clusters=tuple(Cluster(g, _frozen(s)) for g, s in zip(found.groups, series, strict=True)),
+        modes=tuple(m for g in groups for m in g if m in wanted),
+        clusters=tuple(Cluster(one.modes, _frozen(one.coefficients)) for one in known),
         q0=_frozen(x0[: pencil.n_q]),
         y0=_frozen(x0[pencil.n_q :]),
         space=local.space,
         directions=_frozen(local.directions),
         n_linear=local.n_linear,
-        vectors=found.vectors,
-        vector_space=found.space,
-        notes=notes(found.groups, local, pencil),
+        vectors=tuple(one.vectors for one in known),
+        vector_space=half,
+        notes=_notes(groups, local, pencil),
         pencil=pencil,
     )
 
 
-def notes(groups: Sequence[tuple[int, ...]], local: LocalSpace, pencil: Pencil) -> tuple[str, ...]:
+def _notes(groups: Sequence[tuple[int, ...]], local: LocalSpace, pencil: Pencil) -> tuple[str, ...]:
     """Sentences on modes expanded together and on variables dropped."""
     lines = [
         f"modes {g[0]}-{g[-1]} lie close together and are expanded as one cluster"

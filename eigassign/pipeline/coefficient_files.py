@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from eigassign.modal.expansion import Expansion
 from eigassign.output.result_files import dumps
-from eigassign.output.store.cache import key, pack
+from eigassign.output.store.array_file import pack
 from eigassign.study.scene import Scene
 
 Array = NDArray[Any]
@@ -42,10 +42,9 @@ def coefficient_files(scene: Scene, linear_only: bool) -> dict[str, bytes]:
     }
     flat = {f"{part}_{name}": a for part, table in tables.items() for name, a in table.items()}
     meta = {"case": scene.file.title, "sha256": scene.file.sha256, "x_names": ", ".join(names)}
-    entry = key([[name, flat[name]] for name in sorted(flat)], algorithm="coefficients")
     return {
         "coefficients.json": (dumps(document) + "\n").encode(),
-        "coefficients.h5": pack(entry, {**point, **flat}, meta),
+        "coefficients.h5": pack("coefficients", {**point, **flat}, meta),
     }
 
 

@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import comb
-from typing import Any
 
 import numpy as np
 import scipy
 
+from eigassign._version import __version__
 from eigassign.errors import UsageError
 from eigassign.modal.arguments import MOST_TERMS
-from eigassign.modal.confirmation import ExpansionRequest, unlike
 from eigassign.modal.expansion import expand
 from eigassign.modal.model import Model
-from eigassign.modal.storage import (
-    ALGORITHM,
-    expansion_arrays,
-    expansions_from_arrays,
-    pencil_parts,
-)
-from eigassign.output.store.cache import Cache, key
+from eigassign.modal.storage import ALGORITHM, expansion_arrays, stored_series, tree_arrays
+from eigassign.output.store.array_file import Array, content_key
+from eigassign.output.store.cache import Cache
 from eigassign.study.planning import Plan
 from eigassign.study.scene import Expansions
 
@@ -79,81 +75,67 @@ class ExpansionSize:
 def expansion_size(model: Model, plan: Plan) -> ExpansionSize:
     """Estimated: one mode to order p in n variables takes, with the linearised one beside it, about
 
-        t = 1.2 μs · C(2n + p, p) + 20 ns · n_θ V,    V = C(n + ⌊(p−1)/2⌋, n) C(n + ⌊p/2⌋, n)
+        t = 1.2 μs · C(2n + p, p) + 20 ns · n_θ V H + 0.3 μs · n_dof H + 10 μs · n_dof,
+        V = C(n + ⌊(p−1)/2⌋, n),  H = C(n + ⌊p/2⌋, n)
 
-    for the C(2n + p, p) products of two coefficients, and the n_θ terms of the pencil between V
-    pairs of eigenvector coefficients. (The six-axis arm takes 0.6 to 1.4 times as long from order 6
-    to 8, up to 3 times where others use the machine's memory; all of less than 50 ms takes longer.)
+    for the C(2n + p, p) products of two coefficients, the n_θ terms of the pencil between pairs of
+    eigenvector coefficients, the H solves, and once for all modes the modes at the point. Of 200
+    expansions (shipped cases with 1 to 256 times their elements and random chains, to order 14)
+    those of over 50 ms take 0.3 to 2.2 times as long; shorter ones some milliseconds more.
     Each pair and each product holds about 24 bytes at the peak.
     """
     n, p = int(model.pencil.active.sum()), affordable_order(model, plan.order)
-    products = comb(2 * n + p, p)
-    met = model.pencil.n_theta * comb(n + (p - 1) // 2, n) * comb(n + p // 2, n)
-    seconds = 1.2e-6 * products + 20e-9 * met
+    products, solves = comb(2 * n + p, p), comb(n + p // 2, n)
+    met, n_dof = model.pencil.n_theta * comb(n + (p - 1) // 2, n) * solves, model.pencil.n_dof
+    each = 1.2e-6 * products + 20e-9 * met + 0.3e-6 * n_dof * solves
     memory_mb = 24.0 * (met + products) / 1e6
-    times = len(plan.modes) * (1 + len(plan.more_q))
-    return ExpansionSize(p, comb(n + p, p), memory_mb, times * seconds)
+    seconds = (1 + len(plan.more_q)) * (len(plan.modes) * each + 10e-6 * n_dof)
+    return ExpansionSize(p, comb(n + p, p), memory_mb, seconds)
 
 
 def _expansions(
     model: Model, plan: Plan, full_order: int, cache: Cache | None
 ) -> tuple[Expansions, bool]:
     """The expansions, and True where they come from the cache."""
-    if cache is None:
-        return _computed(model, plan, full_order), False
+    one = replace(plan, more_q=())
+    if cache is None or expansion_size(model, one).seconds < cache.least_s:
+        return _made(model, plan, full_order), False
     entry = expansion_key(model, plan, full_order)
-    if (found := _stored(cache, entry, model, plan, full_order)) is not None:
-        return found, True
-    fresh = _computed(model, plan, full_order)
+    if (stored := cache.load(entry)) is not None:
+        try:
+            return _made(model, plan, full_order, stored), True
+        except UsageError as error:
+            _log.warning("cache entry %s cannot be used (%s); computed anew", entry[:12], error)
+    fresh = _made(model, plan, full_order)
     cache.store(entry, expansion_arrays(fresh.full, fresh.linear), _meta(plan))
     return fresh, False
 
 
-def _computed(model: Model, plan: Plan, full_order: int) -> Expansions:
-    point, gap = (model.pencil, plan.q0, plan.y0, plan.modes), plan.cluster_gap
-    return Expansions(
-        full=expand(*point, full_order, linear_in_y=False, cluster_gap=gap),
-        linear=expand(*point, plan.order, linear_in_y=True, cluster_gap=gap),
-        order=plan.order,
-        full_order=full_order,
+def _made(
+    model: Model, plan: Plan, full_order: int, stored: Mapping[str, Array] | None = None
+) -> Expansions:
+    """Both expansions, of what is ``stored`` where that is given."""
+    full, linear = (
+        expand(
+            *(model.pencil, plan.q0, plan.y0, plan.modes, order, linear_in_y),
+            cluster_gap=plan.cluster_gap,
+            known=None if stored is None else stored_series(stored, k),
+        )
+        for k, (order, linear_in_y) in enumerate([(full_order, False), (plan.order, True)])
     )
-
-
-def _stored(
-    cache: Cache, entry: str, model: Model, plan: Plan, full_order: int
-) -> Expansions | None:
-    arrays = cache.load(entry)
-    if arrays is None:
-        return None
-    try:
-        found = expansions_from_arrays(arrays, 2)
-        full, linear = (replace(e, pencil=model.pencil) for e in found)
-        x0 = np.concatenate([plan.q0, plan.y0])
-        sets = ((full_order, False), (plan.order, True))
-        wanted = ExpansionRequest(x0, tuple(sorted(plan.modes)), plan.cluster_gap, sets)
-        if (reason := unlike(model.pencil, (full, linear), wanted)) is not None:
-            raise UsageError(reason)
-        return Expansions(full, linear, plan.order, full_order)
-    except UsageError as error:
-        _log.warning("cache entry %s cannot be used (%s); computed anew", entry[:12], error)
-        return None
+    return Expansions(full, linear, plan.order, full_order)
 
 
 def expansion_key(model: Model, plan: Plan, full_order: int) -> str:
     """SHA-256 over all that the numbers of both expansions follow from.
 
     The pencil's arrays, the point, the modes, the sets, and the versions of this algorithm and of
-    the libraries that do its arithmetic: where any of them differs, so may the last bit.
+    all that does its arithmetic: where any of them differs, so may the last bit.
     """
-    parts: list[Any] = [
-        pencil_parts(model.pencil),
-        plan.q0,
-        plan.y0,
-        list(plan.modes),
-        [full_order, plan.order, plan.cluster_gap],
-        [np.__version__, scipy.__version__],
-    ]
-    return key(parts, algorithm=ALGORITHM)
+    pencil = replace(model.pencil, rails=None, limits=None)  # which refuse, and change no number
+    point = (plan.q0, plan.y0, tuple(plan.modes), full_order, plan.order, plan.cluster_gap)
+    versions = (__version__, np.__version__, scipy.__version__)
+    return content_key(tree_arrays((pencil, *point, *versions)), ALGORITHM)
 
 
 def _meta(plan: Plan) -> dict[str, str]:

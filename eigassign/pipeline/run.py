@@ -25,7 +25,7 @@ from eigassign.output.figures.run import run_figures
 from eigassign.output.formats import number
 from eigassign.output.reports.notebook import Pictured, html
 from eigassign.output.result_files import frequency_columns
-from eigassign.output.store.cache import Cache, default_directory
+from eigassign.output.store.cache import Cache, default_directory, least_work
 from eigassign.pipeline.coefficient_files import coefficient_files
 from eigassign.pipeline.expansions import expand_plan
 from eigassign.pipeline.run_files import RunFolder, new_run_folder
@@ -317,7 +317,8 @@ def _outcome(folder: RunFolder, results: RunResults, stages: Stages) -> Outcome:
 
 
 def _cache(options: Options) -> Cache | None:
-    if not options.use_cache:
+    least_s = least_work()
+    if least_s is None or not options.use_cache:
         return None
     directory = options.cache_dir if options.cache_dir is not None else default_directory()
-    return None if directory is None else Cache(directory)
+    return None if directory is None else Cache(directory, least_s)

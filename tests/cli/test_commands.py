@@ -308,7 +308,10 @@ def test_an_edited_case_in_a_run_is_kept_beside_the_next_run(capsys: Captured) -
     assert Path("run/case.yaml").read_text() != "mine"
 
 
-def test_no_cache_leaves_no_cache_and_a_cache_is_listed_and_cleared(capsys: Captured) -> None:
+def test_no_cache_leaves_no_cache_and_a_cache_is_listed_and_cleared(
+    capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("EIGASSIGN_CACHE", "always")
     assert main(["optimize", "good.yaml", "--no-cache", *LITTLE]) == 0
     assert not Path("cache").exists()
     assert main(["optimize", "good.yaml", "--cache-dir", "elsewhere", *LITTLE]) == 0

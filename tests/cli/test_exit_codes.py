@@ -241,10 +241,14 @@ def test_a_run_folder_that_cannot_be_is_an_io_error(
 
 
 def test_a_cache_that_cannot_be_written_costs_a_warning_and_no_result(
-    capsys: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setenv("EIGASSIGN_CACHE", "always")
     assert main(["optimize", "good.yaml", *LITTLE[:-1], "--cache-dir", "good.yaml"]) == 0
     assert "warning: the cache cannot be" in capsys.readouterr().err
+    monkeypatch.setenv("EIGASSIGN_CACHE", "sometimes")
+    assert main(["optimize", "good.yaml", *LITTLE]) == 2
+    assert "expected one of always, auto, never" in capsys.readouterr().err
 
 
 # The command, which lasts as soon as it begins to write its results. Worker processes import this

@@ -22,6 +22,7 @@ import time
 from collections import Counter
 from itertools import count, cycle
 from pathlib import Path
+from unittest.mock import patch
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -40,7 +41,11 @@ def optimize(case: Path, target: Path, force: bool) -> int:
     """The whole command, with a cache beside its case."""
     os.chdir(case.parents[1])
     args = ["optimize", case, "--out", target, "--cache-dir", case.parents[1] / "cache"]
-    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+    with (
+        contextlib.redirect_stdout(io.StringIO()),
+        contextlib.redirect_stderr(io.StringIO()),
+        patch.dict(os.environ, EIGASSIGN_CACHE="always"),
+    ):
         return main([*map(str, args), *LITTLE, *(["--force"] if force else [])])
 
 

@@ -13,7 +13,8 @@ from chains import model_of, random_chain, two_link
 
 from eigassign import api
 from eigassign.errors import StorageError, UsageError
-from eigassign.modal import reduce, reduced_arrays, reduced_from_arrays
+from eigassign.modal import FORMAT, reduce, reduced_arrays, reduced_from_arrays
+from eigassign.output import pack
 
 Q0, Y0 = np.array([1.817, 5.312]), np.array([0.125, 0.125])
 Q = Q0 + np.column_stack([np.zeros(9), np.linspace(-0.5, 0.5, 9)])
@@ -79,19 +80,48 @@ def test_a_name_that_no_file_can_have_is_refused(reduced, tmp_path: Path, name: 
         api.load_reduced(f"{tmp_path}/{name}")
 
 
-def test_arrays_of_another_version_are_refused(reduced):
-    arrays = reduced_arrays(reduced)
+def spoilt(arrays, change):
     tree = json.loads(arrays["tree"].tobytes())
-    tree["format"] = "reduced model 0"
-    arrays["tree"] = np.frombuffer(json.dumps(tree).encode(), dtype=np.uint8)
-    with pytest.raises(UsageError, match="reduced model 0"):
-        reduced_from_arrays(arrays)
+    change(tree["fields"])
+    return {**arrays, "tree": np.frombuffer(json.dumps(tree).encode(), dtype=np.uint8)}
+
+
+def test_a_file_of_another_version_or_kind_is_refused(reduced, tmp_path):
+    for key in ("reduced model 0", "coefficients"):
+        (tmp_path / "a.h5").write_bytes(pack(key, reduced_arrays(reduced), {}))
+        with pytest.raises(StorageError, match=f"it holds '{key}', not 'reduced model"):
+            api.load_reduced(tmp_path / "a.h5")
 
 
 def test_only_known_classes_are_made(reduced):
     arrays = reduced_arrays(reduced)
     tree = json.loads(arrays["tree"].tobytes())
-    tree["content"]["tuple"][0]["class"] = "Path"
+    tree["class"] = "Path"
     arrays["tree"] = np.frombuffer(json.dumps(tree).encode(), dtype=np.uint8)
     with pytest.raises(UsageError, match="not a reduced model"):
         reduced_from_arrays(arrays)
+
+
+NESTED = b'{"tuple": [' * 100_000
+CHANGES = {
+    "a number that is not finite": lambda a: {**a, "numbers": np.where(a["numbers"], np.nan, 0.0)},
+    "a number less": lambda a: {**a, "numbers": a["numbers"][:-1]},
+    "a number more": lambda a: {**a, "numbers": np.append(a["numbers"], 0.0)},
+    "an index beyond the end": lambda a: {**a, "integers": a["integers"] + 10**9},
+    "no tree": lambda a: {k: v for k, v in a.items() if k != "tree"},
+    "a tree too deep": lambda a: {**a, "tree": np.frombuffer(NESTED, dtype=np.uint8)},
+    "a tree too long": lambda a: {**a, "tree": np.full(3_000_000, 32, dtype=np.uint8)},
+    "a tuple": lambda a: spoilt(a, lambda fields: fields.update(points={"tuple": []})),
+    "a count": lambda a: spoilt(a, lambda fields: fields.update(n_q=10**12)),
+    "other modes": lambda a: spoilt(a, lambda fields: fields.update(modes={"tuple": [99]})),
+    "a missing field": lambda a: spoilt(a, lambda fields: fields.pop("mass")),
+    "no error terms": lambda a: spoilt(a, lambda fields: fields.update(certified=None)),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+def test_what_cannot_be_a_model_is_refused_however_right_its_hash(reduced, tmp_path, change):
+    data = pack(FORMAT, change(reduced_arrays(reduced)), {})
+    (tmp_path / "a.h5").write_bytes(data)
+    with pytest.raises(StorageError, match="not an intact reduced model: these arrays are not a"):
+        api.load_reduced(tmp_path / "a.h5")

@@ -1,27 +1,25 @@
+"""What comes from the cache is what would be computed, bit for bit, and only what takes long."""
+
 from __future__ import annotations
 
-import json
 import logging
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from run_cases import TARGET, automatic, case_of, chain, shipped
+from scipy import sparse
 
 from eigassign import Case
 from eigassign.errors import UsageError
-from eigassign.modal import (
-    Expansion,
-    expansion_arrays,
-    expansions_from_arrays,
-    flatten,
-    pencil_parts,
-)
+from eigassign.modal import Expansion, stored_series, tree_arrays
 from eigassign.output import Cache
 from eigassign.pipeline import Options, affordable_order, expand_plan, expansion_key, solve_case
 from eigassign.study import Plan, plan_expansion
+
+FROM_CACHE = "the expansion coefficients come from the cache"
 
 
 def plan_of(case: Case) -> Plan:
@@ -35,12 +33,8 @@ def expanded(case: Case, cache: Cache | None) -> tuple[Expansion, Expansion, lis
 
 
 def assert_same_bits(one: Expansion, other: Expansion) -> None:
-    a, b = expansion_arrays(one), expansion_arrays(other)
-    assert list(a) == list(b)
-    for name, array in a.items():
-        assert array.dtype == b[name].dtype
-        assert array.shape == b[name].shape
-        assert array.tobytes() == b[name].tobytes(), name
+    a, b = (tree_arrays(replace(expansion, pencil=None)) for expansion in (one, other))
+    assert {k: v.tobytes() for k, v in a.items()} == {k: v.tobytes() for k, v in b.items()}
 
 
 @pytest.mark.parametrize(
@@ -56,8 +50,8 @@ def test_a_hit_equals_a_recomputation_bit_for_bit(text: str, tmp_path: Path) -> 
     fresh = expanded(case, cache)
     known = expanded(case_of(tmp_path, text), cache)
     again = expanded(case_of(tmp_path, text), None)
-    assert "the expansion coefficients come from the cache" in known[2]
-    assert "the expansion coefficients come from the cache" not in [*fresh[2], *again[2]]
+    assert FROM_CACHE in known[2]
+    assert FROM_CACHE not in [*fresh[2], *again[2]]
     for k in (0, 1):
         assert_same_bits(fresh[k], known[k])
         assert_same_bits(again[k], known[k])
@@ -78,16 +72,50 @@ def test_what_comes_from_the_cache_is_frozen(tmp_path: Path) -> None:
             assert not array.flags.writeable, name
 
 
-def test_a_whole_solution_from_the_cache_has_the_same_bits(tmp_path: Path) -> None:
+def test_a_whole_solution_from_the_cache_has_the_same_bits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("EIGASSIGN_CACHE", "always")
     case = case_of(tmp_path, shipped())
     options = Options(cache_dir=tmp_path / "cache")
     first, second, third = (
         solve_case(case, o) for o in (options, options, Options(use_cache=False))
     )
+    assert FROM_CACHE in second.results.notes
     for other in (second, third):
         assert first.design == other.design
         np.testing.assert_array_equal(first.predicted_hz, other.predicted_hz)
         np.testing.assert_array_equal(first.exact_hz, other.exact_hz)
+
+
+LARGE = (("samples: 152", "samples: 3"), ("order: 4", "order: 20"))  # about 0.5 s
+
+
+@pytest.mark.parametrize(
+    ("rule", "small", "large"),
+    [("always", 1, 1), ("auto", 0, 1), (None, 0, 1), ("never", 0, 0)],
+)
+def test_what_is_cached_follows_the_rule_and_the_size(
+    rule: str | None,
+    small: int,
+    large: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv("EIGASSIGN_CACHE", raising=False)
+    if rule is not None:
+        monkeypatch.setenv("EIGASSIGN_CACHE", rule)
+    for name, text, count in (("small", shipped(), small), ("large", shipped(*LARGE), large)):
+        solve_case(case_of(tmp_path, text), Options(cache_dir=tmp_path / name, study="none"))
+        assert len(list((tmp_path / name).glob("*.h5"))) == count, name
+
+
+def test_a_rule_that_is_none_is_a_usage_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("EIGASSIGN_CACHE", "on")
+    with pytest.raises(UsageError, match="EIGASSIGN_CACHE = 'on': expected one of always, auto, n"):
+        solve_case(case_of(tmp_path, shipped()), Options(use_cache=False))
 
 
 @pytest.mark.parametrize("damage", ["truncated", "flipped"])
@@ -106,31 +134,31 @@ def test_a_damaged_entry_is_set_aside_and_rebuilt_with_a_warning(
     assert "set aside" in caplog.text
     assert_same_bits(fresh[0], rebuilt[0])
     assert len(list((tmp_path / "cache").glob("*.damaged"))) == 1
-    assert "the expansion coefficients come from the cache" in expanded(case, cache)[2]
+    assert FROM_CACHE in expanded(case, cache)[2]
 
 
-@pytest.mark.parametrize("spoiled", ["missing", "wrong shape", "no layout"])
+@pytest.mark.parametrize("spoiled", ["a missing array", "a wrong shape", "NaN", "other modes"])
 def test_an_intact_entry_with_other_content_is_recomputed_with_a_warning(
     spoiled: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     case, cache = case_of(tmp_path, shipped()), Cache(tmp_path / "cache")
     fresh = expanded(case, cache)
     entry = expansion_key(case.model(), plan_of(case), 4)
-    stored = cache.load(entry)
-    assert stored is not None
-    tree = json.loads(stored["tree"].tobytes())
-    full, linear = (part["fields"] for part in tree["content"]["tuple"])
-    if spoiled == "missing":
-        del full["q0"]
-    elif spoiled == "wrong shape":
-        linear["directions"] = full["q0"]
-    text = np.frombuffer(json.dumps(tree).encode(), dtype=np.uint8)
-    flat = {"numbers": np.zeros(3)} if spoiled == "no layout" else {**stored, "tree": text}
-    cache.store(entry, flat, {})
+    stored = dict(cache.load(entry) or {})
+    if spoiled == "a missing array":
+        del stored["vectors_1_0"]
+    elif spoiled == "a wrong shape":
+        stored["coefficients_1_0"] = stored["coefficients_0_0"]
+    elif spoiled == "NaN":
+        stored["vectors_0_0"] = np.where(stored["vectors_0_0"] > 0.0, np.nan, 0.0)
+    else:
+        stored["modes_0_0"] = np.array([2])
+    cache.store(entry, stored, {})
     with caplog.at_level(logging.WARNING):
         rebuilt = expanded(case, cache)
     assert "computed anew" in caplog.text
     assert_same_bits(fresh[1], rebuilt[1])
+    assert FROM_CACHE in expanded(case, cache)[2]
 
 
 CHANGES = {
@@ -175,41 +203,46 @@ def test_what_changes_no_coefficient_keeps_the_key(change: str, tmp_path: Path) 
     assert key_of(tmp_path, shipped(SAME[change])) == key_of(tmp_path, shipped())
 
 
-def _numbers(parts: object) -> Iterator[np.ndarray]:
-    if isinstance(parts, np.ndarray):
-        yield parts
-    elif isinstance(parts, list):
-        for part in parts:
-            yield from _numbers(part)
+def _arrays(thing: object) -> Iterator[np.ndarray]:
+    """All arrays that count, to be changed in place."""
+    if isinstance(thing, np.ndarray):
+        yield thing
+    elif sparse.issparse(thing):
+        yield thing.data
+    elif isinstance(thing, tuple):
+        for part in thing:
+            yield from _arrays(part)
+    elif is_dataclass(thing):
+        for field in fields(thing):
+            if field.name not in ("rails", "limits"):
+                yield from _arrays(getattr(thing, field.name))
 
 
 def test_every_array_of_the_pencil_counts(tmp_path: Path) -> None:
     case = case_of(tmp_path, shipped())
-    model = case.model()
-    plain, plan = key_of(tmp_path, shipped()), plan_of(case)
-    pencil = model.pencil
-    for name in ("rows", "columns", "to_program", "shift", "rigid", "stiffness", "mass"):
-        value = getattr(pencil, name) * 1
-        (value.data if name in ("stiffness", "mass") else value.reshape(-1))[-1:] += 1
-        other = replace(model, pencil=replace(pencil, **{name: value}))
-        assert expansion_key(other, plan, 4) != plain, name
-    steps = pencil.program.steps
-    for k, step in enumerate(steps):
-        changed = replace(step, left=step.left[::-1] + 1)
-        program = replace(pencil.program, steps=(*steps[:k], changed, *steps[k + 1 :]))
-        other = replace(model, pencil=replace(pencil, program=program))
-        assert expansion_key(other, plan, 4) != plain, step.kind
-    assert sum(array.size for array in _numbers(pencil_parts(pencil))) > 1000
+    model, plan = case.model(), plan_of(case)
+    plain, count = expansion_key(model, plan, 4), 0
+    for array in _arrays(model.pencil):
+        if array.size:
+            array.setflags(write=True)
+            flat, old = array.reshape(-1), array.flat[-1]
+            flat[-1] = not old if array.dtype == bool else old + 1
+            assert expansion_key(model, plan, 4) != plain, array
+            flat[-1], count = old, count + 1
+    assert count > 20
+    assert expansion_key(model, plan, 4) == plain
 
 
-def test_only_arrays_that_can_be_stored_exactly_are() -> None:
-    with pytest.raises(UsageError, match="cannot be stored"):
-        flatten({"a": np.zeros(3, dtype=np.float32)})
+def test_only_what_can_be_stored_exactly_is() -> None:
+    for thing in (np.zeros(3, dtype=complex), np.array(["a"]), {1: 2}, object()):
+        with pytest.raises(UsageError, match="cannot be stored"):
+            tree_arrays(thing)
 
 
 def test_what_is_no_expansion_is_not_taken_for_one() -> None:
+    assert stored_series({"q0": np.zeros(2)}, 0) == []
     with pytest.raises(UsageError, match="not expansions"):
-        expansions_from_arrays({"q0": np.zeros(2)}, 2)
+        stored_series({"modes_0_0": np.ones(1)}, 0)
 
 
 def test_a_set_too_large_is_taken_to_a_lower_order_and_said_so(tmp_path: Path) -> None:

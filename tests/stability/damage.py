@@ -1,7 +1,7 @@
-"""Damaged copies of what was stored, with every hash made anew: only what they say can betray them.
+"""Damaged copies of what was stored, with the hash as it was or made anew.
 
-Numbers, layout and the tree of classes are changed in the arrays, which are then packed as an
-undamaged file is; or bytes of HDF5 are changed, and the header is made to fit.
+Bytes of the file are changed; or numbers and the tree of classes in the arrays, which are then
+packed as an undamaged file is, so that only what they say can betray them.
 """
 
 from __future__ import annotations
@@ -12,89 +12,87 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.output import header, pack
-
-HEADER = 512  # bytes of a cache file before its HDF5
+from eigassign.output import pack
 
 Arrays = dict[str, NDArray[Any]]
 Damage = Callable[[Arrays, np.random.Generator], None]
 
 
-def scaled(arrays: Arrays, rng: np.random.Generator) -> None:
-    at = rng.integers(len(arrays["numbers"]))
-    arrays["numbers"][at] *= 1.0 + rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-6.0, 1.0)
+def chosen(arrays: Arrays, rng: np.random.Generator, kind: str = "") -> str:
+    """The name of an array of this kind, a letter of NumPy's."""
+    names = [
+        name for name, array in arrays.items() if array.size and kind in (array.dtype.kind, "")
+    ]
+    return str(rng.choice(names))
 
 
 def replaced(arrays: Arrays, rng: np.random.Generator) -> None:
-    values = [0.0, 1.0, -1.0, 1e300, 1e-300, np.nan, np.inf, rng.normal()]
-    arrays["numbers"][rng.integers(len(arrays["numbers"]))] = values[rng.integers(len(values))]
+    flat = arrays[chosen(arrays, rng, "f")].reshape(-1)
+    flat[rng.integers(len(flat))] = rng.choice([np.nan, np.inf, -np.inf])
 
 
-def one_bit(arrays: Arrays, rng: np.random.Generator) -> None:
-    bits = arrays["numbers"].view(np.uint64)
-    bits[rng.integers(len(bits))] ^= np.uint64(1) << np.uint64(rng.integers(64))
-
-
-def swapped(arrays: Arrays, rng: np.random.Generator) -> None:
-    numbers = arrays["numbers"]
-    i, j = rng.integers(len(numbers), size=2)
-    numbers[[i, j]] = numbers[[j, i]]
-
-
-def shifted(arrays: Arrays, rng: np.random.Generator) -> None:
-    i, j = np.sort(rng.integers(len(arrays["numbers"]) + 1, size=2))
-    arrays["numbers"][i:j] = np.roll(arrays["numbers"][i:j], 1)
-
-
-def noisy(arrays: Arrays, rng: np.random.Generator) -> None:
-    numbers = arrays["numbers"]
-    numbers *= 1.0 + 10.0 ** rng.uniform(-6.0, -1.0) * rng.normal(size=len(numbers))
+def scaled(arrays: Arrays, rng: np.random.Generator) -> None:
+    flat = arrays[chosen(arrays, rng, "f")].reshape(-1)
+    flat[rng.integers(len(flat))] *= rng.choice([0.0, -1.0, 1e-300, 1e300])
 
 
 def counted_otherwise(arrays: Arrays, rng: np.random.Generator) -> None:
-    values = arrays["integers"]
-    at = rng.integers(len(values))
-    values[at] = rng.choice([values[at] + 1, values[at] - 1, -1, 0, 10**9, -(2**62)])
+    flat = arrays[chosen(arrays, rng, "i")].reshape(-1)
+    at = rng.integers(len(flat))
+    flat[at] = rng.choice([flat[at] + 1, flat[at] - 1, -1, 0, 10**9, -(2**62)])
 
 
 def shortened(arrays: Arrays, rng: np.random.Generator) -> None:
-    name = rng.choice(["numbers", "integers"])
-    arrays[name] = arrays[name][: rng.integers(len(arrays[name]))].copy()
+    name = chosen(arrays, rng)
+    arrays[name] = arrays[name].reshape(-1)[: rng.integers(arrays[name].size)].copy()
+
+
+def turned(arrays: Arrays, rng: np.random.Generator) -> None:
+    name = chosen(arrays, rng)
+    arrays[name] = arrays[name][None].T.copy()
+
+
+def removed(arrays: Arrays, rng: np.random.Generator) -> None:
+    del arrays[chosen(arrays, rng)]
 
 
 def misspelt(arrays: Arrays, rng: np.random.Generator) -> None:
-    name = rng.choice(["tree", "layout"])
-    text = arrays[name]
+    text = arrays.get("tree")
+    if text is None:
+        return removed(arrays, rng)
     digits = np.flatnonzero((text >= 48) & (text < 58))
     for _ in range(rng.integers(1, 4)):
         text[rng.choice(digits)] = rng.integers(48, 58)
+    return None
 
 
 def garbled(arrays: Arrays, rng: np.random.Generator) -> None:
-    name = rng.choice(["tree", "layout"])
-    arrays[name][rng.integers(len(arrays[name]))] = rng.integers(32, 127)
-
-
-def nested(arrays: Arrays, rng: np.random.Generator) -> None:
-    deep = b'{"tuple": [' * 100_000
-    arrays[str(rng.choice(["tree", "layout"]))] = np.frombuffer(deep, dtype=np.uint8)
+    flat = arrays["tree" if "tree" in arrays else chosen(arrays, rng)].reshape(-1).view(np.uint8)
+    flat[rng.integers(len(flat))] = rng.integers(32, 127)
 
 
 DAMAGES: tuple[Damage, ...] = (
-    *(scaled, replaced, one_bit, swapped, shifted, noisy),
-    *(counted_otherwise, shortened, misspelt, garbled, nested),
+    *(replaced, scaled, counted_otherwise, shortened, turned, removed, misspelt, garbled),
 )
 
 
-def damaged(key: str, arrays: Mapping[str, NDArray[Any]], rng: np.random.Generator) -> bytes:
+def forged(key: str, arrays: Mapping[str, NDArray[Any]], rng: np.random.Generator) -> bytes:
     """The file that holds ``arrays`` under ``key``, damaged in one way and with the right hash."""
     copies = {name: array.copy() for name, array in arrays.items()}
-    kind = int(rng.integers(len(DAMAGES) + 1))
-    if kind < len(DAMAGES):
-        DAMAGES[kind](copies, rng)
-        return pack(key, copies, {})
-    data = bytearray(pack(key, copies, {}))
-    for _ in range(rng.integers(1, 6)):
-        data[rng.integers(HEADER, len(data))] = rng.integers(256)
-    data[:HEADER] = header(key, memoryview(data)[HEADER:])
+    DAMAGES[int(rng.integers(len(DAMAGES)))](copies, rng)
+    return pack(key, copies, {})
+
+
+def damaged(whole: bytes, rng: np.random.Generator) -> bytes:
+    """Another file, of which bytes are changed, missing or new, and no hash is made."""
+    at, data = int(rng.integers(len(whole))), bytearray(whole)
+    kind = int(rng.integers(4))
+    if kind == 0:
+        data[at] ^= 1 << int(rng.integers(8))
+    elif kind == 1:
+        del data[at : at + int(rng.integers(1, 1000))]
+    elif kind == 2:
+        data[at:at] = rng.bytes(int(rng.integers(1, 1000)))
+    else:  # a block of a disk that was never written
+        data[at : at + 4096] = bytes(len(data[at : at + 4096]))
     return bytes(data)

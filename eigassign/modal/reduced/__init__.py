@@ -8,7 +8,6 @@ It takes Taylor vectors as a basis and knows nothing of expansions. In reading o
     added_mass      how far added mass may bring down modes beside the basis
     error_estimate  from residuals to the error in frequency, and when an answer is refused
     model           frequencies and their error estimate
-    rehearsal       answers that a stored model must give again
     compression     a smaller basis for a known region
     reduce          the one function that builds it all
 """

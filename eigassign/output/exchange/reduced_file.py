@@ -1,16 +1,14 @@
-"""A reduced model in one HDF5 file, checked by its hash before it is read."""
+"""A reduced model in one file of arrays, checked by its hash before it is read."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from eigassign.errors import StorageError, UsageError
-from eigassign.files import STORED, read_bytes
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.storage import FORMAT, reduced_arrays, reduced_from_arrays
 from eigassign.output.exchange.files import ENDINGS, write_exchange
-from eigassign.output.store.atomic import replace_synced
-from eigassign.output.store.cache import DamagedError, key, pack, unpack
+from eigassign.output.store.array_file import DamagedError, get, put
 
 
 def save_reduced(reduced: ReducedModel, path: str | Path) -> None:
@@ -28,9 +26,8 @@ def save_reduced(reduced: ReducedModel, path: str | Path) -> None:
         "size": str(reduced.size),
         "expansion points": str(len(reduced.points)),
     }
-    data = pack(_key(), reduced_arrays(reduced), meta)
     try:
-        replace_synced(path, data)
+        put(path, FORMAT, reduced_arrays(reduced), meta)
     except OSError as error:
         raise StorageError(f"cannot write {path}: {error.strerror}") from error
 
@@ -39,12 +36,8 @@ def load_reduced(path: str | Path) -> ReducedModel:
     """Read what `save_reduced` wrote; StorageError for a missing, damaged or other file."""
     path = Path(path)
     try:
-        return reduced_from_arrays(unpack(_key(), read_bytes(path, STORED))[0])
+        return reduced_from_arrays(get(path, FORMAT).arrays)
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror}") from error
     except (DamagedError, UsageError) as error:
         raise StorageError(f"{path} is not an intact reduced model: {error}") from error
-
-
-def _key() -> str:
-    return key(("file of a reduced model",), algorithm=FORMAT)
