@@ -1,8 +1,8 @@
 """The whole process ``eigassign optimize cases/two_link.yaml``, warm, against bare imports.
 
 With all figures and with ``--figures none``. The bare process imports exactly the third-party
-modules that the command has loaded when it ends, and does nothing else. Warm: the coefficients
-are in the cache and the files in memory.
+modules that the command has loaded when it ends, and does nothing else. Warm: the files are in
+memory.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def main() -> None:
         out = str(Path(folder) / "run")
         drawn = ["optimize", str(CASE), "--out", out, "--force"]
         plain = [*drawn, "--figures", "none"]
-        run("-m", "eigassign", *drawn)  # fills the cache
+        run("-m", "eigassign", *drawn)
         bare = {"all figures": bare_imports(drawn), "no figures": bare_imports(plain)}
         jobs = {
             "optimize, all figures": lambda: run("-m", "eigassign", *drawn),
