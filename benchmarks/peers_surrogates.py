@@ -16,7 +16,7 @@ from collections.abc import Callable
 import numpy as np
 
 import eigassign as ea
-from eigassign.chart import Effort, build_features, build_question, spread_points
+from eigassign.chart import Effort, build_bench, build_question, spread_points
 from eigassign.pipeline import Stages, prepare
 
 Fit = Callable[[], Callable[[np.ndarray], np.ndarray]]
@@ -46,16 +46,16 @@ def sklearn_process(u: np.ndarray, f: np.ndarray) -> Callable[[np.ndarray], np.n
 def main() -> None:
     warnings.simplefilter("ignore")
     scene = prepare(ea.load_case(common.CASES / "two_link.yaml"), Stages(lambda line: None), None)
-    features, model = build_features(scene), scene.model
-    points = build_question(scene, features, Effort(designs=5), 1e-5).points
-    exact = model.frequencies(points.q, points.y, 1)[:, 0]
+    bench, model = build_bench(scene, Effort()), scene.model
+    question = build_question(bench)
+    points, exact = question.points, question.exact_hz[:, 0]
     many = points[np.tile(np.arange(len(exact)), 3)]
     solve = common.once(lambda: model.frequencies(points.q, points.y, 1)) / len(exact)
     peers = {"SMT": smt_kriging, "scikit-learn": sklearn_process}
     rows = []
     for count in COUNTS:
-        at = features.nearest(spread_points(count, len(features.names)))
-        f = model.frequencies(at.q, at.y, 1)[:, 0]
+        at = bench.nearest(spread_points(count, len(bench.names)))
+        f = bench.exact(at)[:, 0]
         for name, fit in peers.items():
             made = fit(at.u, f)
             fitting = common.once(lambda fit=fit, u=at.u, f=f: fit(u, f))

@@ -1,4 +1,4 @@
-"""Every method put the same question: built, evaluated, timed, and compared.
+"""Every method put the same question: built, evaluated, timed, compared; and what to choose.
 
 Evaluations are timed in large batches, as a search over designs asks for them: point by point, and
 of fits by whole trajectories, which they answer in one product of matrices.
@@ -6,29 +6,31 @@ of fits by whole trajectories, which they answer in one product of matrices.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign._version import __version__
-from eigassign.chart.advice import advise, front
-from eigassign.chart.methods import Method, list_methods, most_solves
-from eigassign.chart.question import (
-    SEED,
-    Points,
-    Question,
-    build_features,
-    build_question,
-    exact_frequencies,
+from eigassign.chart.methods import Method, list_methods, surrogate_families
+from eigassign.chart.question import Question, build_bench, build_question
+from eigassign.chart.results import (
+    Advice,
+    Asked,
+    AutoTakes,
+    Chart,
+    ChartPoint,
+    Errors,
+    Front,
+    Request,
+    Timing,
+    kind_of,
 )
-from eigassign.chart.results import Asked, Chart, ChartPoint, Errors, Request, Timing
-from eigassign.chart.surrogates import surrogate_families
 from eigassign.chart.timing import Effort, machine, measure, time_in_words, timed
 from eigassign.errors import EigassignError
-from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -42,65 +44,33 @@ def compare_methods(
 
     Raises CaseError where the case has no trajectory, or nothing that changes a frequency.
     """
-    features, model, modes = build_features(scene), scene.model, scene.expansions.modes
-    solve_s, samples = _solve_cost(scene), len(features.q)
-    question = build_question(scene, features, effort, solve_s)
-    points = question.points
-    progress(f"solving {len(points)} points exactly")
-    exact_hz = exact_frequencies(scene, points)
-    ends = (np.concatenate([points.q[k], points.y[k]]) for k in (0, -1))
-    floor = max(rounding_error(model.pencil, x, max(modes)) for x in ends)
-    asked = Asked(
-        modes=modes,
-        n_dof=model.n_dof,
-        features=features.names,
-        random_points=question.n_random,
-        designs=len(question.runs),
-        samples_per_design=len(points[question.runs[0]]),
-        trajectory_samples=samples,
-        evaluations=request.evaluations or float(samples),
-        seed=SEED,
-        typical_hz=float(np.median(exact_hz)),
-        floor_hz=floor * float(exact_hz.max()),
-    )
-    listed = list_methods(scene, features, effort, request.accuracies, solve_s)
-    charted, skipped = chart_methods(listed, question, exact_hz, asked, effort, progress)
-    counts = {"one trajectory": float(samples), "1000 trajectories": 1000.0 * samples}
-    wanted = [request.evaluations] if request.evaluations else list(counts.values())
-    if request.evaluations:
-        counts[f"{request.evaluations:g} evaluations"] = request.evaluations
+    bench = build_bench(scene, effort)
+    progress("solving the points of the question exactly")
+    question = build_question(bench)
+    listed = list_methods(bench, request.accuracies)
+    charted, skipped = chart_methods(listed, effort, question, progress)
+    samples = float(question.asked.trajectory_samples)
+    counts = {"one trajectory": samples, "1000 trajectories": 1000.0 * samples}
+    wanted = list(counts.values())
+    if n := request.evaluations:
+        wanted, counts[f"{n:g} evaluations"] = [n], n
     named = {**counts, "online alone": None}.items()
-    fronts = tuple(front(charted, name, n, asked.floor_hz) for name, n in named)
+    asked = replace(question.asked, evaluations=wanted[0])
     notes = list(skipped_notes(skipped))
-    most, d = most_solves(effort, solve_s), len(features.names)
+    most, d = bench.most_solves, len(bench.names)
     if most < max([*effort.training, *(k**d for k in effort.nodes)]):
         notes.append(f"no grid or surrogate is trained on over {most} exact solves")
     if "Kriging" not in [family for family, *_ in surrogate_families()]:
         notes.append("no Kriging: it is charted where scikit-learn is installed")
+    file = scene.file
     return Chart(
-        title=scene.file.title,
-        case_name=scene.file.path.stem,
-        case_sha256=scene.file.sha256,
-        reference=scene.file.reference,
-        version=__version__,
-        quick=effort.quick,
-        machine=machine(),
-        asked=asked,
-        points=tuple(charted),
-        skipped=tuple(skipped.items()),
-        fronts=fronts,
+        title=file.title, case_name=file.path.stem, case_sha256=file.sha256,
+        reference=file.reference, version=__version__, quick=effort.quick, machine=machine(),
+        asked=asked, points=tuple(charted), skipped=tuple(skipped.items()),
+        fronts=tuple(front(charted, name, n, asked.floor_hz) for name, n in named),
         advice=tuple(advise(charted, asked, request, wanted, skipped)),
-        notes=tuple(notes),
-        warnings=scene.warnings,
-    )
-
-
-def _solve_cost(scene: Scene) -> float:
-    """Seconds of one exact solve, roughly: to decide how many can be afforded."""
-    q = scene.path.q[: 1 if scene.model.n_dof > 1000 else 16]
-    some = Points(q, np.tile(scene.initial, (len(q), 1)), q)
-    exact_frequencies(scene, some[:1])
-    return max(timed(lambda: exact_frequencies(scene, some))[1] / len(q), 1e-6)
+        notes=tuple(notes), warnings=scene.warnings,
+    )  # fmt: skip
 
 
 def skipped_notes(skipped: Mapping[str, str]) -> Iterator[str]:
@@ -110,13 +80,11 @@ def skipped_notes(skipped: Mapping[str, str]) -> Iterator[str]:
         yield f"{', '.join(names)} {'has' if len(names) == 1 else 'have'} no answer: {why}"
 
 
+# --- Measured: what every method costs, and how wrong it is
+
+
 def chart_methods(
-    listed: Iterable[Method],
-    question: Question,
-    exact_hz: Floats,
-    asked: Asked,
-    effort: Effort,
-    progress: Callable[[str], None],
+    listed: Iterator[Method], effort: Effort, question: Question, progress: Callable[[str], None]
 ) -> tuple[list[ChartPoint], dict[str, str]]:
     """A point for every method; of those that cannot answer, why.
 
@@ -130,7 +98,7 @@ def chart_methods(
         try:
             if why := families.setdefault(method.family, ""):
                 raise EigassignError(why)
-            point, set_up_s = _chart_method(method, question, exact_hz, asked, effort)
+            point, set_up_s = _chart_method(method, effort, question)
         except EigassignError as error:
             skipped[method.name] = str(error)
             continue
@@ -146,55 +114,44 @@ def chart_methods(
     return charted, skipped
 
 
-def _chart_method(
-    method: Method, question: Question, exact_hz: Floats, asked: Asked, effort: Effort
-) -> tuple[ChartPoint, float]:
+def _chart_method(method: Method, effort: Effort, question: Question) -> tuple[ChartPoint, float]:
     """Set up, evaluated, timed and compared; and the seconds of setting up."""
-    points, n, first, samples = question.points, question.n_random, 0, asked.trajectory_samples
-    parts, solver = [points[: method.most]], method.family.startswith("exact")
+    points, samples = question.points, question.asked.trajectory_samples
+    rows, n = [slice(0, method.most)], question.asked.random_points
     if method.per_design:
-        parts, first, n = [points[run] for run in question.runs], n, 0
+        rows, n = list(question.runs), 0
+    parts = [points[each] for each in rows]
     one, set_up = measure(lambda: method.build(parts[0].y[0]), effort)
-    made = [one, *(method.build(part.y[0]) for part in parts[1:])]
-    pairs = list(zip(made, parts, strict=True))
-    hz, spent = timed(lambda: np.vstack([each.evaluate(part) for each, part in pairs]))
-    some = parts[0]
-    if not method.most:  # as many as take 20 ms at the pace of the first answers, 32768 at most
-        many = max(300, int(min(0.02 * len(hz) / (spent + 1e-9), 32768)))
-        some = some[np.resize(np.arange(len(some)), many)]
-    job, count = partial(one.evaluate, some), len(some)
-    if one.along is not None:
-        y = points.y[[run.start for run in question.runs]]
-        y = y[np.resize(np.arange(len(y)), 1 + 32768 // samples)]
-        job, count = partial(one.along, y), len(y) * samples
-    online = measure(job, effort)[1].times(1.0 / count)
-    exact, solves = exact_hz[first : first + len(hz)], sum(each.solves for each in made)
-    everywhere, offline, solves_online, note = errors(hz, exact), set_up, 0.0, ""
-    if solver:  # an error below round-off means nothing
-        everywhere = replace(everywhere, worst_hz=max(everywhere.worst_hz, asked.floor_hz))
-        offline, solves, solves_online = NOTHING, 0, 1.0
+    pairs = [(one, parts[0]), *((method.build(part.y[0]), part) for part in parts[1:])]
+    hz, spent = timed(lambda: np.vstack([built.evaluate(part) for built, part in pairs]))
+    exact, solves = question.exact_hz[rows[0].start :][: len(hz)], sum(b.solves for b, _ in pairs)
+    # as many as take 20 ms at the pace of the first answers
+    many = int(np.clip(0.02 * len(hz) / (spent + 1e-9), min(300, len(parts[0])), 32768))
+    many = samples if method.per_design else many
+    some = parts[0][np.resize(np.arange(len(parts[0])), many)]
+    job: Callable[[], Any] = partial(one.evaluate, some)
     if method.per_design:
-        offline, solves, solves_online = NOTHING, 0, solves / (samples * len(parts))
-        online = online.plus(set_up.times(1.0 / samples))
-        note = "set up anew for every design: answers the runs along the trajectory only"
+        job = lambda: method.build(some.y[0]).evaluate(some)  # noqa: E731
+    elif one.along is not None:
+        designs = points.y[np.resize([run.start for run in question.runs], 1 + 32768 // samples)]
+        job, many = partial(one.along, designs), len(designs) * samples
     point = ChartPoint(
-        method=method.name,
-        family=method.family,
-        ours=method.ours,
-        parameters=method.parameters,
-        offline=offline,
-        online=online,
-        solves=solves,
-        solves_online=solves_online,
-        everywhere=everywhere,
+        method=method.name, family=method.family, ours=method.ours, parameters=method.parameters,
+        offline=set_up, online=measure(job, effort)[1].times(1.0 / many),
+        solves=solves, solves_online=0.0, everywhere=errors(hz, exact),
         random=errors(hz[:n], exact[:n]) if n else None,
         trajectory=errors(hz[n:], exact[n:]) if len(hz) > n else None,
-        break_even=None,
-        note=note,
-        use=method.use,
-        at_once=samples if method.per_design else 1,
-        estimate=max((each.estimate for each in made if each.estimate is not None), default=None),
-    )
+        break_even=None, use=method.use,
+        estimate=max((b.estimate for b, _ in pairs if b.estimate is not None), default=None),
+    )  # fmt: skip
+    if method.family.startswith("exact"):  # an error below round-off means nothing
+        worst = max(point.everywhere.worst_hz, question.asked.floor_hz)
+        everywhere = replace(point.everywhere, worst_hz=worst)
+        point = replace(point, everywhere=everywhere, offline=NOTHING, solves_online=1.0)
+    if method.per_design:
+        note = "set up anew for every design: answers the runs along the trajectory only"
+        point = replace(point, note=note, at_once=samples, offline=NOTHING, solves=0)
+        point = replace(point, solves_online=solves / (samples * len(parts)))
     return point, set_up.median_s
 
 
@@ -205,3 +162,111 @@ def errors(hz: Floats, exact: Floats) -> Errors:
     off = np.where(failed, np.inf, off)
     rms, relative = float(np.sqrt(np.mean(np.square(off)))), float((off / exact).max())
     return Errors(float(off.max()), rms, relative, len(hz), int(failed.any(axis=1).sum()))
+
+
+# --- Which methods no other beats, and what to choose
+
+
+def pareto(cost: Floats, error: Floats) -> list[int]:
+    """Indices that nothing beats in cost (n,) and error (n,) at once, the most accurate first.
+
+    A point that equals another in one of the two and is no better in the other is beaten; numbers
+    that are not finite never win.
+    """
+    kept, best = list[int](), np.inf
+    for k in np.lexsort((error, cost)).tolist():
+        if np.isfinite(cost[k]) and error[k] < best:
+            kept.append(k)
+            best = error[k]
+    return kept[::-1]
+
+
+def front(
+    points: Sequence[ChartPoint], name: str, evaluations: float | None, floor_hz: float
+) -> Front:
+    """The front of these points; errors below ``floor_hz`` count as equal.
+
+    A method that is set up anew for every design answers whole trajectories only: it has no part in
+    the front of single evaluations.
+    """
+    able = [p for p in _rivals(points) if p.at_once == 1 or evaluations is not None]
+    cost = np.array([p.cost_s(evaluations) for p in able])
+    error = np.array([max(p.everywhere.worst_hz, floor_hz) for p in able])
+    return Front(name, evaluations, tuple(able[k].method for k in pareto(cost, error)))
+
+
+def advise(
+    points: Sequence[ChartPoint],
+    asked: Asked,
+    request: Request,
+    counts: Sequence[float],
+    skipped: Mapping[str, str],
+) -> Iterator[Advice]:
+    """What to choose for each number of evaluations, in words and as data.
+
+    For an accuracy the quickest method that is accurate enough, without those whose own estimate is
+    over a hundred times as large (most are cautious): they may know of places that the points of
+    the question miss. Nothing is advised below round-off: no method can be seen to be that
+    accurate. For a time, which counts the set-up, the most accurate method, the quicker of equals.
+    """
+    floor, rivals = asked.floor_hz / asked.typical_hz, _rivals(points)
+    for n in counts:
+        words = f"for {n:,.0f} evaluations within"
+        for a in request.accuracies:
+            within = Advice("accuracy", a, None, n, words=f"{words} {_share(a)} of exact")
+            if a < floor:
+                said = f"nothing, for round-off moves even exact solves by {floor:.1e}"
+                yield replace(within, words=f"{within.words}: {said}", is_below_round_off=True)
+                continue
+            good = [p for p in rivals if p.everywhere.worst_relative <= a]
+            good = [p for p in good if (p.estimate or 0.0) <= 100.0 * a]
+            best = min(good, key=lambda p: p.cost_s(n), default=None)
+            yield _beside_auto(_chosen(within, "quickest", best), points, skipped)
+        if (seconds := request.budget_s) is not None:
+            within = Advice("budget", None, seconds, n, words=f"{words} {time_in_words(seconds)}")
+            in_time = [p for p in rivals if p.cost_s(n) <= seconds]
+            best = min(in_time, key=lambda p: (p.everywhere.worst_hz, p.cost_s(n)), default=None)
+            yield _chosen(within, "most accurate", best)
+
+
+def _rivals(points: Sequence[ChartPoint]) -> list[ChartPoint]:
+    """The points without those that ``order: auto`` takes, whose time lacks that of choosing."""
+    return [p for p in points if not p.method.startswith("auto ")]
+
+
+def _chosen(within: Advice, superlative: str, found: ChartPoint | None) -> Advice:
+    if found is None:
+        return replace(within, words=f"{within.words}: no charted method does that")
+    total, worst = found.cost_s(within.evaluations), found.everywhere.worst_relative
+    words = (
+        f"{within.words} the {superlative} is {found.method}: {kind_of(found.family)[1]}. It takes "
+        f"{time_in_words(total)} in all and is off by {_share(worst)} at most"
+        f"{'; it is set up anew for every design' if found.at_once > 1 else ''}"
+    )
+    chosen = replace(within, method=found.method, parameters=found.parameters, words=words)
+    return replace(chosen, worst_relative=worst, total_s=total)
+
+
+def _beside_auto(
+    advice: Advice, points: Sequence[ChartPoint], skipped: Mapping[str, str]
+) -> Advice:
+    """The advice with what ``expansion.order: auto`` takes for the same accuracy."""
+    name, says = f"auto {advice.accuracy:.0e}", f"{advice.words}. `expansion.order: auto`"
+    if why := next((why for method, why in skipped.items() if method.startswith(name)), ""):
+        auto = AutoTakes(None, None, None, 0.0, why)
+        return replace(advice, auto=auto, words=f"{says} refuses: {why}")
+    if (own := next((p for p in points if p.method.startswith(name)), None)) is None:
+        return advice
+    total, worst = own.cost_s(advice.evaluations), own.everywhere.worst_relative
+    longer = f" ({total / advice.total_s:.2g} times as long)" if advice.total_s else ""
+    choosing_s = own.parameters["choosing_s"]
+    words = (
+        f"{says} takes {own.method.partition(': ')[2]}: {time_in_words(total)}{longer}, off by "
+        f"{_share(worst)} at most, after {time_in_words(choosing_s)} of choosing"
+    )
+    return replace(advice, auto=AutoTakes(own.method, worst, total, choosing_s, ""), words=words)
+
+
+def _share(relative: float) -> str:
+    """``0.13 %``; of what is far below as a power of ten."""
+    return f"{100.0 * relative:.2g} %" if relative >= 1e-6 or not relative else f"{relative:.1e}"

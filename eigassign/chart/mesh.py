@@ -40,10 +40,7 @@ def refined(file: CaseFile, factor: float) -> tuple[CaseFile, tuple[int, ...]]:
 
 
 def chart_meshes(
-    file: CaseFile,
-    x: Floats,
-    modes: Sequence[int],
-    effort: Effort,
+    file: CaseFile, x: Floats, modes: Sequence[int], effort: Effort
 ) -> tuple[MeshRow, ...]:
     """One row for each mesh up to ``effort.most_dof``, from coarse to fine, at points x (n, n_x).
 
@@ -54,26 +51,24 @@ def chart_meshes(
     meshes = {
         counts: (k, finer) for k in sorted(effort.factors) for finer, counts in [refined(file, k)]
     }
-    rows, solved, columns = list[MeshRow](), list[Floats](), np.array(modes) - 1
+    rows, solved = list[MeshRow](), list[Floats]()
     for counts, (factor, finer) in meshes.items():
         model = build_model(finer)
         if not counts or model.n_dof > effort.most_dof:
             break
         q, y = np.split(x, [len(model.q_names)], axis=1)
         hz, spent = measure(partial(model.frequencies, q, y, max(modes)), effort)
-        solved.append(hz[:, columns])
+        solved.append(hz[:, np.array(modes) - 1])
         each = spent.times(1.0 / len(x))
         rows.append(MeshRow(factor, sum(counts), model.n_dof, 0.0, 0.0, None, each))
     if len(rows) < 2:
         return ()
-    limit = solved[-1] + (solved[-1] - solved[-2]) / 15.0
-    for k, hz in enumerate(solved):
-        worst = float(np.abs(hz - limit).max())
-        rows[k] = replace(
-            rows[k], worst_hz=worst, worst_relative=float(np.abs(hz / limit - 1.0).max())
-        )
-        if 0 < k < len(rows) - 1 and 0.0 < worst < np.inf and rows[k - 1].worst_hz > 0.0:
-            ratio = np.log(rows[k].factor / rows[k - 1].factor)
-            order = float(np.log(rows[k - 1].worst_hz / worst) / ratio)
-            rows[k - 1] = replace(rows[k - 1], order=order)
-    return tuple(rows)
+    off = np.array(solved) - (limit := solved[-1] + (solved[-1] - solved[-2]) / 15.0)
+    worst, relative = (np.abs(e).max(axis=(1, 2)).tolist() for e in (off, off / limit))
+    orders: list[float | None] = [None] * len(rows)
+    for k in range(len(rows) - 2):
+        if worst[k] > 0.0 and 0.0 < worst[k + 1] < np.inf:
+            finer_by = rows[k + 1].factor / rows[k].factor
+            orders[k] = float(np.log(worst[k] / worst[k + 1]) / np.log(finer_by))
+    found = zip(rows, worst, relative, orders, strict=True)
+    return tuple(replace(r, worst_hz=w, worst_relative=e, order=p) for r, w, e, p in found)

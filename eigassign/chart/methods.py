@@ -1,20 +1,13 @@
-"""The list of methods, in the order in which they are charted.
+"""The methods that a chart puts side by side, in the order in which they are charted.
 
-    exact        dense in batches, sparse, and SciPy's one by one
-    Taylor, 1/λ  expanded to each order, in full and linearised in y; at several points
-    auto         what ``expansion.order: auto`` takes for each accuracy
-    reduced      on Taylor vectors at one or several points
-    fit          of given solves or to an accuracy; along one trajectory, or over the box
-    stations     exact solves at stations of the trajectory, interpolated; anew for every design
-    grid         interpolation on a grid in place and design
-    others       response surfaces, radial basis functions, Kriging
-
-The last three, and SciPy's solver, are what people do without eigassign. They are trained on its
-exact solves, so that only the method differs.
+Interpolation between stations of the trajectory or on grids, surrogates (response surfaces, radial
+basis functions, Kriging) and SciPy's eigensolver are what people do without eigassign: NumPy's,
+SciPy's and scikit-learn's. They are trained on its exact solves, so that only the method differs.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -24,31 +17,29 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import NdBSpline, RBFInterpolator, make_interp_spline
 from scipy.linalg import eigh
+from scipy.stats.qmc import Halton
 
-from eigassign.chart.question import Features, Points, exact_frequencies
-from eigassign.chart.surrogates import (
-    KINDS,
-    FitSurrogate,
-    grid_interpolation,
-    nodes,
-    spread_points,
-    surrogate_families,
-)
-from eigassign.chart.timing import Effort, timed
-from eigassign.errors import AccuracyError
+from eigassign.chart.question import Bench, Points
+from eigassign.chart.timing import timed
+from eigassign.errors import AccuracyError, UsageError
 from eigassign.modal.exact.condensation import condense
-from eigassign.modal.exact.sparse import solve_sparse
 from eigassign.modal.expansion import NearestExpansion, expand
 from eigassign.modal.fit.fit import fit
 from eigassign.modal.fit.region import Box
 from eigassign.modal.model import Model
+from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.reduce import reduce
+from eigassign.series.multi_index import total_degree
+from eigassign.series.power_series import monomials
 from eigassign.study.drawing import spread_samples
 from eigassign.study.planning import choose_order
-from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
+Surrogate = Callable[[Floats], Floats]  # points u (k, d) → (k, n_modes)
+Learn = Callable[[Floats, Floats], Surrogate]  # training points u (n, d) in [0, 1], their values
+KINDS = ("linear", "cubic", "Chebyshev")
 SOLVES = (3, 4, 5, 6, 7, 9, 11, 13, 17, 25, 42, 60, 84, 120, 160, 220, 300, 400, 550)  # of fits
 
 
@@ -80,269 +71,320 @@ class Method:
     most: int | None = None
 
 
-def list_methods(
-    scene: Scene, features: Features, effort: Effort, accuracies: Sequence[float], solve_s: float
-) -> Iterator[Method]:
+def list_methods(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
     """The list of all methods; no training takes more exact solves than the time allows."""
-    most = most_solves(effort, solve_s)
-    yield from exact_methods(scene, effort, solve_s)
-    yield from expansions(scene, effort)
-    yield from auto_methods(scene, accuracies, effort)
-    yield from reduced_models(scene, effort)
-    yield from fits(scene, features, effort, most)
-    yield from stations(scene, features, [k for k in effort.stations if k <= most])
-    yield from grids(scene, features, [k for k in effort.nodes if k ** len(features.names) <= most])
-    yield from regressions(scene, features, sorted({min(k, most) for k in effort.training}))
+    yield from exact_methods(bench)
+    yield from expansions(bench)
+    yield from auto_methods(bench, accuracies)
+    yield from reduced_models(bench)
+    yield from fits(bench)
+    yield from surrogates(bench)
 
 
-def most_solves(effort: Effort, solve_s: float) -> int:
-    """Exact solves of one training: a table of 20 000 numbers stays in the cache."""
-    return max(4, min(20_000, int(effort.most_s / solve_s)))
+# --- Exact solves
+
+
+def exact_methods(bench: Bench) -> Iterator[Method]:
+    """Eigassign's solver and SciPy's, which takes one sample at a time and answers few."""
+    model, modes = bench.scene.model, bench.scene.expansions.modes
+    kind = "dense" if model.pencil.is_dense else "sparse"
+    told: dict[str, Any] = {"solver": f"{kind}, in batches"}
+    yield Method(f"exact {kind}", "exact", told, lambda _: Built(bench.exact))
+    # about 20 n³ operations each at 6e9 a second
+    if most := min(40, int(3e8 * bench.effort.most_s / model.n_dof**3)):
+        name, built = "exact dense, SciPy one by one", Built(partial(by_scipy, model, modes))
+        told = {"solver": "scipy.linalg.eigh, subset by index", "points": most}
+        yield Method(name, "exact by others", told, lambda _: built, ours=False, most=most)
+
+
+def by_scipy(model: Model, modes: Sequence[int], points: Points) -> Floats:
+    """Frequencies (n, n_modes) in Hz by scipy.linalg.eigh on M_c z = μ K_E z, μ = 1/λ."""
+    elastic, mu = model.pencil.elastic, np.empty((len(points), max(modes)))
+    which = [len(elastic) - max(modes), len(elastic) - 1]
+    for k, x in enumerate(np.hstack([points.q, points.y])):
+        K, M = model.pencil.matrices(model.pencil.theta(x[None]))
+        _, M_c = condense(M, elastic, model.pencil.rigid)
+        K_E = K[0][np.ix_(elastic, elastic)]
+        mu[k] = eigh(M_c[0], K_E, eigvals_only=True, subset_by_index=which)[::-1]
+    return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(mu[:, np.array(modes) - 1])))
+
+
+# --- Series
+
+
+def _call(bench: Bench, function: str, arguments: str, **how: Any) -> str:
+    """A call as one writes it, with the charted modes if it needs them."""
+    modes = bench.scene.expansions.modes
+    named = how if modes == (1,) else {"modes": modes, **how}
+    return f"{function}({', '.join([arguments, *(f'{k}={v!r}' for k, v in named.items())])})"
 
 
 def _answering(made: Any, solves: int, estimate: float | None = None) -> Built:
     return Built(lambda points: made.frequencies(points.q, points.y), solves, estimate)
 
 
-def _modes(scene: Scene) -> str:
-    """The charted modes as an argument of `ea.fit`, `ea.expand`, `ea.reduce`, if they need it."""
-    modes = scene.expansions.modes
-    return "" if modes == (1,) else f", modes={modes}"
-
-
-def _points_along(scene: Scene, count: int) -> tuple[Floats, Floats]:
-    """``count`` expansion points (q, y): the case's own, or spread evenly over the trajectory."""
-    full, path = scene.expansions.full, scene.path.q
+def _poses(bench: Bench, count: int) -> tuple[Floats, Floats]:
+    """``count`` points (q, y) to expand about, the case's own or spread along the trajectory."""
+    full, path = bench.scene.expansions.full, bench.scene.path.q
     q = full.q0[None] if count == 1 else path[spread_samples(path, count)]
     return q, np.tile(full.y0, (len(q), 1))
 
 
-# --- Exact solves
+def _series(
+    bench: Bench, name: str, family: str, at: tuple[Floats, Floats], use: str, **how: Any
+) -> Method:
+    """λ about points ``at``, of which the nearest answers; if so named 1/λ, its reciprocal."""
+    pencil, modes = bench.scene.model.pencil, bench.scene.expansions.modes
+
+    def build(_: Floats) -> Built:
+        parts = [
+            expand(pencil, *x0, modes, **how) for x0 in zip(*map(np.atleast_2d, at), strict=True)
+        ]
+        made = parts[0].inverse if name.startswith("1/λ") else NearestExpansion(tuple(parts))
+        return _answering(made, len(parts))
+
+    return Method(name, family, {**how, "q0": at[0], "y0": at[1]}, build, use)
 
 
-def exact_methods(scene: Scene, effort: Effort, solve_s: float) -> Iterator[Method]:
-    """Exact solvers that suit the size; those that take one sample at a time answer few."""
-    model, modes = scene.model, scene.expansions.modes
-    columns = np.array(modes) - 1
-
-    def build(solve: Callable[..., Floats], _: Floats) -> Built:
-        return Built(lambda points: solve(points.q, points.y, max(modes))[:, columns])
-
-    told: dict[str, Any] = {"solver": "dense, in batches"}
-    if model.pencil.is_dense:
-        yield Method("exact dense", "exact", told, partial(build, model.frequencies))
-    most = max(1, min(effort.random_points // 3, int(effort.most_s / solve_s / 5)))
-    told, solve = {"solver": "sparse Lanczos", "points": most}, partial(sparse_frequencies, model)
-    yield Method("exact sparse", "exact", told, partial(build, solve), most=most)
-    # about 20 n³ operations each at 6e9 a second
-    if few := min(40, int(3e8 * effort.most_s / model.n_dof**3)):
-        told = {"solver": "scipy.linalg.eigh, subset by index", "points": few}
-        name, build_one = "exact dense, SciPy one by one", partial(build, partial(by_scipy, model))
-        yield Method(name, "exact by others", told, build_one, ours=False, most=few)
-
-
-def sparse_frequencies(model: Model, q: Floats, y: Floats, count: int) -> Floats:
-    """Exact frequencies (n, count) in Hz by the sparse solver, whatever the size."""
-    theta = model.pencil.theta(np.hstack([q, y]))
-    return np.asarray(np.sqrt(solve_sparse(model.pencil, theta, count, False).lam) / (2.0 * np.pi))
-
-
-def by_scipy(model: Model, q: Floats, y: Floats, count: int) -> Floats:
-    """Exact frequencies (n, count) in Hz by scipy.linalg.eigh on M_c z = μ K_E z, μ = 1/λ."""
-    elastic, mu = model.pencil.elastic, np.empty((len(q), count))
-    last = len(elastic) - 1
-    for k, x in enumerate(np.hstack([q, y])):
-        K, M = model.pencil.matrices(model.pencil.theta(x[None]))
-        _, M_c = condense(M, elastic, model.pencil.rigid)
-        K_E = K[0][np.ix_(elastic, elastic)]
-        lowest = eigh(M_c[0], K_E, eigvals_only=True, subset_by_index=[last + 1 - count, last])
-        mu[k] = lowest[::-1]
-    return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(mu)))
-
-
-# --- Series
-
-
-def _expanded(scene: Scene, q: Floats, how: Mapping[str, Any], inverse: bool, _: Floats) -> Built:
-    """Expansions about q (k, n_q) at the usual design, the nearest one evaluated."""
-    full, pencil = scene.expansions.full, scene.model.pencil
-    made = [expand(pencil, each, full.y0, full.modes, **how) for each in q]
-    return _answering(made[0].inverse if inverse else NearestExpansion(tuple(made)), len(q))
-
-
-def expansions(scene: Scene, effort: Effort) -> Iterator[Method]:
-    """λ and 1/λ expanded to each order, in full and linearised; λ at several points too.
-
-    1/λ is the reciprocal of λ's series: the same coefficients, summed in another way.
-    """
-    n = int(scene.model.pencil.active.sum())
-    wanted = sorted({*effort.orders, scene.expansions.order})
+def expansions(bench: Bench) -> Iterator[Method]:
+    """λ and 1/λ expanded to each order, in full and linearised; λ at several points too."""
+    own, effort = bench.scene.expansions, bench.effort
+    n, wanted = int(bench.scene.model.pencil.active.sum()), sorted({*effort.orders, own.order})
     orders = [p for p in wanted if comb(n + p, p) <= effort.coefficients]
-    q0, y0 = scene.expansions.full.q0, scene.expansions.full.y0
-    for inverse, linear, order in product((False, True), (False, True), orders):
-        symbol, kind = "1/λ" if inverse else "Taylor", "linearised" if linear else "full"
-        how: dict[str, Any] = {"order": order, "linear_in_y": linear}
-        call = f"ea.expand(model, q0, y0{_modes(scene)}, order={order}"
-        use = f"{call}{', linear_in_y=True' * linear}).inverse"
-        if not inverse:
-            use = f"in the case file, expansion: {{order: {order}}}"
-        build, told = partial(_expanded, scene, q0[None], how, inverse), {"q0": q0, "y0": y0}
-        yield Method(f"{symbol} {order} {kind}", f"{symbol}, {kind}", how | told, build, use)
+    for symbol, linear, order in product(("Taylor", "1/λ"), (False, True), orders):
+        how = {"order": order, "linear_in_y": linear}
+        use = f"in the case file, expansion: {{order: {order}}}"
+        if symbol == "1/λ":
+            use = f"{_call(bench, 'ea.expand', 'model, q0, y0', **how)}.inverse"
+        kind, at = "linearised" if linear else "full", (own.full.q0, own.full.y0)
+        yield _series(bench, f"{symbol} {order} {kind}", f"{symbol}, {kind}", at, use, **how)
     for count, order in product(effort.expansion_points[1:], orders[1:]):
-        q, y = _points_along(scene, count)
-        call = f"ea.expand(model, q, y{_modes(scene)}, order={order})"
-        use = f"[{call} for q, y in zip(q0, y0)], at a pose the one whose q is nearest"
-        build = partial(_expanded, scene, q, {"order": order}, False)
-        name, told = f"Taylor {order} at {len(q)} points", {"q0": q, "y0": y}
-        yield Method(name, "Taylor, several points", {"order": order, **told}, build, use)
+        at, each = _poses(bench, count), _call(bench, "ea.expand", "model, q, y", order=order)
+        use = f"[{each} for q, y in zip(q0, y0)], at a pose the one whose q is nearest"
+        name = f"Taylor {order} at {_where(at)}"
+        yield _series(bench, name, "Taylor, several points", at, use, order=order)
 
 
-def auto_methods(scene: Scene, accuracies: Sequence[float], effort: Effort) -> Iterator[Method]:
-    """What ``expansion.order: auto`` takes, by the very function that a run asks.
+def _where(at: tuple[Floats, Floats]) -> str:
+    return f"{len(at[0])} point{'s' if len(at[0]) > 1 else ''}"
 
-    The loosest accuracy first; after a choice that takes too long no other is made.
-    """
-    full, modes, family, spent = scene.expansions.full, scene.expansions.modes, "Taylor, auto", 0.0
-    for accuracy in sorted(accuracies, reverse=True):
+
+def auto_methods(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
+    """What ``expansion.order: auto`` takes, by the very function that a run asks."""
+    scene, full = bench.scene, bench.scene.expansions.full
+    for accuracy in accuracies:
         name = f"auto {accuracy:.0e}"
-        if spent > effort.most_s:
-            yield Method(name, family, {}, partial(_refused, f"choosing took {spent:.1f} s before"))
-            continue
         expansion = scene.file.expansion.model_copy(update={"accuracy": accuracy})
         case = replace(scene.file, expansion=expansion), scene.model, scene.trajectory
         try:
-            choice, spent = timed(partial(choose_order, *case, full.q0, full.y0, modes))
+            choice, spent = timed(partial(choose_order, *case, full.q0, full.y0, full.modes))
         except AccuracyError as error:
-            yield Method(name, family, {}, partial(_refused, str(error)))
+            yield Method(name, "Taylor, auto", {}, partial(_refused, error))
             continue
         q = np.vstack([choice.q0, *choice.more_q])
-        how = {"order": choice.order, "cluster_gap": choice.cluster_gap}
-        told = {"q0": q, "y0": np.tile(full.y0, (len(q), 1)), "choosing_s": spent}
+        at, how = (q, np.tile(full.y0, (len(q), 1))), {"order": choice.order}
         use = f"in the case file, expansion: {{order: auto, accuracy: {accuracy:g}}}"
-        name += f": Taylor {choice.order}{f' at {len(q)} points' if len(q) > 1 else ''}"
-        yield Method(name, family, how | told, partial(_expanded, scene, q, how, False), use)
+        name += f": Taylor {choice.order}{f' at {_where(at)}' if len(q) > 1 else ''}"
+        made = _series(bench, name, "Taylor, auto", at, use, **how, cluster_gap=choice.cluster_gap)
+        yield replace(made, parameters={**made.parameters, "choosing_s": spent})
 
 
-def _refused(why: str, _: Floats) -> Built:
-    raise AccuracyError(why)
+def _refused(why: AccuracyError, _: Floats) -> Built:
+    raise why
 
 
 # --- Reduced models and fits
 
 
-def reduced_models(scene: Scene, effort: Effort) -> Iterator[Method]:
+def _reduced(
+    bench: Bench, m: int, at: tuple[Floats, Floats], guard: bool = True
+) -> tuple[ReducedModel, int]:
+    """The reduced model, and its exact solves: for modes, wanted vectors and guards' vectors."""
+    pencil, modes = bench.scene.model.pencil, bench.scene.expansions.modes
+    others = set(range(1, min(max(modes) + 1, len(pencil.elastic)) + 1)) - set(modes)
+    solves = 3 if guard and others and m >= 2 else 2
+    return reduce(pencil, *at, modes, m, guard), solves * len(at[0])
+
+
+def reduced_models(bench: Bench) -> Iterator[Method]:
     """Reduced models of each half order m at one or several points; at one without guards too."""
-    unguarded = "no argument of ea.reduce: eigassign.modal.reduced.reduce.reduce(model.pencil, "
-    kinds = [*((count, True) for count in effort.expansion_points), (1, False)]
-    for (count, guard), m in product(kinds, effort.half_orders):
-        q, y = _points_along(scene, count)
-        where, call = _where(len(q)), f"q0, y0{_modes(scene)}, half_order={m}"
-        use = f"ea.reduce(model, {call})" if guard else f"{unguarded}{call}, guard=False)"
-        name = f"reduced m = {m}, {where}{'' if guard else ', no guard'}"
-        family = f"reduced, {where if guard else 'no guard'}"
-        told = {"half_order": m, "guard": guard, "q": q, "y": y}
+    kinds = [*((count, True) for count in bench.effort.expansion_points), (1, False)]
+    for (count, guard), m in product(kinds, bench.effort.half_orders):
+        at = _poses(bench, count)
+        where, use = _where(at), _call(bench, "ea.reduce", "model, q0, y0", half_order=m)
+        name, family = f"reduced m = {m}, {where}", f"reduced, {where}"
+        if not guard:
+            function, how = (
+                "eigassign.modal.reduced.reduce.reduce",
+                {"half_order": m, "guard": guard},
+            )
+            use = _call(bench, function, "model.pencil, q0, y0", **how)
+            use = f"no argument of ea.reduce: {use}"
+            name, family = f"{name}, no guard", "reduced, no guard"
 
-        def build(_: Floats, how: Any = (m, q, y, guard)) -> Built:
-            return _answering(*_reduced(scene, *how))
+        def build(_: Floats, how: Any = (m, at, guard)) -> Built:
+            return _answering(*_reduced(bench, *how))
 
+        told = {"half_order": m, "guard": guard, "q": at[0], "y": at[1]}
         yield Method(name, family, told, build, use)
 
 
-def _where(count: int) -> str:
-    return f"{count} point{'s' if count > 1 else ''}"
-
-
-def _reduced(scene: Scene, m: int, q: Floats, y: Floats, guard: bool = True) -> tuple[Any, int]:
-    """The reduced model, and its exact solves: for modes, wanted vectors and guards' vectors."""
-    modes, elastic = scene.expansions.full.modes, len(scene.model.pencil.elastic)
-    others = set(range(1, min(max(modes) + 1, elastic) + 1)) - set(modes)
-    solves = 3 if guard and others and m >= 2 else 2
-    return reduce(scene.model.pencil, q, y, modes, m, guard), solves * len(q)
-
-
-def fits(scene: Scene, features: Features, effort: Effort, most: int) -> Iterator[Method]:
-    """Fits of given solves and to accuracies, of at most ``most`` exact solves each.
+def fits(bench: Bench) -> Iterator[Method]:
+    """Fits of given solves and to accuracies, of as many exact solves as the time allows.
 
     Along the trajectory for each design, and over trajectory × box; there of reduced models too.
     """
-    box, modes = Box(features.lower, features.upper), _modes(scene)
+    most, accuracies, over = bench.most_solves, bench.effort.accuracies, "q, ea.Box(lower, upper)"
     given: list[dict[str, Any]] = [{"solves": k} for k in SOLVES if k <= most]
-    for how in (*given, *({"accuracy": a, "most": most} for a in effort.accuracies)):
-        call = ", ".join(f"{key}={value:g}" for key, value in how.items())
-        k, name, kind = how.get("solves"), f"of {how.get('solves')} solves", "of given solves"
-        if k is None:
+    for how in (*given, *({"accuracy": a, "most": most} for a in accuracies)):
+        k, name, kind = how.get("solves", 0), f"of {how.get('solves')} solves", "of given solves"
+        if k == 0:
             name, kind = f"{how['accuracy']:.0e}", "to an accuracy"
-        if (k is None or k <= 25) and features.place is not None:
-            use, build = f"ea.fit(model, q, y{modes}, {call})", partial(_fitted, scene, how, None)
+        if k <= 25 and bench.place is not None:
+            use, build = _call(bench, "ea.fit", "model, q, y", **how), _fitted(bench, how, False)
             family = f"fit {kind}, one trajectory"
             yield Method(f"fit {name} along", family, how, build, use, per_design=True)
-        if k is None or k >= 9:
-            use = f"ea.fit(model, q, ea.Box(lower, upper){modes}, {call}).along(designs)"
-            build = partial(_fitted, scene, how, box)
-            yield Method(f"fit {name}", f"fit {kind}", how, build, use)
-    for (m, count), accuracy in product(effort.fitted, effort.accuracies):
-        q, y = _points_along(scene, count)
-        of, asked = f"reduced m = {m}, {_where(len(q))}", {"accuracy": accuracy}
-        call = f"ea.reduce(model, q0, y0{modes}, half_order={m})"
-        use = f"ea.fit({call}, q, ea.Box(lower, upper), accuracy={accuracy:g}).along(designs)"
-        told = {**asked, "half_order": m, "q": q, "y": y}
-        build = partial(_fitted, scene, asked, box, (m, q, y))
-        yield Method(f"fit {accuracy:.0e} of {of}", f"fit of {of}", told, build, use)
+        if not 0 < k < 9:
+            use = f"{_call(bench, 'ea.fit', f'model, {over}', **how)}.along(designs)"
+            yield Method(f"fit {name}", f"fit {kind}", how, _fitted(bench, how, True), use)
+    for (m, count), a in product(bench.effort.fitted, accuracies):
+        at = _poses(bench, count)
+        of, source = f"reduced m = {m}, {_where(at)}", partial(_reduced, bench, m, at)
+        use = _call(bench, "ea.reduce", "model, q0, y0", half_order=m)
+        use = f"{_call(bench, 'ea.fit', f'{use}, {over}', accuracy=a)}.along(designs)"
+        told = {"accuracy": a, "half_order": m, "q": at[0], "y": at[1]}
+        build = _fitted(bench, {"accuracy": a}, True, source)
+        yield Method(f"fit {a:.0e} of {of}", f"fit of {of}", told, build, use)
 
 
-def _fitted(scene: Scene, how: Mapping[str, Any], box: Box | None, *more: Any) -> Built:
-    """A fit over the box, or at one design; of the model, or of a reduced one (m, q, y)."""
-    *reduced, y = more
-    source, solves = _reduced(scene, *reduced[0]) if reduced else (scene.model, 0)
-    made = fit(source, scene.path, y if box is None else box, scene.expansions.modes, **how)
-    built = _answering(made, solves if reduced else made.solves, made.error_estimate)
-    return built if box is None else replace(built, along=made.along)
+def _fitted(
+    bench: Bench, how: Mapping[str, Any], over_box: bool, source: Callable[[], Any] | None = None
+) -> Callable[[Floats], Built]:
+    """Fits over the box or at one design, of the model or of a ``source`` with its exact solves."""
+    scene, box = bench.scene, Box(bench.lower, bench.upper)
+
+    def build(y: Floats) -> Built:
+        model, solves = (scene.model, 0) if source is None else source()
+        made = fit(model, scene.path, box if over_box else y, scene.expansions.modes, **how)
+        built = _answering(made, solves or made.solves, made.error_estimate)
+        return replace(built, along=made.along) if over_box else built
+
+    return build
 
 
 # --- What people do without eigassign
 
 
-def _training(features: Features, u: Floats) -> Points:
-    """The points near u (n, d) that are samples of the trajectory, each once."""
-    at = features.nearest(u)
-    return at[np.unique(at.u, axis=0, return_index=True)[1]]
+def surrogates(bench: Bench) -> Iterator[Method]:
+    """Interpolation between stations and on grids, and fits to spread-out points."""
+    most, d = bench.most_solves, len(bench.names)
+    for k, kind in product(bench.effort.stations, KINDS if bench.place is not None else ()):
+        if k <= most and (kind != "Chebyshev" or k <= 20):  # of a higher degree: ill-conditioned
+            u = np.pad(grid_points(kind, k, 1), ((0, 0), (0, d - 1)))
+            name, told = f"stations {kind} {k}", {"interpolation": kind, "stations": k}
+            learn = partial(grid_interpolation, kind)
+            yield _trained(bench, name, f"stations, {kind}", told, learn, u, True)
+    for k, kind in product(bench.effort.nodes, KINDS):
+        if k**d <= most and (kind != "cubic" or k >= 4):
+            told = {"nodes": k, "features": bench.names, "interpolation": kind}
+            learn, u = partial(grid_interpolation, kind), grid_points(kind, k, d)
+            yield _trained(bench, f"grid {kind} {k}", f"grid, {kind}", told, learn, u)
+    counts = sorted({min(k, most) for k in bench.effort.training})
+    for n, (family, learn, how) in product(counts, list(surrogate_families())):
+        told = {**how, "training_points": n, "features": bench.names}
+        name = f"{family.replace(',', '')} {n}"
+        yield _trained(bench, name, family, told, learn, spread_points(n, d))
 
 
-def _trained(scene: Scene, at: Points, fit_to: FitSurrogate, along: bool, y: Floats) -> Built:
-    """Fitted to exact solves; ``along`` the trajectory alone, at the design y."""
-    if along:
-        at = Points(at.q, np.tile(y, (len(at), 1)), at.u[:, :1])
-    made = fit_to(at.u, exact_frequencies(scene, at))
-    return Built(lambda points: made(points.u[:, :1] if along else points.u), len(at))
+def _trained(
+    bench: Bench, name: str, family: str, told: Mapping[str, Any], learn: Learn, u: Floats,
+    per_design: bool = False,
+) -> Method:  # fmt: skip
+    """A fit to exact solves at the samples nearest to u (n, d), each once; or at their places."""
+    near, d = bench.nearest(u), 1 if per_design else len(bench.names)
+
+    def build(y: Floats) -> Built:
+        at = replace(near, y=np.tile(y, (len(near), 1))) if per_design else near
+        made = learn(at.u[:, :d], bench.exact(at))
+        return Built(lambda points: made(points.u[:, :d]), len(at))
+
+    return Method(name, family, told, build, ours=False, per_design=per_design)
 
 
-def stations(scene: Scene, features: Features, counts: Sequence[int]) -> Iterator[Method]:
-    """Modal analyses at stations of the trajectory, interpolated; anew for every design."""
-    for k, kind in product(counts, KINDS if features.place is not None else ()):
-        if kind != "Chebyshev" or k <= 20:  # a polynomial of higher degree is ill-conditioned
-            u = np.pad(nodes(kind, k)[:, None], ((0, 0), (0, len(features.names) - 1)))
-            fit_to, told = partial(grid_interpolation, kind), {"interpolation": kind, "stations": k}
-            build = partial(_trained, scene, _training(features, u), fit_to, True)
-            name, family = f"stations {kind} {k}", f"stations, {kind}"
-            yield Method(name, family, told, build, ours=False, per_design=True)
+def grid_points(kind: str, k: int, d: int) -> Floats:
+    """k^d points (n, d) with the box's corners: even, or extrema of Chebyshev polynomials."""
+    even = np.linspace(0.0, 1.0, k)
+    axis = 0.5 - 0.5 * np.cos(np.pi * even) if kind == "Chebyshev" else even
+    return np.array(list(product(axis, repeat=d)))
 
 
-def grids(scene: Scene, features: Features, counts: Sequence[int]) -> Iterator[Method]:
-    """Interpolation on a grid in place and design: linear, cubic spline, Chebyshev polynomial."""
-    for k, kind in product(counts, KINDS):
-        if kind != "cubic" or k >= 4:
-            mesh = np.meshgrid(*[nodes(kind, k)] * len(features.names), indexing="ij")
-            u = np.stack([axis.ravel() for axis in mesh], axis=1)
-            told = {"nodes": k, "features": features.names, "interpolation": kind}
-            fit_to, at = partial(grid_interpolation, kind), _training(features, u)
-            build = partial(_trained, scene, at, fit_to, False)
-            yield Method(f"grid {kind} {k}", f"grid, {kind}", told, build, ours=False)
+def grid_interpolation(kind: str, u: Floats, f: Floats) -> Surrogate:
+    """Through f on a tensor grid: linear, by cubic splines, or by one polynomial along each axis.
+
+    All are splines; that of "Chebyshev" has no knots within.
+    """
+    axes = [np.unique(column) for column in u.T]
+    table = np.empty((*map(len, axes), f.shape[1]))
+    table[tuple(np.searchsorted(axis, column) for axis, column in zip(axes, u.T, strict=True))] = f
+    knots, degrees = [], []
+    for k, axis in enumerate(axes):
+        degree = min({"linear": 1, "cubic": 3}.get(kind, len(axis)), len(axis) - 1)
+        ends = np.repeat(axis[[0, -1]], degree + 1) if degree == len(axis) - 1 else None
+        spline = make_interp_spline(axis, table, degree, ends, axis=k)
+        table = np.moveaxis(spline.c, 0, k)
+        knots.append(spline.t)
+        degrees.append(degree)
+    return NdBSpline(tuple(knots), np.ascontiguousarray(table), tuple(degrees))
 
 
-def regressions(scene: Scene, features: Features, counts: Sequence[int]) -> Iterator[Method]:
-    """Surrogates fitted to ``counts`` spread-out points."""
-    for n, (family, fit_to, how) in product(counts, list(surrogate_families())):
-        told = {**how, "training_points": n, "features": features.names}
-        at = _training(features, spread_points(n, len(features.names)))
-        build = partial(_trained, scene, at, fit_to, False)
-        yield Method(f"{family.replace(',', '')} {n}", family, told, build, ours=False)
+def response_surface(degree: int, u: Floats, f: Floats) -> Surrogate:
+    """Least squares over all monomials of 2u − 1 up to total ``degree``."""
+    space = total_degree(u.shape[1], degree)
+    if len(space) > len(u):
+        raise UsageError(f"{len(space)} coefficients from {len(u)} training points")
+    coefficients = np.linalg.lstsq(monomials(space, 2.0 * u - 1.0), f, rcond=None)[0]
+    return lambda u: monomials(space, 2.0 * u - 1.0) @ coefficients
+
+
+def radial_basis(kernel: Any, u: Floats, f: Floats) -> Surrogate:
+    """Radial basis functions with the polynomial that the kernel asks for."""
+    try:
+        return RBFInterpolator(u, f, kernel=kernel)
+    except (ValueError, np.linalg.LinAlgError) as error:
+        raise UsageError(f"radial basis functions: {error}") from error
+
+
+def kriging(u: Floats, f: Floats) -> Surrogate:
+    """A Gaussian process with one length scale for each variable."""
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel
+
+    kernel = ConstantKernel(1.0, (1e-3, 1e6)) * RBF(np.ones(u.shape[1]), (1e-2, 1e2))
+    process = GaussianProcessRegressor(
+        kernel, alpha=1e-10, normalize_y=True, n_restarts_optimizer=1, random_state=1
+    )
+    with warnings.catch_warnings():  # of length scales at their bounds
+        warnings.simplefilter("ignore")
+        process.fit(u, f)
+    return lambda u: process.predict(u).reshape(len(u), -1)
+
+
+def surrogate_families() -> Iterator[tuple[str, Learn, dict[str, Any]]]:
+    """Family, fit and parameters; Kriging where scikit-learn is installed."""
+    for name, degree in (("quadratic", 2), ("cubic", 3)):
+        yield f"response surface, {name}", partial(response_surface, degree), {"degree": degree}
+    for kernel in ("thin_plate_spline", "quintic"):
+        name = f"RBF, {kernel.replace('_', ' ')}"
+        yield name, partial(radial_basis, kernel), {"kernel": kernel}
+    try:  # here, or the first fit would be charged for the import
+        import sklearn.gaussian_process  # noqa: F401
+    except ImportError:
+        return
+    yield "Kriging", kriging, {"kernel": "squared exponential", "by": "scikit-learn"}
+
+
+def spread_points(count: int, d: int) -> Floats:
+    """Training points (count, d): the corners where they are few, then Halton's sequence."""
+    corners = list(product((0.0, 1.0), repeat=d)) if 3 * 2**d <= count else []
+    inside = Halton(d, scramble=False).random(1 + count - len(corners))[1:]  # the first is a corner
+    return np.vstack([np.array(corners).reshape(-1, d), inside])

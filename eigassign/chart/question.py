@@ -10,18 +10,20 @@ choice for them: they need not learn poses that the trajectory never takes.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.chart.timing import Effort
+from eigassign.chart.results import Asked
+from eigassign.chart.timing import Effort, timed
 from eigassign.errors import CaseError
-from eigassign.study.planning import joint_map
+from eigassign.modal.exact.roundoff import rounding_error
+from eigassign.study.planning import SEED, at_corners, at_random, corners, joint_map
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-SEED = 20211204
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,57 +41,64 @@ class Points:
         return Points(self.q[rows], self.y[rows], self.u[rows])
 
 
-def exact_frequencies(scene: Scene, points: Points) -> Floats:
-    """The charted modes by eigassign's own exact solve, (n, n_modes) in Hz."""
-    modes = scene.expansions.modes
-    hz = scene.model.frequencies(points.q, points.y, max(modes))
-    return np.asarray(hz[:, np.array(modes) - 1])
-
-
 @dataclass(frozen=True, eq=False)
-class Features:
-    """The trajectory and the box of designs as features."""
+class Bench:
+    """A case on which methods are tried: the features of its samples, and its exact solves."""
 
-    names: tuple[str, ...]
-    q: Floats  # (n_t, n_q) of the trajectory
-    place: Floats | None  # u_0 (n_t,) of its samples; None: no pose that matters changes
+    scene: Scene
+    effort: Effort
+    names: tuple[str, ...]  # of the features
+    place: Floats | None  # u_0 (n_t,) of the samples; None: no pose that matters changes
     lower: Floats  # (n_y,); the same as upper where a parameter is kept
     upper: Floats
 
     def points(self, samples: Ints, y: Floats) -> Points:
         """Samples of the trajectory (n,) at designs (n, n_y)."""
         free = self.upper > self.lower
-        u = (y - self.lower)[:, free] / (self.upper - self.lower)[free]
+        u = ((y - self.lower) / np.where(free, self.upper - self.lower, 1.0))[:, free]
         u = u if self.place is None else np.column_stack([self.place[samples], u])
-        return Points(self.q[samples], y, u)
+        return Points(self.scene.path.q[samples], y, u)
 
     def nearest(self, u: Floats) -> Points:
-        """The points at features (n, d), each at the nearest sample of the trajectory."""
+        """The points at features (n, d), each at the nearest sample of the trajectory, once."""
         samples, unit = np.zeros(len(u), dtype=np.intp), u
         if self.place is not None:
             order = np.argsort(self.place, kind="stable")
             known, unit = self.place[order], u[:, 1:]
             samples = order[np.searchsorted(0.5 * (known[1:] + known[:-1]), u[:, 0])]
-        return self.points(samples, self.design(unit))
-
-    def design(self, unit: Floats) -> Floats:
-        """y (n, n_y) at ``unit`` (n, n_free), 0 at the lower and 1 at the upper bounds."""
-        free, y = self.upper > self.lower, np.tile(self.lower, (len(unit), 1))
+        free, y = self.upper > self.lower, np.tile(self.lower, (len(u), 1))
         y[:, free] = (1.0 - unit) * self.lower[free] + unit * self.upper[free]
-        return y
+        found = self.points(samples, y)
+        return found[np.unique(found.u, axis=0, return_index=True)[1]]
+
+    def exact(self, points: Points) -> Floats:
+        """The charted modes by eigassign's own exact solve, (n, n_modes) in Hz."""
+        modes = self.scene.expansions.modes
+        hz = self.scene.model.frequencies(points.q, points.y, max(modes))
+        return np.asarray(hz[:, np.array(modes) - 1])
+
+    @cached_property
+    def solve_s(self) -> float:
+        """Seconds of one exact solve, roughly: to decide how many can be afforded."""
+        count = 1 if self.scene.model.n_dof > 1000 else min(16, len(self.scene.path.q))
+        some = self.points(np.arange(count), np.tile(self.lower, (count, 1)))
+        self.exact(some[:1])
+        return max(timed(lambda: self.exact(some))[1] / count, 1e-6)
+
+    @property
+    def most_solves(self) -> int:
+        """The most exact solves of one training: a table of 20 000 numbers stays in the cache."""
+        return max(4, min(20_000, int(self.effort.most_s / self.solve_s)))
 
 
-def build_features(scene: Scene) -> Features:
+def build_bench(scene: Scene, effort: Effort) -> Bench:
     """Raises CaseError where nothing varies that a frequency could depend on."""
-    lower, upper = scene.bounds
-    room, place = upper > lower, _place(scene)
+    (lower, upper), place = scene.bounds, _place(scene)
     names = ["place along the trajectory"] if place is not None else []
-    names += [scene.model.y_names[k] for k in np.flatnonzero(room)]
+    names += [scene.model.y_names[k] for k in np.flatnonzero(upper > lower)]
     if not names:
         raise CaseError((scene.file.problem("trajectory", _nothing_varies(scene)),))
-    kept = np.clip(scene.initial, lower, upper)
-    bounds = np.where(room, lower, kept), np.where(room, upper, kept)
-    return Features(tuple(names), scene.path.q, place, *bounds)
+    return Bench(scene, effort, tuple(names), place, lower, upper)
 
 
 def _nothing_varies(scene: Scene) -> str:
@@ -97,11 +106,12 @@ def _nothing_varies(scene: Scene) -> str:
     pencil, driven = scene.model.pencil, list(scene.file.coordinates.values())
     which = np.flatnonzero(pencil.active[: pencil.n_q])
     joints = ", ".join(dict.fromkeys(driven[k].joint for k in which if k < len(driven)))
-    fixed, room = "no design parameter may change", "a design parameter a `max` above its `min`"
-    if not joints:
-        return f"nothing to chart: no coordinate changes a frequency, and {fixed}; give {room}"
-    why = f"along the trajectory nothing moves that a frequency depends on (joints: {joints})"
-    return f"nothing to chart: {why}, and {fixed}; let it move, or give {room}"
+    why, remedy = "no coordinate changes a frequency", "give"
+    if joints:
+        why = f"along the trajectory nothing moves that a frequency depends on (joints: {joints})"
+        remedy = "let it move, or give"
+    room = f"{remedy} a design parameter a `max` above its `min`"
+    return f"nothing to chart: {why}, and no design parameter may change; {room}"
 
 
 def _place(scene: Scene) -> Floats | None:
@@ -117,43 +127,36 @@ def _place(scene: Scene) -> Floats | None:
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """``points``: first ``n_random`` ones, then runs along the trajectory, one for each design."""
+    """``points``: first random ones, then ``runs`` along the trajectory, one for each design."""
 
     points: Points
-    n_random: int
+    exact_hz: Floats  # (n, n_modes)
     runs: tuple[slice, ...]
+    asked: Asked
 
 
-def build_question(scene: Scene, features: Features, effort: Effort, solve_s: float) -> Question:
-    """Seeded points, every third of the random ones at a corner of the box of designs.
+def build_question(bench: Bench) -> Question:
+    """Random samples, half of them at corners of the box of designs, and runs at several designs.
 
-    The runs are of the initial design, of the expansion's, then of corners and random ones in turn,
-    each design once: of one design only where no parameter may change. The points are fewer where
-    an exact solve takes long (``solve_s``), but at least three designs are followed.
+    The runs are at the initial design and at corners, where approximations err most. The samples
+    are fewer where an exact solve takes long.
     """
-    random, n_t = np.random.default_rng(SEED), len(features.q)
-    in_runs = effort.designs * effort.samples_per_design
-    share = min(1.0, effort.most_s / ((effort.random_points + in_runs) * solve_s))
-    designs = max(min(3, effort.designs), round(effort.designs * share))
-    n_random, per_design = (
-        max(4, int(share * n)) for n in (effort.random_points, in_runs / designs)
-    )
-
-    def in_box(n: int, ends: slice) -> Floats:
-        unit = random.random((n, int((features.upper > features.lower).sum())))
-        corners = random.integers(0, 2, unit[ends].shape)
-        pairs = len(corners) // 2
-        corners[1::2] = 1 - corners[: 2 * pairs : 2]  # opposite: errors are largest at such ends
-        unit[ends] = corners
-        return features.design(unit)
-
-    samples, y = random.integers(0, n_t, n_random), in_box(n_random, slice(2, None, 3))
-    first = np.vstack([scene.initial, scene.expansions.full.y0])
-    first = np.clip(first, features.lower, features.upper)
-    followed = np.vstack([first, in_box(2 * designs, slice(0, None, 2))])
-    followed = followed[np.sort(np.unique(followed, axis=0, return_index=True)[1])[:designs]]
-    along = np.unique(np.linspace(0, n_t - 1, min(per_design, n_t)).round().astype(np.intp))
-    samples = np.concatenate([samples, np.tile(along, len(followed))])
-    y, n = np.vstack([y, np.repeat(followed, len(along), axis=0)]), len(along)
-    runs = tuple(slice(n_random + k * n, n_random + (k + 1) * n) for k in range(len(followed)))
-    return Question(features.points(samples, y), n_random, runs)
+    scene, effort, designs = bench.scene, bench.effort, corners(len(bench.lower))
+    wanted = effort.random_points + (1 + len(designs)) * effort.samples_per_design
+    share = min(1.0, effort.most_s / (wanted * bench.solve_s))
+    n_random = max(4, int(share * effort.random_points))
+    along = max(4, int(share * effort.samples_per_design))
+    case = scene.file, scene.trajectory, scene.q0, np.clip(scene.initial, *scene.bounds)
+    found = at_random(*case, n_random).joined(at_corners(*case, designs, along))
+    points = bench.points(found.samples, found.x[:, len(scene.q0) :])
+    n = len(scene.path.spread(along))
+    runs = tuple(slice(k, k + n) for k in range(n_random, len(points), n))
+    exact_hz, modes, samples = bench.exact(points), scene.expansions.modes, len(scene.path.q)
+    floor = max(rounding_error(scene.model.pencil, x, max(modes)) for x in found.x[[0, -1]])
+    asked = Asked(
+        modes=modes, n_dof=scene.model.n_dof, features=bench.names, random_points=n_random,
+        designs=len(runs), samples_per_design=n, trajectory_samples=samples,
+        evaluations=float(samples), seed=SEED, typical_hz=float(np.median(exact_hz)),
+        floor_hz=floor * float(exact_hz.max()),
+    )  # fmt: skip
+    return Question(points, exact_hz, runs, asked)

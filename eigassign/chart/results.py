@@ -1,4 +1,4 @@
-"""What a chart holds, as plain numbers: time against accuracy of every way to the frequencies.
+"""What is asked of a chart, and what it holds, as plain numbers.
 
 Seconds and Hz; errors are those of a frequency, over all charted modes. Every number can be
 computed again from ``parameters``, the seed and the case file.
@@ -12,6 +12,23 @@ from math import ceil
 from typing import Any
 
 SCHEMA = 4  # of chart.json
+_BETWEEN = "interpolation and surrogates"
+_KINDS = (  # how a family's name begins, its kind, and its work in words: the first that fits
+    ("Taylor", "series of λ", "power series of λ about one pose and design, or several"),
+    ("1/λ", "series of 1/λ", "power series of 1/λ about one pose and design"),
+    ("reduced", "reduced models", "small models of modes and their derivatives at a few points"),
+    ("fit", "fits", "polynomials through exact solves"),
+    ("exact by others", "exact solves by others", "eigenvalues solved at every sample"),
+    ("exact", "exact solves", "eigenvalues solved at every sample"),
+    ("stations", _BETWEEN, "exact solves at a few samples of the trajectory, interpolated"),
+    ("grid", _BETWEEN, "exact solves on a grid of poses and designs, interpolated"),
+    ("", _BETWEEN, "a surrogate through exact solves at random poses and designs"),
+)
+
+
+def kind_of(family: str) -> tuple[str, str]:
+    """The kind of a family's methods, as a legend has it, and their work in words."""
+    return next((kind, work) for start, kind, work in _KINDS if family.startswith(start))
 
 
 @dataclass(frozen=True)
@@ -44,12 +61,6 @@ class Timing:
         """The same for ``factor`` as many runs."""
         low, high = factor * self.low_s, factor * self.high_s
         return Timing(factor * self.median_s, low, high, self.repeats)
-
-    def plus(self, other: Timing) -> Timing:
-        """One after the other; quartiles add, which overstates the spread."""
-        low, high = self.low_s + other.low_s, self.high_s + other.high_s
-        repeats = min(self.repeats, other.repeats)
-        return Timing(self.median_s + other.median_s, low, high, repeats)
 
 
 @dataclass(frozen=True)
@@ -84,8 +95,10 @@ class ChartPoint:
     at_once: int = 1  # evaluations that come together: a whole trajectory where set up anew for it
     estimate: float | None = None  # of fits: their own worst estimate, relative; None: has none
 
-    def total_s(self, evaluations: float) -> float:
-        """Seconds for set-up and so many evaluations."""
+    def cost_s(self, evaluations: float | None) -> float:
+        """Seconds for set-up and so many evaluations; of one evaluation alone where None."""
+        if evaluations is None:
+            return self.online.median_s
         runs = ceil(evaluations / self.at_once)
         return self.offline.median_s + runs * self.at_once * self.online.median_s
 
@@ -100,11 +113,6 @@ class Front:
     name: str
     evaluations: float | None
     methods: tuple[str, ...]
-
-    def cost_s(self, point: ChartPoint) -> float:
-        """Seconds that count on this front."""
-        n = self.evaluations
-        return point.online.median_s if n is None else point.total_s(n)
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,7 @@ class Effort:
 
     quick: bool = False
     random_points: int = 600  # at which methods are compared, beside
-    designs: int = 15  # runs along the trajectory
-    samples_per_design: int = 152
+    samples_per_design: int = 152  # along the trajectory at several designs
     most_s: float = 60.0  # for the exact answers, one method's set-up, one search for a design
     orders: tuple[int, ...] = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12)
     coefficients: int = 5000  # largest set that is expanded
@@ -43,15 +42,13 @@ class Effort:
     factors: tuple[float, ...] = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # of a mesh's elements
     most_dof: int = 40_000  # of a refined mesh
     objectives: int = 600  # exact evaluations of the objective in a search
-    rounds: int = 5  # in which jobs are repeated, each
-    round_s: float = 0.01  # for at least so long in all
-    long_s: float = 1.0  # a job whose first run takes longer is not repeated
+    repeats: int = 15  # of a job, at most, and none is begun after
+    repeat_s: float = 1.0  # its first run included
 
 
 QUICK = Effort(
     quick=True,
     random_points=150,
-    designs=9,
     most_s=2.0,
     orders=(1, 2, 3, 4, 6, 8),
     coefficients=1000,
@@ -64,9 +61,8 @@ QUICK = Effort(
     factors=(0.5, 1.0, 2.0, 4.0),
     most_dof=2500,
     objectives=60,
-    rounds=3,
-    round_s=0.0,
-    long_s=0.06,
+    repeats=5,
+    repeat_s=0.1,
 )
 
 
@@ -78,17 +74,11 @@ def timed(job: Callable[[], T]) -> tuple[T, float]:
 
 
 def measure(job: Callable[[], T], effort: Effort) -> tuple[T, Timing]:
-    """The result of a job, and how long it takes after a first run, which warms caches.
-
-    In a round a short job is repeated, and its quickest run counts: the one least disturbed.
-    """
+    """The result of a job, and how long it takes after a first run, which warms caches."""
     result, first = timed(job)
     spent = list[float]()
-    for _ in range(effort.rounds if first <= effort.long_s else 0):
-        once = [timed(job)[1]]
-        while sum(once) < effort.round_s:
-            once.append(max(timed(job)[1], 1e-7))
-        spent.append(min(once))
+    while len(spent) < effort.repeats and first + sum(spent) < effort.repeat_s:
+        spent.append(timed(job)[1])
     median, low, high = np.quantile(spent or [first], (0.5, 0.25, 0.75)).tolist()
     return result, Timing(median, low, high, len(spent))
 

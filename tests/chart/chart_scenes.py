@@ -6,7 +6,6 @@ from eigassign.chart import Effort
 
 TINY = Effort(
     random_points=30,
-    designs=3,
     samples_per_design=9,
     orders=(1, 2, 4),
     half_orders=(1, 2),
@@ -18,6 +17,5 @@ TINY = Effort(
     training=(27,),
     factors=(0.5, 1.0, 2.0),
     objectives=40,
-    rounds=1,
-    round_s=0.0,
+    repeats=1,
 )

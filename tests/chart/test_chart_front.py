@@ -86,8 +86,8 @@ def test_a_front_counts_the_set_up_or_leaves_it_out_and_nothing_below_the_floor_
 
 def test_what_is_set_up_for_a_whole_trajectory_is_paid_for_whole() -> None:
     stations = point("stations", 0.0, 1e-6, 1e-4, at_once=150)
-    assert stations.total_s(1) == stations.total_s(150) == pytest.approx(150e-6)
-    assert stations.total_s(151) == pytest.approx(300e-6)
+    assert stations.cost_s(1) == stations.cost_s(150) == pytest.approx(150e-6)
+    assert stations.cost_s(151) == pytest.approx(300e-6)
     exact = point("exact", 0.0, 4e-5, 0.0)
     assert advised([stations, exact], 1, accuracy=1e-2).method == "exact"
     assert advised([stations, exact], 150, accuracy=1e-2).method == "stations"
@@ -165,18 +165,18 @@ def cost(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 def test_the_first_run_warms_up_and_a_long_one_is_not_repeated(cost: Any) -> None:
     costs = iter([0.5, 3.0, 1.0, 2.0])
-    effort = Effort(rounds=3, round_s=0.0, long_s=10.0)
+    effort = Effort(repeats=3, repeat_s=10.0)
     result, spent = measure(lambda: cost(costs), effort)
     assert result == "done"
     assert (spent.median_s, spent.low_s, spent.high_s, spent.repeats) == (2.0, 1.5, 2.5, 3)
-    _, spent = measure(lambda: cost(iter([7.0])), Effort(long_s=5.0))
+    _, spent = measure(lambda: cost(iter([7.0])), Effort(repeat_s=5.0))
     assert (spent.median_s, spent.repeats) == (7.0, 0)
 
 
-def test_within_a_round_a_short_job_is_repeated_and_its_quickest_run_counts(cost: Any) -> None:
-    costs = iter([0.5, 0.5, 0.2, 0.5, 9.0])
-    _, spent = measure(lambda: cost(costs), Effort(rounds=1, round_s=1.0, long_s=10.0))
-    assert spent.median_s == pytest.approx(0.2)
+def test_no_run_is_begun_after_the_time_for_repeats(cost: Any) -> None:
+    costs = iter([0.5, 0.3, 0.1, 0.2, 9.0])
+    _, spent = measure(lambda: cost(costs), Effort(repeats=15, repeat_s=1.0))
+    assert (spent.median_s, spent.repeats) == (pytest.approx(0.2), 3)
     assert next(costs) == 9.0
 
 

@@ -14,7 +14,7 @@ from scenes import HEAD, SHIPPED, scene_of
 
 import eigassign
 import eigassign as ea
-from eigassign.chart import Chart, Request, build_features, build_question, compare_methods
+from eigassign.chart import Chart, Request, build_bench, build_question, compare_methods
 from eigassign.errors import CaseError
 from eigassign.modal import NearestExpansion
 from eigassign.study import Scene
@@ -62,7 +62,7 @@ def test_a_chart_shows_what_is_known_of_the_arm(compared: Chart) -> None:
         "reduced m = 2, 3 points": 9, "fit of 9 solves": 9, "grid linear 4": 64,
     }  # fmt: skip
     assert {name: by_name[name].solves for name in solves} == solves
-    for name in ("exact dense", "exact sparse", "exact dense, SciPy one by one"):
+    for name in ("exact dense", "exact dense, SciPy one by one"):
         assert by_name[name].everywhere.worst_hz == compared.asked.floor_hz < 1e-8
 
 
@@ -80,15 +80,14 @@ def test_fronts_and_advice_are_made_of_charted_methods(compared: Chart) -> None:
 def test_a_use_gives_the_method_with_the_errors_that_were_charted(
     arm: Scene, compared: Chart
 ) -> None:
-    features = build_features(arm)
-    question = build_question(arm, features, TINY, 1e-6)
-    points = question.points
-    exact = arm.model.frequencies(points.q, points.y, 1)
+    bench = build_bench(arm, TINY)
+    question = build_question(bench)
+    points, exact = question.points, question.exact_hz
     for p in compared.points:
         how: dict[str, Any] = dict(p.parameters)
         known = {
             "ea": ea, "eigassign": eigassign, "model": arm.model, "q": arm.path.q,
-            "lower": features.lower, "upper": features.upper,
+            "lower": bench.lower, "upper": bench.upper,
             "q0": how.get("q0", how.get("q")), "y0": how.get("y0", how.get("y")),
         }  # fmt: skip
         call = p.use.removeprefix("no argument of ea.reduce: ").partition(", at a pose")[0]
@@ -117,7 +116,7 @@ def test_what_auto_takes_is_that_of_a_run_and_as_accurate_as_promised(
         assert advice.auto is not None
         point = known[str(advice.auto.method)]
         assert point.everywhere.worst_relative <= accuracy
-        assert advice.auto.total_s == point.total_s(advice.evaluations)
+        assert advice.auto.total_s == point.cost_s(advice.evaluations)
         assert f"`expansion.order: auto` takes Taylor {point.parameters['order']}" in advice.words
     assert known[f"auto 1e-04: Taylor {taken}"].parameters["order"] == taken
 
@@ -143,31 +142,35 @@ def test_kriging_is_left_out_without_scikit_learn_and_no_set_up_may_take_too_lon
     assert "no Kriging: it is charted where scikit-learn is installed" in made.notes
     assert "no grid or surrogate is trained on over 4 exact solves" in made.notes
     assert any("have no answer: Taylor 1 full took" in note for note in made.notes)
-    assert made.asked.designs == 3  # at least
-    assert made.asked.random_points == 4
+    assert (made.asked.samples_per_design, made.asked.random_points) == (4, 4)  # at least
 
 
 # --- The features that surrogates and grids are functions of
 
 
 def test_features_lead_back_to_samples_and_designs(arm: Scene) -> None:
-    features = build_features(arm)
-    assert features.names == ("place along the trajectory", "m1", "m2")
-    points = build_question(arm, features, TINY, 1e-6).points
+    bench = build_bench(arm, TINY)
+    assert bench.names == ("place along the trajectory", "m1", "m2")
+    points = build_question(bench).points
     assert points.u.min() >= 0.0
     assert points.u.max() <= 1.0
-    back = features.nearest(points.u)
-    np.testing.assert_allclose(back.u, points.u, atol=1e-15)
-    np.testing.assert_allclose(back.y, points.y, atol=1e-15)
+    for k in range(0, len(points), 7):
+        back = bench.nearest(points.u[k : k + 1])
+        np.testing.assert_allclose(back.u[0], points.u[k], atol=1e-15)
+        np.testing.assert_allclose(back.y[0], points.y[k], atol=1e-15)
+    assert len(bench.nearest(np.tile(points.u[:2], (3, 1)))) == 2  # each once
 
 
-def test_a_third_of_the_points_and_half_of_the_designs_are_corners_of_the_box(arm: Scene) -> None:
-    question = build_question(arm, build_features(arm), TINY, 1e-6)
-    again = build_question(arm, build_features(arm), TINY, 1e-6)
+def test_half_of_the_points_and_the_designs_of_all_runs_are_corners_of_the_box(arm: Scene) -> None:
+    question, again = (build_question(build_bench(arm, TINY)) for _ in range(2))
     np.testing.assert_array_equal(question.points.q, again.points.q)
     corners = np.isin(question.points.u[:, 1:], (0.0, 1.0)).all(axis=1)
-    assert corners[: question.n_random].sum() == question.n_random // 3
-    assert [bool(corners[run].all()) for run in question.runs] == [True, False, True]
+    assert corners[: question.asked.random_points].sum() == 15
+    designs = {tuple(question.points.u[run.start, 1:]) for run in question.runs}
+    assert designs == {(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)}
+    for run in question.runs:
+        assert np.ptp(question.points.y[run], axis=0).max() == 0.0
+        assert len(question.points[run]) == 9
 
 
 ABSOLUTE = "q2: {joint: elbow, angle: absolute}"
@@ -183,7 +186,7 @@ def test_a_trajectory_that_stands_still_where_it_matters_is_refused_with_the_joi
     with pytest.raises(
         CaseError, match=r"nothing moves .* \(joints: elbow\).* let it move, or give"
     ):
-        build_features(scene)
+        build_bench(scene, TINY)
 
 
 def test_a_case_in_which_nothing_can_change_a_frequency_says_so(tmp_path: Path) -> None:
@@ -197,4 +200,4 @@ def test_a_case_in_which_nothing_can_change_a_frequency_says_so(tmp_path: Path) 
         "trajectory: {q: [[0], [1]], duration: 1 s}\n"
     )
     with pytest.raises(CaseError, match=r"no coordinate changes a frequency, .*; give a design"):
-        build_features(scene_of(tmp_path, text))
+        build_bench(scene_of(tmp_path, text), TINY)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from eigassign.chart import grid_interpolation, nodes, spread_points, surrogate_families
+from eigassign.chart import grid_interpolation, grid_points, spread_points, surrogate_families
 from eigassign.errors import UsageError
 
 Floats = NDArray[np.float64]
@@ -25,11 +25,6 @@ def smooth(u: Floats) -> Floats:
     return np.exp(-u[:, :1]) * np.cos(2.0 * u[:, 1:2]) + 1.0 / (2.0 + u[:, 2:])
 
 
-def grid(kind: str, k: int, d: int) -> Floats:
-    mesh = np.meshgrid(*[nodes(kind, k)] * d, indexing="ij")
-    return np.stack([axis.ravel() for axis in mesh], axis=1)
-
-
 def test_a_response_surface_of_the_right_degree_is_exact_and_needs_as_many_points() -> None:
     u = spread_points(40, 3)
     exact, rough = (FITS[f"response surface, {name}"] for name in ("cubic", "quadratic"))
@@ -41,7 +36,7 @@ def test_a_response_surface_of_the_right_degree_is_exact_and_needs_as_many_point
 
 @pytest.mark.parametrize("kind", ["cubic", "Chebyshev"])
 def test_a_grid_of_four_nodes_is_exact_for_cubic_polynomials(kind: str) -> None:
-    u = np.random.default_rng(1).permutation(grid(kind, 4, 3))  # in any order
+    u = np.random.default_rng(1).permutation(grid_points(kind, 4, 3))  # in any order
     np.testing.assert_allclose(grid_interpolation(kind, u, cubic(u))(AT), cubic(AT), atol=1e-12)
 
 
@@ -49,7 +44,7 @@ def test_a_grid_of_four_nodes_is_exact_for_cubic_polynomials(kind: str) -> None:
 def test_grid_interpolation_converges_as_it_should(kind: str, rate: float) -> None:
     off = []
     for k in (9, 17):
-        u = grid(kind, k, 3)
+        u = grid_points(kind, k, 3)
         off.append(np.abs(grid_interpolation(kind, u, smooth(u))(AT) - smooth(AT)).max())
     assert math.log2(off[0] / off[1]) == pytest.approx(rate, abs=0.5)
 
@@ -57,7 +52,7 @@ def test_grid_interpolation_converges_as_it_should(kind: str, rate: float) -> No
 @pytest.mark.parametrize("d", [1, 2])
 @pytest.mark.parametrize("kind", ["linear", "cubic", "Chebyshev"])
 def test_what_is_interpolated_is_met_at_the_nodes(kind: str, d: int) -> None:
-    u = grid(kind, 5, d)
+    u = grid_points(kind, 5, d)
     assert u.min() == 0.0
     assert u.max() == 1.0
     f = np.random.default_rng(2).random((5**d, 2))
@@ -87,6 +82,6 @@ def test_training_points_fill_the_box_evenly_and_hold_its_corners() -> None:
     assert u.shape == (200, 3)
     assert u.min() >= 0.0
     assert u.max() <= 1.0
-    assert {tuple(corner) for corner in grid("linear", 2, 3)} <= {tuple(row) for row in u}
+    assert {tuple(corner) for corner in grid_points("linear", 2, 3)} <= {tuple(row) for row in u}
     counts = np.histogramdd(u[8:], bins=2, range=[(0, 1)] * 3)[0]
     assert counts.min() >= 20  # of 192 in 8 octants

@@ -7,29 +7,20 @@ names the kinds. A broad band joins the methods that no other beats.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import cycle
 
 import numpy as np
-from numpy.typing import NDArray
 
-from eigassign.chart.results import Chart, ChartPoint, Front, excess_over
+from eigassign.chart.results import Chart, ChartPoint, Front, excess_over, kind_of
 from eigassign.output.figures import graph
-from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Mark, Panel, Rule
+from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Panel, Rule
 
-Floats = NDArray[np.float64]
 LEAST_EXCESS = 1e-10  # of an objective over the best one: less is the rounding of a search's end
-_KINDS = (  # of methods whose family begins so; the first that fits
-    ("Taylor", "series of λ"),
-    ("1/λ", "series of 1/λ"),
-    ("reduced", "reduced models"),
-    ("fit", "fits"),
-    ("exact by others", "exact solves by others"),
-    ("exact", "exact solves"),
-    ("", "interpolation and surrogates"),
-)
-COLOURS = (*graph.SERIES[:5], graph.BLACK, graph.SKY, graph.GREY)
+WHOSE = {True: "eigassign", False: "others"}  # groups of the legend
+BAND, PLAIN = Look("#c9dfee", 7.0), Look(graph.GREY, 1.0, "fine")
+RING = Look(graph.BLACK, 0.0, marker="o", size=12.0, filled=False)
 
 
 def chart_figures(chart: Chart) -> tuple[FigurePlan, ...]:
@@ -43,12 +34,12 @@ def chart_figures(chart: Chart) -> tuple[FigurePlan, ...]:
 
 
 def _front(chart: Chart, front: Front) -> FigurePlan:
-    """The methods by family, and the front through the best."""
-    asked, single = chart.asked, front.evaluations is None
-    words = "".join(c if c.isalnum() else "_" for c in front.name)
-    name, what = words, "time of one evaluation"
-    if front.evaluations is not None:
-        name, what = f"cost_{words}", f"set-up and {front.evaluations:,.0f} evaluations"
+    """The methods by family, over the band through the best; what auto takes is ringed."""
+    asked, n = chart.asked, front.evaluations
+    name = "".join(c if c.isalnum() else "_" for c in front.name)
+    title = what = "time of one evaluation"
+    if n is not None:
+        name, title, what = f"cost_{name}", front.name, f"set-up and {n:,.0f} evaluations"
     shown = [p for p in chart.points if p.everywhere.worst_hz <= asked.typical_hz]
     lost = len(chart.points) - len(shown)
     verb = "method is" if lost == 1 else "methods are"
@@ -61,34 +52,37 @@ def _front(chart: Chart, front: Front) -> FigurePlan:
         f"`expansion.order: auto`.{beyond}"
     )
 
-    def curve(points: Sequence[ChartPoint], label: str) -> Curve:
-        x = np.array([front.cost_s(p) for p in points])
+    def curve(points: Sequence[ChartPoint], look: Look, label: str = "", whose: str = "") -> Curve:
+        x = np.array([p.cost_s(n) for p in points])
         y = np.array([max(p.everywhere.worst_hz, asked.floor_hz) for p in points])
-        group = "eigassign" if points and points[0].ours else "others"
-        names = tuple(p.method for p in points)
-        return Curve(y, Look(""), label, x, group=group, names=names)
+        return Curve(y, look, label, x, group=whose, names=tuple(p.method for p in points))
 
     families: dict[str, list[ChartPoint]] = {}
     for p in shown:  # what is set up anew for every design has no part in single evaluations
-        if p.at_once == 1 or not single:
+        if p.at_once == 1 or n is not None:
             families.setdefault(p.family, []).append(p)
-    kinds = {
-        f: next(kind for beginning, kind in _KINDS if f.startswith(beginning)) for f in families
-    }
+    curves = [
+        curve(own, PLAIN, kind_of(family)[0], WHOSE[own[0].ours])
+        for family, own in families.items()
+    ]
     taken = {a.auto.method for a in chart.advice if a.auto is not None}
-    ringed = curve([p for p in shown if p.method in taken], "taken by order: auto")
-    drawn = scatter(
-        f"{'Time of one evaluation' if single else front.name.capitalize()} against worst error",
-        ("time", "s"),
-        ("worst error", "Hz"),
-        [curve(own, kinds[family]) for family, own in families.items()],
-        band=curve([p for p in shown if p.method in front.methods], ""),
-        level=("round-off of exact solves", asked.floor_hz),
-        ringed=ringed,
-    )
+    best = sorted((p for p in shown if p.method in front.methods), key=lambda p: p.cost_s(n))
+    band, level = curve(best, BAND), Rule(asked.floor_hz, PLAIN, note="round-off of exact solves")
+    ringed = [curve([p for p in shown if p.method in taken], RING, "taken by order: auto")]
+    marks = (level, _steps(band, curves), *_coloured(curves), *(ringed if taken else ()))
+    room = (np.array([asked.floor_hz / 2.0]),)  # for the name of the level
     heading = f"{what[0].upper()}{what[1:]} against worst error"
     alt = f"Scatter of worst error in Hz over {what} for every method."
+    panel = Panel("worst error [Hz]", marks, 3.8, True, None, room)
+    drawn = _scatter(f"{title[0].upper()}{title[1:]} against worst error", "time [s]", panel)
     return FigurePlan(name, heading, caption, alt, drawn)
+
+
+def _steps(best: Curve, curves: Sequence[Curve]) -> Curve:
+    """A line from the top down through the points of a front, and on to the right."""
+    top, right = np.max([(c.y.max(), np.max(c.x)) for c in curves], axis=0)
+    y = np.insert(np.repeat(best.y, 2), 0, top)
+    return Curve(y, BAND, x=np.append(np.repeat(best.x, 2), right))
 
 
 def _mesh(chart: Chart) -> FigurePlan:
@@ -102,19 +96,16 @@ def _mesh(chart: Chart) -> FigurePlan:
         "Worst error of exact frequencies against the limit that the meshes converge to, "
         f"extrapolated from the two finest ({chart.mesh[-1].elements} elements).{here}"
     )
-    rows = [row for row in chart.mesh if row.worst_hz > 0.0]
-    counts = np.array([float(row.elements) for row in rows])
-    errors, times = np.array([(row.worst_hz, row.solve.median_s) for row in rows]).T
-    heading, x = "Elements against discretisation error", ("elements", "")
-    drawn = scatter(heading, x, ("worst error", "Hz"), [_ours(errors, counts)])
-    below = scatter(heading, x, ("exact solve", "s"), [_ours(times, counts)])
-    drawn = replace(drawn, panels=(*drawn.panels, replace(below.panels[0], height=2.0)))
+    rows = [(row.elements, row.worst_hz, row.solve.median_s) for row in chart.mesh if row.worst_hz]
+    counts, *values = np.array(rows, dtype=np.float64).T
+    heading = "Elements against discretisation error"
+    labels, heights = ("worst error [Hz]", "exact solve [s]"), (3.8, 2.0)
+    panels = [
+        Panel(label, (Curve(y, Look(graph.BLUE, 0.9, marker="o"), x=counts),), height, True, None)
+        for label, y, height in zip(labels, values, heights, strict=True)
+    ]
     alt = "Discretisation error in Hz over the number of elements."
-    return FigurePlan("mesh", heading, caption, alt, drawn)
-
-
-def _ours(y: Floats, x: Floats) -> Curve:
-    return Curve(y, Look(""), x=x, group="eigassign")
+    return FigurePlan("mesh", heading, caption, alt, _scatter(heading, "elements", *panels))
 
 
 def _designs(chart: Chart) -> FigurePlan:
@@ -129,60 +120,24 @@ def _designs(chart: Chart) -> FigurePlan:
     for run in chart.designs:
         seconds, found = np.array(run.trace or ((run.seconds.median_s, run.objective),)).T
         excess = [max(excess_over(best.objective, value), LEAST_EXCESS) for value in found]
-        group = "eigassign" if run.ours else "others"
-        curves.append(Curve(np.array(excess), Look(""), run.method, seconds, group=group))
+        curves.append(Curve(np.array(excess), PLAIN, run.method, seconds, group=WHOSE[run.ours]))
     heading = "Time to a design against the objective it reaches"
-    drawn = scatter(heading, ("time", "s"), ("objective above the best", "relative"), curves)
+    panel = Panel("objective above the best [relative]", (*_coloured(curves),), 3.8, True, None)
     alt = "Scatter of excess objective over seconds for every way to a design."
-    return FigurePlan("designs", heading, caption, alt, drawn)
+    return FigurePlan("designs", heading, caption, alt, _scatter(heading, "time [s]", panel))
 
 
-def scatter(
-    title: str,
-    x: tuple[str, str],
-    y: tuple[str, str],
-    curves: Sequence[Curve],
-    band: Curve | None = None,
-    level: tuple[str, float] | None = None,
-    ringed: Curve | None = None,
-) -> Graph:
-    """``curves`` over the axes ``x``, ``y`` (name, unit), with a legend beside them.
+def _scatter(title: str, x: str, *panels: Panel) -> Graph:
+    return Graph(title, x, np.zeros(0), panels, x_logarithmic=True, beside=True)
 
-    The group "eigassign" is filled, the others are hollow and dashed; of one label all look alike,
-    and the two groups take colours from opposite ends. ``band`` is drawn as steps, ``level`` is a
-    named height across the axes, ``ringed`` are points with a ring around them.
-    """
-    drawn: list[Curve] = []
-    for ours, colours in ((False, COLOURS[::-1]), (True, COLOURS)):
-        own = [curve for curve in curves if (curve.group == "eigassign") is ours]
+
+def _coloured(curves: Sequence[Curve]) -> Iterator[Curve]:
+    """The others first, hollow and dashed; of one label all look alike, and one has it."""
+    colours = dict(zip(dict.fromkeys(c.label for c in curves), cycle(graph.SERIES), strict=False))
+    for ours in (False, True):
+        named = set[str]()
         dash, marker = ("solid", "o") if ours else ("fine", "s")
-        labels = dict.fromkeys(curve.label for curve in own)
-        looks = dict(zip(labels, cycle(colours), strict=False))
-        for k, curve in enumerate(own):
-            label = "" if curve.label in [other.label for other in own[:k]] else curve.label
-            look = Look(looks[curve.label], 0.9, dash, marker, 6.0, ours)
-            drawn.append(replace(curve, look=look, label=label))
-    holds = () if level is None else (np.array([level[1], level[1] / 2.0]),)  # room for its name
-    panel = Panel(graph.labelled(*y), tuple(drawn), 3.8, True, None, holds)
-    marks: list[Mark] = []
-    if level is not None:
-        marks.append(Rule(level[1], Look(graph.GREY, 1.0, "fine"), note=level[0]))
-    if band is not None and len(band.y):
-        right = graph.decades([curve.x for curve in curves if curve.x is not None])[1]
-        marks.append(_steps(band, panel.limits[1], right))
-    marks += panel.curves
-    if ringed is not None and len(ringed.y):
-        ring = Look(graph.BLACK, 0.0, marker="o", size=12.0, filled=False)
-        marks.append(Curve(ringed.y, ring, ringed.label, ringed.x))
-    panel = replace(panel, marks=tuple(marks))
-    label = graph.labelled(*x)
-    return Graph(title, label, np.zeros(0), (panel,), x_logarithmic=True, beside=True)
-
-
-def _steps(band: Curve, top: float, right: float) -> Curve:
-    """A line from the top down through the points of a front, and on to the right edge."""
-    assert band.x is not None
-    order = np.argsort(band.x)
-    y = np.insert(np.repeat(band.y[order], 2), 0, top)
-    x = np.append(np.repeat(band.x[order], 2), right)
-    return Curve(y, Look("#c9dfee", 7.0), x=x)
+        for curve in [each for each in curves if each.group == WHOSE[ours]]:
+            look = Look(colours[curve.label], 0.9, dash, marker, 6.0, ours)
+            yield replace(curve, look=look, label="" if curve.label in named else curve.label)
+            named.add(curve.label)

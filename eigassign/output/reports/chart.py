@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from eigassign.chart.results import SCHEMA, Advice, Chart, Timing
+from eigassign.chart.results import SCHEMA, Chart, Timing
 from eigassign.chart.timing import time_in_words
 from eigassign.output.figures.front import chart_figures
 from eigassign.output.formats import capital
@@ -19,14 +19,14 @@ from eigassign.output.tables import Table
 
 def chart_tables(chart: Chart) -> tuple[Table, ...]:
     """The tables that have rows: the choice, the fronts, all methods, the mesh, the designs."""
-    made = (*_advice(chart, how=True), *_fronts(chart), _methods(chart), _mesh(chart),
+    made = (_choice(chart, how=True), *_fronts(chart), _methods(chart), _mesh(chart),
             _designs(chart), _machine(chart))  # fmt: skip
     return tuple(table for table in made if table.rows)
 
 
 def main_tables(chart: Chart) -> tuple[Table, ...]:
     """The tables for a terminal: the fronts, the ways to a design and what to choose."""
-    made = (*_fronts(chart), _designs(chart), *_advice(chart))
+    made = (*_fronts(chart), _designs(chart), _choice(chart))
     return tuple(table for table in made if table.rows)
 
 
@@ -38,41 +38,37 @@ def _spread(timing: Timing) -> str:
     return f"{median} ({low}–{high})" if timing.repeats else f"{median} (once)"
 
 
-def _advice(chart: Chart, how: bool = False) -> Iterator[Table]:
-    """The recommendations, with ``how`` as a call or in the case file; what ``auto`` takes."""
-    rows, taken, refused = [], [], dict[str, str]()
+def _choice(chart: Chart, how: bool = False) -> Table:
+    """The recommendations beside what ``auto`` takes; with ``how``, as a call or in a case file."""
+    rows, refused = [], dict[str, str]()
     uses = {p.method: p.use for p in chart.points}
     for a in chart.advice:
-        asked = (_asked_for(a), f"{a.evaluations:,.0f}")
-        found: tuple[str, ...] = ("none", "", "")
+        asked = (
+            f"in {time_in_words(a.budget_s or 0)}" if a.accuracy is None else f"{a.accuracy:.0e}"
+        )
+        found = ("none", "", "")
         if a.method is not None:
             found = (a.method, f"{a.worst_relative:.1e}", time_in_words(a.total_s or 0.0))
-        rows.append((*asked, *found, *((uses.get(a.method or "", ""),) if how else ())))
-        if (auto := a.auto) is None:
-            continue
-        found = ("refused", "", "", "")
-        if auto.total_s is None:
-            refused[auto.refused] = asked[0]
-        else:
-            against = f"{auto.total_s / a.total_s:.2g} × as long" if a.total_s else ""
-            worst, total = f"{auto.worst_relative:.1e}", time_in_words(auto.total_s)
-            found = (str(auto.method).partition(": ")[2], worst, total, against)
-        taken.append((*asked, *found, time_in_words(auto.choosing_s)))
-    columns = ("asked for", "evaluations", "choose", "worst error", "time in all")
-    caption = "Accuracy is the worst relative error in Hz; time is set-up and all evaluations."
-    yield Table("What to choose", (*columns, *(("how",) if how else ())), tuple(rows), caption)
-    own = ("auto takes", "worst error", "time in all", "against the choice", "choosing took")
+        taken = ("", "", "", "")
+        if a.auto is not None and a.auto.method is not None:
+            times = (time_in_words(s or 0.0) for s in (a.auto.total_s, a.auto.choosing_s))
+            order = a.auto.method.partition(": ")[2]
+            taken = (order, f"{a.auto.worst_relative:.1e}", *times)
+        elif a.auto is not None:
+            taken, refused[a.auto.refused] = ("refused", "", "", ""), asked
+        row = (asked, f"{a.evaluations:,.0f}", *found, *taken, uses.get(a.method or "", ""))
+        rows.append(row if how else row[:-1])
+    columns = (
+        "asked for", "evaluations", "choose", "worst error", "time in all",
+        "auto takes", "its worst error", "its time in all", "choosing took", "how",
+    )  # fmt: skip
     caption = (
+        "Accuracy is the worst relative error in Hz; time is set-up and all evaluations. "
         "expansion.order: auto takes the fewest coefficients, by its own error estimate and no "
         "timing."
     )
-    for words, accuracy in refused.items():
-        caption += f" {accuracy} is refused: {words}."
-    yield Table("What auto takes", (*columns[:2], *own), tuple(taken), caption)
-
-
-def _asked_for(a: Advice) -> str:
-    return f"{a.accuracy:.0e}" if a.accuracy is not None else f"in {time_in_words(a.budget_s or 0)}"
+    caption += "".join(f" {accuracy} is refused: {why}." for why, accuracy in refused.items())
+    return Table("What to choose", columns if how else columns[:-1], tuple(rows), caption)
 
 
 def _fronts(chart: Chart) -> Iterator[Table]:
@@ -81,7 +77,7 @@ def _fronts(chart: Chart) -> Iterator[Table]:
     columns = ("method", "eigassign's", "time", "worst error [Hz]", "relative")
     for each in chart.fronts:
         rows = tuple(
-            (p.method, "yes" if p.ours else "no", time_in_words(each.cost_s(p)),
+            (p.method, "yes" if p.ours else "no", time_in_words(p.cost_s(each.evaluations)),
              f"{p.everywhere.worst_hz:.2e}", f"{p.everywhere.worst_relative:.1e}")
             for p in (known[name] for name in reversed(each.methods))
         )  # fmt: skip
