@@ -11,10 +11,10 @@ mean square of f/f_d − 1 with the weights of targets and time.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -25,15 +25,14 @@ from eigassign.assignment.exact.design_problem import UnitBox
 from eigassign.assignment.exact.requirements import Frequencies
 from eigassign.assignment.exact.sequential import minimise
 from eigassign.case.schema.targets import FrequencyTarget
-from eigassign.chart.question import SEED
-from eigassign.chart.results import DesignRun, Timing, excess_over
+from eigassign.chart.results import DesignRun, excess_over
 from eigassign.chart.timing import Effort, measure
 from eigassign.errors import EigassignError
 from eigassign.modal.expansion import expand
 from eigassign.study.design.one_shot import assign_design
 from eigassign.study.design.optimum import find_optimum
-from eigassign.study.design.variants import PosedProblem, Task, variant_of
-from eigassign.study.requirements.requirement import Requirement
+from eigassign.study.design.variants import Task, variant_of
+from eigassign.study.planning import SEED
 from eigassign.study.requirements.sampling import requirements_of
 from eigassign.study.scene import Expansions, Scene
 
@@ -61,26 +60,27 @@ def chart_designs(
         return (), ()
     if scene.path.follows_design:
         return (), ("no designs are charted where the coordinates follow the design",)
-    rows = scene.path.spread(max(5, int(effort.most_s / 40.0 / solve_s)))
-    path, runs, notes = scene.path.chosen(rows), list[DesignRun](), list[str]()
+    path = scene.path.chosen(scene.path.spread(max(5, int(effort.most_s / 40.0 / solve_s))))
+    runs, notes = list[DesignRun](), list[str]()
     if len(path.q) < len(scene.path.q):
         few = f"designs are charted on {len(path.q)} of {len(scene.path.q)} samples"
         notes.append(f"{few} of the trajectory, for an exact solve takes long")
-    thinned, targets = replace(scene, trajectory=path), requirements_of(scene.file, path)
-    posed = variant_of(Task(thinned, targets, 0.0), ())
+    targets = requirements_of(scene.file, path)
+    task = Task(replace(scene, trajectory=path), targets, 0.0)
     most = min(effort.objectives, max(1, int(effort.most_s / (len(path.q) * solve_s))))
     ways = {
-        "one shot": partial(_one_shot, thinned, targets, effort),
-        "sequential": partial(_sequential, thinned, posed, effort),
-        "sequential, several starts": partial(_several_starts, thinned, targets),
-        "SLSQP, analytic gradient": partial(_search, thinned, posed, most, partial(_slsqp, True)),
-        "SLSQP, finite differences": partial(_search, thinned, posed, most, partial(_slsqp, False)),
-        "differential evolution": partial(_search, thinned, posed, most, _evolution),
+        "one shot": _one_shot,
+        "sequential": _sequential,
+        "sequential, several starts": _several_starts,
+        "SLSQP, analytic gradient": partial(_search, most, partial(_slsqp, True)),
+        "SLSQP, finite differences": partial(_search, most, partial(_slsqp, False)),
+        "differential evolution": partial(_search, most, _evolution),
     }
     for name, way in ways.items():
         progress(f"designing by {name}")
         try:
-            y, spent, solves, how, more = way()
+            (y, solves, told, more), seconds = measure(partial(way, task), effort)
+            posed = variant_of(task, ())
             seen = posed.problem.appraise(y)
         except EigassignError as error:
             notes.append(f"no design by {name}: {error}")
@@ -88,63 +88,49 @@ def chart_designs(
         curves = zip(posed.requirements.curves(seen), targets, strict=True)
         off = max(float(np.abs(hz / own.hz - 1.0).max()) for (hz, _), own in curves)
         value, rms = posed.problem(y, seen), float(np.linalg.norm(seen.residual))
-        run = DesignRun(
-            name, not more, how, spent, solves, tuple(y.tolist()), value, off, rms, 0.0, **more
-        )
+        at = tuple(y.tolist())
+        run = DesignRun(name, not more, told, seconds, solves, at, value, off, rms, 0.0, **more)
         runs.append(run)
     best = min((run.objective for run in runs), default=0.0)
     return tuple(replace(r, excess=excess_over(best, r.objective)) for r in runs), tuple(notes)
 
 
-# Design, time, exact solves, parameters, and of a search how it went
-_Reached = tuple[Floats, Timing, int, dict[str, Any], dict[str, Any]]
+# Design, exact solves, parameters, and of a search its trace and a note
+_Reached = tuple[Floats, int, dict[str, Any], dict[str, Any]]
 
 
-def _one_shot(scene: Scene, targets: tuple[Requirement, ...], effort: Effort) -> _Reached:
-    full, order = scene.expansions.full, scene.expansions.order
-
-    def design() -> Any:
-        linear = expand(scene.model.pencil, full.q0, full.y0, full.modes, order, linear_in_y=True)
-        return assign_design(
-            replace(scene, expansions=Expansions(full, linear, order, order)), targets
-        )
-
-    found, spent = measure(design, effort)
-    return found.y, spent, 1, {"order": order, "q0": full.q0, "y0": full.y0}, {}
+def _one_shot(task: Task) -> _Reached:
+    scene, full, order = task.scene, task.scene.expansions.full, task.scene.expansions.order
+    linear = expand(scene.model.pencil, full.q0, full.y0, full.modes, order, linear_in_y=True)
+    expanded = replace(scene, expansions=Expansions(full, linear, order, order))
+    told = {"order": order, "q0": full.q0, "y0": full.y0}
+    return assign_design(expanded, task.wanted).y, 1, told, {}
 
 
-def _sequential(scene: Scene, posed: PosedProblem, effort: Effort) -> _Reached:
-    start, most = np.clip(scene.initial, *scene.bounds), scene.file.assignment.steps
-    found, spent = measure(lambda: minimise(posed.problem, start, most), effort)
-    how = {"designs judged": found.appraisals}
-    return found.y, spent, found.appraisals * len(scene.path.q), how, {}
+def _sequential(task: Task) -> _Reached:
+    """A problem of its own, for it remembers the answers at designs that it has seen."""
+    scene = task.scene
+    start = np.clip(scene.initial, *scene.bounds)
+    found = minimise(variant_of(task, ()).problem, start, scene.file.assignment.steps)
+    solves = found.appraisals * len(scene.path.q)
+    return found.y, solves, {"designs judged": found.appraisals}, {}
 
 
-def _several_starts(scene: Scene, targets: tuple[Requirement, ...]) -> _Reached:
-    """Run once: it takes as long as the others in sum."""
-    begun = perf_counter()
-    found = find_optimum(scene, targets, (), lambda line: None)
-    return found.best.y, _once(begun), found.exact_solves, {"starts": found.starts}, {}
+def _several_starts(task: Task) -> _Reached:
+    found = find_optimum(task.scene, task.wanted, (), lambda line: None)
+    return found.best.y, found.exact_solves, {"starts": found.starts}, {}
 
 
-def _once(begun: float) -> Timing:
-    seconds = perf_counter() - begun
-    return Timing(seconds, seconds, seconds, 0)
-
-
-def _search(scene: Scene, posed: PosedProblem, most: int, search: Callable[..., None]) -> _Reached:
+def _search(most: int, search: Callable[..., Any], task: Task) -> _Reached:
     """A search on exact eigenvalues over z in [0, 1]^n of the parameters with room.
 
-    Run once: its trace says how it went. A design counts as the best if it keeps the limits.
+    A design counts as the best if it keeps the limits.
     """
-    problem, asked, q, box = (
-        posed.problem,
-        posed.requirements,
-        scene.path.q,
-        UnitBox.of(posed.problem),
-    )
+    scene, posed = task.scene, variant_of(task, ())
+    problem, asked, q = posed.problem, posed.requirements, scene.path.q
+    box, begun = UnitBox.of(problem), time.process_time()
     start = box.z(np.clip(scene.initial, problem.lower, problem.upper))
-    best, trace, calls, begun = (np.inf, start), list[tuple[float, float]](), 0, perf_counter()
+    best, trace, calls, note = (np.inf, start), list[tuple[float, float]](), 0, ""
 
     def objective(z: Floats, sloped: bool) -> Any:
         nonlocal best, calls
@@ -159,23 +145,20 @@ def _search(scene: Scene, posed: PosedProblem, most: int, search: Callable[..., 
             hz = scene.model.frequencies(q, y, asked.modes)
             seen = asked.appraise(y, Frequencies(hz, np.zeros((*hz.shape, len(y)))))
         value, row = problem(y, seen), box.rows @ inside
-        slack = 1e-8 * (1.0 + np.abs(row))  # rounding
-        kept = (row >= box.row_lower - slack) & (row <= box.row_upper + slack)
-        if value < best[0] and kept.all():
+        missed = np.abs(row - np.clip(row, box.row_lower, box.row_upper))
+        if value < best[0] and np.all(missed <= 1e-8 * (1.0 + np.abs(row))):  # rounding
             best = value, inside
-            trace.append((perf_counter() - begun, value))
+            trace.append((time.process_time() - begun, value))
         slopes = 2.0 * (seen.residual @ seen.slopes)[box.free] * box.width + box.prices
         return (value, slopes) if sloped else value
 
-    bounds, limits, note = Bounds(np.zeros(box.n), np.ones(box.n)), [], ""
-    if len(box.rows):
-        limits.append(LinearConstraint(box.rows, box.row_lower, box.row_upper))
+    limits = (LinearConstraint(box.rows, box.row_lower, box.row_upper),) if len(box.rows) else ()
     try:
-        search(objective, start, bounds=bounds, constraints=tuple(limits))
+        search(objective, start, bounds=Bounds(np.zeros(box.n), np.ones(box.n)), constraints=limits)
     except SpentError:
         note = "stopped: no evaluation left"
-    how, more = {"evaluations": calls, "most": most}, {"trace": tuple(trace), "note": note}
-    return box.y(best[1]), _once(begun), calls * len(q), how, more
+    told, more = {"evaluations": calls, "most": most}, {"trace": tuple(trace), "note": note}
+    return box.y(best[1]), calls * len(q), told, more
 
 
 def _slsqp(analytic: bool, objective: Any, start: Floats, **how: Any) -> None:

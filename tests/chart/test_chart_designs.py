@@ -44,6 +44,17 @@ def test_ways_to_a_design_reach_the_exact_optimum_or_say_that_they_stopped(arm: 
         assert np.all((np.array(run.design) >= lower) & (np.array(run.design) <= upper))
 
 
+def test_a_search_that_is_timed_again_solves_again(arm: Scene) -> None:
+    """The problem that a design is sought with remembers what it has solved."""
+    seconds = []
+    for repeats in (0, 3):
+        effort = replace(TINY, objectives=1, repeats=repeats, repeat_s=10.0)
+        (run,) = [r for r in chart_designs(arm, effort, 1e-4, print)[0] if r.method == "sequential"]
+        seconds.append(run.seconds.median_s)
+    assert run.seconds.repeats == 3
+    assert seconds[1] > 0.5 * seconds[0]  # 0.22 of it where answers were remembered
+
+
 def test_linear_constraints_bind_every_way_on_few_samples_where_solves_are_dear(
     tmp_path: Path,
 ) -> None:
