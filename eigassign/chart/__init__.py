@@ -16,9 +16,9 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "comparison": "advise compare_methods front pareto skipped_notes",
+        "comparison": "advise compare_methods front skipped_notes",
         "designs": "chart_designs",
-        "mesh": "chart_meshes refined",
+        "mesh": "chart_meshes",
         "methods": "grid_interpolation grid_points spread_points surrogate_families",
         "question": "build_bench build_question",
         "results": (

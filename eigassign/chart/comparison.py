@@ -137,7 +137,7 @@ def _chart_method(method: Method, effort: Effort, question: Question) -> tuple[C
         job, many = partial(one.along, designs), len(designs) * samples
     point = ChartPoint(
         method=method.name, family=method.family, ours=method.ours, parameters=method.parameters,
-        offline=set_up, online=measure(job, effort)[1].times(1.0 / many),
+        offline=set_up, online=measure(job, effort, many)[1],
         solves=solves, solves_online=0.0, everywhere=errors(hz, exact),
         random=errors(hz[:n], exact[:n]) if n else None,
         trajectory=errors(hz[n:], exact[n:]) if len(hz) > n else None,
@@ -167,32 +167,26 @@ def errors(hz: Floats, exact: Floats) -> Errors:
 # --- Which methods no other beats, and what to choose
 
 
-def pareto(cost: Floats, error: Floats) -> list[int]:
-    """Indices that nothing beats in cost (n,) and error (n,) at once, the most accurate first.
-
-    A point that equals another in one of the two and is no better in the other is beaten; numbers
-    that are not finite never win.
-    """
-    kept, best = list[int](), np.inf
-    for k in np.lexsort((error, cost)).tolist():
-        if np.isfinite(cost[k]) and error[k] < best:
-            kept.append(k)
-            best = error[k]
-    return kept[::-1]
+def _rivals(points: Sequence[ChartPoint]) -> list[ChartPoint]:
+    """The points without those that ``order: auto`` takes, whose time lacks that of choosing."""
+    return [p for p in points if not p.method.startswith("auto ")]
 
 
 def front(
     points: Sequence[ChartPoint], name: str, evaluations: float | None, floor_hz: float
 ) -> Front:
-    """The front of these points; errors below ``floor_hz`` count as equal.
+    """The methods that nothing beats in cost and error at once; errors below the floor are equal.
 
-    A method that is set up anew for every design answers whole trajectories only: it has no part in
-    the front of single evaluations.
+    A point that equals another in one of the two and is no better in the other is beaten. A method
+    that is set up anew for every design has no part in the front of single evaluations.
     """
     able = [p for p in _rivals(points) if p.at_once == 1 or evaluations is not None]
-    cost = np.array([p.cost_s(evaluations) for p in able])
-    error = np.array([max(p.everywhere.worst_hz, floor_hz) for p in able])
-    return Front(name, evaluations, tuple(able[k].method for k in pareto(cost, error)))
+    errors_hz = {p.method: max(p.everywhere.worst_hz, floor_hz) for p in able}
+    kept, best = list[str](), np.inf
+    for p in sorted(able, key=lambda p: (p.cost_s(evaluations), errors_hz[p.method])):
+        if errors_hz[p.method] < best:
+            kept, best = [p.method, *kept], errors_hz[p.method]
+    return Front(name, evaluations, tuple(kept))
 
 
 def advise(
@@ -229,17 +223,13 @@ def advise(
             yield _chosen(within, "most accurate", best)
 
 
-def _rivals(points: Sequence[ChartPoint]) -> list[ChartPoint]:
-    """The points without those that ``order: auto`` takes, whose time lacks that of choosing."""
-    return [p for p in points if not p.method.startswith("auto ")]
-
-
 def _chosen(within: Advice, superlative: str, found: ChartPoint | None) -> Advice:
+    """The advice with a method, if there is one."""
     if found is None:
         return replace(within, words=f"{within.words}: no charted method does that")
     total, worst = found.cost_s(within.evaluations), found.everywhere.worst_relative
     words = (
-        f"{within.words} the {superlative} is {found.method}: {kind_of(found.family)[1]}. It takes "
+        f"{within.words} the {superlative} is {found.method} ({kind_of(found.family)}). It takes "
         f"{time_in_words(total)} in all and is off by {_share(worst)} at most"
         f"{'; it is set up anew for every design' if found.at_once > 1 else ''}"
     )
@@ -252,19 +242,19 @@ def _beside_auto(
 ) -> Advice:
     """The advice with what ``expansion.order: auto`` takes for the same accuracy."""
     name, says = f"auto {advice.accuracy:.0e}", f"{advice.words}. `expansion.order: auto`"
-    if why := next((why for method, why in skipped.items() if method.startswith(name)), ""):
+    for why in [why for method, why in skipped.items() if method.startswith(name)]:
         auto = AutoTakes(None, None, None, 0.0, why)
-        return replace(advice, auto=auto, words=f"{says} refuses: {why}")
-    if (own := next((p for p in points if p.method.startswith(name)), None)) is None:
-        return advice
-    total, worst = own.cost_s(advice.evaluations), own.everywhere.worst_relative
-    longer = f" ({total / advice.total_s:.2g} times as long)" if advice.total_s else ""
-    choosing_s = own.parameters["choosing_s"]
-    words = (
-        f"{says} takes {own.method.partition(': ')[2]}: {time_in_words(total)}{longer}, off by "
-        f"{_share(worst)} at most, after {time_in_words(choosing_s)} of choosing"
-    )
-    return replace(advice, auto=AutoTakes(own.method, worst, total, choosing_s, ""), words=words)
+        advice = replace(advice, auto=auto, words=f"{says} refuses: {why}")
+    for own in [p for p in points if p.method.startswith(name)]:
+        total, worst = own.cost_s(advice.evaluations), own.everywhere.worst_relative
+        longer = f" ({total / advice.total_s:.2g} times as long)" if advice.total_s else ""
+        auto = AutoTakes(own.method, worst, total, own.parameters["choosing_s"], "")
+        words = (
+            f"{says} takes {own.method.partition(': ')[2]}: {time_in_words(total)}{longer}, off by "
+            f"{_share(worst)} at most, after {time_in_words(auto.choosing_s)} of choosing"
+        )
+        advice = replace(advice, auto=auto, words=words)
+    return advice
 
 
 def _share(relative: float) -> str:

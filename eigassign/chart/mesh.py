@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,30 +12,10 @@ from numpy.typing import NDArray
 from eigassign.case.case_file import CaseFile
 from eigassign.chart.results import MeshRow
 from eigassign.chart.timing import Effort, measure
+from eigassign.mechanism.assembly.build import refined
 from eigassign.study.build import build_model
 
 Floats = NDArray[np.float64]
-
-
-def refined(file: CaseFile, factor: float) -> tuple[CaseFile, tuple[int, ...]]:
-    """The same case with ``factor`` times the elements in every beam, and their numbers.
-
-    A beam keeps at least one. Every number of elements must be given or settled.
-    """
-    counts: list[int] = []
-
-    def scaled(part: Any) -> Any:
-        if hasattr(part, "elements"):
-            counts.append(max(1, round(part.elements * factor)))
-            return part.model_copy(update={"elements": counts[-1]})
-        if hasattr(part, "beams"):
-            beams = {name: scaled(beam) for name, beam in part.beams.items()}
-            return part.model_copy(update={"beams": beams})
-        return part
-
-    links = {name: scaled(link) for name, link in file.mechanism.links.items()}
-    mechanism = file.mechanism.model_copy(update={"links": links})
-    return replace(file, mechanism=mechanism), tuple(counts)
 
 
 def chart_meshes(
@@ -57,10 +36,9 @@ def chart_meshes(
         if not counts or model.n_dof > effort.most_dof:
             break
         q, y = np.split(x, [len(model.q_names)], axis=1)
-        hz, spent = measure(partial(model.frequencies, q, y, max(modes)), effort)
+        hz, spent = measure(partial(model.frequencies, q, y, max(modes)), effort, len(x))
         solved.append(hz[:, np.array(modes) - 1])
-        each = spent.times(1.0 / len(x))
-        rows.append(MeshRow(factor, sum(counts), model.n_dof, 0.0, 0.0, None, each))
+        rows.append(MeshRow(factor, sum(counts), model.n_dof, 0.0, 0.0, None, spent))
     if len(rows) < 2:
         return ()
     off = np.array(solved) - (limit := solved[-1] + (solved[-1] - solved[-2]) / 15.0)

@@ -12,23 +12,20 @@ from math import ceil
 from typing import Any
 
 SCHEMA = 4  # of chart.json
-_BETWEEN = "interpolation and surrogates"
-_KINDS = (  # how a family's name begins, its kind, and its work in words: the first that fits
-    ("Taylor", "series of λ", "power series of λ about one pose and design, or several"),
-    ("1/λ", "series of 1/λ", "power series of 1/λ about one pose and design"),
-    ("reduced", "reduced models", "small models of modes and their derivatives at a few points"),
-    ("fit", "fits", "polynomials through exact solves"),
-    ("exact by others", "exact solves by others", "eigenvalues solved at every sample"),
-    ("exact", "exact solves", "eigenvalues solved at every sample"),
-    ("stations", _BETWEEN, "exact solves at a few samples of the trajectory, interpolated"),
-    ("grid", _BETWEEN, "exact solves on a grid of poses and designs, interpolated"),
-    ("", _BETWEEN, "a surrogate through exact solves at random poses and designs"),
-)
+_KINDS = {  # of methods whose family begins so: the first that fits
+    "Taylor": "series of λ",
+    "1/λ": "series of 1/λ",
+    "reduced": "reduced models",
+    "fit": "fits",
+    "exact by others": "exact solves by others",
+    "exact": "exact solves",
+    "": "interpolation and surrogates",
+}
 
 
-def kind_of(family: str) -> tuple[str, str]:
-    """The kind of a family's methods, as a legend has it, and their work in words."""
-    return next((kind, work) for start, kind, work in _KINDS if family.startswith(start))
+def kind_of(family: str) -> str:
+    """The kind of a family's methods in words."""
+    return next(kind for beginning, kind in _KINDS.items() if family.startswith(beginning))
 
 
 @dataclass(frozen=True)
@@ -56,11 +53,6 @@ class Timing:
     low_s: float
     high_s: float
     repeats: int
-
-    def times(self, factor: float) -> Timing:
-        """The same for ``factor`` as many runs."""
-        low, high = factor * self.low_s, factor * self.high_s
-        return Timing(factor * self.median_s, low, high, self.repeats)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import scipy
@@ -47,23 +47,11 @@ class Effort:
 
 
 QUICK = Effort(
-    quick=True,
-    random_points=150,
-    most_s=2.0,
-    orders=(1, 2, 3, 4, 6, 8),
-    coefficients=1000,
-    expansion_points=(1, 3),
-    fitted=(),
-    accuracies=(1e-2, 1e-4, 1e-6, 1e-8),
-    nodes=(3, 5, 7),
-    stations=(5, 17),
-    training=(27, 125),
-    factors=(0.5, 1.0, 2.0, 4.0),
-    most_dof=2500,
-    objectives=60,
-    repeats=5,
-    repeat_s=0.1,
-)
+    quick=True, random_points=150, most_s=2.0, orders=(1, 2, 3, 4, 6, 8), coefficients=1000,
+    expansion_points=(1, 3), fitted=(), accuracies=(1e-2, 1e-4, 1e-6, 1e-8), nodes=(3, 5, 7),
+    stations=(5, 17), training=(27, 125), factors=(0.5, 1.0, 2.0, 4.0), most_dof=2500,
+    objectives=60, repeats=5, repeat_s=0.1,
+)  # fmt: skip
 
 
 def timed(job: Callable[[], T]) -> tuple[T, float]:
@@ -73,14 +61,17 @@ def timed(job: Callable[[], T]) -> tuple[T, float]:
     return result, time.process_time() - start
 
 
-def measure(job: Callable[[], T], effort: Effort) -> tuple[T, Timing]:
-    """The result of a job, and how long it takes after a first run, which warms caches."""
+def measure(job: Callable[[], T], effort: Effort, count: int = 1) -> tuple[T, Timing]:
+    """The result of a job, and how long each of its ``count`` parts takes.
+
+    The first run does not count, for it warms caches, unless it takes too long for another.
+    """
     result, first = timed(job)
     spent = list[float]()
     while len(spent) < effort.repeats and first + sum(spent) < effort.repeat_s:
         spent.append(timed(job)[1])
-    median, low, high = np.quantile(spent or [first], (0.5, 0.25, 0.75)).tolist()
-    return result, Timing(median, low, high, len(spent))
+    quantiles = np.quantile(spent or [first], (0.5, 0.25, 0.75)) / count
+    return result, Timing(*quantiles.tolist(), len(spent))
 
 
 def time_in_words(seconds: float) -> str:
@@ -93,10 +84,9 @@ def time_in_words(seconds: float) -> str:
 
 def machine() -> dict[str, Any]:
     """Processor, cores, versions, linear algebra and its threads; no names of host or user."""
-    file = Path("/proc/cpuinfo")
+    file, settings = Path("/proc/cpuinfo"), cast(dict[str, Any], np.show_config(mode="dicts"))
     lines = file.read_text(errors="replace").splitlines() if file.exists() else []
     named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    settings: Any = np.show_config(mode="dicts")
     blas = settings.get("Build Dependencies", {}).get("blas", {})
     threads = {os.environ.get(f"{name}_NUM_THREADS") for name in ("OPENBLAS", "OMP", "MKL")}
     packages = {"eigassign": __version__, "NumPy": np.__version__, "SciPy": scipy.__version__}

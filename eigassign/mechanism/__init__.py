@@ -14,7 +14,9 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "assembly.build": "build_pencil erls_motion local_links with_elements with_reduction",
+        "assembly.build": (
+            "build_pencil erls_motion local_links refined with_elements with_reduction"
+        ),
         "assembly.congruence": "motion_matrix motion_scalars",
         "assembly.mode_shapes": "shapes",
         "assembly.pencil": "Pencil",

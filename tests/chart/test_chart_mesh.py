@@ -11,7 +11,8 @@ from chart_scenes import TINY
 from scenes import SHIPPED, changed
 
 from eigassign import Case, load_case
-from eigassign.chart import MeshRow, chart_meshes, refined
+from eigassign.chart import MeshRow, chart_meshes
+from eigassign.mechanism import refined
 from eigassign.study import build_model
 
 X = np.array([[1.817, 5.312, 0.125, 0.125]])

@@ -7,7 +7,7 @@ import pytest
 from chains import Tree, case_of, model_of
 from paper_arm import build, exact, samples
 
-from eigassign.chart import refined
+from eigassign.mechanism import refined
 from eigassign.study import build_model
 
 

@@ -14,9 +14,8 @@ from calibration import Drawn, draw
 from wide_draws import FAMILIES
 
 from eigassign.case import CaseFile
-from eigassign.chart import refined
 from eigassign.errors import AccuracyError, EigassignError
-from eigassign.mechanism import with_elements
+from eigassign.mechanism import refined, with_elements
 from eigassign.modal import Model
 from eigassign.study import automatic_elements, build_model, settle_model
 

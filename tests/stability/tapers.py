@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from chains import Tree, case_of
 
-from eigassign.chart import refined
+from eigassign.mechanism import refined
 from eigassign.modal import rounding_error
 from eigassign.study import build_model
 

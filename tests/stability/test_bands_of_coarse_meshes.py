@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from meshes import DRAWS, FINER
 
-from eigassign.chart import refined
 from eigassign.errors import EigassignError
-from eigassign.mechanism import with_elements, with_reduction
+from eigassign.mechanism import refined, with_elements, with_reduction
 from eigassign.study import Band, automatic_elements, build_model, prove_clear
 
 EACH = 6  # bands of one mechanism

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 from chains import Tree, case_of
 
-from eigassign.chart import refined
+from eigassign.mechanism import refined
 from eigassign.study import build_model
 
 ACCURACY = 1e-2

@@ -73,6 +73,27 @@ def with_reduction(case: CaseFile, frequencies: Mapping[str, float | None]) -> C
     return _with_links(case, "reduce_to", frequencies)
 
 
+def refined(case: CaseFile, factor: float) -> tuple[CaseFile, tuple[int, ...]]:
+    """The same case with ``factor`` times the elements in every beam, and their numbers.
+
+    A beam keeps at least one. Every number of elements must be given or settled.
+    """
+    counts: list[int] = []
+
+    def scaled(part: Any) -> Any:
+        if hasattr(part, "elements"):
+            counts.append(max(1, round(part.elements * factor)))
+            return part.model_copy(update={"elements": counts[-1]})
+        if hasattr(part, "beams"):
+            beams = {name: scaled(beam) for name, beam in part.beams.items()}
+            return part.model_copy(update={"beams": beams})
+        return part
+
+    links = {name: scaled(link) for name, link in case.mechanism.links.items()}
+    mechanism = case.mechanism.model_copy(update={"links": links})
+    return replace(case, mechanism=mechanism), tuple(counts)
+
+
 def _with_links(case: CaseFile, key: str, values: Mapping[str, float | None]) -> CaseFile:
     if not values:
         return case

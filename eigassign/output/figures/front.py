@@ -62,8 +62,7 @@ def _front(chart: Chart, front: Front) -> FigurePlan:
         if p.at_once == 1 or n is not None:
             families.setdefault(p.family, []).append(p)
     curves = [
-        curve(own, PLAIN, kind_of(family)[0], WHOSE[own[0].ours])
-        for family, own in families.items()
+        curve(own, PLAIN, kind_of(family), WHOSE[own[0].ours]) for family, own in families.items()
     ]
     taken = {a.auto.method for a in chart.advice if a.auto is not None}
     best = sorted((p for p in shown if p.method in front.methods), key=lambda p: p.cost_s(n))
