@@ -1,12 +1,7 @@
-"""Ways to a design: time against the exact objective that each reaches.
-
-    one shot                       the paper's: expand, linearise, one quadratic program
-    sequential                     `optimize`'s programs in a row, from the initial design
-    sequential, several starts     all that `optimize` does to find the optimum
-    SLSQP, differential evolution  SciPy's searches on exact eigenvalues
+"""Ways to a design, the paper's, eigassign's and SciPy's: time against the objective of each.
 
 The objective is the one that `optimize` makes small, F of `assignment.exact.design_problem`: the
-mean square of f/f_d − 1 with the weights of targets and time.
+mean square of f/f_d − 1 with the weights of targets and time, by exact eigenvalues.
 """
 
 from __future__ import annotations
@@ -37,6 +32,8 @@ from eigassign.study.requirements.sampling import requirements_of
 from eigassign.study.scene import Expansions, Scene
 
 Floats = NDArray[np.float64]
+SLSQP = {"method": "SLSQP", "options": {"ftol": 1e-12, "maxiter": 100}}
+EVOLUTION = {"seed": SEED, "popsize": 8, "tol": 1e-10, "polish": False}  # until none is left
 
 
 class SpentError(Exception):
@@ -72,9 +69,9 @@ def chart_designs(
         "one shot": _one_shot,
         "sequential": _sequential,
         "sequential, several starts": _several_starts,
-        "SLSQP, analytic gradient": partial(_search, most, partial(_slsqp, True)),
-        "SLSQP, finite differences": partial(_search, most, partial(_slsqp, False)),
-        "differential evolution": partial(_search, most, _evolution),
+        "SLSQP, analytic gradient": partial(_search, most, minimize, {**SLSQP, "jac": True}),
+        "SLSQP, finite differences": partial(_search, most, minimize, SLSQP),
+        "differential evolution": partial(_search, most, differential_evolution, EVOLUTION),
     }
     for name, way in ways.items():
         progress(f"designing by {name}")
@@ -121,8 +118,8 @@ def _several_starts(task: Task) -> _Reached:
     return found.best.y, found.exact_solves, {"starts": found.starts}, {}
 
 
-def _search(most: int, search: Callable[..., Any], task: Task) -> _Reached:
-    """A search on exact eigenvalues over z in [0, 1]^n of the parameters with room.
+def _search(most: int, search: Callable[..., Any], how: dict[str, Any], task: Task) -> _Reached:
+    """SciPy's ``search`` on exact eigenvalues over z in [0, 1]^n of the parameters with room.
 
     A design counts as the best if it keeps the limits.
     """
@@ -132,14 +129,14 @@ def _search(most: int, search: Callable[..., Any], task: Task) -> _Reached:
     start = box.z(np.clip(scene.initial, problem.lower, problem.upper))
     best, trace, calls, note = (np.inf, start), list[tuple[float, float]](), 0, ""
 
-    def objective(z: Floats, sloped: bool) -> Any:
+    def objective(z: Floats) -> Any:
         nonlocal best, calls
         if calls >= most:
             raise SpentError
         calls += 1
         inside = np.clip(z, 0.0, 1.0)
         y = box.y(inside)
-        if sloped:
+        if "jac" in how:
             seen = problem.appraise(y)
         else:
             hz = scene.model.frequencies(q, y, asked.modes)
@@ -150,23 +147,13 @@ def _search(most: int, search: Callable[..., Any], task: Task) -> _Reached:
             best = value, inside
             trace.append((time.process_time() - begun, value))
         slopes = 2.0 * (seen.residual @ seen.slopes)[box.free] * box.width + box.prices
-        return (value, slopes) if sloped else value
+        return (value, slopes) if "jac" in how else value
 
     limits = (LinearConstraint(box.rows, box.row_lower, box.row_upper),) if len(box.rows) else ()
+    bounds = Bounds(np.zeros(box.n), np.ones(box.n))
     try:
-        search(objective, start, bounds=Bounds(np.zeros(box.n), np.ones(box.n)), constraints=limits)
+        search(objective, x0=start, bounds=bounds, constraints=limits, **how)
     except SpentError:
         note = "stopped: no evaluation left"
     told, more = {"evaluations": calls, "most": most}, {"trace": tuple(trace), "note": note}
     return box.y(best[1]), calls * len(q), told, more
-
-
-def _slsqp(analytic: bool, objective: Any, start: Floats, **how: Any) -> None:
-    how |= {"jac": analytic or None, "options": {"ftol": 1e-12, "maxiter": 100}}
-    minimize(objective, start, (analytic,), method="SLSQP", **how)
-
-
-def _evolution(objective: Any, start: Floats, **how: Any) -> None:
-    """Search until the evaluations are used up, without polishing."""
-    how |= {"seed": SEED, "popsize": 8, "tol": 1e-10, "polish": False}
-    differential_evolution(objective, args=(False,), x0=start, **how)

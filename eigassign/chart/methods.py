@@ -29,7 +29,6 @@ from eigassign.modal.expansion import NearestExpansion, expand
 from eigassign.modal.fit.fit import fit
 from eigassign.modal.fit.region import Box
 from eigassign.modal.model import Model
-from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.reduce import reduce
 from eigassign.series.multi_index import total_degree
 from eigassign.series.power_series import monomials
@@ -109,7 +108,7 @@ def by_scipy(model: Model, modes: Sequence[int], points: Points) -> Floats:
     return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(mu[:, np.array(modes) - 1])))
 
 
-# --- Series
+# --- Series, reduced models and fits
 
 
 def _call(bench: Bench, function: str, arguments: str, **how: Any) -> str:
@@ -123,27 +122,26 @@ def _answering(made: Any, solves: int, estimate: float | None = None) -> Built:
     return Built(lambda points: made.frequencies(points.q, points.y), solves, estimate)
 
 
-def _poses(bench: Bench, count: int) -> tuple[Floats, Floats]:
-    """``count`` points (q, y) to expand about, the case's own or spread along the trajectory."""
+def _about(bench: Bench, count: int) -> tuple[Floats, Floats, str]:
+    """Points q, y to expand about, the case's own or spread along the trajectory; and how many."""
     full, path = bench.scene.expansions.full, bench.scene.path.q
     q = full.q0[None] if count == 1 else path[spread_samples(path, count)]
-    return q, np.tile(full.y0, (len(q), 1))
+    return q, np.tile(full.y0, (len(q), 1)), f"{len(q)} point{'s' if len(q) > 1 else ''}"
 
 
 def _series(
-    bench: Bench, name: str, family: str, at: tuple[Floats, Floats], use: str, **how: Any
+    bench: Bench, name: str, family: str, q0: Floats, y0: Floats, use: str, **how: Any
 ) -> Method:
-    """λ about points ``at``, of which the nearest answers; if so named 1/λ, its reciprocal."""
+    """λ about one or several points, of which the nearest answers; if so named 1/λ."""
     pencil, modes = bench.scene.model.pencil, bench.scene.expansions.modes
 
     def build(_: Floats) -> Built:
-        parts = [
-            expand(pencil, *x0, modes, **how) for x0 in zip(*map(np.atleast_2d, at), strict=True)
-        ]
-        made = parts[0].inverse if name.startswith("1/λ") else NearestExpansion(tuple(parts))
+        points = zip(np.atleast_2d(q0), np.atleast_2d(y0), strict=True)
+        parts = tuple(expand(pencil, q, y, modes, **how) for q, y in points)
+        made = parts[0].inverse if name.startswith("1/λ") else NearestExpansion(parts)
         return _answering(made, len(parts))
 
-    return Method(name, family, {**how, "q0": at[0], "y0": at[1]}, build, use)
+    return Method(name, family, {**how, "q0": q0, "y0": y0}, build, use)
 
 
 def expansions(bench: Bench) -> Iterator[Method]:
@@ -156,22 +154,20 @@ def expansions(bench: Bench) -> Iterator[Method]:
         use = f"in the case file, expansion: {{order: {order}}}"
         if symbol == "1/λ":
             use = f"{_call(bench, 'ea.expand', 'model, q0, y0', **how)}.inverse"
-        kind, at = "linearised" if linear else "full", (own.full.q0, own.full.y0)
-        yield _series(bench, f"{symbol} {order} {kind}", f"{symbol}, {kind}", at, use, **how)
+        kind = "linearised" if linear else "full"
+        name, family = f"{symbol} {order} {kind}", f"{symbol}, {kind}"
+        yield _series(bench, name, family, own.full.q0, own.full.y0, use, **how)
     for count, order in product(effort.expansion_points[1:], orders[1:]):
-        at, each = _poses(bench, count), _call(bench, "ea.expand", "model, q, y", order=order)
+        q, y, where = _about(bench, count)
+        each = _call(bench, "ea.expand", "model, q, y", order=order)
         use = f"[{each} for q, y in zip(q0, y0)], at a pose the one whose q is nearest"
-        name = f"Taylor {order} at {_where(at)}"
-        yield _series(bench, name, "Taylor, several points", at, use, order=order)
-
-
-def _where(at: tuple[Floats, Floats]) -> str:
-    return f"{len(at[0])} point{'s' if len(at[0]) > 1 else ''}"
+        name, family = f"Taylor {order} at {where}", "Taylor, several points"
+        yield _series(bench, name, family, q, y, use, order=order)
 
 
 def auto_methods(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
     """What ``expansion.order: auto`` takes, by the very function that a run asks."""
-    scene, full = bench.scene, bench.scene.expansions.full
+    scene, full, family = bench.scene, bench.scene.expansions.full, "Taylor, auto"
     for accuracy in accuracies:
         name = f"auto {accuracy:.0e}"
         expansion = scene.file.expansion.model_copy(update={"accuracy": accuracy})
@@ -179,13 +175,13 @@ def auto_methods(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
         try:
             choice, spent = timed(partial(choose_order, *case, full.q0, full.y0, full.modes))
         except AccuracyError as error:
-            yield Method(name, "Taylor, auto", {}, partial(_refused, error))
+            yield Method(name, family, {}, partial(_refused, error))
             continue
         q = np.vstack([choice.q0, *choice.more_q])
-        at, how = (q, np.tile(full.y0, (len(q), 1))), {"order": choice.order}
+        y, how = np.tile(full.y0, (len(q), 1)), {"cluster_gap": choice.cluster_gap}
         use = f"in the case file, expansion: {{order: auto, accuracy: {accuracy:g}}}"
-        name += f": Taylor {choice.order}{f' at {_where(at)}' if len(q) > 1 else ''}"
-        made = _series(bench, name, "Taylor, auto", at, use, **how, cluster_gap=choice.cluster_gap)
+        name += f": Taylor {choice.order}{f' at {len(q)} points' if len(q) > 1 else ''}"
+        made = _series(bench, name, family, q, y, use, order=choice.order, **how)
         yield replace(made, parameters={**made.parameters, "choosing_s": spent})
 
 
@@ -193,40 +189,31 @@ def _refused(why: AccuracyError, _: Floats) -> Built:
     raise why
 
 
-# --- Reduced models and fits
-
-
-def _reduced(
-    bench: Bench, m: int, at: tuple[Floats, Floats], guard: bool = True
-) -> tuple[ReducedModel, int]:
-    """The reduced model, and its exact solves: for modes, wanted vectors and guards' vectors."""
-    pencil, modes = bench.scene.model.pencil, bench.scene.expansions.modes
-    others = set(range(1, min(max(modes) + 1, len(pencil.elastic)) + 1)) - set(modes)
-    solves = 3 if guard and others and m >= 2 else 2
-    return reduce(pencil, *at, modes, m, guard), solves * len(at[0])
-
-
 def reduced_models(bench: Bench) -> Iterator[Method]:
     """Reduced models of each half order m at one or several points; at one without guards too."""
     kinds = [*((count, True) for count in bench.effort.expansion_points), (1, False)]
     for (count, guard), m in product(kinds, bench.effort.half_orders):
-        at = _poses(bench, count)
-        where, use = _where(at), _call(bench, "ea.reduce", "model, q0, y0", half_order=m)
+        q, y, where = _about(bench, count)
         name, family = f"reduced m = {m}, {where}", f"reduced, {where}"
+        use = _call(bench, "ea.reduce", "model, q0, y0", half_order=m)
         if not guard:
-            function, how = (
-                "eigassign.modal.reduced.reduce.reduce",
-                {"half_order": m, "guard": guard},
-            )
-            use = _call(bench, function, "model.pencil, q0, y0", **how)
-            use = f"no argument of ea.reduce: {use}"
             name, family = f"{name}, no guard", "reduced, no guard"
+            function = "no argument of ea.reduce: eigassign.modal.reduced.reduce.reduce"
+            use = _call(bench, function, "model.pencil, q0, y0", half_order=m, guard=False)
 
-        def build(_: Floats, how: Any = (m, at, guard)) -> Built:
+        def build(_: Floats, how: Any = (m, q, y, guard)) -> Built:
             return _answering(*_reduced(bench, *how))
 
-        told = {"half_order": m, "guard": guard, "q": at[0], "y": at[1]}
+        told = {"half_order": m, "guard": guard, "q": q, "y": y}
         yield Method(name, family, told, build, use)
+
+
+def _reduced(bench: Bench, m: int, q: Floats, y: Floats, guard: bool = True) -> tuple[Any, int]:
+    """The reduced model, and its exact solves: for modes, wanted vectors and guards' vectors."""
+    pencil, modes = bench.scene.model.pencil, bench.scene.expansions.modes
+    others = set(range(1, min(max(modes) + 1, len(pencil.elastic)) + 1)) - set(modes)
+    solves = 3 if guard and others and m >= 2 else 2
+    return reduce(pencil, q, y, modes, m, guard), solves * len(q)
 
 
 def fits(bench: Bench) -> Iterator[Method]:
@@ -248,12 +235,11 @@ def fits(bench: Bench) -> Iterator[Method]:
             use = f"{_call(bench, 'ea.fit', f'model, {over}', **how)}.along(designs)"
             yield Method(f"fit {name}", f"fit {kind}", how, _fitted(bench, how, True), use)
     for (m, count), a in product(bench.effort.fitted, accuracies):
-        at = _poses(bench, count)
-        of, source = f"reduced m = {m}, {_where(at)}", partial(_reduced, bench, m, at)
+        q, y, where = _about(bench, count)
         use = _call(bench, "ea.reduce", "model, q0, y0", half_order=m)
         use = f"{_call(bench, 'ea.fit', f'{use}, {over}', accuracy=a)}.along(designs)"
-        told = {"accuracy": a, "half_order": m, "q": at[0], "y": at[1]}
-        build = _fitted(bench, {"accuracy": a}, True, source)
+        build = _fitted(bench, {"accuracy": a}, True, partial(_reduced, bench, m, q, y))
+        told, of = {"accuracy": a, "half_order": m, "q": q, "y": y}, f"reduced m = {m}, {where}"
         yield Method(f"fit {a:.0e} of {of}", f"fit of {of}", told, build, use)
 
 

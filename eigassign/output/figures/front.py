@@ -16,6 +16,7 @@ import numpy as np
 from eigassign.chart.results import Chart, ChartPoint, Front, excess_over, kind_of
 from eigassign.output.figures import graph
 from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Panel, Rule
+from eigassign.output.formats import capital
 
 LEAST_EXCESS = 1e-10  # of an objective over the best one: less is the rounding of a search's end
 WHOSE = {True: "eigassign", False: "others"}  # groups of the legend
@@ -37,9 +38,9 @@ def _front(chart: Chart, front: Front) -> FigurePlan:
     """The methods by family, over the band through the best; what auto takes is ringed."""
     asked, n = chart.asked, front.evaluations
     name = "".join(c if c.isalnum() else "_" for c in front.name)
-    title = what = "time of one evaluation"
+    what = "time of one evaluation"
     if n is not None:
-        name, title, what = f"cost_{name}", front.name, f"set-up and {n:,.0f} evaluations"
+        name, what = f"cost_{name}", f"set-up and {n:,.0f} evaluations"
     shown = [p for p in chart.points if p.everywhere.worst_hz <= asked.typical_hz]
     lost = len(chart.points) - len(shown)
     verb = "method is" if lost == 1 else "methods are"
@@ -66,35 +67,25 @@ def _front(chart: Chart, front: Front) -> FigurePlan:
     ]
     taken = {a.auto.method for a in chart.advice if a.auto is not None}
     best = sorted((p for p in shown if p.method in front.methods), key=lambda p: p.cost_s(n))
-    band, level = curve(best, BAND), Rule(asked.floor_hz, PLAIN, note="round-off of exact solves")
+    level = Rule(asked.floor_hz, PLAIN, note="round-off of exact solves")
     ringed = [curve([p for p in shown if p.method in taken], RING, "taken by order: auto")]
-    marks = (level, _steps(band, curves), *_coloured(curves), *(ringed if taken else ()))
+    marks = (level, curve(best, BAND), *_coloured(curves), *(ringed if taken else ()))
     room = (np.array([asked.floor_hz / 2.0]),)  # for the name of the level
-    heading = f"{what[0].upper()}{what[1:]} against worst error"
+    heading = f"{capital(what)} against worst error"
     alt = f"Scatter of worst error in Hz over {what} for every method."
     panel = Panel("worst error [Hz]", marks, 3.8, True, None, room)
-    drawn = _scatter(f"{title[0].upper()}{title[1:]} against worst error", "time [s]", panel)
-    return FigurePlan(name, heading, caption, alt, drawn)
-
-
-def _steps(best: Curve, curves: Sequence[Curve]) -> Curve:
-    """A line from the top down through the points of a front, and on to the right."""
-    top, right = np.max([(c.y.max(), np.max(c.x)) for c in curves], axis=0)
-    y = np.insert(np.repeat(best.y, 2), 0, top)
-    return Curve(y, BAND, x=np.append(np.repeat(best.x, 2), right))
+    return FigurePlan(name, heading, caption, alt, _scatter(heading, "time [s]", panel))
 
 
 def _mesh(chart: Chart) -> FigurePlan:
     """Error over elements; below, time over elements."""
-    own = [row for row in chart.mesh if row.factor == 1.0]
-    here = "".join(
-        f" The case's own mesh ({row.elements} elements) is {row.worst_hz:.3g} Hz from the limit."
-        for row in own
-    )
     caption = (
         "Worst error of exact frequencies against the limit that the meshes converge to, "
-        f"extrapolated from the two finest ({chart.mesh[-1].elements} elements).{here}"
+        f"extrapolated from the two finest ({chart.mesh[-1].elements} elements)."
     )
+    for row in [row for row in chart.mesh if row.factor == 1.0]:
+        own = f"The case's own mesh ({row.elements} elements)"
+        caption += f" {own} is {row.worst_hz:.3g} Hz from the limit."
     rows = [(row.elements, row.worst_hz, row.solve.median_s) for row in chart.mesh if row.worst_hz]
     counts, *values = np.array(rows, dtype=np.float64).T
     heading = "Elements against discretisation error"
