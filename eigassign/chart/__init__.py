@@ -6,8 +6,7 @@ Reading order:
     timing      how much a chart tries, how jobs are timed, and the machine
     question    the points at which every method is asked for frequencies
     methods     the list of methods
-    comparison  every method put the same question; which no other beats, and what to choose
-    mesh        elements per link against discretisation error
+    comparison  every method put the same question; meshes; which no other beats, what to choose
     designs     ways to a design against the objective that each reaches
 """
 
@@ -16,9 +15,8 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "comparison": "advise compare_methods front skipped_notes",
+        "comparison": "advise chart_meshes compare_methods front skipped_notes",
         "designs": "chart_designs",
-        "mesh": "chart_meshes",
         "methods": "grid_interpolation grid_points spread_points surrogate_families",
         "question": "build_bench build_question",
         "results": (

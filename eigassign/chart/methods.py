@@ -130,39 +130,37 @@ def _about(bench: Bench, count: int) -> tuple[Floats, Floats, str]:
 
 
 def _series(
-    bench: Bench, name: str, family: str, q0: Floats, y0: Floats, use: str, **how: Any
+    bench: Bench, name: str, family: str, at: Sequence[Floats], use: str, **how: Any
 ) -> Method:
-    """λ about one or several points, of which the nearest answers; if so named 1/λ."""
+    """λ about one or several points (q, y), of which the nearest answers; if so named 1/λ."""
     pencil, modes = bench.scene.model.pencil, bench.scene.expansions.modes
 
     def build(_: Floats) -> Built:
-        points = zip(np.atleast_2d(q0), np.atleast_2d(y0), strict=True)
-        parts = tuple(expand(pencil, q, y, modes, **how) for q, y in points)
+        points = zip(*map(np.atleast_2d, at), strict=True)
+        parts = tuple(expand(pencil, *point, modes, **how) for point in points)
         made = parts[0].inverse if name.startswith("1/λ") else NearestExpansion(parts)
         return _answering(made, len(parts))
 
-    return Method(name, family, {**how, "q0": q0, "y0": y0}, build, use)
+    return Method(name, family, {**how, "q0": at[0], "y0": at[1]}, build, use)
 
 
 def expansions(bench: Bench) -> Iterator[Method]:
-    """λ and 1/λ expanded to each order, in full and linearised; λ at several points too."""
-    own, effort = bench.scene.expansions, bench.effort
+    """λ and 1/λ expanded to each order, in full and linearised; λ in full at several points too."""
+    effort, own = bench.effort, bench.scene.expansions
     n, wanted = int(bench.scene.model.pencil.active.sum()), sorted({*effort.orders, own.order})
     orders = [p for p in wanted if comb(n + p, p) <= effort.coefficients]
     for symbol, linear, order in product(("Taylor", "1/λ"), (False, True), orders):
-        how = {"order": order, "linear_in_y": linear}
+        kind, how = "linearised" if linear else "full", {"order": order, "linear_in_y": linear}
+        call, at = _call(bench, "ea.expand", "model, q0, y0", **how), (own.full.q0, own.full.y0)
         use = f"in the case file, expansion: {{order: {order}}}"
-        if symbol == "1/λ":
-            use = f"{_call(bench, 'ea.expand', 'model, q0, y0', **how)}.inverse"
-        kind = "linearised" if linear else "full"
-        name, family = f"{symbol} {order} {kind}", f"{symbol}, {kind}"
-        yield _series(bench, name, family, own.full.q0, own.full.y0, use, **how)
+        use = f"{call}.inverse" if symbol == "1/λ" else use
+        yield _series(bench, f"{symbol} {order} {kind}", f"{symbol}, {kind}", at, use, **how)
     for count, order in product(effort.expansion_points[1:], orders[1:]):
-        q, y, where = _about(bench, count)
+        *at, where = _about(bench, count)
         each = _call(bench, "ea.expand", "model, q, y", order=order)
         use = f"[{each} for q, y in zip(q0, y0)], at a pose the one whose q is nearest"
-        name, family = f"Taylor {order} at {where}", "Taylor, several points"
-        yield _series(bench, name, family, q, y, use, order=order)
+        name = f"Taylor {order} at {where}"
+        yield _series(bench, name, "Taylor, several points", at, use, order=order)
 
 
 def auto_methods(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
@@ -178,10 +176,10 @@ def auto_methods(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
             yield Method(name, family, {}, partial(_refused, error))
             continue
         q = np.vstack([choice.q0, *choice.more_q])
-        y, how = np.tile(full.y0, (len(q), 1)), {"cluster_gap": choice.cluster_gap}
+        at, how = (q, np.tile(full.y0, (len(q), 1))), {"cluster_gap": choice.cluster_gap}
         use = f"in the case file, expansion: {{order: auto, accuracy: {accuracy:g}}}"
         name += f": Taylor {choice.order}{f' at {len(q)} points' if len(q) > 1 else ''}"
-        made = _series(bench, name, family, q, y, use, order=choice.order, **how)
+        made = _series(bench, name, family, at, use, order=choice.order, **how)
         yield replace(made, parameters={**made.parameters, "choosing_s": spent})
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from eigassign.chart.comparison import compare_methods
+from eigassign.chart.comparison import chart_meshes, compare_methods
 from eigassign.chart.designs import chart_designs
-from eigassign.chart.mesh import chart_meshes
 from eigassign.chart.results import Chart, Request
 from eigassign.chart.timing import Effort
 from eigassign.errors import AccuracyError
