@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from eigassign._version import __version__
 from eigassign.case.case_file import CaseFile
-from eigassign.chart.methods import Method, list_methods, surrogate_families
-from eigassign.chart.question import Question, build_bench, build_question
+from eigassign.chart.methods import Method, builder, list_methods, surrogate_families, use_of
+from eigassign.chart.question import Bench, Question, build_bench, build_question
 from eigassign.chart.results import (
     Advice,
     Asked,
@@ -30,7 +30,7 @@ from eigassign.chart.results import (
     Request,
     Timing,
     kind_of,
-)
+)  # fmt: skip
 from eigassign.chart.timing import Effort, machine, measure, time_in_words, timed
 from eigassign.errors import EigassignError
 from eigassign.mechanism.assembly.build import refined
@@ -51,8 +51,7 @@ def compare_methods(
     bench = build_bench(scene, effort)
     progress("solving the points of the question exactly")
     question = build_question(bench)
-    listed = list_methods(bench, request.accuracies)
-    charted, skipped = chart_methods(listed, effort, question, progress)
+    charted, skipped = chart_methods(bench, question, request.accuracies, progress)
     samples = float(question.asked.trajectory_samples)
     counts = {"one trajectory": samples, "1000 trajectories": 1000.0 * samples}
     wanted = list(counts.values())
@@ -88,7 +87,7 @@ def skipped_notes(skipped: Mapping[str, str]) -> Iterator[str]:
 
 
 def chart_methods(
-    listed: Iterator[Method], effort: Effort, question: Question, progress: Callable[[str], None]
+    bench: Bench, question: Question, accuracies: Sequence[float], progress: Callable[[str], None]
 ) -> tuple[list[ChartPoint], dict[str, str]]:
     """A point for every method; of those that cannot answer, why.
 
@@ -96,18 +95,18 @@ def chart_methods(
     """
     charted, skipped = list[ChartPoint](), dict[str, str]()
     families = dict[str, str]()  # why no other is made, or nothing
-    for method in listed:
+    for method in list_methods(bench, accuracies):
         if method.family not in families:
             progress(f"charting {method.family}")
         try:
             if why := families.setdefault(method.family, ""):
                 raise EigassignError(why)
-            point, set_up_s = _chart_method(method, effort, question)
+            point, set_up_s = _chart_method(bench, question, method)
         except EigassignError as error:
             skipped[method.name] = str(error)
             continue
         charted.append(point)
-        if set_up_s > effort.most_s:
+        if set_up_s > bench.effort.most_s:
             families[method.family] = f"{method.name} took {time_in_words(set_up_s)} to set up"
     solvers = [p for p in charted if p.family.startswith("exact")]
     exact_s = min(p.online.median_s for p in solvers)
@@ -118,15 +117,16 @@ def chart_methods(
     return charted, skipped
 
 
-def _chart_method(method: Method, effort: Effort, question: Question) -> tuple[ChartPoint, float]:
+def _chart_method(bench: Bench, question: Question, method: Method) -> tuple[ChartPoint, float]:
     """Set up, evaluated, timed and compared; and the seconds of setting up."""
     points, samples = question.points, question.asked.trajectory_samples
-    rows, n = [slice(0, method.most)], question.asked.random_points
+    rows, n = [slice(0, method.parameters.get("points"))], question.asked.random_points
     if method.per_design:
         rows, n = list(question.runs), 0
     parts = [points[each] for each in rows]
-    one, set_up = measure(lambda: method.build(parts[0].y[0]), effort)
-    pairs = [(one, parts[0]), *((method.build(part.y[0]), part) for part in parts[1:])]
+    build, effort = builder(bench, method), bench.effort
+    one, set_up = measure(lambda: build(parts[0].y[0]), effort)
+    pairs = [(one, parts[0]), *((build(part.y[0]), part) for part in parts[1:])]
     hz, spent = timed(lambda: np.vstack([built.evaluate(part) for built, part in pairs]))
     exact, solves = question.exact_hz[rows[0].start :][: len(hz)], sum(b.solves for b, _ in pairs)
     # as many as take 20 ms at the pace of the first answers
@@ -135,7 +135,7 @@ def _chart_method(method: Method, effort: Effort, question: Question) -> tuple[C
     some = parts[0][np.resize(np.arange(len(parts[0])), many)]
     job: Callable[[], Any] = partial(one.evaluate, some)
     if method.per_design:
-        job = lambda: method.build(some.y[0]).evaluate(some)  # noqa: E731
+        job = lambda: build(some.y[0]).evaluate(some)  # noqa: E731
     elif one.along is not None:
         designs = points.y[np.resize([run.start for run in question.runs], 1 + 32768 // samples)]
         job, many = partial(one.along, designs), len(designs) * samples
@@ -145,7 +145,7 @@ def _chart_method(method: Method, effort: Effort, question: Question) -> tuple[C
         solves=solves, solves_online=0.0, everywhere=errors(hz, exact),
         random=errors(hz[:n], exact[:n]) if n else None,
         trajectory=errors(hz[n:], exact[n:]) if len(hz) > n else None,
-        break_even=None, use=method.use,
+        break_even=None, use=use_of(bench, method),
         estimate=max((b.estimate for b, _ in pairs if b.estimate is not None), default=None),
     )  # fmt: skip
     if method.family.startswith("exact"):  # an error below round-off means nothing

@@ -42,6 +42,173 @@ KINDS = ("linear", "cubic", "Chebyshev")
 SOLVES = (3, 4, 5, 6, 7, 9, 11, 13, 17, 25, 42, 60, 84, 120, 160, 220, 300, 400, 550)  # of fits
 
 
+@dataclass(frozen=True)
+class Method:
+    """A way to the frequencies, which `build` sets up from its ``parameters`` alone."""
+
+    name: str
+    family: str
+    parameters: Mapping[str, Any]
+
+    @property
+    def ours(self) -> bool:
+        """True of what eigassign offers; the others are what people do without it."""
+        return self.family.startswith(("Taylor", "1/λ", "reduced", "fit")) or self.family == "exact"
+
+    @property
+    def per_design(self) -> bool:
+        """True where it is set up anew for each design, which is a cost of the evaluation."""
+        return self.family.startswith("stations") or self.family.endswith("one trajectory")
+
+
+# --- The list, in the order in which they are charted
+
+
+def list_methods(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
+    """The list of all methods; no training takes more exact solves than the time allows."""
+    model = bench.scene.model
+    kind = "dense" if model.pencil.is_dense else "sparse"
+    yield Method(f"exact {kind}", "exact", {"solver": f"{kind}, in batches"})
+    # one sample at a time, and few: about 20 n³ operations each at 6e9 a second
+    if few := min(40, int(3e8 * bench.effort.most_s / model.n_dof**3)):
+        told = {"solver": "scipy.linalg.eigh, subset by index", "points": few}
+        yield Method("exact dense, SciPy one by one", "exact by others", told)
+    yield from _series(bench)
+    yield from _auto(bench, accuracies)
+    yield from _reduced_models(bench)
+    yield from _fits(bench)
+    yield from _surrogates(bench)
+
+
+def _about(bench: Bench, count: int) -> tuple[Floats, Floats, str]:
+    """Points q, y to expand about, the case's own or spread along the trajectory; and how many."""
+    full, path = bench.scene.expansions.full, bench.scene.path.q
+    q = full.q0[None] if count == 1 else path[spread_samples(path, count)]
+    return q, np.tile(full.y0, (len(q), 1)), f"{len(q)} point{'s' if len(q) > 1 else ''}"
+
+
+def _series(bench: Bench) -> Iterator[Method]:
+    """λ and 1/λ expanded to each order, in full and linearised; λ in full at several points too."""
+    effort, full = bench.effort, bench.scene.expansions.full
+    n = int(bench.scene.model.pencil.active.sum())
+    wanted = sorted({*effort.orders, bench.scene.expansions.order})
+    orders = [p for p in wanted if comb(n + p, p) <= effort.coefficients]
+    for symbol, linear, order in product(("Taylor", "1/λ"), (False, True), orders):
+        kind = "linearised" if linear else "full"
+        told = {"order": order, "linear_in_y": linear, "q0": full.q0, "y0": full.y0}
+        yield Method(f"{symbol} {order} {kind}", f"{symbol}, {kind}", told)
+    for count, order in product(effort.expansion_points[1:], orders[1:]):
+        q, y, where = _about(bench, count)
+        told = {"order": order, "q0": q, "y0": y}
+        yield Method(f"Taylor {order} at {where}", "Taylor, several points", told)
+
+
+def _auto(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
+    """What ``expansion.order: auto`` takes, by the very function that a run asks."""
+    scene, full = bench.scene, bench.scene.expansions.full
+    for accuracy in accuracies:
+        expansion = scene.file.expansion.model_copy(update={"accuracy": accuracy})
+        case = replace(scene.file, expansion=expansion), scene.model, scene.trajectory
+        name = f"auto {accuracy:.0e}"
+        try:
+            choice, spent = timed(partial(choose_order, *case, full.q0, full.y0, full.modes))
+        except AccuracyError as error:
+            yield Method(name, "Taylor, auto", {"refused": str(error)})
+            continue
+        q = np.vstack([choice.q0, *choice.more_q])
+        told = {"order": choice.order, "cluster_gap": choice.cluster_gap}
+        told |= {"accuracy": accuracy, "choosing_s": spent}
+        told |= {"q0": q, "y0": np.tile(full.y0, (len(q), 1))}
+        name += f": Taylor {choice.order}{f' at {len(q)} points' if len(q) > 1 else ''}"
+        yield Method(name, "Taylor, auto", told)
+
+
+def _reduced_models(bench: Bench) -> Iterator[Method]:
+    """Reduced models of each half order m at one or several points; at one without guards too."""
+    kinds = [*((count, True) for count in bench.effort.expansion_points), (1, False)]
+    for (count, guard), m in product(kinds, bench.effort.half_orders):
+        q, y, where = _about(bench, count)
+        name, family = f"reduced m = {m}, {where}", f"reduced, {where}"
+        if not guard:
+            name, family = f"{name}, no guard", "reduced, no guard"
+        yield Method(name, family, {"half_order": m, "guard": guard, "q": q, "y": y})
+
+
+def _fits(bench: Bench) -> Iterator[Method]:
+    """Fits of given solves and to accuracies, of as many exact solves as the time allows.
+
+    Along the trajectory for each design, and over trajectory × box; there of reduced models too.
+    """
+    most, moves = bench.most_solves, bench.place is not None
+    for k in [k for k in SOLVES if k <= most]:
+        name, family, told = f"fit of {k} solves", "fit of given solves", {"solves": k}
+        if k <= 25 and moves:
+            yield Method(f"{name} along", f"{family}, one trajectory", told)
+        if k >= 9:
+            yield Method(name, family, told)
+    for a in bench.effort.accuracies:
+        name, family, told = f"fit {a:.0e}", "fit to an accuracy", {"accuracy": a, "most": most}
+        if moves:
+            yield Method(f"{name} along", f"{family}, one trajectory", told)
+        yield Method(name, family, told)
+    for (m, count), a in product(bench.effort.fitted, bench.effort.accuracies):
+        q, y, where = _about(bench, count)
+        of, told = f"of reduced m = {m}, {where}", {"accuracy": a, "half_order": m, "q": q, "y": y}
+        yield Method(f"fit {a:.0e} {of}", f"fit {of}", told)
+
+
+def _surrogates(bench: Bench) -> Iterator[Method]:
+    """Interpolation between stations and on grids, and fits to spread-out points."""
+    effort, most, features = bench.effort, bench.most_solves, bench.names
+    for k, kind in product(effort.stations, KINDS if bench.place is not None else ()):
+        if k <= most and (kind != "Chebyshev" or k <= 20):  # of a higher degree: ill-conditioned
+            told = {"interpolation": kind, "stations": k}
+            yield Method(f"stations {kind} {k}", f"stations, {kind}", told)
+    for k, kind in product(effort.nodes, KINDS):
+        if k ** len(features) <= most and (kind != "cubic" or k >= 4):
+            told = {"nodes": k, "features": features, "interpolation": kind}
+            yield Method(f"grid {kind} {k}", f"grid, {kind}", told)
+    counts = sorted({min(k, most) for k in effort.training})
+    for n, (family, _, how) in product(counts, list(surrogate_families())):
+        told = {**how, "training_points": n, "features": features}
+        yield Method(f"{family.replace(',', '')} {n}", family, told)
+
+
+# --- How they are asked for, and set up
+
+
+def use_of(bench: Bench, method: Method) -> str:
+    """How to ask for a method: a line of a case file, or a call; empty of those by others."""
+    family, p, modes = method.family, method.parameters, bench.scene.expansions.modes
+
+    def call(function: str, arguments: str, *keys: str) -> str:
+        given = {"modes": modes} if modes != (1,) else {}
+        given |= {key: p[key] for key in keys if key in p}
+        return f"{function}({', '.join([arguments, *(f'{k}={v!r}' for k, v in given.items())])})"
+
+    if family == "Taylor, auto":
+        return f"in the case file, expansion: {{order: auto, accuracy: {p['accuracy']:g}}}"
+    if family == "Taylor, several points":
+        each = call("ea.expand", "model, q, y", "order")
+        return f"[{each} for q, y in zip(q0, y0)], at a pose the one whose q is nearest"
+    if family.startswith("Taylor"):
+        return f"in the case file, expansion: {{order: {p['order']}}}"
+    if family.startswith("1/λ"):
+        return f"{call('ea.expand', 'model, q0, y0', 'order', 'linear_in_y')}.inverse"
+    reduced = call("ea.reduce", "model, q0, y0", "half_order")
+    if family == "reduced, no guard":
+        function = "no argument of ea.reduce: eigassign.modal.reduced.reduce.reduce"
+        return call(function, "model.pencil, q0, y0", "half_order", "guard")
+    if family.startswith("reduced"):
+        return reduced
+    if method.per_design and method.ours:
+        return call("ea.fit", "model, q, y", "solves", "accuracy", "most")
+    if family.startswith("fit"):
+        over = f"{reduced if 'half_order' in p else 'model'}, q, ea.Box(lower, upper)"
+        return f"{call('ea.fit', over, 'solves', 'accuracy', 'most')}.along(designs)"
+    return ""
+
+
 @dataclass(frozen=True, eq=False)
 class Built:
     """A method that is set up: points → Hz (n, n_modes)."""
@@ -52,48 +219,21 @@ class Built:
     along: Callable[[Floats], Floats] | None = None  # of fits: many designs on whole trajectories
 
 
-@dataclass(frozen=True)
-class Method:
-    """``build`` sets it up.
-
-    With ``per_design`` that is done anew for the design y (n_y,) of each run along the trajectory,
-    which counts as a cost of the evaluation. ``most`` limits the points of slow methods.
-    """
-
-    name: str
-    family: str
-    parameters: Mapping[str, Any]
-    build: Callable[[Floats], Built]
-    use: str = ""  # how to ask for it: a line of a case file, or a call
-    ours: bool = True
-    per_design: bool = False
-    most: int | None = None
+def builder(bench: Bench, method: Method) -> Callable[[Floats], Built]:
+    """The set-up of a method, a function of the design y (n_y,) where each has its own."""
+    family, scene = method.family, bench.scene
+    if family == "exact":
+        return lambda _: Built(bench.exact)
+    if family == "exact by others":
+        return lambda _: Built(partial(by_scipy, scene.model, scene.expansions.modes))
+    if not method.ours:
+        return _trained(bench, method)
+    series = family.startswith(("Taylor", "1/λ"))
+    return partial(_expanded if series else _reduced_or_fitted, bench, method)
 
 
-def list_methods(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
-    """The list of all methods; no training takes more exact solves than the time allows."""
-    yield from exact_methods(bench)
-    yield from expansions(bench)
-    yield from auto_methods(bench, accuracies)
-    yield from reduced_models(bench)
-    yield from fits(bench)
-    yield from surrogates(bench)
-
-
-# --- Exact solves
-
-
-def exact_methods(bench: Bench) -> Iterator[Method]:
-    """Eigassign's solver and SciPy's, which takes one sample at a time and answers few."""
-    model, modes = bench.scene.model, bench.scene.expansions.modes
-    kind = "dense" if model.pencil.is_dense else "sparse"
-    told: dict[str, Any] = {"solver": f"{kind}, in batches"}
-    yield Method(f"exact {kind}", "exact", told, lambda _: Built(bench.exact))
-    # about 20 n³ operations each at 6e9 a second
-    if most := min(40, int(3e8 * bench.effort.most_s / model.n_dof**3)):
-        name, built = "exact dense, SciPy one by one", Built(partial(by_scipy, model, modes))
-        told = {"solver": "scipy.linalg.eigh, subset by index", "points": most}
-        yield Method(name, "exact by others", told, lambda _: built, ours=False, most=most)
+def _answering(made: Any, solves: int, **more: Any) -> Built:
+    return Built(lambda points: made.frequencies(points.q, points.y), solves, **more)
 
 
 def by_scipy(model: Model, modes: Sequence[int], points: Points) -> Floats:
@@ -108,191 +248,57 @@ def by_scipy(model: Model, modes: Sequence[int], points: Points) -> Floats:
     return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(mu[:, np.array(modes) - 1])))
 
 
-# --- Series, reduced models and fits
+def _expanded(bench: Bench, method: Method, _: Floats) -> Built:
+    """λ about one or several points, of which the nearest answers, or 1/λ about one."""
+    pencil, modes, p = bench.scene.model.pencil, bench.scene.expansions.modes, method.parameters
+    if why := p.get("refused"):
+        raise AccuracyError(why)
+    how = {key: p[key] for key in ("order", "linear_in_y", "cluster_gap") if key in p}
+    points = zip(np.atleast_2d(p["q0"]), np.atleast_2d(p["y0"]), strict=True)
+    parts = tuple(expand(pencil, q0, y0, modes, **how) for q0, y0 in points)
+    made = parts[0].inverse if method.family.startswith("1/λ") else NearestExpansion(parts)
+    return _answering(made, len(parts))
 
 
-def _call(bench: Bench, function: str, arguments: str, **how: Any) -> str:
-    """A call as one writes it, with the charted modes if it needs them."""
-    modes = bench.scene.expansions.modes
-    named = how if modes == (1,) else {"modes": modes, **how}
-    return f"{function}({', '.join([arguments, *(f'{k}={v!r}' for k, v in named.items())])})"
+def _reduced_or_fitted(bench: Bench, method: Method, y: Floats) -> Built:
+    """A reduced model; or a fit of it, or of the model, over the box or at one design."""
+    scene, modes, p = bench.scene, bench.scene.expansions.modes, method.parameters
+    source, solves = scene.model, 0
+    if (m := p.get("half_order")) is not None:
+        pencil, guard = scene.model.pencil, p.get("guard", True)
+        source = reduce(pencil, p["q"], p["y"], modes, m, guard)
+        # for modes, wanted vectors, and vectors of guards
+        others = set(range(1, min(max(modes) + 1, len(pencil.elastic)) + 1)) - set(modes)
+        solves = (3 if guard and others and m >= 2 else 2) * len(p["q"])
+    if method.family.startswith("reduced"):
+        return _answering(source, solves)
+    over = y if method.per_design else Box(bench.lower, bench.upper)
+    how = {key: p[key] for key in ("solves", "accuracy", "most") if key in p}
+    made = fit(source, scene.path, over, modes, **how)
+    along = None if method.per_design else made.along
+    return _answering(made, solves or made.solves, estimate=made.error_estimate, along=along)
 
 
-def _answering(made: Any, solves: int, estimate: float | None = None) -> Built:
-    return Built(lambda points: made.frequencies(points.q, points.y), solves, estimate)
-
-
-def _about(bench: Bench, count: int) -> tuple[Floats, Floats, str]:
-    """Points q, y to expand about, the case's own or spread along the trajectory; and how many."""
-    full, path = bench.scene.expansions.full, bench.scene.path.q
-    q = full.q0[None] if count == 1 else path[spread_samples(path, count)]
-    return q, np.tile(full.y0, (len(q), 1)), f"{len(q)} point{'s' if len(q) > 1 else ''}"
-
-
-def _series(
-    bench: Bench, name: str, family: str, at: Sequence[Floats], use: str, **how: Any
-) -> Method:
-    """λ about one or several points (q, y), of which the nearest answers; if so named 1/λ."""
-    pencil, modes = bench.scene.model.pencil, bench.scene.expansions.modes
-
-    def build(_: Floats) -> Built:
-        points = zip(*map(np.atleast_2d, at), strict=True)
-        parts = tuple(expand(pencil, *point, modes, **how) for point in points)
-        made = parts[0].inverse if name.startswith("1/λ") else NearestExpansion(parts)
-        return _answering(made, len(parts))
-
-    return Method(name, family, {**how, "q0": at[0], "y0": at[1]}, build, use)
-
-
-def expansions(bench: Bench) -> Iterator[Method]:
-    """λ and 1/λ expanded to each order, in full and linearised; λ in full at several points too."""
-    effort, own = bench.effort, bench.scene.expansions
-    n, wanted = int(bench.scene.model.pencil.active.sum()), sorted({*effort.orders, own.order})
-    orders = [p for p in wanted if comb(n + p, p) <= effort.coefficients]
-    for symbol, linear, order in product(("Taylor", "1/λ"), (False, True), orders):
-        kind, how = "linearised" if linear else "full", {"order": order, "linear_in_y": linear}
-        call, at = _call(bench, "ea.expand", "model, q0, y0", **how), (own.full.q0, own.full.y0)
-        use = f"in the case file, expansion: {{order: {order}}}"
-        use = f"{call}.inverse" if symbol == "1/λ" else use
-        yield _series(bench, f"{symbol} {order} {kind}", f"{symbol}, {kind}", at, use, **how)
-    for count, order in product(effort.expansion_points[1:], orders[1:]):
-        *at, where = _about(bench, count)
-        each = _call(bench, "ea.expand", "model, q, y", order=order)
-        use = f"[{each} for q, y in zip(q0, y0)], at a pose the one whose q is nearest"
-        name = f"Taylor {order} at {where}"
-        yield _series(bench, name, "Taylor, several points", at, use, order=order)
-
-
-def auto_methods(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
-    """What ``expansion.order: auto`` takes, by the very function that a run asks."""
-    scene, full, family = bench.scene, bench.scene.expansions.full, "Taylor, auto"
-    for accuracy in accuracies:
-        name = f"auto {accuracy:.0e}"
-        expansion = scene.file.expansion.model_copy(update={"accuracy": accuracy})
-        case = replace(scene.file, expansion=expansion), scene.model, scene.trajectory
-        try:
-            choice, spent = timed(partial(choose_order, *case, full.q0, full.y0, full.modes))
-        except AccuracyError as error:
-            yield Method(name, family, {}, partial(_refused, error))
-            continue
-        q = np.vstack([choice.q0, *choice.more_q])
-        at, how = (q, np.tile(full.y0, (len(q), 1))), {"cluster_gap": choice.cluster_gap}
-        use = f"in the case file, expansion: {{order: auto, accuracy: {accuracy:g}}}"
-        name += f": Taylor {choice.order}{f' at {len(q)} points' if len(q) > 1 else ''}"
-        made = _series(bench, name, family, at, use, order=choice.order, **how)
-        yield replace(made, parameters={**made.parameters, "choosing_s": spent})
-
-
-def _refused(why: AccuracyError, _: Floats) -> Built:
-    raise why
-
-
-def reduced_models(bench: Bench) -> Iterator[Method]:
-    """Reduced models of each half order m at one or several points; at one without guards too."""
-    kinds = [*((count, True) for count in bench.effort.expansion_points), (1, False)]
-    for (count, guard), m in product(kinds, bench.effort.half_orders):
-        q, y, where = _about(bench, count)
-        name, family = f"reduced m = {m}, {where}", f"reduced, {where}"
-        use = _call(bench, "ea.reduce", "model, q0, y0", half_order=m)
-        if not guard:
-            name, family = f"{name}, no guard", "reduced, no guard"
-            function = "no argument of ea.reduce: eigassign.modal.reduced.reduce.reduce"
-            use = _call(bench, function, "model.pencil, q0, y0", half_order=m, guard=False)
-
-        def build(_: Floats, how: Any = (m, q, y, guard)) -> Built:
-            return _answering(*_reduced(bench, *how))
-
-        told = {"half_order": m, "guard": guard, "q": q, "y": y}
-        yield Method(name, family, told, build, use)
-
-
-def _reduced(bench: Bench, m: int, q: Floats, y: Floats, guard: bool = True) -> tuple[Any, int]:
-    """The reduced model, and its exact solves: for modes, wanted vectors and guards' vectors."""
-    pencil, modes = bench.scene.model.pencil, bench.scene.expansions.modes
-    others = set(range(1, min(max(modes) + 1, len(pencil.elastic)) + 1)) - set(modes)
-    solves = 3 if guard and others and m >= 2 else 2
-    return reduce(pencil, q, y, modes, m, guard), solves * len(q)
-
-
-def fits(bench: Bench) -> Iterator[Method]:
-    """Fits of given solves and to accuracies, of as many exact solves as the time allows.
-
-    Along the trajectory for each design, and over trajectory × box; there of reduced models too.
-    """
-    most, accuracies, over = bench.most_solves, bench.effort.accuracies, "q, ea.Box(lower, upper)"
-    given: list[dict[str, Any]] = [{"solves": k} for k in SOLVES if k <= most]
-    for how in (*given, *({"accuracy": a, "most": most} for a in accuracies)):
-        k, name, kind = how.get("solves", 0), f"of {how.get('solves')} solves", "of given solves"
-        if k == 0:
-            name, kind = f"{how['accuracy']:.0e}", "to an accuracy"
-        if k <= 25 and bench.place is not None:
-            use, build = _call(bench, "ea.fit", "model, q, y", **how), _fitted(bench, how, False)
-            family = f"fit {kind}, one trajectory"
-            yield Method(f"fit {name} along", family, how, build, use, per_design=True)
-        if not 0 < k < 9:
-            use = f"{_call(bench, 'ea.fit', f'model, {over}', **how)}.along(designs)"
-            yield Method(f"fit {name}", f"fit {kind}", how, _fitted(bench, how, True), use)
-    for (m, count), a in product(bench.effort.fitted, accuracies):
-        q, y, where = _about(bench, count)
-        use = _call(bench, "ea.reduce", "model, q0, y0", half_order=m)
-        use = f"{_call(bench, 'ea.fit', f'{use}, {over}', accuracy=a)}.along(designs)"
-        build = _fitted(bench, {"accuracy": a}, True, partial(_reduced, bench, m, q, y))
-        told, of = {"accuracy": a, "half_order": m, "q": q, "y": y}, f"reduced m = {m}, {where}"
-        yield Method(f"fit {a:.0e} of {of}", f"fit of {of}", told, build, use)
-
-
-def _fitted(
-    bench: Bench, how: Mapping[str, Any], over_box: bool, source: Callable[[], Any] | None = None
-) -> Callable[[Floats], Built]:
-    """Fits over the box or at one design, of the model or of a ``source`` with its exact solves."""
-    scene, box = bench.scene, Box(bench.lower, bench.upper)
+def _trained(bench: Bench, method: Method) -> Callable[[Floats], Built]:
+    """Trained on exact solves at the samples nearest to training points, each once."""
+    p, d = method.parameters, 1 if method.per_design else len(bench.names)
+    if kind := p.get("interpolation"):
+        learn: Learn = partial(grid_interpolation, kind)
+        u = grid_points(kind, p.get("stations") or p["nodes"], d)
+    else:
+        learn = {family: learn for family, learn, _ in surrogate_families()}[method.family]
+        u = spread_points(p["training_points"], d)
+    near = bench.nearest(np.pad(u, ((0, 0), (0, len(bench.names) - d))))
 
     def build(y: Floats) -> Built:
-        model, solves = (scene.model, 0) if source is None else source()
-        made = fit(model, scene.path, box if over_box else y, scene.expansions.modes, **how)
-        built = _answering(made, solves or made.solves, made.error_estimate)
-        return replace(built, along=made.along) if over_box else built
+        at = replace(near, y=np.tile(y, (len(near), 1))) if method.per_design else near
+        made = learn(at.u[:, :d], bench.exact(at))
+        return Built(lambda points: made(points.u[:, :d]), len(at))
 
     return build
 
 
-# --- What people do without eigassign
-
-
-def surrogates(bench: Bench) -> Iterator[Method]:
-    """Interpolation between stations and on grids, and fits to spread-out points."""
-    most, d = bench.most_solves, len(bench.names)
-    for k, kind in product(bench.effort.stations, KINDS if bench.place is not None else ()):
-        if k <= most and (kind != "Chebyshev" or k <= 20):  # of a higher degree: ill-conditioned
-            u = np.pad(grid_points(kind, k, 1), ((0, 0), (0, d - 1)))
-            name, told = f"stations {kind} {k}", {"interpolation": kind, "stations": k}
-            learn = partial(grid_interpolation, kind)
-            yield _trained(bench, name, f"stations, {kind}", told, learn, u, True)
-    for k, kind in product(bench.effort.nodes, KINDS):
-        if k**d <= most and (kind != "cubic" or k >= 4):
-            told = {"nodes": k, "features": bench.names, "interpolation": kind}
-            learn, u = partial(grid_interpolation, kind), grid_points(kind, k, d)
-            yield _trained(bench, f"grid {kind} {k}", f"grid, {kind}", told, learn, u)
-    counts = sorted({min(k, most) for k in bench.effort.training})
-    for n, (family, learn, how) in product(counts, list(surrogate_families())):
-        told = {**how, "training_points": n, "features": bench.names}
-        name = f"{family.replace(',', '')} {n}"
-        yield _trained(bench, name, family, told, learn, spread_points(n, d))
-
-
-def _trained(
-    bench: Bench, name: str, family: str, told: Mapping[str, Any], learn: Learn, u: Floats,
-    per_design: bool = False,
-) -> Method:  # fmt: skip
-    """A fit to exact solves at the samples nearest to u (n, d), each once; or at their places."""
-    near, d = bench.nearest(u), 1 if per_design else len(bench.names)
-
-    def build(y: Floats) -> Built:
-        at = replace(near, y=np.tile(y, (len(near), 1))) if per_design else near
-        made = learn(at.u[:, :d], bench.exact(at))
-        return Built(lambda points: made(points.u[:, :d]), len(at))
-
-    return Method(name, family, told, build, ours=False, per_design=per_design)
+# --- Interpolation and regression on the unit box
 
 
 def grid_points(kind: str, k: int, d: int) -> Floats:
