@@ -292,7 +292,10 @@ def _trained(bench: Bench, method: Method) -> Callable[[Floats], Built]:
 
     def build(y: Floats) -> Built:
         at = replace(near, y=np.tile(y, (len(near), 1))) if method.per_design else near
-        made = learn(at.u[:, :d], bench.exact(at))
+        try:
+            made = learn(at.u[:, :d], bench.exact(at))
+        except (ValueError, np.linalg.LinAlgError) as error:  # too few points, or all in a plane
+            raise UsageError(f"{method.family}: {error}") from error
         return Built(lambda points: made(points.u[:, :d]), len(at))
 
     return build
@@ -331,17 +334,9 @@ def response_surface(degree: int, u: Floats, f: Floats) -> Surrogate:
     """Least squares over all monomials of 2u − 1 up to total ``degree``."""
     space = total_degree(u.shape[1], degree)
     if len(space) > len(u):
-        raise UsageError(f"{len(space)} coefficients from {len(u)} training points")
+        raise ValueError(f"{len(space)} coefficients from {len(u)} training points")
     coefficients = np.linalg.lstsq(monomials(space, 2.0 * u - 1.0), f, rcond=None)[0]
     return lambda u: monomials(space, 2.0 * u - 1.0) @ coefficients
-
-
-def radial_basis(kernel: Any, u: Floats, f: Floats) -> Surrogate:
-    """Radial basis functions with the polynomial that the kernel asks for."""
-    try:
-        return RBFInterpolator(u, f, kernel=kernel)
-    except (ValueError, np.linalg.LinAlgError) as error:
-        raise UsageError(f"radial basis functions: {error}") from error
 
 
 def kriging(u: Floats, f: Floats) -> Surrogate:
@@ -365,7 +360,7 @@ def surrogate_families() -> Iterator[tuple[str, Learn, dict[str, Any]]]:
         yield f"response surface, {name}", partial(response_surface, degree), {"degree": degree}
     for kernel in ("thin_plate_spline", "quintic"):
         name = f"RBF, {kernel.replace('_', ' ')}"
-        yield name, partial(radial_basis, kernel), {"kernel": kernel}
+        yield name, partial(RBFInterpolator, kernel=kernel), {"kernel": kernel}
     try:  # here, or the first fit would be charged for the import
         import sklearn.gaussian_process  # noqa: F401
     except ImportError:

@@ -141,6 +141,8 @@ def test_kriging_is_left_out_without_scikit_learn_and_no_set_up_may_take_too_lon
     made = compare_methods(arm, hasty, Request(), lambda line: None)
     assert "no Kriging: it is charted where scikit-learn is installed" in made.notes
     assert "no grid or surrogate is trained on over 4 exact solves" in made.notes
+    assert any("RBF quintic 4 has no answer: RBF, quintic:" in note for note in made.notes)
+    assert any("response surface, cubic: 20 coefficients from 4" in note for note in made.notes)
     assert any("have no answer: Taylor 1 full took" in note for note in made.notes)
     assert (made.asked.samples_per_design, made.asked.random_points) == (4, 4)  # at least
 

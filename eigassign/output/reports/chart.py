@@ -19,15 +19,13 @@ from eigassign.output.tables import Table
 
 def chart_tables(chart: Chart) -> tuple[Table, ...]:
     """The tables that have rows: the choice, the fronts, all methods, the mesh, the designs."""
-    made = (_choice(chart, how=True), *_fronts(chart), _methods(chart), _mesh(chart),
-            _designs(chart), _machine(chart))  # fmt: skip
-    return tuple(table for table in made if table.rows)
+    more = (_methods(chart), _mesh(chart), _designs(chart), _machine(chart))
+    return tuple(t for t in (_choice(chart, how=True), *_fronts(chart), *more) if t.rows)
 
 
 def main_tables(chart: Chart) -> tuple[Table, ...]:
     """The tables for a terminal: the fronts, the ways to a design and what to choose."""
-    made = (*_fronts(chart), _designs(chart), _choice(chart))
-    return tuple(table for table in made if table.rows)
+    return tuple(t for t in (*_fronts(chart), _designs(chart), _choice(chart)) if t.rows)
 
 
 def _spread(timing: Timing) -> str:
@@ -40,24 +38,19 @@ def _spread(timing: Timing) -> str:
 
 def _choice(chart: Chart, how: bool = False) -> Table:
     """The recommendations beside what ``auto`` takes; with ``how``, as a call or in a case file."""
-    rows, refused = [], dict[str, str]()
-    uses = {p.method: p.use for p in chart.points}
+    rows, refused, uses = [], dict[str, str](), {p.method: p.use for p in chart.points}
     for a in chart.advice:
-        asked = (
-            f"in {time_in_words(a.budget_s or 0)}" if a.accuracy is None else f"{a.accuracy:.0e}"
-        )
-        found = ("none", "", "")
+        asked = f"{a.accuracy:.0e}" if a.accuracy else f"in {time_in_words(a.budget_s or 0.0)}"
+        found, taken = ("none", "", ""), ("", "", "", "")
         if a.method is not None:
             found = (a.method, f"{a.worst_relative:.1e}", time_in_words(a.total_s or 0.0))
-        taken = ("", "", "", "")
-        if a.auto is not None and a.auto.method is not None:
-            times = (time_in_words(s or 0.0) for s in (a.auto.total_s, a.auto.choosing_s))
-            order = a.auto.method.partition(": ")[2]
-            taken = (order, f"{a.auto.worst_relative:.1e}", *times)
-        elif a.auto is not None:
-            taken, refused[a.auto.refused] = ("refused", "", "", ""), asked
+        if (auto := a.auto) is not None and auto.method is None:
+            taken, refused[auto.refused] = ("refused", "", "", ""), asked
+        elif auto is not None:
+            times = time_in_words(auto.total_s or 0.0), time_in_words(auto.choosing_s)
+            taken = (str(auto.method).partition(": ")[2], f"{auto.worst_relative:.1e}", *times)
         row = (asked, f"{a.evaluations:,.0f}", *found, *taken, uses.get(a.method or "", ""))
-        rows.append(row if how else row[:-1])
+        rows.append(row[: 9 + how])
     columns = (
         "asked for", "evaluations", "choose", "worst error", "time in all",
         "auto takes", "its worst error", "its time in all", "choosing took", "how",
@@ -68,7 +61,7 @@ def _choice(chart: Chart, how: bool = False) -> Table:
         "timing."
     )
     caption += "".join(f" {accuracy} is refused: {why}." for why, accuracy in refused.items())
-    return Table("What to choose", columns if how else columns[:-1], tuple(rows), caption)
+    return Table("What to choose", columns[: 9 + how], tuple(rows), caption)
 
 
 def _fronts(chart: Chart) -> Iterator[Table]:
