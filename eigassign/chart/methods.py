@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import NdBSpline, RBFInterpolator, make_interp_spline
 from scipy.linalg import eigh
-from scipy.stats.qmc import Halton
 
 from eigassign.chart.question import Bench, Points
 from eigassign.chart.timing import timed
@@ -194,7 +193,8 @@ def use_of(bench: Bench, method: Method) -> str:
     if family.startswith("Taylor"):
         return f"in the case file, expansion: {{order: {p['order']}}}"
     if family.startswith("1/λ"):
-        return f"{call('ea.expand', 'model, q0, y0', 'order', 'linear_in_y')}.inverse"
+        linear = ("linear_in_y",) * p["linear_in_y"]
+        return f"{call('ea.expand', 'model, q0, y0', 'order', *linear)}.inverse"
     reduced = call("ea.reduce", "model, q0, y0", "half_order")
     if family == "reduced, no guard":
         function = "no argument of ea.reduce: eigassign.modal.reduced.reduce.reduce"
@@ -369,7 +369,13 @@ def surrogate_families() -> Iterator[tuple[str, Learn, dict[str, Any]]]:
 
 
 def spread_points(count: int, d: int) -> Floats:
-    """Training points (count, d): the corners where they are few, then Halton's sequence."""
+    """Training points (count, d): the corners where they are few, then the R_d sequence.
+
+    u_k = (1/2 + k α) mod 1 with α_i = g^-i, g^(d+1) = g + 1 (Roberts 2018). SciPy's Halton and
+    Sobol points left quintic RBF on the paper's arm 1.8 and 1.7 times as far off at 125 points.
+    """
     corners = list(product((0.0, 1.0), repeat=d)) if 3 * 2**d <= count else []
-    inside = Halton(d, scramble=False).random(1 + count - len(corners))[1:]  # the first is a corner
+    g = max(np.roots([1.0, *np.zeros(d - 1), -1.0, -1.0]).real)
+    k = np.arange(1, count - len(corners) + 1)[:, None]
+    inside = (0.5 + k * g ** -np.arange(1.0, d + 1.0)) % 1.0
     return np.vstack([np.array(corners).reshape(-1, d), inside])

@@ -69,11 +69,11 @@ def _front(chart: Chart, front: Front) -> FigurePlan:
     best = sorted((p for p in shown if p.method in front.methods), key=lambda p: p.cost_s(n))
     level = Rule(asked.floor_hz, PLAIN, note="round-off of exact solves")
     ringed = [curve([p for p in shown if p.method in taken], RING, "taken by order: auto")]
-    marks = (level, curve(best, BAND), *_coloured(curves), *(ringed if taken else ()))
+    below = (level, curve(best, BAND), *(ringed if taken else ()))
     room = (np.array([asked.floor_hz / 2.0]),)  # for the name of the level
     heading = f"{capital(what)} against worst error"
     alt = f"Scatter of worst error in Hz over {what} for every method."
-    panel = Panel("worst error [Hz]", marks, 3.8, True, None, room)
+    panel = Panel("worst error [Hz]", (*below, *_coloured(curves)), 3.8, True, None, room)
     return FigurePlan(name, heading, caption, alt, _scatter(heading, "time [s]", panel))
 
 
