@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +37,7 @@ from eigassign.study.build import build_model
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
-NOTHING = Timing(0.0, 0.0, 0.0, 0)
+ANEW = "set up anew for every design: answers the runs along the trajectory only"
 
 
 def compare_methods(
@@ -119,53 +118,51 @@ def chart_methods(
 
 def _chart_method(bench: Bench, question: Question, method: Method) -> tuple[ChartPoint, float]:
     """Set up, evaluated, timed and compared; and the seconds of setting up."""
-    points, samples = question.points, question.asked.trajectory_samples
-    rows, n = [slice(0, method.parameters.get("points"))], question.asked.random_points
-    if method.per_design:
-        rows, n = list(question.runs), 0
-    parts = [points[each] for each in rows]
-    build, effort = builder(bench, method), bench.effort
+    points, asked, effort, anew = question.points, question.asked, bench.effort, method.per_design
+    rows = question.runs if anew else [slice(0, method.parameters.get("points"))]
+    n, samples = 0 if anew else asked.random_points, asked.trajectory_samples
+    parts, build = [points[each] for each in rows], builder(bench, method)
     one, set_up = measure(lambda: build(parts[0].y[0]), effort)
     pairs = [(one, parts[0]), *((build(part.y[0]), part) for part in parts[1:])]
     hz, spent = timed(lambda: np.vstack([built.evaluate(part) for built, part in pairs]))
-    exact, solves = question.exact_hz[rows[0].start :][: len(hz)], sum(b.solves for b, _ in pairs)
     # as many as take 20 ms at the pace of the first answers
     many = int(np.clip(0.02 * len(hz) / (spent + 1e-9), min(300, len(parts[0])), 32768))
-    many = samples if method.per_design else many
-    some = parts[0][np.resize(np.arange(len(parts[0])), many)]
-    job: Callable[[], Any] = partial(one.evaluate, some)
-    if method.per_design:
-        job = lambda: build(some.y[0]).evaluate(some)  # noqa: E731
+    some = parts[0][np.resize(np.arange(len(parts[0])), samples if anew else many)]
+    job, count = partial(one.evaluate, some), len(some)
+    if anew:
+        job = partial(lambda at: build(at.y[0]).evaluate(at), some)
     elif one.along is not None:
         designs = points.y[np.resize([run.start for run in question.runs], 1 + 32768 // samples)]
-        job, many = partial(one.along, designs), len(designs) * samples
+        job, count = partial(one.along, designs), len(designs) * samples
+    solver, solves = method.family.startswith("exact"), sum(built.solves for built, _ in pairs)
+    exact = question.exact_hz[rows[0].start :][: len(hz)]
     point = ChartPoint(
         method=method.name, family=method.family, ours=method.ours, parameters=method.parameters,
-        offline=set_up, online=measure(job, effort, many)[1],
-        solves=solves, solves_online=0.0, everywhere=errors(hz, exact),
+        offline=Timing(0.0, 0.0, 0.0, 0) if solver or anew else set_up,
+        online=measure(job, effort, count)[1],
+        solves=0 if anew else solves,
+        solves_online=solves / (samples * len(parts)) if anew else float(solver),
+        everywhere=errors(hz, exact, asked.floor_hz if solver else 0.0),
         random=errors(hz[:n], exact[:n]) if n else None,
         trajectory=errors(hz[n:], exact[n:]) if len(hz) > n else None,
-        break_even=None, use=use_of(bench, method),
+        break_even=None, use=use_of(bench, method), at_once=samples if anew else 1,
+        note=ANEW if anew else "",
         estimate=max((b.estimate for b, _ in pairs if b.estimate is not None), default=None),
     )  # fmt: skip
-    if method.family.startswith("exact"):  # an error below round-off means nothing
-        worst = max(point.everywhere.worst_hz, question.asked.floor_hz)
-        everywhere = replace(point.everywhere, worst_hz=worst)
-        point = replace(point, everywhere=everywhere, offline=NOTHING, solves_online=1.0)
-    if method.per_design:
-        note = "set up anew for every design: answers the runs along the trajectory only"
-        point = replace(point, note=note, at_once=samples, offline=NOTHING, solves=0)
-        point = replace(point, solves_online=solves / (samples * len(parts)))
     return point, set_up.median_s
 
 
-def errors(hz: Floats, exact: Floats) -> Errors:
-    """Worst and root mean square of |f − f_exact|, infinite where a method gives no number."""
+def errors(hz: Floats, exact: Floats, floor_hz: float = 0.0) -> Errors:
+    """Worst and root mean square of |f − f_exact|, infinite where a method gives no number.
+
+    An error below ``floor_hz``, the round-off of the exact solves, means nothing.
+    """
     off = np.abs(hz - exact)
     failed = ~np.isfinite(off)
     off = np.where(failed, np.inf, off)
     rms, relative = float(np.sqrt(np.mean(np.square(off)))), float((off / exact).max())
-    return Errors(float(off.max()), rms, relative, len(hz), int(failed.any(axis=1).sum()))
+    worst = max(float(off.max()), floor_hz)
+    return Errors(worst, rms, relative, len(hz), int(failed.any(axis=1).sum()))
 
 
 # --- Meshes: elements against discretisation error

@@ -32,8 +32,10 @@ from eigassign.study.requirements.sampling import requirements_of
 from eigassign.study.scene import Expansions, Scene
 
 Floats = NDArray[np.float64]
-SLSQP = {"method": "SLSQP", "options": {"ftol": 1e-12, "maxiter": 100}}
-EVOLUTION = {"seed": SEED, "popsize": 8, "tol": 1e-10, "polish": False}  # until none is left
+# Design, exact solves, parameters, and of a search its trace and a note
+Reached = tuple[Floats, int, dict[str, Any], dict[str, Any]]
+SLSQP: dict[str, Any] = {"method": "SLSQP", "options": {"ftol": 1e-12, "maxiter": 100}}
+EVOLUTION: dict[str, Any] = {"seed": SEED, "popsize": 8, "tol": 1e-10, "polish": False}
 
 
 class SpentError(Exception):
@@ -65,7 +67,7 @@ def chart_designs(
     targets = requirements_of(scene.file, path)
     task = Task(replace(scene, trajectory=path), targets, 0.0)
     most = min(effort.objectives, max(1, int(effort.most_s / (len(path.q) * solve_s))))
-    ways = {
+    ways: dict[str, Callable[[Task], Reached]] = {
         "one shot": _one_shot,
         "sequential": _sequential,
         "sequential, several starts": _several_starts,
@@ -92,11 +94,7 @@ def chart_designs(
     return tuple(replace(r, excess=excess_over(best, r.objective)) for r in runs), tuple(notes)
 
 
-# Design, exact solves, parameters, and of a search its trace and a note
-_Reached = tuple[Floats, int, dict[str, Any], dict[str, Any]]
-
-
-def _one_shot(task: Task) -> _Reached:
+def _one_shot(task: Task) -> Reached:
     scene, full, order = task.scene, task.scene.expansions.full, task.scene.expansions.order
     linear = expand(scene.model.pencil, full.q0, full.y0, full.modes, order, linear_in_y=True)
     expanded = replace(scene, expansions=Expansions(full, linear, order, order))
@@ -104,7 +102,7 @@ def _one_shot(task: Task) -> _Reached:
     return assign_design(expanded, task.wanted).y, 1, told, {}
 
 
-def _sequential(task: Task) -> _Reached:
+def _sequential(task: Task) -> Reached:
     """A problem of its own, for it remembers the answers at designs that it has seen."""
     scene = task.scene
     start = np.clip(scene.initial, *scene.bounds)
@@ -113,12 +111,12 @@ def _sequential(task: Task) -> _Reached:
     return found.y, solves, {"designs judged": found.appraisals}, {}
 
 
-def _several_starts(task: Task) -> _Reached:
+def _several_starts(task: Task) -> Reached:
     found = find_optimum(task.scene, task.wanted, (), lambda line: None)
     return found.best.y, found.exact_solves, {"starts": found.starts}, {}
 
 
-def _search(most: int, search: Callable[..., Any], how: dict[str, Any], task: Task) -> _Reached:
+def _search(most: int, search: Callable[..., Any], how: dict[str, Any], task: Task) -> Reached:
     """SciPy's ``search`` on exact eigenvalues over z in [0, 1]^n of the parameters with room.
 
     A design counts as the best if it keeps the limits.

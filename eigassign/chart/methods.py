@@ -28,6 +28,7 @@ from eigassign.modal.expansion import NearestExpansion, expand
 from eigassign.modal.fit.fit import fit
 from eigassign.modal.fit.region import Box
 from eigassign.modal.model import Model
+from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.reduce import reduce
 from eigassign.series.multi_index import total_degree
 from eigassign.series.power_series import monomials
@@ -105,6 +106,7 @@ def _series(bench: Bench) -> Iterator[Method]:
 def _auto(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
     """What ``expansion.order: auto`` takes, by the very function that a run asks."""
     scene, full = bench.scene, bench.scene.expansions.full
+    told: dict[str, Any]
     for accuracy in accuracies:
         expansion = scene.file.expansion.model_copy(update={"accuracy": accuracy})
         case = replace(scene.file, expansion=expansion), scene.model, scene.trajectory
@@ -115,9 +117,8 @@ def _auto(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
             yield Method(name, "Taylor, auto", {"refused": str(error)})
             continue
         q = np.vstack([choice.q0, *choice.more_q])
-        told = {"order": choice.order, "cluster_gap": choice.cluster_gap}
-        told |= {"accuracy": accuracy, "choosing_s": spent}
-        told |= {"q0": q, "y0": np.tile(full.y0, (len(q), 1))}
+        told = {"order": choice.order, "cluster_gap": choice.cluster_gap, "accuracy": accuracy}
+        told |= {"q0": q, "y0": np.tile(full.y0, (len(q), 1)), "choosing_s": spent}
         name += f": Taylor {choice.order}{f' at {len(q)} points' if len(q) > 1 else ''}"
         yield Method(name, "Taylor, auto", told)
 
@@ -139,6 +140,7 @@ def _fits(bench: Bench) -> Iterator[Method]:
     Along the trajectory for each design, and over trajectory × box; there of reduced models too.
     """
     most, moves = bench.most_solves, bench.place is not None
+    told: dict[str, Any]
     for k in [k for k in SOLVES if k <= most]:
         name, family, told = f"fit of {k} solves", "fit of given solves", {"solves": k}
         if k <= 25 and moves:
@@ -263,7 +265,8 @@ def _expanded(bench: Bench, method: Method, _: Floats) -> Built:
 def _reduced_or_fitted(bench: Bench, method: Method, y: Floats) -> Built:
     """A reduced model; or a fit of it, or of the model, over the box or at one design."""
     scene, modes, p = bench.scene, bench.scene.expansions.modes, method.parameters
-    source, solves = scene.model, 0
+    source: Model | ReducedModel = scene.model
+    solves = 0
     if (m := p.get("half_order")) is not None:
         pencil, guard = scene.model.pencil, p.get("guard", True)
         source = reduce(pencil, p["q"], p["y"], modes, m, guard)

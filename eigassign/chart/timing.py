@@ -70,8 +70,8 @@ def measure(job: Callable[[], T], effort: Effort, count: int = 1) -> tuple[T, Ti
     spent = list[float]()
     while len(spent) < effort.repeats and first + sum(spent) < effort.repeat_s:
         spent.append(timed(job)[1])
-    quantiles = np.quantile(spent or [first], (0.5, 0.25, 0.75)) / count
-    return result, Timing(*quantiles.tolist(), len(spent))
+    median, low, high = (np.quantile(spent or [first], (0.5, 0.25, 0.75)) / count).tolist()
+    return result, Timing(median, low, high, len(spent))
 
 
 def time_in_words(seconds: float) -> str:
