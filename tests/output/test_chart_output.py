@@ -52,6 +52,7 @@ def design(name: str, excess: float, trace: tuple[tuple[float, float], ...] = ()
     )  # fmt: skip
 
 
+BEST = Advice("accuracy", 1e-4, None, 152.0, "exact dense", {}, 0.0, 0.0152, "words")
 CHART = Chart(
     title="An <arm> & more",
     case_name="arm",
@@ -59,14 +60,7 @@ CHART = Chart(
     reference=None,
     version="1.0",
     quick=True,
-    machine={
-        "processor": "CPU",
-        "cores": 2,
-        "system": "Linux x86_64",
-        "versions": {"Python": "3.12", "NumPy": "2"},
-        "blas": "blas 1",
-        "threads": "1",
-    },
+    machine={"versions": {"Python": "3.12", "NumPy": "2"}, "blas": "blas 1", "threads": "1"},
     asked=Asked((1,), 23, ("place", "m1"), 30, 2, 9, 152, 152.0, 7, 200.0, 1e-10),
     points=(
         point("exact dense", "exact", True, 1e-4, 0.0),
@@ -81,33 +75,9 @@ CHART = Chart(
         Front("online alone", None, ("exact dense", "grid linear 4", "Taylor 4 full")),
     ),
     advice=(
-        Advice(
-            "accuracy",
-            1e-4,
-            None,
-            152.0,
-            "exact dense",
-            {},
-            0.0,
-            0.0152,
-            "words",
-            False,
-            AutoTakes("auto 1e-04: Taylor 4", 5e-5, 0.00304, 0.4, ""),
-        ),
-        Advice(
-            "accuracy",
-            1e-8,
-            None,
-            152.0,
-            "exact dense",
-            {},
-            0.0,
-            0.0152,
-            "words",
-            False,
-            AutoTakes(None, None, None, 0.4, "no expansion reaches 1.0e-08"),
-        ),
-        Advice("budget", None, 1e-9, 152.0, None, {}, None, None, "nothing"),
+        replace(BEST, auto=AutoTakes("auto 1e-04: Taylor 4", 5e-5, 0.00304, 0.4, "")),
+        replace(BEST, accuracy=1e-8, auto=AutoTakes(None, None, None, 0.0, "it is too large")),
+        Advice("budget", None, 1e-9, 152.0, words="nothing"),
     ),
     mesh=(
         MeshRow(1.0, 7, 23, 0.06, 3e-4, 4.0, timing(1e-4)),
@@ -170,7 +140,7 @@ def test_what_auto_takes_stands_beside_the_choice() -> None:
     assert taken[:3] == ("1e-04", "152", "exact dense")
     assert taken[5:9] == ("Taylor 4", "5.0e-05", "3.04 ms", "400 ms")
     assert refused[5:9] == ("refused", "", "", "")
-    assert shown.caption.endswith("1e-08 is refused: no expansion reaches 1.0e-08.")
+    assert shown.caption.endswith("1e-08 is refused: it is too large.")
     assert [row[2] for row in shown.rows] == ["exact dense"] * 2 + ["none"]
     assert budget[5:9] == ("", "", "", "")
 
