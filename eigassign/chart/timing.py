@@ -50,7 +50,7 @@ QUICK = Effort(
     quick=True, random_points=150, most_s=2.0, orders=(1, 2, 3, 4, 6, 8), coefficients=1000,
     expansion_points=(1, 3), fitted=(), accuracies=(1e-2, 1e-4, 1e-6, 1e-8), nodes=(3, 5, 7),
     stations=(5, 17), training=(27, 125), factors=(0.5, 1.0, 2.0, 4.0), most_dof=2500,
-    objectives=60, repeats=5, repeat_s=0.1,
+    objectives=60, repeat_s=0.1,
 )  # fmt: skip
 
 
