@@ -104,14 +104,19 @@ def _series(bench: Bench) -> Iterator[Method]:
 
 
 def _auto(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
-    """What ``expansion.order: auto`` takes, by the very function that a run asks."""
-    scene, full = bench.scene, bench.scene.expansions.full
+    """What ``expansion.order: auto`` takes, by the very function that a run asks.
+
+    The loosest accuracy first; after a choice that takes too long no other is made.
+    """
+    scene, full, spent = bench.scene, bench.scene.expansions.full, 0.0
     told: dict[str, Any]
-    for accuracy in accuracies:
+    for accuracy in sorted(accuracies, reverse=True):
         expansion = scene.file.expansion.model_copy(update={"accuracy": accuracy})
         case = replace(scene.file, expansion=expansion), scene.model, scene.trajectory
         name = f"auto {accuracy:.0e}"
         try:
+            if spent > bench.effort.most_s:
+                raise AccuracyError(f"choosing took {spent:.1f} s before")
             choice, spent = timed(partial(choose_order, *case, full.q0, full.y0, full.modes))
         except AccuracyError as error:
             yield Method(name, "Taylor, auto", {"refused": str(error)})
