@@ -53,11 +53,10 @@ def compare_methods(
     charted, skipped = chart_methods(bench, question, request.accuracies, progress)
     samples = float(question.asked.trajectory_samples)
     counts = {"one trajectory": samples, "1000 trajectories": 1000.0 * samples}
-    wanted = list(counts.values())
     if n := request.evaluations:
-        wanted, counts[f"{n:g} evaluations"] = [n], n
+        counts[f"{n:g} evaluations"] = n
     named = {**counts, "online alone": None}.items()
-    asked = replace(question.asked, evaluations=wanted[0])
+    asked = replace(question.asked, evaluations=request.evaluations or samples)
     notes = list(skipped_notes(skipped))
     most, d = bench.most_solves, len(bench.names)
     if most < max([*effort.training, *(k**d for k in effort.nodes)]):
@@ -70,7 +69,7 @@ def compare_methods(
         reference=file.reference, version=__version__, quick=effort.quick, machine=machine(),
         asked=asked, points=tuple(charted), skipped=tuple(skipped.items()),
         fronts=tuple(front(charted, name, n, asked.floor_hz) for name, n in named),
-        advice=tuple(advise(charted, asked, request, wanted, skipped)),
+        advice=tuple(advise(charted, asked, request, skipped)),
         notes=tuple(notes), warnings=scene.warnings,
     )  # fmt: skip
 
@@ -228,11 +227,7 @@ def front(
 
 
 def advise(
-    points: Sequence[ChartPoint],
-    asked: Asked,
-    request: Request,
-    counts: Sequence[float],
-    skipped: Mapping[str, str],
+    points: Sequence[ChartPoint], asked: Asked, request: Request, skipped: Mapping[str, str]
 ) -> Iterator[Advice]:
     """What to choose for each number of evaluations, in words and as data.
 
@@ -242,7 +237,8 @@ def advise(
     accurate. For a time, which counts the set-up, the most accurate method, the quicker of equals.
     """
     floor, rivals = asked.floor_hz / asked.typical_hz, _rivals(points)
-    for n in counts:
+    whole = (float(asked.trajectory_samples), 1000.0 * asked.trajectory_samples)
+    for n in (request.evaluations,) if request.evaluations else whole:
         words = f"for {n:,.0f} evaluations within"
         for a in request.accuracies:
             within = Advice("accuracy", a, None, n, words=f"{words} {_share(a)} of exact")

@@ -52,7 +52,7 @@ POINTS = [
 def advised(points: list[ChartPoint], n: float, floor: float = 0.0, **request: Any) -> Advice:
     asked = Asked((1,), 1, ("m",), 1, 1, 1, 1, n, 1, 1.0, floor)
     (given,) = [
-        a for a in advise(points, asked, Request(**request), [n], {})
+        a for a in advise(points, asked, Request(evaluations=n, **request), {})
         if a.asked == ("accuracy" if "accuracy" in request else "budget")
     ]  # fmt: skip
     return given
@@ -126,7 +126,7 @@ def test_advice_is_a_sentence_that_says_what_the_method_does_and_that_auto_refus
     assert "and is off by 0.001 % at most" in found.words
     asked = Asked((1,), 1, ("m",), 1, 1, 1, 1, 1.0, 1, 1.0, 0.0)
     refused = {"auto 1e-02": "no expansion of order up to 4"}
-    (found,) = advise([stations], asked, Request(accuracy=1e-2), [152], refused)
+    (found,) = advise([stations], asked, Request(1e-2, evaluations=152), refused)
     assert found.auto is not None
     assert found.auto.method is None
     assert found.auto.refused == "no expansion of order up to 4"
