@@ -26,9 +26,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from eigassign.batch.manifest import LINES, write_header
+from eigassign.batch.cases import Batch, summarise
+from eigassign.batch.manifest import LINES, line_of, write_header
 from eigassign.batch.plan import BatchPlan, Variant, plan_of
-from eigassign.batch.progress import Batch, summarise
 from eigassign.batch.runner import run
 from eigassign.batch.work import CaseOptions, outcome_of
 from eigassign.batch.workers import Workers
@@ -79,7 +79,7 @@ def finished(batch: Batch) -> None:
     write_header(batch.folder, batch.header)
     with open(batch.folder / LINES, "w") as file:
         for index in batch.header.indices():
-            file.write(to_line(outcome(batch.plan[index])) + "\n")
+            file.write(line_of(to_line(outcome(batch.plan[index])), batch.header.plan))
     summarise(batch.folder, batch.header)
 
 

@@ -9,12 +9,14 @@ limits are multiplied by the environment variable ``EIGASSIGN_LIMITS``.
 from __future__ import annotations
 
 import errno
+import json
 import math
 import os
 import shlex
 import stat
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, NoReturn
 
 from eigassign.errors import UsageError
 
@@ -53,6 +55,24 @@ def how_to_raise(size: float, limit: float) -> str:
 def read_bytes(path: str | Path, limit: int) -> bytes:
     """The content of a regular file of at most ``limit`` bytes; raises as `pieces` does."""
     return b"".join(pieces(path, limit))
+
+
+def json_value(text: str | bytes) -> Any:
+    """The value that JSON of anybody says; raises ValueError for everything else.
+
+    That is NaN and infinities too, and brackets that are nested deeper than can be read.
+    """
+    try:
+        return _JSON.decode(text if isinstance(text, str) else text.decode())
+    except RecursionError:
+        raise ValueError("nested too deep") from None
+
+
+def _no_number(name: str) -> NoReturn:
+    raise ValueError(f"{name} is no number")
+
+
+_JSON = json.JSONDecoder(parse_constant=_no_number)
 
 
 def objection(path: str | Path, limit: int) -> str | None:

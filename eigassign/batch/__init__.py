@@ -4,11 +4,11 @@ Reading order:
 
     variants  the variants of a case: its `sweep`, or what --set says
     plan      which cases, in which order; the name and the key of each
-    manifest  what is remembered of each as it finishes, and which plan a folder is of
+    manifest  the index of a folder: which plan it is of, and how each case ended
     lock      who is at work in a folder, and at which case
     limits    time and memory of a case
     work      what a worker does: check a variant, run it
-    progress  what of a batch is done: setting up a folder, taking it up again
+    cases     the life of a case: its record, taking up a folder, giving cases out, summaries
     merge     one batch of its shards
     workers   where tasks run: this process, or processes that are gone when the parent is
     cluster   the workers of a dask.distributed scheduler
@@ -21,10 +21,10 @@ __all__, __getattr__, __dir__ = face(
     __name__,
     {
         "limits": "OutOfTimeError limited",
+        "cases": "Batch summarise",
         "manifest": "Header InOrder Manifest read_header write_header",
         "plan": "Variant cases_in folder_names plan_of variant_problem",
         "merge": "merge_shards",
-        "progress": "Batch summarise",
         "runner": "run",
         "variants": "Variants variants_of",
         "work": "CaseOptions outcome_of run_cases",

@@ -5,7 +5,8 @@ that holds them, however that ends:
 
     byte 0      who is at work: held alone while the folder is set up, then shared
     byte 1      a line of the manifest is being written
-    byte 2 + k  case k is in flight
+    byte 2      the summaries are being written
+    byte 3 + k  case k is in flight
 
 Windows and some network file systems have no such locks. There one batch at a time is on its word.
 """
@@ -17,13 +18,14 @@ import os
 import socket
 import time
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 from eigassign.errors import StorageError
 
 NAME = ".lock"
-_PRESENCE, _LINE, _CASES = 0, 1, 2
+_PRESENCE, _LINE, _SUMMARIES, _CASES = range(4)
 
 
 class FolderLock:
@@ -69,16 +71,24 @@ class FolderLock:
         """Let go of a case."""
         self._unlock(_CASES + case)
 
-    @contextlib.contextmanager
-    def line(self) -> Iterator[None]:
+    def line(self) -> AbstractContextManager[None]:
         """Held while a line of the manifest is written."""
+        return self._alone(_LINE)
+
+    def summaries(self) -> AbstractContextManager[None]:
+        """Held while the summaries are written."""
+        return self._alone(_SUMMARIES)
+
+    @contextlib.contextmanager
+    def _alone(self, byte: int) -> Iterator[None]:
+        """Wait until no other process holds it."""
         if self._fcntl is not None:
             with contextlib.suppress(OSError):
-                self._fcntl.lockf(self._file, self._fcntl.LOCK_EX, 1, _LINE)
+                self._fcntl.lockf(self._file, self._fcntl.LOCK_EX, 1, byte)
         try:
             yield
         finally:
-            self._unlock(_LINE)
+            self._unlock(byte)
 
     def _try(self, byte: int, shared: bool = False) -> bool:
         if self._fcntl is None:

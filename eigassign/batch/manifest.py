@@ -1,31 +1,32 @@
-"""What a batch remembers while it runs: batch.json, and a line of manifest.jsonl for each result.
+"""The index of a batch: batch.json says which plan it is of, manifest.jsonl how each case ended.
 
-A line is written as its case finishes, in one piece, behind all others; so whoever is killed, and
-when, nothing before is lost. A line without an end, of a kill or a full disk, is none; it is cut
-off before the next is written. Of several lines of one case the last one counts.
+A line is written as its case ends, in one piece, behind all others; so whoever is killed, and when,
+nothing before is lost. It ends with a hash of itself and of the plan: what was cut or edited, and
+what is of another batch, is no line. Of several lines of one case the last one counts.
 """
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import io
 import json
 import re
 from array import array
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from eigassign._version import __version__
+from eigassign.case.schema.sweep import MOST
 from eigassign.errors import StorageError, UsageError
-from eigassign.files import STORED, read_bytes
-from eigassign.output.batch.outcome import CaseOutcome, from_line, to_line
+from eigassign.files import CASE, TABLE, json_value, read_bytes
+from eigassign.output.batch.outcome import CaseOutcome, from_line, status_of, to_line
 from eigassign.output.store.atomic import replace_synced
 
 HEADER, LINES = "batch.json", "manifest.jsonl"
 FORMAT = 1  # of batch.json: others are refused
-_BEGIN = re.compile(rb'\{"index": ([0-9]{1,20}),')  # of a line
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,7 @@ class Header:
     columns: bool = False  # the cases have no folders
     version: str = __version__
     format: int = FORMAT
+    summarised: str = field(default="", compare=False)  # `InOrder.digest` of what the summaries say
 
     def indices(self) -> range:
         """Indices of the cases that are this folder's."""
@@ -53,14 +55,17 @@ def read_header(folder: Path) -> Header | None:
     Raises UsageError where it is damaged or of another format.
     """
     try:
-        found = json.loads(read_bytes(folder / HEADER, STORED))
+        found = json_value(read_bytes(folder / HEADER, TABLE))
         if found["format"] != FORMAT:
             raise UsageError(f"{folder / HEADER} is of another version of eigassign: use --out")
-        found = {**found, "shard": tuple(found["shard"])}
-        found |= {name: tuple(found[name]) for name in ("files", "keys")}
+        found |= {name: tuple(found[name]) for name in ("shard", "files", "keys")}
         header = Header(**found)
-        if header.indices().start < 0:
-            raise ValueError("shards are counted from 1")
+        (i, n), texts = header.shard, (header.plan, header.version, header.summarised)
+        whole = {*map(type, (header.cases, i, n))} == {int} and type(header.columns) is bool
+        right = whole and 1 <= i <= n and 0 <= header.cases <= MOST * len(header.files)
+        names = {*map(type, (*texts, *header.files, *header.keys))} == {str}
+        if not (right and names) or any("\0" in file for file in header.files):
+            raise ValueError("no header of a batch")
         return header
     except (FileNotFoundError, NotADirectoryError):
         return None
@@ -75,43 +80,100 @@ def write_header(folder: Path, header: Header) -> None:
     replace_synced(folder / HEADER, (json.dumps(asdict(header), indent=2) + "\n").encode())
 
 
+# --- Lines
+
+_DIGITS = 16  # of the hash of a line
+_TAIL = len(f', "seal": "{_DIGITS * "0"}"}}\n')
+_INDEX = re.compile(r'\{"index": (-?[0-9]{1,18}),')  # of a row
+
+
+def line_of(row: str, plan: str) -> str:
+    """The line of a row, which is written as `to_line` writes it, of this plan."""
+    seal = hashlib.sha256(f"{plan}{row}".encode()).hexdigest()[:_DIGITS]
+    return f'{row[:-1]}, "seal": "{seal}"}}\n'
+
+
+@dataclass(frozen=True)
+class Line:
+    """A whole line of the manifest: where it begins, its bytes, and the row in it."""
+
+    start: int
+    line: bytes
+    row: str
+    index: int
+
+    @property
+    def seal(self) -> int:
+        """Its hash."""
+        return int(self.line[-_TAIL:].split(b'"')[3], 16)
+
+    @property
+    def status(self) -> str:
+        """How its case ended."""
+        return status_of(self.row)
+
+    @property
+    def run_folder(self) -> str | None:
+        """The folder of its case."""
+        return self.outcome.run_folder
+
+    @property
+    def outcome(self) -> CaseOutcome:
+        """The row, read."""
+        return from_line(self.row)
+
+
 class Manifest:
-    """The lines of manifest.jsonl, a `CaseOutcome` each: read as they are added, and written."""
+    """The lines of manifest.jsonl that are of one plan: read as they are added, and written."""
 
     def __init__(
         self,
         folder: Path,
+        plan: str,
         appending: Callable[[], AbstractContextManager[object]] = contextlib.nullcontext,
     ) -> None:
         """``appending``: entered while a line is written, where several processes write."""
         self.path = folder / LINES
-        self._appending = appending
+        self._plan, self._appending = plan, appending
         self._read = 0  # bytes that were read
 
-    def news(self) -> Iterator[CaseOutcome]:
-        """The outcomes that were added since this was last asked for, by whomever."""
-        for _, line in self.lines():
-            try:
-                outcome = from_line(line)
-            except StorageError:  # somebody edited the file
-                continue
-            yield outcome
+    def news(self) -> Iterator[Line]:
+        """Yield the lines that were added since this was last asked for, by whomever.
 
-    def lines(self) -> Iterator[tuple[int, bytes]]:
-        """Yield where each line begins, and the line; one without an end is left for later."""
+        One without an end is left for later. Raises StorageError where there is something else than
+        a file.
+        """
         try:
             with open(self.path, "rb") as file:
                 file.seek(self._read)
-                for line in file:
-                    if line.endswith(b"\n"):
-                        start, self._read = self._read, self._read + len(line)
-                        yield start, line
+                while line := file.readline(CASE):
+                    if not line.endswith(b"\n") and len(line) < CASE:
+                        return
+                    start, self._read = self._read, self._read + len(line)
+                    if (found := self._opened(start, line)) is not None:
+                        yield found
         except FileNotFoundError:
             return
+        except OSError as error:
+            raise StorageError(f"{self.path}: cannot be read: {error.strerror}") from error
+
+    def _opened(self, start: int, line: bytes) -> Line | None:
+        """The line with these bytes; None where somebody else has written them."""
+        if not line.isascii():
+            return None
+        text = line.decode()
+        row = f"{text[:-_TAIL]}}}"
+        begin = _INDEX.match(row)
+        if begin is None or line_of(row, self._plan) != text:
+            return None
+        return Line(start, line, row, int(begin[1]))
 
     def append(self, outcome: CaseOutcome) -> None:
-        """Write a line behind all others; raises StorageError where it cannot be written whole."""
-        line = to_line(outcome).encode() + b"\n"
+        """Write a line behind all others; raises StorageError where it cannot be written whole.
+
+        A last line without an end, of a kill or a full disk, is cut off before.
+        """
+        line = line_of(to_line(outcome), self._plan).encode()
         try:
             with self._appending(), open(self.path, "ab+", buffering=0) as file:
                 end = _cut(file)
@@ -120,12 +182,6 @@ class Manifest:
                     raise StorageError(f"{self.path}: no space for another line")
         except OSError as error:
             raise StorageError(f"{self.path}: cannot be written: {error.strerror}") from error
-
-
-def _index(line: bytes) -> int:
-    """The index that a whole line begins with, and −1 of anything else."""
-    begin = _BEGIN.match(line)
-    return int(begin[1]) if begin and line.isascii() and line.endswith(b"}\n") else -1
 
 
 def _cut(file: io.FileIO) -> int:
@@ -143,18 +199,22 @@ def _cut(file: io.FileIO) -> int:
 
 
 class InOrder:
-    """The line of each case that has one, the last it has, in the order of ``indices``.
+    """The row of each case that has one, as the last of its lines says, in the order of the plan.
 
-    The file is gone through once for where each line is, and then read line by line: memory is
-    8 bytes a case.
+    The file is gone through once for where each line is, and then read line by line: memory is 16
+    bytes a case. ``digest`` tells these rows from all others.
     """
 
-    def __init__(self, folder: Path, indices: range) -> None:
+    def __init__(self, folder: Path, header: Header) -> None:
+        indices = header.indices()
         self._path, places = folder / LINES, array("q", [-1]) * len(indices)
-        for start, line in Manifest(folder).lines():
-            if (index := _index(line)) in indices:
-                places[indices.index(index)] = start
+        seals = array("Q", [0]) * len(indices)
+        for line in Manifest(folder, header.plan).news():
+            if line.index in indices:
+                k = indices.index(line.index)
+                places[k], seals[k] = line.start, line.seal
         self._places = array("q", (place for place in places if place >= 0))
+        self.digest = hashlib.sha256(seals.tobytes()).hexdigest()
 
     def __len__(self) -> int:
         return len(self._places)
@@ -165,4 +225,4 @@ class InOrder:
                 for place in self._places:
                     if file.tell() != place:
                         file.seek(place)
-                    yield file.readline().decode()
+                    yield f"{file.readline().decode()[:-_TAIL]}}}"

@@ -6,13 +6,13 @@ import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, zip_longest
+from itertools import chain, count, islice, zip_longest
 from pathlib import Path
 
-from eigassign.batch.manifest import LINES, Header, InOrder, read_header, write_header
-from eigassign.batch.progress import summarise
+from eigassign.batch.cases import recorded, summarise
+from eigassign.batch.lock import folder_lock
+from eigassign.batch.manifest import LINES, Header, InOrder, line_of, read_header
 from eigassign.errors import UsageError
-from eigassign.output.batch.files import write_files
 from eigassign.output.batch.outcome import from_line, status_of, to_line
 from eigassign.output.store.atomic import replacing
 from eigassign.output.store.run_record import relative_path
@@ -22,7 +22,15 @@ from eigassign.output.store.run_record import relative_path
 class _Shard:
     folder: Path
     header: Header
-    lines: InOrder
+    rows: InOrder
+
+    def lost(self) -> list[str]:
+        """The cases whose record does not say what the index does; see `cases`."""
+        if self.header.columns:
+            return []
+        listed = (row for row in map(from_line, self.rows) if row.run_folder is not None)
+        found = ((row, recorded(self.folder / str(row.run_folder))) for row in listed)
+        return [row.name for row, now in found if now is None or now.key != row.key]
 
 
 def merge_shards(out: Path, folders: Sequence[Path]) -> Counter[str]:
@@ -30,16 +38,21 @@ def merge_shards(out: Path, folders: Sequence[Path]) -> Counter[str]:
 
     The folders of cases stay where they are. Without ``folders`` the summaries of the batch in
     ``out`` are made anew. Raises UsageError, with all that is wrong, where a shard is missing, not
-    finished, there twice, or of another batch.
+    finished, there twice, or of another batch, and where files of a case were lost.
     """
-    if not folders:
-        summarise(out, _header(out), anew=True)
-        return Counter(map(status_of, InOrder(out, _header(out).indices())))
     shards = [
-        _Shard(folder, header, InOrder(folder, header.indices()))
-        for folder in folders
+        _Shard(folder, header, InOrder(folder, header))
+        for folder in folders or (out,)
         for header in [_header(folder)]
     ]
+    if not folders:
+        if lost := shards[0].lost():
+            some = ", ".join(lost[:5]) + (", …" if len(lost) > 5 else "")
+            message = f"files of {some} are not as their runs have left them: run the batch again"
+            raise UsageError(f"{out}: {message}")
+        with folder_lock(out) as lock:
+            rows = summarise(out, shards[0].header, anew=True, alone=lock.summaries)
+        return Counter(map(status_of, rows))
     one, place = shards[0], Path(os.path.realpath(out))
     files = tuple(relative_path(one.folder / file, place) for file in one.header.files)
     header = replace(one.header, shard=(1, 1), files=files)
@@ -51,13 +64,10 @@ def merge_shards(out: Path, folders: Sequence[Path]) -> Counter[str]:
     shards.sort(key=lambda shard: shard.header.shard)
     out.mkdir(parents=True, exist_ok=True)
     with replacing(out / LINES) as made, open(made, "w", encoding="utf-8") as file:
-        parts = [shard.lines if header.columns else _seen_from(place, shard) for shard in shards]
-        file.writelines(chain.from_iterable(zip_longest(*parts, fillvalue="")))
-    with open(out / LINES, encoding="utf-8") as lines:
-        write_files(out, lines, header.cases, header.keys, header.columns)
-    write_header(out, header)
-    with open(out / LINES, encoding="utf-8") as lines:
-        return Counter(map(status_of, lines))
+        parts = [shard.rows if header.columns else _seen_from(place, shard) for shard in shards]
+        rows_in_turn = filter(None, chain.from_iterable(zip_longest(*parts)))
+        file.writelines(line_of(row, header.plan) for row in rows_in_turn)
+    return Counter(map(status_of, summarise(out, header, anew=True)))
 
 
 def _header(folder: Path) -> Header:
@@ -72,27 +82,26 @@ def _problems(shards: Sequence[_Shard]) -> Iterator[str]:
     n = first.header.shard[1]
     found: dict[int, Path] = {}
     for shard in shards:
-        header, (i, count) = shard.header, shard.header.shard
-        alike = (header.plan, count, header.version, header.columns)
+        header, (i, parts) = shard.header, shard.header.shard
+        alike = (header.plan, parts, header.version, header.columns)
         if alike != (first.header.plan, n, first.header.version, first.header.columns):
             yield f"{shard.folder} is a shard of another batch than {first.folder}"
         elif i in found:
             yield f"{shard.folder} and {found[i]} are the same shard, {i}/{n}"
-        elif (done := len(shard.lines)) < (all_of_it := len(header.indices())):
+        elif (done := len(shard.rows) - len(shard.lost())) < (all_of_it := len(header.indices())):
             yield f"{shard.folder}, shard {i}/{n}, is not finished: {done} of {all_of_it} cases"
         found.setdefault(i, shard.folder)
-    missing = [i for i in range(1, n + 1) if i not in found]
-    if missing:
-        some = ", ".join(map(str, missing[:10]))
-        more = f" and {len(missing) - 10} more" if len(missing) > 10 else ""
-        yield f"missing of {n} shards: {some}{more}"
+    if missing := n - sum(i <= n for i in found):
+        missed = islice((str(i) for i in count(1) if i not in found), min(missing, 10))
+        more = f" and {missing - 10} more" if missing > 10 else ""
+        yield f"missing of {n} shards: {', '.join(missed)}{more}"
 
 
 def _seen_from(place: Path, shard: _Shard) -> Iterator[str]:
-    """Yield the lines of a shard, in which the folders of cases are named from ``place``."""
-    for line in shard.lines:
-        row = from_line(line)
+    """Yield the rows of a shard, in which the folders of cases are named from ``place``."""
+    for text in shard.rows:
+        row = from_line(text)
         if row.run_folder is not None:
             there = relative_path(shard.folder / row.run_folder, place)
-            line = to_line(replace(row, run_folder=there)) + "\n"
-        yield line
+            text = to_line(replace(row, run_folder=there))
+        yield text

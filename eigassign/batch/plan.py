@@ -67,6 +67,16 @@ class PlannedFile:
     def __len__(self) -> int:
         return 1 if self.variants is None else len(self.variants)
 
+    @property
+    def said(self) -> object:
+        """What tells its variants from others; files that values name count by content."""
+        if self.variants is None:
+            return ""
+        texts = dict.fromkeys(_texts(self.variants.columns))
+        folder = Path(self.path).parent
+        named = {text: digest for text in texts if (digest := _digest(folder / text))}
+        return (self.variants.digest, *named.values())
+
     def variant(self, k: int, index: int) -> Variant:
         """Its k-th variant, which is the ``index``-th of the batch."""
         values = {} if self.variants is None else self.variants[k]
@@ -112,9 +122,7 @@ class BatchPlan:
     @cached_property
     def digest(self) -> str:
         """SHA-256 of the plan: contents, values, names and order, not where the files are."""
-        values = ["" if f.variants is None else f.variants.digest for f in self.files]
-        parts = [(f.name, f.content, v) for f, v in zip(self.files, values, strict=True)]
-        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+        return _hash([(file.name, file.content, file.said) for file in self.files])
 
     @property
     def is_swept(self) -> bool:

@@ -3,6 +3,8 @@
     plan → check the variants → what the folder does not hold yet → tasks → a line of the manifest
     for each result as it comes in → summaries
 
+`cases` says what a case goes through.
+
 Where tasks run is `workers.Workers`; they are `work.run_cases` of one or several variants. Workers
 write the folders of their cases, this process writes all else.
 """
@@ -14,10 +16,10 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 
+from eigassign.batch.cases import Batch, Progress, summarise, take_up
 from eigassign.batch.lock import folder_lock
 from eigassign.batch.manifest import read_header
 from eigassign.batch.plan import Variant, variant_problem
-from eigassign.batch.progress import Batch, Progress, set_up, summarise
 from eigassign.batch.work import check_cases, outcome_of, run_cases
 from eigassign.batch.workers import Workers, run_tasks, this_machine
 from eigassign.errors import CaseError, Problem, StorageError
@@ -52,7 +54,7 @@ def run(
     folder.mkdir(parents=True, exist_ok=True)
     with folder_lock(folder) as lock:
         if lock.enter(join):
-            set_up(batch)
+            take_up(batch)
             lock.share()
         elif read_header(folder) != batch.header:
             raise StorageError(f"{folder}: the batch at work there is not this one")
@@ -61,7 +63,7 @@ def run(
         try:
             _run(batch, progress, workers, on_outcome)
         finally:
-            summarise(folder, batch.header)
+            summarise(folder, batch.header, alone=lock.summaries)
     return progress.ends
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -14,7 +14,13 @@ from eigassign.batch.limits import OutOfTimeError, limited
 from eigassign.batch.plan import STUDY, Variant, content_of, key_of
 from eigassign.case.loading import Unchecked, checked, read
 from eigassign.errors import CaseError, EigassignError, Problem, UsageError
-from eigassign.output.batch.outcome import CaseOutcome, Status, frequency_ranges
+from eigassign.output.batch.outcome import (
+    OUTCOME,
+    CaseOutcome,
+    Status,
+    frequency_ranges,
+    to_line,
+)
 from eigassign.pipeline.run import Options, solve_case
 from eigassign.pipeline.run_files import new_run_folder
 from eigassign.process import failure_of
@@ -38,7 +44,7 @@ class CaseOptions:
     seconds: float | None = None  # that a case may take
     megabytes: float | None = None
 
-    def draws(self, status: Status) -> bool:
+    def draws(self, status: str) -> bool:
         """True where a case that ended so has figures and a report."""
         return self.reports == "all" or (self.reports == "failed" and status != "ok")
 
@@ -90,37 +96,35 @@ def run_cases(variants: Sequence[Variant], options: CaseOptions) -> list[CaseOut
 
 def _run(variant: Variant, options: CaseOptions) -> CaseOutcome:
     start = perf_counter()
+
+    def ended(status: Status, message: str, **found: Any) -> CaseOutcome:
+        return outcome_of(variant, status, perf_counter() - start, message=message, **found)
+
     try:
         with limited(options.seconds, options.megabytes):
-            found = _solved(variant, options)
+            return _solved(variant, options, ended)
     except OutOfTimeError:
-        message = f"takes longer than the {options.seconds:g} s of --case-time"
-        found = {"status": "error", "message": message}
+        return ended("error", f"takes longer than the {options.seconds:g} s of --case-time")
     except MemoryError:
         limit = f" (--case-memory is {options.megabytes:g} MB)" if options.megabytes else ""
-        found = {"status": "error", "message": f"out of memory{limit}"}
+        return ended("error", f"out of memory{limit}")
     except Exception as error:
         failure = failure_of(error)
-        status: Status = "failed" if failure.exit_code == 1 else "error"
-        found = {"status": status, "message": failure.text}
-    return outcome_of(variant, seconds=perf_counter() - start, **found)
+        return ended("failed" if failure.exit_code == 1 else "error", failure.text)
 
 
-def outcome_of(variant: Variant, status: Status, seconds: float = 0.0, **found: Any) -> CaseOutcome:
-    """The outcome of this variant."""
-    return CaseOutcome(
-        variant.name,
-        variant.path,
-        status,
-        seconds,
-        values=variant.values,
-        index=variant.index,
-        key=variant.key,
-        **found,
-    )
+def outcome_of(
+    case: Variant | CaseOutcome, status: Status, seconds: float = 0.0, **found: Any
+) -> CaseOutcome:
+    """The outcome of this case."""
+    named = {name: getattr(case, name) for name in ("name", "path", "values", "index", "key")}
+    return CaseOutcome(**named, status=status, seconds=seconds, **found)
 
 
-def _solved(variant: Variant, options: CaseOptions) -> dict[str, Any]:
+def _solved(
+    variant: Variant, options: CaseOptions, ended: Callable[..., CaseOutcome]
+) -> CaseOutcome:
+    """The outcome of a case, which is the last file of its folder, if it has one."""
     case, written = load(variant, options), _written(variant.path)
     if key_of(content_of(written), variant.values, written.path.parent) != variant.key:
         raise UsageError(
@@ -129,12 +133,15 @@ def _solved(variant: Variant, options: CaseOptions) -> dict[str, Any]:
     cache_dir = Path(options.cache_dir) if options.cache_dir else None
     how = Options(None, cache_dir, options.use_cache, report="none", study=STUDY)
     if options.columns:
-        return _found(_uninterrupted(case, how))
+        return ended(**_found(_uninterrupted(case, how)))
     with new_run_folder(case.file, Path(options.out, variant.name), options.force) as folder:
         results = _uninterrupted(case, how)
-        drawn = options.draws(_status(results))
+        found = _found(results)
+        drawn = options.draws(found["status"])
         folder.write(results, options.figures if drawn else (), "light" if drawn else "none")
-    return {"run_folder": variant.name, **_found(results)}
+        outcome = ended(**found, run_folder=variant.name)
+        (folder.hidden / OUTCOME).write_text(f"{to_line(outcome)}\n")
+    return outcome
 
 
 def _uninterrupted(case: BuiltCase, how: Options) -> RunResults:

@@ -16,8 +16,8 @@ from eigassign.errors import EigassignError, UsageError
 if TYPE_CHECKING:
     from collections import Counter
 
+    from eigassign.batch.cases import Batch, Progress
     from eigassign.batch.plan import BatchPlan
-    from eigassign.batch.progress import Batch, Progress
     from eigassign.batch.workers import Workers
     from eigassign.output.batch.outcome import CaseOutcome
     from eigassign.output.previous import EarlierResult
@@ -140,7 +140,7 @@ def _workers(
 
 
 def _batch(plan: BatchPlan, folder: Path, how: Mapping[str, Any]) -> Batch:
-    from eigassign.batch.progress import Batch
+    from eigassign.batch.cases import Batch
     from eigassign.batch.work import CaseOptions
 
     columns = how["columns"] or len(plan) > _FOLDERS
@@ -193,9 +193,10 @@ def _comparison(how: Mapping[str, Any]) -> EarlierResult | None:
 
 def _told(folder: Path, ends: Counter[str], since: EarlierResult | None, reporter: Reporter) -> int:
     """Show how the cases of a folder ended, all of them or the first that failed; the exit code."""
+    from dataclasses import replace
     from itertools import islice
 
-    from eigassign.batch.manifest import LINES, InOrder, read_header
+    from eigassign.batch.manifest import InOrder, read_header, write_header
     from eigassign.output import console
     from eigassign.output.batch.files import write_moves
     from eigassign.output.batch.outcome import from_line, status_of
@@ -203,14 +204,17 @@ def _told(folder: Path, ends: Counter[str], since: EarlierResult | None, reporte
     from eigassign.output.previous import Known
 
     header, total = read_header(folder), ends.total()
-    lines = InOrder(folder, header.indices()) if header else ()
+    lines = InOrder(folder, header) if header else ()
     told = (line for line in lines if total <= _MANY or status_of(line) != "ok")
     listed = [from_line(line) for line in islice(told, _MANY)]
-    if since is not None:
+    if since is not None and header is not None:
         rows = (
             (row, [*map(str, since.add(Known.of_outcome(row)))]) for row in map(from_line, lines)
         )
-        write_moves(folder, rows, folder / LINES)
+        write_header(
+            folder, replace(header, summarised="")
+        )  # without a comparison it is not theirs
+        write_moves(folder, rows)
     console.print_tables([batch_table(listed)] if listed else [])
     console.print_tables([since.table()] if since is not None else [])
     if bad := total - ends["ok"]:
@@ -246,14 +250,14 @@ def _cases(count: int) -> str:
 
 def _tell(batch: Batch, workers: Workers, reporter: Reporter) -> int:
     """List the cases that would run, and say about how long, in how much memory and files."""
-    from eigassign.batch.progress import outcomes_in
+    from eigassign.batch.cases import seconds_of_done
     from eigassign.batch.runner import require_valid
     from eigassign.output.console import print_tables
     from eigassign.output.formats import duration
     from eigassign.output.tables import Table
 
     require_valid(batch, workers, reporter.stage)
-    spent = {found.index: found.seconds for found in outcomes_in(batch)}
+    spent = seconds_of_done(batch)
     todo = [index for index in batch.header.indices() if index not in spent]
     first, last = todo[:_FIRST], todo[_FIRST:][-_LAST:]
     rows = [(str(index + 1), batch.plan[index].name) for index in first]
@@ -276,9 +280,9 @@ def _tell(batch: Batch, workers: Workers, reporter: Reporter) -> int:
         total = duration(case_s * len(todo) / min(workers.slots, len(todo)))
         show(f"time     about {total} in {processes}: {duration(case_s)} a case, {source}")
     show(f"memory   about {150 + memory_mb:.0f} MB in each of {processes}")
-    # of the paper's arm: a folder has 7 files and 30 kB, a report 14 more and 700 kB, a line 1 kB
+    # of the paper's arm: a folder has 8 files and 30 kB, a report 14 more and 700 kB, a line 1 kB
     disk_mb = (len(todo) + 30 * folders + 700 * drawn) / 1e3
-    count = 7 * folders + 14 * drawn
+    count = 8 * folders + 14 * drawn
     show(f"files    {count} more, about {disk_mb:.3g} MB, in {batch.folder}")
     return 0
 

@@ -21,7 +21,7 @@ __all__, __getattr__, __dir__ = face(
     __name__,
     {
         "batch.columns": "Columns",
-        "batch.files": "are_current write_files",
+        "batch.files": "write_files",
         "batch.index": "Index",
         "batch.outcome": "CaseOutcome frequency_ranges from_line to_line",
         "batch.summary": "batch_table",

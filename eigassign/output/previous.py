@@ -7,14 +7,13 @@ results.json, summary.json or what ``validate --json`` printed, or a folder that
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from eigassign.errors import UsageError
-from eigassign.files import STORED, read_bytes
+from eigassign.files import STORED, json_value, read_bytes
 from eigassign.output.batch.outcome import CaseOutcome, Range, from_plain, ranges
 from eigassign.output.tables import Table
 from eigassign.study.comparison import TRAJECTORY
@@ -135,7 +134,7 @@ def _read(path: Path, kind: Kind) -> list[Known]:
         files = [batch] if batch.exists() else [own] if own.exists() else below
     for file in files:
         try:
-            found += _known(json.loads(read_bytes(file, STORED)), kind)
+            found += _known(json_value(read_bytes(file, STORED)), kind)
         except OSError as error:
             raise UsageError(f"{file}: cannot be read: {error.strerror}") from error
         except (ValueError, LookupError, TypeError, AttributeError):

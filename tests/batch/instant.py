@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from eigassign.batch import Batch, CaseOptions, Variant, Workers, outcome_of, plan_of
+from eigassign.output import CaseOutcome, run_folder, to_line
 
 TEXT = (Path(__file__).parents[2] / "cases" / "two_link.yaml").read_text()
 MASS = "mechanism.bodies.tool_mass.mass"
@@ -21,13 +22,23 @@ def case(folder: Path, name: str = "arm.yaml", end: str = "") -> Path:
 
 
 def batch_of(
-    folder: Path, masses: str = "0..1:5", force: bool = False, file: str = "arm.yaml"
+    folder: Path,
+    masses: str = "0..1:5",
+    force: bool = False,
+    file: str = "arm.yaml",
+    setting: str = "",
 ) -> Batch:
-    """A sweep over the mass, of a case that is there already."""
-    out = folder / "out"
-    return Batch(
-        plan_of([folder / file], [f"{MASS}={masses}"]), out, CaseOptions(str(out), force=force)
-    )
+    """A sweep over the mass, or of what ``setting`` says, of a case that is there already."""
+    plan = plan_of([folder / file], [setting or f"{MASS}={masses}"])
+    return Batch(plan, folder / "out", CaseOptions(str(folder / "out"), force=force))
+
+
+def write_run(folder: Path, outcome: CaseOutcome) -> None:
+    """The folder of a case that ended so, as a worker leaves it."""
+    with run_folder(folder, case_path=Path(outcome.path), case_sha256="a" * 64) as hidden:
+        (hidden / "results.json").write_text(f'{{"case": "{outcome.name}"}}\n')
+        (hidden / "case.yaml").write_text(f"title: {outcome.name}\n")
+        (hidden / "outcome.json").write_text(to_line(outcome))
 
 
 class Instant(Executor):
@@ -51,8 +62,9 @@ class Instant(Executor):
             return outcome_of(variant, "error", message="not this one")
         if variant.values.get(MASS) == 0.75:
             return outcome_of(variant, "failed", message="no design meets it")
-        (self.out / variant.name).mkdir(exist_ok=True)
-        return outcome_of(variant, "ok", run_folder=variant.name)
+        outcome = outcome_of(variant, "ok", run_folder=variant.name)
+        write_run(self.out / variant.name, outcome)
+        return outcome
 
 
 def instant(out: Path, heard: Callable[[str], None], slots: int = 2) -> Workers:

@@ -8,7 +8,9 @@ import pytest
 
 from eigassign.batch import Header, InOrder, Manifest, read_header, write_header
 from eigassign.errors import StorageError, UsageError
-from eigassign.output import CaseOutcome, from_line
+from eigassign.output import CaseOutcome, from_line, to_line
+
+PLAN = "abc"
 
 
 def row(index: int, status: str = "ok") -> CaseOutcome:
@@ -16,77 +18,117 @@ def row(index: int, status: str = "ok") -> CaseOutcome:
     return CaseOutcome(f"case {index}", "arm.yaml", status, 0.1, **named)  # type: ignore[arg-type]
 
 
+def news(manifest: Manifest) -> list[CaseOutcome]:
+    return [line.outcome for line in manifest.news()]
+
+
+def in_order(folder: Path, first: int = 1, of: int = 1, cases: int = 10) -> list[CaseOutcome]:
+    header = Header(PLAN, cases, (first, of), ("arm.yaml",))
+    return [from_line(text) for text in InOrder(folder, header)]
+
+
 def test_rows_are_read_as_they_are_added_by_whomever(tmp_path: Path) -> None:
-    one, other = Manifest(tmp_path), Manifest(tmp_path)
-    assert list(one.news()) == []
+    one, other = Manifest(tmp_path, PLAN), Manifest(tmp_path, PLAN)
+    assert news(one) == []
     one.append(row(1))
     other.append(row(0))
-    assert list(one.news()) == [row(1), row(0)]
-    assert list(one.news()) == []
+    assert news(one) == [row(1), row(0)]
+    assert news(one) == []
     one.append(row(2))
-    assert list(one.news()) == [row(2)]
-    assert list(other.news()) == [row(1), row(0), row(2)]
+    assert news(one) == [row(2)]
+    assert news(other) == [row(1), row(0), row(2)]
 
 
 @pytest.mark.parametrize("torn", [b"x", b'{"index": 7, "na', b"y" * 10_000])
 def test_a_torn_last_line_is_none_and_is_cut_off(tmp_path: Path, torn: bytes) -> None:
-    manifest = Manifest(tmp_path)
+    manifest = Manifest(tmp_path, PLAN)
     manifest.append(row(1))
     whole = manifest.path.read_bytes()
     manifest.path.write_bytes(whole + torn)
-    assert list(manifest.news()) == [row(1)]
+    assert news(manifest) == [row(1)]
     manifest.append(row(2))
-    assert list(manifest.news()) == [row(2)]
+    assert news(manifest) == [row(2)]
     assert manifest.path.read_bytes().startswith(whole + b'{"index": 2')
     manifest.path.write_bytes(torn)
     manifest.append(row(3))
-    assert list(Manifest(tmp_path).news()) == [row(3)]
+    assert news(Manifest(tmp_path, PLAN)) == [row(3)]
 
 
 def test_rows_come_in_the_order_of_the_plan_and_the_last_of_a_case_counts(tmp_path: Path) -> None:
-    manifest = Manifest(tmp_path)
+    manifest = Manifest(tmp_path, PLAN)
     for each in (row(5), row(3, "error"), row(4), row(3), row(99)):
         manifest.append(each)
     with open(manifest.path, "ab") as file:
         file.write(b"nonsense\n[1]\n")
-    lines = InOrder(tmp_path, range(1, 8, 2))
-    assert list(map(from_line, lines)) == [row(3), row(5)]
-    assert len(lines) == 2
-    assert list(InOrder(tmp_path, range(10, 12))) == []
-    assert list(InOrder(tmp_path / "none", range(3))) == []
+    assert in_order(tmp_path, 2, 2, 8) == [row(3), row(5)]
+    assert in_order(tmp_path, 1, 1, 3) == []
+    assert in_order(tmp_path / "none") == []
+
+
+def test_what_tells_rows_from_others_is_what_they_say_and_not_where_they_stand(
+    tmp_path: Path,
+) -> None:
+    rows, header = [row(0), row(1), row(2)], Header(PLAN, 3, (1, 1), ("arm.yaml",))
+    digests = []
+    for name, every in (
+        ("a", rows),
+        ("b", rows[::-1]),
+        ("c", [row(1, "error"), *rows, row(1)]),
+        ("d", rows[:2]),
+        ("e", [*rows, row(1, "error")]),
+    ):
+        (tmp_path / name).mkdir()
+        for each in every:
+            Manifest(tmp_path / name, PLAN).append(each)
+        digests.append(InOrder(tmp_path / name, header).digest)
+    assert digests[0] == digests[1] == digests[2]
+    assert len(set(digests)) == 3
+
+
+def test_a_line_of_which_any_byte_was_changed_is_no_result_and_the_one_behind_it_counts(
+    tmp_path: Path,
+) -> None:
+    manifest = Manifest(tmp_path, PLAN)
+    manifest.append(row(1))
+    whole = manifest.path.read_bytes()
+    for k in range(len(whole)):
+        damaged = whole[:k] + bytes([whole[k] ^ 1]) + whole[k + 1 :]
+        manifest.path.write_bytes(damaged)
+        assert news(Manifest(tmp_path, PLAN)) == [], k
+        manifest.path.write_bytes(damaged + b"\n" + whole)
+        assert in_order(tmp_path) == [row(1)], k
+
+
+def test_a_line_of_another_batch_is_none(tmp_path: Path) -> None:
+    Manifest(tmp_path, "another").append(row(1))
+    assert news(Manifest(tmp_path, PLAN)) == []
+    assert in_order(tmp_path) == []
 
 
 @pytest.mark.parametrize(
     ("was", "becomes"),
     [
-        (b'"ok"', b'["ok"]'),
-        (b'"ok"', b'"fine"'),
-        (b'"values": {}', b'"values": null'),
-        (b'"seconds": 0.1', b'"seconds": "0.1"'),
-        (b'"design": []', b'"design": 5'),
-        (b'"design": []', b'"design": [["m", "1"]]'),
-        (b'"frequencies": []', b'"frequencies": [["mode 1", 1.0]]'),
-        (b'"case 1"', b"1"),
-        (b'"run_folder": null', b'"run_folder": ["a"]'),
-        (b'"index": 1,', b'"index": 1.0,'),
-        (b'"arm.yaml"', b"\xff"),
+        ('"ok"', '["ok"]'),
+        ('"ok"', '"fine"'),
+        ('"values": {}', '"values": null'),
+        ('"seconds": 0.1', '"seconds": "0.1"'),
+        ('"seconds": 0.1', '"seconds": NaN'),
+        ('"design": []', '"design": 5'),
+        ('"design": []', '"design": [["m", "1"]]'),
+        ('"design": []', '"design": ' + 10**5 * "["),
+        ('"frequencies": []', '"frequencies": [["mode 1", 1.0]]'),
+        ('"case 1"', "1"),
+        ('"run_folder": null', '"run_folder": ["a"]'),
+        ('"index": 1,', '"index": 1.0,'),
+        ('"index": 1,', f'"index": 1{"0" * 5000},'),
     ],
 )
-def test_a_damaged_line_is_no_result_and_the_one_behind_it_counts(
-    tmp_path: Path, was: bytes, becomes: bytes
-) -> None:
-    manifest = Manifest(tmp_path)
-    manifest.append(row(1))
-    whole = manifest.path.read_bytes()
-    damaged = whole.replace(was, becomes)
-    assert damaged != whole
-    with pytest.raises(StorageError, match="delete it and run the batch again"):
-        from_line(damaged)
-    manifest.path.write_bytes(damaged)
-    assert list(Manifest(tmp_path).news()) == []
-    manifest.path.write_bytes(damaged + whole)
-    assert list(Manifest(tmp_path).news()) == [row(1)]
-    assert list(map(from_line, InOrder(tmp_path, range(3)))) == [row(1)]
+def test_what_is_no_row_is_said_to_be_damaged(was: str, becomes: str) -> None:
+    damaged = to_line(row(1)).replace(was, becomes)
+    assert damaged != to_line(row(1))
+    for text in (damaged, damaged.encode()):
+        with pytest.raises(StorageError, match="delete it and run the batch again"):
+            from_line(text)
 
 
 def test_a_header_reads_back_and_a_damaged_one_is_refused(tmp_path: Path) -> None:
@@ -96,11 +138,13 @@ def test_a_header_reads_back_and_a_damaged_one_is_refused(tmp_path: Path) -> Non
     assert read_header(tmp_path) == header
     assert list(header.indices()) == [1, 4, 7]
     whole = (tmp_path / "batch.json").read_bytes()
-    wrong = [whole.replace(b": 10,", each) for each in (b": 1e9,", b': "10",')]
+    many = (b": 1e9,", b': "10",', b": 1e999,", b": -1,", b": true,", b": 1" + b"0" * 99 + b",")
+    wrong = [whole.replace(b": 10,", each) for each in many]
     wrong += [whole.replace(b"    3\n", each) for each in (b"    0\n", b'    "3"\n')]
-    wrong += [whole.replace(b"    2,\n", b"    0,\n")]
+    wrong += [whole.replace(b"    2,\n", b"    0,\n"), whole.replace(b'"abc"', b"7")]
+    wrong += [whole.replace(b'"../arm.yaml"', each) for each in (b"5", b'"a\\u0000b"')]
     assert whole not in wrong
-    for damaged in (b"{", b"[]", b'{"format": 1}', b'{"format": 9}', *wrong):
+    for damaged in (b"{", b"[]", b"[" * 10**5, b'{"format": 1}', b'{"format": 9}', *wrong):
         (tmp_path / "batch.json").write_bytes(damaged)
         with pytest.raises(UsageError):
             read_header(tmp_path)

@@ -14,6 +14,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from instant import write_run
 
 from eigassign.batch import Header, Manifest, merge_shards, read_header, summarise, write_header
 from eigassign.cli import main
@@ -36,9 +37,11 @@ def shard(folder: Path, i: int, n: int, *, columns: bool = False, **changes: obj
     header = Header("abc", TOTAL, (i, n), ("../arm.yaml",), ("body.mass",), columns)
     folder.mkdir(parents=True)
     write_header(folder, replace(header, **changes))
-    manifest = Manifest(folder)
+    manifest = Manifest(folder, "abc")
     for k in reversed(header.indices()):
         manifest.append(replace(row(k), run_folder=None) if columns else row(k))
+        if not columns:
+            write_run(folder / row(k).name, row(k))
     return folder
 
 
@@ -162,7 +165,8 @@ def test_the_command_counts_and_names_what_has_moved(
         shard(Path(name), 1, 1)
     assert main(["merge", "before"]) == 1  # a case has failed
     moved = replace(row(5), frequencies=(("mode 1", 180.0, 190.0, 200.5),))
-    Manifest(Path("now")).append(moved)
+    write_run(Path("now", moved.name), moved)
+    Manifest(Path("now"), "abc").append(moved)
     capsys.readouterr()
     assert main(["merge", "now", "--against", "before"]) == 1
     out, err = capsys.readouterr()

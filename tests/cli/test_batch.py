@@ -90,7 +90,7 @@ def test_a_dry_run_lists_what_would_run_and_says_what_it_takes(
     assert [line.split()[0] for line in out.splitlines()[3:11]] == list("12345…89")
     assert "9 cases would run, 0 are done and current\ntime     about " in out
     assert "a case, estimated from the first\nmemory   about 150 MB in each of 1 process\n" in out
-    assert "files    189 more, about 6.58 MB, in results/a_sweep\n" in out
+    assert "files    198 more, about 6.58 MB, in results/a_sweep\n" in out
     assert not Path("results").exists()
     one = ["--set", "targets.0.frequency=180 Hz", "--reports", "none", "--jobs", "1"]
     assert main(["batch", "a.yaml", *one]) == 0

@@ -10,8 +10,10 @@ from itertools import count
 from typing import Any, Literal, get_args
 
 from eigassign.errors import StorageError
+from eigassign.files import json_value
 from eigassign.study.results import RunResults
 
+OUTCOME = "outcome.json"  # in the folder of a case
 Status = Literal["ok", "tolerance", "failed", "error"]
 Range = tuple[str, float, float, float]  # of what, lowest, mean, highest
 
@@ -64,7 +66,7 @@ def to_line(outcome: CaseOutcome) -> str:
 def from_line(line: str | bytes) -> CaseOutcome:
     """The outcome that `to_line` wrote, with lists for tuples; raises StorageError else."""
     try:
-        return from_plain(json.loads(line))
+        return from_plain(json_value(line))
     except (ValueError, TypeError):
         begin = line[:40].decode(errors="replace") if isinstance(line, bytes) else line[:40]
         message = f"manifest.jsonl has a damaged line, {begin}…: delete it and run the batch again"

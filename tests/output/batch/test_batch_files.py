@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import re
 from pathlib import Path
 
@@ -16,7 +15,6 @@ from eigassign.output import (
     CaseOutcome,
     Columns,
     Index,
-    are_current,
     to_line,
     write_files,
 )
@@ -120,18 +118,6 @@ def test_a_name_is_no_markup_in_the_page(tmp_path):
     write_files(tmp_path, [to_line(hostile)], 1)
     assert page_data(tmp_path)["rows"][0][1] == "</script><b>"
     assert "<img onerror" not in (tmp_path / "index.html").read_text("utf-8")
-
-
-def test_files_are_current_until_the_manifest_is_newer_or_one_is_gone(tmp_path):
-    manifest = tmp_path / "manifest.jsonl"
-    manifest.write_text("\n".join(lines(2)))
-    assert not are_current(tmp_path, False, manifest)
-    write_files(tmp_path, lines(2), 2)
-    assert are_current(tmp_path, False, manifest)
-    assert not are_current(tmp_path, True, manifest)
-    later = manifest.stat().st_mtime_ns + 10**9
-    os.utime(manifest, ns=(later, later))
-    assert not are_current(tmp_path, False, manifest)
 
 
 def test_columns_of_a_batch_that_has_folders_now_do_not_stay(tmp_path):

@@ -1,0 +1,338 @@
+"""What is done is what its own record says is done: whatever becomes of a file, of the index, of
+clocks and of processes, the same command ends with the same results.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import resource
+import shutil
+import signal
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+
+import pytest
+from instant import batch_of, case, instant
+from stopping import can_stop, stopped_at
+
+from eigassign.batch import Batch, merge_shards, run
+from eigassign.errors import StorageError, UsageError
+
+MASSES = "0,0.5,0.75,1"  # that of 0.75 has no answer, and so no folder
+DONE = ["mass=0", "mass=0.5", "mass=0.75", "mass=1"]
+FILES = ("results.json", "case.yaml", "outcome.json", "run.json")
+
+
+def ran(batch: Batch) -> list[str]:
+    """Run it; the names of the cases that were not done before."""
+    heard: list[str] = []
+    place = instant(batch.folder, lambda _name: None)
+    run(batch, place, lambda _progress: None, lambda found: heard.append(found.name))
+    return heard
+
+
+def summaries(folder: Path) -> dict[str, str]:
+    """What they say, wherever they are."""
+    names = ("summary.csv", "summary.json", "junit.xml", "columns.csv")
+    there = [folder / name for name in names if (folder / name).exists()]
+    return {path.name: path.read_text().replace(str(folder.parent), "") for path in there}
+
+
+@pytest.fixture
+def batch(tmp_path: Path) -> Batch:
+    """One that is done."""
+    case(tmp_path)
+    found = batch_of(tmp_path, MASSES)
+    assert ran(found) == DONE
+    return found
+
+
+def in_columns(batch: Batch) -> Batch:
+    return replace(batch, options=replace(batch.options, columns=True))
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:3])
+
+
+def replaced(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+def flipped(path: Path) -> None:
+    data = path.read_bytes()
+    path.write_bytes(bytes([data[0] ^ 1]) + data[1:])
+
+
+def of_another(path: Path) -> None:
+    shutil.copy(path.parents[1] / "mass=1" / path.name, path)
+
+
+DAMAGES = (
+    Path.unlink,
+    cut,
+    lambda path: path.write_bytes(b""),
+    replaced,
+    flipped,
+    of_another,
+    lambda path: (path.unlink(), path.symlink_to(path.parents[1] / "mass=1" / path.name)),
+    lambda path: (path.unlink(), os.mkfifo(path)),
+)
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("name", FILES)
+def test_a_case_of_which_any_file_was_damaged_runs_again_and_alone(
+    batch: Batch, name: str, damage: Callable[[Path], object]
+) -> None:
+    before = summaries(batch.folder)
+    damage(batch.folder / "mass=0.5" / name)
+    assert ran(batch) == ["mass=0.5"]
+    assert summaries(batch.folder) == before
+    assert os.path.lexists(batch.folder / "mass=0.5.1" / name) == (damage is not Path.unlink)
+    assert ran(batch) == []
+    assert summaries(batch.folder) == before
+
+
+@pytest.mark.parametrize("also_the_index", [False, True])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        shutil.rmtree,
+        lambda folder: os.rename(folder, folder.with_name("elsewhere")),
+        lambda folder: (shutil.rmtree(folder), shutil.copytree(folder.with_name("mass=1"), folder)),
+    ],
+)
+def test_a_folder_that_is_gone_or_another_case_s_is_made_again(
+    batch: Batch, damage: Callable[[Path], object], also_the_index: bool
+) -> None:
+    before = summaries(batch.folder)
+    damage(batch.folder / "mass=0.5")
+    if also_the_index:
+        (batch.folder / "manifest.jsonl").unlink()
+    assert set(ran(batch)) == {"mass=0.5"} | ({"mass=0.75"} if also_the_index else set())
+    assert summaries(batch.folder) == before
+
+
+def test_notes_in_the_folder_of_a_case_leave_it_done(batch: Batch) -> None:
+    (batch.folder / "mass=0.5" / "notes.md").write_text("mine")
+    assert ran(batch) == []
+
+
+def doubled(lines: list[bytes]) -> list[bytes]:
+    return [*lines, *lines]
+
+
+def permuted(lines: list[bytes]) -> list[bytes]:
+    return random.Random(1).sample(lines, len(lines))
+
+
+INDEX: Sequence[tuple[Callable[[list[bytes]], list[bytes]], set[str]]] = (
+    (lambda lines: [], {"mass=0.75"}),
+    (lambda lines: [lines[0], lines[1][:50]], {"mass=0.75"}),
+    (lambda lines: [lines[2]], set()),
+    (doubled, set()),
+    (permuted, set()),
+    (lambda lines: [line.replace(b'"ok"', b'"failed"') for line in lines], set()),
+    (lambda lines: [line.replace(b'"failed"', b'"ok"') for line in lines], {"mass=0.75"}),
+    (lambda lines: [line.replace(b'"seal": "', b'"seal": "0') for line in lines], {"mass=0.75"}),
+    (lambda lines: [b"[" * 10**5 + b"\n", b"\xff\n", b"{}\n", *lines], set()),
+)
+
+
+@pytest.mark.parametrize(("change", "again"), INDEX)
+def test_the_index_is_made_again_of_the_records(
+    batch: Batch, change: Callable[[list[bytes]], list[bytes]], again: set[str]
+) -> None:
+    """But for what has no folder: that runs again."""
+    before = summaries(batch.folder)
+    place = batch.folder / "manifest.jsonl"
+    place.write_bytes(b"".join(change(place.read_bytes().splitlines(keepends=True))))
+    assert set(ran(batch)) == again
+    assert summaries(batch.folder) == before
+    place.unlink()
+    assert ran(batch) == ["mass=0.75"]
+    assert summaries(batch.folder) == before
+
+
+@pytest.mark.parametrize(("change", "_again"), INDEX)
+def test_without_folders_a_line_that_was_changed_is_one_case_to_run(
+    tmp_path: Path, change: Callable[[list[bytes]], list[bytes]], _again: set[str]
+) -> None:
+    case(tmp_path)
+    batch = in_columns(batch_of(tmp_path, MASSES))
+    assert ran(batch) == DONE
+    before = summaries(batch.folder)
+    place = batch.folder / "manifest.jsonl"
+    lines = place.read_bytes().splitlines(keepends=True)
+    changed = change(lines)
+    place.write_bytes(b"".join(changed))
+    assert ran(batch) == [DONE[k] for k in range(4) if lines[k] not in changed]
+    assert summaries(batch.folder) == before
+
+
+def test_the_index_of_another_batch_says_nothing(batch: Batch, tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    case(tmp_path / "other", end="assignment: {starts: 2}\n")
+    other = batch_of(tmp_path / "other", MASSES)
+    ran(other)
+    before = summaries(batch.folder)
+    shutil.copy(other.folder / "manifest.jsonl", batch.folder / "manifest.jsonl")
+    assert ran(batch) == ["mass=0.75"]
+    assert summaries(batch.folder) == before
+    shutil.rmtree(batch.folder / "mass=1")
+    shutil.copytree(other.folder / "mass=1", batch.folder / "mass=1")  # its values, not its file
+    assert ran(batch) == ["mass=1"]
+    assert summaries(batch.folder) == before
+
+
+def test_a_folder_in_the_place_of_the_index_is_told(batch: Batch) -> None:
+    replaced(batch.folder / "manifest.jsonl")
+    with pytest.raises(StorageError, match=r"manifest\.jsonl: cannot be"):
+        ran(batch)
+
+
+def test_without_batch_json_nothing_runs_again(batch: Batch) -> None:
+    before = summaries(batch.folder)
+    (batch.folder / "batch.json").unlink()
+    assert ran(batch) == []
+    assert summaries(batch.folder) == before
+
+
+@pytest.mark.parametrize("minutes", [-10, 10])
+def test_a_clock_that_is_wrong_loses_no_variant(tmp_path: Path, minutes: int) -> None:
+    case(tmp_path)
+    ran(batch_of(tmp_path, "0,0.5"))
+    batch = batch_of(tmp_path, "0,0.5,1")
+    for path in batch.folder.rglob("*"):
+        then = path.stat().st_mtime + 60.0 * minutes
+        os.utime(path, (then, then))
+    assert ran(batch) == ["mass=1"]
+    rows = json.loads((batch.folder / "summary.json").read_text())["cases"]
+    assert [row["name"] for row in rows] == ["mass=0", "mass=0.5", "mass=1"]
+
+
+def test_a_file_that_a_value_names_is_a_part_of_the_case(tmp_path: Path) -> None:
+    text = case(tmp_path).read_text()
+    table = tmp_path / "q.csv"
+    table.write_text("q1,q2\n0,0\n1,1\n")
+    setting = "title=q.csv,other"
+    first = batch_of(tmp_path, setting=setting)
+    assert len(ran(first)) == 2
+    table.write_text("q1,q2\n0,0\n1,2\n")
+    assert (tmp_path / "arm.yaml").read_text() == text
+    assert ran(batch_of(tmp_path, setting=setting)) == ["title=q.csv"]
+
+
+def test_a_shard_with_a_damaged_case_is_not_finished(tmp_path: Path) -> None:
+    case(tmp_path)
+    whole = batch_of(tmp_path, MASSES)
+    parts = [
+        replace(whole, folder=tmp_path / f"part-{i}", shard=(i, 2), options=options)
+        for i in (1, 2)
+        for options in [replace(whole.options, out=str(tmp_path / f"part-{i}"))]
+    ]
+    for part in parts:
+        ran(part)
+    folders = [part.folder for part in parts]
+    merge_shards(whole.folder, folders)
+    before = summaries(whole.folder)
+    cut(folders[1] / "mass=0.5" / "results.json")
+    with pytest.raises(UsageError, match=r"shard 2/2, is not finished: 1 of 2 cases$"):
+        merge_shards(whole.folder, folders)
+    with pytest.raises(UsageError, match=r"files of mass=0\.5 are not as .*: run the batch"):
+        merge_shards(whole.folder, [])
+    assert summaries(whole.folder) == before
+    (folders[0] / "manifest.jsonl").unlink()
+    assert [ran(part) for part in parts] == [["mass=0.75"], ["mass=0.5"]]
+    merge_shards(whole.folder, folders)
+    assert summaries(whole.folder) == before
+
+
+# --- Processes
+
+
+def changed(folder: Path) -> Batch:
+    """A batch of which a case is new, one damaged, and one not in the index."""
+    case(folder)
+    ran(batch_of(folder, "0,0.5,0.75"))
+    out = folder / "out"
+    lines = (out / "manifest.jsonl").read_bytes().splitlines(keepends=True)
+    (out / "manifest.jsonl").write_bytes(b"".join(lines[1:]))
+    cut(out / "mass=0.5" / "results.json")
+    return batch_of(folder, MASSES)
+
+
+needs_ptrace = pytest.mark.skipif(not can_stop(), reason="needs ptrace, on Linux")
+
+
+@needs_ptrace
+@pytest.mark.parametrize("every", [17, pytest.param(1, marks=pytest.mark.slow)])
+def test_a_kill_between_any_two_writes_changes_nothing(tmp_path: Path, every: int) -> None:
+    (tmp_path / "undisturbed").mkdir()
+    undisturbed = changed(tmp_path / "undisturbed")
+    ran(undisturbed)
+    expected = summaries(undisturbed.folder)
+    for call in count(1, every):
+        folder = tmp_path / f"{call}"
+        folder.mkdir()
+        batch = changed(folder)
+        stopped = stopped_at(lambda: len(ran(batch)) * 0, call, signal.SIGKILL)  # noqa: B023
+        again = ran(batch)
+        assert set(again) <= {"mass=0.5", "mass=1"}, call
+        assert summaries(batch.folder) == expected, call
+        assert ran(batch) == [], call
+        assert not [path for path in batch.folder.glob(".*") if path.name != ".lock"], call
+        shutil.rmtree(folder)
+        if not stopped.reached:
+            assert call > 50
+            return
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+@pytest.mark.parametrize("most", [0, 1, 100, 300, 500, 700, 1000, 2000, 5000, 20_000])
+def test_a_disk_that_is_full_at_any_time_loses_nothing(tmp_path: Path, most: int) -> None:
+    (tmp_path / "undisturbed").mkdir()
+    undisturbed = changed(tmp_path / "undisturbed")
+    ran(undisturbed)
+    batch = changed(tmp_path)
+    pid = os.fork()
+    if not pid:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+        code = 1
+        with suppress(BaseException):
+            ran(batch)
+            code = 0
+        os._exit(code)
+    os.waitpid(pid, 0)
+    ran(batch)
+    assert summaries(batch.folder) == summaries(undisturbed.folder)
+    assert ran(batch) == []
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+def test_of_two_that_end_at_once_the_summaries_have_all(tmp_path: Path) -> None:
+    case(tmp_path)
+    batch = batch_of(tmp_path, "1..2:41")
+    others = []
+    for _ in range(4):
+        if not (pid := os.fork()):
+            code = 1
+            with suppress(BaseException):
+                place = instant(batch.folder, lambda _name: None, 1)
+                run(batch, place, lambda _p: None, lambda _o: None, join=True)
+                code = 0
+            os._exit(code)
+        others.append(pid)
+    assert [os.waitpid(pid, 0)[1] for pid in others] == [0] * 4
+    assert len(json.loads((batch.folder / "summary.json").read_text())["cases"]) == 41
+    before = {path: path.stat().st_ino for path in batch.folder.glob("summary.*")}
+    assert ran(batch) == []
+    assert {path: path.stat().st_ino for path in before} == before
