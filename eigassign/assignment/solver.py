@@ -5,7 +5,8 @@ on failure x is 2143289344.0 and not NaN (x is read only when the status is 1); 
 not refused (refused here); a lower triangle is ignored (the upper one is given); an interrupt is
 swallowed (raised again); its own polishing may worsen the answer, and prints to stdout in spite of
 ``verbose=False`` (off; the active-set method below polishes, and `optimality` judges both). With a
-positive semidefinite P and ordered limits nothing is printed, so stdout needs no redirection.
+positive semidefinite P and ordered limits nothing is printed, so stdout needs no redirection. Made
+without a name of its algebra it looks for others on the disk, 1 to 2 ms for each program (named).
 
 **Polish.** Least squares with a linear cost and limits, by the primal active-set method, to
 round-off:
@@ -159,7 +160,7 @@ def solve_osqp(scaled: ScaledProgram) -> RawSolution:
 
     P, c = scaled.P, scaled.c
     _refuse_nan(P, c, scaled)
-    solver = osqp.OSQP()
+    solver = osqp.OSQP(algebra="builtin")
     P_upper, G = csc_matrix(np.triu(P)), csc_matrix(scaled.G)
     solver.setup(P_upper, c, G, scaled.lower, scaled.upper, **SETTINGS)
     result = solver.solve(raise_error=False)
