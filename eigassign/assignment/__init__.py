@@ -19,9 +19,8 @@ __all__, __getattr__, __dir__ = face(
     __name__,
     {
         "assign": "Assignment solve_assignment",
-        "catalogues.branching": "ListedValues hull search_catalogue",
-        "catalogues.choosing": "choose",
-        "catalogues.linear": "solve_catalogue",
+        "catalogues.branching": "CatalogueProblem ListedValues Relaxed hull search_catalogue",
+        "catalogues.choosing": "choose solve_catalogue",
         "exact.design_problem": "Appraisal DesignProblem Objective best_first",
         "exact.identification": "Identified MeasuredFrequencies identify",
         "exact.requirements": "Frequencies FrequencyLimit FrequencyGoal QuantityLimit Requirements",

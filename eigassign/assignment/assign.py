@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.assignment.catalogues.branching import CatalogueSearch, ListedValues
-from eigassign.assignment.catalogues.linear import held, solve_catalogue
+from eigassign.assignment.catalogues.choosing import held, solve_catalogue
 from eigassign.assignment.checks import Floats, finite, frozen
 from eigassign.assignment.optimality import ACCEPT, best_candidate
 from eigassign.assignment.program import (

@@ -3,6 +3,5 @@
 Reading order:
 
     branching  the tree, over any model whose relaxations can be solved
-    linear     the linear model of eqs. (13)–(14), proved
-    choosing   the exact problem
+    choosing   the program of eqs. (13)–(14), proved, and the exact problem
 """

@@ -10,8 +10,7 @@ row, the rows on either side of that part, along the direction in which they dif
 Combinations are found by rounding to the nearest rows, and by looking at all those of a small node;
 a node is dropped when its bound is not below the worst of the combinations kept.
 
-The tree is searched over the linear model in `linear`, and here over any model whose relaxations
-the caller solves (`search_catalogue`).
+Relaxations and combinations are those of a `CatalogueProblem`.
 """
 
 from __future__ import annotations
@@ -19,17 +18,17 @@ from __future__ import annotations
 import heapq
 import itertools
 import time
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from math import prod
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.checks import Floats, finite, frozen, same_length
 from eigassign.assignment.program import Bounds, LinearConstraint
-from eigassign.errors import AccuracyError, InfeasibleError, UsageError
+from eigassign.errors import AccuracyError, EigassignError, InfeasibleError, UsageError
 
 Rows = tuple[int, ...]  # one row of every catalogue: a combination
 Node = tuple[Rows, ...]  # the rows that every catalogue may still take
@@ -92,128 +91,69 @@ class CatalogueSearch:
         return self.gap / abs(self.best[0].objective) if self.gap > 0.0 else 0.0
 
 
-# --- The tree
+# --- The problem, by its nodes and combinations
 
 
 @dataclass(frozen=True)
 class Relaxed:
-    """A node after its relaxation.
+    """A node's optimum over the hull of its rows, and a bound of all its combinations.
 
-    ``node``: the rows that may still be better. ``bound``: no combination of them is below it.
-    ``y`` (n_y,): the optimum, with the multipliers ``mu`` that the problem may want of it again.
+    ``row_bounds``: of the combinations with each row, by catalogue; () where nothing says so.
     """
 
-    node: Node
-    bound: float
     y: Floats
-    mu: Floats = field(default_factory=lambda: np.zeros(0))
+    bound: float
+    row_bounds: tuple[Floats, ...] = ()
 
 
-class CatalogueProblem(Protocol):
-    """A problem over catalogues, by its nodes.
+class CatalogueProblem(ABC):
+    """A problem over catalogues.
 
-    ``metric`` (any, n_y): designs are as far apart as ``metric @ y``. ``small``: the number of
-    combinations up to which all those of a node are looked at together.
+    ``root``: the rows to choose from. ``metric`` (any, n_y): designs are as far apart as
+    ``metric @ y``. ``convex``: the bounds of its relaxations hold without doubt, so that the best
+    few can be proved. ``small``: the number of combinations up to which all those of a node are
+    looked at together.
+
+    Raises UsageError for columns that are none of y (n_y,), or that two catalogues own.
     """
 
-    catalogues: Sequence[ListedValues]
-    metric: Floats
-    small: int
+    convex = False
+    small = 1
 
-    def relax(self, node: Node, above: Relaxed | None, cutoff: float) -> Relaxed | None:
-        """Return None if no combination is below the cutoff; ``above`` is the node split."""
+    def __init__(self, catalogues: Sequence[ListedValues], n_y: int) -> None:
+        _refuse_columns(catalogues, n_y)
+        self.catalogues, width = catalogues, np.ones(n_y)
+        for own in catalogues:
+            width[list(own.columns)] = np.ptp(own.rows, axis=0)
+        self.metric = np.diag(1.0 / np.where(width > 0.0, width, 1.0))
+        self.root = tuple(tuple(distinct_rows(own).tolist()) for own in catalogues)
 
-    def combinations(
-        self, node: Node, near: Relaxed, cutoff: Callable[[], float]
-    ) -> Iterable[Combination]:
-        """Yield those that can be below the cutoff; ``near`` is a node around this small one."""
+    @abstractmethod
+    def relax(self, node: Node, near: Floats | None) -> Relaxed | None:
+        """Return None where there is nothing; ``near`` is y of the node around it."""
 
+    @abstractmethod
+    def fix(self, rows: Rows, cutoff: float) -> tuple[Floats, float] | None:
+        """Return y (n_y,) and the objective of a combination; each is asked for once.
 
-class _Best:
-    """The best combinations so far, distinct, the best first."""
+        None where there is none; or none below the cutoff, where that is easier to tell.
+        """
 
-    def __init__(self, keep: int) -> None:
-        self.keep = keep
-        self.found: list[Combination] = []
+    def ranked(self, node: Node) -> Iterable[tuple[float, Rows]]:
+        """Return the combinations of a small node, the lowest bound of the objective first."""
+        return ((-np.inf, rows) for rows in itertools.product(*node))
 
-    def cutoff(self) -> float:
-        """The objective that a combination must be below to be kept."""
-        return self.found[-1].objective if len(self.found) >= self.keep else np.inf
+    def away(self, node: Node, y: Floats) -> list[Floats]:
+        """The way (rows, any) from y to each row in the node, by catalogue."""
+        return [
+            (own.rows[list(rows)] - y[list(own.columns)]) @ self.metric[:, own.columns].T
+            for own, rows in zip(self.catalogues, node, strict=True)
+        ]
 
-    def add(self, combinations: Iterable[Combination]) -> None:
-        for one in combinations:
-            if one.objective < self.cutoff() and all(one.rows != k.rows for k in self.found):
-                self.found = sorted([*self.found, one], key=lambda c: (c.objective, c.rows))
-                self.found = self.found[: self.keep]
-
-
-def branch_and_bound(
-    problem: CatalogueProblem,
-    root: Node,
-    keep: int,
-    seconds: float,
-    start: Iterable[Combination] = (),
-) -> CatalogueSearch:
-    """Search the lowest bound first for the ``keep`` best, knowing some at the start.
-
-    ``best`` is empty where there is no combination, or none was met in time.
-    """
-    best, nodes, end = _Best(keep), 0, time.monotonic() + seconds
-    best.add(start)
-    heap: list[tuple[float, int, Relaxed]] = []
-    pending: list[Node] = [root]
-    above: Relaxed | None = None
-    while True:
-        for node in pending:
-            nodes += 1
-            relaxed = problem.relax(node, above, best.cutoff())
-            if relaxed is not None:
-                near = [int(np.linalg.norm(d, axis=1).argmin()) for d in _away(problem, relaxed)]
-                rounded = tuple((rows[k],) for rows, k in zip(relaxed.node, near, strict=True))
-                best.add(problem.combinations(rounded, relaxed, best.cutoff))
-                heapq.heappush(heap, (relaxed.bound, nodes, relaxed))
-        exhausted = not heap or heap[0][0] >= best.cutoff() - PROVED * abs(best.cutoff())
-        if exhausted or time.monotonic() > end:
-            break
-        above = heapq.heappop(heap)[2]
-        pending = []
-        if prod(map(len, above.node)) <= problem.small:
-            best.add(problem.combinations(above.node, above, best.cutoff))
-        else:
-            pending = _split(problem, above)
-    bounds = [bound for bound, *_ in heap[:1]] + [one.objective for one in best.found[:1]]
-    return CatalogueSearch(tuple(best.found), min(bounds, default=np.inf), nodes, exhausted)
-
-
-def _away(problem: CatalogueProblem, relaxed: Relaxed) -> list[Floats]:
-    """The way (rows, any) from the relaxation's optimum to each row in the node, by catalogue."""
-    return [
-        (own.rows[list(rows)] - relaxed.y[list(own.columns)]) @ problem.metric[:, own.columns].T
-        for own, rows in zip(problem.catalogues, relaxed.node, strict=True)
-    ]
-
-
-def _split(problem: CatalogueProblem, relaxed: Relaxed) -> list[Node]:
-    """Two nodes that share out the rows of the catalogue furthest from being decided."""
-    ways = _away(problem, relaxed)
-    k = int(np.argmax([np.linalg.norm(d, axis=1).min() if len(d) > 1 else -1.0 for d in ways]))
-    rows, away = np.array(relaxed.node[k]), ways[k]
-    along = away @ np.linalg.svd(away - away.mean(axis=0), full_matrices=False)[2][0]
-    low = along <= 0.0
-    if low.all() or not low.any():
-        low = np.isin(np.arange(rows.size), np.argsort(along, kind="stable")[: rows.size // 2])
-    halves = (tuple(rows[side].tolist()) for side in (low, ~low))
-    return [(*relaxed.node[:k], half, *relaxed.node[k + 1 :]) for half in halves]
-
-
-def answered(found: CatalogueSearch) -> CatalogueSearch:
-    """Return what was found; raise AccuracyError where time ran out first."""
-    if found.best:
-        return found
-    raise AccuracyError(
-        f"catalogues: no combination that meets all limits was found in {found.nodes} nodes; "
-        "allow more, shorten the lists or relax a limit"
-    )
+    def nearest(self, node: Node, y: Floats) -> Rows:
+        """The rows of a node that are nearest to a design."""
+        ways = zip(node, self.away(node, y), strict=True)
+        return tuple(rows[int(np.linalg.norm(away, axis=1).argmin())] for rows, away in ways)
 
 
 def distinct_rows(catalogue: ListedValues) -> NDArray[np.int_]:
@@ -221,7 +161,7 @@ def distinct_rows(catalogue: ListedValues) -> NDArray[np.int_]:
     return np.sort(np.unique(catalogue.rows, axis=0, return_index=True)[1])
 
 
-def refuse_columns(catalogues: Sequence[ListedValues], n_y: int) -> None:
+def _refuse_columns(catalogues: Sequence[ListedValues], n_y: int) -> None:
     """UsageError unless every column is one of y (n_y,) and has one owner."""
     owner: dict[int, str] = {}
     for catalogue in catalogues:
@@ -233,54 +173,6 @@ def refuse_columns(catalogues: Sequence[ListedValues], n_y: int) -> None:
                     f"catalogues {owner[column]!r} and {catalogue.name!r} both set column {column}"
                 )
             owner[column] = catalogue.name
-
-
-# --- Any model
-
-
-def search_catalogue(
-    catalogues: Sequence[ListedValues],
-    relax: Callable[[Node, Floats | None], tuple[Floats, float] | None],
-    fix: Callable[[Rows], tuple[Floats, float] | None],
-    keep: int = KEEP,
-    seconds: float = SECONDS,
-    starts: Iterable[Rows] = (),
-) -> CatalogueSearch:
-    """Combinations of a model that need not be linear or convex, by the same tree.
-
-    ``relax(node, near)`` returns y (n_y,) and the objective at the optimum over the hull of a
-    node's rows (`hull`), or None where there is none; ``near`` is the optimum of the node around
-    it, to start from. ``fix(rows)`` does so for one combination. ``starts``: combinations to begin
-    with. At the end the rows of the best combination are exchanged in two catalogues at a time, as
-    long as that finds a better one.
-
-    Relaxations are dear, so the tree is for the best combination; the others in ``best`` are the
-    best of those met. The lower bound is as good as the optima of ``relax``: on a model that is
-    not convex it is proved as far as these are global.
-
-    Raises:
-        UsageError: columns that two catalogues own.
-        InfeasibleError: there is no combination.
-        AccuracyError: time ran out before any combination was found.
-    """
-    end = time.monotonic() + seconds
-    problem = _AnyProblem(catalogues, relax, fix)
-    known = filter(None, map(problem.combination, starts))
-    found = branch_and_bound(problem, problem.root, 1, seconds, known)
-    if not found.best and found.exhausted:
-        names = tuple(own.name for own in catalogues)
-        listed = ", ".join(map(repr, names))
-        raise InfeasibleError(f"no combination of the catalogues {listed} meets all limits", names)
-    here, better = None, answered(found).best[0]
-    while better is not here and time.monotonic() < end:
-        here = better
-        for pair in itertools.combinations(range(len(catalogues)), min(2, len(catalogues))):
-            rows = (every if k in pair else (here.rows[k],) for k, every in enumerate(problem.root))
-            exchanged = filter(None, map(problem.combination, itertools.product(*rows)))
-            better = min([better, *exchanged], key=lambda one: one.objective)
-    met = filter(None, problem.known.values())
-    best = tuple(sorted(met, key=lambda one: (one.objective, one.rows))[:keep])
-    return replace(found, best=best, lower_bound=min(found.lower_bound, best[0].objective))
 
 
 def hull(
@@ -310,40 +202,123 @@ def hull(
     return Bounds(lower, upper), rows
 
 
-class _AnyProblem:
-    """The caller's relaxations and combinations; every combination is asked for once."""
+# --- The tree
 
-    small = 1
 
-    def __init__(
-        self,
-        catalogues: Sequence[ListedValues],
-        relax: Callable[[Node, Floats | None], tuple[Floats, float] | None],
-        fix: Callable[[Rows], tuple[Floats, float] | None],
-    ) -> None:
-        self.catalogues, self._relax, self._fix = catalogues, relax, fix
-        width = np.ones(1 + max(max(own.columns) for own in catalogues))
-        refuse_columns(catalogues, width.size)
-        for own in catalogues:
-            width[list(own.columns)] = np.ptp(own.rows, axis=0)
-        self.metric = np.diag(1.0 / np.where(width > 0.0, width, 1.0))
-        self.root = tuple(tuple(distinct_rows(own).tolist()) for own in catalogues)
+class _Met:
+    """The combinations met so far, and of those the best."""
+
+    def __init__(self, problem: CatalogueProblem, keep: int) -> None:
+        self.problem, self.keep = problem, keep
         self.known: dict[Rows, Combination | None] = {}
+        self.best: list[Combination] = []
 
-    def relax(self, node: Node, above: Relaxed | None, cutoff: float) -> Relaxed | None:
-        optimum = self._relax(node, None if above is None else above.y)
-        if optimum is None or optimum[1] >= cutoff:
-            return None
-        return Relaxed(node, optimum[1], optimum[0])
+    @property
+    def cutoff(self) -> float:
+        """The objective that a combination must be below to matter."""
+        return self.best[-1].objective if len(self.best) >= self.keep else np.inf
 
-    def combinations(
-        self, node: Node, near: Relaxed, cutoff: Callable[[], float]
-    ) -> Iterable[Combination]:
-        return filter(None, map(self.combination, itertools.product(*node)))
+    def look_at(self, node: Node) -> None:
+        """Meet the combinations of a small node that can be below the cutoff."""
+        for bound, rows in self.problem.ranked(node):
+            if bound >= self.cutoff:
+                break
+            self.meet(rows)
 
-    def combination(self, rows: Rows) -> Combination | None:
-        """The combination with its objective, None where it has none."""
+    def meet(self, rows: Rows) -> None:
         if rows not in self.known:
-            fixed = self._fix(rows)
-            self.known[rows] = Combination(rows, frozen(fixed[0]), fixed[1]) if fixed else None
-        return self.known[rows]
+            fixed = self.problem.fix(rows, self.cutoff)
+            one = None if fixed is None else Combination(rows, frozen(fixed[0]), fixed[1])
+            self.known[rows] = one
+            if one is not None and one.objective < self.cutoff:
+                found = [*self.best, one]
+                self.best = sorted(found, key=lambda c: (c.objective, c.rows))[: self.keep]
+
+    def exchange(self, end: float) -> None:
+        """Exchange the rows of the best in two catalogues at a time while a better one is found."""
+        root, here = self.problem.root, None
+        while self.best[0] is not here and time.monotonic() < end:
+            here = self.best[0]
+            for pair in itertools.combinations(range(len(root)), min(2, len(root))):
+                rows = (every if k in pair else (here.rows[k],) for k, every in enumerate(root))
+                for exchanged in itertools.product(*rows):
+                    self.meet(exchanged)
+
+
+def search_catalogue(
+    problem: CatalogueProblem,
+    keep: int = KEEP,
+    seconds: float = SECONDS,
+    starts: Iterable[Rows] = (),
+) -> CatalogueSearch:
+    """The ``keep`` best combinations, the lowest bound searched first; begun with ``starts``.
+
+    Where the problem is not convex, relaxations are dear and the lower bound is proved as far as
+    their optima are global: the tree is then for the best combination, the others in ``best`` are
+    the best of those met, and at the end the rows of the best are exchanged in two catalogues at a
+    time, as long as that finds a better one.
+
+    Raises:
+        InfeasibleError: there is no combination.
+        AccuracyError: time ran out before any combination was found.
+    """
+    end = time.monotonic() + seconds
+    met = _Met(problem, keep if problem.convex else 1)
+    for rows in starts:
+        met.meet(rows)
+    nodes = 0
+    heap: list[tuple[float, int, Node, Relaxed]] = []  # bound, age
+    pending, near = [problem.root], None
+    while True:
+        for node in pending:
+            nodes += 1
+            relaxed = problem.relax(node, near)
+            if relaxed is not None and relaxed.bound < met.cutoff:
+                heapq.heappush(heap, (relaxed.bound, nodes, node, relaxed))
+                met.look_at(tuple((row,) for row in problem.nearest(node, relaxed.y)))
+        exhausted = not heap or heap[0][0] >= met.cutoff - PROVED * abs(met.cutoff)
+        if exhausted or time.monotonic() > end:
+            break
+        _, _, node, relaxed = heapq.heappop(heap)
+        if relaxed.row_bounds:
+            each = zip(node, relaxed.row_bounds, strict=True)
+            node = tuple(tuple(np.array(rows)[at < met.cutoff].tolist()) for rows, at in each)
+        near, pending = relaxed.y, []
+        if prod(map(len, node)) <= problem.small:
+            met.look_at(node)
+        else:
+            pending = _split(problem, node, near)
+    if not met.best:
+        raise _nothing(problem, nodes, exhausted)
+    bound = min([bound for bound, *_ in heap[:1]] + [met.best[0].objective])
+    if not problem.convex:
+        met.exchange(end)
+    every = sorted(filter(None, met.known.values()), key=lambda one: (one.objective, one.rows))
+    return CatalogueSearch(tuple(every[:keep]), min(bound, every[0].objective), nodes, exhausted)
+
+
+def _nothing(problem: CatalogueProblem, nodes: int, exhausted: bool) -> EigassignError:
+    """The error of a search without any combination."""
+    names = tuple(own.name for own in problem.catalogues)
+    if exhausted:
+        listed = ", ".join(map(repr, names))
+        return InfeasibleError(f"no combination of the catalogues {listed} meets all limits", names)
+    return AccuracyError(
+        f"catalogues: no combination that meets all limits was found in {nodes} nodes; "
+        "allow more, shorten the lists or relax a limit"
+    )
+
+
+def _split(problem: CatalogueProblem, node: Node, y: Floats) -> list[Node]:
+    """Two nodes that share out the rows of the catalogue furthest from being decided."""
+    ways = problem.away(node, y)
+    k = int(
+        np.argmax([np.linalg.norm(away, axis=1).min() if len(away) > 1 else -1.0 for away in ways])
+    )
+    rows, away = np.array(node[k]), ways[k]
+    along = away @ np.linalg.svd(away - away.mean(axis=0), full_matrices=False)[2][0]
+    low = along <= 0.0
+    if low.all() or not low.any():
+        low = np.isin(np.arange(rows.size), np.argsort(along, kind="stable")[: rows.size // 2])
+    halves = (tuple(rows[side].tolist()) for side in (low, ~low))
+    return [(*node[:k], half, *node[k + 1 :]) for half in halves]

@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares, linprog, minimize
 
-from eigassign.assignment import Bounds, ListedValues, hull, search_catalogue
+from eigassign.assignment import (
+    Bounds,
+    CatalogueProblem,
+    ListedValues,
+    Relaxed,
+    hull,
+    search_catalogue,
+)
 from eigassign.errors import AccuracyError, InfeasibleError, UsageError
 
 
@@ -95,6 +102,22 @@ class Arm:
         return np.sort(self.objective(np.array([self.design(catalogues, r) for r in places])))
 
 
+class Problem(CatalogueProblem):
+    """An arm's relaxations and combinations, or others."""
+
+    def __init__(self, arm, catalogues, relax=None, fix=None):
+        super().__init__(catalogues, arm.n_y)
+        self.relaxed = relax or arm.relax(catalogues)
+        self.fixed = fix or arm.fix(catalogues)
+
+    def relax(self, node, near):
+        found = self.relaxed(node, near)
+        return None if found is None else Relaxed(*found)
+
+    def fix(self, rows, cutoff):
+        return self.fixed(rows)
+
+
 def lists(seed, n_y, widest):
     """Of random width up to ``widest``, of 2 to 5 rows."""
     rng, first, found = np.random.default_rng(seed + 1000), 0, []
@@ -110,7 +133,7 @@ def lists(seed, n_y, widest):
 def test_the_best_of_a_nonlinear_model_is_that_of_brute_force(seed, widest):
     arm, catalogues = Arm(seed), lists(seed, 7, widest)
     want = arm.brute_force(catalogues)
-    search = search_catalogue(catalogues, arm.relax(catalogues), arm.fix(catalogues))
+    search = search_catalogue(Problem(arm, catalogues))
     assert search.best[0].objective == pytest.approx(want[0], rel=1e-9)
     assert search.lower_bound <= want[0] * (1 + 1e-12)
     assert arm.calls < want.size
@@ -122,13 +145,13 @@ def test_the_best_of_a_nonlinear_model_is_that_of_brute_force(seed, widest):
 def test_so_it_is_on_many_models_narrow_and_wide(seed):
     arm = Arm(seed, size=(1.0, 10.0, 100.0)[seed % 3])
     catalogues = lists(seed, 7, 1 + seed % 2)
-    search = search_catalogue(catalogues, arm.relax(catalogues), arm.fix(catalogues))
+    search = search_catalogue(Problem(arm, catalogues))
     assert search.best[0].objective == pytest.approx(arm.brute_force(catalogues)[0], rel=1e-9)
 
 
 def test_the_best_few_are_distinct_and_in_order():
     arm, catalogues = Arm(7), lists(7, 7, 1)
-    search = search_catalogue(catalogues, arm.relax(catalogues), arm.fix(catalogues), keep=8)
+    search = search_catalogue(Problem(arm, catalogues), keep=8)
     figures = [one.objective for one in search.best]
     assert figures == sorted(figures)
     assert len({one.rows for one in search.best}) == len(figures) == 8
@@ -142,16 +165,15 @@ def test_no_combination_is_asked_for_twice():
         asked.append(rows)
         return fix(rows)
 
-    search_catalogue(catalogues, arm.relax(catalogues), counted)
+    search_catalogue(Problem(arm, catalogues, fix=counted))
     assert len(asked) == len(set(asked))
 
 
 def test_a_start_that_nothing_beats_is_the_answer_even_if_no_relaxation_is_solved():
     arm, catalogues = Arm(9), lists(9, 7, 1)
-    best = search_catalogue(catalogues, arm.relax(catalogues), arm.fix(catalogues)).best[0]
-    search = search_catalogue(
-        catalogues, lambda node, near: None, arm.fix(catalogues), starts=[best.rows]
-    )
+    best = search_catalogue(Problem(arm, catalogues)).best[0]
+    blind = Problem(arm, catalogues, relax=lambda node, near: None)
+    search = search_catalogue(blind, starts=[best.rows])
     assert search.best[0].rows == best.rows
 
 
@@ -159,7 +181,7 @@ def test_combinations_that_are_impossible_are_passed_over():
     arm, catalogues = Arm(10), lists(10, 7, 1)
     fix = arm.fix(catalogues)
     even = lambda rows: fix(rows) if sum(rows) % 2 == 0 else None  # noqa: E731
-    search = search_catalogue(catalogues, arm.relax(catalogues), even)
+    search = search_catalogue(Problem(arm, catalogues, fix=even))
     every = itertools.product(*(range(c.rows.shape[0]) for c in catalogues))
     want = min(fix(rows)[1] for rows in every if sum(rows) % 2 == 0)
     assert search.best[0].objective == pytest.approx(want, rel=1e-9)
@@ -167,17 +189,18 @@ def test_combinations_that_are_impossible_are_passed_over():
 
 def test_without_any_possible_combination_the_lists_are_named():
     arm, catalogues = Arm(11, n_y=3), lists(11, 3, 1)
+    impossible = Problem(arm, catalogues, fix=lambda rows: None)
     with pytest.raises(InfeasibleError, match="'list0', 'list1', 'list2'") as e:
-        search_catalogue(catalogues, arm.relax(catalogues), lambda rows: None)
+        search_catalogue(impossible)
     assert e.value.constraints == ("list0", "list1", "list2")
     with pytest.raises(AccuracyError, match="was found in 1 nodes"):
-        search_catalogue(catalogues, arm.relax(catalogues), lambda rows: None, seconds=0.0)
+        search_catalogue(impossible, seconds=0.0)
 
 
 def test_a_column_with_two_owners_is_refused():
     twice = [ListedValues("a", (0,), [[1.0]]), ListedValues("b", (0,), [[1.0]])]
     with pytest.raises(UsageError, match="'a' and 'b' both set column 0"):
-        search_catalogue(twice, lambda node, near: None, lambda rows: None)
+        Problem(Arm(0), twice)
 
 
 @pytest.mark.parametrize("n_rows", [1, 2, 4, 9])
