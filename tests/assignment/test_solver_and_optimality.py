@@ -147,6 +147,9 @@ def fake_osqp(monkeypatch, status, x=2143289344.0, y=2143289344.0):
     seen = {}
 
     class Fake:
+        def __init__(self, algebra):
+            seen["algebra"] = algebra
+
         def setup(self, P, q, A, l, u, **settings):  # noqa: E741
             seen.update(P=P.toarray(), settings=settings, shape=A.shape)
 
