@@ -6,7 +6,8 @@ To add a key: give `Document` a field, with a model of what stands below it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, get_args, get_origin
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, Field, ValidationError
 from pydantic.json_schema import GenerateJsonSchema
@@ -151,19 +152,27 @@ def _extra(error: Any) -> _Explained:
 
 def _model_at(loc: Any) -> type[Part]:
     """Model whose keys stand at ``loc`` (a pydantic location, union tags included)."""
-    model: type[Part] = Document
-    in_container = False
+    models: list[type[Part]] = [Document]
+    named = False  # the next item is a name, or a place in a list
     for item in loc:
-        if in_container:  # a name, or a place in a list
-            in_container = False
-        elif item in _TAGS:
-            model = _KINDS.get(item[1:-1], model)
-            in_container = item == "<list>"
+        if item in _TAGS:
+            named = item == "<list>"
+            models = models[-1:] if named else [_KINDS.get(item[1:-1], models[0])]
+        elif named:
+            named = False
         else:
-            annotation = keys_of(model)[item].annotation
-            in_container = get_origin(annotation) in (Mapping, tuple)
-            model = next(_parts_in(annotation), model)
-    return model
+            annotation = keys_of(models[0])[item].annotation
+            named = _holds_several(annotation)
+            models = [*_parts_in(annotation)] or models
+    return models[0]
+
+
+def _holds_several(annotation: object) -> bool:
+    """True for a list or a mapping of names, also where it may be left out."""
+    kind = get_origin(annotation)
+    if kind in (Union, UnionType, Annotated):
+        return any(map(_holds_several, get_args(annotation)))
+    return kind in (Mapping, tuple)
 
 
 def _parts_in(annotation: object) -> Iterator[type[Part]]:
