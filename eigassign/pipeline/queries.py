@@ -26,7 +26,7 @@ from eigassign.study.accuracy import judged_mesh, mesh_lines, truncation_lines
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.design.followed import named_notes
 from eigassign.study.planning import plan_expansion, shown_point
-from eigassign.study.requirements.sampling import requirements_of
+from eigassign.study.requirements.sampling import requirements_of, with_instants
 from eigassign.study.updating.measured import read_measurements
 
 Floats = NDArray[np.float64]
@@ -204,7 +204,7 @@ def _checked(case: BuiltCase) -> CheckAnswer:
     parts = () if trajectory is None else trajectory.parts
     each = tuple((p.name, len(p.trajectory.q), float(np.ptp(p.trajectory.time_s))) for p in parts)
     if trajectory is not None:
-        requirements_of(file, trajectory)
+        requirements_of(file, with_instants(file, trajectory))
     notes += read_measurements(case)[1]
     plan = None
     if trajectory is not None or file.expansion.q != "auto":

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.assign import Assignment
 from eigassign.assignment.exact.sequential import End
+from eigassign.brief import counted
 from eigassign.case.suggestions import shown
 from eigassign.errors import EigassignError
 from eigassign.modal.expansion import Expansion, NearestExpansion
@@ -51,7 +52,7 @@ from eigassign.study.meaning.overall import Studies, study_meaning
 from eigassign.study.moving import moving_modes
 from eigassign.study.planning import plan_expansion
 from eigassign.study.requirements.requirement import Solved
-from eigassign.study.requirements.sampling import requirements_of
+from eigassign.study.requirements.sampling import requirements_of, with_instants
 from eigassign.study.results import MovingMode, RunResults, TargetStudy
 from eigassign.study.scene import Expansions, Scene
 
@@ -143,7 +144,7 @@ def solve_case(case: BuiltCase, options: Options = DEFAULT) -> Result:
     file, stages = case.file, Stages(options.progress)
     require_assignable(file)
     with case.located():
-        scene = prepare(case, stages, _cache(options))
+        scene = _at_instants(prepare(case, stages, _cache(options)))
         wanted = requirements_of(file, scene.path)
         with stages("assignment", "assigning the frequencies"):
             require_one_shape(scene, wanted)
@@ -169,6 +170,19 @@ def solve_case(case: BuiltCase, options: Options = DEFAULT) -> Result:
     moving = _moving(scene, answer.y, targets, options)
     results = replace(collect_results(scene, studies, found, stages.timing_s), moving=moving)
     return _result(results, scene.expansions, answer.one_shot)
+
+
+def _at_instants(scene: Scene) -> Scene:
+    """The scene with what targets ask between samples among its samples, and a note on that."""
+    path = with_instants(scene.file, scene.path)
+    count = int(path.inserted.sum())
+    if not count:
+        return scene
+    note = (
+        f"{counted(count, 'instant')} between samples, of which targets ask something, are looked "
+        "at like samples: q is linear in time there"
+    )
+    return replace(scene, trajectory=path, notes=(*scene.notes, note))
 
 
 def _one_shot(scene: Scene, answer: Answer, exact: Solved) -> tuple[Solved | None, tuple[str, ...]]:

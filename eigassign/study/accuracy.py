@@ -184,7 +184,8 @@ class MotionStudy:
 def study_motion(scene: Scene, hz: Floats) -> MotionStudy | None:
     """Check the case's timed trajectories; ``hz`` (n_t, n_modes) are their exact frequencies."""
     parts = () if scene.trajectory is None else scene.trajectory.parts
-    timed = [part for part in parts if len(part.trajectory.time_s) >= 3]
+    given = (part._replace(trajectory=part.trajectory.given) for part in parts)
+    timed = [part for part in given if len(part.trajectory.time_s) >= 3]
     if not timed:
         return None
     limit = scene.file.validation.max_error

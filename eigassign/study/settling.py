@@ -31,7 +31,7 @@ from eigassign.study.planning import (
     truncation_share,
     with_middle_loads,
 )
-from eigassign.study.requirements.sampling import requirements_of
+from eigassign.study.requirements.sampling import requirements_of, with_instants
 
 Floats = NDArray[np.float64]
 TRIAL = 2  # elements of a link left to auto, in the model whose trajectory choices are judged on
@@ -93,7 +93,12 @@ def _bands_hz(file: CaseFile, path: Trajectories | None) -> Floats:
     """The highest edges of the bands that every mode shall keep out of, (k,) in Hz."""
     if path is None:
         return np.empty(0)
-    bands = (one for w in requirements_of(file, path) for _, one in w.bands if not one.modes)
+    bands = (
+        one
+        for w in requirements_of(file, with_instants(file, path))
+        for _, one in w.bands
+        if not one.modes
+    )
     return np.array([band.upper_hz.max() for band in bands])
 
 

@@ -57,6 +57,7 @@ class Trajectory(Brief):
     """Where the mechanism is when, at the initial design.
 
     ``tip`` is None unless the case gives a path of the tip, which is the same for every design.
+    ``sampled`` is the trajectory without the instants that were put between its samples.
     """
 
     time_s: Floats  # (n,) strictly increasing, n >= 2
@@ -65,6 +66,7 @@ class Trajectory(Brief):
     notes: tuple[str, ...] = ()  # what a reader should know: choices made, columns ignored
     corners_s: tuple[float, ...] = ()  # times in between at which it is known that q̇ may jump
     of_design: OfDesign | None = None  # how q follows y; None where it does not
+    sampled: Trajectory | None = None
 
     def __post_init__(self) -> None:
         for array in (self.time_s, self.q, self.tip):
@@ -105,6 +107,43 @@ class Trajectory(Brief):
             q=self.q[samples],
             tip=tip,
             of_design=None if whole is None else own,
+            sampled=None,
+        )
+
+    @property
+    def given(self) -> Trajectory:
+        """The trajectory with its own samples only, without instants between them."""
+        return self.sampled or self
+
+    @property
+    def inserted(self) -> NDArray[np.bool_]:
+        """True (n,) for each instant between the samples."""
+        return ~np.isin(self.time_s, self.given.time_s)
+
+    def with_instants(self, times_s: ArrayLike) -> Trajectory:
+        """The same with instants between its samples, where q is linear in time for any design."""
+        time_s, whole = np.union1d(self.time_s, times_s), self.of_design
+        if len(time_s) == len(self.time_s):
+            return self
+        after = np.clip(np.searchsorted(self.time_s, time_s), 1, len(self.time_s) - 1)
+        first, last = self.time_s[after - 1], self.time_s[after]
+        share = (time_s - first) / (last - first)  # 0 or 1 at a sample, and its values to the bit
+
+        def between(values: Floats) -> Floats:
+            s = share.reshape(-1, *(1 for _ in values.shape[1:]))
+            return np.asarray((1.0 - s) * values[after - 1] + s * values[after])
+
+        def own(y: Floats) -> tuple[Floats, Floats]:
+            q, slopes = self.at(y)
+            return between(q), between(slopes)
+
+        return replace(
+            self,
+            time_s=time_s,
+            q=between(self.q),
+            tip=None if self.tip is None else between(self.tip),
+            of_design=None if whole is None else own,
+            sampled=self.given,
         )
 
 
@@ -367,8 +406,12 @@ class Trajectories:
     def sample(self, k: int) -> str:
         """Sample k of all, in words: its place in its own trajectory, counted from 0."""
         part, rows = self._at(k)
-        own = k - rows.start
-        return f"sample {own} of trajectory {part.name!r}" if self.several else f"sample {own}"
+        inserted = part.trajectory.inserted[: k - rows.start + 1]
+        own = int((~inserted).sum()) - 1
+        said = (
+            f"an instant between samples {own} and {own + 1}" if inserted[-1] else f"sample {own}"
+        )
+        return f"{said} of trajectory {part.name!r}" if self.several else said
 
     def where(self, k: int) -> str:
         """The same with its time."""
@@ -401,6 +444,20 @@ class Trajectories:
             ends = np.linspace(rows.start, rows.stop - 1, share)
             chosen.append(np.unique(ends.round().astype(np.intp)))
         return np.concatenate(chosen)
+
+    @cached_property
+    def inserted(self) -> NDArray[np.bool_]:
+        """True (n,) for each instant between the samples of its trajectory."""
+        return np.concatenate([part.trajectory.inserted for part in self.parts])
+
+    def with_instants(self, times_s: Sequence[ArrayLike]) -> Trajectories:
+        """The same with instants between the samples of each trajectory, at these of its times."""
+        return Trajectories(
+            tuple(
+                part._replace(trajectory=part.trajectory.with_instants(times))
+                for part, times in zip(self.parts, times_s, strict=True)
+            )
+        )
 
     def chosen(self, samples: Sequence[int] | Ints) -> Trajectories:
         """Some of the samples only, given by ascending numbers; no part that has none of them."""

@@ -73,12 +73,27 @@ def thinned(whole: Task, few: int) -> Task | None:
     path = whole.scene.path
     if len(path.q) < 2 * few:
         return None
-    scene = replace(whole.scene, trajectory=path.chosen(path.spread(few)))
+    scene = replace(whole.scene, trajectory=path.chosen(_few(whole, few)))
     try:
         task = replace(whole, scene=scene, wanted=requirements_of(scene.file, scene.path))
     except CaseError:
         return None
     return task if len(task.bands) == len(whole.bands) else None
+
+
+def _few(whole: Task, few: int) -> NDArray[np.intp]:
+    """About so many samples, and the instants between samples at which most is asked.
+
+    Those are the first and the last of every target, and where its edges are lowest and highest.
+    """
+    path = whole.scene.path
+    most = [
+        one.rows.start + row
+        for one in whole.wanted
+        for row in (0, len(one.hz) - 1, int(one.lower_hz.argmin()), int(one.upper_hz.argmax()))
+    ]
+    between = [row for row in most if path.inserted[row]]
+    return np.union1d(path.spread(few), np.array(between, dtype=np.intp))
 
 
 def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> PosedProblem:

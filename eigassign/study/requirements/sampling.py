@@ -1,11 +1,14 @@
 """The targets of a case as requirements at the samples of its trajectories.
 
-A requirement is at all samples, those of one trajectory, or a part of it.
+A requirement is at all samples, those of one trajectory, or a part of it. What is asked between
+samples counts: the first and the last time of a part, and the points of a profile that is not
+linear from sample to sample, become instants of the trajectory (`with_instants`). From one of all
+these to the next q and the edges are linear in time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +34,9 @@ from eigassign.study.requirements.upper_limit import UpperLimit
 
 Floats = NDArray[np.float64]
 _Curve = float | FrequencyProfile | FrequencyFile
+_Knots = tuple[ArrayLike, ArrayLike | None]
+_SLACK = 1e-9  # of the duration: rounding of a time grid, far below a step
+_LINEAR = 1e-12  # relative: a point of a profile this near to a straight line is on it
 KINDS: dict[str, type[Requirement]] = {
     one.form.kind: one
     for one in (AssignedFrequency, LowerLimit, UpperLimit, ForbiddenBand, ModeGap)
@@ -46,6 +52,46 @@ def requirements_of(file: CaseFile, path: Trajectories) -> tuple[Requirement, ..
     return tuple(
         one for k, target in enumerate(file.targets) for one in _of_target(file, k, target, path)
     )
+
+
+def with_instants(file: CaseFile, path: Trajectories) -> Trajectories:
+    """The trajectories with the instants between samples that targets ask something of.
+
+    Raises CaseError where a file cannot be read.
+    """
+    times: list[list[float]] = [[] for _ in path.parts]
+    for k, target in enumerate(file.targets):
+        curves = [
+            _knots(file, curve, f"targets[{k}].{dotted(keys)}")
+            for keys, curve in target.frequencies
+        ]
+        for part, found in zip(path.parts, times, strict=True):
+            if target.trajectory in (None, part.name):
+                found += _instants(part.trajectory.time_s, target.during, curves)
+    return path.with_instants(times)
+
+
+def _instants(
+    time_s: Floats, during: tuple[float, float] | None, curves: Iterable[_Knots]
+) -> Iterator[float]:
+    """Yield the ends of a part, and the points of curves that are not linear between samples."""
+    slack = _SLACK * float(np.ptp(time_s))
+    first, last = time_s[0], time_s[-1]
+    if during is not None:
+        first, last = max(first, during[0]), min(last, during[1])
+        ends = (end for end in (first, last) if np.abs(time_s - end).min() > slack)
+        yield from ends if first < last else ()
+    inside = time_s[(time_s > first) & (time_s < last)]
+    at = np.unique([first, *inside, last])
+    for values, knots in curves:
+        if knots is None or first >= last:
+            continue
+        hz, times = np.asarray(values), np.asarray(knots)
+        own = (times > first) & (times < last)
+        chord = np.interp(times[own], at, np.interp(at, times, hz))
+        off = np.abs(chord - hz[own]) > _LINEAR * hz[own]
+        interval = np.searchsorted(at, times[own])
+        yield from times[own][np.isin(interval, interval[off])]
 
 
 def time_weights(path: Trajectories) -> Floats:
@@ -102,7 +148,7 @@ def _rows(file: CaseFile, place: str, target: AnyTarget, path: Trajectories) -> 
     if target.during is None:
         return rows
     time_s, (first, last) = path.time_s[rows], target.during
-    slack = 1e-9 * float(np.ptp(time_s))  # rounding of a time grid, far below a step
+    slack = _SLACK * float(np.ptp(time_s))
     inside = np.flatnonzero((time_s >= first - slack) & (time_s <= last + slack))
     if not len(inside):
         message = f"no sample of the trajectory is between {first:g} and {last:g} s"
@@ -131,7 +177,7 @@ def _sampled(file: CaseFile, curve: _Curve, key: str, rows: slice, path: Traject
     return np.concatenate(found)
 
 
-def _knots(file: CaseFile, curve: _Curve, key: str) -> tuple[ArrayLike, ArrayLike | None]:
+def _knots(file: CaseFile, curve: _Curve, key: str) -> _Knots:
     """Frequency in Hz, and the times in s that it is given at."""
     if isinstance(curve, FrequencyProfile):
         return curve.frequency, curve.time
