@@ -7,6 +7,7 @@ instants, q being linear between samples and the profile between its points.
 
 from __future__ import annotations
 
+import json
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -107,27 +108,29 @@ def demanding(seed: int) -> tuple[ea.Case, list[Asked]]:
     if free := [path for path in masses if path not in varied]:
         for own in data["trajectory"]:
             own["set"] = {free[0]: float(10 ** rng.uniform(-2, 0.5))}
-    data["targets"], data["assignment"] = [], {"starts": 1, "steps": 15}
+    data["design"] = dict(list(data["design"].items())[:2])
+    data["design"].pop("constraints", None)
+    data["targets"], data["assignment"] = [], {"starts": 1, "steps": 3}
     data["expansion"] = {"order": 1, "modes": [1], "q": data["trajectory"][0]["q"][0]}
-    case = load_text(yaml.safe_dump(data))
+    case = load_text(json.dumps(data))
     asked: list[Asked] = []
     for _ in range(int(rng.integers(1, 3))):
         target, own = _band(case, rng)
         data["targets"].append(target)
         asked += own
-    return load_text(yaml.safe_dump(data)), asked
+    return load_text(json.dumps(data)), asked
 
 
 def _sampled(part: Any, rng: np.random.Generator) -> dict[str, Any]:
     """Some samples of a trajectory at uneven times; in half of the cases q jumps once."""
     given = part.trajectory
     few = np.sort(rng.choice(len(given.q), int(rng.integers(5, 30)), replace=False))
-    q = given.q[few][:, : given.q.shape[1]]
+    q = given.q[few]
     if rng.random() < 0.5:
         q = np.roll(q, int(rng.integers(len(q))), axis=0)
     time = np.cumsum(rng.uniform(0.2, 1.0, len(q)))
     time = (time - time[0]) / (time[-1] - time[0])
-    return {"name": part.name, "time": time.tolist(), "q": q.tolist()}
+    return {"name": f"m{part.name}", "time": time.tolist(), "q": q.tolist()}
 
 
 def _band(case: ea.Case, rng: np.random.Generator) -> tuple[dict[str, Any], list[Asked]]:
@@ -199,7 +202,7 @@ def test_bands_of_every_form_are_judged_as_counting_at_many_instants_does(seed: 
     if row.verdict == "reached":
         assert all(said.clear for said in row.clearances)
         assert all(constant)
-    each = iter(constant)
     for target in results.targets:
-        if all([next(each) for _ in target.along]):
+        clear, constant = constant[: len(target.along)], constant[len(target.along) :]
+        if all(clear):
             assert target.satisfied

@@ -166,7 +166,7 @@ def test_two_targets_of_a_mode_one_a_trajectory_are_as_good_as_one_for_both(
     assert one is not None
     assert two is not None
     assert two.exact.rms_relative == pytest.approx(one.exact.rms_relative, rel=1e-10)
-    assert [t.trajectory for t in split.results.targets] == ["pick", "return"]
+    assert [t.asked.trajectory for t in split.results.targets] == ["pick", "return"]
     np.testing.assert_array_equal(
         np.concatenate([t.initial_hz for t in split.results.targets]),
         pair.results.targets[0].initial_hz,
