@@ -184,10 +184,10 @@ class MotionStudy:
 def study_motion(scene: Scene, hz: Floats) -> MotionStudy | None:
     """Check the case's timed trajectories; ``hz`` (n_t, n_modes) are their exact frequencies."""
     parts = () if scene.trajectory is None else scene.trajectory.parts
-    given = (part._replace(trajectory=part.trajectory.given) for part in parts)
-    timed = [part for part in given if len(part.trajectory.time_s) >= 3]
+    timed = [part for part in parts if len(part.trajectory.given.time_s) >= 3]
     if not timed:
         return None
+    hz = hz[~scene.path.inserted]  # what targets ask between samples does not change the motion
     limit = scene.file.validation.max_error
     simple = _simple_estimate(scene, timed, hz)
     if simple is not None and simple < NEGLIGIBLE * limit:

@@ -490,7 +490,11 @@ class Rates:
 
 
 def rates(trajectory: Trajectory) -> Rates:
-    """Rates by differences within each smooth part; of a part with one sample nothing is known."""
+    """Rates by differences within each smooth part; of a part with one sample nothing is known.
+
+    Instants between samples have no part in them: there q is linear, and its corners are none.
+    """
+    trajectory = trajectory.given
     parts = [part for part in _smooth_parts(trajectory) if len(part) > 1]
     samples = np.concatenate([np.zeros(0, dtype=np.intp), *parts])
     q, time_s = trajectory.q, trajectory.time_s

@@ -12,6 +12,7 @@ from scenes import SHIPPED, changed
 
 import eigassign as ea
 from eigassign.case import parse
+from eigassign.mechanism import rates
 from eigassign.study import AssignmentRow
 
 BOX = {
@@ -118,3 +119,20 @@ def test_samples_keep_their_numbers_and_rates_where_instants_are_between_them() 
     np.testing.assert_allclose(
         refined.q[k], (1 - share) * path.q[75] + share * path.q[76], rtol=1e-14
     )
+
+
+def test_rates_and_the_speed_of_the_motion_are_those_of_the_samples() -> None:
+    """What the case itself has stays as it was given, and so does what is said of its speed."""
+    case, result, _ = shipped("{mode: 1, at_most: 190, during: [0.49801, 0.498015]}")
+    before = ea.Case(parse(SHIPPED.encode(), "case.yaml")).trajectory
+    np.testing.assert_array_equal(case.trajectory.time_s, before.time_s)
+    np.testing.assert_array_equal(case.trajectory.q, before.q)
+    assert len(result.results.time_s) == len(before.time_s) + 2
+    refined = before.with_instants([[0.49801, 0.498015]])
+    own, given = (rates(path.parts[0].trajectory) for path in (refined, before))
+    np.testing.assert_array_equal(own.rate, given.rate)
+    np.testing.assert_array_equal(own.acceleration, given.acceleration)
+    slow = [note for note in result.results.notes if note.startswith("slow motion")]
+    _, plain, _ = shipped("{mode: 1, at_most: 190}")
+    assert slow
+    assert slow == [note for note in plain.results.notes if note.startswith("slow motion")]
