@@ -57,7 +57,7 @@ def stored_series(arrays: Mapping[str, Array], k: int) -> list[ClusterSeries]:
 
     Raises UsageError where arrays are missing, or their numbers are not finite.
     """
-    found = []
+    found: list[ClusterSeries] = []
     while f"modes_{k}_{len(found)}" in arrays:
         parts = [arrays.get(f"{name}_{k}_{len(found)}") for name in ClusterSeries._fields]
         if any(part is None or not np.isfinite(part).all() for part in parts):
@@ -87,9 +87,10 @@ def reduced_from_arrays(arrays: Mapping[str, Array]) -> ReducedModel:
             raise TypeError
         x, n_modes = model.points[:1], len(model.modes)
         with np.errstate(all="ignore"):
-            told = (model.frequencies(x[:, : model.n_q], x[:, model.n_q :]),)
-            told += (model.error_estimate(x[:, : model.n_q], x[:, model.n_q :]),)
-        if [a.shape for a in told] != [(1, n_modes)] * 2 or not np.isfinite(told[0]).all():
+            hz = model.frequencies(x[:, : model.n_q], x[:, model.n_q :])
+            error_estimate = model.error_estimate(x[:, : model.n_q], x[:, model.n_q :])
+        shape = (1, n_modes)
+        if hz.shape != shape or error_estimate.shape != shape or not np.isfinite(hz).all():
             raise ValueError
     except Exception as error:  # of what is no model, anything may come
         name = type(error).__name__

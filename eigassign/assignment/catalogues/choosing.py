@@ -111,7 +111,7 @@ def held(
 
     Constraints of held columns alone are left out: the combination meets them.
     """
-    bounds = hull(catalogues, [(row,) for row in rows], program.bounds)[0]
+    bounds = hull(catalogues, tuple((row,) for row in rows), program.bounds)[0]
     free = bounds.lower < bounds.upper
     return program.within(bounds, [c for c in program.constraints if c.coefficients[free].any()])
 
@@ -331,7 +331,7 @@ class _Exact(CatalogueProblem):
         """The optimum with a combination's columns held; None where it has no answer."""
         if rows in self.fixed:
             return self.fixed[rows]
-        at = hull(self.catalogues, [(row,) for row in rows], self.bounds)[0]
+        at = hull(self.catalogues, tuple((row,) for row in rows), self.bounds)[0]
         problem = replace(self.problem, lower=at.lower, upper=at.upper)
         found = self._minimised(problem, np.clip(self.starts[0], at.lower, at.upper))
         if found is not None:
