@@ -1,6 +1,7 @@
 """A sweep whose parent and workers are killed at random instants ends as one that nobody disturbed.
 
-Slow: thirty kills, each followed by the same command again.
+So does one of which results are damaged between. Slow: forty kills, each followed by the same
+command again, half of them after a file of a case was cut, emptied or deleted.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs Linux"),
 ]
-CASES, KILLS, JOBS = 60, 30, 2
+CASES, KILLS, DAMAGES, JOBS = 60, 40, 20, 2
 ROOT = Path(eigassign.__file__).parents[1]
 SMALL = ROOT / "benchmarks" / "small_arm.yaml"
 
@@ -89,13 +90,30 @@ def placed(folder: Path) -> Path:
     return folder
 
 
-def disturbed(folder: Path, draw: random.Random, kills: int) -> int:
+def damaged(out: Path, draw: random.Random) -> bool:
+    """Cut, empty or delete a file of a case that is done; False where there is none."""
+    done = [path.parent for path in sorted(out.glob("*/run.json")) if path.parent.name[0] != "."]
+    whole = [each for each in done if not (out / each.name.rpartition(".")[0]).is_dir()]
+    if not whole:
+        return False
+    name = draw.choice(("results.json", "run.json", "outcome.json", "case.yaml"))
+    path = draw.choice(whole) / name
+    if not path.exists():
+        return False
+    data = path.read_bytes()
+    draw.choice((path.unlink, lambda: path.write_bytes(data[:3]), lambda: path.write_bytes(b"")))()
+    return True
+
+
+def disturbed(folder: Path, draw: random.Random, kills: int, damages: int) -> tuple[int, int]:
     """Run the command until it is done, with at most so many kills on the way; how many they were.
 
-    Every other one hits the parent, and the command is given again.
+    Every other one hits the parent, and the command is given again, perhaps after a damage.
     """
-    done = 0
+    done = harmed = 0
     while True:
+        if harmed < damages and damaged(folder / "out", draw):
+            harmed += 1
         process = begun(folder)
         while process.poll() is None and done < kills:
             if not _goes_on(process, folder / "begun"):
@@ -108,7 +126,7 @@ def disturbed(folder: Path, draw: random.Random, kills: int) -> int:
         if process.wait() >= 0:
             break
     assert begun(folder).wait() == 1  # what was killed twice was an error, and is tried again
-    return done
+    return done, harmed
 
 
 def _goes_on(process: subprocess.Popen[bytes], begun: Path) -> bool:
@@ -121,19 +139,21 @@ def _goes_on(process: subprocess.Popen[bytes], begun: Path) -> bool:
     return False
 
 
-def test_sweeps_that_are_killed_thirty_times_end_as_if_they_had_not_been(tmp_path: Path) -> None:
+def test_sweeps_that_are_killed_forty_times_end_as_if_they_had_not_been(tmp_path: Path) -> None:
     undisturbed = placed(tmp_path / "undisturbed")
     assert begun(undisturbed).wait() == 1  # some miss their target
-    expected, draw, left, sweeps, twice = made(undisturbed), random.Random(1), KILLS, 0, 0
+    expected, draw, sweeps, twice = made(undisturbed), random.Random(1), 0, 0
+    left, unharmed = KILLS, DAMAGES
     assert len(expected) == CASES
     assert sum(bool(results) for _, results in expected.values()) > CASES / 2
     while left:
         folder, sweeps = placed(tmp_path / f"killed {sweeps}"), sweeps + 1
-        done = disturbed(folder, draw, left)
-        left -= done
+        done, harmed = disturbed(folder, draw, left, unharmed)
+        left, unharmed = left - done, unharmed - harmed
         assert made(folder) == expected
         starts = Counter((folder / "begun").read_text().splitlines())
         assert len(starts) == CASES
-        assert starts.total() - CASES <= JOBS * done
+        assert starts.total() - CASES <= JOBS * done + harmed
         twice += starts.total() - CASES
-    sys.stdout.write(f"{KILLS} kills in {sweeps} sweeps, {twice} cases begun again\n")
+    said = f"{KILLS} kills and {DAMAGES - unharmed} damages in {sweeps} sweeps"
+    sys.stdout.write(f"{said}, {twice} cases begun again\n")

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic_results import make_results
+from synthetic_results import as_limit, make_results
 
 from eigassign.errors import StorageError
 from eigassign.output import CaseOutcome, frequency_ranges, from_line, to_line
@@ -49,7 +49,9 @@ def test_every_range_has_a_name_of_its_own():
     results = make_results()
     (target,) = results.targets
     hz = target.exact_hz
-    limit = replace(target, kind="at_least", trajectory="pick", exact_hz=np.array([3.0, 1.0, 2.0]))
+    own = np.array([3.0, 1.0, 2.0])
+    limit = as_limit(target, "at_least", hz, np.full_like(hz, np.inf))
+    limit = replace(limit, asked=replace(limit.asked, trajectory="pick"), exact_hz=own)
     assert frequency_ranges(replace(results, targets=(target, target, limit))) == (
         ("mode 1", hz.min(), math.fsum(hz) / 152, hz.max()),
         ("mode 1 (2)", hz.min(), math.fsum(hz) / 152, hz.max()),
