@@ -158,12 +158,12 @@ class QuadraticProgram:
 
     @property
     def bounds(self) -> Bounds:
-        """Of all y."""
+        """The bounds of all y."""
         return Bounds(self.lower, self.upper)
 
     @property
     def constraints(self) -> list[LinearConstraint]:
-        """Those of C y, one by one."""
+        """The limits of C y, one by one."""
         each = zip(self.constraint_names, self.C, self.c_lower, self.c_upper, strict=True)
         return [LinearConstraint(*own) for own in each]
 

@@ -19,7 +19,6 @@ from scipy.optimize import Bounds, LinearConstraint, differential_evolution, min
 from eigassign.assignment.exact.design_problem import UnitBox
 from eigassign.assignment.exact.requirements import Frequencies
 from eigassign.assignment.exact.sequential import minimise
-from eigassign.case.schema.targets import FrequencyTarget
 from eigassign.chart.results import DesignRun, excess_over
 from eigassign.chart.timing import Effort, measure
 from eigassign.errors import EigassignError
@@ -53,7 +52,7 @@ def chart_designs(
     """
     lower, upper = scene.bounds
     wanted, design = scene.file.targets, scene.file.design
-    plain = (isinstance(t, FrequencyTarget) and not (t.followed or t.during) for t in wanted)
+    plain = (t.is_goal and not (t.followed or t.during) for t in wanted)
     limited = design.catalogues or design.mass or scene.file.assignment.objective != "least_squares"
     if not (wanted and all(plain) and len(lower) and np.isfinite(upper - lower).all()) or limited:
         return (), ()

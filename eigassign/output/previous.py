@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from eigassign.case.schema.targets import TARGETS
 from eigassign.errors import UsageError
 from eigassign.files import STORED, json_value, read_bytes
 from eigassign.output.batch.outcome import CaseOutcome, Range, from_plain, ranges
@@ -173,7 +174,8 @@ def _run(document: Any, kind: Kind) -> Known:
         curves = []
         for t in targets:
             name = t["followed"]["name"] if t.get("followed") else f"mode {t['mode']}"
-            curves.append((name, t["kind"], t.get("trajectory"), t["frequencies"]["exact_hz"]))
+            name = TARGETS[t["kind"]].curve_of(name)
+            curves.append((name, t.get("trajectory"), t["frequencies"]["exact_hz"]))
         return Known(case, ranges(curves), (document["assignment"] or {}).get("verdict", ""))
     samples = {row["name"]: row["samples"] for row in document["trajectories"]}
     found: dict[str, Range] = {}
@@ -181,7 +183,8 @@ def _run(document: Any, kind: Kind) -> Known:
         hz, name = target["frequencies"]["initial_hz"], target.get("trajectory")
         where = TRAJECTORY if len(samples) == 1 else f"{TRAJECTORY} {name!r}"
         whole = next(iter(samples.values())) if len(samples) == 1 else samples.get(name)
-        if target["kind"] == "frequency" and target["mode"] is not None and len(hz) == whole:
+        wanted = TARGETS[target["kind"]].is_goal and target["mode"] is not None
+        if wanted and len(hz) == whole:
             place = _place(target["mode"], where)
-            found[place] = ranges([(place, "frequency", None, hz)])[0]
+            found[place] = ranges([(place, None, hz)])[0]
     return Known(case, tuple(found.values()))

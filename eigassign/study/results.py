@@ -235,7 +235,7 @@ class TargetStudy(Brief):
 
     @property
     def label(self) -> str:
-        """What is asked in words: "mode 2 at least 320 Hz"."""
+        """The words for what is asked: "mode 2 at least 320 Hz"."""
         return self.asked.label
 
     @property

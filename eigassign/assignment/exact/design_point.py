@@ -40,14 +40,14 @@ class Rows:
         return float(v), float(t)
 
     def and_more(self, others: Rows) -> Rows:
-        """These rows, then the others."""
+        """The rows of both, these first."""
         names = self.__dataclass_fields__
         return Rows(*(np.concatenate([getattr(self, n), getattr(others, n)]) for n in names))
 
 
 @dataclass(frozen=True)
 class Expected:
-    """What is expected of a step: all rows, which of them lie behind a kink, as one-sided rows."""
+    """The rows expected of a step, which of them lie behind a kink, and those as one-sided rows."""
 
     values: Floats  # (m + k,)
     behind: Indices  # (p,)
@@ -106,7 +106,7 @@ class DesignPoint:
         return self._one_sided(owner, sign, self.values[owner], self.slopes[owner])
 
     def at(self, d: Floats) -> Expected:
-        """What is expected of a step d (n,)."""
+        """The rows expected of a step d (n,)."""
         pairs, values = self.pairs, self.lines(d)
         own, of_residual = values[pairs.row], pairs.row < self.m
         found, slopes, turned = pairs.along(own, self.slopes[pairs.row], d)

@@ -136,7 +136,7 @@ class _Program:
     def with_weight(
         self, region: TrustRegion, rows: Rows
     ) -> tuple[tuple[Floats, Floats] | None, TrustRegion]:
-        """What the rows lead to, and the region with a ν that no further rise betters."""
+        """The step that the rows lead to, and the region with a ν that no further rise betters."""
         solved, heavier = self.solved(region, rows), region
         for _ in range(6):  # tenfold rises of ν, while v falls
             if solved is None or (v := rows.levels(solved[0])[0]) <= MET:

@@ -14,6 +14,7 @@ from eigassign.case.schema.design import RESERVED, column_names, is_entry
 from eigassign.case.schema.joints import FREEDOMS
 from eigassign.case.schema.links import LINKS
 from eigassign.case.schema.parts import Quantity
+from eigassign.case.schema.targets import TARGETS
 from eigassign.case.schema.vectors import ANGLE, PLACE
 from eigassign.case.suggestions import listed, shown, suggestion, unknown
 from eigassign.case.units import QuantityError
@@ -219,7 +220,7 @@ def curves(tree: Tree) -> list[tuple[KeyPath, object]]:
     """Key path and content of every frequency of a target that may change in time."""
     found: list[tuple[KeyPath, object]] = []
     for k, target in enumerate(entries(tree, "targets")):
-        for keys in (("frequency",), ("at_least",), ("at_most",), ("keep_out", "of")):
+        for keys in (keys for form in TARGETS.values() for keys in form.in_time):
             if (curve := at(target, *keys)) is not None:
                 found.append((("targets", k, *keys), curve))
     return found

@@ -168,6 +168,9 @@ class AnyTarget(Part):
     """
 
     kind: ClassVar[str]
+    is_goal: ClassVar[bool] = False  # its error is a distance; a limit's is a violation
+    # keys of the frequencies that may change in time
+    in_time: ClassVar[tuple[tuple[str, ...], ...]] = ()
     weight: Annotated[float, Quantity(above=0)] = 1.0
     trajectory: str | None = None
     during: tuple[Annotated[float, TIME], Annotated[float, TIME]] | None = None
@@ -186,6 +189,11 @@ class AnyTarget(Part):
     def followed(self) -> FollowedMode | None:
         """The mode that it follows by its shape."""
         return None
+
+    @classmethod
+    def curve_of(cls, mode: str) -> str:
+        """The name of its curve: "mode 2" where a frequency is wanted, "mode 2 at least"."""
+        return mode if cls.is_goal else f"{mode} {cls.kind.replace('_', ' ')}"
 
     @model_validator(mode="after")
     def _lasts(self) -> Self:
@@ -252,6 +260,8 @@ class FrequencyTarget(ModeTarget):
     """
 
     kind = "frequency"
+    is_goal = True
+    in_time = (("frequency",),)
     never_all = "all modes cannot have one frequency: list those that shall"
     frequency: Curve
 
@@ -264,6 +274,7 @@ class AtLeastTarget(ModeTarget):
     """
 
     kind = "at_least"
+    in_time = (("at_least",),)
     at_least: Curve
 
 
@@ -275,6 +286,7 @@ class AtMostTarget(ModeTarget):
     """
 
     kind = "at_most"
+    in_time = (("at_most",),)
     never_all = "there is always a higher mode: list those that are meant"
     at_most: Curve
 
@@ -289,6 +301,7 @@ class KeepOutTarget(AnyTarget):
     """
 
     kind = "keep_out"
+    in_time = (("keep_out", "of"),)
     keep_out: OneOrList[Harmonic, tuple[Frequency, Frequency]]
     mode: Mode | None = None
     modes: OneOrList[Literal["all"], Modes] | None = None
@@ -302,7 +315,7 @@ class KeepOutTarget(AnyTarget):
 
     @property
     def named(self) -> tuple[tuple[int, ...], ...]:
-        """All of them together."""
+        """The modes of all of them together."""
         modes = () if self.mode is None else (self.mode,)
         return (modes if self.modes is None else () if self.modes == "all" else self.modes,)
 
@@ -361,7 +374,7 @@ class GapTarget(AnyTarget):
 
     @property
     def named(self) -> tuple[tuple[int, ...], ...]:
-        """Both together."""
+        """The pair."""
         return (self.gap.between,)
 
 

@@ -103,16 +103,15 @@ def frequency_ranges(results: RunResults) -> tuple[Range, ...]:
     What is wanted is not in the names: it may be swept.
     """
     return ranges(
-        (t.asked.curve_name, t.asked.kind, t.asked.trajectory, t.exact_hz.tolist())
+        (t.asked.form.curve_of(t.asked.curve_name), t.asked.trajectory, t.exact_hz.tolist())
         for t in results.targets
     )
 
 
-def ranges(curves: Iterable[tuple[str, str, str | None, Sequence[float]]]) -> tuple[Range, ...]:
-    """Lowest, mean and highest of each: name, kind of target, trajectory or None, values in Hz."""
+def ranges(curves: Iterable[tuple[str, str | None, Sequence[float]]]) -> tuple[Range, ...]:
+    """Lowest, mean and highest of each: name, trajectory or None, values in Hz."""
     found: dict[str, Range] = {}
-    for name, kind, trajectory, hz in curves:
-        name += "" if kind == "frequency" else f" {kind.replace('_', ' ')}"
+    for name, trajectory, hz in curves:
         name += "" if trajectory is None else f" along {trajectory!r}"
         names = (f"{name} ({k})" if k > 1 else name for k in count(1))
         free = next(each for each in names if each not in found)

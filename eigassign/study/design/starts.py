@@ -38,7 +38,7 @@ NOTHING = 1e-14  # of F: no error
 
 @dataclass(frozen=True)
 class Searched:
-    """What has been found of one variant, and how much work that was."""
+    """The optima found of one variant, and how much work that was."""
 
     variant: PosedProblem
     optima: tuple[Optimum, ...] = ()
@@ -129,7 +129,7 @@ def _after(
 def _refined(
     search: Searched, coarse: Sequence[Optimum], initial: Floats, steps: int, deadline: float
 ) -> Searched:
-    """What ``coarse`` optima lead to on a finer level; or the initial design, if that is better."""
+    """The optima on a finer level from ``coarse`` ones; or the initial design, if it is better."""
     problem = search.variant.problem
     for optimum in distinct(coarse, problem)[:3]:  # the best few
         search = _after(search, optimum.y, steps, deadline, optimum)

@@ -40,7 +40,7 @@ class ForbiddenBand(Requirement):
 
     @staticmethod
     def asked(target: KeepOutTarget) -> str:
-        """What is asked of the modes, in words."""
+        """The words for what is asked of the modes."""
         band = target.keep_out
         if not isinstance(band, Harmonic):
             return "clear of {:g} … {:g} Hz".format(*band)
@@ -49,7 +49,7 @@ class ForbiddenBand(Requirement):
 
     @staticmethod
     def edges(target: KeepOutTarget, *hz: Floats) -> Edges:
-        """Both edges as they are given, or about a multiple of a frequency."""
+        """The edges as they are given, or about a multiple of a frequency."""
         band = target.keep_out
         if not isinstance(band, Harmonic):
             return hz[0], hz[1]
@@ -58,7 +58,7 @@ class ForbiddenBand(Requirement):
 
     @staticmethod
     def terms_of(modes: tuple[int, ...]) -> Terms:
-        """None: which mode is at an edge depends on k."""
+        """No terms: which mode is at an edge depends on k."""
         return ()
 
     @property
@@ -74,7 +74,7 @@ class ForbiddenBand(Requirement):
         return tuple(sorted(self.modes))
 
     def below(self, hz: Floats) -> Ints:
-        """How many modes are below each edge (2, n); of ``hz`` (n, count), all that matter."""
+        """The number of modes below each edge (2, n); of ``hz`` (n, count), all that matter."""
         hz = hz[:, [m - 1 for m in self.counted if m <= hz.shape[1]]] if self.modes else hz
         edges = (self.lower_hz, self.upper_hz)
         return np.array([(hz < edge[:, None]).sum(axis=1) for edge in edges])
@@ -137,7 +137,7 @@ class ForbiddenBand(Requirement):
 
     @property
     def forbidden_hz(self) -> Edges:
-        """Both edges."""
+        """The edges."""
         return self.lower_hz, self.upper_hz
 
 

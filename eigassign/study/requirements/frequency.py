@@ -15,18 +15,17 @@ class AssignedFrequency(Requirement):
     """The frequency of a mode is ``hz``; the error is the distance to it, of either sign."""
 
     form = FrequencyTarget
-    is_goal = True
     of_soft_model = True
     columns = ("target", "initial", "one shot", "predicted", "exact")
 
     @staticmethod
     def asked(target: FrequencyTarget) -> str:
-        """What is asked of the mode, in words."""
+        """The words for what is asked of the mode."""
         return f"at {in_hz(target.frequency)}"
 
     @staticmethod
     def edges(target: FrequencyTarget, *hz: Floats) -> Edges:
-        """Both the frequency."""
+        """The frequency, twice."""
         return hz[0], hz[0]
 
     def errors(self, solved: Solved) -> Floats:

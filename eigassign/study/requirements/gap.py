@@ -16,7 +16,7 @@ class ModeGap(Requirement):
 
     @staticmethod
     def asked(target: GapTarget) -> str:
-        """What is asked of the modes, in words."""
+        """The words for what is asked of the modes."""
         return f"at least {target.gap.at_least:g} Hz apart"
 
     @staticmethod

@@ -16,7 +16,7 @@ class LowerLimit(Requirement):
 
     @staticmethod
     def asked(target: AtLeastTarget) -> str:
-        """What is asked of the mode, in words."""
+        """The words for what is asked of the mode."""
         return f"at least {in_hz(target.at_least)}"
 
     @staticmethod
@@ -25,5 +25,5 @@ class LowerLimit(Requirement):
         return hz[0], np.full_like(hz[0], np.inf)
 
     def stake(self, hz: Floats, raised: float) -> float:
-        """How far below the limit ``hz`` may be; where it is met with room, that goes first."""
+        """The relative way of ``hz`` below the limit at worst; room that is left goes first."""
         return float((1.0 - hz / (1.0 + raised) / self.hz).max())

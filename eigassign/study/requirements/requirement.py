@@ -62,7 +62,6 @@ class Requirement(Brief):
     """
 
     form: ClassVar[type[AnyTarget]]  # of the case file
-    is_goal: ClassVar[bool] = False  # its error is a distance; a limit's is a violation
     of_soft_model: ClassVar[bool] = False  # a model that is too stiff may seem to meet it
     columns: ClassVar[tuple[str, ...]] = ("target", "initial", "one shot", "exact")
 
@@ -82,7 +81,7 @@ class Requirement(Brief):
 
     @staticmethod
     def asked(target: Any) -> str:
-        """What is asked of the mode, in words."""
+        """The words for what is asked of the mode."""
         raise NotImplementedError
 
     @staticmethod
@@ -99,6 +98,11 @@ class Requirement(Brief):
     def kind(self) -> str:
         """The key that only its targets have: frequency, at_least, at_most, keep_out or gap."""
         return self.form.kind
+
+    @property
+    def is_goal(self) -> bool:
+        """True where its error is a distance; a limit's is a violation."""
+        return self.form.is_goal
 
     def part(self, name: str, own: slice) -> Self:
         """The same along one trajectory only, at these of its own samples."""
@@ -160,7 +164,7 @@ class Requirement(Brief):
         return None
 
     def stake(self, hz: Floats, raised: float) -> float:
-        """How far off ``hz`` (n,) may be, relative, of a model that raises it so much at most."""
+        """The relative error that ``hz`` (n,) may have in a model that raises it so far at most."""
         return raised if self.of_soft_model else 0.0
 
     # --- Its rows of the program
@@ -199,7 +203,7 @@ class Requirement(Brief):
 
     @property
     def forbidden_hz(self) -> tuple[Floats | None, Floats | None]:
-        """Between what values its curve shall not be; None without an end."""
+        """The values (n,) between which its curve shall not be; None without an end."""
         lower = bool(np.isfinite(self.lower_hz).all())
         return (None, self.lower_hz) if lower else (self.upper_hz, None)
 

@@ -15,7 +15,7 @@ class UpperLimit(Requirement):
 
     @staticmethod
     def asked(target: AtMostTarget) -> str:
-        """What is asked of the mode, in words."""
+        """The words for what is asked of the mode."""
         return f"at most {in_hz(target.at_most)}"
 
     @staticmethod
