@@ -93,6 +93,6 @@ def damaged(whole: bytes, rng: np.random.Generator) -> bytes:
         del data[at : at + int(rng.integers(1, 1000))]
     elif kind == 2:
         data[at:at] = rng.bytes(int(rng.integers(1, 1000)))
-    else:  # a block of a disk that was never written
-        data[at : at + 4096] = bytes(len(data[at : at + 4096]))
+    else:  # a block of an erased disk; zeros are what some blocks of a whole file are
+        data[at : at + 4096] = b"\xff" * len(data[at : at + 4096])
     return bytes(data)
