@@ -164,8 +164,13 @@ class _Reader:
         if "tuple" in tree:
             return tuple(map(self._built, tree["tuple"]))
         if "csr" in tree:
-            parts = tuple(map(self._built, tree["parts"]))
-            matrix = sparse.csr_array(parts, shape=tuple(map(self._built, tree["csr"])))
+            data, indices, indptr = map(self._built, tree["parts"])
+            shape = tuple(map(self._built, tree["csr"]))
+            # SciPy checks no row of a matrix whose last row says that it is empty
+            counts = np.diff(indptr, prepend=0)
+            if (counts < 0).any() or counts[0] or not len(data) == len(indices) == indptr[-1]:
+                raise ValueError
+            matrix = sparse.csr_array((data, indices, indptr), shape=shape)
             matrix.check_format(full_check=True)
             return matrix
         if "array" in tree:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from math import prod
 from pathlib import Path
 
 import numpy as np
@@ -102,6 +103,25 @@ def test_only_known_classes_are_made(reduced):
         reduced_from_arrays(arrays)
 
 
+def with_an_empty_last_row(arrays):
+    """Every matrix of the program ends at 0, as a list of rows does that was torn."""
+    tree, integers = json.loads(arrays["tree"].tobytes()), arrays["integers"].copy()
+    place = 0
+
+    def visit(node):
+        nonlocal place
+        if isinstance(node, dict) and "array" in node:
+            place += 0 if node["array"] == "f" else prod(node["shape"])
+        for name, part in node.items() if isinstance(node, dict) else ():
+            for each in part if isinstance(part, list) else [part]:
+                visit(each)
+            if name == "parts":
+                integers[place - 1] = 0
+
+    visit(tree)
+    return {**arrays, "integers": integers}
+
+
 NESTED = b'{"tuple": [' * 100_000
 CHANGES = {
     "a number that is not finite": lambda a: {**a, "numbers": np.where(a["numbers"], np.nan, 0.0)},
@@ -111,6 +131,7 @@ CHANGES = {
     "no tree": lambda a: {k: v for k, v in a.items() if k != "tree"},
     "a tree too deep": lambda a: {**a, "tree": np.frombuffer(NESTED, dtype=np.uint8)},
     "a tree too long": lambda a: {**a, "tree": np.full(3_000_000, 32, dtype=np.uint8)},
+    "matrices without an end": with_an_empty_last_row,
     "a tuple": lambda a: spoilt(a, lambda fields: fields.update(points={"tuple": []})),
     "a count": lambda a: spoilt(a, lambda fields: fields.update(n_q=10**12)),
     "other modes": lambda a: spoilt(a, lambda fields: fields.update(modes={"tuple": [99]})),
