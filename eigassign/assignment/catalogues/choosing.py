@@ -179,7 +179,7 @@ class _OneShot(CatalogueProblem):
         return Relaxed(y, bound, tuple(bound + cost - cost.min() for cost in costs))
 
     def ranked(self, node: Node) -> Iterator[tuple[float, Rows]]:
-        """Those that can meet each constraint alone, by the module's bound of them all."""
+        """Yield combinations that can meet each constraint alone, by the module's bound of them."""
         program, (least, most) = self.relaxed, self.room
         places = np.indices(tuple(map(len, node))).reshape(len(node), -1)
         chosen = np.array([np.array(rows)[at] for rows, at in zip(node, places, strict=True)])
@@ -208,7 +208,7 @@ class _OneShot(CatalogueProblem):
 
 
 def _within(bounds: Bounds, own: ListedValues, rows: Rows) -> Rows:
-    """Those rows of a catalogue that are within the bounds."""
+    """The rows of a catalogue that are within the bounds."""
     columns, at = list(own.columns), own.rows[list(rows)]
     inside = np.all((at >= bounds.lower[columns]) & (at <= bounds.upper[columns]), axis=1)
     if not inside.any():
