@@ -12,7 +12,7 @@ from typing import Any
 from eigassign.brief import cut, named
 from eigassign.case.canonical import plain, to_yaml
 from eigassign.case.reader import KeyPath, Mark, dotted
-from eigassign.case.rules.properties import property_at
+from eigassign.case.rules.properties import property_at, value_at
 from eigassign.case.schema.design import Design
 from eigassign.case.schema.document import Document
 from eigassign.case.schema.joints import freedom_of
@@ -114,7 +114,7 @@ class CaseFile:
     def _quantities(self, paths: Iterable[str]) -> tuple[Quantity, ...]:
         tree = {"mechanism": plain(self.mechanism), "coordinates": plain(self.coordinates)}
         found = (property_at(tree, path) for path in paths)
-        return tuple(each.quantity if each else Quantity() for each in found)
+        return tuple(each or Quantity() for each in found)
 
     @property
     def design_units(self) -> tuple[str, ...]:
@@ -154,12 +154,7 @@ class CaseFile:
 
     def value_at(self, path: str) -> float:
         """The number that the file gives to the property at ``path``, in SI."""
-        head, name, *keys = path.split(".")
-        group = self.coordinates if head == "coordinates" else getattr(self.mechanism, head)
-        value: Any = group[name]
-        for key in keys:
-            value = getattr(value, key)
-        return float(value)
+        return value_at(self, path)
 
     @property
     def trajectories(self) -> tuple[tuple[str, str, TrajectoryForm], ...]:

@@ -165,7 +165,7 @@ def _case_file(
 ) -> CaseFile:
     path = written.path
     content = {name: getattr(document, name) for name in Document.model_fields}
-    doubts = [*implausible(document), *starts_outside(source.tree, document.design)]
+    doubts = [*implausible(document), *starts_outside(source.tree, document)]
     doubts += unreadable([each for each in named if each.spare])
     warnings = [source.problem(*finding) for finding in doubts]
     return CaseFile(

@@ -8,7 +8,6 @@ schema: every field that is one real number.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any, get_args, get_origin
 
 from pydantic_core import PydanticUndefined
@@ -19,7 +18,6 @@ from eigassign.case.rules.lookups import (
     columns,
     driven,
     is_spatial,
-    number,
     trajectories,
     type_of,
 )
@@ -56,16 +54,8 @@ class NoPropertyError(ValueError):
     """The path names nothing that can be varied; the message says why."""
 
 
-@dataclass(frozen=True)
-class Property:
-    """A real-valued property: what it may be, and what the file says it is (not yet SI)."""
-
-    quantity: Quantity
-    written: object
-
-
-def property_at(tree: Tree, path: str) -> Property | None:
-    """Property at ``path`` (relative to `mechanism`, or from `coordinates` on).
+def property_at(tree: Tree, path: str) -> Quantity | None:
+    """What the property at ``path`` may be (relative to `mechanism`, or from `coordinates` on).
 
     None where the path may be right but the file has another error there; raises NoPropertyError
     where it names nothing, or something that is not a real number.
@@ -83,16 +73,16 @@ def property_at(tree: Tree, path: str) -> Property | None:
     return _of_part(tree, group, *rest)
 
 
-def known_property(tree: Tree, path: str | None) -> Property | None:
-    """Property at ``path``, None where it is unknown."""
+def known_property(tree: Tree, path: str | None) -> Quantity | None:
+    """Quantity of the property at ``path``, None where it is unknown."""
     try:
         return None if path is None else property_at(tree, path)
     except NoPropertyError:
         return None
 
 
-def properties(tree: Tree) -> dict[str, Property | None]:
-    """Property of each component of y, None where it is unknown."""
+def properties(tree: Tree) -> dict[str, Quantity | None]:
+    """Quantity of each component of y, None where it is unknown."""
     return {column.name: known_property(tree, column.parameter) for column in columns(tree)}
 
 
@@ -107,7 +97,7 @@ def _meant(tree: Tree, group: str, path: str) -> str:
     return suggestion(group, (*_GROUPS, "coordinates"))
 
 
-def _of_part(tree: Tree, group: str, name: str, key: str) -> Property | None:
+def _of_part(tree: Tree, group: str, name: str, key: str) -> Quantity | None:
     known = at(tree, "mechanism", group)
     if known is None and group != "links":
         known = {}
@@ -134,7 +124,7 @@ def _of_part(tree: Tree, group: str, name: str, key: str) -> Property | None:
         raise NoPropertyError(
             f"{owner}.{key} is a list in this file and cannot vary: give one number"
         )
-    return Property(real[key], written)
+    return real[key]
 
 
 def _model(group: str, body: object) -> type[Part] | None:
@@ -166,15 +156,14 @@ def _quantity(annotation: Any, metadata: Sequence[object]) -> Quantity | None:
     return next((q for kind, *more in inner if (q := _quantity(kind, more)) is not None), None)
 
 
-def _of_drive(tree: Tree, name: str, key: str) -> Property:
+def _of_drive(tree: Tree, name: str, key: str) -> Quantity:
     if name not in (known := names(tree, "coordinates")):
         raise NoPropertyError(unknown("coordinate", name, known))
-    written = at(tree, "coordinates", name, "drive", key)
-    if written is None:
+    if at(tree, "coordinates", name, "drive", key) is None:
         raise NoPropertyError(
             f"coordinate {name!r} has no drive {key}: write drive: {{{key}: ...}}"
         )
-    return Property(drive_quantity(tree, at(tree, "coordinates", name), key), written)
+    return drive_quantity(tree, at(tree, "coordinates", name), key)
 
 
 def drive_quantity(tree: Tree, coordinate: object, key: str) -> Quantity:
@@ -212,19 +201,31 @@ def load_cases_set_properties(tree: Tree) -> Iterator[Finding]:
                 yield (*place, "set", path), message
 
 
-def starts_outside(tree: Tree, design: Design) -> Iterator[Finding]:
+def value_at(case: Any, path: str) -> float:
+    """The number at ``path`` in the parts of a valid case, in SI."""
+    head, name, *keys = path.split(".")
+    value: Any = (case.coordinates if head == "coordinates" else getattr(case.mechanism, head))[
+        name
+    ]
+    for key in keys:
+        value = getattr(value, key)
+    return float(value)
+
+
+def starts_outside(tree: Tree, case: Any) -> Iterator[Finding]:
     """Warnings where what the file has as design is outside its bounds, or none of those listed.
 
     Bounds and lists say where the answer may be, so that the start need not be there.
     """
+    design = case.design
     found = [property_at(tree, column.parameter) for column in design.parameters.values()]
-    units = [p.quantity.dimension.si if p and p.quantity.dimension else "" for p in found]
-    start = [number(p.written, p.quantity) if p else None for p in found]
+    units = [p.dimension.si if p and p.dimension else "" for p in found]
+    start = [value_at(case, column.parameter) for column in design.parameters.values()]
     catalogued = {k for catalogue in design.catalogues for k in catalogue.columns}
     why = "; the optimum will lie inside"
     for k, (name, column) in enumerate(design.parameters.items()):
         value, unit = start[k], units[k]
-        if k in catalogued or value is None or column.min <= value <= column.max:
+        if k in catalogued or column.min <= value <= column.max:
             continue
         message = f"initial value {value:g} {unit} of {column.parameter} is outside "
         bounds = f"[{column.min:g}, {column.max:g}] {unit}"

@@ -29,7 +29,6 @@ from eigassign.case.rules.lookups import (
 )
 from eigassign.case.rules.properties import (
     DRIVEN,
-    Property,
     drive_quantity,
     known_property,
     properties,
@@ -88,7 +87,7 @@ def _prices(tree: Tree) -> Iterator[tuple[KeyPath, object]]:
             if isinstance(price, str):
                 prop = known_property(tree, path)
                 try:
-                    unit = prop.quantity.dimension if prop else None
+                    unit = prop.dimension if prop else None
                     yield ("design", name, "price", *place), read_rate(price, unit)
                 except QuantityError as error:
                     yield ("design", name, "price", *place), error
@@ -111,14 +110,13 @@ def _undecided(tree: Tree) -> Iterator[Undecided]:
     known, kinds = properties(tree), coordinate_quantities(tree)
     yield from _of_design(tree, known)
     for k, value in enumerate(entries(tree, "expansion", "y")):
-        of_parameters = [p.quantity if p else ANY for p in known.values()]
+        of_parameters = [p or ANY for p in known.values()]
         yield ("expansion", "y", k), value, of_parameters[k] if k < len(of_parameters) else ANY
     for path, listed in coordinate_lists(tree):
         yield from _in_list(listed, kinds, path)
     for path, body in trajectories(tree):
         for name, value in items(body, "set"):
-            prop = known_property(tree, name)
-            yield (*path, "set", name), value, prop.quantity if prop else ANY
+            yield (*path, "set", name), value, known_property(tree, name) or ANY
         for joint, limits in items(body, "branch"):
             freedom = freedoms(tree, joint) or ()
             both = [of_freedom(freedom[0] if len(freedom) == 1 else None)] * 2
@@ -126,8 +124,7 @@ def _undecided(tree: Tree) -> Iterator[Undecided]:
     for path, body in followed_modes(tree):
         for name, value in items(body, "design"):
             if name in known:
-                prop = known[name]
-                yield (*path, "design", name), value, prop.quantity if prop else ANY
+                yield (*path, "design", name), value, known[name] or ANY
     for k, body in enumerate(entries(tree, "measurements")):
         yield from _of_deviation(at(body, "deviation"), ("measurements", k, "deviation"))
     path = ("measurements", "deviation")
@@ -143,16 +140,15 @@ def _undecided(tree: Tree) -> Iterator[Undecided]:
             yield path, at(body, "drive", key), drive_quantity(tree, body, key)
 
 
-def _of_design(tree: Tree, known: Mapping[str, Property | None]) -> Iterator[Undecided]:
+def _of_design(tree: Tree, known: Mapping[str, Quantity | None]) -> Iterator[Undecided]:
     """Bounds of parameters, and of sums of parameters that have a dimension in common."""
     for name, body in design_entries(tree):
         for choice, values in choices(body) or ():
             for path, value in items(values):
-                prop = known_property(tree, path)
                 place = ("design", name, "choices", choice, path)
-                yield place, value, prop.quantity if prop else ANY
+                yield place, value, known_property(tree, path) or ANY
         prop = known.get(name)
-        own = prop.quantity if prop else ANY
+        own = prop or ANY
         for key in ("min", "max"):
             yield ("design", name, key), at(body, key), own
         for k, value in enumerate(entries(body, "values")):
@@ -163,7 +159,7 @@ def _of_design(tree: Tree, known: Mapping[str, Property | None]) -> Iterator[Und
             yield ("design", name, "tolerance"), amount, either
     for name, body in items(tree, "design", "constraints"):
         terms = [known.get(term) for term, _ in items(body, "terms")]
-        dimensions = {term.quantity.dimension for term in terms if term}
+        dimensions = {term.dimension for term in terms if term}
         one = Quantity(dimensions.pop()) if len(dimensions) == 1 else None if dimensions else ANY
         for key in ("min", "max"):
             yield ("design", "constraints", name, key), at(body, key), one
