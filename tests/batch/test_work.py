@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.sparse.linalg
 
 from eigassign.batch import (
     CaseOptions,
@@ -138,3 +139,18 @@ def test_a_case_that_takes_too_much_memory_is_ended(options: CaseOptions, tmp_pa
     run_cases([small], options)  # OpenBLAS, which would end this process, has its memory then
     (found,) = run_cases([large], replace(options, megabytes=5.0))
     assert (found.status, found.message) == ("error", "out of memory (--case-memory is 5 MB)")
+
+
+def test_memory_that_runs_out_inside_a_factorisation_is_no_limp_link(
+    options: CaseOptions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def without_memory(*_given: object, **_options: object) -> None:  # SciPy 1.17, by RLIMIT_AS
+        raise RuntimeError(
+            "SUPERLU_MALLOC fails for buf in intCalloc() at line 173 in file memory.c"
+        )
+
+    file = tmp_path / "large.yaml"
+    file.write_text(SMALL.read_text().replace("elements: 2", "elements: 300"))
+    monkeypatch.setattr(scipy.sparse.linalg, "splu", without_memory)
+    (found,) = run_cases(plan_of([file]), options)
+    assert (found.status, found.message) == ("error", "out of memory")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,17 @@ def factorise(matrix: sparse.csc_array) -> linalg.SuperLU:
     For others the caller checks what comes out.
     """
     options = {"SymmetricMode": True}
-    return linalg.splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    return lu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+
+
+def lu(matrix: sparse.csc_array, **options: Any) -> linalg.SuperLU:
+    """SuperLU's factors; RuntimeError where a pivot is exactly zero, MemoryError without memory."""
+    try:
+        return linalg.splu(matrix, **options)
+    except RuntimeError as error:
+        if "singular" in str(error):
+            raise
+        raise MemoryError(str(error)) from error  # of a malloc that failed
 
 
 def definite_factor(matrix: sparse.csc_array) -> linalg.SuperLU | None:

@@ -30,7 +30,7 @@ from scipy.sparse import linalg
 
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.elements.sparse_factor import factorise
+from eigassign.mechanism.elements.sparse_factor import factorise, lu
 from eigassign.modal.exact.sparse import block, principal
 
 Floats = NDArray[np.float64]
@@ -68,7 +68,7 @@ def factor_dense(A: Floats, border: Floats) -> Solve:
 
 def with_partial_pivoting(matrix: sparse.csc_array) -> linalg.SuperLU:
     """LU factors without any regard to symmetry: more fill-in than `factorise`, and safe."""
-    return linalg.splu(matrix, permc_spec="COLAMD")
+    return lu(matrix, permc_spec="COLAMD")
 
 
 def factor_sparse(
