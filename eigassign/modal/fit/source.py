@@ -45,7 +45,15 @@ def dependence(source: Any) -> tuple[Floats, int]:
 
 def modes_of(source: Any, modes: Sequence[int] | None) -> tuple[int, ...]:
     """The modes to fit. Raises UsageError for one that the source does not have."""
-    own = getattr(source, "modes", None) if not isinstance(source, Model) else None
+    if isinstance(source, Model):
+        wanted, last = mode_numbers((1,) if modes is None else modes), len(source.pencil.elastic)
+        if wanted[-1] > last:
+            raise UsageError(
+                f"mode {wanted[-1]} cannot be fitted: the model has 1 to {last} elastic ones; ask "
+                "for one of those, or refine its mesh"
+            )
+        return wanted
+    own = getattr(source, "modes", None)
     wanted = mode_numbers((own or (1,)) if modes is None else modes)
     if own is not None and not set(wanted) <= set(own):
         raise UsageError(f"modes {wanted} asked for; the source has {own}")

@@ -166,6 +166,8 @@ def test_calls_that_cannot_be_meant_are_refused(arm: tuple[Model, np.ndarray]) -
         ea.Box([1.0], [0.0])
     with pytest.raises(UsageError, match=r"modes \(3,\) asked for"):
         ea.fit(ea.reduce(model, Q0, Y0), q, Y0, (3,))
+    with pytest.raises(UsageError, match=r"mode 99 cannot be fitted: the model has 1 to \d+ elas"):
+        ea.fit(model, q, Y0, (1, 99))
 
 
 def test_a_case_is_no_source_but_has_one(arm: tuple[Model, np.ndarray]) -> None:
