@@ -118,14 +118,18 @@ def _parts(table: Table, room: int) -> Iterator[Drawn]:
             groups[-1] = together
         else:
             groups.append([*names, k])
+    full = [max(wide, cell_len(h)) for wide, h in zip(longest, table.columns, strict=True)]
     for group in groups:
-        wide = sum(max(longest[k], cell_len(table.columns[k])) + _GAP for k in group) - _GAP > room
+        # of what texts leave, headings of numbers are given what they need, one after the other
         drawn = Drawn(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, collapse_padding=True)
+        left = room + _GAP - sum((least if table.numeric[k] else full)[k] + _GAP for k in group)
         for k in group:
+            whole = table.numeric[k] and full[k] - least[k] <= left
+            left -= whole * (full[k] - least[k])
             drawn.add_column(
                 Text(table.columns[k]),
                 justify="right" if k and table.numeric[k] else "left",
-                width=least[k] if wide and table.numeric[k] else None,
+                width=(full if whole else least)[k] if table.numeric[k] else None,
                 overflow="fold",
             )
         for row in rows:

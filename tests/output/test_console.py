@@ -96,6 +96,18 @@ def test_long_paths_go_on_in_the_next_line_and_numbers_are_whole(monkeypatch):
     assert first.endswith("1.5e+05")
 
 
+def test_a_heading_is_folded_only_where_the_width_asks_for_it(monkeypatch):
+    columns = ("name", "at the start", "at the end", "error in Hz")
+    table = Table("", columns, (("mode 1", "1", "2", "3"),))
+    headings = []  # that are in one line
+    for width in (45, 38, 36):
+        monkeypatch.setenv("COLUMNS", str(width))
+        lines = shown(table).splitlines()
+        assert max(map(len, lines)) <= width
+        headings.append([heading for heading in columns if any(heading in line for line in lines)])
+    assert headings == [list(columns), ["name", "at the start", "error in Hz"], list(columns[:2])]
+
+
 def test_rows_that_share_their_first_cell_are_named_by_two_in_every_part(monkeypatch):
     monkeypatch.setenv("COLUMNS", "40")
     rows = (("mode 1", "over q", "1" * 12, "2" * 12), ("mode 1", "over y", "3" * 12, "4" * 12))
