@@ -29,7 +29,7 @@ __all__, __getattr__, __dir__ = face(
         "optimality": "Certificate best_candidate judge",
         "program": (
             "Bounds Goal LinearConstraint LinearModel ProgramAnswer ScaledProgram build_program "
-            "quadratic_form scaled_program unscaled"
+            "scaled_program unscaled"
         ),
         "solver": "Status solve_program solve_scaled",
         "targets": "hz_from_lam lam_from_hz sample_target trapezoidal_weights",

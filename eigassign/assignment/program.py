@@ -20,8 +20,7 @@ h = ∫ (l0 − λ_d) l dt. For one target constant in time λ_d is a common fac
 and both have the same solution. They differ where λ_d differs: the absolute error lets a mode (or
 an instant) of twice the target frequency weigh sixteen times as much, for no other reason than
 being fast; here 1 % is 1 % in every mode and at every instant, and ``weight`` alone says what
-matters more. `quadratic_form` gives R and h of either: of a model as it is, or divided by its
-target.
+matters more.
 
 **Units.** The program is solved in dimensionless units (`Scales`, `ScaledProgram`), in which every
 number is O(1); an answer goes back to SI units by `unscaled`.
@@ -177,15 +176,6 @@ def error_rows(model: LinearModel, lam_d: ArrayLike, weights: Floats) -> tuple[F
     """Rows A = √ω l and b = √ω (l0 − λ_d), so that ∫ (λ − λ_d)² dt = ‖A dy + b‖²."""
     root = np.sqrt(weights)
     return root[:, np.newaxis] * model.l, root * (model.l0 - np.asarray(lam_d))
-
-
-def quadratic_form(model: LinearModel, lam_d: ArrayLike, weights: Floats) -> tuple[Floats, Floats]:
-    """R = ∫ l lᵀ dt (n_y, n_y) and h = ∫ (l0 − λ_d) l dt (n_y,) of eqs. (13)–(14).
-
-    ``weights`` (n_t,) are those of the integral (`trapezoidal_weights`), λ_d is (n_t,) or a number.
-    """
-    A, b = error_rows(model, lam_d, weights)
-    return frozen(A.T @ A), frozen(A.T @ b)
 
 
 def build_program(

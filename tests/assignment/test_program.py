@@ -11,7 +11,6 @@ from eigassign.assignment import (
     LinearConstraint,
     LinearModel,
     build_program,
-    quadratic_form,
     scaled_program,
     trapezoidal_weights,
 )
@@ -24,21 +23,12 @@ def model_of(seed, n_t=30, n_y=3):
     return time, LinearModel(1e6 * (1 + rng.random(n_t)), 1e6 * rng.normal(size=(n_t, n_y)))
 
 
-def test_R_and_h_are_the_integrals_of_equations_13_and_14():
-    time, model = model_of(1)
-    lam_d = 1.2e6 * (1.0 + 0.1 * np.sin(time))
-    R, h = quadratic_form(model, lam_d, trapezoidal_weights(time))
-    outer = np.einsum("ti,tj->tij", model.l, model.l)
-    np.testing.assert_allclose(R, trapezoid(outer, time, axis=0), rtol=1e-12)
-    residual = (model.l0 - lam_d)[:, np.newaxis] * model.l
-    # entries of h cancel to a tenth of their terms at most
-    np.testing.assert_allclose(h, trapezoid(residual, time, axis=0), rtol=1e-11)
-
-
 def test_the_program_of_one_constant_target_is_the_papers_up_to_a_factor():
+    """R = ∫ l lᵀ dt and h = ∫ (l0 − λ_d) l dt of eqs. (13)–(14), by SciPy's trapezoidal rule."""
     time, model = model_of(2)
     lam_d = 1.3e6
-    R, h = quadratic_form(model, lam_d, trapezoidal_weights(time))
+    R = trapezoid(np.einsum("ti,tj->tij", model.l, model.l), time, axis=0)
+    h = trapezoid((model.l0 - lam_d)[:, np.newaxis] * model.l, time, axis=0)
     program = build_program(
         [goal(model.l0, model.l, lam_d, weight=7.0)],
         trapezoidal_weights(time),
@@ -48,7 +38,26 @@ def test_the_program_of_one_constant_target_is_the_papers_up_to_a_factor():
     )
     factor = lam_d**2 * (time[-1] - time[0])
     np.testing.assert_allclose(program.A.T @ program.A, R / factor, rtol=1e-12)
-    np.testing.assert_allclose(program.A.T @ program.b, h / factor, rtol=1e-12)
+    # entries of h cancel to a tenth of their terms at most
+    np.testing.assert_allclose(program.A.T @ program.b, h / factor, rtol=1e-11)
+
+
+def test_of_a_target_that_varies_the_program_is_the_papers_of_the_relative_model():
+    time, model = model_of(1)
+    lam_d = 1.2e6 * (1.0 + 0.1 * np.sin(time))
+    program = build_program(
+        [goal(model.l0, model.l, lam_d)],
+        trapezoidal_weights(time),
+        np.zeros(3),
+        np.zeros(3),
+        Bounds(-np.ones(3), np.ones(3)),
+    )
+    relative = model.l / lam_d[:, np.newaxis]
+    R = trapezoid(np.einsum("ti,tj->tij", relative, relative), time, axis=0)
+    h = trapezoid((model.l0 / lam_d - 1.0)[:, np.newaxis] * relative, time, axis=0)
+    whole = time[-1] - time[0]
+    np.testing.assert_allclose(program.A.T @ program.A, R / whole, rtol=1e-12)
+    np.testing.assert_allclose(program.A.T @ program.b, h / whole, rtol=1e-11)
 
 
 def test_the_objective_is_the_weighted_mean_square_relative_error_in_lambda():

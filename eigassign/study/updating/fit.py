@@ -122,11 +122,6 @@ class UpdateResults(Brief):
         """Their 95 % intervals."""
         return {row.name: (row.low, row.high) for row in self.parameters}
 
-    @property
-    def outliers(self) -> tuple[ExplainedMeasurement, ...]:
-        """Measurements more than three standard deviations off."""
-        return tuple(row for row in self.measurements if row.is_outlier)
-
     @cached_property
     def correlation(self) -> Floats:
         """(n_y, n_y); NaN of parameters that are held or not identified."""
