@@ -173,7 +173,7 @@ def reduce(
     )
 
 
-def assign(case: built_case.BuiltCase) -> Result:
+def assign(case: Case) -> Result:
     """The whole job of ``eigassign optimize``, without writing anything.
 
         min over y of Σ w (f(t)/f_d(t) − 1)² / Σ w  within the bounds, limits and bands of the case
@@ -188,7 +188,7 @@ def assign(case: built_case.BuiltCase) -> Result:
     return solve_case(_loaded(case))
 
 
-def update(case: built_case.BuiltCase) -> Updated:
+def update(case: Case) -> Updated:
     """The whole job of ``eigassign update``, without writing anything.
 
         min over y of Σ ((f(q, y) − f_measured) / σ)²
