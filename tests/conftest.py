@@ -18,6 +18,7 @@ for library in (
 for folder in (
     "oracles",
     "assignment",
+    "batch",
     "case",
     "faults",
     "mechanism",
