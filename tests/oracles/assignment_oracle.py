@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -145,7 +146,8 @@ class Found:
 
 def of_case(case: Any) -> ExactAssignment:
     """The exact problem of a loaded case with targets on single frequencies."""
-    path, file = case.trajectory, case.file
+    file = case.file
+    path = case.trajectory.with_instants([_knots_between(file, p) for p in case.trajectory.parts])
     times = [(part.weight, np.asarray(part.trajectory.time_s)) for part in path.parts]
     omega = np.concatenate([weight * _trapezoidal(t) for weight, t in times])
     goals = []
@@ -309,6 +311,22 @@ def _epigraph_from(unit: _Unit, v: Floats, size: float) -> Floats:
 
 def _trapezoidal(t: Floats) -> Floats:
     return 0.5 * (np.append(np.diff(t), 0.0) + np.append(0.0, np.diff(t)))
+
+
+def _knots_between(file: Any, part: Any) -> list[float]:
+    """Points of profiles between two samples that the straight line from one to the next misses."""
+    t, found = np.asarray(part.trajectory.time_s), []
+    for target in file.targets:
+        if target.trajectory not in (None, part.name) or not hasattr(target.frequency, "time"):
+            continue
+        knots = np.asarray(target.frequency.time, dtype=float)
+        for first, last in pairwise(t):
+            own = knots[(knots > first) & (knots < last)]
+            hz = _wanted(target.frequency, np.array([first, *own, last]))
+            line = np.interp(own, [first, last], hz[[0, -1]])
+            if np.any(np.abs(line / hz[1:-1] - 1.0) > 1e-12):
+                found += own.tolist()
+    return found
 
 
 def _wanted(frequency: Any, time_s: Floats) -> Floats:
