@@ -31,9 +31,9 @@ from references import oracle
 from scipy.sparse import linalg
 
 import eigassign as ea
-from eigassign.assignment import Optimum, minimise
+from eigassign.assignment import Optimum, minimise, requirements_of
 from eigassign.pipeline import Stages, prepare
-from eigassign.study import DesignResponse, Task, find_optimum, requirements_of, variant_of
+from eigassign.study import DesignResponse, Task, find_optimum, variant_of
 
 NEAR = 1e-3  # of the best rms: there a search has arrived
 ELEMENTS = 230  # a link

@@ -2,15 +2,16 @@
 
 Reading order:
 
-    checks       refuses input that is not finite or has another shape
-    targets      wanted frequencies at the samples, weights in time, λ in Hz
-    program      build: the quadratic program of eqs. (13)–(14), and its dimensionless units
-    feasibility  which limits contradict each other
-    solver       solve: OSQP, then an active-set method that goes to round-off
-    optimality   judge: Karush–Kuhn–Tucker residuals, recomputed from the data
-    exact        the optimum of the exact problem, and parameters from measurements
-    catalogues   the best of what catalogues list
-    assign       build, solve, judge: from targets to the optimal design
+    checks        refuses input that is not finite or has another shape
+    targets       wanted frequencies at the samples, weights in time, λ in Hz
+    program       build: the quadratic program of eqs. (13)–(14), and its dimensionless units
+    feasibility   which limits contradict each other
+    solver        solve: OSQP, then an active-set method that goes to round-off
+    optimality    judge: Karush–Kuhn–Tucker residuals, recomputed from the data
+    exact         the optimum of the exact problem, and parameters from measurements
+    requirements  what a case asks for: one type from the case file to the report
+    catalogues    the best of what catalogues list
+    assign        build, solve, judge: from targets to the optimal design
 """
 
 from eigassign.faces import face
@@ -31,6 +32,9 @@ __all__, __getattr__, __dir__ = face(
             "Bounds Goal LinearConstraint LinearModel ProgramAnswer ScaledProgram build_program "
             "scaled_program unscaled"
         ),
+        "requirements.named_modes": "followed_modes named_design named_pose",
+        "requirements.requirement": "Requirement Solved",
+        "requirements.sampling": "KINDS requirements_of time_weights",
         "solver": "Status solve_program solve_scaled",
         "targets": "hz_from_lam lam_from_hz sample_target trapezoidal_weights",
     },

@@ -19,6 +19,7 @@ from scipy.optimize import Bounds, LinearConstraint, differential_evolution, min
 from eigassign.assignment.exact.design_problem import UnitBox
 from eigassign.assignment.exact.requirements import Frequencies
 from eigassign.assignment.exact.sequential import minimise
+from eigassign.assignment.requirements.sampling import requirements_of
 from eigassign.chart.results import DesignRun, excess_over
 from eigassign.chart.timing import Effort, measure
 from eigassign.errors import EigassignError
@@ -27,7 +28,6 @@ from eigassign.study.design.one_shot import assign_design
 from eigassign.study.design.optimum import find_optimum
 from eigassign.study.design.variants import Task, variant_of
 from eigassign.study.planning import SEED
-from eigassign.study.requirements.sampling import requirements_of
 from eigassign.study.scene import Expansions, Scene
 
 Floats = NDArray[np.float64]

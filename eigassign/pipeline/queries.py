@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.requirements.sampling import requirements_of, with_instants
 from eigassign.case.case_file import CaseFile
 from eigassign.case.rules.properties import impossible
 from eigassign.case.schema.parts import Quantity, quantity
@@ -26,7 +27,6 @@ from eigassign.study.accuracy import judged_mesh, mesh_lines, truncation_lines
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.design.followed import named_notes
 from eigassign.study.planning import plan_expansion, shown_point
-from eigassign.study.requirements.sampling import requirements_of, with_instants
 from eigassign.study.updating.measured import read_measurements
 
 Floats = NDArray[np.float64]

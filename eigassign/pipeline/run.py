@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.assign import Assignment
 from eigassign.assignment.exact.sequential import End
+from eigassign.assignment.requirements.requirement import Solved
+from eigassign.assignment.requirements.sampling import requirements_of, with_instants
 from eigassign.brief import counted
 from eigassign.case.suggestions import shown
 from eigassign.errors import EigassignError
@@ -51,8 +53,6 @@ from eigassign.study.design.judgement import SolvedDesigns, study_targets
 from eigassign.study.meaning.overall import Studies, study_meaning
 from eigassign.study.moving import moving_modes
 from eigassign.study.planning import plan_expansion
-from eigassign.study.requirements.requirement import Solved
-from eigassign.study.requirements.sampling import requirements_of, with_instants
 from eigassign.study.results import MovingMode, RunResults, TargetStudy
 from eigassign.study.scene import Expansions, Scene
 

@@ -3,7 +3,6 @@
 Reading order:
 
     build       from a case file in which every number is given to its model and trajectories
-    requirements  what a case asks for: one type from the case file to the report
     results     what a run found, as plain numbers and names: all that the output is given to show
     planning    expansion point, order and modes; what is left to auto, and where it is judged
     settling    chooses elements and reduced links left to auto, and builds the model
@@ -48,9 +47,6 @@ __all__, __getattr__, __dir__ = face(
             "mesh_share plan_expansion series_share shown_point truncation_share "
             "with_middle_loads with_worse_designs"
         ),
-        "requirements.named_modes": "followed_modes named_design named_pose",
-        "requirements.requirement": "Requirement Solved",
-        "requirements.sampling": "KINDS requirements_of time_weights",
         "results": (
             "ActiveRow AssignmentRow CatalogueRow ClearanceRow CombinationRow Comparison "
             "DesignMap DesignRow DrawnBody DrawnJoint DrawnPoses DrawnSpring ErrorRow "

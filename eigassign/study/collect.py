@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign._version import __version__
+from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.accuracy import study_motion
@@ -18,7 +19,6 @@ from eigassign.study.design.answer import Answer
 from eigassign.study.design.judgement import crossing_warnings, swap_notes
 from eigassign.study.design.one_shot import design_rows, solver_row
 from eigassign.study.drawing import draw_poses, rest_pose
-from eigassign.study.requirements.requirement import Requirement, Solved
 from eigassign.study.results import (
     AssignmentRow,
     DrawnPoses,

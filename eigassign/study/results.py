@@ -13,9 +13,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.brief import Brief
 from eigassign.case.units import is_bare
-from eigassign.study.requirements.requirement import Requirement
 
 Floats = NDArray[np.float64]
 

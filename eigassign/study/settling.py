@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.requirements.sampling import requirements_of, with_instants
 from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.assembly.build import WholeLinks, with_elements, with_reduction
 from eigassign.mechanism.kinematics.parameters import initial_design
@@ -31,7 +32,6 @@ from eigassign.study.planning import (
     truncation_share,
     with_middle_loads,
 )
-from eigassign.study.requirements.sampling import requirements_of, with_instants
 
 Floats = NDArray[np.float64]
 TRIAL = 2  # elements of a link left to auto, in the model whose trajectory choices are judged on

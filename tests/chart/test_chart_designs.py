@@ -10,8 +10,9 @@ import pytest
 from chart_scenes import TINY
 from scenes import SHIPPED, changed, scene_of
 
+from eigassign.assignment import time_weights
 from eigassign.chart import DesignRun, chart_designs
-from eigassign.study import Scene, time_weights
+from eigassign.study import Scene
 
 CASES = Path(__file__).parents[2] / "cases"
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from eigassign import Case, load_case
+from eigassign.assignment import requirements_of
 from eigassign.mechanism import with_elements, with_reduction
-from eigassign.study import requirements_of
 
 CASES = Path(__file__).parents[2] / "cases"
 SHIPPED = sorted(path.stem for path in CASES.glob("*.yaml"))

@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment import KINDS
 from eigassign.study import (
-    KINDS,
     ActiveRow,
     AssignmentRow,
     Comparison,

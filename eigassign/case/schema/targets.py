@@ -1,7 +1,8 @@
 """The key `targets`: wanted frequencies, limits, bands to keep out of, gaps between modes.
 
 A target has exactly one of the keys in `TARGETS`, which say what kind it is. What the rest of the
-program goes through are requirements (`study.requirements`): one for each of a target's `named`.
+program goes through are requirements (`assignment.requirements`): one for each of a target's
+`named`.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.output.figures import graph
 from eigassign.output.figures.graph import (
     Curve,
@@ -27,7 +28,6 @@ from eigassign.output.figures.graph import (
     short,
 )
 from eigassign.output.formats import capital, percent
-from eigassign.study.requirements.requirement import Requirement
 from eigassign.study.results import AssignmentRow, OtherModes, RunResults, TargetStudy
 
 Floats = NDArray[np.float64]

@@ -8,13 +8,13 @@ import numpy as np
 
 from eigassign.assignment.exact.design_problem import MET
 from eigassign.assignment.exact.sequential import End
+from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.study.accuracy import model_error
 from eigassign.study.design.answer import MAX_ERROR, Answer
 from eigassign.study.design.clearance import Clearance
 from eigassign.study.design.conclusions import Conflict, is_proved
 from eigassign.study.design.judgement import verdict
 from eigassign.study.design.variants import MASS, Task, variant_of
-from eigassign.study.requirements.requirement import Requirement
 from eigassign.study.results import (
     ActiveRow,
     AssignmentRow,

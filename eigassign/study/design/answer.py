@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.assign import Assignment
 from eigassign.assignment.exact.design_problem import MET
+from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.targets import hz_from_lam
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, InfeasibleError
@@ -26,7 +27,6 @@ from eigassign.study.design.conclusions import (
 )
 from eigassign.study.design.one_shot import assign_design, catalogues
 from eigassign.study.design.optimum import Found, find_optimum
-from eigassign.study.requirements.requirement import Requirement
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]

@@ -16,6 +16,8 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.requirements.named_modes import followed_modes, named_design, named_pose
+from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.targets import FollowedMode
 from eigassign.errors import CaseError, LostModeError
@@ -31,8 +33,6 @@ from eigassign.modal.exact.following import (
 from eigassign.modal.exact.tracking import COINCIDENT, EXTRA
 from eigassign.modal.model import Model
 from eigassign.study.planning import shown_point
-from eigassign.study.requirements.named_modes import followed_modes, named_design, named_pose
-from eigassign.study.requirements.requirement import Requirement, Solved
 from eigassign.study.scene import AT_LEAST, BLOCK, Scene
 
 Floats = NDArray[np.float64]

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.requirements.requirement import Requirement, Solved
+from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.study.requirements.requirement import Requirement, Solved
-from eigassign.study.requirements.sampling import time_weights
 from eigassign.study.results import (
     ErrorRow,
     ErrorSummary,

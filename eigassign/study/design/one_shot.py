@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from eigassign.assignment.assign import Assignment, solve_assignment
 from eigassign.assignment.catalogues.branching import ListedValues
 from eigassign.assignment.program import Bounds, Goal, LinearConstraint, LinearModel
+from eigassign.assignment.requirements.requirement import Requirement
+from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError
-from eigassign.study.requirements.requirement import Requirement
-from eigassign.study.requirements.sampling import time_weights
 from eigassign.study.results import DesignRow, SolverRow
 from eigassign.study.scene import Scene
 

@@ -17,14 +17,14 @@ from eigassign.assignment.catalogues.branching import KEEP, ListedValues
 from eigassign.assignment.catalogues.choosing import RELAXED, Chosen, choose
 from eigassign.assignment.exact.design_problem import MET, best_first
 from eigassign.assignment.exact.sequential import End, Optimum, worth
+from eigassign.assignment.requirements.named_modes import followed_modes
+from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.errors import InfeasibleError
 from eigassign.study.design.clearance import Band, Clearance, prove_clear, wanting
 from eigassign.study.design.one_shot import catalogues
 from eigassign.study.design.response import reduced_models
 from eigassign.study.design.starts import Searched, coarse_to_fine, most_starts, search_starts
 from eigassign.study.design.variants import PosedProblem, Task, possible_counts, variant_of
-from eigassign.study.requirements.named_modes import followed_modes
-from eigassign.study.requirements.requirement import Requirement
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]

@@ -19,14 +19,14 @@ from eigassign.assignment.exact.design_problem import DesignProblem, Objective
 from eigassign.assignment.exact.requirements import QuantityLimit, Requirements
 from eigassign.assignment.feasibility import constraints_agree
 from eigassign.assignment.program import Bounds, LinearConstraint
+from eigassign.assignment.requirements.band import ForbiddenBand
+from eigassign.assignment.requirements.requirement import Requirement
+from eigassign.assignment.requirements.sampling import requirements_of, time_weights
 from eigassign.errors import CaseError, EigassignError, MissingMassError
 from eigassign.study.design.clearance import mode_above
 from eigassign.study.design.followed import Follower, followers
 from eigassign.study.design.one_shot import linear_constraints
 from eigassign.study.design.response import DesignResponse, ReducedModels, response_of
-from eigassign.study.requirements.band import ForbiddenBand
-from eigassign.study.requirements.requirement import Requirement
-from eigassign.study.requirements.sampling import requirements_of, time_weights
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import MET, Appraisal
 from eigassign.assignment.exact.requirements import Requirements
+from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import EigassignError
 from eigassign.study.design.account import active_rows
 from eigassign.study.design.answer import Answer
@@ -23,7 +24,6 @@ from eigassign.study.meaning.reach import misses, proved_ranges, reach_rows, unr
 from eigassign.study.meaning.sensitivity import error_kind, relaxed_limits, sensitivities
 from eigassign.study.meaning.tolerance import study_tolerance
 from eigassign.study.meaning.tradeoff import trade_off
-from eigassign.study.requirements.requirement import Requirement, Solved
 from eigassign.study.results import Meaning, RelaxedRow, ToleranceRows
 from eigassign.study.scene import Scene
 

@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem
 from eigassign.assignment.exact.requirements import FrequencyGoal, Requirements
 from eigassign.assignment.exact.sequential import minimise
+from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import EigassignError
 from eigassign.study.design.followed import followers, solve_design
 from eigassign.study.design.one_shot import linear_constraints
 from eigassign.study.design.response import response_of
 from eigassign.study.meaning.monotone import corners, effects
-from eigassign.study.requirements.requirement import Requirement, Solved
 from eigassign.study.results import RangeRow
 from eigassign.study.scene import Scene
 

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, Objective
 from eigassign.assignment.exact.requirements import Requirements
+from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy
 from eigassign.study.design.variants import MASS
-from eigassign.study.requirements.requirement import Requirement
 from eigassign.study.results import ActiveRow, RelaxedRow, SensitivityRow
 
 Floats = NDArray[np.float64]

@@ -14,11 +14,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import AccuracyError
 from eigassign.modal.reduced.reduce import reduce
 from eigassign.study.design.followed import Follower, followers, solve_design
 from eigassign.study.meaning.monotone import corners, effects
-from eigassign.study.requirements.requirement import Requirement, Solved
 from eigassign.study.results import RangeRow, ToleranceRows
 from eigassign.study.scene import Scene
 

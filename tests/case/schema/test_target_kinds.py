@@ -12,10 +12,10 @@ import pytest
 from json_schema_reader import SCHEMA, accepts
 from small_case import TEXT, edited
 
+from eigassign.assignment import Requirement, requirements_of
 from eigassign.case import CaseFile, load, parse, read_yaml
 from eigassign.errors import CaseError
 from eigassign.mechanism import NamedTrajectory, Trajectories, Trajectory
-from eigassign.study import Requirement, requirements_of
 
 T = "  - {mode: 1, frequency: 190 Hz}\n"
 KINDS = {

@@ -13,19 +13,11 @@ from redesigned_arms import cart, extrapolated
 from scipy.optimize import brentq
 
 from eigassign import Case
+from eigassign.assignment import Requirement, Solved, requirements_of
 from eigassign.case import parse
 from eigassign.errors import CaseError, LostModeError
 from eigassign.pipeline import Stages, prepare
-from eigassign.study import (
-    Requirement,
-    Scene,
-    Solved,
-    followers,
-    require_one_shape,
-    requirements_of,
-    response_of,
-    solve_design,
-)
+from eigassign.study import Scene, followers, require_one_shape, response_of, solve_design
 
 RAIL_LIKE = {"like": 1, "at": {"time": 0.0}}
 MAST_LIKE = {"like": 2, "at": {"time": 0.0}}

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from eigassign.study import KINDS, ErrorRow, ErrorSummary, TargetStudy, verdict
+from eigassign.assignment import KINDS
+from eigassign.study import ErrorRow, ErrorSummary, TargetStudy, verdict
 
 
 def missed(kind: str, initial: ErrorRow, exact: ErrorRow) -> TargetStudy:

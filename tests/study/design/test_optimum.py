@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from scenes import SHIPPED, scene_of
 
-from eigassign.assignment import End
+from eigassign.assignment import End, requirements_of
 from eigassign.modal import Model
-from eigassign.study import Found, find_optimum, requirements_of
+from eigassign.study import Found, find_optimum
 
 
 def found_of(folder: Path, text: str, starts: list[str]) -> Found:

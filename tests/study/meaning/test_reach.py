@@ -10,12 +10,12 @@ import pytest
 from scenes import changed, scene_of
 
 from eigassign import load_case
+from eigassign.assignment import requirements_of
 from eigassign.pipeline import Options, solve_case
 from eigassign.study import (
     Scene,
     proved_ranges,
     reduced_ranges,
-    requirements_of,
     solve_design,
     study_tolerance,
     unreachable,

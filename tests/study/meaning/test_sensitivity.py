@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scenes import changed, scene_of
 
+from eigassign.assignment import requirements_of
 from eigassign.study import (
     Answer,
     Meaning,
     Scene,
     Studies,
     find_answer,
-    requirements_of,
     solve_design,
     study_meaning,
 )

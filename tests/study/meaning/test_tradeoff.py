@@ -9,16 +9,8 @@ import numpy as np
 import pytest
 from scenes import changed, scene_of
 
-from eigassign.study import (
-    Found,
-    Scene,
-    TradeOff,
-    TradeOffPoint,
-    find_answer,
-    kept,
-    requirements_of,
-    trade_off,
-)
+from eigassign.assignment import requirements_of
+from eigassign.study import Found, Scene, TradeOff, TradeOffPoint, find_answer, kept, trade_off
 
 FEW = ("samples: 152", "samples: 12")
 PRICED = "{parameter: bodies.elbow_mass.mass, price: 2, "

@@ -12,8 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from eigassign.assignment.exact.requirements import FrequencyLimit
-from eigassign.case.schema.targets import Harmonic, KeepOutTarget
-from eigassign.study.requirements.requirement import (
+from eigassign.assignment.requirements.requirement import (
     Edges,
     Floats,
     Ints,
@@ -22,6 +21,7 @@ from eigassign.study.requirements.requirement import (
     Terms,
     in_hz,
 )
+from eigassign.case.schema.targets import Harmonic, KeepOutTarget
 
 NEAR = 0.5  # of an edge: modes this near to a band are shown with it
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from eigassign.assignment.requirements.requirement import Edges, Floats, Requirement, Terms
 from eigassign.case.schema.targets import GapTarget
-from eigassign.study.requirements.requirement import Edges, Floats, Requirement, Terms
 
 
 class ModeGap(Requirement):

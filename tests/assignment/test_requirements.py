@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from small_case import TEXT
 
-from eigassign.case import load
-from eigassign.errors import CaseError
-from eigassign.mechanism import NamedTrajectory, Trajectories, Trajectory
-from eigassign.study import (
+from eigassign.assignment import (
     Requirement,
     followed_modes,
     named_design,
     named_pose,
     requirements_of,
 )
+from eigassign.case import load
+from eigassign.errors import CaseError
+from eigassign.mechanism import NamedTrajectory, Trajectories, Trajectory
 
 MOTION = TEXT[TEXT.index("trajectory:\n") : TEXT.index("design:\n")]
 SEVERAL = "trajectory:\n  - {name: a, file: a.csv}\n  - {name: b, file: b.csv}\n"

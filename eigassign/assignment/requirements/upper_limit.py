@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from eigassign.assignment.requirements.requirement import Edges, Floats, Requirement, in_hz
 from eigassign.case.schema.targets import AtMostTarget
-from eigassign.study.requirements.requirement import Edges, Floats, Requirement, in_hz
 
 
 class UpperLimit(Requirement):

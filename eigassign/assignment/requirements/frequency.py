@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from eigassign.assignment.exact.requirements import FrequencyGoal, FrequencyLimit
+from eigassign.assignment.requirements.requirement import Edges, Floats, Requirement, Solved, in_hz
 from eigassign.case.schema.targets import FrequencyTarget
-from eigassign.study.requirements.requirement import Edges, Floats, Requirement, Solved, in_hz
 
 
 class AssignedFrequency(Requirement):

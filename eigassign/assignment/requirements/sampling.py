@@ -15,22 +15,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.assignment.checks import frozen
+from eigassign.assignment.requirements.band import ForbiddenBand
+from eigassign.assignment.requirements.frequency import AssignedFrequency
+from eigassign.assignment.requirements.gap import ModeGap
+from eigassign.assignment.requirements.lower_limit import LowerLimit
+from eigassign.assignment.requirements.named_modes import followed_modes
+from eigassign.assignment.requirements.requirement import Requirement
+from eigassign.assignment.requirements.upper_limit import UpperLimit
 from eigassign.assignment.targets import sample_target, trapezoidal_weights
 from eigassign.case.case_file import CaseFile
 from eigassign.case.reader import dotted
 from eigassign.case.schema.targets import AnyTarget, FrequencyFile, FrequencyProfile
 from eigassign.case.table import CsvColumn, read_table
 from eigassign.case.units import DIMENSIONS
-from eigassign.errors import CaseError, UsageError
+from eigassign.errors import CaseError, MechanismError, UsageError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.study.build import located
-from eigassign.study.requirements.band import ForbiddenBand
-from eigassign.study.requirements.frequency import AssignedFrequency
-from eigassign.study.requirements.gap import ModeGap
-from eigassign.study.requirements.lower_limit import LowerLimit
-from eigassign.study.requirements.named_modes import followed_modes
-from eigassign.study.requirements.requirement import Requirement
-from eigassign.study.requirements.upper_limit import UpperLimit
 
 Floats = NDArray[np.float64]
 _Curve = float | FrequencyProfile | FrequencyFile
@@ -183,7 +182,9 @@ def _knots(file: CaseFile, curve: _Curve, key: str) -> _Knots:
         return curve.frequency, curve.time
     if isinstance(curve, FrequencyFile):
         columns = [CsvColumn(name, (DIMENSIONS[name],)) for name in ("time", "frequency")]
-        with located(file):
+        try:
             numbers = read_table(Path(curve.file), f"{key}.file", columns).numbers
+        except MechanismError as error:
+            raise CaseError((file.problem(error.path, error.message),)) from error
         return numbers["frequency"], numbers["time"]
     return float(curve), None
