@@ -31,6 +31,19 @@ SPATIAL = (
 WAY = np.linspace(0.125, 1.0, 8)  # from one configuration to the other
 PARTS = {"cylindrical": ["translation", "rotation"], "universal": [1, 2], "spherical": [1, 2, 3]}
 
+# Draws that hold every kind of part, all together: see test_spatial
+EVERY_TREE = [  # seed, space, swap
+    *((seed, "planar", swap) for seed, swap in ((68, True), (8, False), (7, False), (16, True))),
+    *((seed, "spatial", False) for seed in (32, 72)),
+    *((seed, "spatial", True) for seed in (89, 97, 5, 10, 36, 45)),
+]
+EVERY_LOOP = [  # seed, space, loops, swap
+    *((seed, "planar", 1, True) for seed in (9, 0, 7)),
+    *((seed, "planar", 1, False) for seed in (1, 10)),
+    *((seed, "spatial", 1, False) for seed in (0, 6, 4)),
+    *((seed, "spatial", 1, True) for seed in (2, 4, 6, 8, 13, 15)),
+]
+
 
 def empty(space: str, rng: Random) -> Tree:
     d = rng.uniform(0.02, 0.04)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from spatial_cases import Built, built, changed
 from spatial_examples import arm3r, ball_screw, four_bar, gantry
 from spatial_oracle import FREEDOMS, Tree, world
-from spatial_random import random_closed, random_open
+from spatial_random import EVERY_LOOP, EVERY_TREE, random_closed, random_open
 
 from eigassign.case import FREEDOMS as KNOWN_FREEDOMS
 from eigassign.errors import MechanismError
@@ -198,16 +198,18 @@ def twists_agree(tree: Tree, q: np.ndarray) -> None:
             np.testing.assert_allclose(T[:, i], [*v, *w], rtol=1e-6, atol=3e-8)
 
 
-@pytest.mark.parametrize("space", ["planar", "spatial"])
-@pytest.mark.parametrize("seed", range(10))
-def test_twists_of_trees_are_the_derivatives_of_the_world_frames(seed: int, space: str) -> None:
-    twists_agree(*random_open(seed, space, swap=seed % 2 == 0))
+@pytest.mark.parametrize("drawn", EVERY_TREE, ids=str)
+def test_twists_of_trees_are_the_derivatives_of_the_world_frames(
+    drawn: tuple[int, str, bool],
+) -> None:
+    twists_agree(*random_open(*drawn))
 
 
-@pytest.mark.parametrize("space", ["planar", "spatial"])
-@pytest.mark.parametrize("seed", range(6))
-def test_twists_of_loops_are_the_derivatives_of_the_world_frames(seed: int, space: str) -> None:
-    tree, q0, _ = random_closed(seed, space)
+@pytest.mark.parametrize("drawn", EVERY_LOOP, ids=str)
+def test_twists_of_loops_are_the_derivatives_of_the_world_frames(
+    drawn: tuple[int, str, int, bool],
+) -> None:
+    tree, q0, _ = random_closed(*drawn)
     twists_agree(tree, q0)
 
 

@@ -43,7 +43,7 @@ def between(lam: Floats) -> tuple[Floats, list[int]]:
 
 
 @pytest.mark.parametrize("space", ["planar", "spatial"])
-@pytest.mark.parametrize("seed", range(9))
+@pytest.mark.parametrize("seed", [2, 6, 5, 8, 0, 1, 3, 4, 7])  # trees and loops by default
 def test_the_count_is_that_of_an_independent_programs_whole_spectrum(
     seed: int, space: str, way: Way
 ) -> None:
