@@ -9,9 +9,9 @@ polynomial for each stretch between them.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,6 @@ from numpy.typing import ArrayLike, NDArray
 from eigassign.brief import counted, of_modes
 from eigassign.errors import UsageError
 from eigassign.modal.arguments import whole_within
-from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.fit.interpolation import (
     Interpolant,
     basis_at,
@@ -28,18 +27,9 @@ from eigassign.modal.fit.interpolation import (
     interpolate,
     newton_basis,
 )
-from eigassign.modal.fit.path import moves, read_path
+from eigassign.modal.fit.path import read_path
 from eigassign.modal.fit.region import Box, Region, build_region
-from eigassign.modal.fit.source import (
-    SHARE,
-    affordable,
-    dependence,
-    fine,
-    modes_of,
-    own_error,
-    question,
-)
-from eigassign.modal.model import Model
+from eigassign.modal.fit.source import SHARE, Source, as_source
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -62,7 +52,7 @@ class Fit:
     region: Region
     accuracy: float | None  # asked for, relative in Hz; None where the solves were given
     interpolant: Interpolant
-    own_error: Callable[[], float]  # of the source, part of the estimate; found when asked for
+    floor: float  # the source's own error, part of the estimate
 
     def __repr__(self) -> str:
         return (
@@ -70,11 +60,6 @@ class Fit:
             f"{counted(len(self.indices), 'term')} in {counted(self.region.d, 'variable')} "
             f"from {counted(self.solves, 'solve')}>"
         )
-
-    @cached_property
-    def floor(self) -> float:
-        """Part of the estimate that is the source's own."""
-        return self.own_error()
 
     @property
     def error_estimate(self) -> float:
@@ -275,54 +260,61 @@ def fit(
     if solves is not None and accuracy is not None:
         raise UsageError("a fit has an accuracy or a number of solves, not both")
     _check_numbers(accuracy, most)
-    directions, n_q = dependence(source)
-    path = None if isinstance(q, Box) else read_path(q, directions, n_q)
-    stretches: tuple[Any, ...] = (q,) if path is None else path.stretches
-    rests = path is not None and any(moves(each, directions, n_q) for each in path.stretches)
-    wanted = modes_of(source, modes)
-    regions = [build_region(directions, n_q, each, y, rests) for each in stretches]
+    asked = as_source(source, modes)
+    of = asked.directions, asked.n_q
+    rows, stretches = ((), (q,)) if isinstance(q, Box) else read_path(q, *of)
+    regions = [build_region(*of, each, y) for each in stretches]
+    if all(region.rests for region in regions):
+        raise UsageError("nothing to fit: no coordinate or parameter that matters has room")
     counts = [most] * len(regions)
     if solves is None:
         accuracy = ACCURACY if accuracy is None else accuracy
     else:
-        counts = [whole_within(solves, "solves", 1, MOST)]
-        if path is not None:
-            counts = path.shares(solves, fewest(max(region.d for region in regions)))
-        for region, count in zip(regions, counts, strict=True):
-            region.require_followed(count)
+        counts = _shares(whole_within(solves, "solves", 1, MOST), regions)
     fits = tuple(
-        _fit_region(source, region, wanted, accuracy, count)
+        _fit_region(asked, region, accuracy, count)
         for region, count in zip(regions, counts, strict=True)
     )
-    return fits[0] if path is None or len(fits) == 1 else PathFit(fits, path.rows)
+    return fits[0] if len(fits) == 1 else PathFit(fits, rows)
 
 
-def _fit_region(
-    source: Any, region: Region, modes: tuple[int, ...], accuracy: float | None, most: int
-) -> Fit:
+def _shares(solves: int, regions: Sequence[Region]) -> list[int]:
+    """The solves of each stretch: as it is long, and as many as an error estimate needs."""
+    n, least = len(regions), fewest(max(region.d for region in regions))
+    counts = [solves]
+    if n > 1:
+        if solves < least * n:
+            raise UsageError(
+                f"{solves} solves for {n} stretches between corners: at least {least * n} are "
+                "needed to tell an error"
+            )
+        counts, lengths = [least] * n, [region.length for region in regions]
+        for _ in range(solves - least * n):
+            counts[int(np.argmax(np.divide(lengths, counts)))] += 1
+    for region, count in zip(regions, counts, strict=True):
+        region.require_followed(count)
+    return counts
+
+
+def _fit_region(source: Source, region: Region, accuracy: float | None, most: int) -> Fit:
     """One polynomial for each mode, to an accuracy or of ``most`` frequencies."""
-    ask, floors, left = question(source, modes), [0.0], accuracy
-    round_off = partial(_round_off, source, region, modes)
-    if not isinstance(source, Model):
-        left = None if accuracy is None else (1.0 - SHARE) * accuracy
-    elif accuracy is not None and accuracy < fine(source):
-        floors = [affordable("round-off", round_off(), accuracy)]
-        left = accuracy - floors[0]
+    floors, left, centre = [0.0], accuracy, region.centre[None]
+    if accuracy is not None and source.fine is None:
+        left = (1.0 - SHARE) * accuracy
+    elif accuracy is not None and source.fine is not None and accuracy < source.fine:
+        floors.append(source.own_error(centre, accuracy))
+        left = accuracy - floors[-1]
 
-    def asked(points: Ints) -> Floats:
+    def ask(points: Ints) -> Floats:
         x = region.x(points)
-        if not isinstance(source, Model):
-            floors.append(own_error(source, x, modes, accuracy))
-        return ask(x)
+        if source.fine is None:
+            floors.append(source.own_error(x, accuracy))
+        return source.ask(x)
 
-    found = interpolate(region.nodes, asked, modes, left, most)
-    small = isinstance(source, Model) and floors == [0.0] and found.error < fine(source)
-    own = round_off if small else partial(max, floors)
-    return Fit(modes, region, accuracy, found, own)
-
-
-def _round_off(model: Model, region: Region, modes: tuple[int, ...]) -> float:
-    return rounding_error(model.pencil, region.centre, modes[-1])
+    found = interpolate(region.nodes, ask, source.modes, left, most)
+    if source.fine is not None and len(floors) == 1 and found.error < source.fine:
+        floors.append(source.error(centre))
+    return Fit(source.modes, region, accuracy, found, max(floors))
 
 
 def _check_numbers(accuracy: object, most: object) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,35 +26,14 @@ LEAST_SAMPLES = 4  # of a stretch
 MOST_PARTS = 32
 
 
-@dataclass(frozen=True, eq=False)
-class Path:
-    """Stretches without corners (n_t, n_q), which of all samples each has, and its length."""
+def read_path(
+    q: ArrayLike | Trajectories | Sequence[Floats], directions: Floats, n_q: int
+) -> tuple[tuple[slice, ...], tuple[Floats, ...]]:
+    """Stretches without corners (n_t, n_q), and which of all samples each has.
 
-    stretches: tuple[Floats, ...]
-    rows: tuple[slice, ...]
-    lengths: tuple[float, ...]
-
-    def shares(self, solves: int, least: int) -> list[int]:
-        """Number of ``solves`` of each stretch: as it is long, and ``least`` at least."""
-        n = len(self.stretches)
-        if n == 1:
-            return [solves]
-        if solves < least * n:
-            raise UsageError(
-                f"{solves} solves for {n} stretches between corners: at least {least * n} are "
-                "needed to tell an error"
-            )
-        counts, lengths = np.full(n, least), np.array(self.lengths)
-        for _ in range(solves - least * n):
-            counts[np.argmax(lengths / counts)] += 1
-        return [int(count) for count in counts]
-
-
-def read_path(q: ArrayLike | Trajectories | Sequence[Floats], directions: Floats, n_q: int) -> Path:
-    """The stretches of one path, samples (n_t, n_q) or a pose (n_q,), or of several in turn.
-
-    ``directions`` (n_w, n_x) are the combinations of x = (q, y) on which anything depends. Raises
-    UsageError for samples of wrong shapes, or none.
+    ``q`` is one path, samples (n_t, n_q) or a pose (n_q,), or several in turn; ``directions``
+    (n_w, n_x) are the combinations of x = (q, y) on which anything depends. Raises UsageError for
+    samples of wrong shapes, or none.
     """
     joints, n_y = moving_joints(directions, n_q), directions.shape[1] - n_q
     stretches: list[Floats] = []
@@ -69,8 +47,7 @@ def read_path(q: ArrayLike | Trajectories | Sequence[Floats], directions: Floats
             stretches.append(path[own])
             rows.append(slice(start + own.start, start + own.stop))
         start += len(path)
-    moved = (np.linalg.norm(np.diff(each @ joints.T, axis=0), axis=1).sum() for each in stretches)
-    return Path(tuple(stretches), tuple(rows), tuple(map(float, moved)))
+    return tuple(rows), tuple(stretches)
 
 
 def _several(q: Any) -> list[Any]:
@@ -83,12 +60,6 @@ def _several(q: Any) -> list[Any]:
 def moving_joints(directions: Floats, n_q: int) -> Floats:
     """The joint coordinates that matter, (n_s, n_q)."""
     return np.asarray(directions[(directions[:, :n_q] != 0.0).any(axis=1), :n_q])
-
-
-def moves(q: Floats, directions: Floats, n_q: int) -> bool:
-    """True where samples q (n_t, n_q) move in the joint coordinates that matter."""
-    reach = (q - q[0]) @ moving_joints(directions, n_q).T
-    return bool(np.abs(reach).max(initial=0.0) > STILL)
 
 
 def along_chord(reach: Floats) -> tuple[Floats, Floats, bool]:

@@ -83,6 +83,18 @@ class Region:
         """True unless v_0 is that of the samples of a curved path."""
         return self.place is None or bool(self.axes[0].row.any()) or not np.ptp(self.place)
 
+    @property
+    def rests(self) -> bool:
+        """True where nothing that matters varies, as on a stretch that rests while others move."""
+        return self.d == 1 and len(self.nodes[0].points) == 1
+
+    @property
+    def length(self) -> float:
+        """The length of the path in the joint coordinates that matter, in rad and m."""
+        assert self.path is not None
+        s = self.path @ moving_joints(self.directions, self.n_q).T
+        return float(np.linalg.norm(np.diff(s, axis=0), axis=1).sum())
+
     @cached_property
     def _to_v(self) -> Floats:
         """dv/dx (d, n_x)."""
@@ -166,18 +178,11 @@ class Region:
             )
 
 
-def build_region(
-    directions: Floats,
-    n_q: int,
-    q: Floats | Box,
-    y: ArrayLike | Box,
-    rests: bool,
-) -> Region:
+def build_region(directions: Floats, n_q: int, q: Floats | Box, y: ArrayLike | Box) -> Region:
     """The region of q, a stretch of a trajectory or a box, and of y, a design or a box.
 
-    ``directions`` (n_w, n_x) are the combinations of x on which anything depends. Raises UsageError
-    for wrong lengths, and where nothing that matters varies, unless the stretch may be one that
-    ``rests`` while others move.
+    ``directions`` (n_w, n_x) are the combinations of x on which anything depends. Where none of
+    them varies its one axis has a single node. Raises UsageError for wrong lengths.
     """
     path = None if isinstance(q, Box) else q
     ends = [
@@ -185,22 +190,14 @@ def build_region(
         _ends(y, directions.shape[1] - n_q, "y"),
     ]
     low, high = np.hstack(ends)
-    rows, steps = _box_axes(directions, low, high, n_q)
+    axes, place = _box_axes(directions, low, high, n_q), None
     line = None if path is None else _travelled(path, moving_joints(directions, n_q))
-    nodes = interval_nodes(MOST_NODES)
-    axes = [
-        Axis(nodes, nodes.points[:, None] * step, row)
-        for row, step in zip(rows, steps, strict=True)
-    ]
-    place = None
     if line is not None and path is not None:
         place, row = line
         axes.insert(0, _line_axis(path, place, row, len(low)))
-    elif not axes and rests and path is not None:  # a single node
-        zero, place = np.zeros((1, len(low))), np.zeros(len(path))
+    elif not axes:
+        zero, place = np.zeros((1, len(low))), np.zeros(1 if path is None else len(path))
         axes = [Axis(sample_nodes(np.zeros(1), 1), zero, zero[0])]
-    if not axes:
-        raise UsageError("nothing to fit: no coordinate or parameter that matters has room")
     return Region(tuple(axes), 0.5 * (low + high), path, place, directions, n_q)
 
 
@@ -216,28 +213,25 @@ def _ends(value: ArrayLike | Box, n: int, name: str) -> Floats:
     return numbers
 
 
-def _box_axes(
-    directions: Floats, low: Floats, high: Floats, n_q: int
-) -> tuple[list[Floats], list[Floats]]:
-    """dv/dx and half-widths (n_x,) of the axes: of x, or of fewer combinations of q that matter."""
-    half = 0.5 * (high - low)
-    free = np.flatnonzero((half > 0.0) & (directions != 0.0).any(axis=0))
-    joints = free[free < n_q]
-    used = directions[(directions[:, joints] != 0.0).any(axis=1)]
-    rows: list[Floats] = []
-    steps: list[Floats] = []
-    if len(used) < len(joints):
-        back = np.zeros((len(half), len(used)))
-        back[joints] = np.linalg.pinv(used[:, joints])
-        for row, shift in zip(used, back.T, strict=True):
-            reach = float(np.abs(row[joints]) @ half[joints])
-            rows.append(np.append(row[:n_q], np.zeros(len(half) - n_q)) / reach)
-            steps.append(shift * reach)
-        free = free[free >= n_q]
-    for unit, width in zip(np.eye(len(half))[free], half[free], strict=True):
-        rows.append(unit / width)
-        steps.append(unit * width)
-    return rows, steps
+def _box_axes(directions: Floats, low: Floats, high: Floats, n_q: int) -> list[Axis]:
+    """One axis for each variable of x that matters and has room.
+
+    Where joint coordinates matter in fewer combinations, these are the axes in their place.
+    """
+    half, nodes = 0.5 * (high - low), interval_nodes(MOST_NODES)
+    is_free = (half > 0.0) & (directions != 0.0).any(axis=0)
+    units, joints = np.eye(len(half)), is_free & (np.arange(len(half)) < n_q)
+    together = np.where(joints, directions, 0.0)
+    together = together[together.any(axis=1)]
+    groups = [units[is_free]]
+    if len(together) < joints.sum():
+        groups = [together, units[is_free & ~joints]]
+    axes = []
+    for rows in groups:
+        for row, step in zip(rows, np.linalg.pinv(rows).T, strict=True):
+            reach = float(np.abs(row) @ half)
+            axes.append(Axis(nodes, np.outer(nodes.points, step * reach), row / reach))
+    return axes
 
 
 def _travelled(q: Floats, joints: Floats) -> tuple[Floats, Floats] | None:

@@ -6,15 +6,15 @@ Each has an error of its own, of exact solves their round-off, which is part of 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import AccuracyError, MissingMassError, UsageError
-from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.arguments import mode_numbers, shown_numbers
+from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.exact.solver import eigenvalues
 from eigassign.modal.expansion import Expansion, InverseExpansion
 from eigassign.modal.model import Model, as_model
@@ -25,88 +25,92 @@ FINE, FINE_LARGE = 1e-8, 1e-6  # accuracies below which round-off is looked at
 SHARE = 0.5  # of the accuracy that the source itself may use
 
 
-def fine(model: Model) -> float:
-    """Accuracy below which the round-off of exact solves is looked at."""
-    return FINE if model.pencil.is_dense else FINE_LARGE
+@dataclass(frozen=True, eq=False)
+class Source:
+    """Frequencies of ``modes``, and how far they are off, as functions of x = (q, y).
 
-
-def dependence(source: Any) -> tuple[Floats, int]:
-    """Combinations of x on which the source's frequencies depend (n_w, n_x), and n_q."""
-    if isinstance(source, Model):
-        return source.pencil.local_directions[1], source.pencil.n_q
-    if isinstance(source, InverseExpansion):
-        source = source.expansion
-    if isinstance(source, Expansion):
-        return source.directions, len(source.q0)
-    if not isinstance(source, ReducedModel):
-        as_model(source)
-    return source.to_program[source.program.dependence.any(axis=0)], source.n_q
-
-
-def modes_of(source: Any, modes: Sequence[int] | None) -> tuple[int, ...]:
-    """The modes to fit. Raises UsageError for one that the source does not have."""
-    if isinstance(source, Model):
-        wanted, last = mode_numbers((1,) if modes is None else modes), len(source.pencil.elastic)
-        if wanted[-1] > last:
-            raise UsageError(
-                f"mode {wanted[-1]} cannot be fitted: the model has 1 to {last} elastic ones; ask "
-                "for one of those, or refine its mesh"
-            )
-        return wanted
-    own = getattr(source, "modes", None)
-    wanted = mode_numbers((own or (1,)) if modes is None else modes)
-    if own is not None and not set(wanted) <= set(own):
-        raise UsageError(f"modes {wanted} asked for; the source has {own}")
-    return wanted
-
-
-def question(source: Any, modes: tuple[int, ...]) -> Callable[[Floats], Floats]:
-    """x (n, n_x) → f (n, modes[-1] + 1) in Hz of all modes up to those, and of one more.
-
-    Where that one has no mass its f is infinite. AccuracyError where the source gives no number.
+    ``ask`` gives f (n, modes[-1] + 1) in Hz at x (n, n_x), of all modes up to those and of one
+    more, infinite where that one has no mass; ``error`` the largest relative error there.
     """
-    if isinstance(source, Model):
-        return lambda x: _solved(source.pencil, modes[-1], x)
-    columns, n_q = [source.modes.index(m) for m in modes], dependence(source)[1]
-    expansion = source.expansion if isinstance(source, InverseExpansion) else source
-    reduced = expansion.reduced if isinstance(expansion, Expansion) else expansion
-    beside = replace(reduced, modes=tuple(range(1, min(modes[-1] + 1, reduced.size) + 1)))
+
+    modes: tuple[int, ...]
+    directions: Floats  # (n_w, n_x): the combinations of x on which anything depends
+    n_q: int
+    ask: Callable[[Floats], Floats]
+    error: Callable[[Floats], float]
+    fine: float | None = None  # of exact solves: the accuracy below which their error matters
+
+    def own_error(self, x: Floats, accuracy: float | None) -> float:
+        """The error; AccuracyError where it is unknown or leaves nothing of an accuracy."""
+        what, error = "round-off" if self.fine else "the source itself", self.error(x)
+        if not error < np.inf:
+            raise AccuracyError(
+                f"{what} may cost any amount: it vouches for no number in the region"
+            )
+        if accuracy is not None and error > SHARE * accuracy:
+            left = f"which leaves nothing of {accuracy:.1e}"
+            raise AccuracyError(f"{what} may cost {error:.1e}, {left}")
+        return error
+
+
+def as_source(given: Any, modes: Sequence[int] | None) -> Source:
+    """What is asked for ``modes``, which are all of the source, of a model the first, unless given.
+
+    Raises UsageError for a mode that it does not have, and for what is no source.
+    """
+    if isinstance(given, Expansion | InverseExpansion | ReducedModel):
+        return _stated(given, modes)
+    return _exact(as_model(given), modes)
+
+
+def _exact(model: Model, modes: Sequence[int] | None) -> Source:
+    pencil, wanted = model.pencil, mode_numbers((1,) if modes is None else modes)
+    last, most = wanted[-1], len(pencil.elastic)
+    if last > most:
+        raise UsageError(
+            f"mode {last} cannot be fitted: the model has 1 to {most} elastic ones; ask "
+            "for one of those, or refine its mesh"
+        )
+
+    def ask(x: Floats) -> Floats:
+        try:
+            lam = eigenvalues(pencil, x, min(last + 1, most))
+        except MissingMassError:
+            lam = eigenvalues(pencil, x, last)
+        missing = ((0, 0), (0, last + 1 - lam.shape[1]))
+        return np.pad(np.sqrt(lam) * (0.5 / np.pi), missing, constant_values=np.inf)
+
+    def error(x: Floats) -> float:
+        return rounding_error(pencil, x[0], last)
+
+    fine = FINE if pencil.is_dense else FINE_LARGE
+    return Source(wanted, pencil.local_directions[1], pencil.n_q, ask, error, fine)
+
+
+def _stated(
+    given: Expansion | InverseExpansion | ReducedModel, modes: Sequence[int] | None
+) -> Source:
+    """A source that states its error; neighbours of its modes are those of the reduced model."""
+    wanted = mode_numbers(given.modes if modes is None else modes)
+    if not set(wanted) <= set(given.modes):
+        raise UsageError(f"modes {wanted} asked for; the source has {given.modes}")
+    made = given.expansion if isinstance(given, InverseExpansion) else given
+    reduced = made.reduced if isinstance(made, Expansion) else made
+    every = tuple(range(1, min(wanted[-1] + 1, reduced.size) + 1))
+    beside, n_q = replace(reduced, modes=every), reduced.n_q
+    columns, own = [given.modes.index(m) for m in wanted], [m - 1 for m in wanted]
 
     def ask(x: Floats) -> Floats:
         q, y = x[:, :n_q], x[:, n_q:]
-        hz = np.asarray(source.frequencies(q, y))[:, columns]
+        hz, all_hz = given.frequencies(q, y)[:, columns], beside.frequencies(q, y)
         if not np.isfinite(hz).all():
             k = int(np.argmin(np.isfinite(hz).all(axis=1)))
             raise AccuracyError(f"the source has no frequency at (q, y) = {shown_numbers(x[k])}")
-        every = np.asarray(beside.frequencies(q, y))
-        every[:, [m - 1 for m in modes]] = hz
-        return every
+        all_hz[:, own] = hz
+        return all_hz
 
-    return ask
+    def error(x: Floats) -> float:
+        return float(given.error_estimate(x[:, :n_q], x[:, n_q:])[:, columns].max())
 
-
-def _solved(pencil: Pencil, last: int, x: Floats) -> Floats:
-    """Exact f (n, last + 1) in Hz."""
-    try:
-        lam = eigenvalues(pencil, x, min(last + 1, len(pencil.elastic)))
-    except MissingMassError:
-        lam = eigenvalues(pencil, x, last)
-    missing = last + 1 - lam.shape[1]
-    return np.pad(np.sqrt(lam) * (0.5 / np.pi), ((0, 0), (0, missing)), constant_values=np.inf)
-
-
-def own_error(source: Any, x: Floats, modes: tuple[int, ...], accuracy: float | None) -> float:
-    """The largest error that the source, no model, states at x (n, n_x); see `affordable`."""
-    n_q = dependence(source)[1]
-    columns = [source.modes.index(m) for m in modes]
-    estimates = source.error_estimate(x[:, :n_q], x[:, n_q:])[:, columns]
-    return affordable("the source itself", float(estimates.max()), accuracy)
-
-
-def affordable(what: str, error: float, accuracy: float | None) -> float:
-    """The error, unless it is unknown or leaves nothing of an accuracy: then AccuracyError."""
-    if not error < np.inf:
-        raise AccuracyError(f"{what} may cost any amount: it vouches for no number in the region")
-    if accuracy is not None and error > SHARE * accuracy:
-        raise AccuracyError(f"{what} may cost {error:.1e}, which leaves nothing of {accuracy:.1e}")
-    return error
+    directions = reduced.to_program[reduced.program.dependence.any(axis=0)]
+    return Source(wanted, directions, n_q, ask, error)
