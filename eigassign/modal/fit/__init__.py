@@ -2,8 +2,8 @@
 
 Reading order:
 
-    meeting        what is missed where modes meet between the nodes
-    interpolation  nodes, coefficients and error of a polynomial on one axis or several
+    interpolation  nodes, coefficients and error of a polynomial on one axis or several,
+                   and what it misses where modes meet
     path           a trajectory, cut at its corners
     region         a trajectory or a box of q, times a box of y, as axes
     source         where a fit takes frequencies from: a model, a reduced model or an expansion

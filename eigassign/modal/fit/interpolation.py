@@ -19,6 +19,15 @@ for several in turn may be small by accident, and every other one by symmetry; o
 the geometric mean over all j with γ_j > 0. Batch by batch the
 set grows by the members whose coefficients are predicted to be largest. The error is estimated from
 those that are missing, and from values held out, which no coefficient uses.
+
+Where two modes cross between the nodes, neither is smooth, however little of that the nodes show:
+with all of them on one side of the crossing both interpolants are right there, and wrong beyond.
+What stays smooth are the symmetric functions of both, their mean s and their squared distance d²:
+
+    g_k , g_{k+1} = s ∓ ½ √(d²) ,   g = f^power .
+
+Interpolants of d and of d² at the same nodes agree unless the modes meet; what they differ by is
+what the interpolant of g_k misses, |√(d²) − d| / 2, the error of s being the same in both.
 """
 
 from __future__ import annotations
@@ -33,7 +42,6 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from eigassign.errors import AccuracyError, UsageError
-from eigassign.modal.fit.meeting import cause, missed_between
 from eigassign.series.multi_index import LowerSet, lower_set, total_degree
 
 Floats = NDArray[np.float64]
@@ -77,14 +85,17 @@ def basis_at(axes: Sequence[Nodes], members: Ints, v: Floats) -> Floats:
 class Nodes:
     """Nodes of one axis, and places for checks that are never nodes.
 
-    They are ``whole`` if no value can be asked for elsewhere; the ``domain`` is where the
-    polynomial will be used.
+    The ``domain`` is where the polynomial will be used.
     """
 
     v: Floats
     checks: Floats
-    whole: bool
     domain: Floats
+
+    @property
+    def whole(self) -> bool:
+        """True where no value can be asked for elsewhere."""
+        return not len(self.checks)
 
     @cached_property
     def points(self) -> Floats:
@@ -100,17 +111,15 @@ def interval_nodes(most: int) -> Nodes:
     """
     v = -np.cos(np.linspace(0.0, np.pi, 4 * most + 1))
     v[2 * most] = 0.0
-    return Nodes(leja(v, most), GENERIC, False, v)
+    return Nodes(leja(v, most), GENERIC, v)
 
 
 def sample_nodes(places: Floats, most: int) -> Nodes:
     """Nodes among samples, the only places where values can be asked for."""
     v = leja(places, most)
     others = np.setdiff1d(places, v)
-    if not len(others):
-        return Nodes(v, others, True, places)
-    nearest = np.abs(others[:, None] - GENERIC).argmin(axis=0)
-    return Nodes(v, others[list(dict.fromkeys(nearest))], False, places)
+    nearest = np.abs(others[:, None] - GENERIC).argmin(axis=0) if len(others) else []
+    return Nodes(v, others[list(dict.fromkeys(nearest))], places)
 
 
 # --- Interpolants
@@ -172,7 +181,7 @@ def interpolate(
         wanted = "" if accuracy is None else f", not {accuracy:.1e}, and {why}"
         raise AccuracyError(
             f"{count} values leave an estimated error of {error:.1e}{wanted}"
-            f"{cause(np.vstack([hz, held]), modes)}"
+            f"{_cause(np.vstack([hz, held]), modes)}"
         )
 
     while True:
@@ -207,19 +216,12 @@ def interpolate(
             refuse("more do not help")
     if accuracy is None and not rounds[-1][1] < WORTHLESS:
         refuse("")
-    at_nodes = basis_at(axes, space.indices, _places(axes, space.indices))
-    between = MISSED * missed_between(
-        at_nodes,
-        lambda: basis_at(axes, space.indices, _everywhere(axes)),
-        hz,
-        own,
-        found.power,
-    )
+    between = MISSED * _missed_between(axes, space, hz, own, found.power)
     asked = len(hz) + len(held)
     if between > max(rounds[-1][1], WORTHLESS if accuracy is None else accuracy):
         raise AccuracyError(
             f"{asked} values may miss {between:.1e} between them"
-            f"{cause(np.vstack([hz, held]), modes)}"
+            f"{_cause(np.vstack([hz, held]), modes)}"
         )
     error = max(rounds[-1][1], between)
     return replace(found, error=error, rounds=tuple(rounds), asked=asked)
@@ -391,3 +393,50 @@ def _everywhere(axes: Sequence[Nodes], count: int = 1000) -> Floats:
     sizes = np.array([len(each.domain) for each in axes])
     rows = np.minimum(at * sizes, sizes - 1.0).astype(np.intp)
     return np.column_stack([each.domain[own] for each, own in zip(axes, rows.T, strict=True)])
+
+
+# --- Where modes meet between the nodes
+
+CLOSE = 1e-2  # relative gap in Hz below which neighbouring modes are named as a cause, or
+CLOSER = 0.2  # this part of the largest
+FAR = 0.5  # part of the largest distance at the nodes over which modes nowhere come near
+
+
+def _missed_between(
+    axes: Sequence[Nodes], space: LowerSet, hz: Floats, own: Sequence[int], power: float
+) -> float:
+    """|δf/f| of the modes in columns ``own`` of ``hz`` (N, n), the lowest modes at the nodes.
+
+    Zero where they come near no neighbour, as one without mass, whose f is infinite.
+    """
+    g = hz**power
+    d = np.abs(np.diff(g, axis=1))
+    near = (d.min(axis=0) < FAR * d.max(axis=0)) & np.isfinite(hz[:, 1:]).all(axis=0)
+    pairs = {k for mode in own for k in (mode - 1, mode) if 0 <= k < len(near) and near[k]}
+    if not pairs:
+        return 0.0
+    at_nodes, between = (
+        basis_at(axes, space.indices, v) for v in (_places(axes, space.indices), _everywhere(axes))
+    )
+    missed = 0.0
+    for k in pairs:
+        here = g[:, [j for j in (k, k + 1) if j in own]]
+        known = np.column_stack([d[:, k], d[:, k] ** 2, here])
+        found = between @ solve_triangular(at_nodes, known, lower=True)
+        off = np.abs(np.sqrt(np.maximum(found[:, 1], 0.0)) - found[:, 0])
+        missed = max(missed, float((off[:, None] / np.abs(found[:, 2:])).max()))
+    return 0.5 * missed / abs(power)
+
+
+def _cause(hz: Floats, modes: Sequence[int]) -> str:
+    """Neighbouring modes that come close, the usual cause of a large error, to end a message.
+
+    ``hz`` (n, modes[-1] + 1) are all modes up to those, and one more.
+    """
+    gap = 1.0 - hz[:, :-1] / hz[:, 1:]
+    if not len(gap):
+        return ""
+    close = gap.min(axis=0) < np.maximum(CLOSE, CLOSER * gap.max(axis=0))
+    near = [k + 1 for k in np.flatnonzero(close) if {k + 1, k + 2} & set(modes)]
+    named = ", ".join(f"{k} and {k + 1}" for k in near)
+    return f"; modes {named} come close, and where they meet none is smooth" if near else ""
