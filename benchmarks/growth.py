@@ -105,7 +105,7 @@ def one(branches: int) -> dict[str, float]:
     tracemalloc.stop()
     x0 = np.concatenate([Q0, y0])[None]
     theta = pencil.theta(x0)[:, 0]
-    lam, phi = expansion.clusters[0].coefficients[0, 0, 0], expansion.vectors[0][0, :, 0]
+    lam, phi = expansion.clusters[0].coefficients[0, 0, 0], expansion.clusters[0].vectors[0, :, 0]
     data = pencil.stiffness @ theta - lam * (pencil.mass @ theta)
     border = pencil.sparse(pencil.mass @ theta) @ phi
     A = pencil.sparse(data)
@@ -126,7 +126,7 @@ def one(branches: int) -> dict[str, float]:
         "plain": plain_floor(A, border, counts),
         "peak_mb": peak,
         "rss_mb": memory,
-        "vectors_mb": expansion.vectors[0].nbytes / 1e6,
+        "vectors_mb": expansion.clusters[0].vectors.nbytes / 1e6,
         "n_lambda": len(expansion.space),
     }
 

@@ -12,10 +12,9 @@ Error estimate: with f̂ of the reduced model on the same Taylor vectors and its
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import comb
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -45,17 +44,10 @@ MOST_VECTORS = 150  # Taylor vectors of one mode in the reduced model beside an 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Cluster(Brief):
-    """Λ(w) (r, r, N) of the neighbouring ``modes``; r = 1 is a single eigenvalue."""
+    """Λ(w) and X(w) of the neighbouring ``modes``; r = 1 is a single eigenvalue."""
 
     modes: tuple[int, ...]
-    coefficients: Floats  # rad²/s² over units of w
-
-
-class ClusterSeries(NamedTuple):
-    """What takes long to compute of an expansion, for the neighbouring ``modes`` of a cluster."""
-
-    modes: tuple[int, ...]
-    coefficients: Floats  # Λ (r, r, N)
+    coefficients: Floats  # Λ (r, r, N), rad²/s² over units of w
     vectors: Floats  # X (N_H, n_dof, r)
 
 
@@ -78,7 +70,6 @@ class Expansion:
     space: LowerSet  # over w
     directions: Floats  # V (n_w, n_x): w = V (x − x0)
     n_linear: int  # the last n_linear of w enter at most linearly, 0 for a full expansion
-    vectors: tuple[Floats, ...]  # per cluster, (N_H, n_dof, r)
     vector_space: LowerSet
     notes: tuple[str, ...]
     pencil: Pencil | None = None  # what was expanded; not stored, needed by ``error_estimate``
@@ -102,12 +93,6 @@ class Expansion:
                 for c, made in zip(self.clusters, self._prepared, strict=True)
             ]
         )
-
-    @property
-    def series(self) -> list[ClusterSeries]:
-        """The series of each cluster, of which `expand` makes the expansion again."""
-        parts = zip(self.clusters, self.vectors, strict=True)
-        return [ClusterSeries(c.modes, c.coefficients, X) for c, X in parts]
 
     @cached_property
     def _prepared(self) -> tuple[Polynomials, ...]:
@@ -145,7 +130,7 @@ class Expansion:
         keep = space.degrees <= order
         given = None
         if keep.sum() == comb(space.n_variables + order, order):
-            given = as_columns([X[keep] for X in self.vectors])
+            given = as_columns([c.vectors[keep] for c in self.clusters])
         return reduce(self.pencil, self.q0, self.y0, self.modes, order, given=given)
 
     @cached_property
@@ -171,13 +156,8 @@ class Expansion:
         """λ (n_samples, n_modes) and ∂λ/∂x (n_samples, n_modes, n_x) at samples of q, y = y0."""
         w = (samples(q, self.y0, len(self.q0), len(self.y0)) - self.x0) @ self.directions.T
         l0, powers = self._at(w), monomials(self.space, w)
-        slopes = np.zeros((*l0.shape, len(self.directions)))
-        for local in range(len(self.directions)):
-            derivative = _derivative_powers(self.space, powers, local)
-            slopes[:, :, local] = np.hstack(
-                [_slope(c, powers, derivative, self.modes) for c in self.clusters]
-            )
-        return l0, slopes @ self.directions
+        slopes = [_slopes(c, self.space, powers, self.modes) for c in self.clusters]
+        return l0, np.concatenate(slopes, axis=1) @ self.directions
 
     @property
     def x0(self) -> Floats:
@@ -225,27 +205,20 @@ def _eigenvalues(cluster: Cluster, matrices: Floats, wanted: tuple[int, ...]) ->
     return np.asarray(np.linalg.eigvalsh(matrices)[:, columns])
 
 
-def _derivative_powers(space: LowerSet, powers: Floats, variable: int) -> Floats:
-    """∂ w^γ/∂w_j = γ_j w^(γ − e_j), (n, N), from the powers w^γ (n, N)."""
-    out = np.zeros_like(powers)
-    present = np.flatnonzero(space.indices[:, variable])
-    lower = space.indices[present].copy()
-    times = lower[:, variable].astype(np.float64)
-    lower[:, variable] -= 1
-    out[:, present] = times * powers[:, space.find(lower)]
-    return out
-
-
-def _slope(cluster: Cluster, powers: Floats, derivative: Floats, wanted: tuple[int, ...]) -> Floats:
-    """∂λ/∂w_j; in a cluster vᵀ (∂Λ/∂w_j) v with the eigenvectors v of Λ."""
-    if len(cluster.modes) == 1:
-        return np.asarray((derivative @ cluster.coefficients[0, 0])[:, None])
+def _slopes(cluster: Cluster, space: LowerSet, powers: Floats, wanted: tuple[int, ...]) -> Floats:
+    """∂λ/∂w (n, n_modes, n_w) = vᵀ (∂Λ/∂w) v with the eigenvectors v of Λ, from w^γ (n, N)."""
+    value = np.tensordot(powers, cluster.coefficients, axes=(1, 2))
     columns = [k for k, mode in enumerate(cluster.modes) if mode in wanted]
-    value, slope = (
-        np.tensordot(p, cluster.coefficients, axes=(1, 2)) for p in (powers, derivative)
-    )
-    v = np.linalg.eigh(value)[1]
-    return np.asarray(np.einsum("nik,nij,njk->nk", v, slope, v)[:, columns])
+    v = np.linalg.eigh(value)[1][:, :, columns]
+    slopes = np.empty((len(v), len(columns), space.n_variables))
+    for j in range(space.n_variables):  # ∂w^γ/∂w_j = γ_j w^(γ − e_j)
+        there = np.flatnonzero(space.indices[:, j])
+        lower = space.indices[there].copy()
+        times = cluster.coefficients[:, :, there] * lower[:, j]
+        lower[:, j] -= 1
+        rates = np.tensordot(powers[:, space.find(lower)], times, axes=(1, 2))
+        slopes[:, :, j] = np.einsum("nik,nij,njk->nk", v, rates, v)
+    return slopes
 
 
 def expand(
@@ -258,14 +231,14 @@ def expand(
     space: LowerSet | None = None,
     vector_order: int | None = None,
     cluster_gap: float = CLUSTER_GAP,
-    known: Sequence[ClusterSeries] | None = None,
+    known: Sequence[Cluster] | None = None,
 ) -> Expansion:
     """Expand the eigenvalues of ``modes`` (1 is the lowest elastic one) to total ``order``.
 
     ``linear_in_y`` keeps |β| ≤ 1, the terms of eqs. (7)-(9). ``space`` is any other lower set over
     (q, y). Eigenvectors are expanded to half the order, which suffices (2m + 1), or to
     ``vector_order``. Modes closer than ``cluster_gap`` (relative in λ) are expanded together.
-    ``known`` series of the same expansion (`Expansion.series`) are not computed again.
+    ``known`` clusters of the same expansion are not computed again.
     Raises UsageError for impossible arguments, and for known series of other shapes.
     """
     wanted = mode_numbers(modes)
@@ -279,25 +252,25 @@ def expand(
     if known is None:
         found = taylor_vectors(pencil, x0, wanted, local, vector_order, cluster_gap)
         known = [
-            ClusterSeries(g, eigenvalue_series(pencil, found.theta, local.space, half, X), X)
+            Cluster(g, eigenvalue_series(pencil, found.theta, local.space, half, X), X)
             for g, X in zip(found.groups, found.vectors, strict=True)
         ]
-    for of, c, X in known:
-        r = len(of)
-        if (c.shape, X.shape) != ((r, r, len(local.space)), (len(half), pencil.n_dof, r)):
+    for one in known:
+        r = len(one.modes)
+        shapes = (r, r, len(local.space)), (len(half), pencil.n_dof, r)
+        if (one.coefficients.shape, one.vectors.shape) != shapes:
             raise UsageError("these series are not of this expansion: their shapes do not fit")
     groups = tuple(one.modes for one in known)
     if not set(wanted) <= {mode for group in groups for mode in group}:
         raise UsageError("these series are not of this expansion: a mode is missing")
     return Expansion(
         modes=tuple(m for g in groups for m in g if m in wanted),
-        clusters=tuple(Cluster(one.modes, _frozen(one.coefficients)) for one in known),
+        clusters=tuple(replace(c, coefficients=_frozen(c.coefficients)) for c in known),
         q0=_frozen(x0[: pencil.n_q]),
         y0=_frozen(x0[pencil.n_q :]),
         space=local.space,
         directions=_frozen(local.directions),
         n_linear=local.n_linear,
-        vectors=tuple(one.vectors for one in known),
         vector_space=half,
         notes=_notes(groups, local, pencil),
         pencil=pencil,

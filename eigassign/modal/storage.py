@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.errors import UsageError
-from eigassign.modal.expansion import ClusterSeries, Expansion
+from eigassign.modal.expansion import Cluster, Expansion
 from eigassign.modal.reduced.added_mass import AddedMass
 from eigassign.modal.reduced.error_estimate import ErrorTerms
 from eigassign.modal.reduced.model import ReducedModel
@@ -45,25 +45,25 @@ LONGEST_TREE = 2_000_000  # bytes: a hundred times those of the longest shipped 
 def expansion_arrays(*expansions: Expansion) -> dict[str, Array]:
     """Modes, coefficients and vectors of the clusters of some expansions."""
     return {
-        f"{name}_{k}_{i}": np.asarray(values)
+        f"{each.name}_{k}_{i}": np.asarray(getattr(cluster, each.name))
         for k, expansion in enumerate(expansions)
-        for i, series in enumerate(expansion.series)
-        for name, values in series._asdict().items()
+        for i, cluster in enumerate(expansion.clusters)
+        for each in fields(Cluster)
     }
 
 
-def stored_series(arrays: Mapping[str, Array], k: int) -> list[ClusterSeries]:
+def stored_series(arrays: Mapping[str, Array], k: int) -> list[Cluster]:
     """The clusters of expansion k of those that `expansion_arrays` took apart.
 
     Raises UsageError where arrays are missing, or their numbers are not finite.
     """
-    found: list[ClusterSeries] = []
+    found: list[Cluster] = []
     while f"modes_{k}_{len(found)}" in arrays:
-        parts = [arrays.get(f"{name}_{k}_{len(found)}") for name in ClusterSeries._fields]
+        parts = [arrays.get(f"{each.name}_{k}_{len(found)}") for each in fields(Cluster)]
         if any(part is None or not np.isfinite(part).all() for part in parts):
             raise UsageError("these arrays are not expansions")
         modes, coefficients, vectors = (np.asarray(part) for part in parts)
-        found.append(ClusterSeries(tuple(modes.ravel().tolist()), coefficients, vectors))
+        found.append(Cluster(tuple(modes.ravel().tolist()), coefficients, vectors))
     return found
 
 

@@ -272,7 +272,7 @@ def test_an_expansion_cannot_be_changed_and_is_the_same_every_time() -> None:
     a, b = (expand(model, Q0, Y0, (1, 2), 4) for _ in range(2))
     np.testing.assert_array_equal(a.coefficients, b.coefficients)
     assert a.x0.tolist() == [*Q0, *Y0]
-    for array in (a.coefficients, a.q0, a.vectors[0], a.clusters[0].coefficients):
+    for array in (a.coefficients, a.q0, a.clusters[0].vectors, a.clusters[0].coefficients):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0.0
 

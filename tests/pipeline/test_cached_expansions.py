@@ -66,7 +66,7 @@ def test_what_comes_from_the_cache_is_frozen(tmp_path: Path) -> None:
     for expansion in (full, linear):
         named = {name: getattr(expansion, name) for name in ("q0", "y0", "directions")}
         named |= {"indices": expansion.space.indices, "halves": expansion.vector_space.indices}
-        named |= dict(enumerate(expansion.vectors))
+        named |= {k: c.vectors for k, c in enumerate(expansion.clusters)}
         named |= {c.modes: c.coefficients for c in expansion.clusters}
         for name, array in named.items():
             assert not array.flags.writeable, name

@@ -16,7 +16,7 @@ from eigassign.errors import UsageError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.taylor.rayleigh import vector_members
 from eigassign.series.multi_index import LowerSet, lower_set, partially_linear, total_degree
-from eigassign.series.power_series import multiply
+from eigassign.series.power_series import monomials_of, multiply
 
 Floats = NDArray[np.float64]
 
@@ -113,10 +113,6 @@ def _monomial_series(space: LowerSet, inner: LowerSet, directions: Floats) -> Fl
     linear[:, units[units >= 0]] = directions[:, units >= 0]
     rows = np.zeros((len(space), len(inner)))
     rows[0, 0] = 1.0
-    for degree in range(1, space.order + 1):
-        here = np.arange(space.degree_starts[degree], space.degree_starts[degree + 1])
-        first = (space.indices[here] > 0).argmax(axis=1)
-        parents = space.indices[here].copy()
-        parents[np.arange(len(here)), first] -= 1
-        rows[here] = multiply(inner, rows[space.find(parents)], linear[first])
+    for first, last, parents, variables in monomials_of(space).steps:
+        rows[first:last] = multiply(inner, rows[parents], linear[variables])
     return rows
