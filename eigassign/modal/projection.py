@@ -72,6 +72,13 @@ def project_at(pencil: Pencil, theta: Floats, rows: Floats) -> Floats:
     return out
 
 
+def entries(pencil: Pencil, terms: sparse.csc_array, term: int) -> tuple[Ints, Ints, Floats]:
+    """Rows, columns and values of the non-zeros of one of the ``terms`` of K or of M."""
+    at = slice(terms.indptr[term], terms.indptr[term + 1])
+    places = terms.indices[at]
+    return pencil.rows[places], pencil.columns[places], terms.data[at]
+
+
 def _project(
     pencil: Pencil, which: int, terms: sparse.csc_array, W: Floats, V: Floats, wanted: Ints
 ) -> ProjectedTerms:

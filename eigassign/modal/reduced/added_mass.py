@@ -23,12 +23,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 from scipy.sparse import linalg
 
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.modal.exact.condensation import rigid_coupling
 from eigassign.modal.exact.sparse import block
+from eigassign.modal.projection import entries
 from eigassign.series.algebra import Samples
 
 Floats = NDArray[np.float64]
@@ -80,7 +80,7 @@ def added_mass(
     depends = np.vstack([np.zeros(len(pencil.shift), dtype=bool), pencil.program.dependence])
     sizes = np.diff(terms.indptr)
     changed = np.flatnonzero(depends[:, n:].any(axis=1) & (sizes > 0))
-    rows = {t: np.unique(pencil.rows[_entries(terms, t)]) for t in changed.tolist()}
+    rows = {t: np.unique(entries(pencil, terms, t)[0]) for t in changed.tolist()}
     wide = np.array([not pencil.is_dense and len(rows[t]) > WIDE for t in rows], dtype=bool)
     scaled = changed[wide & ~depends[changed, :n].any(axis=1)]
     dofs = np.unique(np.concatenate([[], *(rows[t] for t in changed[~wide].tolist())])).astype(
@@ -90,8 +90,7 @@ def added_mass(
     traces, flexible = np.zeros(len(changed)), np.zeros(len(changed))
     moved = np.zeros((len(phi), len(changed), phi.shape[2]))
     for k, t in enumerate(changed.tolist()):
-        at, data = _entries(terms, t), terms.data[terms.indptr[t] : terms.indptr[t + 1]]
-        i, j = pencil.rows[at], pencil.columns[at]
+        i, j, data = entries(pencil, terms, t)
         moved[:, k] = np.einsum("e,pec,pec->pc", data, phi[:, i], phi[:, j])
         if not wide[k]:
             i, j = np.searchsorted(dofs, i), np.searchsorted(dofs, j)
@@ -106,11 +105,6 @@ def added_mass(
     changes = np.vstack([np.ones((1, len(y0))), varied]) - theta0[:, None]
     heavier = ~(flexible @ changes[changed] < 0.0)
     return AddedMass(changed, traces, moved, heavier, scaled, theta0[scaled])
-
-
-def _entries(terms: sparse.csc_array, t: int) -> Ints:
-    """Places of a term's non-zeros in the pattern."""
-    return np.asarray(terms.indices[terms.indptr[t] : terms.indptr[t + 1]], dtype=np.intp)
 
 
 def _flexibility(

@@ -27,7 +27,7 @@ from scipy.sparse import linalg
 
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.projection import project
+from eigassign.modal.projection import entries, project
 from eigassign.modal.reduced.basis import INDEFINITE
 
 Floats = NDArray[np.float64]
@@ -140,23 +140,19 @@ def half_solve(factor: linalg.SuperLU, A: Floats) -> Floats:
     return np.asarray(solved / np.sqrt(pivots)[:, None])
 
 
-def _blocks(pencil: Pencil, columns: sparse.csc_array, basis: Floats) -> list[_Block]:
+def _blocks(pencil: Pencil, terms: sparse.csc_array, basis: Floats) -> list[_Block]:
     """Elastic rows of every term of one matrix applied to ``basis``."""
     position = np.full(pencil.n_dof, -1, dtype=np.intp)
     position[pencil.elastic] = np.arange(len(pencil.elastic))
     blocks = []
-    for theta in range(columns.shape[1]):
-        at = slice(columns.indptr[theta], columns.indptr[theta + 1])
-        entries, data = columns.indices[at], columns.data[at]
-        place = position[pencil.rows[entries]]
-        keep = place >= 0
-        rows, slot = np.unique(place[keep], return_inverse=True)
+    for theta in range(terms.shape[1]):
+        i, j, data = entries(pencil, terms, theta)
+        keep = position[i] >= 0
+        rows, slot = np.unique(position[i[keep]], return_inverse=True)
         if len(rows):
             shape = (len(rows), pencil.n_dof)
-            term = sparse.csr_array(
-                (data[keep], (slot, pencil.columns[entries[keep]])), shape=shape
-            )
-            blocks.append(_Block(theta, rows.astype(np.intp), np.asarray(term @ basis)))
+            term = sparse.csr_array((data[keep], (slot, j[keep])), shape=shape)
+            blocks.append(_Block(theta, rows, np.asarray(term @ basis)))
     return blocks
 
 
@@ -173,46 +169,31 @@ def _dense(blocks: list[_Block], L: Floats) -> Floats:
 def _span(blocks: list[_Block], n: int) -> tuple[Floats, list[Coordinates]]:
     """A (n, a) spanning all blocks, and each block's coordinates in it.
 
-    Terms with few rows (joints) share unit vectors; the others bring their own column space.
+    Terms with few rows (joints) share unit vectors; others on the same rows orthonormal columns.
     """
-    narrow = [len(b.rows) <= b.values.shape[1] for b in blocks]
-    shared = np.zeros(n, dtype=bool)
-    for block, is_narrow in zip(blocks, narrow, strict=True):
-        if is_narrow:
-            shared[block.rows] = True
-    units = np.flatnonzero(shared)
-    wide: list[tuple[Ints, Floats]] = []
-    where: dict[bytes, int] = {}
-    coordinates: list[Coordinates] = [
-        (np.searchsorted(units, block.rows), block.values)
-        if is_narrow
-        else _columns(block, wide, where, len(units))
-        for block, is_narrow in zip(blocks, narrow, strict=True)
-    ]
-    A = np.zeros((n, len(units) + len(wide)))
-    A[units, np.arange(len(units))] = 1.0
-    for k, (rows, column) in enumerate(wide):
-        A[rows, len(units) + k] = column
-    return A, coordinates
-
-
-def _columns(
-    block: _Block, wide: list[tuple[Ints, Floats]], where: dict[bytes, int], offset: int
-) -> Coordinates:
-    """Orthonormal columns of a block, equal ones of other blocks used again."""
-    U, s, Vt = np.linalg.svd(block.values, full_matrices=False)
-    rank = int((s > 1e-13 * s[0]).sum()) if s[0] > 0.0 else 0
-    U, values = U[:, :rank], s[:rank, None] * Vt[:rank]
-    signs = np.where(U[np.abs(U).argmax(axis=0), np.arange(rank)] < 0.0, -1.0, 1.0)
-    columns, place = np.ascontiguousarray((signs * U).T), block.rows.tobytes()
-    at = []
-    for column, rounded in zip(columns, np.round(columns, 9), strict=True):
-        key = rounded.tobytes() + place
-        if key not in where:
-            where[key] = len(wide)
-            wide.append((block.rows, column))
-        at.append(offset + where[key])
-    return np.array(at, dtype=np.intp), signs[:, None] * values
+    alike: dict[bytes, list[int]] = {}
+    for k, block in enumerate(blocks):
+        if len(block.rows) > block.values.shape[1]:
+            alike.setdefault(block.rows.tobytes(), []).append(k)
+    narrow = sorted(set(range(len(blocks))) - {k for members in alike.values() for k in members})
+    units = np.unique(np.concatenate([np.zeros(0, np.intp), *(blocks[k].rows for k in narrow)]))
+    coordinates = {k: (np.searchsorted(units, blocks[k].rows), blocks[k].values) for k in narrow}
+    first = np.zeros((n, len(units)))
+    first[units, np.arange(len(units))] = 1.0
+    columns, count = [first], len(units)
+    for members in alike.values():
+        values = [blocks[k].values for k in members]
+        size = [np.abs(each).max(initial=0.0) or 1.0 for each in values]
+        every = np.hstack([each / own for each, own in zip(values, size, strict=True)])
+        U, s, _ = np.linalg.svd(every, full_matrices=False)
+        U = U[:, s > 1e-13 * s[0]]
+        column = np.zeros((n, U.shape[1]))
+        column[blocks[members[0]].rows] = U
+        columns.append(column)
+        at = np.arange(count, count + U.shape[1])
+        coordinates |= {k: (at, U.T @ blocks[k].values) for k in members}
+        count += len(at)
+    return np.hstack(columns), [coordinates[k] for k in range(len(blocks))]
 
 
 # --- Offline: what turned joints need
@@ -253,10 +234,7 @@ def _joint_blocks(pencil: Pencil, terms: Ints, dofs: Ints) -> Floats:
     blocks = np.zeros((len(terms), len(dofs), len(dofs)))
     position = np.full(pencil.n_dof, -1, dtype=np.intp)
     position[dofs] = np.arange(len(dofs))
-    columns = pencil.by_term[0]
-    for block, term in zip(blocks, terms, strict=True):
-        part = slice(columns.indptr[term], columns.indptr[term + 1])
-        entries = columns.indices[part]
-        rows, cols = position[pencil.rows[entries]], position[pencil.columns[entries]]
-        block[rows, cols] = columns.data[part]
+    for block, term in zip(blocks, terms.tolist(), strict=True):
+        i, j, data = entries(pencil, pencil.by_term[0], term)
+        block[position[i], position[j]] = data
     return blocks
