@@ -249,3 +249,25 @@ def _rule(
 def is_constant(x: Scalar) -> TypeIs[float]:
     """True for a plain number."""
     return not isinstance(x, Expression)
+
+
+def parts(x: Scalar) -> list[tuple[int, float]]:
+    """The atoms of a scalar and their factors; −1 stands for the number 1."""
+    if not isinstance(x, Expression):
+        return [(-1, float(x))] if x else []
+    return [(-1, x.constant)] * (x.constant != 0.0) + list(x.terms.items())
+
+
+def atom_of(x: Scalar, atom: int) -> Scalar:
+    """One of the atoms that `parts` names, by itself."""
+    return (
+        Expression(x.recorder, 0.0, {atom: 1.0}) if isinstance(x, Expression) and atom >= 0 else 1.0
+    )
+
+
+def one_atom(x: Scalar) -> Scalar:
+    """The same scalar as factor × atom, a sum being recorded as an atom of its own."""
+    if not isinstance(x, Expression):
+        return x
+    factor, atom = x.single()
+    return Expression(x.recorder, 0.0, {atom: factor})

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.mechanism.kinematics.rotations import Objects, some
-from eigassign.series.expression import Expression, Scalar
+from eigassign.series.expression import Scalar, one_atom, parts
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -45,7 +45,7 @@ class AffineEntries:
         j = places[matrix.indices]
         inner = (i >= 0) & (j >= 0)
         entries = i[inner], j[inner], matrix.data[inner]
-        self.blocks += [(*entries, *part) for part in _parts(coefficient)]
+        self.blocks += [(*entries, *part) for part in parts(coefficient)]
 
     def add_coupling(self, coefficient: Scalar, v: Floats, places: Ints, r: Row) -> None:
         """coefficient × (Pᵀ v r + rᵀ vᵀ P)."""
@@ -53,7 +53,7 @@ class AffineEntries:
         rows, values = places[present], v[present]
         for unknown, factor in r if len(rows) else ():
             self.couplings += [
-                (rows, unknown, values, *part) for part in _parts(coefficient * factor)
+                (rows, unknown, values, *part) for part in parts(coefficient * factor)
             ]
 
     def add_square(self, coefficient: Scalar, r: Row) -> None:
@@ -85,16 +85,16 @@ class AffineEntries:
         sums = [
             (row, column, atom, factor)
             for (row, column), value in self.sums.items()
-            for atom, factor in _parts(_whole(value) if min(row, column) >= n_u else value)
+            for atom, factor in parts(one_atom(value) if min(row, column) >= n_u else value)
         ]
         rows, columns, *what = _spread(self.couplings)
-        parts = [
+        groups = [
             list(zip(*sums, strict=True)) or [()] * 4,
             _spread(self.blocks),
             (rows, columns, *what),
             (columns, rows, *what),
         ]
-        i, j, atom, value = (np.concatenate(own) for own in zip(*parts, strict=True))
+        i, j, atom, value = (np.concatenate(own) for own in zip(*groups, strict=True))
         return i.astype(np.intp), j.astype(np.intp), atom.astype(np.intp), value
 
 
@@ -107,21 +107,6 @@ def _spread(blocks: Sequence[Block]) -> tuple[Any, ...]:
     column = np.concatenate(columns) if np.ndim(columns[0]) else np.repeat(columns, sizes)
     value = np.concatenate(values) * np.repeat(factors, sizes)
     return np.concatenate(rows), column, np.repeat(atoms, sizes), value
-
-
-def _whole(value: Scalar) -> Scalar:
-    """A sum as one atom."""
-    if not isinstance(value, Expression):
-        return value
-    factor, atom = value.single()
-    return Expression(value.recorder, 0.0, {atom: factor})
-
-
-def _parts(value: Scalar) -> list[tuple[int, float]]:
-    """The atoms of a scalar and their factors."""
-    if not isinstance(value, Expression):
-        return [(-1, float(value))] if value else []
-    return [(-1, value.constant)] * (value.constant != 0.0) + list(value.terms.items())
 
 
 def pattern(

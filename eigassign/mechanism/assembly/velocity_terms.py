@@ -45,7 +45,7 @@ from eigassign.mechanism.elements.profiles import field_inertia
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type
-from eigassign.mechanism.kinematics.rotations import DOFS
+from eigassign.mechanism.kinematics.rotations import CROSS, DOFS
 from eigassign.series.algebra import Samples
 from eigassign.series.compiler import CompiledTable, compile_table
 from eigassign.series.expression import Scalar
@@ -54,9 +54,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Matrix = Any  # sparse, or dense where that is quicker
 IMAGINARY = 1e-30  # step of derivatives along the imaginary axis, which lose no digits
-# entries (i, j) of ω̃: which component of ω, and its sign
-CROSS = ((0, 1, 2, -1.0), (0, 2, 1, 1.0), (1, 0, 2, 1.0), (1, 2, 0, -1.0), (2, 0, 1, -1.0),
-         (2, 1, 0, 1.0))  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

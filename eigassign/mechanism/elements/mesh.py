@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +16,11 @@ from scipy import sparse
 
 from eigassign.mechanism.elements.beam import Shear
 from eigassign.mechanism.elements.profiles import Profile
-from eigassign.mechanism.kinematics.rotations import DOFS, Objects, skew, some
-from eigassign.series.expression import Expression, Scalar
+from eigassign.mechanism.kinematics.rotations import CROSS, DOFS, Objects, multiply, skew
+from eigassign.series.expression import Expression, Scalar, atom_of, parts
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-_PLACES = {
-    space: np.array([kept.index(dof) if dof in kept else -1 for dof in range(6)])
-    for space, kept in DOFS.items()
-}
 
 
 class Term(NamedTuple):
@@ -84,94 +80,73 @@ class Entries:
     """Collects entries of an affine matrix by coefficient while a mesh is built."""
 
     size: tuple[int, int]
-    groups: dict[object, tuple[Scalar, list[tuple[Ints, Ints, Floats]]]] = field(
-        default_factory=dict
-    )
+    groups: dict[int, tuple[Scalar, list[Sequence[Any]]]] = field(default_factory=dict)
 
     def add(self, coefficient: Scalar, rows: Ints, columns: Ints, values: Floats) -> None:
         """coefficient × values at (rows, columns); constants are folded into the values."""
-        key: object = "constant"
+        factor: Any = coefficient
+        atom = -1
         if isinstance(coefficient, Expression):
             factor, atom = coefficient.single()
-            key, values = atom, values * factor
-            coefficient = Expression(coefficient.recorder, 0.0, {atom: 1.0})
-        else:
-            coefficient, values = 1.0, values * coefficient
-        self.groups.setdefault(key, (coefficient, []))[1].append((rows, columns, values))
+        self._of(atom, coefficient).append((rows, columns, values * factor))
 
-    def add_block(self, coefficient: Scalar, dofs: Ints, block: Floats) -> None:
-        """coefficient × a small dense matrix on the given dofs (negative ones are left out)."""
-        i, j = np.nonzero(block)
-        keep = (dofs[i] >= 0) & (dofs[j] >= 0)
-        i, j = i[keep], j[keep]
-        if len(i):
-            self.add(coefficient, dofs[i], dofs[j], block[i, j])
+    def add_scalars(self, scalars: Sequence[Scalar], rows: Ints, columns: Ints) -> None:
+        """One scalar at each (row, column), atom by atom; none where a place is negative."""
+        found: dict[int, tuple[Scalar, list[tuple[int, int, float]]]] = {}
+        for scalar, row, column in zip(scalars, rows.tolist(), columns.tolist(), strict=True):
+            if row >= 0 and column >= 0:
+                for atom, factor in parts(scalar):
+                    found.setdefault(atom, (scalar, []))[1].append((row, column, factor))
+        for atom, (scalar, entries) in found.items():
+            self._of(atom, scalar).append(tuple(zip(*entries, strict=True)))
+
+    def _of(self, atom: int, scalar: Scalar) -> list[Sequence[Any]]:
+        """The entries of one atom of a scalar, or of the number 1."""
+        return self.groups.setdefault(atom, (atom_of(scalar, atom), []))[1]
 
     def terms(self) -> list[Term]:
         """The affine terms, in the order of first appearance."""
         out = []
-        for coefficient, parts in self.groups.values():
-            rows, columns, values = (np.concatenate(p) for p in zip(*parts, strict=True))
+        for coefficient, entries in self.groups.values():
+            rows, columns, values = (np.concatenate(each) for each in zip(*entries, strict=True))
             matrix = sparse.csr_array((values, (rows, columns)), shape=self.size)
             out.append(Term(coefficient, matrix))
         return out
 
 
-def node_dofs(first: int, space: str) -> Ints:
-    """Six slots of a node's dofs; −1 for those a planar mechanism has not."""
-    return np.where(_PLACES[space] >= 0, first + _PLACES[space], -1)
-
-
 def chain_dofs(count: int, space: str) -> Ints:
-    """The slots of ``count`` nodes one after the other, (count, 6)."""
-    first = len(DOFS[space]) * np.arange(count)[:, None]
-    return np.where(_PLACES[space] >= 0, first + _PLACES[space], -1)
+    """The six slots of each of ``count`` nodes one after the other, (count, 6).
 
-
-def rigid_motion(
-    positions: Sequence[Objects], dofs: Sequence[Ints], n: int, space: str
-) -> list[Term]:
-    """N: node motion v + ω × X, ω per twist (v, ω) of the origin, as affine terms."""
+    −1 stands for those that a planar mechanism has not.
+    """
     kept = list(DOFS[space])
-    entries = Entries((n, len(kept)))
-    for X, slots in zip(positions, dofs, strict=True):
-        entries.add(1.0, slots[kept], np.arange(len(kept)), np.ones(len(kept)))
-        lever = skew(X) * -1.0
-        for i in range(3):
-            for j in range(3):
-                value = lever[i, j]
-                if slots[i] >= 0 and 3 + j in kept and some(value):
-                    at = np.array([slots[i]]), np.array([kept.index(3 + j)])
-                    entries.add(value, *at, np.ones(1))
+    slots = np.full((count, 6), -1)
+    slots[:, kept] = np.arange(count * len(kept)).reshape(count, -1)
+    return slots
+
+
+def rigid_motion(positions: Sequence[Objects], slots: Ints, n: int, space: str) -> list[Term]:
+    """N (n, n_twist): node motion v + ω × X, ω per twist (v, ω) of the origin, as affine terms."""
+    kept = list(DOFS[space])
+    entries, own = Entries((n, len(kept))), slots[:, kept].ravel()
+    entries.add(1.0, own, np.tile(np.arange(len(kept)), len(slots)), np.ones(len(own)))
+    for i, j, component, sign in CROSS:  # ω × X = −[X]× ω
+        if i in kept and 3 + j in kept:
+            column = np.full(len(slots), kept.index(3 + j))
+            entries.add_scalars([X[component] * -sign for X in positions], slots[:, i], column)
     return entries.terms()
 
 
-def body_block(mass: Scalar, inertia: Sequence[Scalar], lever: Objects) -> Objects:
-    """Mass matrix (6, 6) of a rigid body at a node from its centre of mass at ``lever``.
+def add_body(
+    entries: Entries, slots: Ints, mass: Scalar, inertia: Sequence[Scalar], lever: Objects
+) -> None:
+    """Add the mass matrix of a rigid body at a node, its centre of mass being at ``lever``.
 
     [[m I, −m[c]×], [m[c]×, J − m[c]×[c]×]] with J (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the centre.
     """
-    S = skew(lever)
-    out = np.zeros((6, 6), dtype=object)
     xx, yy, zz, xy, xz, yz = inertia
     J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], dtype=object)
-    for i in range(3):
-        out[i, i] = mass
-        for j in range(3):
-            out[i, 3 + j] = S[i, j] * -1.0 * mass if some(S[i, j]) else 0.0
-            out[3 + i, j] = S[i, j] * mass if some(S[i, j]) else 0.0
-            square: Scalar = J[i, j]
-            for k in range(3):
-                if some(S[i, k]) and some(S[k, j]):
-                    square = square - S[i, k] * S[k, j] * mass
-            out[3 + i, 3 + j] = square
-    return out
-
-
-def add_scalars(entries: Entries, slots: Ints, block: Objects) -> None:
-    """Add a small matrix of scalars at one node."""
-    for i in range(len(slots)):
-        for j in range(len(slots)):
-            if slots[i] >= 0 and slots[j] >= 0 and some(block[i, j]):
-                at = np.array([slots[i]]), np.array([slots[j]])
-                entries.add(block[i, j], *at, np.ones(1))
+    m, S = np.diag(np.array([mass] * 3, dtype=object)), skew(lever)
+    mS = multiply(S, m)
+    block = np.block([[m, mS * -1.0], [mS, J - multiply(S, mS)]])
+    entries.add_scalars(block.ravel().tolist(), np.repeat(slots, 6), np.tile(slots, 6))

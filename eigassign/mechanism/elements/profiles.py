@@ -18,7 +18,7 @@ from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.sections import SectionValues, section_values
 from eigassign.mechanism.kinematics.parameters import ModelParameters
-from eigassign.series.expression import Expression, Scalar, is_constant
+from eigassign.series.expression import Scalar, is_constant, one_atom
 
 Floats = NDArray[np.float64]
 TERMS = 5  # Legendre polynomials over an element of a taper
@@ -157,19 +157,11 @@ def _combined(values: tuple[Scalar | None, ...], weights: Floats) -> Any:
         return None
     if all(is_constant(value) for value in given):
         return weights @ np.array(given)
-    atoms = [_one_atom(value) for value in given]
+    atoms = [one_atom(value) for value in given]
     return [
         [sum((v * w for v, w in zip(atoms, row, strict=True)), 0.0) for row in rows]
         for rows in weights.tolist()
     ]
-
-
-def _one_atom(x: Scalar) -> Scalar:
-    """x as factor × atom, so that combinations of several are combinations of as few atoms."""
-    if is_constant(x):
-        return x
-    factor, atom = x.single()
-    return Expression(x.recorder, 0.0, {atom: factor})
 
 
 def _torsion(at: Callable[[float], BeamValues], n: int) -> Any:

@@ -18,7 +18,7 @@ from eigassign.errors import MechanismError
 from eigassign.mechanism.elements.bodies import add_bodies
 from eigassign.mechanism.elements.craig_bampton import held_factor
 from eigassign.mechanism.elements.matrix_file import read_matrix
-from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Term, rigid_motion
+from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Term, chain_dofs, rigid_motion
 from eigassign.mechanism.elements.sparse_factor import is_semidefinite
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type, parameters
 from eigassign.mechanism.kinematics.rotations import DOFS, vector
@@ -40,13 +40,10 @@ def superelement_mesh(case: CaseFile, parameters: ModelParameters, name: str) ->
     order = np.concatenate([boundary, np.setdiff1d(np.arange(K.shape[0]), boundary)])
     K, M = K[order][:, order].tocsr(), M[order][:, order].tocsr()
     space, n = case.mechanism.space, K.shape[0]
-    width, kept = len(DOFS[space]), list(DOFS[space])
-    nodes, places = {}, {}
-    for k, (key, node) in enumerate(link.nodes.items()):
-        slots = np.full(6, -1, dtype=np.intp)
-        slots[kept] = width * k + np.arange(width)
-        nodes[key], places[key] = slots, vector([float(c) for c in node.position])
-    at_interface = rigid_motion(list(places.values()), list(nodes.values()), n, space)
+    slots = chain_dofs(len(link.nodes), space)
+    nodes = dict(zip(link.nodes, slots, strict=True))
+    places = {key: vector([float(c) for c in node.position]) for key, node in link.nodes.items()}
+    at_interface = rigid_motion(list(places.values()), slots, n, space)
     rigid = [Term(t.coefficient, _follow(K, t.matrix, len(boundary), path)) for t in at_interface]
     _check_rigid(K, rigid, path)
     _check_mass(M, rigid, space, path)

@@ -15,6 +15,9 @@ from eigassign.series.expression import Expression, Scalar, cos, sin
 Objects = NDArray[np.object_]
 Floats = NDArray[np.float64]
 DOFS = {"planar": (0, 1, 5), "spatial": (0, 1, 2, 3, 4, 5)}  # of a motion (v, ω): x, y, z each
+# entries (i, j) of [a]×: which component of a, and its sign
+CROSS = ((0, 1, 2, -1.0), (0, 2, 1, 1.0), (1, 0, 2, 1.0), (1, 2, 0, -1.0), (2, 0, 1, -1.0),
+         (2, 1, 0, 1.0))  # fmt: skip
 
 
 def vector(values: Sequence[Scalar]) -> Objects:
