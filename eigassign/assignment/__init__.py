@@ -4,6 +4,7 @@ Reading order:
 
     checks        refuses input that is not finite or has another shape
     targets       wanted frequencies at the samples, weights in time, λ in Hz
+    linear        what is linear in the design: λ along the trajectory, and limits
     program       build: the quadratic program of eqs. (13)–(14), and its dimensionless units
     feasibility   which limits contradict each other
     solver        solve: OSQP, then an active-set method that goes to round-off
@@ -27,10 +28,10 @@ __all__, __getattr__, __dir__ = face(
         "exact.requirements": "Frequencies FrequencyLimit FrequencyGoal QuantityLimit Requirements",
         "exact.sequential": "End Optimum minimise",
         "exact.stationarity": "stationarity",
+        "linear": "LinearConstraint LinearModel",
         "optimality": "Certificate best_candidate judge",
         "program": (
-            "Bounds Goal LinearConstraint LinearModel ProgramAnswer ScaledProgram build_program "
-            "scaled_program unscaled"
+            "Bounds Goal ProgramAnswer ScaledProgram build_program scaled_program unscaled"
         ),
         "requirements.named_modes": "followed_modes named_design named_pose",
         "requirements.requirement": "Requirement Solved",

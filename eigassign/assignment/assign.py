@@ -17,11 +17,11 @@ from numpy.typing import ArrayLike, NDArray
 from eigassign.assignment.catalogues.branching import CatalogueSearch, ListedValues
 from eigassign.assignment.catalogues.choosing import held, solve_catalogue
 from eigassign.assignment.checks import Floats, finite, frozen
+from eigassign.assignment.linear import LinearConstraint
 from eigassign.assignment.optimality import ACCEPT, best_candidate
 from eigassign.assignment.program import (
     Bounds,
     Goal,
-    LinearConstraint,
     ProgramAnswer,
     QuadraticProgram,
     build_program,

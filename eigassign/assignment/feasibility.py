@@ -8,12 +8,8 @@ from typing import TypeVar
 import numpy as np
 
 from eigassign.assignment.checks import Floats
-from eigassign.assignment.program import (
-    Bounds,
-    LinearConstraint,
-    QuadraticProgram,
-    ScaledProgram,
-)
+from eigassign.assignment.linear import LinearConstraint
+from eigassign.assignment.program import Bounds, QuadraticProgram, ScaledProgram
 from eigassign.errors import InfeasibleError
 
 T = TypeVar("T")

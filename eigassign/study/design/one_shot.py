@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.assign import Assignment, solve_assignment
 from eigassign.assignment.catalogues.branching import ListedValues
-from eigassign.assignment.program import Bounds, Goal, LinearConstraint, LinearModel
+from eigassign.assignment.linear import LinearConstraint, LinearModel
+from eigassign.assignment.program import Bounds, Goal
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile

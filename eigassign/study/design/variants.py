@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from eigassign.assignment.exact.design_problem import DesignProblem, Objective
 from eigassign.assignment.exact.requirements import QuantityLimit, Requirements
 from eigassign.assignment.feasibility import constraints_agree
-from eigassign.assignment.program import Bounds, LinearConstraint
+from eigassign.assignment.linear import LinearConstraint
+from eigassign.assignment.program import Bounds
 from eigassign.assignment.requirements.band import ForbiddenBand
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import requirements_of, time_weights
