@@ -5,12 +5,12 @@ Reading order:
     checks        refuses input that is not finite or has another shape
     targets       wanted frequencies at the samples, weights in time, λ in Hz
     linear        what is linear in the design: λ along the trajectory, and limits
+    requirements  what a case asks for: one type from the case file to the report
     program       build: the quadratic program of eqs. (13)–(14), and its dimensionless units
     feasibility   which limits contradict each other
     solver        solve: OSQP, then an active-set method that goes to round-off
     optimality    judge: Karush–Kuhn–Tucker residuals, recomputed from the data
     exact         the optimum of the exact problem, and parameters from measurements
-    requirements  what a case asks for: one type from the case file to the report
     catalogues    the best of what catalogues list
     assign        build, solve, judge: from targets to the optimal design
 """
@@ -25,17 +25,19 @@ __all__, __getattr__, __dir__ = face(
         "catalogues.choosing": "choose solve_catalogue",
         "exact.design_problem": "Appraisal DesignProblem Objective best_first",
         "exact.identification": "Identified MeasuredFrequencies identify",
-        "exact.requirements": "Frequencies FrequencyLimit FrequencyGoal QuantityLimit Requirements",
+        "exact.requirements": "Requirements",
         "exact.sequential": "End Optimum minimise",
         "exact.stationarity": "stationarity",
         "linear": "LinearConstraint LinearModel",
         "optimality": "Certificate best_candidate judge",
-        "program": (
-            "Bounds Goal ProgramAnswer ScaledProgram build_program scaled_program unscaled"
-        ),
+        "program": ("Bounds ProgramAnswer ScaledProgram build_program scaled_program unscaled"),
+        "requirements.frequency": "AssignedFrequency",
+        "requirements.lower_limit": "LowerLimit",
+        "requirements.mass_limit": "MassLimit",
         "requirements.named_modes": "followed_modes named_design named_pose",
-        "requirements.requirement": "Requirement Solved",
-        "requirements.sampling": "KINDS requirements_of time_weights",
+        "requirements.requirement": "Frequencies Requirement Solved",
+        "requirements.sampling": "KINDS design_limits requirements_of time_weights",
+        "requirements.upper_limit": "UpperLimit",
         "solver": "Status solve_program solve_scaled",
         "targets": "hz_from_lam lam_from_hz sample_target trapezoidal_weights",
     },

@@ -21,7 +21,7 @@ from eigassign.assignment.linear import LinearConstraint
 from eigassign.assignment.optimality import ACCEPT, best_candidate
 from eigassign.assignment.program import (
     Bounds,
-    Goal,
+    Goals,
     ProgramAnswer,
     QuadraticProgram,
     build_program,
@@ -73,7 +73,7 @@ class Assignment(Brief):
 
 
 def solve_assignment(
-    goals: Sequence[Goal],
+    goals: Goals,
     time_weights: ArrayLike,
     y0: ArrayLike,
     y_initial: ArrayLike,
@@ -84,6 +84,7 @@ def solve_assignment(
 ) -> Assignment:
     """The design y within its limits that minimises J of eqs. (13)–(14), in relative error.
 
+    ``goals`` are wanted frequencies, each with the linear model of its mode at its own samples.
     ``time_weights`` (n_t,) in s are those of the integral over time (`trapezoidal_weights`, of
     several trajectories one after the other); ``y0`` (n_y,) is the point dy counts from,
     ``y_initial`` (n_y,) the design to improve on; ``names`` of the parameters (y1, y2, … if not
@@ -109,7 +110,7 @@ def solve_assignment(
         names=program.names,
         y=frozen(optimum.y),
         dy=frozen(dy),
-        lam=tuple(frozen(goal.model(dy)) for goal in goals),
+        lam=tuple(frozen(model(dy)) for _, model in goals),
         status=solution.status,
         iterations=solution.iterations,
         primal_residual=certificate.primal_residual,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from eigassign.assignment.checks import Floats, finite, limit, same_length
 from eigassign.errors import UsageError
@@ -30,11 +29,6 @@ class LinearModel:
         """λ (n_t,) at y = y0 + dy."""
         return np.asarray(self.l0 + self.l @ dy)
 
-    def relative_to(self, lam_d: ArrayLike) -> LinearModel:
-        """The same model divided by the target's λ_d (n_t,): dimensionless, target 1."""
-        divisor = np.asarray(lam_d, dtype=np.float64)
-        return LinearModel(self.l0 / divisor, self.l / divisor[:, np.newaxis])
-
 
 @dataclass(frozen=True)
 class LinearConstraint:
@@ -51,3 +45,7 @@ class LinearConstraint:
         low, high = limit(what, self.lower, 0), limit(what, self.upper, 0)
         if low > high or low == np.inf or high == -np.inf:
             raise UsageError(f"{what}: no number is between {self.lower} and {self.upper}")
+
+    def __call__(self, y: Floats) -> tuple[float, Floats]:
+        """Its value at a design y (n_y,), and the slopes (n_y,)."""
+        return float(self.coefficients @ y), self.coefficients

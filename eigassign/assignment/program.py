@@ -36,32 +36,10 @@ from numpy.typing import ArrayLike
 
 from eigassign.assignment.checks import Floats, finite, frozen, limit, positive, same_length
 from eigassign.assignment.linear import LinearConstraint, LinearModel
-from eigassign.assignment.targets import lam_from_hz, positive_hz
+from eigassign.assignment.requirements.requirement import Requirement, time_shares
 from eigassign.errors import UsageError
 
-
-@dataclass(frozen=True)
-class Goal:
-    """One assigned mode: its model, its wanted frequency (n_t,) in Hz, and its weight (> 0).
-
-    ``rows`` says which of all samples in time these n_t are, where it is not wanted at all of them.
-    """
-
-    model: LinearModel
-    target_hz: Floats
-    weight: float = 1.0
-    rows: slice = field(default_factory=lambda: slice(None))
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "target_hz", positive_hz(self.target_hz))
-        same_length("target frequency", self.target_hz.size, self.model.l0.size, "samples in l0")
-        if not (np.isfinite(self.weight) and self.weight > 0.0):
-            raise UsageError(f"target weight: {self.weight} given; must be finite and above 0")
-
-    @property
-    def lam_d(self) -> Floats:
-        """λ_d (n_t,) in rad²/s²."""
-        return lam_from_hz(self.target_hz)
+Goals = Sequence[tuple[Requirement, LinearModel]]  # wanted frequencies, each with λ at its rows
 
 
 @dataclass(frozen=True)
@@ -131,14 +109,8 @@ class QuadraticProgram:
         return _program(self.names, self.A, self.b, self.y0, start, bounds, constraints)
 
 
-def error_rows(model: LinearModel, lam_d: ArrayLike, weights: Floats) -> tuple[Floats, Floats]:
-    """Rows A = √ω l and b = √ω (l0 − λ_d), so that ∫ (λ − λ_d)² dt = ‖A dy + b‖²."""
-    root = np.sqrt(weights)
-    return root[:, np.newaxis] * model.l, root * (model.l0 - np.asarray(lam_d))
-
-
 def build_program(
-    goals: Sequence[Goal],
+    goals: Goals,
     time_weights: ArrayLike,
     y0: ArrayLike,
     y_initial: ArrayLike,
@@ -185,20 +157,18 @@ def _program(
     )
 
 
-def _relative_rows(goals: Sequence[Goal], time_weights: Floats) -> tuple[Floats, Floats]:
+def _relative_rows(goals: Goals, time_weights: Floats) -> tuple[Floats, Floats]:
     """A and b of J: relative error, mean over time, weighted mean over the goals."""
-    each = [time_weights[goal.rows] for goal in goals]
-    total = sum(goal.weight * own.sum() for goal, own in zip(goals, each, strict=True))
     rows = []
-    for goal, own in zip(goals, each, strict=True):
-        same_length("target model", goal.model.l0.size, own.size, "samples in time")
-        share = frozen(goal.weight / total * own)
-        rows.append(error_rows(goal.model.relative_to(goal.lam_d), 1.0, share))
+    shares = time_shares([one for one, _ in goals], time_weights)
+    for (one, model), share in zip(goals, shares, strict=True):
+        same_length("target model", model.l0.size, share.size, "samples in time")
+        rows.append(one.lam_rows(model, share))
     return np.vstack([A for A, _ in rows]), np.concatenate([b for _, b in rows])
 
 
 def _require_sizes(
-    goals: Sequence[Goal],
+    goals: Goals,
     n_y: int,
     start: Floats,
     bounds: Bounds,
@@ -207,8 +177,9 @@ def _require_sizes(
 ) -> None:
     if not goals:
         raise UsageError("targets: none given, so there is nothing to assign")
-    for goal in goals:
-        same_length("columns of l", goal.model.l.shape[1], n_y, "design parameters")
+    for one, model in goals:
+        same_length("target frequency", one.hz.size, model.l0.size, "samples in l0")
+        same_length("columns of l", model.l.shape[1], n_y, "design parameters")
     same_length("initial design", start.size, n_y, "design parameters")
     same_length("bounds", bounds.lower.size, n_y, "design parameters")
     same_length("names", len(names), n_y, "design parameters")

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, differential_evolution, minimize
 
 from eigassign.assignment.exact.design_problem import UnitBox
-from eigassign.assignment.exact.requirements import Frequencies
 from eigassign.assignment.exact.sequential import minimise
+from eigassign.assignment.requirements.requirement import Frequencies
 from eigassign.assignment.requirements.sampling import requirements_of
 from eigassign.chart.results import DesignRun, excess_over
 from eigassign.chart.timing import Effort, measure
@@ -83,8 +83,8 @@ def chart_designs(
         except EigassignError as error:
             notes.append(f"no design by {name}: {error}")
             continue
-        curves = zip(posed.requirements.curves(seen), targets, strict=True)
-        off = max(float(np.abs(hz / own.hz - 1.0).max()) for (hz, _), own in curves)
+        curves = posed.requirements.curves(seen)
+        off = max(float(np.abs(hz / own.hz - 1.0).max()) for own, hz, _ in curves)
         value, rms = posed.problem(y, seen), float(np.linalg.norm(seen.residual))
         at = tuple(y.tolist())
         run = DesignRun(name, not more, told, seconds, solves, at, value, off, rms, 0.0, **more)

@@ -120,7 +120,7 @@ def without(row: Any, *names: str) -> dict[str, Any]:
 def _frequencies(results: RunResults, target: TargetStudy) -> dict[str, Any]:
     """Curves of a target; a limit or band has its edges too, null where there is none."""
     asked = target.asked
-    edges = {} if asked.is_goal else {"lower_hz": asked.lower_hz, "upper_hz": asked.upper_hz}
+    edges = {} if asked.is_goal else {"lower_hz": asked.lower, "upper_hz": asked.upper}
     return {
         "time_s": results.time_s[asked.rows],
         **_named(results, asked.rows),
@@ -366,7 +366,8 @@ def _curves(targets: Sequence[TargetStudy]) -> dict[str, list[Floats | None]]:
 def _column(target: TargetStudy, name: str) -> Floats | None:
     """A curve of a target, or an edge of what it asks."""
     field = f"{name.replace(' ', '_')}_hz"
-    hz: Floats | None = getattr(target if hasattr(target, field) else target.asked, field)
+    of_asked = not hasattr(target, field)
+    hz: Floats | None = getattr(target.asked, name) if of_asked else getattr(target, field)
     return hz
 
 

@@ -229,12 +229,4 @@ def _is_feasible(scene: Scene) -> bool:
     lower, upper = scene.bounds
     if np.any((scene.initial < lower) | (scene.initial > upper)):
         return False
-    names = scene.model.y_names
-    initial = dict(zip(names, scene.initial, strict=True))
-    for constraint in scene.file.design.constraints.values():
-        total = sum(factor * initial[name] for name, factor in constraint.terms.items())
-        low = -np.inf if constraint.min is None else constraint.min
-        high = np.inf if constraint.max is None else constraint.max
-        if not low <= total <= high:
-            return False
-    return True
+    return all(one.lower <= one(scene.initial)[0] <= one.upper for one in scene.constraints)

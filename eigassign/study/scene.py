@@ -9,6 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.linear import LinearConstraint
+from eigassign.assignment.requirements.requirement import Requirement
+from eigassign.assignment.requirements.sampling import design_limits
 from eigassign.brief import Brief
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import CaseError, MissingMassError
@@ -122,6 +125,16 @@ class Scene:
         """Lower and upper bounds of y, each (n_y,)."""
         parameters = self.file.design.parameters.values()
         return np.array([p.min for p in parameters]), np.array([p.max for p in parameters])
+
+    @cached_property
+    def limits(self) -> tuple[Requirement, ...]:
+        """The limits of quantities of the design, whatever the trajectory."""
+        return design_limits(self.file, self.model)
+
+    @property
+    def constraints(self) -> tuple[LinearConstraint, ...]:
+        """Those of them that are linear in the design."""
+        return tuple(one.constraint for one in self.limits if one.constraint is not None)
 
     @cached_property
     def shown_modes(self) -> tuple[int, ...]:

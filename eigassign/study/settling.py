@@ -99,7 +99,7 @@ def _bands_hz(file: CaseFile, path: Trajectories | None) -> Floats:
         for _, one in w.bands
         if not one.modes
     )
-    return np.array([band.upper_hz.max() for band in bands])
+    return np.array([band.upper.max() for band in bands])
 
 
 def _path(file: CaseFile, trial: Model) -> tuple[Trajectories | None, Floats]:

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from eigassign.assignment import Bounds, Goal, LinearModel, hz_from_lam, trapezoidal_weights
+from eigassign.assignment import (
+    AssignedFrequency,
+    Bounds,
+    LinearModel,
+    hz_from_lam,
+    lam_from_hz,
+    trapezoidal_weights,
+)
 
 
 @dataclass(frozen=True)
@@ -32,10 +40,36 @@ class Problem:
         return self.goals, self.weights, self.y0, self.y_initial, self.bounds
 
 
-def goal(l0, slope, lam_d, weight=1.0):
+class Goal(NamedTuple):
+    """A wanted frequency with the linear model of its mode, as the program takes them."""
+
+    wanted: AssignedFrequency
+    model: LinearModel
+
+    @property
+    def target_hz(self):
+        return self.wanted.hz
+
+    @property
+    def lam_d(self):
+        return lam_from_hz(self.wanted.hz)
+
+    @property
+    def weight(self):
+        return self.wanted.weight
+
+
+def wanted(target_hz, rows=slice(None), **more):
+    return AssignedFrequency(
+        "mode 1", "targets[0]", ((1, 1.0),), rows, target_hz, target_hz, **more
+    )
+
+
+def goal(l0, slope, lam_d, weight=1.0, rows=slice(None)):
     l0 = np.atleast_1d(np.asarray(l0, dtype=float))
     target = hz_from_lam(np.broadcast_to(np.asarray(lam_d, dtype=float), l0.shape))
-    return Goal(LinearModel(l0, np.asarray(slope, dtype=float)), target, weight)
+    model = LinearModel(l0, np.asarray(slope, dtype=float))
+    return Goal(wanted(target, rows, weight=weight), model)
 
 
 def random_problem(seed, n_y=None, n_t=None):

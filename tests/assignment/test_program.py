@@ -2,12 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from assignment_problems import goal, random_problem
+from assignment_problems import goal, random_problem, wanted
 from scipy.integrate import trapezoid
 
 from eigassign.assignment import (
     Bounds,
-    Goal,
     LinearConstraint,
     LinearModel,
     build_program,
@@ -137,10 +136,9 @@ BOX = Bounds(np.zeros(1), np.ones(1))
         (lambda: LinearModel(np.ones(2), np.array([[1.0], [np.inf]])), r"l: inf at index \[1, 0\]"),
         (lambda: LinearModel(np.ones(2), np.ones((3, 1))), "3 given, but there are 2 samples"),
         (lambda: LinearModel(np.ones(2), np.ones(2)), "1 axes, 2 expected"),
-        (lambda: Goal(model(), np.array([1.0, 0.0])), "above 0 Hz"),
-        (lambda: Goal(model(), np.ones(3)), "3 given, but there are 2 samples"),
-        (lambda: Goal(model(), np.ones(2), weight=0.0), "weight: 0.0"),
-        (lambda: Goal(model(), np.ones(2), weight=np.nan), "weight: nan"),
+        (lambda: wanted(np.array([1.0, 0.0])), "above 0 Hz"),
+        (lambda: wanted(np.ones(2), weight=0.0), "weight: 0.0"),
+        (lambda: wanted(np.ones(2), weight=np.nan), "weight: nan"),
         (lambda: Bounds(np.array([np.nan]), np.ones(1)), "not a number"),
         (lambda: Bounds(np.ones(1), np.zeros(1)), "parameter 0 is empty"),
         (lambda: Bounds(np.array([np.inf]), np.array([np.inf])), "parameter 0 is empty"),
@@ -159,6 +157,7 @@ def test_data_that_is_not_a_number_or_does_not_fit_is_refused(make, words):
     ("change", "words"),
     [
         ({"goals": []}, "targets: none given"),
+        ({"goals": [(wanted(np.ones(3)), model())]}, "3 given, but there are 2 samples"),
         ({"time_weights": [0.5, 1.0, 0.5]}, "2 given, but there are 3 samples"),
         ({"time_weights": [0.5, 0.0]}, "time weights: 0.0 given; must be above 0"),
         ({"time_weights": []}, "time weights: none given"),
@@ -173,7 +172,7 @@ def test_data_that_is_not_a_number_or_does_not_fit_is_refused(make, words):
 )
 def test_parts_that_do_not_fit_each_other_are_refused(change, words):
     whole = {
-        "goals": [Goal(model(), np.ones(2))],
+        "goals": [(wanted(np.ones(2)), model())],
         "time_weights": [0.5, 0.5],
         "y0": [0.0],
         "y_initial": [0.5],
@@ -188,8 +187,8 @@ def test_goals_on_some_of_the_samples_count_by_the_time_of_those():
     rng = np.random.default_rng(8)
     weights = rng.uniform(0.1, 2.0, 7)
     whole = goal(1e6 * (1 + rng.random(7)), rng.normal(size=(7, 1)), 1.3e6, weight=0.7)
-    late = goal(1e6 * (1 + rng.random(3)), rng.normal(size=(3, 1)), 1.1e6, weight=2.0)
-    late = Goal(late.model, late.target_hz, late.weight, slice(4, 7))
+    l0, slope = 1e6 * (1 + rng.random(3)), rng.normal(size=(3, 1))
+    late = goal(l0, slope, 1.1e6, weight=2.0, rows=slice(4, 7))
     program = build_program([whole, late], weights, [0.0], [0.0], BOX)
     e1, e2 = (g.model(np.zeros(1)) / g.lam_d - 1.0 for g in (whole, late))
     above = 0.7 * weights @ e1**2 + 2.0 * weights[4:] @ e2**2

@@ -70,8 +70,8 @@ def test_a_frequency_is_both_limits_and_a_limit_is_one(wanted: Read) -> None:
             3.0,
             slice(0, 17),
         )
-        np.testing.assert_array_equal(one.lower_hz, np.full(17, low))
-        np.testing.assert_array_equal(one.upper_hz, np.full(17, high))
+        np.testing.assert_array_equal(one.lower, np.full(17, low))
+        np.testing.assert_array_equal(one.upper, np.full(17, high))
 
 
 def test_each_mode_of_a_list_is_wanted(wanted: Read) -> None:
@@ -80,18 +80,18 @@ def test_each_mode_of_a_list_is_wanted(wanted: Read) -> None:
 
 def test_a_band_lies_between_its_edges_and_follows_the_harmonic(wanted: Read) -> None:
     (fixed,) = wanted("{keep_out: [48, 52]}")
-    assert set(fixed.lower_hz) == {48.0}
-    assert set(fixed.upper_hz) == {52.0}
+    assert set(fixed.lower) == {48.0}
+    assert set(fixed.upper) == {52.0}
     (moving,) = wanted("{keep_out: {harmonic: 2, of: {file: f.csv}, margin: 10 %}, trajectory: b}")
     f = 100.0 + 100.0 * T_B  # the file: 100 Hz at 0 s, 400 Hz at 3 s
-    np.testing.assert_allclose(moving.lower_hz, 0.9 * 2 * f, rtol=1e-14)
-    np.testing.assert_allclose(moving.upper_hz, 1.1 * 2 * f, rtol=1e-14)
+    np.testing.assert_allclose(moving.lower, 0.9 * 2 * f, rtol=1e-14)
+    np.testing.assert_allclose(moving.upper, 1.1 * 2 * f, rtol=1e-14)
 
 
 def test_a_gap_is_a_width(wanted: Read) -> None:
     (gap,) = wanted("{gap: {between: [1, 2], at_least: 20 Hz}}")
     assert (gap.modes, gap.terms) == ((1, 2), ((2, 1.0), (1, -1.0)))
-    assert set(gap.lower_hz) == {20.0}
+    assert set(gap.lower) == {20.0}
 
 
 def test_each_trajectory_takes_a_profile_by_its_own_time(wanted: Read) -> None:

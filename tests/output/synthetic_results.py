@@ -219,8 +219,8 @@ def _target(mode: int, time: Floats, scale: float, parts: tuple[int, ...]) -> Ta
         modes=(mode,),
         terms=((mode, 1.0),),
         rows=whole,
-        lower_hz=target,
-        upper_hz=target,
+        lower=target,
+        upper=target,
         along=tuple(rows_of.items()),
     )
     return TargetStudy(
@@ -243,7 +243,7 @@ def as_limit(target: TargetStudy, kind: str, lower_hz: Floats, upper_hz: Floats)
     modes = (1, 2) if kind == "gap" else (1,)
     asked = KINDS[kind](
         label=f"mode 1 {kind}", place="targets[0]", modes=(1,), terms=KINDS[kind].terms_of(modes),
-        rows=target.asked.rows, lower_hz=lower_hz, upper_hz=upper_hz, along=target.asked.along,
+        rows=target.asked.rows, lower=lower_hz, upper=upper_hz, along=target.asked.along,
     )  # fmt: skip
     return replace(
         target, asked=asked, predicted_hz=None, error=error, satisfied=False, along=along

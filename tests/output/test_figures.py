@@ -114,7 +114,7 @@ def test_the_assignment_shows_requirements_of_and_distances(paper):
 
 
 def test_a_limit_is_drawn_with_what_it_forbids_and_equal_names_are_numbered(paper):
-    lower, upper = paper.targets[0].asked.lower_hz, paper.targets[0].asked.upper_hz
+    lower, upper = paper.targets[0].asked.lower, paper.targets[0].asked.upper
     endless = np.full(lower.size, np.inf)
     found = with_limits(
         paper,
@@ -132,14 +132,14 @@ def test_a_limit_is_drawn_with_what_it_forbids_and_equal_names_are_numbered(pape
         (shade,) = figure.axes[0].collections
         heights = shade.get_paths()[0].get_extents()
         for edge in (
-            hz[0] for hz in (limit.asked.lower_hz, limit.asked.upper_hz) if np.isfinite(hz).all()
+            hz[0] for hz in (limit.asked.lower, limit.asked.upper) if np.isfinite(hz).all()
         ):
             assert min(abs(edge - heights.y0), abs(edge - heights.y1)) < 1e-9
         assert legend(figure)[0] == "forbidden"
 
 
 def test_limits_are_strips_on_their_wrong_side_so_that_other_modes_stay_legible(paper):
-    lower = paper.targets[0].asked.lower_hz
+    lower = paper.targets[0].asked.lower
     endless = np.full(lower.size, np.inf)
     found = with_limits(paper, ("at_least", lower, endless), ("at_most", -endless, lower))
     axes = drawn(found, "frequencies").axes[0]
@@ -156,7 +156,7 @@ def test_the_progress_shows_every_step_and_the_one_shot(paper):
     taken = [100.0 * np.sqrt(step.objective) for step in paper.assignment.steps if step.taken]
     shown = next(line for line in figure.axes[0].get_lines() if line.get_label() == "taken")
     np.testing.assert_allclose(shown.get_ydata(), taken)
-    found = with_limits(paper, ("at_least", paper.targets[0].asked.lower_hz, np.full(152, np.inf)))
+    found = with_limits(paper, ("at_least", paper.targets[0].asked.lower, np.full(152, np.inf)))
     axes, below = drawn(found, "progress").axes
     assert axes.get_ylabel() == "objective"
     assert below.get_ylabel() == "limits missed [%]"  # by the initial design

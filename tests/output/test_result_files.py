@@ -116,11 +116,11 @@ def test_what_an_expansion_cannot_say_is_null():
 def test_a_limit_has_its_edges_and_null_for_what_it_lacks():
     results = make_results()
     (target,) = results.targets
-    endless = np.full(target.asked.lower_hz.size, np.inf)
+    endless = np.full(target.asked.lower.size, np.inf)
     for kind, edges, lacking in (
-        ("at_least", (target.asked.lower_hz, endless), "upper_hz"),
-        ("at_most", (-endless, target.asked.upper_hz), "lower_hz"),
-        ("keep_out", (target.asked.lower_hz, 1.1 * target.asked.lower_hz), None),
+        ("at_least", (target.asked.lower, endless), "upper_hz"),
+        ("at_most", (-endless, target.asked.upper), "lower_hz"),
+        ("keep_out", (target.asked.lower, 1.1 * target.asked.lower), None),
     ):
         limit = as_limit(target, kind, *edges)
         found = read(dataclasses.replace(results, targets=(limit,)))

@@ -88,7 +88,7 @@ def test_a_limit_beside_a_target_of_the_same_mode_overwrites_nothing() -> None:
     (target,) = results.targets
     limit = as_limit(target, "at_most", np.full(152, -np.inf), np.full(152, 205.0))
     other = np.full(152, 180.0)
-    twice = replace(target, asked=replace(target.asked, lower_hz=other, upper_hz=other))
+    twice = replace(target, asked=replace(target.asked, lower=other, upper=other))
     band = as_limit(target, "keep_out", np.full(152, 150.0), np.full(152, 160.0))
     near = OtherModes((1, 2), np.full((152, 2), 140.0), np.full((152, 2), 170.0))
     band = replace(band, near=near)

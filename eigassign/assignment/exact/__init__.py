@@ -2,12 +2,11 @@
 
 Reading order:
 
-    crossing        two modes that meet: the matrix of both, smooth where each alone has a kink
     design_problem  objective and limits over the design, in units of the bounds
     design_point    a design with its rows: what is expected of a step, also past kinks
     stationarity    first-order optimality, also where modes meet
     step            one program in a trust region, until it misses no rows
     sequential      the steps in a row, and the local optimum that they lead to
-    requirements    targets and inequalities on frequencies and quantities as such a problem
+    requirements    a set of requirements as such a problem
     identification  parameters from measured frequencies, their covariance and intervals
 """

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.checks import Floats
-from eigassign.assignment.exact.crossing import MEET, NeighbourPairs
 from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, UnitBox
+from eigassign.assignment.requirements.crossing import MEET, NeighbourPairs
 
 Indices = NDArray[np.intp]
 

@@ -19,9 +19,9 @@ from typing import TypeVar
 import numpy as np
 
 from eigassign.assignment.checks import Floats
-from eigassign.assignment.exact.crossing import NeighbourPairs
 from eigassign.assignment.linear import LinearConstraint
 from eigassign.assignment.program import ScaledProgram
+from eigassign.assignment.requirements.crossing import NeighbourPairs
 from eigassign.assignment.solver import solve_scaled
 
 MET = 1e-9  # excess, relative to the inequality's limit, that is round-off

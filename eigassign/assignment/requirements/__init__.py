@@ -1,13 +1,17 @@
-"""What a case asks of its frequencies: one type from the case file to the report.
+"""What a case asks for: one type from the case file to the report.
 
 Reading order:
 
-    requirement  what all kinds have in common, and the frequencies that they are asked of
-    frequency    a mode has a frequency
-    lower_limit  a mode does not fall below a frequency
-    upper_limit  a mode does not exceed a frequency
-    gap          two modes stay apart
-    band         no mode is in a band
-    named_modes  modes that targets name by their shape
-    sampling     the targets of a case at the samples of its trajectories
+    crossing      two modes that meet: the matrix of both, smooth where each alone has a kink
+    requirement   what all kinds have in common, its rows, and the frequencies that they are of
+    frequency     a mode has a frequency
+    lower_limit   a mode does not fall below a frequency
+    upper_limit   a mode does not exceed a frequency
+    gap           two modes stay apart
+    band          no mode is in a band
+    quantity      a quantity of the design is within limits
+    mass_limit    the mass of the mechanism
+    linear_limit  a weighted sum of design parameters
+    named_modes   modes that targets name by their shape
+    sampling      what a case asks for, at the samples of its trajectories
 """

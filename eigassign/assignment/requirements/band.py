@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from eigassign.assignment.exact.requirements import FrequencyLimit
+from eigassign.assignment.requirements.lower_limit import LowerLimit
 from eigassign.assignment.requirements.requirement import (
     Edges,
     Floats,
@@ -21,6 +21,7 @@ from eigassign.assignment.requirements.requirement import (
     Terms,
     in_hz,
 )
+from eigassign.assignment.requirements.upper_limit import UpperLimit
 from eigassign.case.schema.targets import Harmonic, KeepOutTarget
 
 NEAR = 0.5  # of an edge: modes this near to a band are shown with it
@@ -76,33 +77,32 @@ class ForbiddenBand(Requirement):
     def below(self, hz: Floats) -> Ints:
         """The number of modes below each edge (2, n); of ``hz`` (n, count), all that matter."""
         hz = hz[:, [m - 1 for m in self.counted if m <= hz.shape[1]]] if self.modes else hz
-        edges = (self.lower_hz, self.upper_hz)
+        edges = (self.lower, self.upper)
         return np.array([(hz < edge[:, None]).sum(axis=1) for edge in edges])
 
-    def kept_clear(self, k: int, above: int | None, margin: float) -> Iterator[FrequencyLimit]:
-        """The limits that say: k of the modes that count are below, and mode ``above`` is above.
+    def kept_clear(self, k: int, above: int | None, margin: float) -> Iterator[Requirement]:
+        """Yield what says: k of the modes that count are below, and mode ``above`` is above.
 
         ``above`` is 0 or None where there is no such mode; by ``margin`` (relative) modes keep off.
         """
-        lower, upper = self.lower_hz * (1.0 - margin), self.upper_hz * (1.0 + margin)
+        lower, upper = self.lower * (1.0 - margin), self.upper * (1.0 + margin)
+        endless = np.full_like(lower, np.inf)
         if k:
             highest = self.counted[k - 1] if self.modes else k
-            yield self._limit(highest, lower, False)
+            yield self._one_side(UpperLimit, highest, -endless, lower)
         if above:
-            yield self._limit(above, upper, True)
+            yield self._one_side(LowerLimit, above, upper, endless)
 
-    def _limit(self, mode: int, hz: Floats, at_least: bool) -> FrequencyLimit:
-        terms, curve = ((mode, 1.0),), f"{self.label}: mode {mode}"
-        return FrequencyLimit(self.label, terms, hz, self.rows, at_least, curve)
-
-    def limits(self) -> Iterator[FrequencyLimit]:
-        """Yield nothing: they depend on k."""
-        yield from ()
+    def _one_side(
+        self, kind: type[Requirement], mode: int, lower: Floats, upper: Floats
+    ) -> Requirement:
+        own = {"label": f"{self.label}: mode {mode}", "terms": ((mode, 1.0),), "modes": (mode,)}
+        return kind(**vars(self) | own | {"lower": lower, "upper": upper, "part_of": self.label})
 
     def curve(self, solved: Solved) -> Floats:
         """The frequency (n,) nearest to the middle of the band."""
         own = self._counted(solved)
-        middle = 0.5 * (self.lower_hz + self.upper_hz)
+        middle = 0.5 * (self.lower + self.upper)
         nearest = np.abs(own - middle[:, None]).argmin(axis=1)
         return np.asarray(own[np.arange(len(own)), nearest])
 
@@ -113,13 +113,13 @@ class ForbiddenBand(Requirement):
     def worst_errors(self, lowest: Solved, highest: Solved) -> Floats:
         """The way (n,) that modes between two frequencies lack to be clear."""
         least, most = self._counted(lowest), self._counted(highest)
-        low, high = self.lower_hz[:, None], self.upper_hz[:, None]
+        low, high = self.lower[:, None], self.upper[:, None]
         down, up = np.maximum(most / low - 1.0, 0.0), np.maximum(1.0 - least / high, 0.0)
         return np.concatenate([_fewest(down[own], up[own]) for _, own in self.along])
 
     def least_errors(self, lowest: Solved, highest: Solved) -> Floats:
         """No errors (n,): which mode is where is not known."""
-        return np.zeros(len(self.lower_hz))
+        return np.zeros(len(self.lower))
 
     def _counted(self, solved: Solved) -> Floats:
         own = solved.hz[self.rows]
@@ -128,7 +128,7 @@ class ForbiddenBand(Requirement):
     def near(self, initial: Solved, exact: Solved) -> tuple[int, ...]:
         """The modes near the band before or after, and at least those on either side of it."""
         both = np.stack([initial.hz[self.rows], exact.hz[self.rows]])
-        low, high = self.lower_hz.min(), self.upper_hz.max()
+        low, high = self.lower.min(), self.upper.max()
         inside = (both > low * (1.0 - NEAR)) & (both < high * (1.0 + NEAR))
         shown = inside.any(axis=(0, 1))
         below = int((both[1].max(axis=0) < high).sum())  # as many modes are below
@@ -138,7 +138,7 @@ class ForbiddenBand(Requirement):
     @property
     def forbidden_hz(self) -> Edges:
         """The edges."""
-        return self.lower_hz, self.upper_hz
+        return self.lower, self.upper
 
 
 def _fewest(down: Floats, up: Floats) -> Floats:

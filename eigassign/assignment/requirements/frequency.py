@@ -6,17 +6,31 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from eigassign.assignment.exact.requirements import FrequencyGoal, FrequencyLimit
-from eigassign.assignment.requirements.requirement import Edges, Floats, Requirement, Solved, in_hz
+from eigassign.assignment.requirements.requirement import (
+    EdgeRows,
+    Edges,
+    Floats,
+    Requirement,
+    Solved,
+    in_hz,
+)
+from eigassign.assignment.targets import positive_hz
 from eigassign.case.schema.targets import FrequencyTarget
 
 
 class AssignedFrequency(Requirement):
-    """The frequency of a mode is ``hz``; the error is the distance to it, of either sign."""
+    """The frequency of a mode is ``hz``; the error is the distance to it, of either sign.
+
+    Raises UsageError for a frequency that is not finite and above 0.
+    """
 
     form = FrequencyTarget
     of_soft_model = True
     columns = ("target", "initial", "one shot", "predicted", "exact")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        positive_hz(self.lower)
 
     @staticmethod
     def asked(target: FrequencyTarget) -> str:
@@ -32,10 +46,6 @@ class AssignedFrequency(Requirement):
         """The errors f / f_d − 1 (n,)."""
         return np.asarray(self.curve(solved) / self.hz - 1.0)
 
-    def goals(self) -> Iterator[FrequencyGoal]:
-        """Yield the frequency itself."""
-        yield FrequencyGoal(self.terms[0][0], self.hz, self.rows, self.weight)
-
-    def limits(self) -> Iterator[FrequencyLimit]:
-        """Yield nothing: to miss it violates no limit."""
-        yield from ()
+    def edge_rows(self, factor: Floats | float = 1.0) -> Iterator[EdgeRows]:
+        """Yield factor · (f / f_d − 1), of either sign: to miss it violates no limit."""
+        yield EdgeRows(self, "lower", self.hz, factor / self.hz)

@@ -1,25 +1,30 @@
-"""What all kinds of requirements have in common: a curve in time, and edges that it keeps to.
+"""What all kinds of requirements have in common: a curve, and edges that it keeps to.
 
-The curve of a requirement is Σ c_i f_i, its terms being pairs (mode i, c_i): one mode with 1, of a
-gap its two with ±1. There it shall be between ``lower_hz`` and ``upper_hz``: both are the same
-where a frequency is wanted, and one is missing (infinite) for a limit. Its error is
+The curve of a requirement is Σ c_i x_i. Its terms are pairs (x_i, c_i): x_i is a mode and stands
+for its frequency, or a quantity of the design; one mode has 1, the two of a gap ±1. The curve shall
+be between ``lower`` and ``upper``: both are the same where a frequency is wanted, and one is
+missing (infinite) for a limit. Its error is
 
     f / f_d − 1                                   of a wanted frequency,
     1 − f / lower  or  f / upper − 1, above 0     of a limit: its relative violation.
 
-A kind is a class in a module of its own that says in which of this it differs.
+It hands over its rows: of the one shot those in λ, of the sequential method `EdgeRows`. A kind is
+a class in a module of its own that says in which of this it differs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.exact.requirements import FrequencyGoal, FrequencyLimit
+from eigassign.assignment.checks import frozen
+from eigassign.assignment.linear import LinearConstraint, LinearModel
+from eigassign.assignment.requirements.crossing import NeighbourPairs
+from eigassign.assignment.targets import lam_from_hz
 from eigassign.brief import Brief
 from eigassign.case.schema.targets import (
     AnyTarget,
@@ -27,11 +32,14 @@ from eigassign.case.schema.targets import (
     FrequencyFile,
     FrequencyProfile,
 )
+from eigassign.errors import UsageError
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Edges = tuple[Floats, Floats]
-Terms = tuple[tuple[int, float], ...]
+# of a design y (n_y,): its value, or one at each sample, and the slopes ((n,) n_y)
+Quantity = Callable[[Floats], tuple[float | Floats, Floats]]
+Terms = tuple[tuple[int | Quantity, float], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,14 +59,34 @@ class Solved:
         return np.asarray(self.hz[:, mode - 1] if mode > 0 else self.followed[:, mode])
 
 
+@dataclass(frozen=True)
+class Frequencies:
+    """Frequencies ``hz`` (n_t, n_modes) of a design: the lowest, ascending, then followed ones.
+
+    ``slopes`` (n_t, n_modes, n_y) in Hz per SI unit of y; where the trajectory follows the design,
+    they hold its part too. ``mixed`` (n_t, n_lowest − 1, n_y) are the slopes off the diagonal of
+    the matrices that neighbours among the lowest make (`crossing`), if known.
+    """
+
+    hz: Floats
+    slopes: Floats
+    mixed: Floats | None = None
+
+    def of(self, mode: int, rows: slice) -> tuple[Floats, Floats]:
+        """The frequency (n,) of a mode, numbered as in `Requirement`, and its slopes (n, n_y)."""
+        column = mode - 1 if mode > 0 else mode
+        return self.hz[rows, column], self.slopes[rows, column]
+
+
 @dataclass(frozen=True, repr=False, eq=False)
 class Requirement(Brief):
-    """One target on one mode at those ``rows`` of all samples where it holds; (n,) in Hz.
+    """One target on one mode, or limit of a quantity, at those ``rows`` of all samples; edges (n,).
 
     A gap is on two modes, a band on all the ``modes`` it names, or without any on all there are.
     Modes are numbered from 1; those followed by their shape −1, −2, …, the last of them named being
     −1: they are in ``terms``, and none of ``modes``. ``along`` has each trajectory's part of
-    the requirement's own arrays.
+    the requirement's own arrays. Edges are in Hz, or in the SI unit of the quantity. Raises
+    UsageError for a weight that is not finite and above 0.
     """
 
     form: ClassVar[type[AnyTarget]]  # of the case file
@@ -66,16 +94,23 @@ class Requirement(Brief):
     columns: ClassVar[tuple[str, ...]] = ("target", "initial", "one shot", "exact")
 
     label: str  # in words: "mode 2 at least 320 Hz"
-    place: str  # key path of its target
-    modes: tuple[int, ...]
+    place: str  # key path in the case file
     terms: Terms
     rows: slice
-    lower_hz: Floats
-    upper_hz: Floats
-    along: tuple[tuple[str, slice], ...]
+    lower: Floats
+    upper: Floats
+    modes: tuple[int, ...] = ()
+    along: tuple[tuple[str, slice], ...] = ()
     weight: float = 1.0
     trajectory: str | None = None  # the only one on which it holds
     followed: FollowedMode | None = None
+    part_of: str = ""  # the label of the band that it keeps clear
+
+    def __post_init__(self) -> None:
+        for side in ("lower", "upper"):
+            object.__setattr__(self, side, frozen(getattr(self, side)))
+        if not (np.isfinite(self.weight) and self.weight > 0.0):
+            raise UsageError(f"target weight: {self.weight} given; must be finite and above 0")
 
     # --- From a target of the case file
 
@@ -104,14 +139,24 @@ class Requirement(Brief):
         """True where its error is a distance; a limit's is a violation."""
         return self.form.is_goal
 
+    @property
+    def name(self) -> str:
+        """The label of what the case file asks for, also of the two sides of a band."""
+        return self.part_of or self.label
+
+    @property
+    def mode_terms(self) -> tuple[tuple[int, float], ...]:
+        """The terms that are modes."""
+        return tuple((term, c) for term, c in self.terms if isinstance(term, int))
+
     def part(self, name: str, own: slice) -> Self:
         """The same along one trajectory only, at these of its own samples."""
         first, n = self.rows.start + own.start, own.stop - own.start
         return replace(
             self,
             rows=slice(first, first + n),
-            lower_hz=self.lower_hz[own],
-            upper_hz=self.upper_hz[own],
+            lower=self.lower[own],
+            upper=self.upper[own],
             along=((name, slice(0, n)),),
         )
 
@@ -125,17 +170,17 @@ class Requirement(Brief):
     @property
     def hz(self) -> Floats:
         """The wanted frequency, or the limit (n,); the lower edge of a band."""
-        return self.lower_hz if np.isfinite(self.lower_hz).all() else self.upper_hz
+        return self.lower if np.isfinite(self.lower).all() else self.upper
 
     def curve(self, solved: Solved) -> Floats:
         """The curve (n,) that stands for it."""
-        return np.asarray(sum(c * solved.curve(mode)[self.rows] for mode, c in self.terms))
+        return np.asarray(sum(c * solved.curve(mode)[self.rows] for mode, c in self.mode_terms))
 
     def curve_range(self, lowest: Solved, highest: Solved) -> Edges:
         """The range (n,) of its curve where each mode is between two frequencies."""
         least: Floats | float = 0.0
         most: Floats | float = 0.0
-        for mode, c in self.terms:
+        for mode, c in self.mode_terms:
             low, high = (c * solved.curve(mode)[self.rows] for solved in (lowest, highest))
             least, most = least + (low if c > 0.0 else high), most + (high if c > 0.0 else low)
         return np.asarray(least), np.asarray(most)
@@ -155,9 +200,9 @@ class Requirement(Brief):
 
     def _outside(self, low: Floats, high: Floats) -> Floats:
         """The way (n,) of ``low`` below the lower edge, or of ``high`` above the upper one."""
-        with_edge = np.isfinite(self.lower_hz)
-        below = np.where(with_edge, 1.0 - low / np.where(with_edge, self.lower_hz, 1.0), 0.0)
-        return np.maximum(np.maximum(below, high / self.upper_hz - 1.0), 0.0)
+        with_edge = np.isfinite(self.lower)
+        below = np.where(with_edge, 1.0 - low / np.where(with_edge, self.lower, 1.0), 0.0)
+        return np.maximum(np.maximum(below, high / self.upper - 1.0), 0.0)
 
     def near(self, initial: Solved, exact: Solved) -> tuple[int, ...] | None:
         """The modes to be shown with it, before and after; None where its curve says it all."""
@@ -167,24 +212,62 @@ class Requirement(Brief):
         """The relative error that ``hz`` (n,) may have in a model that raises it so far at most."""
         return raised if self.of_soft_model else 0.0
 
-    # --- Its rows of the program
+    # --- Its rows of the programs
 
-    def goals(self) -> Iterator[FrequencyGoal]:
-        """Yield what the program is to come near to."""
-        yield from ()
+    @property
+    def in_one_shot(self) -> bool:
+        """True where eqs. (13)–(14) take it: a wanted frequency of a numbered mode."""
+        return self.is_goal and self.followed is None
 
-    def limits(self) -> Iterator[FrequencyLimit]:
-        """Yield what the program has to keep, whatever else is chosen."""
-        for edge, at_least in ((self.lower_hz, True), (self.upper_hz, False)):
-            if np.isfinite(edge).all():
-                yield FrequencyLimit(self.label, self.terms, edge, self.rows, at_least)
+    @property
+    def constraint(self) -> LinearConstraint | None:
+        """The same as a limit that is linear in the design; None where it is not."""
+        return None
+
+    @property
+    def is_convex(self) -> bool:
+        """True where it allows a convex set of designs if K, M and quantities are affine in y."""
+        return self.terms == ((1, 1.0),) and bool(np.isinf(self.upper).all())
 
     @property
     def bands(self) -> tuple[tuple[str, Any], ...]:
         """Bands along each trajectory for itself, in words, of which the program has a choice."""
         return ()
 
+    def lam_rows(self, model: LinearModel, weights: Floats) -> tuple[Floats, Floats]:
+        """A (n, n_y) and b (n,) of a wanted frequency: ‖A dy + b‖² = Σ ω (λ/λ_d − 1)².
+
+        ``model`` is λ at its rows, ``weights`` (n,) are ω.
+        """
+        root, lam_d = np.sqrt(weights), lam_from_hz(self.hz)
+        return root[:, None] * (model.l / lam_d[:, None]), root * (model.l0 / lam_d - 1.0)
+
+    def value(self, y: Floats, found: Frequencies) -> tuple[Floats, Floats]:
+        """Its curve (n,) and slopes (n, n_y) at a design y (n_y,) of frequencies ``found``."""
+        value: Floats | float = 0.0
+        slopes: Floats | float = 0.0
+        for term, c in self.terms:
+            own, steep = found.of(term, self.rows) if isinstance(term, int) else term(y)
+            value, slopes = value + c * own, slopes + c * steep
+        return np.atleast_1d(value), np.atleast_2d(slopes)
+
+    def edge_rows(self, factor: Floats | float = 1.0) -> Iterator[EdgeRows]:
+        """Yield what the sequential method looks at: the way beyond each edge, relative to it."""
+        for side, sign, edge in (("lower", -1.0, self.lower), ("upper", 1.0, self.upper)):
+            if np.isfinite(edge).all():
+                size = np.where(edge == 0.0, 1.0, np.abs(edge))
+                yield EdgeRows(self, side, edge, sign * factor / size)
+
     # --- How it is shown
+
+    @property
+    def in_words(self) -> str:
+        """Its name in a sentence about limits."""
+        return self.name
+
+    def relaxed(self, side: str, share: float) -> str:
+        """The words for an edge, lower or upper, that is relaxed by a share of it."""
+        return f"{self.name}, relaxed by {100 * share:g} %"
 
     @property
     def mode(self) -> int:
@@ -204,8 +287,62 @@ class Requirement(Brief):
     @property
     def forbidden_hz(self) -> tuple[Floats | None, Floats | None]:
         """The values (n,) between which its curve shall not be; None without an end."""
-        lower = bool(np.isfinite(self.lower_hz).all())
-        return (None, self.lower_hz) if lower else (self.upper_hz, None)
+        lower = bool(np.isfinite(self.lower).all())
+        return (None, self.lower) if lower else (self.upper, None)
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeRows:
+    """Rows (n,) of the sequential method: scale · (curve − edge) of one requirement.
+
+    They are residuals of a wanted frequency, and of a limit excesses, positive where it is missed.
+    """
+
+    of: Requirement
+    side: str  # lower | upper
+    edge: Floats  # (n,)
+    scale: Floats  # (n,)
+
+    def at(self, y: Floats, found: Frequencies) -> tuple[Floats, Floats]:
+        """The rows and their slopes (n, n_y) at a design y (n_y,) of frequencies ``found``."""
+        value, slopes = self.of.value(y, found)
+        return self.scale * (value - self.edge), self.scale[:, None] * slopes
+
+    def curve(self, rows: Floats) -> Floats:
+        """The curve (n,) that these rows stand for."""
+        return rows / self.scale + self.edge
+
+    def beside(
+        self, found: Frequencies, first: int, along: Collection[int] = ()
+    ) -> Iterator[NeighbourPairs]:
+        """Yield the rows, numbered from ``first``, with those of the modes below and above.
+
+        Not with modes that go ``along``, whose rows are smooth together with these. ``found`` must
+        have its mixed slopes.
+        """
+        assert found.mixed is not None
+        (mode, _), rows, lowest = self.of.terms[0], self.of.rows, found.mixed.shape[1] + 1
+        if len(self.of.terms) > 1 or not isinstance(mode, int) or mode < 0:
+            return
+        own, scale = found.of(mode, rows)[0], self.scale
+        for neighbour in (mode - 1, mode + 1):
+            if neighbour in along or not 1 <= neighbour <= lowest:
+                continue
+            hz, slopes = found.of(neighbour, rows)
+            yield NeighbourPairs(
+                row=np.arange(first, first + len(hz)),
+                other=scale * (hz - self.edge),
+                others=scale[:, None] * slopes,
+                mixed=scale[:, None] * found.mixed[rows, min(mode, neighbour) - 1],
+                gap=np.abs(hz / own - 1.0),
+                larger=np.equal(neighbour < mode, scale > 0.0),
+            )
+
+
+def time_shares(goals: Sequence[Requirement], time_weights: Floats) -> tuple[Floats, ...]:
+    """w ω_k / Σ w ω (n,) of each goal, ``time_weights`` (n_t,) being ω: 1 together."""
+    total = sum(one.weight * time_weights[one.rows].sum() for one in goals)
+    return tuple(one.weight / total * time_weights[one.rows] for one in goals)
 
 
 def in_hz(curve: float | FrequencyProfile | FrequencyFile) -> str:

@@ -1,4 +1,4 @@
-"""The targets of a case as requirements at the samples of its trajectories.
+"""What a case asks for as requirements: targets at the samples of its trajectories, and limits.
 
 A requirement is at all samples, those of one trajectory, or a part of it. What is asked between
 samples counts: the first and the last time of a part, and the points of a profile that is not
@@ -14,12 +14,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.assignment.checks import frozen
 from eigassign.assignment.requirements.band import ForbiddenBand
 from eigassign.assignment.requirements.frequency import AssignedFrequency
 from eigassign.assignment.requirements.gap import ModeGap
+from eigassign.assignment.requirements.linear_limit import LinearLimit
 from eigassign.assignment.requirements.lower_limit import LowerLimit
+from eigassign.assignment.requirements.mass_limit import MassLimit
 from eigassign.assignment.requirements.named_modes import followed_modes
+from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.upper_limit import UpperLimit
 from eigassign.assignment.targets import sample_target, trapezoidal_weights
@@ -30,6 +32,7 @@ from eigassign.case.table import CsvColumn, read_table
 from eigassign.case.units import DIMENSIONS
 from eigassign.errors import CaseError, MechanismError, UsageError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.modal.model import Model
 
 Floats = NDArray[np.float64]
 _Curve = float | FrequencyProfile | FrequencyFile
@@ -40,6 +43,7 @@ KINDS: dict[str, type[Requirement]] = {
     one.form.kind: one
     for one in (AssignedFrequency, LowerLimit, UpperLimit, ForbiddenBand, ModeGap)
 }  # by the key that only their targets have
+QUANTITIES: tuple[type[LimitedQuantity], ...] = (MassLimit, LinearLimit)
 
 
 def requirements_of(file: CaseFile, path: Trajectories) -> tuple[Requirement, ...]:
@@ -51,6 +55,11 @@ def requirements_of(file: CaseFile, path: Trajectories) -> tuple[Requirement, ..
     return tuple(
         one for k, target in enumerate(file.targets) for one in _of_target(file, k, target, path)
     )
+
+
+def design_limits(file: CaseFile, model: Model) -> tuple[Requirement, ...]:
+    """The limits of quantities of the design."""
+    return tuple(one for kind in QUANTITIES for one in kind.of_case(file, model))
 
 
 def with_instants(file: CaseFile, path: Trajectories) -> Trajectories:
@@ -108,7 +117,7 @@ def _of_target(
         _sampled(file, curve, f"{place}.{dotted(keys)}", rows, path)
         for keys, curve in target.frequencies
     )
-    lower, upper = map(frozen, kind.edges(target, *sampled))
+    lower, upper = kind.edges(target, *sampled)
     for modes in target.named:
         who, terms = _who(modes), kind.terms_of(modes)
         if target.followed is not None:
@@ -121,8 +130,8 @@ def _of_target(
             modes=modes,
             terms=terms,
             rows=rows,
-            lower_hz=lower,
-            upper_hz=upper,
+            lower=lower,
+            upper=upper,
             along=along,
             weight=target.weight,
             trajectory=target.trajectory,

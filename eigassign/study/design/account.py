@@ -12,9 +12,9 @@ from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.study.accuracy import model_error
 from eigassign.study.design.answer import MAX_ERROR, Answer
 from eigassign.study.design.clearance import Clearance
-from eigassign.study.design.conclusions import Conflict, is_proved
+from eigassign.study.design.conclusions import is_proved
 from eigassign.study.design.judgement import verdict
-from eigassign.study.design.variants import MASS, Task, variant_of
+from eigassign.study.design.variants import Task, variant_of
 from eigassign.study.results import (
     ActiveRow,
     AssignmentRow,
@@ -50,7 +50,7 @@ def assignment_row(
     clearances = () if found is None else tuple(map(_clearance, found.clearances))
     optimality = _optimality(scene, answer)
     proved = optimality.kind == "proved"
-    contradiction = _in_words(scene, wanted, answer.conflict, proved)
+    contradiction = _in_words(scene, answer, proved)
     merits = initial, optimal
     word, reason = verdict(targets, merits, trusted, unreachable, contradiction)
     unproved = [_why_unproved(row) for row in clearances if not row.clear]
@@ -96,20 +96,14 @@ def assignment_row(
     )
 
 
-def _in_words(
-    scene: Scene, wanted: Sequence[Requirement], contradiction: Conflict | None, proved: bool
-) -> str:
+def _in_words(scene: Scene, answer: Answer, proved: bool) -> str:
     """Name the limits that contradict, with their lines in the case file; empty where none do."""
-    if contradiction is None:
+    contradiction, found = answer.conflict, answer.found
+    if contradiction is None or found is None:
         return ""
-    file = scene.file
-    places = {w.label: w.place for w in wanted} | {MASS: MASS}
-    places |= {name: f"design.constraints.{name}" for name in file.design.constraints}
-    lines = (file.problem(places[name], "").line for name in contradiction.names)
-    listed = " and ".join(
-        f"{'the limit of the mass' if name == MASS else name} (line {line})"
-        for name, line in zip(contradiction.names, lines, strict=True)
-    )
+    limits = map(found.variant.requirements.named, contradiction.names)
+    lines = ((one.in_words, scene.file.problem(one.place, "").line) for one in limits)
+    listed = " and ".join(f"{name} (line {line})" for name, line in lines)
     meets = "meets" if proved else "was found that meets"
     if not contradiction.smallest:
         return f"no design {meets} all limits; the nearest one misses {listed}"
@@ -228,13 +222,13 @@ def active_rows(scene: Scene, answer: Answer) -> Iterator[ActiveRow]:
             yield ActiveRow(one.name, one.kind, one.side, one.multiplier)
         return
     names = tuple(scene.file.design.parameters)
-    constraints = tuple(scene.file.design.constraints)
+    constraints = found.variant.problem.constraints
     for limit in found.best.limits:
         side = "upper" if limit.upper else "lower"
         if limit.kind == "bound":
             yield ActiveRow(names[limit.index], "bound", side, limit.multiplier)
         elif limit.kind == "constraint":
-            yield ActiveRow(constraints[limit.index], "constraint", side, limit.multiplier)
+            yield ActiveRow(constraints[limit.index].name, "constraint", side, limit.multiplier)
     asked = found.variant.requirements
     shares: dict[tuple[str, str], float] = {}
     for limit in found.best.limits:

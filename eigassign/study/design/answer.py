@@ -74,8 +74,7 @@ def find_answer(
     """
     sequential = scene.file.assignment.method == "sequential"
     one_shot, notes = None, []
-    plain = all(one.is_goal and one.followed is None for one in wanted)
-    if wanted and plain and scene.file.design.mass is None:  # eqs. (13)–(14) take all of it
+    if wanted and all(one.in_one_shot for one in (*wanted, *scene.limits)):
         try:
             one_shot = assign_design(scene, wanted)
         except (AccuracyError, InfeasibleError) as error:

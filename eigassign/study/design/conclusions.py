@@ -24,6 +24,7 @@ from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import OPTIMAL, End, minimise
 from eigassign.assignment.exact.stationarity import first_order
 from eigassign.assignment.feasibility import smallest
+from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.errors import EigassignError
 from eigassign.study.design.optimum import Found
 from eigassign.study.design.variants import PosedProblem
@@ -47,7 +48,7 @@ def is_proved(scene: Scene, found: Found) -> bool:
     """
     best, asked = found.best, found.variant.requirements
     if best.seen.violation <= MET:
-        return best.stationarity <= OPTIMAL and not asked.targets and _are_convex(scene, asked)
+        return best.stationarity <= OPTIMAL and not asked.goals and _are_convex(scene, asked)
     if not _are_convex(scene, asked):
         return False
     problem = found.variant.problem
@@ -65,14 +66,14 @@ def _are_convex(scene: Scene, asked: Requirements) -> bool:
     """True where the limits allow a convex set of designs; prices and least change are convex."""
     if scene.file.design.catalogues or scene.path.follows_design:
         return False
-    if not asked.limits and scene.file.design.mass is None:
-        return True  # linear limits alone
-    lowest = all(one.at_least and one.terms == ((1, 1.0),) for one in asked.limits)
-    return lowest and scene.model.n_rigid == 0 and _is_affine(scene)
+    limits = [one for one in asked.limits if one.constraint is None]
+    if not all(one.is_convex for one in limits):
+        return False
+    return not limits or (scene.model.n_rigid == 0 and _is_affine(scene, limits))
 
 
-def _is_affine(scene: Scene) -> bool:
-    """True where K, M and the total mass have the same slopes in y all over the bounds."""
+def _is_affine(scene: Scene, limits: Sequence[Requirement]) -> bool:
+    """True where K, M and limited quantities have the same slopes in y all over the bounds."""
     lower, upper = scene.bounds
     pencil, n_q = scene.model.pencil, scene.path.q.shape[1]
     along = n_q + np.arange(len(lower))
@@ -82,10 +83,9 @@ def _is_affine(scene: Scene) -> bool:
         size = np.abs(found).max(axis=2, keepdims=True)
         if (np.abs(found - found[..., :1]) > AFFINE * size).any():
             return False
-    if scene.file.design.mass is None:
-        return True
-    slopes = np.array([scene.model.mass_slopes(y) for y in designs])
-    return bool((np.ptp(slopes, axis=0) <= AFFINE * np.abs(slopes).max(axis=0)).all())
+    quantities = (term for one in limits for term, _ in one.terms if not isinstance(term, int))
+    each = (np.array([quantity(y)[1] for y in designs]) for quantity in quantities)
+    return all((np.ptp(s, axis=0) <= AFFINE * np.abs(s).max(axis=0)).all() for s in each)
 
 
 # --- Contradictions

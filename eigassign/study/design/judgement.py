@@ -88,7 +88,7 @@ def _followed(asked: Requirement, before: Solved, after: Solved) -> FollowedRow 
     mode = asked.followed
     if mode is None:
         return None
-    numbers = (solved.numbers[asked.rows, asked.terms[0][0]] for solved in (before, after))
+    numbers = (solved.numbers[asked.rows, asked.mode_terms[0][0]] for solved in (before, after))
     return FollowedRow(mode.name, mode.like, *numbers)
 
 

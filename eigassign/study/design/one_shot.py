@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.assign import Assignment, solve_assignment
 from eigassign.assignment.catalogues.branching import ListedValues
-from eigassign.assignment.linear import LinearConstraint, LinearModel
-from eigassign.assignment.program import Bounds, Goal
+from eigassign.assignment.linear import LinearModel
+from eigassign.assignment.program import Bounds
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import time_weights
 from eigassign.case.case_file import CaseFile
@@ -35,9 +35,8 @@ def assign_design(scene: Scene, targets: Sequence[Requirement]) -> Assignment:
     _require_near(scene, l0)
     column = scene.expansions.column
     goals = [
-        Goal(LinearModel(l0[own.rows, k], slope[own.rows, k]), own.hz, own.weight, own.rows)
-        for wanted in targets
-        for own in wanted.goals()
+        (own, LinearModel(l0[own.rows, k], slope[own.rows, k]))
+        for own in targets
         for k in [column(own.mode)]
     ]
     return solve_assignment(
@@ -46,8 +45,8 @@ def assign_design(scene: Scene, targets: Sequence[Requirement]) -> Assignment:
         scene.expansions.linear.y0,
         scene.initial,
         Bounds(*scene.bounds),
-        linear_constraints(file),
-        _names(file),
+        scene.constraints,
+        tuple(file.design.parameters),
         catalogues(file),
     )
 
@@ -72,23 +71,6 @@ def _require_near(scene: Scene, l0: Floats) -> None:
             "give a pose of the trajectory, or auto",
         )
         raise AccuracyError(str(problem))
-
-
-def _names(file: CaseFile) -> tuple[str, ...]:
-    return tuple(file.design.parameters)
-
-
-def linear_constraints(file: CaseFile) -> list[LinearConstraint]:
-    """The case's linear limits between design parameters."""
-    return [
-        LinearConstraint(
-            name,
-            np.array([constraint.terms.get(parameter, 0.0) for parameter in _names(file)]),
-            -np.inf if constraint.min is None else constraint.min,
-            np.inf if constraint.max is None else constraint.max,
-        )
-        for name, constraint in file.design.constraints.items()
-    ]
 
 
 def design_rows(scene: Scene, optimal: Floats) -> tuple[DesignRow, ...]:

@@ -146,7 +146,7 @@ def _search_catalogues(
 def _clearances(task: Task, variant: PosedProblem, y: Floats) -> Iterator[Clearance]:
     q = task.scene.path.at(y)[0]
     for (label, band), (_, below) in zip(task.bands, variant.below, strict=True):
-        own = Band(label, q[band.rows], band.lower_hz, band.upper_hz, below, band.counted)
+        own = Band(label, q[band.rows], band.lower, band.upper, below, band.counted)
         yield prove_clear(task.scene.model, own, y)
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.assignment.exact.requirements import Frequencies
+from eigassign.assignment.requirements.requirement import Frequencies
 from eigassign.errors import AccuracyError, EigassignError, LostModeError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.condensation import Modes

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.catalogues.choosing import Chosen
 from eigassign.assignment.exact.design_problem import MET, UnitBox, best_first
-from eigassign.assignment.exact.requirements import Frequencies
 from eigassign.assignment.exact.sequential import End, Optimum, distinct, minimise, worth
+from eigassign.assignment.requirements.requirement import Frequencies
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import EigassignError
 from eigassign.study.design.response import ReducedModels

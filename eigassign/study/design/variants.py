@@ -7,18 +7,17 @@ modes below it is the same everywhere, so each k that the bounds may allow is on
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import DesignProblem, Objective
-from eigassign.assignment.exact.requirements import QuantityLimit, Requirements
+from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.feasibility import constraints_agree
-from eigassign.assignment.linear import LinearConstraint
 from eigassign.assignment.program import Bounds
 from eigassign.assignment.requirements.band import ForbiddenBand
 from eigassign.assignment.requirements.requirement import Requirement
@@ -26,12 +25,10 @@ from eigassign.assignment.requirements.sampling import requirements_of, time_wei
 from eigassign.errors import CaseError, EigassignError, MissingMassError
 from eigassign.study.design.clearance import mode_above
 from eigassign.study.design.followed import Follower, followers
-from eigassign.study.design.one_shot import linear_constraints
 from eigassign.study.design.response import DesignResponse, ReducedModels, response_of
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
-MASS = "design.mass"  # what the limit of the whole mechanism's mass is called
 
 
 @dataclass(frozen=True)
@@ -91,7 +88,7 @@ def _few(whole: Task, few: int) -> NDArray[np.intp]:
     most = [
         one.rows.start + row
         for one in whole.wanted
-        for row in (0, len(one.hz) - 1, int(one.lower_hz.argmin()), int(one.upper_hz.argmax()))
+        for row in (0, len(one.hz) - 1, int(one.lower.argmin()), int(one.upper.argmax()))
     ]
     between = [row for row in most if path.inserted[row]]
     return np.union1d(path.spread(few), np.array(between, dtype=np.intp))
@@ -104,61 +101,38 @@ def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Pose
     """
     scene, wanted = task.scene, task.wanted
     lower, upper = scene.bounds
-    targets = tuple(goal for one in wanted for goal in one.goals())
+    has_goals = any(one.is_goal for one in wanted)
     objective = Objective(scene.file.assignment.objective)
     prices = np.array([column.price or 0.0 for column in scene.file.design.parameters.values()])
-    if targets:  # F is errors, and prices are in %² of them, in the worst case in %
+    if has_goals:  # F is errors, and prices are in %² of them, in the worst case in %
         prices = prices / (1e2 if objective is Objective.WORST_CASE else 1e4)
-    limits = [limit for one in wanted for limit in one.limits()]
+    asked = [one for one in wanted if not one.bands]
     for (_, band), k in zip(task.bands, below, strict=True):
         q = scene.path.at(scene.initial)[0][band.rows]
         above = mode_above(scene.model, k, band.counted, q, scene.initial)
-        limits += band.kept_clear(k, above, task.margin)
-    constraints, elastic = _linear(scene, missed)
+        asked += band.kept_clear(k, above, task.margin)
+    # linear limits are kept by every step; where they contradict, they are missed least
+    kept = not missed and constraints_agree(scene.constraints, Bounds(lower, upper))
+    asked += (one for one in scene.limits if not kept or one.constraint is None)
     width = np.where(upper > lower, upper - lower, 1.0)
-    asked = Requirements(
-        targets=targets,
-        limits=tuple(limits),
-        quantities=(*_mass(scene), *elastic),
+    requirements = Requirements(
+        asked=tuple(asked),
         time_weights=time_weights(scene.path),
         objective=objective,
-        least_change=(scene.initial, width) if not targets and not prices.any() else None,
+        least_change=(scene.initial, width) if not has_goals and not prices.any() else None,
     )
-    response = response_of(scene, asked.modes, task.followers, task.models)
+    response = response_of(scene, requirements.modes, task.followers, task.models)
     problem = DesignProblem(
-        appraise=lambda y: asked.appraise(y, response(y)),
+        appraise=lambda y: requirements.appraise(y, response(y)),
         lower=lower,
         upper=upper,
-        constraints=constraints,
+        constraints=scene.constraints if kept else (),
         prices=prices if prices.any() else None,
         reference=scene.initial,
-        objective=objective if targets else Objective.LEAST_SQUARES,
+        objective=objective if has_goals else Objective.LEAST_SQUARES,
     )
     named = zip((words for words, _ in task.bands), below, strict=True)
-    return PosedProblem(tuple(named), asked, problem, response)
-
-
-def _mass(scene: Scene) -> Iterator[QuantityLimit]:
-    given = scene.file.design.mass
-    if given is not None:
-        low = -np.inf if given.min is None else given.min
-        high = np.inf if given.max is None else given.max
-        yield QuantityLimit(MASS, scene.model.total_mass, low, high)
-
-
-def _linear(
-    scene: Scene, missed: bool
-) -> tuple[tuple[LinearConstraint, ...], tuple[QuantityLimit, ...]]:
-    """Linear limits that every step keeps; where they contradict, limits to be missed least."""
-    rows = tuple(linear_constraints(scene.file))
-    if not missed and constraints_agree(rows, Bounds(*scene.bounds)):
-        return rows, ()
-    return (), tuple(QuantityLimit(r.name, partial(_sum, r), r.lower, r.upper) for r in rows)
-
-
-def _sum(row: LinearConstraint, y: Floats) -> tuple[float, Floats]:
-    """The value of a linear limit and its slopes."""
-    return float(row.coefficients @ y), row.coefficients
+    return PosedProblem(tuple(named), requirements, problem, response)
 
 
 def possible_counts(scene: Scene, band: ForbiddenBand) -> list[int]:
@@ -174,7 +148,7 @@ def possible_counts(scene: Scene, band: ForbiddenBand) -> list[int]:
     for y in designs:
         with suppress(EigassignError):
             q = scene.path.at(y)[0][band.rows]
-            found.append(band.below(_all_below(scene, q, y, float(band.upper_hz.max()))))
+            found.append(band.below(_all_below(scene, q, y, float(band.upper.max()))))
     first, counts = int(np.median(found[0])), np.array(found)
     possible = range(int(counts.min()), int(counts.max()) + 1)
     return sorted(possible, key=lambda k: (abs(k - first), k))

@@ -21,7 +21,7 @@ from eigassign.study.design.answer import Answer
 from eigassign.study.design.optimum import Found
 from eigassign.study.design.variants import Task, variant_of
 from eigassign.study.meaning.reach import misses, proved_ranges, reach_rows, unreachable
-from eigassign.study.meaning.sensitivity import error_kind, relaxed_limits, sensitivities
+from eigassign.study.meaning.sensitivity import relaxed_limits, sensitivities
 from eigassign.study.meaning.tolerance import study_tolerance
 from eigassign.study.meaning.tradeoff import trade_off
 from eigassign.study.results import Meaning, RelaxedRow, ToleranceRows
@@ -62,7 +62,7 @@ def study_meaning(
     found, (asked, seen) = answer.found, _judged(scene, answer, wanted)
     notes: list[str] = []
     return Meaning(
-        sensitivity=tuple(sensitivities(scene.file, wanted, asked, answer.y, seen)),
+        sensitivity=tuple(sensitivities(scene.file, asked, answer.y, seen)),
         relaxed=() if found is None else tuple(_relaxed(scene, answer, found)),
         reach=reach,
         tolerance=_tolerance(scene, answer, wanted, exact, notes),
@@ -87,12 +87,10 @@ def _tolerance(
 
 
 def _relaxed(scene: Scene, answer: Answer, found: Found) -> Iterator[RelaxedRow]:
-    variant = found.variant
     if found.best.seen.violation > MET:  # a limit that is missed is no price of the objective
         return
-    kind = error_kind(variant.problem, variant.requirements)
     active = tuple(active_rows(scene, answer))
-    yield from relaxed_limits(scene.file, variant.problem, kind, found.best.objective, active)
+    yield from relaxed_limits(scene.file, found.variant, found.best.objective, active)
 
 
 def _judged(

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem
-from eigassign.assignment.exact.requirements import FrequencyGoal, Requirements
+from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import minimise
+from eigassign.assignment.requirements.frequency import AssignedFrequency
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import EigassignError
 from eigassign.study.design.followed import followers, solve_design
-from eigassign.study.design.one_shot import linear_constraints
 from eigassign.study.design.response import response_of
 from eigassign.study.meaning.monotone import corners, effects
 from eigassign.study.results import RangeRow
@@ -112,26 +112,25 @@ def _nearest(scene: Scene, wanted: Requirement, k: int, y: Floats, allowed: floa
 
     The search ends with the first start that leads within ``allowed`` of it.
     """
-    at, goal = wanted.rows.start + k, float(wanted.hz[k])
-    target = FrequencyGoal(wanted.terms[0][0], wanted.hz[k : k + 1], slice(0, 1))
-    asked = Requirements((target,), (), (), np.ones(1))
+    at, goal, first = wanted.rows.start + k, wanted.hz[k : k + 1], slice(0, 1)
+    there = AssignedFrequency(wanted.label, wanted.place, wanted.terms, first, goal, goal)
+    asked = Requirements((there,), np.ones(1))
     alone = replace(scene, trajectory=scene.path.chosen([at]))
-    own = followers(alone, [replace(wanted, rows=slice(0, 1))])
+    own = followers(alone, [replace(there, followed=wanted.followed)])
     response = response_of(alone, asked.modes, own)
 
     def appraise(y: Floats) -> Appraisal:
         return asked.appraise(y, response(y))
 
     lower, upper = scene.bounds
-    constraints = tuple(linear_constraints(scene.file))
-    problem = DesignProblem(appraise, lower, upper, constraints)
+    problem = DesignProblem(appraise, lower, upper, scene.constraints)
     found = []
     for start in (y, 0.5 * (lower + upper), scene.initial):
         try:
             best = minimise(problem, start, STEPS)
         except EigassignError:
             continue
-        found.append((abs(best.seen.residual[0]), (best.seen.residual[0] + 1.0) * goal))
+        found.append((abs(best.seen.residual[0]), (best.seen.residual[0] + 1.0) * goal[0]))
         if found[-1][0] <= allowed:
             break
     return float(min(found)[1]) if found else None

@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, Objective
 from eigassign.assignment.exact.requirements import Requirements
-from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy
-from eigassign.study.design.variants import MASS
+from eigassign.study.design.variants import PosedProblem
 from eigassign.study.results import ActiveRow, RelaxedRow, SensitivityRow
 
 Floats = NDArray[np.float64]
@@ -26,18 +25,18 @@ MOST = 0.3  # of F: a larger fall is beyond what first order can tell
 
 
 def sensitivities(
-    file: CaseFile, wanted: Sequence[Requirement], asked: Requirements, y: Floats, seen: Appraisal
+    file: CaseFile, asked: Requirements, y: Floats, seen: Appraisal
 ) -> Iterator[SensitivityRow]:
     """One row for each parameter and curve that a target or limit is about."""
-    curves = list(zip(_labels(wanted, asked), asked.curves(seen), strict=True))
+    curves = list(asked.curves(seen))
     for k, name in enumerate(file.design.parameters):
-        for label, (hz, slopes) in curves:
+        for own, hz, slopes in curves:
             of_f = slopes[:, k]
             share = y[k] * of_f / np.where(hz == 0.0, np.inf, hz)
             yield SensitivityRow(
                 parameter=name,
                 unit=file.design_units[k],
-                label=label,
+                label=own.label,
                 hz_per_unit=float(of_f.mean()),
                 hz_per_unit_largest=_largest(of_f),
                 percent_per_percent=float(share.mean()),
@@ -49,20 +48,14 @@ def _largest(values: Floats) -> float:
     return float(values[np.abs(values).argmax()])
 
 
-def _labels(wanted: Sequence[Requirement], asked: Requirements) -> Iterator[str]:
-    """The name of each curve: as its target, and at the edge of a band by its mode."""
-    yield from (w.label for w in wanted if w.is_goal)
-    yield from (limit.curve or limit.name for limit in asked.limits)
-
-
 # --- Limits
 
 
 def error_kind(problem: DesignProblem, asked: Requirements) -> str:
     """The objective F in words: an error only where nothing has a price."""
-    if not asked.targets and problem.prices is not None:
+    if not asked.goals and problem.prices is not None:
         return "price"
-    if not asked.targets or problem.prices is not None:
+    if not asked.goals or problem.prices is not None:
         return "objective"
     return "worst error" if problem.objective is Objective.WORST_CASE else "rms error"
 
@@ -73,9 +66,10 @@ def as_error(kind: str, F: float) -> float:
 
 
 def relaxed_limits(
-    file: CaseFile, problem: DesignProblem, kind: str, F: float, active: Sequence[ActiveRow]
+    file: CaseFile, variant: PosedProblem, F: float, active: Sequence[ActiveRow]
 ) -> Iterator[RelaxedRow]:
     """The gain of a little more room at each active limit, if there is any."""
+    problem, kind = variant.problem, error_kind(variant.problem, variant.requirements)
     for row in active:
         if row.multiplier <= 0.0 or _is_natural(file, problem, row):
             continue
@@ -88,7 +82,7 @@ def relaxed_limits(
             change = f"{100 * before:#.3g} → {100 * after:#.3g} %"
         yield RelaxedRow(
             row.name, row.kind, row.side, amount, unit, kind, before, after,
-            f"{_room(file, row, amount, unit)}: {kind} {change}",
+            f"{_room(variant, row, amount, unit)}: {kind} {change}",
         )  # fmt: skip
 
 
@@ -101,16 +95,13 @@ def _is_natural(file: CaseFile, problem: DesignProblem, row: ActiveRow) -> bool:
 
 
 def _amount(file: CaseFile, problem: DesignProblem, row: ActiveRow) -> tuple[float, str]:
-    names = list(file.design.parameters)
     if row.kind == "bound":
-        k = names.index(row.name)
+        k = list(file.design.parameters).index(row.name)
         return _rounded(STEP * float(problem.upper[k] - problem.lower[k])), file.design_units[k]
     if row.kind == "constraint":
-        terms = file.design.constraints[row.name].terms
-        own = [k for k, name in enumerate(names) if terms.get(name)]
-        widths = (problem.upper - problem.lower)[own]
-        span = float(np.abs([terms[names[k]] for k in own]) @ widths)
-        units = {file.design_units[k] for k in own}
+        (terms,) = (one.coefficients for one in problem.constraints if one.name == row.name)
+        span = float(np.abs(terms) @ (problem.upper - problem.lower))
+        units = {file.design_units[k] for k in np.flatnonzero(terms)}
         return _rounded(STEP * span), units.pop() if len(units) == 1 else "(SI)"
     return 0.01, ""
 
@@ -120,14 +111,9 @@ def _rounded(value: float) -> float:
     return float(f"{value:.0e}") if value > 0.0 else 1.0
 
 
-def _room(file: CaseFile, row: ActiveRow, amount: float, unit: str) -> str:
-    if row.kind != "target":
-        more = "more" if row.side == "upper" else "less"
-        named = f"{'bound' if row.kind == 'bound' else 'limit'} of {row.name}"
-        return f"{handy(amount, unit)} {more} at the {row.side} {named}"
-    if row.name != MASS or (mass := file.design.mass) is None:
-        return f"{row.name}, relaxed by {100 * amount:g} %"
-    limit, more = (mass.max, "more") if row.side == "upper" else (mass.min, "less")
-    if limit is None:
-        return f"the limit of the mass, relaxed by {100 * amount:g} %"
-    return f"{handy(amount * limit, 'kg')} {more} mass"
+def _room(variant: PosedProblem, row: ActiveRow, amount: float, unit: str) -> str:
+    if row.kind == "target":
+        return variant.requirements.named(row.name).relaxed(row.side, amount)
+    more = "more" if row.side == "upper" else "less"
+    named = f"{'bound' if row.kind == 'bound' else 'limit'} of {row.name}"
+    return f"{handy(amount, unit)} {more} at the {row.side} {named}"

@@ -24,7 +24,7 @@ from eigassign.study.results import TradeOff, TradeOffPoint
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
-Quantity = Callable[[Floats], tuple[float, Floats]]  # of a design: its value and slope (n_y,)
+Amount = Callable[[Floats], tuple[float, Floats]]  # of a design: its value and slope (n_y,)
 LIMITS = 8
 STEPS = 30  # from one optimum to the next
 SEEN = 1e-3  # of an error: a gain that its three digits do not show
@@ -37,7 +37,7 @@ def trade_off(scene: Scene, found: Found) -> TradeOff | None:
     None without wanted frequencies, with catalogues, or where the design does not change the mass.
     """
     variant, best = found.variant, found.best
-    if not variant.requirements.targets or found.chosen or best.seen.violation > MET:
+    if not variant.requirements.goals or found.chosen or best.seen.violation > MET:
         return None
     priced = variant.problem.prices is not None
     problem = replace(variant.problem, prices=None)
@@ -46,7 +46,7 @@ def trade_off(scene: Scene, found: Found) -> TradeOff | None:
     def price(y: Floats) -> tuple[float, Floats]:  # of the change, in the file's units
         return float(prices @ (y - scene.initial)), prices
 
-    quantity: Quantity = price if priced else scene.model.total_mass
+    quantity: Amount = price if priced else scene.model.total_mass
     high, first = quantity(best.y)[0], quantity(scene.initial)[0]
     low = min(first, high)
     if high - low <= SAME * abs(high):
@@ -76,9 +76,7 @@ def trade_off(scene: Scene, found: Found) -> TradeOff | None:
     )
 
 
-def _limited(
-    problem: DesignProblem, quantity: Quantity, limit: float, unit: float
-) -> DesignProblem:
+def _limited(problem: DesignProblem, quantity: Amount, limit: float, unit: float) -> DesignProblem:
     """The problem with quantity ≤ limit beside its other limits."""
 
     def appraise(y: Floats) -> Appraisal:

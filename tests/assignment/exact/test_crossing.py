@@ -9,14 +9,15 @@ import pytest
 from scipy.optimize import minimize
 
 from eigassign.assignment import (
+    AssignedFrequency,
     DesignProblem,
     End,
     Frequencies,
-    FrequencyGoal,
-    FrequencyLimit,
     LinearConstraint,
+    LowerLimit,
     Objective,
     Optimum,
+    Requirement,
     Requirements,
     minimise,
     stationarity,
@@ -68,16 +69,15 @@ def frequencies(matrices: Matrices) -> Callable[[np.ndarray], Frequencies]:
 
 def problem(
     matrices: Matrices,
-    targets: tuple[FrequencyGoal, ...],
-    limits: tuple[FrequencyLimit, ...] = (),
+    asked: tuple[Requirement, ...],
     objective: Objective = Objective.LEAST_SQUARES,
     constraints: tuple[LinearConstraint, ...] = (),
     **more: object,
 ) -> DesignProblem:
-    asked = Requirements(targets, limits, (), np.ones(N), objective, **more)
+    together = Requirements(asked, np.ones(N), objective, **more)
     response = frequencies(matrices)
     return DesignProblem(
-        lambda y: asked.appraise(y, response(y)),
+        lambda y: together.appraise(y, response(y)),
         np.array([0.0, 0.0, 0.0]) if matrices is apart else -np.ones(3),
         np.ones(3),
         constraints,
@@ -85,8 +85,9 @@ def problem(
     )
 
 
-def first(hz: float, mode: int = 1) -> FrequencyGoal:
-    return FrequencyGoal(mode, np.full(N, hz), EVERY)
+def first(hz: float, mode: int = 1) -> AssignedFrequency:
+    each = np.full(N, hz)
+    return AssignedFrequency(f"mode {mode}", "", ((mode, 1.0),), EVERY, each, each)
 
 
 BUDGET = (LinearConstraint("budget", np.array([1.0, 1.2, 1.5]), upper=1.0),)
@@ -163,8 +164,9 @@ def test_the_second_mode_is_lowered_to_where_it_meets_the_first() -> None:
 
 def test_a_limit_of_mode_one_is_kept_by_both_branches() -> None:
     start = np.array([0.3, 0.1, 0.1])
-    limit = FrequencyLimit("stiff", ((1, 1.0),), np.full(N, 1.35), EVERY, True)
-    asked = problem(apart, (), (limit,), least_change=(start, np.ones(3)))
+    edges = np.full(N, 1.35), np.full(N, np.inf)
+    limit = LowerLimit("stiff", "", ((1, 1.0),), EVERY, *edges)
+    asked = problem(apart, (limit,), least_change=(start, np.ones(3)))
     found = minimise(asked, start)
     assert found.seen.violation <= 1e-9
     assert found.end is End.OPTIMAL

@@ -15,11 +15,12 @@ from eigassign.assignment import (
     Appraisal,
     DesignProblem,
     End,
-    FrequencyLimit,
     LinearConstraint,
+    LowerLimit,
+    MassLimit,
     Objective,
-    QuantityLimit,
     Requirements,
+    UpperLimit,
     best_first,
     minimise,
     stationarity,
@@ -188,13 +189,13 @@ def test_equal_violations_are_told_apart_by_the_objective() -> None:
 
 
 def test_limits_of_frequencies_and_quantities_have_a_side() -> None:
-    hz, rows = np.ones(2), slice(0, 2)
+    hz, endless, rows = np.ones(2), np.full(2, np.inf), slice(0, 2)
     limits = (
-        FrequencyLimit("stiff", ((1, 1.0),), hz, rows, True),
-        FrequencyLimit("soft", ((2, 1.0),), hz, rows, False),
+        LowerLimit("stiff", "", ((1, 1.0),), rows, hz, endless),
+        UpperLimit("soft", "", ((2, 1.0),), rows, -endless, hz),
+        MassLimit.between(1.0, lambda y: (1.0, y), 2.0, "mass", ""),
     )
-    mass = QuantityLimit("mass", lambda y: (1.0, y), 1.0, 2.0)
-    asked = Requirements((), limits, (mass,), np.ones(2))
+    asked = Requirements(limits, np.ones(2))
     sides = [asked.owner(k) for k in (1, 2, 4, 5)]
     assert sides == [("stiff", "lower"), ("soft", "upper"), ("mass", "lower"), ("mass", "upper")]
 

@@ -12,7 +12,7 @@ def missed(kind: str, initial: ErrorRow, exact: ErrorRow) -> TargetStudy:
     hz = np.full(3, 48.0)
     asked = KINDS[kind](
         label="mode 1 at 48 Hz", place="targets[0]", modes=(1,), terms=((1, 1.0),),
-        rows=slice(0, 3), lower_hz=hz, upper_hz=hz, along=(("1", slice(0, 3)),),
+        rows=slice(0, 3), lower=hz, upper=hz, along=(("1", slice(0, 3)),),
     )  # fmt: skip
     return TargetStudy(
         asked=asked, initial_hz=hz, exact_hz=hz, predicted_hz=None, one_shot_hz=None,
