@@ -71,6 +71,8 @@ class Unit:
         `30 mm` is the very float 0.03; a min, a max and an initial value written in different
         units then compare as their author expects.
         """
+        if self.factor == 1:
+            return float(number) * math.pi**self.pi
         exponent = number.lower().partition("e")[2]
         if abs(int(exponent or 0)) > 1000:
             return float(number)  # 0 or infinite, in any unit
