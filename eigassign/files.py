@@ -8,7 +8,9 @@ limits are multiplied by the environment variable ``EIGASSIGN_LIMITS``.
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import io
 import json
 import math
 import os
@@ -16,7 +18,7 @@ import shlex
 import stat
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from eigassign.errors import UsageError
 
@@ -60,7 +62,8 @@ def read_bytes(path: str | Path, limit: int) -> bytes:
 def json_value(text: str | bytes) -> Any:
     """The value that JSON of anybody says; raises ValueError for everything else.
 
-    That is NaN and infinities too, and brackets that are nested deeper than can be read.
+    That is NaN, infinities and numbers beyond all floats too, and brackets that are nested deeper
+    than can be read.
     """
     try:
         return _JSON.decode(text if isinstance(text, str) else text.decode())
@@ -68,11 +71,14 @@ def json_value(text: str | bytes) -> Any:
         raise ValueError("nested too deep") from None
 
 
-def _no_number(name: str) -> NoReturn:
-    raise ValueError(f"{name} is no number")
+def _number(text: str) -> float:
+    """The number; raises ValueError where no float is as large."""
+    if not math.isfinite(value := float(text)):
+        raise ValueError(f"{text:.20} is no number")
+    return int(text) if text.lstrip("-").isdecimal() else value
 
 
-_JSON = json.JSONDecoder(parse_constant=_no_number)
+_JSON = json.JSONDecoder(parse_float=_number, parse_int=_number, parse_constant=_number)
 
 
 def objection(path: str | Path, limit: int) -> str | None:
@@ -103,8 +109,24 @@ def quoted(path: str | Path) -> str:
 def pieces(path: str | Path, limit: int) -> Iterator[bytes]:
     """The content of a regular file of at most ``limit`` bytes, a megabyte at a time.
 
+    Raises OSError, as `opened` does, for everything else; a file that grows while it is read is
+    refused as well.
+    """
+    with opened(path) as file:
+        _require_small(os.fstat(file.fileno()).st_size, limit)
+        size = 0
+        while part := file.read(_PIECE):
+            size += len(part)
+            _require_small(size, limit)
+            yield part
+
+
+@contextlib.contextmanager
+def opened(path: str | Path) -> Iterator[io.FileIO]:
+    """A regular file to be read, without a buffer.
+
     Raises OSError, whose ``strerror`` says what is wrong, for everything else. Opening waits for
-    nobody, and a file that grows while it is read is refused as well.
+    nobody.
     """
     try:
         _require_regular(os.stat(path))  # opening a device may already do something
@@ -113,14 +135,8 @@ def pieces(path: str | Path, limit: int) -> Iterator[bytes]:
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0)
     descriptor = os.open(path, flags | getattr(os, "O_BINARY", 0))
     with open(descriptor, "rb", buffering=0) as file:
-        status = os.fstat(descriptor)
-        _require_regular(status)
-        _require_small(status.st_size, limit)
-        size = 0
-        while part := file.read(_PIECE):
-            size += len(part)
-            _require_small(size, limit)
-            yield part
+        _require_regular(os.fstat(descriptor))
+        yield file
 
 
 def _require_regular(status: os.stat_result) -> None:

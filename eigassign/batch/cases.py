@@ -45,7 +45,7 @@ from eigassign.batch.plan import BatchPlan, Variant
 from eigassign.batch.work import CaseOptions, outcome_of
 from eigassign.errors import StorageError
 from eigassign.files import CASE, quoted, read_bytes
-from eigassign.output.batch.files import are_there, write_files
+from eigassign.output.batch.files import digest, write_files
 from eigassign.output.batch.outcome import OUTCOME, CaseOutcome, from_line, to_line
 from eigassign.output.store.atomic import replace_synced
 from eigassign.output.store.run_record import is_whole, read_record, relative_path
@@ -294,18 +294,18 @@ def summarise(
 ) -> InOrder:
     """Make the summaries from the rows of the index, in the order of the plan; the rows.
 
-    Those that were made from the same rows stay, unless all are to be made ``anew``; batch.json
-    says from which they were made. ``alone``: entered meanwhile, where several processes do this.
+    Those that were made from the same rows, and are as they were made, stay; batch.json has a hash
+    of both. All are made ``anew`` if asked to be. ``alone``: entered meanwhile, where several
+    processes do this.
     """
     with alone():
         rows = InOrder(folder, header)
         before = read_header(folder)
-        is_made = before is not None and before.summarised == rows.digest
-        if is_made and not anew and are_there(folder, header.columns):
+        if not anew and before is not None and before.summarised == digest(folder, rows.digest):
             return rows
         try:
             write_files(folder, rows, len(rows), header.keys, header.columns)
-            write_header(folder, replace(header, summarised=rows.digest))
+            write_header(folder, replace(header, summarised=digest(folder, rows.digest)))
         except OSError as error:
             raise StorageError(
                 f"{folder}: the summaries cannot be written: {error.strerror}; "

@@ -8,20 +8,24 @@ what is of another batch, is no line. Of several lines of one case the last one 
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import io
 import json
 import re
+import sys
 from array import array
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from eigassign._version import __version__
 from eigassign.case.schema.sweep import MOST
 from eigassign.errors import StorageError, UsageError
-from eigassign.files import CASE, TABLE, json_value, read_bytes
+from eigassign.files import CASE, TABLE, json_value, opened, read_bytes
 from eigassign.output.batch.outcome import CaseOutcome, from_line, status_of, to_line
 from eigassign.output.store.atomic import replace_synced
 
@@ -41,7 +45,7 @@ class Header:
     columns: bool = False  # the cases have no folders
     version: str = __version__
     format: int = FORMAT
-    summarised: str = field(default="", compare=False)  # `InOrder.digest` of what the summaries say
+    summarised: str = field(default="", compare=False)  # `digest` of the summaries
 
     def indices(self) -> range:
         """Indices of the cases that are this folder's."""
@@ -93,10 +97,10 @@ def line_of(row: str, plan: str) -> str:
     return f'{row[:-1]}, "seal": "{seal}"}}\n'
 
 
-@dataclass(frozen=True)
-class Line:
-    """A whole line of the manifest: where it begins, its bytes, and the row in it."""
+class Line(NamedTuple):
+    """A whole line of the manifest: of which file, where it begins, its bytes, and its row."""
 
+    path: Path
     start: int
     line: bytes
     row: str
@@ -120,7 +124,7 @@ class Line:
     @property
     def outcome(self) -> CaseOutcome:
         """The row, read."""
-        return from_line(self.row)
+        return from_line(self.row, self.path.parent)
 
 
 class Manifest:
@@ -141,13 +145,15 @@ class Manifest:
         """Yield the lines that were added since this was last asked for, by whomever.
 
         One without an end is left for later. Raises StorageError where there is something else than
-        a file.
+        a file of lines.
         """
         try:
-            with open(self.path, "rb") as file:
+            with opened(self.path) as raw, io.BufferedReader(raw) as file:
                 file.seek(self._read)
                 while line := file.readline(CASE):
-                    if not line.endswith(b"\n") and len(line) < CASE:
+                    if not line.endswith(b"\n"):
+                        if len(line) == CASE:
+                            raise OSError(errno.EFBIG, f"a line of more than {CASE / 1e6:g} MB")
                         return
                     start, self._read = self._read, self._read + len(line)
                     if (found := self._opened(start, line)) is not None:
@@ -166,7 +172,7 @@ class Manifest:
         begin = _INDEX.match(row)
         if begin is None or line_of(row, self._plan) != text:
             return None
-        return Line(start, line, row, int(begin[1]))
+        return Line(self.path, start, line, row, int(begin[1]))
 
     def append(self, outcome: CaseOutcome) -> None:
         """Write a line behind all others; raises StorageError where it cannot be written whole.
@@ -201,20 +207,21 @@ def _cut(file: io.FileIO) -> int:
 class InOrder:
     """The row of each case that has one, as the last of its lines says, in the order of the plan.
 
-    The file is gone through once for where each line is, and then read line by line: memory is 16
-    bytes a case. ``digest`` tells these rows from all others.
+    The file is gone through once for where each line is, and then read line by line: memory is 24
+    bytes a case. ``digest`` tells these rows from all others, ``ends`` counts how they ended.
     """
 
     def __init__(self, folder: Path, header: Header) -> None:
         indices = header.indices()
         self._path, places = folder / LINES, array("q", [-1]) * len(indices)
-        seals = array("Q", [0]) * len(indices)
+        seals, ends = array("Q", [0]) * len(indices), [""] * len(indices)
         for line in Manifest(folder, header.plan).news():
             if line.index in indices:
                 k = indices.index(line.index)
-                places[k], seals[k] = line.start, line.seal
+                places[k], seals[k], ends[k] = line.start, line.seal, sys.intern(line.status)
         self._places = array("q", (place for place in places if place >= 0))
         self.digest = hashlib.sha256(seals.tobytes()).hexdigest()
+        self.ends = Counter(filter(None, ends))
 
     def __len__(self) -> int:
         return len(self._places)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, count, islice, zip_longest
@@ -13,7 +12,7 @@ from eigassign.batch.cases import recorded, summarise
 from eigassign.batch.lock import folder_lock
 from eigassign.batch.manifest import LINES, Header, InOrder, line_of, read_header
 from eigassign.errors import UsageError
-from eigassign.output.batch.outcome import from_line, status_of, to_line
+from eigassign.output.batch.outcome import from_line, to_line
 from eigassign.output.store.atomic import replacing
 from eigassign.output.store.run_record import relative_path
 
@@ -28,13 +27,14 @@ class _Shard:
         """The cases whose record does not say what the index does; see `cases`."""
         if self.header.columns:
             return []
-        listed = (row for row in map(from_line, self.rows) if row.run_folder is not None)
-        found = ((row, recorded(self.folder / str(row.run_folder))) for row in listed)
+        every = (from_line(text, self.folder) for text in self.rows)
+        listed = ((row, row.run_folder) for row in every if row.run_folder is not None)
+        found = ((row, recorded(self.folder / place)) for row, place in listed)
         return [row.name for row, now in found if now is None or now.key != row.key]
 
 
-def merge_shards(out: Path, folders: Sequence[Path]) -> Counter[str]:
-    """Make ``out`` the batch of the shards in ``folders``; how many cases ended in which way.
+def merge_shards(out: Path, folders: Sequence[Path]) -> InOrder:
+    """Make ``out`` the batch of the shards in ``folders``; its rows.
 
     The folders of cases stay where they are. Without ``folders`` the summaries of the batch in
     ``out`` are made anew. Raises UsageError, with all that is wrong, where a shard is missing, not
@@ -51,8 +51,7 @@ def merge_shards(out: Path, folders: Sequence[Path]) -> Counter[str]:
             message = f"files of {some} are not as their runs have left them: run the batch again"
             raise UsageError(f"{out}: {message}")
         with folder_lock(out) as lock:
-            rows = summarise(out, shards[0].header, anew=True, alone=lock.summaries)
-        return Counter(map(status_of, rows))
+            return summarise(out, shards[0].header, anew=True, alone=lock.summaries)
     one, place = shards[0], Path(os.path.realpath(out))
     files = tuple(relative_path(one.folder / file, place) for file in one.header.files)
     header = replace(one.header, shard=(1, 1), files=files)
@@ -67,7 +66,7 @@ def merge_shards(out: Path, folders: Sequence[Path]) -> Counter[str]:
         parts = [shard.rows if header.columns else _seen_from(place, shard) for shard in shards]
         rows_in_turn = filter(None, chain.from_iterable(zip_longest(*parts)))
         file.writelines(line_of(row, header.plan) for row in rows_in_turn)
-    return Counter(map(status_of, summarise(out, header, anew=True)))
+    return summarise(out, header, anew=True)
 
 
 def _header(folder: Path) -> Header:

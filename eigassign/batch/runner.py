@@ -12,13 +12,12 @@ write the folders of their cases, this process writes all else.
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 
 from eigassign.batch.cases import Batch, Progress, summarise, take_up
 from eigassign.batch.lock import folder_lock
-from eigassign.batch.manifest import read_header
+from eigassign.batch.manifest import InOrder, read_header
 from eigassign.batch.plan import Variant, variant_problem
 from eigassign.batch.work import check_cases, outcome_of, run_cases
 from eigassign.batch.workers import Workers, run_tasks, this_machine
@@ -37,8 +36,8 @@ def run(
     on_outcome: Callable[[CaseOutcome], None],
     join: bool = False,
     say: Callable[[str], None] = silent,
-) -> Counter[str]:
-    """Run what is not done yet, and write the summaries; how many of all cases ended in which way.
+) -> InOrder:
+    """Run what is not done yet, and write the summaries; the rows of all cases.
 
     ``on_start`` hears what is done already, ``on_outcome`` of each case that is run. After an
     interrupt the summaries have what there is. Raises CaseError, before anything is written, where
@@ -63,8 +62,8 @@ def run(
         try:
             _run(batch, progress, workers, on_outcome)
         finally:
-            summarise(folder, batch.header, alone=lock.summaries)
-    return progress.ends
+            rows = summarise(folder, batch.header, alone=lock.summaries)
+    return rows
 
 
 def require_valid(batch: Batch, workers: Workers, say: Callable[[str], None] = silent) -> None:

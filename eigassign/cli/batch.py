@@ -14,9 +14,8 @@ from eigassign.cli.reporter import Reporter, reporting, show
 from eigassign.errors import EigassignError, UsageError
 
 if TYPE_CHECKING:
-    from collections import Counter
-
     from eigassign.batch.cases import Batch, Progress
+    from eigassign.batch.manifest import InOrder
     from eigassign.batch.plan import BatchPlan
     from eigassign.batch.workers import Workers
     from eigassign.output.batch.outcome import CaseOutcome
@@ -119,8 +118,8 @@ def batch(
             if dry_run:
                 return _tell(asked, workers, reporter)
             since = _comparison(how)
-            ends = _watched(asked, workers, reporter, join)
-        return _told(asked.folder, ends, since, reporter)
+            rows = _watched(asked, workers, reporter, join)
+        return _told(asked.folder, rows, since, reporter)
 
 
 def _workers(
@@ -191,30 +190,22 @@ def _comparison(how: Mapping[str, Any]) -> EarlierResult | None:
     return against and EarlierResult(against, "answers", how["tolerance"])
 
 
-def _told(folder: Path, ends: Counter[str], since: EarlierResult | None, reporter: Reporter) -> int:
+def _told(folder: Path, rows: InOrder, since: EarlierResult | None, reporter: Reporter) -> int:
     """Show how the cases of a folder ended, all of them or the first that failed; the exit code."""
-    from dataclasses import replace
     from itertools import islice
 
-    from eigassign.batch.manifest import InOrder, read_header, write_header
     from eigassign.output import console
     from eigassign.output.batch.files import write_moves
     from eigassign.output.batch.outcome import from_line, status_of
     from eigassign.output.batch.summary import batch_table, said
     from eigassign.output.previous import Known
 
-    header, total = read_header(folder), ends.total()
-    lines = InOrder(folder, header) if header else ()
-    told = (line for line in lines if total <= _MANY or status_of(line) != "ok")
-    listed = [from_line(line) for line in islice(told, _MANY)]
-    if since is not None and header is not None:
-        rows = (
-            (row, [*map(str, since.add(Known.of_outcome(row)))]) for row in map(from_line, lines)
-        )
-        write_header(
-            folder, replace(header, summarised="")
-        )  # without a comparison it is not theirs
-        write_moves(folder, rows)
+    ends, total = rows.ends, rows.ends.total()
+    told = (line for line in rows if total <= _MANY or status_of(line) != "ok")
+    listed = [from_line(line, folder) for line in islice(told, _MANY)]
+    if since is not None:
+        every = (from_line(line, folder) for line in rows)
+        write_moves(folder, ((row, [*map(str, since.add(Known.of_outcome(row)))]) for row in every))
     console.print_tables([batch_table(listed)] if listed else [])
     console.print_tables([since.table()] if since is not None else [])
     if bad := total - ends["ok"]:
@@ -223,8 +214,8 @@ def _told(folder: Path, ends: Counter[str], since: EarlierResult | None, reporte
     return 1 if bad or (since is not None and since.moves) else 0
 
 
-def _watched(batch: Batch, workers: Workers, reporter: Reporter, join: bool) -> Counter[str]:
-    """Run it with a line of progress for each case; how many ended in which way."""
+def _watched(batch: Batch, workers: Workers, reporter: Reporter, join: bool) -> InOrder:
+    """Run it with a line of progress for each case; the rows of all."""
     from eigassign.batch import runner
     from eigassign.output import console
 

@@ -192,10 +192,46 @@ def test_the_index_of_another_batch_says_nothing(batch: Batch, tmp_path: Path) -
     assert summaries(batch.folder) == before
 
 
-def test_a_folder_in_the_place_of_the_index_is_told(batch: Batch) -> None:
-    replaced(batch.folder / "manifest.jsonl")
+@pytest.mark.parametrize(
+    "change",
+    [
+        replaced,
+        lambda path: (path.unlink(), os.mkfifo(path)),
+        lambda path: (path.unlink(), path.symlink_to("/dev/zero")),
+        lambda path: os.truncate(path, 2**40),
+    ],
+)
+def test_what_is_no_file_of_lines_in_the_place_of_the_index_is_told(
+    batch: Batch, change: Callable[[Path], object]
+) -> None:
+    change(batch.folder / "manifest.jsonl")
     with pytest.raises(StorageError, match=r"manifest\.jsonl: cannot be"):
         ran(batch)
+
+
+@pytest.mark.parametrize("columns", [False, True])
+@pytest.mark.parametrize("damage", [cut, flipped, Path.unlink])
+def test_summaries_that_were_damaged_are_made_again(
+    tmp_path: Path, columns: bool, damage: Callable[[Path], object]
+) -> None:
+    case(tmp_path)
+    batch = in_columns(batch_of(tmp_path, MASSES)) if columns else batch_of(tmp_path, MASSES)
+    assert ran(batch) == DONE
+    made = [*batch.folder.glob("*.csv"), *batch.folder.glob("summary.*")]
+    for path in {*made, *batch.folder.glob("*.h5"), batch.folder / "junit.xml"}:
+        before = path.read_bytes()
+        damage(path)
+        assert ran(batch) == []
+        assert path.read_bytes() == before, path
+
+
+def test_a_file_of_a_terabyte_that_its_record_vouches_for_is_not_read(batch: Batch) -> None:
+    place = batch.folder / "mass=0.5"
+    os.truncate(place / "results.json", 2**40)  # which takes no place on the disk
+    record = json.loads((place / "run.json").read_text())
+    record["files"]["results.json"]["bytes"] = 2**40
+    (place / "run.json").write_text(json.dumps(record))
+    assert ran(batch) == ["mass=0.5"]
 
 
 def test_without_batch_json_nothing_runs_again(batch: Batch) -> None:

@@ -54,8 +54,8 @@ def names(folder: Path) -> list[str]:
 def test_shards_in_any_order_become_what_one_batch_is(tmp_path: Path, columns: bool) -> None:
     shards = [shard(tmp_path / str(i), i, 3, columns=columns) for i in (2, 3, 1)]
     out, whole = tmp_path / "out", shard(tmp_path / "whole", 1, 1, columns=columns)
-    assert merge_shards(out, shards) == {"ok": TOTAL - 1, "failed": 1}
-    assert merge_shards(whole, []) == {"ok": TOTAL - 1, "failed": 1}
+    assert merge_shards(out, shards).ends == {"ok": TOTAL - 1, "failed": 1}
+    assert merge_shards(whole, []).ends == {"ok": TOTAL - 1, "failed": 1}
     assert names(out) == [f"mass={k}g" for k in range(TOTAL)]
     if columns:
         for name in ("summary.csv", "summary.json", "junit.xml", "columns.csv"):

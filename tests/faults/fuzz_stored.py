@@ -73,7 +73,7 @@ class Trial:
         folder = self.damaged.partition("/")[0]
         if outcome.code > 1 and folder not in outcome.err:
             found.append("refused without the name of the file")
-        if outcome.code <= 1 and not self.believed and not self._is_as_before():
+        if outcome.code in (0, 1) and not self.believed and not self._is_as_before():
             found.append("something else than without the damage")
         return [f"{self}: {fault}\n{outcome.err}" for fault in found]
 
@@ -94,7 +94,9 @@ def made(root: Path, to_the_byte: bool = False) -> dict[str, Any]:
     """What the batches say, but for times; with those and columns.h5 where no case ran again."""
     found: dict[str, Any] = {}
     if to_the_byte:
-        return {name: (root / "columns" / name).read_bytes() for name in ("columns.h5", "columns.csv")}
+        return {
+            name: (root / "columns" / name).read_bytes() for name in ("columns.h5", "columns.csv")
+        }
     for name in ("out", "columns", "part-2", "whole"):
         if (root / name / "summary.json").exists():
             rows = json.loads((root / name / "summary.json").read_text())["cases"]

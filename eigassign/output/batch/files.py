@@ -6,26 +6,34 @@ would be files of others, and may say something else than the rows.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TextIO
 
+from eigassign.files import MATRIX
 from eigassign.output.batch.columns import Columns, write_csv
 from eigassign.output.batch.index import Index
 from eigassign.output.batch.junit import Junit
 from eigassign.output.batch.outcome import CaseOutcome, from_line
 from eigassign.output.batch.summary import SummaryCsv, SummaryJson
 from eigassign.output.store.atomic import replace_synced, replacing
+from eigassign.output.store.run_record import file_digest
 
 _ALWAYS = ("summary.csv", "summary.json", "junit.xml", "index.html")
 _COLUMNS = ("columns.h5", "columns.csv")
 NAMES = (*_ALWAYS, *_COLUMNS)
 
 
-def are_there(folder: Path, columns: bool) -> bool:
-    """True where no file is missing."""
-    return all((folder / name).is_file() for name in (NAMES if columns else _ALWAYS))
+def digest(folder: Path, rows: str) -> str:
+    """SHA-256 of what the files in ``folder`` say and of the rows that they are of.
+
+    Of files that are larger than a gigabyte their sizes count.
+    """
+    paths = [folder / name for name in NAMES]
+    files = [(path.is_file() and path.stat().st_size, file_digest(path, MATRIX)) for path in paths]
+    return hashlib.sha256(f"{rows}{files}".encode()).hexdigest()
 
 
 def write_files(
@@ -47,7 +55,7 @@ def write_files(
         stored = stack.enter_context(replacing(folder / "columns.h5")) if columns else None
         columnar = None if stored is None else Columns(stored, total)
         for line in map(str.rstrip, lines):
-            row = from_line(line)
+            row = from_line(line, folder)
             summary.add(row)
             plain.add(row.status, line)
             _test(junit, row)

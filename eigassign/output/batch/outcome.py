@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
+from pathlib import Path
 from typing import Any, Literal, get_args
 
 from eigassign.errors import StorageError
@@ -63,14 +64,17 @@ def to_line(outcome: CaseOutcome) -> str:
     return json.dumps(plain, allow_nan=False)
 
 
-def from_line(line: str | bytes) -> CaseOutcome:
-    """The outcome that `to_line` wrote, with lists for tuples; raises StorageError else."""
+def from_line(line: str | bytes, folder: str | Path = "") -> CaseOutcome:
+    """The outcome that `to_line` wrote, with lists for tuples.
+
+    Raises StorageError, which names the manifest in ``folder``, for anything else.
+    """
     try:
         return from_plain(json_value(line))
     except (ValueError, TypeError):
         begin = line[:40].decode(errors="replace") if isinstance(line, bytes) else line[:40]
-        message = f"manifest.jsonl has a damaged line, {begin}…: delete it and run the batch again"
-        raise StorageError(message) from None
+        message = f"has a damaged line, {begin}…: delete it and run the batch again"
+        raise StorageError(f"{Path(folder, 'manifest.jsonl')} {message}") from None
 
 
 def from_plain(row: Any) -> CaseOutcome:

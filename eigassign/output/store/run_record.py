@@ -158,15 +158,14 @@ def _contents(folder: Path) -> set[str]:
 def _is_as_marked(path: Path, mark: FileMark) -> bool:
     try:
         status = os.lstat(path)
-        if not stat.S_ISREG(status.st_mode) or status.st_size != mark.bytes:
-            return False
-        with open(path, "rb", buffering=0) as file:
-            return _mark(file.readall()) == mark
     except (OSError, ValueError):  # a null character in its name
         return False
+    if not stat.S_ISREG(status.st_mode) or status.st_size != mark.bytes:
+        return False
+    return file_digest(path, MATRIX) == mark.sha256
 
 
-def _digest(path: Path, limit: int) -> str | None:
+def file_digest(path: Path, limit: int) -> str | None:
     """SHA-256 of a regular file of at most so many bytes; None where there is none."""
     digest = hashlib.sha256()
     try:
@@ -236,5 +235,5 @@ def run_status(folder: str | Path) -> RunStatus:
 
 
 def _state(path: Path, digest: str, limit: int) -> State:
-    found = _digest(path, limit)
+    found = file_digest(path, limit)
     return "missing" if found is None else "same" if found == digest else "changed"

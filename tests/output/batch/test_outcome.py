@@ -43,6 +43,8 @@ def test_what_is_not_finite_is_null():
 def test_a_torn_line_is_an_error():
     with pytest.raises(StorageError, match="has a damaged line"):
         from_line(to_line(ROW)[:-30])
+    with pytest.raises(StorageError, match=r"^night/manifest\.jsonl has a damaged line"):
+        from_line(to_line(ROW)[:-30], "night")
 
 
 def test_every_range_has_a_name_of_its_own():
