@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from small_case import TEXT
 
 from eigassign.assignment import (
     Requirement,
+    Solved,
     followed_modes,
     named_design,
     named_pose,
@@ -103,6 +105,71 @@ def test_a_part_of_a_trajectory_has_its_samples_only(wanted: Read) -> None:
     (one,) = wanted("{mode: 1, frequency: {file: f.csv}, trajectory: b, during: [2.4, 2.8]}")
     assert one.rows == slice(13, 16)  # 2.4, 2.6 and 2.8 s, of 11 + 6 samples
     np.testing.assert_allclose(one.hz, [340.0, 360.0, 380.0], rtol=1e-14)
+
+
+def solved(hz: np.ndarray) -> Solved:
+    return Solved(hz, np.zeros((len(hz), 0)), np.zeros((len(hz), 0), dtype=np.intp))
+
+
+@pytest.mark.parametrize(
+    ("target", "is_met"),
+    [
+        ("{mode: 2, frequency: 205}", False),
+        ("{mode: 2, at_least: 205}", False),
+        ("{mode: 2, at_least: 150}", True),
+        ("{mode: 2, at_most: 195}", False),
+        ("{gap: {between: [1, 2], at_least: 110}}", False),
+        ("{gap: {between: [1, 2], at_least: 50}}", True),
+        ("{keep_out: [105, 160]}", False),
+        ("{keep_out: [140, 210]}", False),
+        ("{keep_out: [140, 160]}", True),
+        ("{modes: [2, 3], keep_out: [90, 210]}", False),
+    ],
+)
+def test_errors_of_frequencies_that_lie_between_two_are_those_of_the_worst_and_the_best(
+    wanted: Read, target: str, is_met: bool
+) -> None:
+    """Each of three modes may lie anywhere between two curves: against all their corners."""
+    (one,) = wanted(target)
+    rng = np.random.default_rng(4)
+    lowest = np.array([100.0, 200.0, 300.0]) * rng.uniform(0.99, 1.01, (17, 3))
+    highest = lowest * rng.uniform(1.0, 1.1, (17, 3))
+    corners = [np.where(high, highest, lowest) for high in itertools.product([0, 1], repeat=3)]
+    inside = [lowest + rng.random((17, 3)) * (highest - lowest) for _ in range(20)]
+    worst, best = (
+        one.worst_errors(solved(lowest), solved(highest)),
+        one.least_errors(solved(lowest), solved(highest)),
+    )
+    at_corners = np.abs([one.errors(solved(hz)) for hz in corners])
+    assert worst.max() == pytest.approx(at_corners.max(), rel=1e-12)
+    assert bool(worst.max() == 0.0) is is_met
+    for errors in np.abs([*at_corners, *(one.errors(solved(hz)) for hz in inside)]):
+        assert (best <= errors + 1e-15).all()
+        assert errors.max() <= worst.max() + 1e-15
+    if "keep_out" not in target:
+        least, most = one.curve_range(solved(lowest), solved(highest))
+        curves = np.array([one.curve(solved(hz)) for hz in corners])
+        np.testing.assert_allclose([least, most], [curves.min(axis=0), curves.max(axis=0)])
+
+
+def test_a_band_is_missed_by_the_best_number_of_modes_below_it(wanted: Read) -> None:
+    """Mode 2 rises from 200 to 210 Hz: k is 2 where it is nearer to the lower edge, else 1."""
+    hz = np.column_stack([np.full(17, 100.0), np.linspace(200.0, 210.0, 17), np.full(17, 300.0)])
+    for low, high, error in ((205.0, 230.0, 210.0 / 205.0 - 1.0), (180.0, 208.0, 1.0 - 200 / 208)):
+        (one,) = wanted(f"{{keep_out: [{low}, {high}]}}")
+        assert one.errors(solved(hz)).max() == pytest.approx(error, rel=1e-12)
+        assert one.below(hz).tolist() == [
+            [1 + (f < edge) for f in hz[:, 1]] for edge in (low, high)
+        ]
+
+
+def test_modes_near_a_band_and_on_either_side_of_it_are_shown_with_it(wanted: Read) -> None:
+    (one,) = wanted("{keep_out: [140, 160]}")
+    far = np.tile([20.0, 30.0, 700.0, 900.0], (17, 1))
+    assert one.near(solved(far), solved(far)) == (2, 3)
+    assert one.near(solved(np.where(far == 20.0, 150.0, far)), solved(far)) == (1, 2, 3)
+    assert one.near(solved(far), solved(10.0 * far)) == (1,)
+    assert one.near(solved(far), solved(0.1 * far)) == (4,)
 
 
 @pytest.mark.parametrize(
