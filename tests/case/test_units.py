@@ -122,9 +122,18 @@ def test_anything_else_is_refused_and_says_what_is_allowed(
 
 
 def test_hertz_and_radians_per_second_and_one_per_second_are_three_things() -> None:
-    for unit, name in (("Hz", "angular rate"), ("rad/s", "frequency"), ("s^-1", "frequency")):
-        with pytest.raises(QuantityError):
-            read_quantity(f"1 {unit}", DIMENSIONS[name])
+    for name, others in (("frequency", ("rad/s", "s^-1")), ("angular rate", ("Hz", "s^-1"))):
+        for unit in others:
+            with pytest.raises(QuantityError):
+                read_quantity(f"1 {unit}", DIMENSIONS[name])
+
+
+def test_every_dimension_takes_the_units_that_its_messages_name() -> None:
+    for dimension in DIMENSIONS.values():
+        for unit in filter(None, (dimension.si, *dimension.examples.split(", "))):
+            assert read_quantity(f"1 {unit}", dimension) > 0.0, unit
+        if dimension.si:
+            assert read_quantity(f"1.5 {dimension.si}", dimension) == 1.5
 
 
 @pytest.mark.parametrize(
@@ -137,11 +146,13 @@ def test_hertz_and_radians_per_second_and_one_per_second_are_three_things() -> N
         ("Pa", "k M G T"),
         ("Hz", "m k M"),
         ("rad", "m"),
+        ("g", "m k"),
     ],
 )
 def test_every_prefix_is_worth_what_its_letter_says(unit: str, prefixes: str) -> None:
     power = {"n": -9, "u": -6, "µ": -6, "μ": -6, "m": -3, "c": -2, "k": 3, "M": 6, "G": 9, "T": 12}
     for prefix in prefixes.split():
-        assert read_quantity(f"1 {prefix}{unit}", None) == float(f"1e{power[prefix]}")
+        si = power[prefix] - 3 * (unit == "g")
+        assert read_quantity(f"1 {prefix}{unit}", None) == float(f"1e{si}")
         with pytest.raises(QuantityError):
             read_quantity(f"1 {prefix}{unit}", DIMENSIONS["area"])

@@ -48,6 +48,29 @@ def test_every_method_has_numbers_and_a_name_of_its_own(compared: Chart) -> None
         assert "solves" in why  # fits of too few
 
 
+def test_it_pays_from_where_both_costs_are_equal(compared: Chart) -> None:
+    """Set-up and n evaluations cost as much as n exact solves by the quickest solver."""
+    solvers = [p for p in compared.points if p.family.startswith("exact")]
+    exact_s = min(p.online.median_s for p in solvers)
+    for p in compared.points:
+        quicker = p not in solvers and p.online.median_s < exact_s
+        assert (p.break_even is not None) is quicker, p.method
+        if p.break_even is not None:
+            cost_s = p.offline.median_s + p.break_even * p.online.median_s
+            assert cost_s == pytest.approx(p.break_even * exact_s, abs=1e-15), p.method
+
+
+def test_what_gives_no_number_is_infinitely_wrong(tmp_path: Path) -> None:
+    """A first order in masses of up to 2 kg: λ is below 0 where both are heavy."""
+    scene = scene_of(tmp_path, SHIPPED.replace("max: 250 g", "max: 2 kg"))
+    few = replace(TINY, orders=(1,), half_orders=(1,), expansion_points=(1,), accuracies=())
+    made = compare_methods(scene, few, Request(accuracy=0.5), lambda line: None)
+    (taylor,) = [p for p in made.points if p.method == "Taylor 1 full"]
+    assert 0 < taylor.everywhere.failed < taylor.everywhere.samples
+    assert taylor.everywhere.worst_hz == taylor.everywhere.rms_hz == np.inf
+    assert not any("Taylor 1 full" in each.methods for each in made.fronts)
+
+
 def test_a_chart_shows_what_is_known_of_the_arm(compared: Chart) -> None:
     by_name = {p.method: p for p in compared.points}
     worst = {name: p.everywhere.worst_relative for name, p in by_name.items()}
@@ -144,6 +167,10 @@ def test_kriging_is_left_out_without_scikit_learn_and_no_set_up_may_take_too_lon
     assert any("RBF quintic 4 has no answer: RBF, quintic:" in note for note in made.notes)
     assert any("response surface, cubic: 20 coefficients from 4" in note for note in made.notes)
     assert any("have no answer: Taylor 1 full took" in note for note in made.notes)
+    loosest, *others = {a.accuracy: a.auto for a in made.advice if a.accuracy}.items()
+    assert loosest[0] == 1e-2  # chosen first, and no other after it
+    assert loosest[1].method in {p.method for p in made.points if p.family == "Taylor, auto"}
+    assert all("auto 1e-02" in auto.refused for _, auto in others)
     assert (made.asked.samples_per_design, made.asked.random_points) == (4, 4)  # at least
 
 
@@ -188,6 +215,12 @@ def test_a_trajectory_that_stands_still_where_it_matters_is_refused_with_the_joi
     with pytest.raises(
         CaseError, match=r"nothing moves .* \(joints: elbow\).* let it move, or give"
     ):
+        build_bench(scene, TINY)
+
+
+def test_a_case_without_a_trajectory_cannot_be_charted(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, HEAD + "expansion: {q: [1.8, 5.3]}\n")
+    with pytest.raises(CaseError, match="trajectory: is missing, and needed here"):
         build_bench(scene, TINY)
 
 

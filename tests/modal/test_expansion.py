@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from chains import bar, model_of, two_link
 from rungs import richardson
+from spatial_cases import built
+from spatial_examples import arm3r
 
 from eigassign import expand
 from eigassign.errors import UsageError
@@ -52,6 +54,12 @@ def test_the_quotient_has_the_eigenvalues_of_the_recursion() -> None:
     vectors = modes(model.pencil, found.x0[None], 1)
     series = expand_subspace(model.pencil, theta, found.space, vectors.lam[0], vectors.phi[0])
     agree(found.clusters[0].coefficients[0, 0], series.values[:, 0, 0], 1e-10)
+
+
+def test_a_coordinate_that_turns_the_whole_mechanism_is_in_no_series() -> None:
+    e = expand_pencil(built(arm3r("free")).pencil, [0.3, 0.5, -0.9], [], (1,), 3)
+    assert not e.coefficients[:, e.indices[:, 0] > 0].any()
+    assert (e.coefficients[:, (e.indices[:, 0] == 0) & (e.indices[:, 1] > 0)] != 0.0).any()
 
 
 def test_only_a_set_that_is_linear_in_some_variables_may_leave_out_their_vectors() -> None:
