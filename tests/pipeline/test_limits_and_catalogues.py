@@ -167,6 +167,20 @@ def test_the_one_shot_of_catalogues_is_the_best_of_the_linear_model() -> None:
     assert result.results.error.one_shot == result.results.error.exact
 
 
+@pytest.mark.parametrize(("masses", "below"), [("0, 10 g", 1), ("240 g, 250 g", 2)])
+def test_catalogues_are_searched_for_every_number_of_modes_below_a_band(
+    masses: str, below: int
+) -> None:
+    """Mode 2 of light arms is above 487 Hz, that of heavy ones below 399 Hz."""
+    design = "".join(
+        f"  {name}: {{parameter: bodies.{body}.mass, values: [{masses}]}}\n"
+        for name, body in (("m1", "elbow_mass"), ("m2", "tool_mass"))
+    )
+    _, row = solved(f"design:\n{design}", "  - {keep_out: [400 Hz, 480 Hz]}\n")
+    assert row.verdict == "reached"
+    assert [(one.below, one.clear) for one in row.clearances] == [(below, True)]
+
+
 def test_of_compromises_that_miss_alike_the_one_with_the_least_objective_is_the_answer() -> None:
     limits = (
         "  constraints:\n"
@@ -195,6 +209,17 @@ def test_lists_that_contradict_linear_limits_leave_a_compromise() -> None:
     assert sorted(row.conflict) == ["less", "more"]
     # 0.16 + 4 · 0.032 = 0.288 misses the first by 4 %, 0.25 the second by 25 %
     assert row.catalogue.best[0].violation == pytest.approx(0.04)
+
+
+def test_limits_that_only_time_left_missed_are_not_said_to_be_out_of_reach() -> None:
+    """The initial design has mode 1 at 22.7 Hz, the lightest at 27.1 Hz."""
+    heavy = HELD.replace("upper_arm.end, mass: 0", "upper_arm.end, mass: 0.25")
+    heavy = heavy.replace("forearm.end, mass: 0", "forearm.end, mass: 0.25")
+    target, no_time = "  - {mode: 1, at_least: 25 Hz}\n", "assignment: {seconds: 1e-9}\n"
+    _, ended = solved(DESIGN, target + no_time, heavy)
+    assert (ended.verdict, ended.optimality.kind, ended.conflict) == ("do_not_use", "local", ())
+    _, row = solved(DESIGN, target, heavy)
+    assert (row.verdict, row.optimality.kind) == ("reached", "proved")
 
 
 def test_limits_that_contradict_are_proved_where_the_problem_is_convex() -> None:

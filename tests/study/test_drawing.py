@@ -10,6 +10,7 @@ from scenes import HEAD, SHIPPED, changed, scene_of
 
 import eigassign as ea
 from eigassign.case import parse
+from eigassign.mechanism import Trajectories
 from eigassign.study import (
     AMPLITUDE,
     ModePictures,
@@ -38,6 +39,19 @@ def test_poses_are_the_rigid_links_where_kinematics_puts_them(tmp_path: Path) ->
     np.testing.assert_allclose(bodies["tool_mass"][3], tip, atol=1e-12)
     assert poses.tip_path is not None
     np.testing.assert_allclose(poses.tip_path[k], tip, atol=1e-9)
+
+
+def test_poses_say_which_of_several_trajectories_they_belong_to() -> None:
+    case = ea.load_case(CASES / "pick_and_place.yaml")
+    several, alone = case.trajectory, case.trajectory.parts[:1]
+    assert len(several.parts) > 1
+    poses = draw_poses(case.file, case.model(), several, case.initial_design)
+    for time_s, whose in zip(poses.time_s, poses.of, strict=True):
+        (part,) = [part for part in several.parts if part.name == whose]
+        assert time_s in part.trajectory.time_s
+    assert {*poses.of} == {part.name for part in several.parts}
+    one = draw_poses(case.file, case.model(), Trajectories(tuple(alone)), case.initial_design)
+    assert one.of == ()
 
 
 def test_a_body_at_the_start_of_a_link_is_drawn_there(tmp_path: Path) -> None:

@@ -46,6 +46,10 @@ def test_a_band_is_clear_with_another_number_of_modes_below_it_along_each_trajec
     assert [(one.below, one.clear) for one in row.clearances] == [(1, True), (0, True)]
     assert row.verdict == "reached"
     (target,) = result.results.targets
+    names = [along.name for along in target.along]
+    assert len(set(names)) == 2
+    labels = [f"{target.asked.label} along {name!r}" for name in names]
+    assert [one.label for one in row.clearances] == labels
     assert target.satisfied
     assert target.error.exact.max_relative == 0.0
     assert [along.error.exact.max_relative for along in target.along] == [0.0, 0.0]

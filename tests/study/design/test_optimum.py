@@ -22,10 +22,13 @@ def found_of(folder: Path, text: str, starts: list[str]) -> Found:
 
 
 class PressedModel:
-    """A model at whose ``call``-th design, as the search asks for it, Ctrl-C is pressed."""
+    """A model at whose ``call``-th design, as the search asks for it, Ctrl-C is pressed.
+
+    It counts the samples that are solved, but those of designs that are only screened.
+    """
 
     def __init__(self, model: Model, call: int) -> None:
-        self.model, self.call, self.calls = model, call, 0
+        self.model, self.call, self.calls, self.samples = model, call, 0, 0
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.model, name)
@@ -34,7 +37,9 @@ class PressedModel:
         self.calls += 1
         if self.calls == self.call:
             raise KeyboardInterrupt
-        return self.model.x(q, y)
+        x = self.model.x(q, y)
+        self.samples += len(x)
+        return x
 
 
 @pytest.mark.parametrize("call", [1, 3, 9, 12])
@@ -47,6 +52,13 @@ def test_ctrl_c_ends_the_whole_search_and_not_one_start_of_it(call: int, tmp_pat
     assert len(starts) <= 3
     assert pressed.calls <= call + 4  # what is known is judged on all samples, no step is made
     assert found.best.objective <= found.initial[1]
+
+
+def test_exact_solves_are_those_of_the_search_and_of_the_answer(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, SHIPPED)
+    counting, wanted = PressedModel(scene.model, 0), requirements_of(scene.file, scene.path)
+    found = find_optimum(replace(scene, model=counting), wanted, [], lambda line: None)
+    assert found.exact_solves == counting.samples + len(scene.path.q)
 
 
 def test_no_time_leaves_the_initial_design_and_says_so(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from scenes import changed, scene_of
 
 from eigassign import load_case
 from eigassign.assignment import requirements_of
+from eigassign.errors import AccuracyError
 from eigassign.pipeline import Options, solve_case
 from eigassign.study import (
     Scene,
@@ -141,6 +142,12 @@ def test_ranges_of_a_reduced_model_hold_the_exact_frequencies(tmp_path: Path) ->
         assert np.all(low <= exact * (1.0 + 1e-12))
         assert np.all(exact * (1.0 - 1e-12) <= high)
         assert np.all(high / low - 1.0 < 1e-3)
+
+
+def test_a_reduced_model_that_doubts_itself_bounds_nothing(tmp_path: Path) -> None:
+    ranges = reduced_ranges(scene_of(tmp_path, changed(SHORT, SECTION)), np.array([0.2, 7e-4]), 3)
+    with pytest.raises(AccuracyError, match="the tolerances are too wide for the reduced model"):
+        ranges(np.array([0.2, 1e-6]))  # m²: a rod that is soft in tension
 
 
 def test_without_tolerances_there_is_nothing_to_say(tmp_path: Path) -> None:
