@@ -2,9 +2,8 @@
 
 Reading order:
 
-    results     what is asked of a chart and what it holds, as plain numbers
-    timing      how much a chart tries, how jobs are timed, and the machine
-    question    the points at which every method is asked for frequencies
+    results     what is asked of a chart and what it holds, as plain numbers, and words for these
+    question    the points at which every method is asked for frequencies; how answers are timed
     methods     the list of methods
     comparison  every method put the same question; meshes; which no other beats, what to choose
     designs     ways to a design against the objective that each reaches
@@ -18,11 +17,10 @@ __all__, __getattr__, __dir__ = face(
         "comparison": "advise chart_meshes compare_methods front skipped_notes",
         "designs": "chart_designs",
         "methods": "grid_interpolation grid_points spread_points surrogate_families",
-        "question": "build_bench build_question",
+        "question": "QUICK Effort build_bench build_question measure",
         "results": (
             "Advice Asked AutoTakes Chart ChartPoint DesignRun Errors Front MeshRow Request Timing "
-            "excess_over"
+            "excess_over machine time_in_words"
         ),
-        "timing": "QUICK Effort machine measure time_in_words",
     },
 )

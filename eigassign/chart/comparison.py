@@ -15,8 +15,16 @@ from numpy.typing import NDArray
 
 from eigassign._version import __version__
 from eigassign.case.case_file import CaseFile
-from eigassign.chart.methods import Method, builder, list_methods, surrogate_families, use_of
-from eigassign.chart.question import Bench, Question, build_bench, build_question
+from eigassign.chart.methods import Method, list_methods, surrogate_families
+from eigassign.chart.question import (
+    Bench,
+    Effort,
+    Question,
+    build_bench,
+    build_question,
+    measure,
+    timed,
+)
 from eigassign.chart.results import (
     Advice,
     Asked,
@@ -29,8 +37,9 @@ from eigassign.chart.results import (
     Request,
     Timing,
     kind_of,
-)  # fmt: skip
-from eigassign.chart.timing import Effort, machine, measure, time_in_words, timed
+    machine,
+    time_in_words,
+)
 from eigassign.errors import EigassignError
 from eigassign.mechanism.assembly.build import refined
 from eigassign.study.build import build_model
@@ -51,16 +60,13 @@ def compare_methods(
     progress("solving the points of the question exactly")
     question = build_question(bench)
     charted, skipped = chart_methods(bench, question, request.accuracies, progress)
-    samples = float(question.asked.trajectory_samples)
-    counts = {"one trajectory": samples, "1000 trajectories": 1000.0 * samples}
-    if n := request.evaluations:
-        counts[f"{n:g} evaluations"] = n
-    named = {**counts, "online alone": None}.items()
-    asked = replace(question.asked, evaluations=request.evaluations or samples)
-    notes = list(skipped_notes(skipped))
-    most, d = bench.most_solves, len(bench.names)
-    if most < max([*effort.training, *(k**d for k in effort.nodes)]):
-        notes.append(f"no grid or surrogate is trained on over {most} exact solves")
+    one, n = float(question.asked.trajectory_samples), request.evaluations
+    counts = {"one trajectory": one, "1000 trajectories": 1000.0 * one}
+    named = counts | ({f"{n:g} evaluations": n} if n else {}) | {"online alone": None}
+    asked, notes = replace(question.asked, evaluations=n or one), list(skipped_notes(skipped))
+    largest = max([*effort.training, *(k ** len(bench.names) for k in effort.nodes)])
+    if bench.most_solves < largest:
+        notes.append(f"no grid or surrogate is trained on over {bench.most_solves} exact solves")
     if "Kriging" not in [family for family, *_ in surrogate_families()]:
         notes.append("no Kriging: it is charted where scikit-learn is installed")
     file = scene.file
@@ -68,7 +74,7 @@ def compare_methods(
         title=file.title, case_name=file.path.stem, case_sha256=file.sha256,
         reference=file.reference, version=__version__, quick=effort.quick, machine=machine(),
         asked=asked, points=tuple(charted), skipped=tuple(skipped.items()),
-        fronts=tuple(front(charted, name, n, asked.floor_hz) for name, n in named),
+        fronts=tuple(front(charted, name, n, asked.floor_hz) for name, n in named.items()),
         advice=tuple(advise(charted, asked, request, skipped)),
         notes=tuple(notes), warnings=scene.warnings,
     )  # fmt: skip
@@ -87,65 +93,62 @@ def skipped_notes(skipped: Mapping[str, str]) -> Iterator[str]:
 def chart_methods(
     bench: Bench, question: Question, accuracies: Sequence[float], progress: Callable[[str], None]
 ) -> tuple[list[ChartPoint], dict[str, str]]:
-    """A point for every method; of those that cannot answer, why.
+    """A point for every method, exact solvers first; of those that cannot answer, why.
 
     After a set-up that takes over ``effort.most_s`` no other of its family is made.
     """
-    charted, skipped = list[ChartPoint](), dict[str, str]()
-    families = dict[str, str]()  # why no other is made, or nothing
+    charted, skipped, ended = list[ChartPoint](), dict[str, str](), dict[str, str]()
     for method in list_methods(bench, accuracies):
-        if method.family not in families:
+        if method.family not in ended:
             progress(f"charting {method.family}")
+        exact = (p.online.median_s for p in charted if p.family.startswith("exact"))
         try:
-            if why := families.setdefault(method.family, ""):
+            if why := ended.setdefault(method.family, ""):
                 raise EigassignError(why)
-            point, set_up_s = _chart_method(bench, question, method)
+            point, set_up_s = _chart_method(bench, question, method, min(exact, default=0.0))
         except EigassignError as error:
             skipped[method.name] = str(error)
             continue
         charted.append(point)
         if set_up_s > bench.effort.most_s:
-            families[method.family] = f"{method.name} took {time_in_words(set_up_s)} to set up"
-    solvers = [p for p in charted if p.family.startswith("exact")]
-    exact_s = min(p.online.median_s for p in solvers)
-    for k, p in enumerate(charted):  # from so many evaluations: offline + N online < N exact
-        if p not in solvers and p.online.median_s < exact_s:
-            count = p.offline.median_s / (exact_s - p.online.median_s)
-            charted[k] = replace(p, break_even=count)
+            ended[method.family] = f"{method.name} took {time_in_words(set_up_s)} to set up"
     return charted, skipped
 
 
-def _chart_method(bench: Bench, question: Question, method: Method) -> tuple[ChartPoint, float]:
+def _chart_method(
+    bench: Bench, question: Question, method: Method, exact_s: float
+) -> tuple[ChartPoint, float]:
     """Set up, evaluated, timed and compared; and the seconds of setting up."""
     points, asked, effort, anew = question.points, question.asked, bench.effort, method.per_design
+    solver, samples = method.family.startswith("exact"), asked.trajectory_samples
     rows = question.runs if anew else [slice(0, method.parameters.get("points"))]
-    n, samples = 0 if anew else asked.random_points, asked.trajectory_samples
-    parts, build = [points[each] for each in rows], builder(bench, method)
-    one, set_up = measure(lambda: build(parts[0].y[0]), effort)
-    pairs = [(one, parts[0]), *((build(part.y[0]), part) for part in parts[1:])]
+    parts = [points[each] for each in rows]
+    own, set_up = measure(lambda: method.build(parts[0].y[0] if anew else None), effort)
+    pairs = [(own, parts[0]), *((method.build(part.y[0]), part) for part in parts[1:])]
     hz, spent = timed(lambda: np.vstack([built.evaluate(part) for built, part in pairs]))
     # as many as take 20 ms at the pace of the first answers
     many = int(np.clip(0.02 * len(hz) / (spent + 1e-9), min(300, len(parts[0])), 32768))
     some = parts[0][np.resize(np.arange(len(parts[0])), samples if anew else many)]
-    job, count = partial(one.evaluate, some), len(some)
+    job, count = partial(own.evaluate, some), len(some)
     if anew:
-        job = partial(lambda at: build(at.y[0]).evaluate(at), some)
-    elif one.along is not None:
+        job = partial(lambda at: method.build(at.y[0]).evaluate(at), some)
+    elif own.along is not None:
         designs = points.y[np.resize([run.start for run in question.runs], 1 + 32768 // samples)]
-        job, count = partial(one.along, designs), len(designs) * samples
-    solver, solves = method.family.startswith("exact"), sum(built.solves for built, _ in pairs)
-    exact = question.exact_hz[rows[0].start :][: len(hz)]
+        job, count = partial(own.along, designs), len(designs) * samples
+    offline = Timing(0.0, 0.0, 0.0, 0) if solver or anew else set_up
+    online, solves = measure(job, effort, count)[1], sum(built.solves for built, _ in pairs)
+    exact, n = question.exact_hz[rows[0].start :][: len(hz)], 0 if anew else asked.random_points
+    pays = not solver and online.median_s < exact_s
     point = ChartPoint(
         method=method.name, family=method.family, ours=method.ours, parameters=method.parameters,
-        offline=Timing(0.0, 0.0, 0.0, 0) if solver or anew else set_up,
-        online=measure(job, effort, count)[1],
-        solves=0 if anew else solves,
+        offline=offline, online=online, solves=0 if anew else solves,
         solves_online=solves / (samples * len(parts)) if anew else float(solver),
         everywhere=errors(hz, exact, asked.floor_hz if solver else 0.0),
         random=errors(hz[:n], exact[:n]) if n else None,
         trajectory=errors(hz[n:], exact[n:]) if len(hz) > n else None,
-        break_even=None, use=use_of(bench, method), at_once=samples if anew else 1,
-        note=ANEW if anew else "",
+        # from so many evaluations: offline + N online < N exact
+        break_even=offline.median_s / (exact_s - online.median_s) if pays else None,
+        use=method.use, at_once=samples if anew else 1, note=ANEW if anew else "",
         estimate=max((b.estimate for b, _ in pairs if b.estimate is not None), default=None),
     )  # fmt: skip
     return point, set_up.median_s
@@ -179,7 +182,7 @@ def chart_meshes(
     meshes = {
         counts: (k, finer) for k in sorted(effort.factors) for finer, counts in [refined(file, k)]
     }
-    rows, solved = list[MeshRow](), list[Floats]()
+    found, solved = list[tuple[float, int, int, Timing]](), list[Floats]()
     for counts, (factor, finer) in meshes.items():
         model = build_model(finer)
         if not counts or model.n_dof > effort.most_dof:
@@ -187,18 +190,16 @@ def chart_meshes(
         q, y = np.split(x, [len(model.q_names)], axis=1)
         hz, spent = measure(partial(model.frequencies, q, y, max(modes)), effort, len(x))
         solved.append(hz[:, np.array(modes) - 1])
-        rows.append(MeshRow(factor, sum(counts), model.n_dof, 0.0, 0.0, None, spent))
-    if len(rows) < 2:
+        found.append((factor, sum(counts), model.n_dof, spent))
+    if len(found) < 2:
         return ()
     off = np.array(solved) - (limit := solved[-1] + (solved[-1] - solved[-2]) / 15.0)
-    worst, relative = (np.abs(e).max(axis=(1, 2)).tolist() for e in (off, off / limit))
-    orders: list[float | None] = [None] * len(rows)
-    for k in range(len(rows) - 2):
-        if worst[k] > 0.0 and 0.0 < worst[k + 1] < np.inf:
-            finer_by = rows[k + 1].factor / rows[k].factor
-            orders[k] = float(np.log(worst[k] / worst[k + 1]) / np.log(finer_by))
-    found = zip(rows, worst, relative, orders, strict=True)
-    return tuple(replace(r, worst_hz=w, worst_relative=e, order=p) for r, w, e, p in found)
+    worst, relative = (np.abs(e).max(axis=(1, 2)) for e in (off, off / limit))
+    with np.errstate(divide="ignore", invalid="ignore"):  # where an error is 0
+        slopes = -np.diff(np.log(worst)) / np.diff(np.log([factor for factor, *_ in found]))
+    orders = [*(float(p) if np.isfinite(p) else None for p in slopes[:-1]), None, None]
+    rows = zip(found, worst.tolist(), relative.tolist(), orders, strict=True)
+    return tuple(MeshRow(*sizes, w, e, order, spent) for (*sizes, spent), w, e, order in rows)
 
 
 # --- Which methods no other beats, and what to choose
@@ -217,12 +218,15 @@ def front(
     A point that equals another in one of the two and is no better in the other is beaten. A method
     that is set up anew for every design has no part in the front of single evaluations.
     """
-    able = [p for p in _rivals(points) if p.at_once == 1 or evaluations is not None]
-    errors_hz = {p.method: max(p.everywhere.worst_hz, floor_hz) for p in able}
+    able = [
+        (p.cost_s(evaluations), max(p.everywhere.worst_hz, floor_hz), p.method)
+        for p in _rivals(points)
+        if p.at_once == 1 or evaluations is not None
+    ]
     kept, best = list[str](), np.inf
-    for p in sorted(able, key=lambda p: (p.cost_s(evaluations), errors_hz[p.method])):
-        if errors_hz[p.method] < best:
-            kept, best = [p.method, *kept], errors_hz[p.method]
+    for _, error, method in sorted(able, key=lambda each: each[:2]):
+        if error < best:
+            kept, best = [method, *kept], error
     return Front(name, evaluations, tuple(kept))
 
 
@@ -275,20 +279,18 @@ def _beside_auto(
     advice: Advice, points: Sequence[ChartPoint], skipped: Mapping[str, str]
 ) -> Advice:
     """The advice with what ``expansion.order: auto`` takes for the same accuracy."""
-    name, says = f"auto {advice.accuracy:.0e}", f"{advice.words}. `expansion.order: auto`"
+    name, says, auto = f"auto {advice.accuracy:.0e}", "`expansion.order: auto`", None
     for why in [why for method, why in skipped.items() if method.startswith(name)]:
-        auto = AutoTakes(None, None, None, 0.0, why)
-        advice = replace(advice, auto=auto, words=f"{says} refuses: {why}")
+        auto, says = AutoTakes(refused=why), f"{says} refuses: {why}"
     for own in [p for p in points if p.method.startswith(name)]:
         total, worst = own.cost_s(advice.evaluations), own.everywhere.worst_relative
         longer = f" ({total / advice.total_s:.2g} times as long)" if advice.total_s else ""
-        auto = AutoTakes(own.method, worst, total, own.parameters["choosing_s"], "")
-        words = (
+        auto = AutoTakes(own.method, worst, total, own.parameters["choosing_s"])
+        says = (
             f"{says} takes {own.method.partition(': ')[2]}: {time_in_words(total)}{longer}, off by "
             f"{_share(worst)} at most, after {time_in_words(auto.choosing_s)} of choosing"
         )
-        advice = replace(advice, auto=auto, words=words)
-    return advice
+    return advice if auto is None else replace(advice, auto=auto, words=f"{advice.words}. {says}")
 
 
 def _share(relative: float) -> str:

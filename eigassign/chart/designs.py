@@ -20,8 +20,8 @@ from eigassign.assignment.exact.design_problem import UnitBox
 from eigassign.assignment.exact.sequential import minimise
 from eigassign.assignment.requirements.requirement import Frequencies
 from eigassign.assignment.requirements.sampling import requirements_of
+from eigassign.chart.question import Effort, measure
 from eigassign.chart.results import DesignRun, excess_over
-from eigassign.chart.timing import Effort, measure
 from eigassign.errors import EigassignError
 from eigassign.modal.expansion import expand
 from eigassign.study.design.one_shot import assign_design

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import NdBSpline, RBFInterpolator, make_interp_spline
 from scipy.linalg import eigh
 
-from eigassign.chart.question import Bench, Points
-from eigassign.chart.timing import timed
+from eigassign.chart.question import Bench, Points, timed
 from eigassign.errors import AccuracyError, UsageError
+from eigassign.mechanism.kinematics.loop_closure import kronecker
 from eigassign.modal.exact.condensation import condense
 from eigassign.modal.expansion import NearestExpansion, expand
 from eigassign.modal.fit.fit import fit
@@ -38,46 +38,82 @@ from eigassign.study.planning import choose_order
 Floats = NDArray[np.float64]
 Surrogate = Callable[[Floats], Floats]  # points u (k, d) → (k, n_modes)
 Learn = Callable[[Floats, Floats], Surrogate]  # training points u (n, d) in [0, 1], their values
+REDUCE = "ea.reduce", "model, q0, y0"
 KINDS = ("linear", "cubic", "Chebyshev")
 SOLVES = (3, 4, 5, 6, 7, 9, 11, 13, 17, 25, 42, 60, 84, 120, 160, 220, 300, 400, 550)  # of fits
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class Built:
+    """A method that is set up: points → Hz (n, n_modes)."""
+
+    evaluate: Callable[[Points], Floats]
+    solves: int = 0  # exact ones of the set-up
+    estimate: float | None = None  # of its error by the method itself, relative in Hz
+    along: Callable[[Floats], Floats] | None = None  # of fits: many designs on whole trajectories
+
+
+@dataclass(frozen=True, eq=False)
 class Method:
-    """A way to the frequencies, which `build` sets up from its ``parameters`` alone."""
+    """A way to the frequencies; ``build`` sets it up, where ``per_design`` for one y (n_y,)."""
 
     name: str
     family: str
-    parameters: Mapping[str, Any]
+    parameters: Mapping[str, Any]  # from which it can be set up again
+    build: Callable[[Floats | None], Built]
+    use: str = ""  # how to ask for it: a line of a case file, or a call; of those by others none
+    per_design: bool = False  # so the set-up is a cost of the evaluation
 
     @property
     def ours(self) -> bool:
         """True of what eigassign offers; the others are what people do without it."""
-        return self.family.startswith(("Taylor", "1/λ", "reduced", "fit")) or self.family == "exact"
-
-    @property
-    def per_design(self) -> bool:
-        """True where it is set up anew for each design, which is a cost of the evaluation."""
-        return self.family.startswith("stations") or self.family.endswith("one trajectory")
-
-
-# --- The list, in the order in which they are charted
+        return bool(self.use) or self.family == "exact"
 
 
 def list_methods(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
     """The list of all methods; no training takes more exact solves than the time allows."""
     model = bench.scene.model
-    kind = "dense" if model.pencil.is_dense else "sparse"
-    yield Method(f"exact {kind}", "exact", {"solver": f"{kind}, in batches"})
+    kind, solver = "dense" if model.pencil.is_dense else "sparse", Built(bench.exact)
+    yield Method(f"exact {kind}", "exact", {"solver": f"{kind}, in batches"}, lambda _: solver)
     # one sample at a time, and few: about 20 n³ operations each at 6e9 a second
     if few := min(40, int(3e8 * bench.effort.most_s / model.n_dof**3)):
         told = {"solver": "scipy.linalg.eigh, subset by index", "points": few}
-        yield Method("exact dense, SciPy one by one", "exact by others", told)
+        peer = Built(partial(by_scipy, model, bench.scene.expansions.modes))
+        yield Method("exact dense, SciPy one by one", "exact by others", told, lambda _: peer)
     yield from _series(bench)
     yield from _auto(bench, accuracies)
     yield from _reduced_models(bench)
     yield from _fits(bench)
     yield from _surrogates(bench)
+
+
+# --- Exact solves by others
+
+
+def by_scipy(model: Model, modes: Sequence[int], points: Points) -> Floats:
+    """Frequencies (n, n_modes) in Hz by scipy.linalg.eigh on M_c z = μ K_E z, μ = 1/λ."""
+    elastic, mu = model.pencil.elastic, np.empty((len(points), max(modes)))
+    which = [len(elastic) - max(modes), len(elastic) - 1]
+    for k, x in enumerate(np.hstack([points.q, points.y])):
+        K, M = model.pencil.matrices(model.pencil.theta(x[None]))
+        _, M_c = condense(M, elastic, model.pencil.rigid)
+        K_E = K[0][np.ix_(elastic, elastic)]
+        mu[k] = eigh(M_c[0], K_E, eigvals_only=True, subset_by_index=which)[::-1]
+    return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(mu[:, np.array(modes) - 1])))
+
+
+# --- Series, reduced models and fits: eigassign's
+
+
+def _call(bench: Bench, function: str, arguments: str, **how: object) -> str:
+    """The words of a call for the modes of the chart."""
+    modes = bench.scene.expansions.modes
+    named = how if modes == (1,) else {"modes": modes, **how}
+    return f"{function}({', '.join([arguments, *(f'{k}={v!r}' for k, v in named.items())])})"
+
+
+def _answering(made: Any, solves: int, **more: Any) -> Built:
+    return Built(lambda points: made.frequencies(points.q, points.y), solves, **more)
 
 
 def _about(bench: Bench, count: int) -> tuple[Floats, Floats, str]:
@@ -89,18 +125,26 @@ def _about(bench: Bench, count: int) -> tuple[Floats, Floats, str]:
 
 def _series(bench: Bench) -> Iterator[Method]:
     """λ and 1/λ expanded to each order, in full and linearised; λ in full at several points too."""
-    effort, full = bench.effort, bench.scene.expansions.full
+    effort, full, told = bench.effort, bench.scene.expansions.full, dict[str, Any]()
     n = int(bench.scene.model.pencil.active.sum())
     wanted = sorted({*effort.orders, bench.scene.expansions.order})
     orders = [p for p in wanted if comb(n + p, p) <= effort.coefficients]
-    for symbol, linear, order in product(("Taylor", "1/λ"), (False, True), orders):
-        kind = "linearised" if linear else "full"
+    for inverse, linear, order in product((False, True), (False, True), orders):
+        kind, how = ("linearised", {"linear_in_y": True}) if linear else ("full", {})
+        symbol, use = "Taylor", f"in the case file, expansion: {{order: {order}}}"
+        if inverse:
+            call = _call(bench, "ea.expand", "model, q0, y0", order=order, **how)
+            symbol, use = "1/λ", f"{call}.inverse"
         told = {"order": order, "linear_in_y": linear, "q0": full.q0, "y0": full.y0}
-        yield Method(f"{symbol} {order} {kind}", f"{symbol}, {kind}", told)
+        build = partial(_expanded, bench, told, inverse)
+        yield Method(f"{symbol} {order} {kind}", f"{symbol}, {kind}", told, build, use)
     for count, order in product(effort.expansion_points[1:], orders[1:]):
         q, y, where = _about(bench, count)
         told = {"order": order, "q0": q, "y0": y}
-        yield Method(f"Taylor {order} at {where}", "Taylor, several points", told)
+        each = _call(bench, "ea.expand", "model, q, y", order=order)
+        use = f"[{each} for q, y in zip(q0, y0)], at a pose the one whose q is nearest"
+        build = partial(_expanded, bench, told, False)
+        yield Method(f"Taylor {order} at {where}", "Taylor, several points", told, build, use)
 
 
 def _auto(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
@@ -119,13 +163,25 @@ def _auto(bench: Bench, accuracies: Sequence[float]) -> Iterator[Method]:
                 raise AccuracyError(f"choosing took {spent:.1f} s before")
             choice, spent = timed(partial(choose_order, *case, full.q0, full.y0, full.modes))
         except AccuracyError as error:
-            yield Method(name, "Taylor, auto", {"refused": str(error)})
-            continue
-        q = np.vstack([choice.q0, *choice.more_q])
-        told = {"order": choice.order, "cluster_gap": choice.cluster_gap, "accuracy": accuracy}
-        told |= {"q0": q, "y0": np.tile(full.y0, (len(q), 1)), "choosing_s": spent}
-        name += f": Taylor {choice.order}{f' at {len(q)} points' if len(q) > 1 else ''}"
-        yield Method(name, "Taylor, auto", told)
+            told = {"refused": str(error)}
+        else:
+            q = np.vstack([choice.q0, *choice.more_q])
+            told = {"order": choice.order, "cluster_gap": choice.cluster_gap, "accuracy": accuracy}
+            told |= {"q0": q, "y0": np.tile(full.y0, (len(q), 1)), "choosing_s": spent}
+            name += f": Taylor {choice.order}{f' at {len(q)} points' if len(q) > 1 else ''}"
+        use = f"in the case file, expansion: {{order: auto, accuracy: {accuracy:g}}}"
+        yield Method(name, "Taylor, auto", told, partial(_expanded, bench, told, False), use)
+
+
+def _expanded(bench: Bench, told: Mapping[str, Any], inverse: bool, _: Floats | None) -> Built:
+    """λ about one or several points, of which the nearest answers, or 1/λ about one."""
+    if why := told.get("refused"):
+        raise AccuracyError(why)
+    pencil, modes = bench.scene.model.pencil, bench.scene.expansions.modes
+    how = {key: told[key] for key in ("order", "linear_in_y", "cluster_gap") if key in told}
+    points = zip(np.atleast_2d(told["q0"]), np.atleast_2d(told["y0"]), strict=True)
+    parts = tuple(expand(pencil, q0, y0, modes, **how) for q0, y0 in points)
+    return _answering(parts[0].inverse if inverse else NearestExpansion(parts), len(parts))
 
 
 def _reduced_models(bench: Bench) -> Iterator[Method]:
@@ -134,9 +190,13 @@ def _reduced_models(bench: Bench) -> Iterator[Method]:
     for (count, guard), m in product(kinds, bench.effort.half_orders):
         q, y, where = _about(bench, count)
         name, family = f"reduced m = {m}, {where}", f"reduced, {where}"
+        use = _call(bench, *REDUCE, half_order=m)
         if not guard:
             name, family = f"{name}, no guard", "reduced, no guard"
-        yield Method(name, family, {"half_order": m, "guard": guard, "q": q, "y": y})
+            inner = "no argument of ea.reduce: eigassign.modal.reduced.reduce.reduce"
+            use = _call(bench, inner, "model.pencil, q0, y0", half_order=m, guard=False)
+        told = {"half_order": m, "guard": guard, "q": q, "y": y}
+        yield Method(name, family, told, partial(_reduced_or_fitted, bench, told, {}), use)
 
 
 def _fits(bench: Bench) -> Iterator[Method]:
@@ -144,169 +204,87 @@ def _fits(bench: Bench) -> Iterator[Method]:
 
     Along the trajectory for each design, and over trajectory × box; there of reduced models too.
     """
-    most, moves = bench.most_solves, bench.place is not None
-    told: dict[str, Any]
-    for k in [k for k in SOLVES if k <= most]:
-        name, family, told = f"fit of {k} solves", "fit of given solves", {"solves": k}
-        if k <= 25 and moves:
-            yield Method(f"{name} along", f"{family}, one trajectory", told)
-        if k >= 9:
-            yield Method(name, family, told)
-    for a in bench.effort.accuracies:
-        name, family, told = f"fit {a:.0e}", "fit to an accuracy", {"accuracy": a, "most": most}
-        if moves:
-            yield Method(f"{name} along", f"{family}, one trajectory", told)
-        yield Method(name, family, told)
-    for (m, count), a in product(bench.effort.fitted, bench.effort.accuracies):
+    most, effort, over = bench.most_solves, bench.effort, "q, ea.Box(lower, upper)"
+    given = [("of given solves", f"of {k} solves", {"solves": k}) for k in SOLVES if k <= most]
+    to = [("to an accuracy", f"{a:.0e}", {"accuracy": a, "most": most}) for a in effort.accuracies]
+    for family, name, how in [*given, *to]:
+        build = partial(_reduced_or_fitted, bench, {}, how)
+        if bench.place is not None and how.get("solves", 0) <= 25:
+            use = _call(bench, "ea.fit", "model, q, y", **how)
+            yield Method(
+                f"fit {name} along", f"fit {family}, one trajectory", how, build, use, True
+            )
+        if how.get("solves", 9) >= 9:
+            use = f"{_call(bench, 'ea.fit', f'model, {over}', **how)}.along(designs)"
+            yield Method(f"fit {name}", f"fit {family}", how, build, use)
+    for (m, count), a in product(effort.fitted, effort.accuracies):
         q, y, where = _about(bench, count)
-        of, told = f"of reduced m = {m}, {where}", {"accuracy": a, "half_order": m, "q": q, "y": y}
-        yield Method(f"fit {a:.0e} {of}", f"fit {of}", told)
+        basis, how = {"half_order": m, "q": q, "y": y}, {"accuracy": a}
+        of, source = f"of reduced m = {m}, {where}", _call(bench, *REDUCE, half_order=m)
+        use = f"{_call(bench, 'ea.fit', f'{source}, {over}', **how)}.along(designs)"
+        build = partial(_reduced_or_fitted, bench, basis, how)
+        yield Method(f"fit {a:.0e} {of}", f"fit {of}", {**how, **basis}, build, use)
+
+
+def _reduced_or_fitted(
+    bench: Bench, basis: Mapping[str, Any], how: Mapping[str, Any], y: Floats | None
+) -> Built:
+    """A reduced model on a basis; or a fit of it, or of the model, at a design or over the box."""
+    scene, modes, solves = bench.scene, bench.scene.expansions.modes, 0
+    source: Model | ReducedModel = scene.model
+    if basis:
+        pencil, m, guard = scene.model.pencil, basis["half_order"], basis.get("guard", True)
+        source = reduce(pencil, basis["q"], basis["y"], modes, m, guard)
+        # for modes, wanted vectors, and vectors of guards
+        others = set(range(1, min(max(modes) + 1, len(pencil.elastic)) + 1)) - set(modes)
+        solves = (3 if guard and others and m >= 2 else 2) * len(basis["q"])
+    if not how:
+        return _answering(source, solves)
+    made = fit(source, scene.path, Box(bench.lower, bench.upper) if y is None else y, modes, **how)
+    solves = solves or made.solves
+    return _answering(made, solves, estimate=made.error_estimate, along=made.along)
+
+
+# --- Interpolation and surrogates: others'
 
 
 def _surrogates(bench: Bench) -> Iterator[Method]:
     """Interpolation between stations and on grids, and fits to spread-out points."""
-    effort, most, features = bench.effort, bench.most_solves, bench.names
+    effort, most, d = bench.effort, bench.most_solves, len(bench.names)
+    told: dict[str, Any]
     for k, kind in product(effort.stations, KINDS if bench.place is not None else ()):
         if k <= most and (kind != "Chebyshev" or k <= 20):  # of a higher degree: ill-conditioned
             told = {"interpolation": kind, "stations": k}
-            yield Method(f"stations {kind} {k}", f"stations, {kind}", told)
+            learn, u = partial(grid_interpolation, kind), grid_points(kind, k, 1)
+            yield _trained(bench, f"stations {kind} {k}", f"stations, {kind}", told, learn, u)
     for k, kind in product(effort.nodes, KINDS):
-        if k ** len(features) <= most and (kind != "cubic" or k >= 4):
-            told = {"nodes": k, "features": features, "interpolation": kind}
-            yield Method(f"grid {kind} {k}", f"grid, {kind}", told)
+        if k**d <= most and (kind != "cubic" or k >= 4):
+            told = {"nodes": k, "features": bench.names, "interpolation": kind}
+            learn, u = partial(grid_interpolation, kind), grid_points(kind, k, d)
+            yield _trained(bench, f"grid {kind} {k}", f"grid, {kind}", told, learn, u)
     counts = sorted({min(k, most) for k in effort.training})
-    for n, (family, _, how) in product(counts, list(surrogate_families())):
-        told = {**how, "training_points": n, "features": features}
-        yield Method(f"{family.replace(',', '')} {n}", family, told)
+    for n, (family, learn, how) in product(counts, list(surrogate_families())):
+        told = {**how, "training_points": n, "features": bench.names}
+        name, u = f"{family.replace(',', '')} {n}", spread_points(n, d)
+        yield _trained(bench, name, family, told, learn, u)
 
 
-# --- How they are asked for, and set up
-
-
-def use_of(bench: Bench, method: Method) -> str:
-    """How to ask for a method: a line of a case file, or a call; empty of those by others."""
-    family, p, modes = method.family, method.parameters, bench.scene.expansions.modes
-
-    def call(function: str, arguments: str, *keys: str) -> str:
-        given = {"modes": modes} if modes != (1,) else {}
-        given |= {key: p[key] for key in keys if key in p}
-        return f"{function}({', '.join([arguments, *(f'{k}={v!r}' for k, v in given.items())])})"
-
-    if family == "Taylor, auto":
-        return f"in the case file, expansion: {{order: auto, accuracy: {p['accuracy']:g}}}"
-    if family == "Taylor, several points":
-        each = call("ea.expand", "model, q, y", "order")
-        return f"[{each} for q, y in zip(q0, y0)], at a pose the one whose q is nearest"
-    if family.startswith("Taylor"):
-        return f"in the case file, expansion: {{order: {p['order']}}}"
-    if family.startswith("1/λ"):
-        linear = ("linear_in_y",) * p["linear_in_y"]
-        return f"{call('ea.expand', 'model, q0, y0', 'order', *linear)}.inverse"
-    reduced = call("ea.reduce", "model, q0, y0", "half_order")
-    if family == "reduced, no guard":
-        function = "no argument of ea.reduce: eigassign.modal.reduced.reduce.reduce"
-        return call(function, "model.pencil, q0, y0", "half_order", "guard")
-    if family.startswith("reduced"):
-        return reduced
-    if method.per_design and method.ours:
-        return call("ea.fit", "model, q, y", "solves", "accuracy", "most")
-    if family.startswith("fit"):
-        over = f"{reduced if 'half_order' in p else 'model'}, q, ea.Box(lower, upper)"
-        return f"{call('ea.fit', over, 'solves', 'accuracy', 'most')}.along(designs)"
-    return ""
-
-
-@dataclass(frozen=True, eq=False)
-class Built:
-    """A method that is set up: points → Hz (n, n_modes)."""
-
-    evaluate: Callable[[Points], Floats]
-    solves: int = 0  # exact ones of the set-up
-    estimate: float | None = None  # of its error by the method itself, relative in Hz
-    along: Callable[[Floats], Floats] | None = None  # of fits: many designs on whole trajectories
-
-
-def builder(bench: Bench, method: Method) -> Callable[[Floats], Built]:
-    """The set-up of a method, a function of the design y (n_y,) where each has its own."""
-    family, scene = method.family, bench.scene
-    if family == "exact":
-        return lambda _: Built(bench.exact)
-    if family == "exact by others":
-        return lambda _: Built(partial(by_scipy, scene.model, scene.expansions.modes))
-    if not method.ours:
-        return _trained(bench, method)
-    series = family.startswith(("Taylor", "1/λ"))
-    return partial(_expanded if series else _reduced_or_fitted, bench, method)
-
-
-def _answering(made: Any, solves: int, **more: Any) -> Built:
-    return Built(lambda points: made.frequencies(points.q, points.y), solves, **more)
-
-
-def by_scipy(model: Model, modes: Sequence[int], points: Points) -> Floats:
-    """Frequencies (n, n_modes) in Hz by scipy.linalg.eigh on M_c z = μ K_E z, μ = 1/λ."""
-    elastic, mu = model.pencil.elastic, np.empty((len(points), max(modes)))
-    which = [len(elastic) - max(modes), len(elastic) - 1]
-    for k, x in enumerate(np.hstack([points.q, points.y])):
-        K, M = model.pencil.matrices(model.pencil.theta(x[None]))
-        _, M_c = condense(M, elastic, model.pencil.rigid)
-        K_E = K[0][np.ix_(elastic, elastic)]
-        mu[k] = eigh(M_c[0], K_E, eigvals_only=True, subset_by_index=which)[::-1]
-    return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(mu[:, np.array(modes) - 1])))
-
-
-def _expanded(bench: Bench, method: Method, _: Floats) -> Built:
-    """λ about one or several points, of which the nearest answers, or 1/λ about one."""
-    pencil, modes, p = bench.scene.model.pencil, bench.scene.expansions.modes, method.parameters
-    if why := p.get("refused"):
-        raise AccuracyError(why)
-    how = {key: p[key] for key in ("order", "linear_in_y", "cluster_gap") if key in p}
-    points = zip(np.atleast_2d(p["q0"]), np.atleast_2d(p["y0"]), strict=True)
-    parts = tuple(expand(pencil, q0, y0, modes, **how) for q0, y0 in points)
-    made = parts[0].inverse if method.family.startswith("1/λ") else NearestExpansion(parts)
-    return _answering(made, len(parts))
-
-
-def _reduced_or_fitted(bench: Bench, method: Method, y: Floats) -> Built:
-    """A reduced model; or a fit of it, or of the model, over the box or at one design."""
-    scene, modes, p = bench.scene, bench.scene.expansions.modes, method.parameters
-    source: Model | ReducedModel = scene.model
-    solves = 0
-    if (m := p.get("half_order")) is not None:
-        pencil, guard = scene.model.pencil, p.get("guard", True)
-        source = reduce(pencil, p["q"], p["y"], modes, m, guard)
-        # for modes, wanted vectors, and vectors of guards
-        others = set(range(1, min(max(modes) + 1, len(pencil.elastic)) + 1)) - set(modes)
-        solves = (3 if guard and others and m >= 2 else 2) * len(p["q"])
-    if method.family.startswith("reduced"):
-        return _answering(source, solves)
-    over = y if method.per_design else Box(bench.lower, bench.upper)
-    how = {key: p[key] for key in ("solves", "accuracy", "most") if key in p}
-    made = fit(source, scene.path, over, modes, **how)
-    along = None if method.per_design else made.along
-    return _answering(made, solves or made.solves, estimate=made.error_estimate, along=along)
-
-
-def _trained(bench: Bench, method: Method) -> Callable[[Floats], Built]:
-    """Trained on exact solves at the samples nearest to training points, each once."""
-    p, d = method.parameters, 1 if method.per_design else len(bench.names)
-    if kind := p.get("interpolation"):
-        learn: Learn = partial(grid_interpolation, kind)
-        u = grid_points(kind, p.get("stations") or p["nodes"], d)
-    else:
-        learn = {family: learn for family, learn, _ in surrogate_families()}[method.family]
-        u = spread_points(p["training_points"], d)
+def _trained(
+    bench: Bench, name: str, family: str, told: Mapping[str, Any], learn: Learn, u: Floats
+) -> Method:
+    """A method that learns exact solves at the samples nearest to points u (n, d), each once."""
+    d, per_design = u.shape[1], family.startswith("stations")
     near = bench.nearest(np.pad(u, ((0, 0), (0, len(bench.names) - d))))
 
-    def build(y: Floats) -> Built:
-        at = replace(near, y=np.tile(y, (len(near), 1))) if method.per_design else near
+    def build(y: Floats | None) -> Built:
+        at = near if y is None else replace(near, y=np.tile(y, (len(near), 1)))
         try:
             made = learn(at.u[:, :d], bench.exact(at))
         except (ValueError, np.linalg.LinAlgError) as error:  # too few points, or all in a plane
-            raise UsageError(f"{method.family}: {error}") from error
+            raise UsageError(f"{family}: {error}") from error
         return Built(lambda points: made(points.u[:, :d]), len(at))
 
-    return build
+    return Method(name, family, told, build, per_design=per_design)
 
 
 # --- Interpolation and regression on the unit box
@@ -377,13 +355,10 @@ def surrogate_families() -> Iterator[tuple[str, Learn, dict[str, Any]]]:
 
 
 def spread_points(count: int, d: int) -> Floats:
-    """Training points (count, d): the corners where they are few, then the R_d sequence.
+    """Training points (count, d): the corners where they are few, then `kronecker`'s.
 
-    u_k = (1/2 + k α) mod 1 with α_i = g^-i, g^(d+1) = g + 1 (Roberts 2018). SciPy's Halton and
-    Sobol points left quintic RBF on the paper's arm 1.8 and 1.7 times as far off at 125 points.
+    SciPy's Halton and Sobol points left quintic RBF on the paper's arm 1.8 and 1.7 times as far off
+    at 125 points.
     """
-    corners = list(product((0.0, 1.0), repeat=d)) if 3 * 2**d <= count else []
-    g = max(np.roots([1.0, *np.zeros(d - 1), -1.0, -1.0]).real)
-    k = np.arange(1, count - len(corners) + 1)[:, None]
-    inside = (0.5 + k * g ** -np.arange(1.0, d + 1.0)) % 1.0
-    return np.vstack([np.array(corners).reshape(-1, d), inside])
+    few = np.array(list(product((0.0, 1.0), repeat=d) if 3 * 2**d <= count else ())).reshape(-1, d)
+    return np.vstack([few, kronecker(count - len(few) + 1, d)[1:]])

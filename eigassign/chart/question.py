@@ -1,22 +1,26 @@
-"""The question put to every method: frequencies along the trajectory, over the box of designs.
+"""The question put to every method, and how the answers are timed.
 
-The points are random samples of trajectory × design box, and the trajectory at several designs.
-Surrogates and grids are functions of a few *features* u in [0, 1]: the place along the trajectory,
-and each design parameter that may change. The place is the joint coordinate itself where only one
-matters to any frequency, else the distance travelled in joint coordinates. Either is the best
-choice for them: they need not learn poses that the trajectory never takes.
+Frequencies are asked for at random samples of trajectory × design box, and along the trajectory at
+several designs. Surrogates and grids are functions of a few *features* u in [0, 1]: the place along
+the trajectory, and each design parameter that may change. The place is the joint coordinate itself
+where only one matters to any frequency, else the distance travelled in joint coordinates. Either is
+the best choice for them: they need not learn poses that the trajectory never takes.
+
+Times are processor time, which on one thread is the time it takes where nothing else runs.
 """
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.chart.results import Asked
-from eigassign.chart.timing import Effort, timed
+from eigassign.chart.results import Asked, Timing
 from eigassign.errors import CaseError
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.study.planning import SEED, at_corners, at_random, corners, joint_map
@@ -24,6 +28,64 @@ from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+T = TypeVar("T")
+
+
+# --- How much is tried, and how it is timed
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Points, sizes of the methods and time limits, unless given those without ``--quick``."""
+
+    quick: bool = False
+    random_points: int = 600  # at which methods are compared, beside
+    samples_per_design: int = 152  # along the trajectory at several designs
+    most_s: float = 60.0  # for the exact answers, one method's set-up, one search for a design
+    orders: tuple[int, ...] = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12)
+    coefficients: int = 5000  # largest set that is expanded
+    half_orders: tuple[int, ...] = (0, 1, 2, 3)
+    expansion_points: tuple[int, ...] = (1, 3, 5)
+    fitted: tuple[tuple[int, int], ...] = ((1, 3), (2, 1))  # half order, points of reduced models
+    accuracies: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)  # of fits
+    nodes: tuple[int, ...] = (2, 3, 4, 5, 6, 7, 9, 11)  # of a grid, along each axis
+    stations: tuple[int, ...] = (3, 5, 9, 17, 33, 65)
+    training: tuple[int, ...] = (27, 64, 125, 343)  # points of surrogates
+    factors: tuple[float, ...] = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # of a mesh's elements
+    most_dof: int = 40_000  # of a refined mesh
+    objectives: int = 600  # exact evaluations of the objective in a search
+    repeats: int = 15  # of a job, at most, and none is begun after
+    repeat_s: float = 1.0  # its first run included
+
+
+QUICK = Effort(
+    quick=True, random_points=150, most_s=2.0, orders=(1, 2, 3, 4, 6, 8), coefficients=1000,
+    expansion_points=(1, 3), fitted=(), accuracies=(1e-2, 1e-4, 1e-6, 1e-8), nodes=(3, 5, 7),
+    stations=(5, 17), training=(27, 125), factors=(0.5, 1.0, 2.0, 4.0), most_dof=2500,
+    objectives=60, repeat_s=0.1,
+)  # fmt: skip
+
+
+def timed(job: Callable[[], T]) -> tuple[T, float]:
+    """The result of a job, and the seconds it took."""
+    start = time.process_time()
+    return job(), time.process_time() - start
+
+
+def measure(job: Callable[[], T], effort: Effort, count: int = 1) -> tuple[T, Timing]:
+    """The result of a job, and how long each of its ``count`` parts takes.
+
+    The first run does not count, for it warms caches, unless it takes too long for another.
+    """
+    result, first = timed(job)
+    spent = list[float]()
+    while len(spent) < effort.repeats and first + sum(spent) < effort.repeat_s:
+        spent.append(timed(job)[1])
+    median, low, high = (np.quantile(spent or [first], (0.5, 0.25, 0.75)) / count).tolist()
+    return result, Timing(median, low, high, len(spent))
+
+
+# --- Features of the case, and its exact solves
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +117,7 @@ class Bench:
     def points(self, samples: Ints, y: Floats) -> Points:
         """Samples of the trajectory (n,) at designs (n, n_y)."""
         free = self.upper > self.lower
-        u = ((y - self.lower) / np.where(free, self.upper - self.lower, 1.0))[:, free]
+        u = (y - self.lower)[:, free] / (self.upper - self.lower)[free]
         u = u if self.place is None else np.column_stack([self.place[samples], u])
         return Points(self.scene.path.q[samples], y, u)
 
@@ -93,25 +155,19 @@ class Bench:
 
 def build_bench(scene: Scene, effort: Effort) -> Bench:
     """Raises CaseError where nothing varies that a frequency could depend on."""
-    (lower, upper), place = scene.bounds, _place(scene)
-    names = ["place along the trajectory"] if place is not None else []
-    names += [scene.model.y_names[k] for k in np.flatnonzero(upper > lower)]
+    (lower, upper), place, model = scene.bounds, _place(scene), scene.model
+    names = [] if place is None else ["place along the trajectory"]
+    names += [model.y_names[k] for k in np.flatnonzero(upper > lower)]
     if not names:
-        raise CaseError((scene.file.problem("trajectory", _nothing_varies(scene)),))
+        why, remedy = "no coordinate changes a frequency", "give"
+        which = zip(scene.file.coordinates.values(), model.pencil.active, strict=False)
+        if joints := ", ".join(dict.fromkeys(each.joint for each, active in which if active)):
+            still = "along the trajectory nothing moves that a frequency depends on"
+            why, remedy = f"{still} (joints: {joints})", "let it move, or give"
+        room = f"{remedy} a design parameter a `max` above its `min`"
+        message = f"nothing to chart: {why}, and no design parameter may change; {room}"
+        raise CaseError((scene.file.problem("trajectory", message),))
     return Bench(scene, effort, tuple(names), place, lower, upper)
-
-
-def _nothing_varies(scene: Scene) -> str:
-    """Why there is nothing to chart, and what to do."""
-    pencil, driven = scene.model.pencil, list(scene.file.coordinates.values())
-    which = np.flatnonzero(pencil.active[: pencil.n_q])
-    joints = ", ".join(dict.fromkeys(driven[k].joint for k in which if k < len(driven)))
-    why, remedy = "no coordinate changes a frequency", "give"
-    if joints:
-        why = f"along the trajectory nothing moves that a frequency depends on (joints: {joints})"
-        remedy = "let it move, or give"
-    room = f"{remedy} a design parameter a `max` above its `min`"
-    return f"nothing to chart: {why}, and no design parameter may change; {room}"
 
 
 def _place(scene: Scene) -> Floats | None:
@@ -123,6 +179,9 @@ def _place(scene: Scene) -> Floats | None:
         return np.asarray((s[:, 0] - s.min()) / np.ptp(s))
     travelled = np.cumsum(np.linalg.norm(np.diff(s, axis=0, prepend=s[:1]), axis=1))
     return np.asarray(travelled / travelled[-1])
+
+
+# --- The question
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,14 +203,15 @@ def build_question(bench: Bench) -> Question:
     scene, effort, designs = bench.scene, bench.effort, corners(len(bench.lower))
     wanted = effort.random_points + (1 + len(designs)) * effort.samples_per_design
     share = min(1.0, effort.most_s / (wanted * bench.solve_s))
-    n_random = max(4, int(share * effort.random_points))
-    along = max(4, int(share * effort.samples_per_design))
+    n_random, along = (
+        max(4, int(share * count)) for count in (effort.random_points, effort.samples_per_design)
+    )
     case = scene.file, scene.trajectory, scene.q0, np.clip(scene.initial, *scene.bounds)
     found = at_random(*case, n_random).joined(at_corners(*case, designs, along))
     points = bench.points(found.samples, found.x[:, len(scene.q0) :])
-    n = len(scene.path.spread(along))
+    n, modes = len(scene.path.spread(along)), scene.expansions.modes
     runs = tuple(slice(k, k + n) for k in range(n_random, len(points), n))
-    exact_hz, modes, samples = bench.exact(points), scene.expansions.modes, len(scene.path.q)
+    exact_hz, samples = bench.exact(points), len(scene.path.q)
     floor = max(rounding_error(scene.model.pencil, x, max(modes)) for x in found.x[[0, -1]])
     asked = Asked(
         modes=modes, n_dof=scene.model.n_dof, features=bench.names, random_points=n_random,

@@ -1,4 +1,4 @@
-"""What is asked of a chart, and what it holds, as plain numbers.
+"""What is asked of a chart and what it holds, as plain numbers, and the words for these.
 
 Seconds and Hz; errors are those of a frequency, over all charted modes. Every number can be
 computed again from ``parameters``, the seed and the case file.
@@ -6,10 +6,18 @@ computed again from ``parameters``, the seed and the case file.
 
 from __future__ import annotations
 
+import os
+import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import ceil
-from typing import Any
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import scipy
+
+from eigassign._version import __version__
 
 SCHEMA = 4  # of chart.json
 _KINDS = {  # of methods whose family begins so: the first that fits
@@ -28,18 +36,44 @@ def kind_of(family: str) -> str:
     return next(kind for beginning, kind in _KINDS.items() if family.startswith(beginning))
 
 
+def time_in_words(seconds: float) -> str:
+    """Three digits with a unit: ``12.3 µs``."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9)):
+        if seconds >= size or (unit == "ns" and seconds > 0.0):
+            return f"{seconds / size:.3g} {unit}"
+    return "0"
+
+
+def excess_over(best: float, objective: float) -> float:
+    """(F − F_best) / F_best; an F_best below 1e-12, a rms error of 1e-6, is no yardstick."""
+    return (objective - best) / max(best, 1e-12)
+
+
+def machine() -> dict[str, Any]:
+    """Processor, cores, versions, linear algebra and its threads; no names of host or user."""
+    file, settings = Path("/proc/cpuinfo"), cast(dict[str, Any], np.show_config(mode="dicts"))
+    lines = file.read_text(errors="replace").splitlines() if file.exists() else []
+    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    blas = settings.get("Build Dependencies", {}).get("blas", {})
+    threads = {os.environ.get(f"{name}_NUM_THREADS") for name in ("OPENBLAS", "OMP", "MKL")}
+    packages = {"eigassign": __version__, "NumPy": np.__version__, "SciPy": scipy.__version__}
+    return {
+        "processor": (named or [platform.processor()])[0] or platform.machine(),
+        "cores": os.cpu_count() or 1,
+        "system": f"{platform.system()} {platform.machine()}",
+        "versions": {"Python": platform.python_version(), **packages},
+        "blas": f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip(),
+        "threads": "1" if threads == {"1"} else "as the library chooses",  # NumPy does not tell
+    }
+
+
 @dataclass(frozen=True)
 class Request:
     """The advice that is asked for."""
 
-    accuracy: float | None = None  # worst relative error in Hz; several if None
+    accuracies: tuple[float, ...] = (1e-2, 1e-4, 1e-6, 1e-8)  # worst relative errors in Hz
     budget_s: float | None = None  # advice for this time, too
     evaluations: float | None = None  # one trajectory, and a thousand of them, if None
-
-    @property
-    def accuracies(self) -> tuple[float, ...]:
-        """The accuracies for which advice is given."""
-        return (1e-2, 1e-4, 1e-6, 1e-8) if self.accuracy is None else (self.accuracy,)
 
 
 @dataclass(frozen=True)
@@ -91,8 +125,8 @@ class ChartPoint:
         """Seconds for set-up and so many evaluations; of one evaluation alone where None."""
         if evaluations is None:
             return self.online.median_s
-        runs = ceil(evaluations / self.at_once)
-        return self.offline.median_s + runs * self.at_once * self.online.median_s
+        paid = ceil(evaluations / self.at_once) * self.at_once
+        return self.offline.median_s + paid * self.online.median_s
 
 
 @dataclass(frozen=True)
@@ -109,16 +143,16 @@ class Front:
 
 @dataclass(frozen=True)
 class AutoTakes:
-    """What ``expansion.order: auto`` takes for an accuracy, as charted.
+    """What ``expansion.order: auto`` takes for an accuracy, as charted, or why it refuses.
 
-    ``choosing_s`` went before and is no part of ``total_s``; ``refused`` says why there is none.
+    ``choosing_s`` went before and is no part of ``total_s``.
     """
 
-    method: str | None
-    worst_relative: float | None
-    total_s: float | None
-    choosing_s: float
-    refused: str
+    method: str | None = None
+    worst_relative: float | None = None
+    total_s: float | None = None
+    choosing_s: float = 0.0
+    refused: str = ""
 
 
 @dataclass(frozen=True)
@@ -167,11 +201,6 @@ class DesignRun:
     excess: float  # objective over the best one found by any method: see `excess_over`
     trace: tuple[tuple[float, float], ...] = ()  # of searches: seconds, the best F so far
     note: str = ""
-
-
-def excess_over(best: float, objective: float) -> float:
-    """(F − F_best) / F_best; an F_best below 1e-12, a rms error of 1e-6, is no yardstick."""
-    return (objective - best) / max(best, 1e-12)
 
 
 @dataclass(frozen=True)

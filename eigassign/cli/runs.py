@@ -296,11 +296,12 @@ def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
     exact answers on this machine; the mesh; and ways to a design. Leaves figures, chart.json and
     report.html, and says what to choose.
     """
+    from eigassign.chart.question import QUICK, Effort
     from eigassign.chart.results import Request
-    from eigassign.chart.timing import QUICK, Effort
     from eigassign.pipeline import chart as charting
 
-    request = Request(how["accuracy"], how["budget_s"], how["evaluations"])
+    accuracies = Request.accuracies if how["accuracy"] is None else (how["accuracy"],)
+    request = Request(accuracies, how["budget_s"], how["evaluations"])
     out = how["out"] or Path("results", f"{case.stem}_chart")
     with reporting(how) as reporter:
         given = _options({**how, "out": out, "cache_dir": None, "no_cache": True}, reporter)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from eigassign.chart.comparison import chart_meshes, compare_methods
 from eigassign.chart.designs import chart_designs
+from eigassign.chart.question import Effort
 from eigassign.chart.results import Chart, Request
-from eigassign.chart.timing import Effort
 from eigassign.errors import AccuracyError
 from eigassign.output.reports.chart import write_chart
 from eigassign.pipeline.run import Options, prepare

@@ -53,7 +53,7 @@ def advised(points: list[ChartPoint], n: float, floor: float = 0.0, **request: A
     asked = Asked((1,), 1, ("m",), 1, 1, 1, 1, n, 1, 1.0, floor)
     (given,) = [
         a for a in advise(points, asked, Request(evaluations=n, **request), {})
-        if a.asked == ("accuracy" if "accuracy" in request else "budget")
+        if a.asked == ("accuracy" if "accuracies" in request else "budget")
     ]  # fmt: skip
     return given
 
@@ -89,23 +89,23 @@ def test_what_is_set_up_for_a_whole_trajectory_is_paid_for_whole() -> None:
     assert stations.cost_s(1) == stations.cost_s(150) == pytest.approx(150e-6)
     assert stations.cost_s(151) == pytest.approx(300e-6)
     exact = point("exact", 0.0, 4e-5, 0.0)
-    assert advised([stations, exact], 1, accuracy=1e-2).method == "exact"
-    assert advised([stations, exact], 150, accuracy=1e-2).method == "stations"
+    assert advised([stations, exact], 1, accuracies=(1e-2,)).method == "exact"
+    assert advised([stations, exact], 150, accuracies=(1e-2,)).method == "stations"
 
 
 def test_advice_is_the_cheapest_that_is_good_enough_and_does_not_doubt_itself() -> None:
-    found = advised(POINTS, 1e4, accuracy=1e-7)
+    found = advised(POINTS, 1e4, accuracies=(1e-7,))
     assert found.method == "good"
     assert found.total_s == pytest.approx(1e-2 + 1e4 * 1e-5)
-    assert advised(POINTS, 1e4, accuracy=1e-2).method == "rough"
-    assert advised(POINTS[1:], 1e4, accuracy=1e-9).method is None
+    assert advised(POINTS, 1e4, accuracies=(1e-2,)).method == "rough"
+    assert advised(POINTS[1:], 1e4, accuracies=(1e-9,)).method is None
     lucky = point("lucky", 0.0, 1e-7, 1e-6, estimate=1e-3)
-    assert advised([*POINTS, lucky], 1e4, accuracy=1e-6).method == "good"
-    assert advised([*POINTS, lucky], 1e4, accuracy=1e-5).method == "lucky"
+    assert advised([*POINTS, lucky], 1e4, accuracies=(1e-6,)).method == "good"
+    assert advised([*POINTS, lucky], 1e4, accuracies=(1e-5,)).method == "lucky"
 
 
 def test_nothing_is_advised_below_round_off() -> None:
-    found = advised(POINTS, 1e4, 2e-7, accuracy=1e-7)
+    found = advised(POINTS, 1e4, 2e-7, accuracies=(1e-7,))
     assert found.method is None
     assert found.auto is None
     assert "round-off moves even exact solves by 2.0e-07" in found.words
@@ -119,14 +119,14 @@ def test_advice_for_a_budget_is_the_most_accurate_in_time() -> None:
 
 def test_advice_is_a_sentence_that_says_what_the_method_does_and_that_auto_refuses() -> None:
     stations = point("stations linear 3", 0.0, 1e-3, 1e-3, family="stations, linear")
-    found = advised([stations], 152, accuracy=1e-2)
+    found = advised([stations], 152, accuracies=(1e-2,))
     assert found.words.startswith(
         "for 152 evaluations within 1 % of exact the quickest is stations linear 3 (interpolation"
     )
     assert "and is off by 0.001 % at most" in found.words
     asked = Asked((1,), 1, ("m",), 1, 1, 1, 1, 1.0, 1, 1.0, 0.0)
     refused = {"auto 1e-02": "no expansion of order up to 4"}
-    (found,) = advise([stations], asked, Request(1e-2, evaluations=152), refused)
+    (found,) = advise([stations], asked, Request((1e-2,), evaluations=152), refused)
     assert found.auto is not None
     assert found.auto.method is None
     assert found.auto.refused == "no expansion of order up to 4"

@@ -148,7 +148,7 @@ def test_several_modes_on_several_trajectories_are_charted_too(tmp_path: Path) -
     text = (CASES / "five_bar.yaml").read_text()
     scene = scene_of(tmp_path, text.replace("modes: [1]", "modes: [1, 2]"))
     few = replace(TINY, orders=(2,), half_orders=(1,), expansion_points=(1,), fitted=(), nodes=(4,))
-    made = compare_methods(scene, few, Request(accuracy=1e-3), lambda line: None)
+    made = compare_methods(scene, few, Request((1e-3,)), lambda line: None)
     assert made.asked.modes == scene.expansions.modes
     assert {p.family for p in made.points} >= {"exact", "fit to an accuracy", "grid, cubic"}
     assert min(p.everywhere.worst_relative for p in made.points if not p.ours) < 1e-3

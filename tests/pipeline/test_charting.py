@@ -25,7 +25,7 @@ def test_a_case_whose_auto_refuses_is_charted_all_the_same(tmp_path: Path) -> No
     start, end = SHIPPED.index("expansion:"), SHIPPED.index("targets:")
     line = "expansion: {order: auto, accuracy: 1e-13}\n"
     (tmp_path / "arm.yaml").write_text(f"{SHIPPED[:start]}{line}{SHIPPED[end:]}")
-    request = Request(accuracy=3e-11)
+    request = Request((3e-11,))
     made = chart_case(load_case(tmp_path / "arm.yaml"), Options(), FEW, request)
     assert made.advice[0].auto is not None
     assert made.advice[0].auto.refused.startswith("no reduced model of up to 200 vectors")

@@ -8,8 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from eigassign.chart.results import SCHEMA, Chart, Timing
-from eigassign.chart.timing import time_in_words
+from eigassign.chart.results import SCHEMA, Chart, Timing, time_in_words
 from eigassign.output.figures.front import chart_figures
 from eigassign.output.formats import capital
 from eigassign.output.reports import page as report
