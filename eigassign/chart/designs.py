@@ -59,12 +59,11 @@ def chart_designs(
     if scene.path.follows_design:
         return (), ("no designs are charted where the coordinates follow the design",)
     path = scene.path.chosen(scene.path.spread(max(5, int(effort.most_s / 40.0 / solve_s))))
-    runs, notes = list[DesignRun](), list[str]()
-    if len(path.q) < len(scene.path.q):
-        few = f"designs are charted on {len(path.q)} of {len(scene.path.q)} samples"
+    runs, notes, samples = list[DesignRun](), list[str](), len(scene.path.q)
+    if len(path.q) < samples:
+        few = f"designs are charted on {len(path.q)} of {samples} samples"
         notes.append(f"{few} of the trajectory, for an exact solve takes long")
-    targets = requirements_of(scene.file, path)
-    task = Task(replace(scene, trajectory=path), targets, 0.0)
+    task = Task(replace(scene, trajectory=path), requirements_of(scene.file, path), 0.0)
     most = min(effort.objectives, max(1, int(effort.most_s / (len(path.q) * solve_s))))
     ways: dict[str, Callable[[Task], Reached]] = {
         "one shot": _one_shot,
@@ -120,10 +119,10 @@ def _search(most: int, search: Callable[..., Any], how: dict[str, Any], task: Ta
 
     A design counts as the best if it keeps the limits.
     """
-    scene, posed = task.scene, variant_of(task, ())
-    problem, asked, q = posed.problem, posed.requirements, scene.path.q
-    box, begun = UnitBox.of(problem), time.process_time()
-    start = box.z(np.clip(scene.initial, problem.lower, problem.upper))
+    posed, q, begun = variant_of(task, ()), task.scene.path.q, time.process_time()
+    problem, asked = posed.problem, posed.requirements
+    box = UnitBox.of(problem)
+    start = box.z(np.clip(task.scene.initial, problem.lower, problem.upper))
     best, trace, calls, note = (np.inf, start), list[tuple[float, float]](), 0, ""
 
     def objective(z: Floats) -> Any:
@@ -136,7 +135,7 @@ def _search(most: int, search: Callable[..., Any], how: dict[str, Any], task: Ta
         if "jac" in how:
             seen = problem.appraise(y)
         else:
-            hz = scene.model.frequencies(q, y, asked.modes)
+            hz = task.scene.model.frequencies(q, y, asked.modes)
             seen = asked.appraise(y, Frequencies(hz, np.zeros((*hz.shape, len(y)))))
         value, row = problem(y, seen), box.rows @ inside
         missed = np.abs(row - np.clip(row, box.row_lower, box.row_upper))

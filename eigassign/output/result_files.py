@@ -104,12 +104,14 @@ def _error(summary: ErrorSummary) -> dict[str, Any]:
 
 
 def finite(value: Any) -> Any:
-    """A number, or a list or array of them, with null for what is not finite."""
+    """A value, or all those in mappings, lists and arrays, with null for what is not finite."""
     if isinstance(value, np.ndarray):
         value = value.tolist()
-    if isinstance(value, list):
+    if isinstance(value, dict):
+        return {name: finite(one) for name, one in value.items()}
+    if isinstance(value, list | tuple):
         return [finite(one) for one in value]
-    return value if math.isfinite(value) else None
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def without(row: Any, *names: str) -> dict[str, Any]:

@@ -27,20 +27,17 @@ RING = Look(graph.BLACK, 0.0, marker="o", size=12.0, filled=False)
 def chart_figures(chart: Chart) -> tuple[FigurePlan, ...]:
     """The figures that this chart has something to show for, in reading order."""
     plans = [_front(chart, each) for each in chart.fronts]
-    if chart.mesh:
-        plans.append(_mesh(chart))
-    if chart.designs:
-        plans.append(_designs(chart))
+    plans += [_mesh(chart)] if chart.mesh else []
+    plans += [_designs(chart)] if chart.designs else []
     return tuple(plans)
 
 
 def _front(chart: Chart, front: Front) -> FigurePlan:
     """The methods by family, over the band through the best; what auto takes is ringed."""
     asked, n = chart.asked, front.evaluations
+    what = "time of one evaluation" if n is None else f"set-up and {n:,.0f} evaluations"
     name = "".join(c if c.isalnum() else "_" for c in front.name)
-    what = "time of one evaluation"
-    if n is not None:
-        name, what = f"cost_{name}", f"set-up and {n:,.0f} evaluations"
+    name = name if n is None else f"cost_{name}"
     shown = [p for p in chart.points if p.everywhere.worst_hz <= asked.typical_hz]
     lost = len(chart.points) - len(shown)
     verb = "method is" if lost == 1 else "methods are"
@@ -58,12 +55,11 @@ def _front(chart: Chart, front: Front) -> FigurePlan:
         y = np.array([max(p.everywhere.worst_hz, asked.floor_hz) for p in points])
         return Curve(y, look, label, x, group=whose, names=tuple(p.method for p in points))
 
-    families: dict[str, list[ChartPoint]] = {}
-    for p in shown:  # what is set up anew for every design has no part in single evaluations
-        if p.at_once == 1 or n is not None:
-            families.setdefault(p.family, []).append(p)
+    # what is set up anew for every design has no part in single evaluations
+    drawn = [p for p in shown if p.at_once == 1 or n is not None]
     curves = [
-        curve(own, PLAIN, kind_of(family), WHOSE[own[0].ours]) for family, own in families.items()
+        curve([p for p in drawn if p.family == family], PLAIN, kind_of(family), WHOSE[ours])
+        for family, ours in dict.fromkeys((p.family, p.ours) for p in drawn)
     ]
     taken = {a.auto.method for a in chart.advice if a.auto is not None}
     best = sorted((p for p in shown if p.method in front.methods), key=lambda p: p.cost_s(n))
@@ -89,11 +85,11 @@ def _mesh(chart: Chart) -> FigurePlan:
     rows = [(row.elements, row.worst_hz, row.solve.median_s) for row in chart.mesh if row.worst_hz]
     counts, *values = np.array(rows, dtype=np.float64).T
     heading = "Elements against discretisation error"
-    labels, heights = ("worst error [Hz]", "exact solve [s]"), (3.8, 2.0)
-    panels = [
-        Panel(label, (Curve(y, Look(graph.BLUE, 0.9, marker="o"), x=counts),), height, True, None)
-        for label, y, height in zip(labels, values, heights, strict=True)
-    ]
+    above, below = (Curve(y, Look(graph.BLUE, 0.9, marker="o"), x=counts) for y in values)
+    panels = (
+        Panel("worst error [Hz]", (above,), 3.8, True, None),
+        Panel("exact solve [s]", (below,), 2.0, True, None),
+    )
     alt = "Discretisation error in Hz over the number of elements."
     return FigurePlan("mesh", heading, caption, alt, _scatter(heading, "elements", *panels))
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from eigassign.chart.results import SCHEMA, Chart, Timing, time_in_words
 from eigassign.output.figures.front import chart_figures
 from eigassign.output.formats import capital
 from eigassign.output.reports import page as report
-from eigassign.output.result_files import dumps
+from eigassign.output.result_files import dumps, finite
 from eigassign.output.tables import Table
 
 
@@ -68,12 +66,12 @@ def _fronts(chart: Chart) -> Iterator[Table]:
     known = {p.method: p for p in chart.points}
     columns = ("method", "eigassign's", "time", "worst error [Hz]", "relative")
     for each in chart.fronts:
-        rows = tuple(
-            (p.method, "yes" if p.ours else "no", time_in_words(p.cost_s(each.evaluations)),
-             f"{p.everywhere.worst_hz:.2e}", f"{p.everywhere.worst_relative:.1e}")
-            for p in (known[name] for name in reversed(each.methods))
-        )  # fmt: skip
         n = each.evaluations
+        rows = tuple(
+            (p.method, "yes" if p.ours else "no", time_in_words(p.cost_s(n)),
+             f"{p.everywhere.worst_hz:.2e}", f"{p.everywhere.worst_relative:.1e}")
+            for p in map(known.__getitem__, reversed(each.methods))
+        )  # fmt: skip
         what = "one evaluation" if n is None else f"{n:,.0f} evaluations"
         caption = f"No charted method is both quicker and more accurate; time is that of {what}."
         yield Table(f"Front: {each.name}", columns, rows, caption)
@@ -81,23 +79,24 @@ def _fronts(chart: Chart) -> Iterator[Table]:
 
 def _methods(chart: Chart) -> Table:
     """The table of all methods, the most accurate first."""
-    rows = []
-    for p in sorted(chart.points, key=lambda p: p.everywhere.worst_hz):
-        solves = f"{p.solves}" + (f" + {p.solves_online:.2g} each" if p.solves_online else "")
-        along = "" if p.trajectory is None else f"{p.trajectory.worst_hz:.2e}"
-        gain = "never" if p.break_even is None else f"{p.break_even:,.0f}"
-        worst, rms = f"{p.everywhere.worst_hz:.2e}", f"{p.everywhere.rms_hz:.2e}"
-        cost = (_spread(p.offline), _spread(p.online), solves)
-        rows.append((p.method, *cost, worst, rms, along, str(p.everywhere.failed or ""), gain))
     columns = (
         "method", "set-up", "one evaluation", "exact solves", "worst [Hz]", "rms [Hz]",
         "worst along the trajectory [Hz]", "no number", "pays from",
+    )  # fmt: skip
+    rows = tuple(
+        (p.method, _spread(p.offline), _spread(p.online),
+         f"{p.solves}" + (f" + {p.solves_online:.2g} each" if p.solves_online else ""),
+         f"{p.everywhere.worst_hz:.2e}", f"{p.everywhere.rms_hz:.2e}",
+         "" if p.trajectory is None else f"{p.trajectory.worst_hz:.2e}",
+         str(p.everywhere.failed or ""),
+         "never" if p.break_even is None else f"{p.break_even:,.0f}")
+        for p in sorted(chart.points, key=lambda p: p.everywhere.worst_hz)
     )  # fmt: skip
     caption = (
         'Time as median (quartiles); errors against the same exact solves; "pays from" is the '
         "number of evaluations from which it beats exact solves."
     )
-    return Table("All methods", columns, tuple(rows), caption)
+    return Table("All methods", columns, rows, caption)
 
 
 def _mesh(chart: Chart) -> Table:
@@ -127,9 +126,8 @@ def _designs(chart: Chart) -> Table:
 def _machine(chart: Chart) -> Table:
     """The machine and versions that the times are from."""
     m = dict(chart.machine)
-    blas, threads = m.pop("blas"), m.pop("threads")
+    m["linear algebra"] = f"{m.pop('blas')}, threads: {m.pop('threads')}"
     m["versions"] = ", ".join(f"{name} {version}" for name, version in m["versions"].items())
-    m["linear algebra"] = f"{blas}, threads: {threads}"
     return Table("Machine", ("", ""), tuple((name, str(value)) for name, value in m.items()))
 
 
@@ -140,23 +138,9 @@ def write_chart(
 
     Every point in chart.json can be computed again from its parameters.
     """
-    text = dumps(_finite({"schema": SCHEMA, **asdict(chart)})) + "\n"
-    (folder / "chart.json").write_text(text, encoding="utf-8")
-    plans = chart_figures(chart)
-    files = report.write_figures(plans, folder, formats)
+    data = f"{dumps(finite({'schema': SCHEMA, **asdict(chart)}))}\n".encode()
     line = f"{capital(chart.advice[0].words)}." if chart.advice else None
-    if kind != "none":
-        html = report.page(
-            chart, chart_tables(chart), plans, files, line=line, tone="good", full=kind == "full",
-            document=("chart.json", text.encode()),
-        )  # fmt: skip
-        (folder / "report.html").write_bytes(html)
-
-
-def _finite(value: Any) -> Any:
-    """Numbers that JSON has not, of methods that gave none, as null."""
-    if isinstance(value, dict):
-        return {key: _finite(inner) for key, inner in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(inner) for inner in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    report.write_page(
+        chart, chart_tables(chart), chart_figures(chart), folder, formats, kind,
+        ("chart.json", data), line=line, tone="good",
+    )  # fmt: skip

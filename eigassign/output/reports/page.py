@@ -137,18 +137,34 @@ def write_run(
     ``kind`` is full, light or none. The folder must exist and be empty. Wrap it in
     :func:`eigassign.output.store.run_folder.run_folder` to have them whole or not at all.
     """
-    document = to_json(results)
-    (folder / "results.json").write_bytes(document)
     for name, data in sample_files(results).items():
         (folder / name).write_bytes(data)
     plans = run_figures(results) if formats or kind != "none" else ()
+    write_page(
+        results, run_tables(results), plans, folder, formats, kind,
+        ("results.json", to_json(results)),
+        first=sum(plan.name.startswith("frequencies") for plan in plans),
+    )  # fmt: skip
+
+
+def write_page(
+    f: RunResults | Chart | UpdateResults,
+    shown: Sequence[Table],
+    plans: Sequence[FigurePlan],
+    folder: Path,
+    formats: Sequence[str],
+    kind: str,
+    document: tuple[str, bytes],
+    **how: Any,
+) -> None:
+    """The file of all numbers, the figures in these formats, and report.html unless it is none.
+
+    ``kind`` is full, light or none; `page` has the rest of ``how``.
+    """
+    (folder / document[0]).write_bytes(document[1])
     files = write_figures(plans, folder, formats)
     if kind != "none":
-        first = sum(plan.name.startswith("frequencies") for plan in plans)
-        html = page(
-            results, run_tables(results), plans, files,
-            first=first, full=kind == "full", document=("results.json", document),
-        )  # fmt: skip
+        html = page(f, shown, plans, files, full=kind == "full", document=document, **how)
         (folder / "report.html").write_bytes(html)
 
 

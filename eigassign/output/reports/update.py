@@ -131,17 +131,12 @@ def write_update(
     results: UpdateResults, folder: Path, formats: Sequence[str] = ("png",), kind: str = "full"
 ) -> None:
     """Into ``folder``, which must exist: results.json, a report of this kind, figures."""
-    data = f"{dumps(document(results))}\n".encode()
-    (folder / "results.json").write_bytes(data)
-    plans = update_figures(results)
-    files = report.write_figures(plans, folder, formats)
-    if kind != "none":
-        html = report.page(
-            results, update_tables(results, None), plans, files, line=headline(results),
-            tone="good" if results.verdict == "fitted" else "bad", first=len(plans),
-            full=kind == "full", document=("results.json", data),
-        )  # fmt: skip
-        (folder / "report.html").write_bytes(html)
+    data, plans = f"{dumps(document(results))}\n".encode(), update_figures(results)
+    report.write_page(
+        results, update_tables(results, None), plans, folder, formats, kind,
+        ("results.json", data), line=headline(results), first=len(plans),
+        tone="good" if results.verdict == "fitted" else "bad",
+    )  # fmt: skip
 
 
 def document(results: UpdateResults) -> dict[str, Any]:
