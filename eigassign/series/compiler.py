@@ -16,13 +16,14 @@ import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.errors import UsageError
-from eigassign.series.algebra import Algebra, Function
+from eigassign.series.algebra import Algebra, Function, Samples
 from eigassign.series.expression import Expression, Node, Recorder, Scalar
 
 Floats = NDArray[np.float64]
@@ -252,6 +253,30 @@ def compile_table(recorder: Recorder, scalars: Sequence[Scalar], n_variables: in
             shape=(len(scalars), len(atoms)),
         ),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledArrays:
+    """Arrays of scalars by one program, evaluated on many samples together."""
+
+    table: CompiledTable
+    shapes: tuple[tuple[int, ...], ...]
+
+    def __call__(self, variables: Floats) -> list[Floats]:
+        """The values (n, *shape) of each array at variables (n_variables, n)."""
+        values = self.table.evaluate(Samples(), variables).T
+        cuts = np.cumsum([prod(shape) for shape in self.shapes])[:-1]
+        parts = zip(np.split(values, cuts, axis=1), self.shapes, strict=True)
+        return [part.reshape(len(values), *shape) for part, shape in parts]
+
+
+def compile_arrays(
+    recorder: Recorder, arrays: Sequence[NDArray[np.object_]], n_variables: int
+) -> CompiledArrays:
+    """Compile arrays of scalars over the variables of one recorder."""
+    scalars = [scalar for array in arrays for scalar in array.ravel()]
+    table = compile_table(recorder, scalars, n_variables)
+    return CompiledArrays(table, tuple(array.shape for array in arrays))
 
 
 # --- Faces of a program

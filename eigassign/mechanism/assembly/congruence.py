@@ -124,27 +124,26 @@ def _add_mixed(
 # --- B of a single link as numbers
 
 
-def motion_scalars(link: LocalLink) -> list[list[Scalar]]:
-    """The functions of (q, y) in B, in three groups: all c_s, T, all ν_b."""
-    return [
-        [carry for row in link.carried.values() for _, carry in row],
-        list(link.twist.ravel()),
-        [N.coefficient for N in link.rigid],
-    ]
+def motion_scalars(link: LocalLink) -> list[Objects]:
+    """The functions of (q, y) in B, in three arrays: all c_s, T, all ν_b."""
+    carries = [carry for row in link.carried.values() for _, carry in row]
+    rigid = [N.coefficient for N in link.rigid]
+    return [np.array(carries, dtype=object), link.twist, np.array(rigid, dtype=object)]
 
 
 def motion_matrix(
-    link: LocalLink, carries: Floats, twist: Floats, rigid: Floats, n_u: int, n_dof: int
+    link: LocalLink, values: Sequence[Floats], n_u: int, n_dof: int
 ) -> sparse.csr_array:
     """B (n_local, n_dof) from the values of `motion_scalars`: P, c_s, N T."""
+    carries, twist, rigid = values
     own = np.flatnonzero(link.own >= 0)
     pairs = [(slot, unknown) for slot, row in link.carried.items() for unknown, _ in row]
     slots, unknowns = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
     places = np.concatenate([own, slots]), np.concatenate([link.own[own], unknowns])
-    values = np.concatenate([np.ones(len(own)), carries])
-    B = sparse.csr_array((values, places), shape=(len(link.own), n_dof))
+    entries = np.concatenate([np.ones(len(own)), carries]), places
+    B = sparse.csr_array(entries, shape=(len(link.own), n_dof))
     if link.twist.shape[1]:
-        N, T = total(link.rigid, rigid), twist.reshape(link.twist.shape)
+        N = total(link.rigid, rigid)
         wide = sparse.csr_array((len(link.own), n_u))
-        B = B + sparse.hstack([wide, sparse.csr_array(N @ T)], format="csr")
+        B = B + sparse.hstack([wide, sparse.csr_array(N @ twist)], format="csr")
     return B

@@ -6,7 +6,7 @@ For the bounds of what reduced links and meshes leave out; nothing is compiled b
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -16,53 +16,17 @@ from scipy import sparse
 
 from eigassign.mechanism.assembly.congruence import LocalLink, motion_matrix, motion_scalars
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.mechanism.elements.mesh import LinkMesh, total
+from eigassign.mechanism.elements.mesh import LinkMesh, element_motion, total
 from eigassign.mechanism.elements.profiles import BeamValues, Profile
 from eigassign.mechanism.kinematics.parameters import ModelParameters
-from eigassign.series.algebra import Samples
-from eigassign.series.compiler import CompiledTable, compile_table
-from eigassign.series.expression import Scalar
+from eigassign.mechanism.kinematics.rotations import Objects
+from eigassign.series.compiler import CompiledArrays
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 
-@dataclass
-class _ScalarRows:
-    """Scalars on their way to one table; each group is told its rows in it."""
-
-    scalars: list[Scalar] = field(default_factory=list)
-
-    def put(self, group: Sequence[Scalar]) -> slice:
-        """The rows of a group."""
-        self.scalars.extend(group)
-        return slice(len(self.scalars) - len(group), len(self.scalars))
-
-    def table(self, parameters: ModelParameters) -> CompiledTable:
-        return compile_table(parameters.recorder, self.scalars, parameters.count)
-
-
-def _values(table: CompiledTable, pencil: Pencil, x: Floats) -> Floats:
-    """Scalars of a table at x = (q, y) (n_x,)."""
-    z = pencil.to_program @ x + pencil.shift
-    return table.evaluate(Samples(), z[:, None])[:, 0]
-
-
-def _motion(
-    link: LocalLink, rows: Sequence[slice], values: Floats, pencil: Pencil
-) -> sparse.csr_array:
-    """B of a link in its (reduced) local dofs, (n_local, n_dof)."""
-    carries, twist, rigid = (values[group] for group in rows)
-    return motion_matrix(link, carries, twist, rigid, pencil.n_u, pencil.n_dof)
-
-
 # --- reduced links
-
-
-class _ReducedRows(NamedTuple):
-    motion: tuple[slice, ...]  # those of `motion_scalars`
-    stiffness: slice
-    mass: slice
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,24 +34,26 @@ class ReducedLinks:
     """The reduced links of a mechanism, each with its motion and its whole matrices."""
 
     links: tuple[LocalLink, ...]
-    rows: tuple[_ReducedRows, ...]
-    table: CompiledTable
+    table: CompiledArrays  # five for each link: `motion_scalars`, coefficients of k and of m
+    parameters: ModelParameters
     pencil: Pencil
 
-    def values(self, x: Floats) -> Floats:
+    def values(self, x: Floats) -> list[Floats]:
         """The values of all scalars at x = (q, y) (n_x,)."""
-        return _values(self.table, self.pencil, x)
+        return [each[0] for each in self.table(self.parameters.z(x[None]))]
 
-    def motion(self, k: int, values: Floats) -> sparse.csr_array:
+    def motion(self, k: int, values: Sequence[Floats]) -> sparse.csr_array:
         """B of link k in its reduced local dofs, (n_reduced, n_dof)."""
-        return _motion(self.links[k], self.rows[k].motion, values, self.pencil)
+        own = values[5 * k : 5 * k + 3]
+        return motion_matrix(self.links[k], own, self.pencil.n_u, self.pencil.n_dof)
 
-    def matrices(self, k: int, values: Floats) -> tuple[sparse.csr_array, sparse.csr_array]:
+    def matrices(
+        self, k: int, values: Sequence[Floats]
+    ) -> tuple[sparse.csr_array, sparse.csr_array]:
         """Stiffness and mass of the whole link k, with all its dofs."""
-        reduction, rows = self.links[k].reduction, self.rows[k]
+        reduction, (kappa, mu) = self.links[k].reduction, values[5 * k + 3 : 5 * k + 5]
         assert reduction is not None
-        mesh = reduction.mesh
-        return total(mesh.stiffness, values[rows.stiffness]), total(mesh.mass, values[rows.mass])
+        return total(reduction.mesh.stiffness, kappa), total(reduction.mesh.mass, mu)
 
 
 def reduced_links(
@@ -97,15 +63,13 @@ def reduced_links(
     reduced = tuple(link for link in links if link.reduction is not None)
     if not reduced:
         return None
-    scalars, rows = _ScalarRows(), []
+    arrays: list[Objects] = []
     for link in reduced:
         mesh = link.reduction.mesh  # type: ignore[union-attr]
-        motion = tuple(scalars.put(group) for group in motion_scalars(link))
-        matrices = (
-            scalars.put([t.coefficient for t in terms]) for terms in (mesh.stiffness, mesh.mass)
-        )
-        rows.append(_ReducedRows(motion, *matrices))
-    return ReducedLinks(reduced, tuple(rows), scalars.table(parameters), pencil)
+        arrays += motion_scalars(link)
+        for terms in (mesh.stiffness, mesh.mass):
+            arrays.append(np.array([t.coefficient for t in terms], dtype=object))
+    return ReducedLinks(reduced, parameters.compiled(*arrays), parameters, pencil)
 
 
 # --- the elements of beams
@@ -152,75 +116,79 @@ class MeshedLinks:
     parameters: ModelParameters
     pencil: Pencil
 
-    def values(self, x: Floats) -> Floats:
+    def values(self, x: Floats) -> list[Floats]:
         """The values of all scalars at x = (q, y) (n_x,)."""
-        return _values(self._rows.table, self.pencil, x)
+        return [each[0] for each in self._table(self.parameters.z(x[None]))]
 
-    @property
+    @cached_property
     def owners(self) -> Ints:
         """The link that each element belongs to, (n,)."""
-        return self._rows.owners
+        count = [sum(len(strand.profiles) for strand in link.mesh.strands) for link in self.links]
+        return np.repeat(np.arange(len(count)), count)
 
-    def elements(self, values: Floats) -> list[Alike]:
+    def elements(self, values: Sequence[Floats]) -> list[Alike]:
         """The elements, kind by kind."""
-        places = [values[rows].reshape(-1, 3) for rows in self._rows.points]
+        places = values[3 * len(self.links) : -len(self._kinds)]
         h = np.concatenate([np.linalg.norm(np.diff(X, axis=0), axis=1) for X in places])
         return [
-            Alike(which, h[which], values[rows], sheared)
-            for (sheared, _), (which, rows) in self._rows.kinds.items()
+            Alike(kind.elements, h[kind.elements], found[kind.profile], kind.sheared)
+            for kind, found in zip(self._kinds, values[-len(self._kinds) :], strict=True)
         ]
 
-    def motion(self, values: Floats, phi: Floats) -> Floats:
+    def motion(self, values: Sequence[Floats], phi: Floats) -> Floats:
         """The motion of both nodes of each element in its axes, (n, 12, count), for vectors
         (n_dof, count).
         """
         out = []
-        for link, rows in zip(self.links, self._rows.motions, strict=True):
-            v = np.asarray(_motion(link.local, rows, values, self.pencil) @ phi)
+        for k, link in enumerate(self.links):
+            own, n_u = values[3 * k : 3 * k + 3], self.pencil.n_u
+            v = np.asarray(motion_matrix(link.local, own, n_u, self.pencil.n_dof) @ phi)
             if link.local.reduction is not None:
                 v = link.local.reduction.basis @ v
             v = np.vstack([v, np.zeros((1, v.shape[1]))])  # what a planar node has not
             for strand in link.mesh.strands:
                 assert strand.axes is not None
-                nodes = v[np.array(list(strand.slots))]  # (n + 1, 6, count)
-                turned = np.concatenate([strand.axes @ nodes[:, :3], strand.axes @ nodes[:, 3:]], 1)
-                out.append(np.concatenate([turned[:-1], turned[1:]], axis=1))
+                out.append(element_motion(v[np.array(list(strand.slots))], strand.axes))
         return np.concatenate(out)
 
     @cached_property
-    def _rows(self) -> _MeshRows:
-        """The table of all that varies, and where in it everything is."""
-        scalars = _ScalarRows()
-        motions, points = [], []
-        owners: list[int] = []
-        known: dict[int, Ints] = {}
-        kinds: dict[tuple[bool, int], tuple[list[int], list[Ints]]] = {}
-        for k, link in enumerate(self.links):
-            motions.append(tuple(scalars.put(group) for group in motion_scalars(link.local)))
-            for strand in link.mesh.strands:
-                points.append(scalars.put([c for X in strand.points for c in X]))
-                for profile in strand.profiles:
-                    if id(profile) not in known:
-                        entries = [0.0 if v is None else v for each in profile for v in each]
-                        rows = scalars.put(entries)
-                        places = np.arange(rows.start, rows.stop)
-                        known[id(profile)] = places.reshape(len(profile), -1)
-                    sheared = profile[0].shear is not None
-                    which, values = kinds.setdefault((sheared, len(profile)), ([], []))
-                    which.append(len(owners))
-                    values.append(known[id(profile)])
-                    owners.append(k)
-        stacked = {key: (np.array(a), np.array(b)) for key, (a, b) in kinds.items()}
-        table = scalars.table(self.parameters)
-        return _MeshRows(table, tuple(motions), tuple(points), stacked, np.array(owners))
+    def _table(self) -> CompiledArrays:
+        """`motion_scalars` of each link, points of each strand, different values of each kind."""
+        motions = [array for link in self.links for array in motion_scalars(link.local)]
+        points = [
+            np.array(list(strand.points), dtype=object)
+            for link in self.links
+            for strand in link.mesh.strands
+        ]
+        return self.parameters.compiled(*motions, *points, *(kind.values for kind in self._kinds))
+
+    @cached_property
+    def _kinds(self) -> list[_Kind]:
+        strands = [strand for link in self.links for strand in link.mesh.strands]
+        row = [profile for strand in strands for profile in strand.profiles]
+        kinds: dict[tuple[bool, int], list[int]] = {}
+        for k, profile in enumerate(row):
+            kinds.setdefault((profile[0].shear is not None, len(profile)), []).append(k)
+        found = []
+        for (sheared, _), which in kinds.items():
+            different = {id(row[k]): row[k] for k in which}
+            place = {key: n for n, key in enumerate(different)}
+            values = [
+                [[0.0 if v is None else v for v in each] for each in profile]
+                for profile in different.values()
+            ]
+            like = np.array([place[id(row[k])] for k in which])
+            found.append(_Kind(sheared, np.array(which), like, np.array(values, dtype=object)))
+        return found
 
 
-class _MeshRows(NamedTuple):
-    table: CompiledTable
-    motions: tuple[tuple[slice, ...], ...]  # of each link those of `motion_scalars`
-    points: tuple[slice, ...]  # of each strand
-    kinds: dict[tuple[bool, int], tuple[Ints, Ints]]  # elements (n,), values (n, n_legendre, 9)
-    owners: Ints
+class _Kind(NamedTuple):
+    """Elements of one kind, as `Alike`, and their different values (n_different, n_legendre, 9)."""
+
+    sheared: bool
+    elements: Ints
+    profile: Ints  # (n,) which of the different ones each has
+    values: Objects
 
 
 def meshed_links(

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from eigassign.brief import Brief
 from eigassign.mechanism.assembly.build import local_links
 from eigassign.mechanism.assembly.congruence import LocalLink, motion_matrix, motion_scalars
-from eigassign.mechanism.elements.beam import PLANES, Shear, bending_shapes
+from eigassign.mechanism.elements.beam import Shear, fields
 from eigassign.mechanism.elements.links import axes
-from eigassign.mechanism.elements.mesh import LinkMesh, Strand
+from eigassign.mechanism.elements.mesh import LinkMesh, Strand, element_motion
 from eigassign.mechanism.kinematics.forward import Placement
 from eigassign.mechanism.kinematics.link_frames import LinkFrames
 from eigassign.mechanism.kinematics.rotations import Objects
@@ -96,7 +96,7 @@ def _symbols(local: LocalLink, placement: Placement, mesh: LinkMesh, poses: Link
         placement.world_rotation,
         placement.world_origin,
         np.array(list(mesh.positions.values()), dtype=object).reshape(-1, 3),
-        *(np.array(group, dtype=object) for group in motion_scalars(local)),
+        *motion_scalars(local),
     ]
     for strand in strands:
         shear = np.array(strand.shear, dtype=object).reshape(-1, 2, 2)
@@ -131,9 +131,9 @@ class _LinkMotion:
 
     def __init__(self, part: _Symbols, values: Sequence[Floats], phi: Floats, n_u: int) -> None:
         self.part = part
-        self.rotation, self.origin, self.positions, carries, twist, rigid, *strands = values
+        self.rotation, self.origin, self.positions, *motion, strands = [*values[:6], values[6:]]
         self.lines = list(zip(part.strands, strands[::2], strands[1::2], strict=True))
-        v = motion_matrix(part.local, carries, twist, rigid, n_u, len(phi)) @ phi
+        v = motion_matrix(part.local, motion, n_u, len(phi)) @ phi
         reduction = part.local.reduction
         self.local = v if reduction is None else reduction.basis @ v  # (n_local, count)
 
@@ -187,37 +187,9 @@ def along(X: Floats, motion: Floats, shear: Floats, turn: Floats | None) -> tupl
     # at least 24 intervals drawn of a beam, and one of each element
     n, count = len(h), max(1, -(-24 // len(h)))
     xi = np.arange(count) / count
-    local = np.concatenate([turn @ motion[:, :3], turn @ motion[:, 3:]], axis=1)
-    inner = _between(local, h, shear, xi) @ turn  # (count, n, n_xi, 3)
+    N = fields(np.tile(xi, (n, 1)), h[:, None], shear[:, None])[..., :3, :]  # (n, n_xi, 3, 12)
+    inner = np.einsum("exij,ejc->cexi", N, element_motion(motion, turn)) @ turn
     places = X[:-1, None] + xi[:, None] * step[:, None]
     ends = motion[-1, :3].T[:, None]
     flat = inner.reshape(len(inner), n * len(xi), 3)
     return np.concatenate([places.reshape(-1, 3), X[-1:]]), np.concatenate([flat, ends], axis=1)
-
-
-def _between(local: Floats, h: Floats, shear: Floats, xi: Floats) -> Floats:
-    """Displacements (count, n, n_xi, 3) at ξ of each element, in the elements' axes."""
-    first, second = local[:-1], local[1:]
-    axial = np.einsum(
-        "xj,jnc->cnx", np.stack([1.0 - xi, xi], 1), np.stack([first, second])[:, :, 0]
-    )
-    bent = [_bent(first, second, h, shear[:, k], xi, plane) for k, plane in enumerate(PLANES)]
-    return np.stack([axial, *bent], axis=-1)
-
-
-def _bent(
-    first: Floats,
-    second: Floats,
-    h: Floats,
-    shear: Floats,
-    xi: Floats,
-    plane: tuple[int, int, float],
-) -> Floats:
-    """Deflection (count, n, n_xi) in one plane of bending."""
-    w, slope, sign = plane
-    turned = sign * h[:, None]
-    dofs = np.stack(
-        [first[:, w], turned * first[:, slope], second[:, w], turned * second[:, slope]]
-    )
-    N = bending_shapes(xi[None, :], *shear.T[..., None])  # (n, n_xi, 4)
-    return np.asarray(np.einsum("nxj,jnc->cnx", N, dofs))

@@ -23,8 +23,7 @@ from eigassign.mechanism.kinematics.loop_closure import reference
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.rotations import multiply
 from eigassign.mechanism.kinematics.topology import NodeName
-from eigassign.series.algebra import Samples
-from eigassign.series.compiler import CompiledTable, compile_table
+from eigassign.series.compiler import CompiledArrays
 
 Floats = NDArray[np.float64]
 REACH = (0.4, 0.1, 0.02)  # rad or m about the reference, smaller where a loop cannot follow
@@ -65,14 +64,14 @@ def _rows(
 
     known = parameters.with_passive(motion.passive)
     springs = list(spring_ends(case, known, motion, stiff, 0))
-    entries = [row.get(k, 0.0) for _, *pair in springs for row in pair for k in free]
+    entries = [[[row.get(k, 0.0) for k in free] for row in pair] for _, *pair in springs]
     z = reference(case, parameters)
-    table = compile_table(parameters.recorder, entries, len(z))
+    table = parameters.compiled(np.array(entries, dtype=object))
     n = len(parameters.coordinates)
     half = [0.5 * (high - low) for low, high in case.ranges.values()]
     span = np.append(np.ones(n), parameters.to_z[n:, n:] @ half)  # rad or m; half of a property's
-    values = _at_poses(table, z, span)
-    ends = values.reshape(-1, 3, 2, len(free), values.shape[1])  # three axes of v or ω together
+    values = np.moveaxis(_at_poses(table, z, span), 0, -1)
+    ends = values.reshape(-1, 3, *values.shape[1:])  # three axes of v or ω together
     size = np.abs(ends).max(axis=(1, 2, 3, 4), initial=0.0)[:, None, None, None]
     apart = ends[:, :, 1] - ends[:, :, 0]
     noise = np.abs(apart).max(axis=3, keepdims=True) <= np.maximum(RESISTED * size, ROUND_OFF)
@@ -86,17 +85,17 @@ def _rows(
     return rows[held], tuple(path for path, holds in zip(paths, held, strict=True) if holds)
 
 
-def _at_poses(table: CompiledTable, z: Floats, span: Floats) -> Floats:
-    """Values (n, n_poses) at the reference and at random places about it."""
+def _at_poses(table: CompiledArrays, z: Floats, span: Floats) -> Floats:
+    """Values (n_poses, …) at the reference and at random places about it."""
     rng = np.random.default_rng(0)
     # six poses tell what a direction that changes with the pose resists
     directions = rng.uniform(-1.0, 1.0, (len(z), 6)) * span[:, None]
     for reach in REACH:
         try:
-            return table.evaluate(Samples(), z[:, None] + reach * directions)
+            return table(z[:, None] + reach * directions)[0]
         except SingularityError:
             continue
-    return np.repeat(table.evaluate(Samples(), z[:, None]), 2, axis=1)
+    return np.repeat(table(z[:, None])[0], 2, axis=0)
 
 
 def _unresisted(

@@ -24,8 +24,6 @@ from eigassign.mechanism.kinematics.loop_closure import RANK, passive_motion
 from eigassign.mechanism.kinematics.parameters import ModelParameters
 from eigassign.mechanism.kinematics.rotations import DOFS, Objects
 from eigassign.mechanism.kinematics.topology import JointEdge
-from eigassign.series.algebra import Samples
-from eigassign.series.compiler import compile_table
 
 Floats = NDArray[np.float64]
 
@@ -50,8 +48,7 @@ def close_rigid_loops(nodes: NodeMotions, parameters: ModelParameters, reference
     labels = [-1 - k for k in range(len(passive))]
     unknowns = sorted({u for row in gaps for u in row if u >= 0})
     J, G = _matrix(gaps, labels), _matrix(gaps, unknowns)
-    table = compile_table(parameters.recorder, np.hstack([J, G]).ravel().tolist(), len(reference))
-    at = table.evaluate(Samples(), reference[:, None]).reshape(len(gaps), -1)
+    at = parameters.compiled(np.hstack([J, G]))(reference[:, None])[0][0]
     dependent = _pivots(at[:, : len(labels)])
     require_consistent(at[:, dependent], at[:, len(labels) :], loops, nodes.space)
     free = [k for k in range(len(passive)) if k not in dependent]

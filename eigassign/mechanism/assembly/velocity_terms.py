@@ -25,11 +25,10 @@ frames. Each is a fixed pattern: only its numbers change along a motion.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,21 +37,21 @@ from scipy import sparse
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError
 from eigassign.mechanism.assembly.build import local_links
-from eigassign.mechanism.assembly.congruence import LocalLink, motion_scalars
-from eigassign.mechanism.elements.beam import PLANES, RealOrComplex, bending_shapes, bending_slopes
-from eigassign.mechanism.elements.mesh import LinkMesh, Term
+from eigassign.mechanism.assembly.congruence import LocalLink
+from eigassign.mechanism.assembly.node_motion import NodeMotions
+from eigassign.mechanism.elements.beam import fields
+from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Term
 from eigassign.mechanism.elements.profiles import field_inertia
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import all_moving
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type
-from eigassign.mechanism.kinematics.rotations import CROSS, DOFS
-from eigassign.series.algebra import Samples
-from eigassign.series.compiler import CompiledTable, compile_table
-from eigassign.series.expression import Scalar
+from eigassign.mechanism.kinematics.rotations import CROSS, DOFS, Objects
+from eigassign.series.compiler import CompiledArrays
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Matrix = Any  # sparse, or dense where that is quicker
+Values = Sequence[Floats]  # the numbers of all matrices at one instant, see `StackedLinks`
 IMAGINARY = 1e-30  # step of derivatives along the imaginary axis, which lose no digits
 
 
@@ -61,7 +60,7 @@ class VelocityTerms:
     """C and K_v of a mechanism along a motion; built once, evaluated at instants."""
 
     stack: StackedLinks
-    table: CompiledTable
+    table: CompiledArrays
     parameters: ModelParameters
     # Of the differences, in the time in which the fastest coordinate or spin moves, or would, by
     # 1 rad or m: they err by its square, 1e-8, and by round-off over it, 1e-12.
@@ -80,7 +79,7 @@ class VelocityTerms:
         B, W = [self.stack.motion(each) for each in z], self._joints(rate + acceleration * t)
         m = [self.stack.mass(z[k]) for k in (1, 2, 3)]
         P = [
-            (B[k + 1] - B[k - 1]) * (0.5 / h) + self.stack.spin(z[k], W[k]) @ B[k]
+            (B[k + 1] - B[k - 1]) * (0.5 / h) + self.stack.turned(z[k], W[k], B[k])
             for k in (1, 2, 3)
         ]
         growth = (B[3].T @ m[2] @ B[3] - B[1].T @ m[0] @ B[1]) * (0.5 / h)
@@ -94,7 +93,7 @@ class VelocityTerms:
     def _step(self, q: Floats, y: Floats, rate: Floats, acceleration: Floats) -> float:
         """The interval of the differences, s: a screw turns much faster than its nut travels."""
         (z,) = self.values(q[None], y)
-        spins = self.stack.spins.at(z)
+        spins = self.stack.spins.at(z[4])
         turned = (spins @ self._joints(rate), spins @ self._joints(acceleration))
         fastest, hardest = (
             np.abs(np.concatenate(both)).max()
@@ -103,10 +102,10 @@ class VelocityTerms:
         speed = max(float(fastest), float(np.sqrt(hardest)))
         return self.step / speed if speed > 0.0 else self.step
 
-    def values(self, q: Floats, y: Floats) -> Floats:
-        """The values of all scalars at poses q (n, n_q), and a 1: (n, n_scalars + 1)."""
+    def values(self, q: Floats, y: Floats) -> list[Values]:
+        """The numbers of all matrices at each of the poses q (n, n_q)."""
         z = self.parameters.z(np.hstack([q, np.tile(y, (len(q), 1))]))
-        return np.column_stack([self.table.evaluate(Samples(), z).T, np.ones(len(q))])
+        return list(zip(*self.table(z), strict=True))
 
     def _joints(self, rates: Floats) -> Floats:
         """The rates of the coordinates alone, of rates (…, n_q) of loads too."""
@@ -129,25 +128,83 @@ def velocity_terms(
         message = "has inner dofs of unknown direction: its velocity terms cannot be formed"
         raise MechanismError(f"mechanism.links.{name}", message)
     links, nodes = local_links(case, parameters, motion)
-    moving = all_moving(case, parameters, motion)
-    scalars: list[Scalar] = []
-    rows, ridings = [], []
-    for link, placement in zip(links, motion.placements, strict=True):
-        spin = moving.placement(placement.link).twist[3:]
-        mass = [t.coefficient for t in whole_mass(link)]
-        mesh, rides = nodes.meshes[placement.link], motion.tree.riders(placement.link)
-        parts = [list(spin.ravel()), *motion_scalars(link), mass]
-        parts.append(mesh_scalars(mesh) if rides else [])
-        cuts = np.cumsum([len(scalars), *(len(p) for p in parts)]).tolist()
-        rows.append(ScalarRows(*(slice(a, b) for a, b in itertools.pairwise(cuts))))
-        scalars += [s for part in parts for s in part]
-        ridings.append(riding(mesh) if rides else None)
-    n_dof = nodes.count + len(motion.columns)
-    return VelocityTerms(
-        stack=stack(links, rows, ridings, case.mechanism.space, nodes.count, n_dof),
-        table=compile_table(parameters.recorder, scalars, parameters.count),
-        parameters=parameters,
+    placed = zip(links, motion.placements, strict=True)
+    heavy = [_Heavy(link, p.link) for link, p in placed if whole_mass(link)]  # rigid ones may not
+    stack, meshes = _stacked(heavy, nodes, all_moving(case, parameters, motion), motion)
+    patterns = (stack.joined, stack.spread, stack.twist, stack.masses, stack.spins)
+    scalars = [np.array(each.coefficients, dtype=object) for each in patterns]
+    scalars += [array for mesh in meshes for array in _mesh_scalars(mesh)]
+    return VelocityTerms(stack, parameters.compiled(*scalars), parameters)
+
+
+class _Heavy(NamedTuple):
+    """A link that has mass."""
+
+    local: LocalLink
+    name: str
+
+    @property
+    def size(self) -> int:
+        """Number of its dofs before it was reduced."""
+        return int(whole_mass(self.local)[0].matrix.shape[0])
+
+
+def _stacked(
+    links: Sequence[_Heavy], nodes: NodeMotions, moving: Kinematics, motion: Kinematics
+) -> tuple[StackedLinks, list[LinkMesh]]:
+    """The links one below the other, and the meshes of those on which something rides."""
+    kept, n_dof = DOFS[nodes.space], nodes.count + len(motion.columns)
+    n_local, n_whole = sum(len(link.own) for link, _ in links), sum(each.size for each in links)
+    n_twist = len(kept) * len(links)
+    U, N, T = Entries((n_local, n_dof)), Entries((n_local, n_twist)), Entries((n_twist, n_dof))
+    m, spins = Entries((n_whole, n_whole)), Entries((3 * len(links), len(motion.relative)))
+    local = whole = 0
+    riders, meshes, bases = [], [], []
+    for k, (link, name) in enumerate(links):
+        own, size = np.flatnonzero(link.own >= 0), links[k].size
+        U.add(1.0, local + own, link.own[own], np.ones(len(own)))
+        for slot, row in link.carried.items():
+            unknowns = np.array([unknown for unknown, _ in row], dtype=np.intp)
+            U.add_scalars([c for _, c in row], np.full(len(row), local + slot), unknowns)
+        _add_terms(N, link.rigid, local, len(kept) * k)
+        _add_dense(T, link.twist, len(kept) * k, nodes.count)
+        _add_terms(m, whole_mass(link), whole, whole)
+        _add_dense(spins, moving.placement(name).twist[3:], 3 * k, 0)
+        if motion.tree.riders(name):
+            meshes.append(nodes.meshes[name])
+            riders.append(_riding(meshes[-1], whole, n_whole))
+        bases.append(sparse.eye_array(size) if link.reduction is None else link.reduction.basis)
+        local, whole = local + len(link.own), whole + size
+    stack = StackedLinks(
+        _pattern(U),
+        _pattern(N),
+        _pattern(T),
+        _pattern(m),
+        _pattern(spins),
+        sparse.csr_array(sparse.block_diag(bases)) if n_local != n_whole else None,
+        np.repeat(np.arange(len(links)), [h.size // len(kept) for h in links]),
+        np.array(kept),
+        tuple(riders),
     )
+    return stack, meshes
+
+
+def whole_mass(link: LocalLink) -> Sequence[Term]:
+    """The mass terms of a link with all its dofs."""
+    return link.mass if link.reduction is None else link.reduction.mesh.mass
+
+
+def _add_terms(out: Entries, terms: Sequence[Term], row: int, column: int) -> None:
+    """Σ coefficient × matrix with its corner at (row, column)."""
+    for coefficient, matrix in terms:
+        A = matrix.tocoo()
+        out.add(coefficient, row + A.row.astype(np.intp), column + A.col.astype(np.intp), A.data)
+
+
+def _add_dense(out: Entries, block: Objects, row: int, column: int) -> None:
+    """A block of scalars with its corner at (row, column)."""
+    i, j = np.indices(block.shape).reshape(2, -1)
+    out.add_scalars(block.ravel().tolist(), row + i, column + j)
 
 
 # --- convection: a mesh that moves along its beam
@@ -155,93 +212,63 @@ def velocity_terms(
 
 @dataclass(frozen=True, eq=False)
 class Riding:
-    """A straight beam whose mesh moves; its varying numbers come as rows of a table of scalars."""
+    """A straight beam whose mesh moves."""
 
-    dofs: NDArray[np.intp]  # (n, 12) local dofs of each element; −1 where a plane has none
+    dofs: Ints  # (n, 12) dofs of each element among those of all links; −1 where a plane has none
     turn: Floats  # (12, 12) from the link's axes to those of the section
-    n_local: int
+    n_whole: int
 
-    def at(
-        self, values: Sequence[Floats], step: float
-    ) -> tuple[sparse.csr_array, sparse.csr_array]:
-        """G [kg/s] and H [kg/s²] (n_local, n_local) at the middle of three instants ``step`` apart.
+    def at(self, values: Sequence[Values], step: float) -> tuple[sparse.csr_array, ...]:
+        """G [kg/s] and H [kg/s²] (n_whole, n_whole) at the middle of three instants ``step`` apart.
 
-        ``values`` are those of `mesh_scalars` at the three.
+        ``values`` at the three are places x (n + 1,) of the nodes, Φ and Φ r (n, 1, 2, 2) of the
+        elements, and their inertia (n, n_legendre, 6).
         """
-        n = len(self.dofs)
-        before, now, after = (_Elements(v, n) for v in values)
-        xi, weights = np.polynomial.legendre.leggauss(4)
-        xi, weights = np.tile(0.5 * (1.0 + xi), (n, 1)), 0.5 * weights
-        x_rate, h_rate, phi_rate = (
-            (getattr(after, key) - getattr(before, key)) * (0.5 / step) for key in ("x", "h", "phi")
+        (x_before, phi_before, _), (x, phi, inertia), (x_after, phi_after, _) = values
+        x_rate, phi_rate = (
+            (x_after - x_before) * (0.5 / step),
+            (phi_after - phi_before) * (0.5 / step),
         )
-        xi_rate = -(x_rate + xi * h_rate) / now.h
+        h, h_rate = np.diff(x)[:, None], np.diff(x_rate)[:, None]
+        xi, weights = np.polynomial.legendre.leggauss(4)
+        xi, weights = np.tile(0.5 * (1.0 + xi), (len(h), 1)), 0.5 * weights
+        xi_rate = -(x_rate[:-1, None] + xi * h_rate) / h
         moved = 1j * IMAGINARY
-        shapes = fields(xi + moved * xi_rate, now.h + moved * h_rate, now.phi + moved * phi_rate)
+        shapes = fields(xi + moved * xi_rate, h + moved * h_rate, phi + moved * phi_rate)
         N, N_rate = shapes.real, shapes.imag / IMAGINARY
-        legendre = np.polynomial.legendre.legvander(2.0 * xi[0] - 1.0, now.inertia.shape[1] - 1)
-        matter = now.h[..., None] * weights[:, None] * (legendre @ now.inertia)  # (n, n_xi, 6)
+        legendre = np.polynomial.legendre.legvander(2.0 * xi[0] - 1.0, inertia.shape[1] - 1)
+        matter = h[..., None] * weights[:, None] * (legendre @ inertia)  # (n, n_xi, 6)
         G = np.einsum("epri,epr,eprj->eij", N, matter, N_rate)
         H = np.einsum("epri,epr,eprj->eij", N_rate, matter, N_rate)
         return self.assembled(G), self.assembled(H)
 
     def assembled(self, blocks: Floats) -> sparse.csr_array:
-        """Matrices (n, 12, 12) of the elements in the section's axes, on the link's local dofs."""
+        """Matrices (n, 12, 12) of the elements in the section's axes, on the dofs of all links."""
         blocks = self.turn.T @ blocks @ self.turn
         places = self.dofs[:, :, None], self.dofs[:, None, :]
         rows, columns = (np.broadcast_to(a, blocks.shape) for a in places)
         kept = (rows >= 0) & (columns >= 0)
         entries = (blocks[kept], (rows[kept], columns[kept]))
-        return sparse.csr_array(entries, shape=(self.n_local, self.n_local))
+        return sparse.csr_array(entries, shape=(self.n_whole, self.n_whole))
 
 
-class _Elements:
-    """Nodes, length, Φ and Φ r (n, 1, 2, 2), inertia (n, n_legendre, 6) of all at one instant."""
-
-    def __init__(self, values: Floats, n: int) -> None:
-        nodes, phi, inertia = np.split(values, [n + 1, 5 * n + 1])
-        self.x = nodes[:-1, None]
-        self.h = np.diff(nodes)[:, None]
-        self.phi = phi.reshape(n, 1, 2, 2)
-        self.inertia = inertia.reshape(n, -1, 6)
-
-
-def riding(mesh: LinkMesh) -> Riding:
-    """The beam of a link on which a carriage or nut rides."""
+def _riding(mesh: LinkMesh, first: int, n_whole: int) -> Riding:
+    """The beam of a link on which a carriage or nut rides, its dofs counted from ``first``."""
     (strand,) = mesh.strands
     assert strand.axes is not None
     slots = np.array(list(strand.slots), dtype=np.intp)
+    slots = np.where(slots >= 0, first + slots, -1)
     turn = np.kron(np.eye(4), strand.axes).astype(np.float64)
-    return Riding(np.hstack([slots[:-1], slots[1:]]), turn, mesh.n_local)
+    return Riding(np.hstack([slots[:-1], slots[1:]]), turn, n_whole)
 
 
-def mesh_scalars(mesh: LinkMesh) -> list[Scalar]:
+def _mesh_scalars(mesh: LinkMesh) -> list[Objects]:
     """The scalars of a `Riding`: its nodes' places, and shear and inertia of its elements."""
     (strand,) = mesh.strands
     places = [X[0] for X in strand.points]
-    shear = [value for pair in strand.shear for bent in pair for value in bent]
-    inertia = [rho for each in strand.profiles for beam in each for rho in field_inertia(beam)]
-    return [*places, *shear, *inertia]
-
-
-def fields(xi: RealOrComplex, h: RealOrComplex, phi: RealOrComplex) -> RealOrComplex:
-    """N (n, n_xi, 6, 12): displacements and rotations at ξ per dof of an element, section's axes.
-
-    xi (n, n_xi), h (n, 1) in m, phi (n, 1, 2, 2): `Shear` of each plane. Stretch and twist are
-    linear, bending is that of `bending_shapes` and `bending_slopes`.
-    """
-    N = np.zeros((*xi.shape, 6, 12), dtype=np.result_type(xi, h, phi))
-    for row in (0, 3):
-        N[..., row, row], N[..., row, row + 6] = 1.0 - xi, xi
-    one = np.ones_like(h)
-    for k, (w, slope, sign) in enumerate(PLANES):
-        scale = np.stack([one, sign * h, one, sign * h], axis=-1)
-        bent = phi[..., k, 0], phi[..., k, 1]
-        deflection = bending_shapes(xi, *bent) * scale
-        rotation = bending_slopes(xi, *bent) * scale * (sign / h)[..., None]
-        for j, dof in enumerate((w, slope, w + 6, slope + 6)):
-            N[..., w, dof], N[..., slope, dof] = deflection[..., j], rotation[..., j]
-    return N
+    shear = np.array(strand.shear, dtype=object).reshape(-1, 1, 2, 2)
+    inertia = [[field_inertia(beam) for beam in each] for each in strand.profiles]
+    return [np.array(places, dtype=object), shear, np.array(inertia, dtype=object)]
 
 
 # --- all links one below the other
@@ -249,23 +276,23 @@ def fields(xi: RealOrComplex, h: RealOrComplex, phi: RealOrComplex) -> RealOrCom
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """A sparse matrix whose entries are sums of constants times scalars."""
+    """A sparse matrix Σ c_k A_k: its numbers change, their places do not."""
 
-    values: Floats  # (n,) constants
-    scalars: Ints  # (n,) which scalar each is multiplied by; the last one for none
-    slots: Ints  # (n,) which entry each adds to
+    coefficients: tuple[Any, ...]  # c_k as scalars
+    weights: sparse.csr_array  # entries of A_k as columns, (n_entries, n_coefficients)
     places: Ints  # row and column of each entry as one number, ascending
     shape: tuple[int, int]
 
-    def at(self, z: Floats) -> Matrix:
-        """The matrix for scalars z."""
-        data = np.bincount(self.slots, self.values * z[self.scalars], len(self.places))
+    def at(self, c: Floats) -> Matrix:
+        """The matrix for numbers c (n_coefficients,)."""
+        data = self.weights @ c
         # up to 128 rows and columns dense is quicker
         if max(self.shape) <= 128:
             out = np.zeros(self.shape)
             out.flat[self.places] = data
             return out
-        return sparse.csr_array((data, *self._compressed), shape=self.shape)
+        columns, starts = self._compressed
+        return sparse.csr_array((data, columns, starts), shape=self.shape)
 
     @cached_property
     def _compressed(self) -> tuple[Ints, Ints]:
@@ -274,167 +301,64 @@ class Pattern:
         return self.places % width, np.searchsorted(self.places, np.arange(rows + 1) * width)
 
 
-@dataclass
-class _PatternEntries:
-    """Parts of entries on their way to a `Pattern`."""
-
-    parts: list[tuple[Ints, Ints, Floats, Ints]] = field(default_factory=list)
-
-    def add(self, rows: Any, columns: Any, values: Any, scalars: Any) -> None:
-        """Entries values × scalars at (rows, columns), broadcast."""
-        r, c, v, s = np.broadcast_arrays(rows, columns, values, scalars)
-        self.parts.append((_whole(r), _whole(c), np.asarray(v, dtype=np.float64), _whole(s)))
-
-    def add_terms(self, terms: Sequence[Term], first: int, row: int, column: int) -> None:
-        """Σ scalar × matrix with its corner at (row, column), scalars counted from ``first``."""
-        for k, term in enumerate(terms):
-            entries = term.matrix.tocoo()
-            self.add(entries.row + row, entries.col + column, entries.data, first + k)
-
-    def pattern(self, shape: tuple[int, int]) -> Pattern:
-        empty = (np.zeros(0, np.intp),) * 2 + (np.zeros(0), np.zeros(0, np.intp))
-        rows, columns, values, scalars = (
-            np.concatenate(each) for each in zip(*(self.parts or [empty]), strict=True)
-        )
-        places, slots = np.unique(rows * shape[1] + columns, return_inverse=True)
-        return Pattern(values, scalars, slots, places, shape)
-
-
-@dataclass(frozen=True)
-class ScalarRows:
-    """The rows of a link in a table of scalars: see `velocity_terms`."""
-
-    spin: slice
-    carries: slice
-    twist: slice
-    rigid: slice
-    mass: slice
-    mesh: slice
-
-
-@dataclass(frozen=True, eq=False)
-class Rider:
-    """A beam that something rides on: its first row among all, and its scalars."""
-
-    riding: Riding
-    first: int
-    rows: slice
+def _pattern(entries: Entries) -> Pattern:
+    none = np.zeros(0, dtype=np.intp)
+    keys, columns, data = [none], [none], [np.zeros(0)]
+    for k, (_, groups) in enumerate(entries.groups.values()):
+        for i, j, values in groups:
+            keys.append(np.asarray(i) * entries.size[1] + np.asarray(j))
+            columns.append(np.full(len(i), k))
+            data.append(values)
+    places, slots = np.unique(np.concatenate(keys), return_inverse=True)
+    shape = (len(places), len(entries.groups))
+    at = slots, np.concatenate(columns)
+    weights = sparse.csr_array((np.concatenate(data), at), shape=shape)
+    return Pattern(tuple(c for c, _ in entries.groups.values()), weights, places, entries.size)
 
 
 @dataclass(frozen=True, eq=False)
 class StackedLinks:
-    """The links with mass; z are the values of a table of scalars, followed by a 1."""
+    """The links with mass; z are the numbers of the five patterns, then three for each rider."""
 
     joined: Pattern  # U (n_local, n_dof)
     spread: Pattern  # N (n_local, Σ n_twist)
     twist: Pattern  # T (Σ n_twist, n_dof)
-    basis: sparse.csr_array | None  # Ψ (n_whole, n_local); None where no link is reduced
     masses: Pattern  # m (n_whole, n_whole)
     spins: Pattern  # ω per rate of every coordinate, (3 n_links, n_coordinates)
-    turns: Pattern  # ω̃ (n_whole, n_whole) of ω
-    riders: tuple[Rider, ...]
+    basis: sparse.csr_array | None  # Ψ (n_whole, n_local); None where no link is reduced
+    owners: Ints  # the link of each node
+    kept: Ints  # of the six dofs of a node
+    riders: tuple[Riding, ...]
 
-    def motion(self, z: Floats) -> Matrix:
+    def motion(self, z: Values) -> Matrix:
         """B (n_whole, n_dof)."""
-        B = self.joined.at(z) + self.spread.at(z) @ self.twist.at(z)
+        B = self.joined.at(z[0]) + self.spread.at(z[1]) @ self.twist.at(z[2])
         return B if self.basis is None else self.basis @ B
 
-    def mass(self, z: Floats) -> Matrix:
+    def mass(self, z: Values) -> Matrix:
         """m (n_whole, n_whole)."""
-        return self.masses.at(z)
+        return self.masses.at(z[3])
 
-    def spin(self, z: Floats, rate: Floats) -> Matrix:
-        """ω̃ on the translations and rotations of every node, in its link's axes."""
-        return self.turns.at(self.spins.at(z) @ rate)
+    def turned(self, z: Values, rate: Floats, B: Matrix) -> Matrix:
+        """ω̃ B, ω̃ on translations and rotations of every node, in its link's axes."""
+        spins = (self.spins.at(z[4]) @ rate).reshape(-1, 3)
+        turns = np.zeros((len(spins), 6, 6))
+        for i, j, component, sign in CROSS:
+            turns[:, i, j] = turns[:, 3 + i, 3 + j] = sign * spins[:, component]
+        blocks = turns[np.ix_(self.owners, self.kept, self.kept)]
+        if isinstance(B, np.ndarray):
+            return (blocks @ B.reshape(len(blocks), len(self.kept), -1)).reshape(B.shape)
+        nodes = np.arange(len(blocks) + 1)
+        return sparse.bsr_array((blocks, nodes[:-1], nodes), shape=self.masses.shape) @ B
 
-    def convection(self, values: Floats, step: float) -> tuple[sparse.csr_array, sparse.csr_array]:
+    def convection(
+        self, values: Sequence[Values], step: float
+    ) -> tuple[sparse.csr_array, sparse.csr_array]:
         """G and H (n_whole, n_whole) at the middle of three instants."""
         shape = self.masses.shape
         G, H = sparse.csr_array(shape), sparse.csr_array(shape)
-        for rider in self.riders:
-            found = rider.riding.at([z[rider.rows] for z in values], step)
-            g, h = (_placed(each, rider.first, shape) for each in found)
+        for k, rider in enumerate(self.riders):
+            own = slice(5 + 3 * k, 8 + 3 * k)
+            g, h = rider.at([z[own] for z in values], step)
             G, H = G + g, H + h
         return G, H
-
-
-def _whole(numbers: Any) -> Ints:
-    return np.asarray(numbers, dtype=np.intp)
-
-
-def _placed(block: sparse.csr_array, first: int, shape: tuple[int, int]) -> sparse.csr_array:
-    entries = block.tocoo()
-    where = (entries.row + first, entries.col + first)
-    return sparse.csr_array((entries.data, where), shape=shape)
-
-
-def whole_mass(link: LocalLink) -> Sequence[Term]:
-    """The mass terms of a link with all its dofs."""
-    return link.mass if link.reduction is None else link.reduction.mesh.mass
-
-
-def stack(
-    links: Sequence[LocalLink],
-    rows: Sequence[ScalarRows],
-    ridings: Sequence[Riding | None],
-    space: str,
-    n_u: int,
-    n_dof: int,
-) -> StackedLinks:
-    """The links that have mass, stacked; ``rows`` are where each has its scalars."""
-    joined, spread, twist, masses, spins, turns = (_PatternEntries() for _ in range(6))
-    riders, bases = [], []
-    local = whole = turned = spun = 0
-    for link, own, riding in zip(links, rows, ridings, strict=True):
-        mass = whole_mass(link)
-        if not mass:  # a rigid link without mass
-            continue
-        _add_joined(joined, link, own, local)
-        spread.add_terms(link.rigid, own.rigid.start, local, turned)
-        _add_dense(twist, own.twist, link.twist.shape, turned, n_u)
-        masses.add_terms(mass, own.mass.start, whole, whole)
-        n = mass[0].matrix.shape[0]
-        _add_dense(spins, own.spin, (3, (own.spin.stop - own.spin.start) // 3), spun, 0)
-        _add_turns(turns, space, n, whole, spun)
-        if riding is not None:
-            riders.append(Rider(riding, whole, own.mesh))
-        bases.append(sparse.eye_array(n) if link.reduction is None else link.reduction.basis)
-        local, whole = local + len(link.own), whole + n
-        turned, spun = turned + link.twist.shape[0], spun + 3
-    return StackedLinks(
-        joined.pattern((local, n_dof)),
-        spread.pattern((local, turned)),
-        twist.pattern((turned, n_dof)),
-        sparse.csr_array(sparse.block_diag(bases)) if local != whole else None,
-        masses.pattern((whole, whole)),
-        spins.pattern((spun, (rows[0].spin.stop - rows[0].spin.start) // 3)),
-        turns.pattern((whole, whole)),
-        tuple(riders),
-    )
-
-
-def _add_joined(out: _PatternEntries, link: LocalLink, rows: ScalarRows, first: int) -> None:
-    own = np.flatnonzero(link.own >= 0)
-    out.add(first + own, link.own[own], 1.0, -1)
-    carried = ((slot, unknown) for slot, pairs in link.carried.items() for unknown, _ in pairs)
-    for k, (slot, unknown) in enumerate(carried):
-        out.add(np.array([first + slot]), unknown, 1.0, rows.carries.start + k)
-
-
-def _add_dense(
-    out: _PatternEntries, scalars: slice, shape: tuple[int, ...], row: int, column: int
-) -> None:
-    """A full block whose entries are scalars, row by row."""
-    i, j = np.indices(shape)
-    out.add((row + i).ravel(), (column + j).ravel(), 1.0, np.arange(scalars.start, scalars.stop))
-
-
-def _add_turns(out: _PatternEntries, space: str, n: int, first: int, spin: int) -> None:
-    """ω̃ at every node of a link with n dofs, for translations and rotations alike."""
-    kept = DOFS[space]
-    nodes = first + len(kept) * np.arange(n // len(kept))
-    for half in (0, 3):
-        for i, j, component, sign in CROSS:
-            if half + i in kept and half + j in kept:
-                r, c = kept.index(half + i), kept.index(half + j)
-                out.add(nodes + r, nodes + c, sign, spin + component)

@@ -167,6 +167,26 @@ def bending_slopes(
     return _shapes(ROTATION, xi, phi, skew)
 
 
+def fields(xi: RealOrComplex, h: RealOrComplex, phi: RealOrComplex) -> RealOrComplex:
+    """N (n, n_xi, 6, 12): displacements and rotations at ξ per dof of an element, section's axes.
+
+    xi (n, n_xi), h (n, 1) in m, phi (n, 1, 2, 2): `Shear` of each plane. Stretch and twist are
+    linear, bending is that of `bending_shapes` and `bending_slopes`.
+    """
+    N = np.zeros((*xi.shape, 6, 12), dtype=np.result_type(xi, h, phi))
+    for row in (0, 3):
+        N[..., row, row], N[..., row, row + 6] = 1.0 - xi, xi
+    one = np.ones_like(h)
+    for k, (w, slope, sign) in enumerate(PLANES):
+        scale = np.stack([one, sign * h, one, sign * h], axis=-1)
+        bent = phi[..., k, 0], phi[..., k, 1]
+        deflection = bending_shapes(xi, *bent) * scale
+        rotation = bending_slopes(xi, *bent) * scale * (sign / h)[..., None]
+        for j, dof in enumerate((w, slope, w + 6, slope + 6)):
+            N[..., w, dof], N[..., slope, dof] = deflection[..., j], rotation[..., j]
+    return N
+
+
 def _shapes(
     parts: tuple[Floats, Floats, Floats],
     xi: RealOrComplex,

@@ -29,8 +29,6 @@ from eigassign.errors import AccuracyError, MechanismError
 from eigassign.mechanism.elements.mesh import LinkMesh, Reduction, Term, total
 from eigassign.mechanism.elements.sparse_factor import kept_factor
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type
-from eigassign.series.algebra import Samples
-from eigassign.series.compiler import compile_table
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -138,9 +136,8 @@ def _designs(case: CaseFile) -> Floats:
 
 def coefficients(parameters: ModelParameters, terms: Sequence[Term], p: Floats) -> Floats:
     """The coefficients of a link's terms at properties p (n, n_p), (n_terms, n), in any pose."""
-    table = compile_table(parameters.recorder, [t.coefficient for t in terms], parameters.count)
-    z = parameters.z(np.hstack([np.zeros((len(p), len(parameters.coordinates))), p]))
-    return np.asarray(np.broadcast_to(table.evaluate(Samples(), z), (len(terms), len(p))))
+    table = parameters.compiled(np.array([t.coefficient for t in terms], dtype=object))
+    return table(parameters.z(np.hstack([np.zeros((len(p), len(parameters.coordinates))), p])))[0].T
 
 
 def _span(

@@ -48,6 +48,15 @@ class Strand(NamedTuple):
     profiles: Sequence[Profile] = ()  # per element its values
 
 
+def element_motion(motion: Floats, axes: Floats) -> Floats:
+    """Motion (n, 12, count) of both nodes of each element of a row, in its axes.
+
+    ``motion`` (n + 1, 6, count) is that of the nodes.
+    """
+    turned = np.concatenate([axes @ motion[:, :3], axes @ motion[:, 3:]], axis=1)
+    return np.concatenate([turned[:-1], turned[1:]], axis=1)
+
+
 @dataclass(frozen=True)
 class LinkMesh:
     """One link: ``nodes`` maps a name to the local dofs of that node (None: rigidly attached).

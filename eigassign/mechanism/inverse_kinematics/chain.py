@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -26,8 +25,7 @@ from eigassign.mechanism.kinematics.loop_closure import closure_rows, reference_
 from eigassign.mechanism.kinematics.parameters import ModelParameters, node_position
 from eigassign.mechanism.kinematics.rotations import Objects, multiply
 from eigassign.mechanism.kinematics.topology import Topology, split
-from eigassign.series.algebra import Samples
-from eigassign.series.compiler import CompiledTable, Program, compile_table
+from eigassign.series.compiler import CompiledArrays, compile_arrays
 from eigassign.series.expression import Recorder, derivative
 
 Floats = NDArray[np.float64]
@@ -144,7 +142,7 @@ def tip_chain(
     tables = _TipTables(case, parameters, motion, tip, points, turns if oriented else (), set_)
     passive = None  # the passive freedoms of the model itself
     if motion.passive:
-        passive = compile_table(parameters.recorder, motion.passive, parameters.count)
+        passive = parameters.compiled(np.array(motion.passive, dtype=object))
 
     def at(y: Floats) -> TipChain:
         return TipChain(
@@ -205,27 +203,25 @@ class _TipTables:
     def _n_y(self) -> int:
         return len(self.parameters.design)
 
-    @property
-    def _n_variables(self) -> int:
-        return len(self.motion.tree.freedoms) + len(self.parameters.varied)
+    def _compiled(self, arrays: Sequence[Objects]) -> CompiledArrays:
+        n_variables = len(self.motion.tree.freedoms) + len(self.parameters.varied)
+        return compile_arrays(self._recorded[0], arrays, n_variables)
 
     @cached_property
-    def _state_table(self) -> _Table:
-        recorder, parts = self._recorded
-        return _Table.of(recorder, parts, self._n_variables)
+    def _state_table(self) -> CompiledArrays:
+        return self._compiled(self._recorded[1])
 
     @cached_property
-    def _design_table(self) -> _Table:
+    def _design_table(self) -> CompiledArrays:
         """∂(place)/∂y (d, n_y) and ∂F/∂y (n_e, n_y)."""
-        recorder, (place, _, _, F, _) = self._recorded
+        place, _, _, F, _ = self._recorded[1]
         first = len(self.motion.offset) + len(self.loads)
         columns = range(first, first + self._n_y)
         parts = [
             np.array([[derivative(f, k) for k in columns] for f in of], dtype=object)
             for of in (place, F)
         ]
-        shaped = [part.reshape(-1, self._n_y) for part in parts]
-        return _Table.of(recorder, shaped, self._n_variables)
+        return self._compiled([part.reshape(-1, self._n_y) for part in parts])
 
     def evaluate(self, z: Floats, y: Floats) -> TipEvaluation:
         """Evaluate the tip at states z (n, n_z) and design y."""
@@ -256,31 +252,6 @@ class _TipTables:
         at[n_q : n_q + len(given)] = given[:, None]
         at[n_q + len(given) :] = z[:, n_q:].T
         return at
-
-
-@dataclass(frozen=True, eq=False)
-class _Table:
-    """Arrays of scalars, evaluated for many samples together."""
-
-    program: Program
-    weights: Floats  # small: dense is quick
-    constants: Floats
-    shapes: tuple[tuple[int, ...], ...]
-
-    @staticmethod
-    def of(recorder: Recorder, arrays: Sequence[Objects], n_variables: int) -> _Table:
-        """Compile them over the recorder's variables."""
-        scalars = [scalar for array in arrays for scalar in array.ravel()]
-        table = compile_table(recorder, scalars, n_variables)
-        shapes = tuple(array.shape for array in arrays)
-        return _Table(table.program, table.weights.toarray(), table.constants[:, None], shapes)
-
-    def __call__(self, variables: Floats) -> list[Floats]:
-        """The values of each array at variables (n_variables, n), (n, *shape)."""
-        values = (self.weights @ self.program.run(Samples(), variables) + self.constants).T
-        cuts = np.cumsum([prod(shape) for shape in self.shapes])[:-1]
-        parts = zip(np.split(values, cuts, axis=1), self.shapes, strict=True)
-        return [part.reshape(len(values), *shape) for part, shape in parts]
 
 
 def _per_coordinate(rates: Objects, A: Floats) -> Objects:
@@ -318,7 +289,7 @@ def _kinds(case: CaseFile, tree: Topology) -> tuple[str, ...]:
 
 
 def _assembly(
-    case: CaseFile, table: CompiledTable | None, motion: Kinematics, properties: Floats
+    case: CaseFile, table: CompiledArrays | None, motion: Kinematics, properties: Floats
 ) -> LoopAssembly | None:
     """The branch of the model itself: where it was chosen, and its passive freedoms."""
     if table is None:
@@ -327,8 +298,7 @@ def _assembly(
     def passive(q: Floats) -> Floats:
         s = q @ motion.relative.T + motion.offset
         z = np.hstack([s, np.broadcast_to(properties, (len(q), len(properties)))]).T
-        values = table.evaluate(Samples(), z)
-        return np.broadcast_to(values, (len(values), len(q))).T
+        return table(z)[0]
 
     gaps, sines = (2, 1) if case.mechanism.space == "planar" else (3, 3)
     turning = np.array(([False] * gaps + [True] * sines) * len(motion.tree.loops), dtype=bool)

@@ -17,9 +17,7 @@ from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type, node_position
 from eigassign.mechanism.kinematics.topology import split
-from eigassign.series.algebra import Samples
-from eigassign.series.compiler import CompiledTable, compile_table
-from eigassign.series.expression import Scalar
+from eigassign.series.compiler import CompiledArrays
 
 Floats = NDArray[np.float64]
 
@@ -34,31 +32,16 @@ class LinkFrames:
     links: tuple[str, ...]
     drawn: tuple[tuple[tuple[str, str], ...], ...]  # per link: the node pairs of its lines
 
-    def _compile(self, scalars: Sequence[Scalar]) -> CompiledTable:
-        return compile_table(self.parameters.recorder, scalars, self.parameters.count)
-
-    def _evaluate(self, table: CompiledTable, x: Floats) -> Floats:
-        """(n_samples, n_scalars)."""
-        z = self.parameters.z(np.atleast_2d(x))
-        rows = table.evaluate(Samples(), z)
-        return np.broadcast_to(rows, (len(rows), z.shape[1])).T
-
     def values(self, x: Floats, arrays: Sequence[NDArray[np.object_]]) -> list[Floats]:
         """Numbers (n_samples, *shape) of arrays of this mechanism's scalars, evaluated together."""
-        table = self._compile([scalar for array in arrays for scalar in array.ravel()])
-        rows = self._evaluate(table, x)
-        cuts = np.cumsum([array.size for array in arrays])[:-1]
-        parts = zip(np.split(rows, cuts, axis=1), arrays, strict=True)
-        return [part.reshape(len(rows), *array.shape) for part, array in parts]
+        return self.parameters.compiled(*arrays)(self.parameters.z(np.atleast_2d(x)))
 
     @cached_property
-    def _ends(self) -> CompiledTable:
-        """World positions of both ends of every drawn line."""
-        scalars: list[Scalar] = []
-        for link, pairs in zip(self.links, self.drawn, strict=True):
-            for node in (name for pair in pairs for name in pair):
-                scalars += list(self.world(link, node))
-        return self._compile(scalars)
+    def _ends(self) -> CompiledArrays:
+        """World positions (n_lines, 2, 3) of both ends of every drawn line of each link."""
+        drawn = zip(self.links, self.drawn, strict=True)
+        places = [[[self.world(k, node) for node in pair] for pair in pairs] for k, pairs in drawn]
+        return self.parameters.compiled(*(np.array(each, dtype=object) for each in places))
 
     def world(self, link: str, node: str) -> NDArray[np.object_]:
         """World position of a named node, as scalars (3,)."""
@@ -67,10 +50,7 @@ class LinkFrames:
 
     def segments(self, x: Floats) -> tuple[Floats, ...]:
         """The straight lines of each link, (n, n_lines, 2 ends, 3) in m."""
-        values = self._evaluate(self._ends, x)
-        points = values.reshape(len(values), -1, 2, 3)
-        cuts = np.cumsum([len(pairs) for pairs in self.drawn])[:-1]
-        return tuple(np.split(points, cuts, axis=1))
+        return tuple(self._ends(self.parameters.z(np.atleast_2d(x))))
 
     def lines(self, x: Floats) -> Floats:
         """Start and end of every link, (n, n_links, 2, 3) in m: the first and last point drawn."""
@@ -80,7 +60,7 @@ class LinkFrames:
 
     def position(self, x: Floats, link: str, node: str) -> Floats:
         """World position (n, 3) of a named node, in m."""
-        return self._evaluate(self._compile(list(self.world(link, node))), x)
+        return self.values(x, [self.world(link, node)])[0]
 
 
 def build_link_frames(
@@ -111,9 +91,9 @@ def _lines(case: CaseFile, motion: Kinematics, link: str) -> tuple[tuple[str, st
 def design_dependence(poses: LinkFrames, tip: str, oriented: bool = False) -> NDArray[np.bool_]:
     """Masks (n_y,) of the design parameters that a node's place, and its turning, depend on."""
     link, node = split(tip)
-    scalars = list(poses.world(link, node))
+    arrays = [poses.world(link, node)]
     if oriented:
-        scalars += list(poses.motion.placement(link).world_rotation.ravel())
-    table = poses._compile(scalars)
-    depends = np.asarray(table.program.dependence.any(axis=0))
+        arrays.append(poses.motion.placement(link).world_rotation)
+    program = poses.parameters.compiled(*arrays).table.program
+    depends = np.asarray(program.dependence.any(axis=0))
     return depends[len(depends) - len(poses.parameters.design) :]

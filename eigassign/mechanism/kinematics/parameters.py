@@ -17,6 +17,7 @@ from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.kinematics.coordinates import coordinates
 from eigassign.mechanism.kinematics.rotations import Objects, vector
 from eigassign.mechanism.kinematics.topology import NodeName, Topology, build_tree
+from eigassign.series.compiler import CompiledArrays, compile_arrays
 from eigassign.series.expression import Expression, Recorder, Scalar
 
 Floats = NDArray[np.float64]
@@ -68,6 +69,10 @@ class ModelParameters:
     def z(self, x: Floats) -> Floats:
         """z (n_z, n) of samples x (n, n_x)."""
         return np.asarray(self.to_z @ x.T + self.shift[:, None])
+
+    def compiled(self, *arrays: NDArray[np.object_]) -> CompiledArrays:
+        """Arrays of scalars, to be evaluated at z (n_z, n)."""
+        return compile_arrays(self.recorder, arrays, self.count)
 
     def number(self, path: str, value: float) -> Scalar:
         """The value at a key path of the case, as an expression if it varies."""

@@ -19,9 +19,7 @@ from eigassign.case.schema.joints import RIDING
 from eigassign.errors import TravelError
 from eigassign.mechanism.kinematics.parameters import ModelParameters, length, station
 from eigassign.mechanism.kinematics.topology import Topology
-from eigassign.series.algebra import Samples
-from eigassign.series.compiler import CompiledTable, compile_table
-from eigassign.series.expression import Scalar
+from eigassign.series.compiler import CompiledArrays
 
 Floats = NDArray[np.float64]
 Label = Callable[[int], str]
@@ -34,7 +32,7 @@ class Rails:
     joints: tuple[str, ...]
     links: tuple[str, ...]
     margins: Floats  # (n_riders, 2): of the length, at start and end
-    table: CompiledTable  # station and length of every rider
+    table: CompiledArrays  # station and length of every rider, (n_riders, 2)
     names: tuple[str, ...]  # of the coordinates
 
     def require(self, z: Floats, x: Floats, label: Label = "sample {}".format) -> None:
@@ -43,9 +41,7 @@ class Rails:
         z (n_z, n_samples), and x (n_samples, n_x) to name the pose by; ``label`` names sample k of
         several, counted from 0.
         """
-        n = z.shape[1]
-        values = np.broadcast_to(self.table.evaluate(Samples(), z), (2 * len(self.joints), n))
-        s, L = values.reshape(-1, 2, n).swapaxes(0, 1)
+        s, L = self.table(z)[0].T
         low, high = self.margins[:, :1] * L, L * (1.0 - self.margins[:, 1:])
         outside = ~((s >= low) & (s <= high))
         if outside.any():
@@ -71,14 +67,15 @@ def rails(case: CaseFile, parameters: ModelParameters, tree: Topology) -> Rails 
     riders = [(joint, link) for link in case.mechanism.links for joint in tree.riders(link)]
     if not riders:
         return None
-    scalars: list[Scalar] = []
-    for joint, link in riders:
-        scalars += [station(parameters, tree, joint), length(case, parameters, link)]
+    scalars = [
+        [station(parameters, tree, joint) for joint, _ in riders],
+        [length(case, parameters, link) for _, link in riders],
+    ]
     return Rails(
         tuple(joint for joint, _ in riders),
         tuple(link for _, link in riders),
         np.array([_margins(case, link) for _, link in riders]),
-        compile_table(parameters.recorder, scalars, parameters.count),
+        parameters.compiled(np.array(scalars, dtype=object).T),
         parameters.coordinates,
     )
 

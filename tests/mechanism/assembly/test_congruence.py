@@ -20,8 +20,8 @@ def products(model: Built, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     n = model.pencil.n_dof
     K, M = np.zeros((n, n)), np.zeros((n, n))
     for link in links:
-        carries, twist, rigid, *factors = numbers(model, link, q)
-        B = motion_matrix(link, carries, twist, rigid, nodes.count, n).toarray()
+        *scalars, kappa, mu = numbers(model, link, q)
+        B, factors = motion_matrix(link, scalars, nodes.count, n).toarray(), (kappa, mu)
         for matrix, terms, values in zip((K, M), (link.stiffness, link.mass), factors, strict=True):
             if terms:
                 matrix += B.T @ (total(terms, values) @ B)
@@ -29,9 +29,8 @@ def products(model: Built, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def numbers(model: Built, link: Any, q: np.ndarray) -> list[np.ndarray]:
-    scalars = [*motion_scalars(link)]
-    scalars += [[t.coefficient for t in terms] for terms in (link.stiffness, link.mass)]
-    arrays = [np.array(group, dtype=object) for group in scalars]
+    groups = [[t.coefficient for t in terms] for terms in (link.stiffness, link.mass)]
+    arrays = [*motion_scalars(link), *(np.array(group, dtype=object) for group in groups)]
     return [values[0] for values in model.poses.values(model.x(q), arrays)]
 
 
