@@ -78,8 +78,7 @@ def expand(
     def expanded(path: Path, options: Options) -> Outcome:
         return run.expand_case(path, options, order=order, modes=modes or None, linear=linear)
 
-    out = how["out"] or Path("results", f"{case.stem}_expansion")
-    return _finished(expanded, case, as_json, {**how, "out": out})
+    return _finished(expanded, case, as_json, how)
 
 
 def _finished(
@@ -102,8 +101,8 @@ def _options(how: Mapping[str, Any], reporter: Reporter) -> Options:
 
     return Options(
         out=how.get("out"),
-        cache_dir=how["cache_dir"],
-        use_cache=not how["no_cache"],
+        cache_dir=how.get("cache_dir"),
+        use_cache=not how.get("no_cache", True),
         force=how.get("force", False),
         figures=how.get("figures", ()),
         report=how.get("report", "none"),
@@ -153,10 +152,8 @@ def update(case: Path, as_json: bool, **how: Any) -> int:
     """
     from eigassign.pipeline import update as updating
 
-    out = how["out"] or Path("results", f"{case.stem}_update")
     with reporting(how) as reporter:
-        given = _options({**how, "out": out, "cache_dir": None, "no_cache": True}, reporter)
-        done = updating.update(case, given)
+        done = updating.update(case, _options(how, reporter))
         reporter.warn(done.results.warnings)
     if as_json:
         from eigassign.output.reports.update import document
@@ -302,10 +299,9 @@ def chart(case: Path, quick: bool, as_json: bool, **how: Any) -> int:
 
     accuracies = Request.accuracies if how["accuracy"] is None else (how["accuracy"],)
     request = Request(accuracies, how["budget_s"], how["evaluations"])
-    out = how["out"] or Path("results", f"{case.stem}_chart")
+    effort = QUICK if quick else Effort()
     with reporting(how) as reporter:
-        given = _options({**how, "out": out, "cache_dir": None, "no_cache": True}, reporter)
-        folder, made = charting.chart(case, given, QUICK if quick else Effort(), request)
+        folder, made = charting.chart(case, _options(how, reporter), effort, request)
         reporter.warn(made.warnings)
     if as_json:
         print_json({"run_folder": str(folder), **vars(made)})

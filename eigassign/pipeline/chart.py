@@ -23,11 +23,10 @@ def chart(
 ) -> tuple[Path, Chart]:
     """`chart_case`, and its folder: chart.json, report.html, figures, case.yaml."""
     case = load_case(path, options.allow_outside)
-    with new_run_folder(case.file, options.out, options.force) as folder:
+    with new_run_folder(case.file, options.out, options.force, "_chart") as folder:
         made = chart_case(case, options, effort, request)
         options.progress("writing the chart")
         write_chart(made, folder.hidden, options.figures, options.report)
-        (folder.hidden / "case.yaml").write_text(case.file.resolved(), encoding="utf-8")
     return folder.path, made
 
 

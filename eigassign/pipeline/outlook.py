@@ -19,7 +19,7 @@ from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.motion import mechanism_plan
 from eigassign.output.reports.page import write_figures
 from eigassign.pipeline.expansions import ExpansionSize, expansion_size
-from eigassign.pipeline.run_files import RESULTS, new_run_folder
+from eigassign.pipeline.run_files import new_run_folder
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.drawing import draw_poses, rest_pose
 from eigassign.study.planning import Plan
@@ -83,11 +83,9 @@ def draw(
     Raises StorageError where the folder may not be replaced.
     """
     case = load_case(path, allow_outside)
-    target = RESULTS / f"{case.file.path.stem}_check" if out is None else out
-    with new_run_folder(case.file, target, force) as folder:
+    with new_run_folder(case.file, out, force, "_check") as folder:
         write_figures([picture(case)], folder.hidden, formats)
-        (folder.hidden / "case.yaml").write_text(case.file.resolved(), encoding="utf-8")
-    return target
+    return folder.path
 
 
 def picture(case: BuiltCase) -> FigurePlan:

@@ -21,7 +21,7 @@ from eigassign.mechanism.kinematics.parameters import written_loads
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.output.reports import page as report
 from eigassign.pipeline.outlook import Outlook, next_step, outlook, some_pose
-from eigassign.pipeline.run_files import RESULTS, new_run_folder
+from eigassign.pipeline.run_files import new_run_folder
 from eigassign.study import drawing
 from eigassign.study.accuracy import judged_mesh, mesh_lines, truncation_lines
 from eigassign.study.built_case import BuiltCase, load_case
@@ -106,13 +106,11 @@ def draw_modes(
     """
     case = load_case(path, allow_outside)
     at_q, at_y = pose_and_design(case, q, y, beyond_bounds)
-    target = RESULTS / f"{case.file.path.stem}_modes" if out is None else out
-    with new_run_folder(case.file, target, force) as folder:
+    with new_run_folder(case.file, out, force, "_modes") as folder:
         with case.located():
             pictures = drawing.draw_modes(case.file, case.model(), at_q, at_y, count)
         report.write_modes(pictures, folder.hidden, formats)
-        (folder.hidden / "case.yaml").write_text(case.file.resolved(), encoding="utf-8")
-    return _answer(case, at_q, at_y, np.array(pictures.frequencies_hz)), target
+    return _answer(case, at_q, at_y, np.array(pictures.frequencies_hz)), folder.path
 
 
 def pose_and_design(

@@ -63,7 +63,7 @@ Floats = NDArray[np.float64]
 class Options:
     """Options of a run, none of which changes a number."""
 
-    out: Path | None = None  # the run folder; results/<stem of the case file> if None
+    out: Path | None = None  # the run folder; below results, by the case file, if None
     cache_dir: Path | None = None  # the user's cache folder if None
     use_cache: bool = True
     force: bool = False  # a folder that another case wrote is moved aside
@@ -291,7 +291,8 @@ def expand_case(
     """
     stages = Stages(options.progress)
     case = load_case(path, options.allow_outside)
-    with new_run_folder(case.file, options.out, options.force) as folder, case.located():
+    out, force = options.out, options.force
+    with new_run_folder(case.file, out, force, "_expansion") as folder, case.located():
         scene = prepare(case, stages, _cache(options), order, modes)
         with stages("comparison", "comparing the expansion with exact frequencies"):
             studies = study_modes(scene)

@@ -14,8 +14,6 @@ from eigassign.output.reports import page as report
 from eigassign.output.store.run_folder import run_folder
 from eigassign.study.results import AssignmentRow, ErrorSummary, RunResults
 
-RESULTS = Path("results")  # below the current folder
-
 
 @dataclass(frozen=True)
 class RunFolder:
@@ -23,7 +21,6 @@ class RunFolder:
 
     path: Path
     hidden: Path
-    file: CaseFile
 
     def write(
         self,
@@ -32,17 +29,19 @@ class RunFolder:
         kind: str,
         extra: Mapping[str, bytes] | None = None,
     ) -> None:
-        """Results, report of this kind, figures in these formats; case; log; ``extra`` by name."""
+        """Results, report of this kind, figures in these formats; log; ``extra`` by name."""
         report.write_run(results, self.hidden, formats, kind)
-        texts = {"case.yaml": self.file.resolved(), "log.txt": log_text(results)}
-        encoded = {name: text.encode() for name, text in texts.items()}
-        for name, data in {**encoded, **(extra or {})}.items():
+        for name, data in {"log.txt": log_text(results).encode(), **(extra or {})}.items():
             (self.hidden / name).write_bytes(data)
 
 
 @contextmanager
-def new_run_folder(file: CaseFile, out: Path | None, force: bool) -> Iterator[RunFolder]:
-    """Yield the folder to fill: ``out``, or results/<stem of the case file>.
+def new_run_folder(
+    file: CaseFile, out: Path | None, force: bool, suffix: str = ""
+) -> Iterator[RunFolder]:
+    """Yield the folder to fill: ``out``, or results/<stem of the case file><suffix>.
+
+    It has the case already, as case.yaml.
 
     Raises StorageError on entry already where the folder may not be replaced, UsageError where the
     file has no stem.
@@ -50,10 +49,11 @@ def new_run_folder(file: CaseFile, out: Path | None, force: bool) -> Iterator[Ru
     if out is None and not file.path.stem.strip("."):
         message = f"{file.path} has no name before its ending: say where the run goes, --out DIR"
         raise UsageError(message)
-    target = RESULTS / file.path.stem if out is None else Path(out)
+    target = Path("results", file.path.stem + suffix) if out is None else Path(out)
     case = {"case_path": file.path, "case_sha256": file.sha256, "case_files": file.files}
     with run_folder(target, **case, force=force) as hidden:  # type: ignore[arg-type]
-        yield RunFolder(target, hidden, file)
+        (hidden / "case.yaml").write_text(file.resolved(), encoding="utf-8")
+        yield RunFolder(target, hidden)
 
 
 def log_text(results: RunResults) -> str:

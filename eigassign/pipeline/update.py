@@ -52,12 +52,12 @@ def update(path: str | Path, options: Options) -> Updated:
     Raises StorageError before anything is computed where the folder may not be replaced.
     """
     case = load_case(path, options.allow_outside)
-    with new_run_folder(case.file, options.out, options.force) as folder:
+    with new_run_folder(case.file, options.out, options.force, "_update") as folder:
         found = update_case(case, options)
         options.progress("writing the report")
         write_update(found.results, folder.hidden, options.figures, options.report)
-        for name, file in (("case.yaml", case.file), ("updated.yaml", found.case.file)):
-            (folder.hidden / name).write_text(file.resolved(), encoding="utf-8")
+        updated = found.case.file.resolved()
+        (folder.hidden / "updated.yaml").write_text(updated, encoding="utf-8")
     return replace(found, folder=folder.path)
 
 
