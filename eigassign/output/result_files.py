@@ -99,17 +99,17 @@ def _error(summary: ErrorSummary) -> dict[str, Any]:
         for row in [getattr(summary, name)]
     }
     if found["predicted"] is not None:
-        found["predicted"] = {key: finite(value) for key, value in found["predicted"].items()}
+        found["predicted"] = finite(found["predicted"])
     return found
 
 
 def finite(value: Any) -> Any:
-    """A value, or all those in mappings, lists and arrays, with null for what is not finite."""
+    """Plain values with null for numbers that are not finite, which JSON has not."""
     if isinstance(value, np.ndarray):
         value = value.tolist()
-    if isinstance(value, dict):
-        return {name: finite(one) for name, one in value.items()}
-    if isinstance(value, list | tuple):
+    if isinstance(value, Mapping):
+        return {key: finite(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
         return [finite(one) for one in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
@@ -352,7 +352,13 @@ def _assigned(results: RunResults) -> Iterator[Column]:
 def _curves(targets: Sequence[TargetStudy]) -> dict[str, list[Floats | None]]:
     """The edges, and the modes before and after, of each target; by what they are called."""
     found: dict[str, list[Floats | None]] = {
-        name: [_column(target, name) for target in targets] for name in targets[0].asked.columns
+        name: [
+            # a curve of a target, or an edge of what it asks
+            getattr(target, field) if hasattr(target, field) else getattr(target.asked, name)
+            for field in [f"{name.replace(' ', '_')}_hz"]
+            for target in targets
+        ]
+        for name in targets[0].asked.columns
     }
     for mode in sorted({mode for t in targets if t.near for mode in t.near.modes}):
         for when in ("initial", "optimal"):
@@ -363,14 +369,6 @@ def _curves(targets: Sequence[TargetStudy]) -> dict[str, list[Floats | None]]:
                 for t in targets
             ]
     return found
-
-
-def _column(target: TargetStudy, name: str) -> Floats | None:
-    """A curve of a target, or an edge of what it asks."""
-    field = f"{name.replace(' ', '_')}_hz"
-    of_asked = not hasattr(target, field)
-    hz: Floats | None = getattr(target.asked, name) if of_asked else getattr(target, field)
-    return hz
 
 
 def _expanded(results: RunResults) -> Iterator[Column]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from eigassign.errors import TrajectoryError, UsageError
 from eigassign.modal.adaptive.reduced_model import reduce_adaptively
-from eigassign.output.exchange.files import ENDINGS, write_exchange
+from eigassign.output.exchange.files import ENDINGS
 from eigassign.output.exchange.reduced_file import save_reduced
 from eigassign.pipeline.queries import pose_and_design
 from eigassign.study.built_case import BuiltCase
@@ -49,12 +49,7 @@ def export(
     with case.located():
         x = _samples(case)
         made = reduce_adaptively(case.model().pencil, x, accuracy, modes)
-    reduced = made.reduced
-    if path.suffix == ".h5":
-        save_reduced(reduced, path)
-        files: tuple[Path, ...] = (path,)
-    else:
-        files = write_exchange(reduced, path, case.file.title)
+    reduced, files = made.reduced, save_reduced(made.reduced, path, case.file.title)
     return Exported(files, reduced.modes, reduced.size, len(reduced.points), made.error, len(x))
 
 

@@ -11,15 +11,14 @@ from eigassign.output.exchange.files import ENDINGS, write_exchange
 from eigassign.output.store.array_file import DamagedError, get, put
 
 
-def save_reduced(reduced: ReducedModel, path: str | Path) -> None:
-    """Write ``reduced`` to ``path``, whole or not at all; raises StorageError if that fails.
+def save_reduced(reduced: ReducedModel, path: str | Path, title: str = "") -> tuple[Path, ...]:
+    """Write ``reduced`` to ``path``, whole or not at all; the files. Raises StorageError.
 
     The ending .npz, .mat or .c asks for the `exchange` formats, any other for HDF5.
     """
     path = Path(path)
     if path.suffix in ENDINGS:
-        write_exchange(reduced, path)
-        return
+        return write_exchange(reduced, path, title)
     meta = {
         "what": "reduced model",
         "modes": ", ".join(map(str, reduced.modes)),
@@ -30,6 +29,7 @@ def save_reduced(reduced: ReducedModel, path: str | Path) -> None:
         put(path, FORMAT, reduced_arrays(reduced), meta)
     except OSError as error:
         raise StorageError(f"cannot write {path}: {error.strerror}") from error
+    return (path,)
 
 
 def load_reduced(path: str | Path) -> ReducedModel:
