@@ -20,7 +20,6 @@ from eigassign.case.schema.targets import (
     AtMostTarget,
     FrequencyFile,
     FrequencyProfile,
-    ModeTarget,
 )
 from eigassign.case.schema.trajectory import (
     PointTrajectory,
@@ -351,7 +350,7 @@ def limits_leave_room(document: Document) -> Iterator[Finding]:
         (k, type(target), mode, target.curve, (target.trajectory, target.during))
         for k, target in enumerate(document.targets)
         if isinstance(target, (AtLeastTarget, AtMostTarget)) and isinstance(target.curve, float)
-        for mode in _numbers(target)
+        for mode in (mode for modes in target.named for mode in modes if not target.followed)
     ]
     for k, _, upper, most, when in (one for one in limits if one[1] is AtMostTarget):
         for _, _, lower, least, also in (one for one in limits if one[1] is AtLeastTarget):
@@ -360,12 +359,6 @@ def limits_leave_room(document: Document) -> Iterator[Finding]:
                 message = f"mode {upper} is to be at most {most:g} Hz and {other}at least {least:g}"
                 yield ("targets", k, "at_most"), f"{message} Hz: no design meets both"
                 break
-
-
-def _numbers(target: ModeTarget) -> Sequence[int]:
-    if target.modes is not None:
-        return (1,) if isinstance(target.modes, str) else target.modes
-    return (target.mode,) if isinstance(target.mode, int) else ()
 
 
 def constraints_can_be_met(document: Document) -> Iterator[Finding]:

@@ -21,7 +21,7 @@ from eigassign.case.rules.lookups import (
     trajectories,
     type_of,
 )
-from eigassign.case.schema.design import Choices, Design, Entry
+from eigassign.case.schema.design import Choices, Design
 from eigassign.case.schema.links import LINKS
 from eigassign.case.schema.mechanism import Body, Spring
 from eigassign.case.schema.parts import Part, Quantity, quantity
@@ -252,7 +252,11 @@ Ranges = Mapping[str, tuple[float, float]]  # SI, by path of the parameter
 def bounds_hold_no_impossible_section(mechanism: Any, design: Design) -> Iterator[Finding]:
     """Sections exist wherever the design may go; each problem is at the bound to narrow."""
     ranges = {p.parameter: (p.min, p.max) for p in design.parameters.values()}
-    entry = {p: name for name, e in design.entries.items() for p in _paths(e)}
+    entry = {
+        path: name
+        for name, e in design.entries.items()
+        for path in (e.properties if isinstance(e, Choices) else (e.parameter,))
+    }
     for path, bound, message in impossible(mechanism.sections, ranges):
         body = design.entries[name := entry[path]]
         if isinstance(body, Choices):
@@ -261,10 +265,6 @@ def bounds_hold_no_impossible_section(mechanism: Any, design: Design) -> Iterato
         else:
             key = bound if body.values is None else "values"
             yield ("design", name, key), f"at this bound {message}; narrow the bounds"
-
-
-def _paths(entry: Entry) -> tuple[str, ...]:
-    return entry.properties if isinstance(entry, Choices) else (entry.parameter,)
 
 
 def load_cases_have_possible_sections(

@@ -45,32 +45,35 @@ def targets_are_on_trajectories(tree: Tree) -> Iterator[Finding]:
 
 def a_mode_has_one_frequency_at_a_time(tree: Tree) -> Iterator[Finding]:
     """No two targets want frequencies of the same mode on the same part of a trajectory."""
-    known, seen = trajectory_names(tree), list[tuple[int, str, Span | None]]()
+    known, seen = trajectory_names(tree), dict[tuple[int, str], list[Span | None]]()
     for k, target in enumerate(entries(tree, "targets")):
         if at(target, "frequency") is None:
             continue
-        single, where, span = at(target, "mode"), text(target, "trajectory"), at(target, "during")
+        single, where, span = (
+            at(target, "mode"),
+            text(target, "trajectory"),
+            _span(at(target, "during")),
+        )
         places: list[tuple[KeyPath, object]] = [(("targets", k, "mode"), single)]
         each = enumerate(entries(target, "modes"))
         places += [(("targets", k, "modes", i), mode) for i, mode in each]
-        own: list[tuple[int, str, Span | None]] = []
+        own: list[tuple[int, str]] = []
         for path, mode in places:
             if not isinstance(mode, int) or isinstance(mode, bool):
                 continue
-            along = [(mode, name, _span(span)) for name in ([where] if where else known or [""])]
-            both = sorted(n for m, n, s in along if any(_meet((m, n, s), one) for one in seen))
+            along = [(mode, name) for name in ([where] if where else known or [""])]
+            both = sorted(
+                name
+                for mode, name in along
+                for other in seen.get((mode, name), ())
+                if span is None or other is None or (span[0] < other[1] and other[0] < span[1])
+            )
             if both:
                 which = f" along trajectory {both[0]!r}" if len(known) > 1 else ""
                 yield path, f"mode {mode} has a target already{which}"
             own += along
-        seen += own
-
-
-def _meet(a: tuple[int, str, Span | None], b: tuple[int, str, Span | None]) -> bool:
-    """True for two (mode, trajectory, part of it) that have an instant in common."""
-    if a[:2] != b[:2]:
-        return False
-    return a[2] is None or b[2] is None or (a[2][0] < b[2][1] and b[2][0] < a[2][1])
+        for place in own:
+            seen.setdefault(place, []).append(span)
 
 
 def followed_modes_are_at_a_pose(tree: Tree) -> Iterator[Finding]:

@@ -238,15 +238,16 @@ def is_entry(value: object) -> bool:
     return isinstance(value, Mapping) and ("parameter" in value or "choices" in value)
 
 
-def _entry_tag(value: object) -> str:
-    if isinstance(value, Mapping):
-        return "<choices>" if "choices" in value and "parameter" not in value else "<parameter>"
-    return "<choices>" if isinstance(value, Choices) else "<parameter>"
-
-
 Entry: TypeAlias = Annotated[
     Annotated[Parameter, Tag("<parameter>")] | Annotated[Choices, Tag("<choices>")],
-    Discriminator(_entry_tag),
+    Discriminator(
+        lambda value: (
+            "<choices>"
+            if isinstance(value, Choices)
+            or (isinstance(value, Mapping) and "choices" in value and "parameter" not in value)
+            else "<parameter>"
+        )
+    ),
 ]
 ENTRIES: dict[str, type[Part]] = {"parameter": Parameter, "choices": Choices}
 

@@ -5,11 +5,11 @@ To add a key: give `Document` a field, with a model of what stands below it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
-from pydantic import AfterValidator, BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 from pydantic.json_schema import GenerateJsonSchema
 
 from eigassign.case.reader import Finding, KeyPath, Tree, text, unspaced
@@ -17,7 +17,7 @@ from eigassign.case.schema.design import ENTRIES, RESERVED, Design, Parameter, i
 from eigassign.case.schema.joints import JOINTS
 from eigassign.case.schema.links import LINKS
 from eigassign.case.schema.mechanism import Coordinate, Mechanism
-from eigassign.case.schema.parts import FrozenDict, Named, Part, Quantity, keys_of, wrong
+from eigassign.case.schema.parts import FrozenDict, Named, Part, Quantity, keys_of, must
 from eigassign.case.schema.sections import SHAPES
 from eigassign.case.schema.study import AssignmentKeys, ExpansionKeys, Measurements, ValidationKeys
 from eigassign.case.schema.sweep import Sweep
@@ -25,11 +25,7 @@ from eigassign.case.schema.targets import CURVES, TARGETS, TargetForm
 from eigassign.case.schema.trajectory import MOTIONS, TrajectoryForms
 from eigassign.case.suggestions import listed, shown, suggestion, unknown
 
-
-def _one_line(text: str) -> str:
-    if not text.isprintable():
-        raise wrong("expected one line of printable text")
-    return text
+_ONE_LINE = must(str.isprintable, "expected one line of printable text")
 
 
 class Document(Part):
@@ -50,8 +46,8 @@ class Document(Part):
         sweep: variants of the case
     """
 
-    title: Annotated[str, Field(min_length=1, max_length=200), AfterValidator(_one_line)]
-    reference: Annotated[str, Field(max_length=1000), AfterValidator(_one_line)] | None = None
+    title: Annotated[str, Field(min_length=1, max_length=200), _ONE_LINE]
+    reference: Annotated[str, Field(max_length=1000), _ONE_LINE] | None = None
     mechanism: Mechanism
     coordinates: Named[Coordinate] = FrozenDict()
     trajectory: TrajectoryForms | None = None
@@ -112,7 +108,9 @@ def _findings(error: ValidationError, *below: str) -> list[Finding]:
         kind = each["type"]
         if kind.startswith("no_") and not isinstance(each["input"], Mapping):
             kind = "no_mapping"
-        suffix, message = _EXPLAIN.get(kind, _by_message)(detail)
+        suffix, message = (), f"{each['msg']}, got {shown(each['input'])}"
+        if kind in _EXPLAIN:
+            suffix, message = _EXPLAIN[kind](detail)
         found.append(((*path, *suffix), message))
     return found
 
@@ -128,10 +126,6 @@ def _with_entries_apart(tree: Tree) -> Tree:
     apart = {key: design[key] for key in RESERVED if key in design and not is_entry(design[key])}
     entries = {name: body for name, body in design.items() if name not in apart}
     return {**tree, "design": {"entries": entries, **apart}}
-
-
-def _by_message(error: Any) -> _Explained:
-    return (), f"{error['msg']}, got {shown(error['input'])}"
 
 
 def _missing(error: Any) -> _Explained:
@@ -217,24 +211,24 @@ def _mapping(error: Any) -> _Explained:
     what = "a mapping (key: value)"
     if error["loc"][-2:] == ("keep_out", "<one>"):
         what = "[low, high] or {harmonic: ..., of: ..., margin: ...}"
-    given = error["input"]
-    return (), f"expected {what}, got {shown(given)}{unspaced(given)}"
+    found: _Explained = _expected(what, lambda e: unspaced(e["input"]))(error)
+    return found
 
 
-def _whole(error: Any) -> _Explained:
-    hint = ": write modes: all" if "mode" in error["loc"][-2:] and error["input"] == "all" else ""
-    return (), f"expected a whole number, got {shown(error['input'])}{hint}"
+def _expected(what: str, hint: Callable[[Any], str] = lambda _: "") -> Any:
+    """Explanation of another value than ``what``, which the ``hint`` of an error goes on with."""
+    return lambda error: ((), f"expected {what}, got {shown(error['input'])}{hint(error)}")
 
 
-def _expected(what: str) -> Any:
-    return lambda error: ((), f"expected {what}, got {shown(error['input'])}")
-
-
-def _text(error: Any) -> _Explained:
+def _in_quotes(error: Any) -> str:
     value = error["input"]
     number = isinstance(value, int | float) and not isinstance(value, bool)
-    hint = f': write "{value}", in quotes, if that is its name' if number else ""
-    return (), f"expected text (in quotes if need be), got {shown(value)}{hint}"
+    return f': write "{value}", in quotes, if that is its name' if number else ""
+
+
+def _of_one_entry(error: Any) -> str:
+    given = error["input"]
+    return f"; of one entry it is [{'{...}' if isinstance(given, Mapping) else shown(given)}]"
 
 
 def _literal(error: Any) -> _Explained:
@@ -248,20 +242,11 @@ def _literal(error: Any) -> _Explained:
     return (), f"expected {expected}{also}, got {shown(value)}{hint}"
 
 
-def _list(error: Any) -> _Explained:
-    given = error["input"]
-    meant = "[{...}]" if isinstance(given, Mapping) else f"[{shown(given)}]"
-    return (), f"expected a list, got {shown(given)}; of one entry it is {meant}"
-
-
 _EXPLAIN: dict[str, Any] = {
     "at_key": lambda e: (e["ctx"]["keys"], e["ctx"]["text"]),
     "missing": _missing,
     "extra_forbidden": _extra,
-    "no_mapping": lambda e: (
-        (),
-        f"expected a mapping, got {shown(e['input'])}{unspaced(e['input'])}",
-    ),
+    "no_mapping": _expected("a mapping", lambda e: unspaced(e["input"])),
     "no_shape": _no_kind("shape", SHAPES),
     "no_link": _no_kind("type", LINKS),
     "no_joint": _no_kind("type", JOINTS),
@@ -273,11 +258,14 @@ _EXPLAIN: dict[str, Any] = {
     "dict_type": _mapping,
     "mapping_type": _mapping,
     "is_instance_of": _mapping,
-    "tuple_type": _list,
+    "tuple_type": _expected("a list", _of_one_entry),
     "bool_type": _expected("true or false"),
-    "int_type": _whole,
+    "int_type": _expected(
+        "a whole number",
+        lambda e: ": write modes: all" if e["input"] == "all" and "mode" in e["loc"][-2:] else "",
+    ),
     "int_from_float": _expected("a whole number"),
-    "string_type": _text,
+    "string_type": _expected("text (in quotes if need be)", _in_quotes),
     "string_too_short": _expected("some text"),
     "string_too_long": lambda e: ((), f"is longer than {e['ctx']['max_length']} characters"),
     "too_short": lambda e: (

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
-from pydantic import AfterValidator, ValidationInfo, model_validator
+from pydantic import ValidationInfo, model_validator
 
-from eigassign.case.schema.parts import KindBy, Part, kinds, wrong
+from eigassign.case.schema.parts import KindBy, Part, kinds, must, wrong
 from eigassign.case.schema.vectors import (
     IN_PLANE,
     IN_SPACE,
@@ -62,13 +62,9 @@ class JointBase(Part):
         return value
 
 
-def _travels(lead: float) -> float:
-    if lead == 0:
-        raise wrong("must not be 0 m: a screw travels as it turns")
-    return lead
-
-
-Lead: TypeAlias = Annotated[float, PLACE, AfterValidator(_travels)]
+Lead: TypeAlias = Annotated[
+    float, PLACE, must(bool, "must not be 0 m: a screw travels as it turns")
+]
 
 
 class RevoluteJoint(JointBase):

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias, TypeVar, Union, get_args
 
@@ -84,6 +84,17 @@ def keys_of(model: type[Part]) -> dict[str, FieldInfo]:
 def wrong(message: str, *keys: str | int) -> PydanticCustomError:
     """Error of a validator, to be shown at ``keys`` below the value it validates."""
     return PydanticCustomError("at_key", "{text}", {"text": message, "keys": keys})
+
+
+def must(hold: Callable[[Any], object], message: str) -> AfterValidator:
+    """Validator of values for which this has to ``hold``."""
+
+    def checked(value: T) -> T:
+        if not hold(value):
+            raise wrong(message)
+        return value
+
+    return AfterValidator(checked)
 
 
 # --- Quantities
@@ -172,15 +183,6 @@ def quantity(dimension: str, above: float | None = None, at_least: float | None 
 _NAME = re.compile(r"[^\W\d][\w-]{0,63}")
 
 
-def _usable(name: str) -> str:
-    if not _NAME.fullmatch(name):
-        raise wrong(
-            "not a usable name: names start with a letter and hold letters, digits, _ and - only "
-            "(at most 64)"
-        )
-    return name
-
-
 class FrozenDict(Mapping[str, V]):
     """An immutable, hashable, picklable mapping that keeps the order of the file."""
 
@@ -221,7 +223,14 @@ class FrozenDict(Mapping[str, V]):
 
 
 Frozen = AfterValidator(FrozenDict)
-Name: TypeAlias = Annotated[str, AfterValidator(_usable)]
+Name: TypeAlias = Annotated[
+    str,
+    must(
+        _NAME.fullmatch,
+        "not a usable name: names start with a letter and hold letters, digits, _ and - only "
+        "(at most 64)",
+    ),
+]
 File: TypeAlias = str  # absolute; `rules.files` looks at it
 Named: TypeAlias = Annotated[Mapping[Name, T], Frozen]  # parts by the names that a file gives them
 OneOrMoreNamed: TypeAlias = Annotated[Mapping[Name, T], Field(min_length=1), Frozen]

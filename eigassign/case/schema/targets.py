@@ -78,17 +78,19 @@ class FrequencyFile(Part):
 CURVES: dict[str, type[Part]] = {"profile": FrequencyProfile, "csv": FrequencyFile}
 
 
-def _curve_tag(value: object) -> str:
-    if isinstance(value, FrequencyFile) or (isinstance(value, Mapping) and "file" in value):
-        return "<csv>"
-    return "<profile>" if isinstance(value, (FrequencyProfile, Mapping)) else "<value>"
-
-
 Curve: TypeAlias = Annotated[
     Annotated[Frequency, Tag("<value>")]
     | Annotated[FrequencyProfile, Tag("<profile>")]
     | Annotated[FrequencyFile, Tag("<csv>")],
-    Discriminator(_curve_tag),
+    Discriminator(
+        lambda value: (
+            "<csv>"
+            if isinstance(value, FrequencyFile) or (isinstance(value, Mapping) and "file" in value)
+            else "<profile>"
+            if isinstance(value, (FrequencyProfile, Mapping))
+            else "<value>"
+        )
+    ),
 ]
 
 

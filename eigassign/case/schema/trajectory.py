@@ -49,15 +49,15 @@ PropertyValue: TypeAlias = Annotated[
 Samples: TypeAlias = Annotated[int, Field(ge=2, le=100_000)]
 
 
-def _nested_tag(value: object) -> str:
-    """Tag of one triple of angles, or a list of them."""
-    nested = isinstance(value, (tuple, list)) and any(isinstance(v, (tuple, list)) for v in value)
-    return "<list>" if nested else "<one>"
-
-
-Orientations: TypeAlias = Annotated[
+Orientations: TypeAlias = Annotated[  # a triple of angles, or a list of them
     Annotated[Orientation, Tag("<one>")] | Annotated[tuple[Orientation, ...], Tag("<list>")],
-    Discriminator(_nested_tag),
+    Discriminator(
+        lambda value: (
+            "<list>"
+            if isinstance(value, (tuple, list)) and any(isinstance(v, (tuple, list)) for v in value)
+            else "<one>"
+        )
+    ),
 ]
 
 

@@ -13,7 +13,7 @@ from typing import Annotated, Any, TypeAlias
 from pydantic import AfterValidator, BeforeValidator, ValidationInfo
 from pydantic_core import core_schema
 
-from eigassign.case.schema.parts import OneOrList, Quantity, quantity, wrong
+from eigassign.case.schema.parts import OneOrList, Quantity, must, quantity, wrong
 
 LENGTH = quantity("length", above=0)
 ANGLE = quantity("angle")
@@ -66,14 +66,13 @@ Angle: TypeAlias = Annotated[float, ANGLE]
 Orientation: TypeAlias = tuple[Angle, Angle, Angle]  # rad, about x, y, z: R = Rz Ry Rx
 
 
-def _points_somewhere(direction: tuple[float, ...]) -> tuple[float, ...]:
-    if not any(abs(v) >= _SHORTEST for v in direction):
-        raise wrong("has no direction: all components are zero")
-    return direction
-
-
 Direction: TypeAlias = Annotated[
-    tuple[Annotated[float, Quantity()], ...], Components(), AfterValidator(_points_somewhere)
+    tuple[Annotated[float, Quantity()], ...],
+    Components(),
+    must(
+        lambda direction: any(abs(v) >= _SHORTEST for v in direction),
+        "has no direction: all components are zero",
+    ),
 ]
 
 
