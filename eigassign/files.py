@@ -10,13 +10,15 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import hashlib
 import io
 import json
 import math
 import os
 import shlex
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +61,25 @@ def read_bytes(path: str | Path, limit: int) -> bytes:
     return b"".join(pieces(path, limit))
 
 
+def file_digest(path: str | Path, limit: int) -> str | None:
+    """SHA-256 of a regular file of at most ``limit`` bytes; None where there is none."""
+    found = hashlib.sha256()
+    try:
+        for piece in pieces(path, limit):
+            found.update(piece)
+    except (OSError, ValueError):
+        return None
+    return found.hexdigest()
+
+
+def seen_from(folder: Path, path: str | Path) -> str:
+    """``path`` as seen from ``folder``, or from the root on another drive."""
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:
+        return Path(path).as_posix()
+
+
 def json_value(text: str | bytes) -> Any:
     """The value that JSON of anybody says; raises ValueError for everything else.
 
@@ -79,6 +100,24 @@ def _number(text: str) -> float:
 
 
 _JSON = json.JSONDecoder(parse_float=_number, parse_int=_number, parse_constant=_number)
+
+
+def plain(value: object) -> Any:
+    """Dataclasses, mappings, sequences, arrays and paths as JSON has them.
+
+    A number that is not finite is null.
+    """
+    if hasattr(value, "tolist"):  # NumPy's arrays and scalars, without importing NumPy
+        value = value.tolist()
+    if is_dataclass(value):
+        value = {field.name: getattr(value, field.name) for field in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): plain(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(inner) for inner in value]
+    if isinstance(value, Path):
+        return str(value)
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def objection(path: str | Path, limit: int) -> str | None:

@@ -115,16 +115,13 @@ def _differences(batch: Batch, rows: Mapping[int, CaseOutcome]) -> Iterator[Case
                 now = replace(found, index=index, name=case.name, path=case.path, run_folder=name)
                 break
         else:
-            if listed is None and not _is_damaged(folder / case.name):
+            place = folder / case.name
+            is_of_a_case = os.path.lexists(place / OUTCOME)
+            if listed is None and not (is_of_a_case and recorded(place) is None):
                 continue
             now = outcome_of(case, "error", message="its files are not as its run has left them")
         if now != row:
             yield now
-
-
-def _is_damaged(place: Path) -> bool:
-    """True for the folder of a case of a batch whose record vouches for it no more."""
-    return os.path.lexists(place / OUTCOME) and recorded(place) is None
 
 
 # --- Taking up a folder

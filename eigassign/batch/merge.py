@@ -40,11 +40,11 @@ def merge_shards(out: Path, folders: Sequence[Path]) -> InOrder:
     ``out`` are made anew. Raises UsageError, with all that is wrong, where a shard is missing, not
     finished, there twice, or of another batch, and where files of a case were lost.
     """
-    shards = [
-        _Shard(folder, header, InOrder(folder, header))
-        for folder in folders or (out,)
-        for header in [_header(folder)]
-    ]
+    shards = []
+    for folder in folders or (out,):
+        if (found := read_header(folder)) is None:
+            raise UsageError(f"{folder}: no folder of a batch, there is no batch.json")
+        shards.append(_Shard(folder, found, InOrder(folder, found)))
     if not folders:
         if lost := shards[0].lost():
             some = ", ".join(lost[:5]) + (", …" if len(lost) > 5 else "")
@@ -67,12 +67,6 @@ def merge_shards(out: Path, folders: Sequence[Path]) -> InOrder:
         rows_in_turn = filter(None, chain.from_iterable(zip_longest(*parts)))
         file.writelines(line_of(row, header.plan) for row in rows_in_turn)
     return summarise(out, header, anew=True)
-
-
-def _header(folder: Path) -> Header:
-    if (header := read_header(folder)) is None:
-        raise UsageError(f"{folder}: no folder of a batch, there is no batch.json")
-    return header
 
 
 def _problems(shards: Sequence[_Shard]) -> Iterator[str]:

@@ -8,7 +8,6 @@ names say, its own values, and the version. So a result is known again wherever 
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
 import os
@@ -26,9 +25,10 @@ from eigassign.batch.variants import OPTION, Variants, variants_of
 from eigassign.case.loading import Unchecked, read
 from eigassign.case.reader import dotted
 from eigassign.case.schema.sweep import text_of
+from eigassign.case.units import NUMBER
 from eigassign.case.values import key_path
 from eigassign.errors import EigassignError, Problem, StorageError, UsageError
-from eigassign.files import MATRIX, read_bytes
+from eigassign.files import MATRIX, file_digest
 from eigassign.modal.storage import ALGORITHM
 from eigassign.output.batch.files import NAMES
 from eigassign.output.store.run_record import MARKER
@@ -74,7 +74,7 @@ class PlannedFile:
             return ""
         texts = dict.fromkeys(_texts(self.variants.columns))
         folder = Path(self.path).parent
-        named = {text: digest for text in texts if (digest := _digest(folder / text))}
+        named = {text: sha for text in texts if (sha := _digest(folder / text))}
         return (self.variants.digest, *named.values())
 
     def variant(self, k: int, index: int) -> Variant:
@@ -161,8 +161,8 @@ def content_of(case: Unchecked) -> str:
 
 def key_of(content: str, values: Mapping[str, object], folder: Path) -> str:
     """Key of the variant of a case in ``folder`` with this `content_of`; files count by content."""
-    digests = [_digest(folder / text) for text in _texts(values)]
-    return _hash([content, values, [digest for digest in digests if digest]])
+    digests = map(_digest, (folder / text for text in _texts(values)))
+    return _hash([content, values, [*filter(None, digests)]])
 
 
 def _hash(parts: list[object]) -> str:
@@ -189,9 +189,7 @@ def _digest(file: Path) -> str | None:
 
 @lru_cache(maxsize=100)
 def _digest_once(file: Path, _time: int, _size: int) -> str | None:
-    with contextlib.suppress(OSError):
-        return hashlib.sha256(read_bytes(file, MATRIX)).hexdigest()
-    return None
+    return file_digest(file, MATRIX)
 
 
 def variant_problem(plan: BatchPlan, index: int, problem: Problem) -> Problem:
@@ -212,7 +210,6 @@ def variant_problem(plan: BatchPlan, index: int, problem: Problem) -> Problem:
 
 # --- Names of variants
 
-_NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _LONG = re.compile(r"[0-9.]{7}")  # what may have more digits than a name has
 _UNSAFE = re.compile(r"[^\w.,=+-]")
 
@@ -223,7 +220,7 @@ def _named(short: Mapping[str, str], values: Mapping[str, object]) -> str:
     File systems allow names of 255 bytes, and hidden ones are longer than these.
     """
     exact = ",".join(f"{short[key]}={text_of(value)}" for key, value in values.items())
-    rounded = _NUMBER.sub(_six_digits, exact) if _LONG.search(exact) else exact
+    rounded = NUMBER.sub(_six_digits, exact) if _LONG.search(exact) else exact
     shown = _UNSAFE.sub("_", rounded)
     if shown == exact and len(shown.encode()) <= 100:
         return shown

@@ -147,7 +147,7 @@ def _solved(
 def _uninterrupted(case: BuiltCase, how: Options) -> RunResults:
     """The answer; Ctrl-C ends a batch, and makes no answer of the best design so far."""
     results = solve_case(case, how).results
-    if results.assignment is not None and results.assignment.ended == "interrupted":
+    if results.interrupted:
         raise KeyboardInterrupt
     return results
 

@@ -35,7 +35,7 @@ from eigassign.case.schema.parts import FrozenDict
 from eigassign.case.schema.trajectory import named_trajectories
 from eigassign.case.values import with_values
 from eigassign.errors import CaseError, Problem, StorageError, UsageError
-from eigassign.files import CASE, pieces, read_bytes
+from eigassign.files import CASE, file_digest, read_bytes, seen_from
 
 NO_VALUES: Mapping[str, object] = FrozenDict()
 MOST_PROBLEMS = 100  # shown; of each kind of check twice as many are looked at
@@ -181,22 +181,5 @@ def _case_file(
 
 def _digests(named: Sequence[NamedFile], folder: Path) -> dict[str, str]:
     """SHA-256 of each file, by its name as seen from ``folder``; of none that cannot be read."""
-    digests = {each.file: _digest(each.file, each.limit) for each in named}
-    return {_seen_from(folder, file): sha for file, sha in digests.items() if sha is not None}
-
-
-def _seen_from(folder: Path, file: str) -> str:
-    try:
-        return Path(os.path.relpath(file, folder)).as_posix()
-    except ValueError:  # another drive
-        return Path(file).as_posix()
-
-
-def _digest(file: str, limit: int) -> str | None:
-    digest = hashlib.sha256()
-    try:
-        for piece in pieces(file, limit):
-            digest.update(piece)
-    except (OSError, ValueError):
-        return None
-    return digest.hexdigest()
+    digests = {each.file: file_digest(each.file, each.limit) for each in named}
+    return {seen_from(folder, file): sha for file, sha in digests.items() if sha is not None}

@@ -76,12 +76,13 @@ class Source:
 
 def dotted(path: KeyPath) -> str:
     """``("targets", 0, "mode")`` → ``"targets[0].mode"``."""
-    text = "".join(f"[{p}]" if isinstance(p, int) else f".{_printable(p)}" for p in path)
-    return text.removeprefix(".")
-
-
-def _printable(key: str) -> str:
-    return key if key.isprintable() and len(key) <= 80 else shown(key)
+    parts = (
+        f"[{p}]"
+        if isinstance(p, int)
+        else f".{p if p.isprintable() and len(p) <= 80 else shown(p)}"
+        for p in path
+    )
+    return "".join(parts).removeprefix(".")
 
 
 def resolve(text: str) -> object:

@@ -21,6 +21,7 @@ from pathlib import Path
 from eigassign.case.suggestions import listed, shown, suggestion
 from eigassign.case.units import (
     DIMENSIONS,
+    NUMBER,
     TWO_TURNS,
     Dimension,
     QuantityError,
@@ -32,7 +33,6 @@ from eigassign.errors import MechanismError
 from eigassign.files import TABLE, read_bytes
 
 _HEADER_CELL = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
-_NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _SEPARATOR_LINE = re.compile(r"sep=([;,\t])", re.IGNORECASE)  # a spreadsheet's hint to itself
 _POINT = re.compile(r"\d\.\d")
 _MOST = 1_000_000  # rows: what 100 MB hold, the limit of a table
@@ -109,8 +109,10 @@ def read_table(
             if column.name in present or not column.optional
         ]
     except MechanismError:
-        if _hold_numbers(header, next(rows, (0, []))[1]):
-            raise
+        for row in (header, next(rows, (0, []))[1]):
+            words = " ".join(row).replace(",", ".").split()
+            if words and 2 * len([*filter(NUMBER.fullmatch, words)]) >= len(words):
+                raise
         wanted = ", ".join(column.name for column in columns if not column.optional)
         message = f"{where}: expected a header with {wanted}, and numbers below it"
         raise MechanismError(key, message) from None  # what the file says is not for a message
@@ -209,13 +211,6 @@ def _rows(text: str, dialect: _Dialect, name: str, key: str) -> Iterator[tuple[i
         raise MechanismError(key, f"{message}; close every quote") from error
 
 
-def _hold_numbers(*rows: list[str]) -> bool:
-    """True where at least half of the words of one of these rows are numbers."""
-    words = [" ".join(row).replace(",", ".").split() for row in rows]
-    shares = [[_NUMBER.fullmatch(word) is not None for word in row] for row in words]
-    return any(share and 2 * sum(share) >= len(share) for share in shares)
-
-
 def _split(cell: str, where: str, key: str) -> tuple[str, str]:
     """``"q1 [deg]"`` → ``("q1", "deg")``."""
     match = _HEADER_CELL.fullmatch(cell)
@@ -251,7 +246,7 @@ def _miscounted(column: CsvColumn, known: Sequence[str]) -> str:
     if name in known:
         return f"column {name} appears {known.count(name)} times"
     message = f"no column {name}; the columns are {listed(known)}"
-    if all(_NUMBER.fullmatch(other) for other in known):
+    if all(NUMBER.fullmatch(other) for other in known):
         return f"{message}; the first line must be a header, such as time [s],q1 [deg]"
     if len(known) == 1 and " " in known[0]:
         return f"{message}; columns are separated by commas, semicolons or tabs"
@@ -278,7 +273,7 @@ def _values(
             yield cell
             continue
         number = cell.replace(",", ".", 1) if dialect.comma else cell
-        value = float(number) if _NUMBER.fullmatch(number) else math.nan
+        value = float(number) if NUMBER.fullmatch(number) else math.nan
         if not math.isfinite(value):
             mixed = "; decimals take a comma or a point, not both" if "," in cell else ""
             raise ValueError(f"column {column.name}: {shown(cell)} is not a finite number{mixed}")

@@ -172,7 +172,7 @@ _TURNS = (
 
 TWO_TURNS = 4 * math.pi  # rad: a bare number beyond was probably meant in degrees
 
-_NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _FACTOR = re.compile(r"([^\W\d_]+|[%°])(?:(?:\^|\*\*)?([-+]?[1-9]))?")
 _SUPERSCRIPTS = str.maketrans("⁻¹²³⁴⁵⁶⁷⁸⁹", "-123456789")
 
@@ -219,7 +219,7 @@ def number_and_unit(value: object) -> tuple[Fraction, str]:
 
 def is_bare(text: str) -> bool:
     """True for the text of a number without a unit."""
-    return _NUMBER.fullmatch(text.strip()) is not None
+    return NUMBER.fullmatch(text.strip()) is not None
 
 
 def read_rate(value: object, dimension: Dimension | None) -> float:
@@ -255,7 +255,7 @@ def _to_float(value: int | float) -> float:
 def _split(text: str, dimension: Dimension | None) -> tuple[str, str]:
     """``"30 mm"`` → ``("30", "mm")``."""
     stripped = text.strip()
-    match = _NUMBER.match(stripped)
+    match = NUMBER.match(stripped)
     if match is None or len(stripped) > 60:  # keeps the integers of a nonsense unit small
         raise QuantityError(f"{_expected(dimension)}, got text {shown(text)}")
     rest = stripped[match.end() :].strip()
@@ -269,16 +269,13 @@ def _checked(text: str, unit_text: str, dimension: Dimension | None) -> Unit:
     if dimension is None or unit.exponents == dimension.exponents:
         return unit
     found = _BY_EXPONENTS.get(unit.exponents)
-    name = found.name if found else f"of dimension {_spelt(unit.exponents)}"
+    names = zip(("kg", "m", "s", "rad", "cycle"), unit.exponents, strict=True)
+    spelt = " ".join(f"{n}^{e}" for n, e in names if e) or "1"
+    name = found.name if found else f"of dimension {spelt}"
     hint = ""
     if dimension.name == "frequency" and name == "angular rate":
         hint = "; an angular rate is never converted silently: divide by 2π and write Hz"
     raise QuantityError(f"{_expected(dimension)}, got {shown(text)}, which is {name}{hint}")
-
-
-def _spelt(exponents: Exponents) -> str:
-    names = zip(("kg", "m", "s", "rad", "cycle"), exponents, strict=True)
-    return " ".join(f"{n}^{e}" for n, e in names if e) or "1"
 
 
 @lru_cache(maxsize=256)  # the same few units in every row of a sweep or table: 0.1 ms each

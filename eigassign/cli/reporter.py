@@ -5,19 +5,17 @@ from __future__ import annotations
 import io
 import json
 import logging
-import math
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, is_dataclass
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any, TextIO
 
 import click
 
 from eigassign.errors import Problem
-from eigassign.files import printable
+from eigassign.files import plain, printable
 from eigassign.process import say
 
 # --- stderr while a command works
@@ -88,24 +86,5 @@ def show(*lines: str) -> None:
 
 
 def print_json(value: object, indent: int | None = None) -> None:
-    """``value`` on stdout, as JSON."""
-    click.echo(dumps(value, indent))
-
-
-def dumps(value: object, indent: int | None = None) -> str:
-    """JSON of dataclasses, mappings, sequences and arrays; a number that is not finite is null."""
-    return json.dumps(_plain(value), indent=indent, allow_nan=False)
-
-
-def _plain(value: object) -> object:
-    if hasattr(value, "tolist"):  # NumPy's arrays and scalars, without importing NumPy
-        value = value.tolist()
-    if is_dataclass(value):
-        value = {field.name: getattr(value, field.name) for field in fields(value)}
-    if isinstance(value, Mapping):
-        return {str(key): _plain(inner) for key, inner in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(inner) for inner in value]
-    if isinstance(value, Path):
-        return str(value)
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    """`plain` values on stdout, as JSON."""
+    click.echo(json.dumps(plain(value), indent=indent, allow_nan=False))

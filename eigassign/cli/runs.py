@@ -87,13 +87,14 @@ def _finished(
     """Run one case into its folder and show what it found; the exit code."""
     with reporting(how) as reporter:
         outcome = work(case, _options(how, reporter))
-        reporter.warn(outcome.warnings)
+        results = outcome.results
+        reporter.warn(results.warnings)
         _show(outcome, as_json)
-        if outcome.shortcoming is not None:
-            reporter.error(outcome.shortcoming)
-    if outcome.interrupted:
+        if results.shortcoming is not None:
+            reporter.error(results.shortcoming)
+    if results.interrupted:
         return process.INTERRUPTED
-    return 0 if outcome.shortcoming is None else 1
+    return 0 if results.shortcoming is None else 1
 
 
 def _options(how: Mapping[str, Any], reporter: Reporter) -> Options:

@@ -104,7 +104,7 @@ def _part(topic: str) -> str:
     elif wanted in pages:
         return pages[wanted]
     found = [
-        (not _is_about(_folded(title), wanted), level, _below(text, level, start))
+        (not _is_about(_folded(title), wanted), level, start, text)
         for text in pages.values()
         for level, title, start in _headings(text)
         if _is_about(_folded(title), wanted) or _folded(title).startswith(wanted)
@@ -116,7 +116,9 @@ def _part(topic: str) -> str:
             f"no page and no heading begins with {topic!r}{listed}: eigassign docs lists the pages"
         )
     exact = [one for one in found if not one[0]]
-    return min(exact or found[:1], key=lambda whole_first: whole_first[1])[2]
+    _, level, start, text = min(exact or found[:1], key=lambda one: one[1])
+    ends = [k for other, _, k in _headings(text) if k > start and other <= level]
+    return "\n".join(text.splitlines()[start : ends[0] if ends else None])
 
 
 def _is_about(title: str, wanted: str) -> bool:
@@ -156,11 +158,6 @@ def _headings(text: str) -> list[tuple[int, str, int]]:
         if marks and set(marks) == {"#"} and not code:
             found.append((len(marks), title, k))
     return found
-
-
-def _below(text: str, level: int, start: int) -> str:
-    ends = [k for other, _, k in _headings(text) if k > start and other <= level]
-    return "\n".join(text.splitlines()[start : ends[0] if ends else None])
 
 
 # --- Shell completion

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import EigassignError
+from eigassign.files import plain
 from eigassign.mechanism.trajectory.csv import TIME, TIP_COLUMNS
 from eigassign.study.results import (
     Comparison,
@@ -59,7 +60,7 @@ def results_document(results: RunResults) -> dict[str, Any]:
         "assignment": {**asdict(row), "finished": row.finished} if row else None,
         **_meaning(results),
         "other_modes": _other_modes(results.others),
-        "discretisation": {**asdict(mesh), "error": finite(np.array(mesh.error))} if mesh else None,
+        "discretisation": plain(mesh) if mesh else None,
         "approximation": [_study(study) for study in results.studies],
         "trajectory": {
             "time_s": results.time_s,
@@ -99,19 +100,8 @@ def _error(summary: ErrorSummary) -> dict[str, Any]:
         for row in [getattr(summary, name)]
     }
     if found["predicted"] is not None:
-        found["predicted"] = finite(found["predicted"])
+        found["predicted"] = plain(found["predicted"])
     return found
-
-
-def finite(value: Any) -> Any:
-    """Plain values with null for numbers that are not finite, which JSON has not."""
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
-    if isinstance(value, Mapping):
-        return {key: finite(one) for key, one in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [finite(one) for one in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def without(row: Any, *names: str) -> dict[str, Any]:
@@ -130,7 +120,7 @@ def _frequencies(results: RunResults, target: TargetStudy) -> dict[str, Any]:
         **{name: hz if np.isfinite(hz).all() else None for name, hz in edges.items()},
         "initial_hz": target.initial_hz,
         "one_shot_hz": target.one_shot_hz,
-        "predicted_hz": None if target.predicted_hz is None else finite(target.predicted_hz),
+        "predicted_hz": plain(target.predicted_hz),
         "exact_hz": target.exact_hz,
     }
 
@@ -218,8 +208,8 @@ def _study(study: ModeStudy) -> dict[str, Any]:
 def _worst(comparison: Comparison | None) -> dict[str, float | None] | None:
     if comparison is None:
         return None
-    taylor, linearised = comparison.worst_taylor, comparison.worst_linearised
-    return {"taylor": finite(taylor), "linearised": finite(linearised)}
+    worst = {"taylor": comparison.worst_taylor, "linearised": comparison.worst_linearised}
+    return dict(plain(worst))
 
 
 def to_json(results: RunResults) -> bytes:

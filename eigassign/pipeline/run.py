@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.assign import Assignment
-from eigassign.assignment.exact.sequential import End
 from eigassign.assignment.requirements.requirement import Solved
 from eigassign.assignment.requirements.sampling import requirements_of, with_instants
 from eigassign.brief import counted
@@ -31,7 +30,7 @@ from eigassign.output.result_files import frequency_columns
 from eigassign.output.store.cache import Cache, default_directory, least_work
 from eigassign.pipeline.coefficient_files import coefficient_files
 from eigassign.pipeline.expansions import expand_plan
-from eigassign.pipeline.run_files import RunFolder, new_run_folder
+from eigassign.pipeline.run_files import new_run_folder
 from eigassign.pipeline.stages import Stages, silent
 from eigassign.study.accuracy import accuracy_notes, judged_mesh, truncation_notes
 from eigassign.study.built_case import BuiltCase, load_case
@@ -124,12 +123,9 @@ class Result(Pictured):
 class Outcome:
     """A finished run: where it is and what it found."""
 
-    folder: Path | None
+    folder: Path
     results: RunResults
-    shortcoming: str | None  # why this is no answer to build on; None if it is
-    interrupted: bool  # by Ctrl-C, and what was found until then is the answer
     seconds: float
-    warnings: tuple[str, ...]
 
 
 DEFAULT = Options()
@@ -274,7 +270,7 @@ def optimize(path: str | Path, options: Options = DEFAULT) -> Outcome:
         results = solve_case(case, options).results
         options.progress("writing the report")
         folder.write(results, options.figures, options.report)
-    return _outcome(folder, results, stages)
+    return Outcome(folder.path, results, stages.total_s)
 
 
 def expand_case(
@@ -302,7 +298,7 @@ def expand_case(
         results = replace(results, moving=moving)
         options.progress("writing the report")
         folder.write(results, options.figures, options.report, coefficient_files(scene, linear))
-    return _outcome(folder, results, stages)
+    return Outcome(folder.path, results, stages.total_s)
 
 
 def validate(path: str | Path, options: Options = DEFAULT) -> Validation:
@@ -317,18 +313,6 @@ def validate(path: str | Path, options: Options = DEFAULT) -> Validation:
     along = [(row.worst_taylor, row.mode) for row in rows if row.where.startswith(TRAJECTORY)]
     warnings = (*scene.warnings, *reach_warnings(scene, along))
     return Validation(rows, notes, warnings, stages.total_s)
-
-
-def _outcome(folder: RunFolder, results: RunResults, stages: Stages) -> Outcome:
-    row = results.assignment
-    return Outcome(
-        folder.path,
-        results,
-        results.shortcoming,
-        row is not None and row.ended == End.INTERRUPTED,
-        stages.total_s,
-        results.warnings,
-    )
 
 
 def _cache(options: Options) -> Cache | None:

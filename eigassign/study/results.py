@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.exact.sequential import End
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.brief import Brief
 from eigassign.case.units import is_bare
@@ -649,6 +650,11 @@ class RunResults(Brief):
         """True if the prediction that the optimum rests on is as exact as the case asks for."""
         error = self.approximation_error
         return error is None or error <= self.tolerance
+
+    @property
+    def interrupted(self) -> bool:
+        """True where Ctrl-C ended the search: what was found until then is the answer."""
+        return self.assignment is not None and self.assignment.ended == End.INTERRUPTED
 
     @property
     def shortcoming(self) -> str | None:

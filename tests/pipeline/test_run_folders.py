@@ -27,23 +27,18 @@ def outcome(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
     return optimize(SHIPPED, Options(out=out, use_cache=False))
 
 
-def folder_of(outcome: Outcome) -> Path:
-    assert outcome.folder is not None
-    return outcome.folder
-
-
 def test_a_run_leaves_results_report_figures_resolved_case_and_log(outcome: Outcome) -> None:
-    folder = folder_of(outcome)
+    folder = outcome.folder
     names = {path.name for path in folder.iterdir()}
     assert names >= {"results.json", "report.html", "figures", "case.yaml", "log.txt"}
     assert len(list((folder / "figures").glob("*.png"))) >= 5
-    assert outcome.shortcoming is None
-    assert outcome.warnings == ()
+    assert outcome.results.shortcoming is None
+    assert outcome.results.warnings == ()
     assert outcome.seconds > 0.0
 
 
 def test_results_json_has_what_programs_rely_on(outcome: Outcome) -> None:
-    results = json.loads((folder_of(outcome) / "results.json").read_text())
+    results = json.loads((outcome.folder / "results.json").read_text())
     assert set(results["design"]) == {"m1", "m2"}
     assert set(results["design"]["m1"]) >= {"initial", "optimal", "lower", "upper"}
     for when in ("initial", "one_shot", "predicted", "exact"):
@@ -76,13 +71,13 @@ def test_results_json_has_what_programs_rely_on(outcome: Outcome) -> None:
 
 
 def test_the_resolved_case_solves_to_the_same_bits(outcome: Outcome) -> None:
-    again = solve_case(load_case(folder_of(outcome) / "case.yaml"), UNCACHED)
+    again = solve_case(load_case(outcome.folder / "case.yaml"), UNCACHED)
     design = {row.name: row.optimal for row in outcome.results.design}
     assert again.design == design
 
 
 def test_the_log_tells_choices_outcome_and_times(outcome: Outcome) -> None:
-    log = (folder_of(outcome) / "log.txt").read_text()
+    log = (outcome.folder / "log.txt").read_text()
     for line in (
         "note      expansion point: q1 = 1.817 rad, q2 = 5.312 rad, from the case file",
         "design    m2 = 0 kg (before: 0)",
@@ -119,12 +114,12 @@ def test_the_default_folder_is_named_after_the_case_below_the_current_one(
 def test_a_run_over_tolerance_is_kept_and_says_so(tmp_path: Path) -> None:
     text = shipped(("max_error: 2 %", "max_error: 0.1 %")) + ONE_SHOT
     outcome = optimize(written(tmp_path, text), in_folder(tmp_path / "out"))
-    assert outcome.shortcoming is not None
+    assert outcome.results.shortcoming is not None
     assert (
         "predicted against exact: 0.3198 %, OVER 0.1 %"
         in (tmp_path / "out" / "log.txt").read_text()
     )
-    assert "0.32 % off" in outcome.warnings[0]
+    assert "0.32 % off" in outcome.results.warnings[0]
 
 
 def test_an_expansion_run_holds_its_coefficients_as_json_and_hdf5(tmp_path: Path) -> None:
@@ -140,7 +135,7 @@ def test_an_expansion_run_holds_its_coefficients_as_json_and_hdf5(tmp_path: Path
                 np.testing.assert_array_equal(file[f"{part}_{name}"], expected)
                 np.testing.assert_array_equal(document[part][name], expected)
     assert outcome.results.targets == ()
-    assert outcome.shortcoming is None
+    assert outcome.results.shortcoming is None
     assert {path.name for path in (tmp_path / "out").iterdir()} >= {"log.txt", "results.json"}
 
 

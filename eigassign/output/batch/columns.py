@@ -115,12 +115,6 @@ def quantity(value: float | str) -> float | None:
         return None
 
 
-def _ranges(row: CaseOutcome) -> Iterator[tuple[str, float]]:
-    for name, *hz in row.frequencies:
-        for what, value in zip(("lowest_hz", "mean_hz", "highest_hz"), hz, strict=True):
-            yield f"{_level(name)}/{what}", value
-
-
 def _level(name: str) -> str:
     """``name`` as one level of a path in the file."""
     return name.replace("/", "|")
@@ -129,7 +123,11 @@ def _level(name: str) -> str:
 _GROUPS: dict[str, Callable[[CaseOutcome], Iterable[tuple[str, Any]]]] = {
     "values": _values,
     "design": lambda row: ((_level(name), value) for name, value in row.design),
-    "frequencies": _ranges,
+    "frequencies": lambda row: (
+        (f"{_level(name)}/{what}", value)
+        for name, *hz in row.frequencies
+        for what, value in zip(("lowest_hz", "mean_hz", "highest_hz"), hz, strict=True)
+    ),
 }
 
 
@@ -142,11 +140,10 @@ def write_csv(columns: Path, file: TextIO) -> None:
         names = _names(stored)
         writer.writerow([cell(name) for name in names])
         for start in range(0, stored.attrs["cases"], ROWS):
-            parts = [_cells(stored[name], slice(start, start + ROWS)) for name in names]
+            parts = [
+                [cell(text) for text in column.asstr()[start : start + ROWS]]
+                if _is_text(column)
+                else ["" if v != v else v for v in column[start : start + ROWS].tolist()]
+                for column in map(stored.get, names)
+            ]
             writer.writerows(zip(*parts, strict=True))
-
-
-def _cells(column: Any, rows: slice) -> list[object]:
-    if not _is_text(column):
-        return ["" if value != value else value for value in column[rows].tolist()]
-    return [cell(text) for text in column.asstr()[rows]]

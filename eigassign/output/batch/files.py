@@ -12,14 +12,13 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TextIO
 
-from eigassign.files import MATRIX
+from eigassign.files import MATRIX, file_digest
 from eigassign.output.batch.columns import Columns, write_csv
 from eigassign.output.batch.index import Index
 from eigassign.output.batch.junit import Junit
 from eigassign.output.batch.outcome import CaseOutcome, from_line
 from eigassign.output.batch.summary import SummaryCsv, SummaryJson
 from eigassign.output.store.atomic import replace_synced, replacing
-from eigassign.output.store.run_record import file_digest
 
 _ALWAYS = ("summary.csv", "summary.json", "junit.xml", "index.html")
 _COLUMNS = ("columns.h5", "columns.csv")

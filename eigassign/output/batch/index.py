@@ -68,9 +68,13 @@ def _columns(
 ) -> list[tuple[str, Callable[[CaseOutcome], Cell]]]:
     """Name and cell of each column in a row; columns without a cell are left out."""
     designs = dict.fromkeys(name for row in rows for name, _ in row.design)
+    # keys by their last two names, and numbers between them, where that tells them apart
+    tails = {key: _TAIL.findall(key)[0] for key in keys}
+    several = {tail for tail, n in Counter(tails.values()).items() if n > 1}
+    short = {key if tail in several else tail: key for key, tail in tails.items()}
     found: list[tuple[str, Callable[[CaseOutcome], Cell]]] = [
         ("case", lambda row: row.name),
-        *((n, lambda row, key=key: _value(row.values.get(key))) for n, key in _short(keys).items()),
+        *((n, lambda row, key=key: _value(row.values.get(key))) for n, key in short.items()),
         ("status", lambda row: row.status),
         ("verdict", lambda row: row.verdict.replace("_", " ")),
         *(
@@ -88,13 +92,6 @@ def _columns(
         if name in kept
         or any(shown if isinstance(shown, str) else shown[0] for shown in map(cell, rows))
     ]
-
-
-def _short(keys: Sequence[str]) -> dict[str, str]:
-    """Keys by their last two names, and numbers between them, where that tells them apart."""
-    tails = {key: _TAIL.findall(key)[0] for key in keys}
-    several = {tail for tail, n in Counter(tails.values()).items() if n > 1}
-    return {key if tail in several else tail: key for key, tail in tails.items()}
 
 
 def _value(value: Any) -> Cell:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
 from pathlib import Path
 
 from eigassign.chart.results import SCHEMA, Chart, Timing, time_in_words
+from eigassign.files import plain
 from eigassign.output.figures.front import chart_figures
 from eigassign.output.formats import capital
 from eigassign.output.reports import page as report
-from eigassign.output.result_files import dumps, finite
+from eigassign.output.result_files import dumps
 from eigassign.output.tables import Table
 
 
@@ -138,7 +138,7 @@ def write_chart(
 
     Every point in chart.json can be computed again from its parameters.
     """
-    data = f"{dumps(finite({'schema': SCHEMA, **asdict(chart)}))}\n".encode()
+    data = f"{dumps(plain({'schema': SCHEMA, **vars(chart)}))}\n".encode()
     line = f"{capital(chart.advice[0].words)}." if chart.advice else None
     report.write_page(
         chart, chart_tables(chart), chart_figures(chart), folder, formats, kind,

@@ -7,10 +7,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from eigassign.files import plain
 from eigassign.output.figures.update import shown_in, update_figures
 from eigassign.output.formats import number
 from eigassign.output.reports import page as report
-from eigassign.output.result_files import dumps, finite, origin, without
+from eigassign.output.result_files import dumps, origin, without
 from eigassign.output.tables import Table
 from eigassign.study.updating.fit import POOR, UpdatedParameter, UpdateResults
 
@@ -146,8 +147,8 @@ def document(results: UpdateResults) -> dict[str, Any]:
         "verdict": results.verdict,
         "headline": headline(results),
         "parameters": {row.name: without(row, "name") for row in results.parameters},
-        "covariance": finite(results.covariance),
-        "correlation": finite(results.correlation),
+        "covariance": plain(results.covariance),
+        "correlation": plain(results.correlation),
         "not_identified": [asdict(each) for each in results.unidentified],
         "fit": {
             "initial_chi_squared": results.initial_chi_squared,

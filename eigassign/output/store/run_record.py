@@ -17,7 +17,7 @@ from typing import Literal
 
 from eigassign._version import __version__
 from eigassign.errors import StorageError, UsageError
-from eigassign.files import CASE, MATRIX, json_value, pieces, read_bytes
+from eigassign.files import CASE, MATRIX, file_digest, json_value, read_bytes, seen_from
 from eigassign.output.store.atomic import write_synced
 
 MARKER = "run.json"
@@ -105,12 +105,8 @@ def read_record(folder: Path) -> RunRecord | None:
 
 
 def relative_path(path: Path, folder: Path) -> str:
-    """``path`` as seen from ``folder``, or from the root on another drive."""
-    real = os.path.realpath(path)
-    try:
-        return Path(os.path.relpath(real, folder)).as_posix()
-    except ValueError:
-        return Path(real).as_posix()
+    """`seen_from`, links of ``path`` followed."""
+    return seen_from(folder, os.path.realpath(path))
 
 
 # --- What has changed since
@@ -165,17 +161,6 @@ def _is_as_marked(path: Path, mark: FileMark) -> bool:
     return file_digest(path, MATRIX) == mark.sha256
 
 
-def file_digest(path: Path, limit: int) -> str | None:
-    """SHA-256 of a regular file of at most so many bytes; None where there is none."""
-    digest = hashlib.sha256()
-    try:
-        for piece in pieces(path, limit):
-            digest.update(piece)
-    except (OSError, ValueError):
-        return None
-    return digest.hexdigest()
-
-
 # --- A run folder, long after
 
 
@@ -226,7 +211,7 @@ def run_status(folder: str | Path) -> RunStatus:
     return RunStatus(
         case=relative_path(case, Path.cwd()),
         case_state=_state(case, record.run.case_sha256, CASE),
-        case_files={name: _state(case.parent / name, digest, MATRIX) for name, digest in named},
+        case_files={name: _state(case.parent / name, sha, MATRIX) for name, sha in named},
         version=record.version,
         installed=__version__,
         files=len(record.files) + 1,
@@ -234,6 +219,6 @@ def run_status(folder: str | Path) -> RunStatus:
     )
 
 
-def _state(path: Path, digest: str, limit: int) -> State:
+def _state(path: Path, sha256: str, limit: int) -> State:
     found = file_digest(path, limit)
-    return "missing" if found is None else "same" if found == digest else "changed"
+    return "missing" if found is None else "same" if found == sha256 else "changed"
