@@ -42,6 +42,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from eigassign.errors import AccuracyError, UsageError
+from eigassign.mechanism.kinematics.loop_closure import kronecker, strides
 from eigassign.series.multi_index import LowerSet, lower_set, total_degree
 
 Floats = NDArray[np.float64]
@@ -260,18 +261,9 @@ def _held_out(axes: Sequence[Nodes], count: int) -> Ints:
     corners = [np.full(d, 1), np.full(d, 2), 1 + turns, 2 - turns] if d > 1 else []
     first = np.array([len(each.v) if len(each.checks) else 0 for each in axes])
     rooms = np.array([len(each.points) for each in axes]) - first
-    k = np.arange(1, count + 1)[:, None]
-    spread = first + np.floor((0.5 + k * spread_steps(d)) % 1.0 * rooms).astype(np.intp)
+    spread = first + np.floor(kronecker(count + 1, d)[1:] * rooms).astype(np.intp)
     tops = np.array([len(each.points) - 1 for each in axes])
     return np.asarray(np.minimum(np.vstack([*corners, spread]), tops)[:count])
-
-
-def spread_steps(d: int) -> Floats:
-    """α_i = g^-i, g the root of g^(d+1) = g + 1: (k α) mod 1 fills the unit box (Roberts 2018)."""
-    g = 2.0
-    for _ in range(60):
-        g = (1.0 + g) ** (1.0 / (d + 1.0))
-    return np.asarray(g ** -np.arange(1.0, d + 1.0))
 
 
 def _places(axes: Sequence[Nodes], points: Ints) -> Floats:
@@ -387,7 +379,7 @@ def _everywhere(axes: Sequence[Nodes], count: int = 1000) -> Floats:
     d = len(axes)
     if d == 1:
         return axes[0].domain[:, None]
-    spread = np.arange(1, count + 1)[:, None] * spread_steps(2 * d) % 1.0
+    spread = np.arange(1, count + 1)[:, None] * strides(2 * d) % 1.0
     at, face = np.hsplit(spread, [d])
     at[::2] = np.where(face[::2] < 0.5, at[::2], np.round(at[::2]))
     sizes = np.array([len(each.domain) for each in axes])
