@@ -29,7 +29,7 @@ from eigassign.modal.fit.interpolation import (
 )
 from eigassign.modal.fit.path import read_path
 from eigassign.modal.fit.region import Box, Region, build_region
-from eigassign.modal.fit.source import SHARE, Source, as_source
+from eigassign.modal.fit.source import SHARE, FitSource, as_source
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -296,7 +296,7 @@ def _shares(solves: int, regions: Sequence[Region]) -> list[int]:
     return counts
 
 
-def _fit_region(source: Source, region: Region, accuracy: float | None, most: int) -> Fit:
+def _fit_region(source: FitSource, region: Region, accuracy: float | None, most: int) -> Fit:
     """One polynomial for each mode, to an accuracy or of ``most`` frequencies."""
     floors, left, centre = [0.0], accuracy, region.centre[None]
     if accuracy is not None and source.fine is None:

@@ -26,7 +26,7 @@ SHARE = 0.5  # of the accuracy that the source itself may use
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
+class FitSource:
     """Frequencies of ``modes``, and how far they are off, as functions of x = (q, y).
 
     ``ask`` gives f (n, modes[-1] + 1) in Hz at x (n, n_x), of all modes up to those and of one
@@ -53,7 +53,7 @@ class Source:
         return error
 
 
-def as_source(given: Any, modes: Sequence[int] | None) -> Source:
+def as_source(given: Any, modes: Sequence[int] | None) -> FitSource:
     """What is asked for ``modes``, which are all of the source, of a model the first, unless given.
 
     Raises UsageError for a mode that it does not have, and for what is no source.
@@ -63,7 +63,7 @@ def as_source(given: Any, modes: Sequence[int] | None) -> Source:
     return _exact(as_model(given), modes)
 
 
-def _exact(model: Model, modes: Sequence[int] | None) -> Source:
+def _exact(model: Model, modes: Sequence[int] | None) -> FitSource:
     pencil, wanted = model.pencil, mode_numbers((1,) if modes is None else modes)
     last, most = wanted[-1], len(pencil.elastic)
     if last > most:
@@ -84,12 +84,12 @@ def _exact(model: Model, modes: Sequence[int] | None) -> Source:
         return rounding_error(pencil, x[0], last)
 
     fine = FINE if pencil.is_dense else FINE_LARGE
-    return Source(wanted, pencil.local_directions[1], pencil.n_q, ask, error, fine)
+    return FitSource(wanted, pencil.local_directions[1], pencil.n_q, ask, error, fine)
 
 
 def _stated(
     given: Expansion | InverseExpansion | ReducedModel, modes: Sequence[int] | None
-) -> Source:
+) -> FitSource:
     """A source that states its error; neighbours of its modes are those of the reduced model."""
     wanted = mode_numbers(given.modes if modes is None else modes)
     if not set(wanted) <= set(given.modes):
@@ -113,4 +113,4 @@ def _stated(
         return float(given.error_estimate(x[:, :n_q], x[:, n_q:])[:, columns].max())
 
     directions = reduced.to_program[reduced.program.dependence.any(axis=0)]
-    return Source(wanted, directions, n_q, ask, error)
+    return FitSource(wanted, directions, n_q, ask, error)
