@@ -31,26 +31,17 @@ def samples(q: ArrayLike, y: ArrayLike, n_q: int, n_y: int) -> Floats:
 
 def point(q: ArrayLike, y: ArrayLike, n_q: int, n_y: int) -> Floats:
     """One point x = (q, y) as (n_q + n_y,); raises UsageError for several."""
-    a, b = _numbers(q, "q"), _numbers(y, "y")
-    if a.shape == (n_q,) and b.shape == (n_y,):
-        x = np.concatenate([a, b])
-        if np.isfinite(x).all():
-            return x
-    x = samples(a, b, n_q, n_y)
+    x = samples(q, y, n_q, n_y)
     if len(x) != 1:
         raise UsageError(f"{len(x)} samples of q and y; one point is expected")
     return np.asarray(x[0])
 
 
-def _numbers(values: ArrayLike, name: str) -> Floats:
+def _rows(values: ArrayLike, width: int, name: str) -> Floats:
     try:
-        return np.asarray(values, dtype=np.float64)
+        array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise UsageError(f"{name} must be real numbers, every sample with as many") from error
-
-
-def _rows(values: ArrayLike, width: int, name: str) -> Floats:
-    array = _numbers(values, name)
     if array.ndim > 2 or (array.ndim == 2 and array.shape[1] != width):
         raise UsageError(f"{name} has shape {array.shape}; expected (n_samples, {width})")
     if array.ndim < 2 and array.size != width:

@@ -193,8 +193,11 @@ class Inner:
         """The same with Q grown to hold ``vectors`` (n_I, r), and these in its coordinates."""
         Q, parts = self.Q, [np.zeros((self.Q.shape[1], 0))]
         for i in range(0, vectors.shape[1], BLOCK):
-            Q, coordinates = _grown(self.K, Q, vectors[:, i : i + BLOCK])
-            parts.append(coordinates)
+            # twice: a small remainder is not orthogonal to Q yet, or nothing but round-off
+            once, across, within = _remainder(self.K, Q, vectors[:, i : i + BLOCK], DEPENDENT)
+            twice, more, again = _remainder(self.K, Q, once, ROUND_OFF)
+            Q = np.hstack([Q, twice])
+            parts.append(np.vstack([across + more @ within, again @ within]))
         found = np.hstack([_taller(part, Q.shape[1]) for part in parts])
         W, TW = (_taller(A, Q.shape[1]) for A in (self.W, self.TW))
         return replace(self, Q=Q, W=W, TW=TW), found
@@ -241,21 +244,13 @@ def _taller(A: Floats, rows: int) -> Floats:
     return np.vstack([A, np.zeros((rows - len(A), A.shape[1]))])
 
 
-def _grown(K: sparse.csr_array, Q: Floats, vectors: Floats) -> tuple[Floats, Floats]:
-    """Q with what it lacks of ``vectors`` (n, r), and their coordinates in it.
-
-    By Gram-Schmidt, and again on what it leaves: a small remainder is not orthogonal to Q yet, or
-    nothing but round-off.
-    """
-    once, across, within = _remainder(K, Q, vectors, DEPENDENT)
-    twice, more, again = _remainder(K, Q, once, ROUND_OFF)
-    return np.hstack([Q, twice]), np.vstack([across + more @ within, again @ within])
-
-
 def _remainder(
     K: sparse.csr_array, Q: Floats, vectors: Floats, least: float
 ) -> tuple[Floats, Floats, Floats]:
-    """Orthonormal R, A and B with ``vectors`` = Q A + R B, parts below ``least`` left out."""
+    """Orthonormal R, A and B with ``vectors`` (n, r) = Q A + R B, by Gram-Schmidt.
+
+    Parts below ``least`` are left out.
+    """
     K_vectors = K @ vectors
     size = np.sqrt(np.maximum(np.einsum("ij,ij->j", vectors, K_vectors), 0.0))
     across = Q.T @ K_vectors

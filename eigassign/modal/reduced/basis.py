@@ -83,7 +83,10 @@ def ritz_basis(
     """
     theta0 = pencil.theta(points)
     found = lowest_modes(pencil, theta0, wanted[-1], 2 + PROBES if guard else 1)
-    count = _represented(found.lam, wanted[-1]) if guard else wanted[-1]
+    count = wanted[-1]
+    if guard:  # one above, and probes up to DISTANT
+        near = (found.lam < DISTANT * found.lam[:, [count - 1]]).any(axis=0).sum()
+        count = int(min(max(near, count + 1), count + 1 + PROBES, found.lam.shape[1]))
     plan = _plan(found.lam.shape[1], wanted, half_order, guard)
     columns = [phi[:, :count][:, ::-1] for phi in found.phi]
     if given is None:
@@ -96,13 +99,6 @@ def ritz_basis(
     V = np.hstack([V[:, :count][:, ::-1], V[:, count:]])
     represented = found.phi[:, :, :count]
     return RitzBasis(pencil, wanted, points, theta0, theta_mean, K0, V, found.lam, represented)
-
-
-def _represented(lam: Floats, highest: int) -> int:
-    """Number of modes that join the basis as they are: a guard, and probes up to DISTANT."""
-    near = (lam < DISTANT * lam[:, [highest - 1]]).any(axis=0)
-    wished = max(int(near.sum()), highest + 1)
-    return int(min(wished, highest + 1 + PROBES, lam.shape[1]))
 
 
 def _plan(most: int, wanted: tuple[int, ...], half_order: int, guard: bool) -> Plan:

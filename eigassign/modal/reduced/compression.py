@@ -50,7 +50,10 @@ def compressed(
 ) -> ReducedModel:
     """``whole`` on as few vectors as serve ``accuracy``; itself where all are needed."""
     rng = np.random.default_rng(0)
-    learnt, judged = (_drawn(basis.points, widths, rng) for _ in range(2))
+    points, count = basis.points[:, None], max(SAMPLES // len(basis.points), 2)
+    # denser towards the faces of the boxes, where errors are largest
+    drawn = np.sin(np.pi * (rng.random((2, len(points), count, len(widths))) - 0.5))
+    learnt, judged = (points + widths * drawn).reshape(2, -1, len(widths))
     directions, fixed = _directions(basis, whole, learnt)
     judges = [(K, M_c, ritz_values(K, M_c)) for K, M_c, _ in whole.matrices(judged)]
     low, high = fixed, directions.shape[1]
@@ -92,13 +95,6 @@ def largest_change(
         smaller = ritz_values(U.T @ K @ U, U.T @ M_c @ U)
         worst = max(worst, float(np.sqrt(mu[:, wanted] / smaller[:, wanted]).max()) - 1.0)
     return worst
-
-
-def _drawn(points: Floats, widths: Floats, rng: np.random.Generator) -> Floats:
-    """Samples (n, n_x) of the boxes, denser towards their faces, where errors are largest."""
-    count = max(SAMPLES // len(points), 2)
-    inside = np.sin(np.pi * (rng.random((len(points), count, len(widths))) - 0.5))
-    return np.asarray((points[:, None] + widths * inside).reshape(-1, len(widths)))
 
 
 def _directions(basis: RitzBasis, whole: ReducedModel, x: Floats) -> tuple[Floats, int]:

@@ -255,19 +255,14 @@ def _sparse_terms(pencil: Pencil, columns: sparse.csc_array, theta: Floats) -> S
     bodies = _bodies(pencil.n_u, slot[inside], rows[inside], cols[inside], values[inside])
     edge = rows >= pencil.n_u
     n_q = pencil.n_dof - pencil.n_u
-    keys, at = _ranked(slot[edge] * n_q + rows[edge] - pencil.n_u, theta.shape[1] * n_q)
+    key, there = slot[edge] * n_q + rows[edge] - pencil.n_u, np.zeros(theta.shape[1] * n_q, bool)
+    there[key] = True
+    keys, at = np.flatnonzero(there), (np.cumsum(there) - 1)[key]
     halved = np.where(cols[edge] < pencil.n_u, 1.0, 0.5) * values[edge]
     size = len(keys) * pencil.n_dof
     B = np.bincount(at * pencil.n_dof + cols[edge], halved, size).astype(np.float64, copy=False)
     dofs = pencil.n_u + keys % n_q
     return SparseTerms(bodies, keys // n_q, dofs, B.reshape(-1, pencil.n_dof))
-
-
-def _ranked(keys: Ints, stop: int) -> tuple[Ints, Ints]:
-    """The distinct keys below ``stop``, ascending, and the place of each key among them."""
-    there = np.zeros(stop, dtype=bool)
-    there[keys] = True
-    return np.flatnonzero(there), (np.cumsum(there) - 1)[keys]
 
 
 def _entries(columns: sparse.csc_array, theta: Floats) -> tuple[Ints, Ints, Floats]:
