@@ -38,8 +38,10 @@ from eigassign.mechanism.assembly.velocity_terms import VelocityTerms
 from eigassign.mechanism.trajectory.trajectory import Rates
 from eigassign.modal.exact.clusters import CLUSTER_GAP, whole_clusters
 from eigassign.modal.taylor.coefficients import pencil_series
+from eigassign.modal.taylor.rayleigh import inverse_root, quadratics
 from eigassign.modal.taylor.recursion import expand_subspace
 from eigassign.series.multi_index import lower_set, total_degree
+from eigassign.series.power_series import matrix_product
 
 Floats = NDArray[np.float64]
 MIXED = 0.05  # Σ_j |η_j|² from which on a mode is followed together with its near neighbours
@@ -159,7 +161,6 @@ def _turning(K: Floats, C: Floats) -> Floats:
 
 # --- Modes along a motion, with two derivatives in time
 
-Series = tuple[Floats, Floats, Floats]  # coefficients of 1, t and t², or derivatives
 IN_TIME = total_degree(1, 2)
 IN_TWO = lower_set([[0, 0], [1, 0], [0, 1], [2, 0]])  # t and t² as variables of their own
 
@@ -168,8 +169,8 @@ IN_TWO = lower_set([[0, 0], [1, 0], [0, 1], [2, 0]])  # t and t² as variables o
 class MovingModes:
     """Modes (n_dof, r) that are followed together: value, rate and acceleration at one instant."""
 
-    phi: Series  # Φ, Φ̇, Φ̈
-    lam: Series  # Λ, Λ̇, Λ̈ (r, r)
+    phi: Floats  # (3, n_dof, r): Φ, Φ̇, Φ̈
+    lam: Floats  # (3, r, r): Λ, Λ̇, Λ̈
 
 
 def theta_in_time(
@@ -185,27 +186,13 @@ def theta_in_time(
 def moving_modes(pencil: Pencil, theta: Floats, lam: Floats, phi: Floats) -> MovingModes:
     """The motion of λ (r,) and Φ (n_dof, r), mass-normalised, for θ of `theta_in_time`."""
     found = expand_subspace(pencil, theta, IN_TIME, lam, phi)
-    X, L = (found.vectors[0], found.vectors[1], found.vectors[2]), found.values
-    N1, N2 = _normality(pencil, theta, X)
-    one = np.eye(len(lam))
-    up = (one, 0.5 * N1, 0.5 * N2 - 0.125 * N1 @ N1)
-    down = (one, -0.5 * N1, 0.375 * N1 @ N1 - 0.5 * N2)
-    Lambda = _product(_product(up, (L[0], L[1], L[2])), down)
-    return MovingModes(_derivatives(_product(X, down)), _derivatives(Lambda))
-
-
-def _normality(pencil: Pencil, theta: Floats, X: Series) -> tuple[Floats, Floats]:
-    """N_1 and N_2 (r, r) of N = XᵀMX = I + N_1 t + N_2 t²."""
-    M0, M1, M2 = (pencil.sparse(pencil.mass @ column) for column in theta.T)
-    cross = X[1].T @ (M1 @ X[0])
-    N1 = X[0].T @ (M1 @ X[0])
-    N2 = X[0].T @ (M2 @ X[0]) + cross + cross.T + X[1].T @ (M0 @ X[1])
-    return N1, N2
-
-
-def _product(A: Series, B: Series) -> Series:
-    return A[0] @ B[0], A[0] @ B[1] + A[1] @ B[0], A[0] @ B[2] + A[1] @ B[1] + A[2] @ B[0]
-
-
-def _derivatives(A: Series) -> Series:
-    return A[0], A[1], 2.0 * A[2]
+    X, L = (np.moveaxis(series, 0, 2) for series in (found.vectors, found.values))
+    N = quadratics(pencil, theta, IN_TIME, IN_TIME, found.vectors)[1]
+    down = inverse_root(IN_TIME, N)
+    up = matrix_product(IN_TIME, N, down)
+    Lambda = matrix_product(IN_TIME, matrix_product(IN_TIME, up, L), down)
+    derivatives = (
+        np.moveaxis(series * [1.0, 1.0, 2.0], 2, 0)
+        for series in (matrix_product(IN_TIME, X, down), Lambda)
+    )
+    return MovingModes(*derivatives)

@@ -42,7 +42,7 @@ def eigenvalue_series(
     pencil: Pencil, theta: Floats, space: LowerSet, half: LowerSet, vectors: Floats
 ) -> Floats:
     """Λ's coefficients (r, r, N), symmetric, from X (N_H, n, r) over the set ``half``."""
-    numerator, denominator = _quadratics(pencil, theta, space, half, vectors)
+    numerator, denominator = quadratics(pencil, theta, space, half, vectors)
     if len(numerator) == 1:
         return multiply(space, numerator[0], reciprocal(space, denominator[0]))[:, None]
     root = inverse_root(space, denominator)
@@ -108,7 +108,7 @@ def _slots(space: LowerSet, positions: Ints) -> Ints:
     return slots
 
 
-def _quadratics(
+def quadratics(
     pencil: Pencil, theta: Floats, space: LowerSet, half: LowerSet, vectors: Floats
 ) -> tuple[Floats, Floats]:
     """Series (r, r, N) of Xᵀ K X and Xᵀ M X: at w = 0, and Σ_j θ_j(w) Xᵀ A_j X for the rest."""
