@@ -18,7 +18,6 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,19 +30,6 @@ from eigassign.series.multi_index import LowerSet, first_of_each
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Body = tuple[Ints, sparse.csr_array]  # touched elastic unknowns, C on them
-
-
-class PencilSeries(Protocol):
-    """K(w) = Σ_γ K_γ w^γ and M(w) likewise, over one lower set."""
-
-    def convolve(self, degree: int, X: Floats, Y: Floats, out: Floats) -> None:
-        """out_γ = Σ_{0<δ≤γ} M_δ Y_{γ−δ} − K_δ X_{γ−δ} for |γ| = degree; out (N_degree, r, n)."""
-
-    def mass_times(self, X: Floats) -> Floats:
-        """M_0 X for rows X (k, n)."""
-
-    def factor(self, lam: float, border: Floats, phi: Floats) -> Solve:
-        """The bordered system of K_0 − λ M_0, ``border`` M_0 Φ_0 and Φ_0 as rows (r, n)."""
 
 
 def pencil_series(pencil: Pencil, theta: Floats, space: LowerSet) -> PencilSeries:
@@ -129,13 +115,13 @@ class DenseTerms:
 
 @dataclass(frozen=True, eq=False)
 class DenseSeries:
-    """K and M over one set as stacks, each with the coefficients that it has."""
+    """K(w) = Σ_γ K_γ w^γ and M(w) over one set as stacks, each with the coefficients it has."""
 
     stiffness: DenseTerms
     mass: DenseTerms
 
     def convolve(self, degree: int, X: Floats, Y: Floats, out: Floats) -> None:
-        """See :class:`PencilSeries`."""
+        """out_γ = Σ_{0<δ≤γ} M_δ Y_{γ−δ} − K_δ X_{γ−δ} for |γ| = degree; out (N_degree, r, n)."""
         out[...] = 0.0
         for target, sums in self.mass.sums(degree, Y):
             out[target] += sums
@@ -147,7 +133,7 @@ class DenseSeries:
         return np.asarray(X @ self.mass.stack[0])
 
     def factor(self, lam: float, border: Floats, phi: Floats) -> Solve:
-        """The bordered system of K_0 − λ M_0."""
+        """The bordered system of K_0 − λ M_0, ``border`` M_0 Φ_0 and Φ_0 as rows (r, n)."""
         return factor_dense(self.stiffness.stack[0] - lam * self.mass.stack[0], border)
 
 
@@ -216,7 +202,7 @@ class SparseSeries:
     M0_matrix: sparse.csc_array
 
     def convolve(self, degree: int, X: Floats, Y: Floats, out: Floats) -> None:
-        """See :class:`PencilSeries`."""
+        """See `DenseSeries.convolve`."""
         out[...] = 0.0
         for p in self.pairs[degree]:
             self.mass.add_products(p, Y[p.below], 1.0, out)
@@ -229,6 +215,9 @@ class SparseSeries:
     def factor(self, lam: float, border: Floats, phi: Floats) -> Solve:
         """The bordered system of K_0 − λ M_0."""
         return factor_sparse(self.pencil, self.K0 - lam * self.M0, border, phi)
+
+
+PencilSeries = DenseSeries | SparseSeries
 
 
 def _sparse_series(pencil: Pencil, theta: Floats, space: LowerSet) -> SparseSeries:
