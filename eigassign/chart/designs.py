@@ -95,7 +95,7 @@ def chart_designs(
 def _one_shot(task: Task) -> Reached:
     scene, full, order = task.scene, task.scene.expansions.full, task.scene.expansions.order
     linear = expand(scene.model.pencil, full.q0, full.y0, full.modes, order, linear_in_y=True)
-    expanded = replace(scene, expansions=Expansions(full, linear, order, order))
+    expanded = replace(scene, expanded=Expansions(full, linear, order, order))
     told = {"order": order, "q0": full.q0, "y0": full.y0}
     return assign_design(expanded, task.wanted).y, 1, told, {}
 

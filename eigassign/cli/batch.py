@@ -282,11 +282,12 @@ def _of_first(batch: Batch, index: int, drawn: bool) -> tuple[float | None, floa
     """Seconds of a case, and megabytes of its expansion, from its sizes; None: it has no answer."""
     from eigassign.batch.work import load
     from eigassign.pipeline.outlook import ELSE_S, outlook
-    from eigassign.study.planning import plan_expansion
+    from eigassign.study.planning import expansion_needed, plan_expansion
 
     try:
         case = load(batch.plan[index], batch.options)
-        plan = plan_expansion(case.file, case.model(), case.trajectory)
+        needed = expansion_needed(case.file)
+        plan = plan_expansion(case.file, case.model(), case.trajectory, needed=needed)
         found = outlook(case, plan, case.trajectory)
     except EigassignError:
         return None, 0.0

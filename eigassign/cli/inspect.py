@@ -121,10 +121,12 @@ def _expected(outlook: Outlook) -> list[str]:
     modes = f"mode{'s' if len(outlook.modes) > 1 else ''} {', '.join(map(str, outlook.modes))}"
     mb = size.memory_mb
     memory = "1 MB" if mb < 1.0 else f"{float(f'{mb:.1g}'):.0f} MB"
-    lines = [
-        f"expansion of {modes} to order {size.order}: {size.coefficients} coefficients, "
-        f"{'less than' if mb < 1.0 else 'about'} {memory}, {_about(size.seconds)}"
-    ]
+    lines = []
+    if size.order:
+        lines.append(
+            f"expansion of {modes} to order {size.order}: {size.coefficients} coefficients, "
+            f"{'less than' if mb < 1.0 else 'about'} {memory}, {_about(size.seconds)}"
+        )
     if outlook.optimize_s is not None:
         lines.append(f"optimize: {_about(outlook.optimize_s)}")
     return lines

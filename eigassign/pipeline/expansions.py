@@ -84,6 +84,8 @@ def expansion_size(model: Model, plan: Plan) -> ExpansionSize:
     those of over 50 ms take 0.3 to 2.2 times as long; shorter ones some milliseconds more.
     Each pair and each product holds about 24 bytes at the peak.
     """
+    if not plan.order:
+        return ExpansionSize(0, 0, 0.0, 0.0)
     n, p = int(model.pencil.active.sum()), affordable_order(model, plan.order)
     products, solves = comb(2 * n + p, p), comb(n + p // 2, n)
     met, n_dof = model.pencil.n_theta * comb(n + (p - 1) // 2, n) * solves, model.pencil.n_dof

@@ -26,7 +26,7 @@ from eigassign.study import drawing
 from eigassign.study.accuracy import judged_mesh, mesh_lines, truncation_lines
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.design.followed import named_notes
-from eigassign.study.planning import plan_expansion, shown_point
+from eigassign.study.planning import expansion_needed, plan_expansion, shown_point
 from eigassign.study.updating.measured import read_measurements
 
 Floats = NDArray[np.float64]
@@ -206,7 +206,8 @@ def _checked(case: BuiltCase) -> CheckAnswer:
     notes += read_measurements(case)[1]
     plan = None
     if trajectory is not None or file.expansion.q != "auto":
-        plan = plan_expansion(file, model, trajectory)
+        needed = expansion_needed(file)
+        plan = plan_expansion(file, model, trajectory, needed=needed)
         q = plan.q0[None] if trajectory is None else trajectory.q
         notes += (*plan.notes, *truncation_lines(model, plan.modes, q, case.initial_design[None]))
         y = case.initial_design

@@ -7,7 +7,7 @@ commands ``optimize``, ``expand`` and ``validate`` do.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.assign import Assignment
-from eigassign.assignment.requirements.requirement import Solved
+from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import requirements_of, with_instants
 from eigassign.brief import counted
 from eigassign.case.suggestions import shown
@@ -32,7 +32,7 @@ from eigassign.pipeline.coefficient_files import coefficient_files
 from eigassign.pipeline.expansions import expand_plan
 from eigassign.pipeline.run_files import new_run_folder
 from eigassign.pipeline.stages import Stages, silent
-from eigassign.study.accuracy import accuracy_notes, judged_mesh, truncation_notes
+from eigassign.study.accuracy import study_accuracy, truncation_notes
 from eigassign.study.built_case import BuiltCase, load_case
 from eigassign.study.collect import VerifiedAssignment, collect_results
 from eigassign.study.comparison import (
@@ -43,15 +43,11 @@ from eigassign.study.comparison import (
     validate_expansions,
 )
 from eigassign.study.design.answer import MAX_ERROR, Answer, find_answer, require_assignable
-from eigassign.study.design.followed import (
-    followers,
-    require_one_shape,
-    solve_design,
-)
+from eigassign.study.design.followed import followers, solve_design
 from eigassign.study.design.judgement import SolvedDesigns, study_targets
 from eigassign.study.meaning.overall import Studies, study_meaning
 from eigassign.study.moving import moving_modes
-from eigassign.study.planning import plan_expansion
+from eigassign.study.planning import expansion_needed, plan_expansion
 from eigassign.study.results import MovingMode, RunResults, TargetStudy
 from eigassign.study.scene import Expansions, Scene
 
@@ -89,9 +85,10 @@ class Result(Pictured):
     predicted_hz: Floats | None  # None of a limit
     exact_hz: Floats
     results: RunResults
-    # about one point; or about several that `auto` took, the nearest of which is evaluated
-    expansion: Expansion | NearestExpansion  # full
-    linearised: Expansion | NearestExpansion
+    # about one point; or about several that `auto` took, the nearest of which is evaluated; None
+    # where none meets the accuracy and the answer does without
+    expansion: Expansion | NearestExpansion | None  # full
+    linearised: Expansion | NearestExpansion | None
     assignment: Assignment | None  # the paper's one shot, where the case has one
 
     def __repr__(self) -> str:
@@ -140,57 +137,42 @@ def solve_case(case: BuiltCase, options: Options = DEFAULT) -> Result:
     file, stages = case.file, Stages(options.progress)
     require_assignable(file)
     with case.located():
-        scene = _at_instants(prepare(case, stages, _cache(options)))
+        scene = prepare(case, stages, _cache(options), assigned=True)
         wanted = requirements_of(file, scene.path)
         with stages("assignment", "assigning the frequencies"):
-            require_one_shape(scene, wanted)
             answer = find_answer(scene, wanted, options.progress)
-            scene = replace(scene, asked_modes=answer.modes)
-        own = followers(scene, wanted)
-        with stages("initial", "solving the initial design exactly"):
-            initial = solve_design(scene, own, scene.initial, stages.advance)
-        with stages("verification", "solving the optimal design exactly"):
-            exact = solve_design(scene, own, answer.y, stages.advance)
-            one_shot, notes = _one_shot(scene, answer, exact)
-            scene = replace(scene, notes=(*scene.notes, *notes))
+        solved = _solved(scene, wanted, answer, stages)
         with stages("comparison", "comparing the expansion with exact frequencies"):
-            studies = study_modes(scene, initial.hz)
-            scene = _with_accuracy(scene, answer.y)
-        solved = SolvedDesigns(initial, exact, one_shot)
+            studies = study_modes(scene, solved.initial.hz)
+            accuracy = study_accuracy(scene, answer.y)
         accepted = file.assignment.max_error or MAX_ERROR
         targets = study_targets(scene.path, wanted, solved, answer.predicted, accepted)
         with stages("meaning", "studying what the answer means"):
             asked = Studies(options.study)
-            meaning = study_meaning(scene, answer, wanted, exact, accepted, asked)
-    found = VerifiedAssignment(answer, tuple(wanted), targets, initial, exact, meaning)
+            meaning = study_meaning(scene, answer, wanted, solved.exact, accepted, asked)
+    found = VerifiedAssignment(answer, tuple(wanted), targets, solved, meaning)
     moving = _moving(scene, answer.y, targets, options)
-    results = replace(collect_results(scene, studies, found, stages.timing_s), moving=moving)
-    return _result(results, scene.expansions, answer.one_shot)
+    results = collect_results(scene, studies, accuracy, found, moving, stages.timing_s)
+    return _result(results, scene.expanded, answer.one_shot)
 
 
-def _at_instants(scene: Scene) -> Scene:
-    """The scene with what targets ask between samples among its samples, and a note on that."""
-    path = with_instants(scene.file, scene.path)
-    count = int(path.inserted.sum())
-    if not count:
-        return scene
-    note = (
-        f"{counted(count, 'instant')} between samples, of which targets ask something, are looked "
-        "at like samples: q is linear in time there"
-    )
-    return replace(scene, trajectory=path, notes=(*scene.notes, note))
-
-
-def _one_shot(scene: Scene, answer: Answer, exact: Solved) -> tuple[Solved | None, tuple[str, ...]]:
-    """Exact frequencies of the paper's answer; None, and why, where there are none."""
-    if answer.one_shot is None:
-        return None, ()
-    if answer.found is None:
-        return exact, ()
-    try:
-        return solve_design(scene, (), answer.one_shot.y), ()
-    except EigassignError as error:  # a pose that its lengths cannot reach, say
-        return None, (f"no errors of the one-shot design: {error}",)
+def _solved(
+    scene: Scene, wanted: Sequence[Requirement], answer: Answer, stages: Stages
+) -> SolvedDesigns:
+    """The initial design, the answer and the paper's one shot, solved exactly at every sample."""
+    own, count = followers(scene, wanted), scene.shown_modes(answer.modes)
+    with stages("initial", "solving the initial design exactly"):
+        initial = solve_design(scene, own, scene.initial, count, stages.advance)
+    with stages("verification", "solving the optimal design exactly"):
+        exact = solve_design(scene, own, answer.y, count, stages.advance)
+        if answer.one_shot is None or answer.found is None:
+            return SolvedDesigns(initial, exact, None if answer.one_shot is None else exact)
+        try:
+            one_shot = solve_design(scene, (), answer.one_shot.y, count)
+        except EigassignError as error:  # a pose that its lengths cannot reach, say
+            note = f"no errors of the one-shot design: {error}"
+            return SolvedDesigns(initial, exact, None, (note,))
+    return SolvedDesigns(initial, exact, one_shot)
 
 
 def _moving(
@@ -202,7 +184,7 @@ def _moving(
     numbers = np.full(len(scene.path.q), np.nan)
     target = next((t for t in targets if t.asked.is_goal), next(iter(targets), None))
     if target is None:
-        name, numbers[:] = f"mode {scene.expansions.modes[0]}", scene.expansions.modes[0]
+        name, numbers[:] = f"mode {scene.modes[0]}", scene.modes[0]
     else:
         asked, row = target.asked, target.followed
         name = asked.curve_name
@@ -216,35 +198,43 @@ def prepare(
     cache: Cache | None,
     order: int | None = None,
     modes: Sequence[int] | None = None,
+    assigned: bool = False,
 ) -> Scene:
-    """Case → model → trajectory (if it has one) → expansions about the planned point."""
+    """Case → model → trajectory (if it has one) → expansions about the planned point.
+
+    To be ``assigned``, the trajectory has what targets ask between samples among its samples, and a
+    search that does without the expansions goes on without any that meets the accuracy.
+    """
     file = case.file
     with stages("model", "assembling K and M"):
         model, initial = case.model(), case.initial_design
     with stages("trajectory", "following the trajectory"):
-        trajectory = None if file.trajectory is None else case.trajectory
+        path = None if file.trajectory is None else case.trajectory
     with stages("expansion", "expanding the eigenvalues"):
-        plan = plan_expansion(file, model, trajectory, order, modes)
-        expansions, notes = expand_plan(model, plan, cache)
-    moving = () if trajectory is None else trajectory.notes
+        needed = not assigned or expansion_needed(file)
+        plan = plan_expansion(file, model, path, order, modes, needed)
+        expansions, notes = expand_plan(model, plan, cache) if plan.order else (None, [])
+    moving = () if path is None else path.notes
     mesh = () if case.mesh is None else case.mesh.reasons
     smaller = () if case.reduction is None else case.reduction.reasons
     variant = (f"variant: {key} = {shown(value)}" for key, value in file.variant.items())
     notes = [*variant, *mesh, *smaller, *moving, *plan.notes, *notes]
-    return Scene(file, model, initial, trajectory, expansions, tuple(notes))
+    path = with_instants(file, path) if assigned and path is not None else path
+    if path is not None and (count := int(path.inserted.sum())):
+        notes.append(
+            f"{counted(count, 'instant')} between samples, of which targets ask something, are "
+            "looked at like samples: q is linear in time there"
+        )
+    return Scene(file, model, initial, path, plan, expansions, tuple(notes))
 
 
-def _with_accuracy(scene: Scene, optimum: Floats | None = None) -> Scene:
-    """The scene with what mesh, reduction, expansion and round-off leave at the optimum or y0."""
-    y, design = (scene.initial, "initial") if optimum is None else (optimum, "optimal")
-    modes = scene.expansions.modes
-    mesh = judged_mesh(scene.model, modes, scene.trajectory, scene.q0, y, design)
-    scene = replace(scene, discretisation=mesh)
-    return replace(scene, notes=(*scene.notes, *accuracy_notes(scene, optimum)))
-
-
-def _result(results: RunResults, expansions: Expansions, assignment: Assignment | None) -> Result:
-    first = results.targets[0]
+def _result(
+    results: RunResults, expansions: Expansions | None, assignment: Assignment | None
+) -> Result:
+    first, full, linear = results.targets[0], None, None
+    if expansions is not None:
+        full = expansions.fulls if expansions.others else expansions.full
+        linear = expansions.linears if expansions.others else expansions.linear
     return Result(
         design={row.name: row.optimal for row in results.design},
         time_s=results.time_s[first.asked.rows],
@@ -253,8 +243,8 @@ def _result(results: RunResults, expansions: Expansions, assignment: Assignment 
         predicted_hz=first.predicted_hz,
         exact_hz=first.exact_hz,
         results=results,
-        expansion=expansions.fulls if expansions.others else expansions.full,
-        linearised=expansions.linears if expansions.others else expansions.linear,
+        expansion=full,
+        linearised=linear,
         assignment=assignment,
     )
 
@@ -291,11 +281,9 @@ def expand_case(
     with new_run_folder(case.file, out, force, "_expansion") as folder, case.located():
         scene = prepare(case, stages, _cache(options), order, modes)
         with stages("comparison", "comparing the expansion with exact frequencies"):
-            studies = study_modes(scene)
-            scene = _with_accuracy(scene)
+            studies, accuracy = study_modes(scene), study_accuracy(scene)
         moving = _moving(scene, scene.initial, (), options)
-        results = collect_results(scene, studies, None, stages.timing_s)
-        results = replace(results, moving=moving)
+        results = collect_results(scene, studies, accuracy, None, moving, stages.timing_s)
         options.progress("writing the report")
         folder.write(results, options.figures, options.report, coefficient_files(scene, linear))
     return Outcome(folder.path, results, stages.total_s)

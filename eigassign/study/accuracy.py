@@ -1,6 +1,6 @@
 """How far the numbers of a run can be trusted: errors stated side by side, and the motion's speed.
 
-`accuracy_notes` states the errors of mesh, reduced links, expansion and round-off. It needs no
+`study_accuracy` states the errors of mesh, reduced links, expansion and round-off. It needs no
 exact solves but those at the few poses where mesh and reduced links are judged.
 
 `study_motion` estimates what the velocity terms of eq. (1) would change, which the method neglects.
@@ -42,28 +42,38 @@ LARGE = 10_000
 SAMPLES = 20  # at which the expansion's own estimate is evaluated
 
 
-def accuracy_notes(scene: Scene, optimum: Floats | None = None) -> list[str]:
-    """Lines on discretisation, truncation, estimated approximation error and round-off, per mode.
+@dataclass(frozen=True)
+class Accuracy:
+    """The errors of a run's numbers: of the mesh, and of all in lines of text."""
 
-    ``optimum`` (n_y,) is one more design at which the truncation is looked at; where there is one,
-    the expansion is compared with exact solves at every sample, and its error not estimated too.
+    mesh: MeshError | None  # None without beams
+    notes: tuple[str, ...]
+
+
+def study_accuracy(scene: Scene, optimum: Floats | None = None) -> Accuracy:
+    """Errors of mesh, reduced links, expansion and round-off, per mode.
+
+    Those of mesh and links at the ``optimum`` (n_y,), of the mesh at the initial design without
+    one. Where there is one, the expansion is compared with exact solves at every sample, and its
+    error not estimated too.
     """
     q = scene.q0[None] if scene.trajectory is None else scene.path.q
-    lines = mesh_lines(scene.discretisation)
+    y, design = (scene.initial, "initial") if optimum is None else (optimum, "optimal")
+    mesh = judged_mesh(scene.model, scene.modes, scene.trajectory, scene.q0, y, design)
+    lines = mesh_lines(mesh)
     lines += truncation_notes(scene, optimum)
     if optimum is None:
         lines += _estimated_lines(scene, spread(q, SAMPLES))
     first = scene.model.x(q[0], scene.initial)[0]
-    lost = rounding_error(scene.model.pencil, first, max(scene.expansions.modes))
-    return [*lines, rounding_line(lost)]
+    lost = rounding_error(scene.model.pencil, first, max(scene.modes))
+    return Accuracy(mesh, (*lines, rounding_line(lost)))
 
 
-def model_error(scene: Scene, y: Floats, modes: Collection[int]) -> float:
+def model_error(scene: Scene, judged: MeshError | None, y: Floats, modes: Collection[int]) -> float:
     """By how much mesh and reduced links raise ``modes`` at most at design y (n_y,), relative.
 
-    The mesh's part is that of `Scene.discretisation`; infinite where nothing is known.
+    The mesh's part was ``judged`` before; infinite where nothing is known.
     """
-    judged = scene.discretisation
     mesh = {} if judged is None else dict(zip(judged.modes, judged.error, strict=True))
     of_mesh = max((mesh.get(mode, 0.0) for mode in modes), default=0.0)
     if scene.model.reduced is None or not modes:
@@ -125,7 +135,7 @@ def _estimated_lines(scene: Scene, q: Floats) -> list[str]:
     where = "at the expansion point" if scene.trajectory is None else "along the trajectory"
     where = "along all trajectories" if several else where
     lines = []
-    for mode, error in zip(scene.expansions.modes, estimate, strict=True):
+    for mode, error in zip(scene.modes, estimate, strict=True):
         stated = (
             "cannot be vouched for" if not np.isfinite(error) else f"{100 * error:.2g} % at most"
         )
@@ -140,7 +150,7 @@ def truncation_notes(scene: Scene, optimum: Floats | None = None) -> list[str]:
     """`truncation_lines` along the trajectory, at the initial design, both bounds, the optimum."""
     q = scene.q0[None] if scene.trajectory is None else travelled(scene.file, scene.trajectory)
     designs = [scene.initial, *scene.bounds, *([] if optimum is None else [optimum])]
-    return truncation_lines(scene.model, scene.expansions.modes, q, np.array(designs))
+    return truncation_lines(scene.model, scene.modes, q, np.array(designs))
 
 
 def truncation_lines(model: Model, modes: tuple[int, ...], q: Floats, designs: Floats) -> list[str]:
@@ -221,7 +231,7 @@ def _simple_estimate(scene: Scene, parts: list[NamedTrajectory], hz: Floats) -> 
     """The largest (5 Ω²/g³ + |Ω̇|/g)/λ_1 along any trajectory; None where joints translate."""
     if any(joint.type in SLIDING for joint in scene.file.mechanism.joints.values()):
         return None
-    lam, gap = float((2.0 * np.pi * hz.min()) ** 2), least_gap(hz, scene.expansions.modes)
+    lam, gap = float((2.0 * np.pi * hz.min()) ** 2), least_gap(hz, scene.modes)
     return max(_neglected_terms(part.trajectory, gap) for part in parts) / lam
 
 
@@ -244,8 +254,8 @@ def _change(scene: Scene, part: NamedTrajectory) -> float:
     """The largest relative change of a frequency along one trajectory, velocity terms included."""
     model = scene.model
     terms = velocity_terms(model.poses.case, model.poses.parameters, model.motion)
-    modes = tuple(scene.expansions.modes)
-    return motion_effect(model.pencil, terms, rates(part.trajectory), scene.initial, modes).worst
+    motion = rates(part.trajectory)
+    return motion_effect(model.pencil, terms, motion, scene.initial, scene.modes).worst
 
 
 def _motion_study(change: float, limit: float, along: str) -> MotionStudy:

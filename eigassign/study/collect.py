@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign._version import __version__
-from eigassign.assignment.requirements.requirement import Requirement, Solved
+from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.study.accuracy import study_motion
+from eigassign.study.accuracy import Accuracy, study_motion
 from eigassign.study.comparison import reach_warnings
 from eigassign.study.design.account import assignment_row, limit_notes
 from eigassign.study.design.answer import Answer
-from eigassign.study.design.judgement import crossing_warnings, swap_notes
+from eigassign.study.design.judgement import SolvedDesigns, crossing_warnings, swap_notes
 from eigassign.study.design.one_shot import design_rows, solver_row
 from eigassign.study.drawing import draw_poses, rest_pose
 from eigassign.study.results import (
@@ -25,6 +25,7 @@ from eigassign.study.results import (
     MassRow,
     Meaning,
     ModeStudy,
+    MovingMode,
     OtherModes,
     RunResults,
     TargetStudy,
@@ -42,26 +43,28 @@ class VerifiedAssignment:
     answer: Answer
     wanted: tuple[Requirement, ...]
     targets: tuple[TargetStudy, ...]
-    initial: Solved
-    exact: Solved
+    solved: SolvedDesigns
     meaning: Meaning
 
 
 def collect_results(
     scene: Scene,
     studies: tuple[ModeStudy, ...],
+    accuracy: Accuracy,
     assigned: VerifiedAssignment | None,
+    moving: tuple[MovingMode, ...],
     timing_s: Mapping[str, float],
 ) -> RunResults:
     """The results of a run; without ``assigned`` those of an expansion only."""
     file, trajectory = scene.file, scene.trajectory
-    motion, row = _motion(scene, assigned), _assignment(scene, assigned)
+    motion, row = _motion(scene, assigned), _assignment(scene, accuracy, assigned)
     along = [(s.over_time.worst_taylor, s.mode) for s in studies if s.over_time is not None]
     followed = assigned is not None and assigned.answer.found is not None  # by exact frequencies
     reach = () if followed else reach_warnings(scene, along)
     one_shot = None if assigned is None else assigned.answer.one_shot
     n = len(file.coordinates)
     meaning = Meaning() if assigned is None else assigned.meaning
+    unsolved = () if assigned is None else assigned.solved.notes
     return RunResults(
         title=file.title,
         reference=file.reference,
@@ -78,17 +81,25 @@ def collect_results(
         studies=studies,
         design=() if assigned is None else design_rows(scene, assigned.answer.y),
         targets=() if assigned is None else assigned.targets,
-        others=None if assigned is None else _others(scene, assigned),
-        spectrum=None if assigned is None else _spectrum(scene, assigned),
+        others=None if assigned is None else _others(assigned),
+        spectrum=None if assigned is None else _spectrum(assigned),
         solver=None if one_shot is None else solver_row(one_shot),
         assignment=row,
         warnings=(*scene.warnings, *_warnings(scene, assigned), *reach, *motion[1]),
-        notes=(*scene.notes, *_notes(scene, assigned, row), *motion[0], *meaning.notes),
+        notes=(
+            *scene.notes,
+            *unsolved,
+            *accuracy.notes,
+            *_notes(scene, assigned, row),
+            *motion[0],
+            *meaning.notes,
+        ),
         timing_s=dict(timing_s),
         tolerance=file.validation.max_error,
         meaning=meaning,
         mass=None if assigned is None else _mass(scene, assigned.answer.y),
-        discretisation=scene.discretisation,
+        discretisation=accuracy.mesh,
+        moving=moving,
     )
 
 
@@ -98,11 +109,14 @@ def _mass(scene: Scene, y: Floats) -> MassRow:
     return MassRow(mass(scene.initial), mass(y), low, high)
 
 
-def _assignment(scene: Scene, assigned: VerifiedAssignment | None) -> AssignmentRow | None:
+def _assignment(
+    scene: Scene, accuracy: Accuracy, assigned: VerifiedAssignment | None
+) -> AssignmentRow | None:
     if assigned is None:
         return None
     answer, beyond = assigned.answer, assigned.meaning.unreachable
-    return assignment_row(scene, answer, assigned.wanted, assigned.targets, beyond)
+    asked = assigned.wanted, assigned.targets
+    return assignment_row(scene, answer, *asked, accuracy.mesh, beyond)
 
 
 def _notes(
@@ -136,7 +150,7 @@ def _motion(scene: Scene, assigned: VerifiedAssignment | None) -> tuple[list[str
     """Notes and warnings on the speed of the motion."""
     if assigned is None:
         return [], []
-    study = study_motion(scene, assigned.initial.hz)
+    study = study_motion(scene, assigned.solved.initial.hz)
     if study is None:
         return [], []
     return [study.note] if study.note else [], [study.warning] if study.warning else []
@@ -148,23 +162,22 @@ def _poses(scene: Scene) -> DrawnPoses:
     return draw_poses(scene.file, scene.model, scene.trajectory, scene.initial)
 
 
-def _others(scene: Scene, assigned: VerifiedAssignment) -> OtherModes | None:
+def _others(assigned: VerifiedAssignment) -> OtherModes | None:
     """Up to three modes above the lowest assigned one that have no target themselves."""
     targets = {mode for target in assigned.targets for mode in _modes(target)}
-    rest = [m for m in scene.shown_modes if m > min(targets, default=0) and m not in targets][:3]
-    if not rest:
-        return None
+    before, after = assigned.solved.initial.hz, assigned.solved.exact.hz
+    above = range(min(targets, default=0) + 1, before.shape[1] + 1)
+    rest = [m for m in above if m not in targets][:3]
     columns = [mode - 1 for mode in rest]
-    before, after = assigned.initial.hz[:, columns], assigned.exact.hz[:, columns]
-    return OtherModes(tuple(rest), before, after)
+    return OtherModes(tuple(rest), before[:, columns], after[:, columns]) if rest else None
 
 
-def _spectrum(scene: Scene, assigned: VerifiedAssignment) -> OtherModes:
+def _spectrum(assigned: VerifiedAssignment) -> OtherModes:
     """The modes from the lowest to the one above the highest that a target names."""
     highest = max((mode for target in assigned.targets for mode in _modes(target)), default=1)
-    modes = scene.shown_modes[: highest + 1]
-    before, after = (solved.hz[:, : len(modes)] for solved in (assigned.initial, assigned.exact))
-    return OtherModes(modes, before, after)
+    solved = assigned.solved
+    before, after = (each.hz[:, : highest + 1] for each in (solved.initial, solved.exact))
+    return OtherModes(tuple(range(1, before.shape[1] + 1)), before, after)
 
 
 def _modes(target: TargetStudy) -> set[int]:
@@ -179,7 +192,10 @@ def _warnings(scene: Scene, assigned: VerifiedAssignment | None) -> Iterator[str
     if assigned is None:
         return
     modes = tuple(sorted({mode for target in assigned.targets for mode in target.asked.modes}))
-    for solved, design in ((assigned.initial, "initial"), (assigned.exact, "optimal")):
+    for solved, design in (
+        (assigned.solved.initial, "initial"),
+        (assigned.solved.exact, "optimal"),
+    ):
         yield from crossing_warnings(solved.hz, modes, scene.path.where, design)
     if assigned.answer.found is None:
         yield from _accuracy_warnings(scene, assigned)

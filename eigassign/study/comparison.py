@@ -142,7 +142,9 @@ def map_over(model: Model, expansions: Expansions, grid: Grid | None) -> tuple[D
 
 def study_modes(scene: Scene, initial_hz: Floats | None = None) -> tuple[ModeStudy, ...]:
     """One study for each expanded mode; ``initial_hz`` (n_t, modes) exact on the trajectory."""
-    model, expansions = scene.model, scene.expansions
+    if scene.expanded is None:
+        return ()
+    model, expansions = scene.model, scene.expanded
     over_time: tuple[Comparison, ...] = ()
     if scene.trajectory is not None:
         x = model.x(scene.trajectory.q, scene.initial)

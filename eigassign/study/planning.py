@@ -19,7 +19,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import hadamard
 
 from eigassign.case.case_file import CaseFile
-from eigassign.errors import AccuracyError, CaseError, TrajectoryError, UsageError
+from eigassign.errors import (
+    AccuracyError,
+    CaseError,
+    EigassignError,
+    TrajectoryError,
+    UsageError,
+)
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.adaptive.link_reduction import POSES
@@ -46,7 +52,7 @@ class Plan:
 
     q0: Floats
     y0: Floats
-    order: int
+    order: int  # 0: none meets the accuracy, and there is no expansion
     modes: tuple[int, ...]
     notes: tuple[str, ...]
     more_q: tuple[tuple[float, ...], ...] = ()  # further expansion points along the trajectory
@@ -59,11 +65,13 @@ def plan_expansion(
     trajectory: Trajectories | None,
     order: int | None = None,
     modes: Sequence[int] | None = None,
+    needed: bool = True,
 ) -> Plan:
     """Settle the expansion; ``order`` and ``modes`` override the file's.
 
-    Raises CaseError at the key at fault: lengths that differ from the model's, modes it does not
-    have, an automatic expansion point without a trajectory to be central in, an order of which
+    Where one that is not ``needed`` is not found within `LOOKS`, its order is 0, and a note says
+    why. Raises CaseError at the key at fault: lengths that differ from the model's, modes it does
+    not have, an automatic expansion point without a trajectory to be central in, an order of which
     the memory would not suffice; UsageError for such an ``order``.
     """
     q0, q_note = _q0(file, model, trajectory)
@@ -75,7 +83,7 @@ def plan_expansion(
     if isinstance(wanted, int):
         _require_affordable(file, model, wanted, given=order is None)
         return Plan(q0, y0, wanted, chosen, tuple(note for note in notes if note))
-    found = choose_order(file, model, trajectory, q0, y0, chosen)
+    found = choose_order(file, model, trajectory, q0, y0, chosen, needed)
     all_notes = tuple(note for note in (*notes, *found.reasons) if note)
     return Plan(q0, y0, found.order, chosen, all_notes, found.more_q, found.cluster_gap)
 
@@ -344,6 +352,15 @@ def require_little_truncation(file: CaseFile, model: Model, x: Floats) -> None:
 FEW, MANY = 200, 1000  # poses at corners that an order is chosen at, and confirmed at: see below
 RANDOM = 600  # further poses and designs that it is confirmed at
 ATTEMPTS = 3  # confirmations before the choice at all that was looked at is taken
+# Looks at samples, and coefficients, after which an expansion that is not needed is given up: as
+# many as the search for a design solves samples exactly, some 100 designs at 100 samples. Most of
+# the shipped cases at 1e-3 take under a third, a full turn of a crank without an answer 42 000.
+LOOKS = 10_000
+
+
+def expansion_needed(file: CaseFile) -> bool:
+    """True where all that is asked rests on the expansion; a sequential search does without."""
+    return file.assignment.method == "one_shot" or not file.targets
 
 
 @dataclass(frozen=True)
@@ -364,6 +381,7 @@ def choose_order(
     q0: Floats,
     y0: Floats,
     modes: tuple[int, ...],
+    needed: bool = True,
 ) -> OrderChoice:
     """Order and expansion points that meet the series' share of the accuracy.
 
@@ -371,7 +389,8 @@ def choose_order(
     random designs and at those that are worse than the worst of these. (Choosing at all of them at
     once takes 1.6 times as long and chooses the same for the shipped cases at 1e-3, 1e-5 and 1e-7.)
     Where the confirmation fails, they are chosen anew at all that was looked at. Raises
-    AccuracyError, naming the pose, where no order and number of points will do.
+    AccuracyError, naming the pose, where no order and number of points will do; where they are not
+    ``needed``, the order is then 0.
     """
     at_upper = corners(len(y0))
     few, many = (max(8, rows // (1 + len(at_upper))) for rows in (FEW, MANY))  # samples of each
@@ -379,11 +398,33 @@ def choose_order(
     require_little_truncation(file, model, seen.x)
     if len(y0):
         every = every.joined(at_random(file, trajectory, q0, y0, RANDOM))
-    accuracy, start = series_share(file), np.concatenate([q0, y0])
-    reasons: list[str] = []
+    x0, looks = np.concatenate([q0, y0]), np.inf if needed else LOOKS
+    try:
+        found, reasons = _confirmed(file, model, seen, every, x0, modes, looks)
+    except EigassignError as error:  # an accuracy that is not met, or a design without a pose
+        if needed:
+            raise
+        why = f"no expansion, so that nothing is told of one, nor a one-shot design: {error}"
+        return OrderChoice(0, q0, (), CLUSTER_GAP, (why,))
+    _, *more = (part.q0 for part in found.expansions)
+    more_q = tuple(tuple(q.tolist()) for q in more)
+    return OrderChoice(found.order, q0, more_q, found.cluster_gap, tuple(reasons))
+
+
+def _confirmed(
+    file: CaseFile,
+    model: Model,
+    seen: DesignSamples,
+    every: DesignSamples,
+    x0: Floats,
+    modes: tuple[int, ...],
+    looks: float,
+) -> tuple[ExpansionChoice, list[str]]:
+    """The choice at the samples ``seen``, confirmed at ``every`` one or made anew; and why."""
+    accuracy, reasons = series_share(file), list[str]()
     for attempt in range(1 + ATTEMPTS):
         found = choose_expansion(
-            model.pencil, seen.x, accuracy, modes, start=start, place=seen.place
+            model.pencil, seen.x, accuracy, modes, start=x0, place=seen.place, most_looks=looks
         )
         reasons += found.reasons
         if attempt == ATTEMPTS:
@@ -395,10 +436,10 @@ def choose_order(
         reasons.append(line if met else f"{line}, chosen anew")
         if met:
             break
-        seen = every
-    _, *more = (part.q0 for part in found.expansions)
-    more_q = tuple(tuple(q.tolist()) for q in more)
-    return OrderChoice(found.order, q0, more_q, found.cluster_gap, tuple(reasons))
+        seen, looks = every, looks - found.looks
+        if len(seen.x) > looks:
+            raise AccuracyError(f"the expansion chosen at few poses and designs errs: {line}")
+    return found, reasons
 
 
 def _largest_estimate(found: ExpansionChoice, x: Floats) -> Floats:

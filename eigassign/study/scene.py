@@ -14,11 +14,11 @@ from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.sampling import design_limits
 from eigassign.brief import Brief
 from eigassign.case.case_file import CaseFile
-from eigassign.errors import CaseError, MissingMassError
+from eigassign.errors import AccuracyError, CaseError, MissingMassError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.expansion import Expansion, NearestExpansion
 from eigassign.modal.model import Model
-from eigassign.study.results import MeshError
+from eigassign.study.planning import Plan
 
 Floats = NDArray[np.float64]
 BLOCK = 2_000_000  # numbers of a batch of matrices: a second or so of dense solves
@@ -97,10 +97,21 @@ class Scene:
     model: Model
     initial: Floats  # y as the file writes it, (n_y,)
     trajectory: Trajectories | None
-    expansions: Expansions
+    plan: Plan
+    expanded: Expansions | None  # None where an answer does without
     notes: tuple[str, ...]  # what was chosen and why
-    asked_modes: int = 1  # the highest mode that a target needs
-    discretisation: MeshError | None = None
+
+    @property
+    def expansions(self) -> Expansions:
+        """The expansions; raises AccuracyError where there are none."""
+        if self.expanded is None:
+            raise AccuracyError("no expansion meets the accuracy that is asked for")
+        return self.expanded
+
+    @property
+    def modes(self) -> tuple[int, ...]:
+        """The modes that are expanded, or would be: those with a target, or of the file."""
+        return self.plan.modes
 
     @property
     def path(self) -> Trajectories:
@@ -113,7 +124,7 @@ class Scene:
     @property
     def q0(self) -> Floats:
         """The expansion point in q, (n_q,)."""
-        return self.expansions.full.q0
+        return self.plan.q0
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -136,30 +147,32 @@ class Scene:
         """Those of them that are linear in the design."""
         return tuple(one.constraint for one in self.limits if one.constraint is not None)
 
-    @cached_property
-    def shown_modes(self) -> tuple[int, ...]:
-        """Every mode solved along the trajectory: the expanded and asked ones and three above.
+    def shown_modes(self, asked: int = 1) -> int:
+        """The number of modes shown along the trajectory: up to three above those ``asked`` for.
 
-        Of those above, as many as have mass.
+        Those are the expanded ones too; of the three, as many as have mass.
         """
         available = self.model.n_dof - self.model.n_rigid
-        highest = max(*self.expansions.modes, self.asked_modes)
+        highest = max(*self.modes, asked)
         last = min(highest + OTHERS, available)
         try:
             self.model.frequencies(self.q0, self.initial, last)
         except MissingMassError as error:
             last = max(highest, error.most)
-        return tuple(range(1, last + 1))
+        return last
 
     def exact(
-        self, y: Floats, progress: Callable[[int, int], None] = lambda _done, _of: None
+        self,
+        y: Floats,
+        count: int | None = None,
+        progress: Callable[[int, int], None] = lambda _done, _of: None,
     ) -> Floats:
-        """Exact frequencies (n_t, n_shown_modes) in Hz on every sample of the trajectory at y.
+        """Exact frequencies (n_t, count or `shown_modes`) in Hz on every sample, at design y.
 
         They are solved in blocks: between two of them ``progress`` is called with the number of
         samples done and of all, and signals are handled.
         """
-        q, count = self.path.at(y)[0], len(self.shown_modes)
+        q, count = self.path.at(y)[0], self.shown_modes() if count is None else count
         block = max(AT_LEAST, BLOCK // self.model.n_dof**2)
         parts = []
         for start in range(0, len(q), block):

@@ -69,6 +69,7 @@ class ExpansionChoice:
     estimate: Floats  # (n, n_modes) at the samples
     beside: AdaptiveReduction
     reasons: tuple[str, ...]
+    looks: int  # at samples, and coefficients, that the choice took
 
     @property
     def order(self) -> int:
@@ -112,12 +113,14 @@ def choose_expansion(
     orders: Sequence[int] = ORDERS,
     start: Floats | None = None,
     place: Callable[[int], str] = row_in_words,
+    most_looks: float = np.inf,
 ) -> ExpansionChoice:
     """Expansions of few coefficients whose estimate is ≤ ``accuracy`` at samples x (n, n_x).
 
     The first point is ``start`` (n_x,) or the most central sample; all share its design. No order
     of over `MOST_TERMS` coefficients is tried. ``place`` says in words what row k of x is. Raises
-    AccuracyError, naming the sample, where nothing meets the accuracy.
+    AccuracyError, naming the sample, where nothing meets the accuracy, or nothing is found while
+    all that is tried takes fewer than ``most_looks`` at samples, and coefficients.
     """
     beside = reduce_adaptively(  # half of the accuracy where round-off allows no more
         pencil, x, 0.05 * accuracy, modes, place=place, tolerable=0.5 * accuracy
@@ -128,12 +131,13 @@ def choose_expansion(
     waiting = _first_trials(pencil, x0, modes, orders)
     alone: dict[float, list[float]] = {trial.gap: [] for trial in waiting}  # errors of one point
     lines: dict[tuple[float, int, bool], str] = {}
-    least, at = np.inf, 0
-    while waiting:
+    least, at, looks = np.inf, 0, len(x) * len(beside.reasons)
+    while waiting and looks < most_looks:
         trial = min(waiting, key=lambda each: each.cost)
         waiting.remove(trial)
         if not trial.parts and _hopeless(trial, alone, int(pencil.active.sum())):
             continue
+        looks += len(x) + trial.size
         q0, y0 = np.split(x0 if trial.point is None else trial.point, [pencil.n_q])
         part = expand(pencil, q0, y0, modes, trial.order, cluster_gap=trial.gap)
         parts, hz = (*trial.parts, part), (*trial.hz, part.frequencies(q, y))
@@ -146,7 +150,7 @@ def choose_expansion(
         if error <= accuracy:
             told = f"{beside.reduced.size} vectors, itself right to {beside.error:.1e}"
             reasons = (f"judged beside a reduced model of {told}", *lines.values())
-            return ExpansionChoice(parts, trial.gap, estimate, beside, reasons)
+            return ExpansionChoice(parts, trial.gap, estimate, beside, reasons, looks)
         if error <= least:
             least, at = error, worst
         if not several:
@@ -159,10 +163,10 @@ def choose_expansion(
     where = f"at {place(at)}, (q, y) = {shown_numbers(x[at])}"
     none = f"none has a number that it vouches for {where}"
     nearest = f"the nearest left {least:.1e} {where}" if np.isfinite(least) else none
+    tried = f"of order up to {max(_affordable(pencil, orders))} at up to {MAX_POINTS} points"
     raise AccuracyError(
-        f"no expansion of order up to {max(_affordable(pencil, orders))} at up to {MAX_POINTS} "
-        f"points reaches {accuracy:.1e}: {nearest}; ask for less, narrow the bounds of the design, "
-        "or take ea.reduce or ea.fit"
+        f"no expansion {tried if looks < most_looks else 'tried'} reaches {accuracy:.1e}: "
+        f"{nearest}; ask for less, narrow the bounds of the design, or take ea.reduce or ea.fit"
     )
 
 

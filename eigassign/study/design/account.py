@@ -22,6 +22,7 @@ from eigassign.study.results import (
     ClearanceRow,
     CombinationRow,
     LocalOptimum,
+    MeshError,
     OptimalityRow,
     StepRow,
     TargetStudy,
@@ -36,11 +37,13 @@ def assignment_row(
     answer: Answer,
     wanted: Sequence[Requirement],
     targets: Sequence[TargetStudy],
+    mesh: MeshError | None,
     unreachable: Sequence[str] = (),
 ) -> AssignmentRow:
     """How the answer was found and what it is worth, as plain numbers.
 
-    ``unreachable`` says in words which targets are out of reach within the bounds.
+    ``mesh`` is the mesh's error there; ``unreachable`` says in words which targets are out of reach
+    within the bounds.
     """
     keys, found = scene.file.assignment, answer.found
     initial, optimal = _merits(answer, targets)
@@ -55,7 +58,7 @@ def assignment_row(
     word, reason = verdict(targets, merits, trusted, unreachable, contradiction)
     unproved = [_why_unproved(row) for row in clearances if not row.clear]
     of_model = {m for one in wanted if one.of_soft_model for m in one.modes}
-    raised = model_error(scene, answer.y, of_model)
+    raised = model_error(scene, mesh, answer.y, of_model)
     largest = MAX_ERROR if keys.max_error is None else keys.max_error
     at_stake = (t.asked.stake(t.exact_hz, raised) for t in targets)
     if word == "reached" and any(stake > largest for stake in at_stake):

@@ -18,13 +18,14 @@ from eigassign.assignment.exact.design_problem import MET
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.targets import hz_from_lam
 from eigassign.case.case_file import CaseFile
-from eigassign.errors import AccuracyError, InfeasibleError
+from eigassign.errors import AccuracyError, EigassignError
 from eigassign.study.design.conclusions import (
     Conflict,
     conflict,
     idle_notes,
     least_changed,
 )
+from eigassign.study.design.followed import require_one_shape
 from eigassign.study.design.one_shot import assign_design, catalogues
 from eigassign.study.design.optimum import Found, find_optimum
 from eigassign.study.scene import Scene
@@ -69,15 +70,18 @@ def find_answer(
 ) -> Answer:
     """The design asked for by the case's method.
 
-    Under `method: one_shot` raises InfeasibleError where bounds, lists and linear constraints
-    contradict each other, AccuracyError where it cannot be vouched for.
+    Raises CaseError where a mode to be followed has no shape of its own; under `method: one_shot`
+    InfeasibleError where bounds, lists and linear constraints contradict each other, AccuracyError
+    where it cannot be vouched for.
     """
+    require_one_shape(scene, wanted)
     sequential = scene.file.assignment.method == "sequential"
     one_shot, notes = None, []
-    if wanted and all(one.in_one_shot for one in (*wanted, *scene.limits)):
+    plain = all(one.in_one_shot for one in (*wanted, *scene.limits))
+    if wanted and plain and scene.expanded is not None:
         try:
             one_shot = assign_design(scene, wanted)
-        except (AccuracyError, InfeasibleError) as error:
+        except EigassignError as error:  # also where its design cannot follow the path of a tip
             if not sequential:
                 raise
             notes.append(f"no one-shot design: {error}")

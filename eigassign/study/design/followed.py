@@ -238,10 +238,11 @@ def solve_design(
     scene: Scene,
     own: Sequence[Follower],
     y: Floats,
+    count: int | None = None,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> Solved:
-    """Solve all shown modes and those followed; raises what these raise, and LostModeError."""
-    hz, n = scene.exact(y, progress), len(scene.path.q)
+    """Solve ``count`` or all shown modes, and those followed; raises LostModeError too."""
+    hz, n = scene.exact(y, count, progress), len(scene.path.q)
     if not own:
         return Solved(hz, np.zeros((n, 0)), np.zeros((n, 0), dtype=np.intp))
     found = follow_all(scene.model, scene.path, own, y, 1)

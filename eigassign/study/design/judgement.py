@@ -31,6 +31,7 @@ class SolvedDesigns:
     initial: Solved
     exact: Solved
     one_shot: Solved | None = None
+    notes: tuple[str, ...] = ()  # why there are none of the one shot
 
 
 def study_targets(
