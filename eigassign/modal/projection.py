@@ -62,7 +62,7 @@ def project_terms(
 def project_at(pencil: Pencil, theta: Floats, rows: Floats) -> Floats:
     """R K Rᵀ and R M Rᵀ at θ (n_theta, 1), (2, k, k), for rows R (k, n_dof)."""
     if pencil.is_dense:
-        return np.asarray(rows @ pencil.both_matrices(theta)[:, 0] @ rows.T)
+        return np.asarray(rows @ pencil.matrices(theta)[:, 0] @ rows.T)
     V = np.ascontiguousarray(rows.T)
     out = np.zeros((2, len(rows), len(rows)))
     for square, weights in zip(out, (pencil.stiffness, pencil.mass), strict=True):

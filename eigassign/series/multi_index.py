@@ -247,8 +247,6 @@ def on_faces(space: LowerSet, faces: bytes) -> tuple[LowerSet, Ints]:
     """
     if not space.n_variables:
         return space, np.arange(len(space))
-    if not space.n_variables:
-        return space, np.zeros(1, dtype=np.intp)
     allowed = np.frombuffer(faces, dtype=bool).reshape(-1, space.n_variables)
     inside = ((space.indices > 0).astype(np.int64) @ ~allowed.T == 0).any(axis=1)
     where = np.flatnonzero(inside | (space.degrees == 0))

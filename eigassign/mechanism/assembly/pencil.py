@@ -7,10 +7,9 @@ between exact, Taylor and reduced evaluation.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,21 +20,15 @@ from eigassign.series.algebra import Samples, Tangents, Truncated
 from eigassign.series.compiler import Program
 from eigassign.series.multi_index import LowerSet, on_faces
 
+if TYPE_CHECKING:  # a stored reduced model is evaluated without kinematics and case
+    from eigassign.mechanism.kinematics.property_limits import PropertyLimits
+    from eigassign.mechanism.kinematics.travel_limits import Rails
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 DENSE_LIMIT = 220  # n_dof up to which matrices are kept dense (benchmarks/dense_or_sparse.py)
 STACK_LIMIT = 500_000  # numbers: 4 MB
 TINY_STACK = 20_000
-
-
-class TravelRanges(Protocol):
-    """Where carriages and nuts may stand: see `kinematics.travel_limits`.
-
-    A stored reduced model is evaluated without kinematics and case, so they are not imported here.
-    """
-
-    def require(self, z: Floats, x: Floats, label: Callable[[int], str] = ...) -> None:
-        """Raise TravelError for the first sample at which one leaves its range."""
 
 
 def theta_slopes(
@@ -50,13 +43,6 @@ def theta_slopes(
     slopes = np.zeros((len(along), 1 + len(rows), len(x)))
     slopes[:, 1:] = rows.reshape(len(rows), len(along), len(x)).swapaxes(0, 1)
     return slopes
-
-
-class PossibleValues(Protocol):
-    """The possible values of the properties that vary: see `kinematics.property_limits`."""
-
-    def require(self, x: Floats) -> None:
-        """Raise UsageError for the first sample that no mechanism can have."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -80,8 +66,8 @@ class Pencil(Brief):
     shift: Floats  # (n_z,)
     n_q: int
     n_loads: int = 0
-    rails: TravelRanges | None = None  # where carriages and nuts may stand
-    limits: PossibleValues | None = None  # of the loads and design parameters
+    rails: Rails | None = None  # where carriages and nuts may stand
+    limits: PropertyLimits | None = None  # of the loads and design parameters
     dense_limit: int = DENSE_LIMIT
 
     @property
@@ -182,13 +168,8 @@ class Pencil(Brief):
         theta[1:, where] = self.program.run(Truncated(inner), z)
         return theta
 
-    def matrices(self, theta: Floats) -> tuple[Floats, Floats]:
-        """Dense K, M (n_samples, n_dof, n_dof) for θ (n_theta, n_samples)."""
-        K, M = self.both_matrices(theta)
-        return K, M
-
-    def both_matrices(self, theta: Floats) -> Floats:
-        """The same as one array (2, n_samples, n_dof, n_dof)."""
+    def matrices(self, theta: Floats) -> Floats:
+        """Dense K and M, (2, n_samples, n_dof, n_dof), for θ (n_theta, n_samples)."""
         if self._stack is not None:
             return np.asarray((theta.T @ self._stack).reshape(2, -1, self.n_dof, self.n_dof))
         return self._pair((self._both @ theta).reshape(2, -1, theta.shape[1]))

@@ -9,7 +9,7 @@ along, so that rigid motions are columns again and are projected out exactly.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import MechanismError, SingularityError
 from eigassign.mechanism.assembly.node_motion import MotionRows
-from eigassign.mechanism.assembly.springs import resists, spring_ends
+from eigassign.mechanism.assembly.springs import SpringEnds, resists
 from eigassign.mechanism.kinematics.forward import Kinematics
 from eigassign.mechanism.kinematics.loop_closure import reference
 from eigassign.mechanism.kinematics.parameters import ModelParameters
@@ -39,9 +39,9 @@ def separated(
     Raises MechanismError where springs leave a motion whose direction changes with the pose, or
     would leave one more where a stiffness that varies is zero.
     """
-    rows, springs = _rows(case, parameters, motion, free)
-    W, pivots = _unresisted(case, motion, free, rows, springs)
-    _require_lasting(case, motion, free, rows, springs, W.shape[1])
+    found = _Resistance(case, motion, free, *_rows(case, parameters, motion, free))
+    W, pivots = found.unresisted()
+    found.require_lasting(W.shape[1])
     change = np.eye(len(motion.columns))
     change[np.ix_(free, [free[k] for k in pivots])] = W
     rigid = tuple(sorted(free[k] for k in pivots))
@@ -63,7 +63,7 @@ def _rows(
         return [{} for _ in range(6)]
 
     known = parameters.with_passive(motion.passive)
-    springs = list(spring_ends(case, known, motion, stiff, 0))
+    springs = list(SpringEnds(case, known, motion, stiff, 0).all())
     entries = [[[row.get(k, 0.0) for k in free] for row in pair] for _, *pair in springs]
     z = reference(case, parameters)
     table = parameters.compiled(np.array(entries, dtype=object))
@@ -98,23 +98,65 @@ def _at_poses(table: CompiledArrays, z: Floats, span: Floats) -> Floats:
     return np.repeat(table(z[:, None])[0], 2, axis=0)
 
 
-def _unresisted(
-    case: CaseFile,
-    motion: Kinematics,
-    free: Sequence[int],
-    rows: Floats,
-    springs: Sequence[str],
-) -> tuple[Floats, list[int]]:
-    """W (n_free, n_rigid), and the coordinate of each column where it is 1 and the others are 0."""
-    units = np.abs(rows).max(axis=(0, 1), initial=0.0)
-    units[units == 0.0] = 1.0
-    scaled = rows / units  # rad against m
-    scaled = scaled / np.maximum(np.abs(scaled).max(axis=(1, 2), keepdims=True), 1e-300)
-    always = _null_space(scaled.reshape(-1, len(free)))
-    least = min((_null_space(A) for A in scaled.swapaxes(0, 1)), key=lambda W: W.shape[1])
-    if least.shape[1] > always.shape[1]:
-        _refuse(case, motion, free, least - always @ (always.T @ least), springs)
-    return _echelon(always / units[:, None])
+@dataclass(frozen=True, eq=False)
+class _Resistance:
+    """What springs resist of the motions of the ``free`` columns, see `_rows`."""
+
+    case: CaseFile
+    motion: Kinematics
+    free: Sequence[int]
+    rows: Floats
+    springs: tuple[str, ...]
+
+    def unresisted(self) -> tuple[Floats, list[int]]:
+        """W (n_free, n_rigid), and the coordinate of each column where it is 1, the others 0."""
+        units = np.abs(self.rows).max(axis=(0, 1), initial=0.0)
+        units[units == 0.0] = 1.0
+        scaled = self.rows / units  # rad against m
+        scaled = scaled / np.maximum(np.abs(scaled).max(axis=(1, 2), keepdims=True), 1e-300)
+        always = _null_space(scaled.reshape(-1, len(self.free)))
+        least = min((_null_space(A) for A in scaled.swapaxes(0, 1)), key=lambda W: W.shape[1])
+        if least.shape[1] > always.shape[1]:
+            raise self._turning(least - always @ (always.T @ least))
+        return _echelon(always / units[:, None])
+
+    def require_lasting(self, n_rigid: int) -> None:
+        """The motions that springs leave stay the same where stiffnesses that vary are least."""
+        ranges = self.case.ranges
+        lost = [path in ranges and ranges[path][0] == 0.0 for path in self.springs]
+        zero = np.array(lost, dtype=bool)
+        left = _null_space(self.rows[~zero].reshape(-1, len(self.free)))
+        if not zero.any() or left.shape[1] == n_rigid:
+            return
+        paths = dict.fromkeys(np.array(self.springs)[zero].tolist())
+        named = {p.parameter: name for name, p in self.case.design.parameters.items()}
+        path = next(iter(paths))
+        place = f"design.{named[path]}.min" if path in named else f"mechanism.{path}"
+        what = " and ".join(named.get(path, path) for path in paths)
+        raise MechanismError(
+            place,
+            f"with {what} = 0 nothing resists the motion of {self._moved(left)}, which would be "
+            f"one more rigid-body motion: {'take a min' if path in named else 'set a value'} above "
+            "0, such as a thousandth of the largest, or give the coordinate a drive",
+        )
+
+    def _moved(self, W: Floats) -> str:
+        """The coordinates that move in W (n_free, n), in words."""
+        names = tuple(self.case.coordinates)
+        moving = np.flatnonzero(np.abs(W).max(axis=1) > RESISTED).tolist()
+        moved = [names[self.motion.columns[self.free[k]]] for k in moving]
+        return " and ".join([", ".join(moved[:-1]), moved[-1]] if len(moved) > 1 else moved)
+
+    def _turning(self, left: Floats) -> MechanismError:
+        paths = tuple(dict.fromkeys(self.springs))
+        return MechanismError(
+            "mechanism." + ".".join(paths[0].split(".")[:2]),
+            f"{' and '.join(paths)} resist some motions of {self._moved(left)}, which no drive "
+            "holds, and leave others, in a direction that changes with the pose (a spring's axes "
+            "turn with the link it names first): what is left is a rigid-body motion, but no "
+            "coordinate. Give the springs stiffness in the other directions too, or lock one of "
+            "these coordinates, or give it a drive with a stiffness, a small one if it is to move",
+        )
 
 
 def _null_space(A: Floats) -> Floats:
@@ -134,57 +176,3 @@ def _echelon(W: Floats) -> tuple[Floats, list[int]]:
         W[:, others] -= np.outer(W[:, column], W[pivots[-1], others])
     whole = np.round(W)
     return np.where(np.abs(W - whole) < ROUND_OFF, whole, W), pivots
-
-
-def _require_lasting(
-    case: CaseFile,
-    motion: Kinematics,
-    free: Sequence[int],
-    rows: Floats,
-    springs: Sequence[str],
-    n_rigid: int,
-) -> None:
-    """The motions that springs leave stay the same where stiffnesses that vary are least."""
-    ranges = case.ranges
-    lost = [path in ranges and ranges[path][0] == 0.0 for path in springs]
-    if not any(lost):
-        return
-    least = rows[~np.array(lost)]
-    left = _null_space(least.reshape(-1, len(free)))
-    if left.shape[1] == n_rigid:
-        return
-    moving = _names(case, motion, free, left)
-    paths = dict.fromkeys(path for path, zero in zip(springs, lost, strict=True) if zero)
-    named = {p.parameter: name for name, p in case.design.parameters.items()}
-    path = next(iter(paths))
-    place = f"design.{named[path]}.min" if path in named else f"mechanism.{path}"
-    what = " and ".join(named.get(path, path) for path in paths)
-    raise MechanismError(
-        place,
-        f"with {what} = 0 nothing resists the motion of {moving}, which would be one more "
-        f"rigid-body motion: {'take a min' if path in named else 'set a value'} above 0, such as a "
-        "thousandth of the largest, or give the coordinate a drive",
-    )
-
-
-def _names(case: CaseFile, motion: Kinematics, free: Sequence[int], W: Floats) -> str:
-    """The coordinates that move in W (n_free, n), in words."""
-    names = tuple(case.coordinates)
-    moving = np.abs(W).max(axis=1) > RESISTED
-    moved = [names[motion.columns[k]] for k, moves in zip(free, moving, strict=True) if moves]
-    return " and ".join([", ".join(moved[:-1]), moved[-1]] if len(moved) > 1 else moved)
-
-
-def _refuse(
-    case: CaseFile, motion: Kinematics, free: Sequence[int], left: Floats, springs: Sequence[str]
-) -> None:
-    moving = _names(case, motion, free, left)
-    paths = tuple(dict.fromkeys(springs))
-    raise MechanismError(
-        "mechanism." + ".".join(paths[0].split(".")[:2]),
-        f"{' and '.join(paths)} resist some motions of {moving}, which no drive holds, and leave "
-        "others, in a direction that changes with the pose (a spring's axes turn with the link it "
-        "names first): what is left is a rigid-body motion, but no coordinate. Give the springs "
-        "stiffness in the other directions too, or lock one of these coordinates, or give it a "
-        "drive with a stiffness, a small one if it is to move",
-    )
