@@ -27,15 +27,15 @@ from eigassign.mechanism.inverse_kinematics.solver import (
     DEAD,
     ROUND_OFF,
     Trace,
-    crossed,
     interpolated,
     levenberg,
     loop_regularity,
+    lost,
     newton,
     trace,
 )
 from eigassign.mechanism.inverse_kinematics.state import TipProblem, prepare
-from eigassign.mechanism.inverse_kinematics.tip_path import Course, TipTarget
+from eigassign.mechanism.inverse_kinematics.tip_path import Course
 
 RESIDUAL = 1e-10  # largest miss of a sample: of L in m, and in rad
 _TURNS = (0.2, 0.02)  # rad: largest step of the trace, and of a second try where that was too bold
@@ -77,11 +77,13 @@ def follow(
     failures = []
     # eight first solutions are followed before giving up
     for candidate in candidates[:8]:
-        u0 = assembled(ik, course.target(course.s[:1]), candidate)
-        if u0 is None:
-            continue
         try:
-            u = _along(ik, course, u0)
+            u0 = _own(ik, candidate[None])
+            if _off(ik, course, u0, 10.0 * RESIDUAL)[0]:
+                continue
+            u = _along(ik, course, u0[0])
+        except SingularityError:
+            continue
         except TrajectoryError as error:
             failures.append(error)
             continue
@@ -95,30 +97,24 @@ def follow(
 
 def _along(ik: TipProblem, course: Course, u0: Floats) -> Floats:
     """The states (n, n_z) of the solution that begins with u0; TrajectoryError where it ends."""
-    target = course.target(course.s)
     for turn in _TURNS if ik.rank == ik.n_q else _REDUNDANT:
         path = trace(ik, course, u0, turn)
         n = int(np.searchsorted(course.s, path.s[-1], side="right"))
         seeds = interpolated(path, course.s[:n])
-        u, seen, motion, settled = newton(ik, seeds, _first(target, n), ROUND_OFF)
-        strayed = ~settled | (np.abs(u - seeds).max(axis=1) > turn)
-        strayed |= crossed(ik, seen, motion, path.sense)
+        found = newton(ik, seeds, course.target(course.s[:n]), ROUND_OFF)
+        strayed = lost(ik, found, seeds, turn, path.sense)
         if not strayed.any():
             break
     n = int(np.argmax(strayed)) if strayed.any() else n
-    require_reached(ik, course, u[:n], _first(target, n))
+    require_reached(ik, course, found.u[:n])
     if n < len(course.s):
         raise _blocked(ik, course, n, path)
-    return as_assembled(ik, course, u, target)
+    return as_assembled(ik, course, found.u)
 
 
-def _first(target: TipTarget, n: int) -> TipTarget:
-    return TipTarget(target.point[:n], None if target.rotation is None else target.rotation[:n])
-
-
-def require_reached(ik: TipProblem, course: Course, u: Floats, target: TipTarget) -> None:
+def require_reached(ik: TipProblem, course: Course, u: Floats) -> None:
     """Raises TrajectoryError for the first of the samples u that leaves its branch or its point."""
-    off_path = _off(ik, u, target, RESIDUAL)
+    off_path = _off(ik, course, u, RESIDUAL)
     off_branch = ~ik.inside(u).all(axis=1)
     if (off_path | off_branch).any():
         k = int(np.argmax(off_path | off_branch))
@@ -126,24 +122,21 @@ def require_reached(ik: TipProblem, course: Course, u: Floats, target: TipTarget
         raise why(ik, course, k, u[k])
 
 
-def _off(ik: TipProblem, u: Floats, target: TipTarget, tolerance: float) -> Bools:
-    """True where tips are off their points or their orientations, (n,)."""
-    distance, turn = ik.misses(ik.error(ik.evaluate(u), target))
+def _off(ik: TipProblem, course: Course, u: Floats, tolerance: float) -> Bools:
+    """True where tips of the first samples are off their points or their orientations, (n,)."""
+    distance, turn = ik.misses(ik.error(ik.evaluate(u), course.target(course.s[: len(u)])))
     return np.asarray((distance > tolerance * ik.lever) | (turn > tolerance))
 
 
-def as_assembled(ik: TipProblem, course: Course, u: Floats, target: TipTarget) -> Floats:
+def as_assembled(ik: TipProblem, course: Course, u: Floats) -> Floats:
     """The same with the passive freedoms as the model has them; TrajectoryError if others."""
-    assembly = ik.chain.assembly
-    if assembly is None:
+    if ik.chain.assembly is None:
         return u
-    q = (u * ik.scale)[:, : ik.n_q]
     try:
-        p = assembly.passive(q)
+        own = _own(ik, u)
     except SingularityError:
         raise _first_lost(ik, course, u) from None
-    own = np.hstack([q, p]) / ik.scale
-    other = _off(ik, own, target, 100.0 * RESIDUAL)
+    other = _off(ik, course, own, 100.0 * RESIDUAL)
     if other.any():
         k = int(np.argmax(other))
         why = "the model, coming straight from its reference, has its loops put together otherwise"
@@ -151,13 +144,22 @@ def as_assembled(ik: TipProblem, course: Course, u: Floats, target: TipTarget) -
     return own
 
 
+def _own(ik: TipProblem, u: Floats) -> Floats:
+    """States with the passive freedoms that the model itself has, coming from its reference.
+
+    Raises SingularityError where the model has none.
+    """
+    if ik.chain.assembly is None:
+        return u
+    q = (u * ik.scale)[:, : ik.n_q]
+    return np.hstack([q, ik.chain.assembly.passive(q)]) / ik.scale
+
+
 def _first_lost(ik: TipProblem, course: Course, u: Floats) -> TrajectoryError:
     """The first sample whose loops the model cannot close."""
-    assembly = ik.chain.assembly
-    assert assembly is not None
-    for k, q in enumerate((u * ik.scale)[:, : ik.n_q]):
+    for k in range(len(u)):
         try:
-            assembly.passive(q[None])
+            _own(ik, u[k : k + 1])
         except SingularityError as error:
             return lost_assembly(ik, course, k, u[k], str(error))
     return lost_assembly(ik, course, 0, u[0], "its loops cannot be closed together with the rest")
@@ -250,21 +252,3 @@ def _normalised(ik: TipProblem, u: Floats, turns: Bools) -> Floats:
     # 1e-9 rad below 2π is taken for round-off below 0
     turned = np.where(turned >= 2.0 * np.pi - 1e-9, turned - 2.0 * np.pi, turned)
     return np.where(turns, turned, u)
-
-
-def assembled(ik: TipProblem, target: TipTarget, u: Floats) -> Floats | None:
-    """The same solution if the model itself has the loops in that assembly, coming from its
-    reference; else None.
-    """
-    assembly = ik.chain.assembly
-    if assembly is None:
-        return u
-    q = (u * ik.scale)[: ik.n_q]
-    try:
-        p = assembly.passive(q[None])[0]
-    except SingularityError:
-        return None
-    own = np.concatenate([q, p]) / ik.scale
-    distance, turn = ik.misses(ik.error(ik.evaluate(own[None]), target))
-    met = distance[0] <= 10.0 * RESIDUAL * ik.lever and turn[0] <= 10.0 * RESIDUAL
-    return own if met else None

@@ -39,10 +39,10 @@ from eigassign.mechanism.inverse_kinematics.follow import (
 )
 from eigassign.mechanism.inverse_kinematics.solver import (
     ROUND_OFF,
-    crossed,
     handedness,
     least_norm,
     levenberg,
+    lost,
     newton,
     singular,
     within,
@@ -119,18 +119,16 @@ class PathOfDesign:
             ik = self._at(y0 + ahead * (y - y0))
             slopes = self._slopes(y0 + done * (y - y0), u)
             guess = u + (ahead - done) * (slopes @ (y - y0))
-            found, seen, motion, settled = newton(ik, guess, target, ROUND_OFF, self.directions)
+            found = newton(ik, guess, target, ROUND_OFF, self.directions)
             # a corrector that moves by 0.1 rad, or of L, may have left the branch, as in tracing
-            strayed = ~settled | (np.abs(found - guess).max(axis=1) > 0.1)
-            strayed |= crossed(ik, seen, motion, sense)
-            strayed |= singular(ik, seen, motion)
+            strayed = lost(ik, found, guess, 0.1, sense) | singular(ik, found)
             if not strayed.any():
-                u, done, step = found, ahead, 2.0 * step
+                u, done, step = found.u, ahead, 2.0 * step
             # steps below 1/256 of the way from y0 to y are given up
             elif (step := 0.5 * min(step, 1.0 - done)) < 1.0 / 256.0:
                 raise self._lost(y, u, strayed)
-        require_reached(ik, self.course, u, target)
-        return as_assembled(ik, self.course, u, target)
+        require_reached(ik, self.course, u)
+        return as_assembled(ik, self.course, u)
 
     def _lost(self, y: Floats, u: Floats, strayed: Bools) -> TrajectoryError:
         """Why the first of the samples that ``strayed`` from u (n, n_z) cannot be had at y."""

@@ -9,6 +9,7 @@ Shapes: n states u (n, n_q + n_p) of an `TipProblem`, m task components.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -62,14 +63,23 @@ def _residual(ik: TipProblem, u: Floats, target: TipTarget) -> tuple[Floats, Flo
     return np.hstack([error, -seen.gap]), np.concatenate([seen.jacobian, seen.closure], axis=1)
 
 
+class Corrected(NamedTuple):
+    """States (n, n_z) that Newton's iteration came to, what is seen there, and who settled (n,)."""
+
+    u: Floats
+    seen: TipEvaluation
+    motion: Reduced
+    settled: Bools
+
+
 def newton(
     ik: TipProblem,
     u: Floats,
     target: TipTarget,
     tolerance: float,
     directions: Floats | None = None,
-) -> tuple[Floats, TipEvaluation, Reduced, Bools]:
-    """Newton for tip(u) = target with closed loops; returns u, what is seen there, who settled.
+) -> Corrected:
+    """Newton for tip(u) = target with closed loops.
 
     A chain that cannot fill the space (rank < m) settles, more slowly, on the nearest point. With
     ``directions`` V (n, n_q, rank) the coordinates move in these only, and J returned is J V.
@@ -90,7 +100,7 @@ def newton(
         if settled.all():
             break
         u = u + np.clip(step, -1.0, 1.0)
-    return u, seen, motion, settled
+    return Corrected(u, seen, motion, settled)
 
 
 def within(motion: Reduced, directions: Floats | None) -> Reduced:
@@ -138,11 +148,6 @@ def handedness(ik: TipProblem, seen: TipEvaluation, motion: Reduced) -> Floats:
     if F_p.shape[2] and F_p.shape[1] == F_p.shape[2]:
         signs[:, 1] = np.sign(np.linalg.det(F_p))
     return signs
-
-
-def regularity(ik: TipProblem, motion: Reduced) -> Floats:
-    """The smallest singular value of J (n,) over L: 0 in a singular pose."""
-    return np.asarray(np.linalg.svd(motion.J, compute_uv=False)[:, ik.rank - 1] / ik.lever)
 
 
 def loop_regularity(ik: TipProblem, seen: TipEvaluation) -> Floats:
@@ -199,10 +204,13 @@ def trace(ik: TipProblem, course: Course, u0: Floats, turn: float) -> Trace:
         fastest = float(np.abs(here.slope[:, : ik.n_q]).max())
         advance = min(advance, turn / max(fastest, turn))
         stop = float(stops[np.searchsorted(stops, here.s, side="right")])
-        there = _step(ik, course, here, min(here.s + advance, stop), bend, sense, turn)
-        if there is None:
+        s = min(here.s + advance, stop)
+        guess = here.u + (s - here.s) * (here.slope + (s - here.s) * bend)
+        found = newton(ik, guess, course.target(np.array([s])), _TRACE)
+        if (lost(ik, found, guess, _STRAY * turn, sense) | singular(ik, found))[0]:
             advance = 0.5 * min(advance, stop - here.s)
             continue
+        there = _pose(ik, course, s, found.u, found.motion)
         bend = 0.5 * (there.slope - here.slope) / (there.s - here.s) * (there.s < stop)
         poses.append(there)
         here, advance = there, min(2.0 * advance, _MAX_ADVANCE)
@@ -210,32 +218,18 @@ def trace(ik: TipProblem, course: Course, u0: Floats, turn: float) -> Trace:
     return Trace(np.array([p.s for p in poses]), u, slopes, sense)
 
 
-def _step(
-    ik: TipProblem,
-    course: Course,
-    here: TracePoint,
-    s: float,
-    bend: Floats,
-    sense: Floats,
-    turn: float,
-) -> TracePoint | None:
-    """The pose at s ahead: a quadratic guess, corrected; None if that is not the same branch."""
-    guess = here.u + (s - here.s) * (here.slope + (s - here.s) * bend)
-    u, seen, motion, settled = newton(ik, guess, course.target(np.array([s])), _TRACE)
-    strayed = not settled[0] or np.abs(u - guess).max() > _STRAY * turn
-    if strayed or crossed(ik, seen, motion, sense)[0] or singular(ik, seen, motion)[0]:
-        return None
-    return _pose(ik, course, s, u, motion)
+def lost(ik: TipProblem, found: Corrected, guess: Floats, most: float, sense: Floats) -> Bools:
+    """True where a corrector did not settle or moved by over ``most`` from its guess, or where a
+    branch other than that of ``sense`` has been met, (n,).
+    """
+    crossed = (handedness(ik, found.seen, found.motion) * sense < 0.0).any(axis=1)
+    return np.asarray(~found.settled | (np.abs(found.u - guess).max(axis=1) > most) | crossed)
 
 
-def crossed(ik: TipProblem, seen: TipEvaluation, motion: Reduced, sense: Floats) -> Floats:
-    """True where a branch other than that of ``sense`` has been met, (n,)."""
-    return np.asarray((handedness(ik, seen, motion) * sense < 0.0).any(axis=1))
-
-
-def singular(ik: TipProblem, seen: TipEvaluation, motion: Reduced) -> Bools:
+def singular(ik: TipProblem, found: Corrected) -> Bools:
     """True where the chain is stretched or folded, or its loops at a dead point, (n,)."""
-    return (regularity(ik, motion) < _SINGULAR) | (loop_regularity(ik, seen) < DEAD)
+    regularity = np.linalg.svd(found.motion.J, compute_uv=False)[:, ik.rank - 1] / ik.lever
+    return np.asarray((regularity < _SINGULAR) | (loop_regularity(ik, found.seen) < DEAD))
 
 
 def _pose(ik: TipProblem, course: Course, s: float, u: Floats, motion: Reduced) -> TracePoint:
