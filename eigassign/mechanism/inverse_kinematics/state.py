@@ -118,15 +118,15 @@ def prepare(
 ) -> TipProblem:
     """The problem for a branch {joint: (low, high)} in rad or m and a guess of the first q.
 
-    Raises MechanismError if a joint does not exist, a range does not go upwards, the guess does
-    not fit the coordinates or the loops, or there is none for a coordinate that does not move the
-    tip.
+    Raises MechanismError if the guess does not fit the loops, or there is none for a coordinate
+    that does not move the tip.
     """
     if not chain.n_q:
         raise MechanismError("trajectory.tip", "no coordinate moves this mechanism")
-    rows = tuple(_row(chain, joint) for joint in branch)
-    limits = np.array([_limits(joint, *ends) for joint, ends in branch.items()]).reshape(-1, 2)
-    guess = _checked_start(start, chain.n_q)
+    rows = tuple(chain.joints.index(joint) for joint in branch)
+    low, high = np.array([*branch.values()], dtype=np.float64).reshape(-1, 2).T
+    limits = np.column_stack([low, high - low])
+    guess = None if start is None else np.array(start, dtype=np.float64)
     near = _near(chain, guess)
     z, J = first_guesses(chain, course, rows, limits, near)
     lever = _lever(chain, course, J)
@@ -139,38 +139,7 @@ def prepare(
     rank = int((singular_values > _STRUCTURAL * lever).sum(axis=1).max())
     first = None if near is None else near / scale
     guessed = guess is not None
-    low, width = limits.T
-    return TipProblem(chain, rows, low, width, first, guessed, z / scale, scale, lever, rank)
-
-
-def _row(chain: TipChain, joint: str) -> int:
-    if joint not in chain.joints:
-        known = ", ".join(chain.joints)
-        message = f"no coordinate moves this joint; there are {known}"
-        if chain.assembly is not None:
-            message += "; passive joints are placed by mechanism.assembly"
-        raise MechanismError(f"trajectory.branch.{joint}", message)
-    return chain.joints.index(joint)
-
-
-def _limits(joint: str, low: float, high: float) -> tuple[float, float]:
-    """Low end and width of a range."""
-    if not low < high:
-        message = (
-            f"[{low:.6g}, {high:.6g}] must go upwards; "
-            "angles count modulo 360 deg, so [350 deg, 370 deg] is allowed"
-        )
-        raise MechanismError(f"trajectory.branch.{joint}", message)
-    return low, high - low
-
-
-def _checked_start(start: Sequence[float] | Floats | None, n_q: int) -> Floats | None:
-    if start is None:
-        return None
-    guess = np.array(start, dtype=np.float64)
-    if guess.shape != (n_q,) or not np.isfinite(guess).all():
-        raise MechanismError("trajectory.start", f"must be {n_q} finite coordinates")
-    return guess
+    return TipProblem(chain, rows, low, high - low, first, guessed, z / scale, scale, lever, rank)
 
 
 def _near(chain: TipChain, guess: Floats | None) -> Floats | None:

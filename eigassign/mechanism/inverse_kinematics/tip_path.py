@@ -69,8 +69,7 @@ class TipPath:
 def straight(waypoints: ArrayLike) -> TipPath:
     """Polyline through the waypoints (m, d), in m, parameterised by arc length.
 
-    Raises MechanismError if there are fewer than two waypoints, if they are not finite, not (m, 2)
-    or (m, 3), or if two consecutive ones coincide.
+    Raises MechanismError if two consecutive ones of the at least two waypoints coincide.
     """
     points, knots, length = _measure(waypoints)
     return replace(polyline(knots, points), chord_length=length)
@@ -108,8 +107,8 @@ def _path(knots: Floats, coefficients: Floats) -> TipPath:
 
 
 def _measure(waypoints: ArrayLike) -> tuple[Floats, Floats, float]:
-    """Checked points (m, d), knots s (m,) and the chord length in m."""
-    points = _checked(waypoints)
+    """Points (m, d), knots s (m,) and the chord length in m."""
+    points = np.array(waypoints, dtype=np.float64)
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     length = float(chords.sum())
     # 1e-12 of the length is round-off of coordinates, no distance anybody means
@@ -119,20 +118,6 @@ def _measure(waypoints: ArrayLike) -> tuple[Floats, Floats, float]:
     knots = np.concatenate([[0.0], np.cumsum(chords)]) / length
     knots[-1] = 1.0
     return points, knots, length
-
-
-def _checked(waypoints: ArrayLike) -> Floats:
-    try:
-        points = np.array(waypoints, dtype=np.float64)
-    except ValueError:
-        points = np.empty(0)
-    if points.ndim != 2 or points.shape[1] not in (2, 3):
-        raise MechanismError(WAYPOINTS, "must be a list of points, each [x, y] or each [x, y, z]")
-    if len(points) < 2:
-        raise MechanismError(WAYPOINTS, "a path needs at least two waypoints")
-    for i in np.flatnonzero(~np.isfinite(points).all(axis=1)):
-        raise MechanismError(f"{WAYPOINTS}[{i}]", f"{points[i].tolist()} is not finite")
-    return points
 
 
 # --- attitude
@@ -154,8 +139,6 @@ def planar_attitude(path: TipPath, angle: ArrayLike, kind: str) -> Attitude:
 
     knots = path.knots
     values = np.broadcast_to(np.asarray(angle, dtype=np.float64), knots.shape)[:, None]
-    if not np.isfinite(values).all():
-        raise MechanismError("trajectory.angle", "is not finite")
     theta = smooth(knots, values) if kind == "spline" else polyline(knots, values)
     axis = np.array([0.0, 0.0, 1.0])
     return Attitude(
@@ -176,8 +159,6 @@ def spatial_attitude(path: TipPath, orientation: ArrayLike, kind: str) -> Attitu
 
     knots = path.knots
     angles = np.broadcast_to(np.asarray(orientation, dtype=np.float64), (len(knots), 3))
-    if not np.isfinite(angles).all():
-        raise MechanismError("trajectory.orientation", "is not finite")
     R = Rotation.from_euler("xyz", angles)
     steps = (R[1:] * R[:-1].inv()).as_rotvec()
     size = np.linalg.norm(steps, axis=1)

@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.errors import MechanismError, UsageError
+from eigassign.errors import UsageError
 
 Floats = NDArray[np.float64]
 
@@ -110,15 +110,11 @@ def shared_times(points: Floats, duration: float) -> Floats:
 
     The time of a segment is in proportion to the largest move of a coordinate, each relative to the
     range R_i which that coordinate has over all points: T_k ∝ max_i |q_{k+1,i} − q_{k,i}| / R_i. So
-    radians and metres need no common measure. Raises MechanismError for a point that equals the one
-    before it.
+    radians and metres need no common measure.
     """
     extent = np.ptp(points, axis=0)
     moves = np.abs(np.diff(points, axis=0)) / np.where(extent > 0.0, extent, 1.0)
     share = moves.max(axis=1)
-    for k in np.flatnonzero(share == 0.0):
-        message = "the same point as the one before it: give times instead of duration to wait"
-        raise MechanismError(f"trajectory.points[{k + 1}]", message)
     reached = np.asarray(np.concatenate([[0.0], np.cumsum(share)]) * (duration / share.sum()))
     reached[-1] = duration
     return reached

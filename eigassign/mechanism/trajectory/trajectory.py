@@ -28,12 +28,11 @@ from eigassign.case.schema.trajectory import (
     SampledTrajectory,
     TipTrajectory,
 )
-from eigassign.errors import MechanismError, TrajectoryError, UsageError
+from eigassign.errors import TrajectoryError, UsageError
 from eigassign.mechanism.inverse_kinematics.chain import TipChain
 from eigassign.mechanism.inverse_kinematics.follow import follow
 from eigassign.mechanism.inverse_kinematics.redesign import path_of_design
 from eigassign.mechanism.inverse_kinematics.tip_path import (
-    WAYPOINTS,
     Course,
     TipPath,
     planar_attitude,
@@ -44,11 +43,11 @@ from eigassign.mechanism.inverse_kinematics.tip_path import (
 from eigassign.mechanism.trajectory.csv import read_samples
 from eigassign.mechanism.trajectory.timing import point_to_point, shared_times, timing_law
 
-_BACKWARDS = "time must increase, and goes from {:g} s to {:g} s"
 _PATHS: dict[str, Callable[[ArrayLike], TipPath]] = {"spline": spline, "straight": straight}
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+Change = Callable[[Floats], Floats]
 OfDesign = Callable[[Floats], tuple[Floats, Floats]]  # y (n_y,) -> q (n, n_q), dq/dy (n, n_q, n_y)
 
 
@@ -81,34 +80,32 @@ class Trajectory(Brief):
 
     def joined(self, loads: Floats) -> Trajectory:
         """The same with ``loads`` (n_loads,), which neither time nor design change, behind q."""
+
+        def behind(values: Floats, own: Floats) -> Floats:
+            shape = (len(values), len(loads), *values.shape[2:])
+            return np.concatenate([values, np.broadcast_to(own, shape)], axis=1)
+
+        return self._moving(lambda q: behind(q, loads), lambda slopes: behind(slopes, np.zeros(1)))
+
+    def chosen(self, samples: Ints) -> Trajectory:
+        """Some of the samples only, given by ascending numbers."""
+
+        def some(values: Floats) -> Floats:
+            return values[samples]
+
+        tip = None if self.tip is None else some(self.tip)
+        kept = replace(self, time_s=self.time_s[samples], tip=tip, sampled=None)
+        return kept._moving(some, some)
+
+    def _moving(self, of_q: Change, of_slopes: Change) -> Trajectory:
+        """The same with other coordinates and slopes, made of these for every design."""
         whole = self.of_design
 
         def own(y: Floats) -> tuple[Floats, Floats]:
             q, slopes = self.at(y)
-            still = np.zeros((len(q), len(loads), len(y)))
-            return behind(q), np.concatenate([slopes, still], axis=1)
+            return of_q(q), of_slopes(slopes)
 
-        def behind(q: Floats) -> Floats:
-            return np.hstack([q, np.tile(loads, (len(q), 1))])
-
-        return replace(self, q=behind(self.q), of_design=None if whole is None else own)
-
-    def chosen(self, samples: Ints) -> Trajectory:
-        """Some of the samples only, given by ascending numbers."""
-        tip, whole = None if self.tip is None else self.tip[samples], self.of_design
-
-        def own(y: Floats) -> tuple[Floats, Floats]:
-            q, slopes = self.at(y)
-            return q[samples], slopes[samples]
-
-        return replace(
-            self,
-            time_s=self.time_s[samples],
-            q=self.q[samples],
-            tip=tip,
-            of_design=None if whole is None else own,
-            sampled=None,
-        )
+        return replace(self, q=of_q(self.q), of_design=None if whole is None else own)
 
     @property
     def given(self) -> Trajectory:
@@ -122,7 +119,7 @@ class Trajectory(Brief):
 
     def with_instants(self, times_s: ArrayLike) -> Trajectory:
         """The same with instants between its samples, where q is linear in time for any design."""
-        time_s, whole = np.union1d(self.time_s, times_s), self.of_design
+        time_s = np.union1d(self.time_s, times_s)
         if len(time_s) == len(self.time_s):
             return self
         after = np.clip(np.searchsorted(self.time_s, time_s), 1, len(self.time_s) - 1)
@@ -133,18 +130,8 @@ class Trajectory(Brief):
             s = share.reshape(-1, *(1 for _ in values.shape[1:]))
             return np.asarray((1.0 - s) * values[after - 1] + s * values[after])
 
-        def own(y: Floats) -> tuple[Floats, Floats]:
-            q, slopes = self.at(y)
-            return between(q), between(slopes)
-
-        return replace(
-            self,
-            time_s=time_s,
-            q=between(self.q),
-            tip=None if self.tip is None else between(self.tip),
-            of_design=None if whole is None else own,
-            sampled=self.given,
-        )
+        tip = None if self.tip is None else between(self.tip)
+        return replace(self, time_s=time_s, tip=tip, sampled=self.given)._moving(between, between)
 
 
 def build_trajectory(
@@ -158,22 +145,21 @@ def build_trajectory(
 
     ``tip_chain(node, oriented)`` gives the chain of a tip path's node, with its turning if
     oriented, and is called for nothing else; ``q_units`` are "rad" or "m" for each coordinate, all
-    rad if empty. Raises MechanismError for what is wrong as a whole, TrajectoryError for what is
-    wrong with one sample. Where ``moved`` says that the design moves the tip's node (oriented or
-    not), the coordinates of a tip path follow the design.
+    rad if empty. Where ``moved`` says that the design moves the tip's node (oriented or not), the
+    coordinates of a tip path follow the design. What the rules of a case say of ``spec`` holds.
+    Raises MechanismError for what else is wrong as a whole, TrajectoryError for one sample.
     """
     if isinstance(spec, TipTrajectory):
-        return _from_tip_path(spec, q_names, tip_chain, moved)
+        return _from_tip_path(spec, tip_chain, moved)
     if isinstance(spec, FileTrajectory):
         return _from_file(spec, q_names, q_units)
     if isinstance(spec, PointTrajectory):
-        return _from_points(spec, q_names)
+        return _from_points(spec)
     return _from_samples(spec, q_names, q_units)
 
 
 def _from_tip_path(
     spec: TipTrajectory,
-    q_names: Sequence[str],
     tip_chain: Callable[[str, bool], TipChain],
     moved: Callable[[str, bool], bool],
 ) -> Trajectory:
@@ -184,9 +170,6 @@ def _from_tip_path(
     elif spec.orientation is not None:
         attitude = spatial_attitude(path, spec.orientation, spec.path)
     chain = tip_chain(spec.tip, attitude is not None)
-    d = chain.evaluate(np.zeros((1, len(chain.kinds)))).point.shape[1]
-    if path.coefficients.shape[2] != d:
-        raise MechanismError(WAYPOINTS, f"the tip moves in {d} dimensions: give {d} coordinates")
     tau = np.linspace(0.0, 1.0, spec.samples)
     s = timing_law(spec.timing, spec.acceleration_share).position(tau)
     s = np.maximum.accumulate(np.clip(s, 0.0, 1.0))  # round-off at the ends
@@ -204,9 +187,10 @@ def _from_tip_path(
 
 def _from_file(spec: FileTrajectory, q_names: Sequence[str], q_units: Sequence[str]) -> Trajectory:
     table = read_samples(Path(spec.file), q_names, q_units)
-    for k in _not_later(table.time_s):
-        message = f"{table.where(k)}: {_BACKWARDS.format(*table.time_s[k - 1 : k + 1])}"
-        raise TrajectoryError("trajectory.file", message, k)
+    for k in np.flatnonzero(np.diff(table.time_s) <= 0.0).tolist():
+        before, after = table.time_s[k : k + 2]
+        message = f"time must increase, and goes from {before:g} s to {after:g} s"
+        raise TrajectoryError("trajectory.file", f"{table.where(k + 1)}: {message}", k + 1)
     notes = (*table.notes, *_jumps(table.q, q_names, q_units))
     return Trajectory(table.time_s, table.q, None, notes)
 
@@ -215,18 +199,17 @@ def _from_samples(
     spec: SampledTrajectory, q_names: Sequence[str], q_units: Sequence[str]
 ) -> Trajectory:
     """Samples given in the case: times as given, or at equal steps over the duration from 0."""
-    q = _checked_rows(spec.q, q_names, "q", "sample")
-    if spec.time is None:
-        time_s = np.linspace(0.0, spec.duration or 1.0, len(q))
-    else:
-        time_s = _checked_time(spec.time, len(q), "time", "sample")
+    q = np.array(spec.q, dtype=np.float64)
+    time_s = np.linspace(0.0, spec.duration or 1.0, len(q))
+    if spec.time is not None:
+        time_s = np.array(spec.time, dtype=np.float64)
     notes = _jumps(q, q_names, q_units) or _sparse(q, q_names, q_units)
     return Trajectory(time_s, q, None, notes)
 
 
-def _from_points(spec: PointTrajectory, q_names: Sequence[str]) -> Trajectory:
+def _from_points(spec: PointTrajectory) -> Trajectory:
     """Point to point, in equal steps of time."""
-    points = _checked_rows(spec.points, q_names, "points", "point")
+    points = np.array(spec.points, dtype=np.float64)
     if spec.times is None:
         reached = shared_times(points, spec.duration or 1.0)
         said: tuple[str, ...] = (
@@ -234,42 +217,11 @@ def _from_points(spec: PointTrajectory, q_names: Sequence[str]) -> Trajectory:
             "proportion to the largest move of a coordinate relative to its range",
         )
     else:
-        reached, said = _checked_time(spec.times, len(points), "times", "point"), ()
+        reached, said = np.array(spec.times, dtype=np.float64), ()
     law = timing_law(spec.timing, spec.acceleration_share)
     time_s, q = point_to_point(points, reached, law, spec.samples)
     corners = tuple(reached[1:-1].tolist()) if spec.timing == "linear" else ()  # elsewhere at rest
     return Trajectory(time_s, q, None, said if len(points) > 2 else (), corners)
-
-
-def _checked_rows(
-    rows: Sequence[Sequence[float]], q_names: Sequence[str], key: str, what: str
-) -> Floats:
-    """Rows of finite coordinates (n, n_q), at least two."""
-    for k, row in enumerate(rows):
-        path = f"trajectory.{key}[{k}]"
-        if len(row) != len(q_names):
-            message = f"{what} {k} has {len(row)} values for the coordinates {', '.join(q_names)}"
-            raise TrajectoryError(path, message, k)
-        if not np.isfinite(row).all():
-            raise TrajectoryError(path, f"{what} {k} is not finite", k)
-    if len(rows) < 2:
-        raise MechanismError(f"trajectory.{key}", f"a trajectory needs at least two {what}s")
-    return np.array(rows, dtype=np.float64)
-
-
-def _checked_time(time: Sequence[float], n: int, key: str, what: str) -> Floats:
-    time_s = np.array(time, dtype=np.float64)
-    if len(time_s) != n:
-        raise MechanismError(f"trajectory.{key}", f"{len(time_s)} times for {n} {what}s")
-    for k in _not_later(time_s):
-        message = f"{what} {k}: {_BACKWARDS.format(*time_s[k - 1 : k + 1])}"
-        raise TrajectoryError(f"trajectory.{key}[{k}]", message, k)
-    return time_s
-
-
-def _not_later(time_s: Floats) -> list[int]:
-    """Samples that do not come after the one before them (NaN comes after nothing)."""
-    return [int(k) + 1 for k in np.flatnonzero(~(np.diff(time_s) > 0.0))]
 
 
 def _jumps(q: Floats, q_names: Sequence[str], q_units: Sequence[str]) -> tuple[str, ...]:

@@ -345,27 +345,6 @@ def test_three_joints_place_a_tip_in_space():
     assert away(q[:, 2] - q[:, 1], expected[:, 1]) < 1e-8
 
 
-# --- wishes that make no sense ---
-
-
-@pytest.mark.parametrize(
-    ("wishes", "key", "message"),
-    [
-        ({"branch": {"hip": (0.0, 1.0)}}, "trajectory.branch.hip", "shoulder, elbow"),
-        ({"branch": {"elbow": (2.0, 1.0)}}, "trajectory.branch.elbow", "must go upwards"),
-        ({"branch": {"elbow": (1.0, 1.0)}}, "trajectory.branch.elbow", "must go upwards"),
-        ({"branch": {"elbow": (np.nan, 1.0)}}, "trajectory.branch.elbow", "must go upwards"),
-        ({"start": [1.0]}, "trajectory.start", "2 finite coordinates"),
-        ({"start": [1.0, 2.0, 3.0]}, "trajectory.start", "2 finite coordinates"),
-        ({"start": [1.0, np.inf]}, "trajectory.start", "2 finite coordinates"),
-    ],
-)
-def test_wishes_that_make_no_sense_are_refused(wishes, key, message):
-    with pytest.raises(MechanismError, match=message) as error:
-        follow(serial_arm(0.6, 0.45), course(spline(PAPER)), **wishes)
-    assert error.value.path == key
-
-
 def test_results_are_frozen():
     q = follow(serial_arm(0.6, 0.45), course(spline(PAPER)), PAPER_BRANCH).q
     with pytest.raises(ValueError, match="read-only"):

@@ -97,14 +97,6 @@ def test_round_off_beyond_the_ends_is_the_end(path):
         ([[0, 0], [1, 0], [1, 0], [2, 0]], "trajectory.waypoints[2]", "same point as the one befo"),
         ([[0, 0], [1, 0], [1, 1e-15]], "trajectory.waypoints[2]", "same point as the one before"),
         ([[0, 0], [0, 0]], "trajectory.waypoints[1]", "same point as the one before it"),
-        ([[0, 0], [np.nan, 0]], "trajectory.waypoints[1]", "not finite"),
-        ([[0, 0], [np.inf, 0]], "trajectory.waypoints[1]", "not finite"),
-        ([[0, 0]], "trajectory.waypoints", "at least two"),
-        ([], "trajectory.waypoints", "list of points"),
-        ([[0, 0], [1]], "trajectory.waypoints", "list of points"),
-        ([[0], [1]], "trajectory.waypoints", "list of points"),
-        ([0, 1], "trajectory.waypoints", "list of points"),
-        ([["a", "b"], [0, 1]], "trajectory.waypoints", "list of points"),
     ],
 )
 def test_wrong_waypoints_are_named(path, points, key, message):

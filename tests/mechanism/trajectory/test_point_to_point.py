@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from eigassign.case import PointTrajectory
-from eigassign.errors import MechanismError
 from eigassign.mechanism import build_trajectory, timing_law
 
 Q = ("q1", "q2")
@@ -75,20 +74,3 @@ def test_two_points_leave_nothing_to_tell():
 def test_it_waits_where_two_points_are_the_same_and_times_are_given():
     path = motion(points=(POINTS[0], POINTS[0], POINTS[1]), duration=None, times=(0, 1, 2))
     np.testing.assert_allclose(path.q[:201], np.tile(POINTS[0], (201, 1)), atol=1e-15)
-
-
-@pytest.mark.parametrize(
-    ("changes", "key", "message"),
-    [
-        ({"points": ((0.0, 0.0), (0.0, 0.0))}, "points[1]", "same point"),
-        ({"points": ((0.0, 0.0), (0.0,))}, "points[1]", "point 1 has 1 values"),
-        ({"points": ((0.0, np.nan), (0.0, 1.0))}, "points[0]", "not finite"),
-        ({"points": ((0.0, 1.0),)}, "points", "at least two points"),
-        ({"duration": None, "times": (0.0, 1.0)}, "times", "2 times for 4 points"),
-        ({"duration": None, "times": (0.0, 2.0, 2.0, 3.0)}, "times[2]", "point 2: time must"),
-    ],
-)
-def test_wrong_points_are_named(changes, key, message):
-    with pytest.raises(MechanismError, match=message) as error:
-        motion(**changes)
-    assert error.value.path == f"trajectory.{key}"
