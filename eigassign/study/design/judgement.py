@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,12 +60,12 @@ def _studied(
     max_error: float,
 ) -> TargetStudy:
     before, after, one_shot = solved.initial, solved.exact, solved.one_shot
-    errors = _Errors(
-        initial=asked.errors(before),
-        exact=asked.errors(after),
-        predicted=None if predicted is None else np.asarray(predicted / asked.hz - 1.0),
-        one_shot=None if one_shot is None else asked.errors(one_shot),
-    )
+    errors = {
+        "initial": asked.errors(before),
+        "exact": asked.errors(after),
+        "predicted": None if predicted is None else predicted / asked.hz - 1.0,
+        "one_shot": None if one_shot is None else asked.errors(one_shot),
+    }
     summary = _summary(errors, weights)
     return TargetStudy(
         asked=asked,
@@ -77,8 +77,7 @@ def _studied(
         satisfied=bool(summary.exact.max_relative <= (max_error if asked.is_goal else MET)),
         weight_s=float(weights.sum()),
         along=tuple(
-            TargetAlong(name, own, _summary(errors.part(own), weights[own]))
-            for name, own in asked.along
+            TargetAlong(name, own, _summary(errors, weights, own)) for name, own in asked.along
         ),
         followed=_followed(asked, before, after),
         near=_near(asked, before, after),
@@ -101,29 +100,12 @@ def _near(asked: Requirement, before: Solved, after: Solved) -> OtherModes | Non
     return OtherModes(modes, *(solved.hz[asked.rows][:, columns] for solved in (before, after)))
 
 
-@dataclass(frozen=True)
-class _Errors:
-    """The errors (n,) of one target."""
-
-    initial: Floats
-    exact: Floats
-    predicted: Floats | None
-    one_shot: Floats | None
-
-    def part(self, own: slice) -> _Errors:
-        predicted, one_shot = (
-            None if e is None else e[own] for e in (self.predicted, self.one_shot)
-        )
-        return _Errors(self.initial[own], self.exact[own], predicted, one_shot)
-
-
-def _summary(errors: _Errors, weights: Floats) -> ErrorSummary:
-    return ErrorSummary(
-        initial=_row(errors.initial, weights),
-        exact=_row(errors.exact, weights),
-        predicted=None if errors.predicted is None else _row(errors.predicted, weights),
-        one_shot=None if errors.one_shot is None else _row(errors.one_shot, weights),
-    )
+def _summary(
+    errors: Mapping[str, Floats | None], weights: Floats, own: slice = slice(None)
+) -> ErrorSummary:
+    """The errors (n,) of one target, at some ``own`` of its samples, by the names of the rows."""
+    found = {k: None if e is None else _row(e[own], weights[own]) for k, e in errors.items()}
+    return ErrorSummary(**found)
 
 
 def _row(errors: Floats, weights: Floats) -> ErrorRow:
