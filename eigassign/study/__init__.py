@@ -31,7 +31,7 @@ __all__, __getattr__, __dir__ = face(
             "random_q reach_warnings study_modes validate_expansions"
         ),
         "design.answer": "Answer find_answer",
-        "design.clearance": "Band prove_clear",
+        "design.clearance": "prove_clear",
         "design.followed": "followers require_one_shape solve_design",
         "design.judgement": "crossing_warnings verdict",
         "design.optimum": "Found find_optimum",

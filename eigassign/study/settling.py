@@ -96,7 +96,7 @@ def _bands_hz(file: CaseFile, path: Trajectories | None) -> Floats:
     bands = (
         one
         for w in requirements_of(file, with_instants(file, path))
-        for _, one in w.bands
+        for one in w.bands
         if not one.modes
     )
     return np.array([band.upper.max() for band in bands])

@@ -16,7 +16,8 @@ import yaml
 from random_assignments import load_text, random_case
 
 import eigassign as ea
-from eigassign.study import Band, prove_clear
+from eigassign.assignment import ForbiddenBand
+from eigassign.study import prove_clear
 
 SEEDS = range(200)
 QUICK = (0,)
@@ -66,15 +67,16 @@ def test_an_answer_called_clear_is_clear_at_random_instants_and_a_forged_one_is_
     model = case.model()
     for said, rows in zip(row.clearances, case.trajectory.rows, strict=True):
         q = case.trajectory.q[rows]
-        edges = np.full(len(q), low), np.full(len(q), high)
+        kind = "forged", "", (), slice(0, len(q)), np.full(len(q), low)
+        band = ForbiddenBand(*kind, np.full(len(q), high))
         if not said.clear:
             continue
         assert (along(case, q, y, low, high) == said.below).all()
         for k in {said.below + 1, max(said.below - 1, 0)} - {said.below}:
-            assert not prove_clear(model, Band("forged", q, *edges, k), y).clear
+            assert not prove_clear(model, band, k, q, y).clear
         hz = model.frequencies(q, y, said.below + 1)[:, said.below]
-        wide = edges[0], np.full(len(q), hz.min() * (1.0 + 1e-9))
-        assert not prove_clear(model, Band("forged", q, *wide, said.below), y).clear
+        wide = ForbiddenBand(*kind, np.full(len(q), hz.min() * (1.0 + 1e-9)))
+        assert not prove_clear(model, wide, said.below, q, y).clear
 
 
 # --- Load cases, several trajectories, jumps, profiles, parts

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from meshes import DRAWS, FINER
 
+from eigassign.assignment import ForbiddenBand
 from eigassign.errors import EigassignError
 from eigassign.mechanism import refined, with_elements, with_reduction
-from eigassign.study import Band, automatic_elements, build_model, prove_clear
+from eigassign.study import automatic_elements, build_model, prove_clear
 
 EACH = 6  # bands of one mechanism
 
@@ -50,9 +51,9 @@ def judged(seed: int) -> tuple[int, int, list[str]]:
         lower = floor + (upper - floor) * rng.uniform(0.01, 0.9)
         if not floor < lower < upper:
             continue
-        band = Band("band", q, np.array([lower]), np.array([upper]), below)
+        band = ForbiddenBand("band", "", (), slice(0, 1), np.array([lower]), np.array([upper]))
         try:
-            found = prove_clear(model, band, y)
+            found = prove_clear(model, band, below, q, y)
         except EigassignError:
             continue
         clear, open_ = clear + found.clear, open_ + (not found.clear)

@@ -14,7 +14,7 @@ frequency is wanted, the residuals are the changes of the design, (y − y_ref)/
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -29,8 +29,6 @@ from eigassign.assignment.requirements.requirement import (
     Requirement,
     time_shares,
 )
-
-Response = Callable[[Floats], Frequencies]
 
 
 @dataclass(frozen=True)

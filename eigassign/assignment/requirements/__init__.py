@@ -9,9 +9,7 @@ Reading order:
     upper_limit   a mode does not exceed a frequency
     gap           two modes stay apart
     band          no mode is in a band
-    quantity      a quantity of the design is within limits
-    mass_limit    the mass of the mechanism
-    linear_limit  a weighted sum of design parameters
+    quantity      the mass, or a weighted sum of design parameters, is within limits
     named_modes   modes that targets name by their shape
     sampling      what a case asks for, at the samples of its trajectories
 """

@@ -8,6 +8,7 @@ k + 1 at least the upper one. From one trajectory to another k may change.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -63,11 +64,23 @@ class ForbiddenBand(Requirement):
         return ()
 
     @property
-    def bands(self) -> tuple[tuple[str, ForbiddenBand], ...]:
-        """The band along each trajectory for itself, in words: only there k must not change."""
-        words = (f"{self.label} along {name!r}" for name, _ in self.along)
-        each = words if len(self.along) > 1 else (self.label,)
-        return tuple(zip(each, self.parts, strict=True))
+    def bands(self) -> tuple[ForbiddenBand, ...]:
+        """The band along each trajectory for itself: only there k must not change."""
+        if len(self.along) < 2:
+            return (self,)
+        return tuple(self._part(name, own) for name, own in self.along)
+
+    def _part(self, name: str, own: slice) -> ForbiddenBand:
+        first, n = self.rows.start + own.start, own.stop - own.start
+        return replace(
+            self,
+            label=f"{self.label} along {name!r}",
+            part_of=self.label,
+            rows=slice(first, first + n),
+            lower=self.lower[own],
+            upper=self.upper[own],
+            along=((name, slice(0, n)),),
+        )
 
     @property
     def counted(self) -> tuple[int, ...]:
@@ -96,8 +109,8 @@ class ForbiddenBand(Requirement):
     def _one_side(
         self, kind: type[Requirement], mode: int, lower: Floats, upper: Floats
     ) -> Requirement:
-        own = {"label": f"{self.label}: mode {mode}", "terms": ((mode, 1.0),), "modes": (mode,)}
-        return kind(**vars(self) | own | {"lower": lower, "upper": upper, "part_of": self.label})
+        own = {"label": f"{self.name}: mode {mode}", "terms": ((mode, 1.0),), "modes": (mode,)}
+        return kind(**vars(self) | own | {"lower": lower, "upper": upper, "part_of": self.name})
 
     def curve(self, solved: Solved) -> Floats:
         """The frequency (n,) nearest to the middle of the band."""

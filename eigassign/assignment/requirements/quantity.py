@@ -1,4 +1,4 @@
-"""A quantity of the design keeps within its limits, of whatever kind it is."""
+"""A quantity of the design keeps within its limits: the mass, or a weighted sum of parameters."""
 
 from __future__ import annotations
 
@@ -7,16 +7,20 @@ from typing import Self
 
 import numpy as np
 
+from eigassign.assignment.linear import LinearConstraint
 from eigassign.assignment.requirements.requirement import Quantity, Requirement
 from eigassign.case.case_file import CaseFile
+from eigassign.case.units import handy
 from eigassign.modal.model import Model
+
+_MASS = "design.mass"
 
 
 class LimitedQuantity(Requirement):
     """low ≤ quantity(y) ≤ high, in SI units; no kind of target, for it belongs to no mode."""
 
     is_goal = False
-    is_convex = True  # the designs that it allows, where the quantity is affine
+    is_convex = True  # the set of designs that it allows, where the quantity is affine
 
     @classmethod
     def of_case(cls, file: CaseFile, model: Model) -> Iterator[Self]:
@@ -24,6 +28,52 @@ class LimitedQuantity(Requirement):
         raise NotImplementedError
 
     @classmethod
-    def between(cls, low: float, quantity: Quantity, high: float, label: str, place: str) -> Self:
-        """The limits of a quantity that has one value for all samples."""
-        return cls(label, place, ((quantity, 1.0),), slice(0, 1), np.array([low]), np.array([high]))
+    def between(cls, low: float, high: float, quantity: Quantity, label: str, place: str) -> Self:
+        """The limits, infinite without one, of a quantity that has one value for all samples."""
+        lower, upper = np.array([low]), np.array([high])
+        return cls(label, place, ((quantity, 1.0),), slice(0, 1), lower, upper)
+
+
+class MassLimit(LimitedQuantity):
+    """The mass in kg of all links and bodies, those that never move included."""
+
+    @classmethod
+    def of_case(cls, file: CaseFile, model: Model) -> Iterator[Self]:
+        """Yield the limits of the mass, if there are any."""
+        if (given := file.design.mass) is not None:
+            yield cls.between(*_ends(given.min, given.max), model.total_mass, _MASS, _MASS)
+
+    @property
+    def in_words(self) -> str:
+        """Its name in a sentence about limits."""
+        return "the limit of the mass"
+
+    def relaxed(self, side: str, share: float) -> str:
+        """The words for a limit that is relaxed by a share of it."""
+        edge, more = (self.upper, "more") if side == "upper" else (self.lower, "less")
+        return f"{handy(share * float(edge[0]), 'kg')} {more} mass"
+
+
+class LinearLimit(LimitedQuantity):
+    """low ≤ Σ c_j y_j ≤ high: linear in the design, so that each step can keep it exactly."""
+
+    in_one_shot = True
+
+    @classmethod
+    def of_case(cls, file: CaseFile, model: Model) -> Iterator[Self]:
+        """Yield the linear limits between design parameters."""
+        for name, given in file.design.constraints.items():
+            factors = np.array([given.terms.get(column, 0.0) for column in model.y_names])
+            low, high = _ends(given.min, given.max)
+            row = LinearConstraint(name, factors, low, high)
+            yield cls.between(low, high, row, name, f"design.constraints.{name}")
+
+    @property
+    def constraint(self) -> LinearConstraint | None:
+        """The same as a row of the program."""
+        row = self.terms[0][0]
+        return row if isinstance(row, LinearConstraint) else None
+
+
+def _ends(low: float | None, high: float | None) -> tuple[float, float]:
+    return -np.inf if low is None else low, np.inf if high is None else high

@@ -15,8 +15,8 @@ a class in a module of its own that says in which of this it differs.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,7 +104,7 @@ class Requirement(Brief):
     weight: float = 1.0
     trajectory: str | None = None  # the only one on which it holds
     followed: FollowedMode | None = None
-    part_of: str = ""  # the label of the band that it keeps clear
+    part_of: str = ""  # the label of the whole, where it is a part of a band
 
     def __post_init__(self) -> None:
         for side in ("lower", "upper"):
@@ -141,29 +141,13 @@ class Requirement(Brief):
 
     @property
     def name(self) -> str:
-        """The label of what the case file asks for, also of the two sides of a band."""
+        """The label of what the case file asks for, also of the parts and sides of a band."""
         return self.part_of or self.label
 
     @property
     def mode_terms(self) -> tuple[tuple[int, float], ...]:
         """The terms that are modes."""
         return tuple((term, c) for term, c in self.terms if isinstance(term, int))
-
-    def part(self, name: str, own: slice) -> Self:
-        """The same along one trajectory only, at these of its own samples."""
-        first, n = self.rows.start + own.start, own.stop - own.start
-        return replace(
-            self,
-            rows=slice(first, first + n),
-            lower=self.lower[own],
-            upper=self.upper[own],
-            along=((name, slice(0, n)),),
-        )
-
-    @property
-    def parts(self) -> tuple[Self, ...]:
-        """The same along each trajectory for itself."""
-        return tuple(self.part(*one) for one in self.along)
 
     # --- Its curve and errors, where modes have some frequencies or lie between two
 
@@ -174,7 +158,7 @@ class Requirement(Brief):
 
     def curve(self, solved: Solved) -> Floats:
         """The curve (n,) that stands for it."""
-        return np.asarray(sum(c * solved.curve(mode)[self.rows] for mode, c in self.mode_terms))
+        return self.curve_range(solved, solved)[0]
 
     def curve_range(self, lowest: Solved, highest: Solved) -> Edges:
         """The range (n,) of its curve where each mode is between two frequencies."""
@@ -230,8 +214,8 @@ class Requirement(Brief):
         return self.terms == ((1, 1.0),) and bool(np.isinf(self.upper).all())
 
     @property
-    def bands(self) -> tuple[tuple[str, Any], ...]:
-        """Bands along each trajectory for itself, in words, of which the program has a choice."""
+    def bands(self) -> tuple[Requirement, ...]:
+        """Bands along each trajectory for itself, of which the program has a choice."""
         return ()
 
     def lam_rows(self, model: LinearModel, weights: Floats) -> tuple[Floats, Floats]:

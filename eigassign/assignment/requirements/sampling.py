@@ -17,11 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from eigassign.assignment.requirements.band import ForbiddenBand
 from eigassign.assignment.requirements.frequency import AssignedFrequency
 from eigassign.assignment.requirements.gap import ModeGap
-from eigassign.assignment.requirements.linear_limit import LinearLimit
 from eigassign.assignment.requirements.lower_limit import LowerLimit
-from eigassign.assignment.requirements.mass_limit import MassLimit
 from eigassign.assignment.requirements.named_modes import followed_modes
-from eigassign.assignment.requirements.quantity import LimitedQuantity
+from eigassign.assignment.requirements.quantity import LimitedQuantity, LinearLimit, MassLimit
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.assignment.requirements.upper_limit import UpperLimit
 from eigassign.assignment.targets import sample_target, trapezoidal_weights

@@ -19,32 +19,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.assignment.requirements.band import ForbiddenBand
 from eigassign.errors import MissingMassError
 from eigassign.modal.exact.inertia import count_below
 from eigassign.modal.model import Model
 from eigassign.study.accuracy import judged_poses
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Band:
-    """A band to keep out of along one trajectory: q (n, n_q), edges (n,) in Hz, and k.
-
-    ``named`` are the only modes that count, in ascending order; none: all do.
-    """
-
-    label: str
-    q: Floats
-    lower_hz: Floats
-    upper_hz: Floats
-    below: int
-    named: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -64,13 +50,14 @@ class Clearance:
     raised: float
 
 
-def prove_clear(model: Model, band: Band, y: Floats) -> Clearance:
-    """Judge one band at design y (n_y,); raises what the exact solves raise."""
-    counted = _counted(model, band, y)
-    above = mode_above(model, band.below, band.named, band.q, y)
-    raised = _raised(model, band, y, above)
-    room = _least_room(model, band, y, above, raised)
-    return Clearance(band.label, band.below, counted and room > 0.0, room, counted, raised)
+def prove_clear(model: Model, band: ForbiddenBand, below: int, q: Floats, y: Floats) -> Clearance:
+    """Judge a band along one trajectory, of poses q (n, n_q) at its rows and design y (n_y,).
+
+    ``below`` is k. Raises what the exact solves raise.
+    """
+    motion = _Motion(model, band, below, q, y)
+    counted, room, raised = motion.counted(), motion.least_room(), motion.raised
+    return Clearance(band.label, below, counted and room > 0.0, room, counted, raised)
 
 
 def mode_above(model: Model, below: int, named: Sequence[int], q: Floats, y: Floats) -> int | None:
@@ -89,73 +76,82 @@ def mode_above(model: Model, below: int, named: Sequence[int], q: Floats, y: Flo
     return below + 1
 
 
-def _raised(model: Model, band: Band, y: Floats, above: int | None) -> float:
-    """e: by how much mesh and reduced links raise the mode above the band at most, relative."""
-    exact = model.meshed is None and model.reduced is None
-    if above == 0 or exact:
-        return 0.0
-    if above is None:
-        return float(np.inf)
-    q = judged_poses(model, band.q)
-    mesh, truncation = (
-        float(error(q, y, (above,)).max())
-        for error in (model.discretisation_error, model.truncation_error)
-    )
-    return (1.0 + mesh) * (1.0 + truncation) - 1.0
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """A band, k, and the poses and the design at which it is looked at."""
 
+    model: Model
+    band: ForbiddenBand
+    below: int
+    q: Floats
+    y: Floats
 
-def _counted(model: Model, band: Band, y: Floats) -> bool:
-    """k modes below both edges at every sample; of named modes only their order is known."""
-    if band.named:
-        return True
-    edges = np.column_stack([band.lower_hz, band.upper_hz])
-    return bool((count_below(model.pencil, model.x(band.q, y), edges) == band.below).all())
+    @cached_property
+    def above(self) -> int | None:
+        """The mode that has to stay above the band."""
+        return mode_above(self.model, self.below, self.band.counted, self.q, self.y)
 
-
-def _least_room(model: Model, band: Band, y: Floats, above: int | None, raised: float) -> float:
-    """The least g over the trajectory, less its possible deviation where that is not resolved."""
-    at = np.arange(len(band.q), dtype=np.float64)
-    room = partial(_room, model, band, y, above, raised)
-    g = room(at)
-    least = float(g.min())
-    if least <= 0.0 or len(at) < 2:
-        return least
-    start, end, g_start, g_end = at[:-1], at[1:], g[:-1], g[1:]
-    for _ in range(9):  # halvings: 512 points between two samples
-        middle = 0.5 * (start + end)
-        g_middle = room(middle)
-        ends = np.minimum(np.minimum(g_start, g_end), g_middle)
-        least = min(least, float(ends.min()))
-        bound = ends - 0.5 * np.abs(g_start - 2.0 * g_middle + g_end)
-        open_ = bound <= 0.0
-        if least <= 0.0:
-            return least
-        least = min(least, float(bound[~open_].min(initial=np.inf)))
-        if not open_.any():
-            return least
-        halves = ((start, middle, g_start, g_middle), (middle, end, g_middle, g_end))
-        start, end, g_start, g_end = (
-            np.concatenate([half[k][open_] for half in halves]) for k in range(4)
+    @cached_property
+    def raised(self) -> float:
+        """e: by how much mesh and reduced links raise the mode above the band at most, relative."""
+        if self.above == 0 or (self.model.meshed is None and self.model.reduced is None):
+            return 0.0
+        if self.above is None:
+            return float(np.inf)
+        q, modes = judged_poses(self.model, self.q), (self.above,)
+        mesh, truncation = (
+            float(error(q, self.y, modes).max())
+            for error in (self.model.discretisation_error, self.model.truncation_error)
         )
-    return min(0.0, float(bound.min()))
+        return (1.0 + mesh) * (1.0 + truncation) - 1.0
 
+    def counted(self) -> bool:
+        """k modes below both edges at every sample; of named modes only their order is known."""
+        if self.band.counted:
+            return True
+        edges = np.column_stack([self.band.lower, self.band.upper])
+        found = count_below(self.model.pencil, self.model.x(self.q, self.y), edges)
+        return bool((found == self.below).all())
 
-def _room(
-    model: Model, band: Band, y: Floats, above: int | None, raised: float, at: Floats
-) -> Floats:
-    """g (n,) at places ``at`` along the samples: 1.5 is midway between the second and third."""
-    samples = np.arange(len(band.q))
-    q = np.reshape([np.interp(at, samples, column) for column in band.q.T], (-1, len(at))).T
-    lower, upper = (np.interp(at, samples, edge) for edge in (band.lower_hz, band.upper_hz))
-    k = band.below
-    low = band.named[k - 1] if band.named and k else k
-    hz = model.frequencies(q, y, max(low, above or 0, 1))
-    g = np.full(len(at), np.inf)
-    if k:
-        g = np.minimum(g, 1.0 - hz[:, low - 1] / lower)
-    if above:
-        g = np.minimum(g, hz[:, above - 1] / (1.0 + raised) / upper - 1.0)
-    return g if np.isfinite(raised) else np.minimum(g, 0.0)
+    def least_room(self) -> float:
+        """The least g over the trajectory, less its possible deviation where not resolved."""
+        at = np.arange(len(self.q), dtype=np.float64)
+        g = self.room(at)
+        least = float(g.min())
+        if least <= 0.0 or len(at) < 2:
+            return least
+        start, end, g_start, g_end = at[:-1], at[1:], g[:-1], g[1:]
+        for _ in range(9):  # halvings: 512 points between two samples
+            middle = 0.5 * (start + end)
+            g_middle = self.room(middle)
+            ends = np.minimum(np.minimum(g_start, g_end), g_middle)
+            least = min(least, float(ends.min()))
+            bound = ends - 0.5 * np.abs(g_start - 2.0 * g_middle + g_end)
+            open_ = bound <= 0.0
+            if least <= 0.0:
+                return least
+            least = min(least, float(bound[~open_].min(initial=np.inf)))
+            if not open_.any():
+                return least
+            halves = ((start, middle, g_start, g_middle), (middle, end, g_middle, g_end))
+            start, end, g_start, g_end = (
+                np.concatenate([half[k][open_] for half in halves]) for k in range(4)
+            )
+        return min(0.0, float(bound.min()))
+
+    def room(self, at: Floats) -> Floats:
+        """g (n,) at places ``at`` along the samples: 1.5 is midway between second and third."""
+        samples, k, above = np.arange(len(self.q)), self.below, self.above
+        q = np.reshape([np.interp(at, samples, column) for column in self.q.T], (-1, len(at))).T
+        lower, upper = (np.interp(at, samples, e) for e in (self.band.lower, self.band.upper))
+        low = self.band.counted[k - 1] if self.band.counted and k else k
+        hz = self.model.frequencies(q, self.y, max(low, above or 0, 1))
+        g = np.full(len(at), np.inf)
+        if k:
+            g = np.minimum(g, 1.0 - hz[:, low - 1] / lower)
+        if above:
+            g = np.minimum(g, hz[:, above - 1] / (1.0 + self.raised) / upper - 1.0)
+        return g if np.isfinite(self.raised) else np.minimum(g, 0.0)
 
 
 def wanting(found: Sequence[Clearance]) -> float:

@@ -20,7 +20,7 @@ from eigassign.assignment.exact.sequential import End, Optimum, worth
 from eigassign.assignment.requirements.named_modes import followed_modes
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.errors import InfeasibleError
-from eigassign.study.design.clearance import Band, Clearance, prove_clear, wanting
+from eigassign.study.design.clearance import Clearance, prove_clear, wanting
 from eigassign.study.design.one_shot import catalogues
 from eigassign.study.design.response import reduced_models
 from eigassign.study.design.starts import Searched, coarse_to_fine, most_starts, search_starts
@@ -92,7 +92,7 @@ def _best_variant(
     one that misses them least, relative to the limits.
     """
     scene, listed = task.scene, catalogues(task.scene.file)
-    counts = (possible_counts(scene, band) for _, band in task.bands)
+    counts = (possible_counts(scene, band) for band in task.bands)
     tried: list[Searched] = []
     for below in itertools.islice(itertools.product(*counts), VARIANTS):
         if listed:
@@ -145,9 +145,8 @@ def _search_catalogues(
 
 def _clearances(task: Task, variant: PosedProblem, y: Floats) -> Iterator[Clearance]:
     q = task.scene.path.at(y)[0]
-    for (label, band), (_, below) in zip(task.bands, variant.below, strict=True):
-        own = Band(label, q[band.rows], band.lower, band.upper, below, band.counted)
-        yield prove_clear(task.scene.model, own, y)
+    for band, (_, below) in zip(task.bands, variant.below, strict=True):
+        yield prove_clear(task.scene.model, band, below, q[band.rows], y)
 
 
 def _initial(scene: Scene, variant: PosedProblem) -> tuple[float, float]:

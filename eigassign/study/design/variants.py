@@ -56,8 +56,8 @@ class Task:
     models: ReducedModels | None = None  # that stand for exact solves
 
     @cached_property
-    def bands(self) -> tuple[tuple[str, ForbiddenBand], ...]:
-        """The bands along each trajectory for itself, in words."""
+    def bands(self) -> tuple[ForbiddenBand, ...]:
+        """The bands along each trajectory for itself."""
         return tuple(band for one in self.wanted for band in one.bands)
 
     @cached_property
@@ -107,7 +107,7 @@ def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Pose
     if has_goals:  # F is errors, and prices are in %² of them, in the worst case in %
         prices = prices / (1e2 if objective is Objective.WORST_CASE else 1e4)
     asked = [one for one in wanted if not one.bands]
-    for (_, band), k in zip(task.bands, below, strict=True):
+    for band, k in zip(task.bands, below, strict=True):
         q = scene.path.at(scene.initial)[0][band.rows]
         above = mode_above(scene.model, k, band.counted, q, scene.initial)
         asked += band.kept_clear(k, above, task.margin)
@@ -131,7 +131,7 @@ def variant_of(task: Task, below: tuple[int, ...], missed: bool = False) -> Pose
         reference=scene.initial,
         objective=objective if has_goals else Objective.LEAST_SQUARES,
     )
-    named = zip((words for words, _ in task.bands), below, strict=True)
+    named = zip((band.label for band in task.bands), below, strict=True)
     return PosedProblem(tuple(named), requirements, problem, response)
 
 

@@ -11,8 +11,9 @@ import scipy.io
 from scenes import SHIPPED, changed, scene_of
 
 import eigassign
+from eigassign.assignment import ForbiddenBand
 from eigassign.pipeline import solve_case
-from eigassign.study import Band, Scene, load_case, prove_clear
+from eigassign.study import Scene, load_case, prove_clear
 
 
 @pytest.fixture(scope="module")
@@ -20,14 +21,14 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return scene_of(tmp_path_factory.mktemp("arm"), SHIPPED)
 
 
-def band(scene: Scene, low: float, high: float, below: int) -> Band:
-    q = scene.path.q
-    return Band("band", q, np.full(len(q), low), np.full(len(q), high), below)
+def band(scene: Scene, low: float, high: float) -> ForbiddenBand:
+    n = len(scene.path.q)
+    return ForbiddenBand("band", "", (), slice(0, n), np.full(n, low), np.full(n, high))
 
 
 def test_room_is_the_least_distance_to_an_edge(arm: Scene) -> None:
     hz = arm.model.frequencies(arm.path.q, arm.initial, 2)
-    found = prove_clear(arm.model, band(arm, 230.0, 300.0, 1), arm.initial)
+    found = prove_clear(arm.model, band(arm, 230.0, 300.0), 1, arm.path.q, arm.initial)
     assert found.clear
     assert found.counted
     exact = min(1.0 - hz[:, 0].max() / 230.0, hz[:, 1].min() / 300.0 - 1.0)
@@ -37,7 +38,8 @@ def test_room_is_the_least_distance_to_an_edge(arm: Scene) -> None:
 
 def test_a_forged_answer_is_rejected(arm: Scene) -> None:
     for low, high, below in ((150.0, 300.0, 1), (230.0, 300.0, 2), (230.0, 300.0, 0)):
-        assert not prove_clear(arm.model, band(arm, low, high, below), arm.initial).clear
+        forged = band(arm, low, high), below, arm.path.q
+        assert not prove_clear(arm.model, *forged, arm.initial).clear
 
 
 @pytest.mark.parametrize("low", [196.0, pytest.param(203.0, marks=pytest.mark.slow)])
@@ -82,13 +84,12 @@ def test_a_mode_that_mesh_or_reduced_links_raise_beyond_a_band_is_not_clear_of_i
     pose = np.array([[1.817, 5.312]])
     assert scene.model.frequencies(pose, scene.initial, 3)[0, below] > high
     assert true.model.frequencies(pose, scene.initial, 3)[0, below] < low
-    there = Band("band", pose, np.array([low]), np.array([high]), below)
-    found = prove_clear(scene.model, there, scene.initial)
+    there = ForbiddenBand("band", "", (), slice(0, 1), np.array([low]), np.array([high]))
+    found = prove_clear(scene.model, there, below, pose, scene.initial)
     assert found.counted
     assert not found.clear
     assert np.isfinite(found.raised) == bounded
-    above = Band("band", pose, there.lower_hz, there.upper_hz, below + 1)
-    assert prove_clear(true.model, above, scene.initial).clear
+    assert prove_clear(true.model, there, below + 1, pose, scene.initial).clear
 
 
 def test_links_left_to_auto_are_modelled_up_to_the_bands(tmp_path: Path) -> None:
