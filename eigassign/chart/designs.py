@@ -18,7 +18,6 @@ from scipy.optimize import Bounds, LinearConstraint, differential_evolution, min
 
 from eigassign.assignment.exact.design_problem import UnitBox
 from eigassign.assignment.exact.sequential import minimise
-from eigassign.assignment.requirements.requirement import Frequencies
 from eigassign.assignment.requirements.sampling import requirements_of
 from eigassign.chart.question import Effort, measure
 from eigassign.chart.results import DesignRun, excess_over
@@ -119,9 +118,8 @@ def _search(most: int, search: Callable[..., Any], how: dict[str, Any], task: Ta
 
     A design counts as the best if it keeps the limits.
     """
-    posed, q, begun = variant_of(task, ()), task.scene.path.q, time.process_time()
-    problem, asked = posed.problem, posed.requirements
-    box = UnitBox.of(problem)
+    posed, begun = variant_of(task, ()), time.process_time()
+    problem, box = posed.problem, UnitBox.of(posed.problem)
     start = box.z(np.clip(task.scene.initial, problem.lower, problem.upper))
     best, trace, calls, note = (np.inf, start), list[tuple[float, float]](), 0, ""
 
@@ -132,11 +130,7 @@ def _search(most: int, search: Callable[..., Any], how: dict[str, Any], task: Ta
         calls += 1
         inside = np.clip(z, 0.0, 1.0)
         y = box.y(inside)
-        if "jac" in how:
-            seen = problem.appraise(y)
-        else:
-            hz = task.scene.model.frequencies(q, y, asked.modes)
-            seen = asked.appraise(y, Frequencies(hz, np.zeros((*hz.shape, len(y)))))
+        seen = problem.appraise(y) if "jac" in how else posed.without_slopes(y)
         value, row = problem(y, seen), box.rows @ inside
         missed = np.abs(row - np.clip(row, box.row_lower, box.row_upper))
         if value < best[0] and np.all(missed <= 1e-8 * (1.0 + np.abs(row))):  # rounding
@@ -152,4 +146,4 @@ def _search(most: int, search: Callable[..., Any], how: dict[str, Any], task: Ta
     except SpentError:
         note = "stopped: no evaluation left"
     told, more = {"evaluations": calls, "most": most}, {"trace": tuple(trace), "note": note}
-    return box.y(best[1]), calls * len(q), told, more
+    return box.y(best[1]), calls * len(task.scene.path.q), told, more

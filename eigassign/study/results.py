@@ -313,7 +313,8 @@ class ClearanceRow:
 
     ``room`` is the least distance of a mode relative to the edge, less what it may deviate between
     the points looked at, and less ``raised``: how much too high the mode above may be for mesh and
-    reduced links, relative; None where that is not known.
+    reduced links, relative; None where that is not known. ``counted`` says whether inertia
+    confirmed ``below`` at every sample.
     """
 
     label: str

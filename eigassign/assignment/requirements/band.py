@@ -68,19 +68,8 @@ class ForbiddenBand(Requirement):
         """The band along each trajectory for itself: only there k must not change."""
         if len(self.along) < 2:
             return (self,)
-        return tuple(self._part(name, own) for name, own in self.along)
-
-    def _part(self, name: str, own: slice) -> ForbiddenBand:
-        first, n = self.rows.start + own.start, own.stop - own.start
-        return replace(
-            self,
-            label=f"{self.label} along {name!r}",
-            part_of=self.label,
-            rows=slice(first, first + n),
-            lower=self.lower[own],
-            upper=self.upper[own],
-            along=((name, slice(0, n)),),
-        )
+        words = ((f"{self.label} along {name!r}", self.part(name, own)) for name, own in self.along)
+        return tuple(replace(part, label=label, part_of=self.label) for label, part in words)
 
     @property
     def counted(self) -> tuple[int, ...]:

@@ -15,8 +15,8 @@ a class in a module of its own that says in which of this it differs.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,6 +149,17 @@ class Requirement(Brief):
         """The terms that are modes."""
         return tuple((term, c) for term, c in self.terms if isinstance(term, int))
 
+    def part(self, name: str, own: slice) -> Self:
+        """The same along one trajectory only, at these of its own samples."""
+        first, n = self.rows.start + own.start, own.stop - own.start
+        return replace(
+            self,
+            rows=slice(first, first + n),
+            lower=self.lower[own],
+            upper=self.upper[own],
+            along=((name, slice(0, n)),),
+        )
+
     # --- Its curve and errors, where modes have some frequencies or lie between two
 
     @property
@@ -214,7 +225,7 @@ class Requirement(Brief):
         return self.terms == ((1, 1.0),) and bool(np.isinf(self.upper).all())
 
     @property
-    def bands(self) -> tuple[Requirement, ...]:
+    def bands(self) -> tuple[Any, ...]:
         """Bands along each trajectory for itself, of which the program has a choice."""
         return ()
 

@@ -11,7 +11,6 @@ from eigassign.assignment.exact.sequential import End
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.study.accuracy import model_error
 from eigassign.study.design.answer import MAX_ERROR, Answer
-from eigassign.study.design.clearance import Clearance
 from eigassign.study.design.conclusions import is_proved
 from eigassign.study.design.judgement import verdict
 from eigassign.study.design.variants import Task, variant_of
@@ -50,7 +49,7 @@ def assignment_row(
     accepted = scene.file.validation.max_error
     # The exact optimum rests on exact frequencies, the one shot on its prediction.
     trusted = found is not None or all(t.approximation_error <= accepted for t in targets)
-    clearances = () if found is None else tuple(map(_clearance, found.clearances))
+    clearances = () if found is None else found.clearances
     optimality = _optimality(scene, answer)
     proved = optimality.kind == "proved"
     contradiction = _in_words(scene, answer, proved)
@@ -112,17 +111,6 @@ def _in_words(scene: Scene, answer: Answer, proved: bool) -> str:
         return f"no design {meets} all limits; the nearest one misses {listed}"
     together = " together" if len(contradiction.names) > 1 else ""
     return f"no design within the bounds {meets} {listed}{together}"
-
-
-def _clearance(found: Clearance) -> ClearanceRow:
-    return ClearanceRow(
-        found.label,
-        found.below,
-        found.clear,
-        found.room,
-        found.counted,
-        found.raised if np.isfinite(found.raised) else None,
-    )
 
 
 def _too_coarse(raised: float, accepted: float) -> str:

@@ -29,35 +29,22 @@ from eigassign.errors import MissingMassError
 from eigassign.modal.exact.inertia import count_below
 from eigassign.modal.model import Model
 from eigassign.study.accuracy import judged_poses
+from eigassign.study.results import ClearanceRow
 
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Clearance:
-    """Whether a band is clear, and the least room relative to its edges.
-
-    ``room`` is the least g found less what it may deviate between the points looked at: negative
-    where the band is not clear. ``counted`` says whether inertia confirmed k at every sample;
-    ``raised`` is e: infinite where nothing is known of it.
-    """
-
-    label: str
-    below: int
-    clear: bool
-    room: float
-    counted: bool
-    raised: float
-
-
-def prove_clear(model: Model, band: ForbiddenBand, below: int, q: Floats, y: Floats) -> Clearance:
+def prove_clear(
+    model: Model, band: ForbiddenBand, below: int, q: Floats, y: Floats
+) -> ClearanceRow:
     """Judge a band along one trajectory, of poses q (n, n_q) at its rows and design y (n_y,).
 
     ``below`` is k. Raises what the exact solves raise.
     """
     motion = _Motion(model, band, below, q, y)
-    counted, room, raised = motion.counted(), motion.least_room(), motion.raised
-    return Clearance(band.label, below, counted and room > 0.0, room, counted, raised)
+    counted, room = motion.counted(), motion.least_room()
+    raised = motion.raised if np.isfinite(motion.raised) else None
+    return ClearanceRow(band.label, below, counted and room > 0.0, room, counted, raised)
 
 
 def mode_above(model: Model, below: int, named: Sequence[int], q: Floats, y: Floats) -> int | None:
@@ -154,7 +141,7 @@ class _Motion:
         return g if np.isfinite(self.raised) else np.minimum(g, 0.0)
 
 
-def wanting(found: Sequence[Clearance]) -> float:
+def wanting(found: Sequence[ClearanceRow]) -> float:
     """The largest lack of room that another design may have; 0 where all bands are clear."""
-    open_ = (c for c in found if not c.clear and np.isfinite(c.raised))
+    open_ = (c for c in found if not c.clear and c.raised is not None)
     return max((-c.room for c in open_), default=0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,8 +105,10 @@ def _summary(
     errors: Mapping[str, Floats | None], weights: Floats, own: slice = slice(None)
 ) -> ErrorSummary:
     """The errors (n,) of one target, at some ``own`` of its samples, by the names of the rows."""
-    found = {k: None if e is None else _row(e[own], weights[own]) for k, e in errors.items()}
-    return ErrorSummary(**found)
+    rows: dict[str, Any] = {
+        name: None if one is None else _row(one[own], weights[own]) for name, one in errors.items()
+    }
+    return ErrorSummary(**rows)
 
 
 def _row(errors: Floats, weights: Floats) -> ErrorRow:

@@ -20,11 +20,12 @@ from eigassign.assignment.exact.sequential import End, Optimum, worth
 from eigassign.assignment.requirements.named_modes import followed_modes
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.errors import InfeasibleError
-from eigassign.study.design.clearance import Clearance, prove_clear, wanting
+from eigassign.study.design.clearance import prove_clear, wanting
 from eigassign.study.design.one_shot import catalogues
 from eigassign.study.design.response import reduced_models
 from eigassign.study.design.starts import Searched, coarse_to_fine, most_starts, search_starts
 from eigassign.study.design.variants import PosedProblem, Task, possible_counts, variant_of
+from eigassign.study.results import ClearanceRow
 from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -40,7 +41,7 @@ class Found:
     optima: tuple[Optimum, ...]  # distinct local optima of the variant, the best first
     variants: tuple[Searched, ...]  # all that were tried, the best first
     initial: tuple[float, float]  # violation and objective of the initial design
-    clearances: tuple[Clearance, ...]  # of every band along every trajectory
+    clearances: tuple[ClearanceRow, ...]  # of every band along every trajectory
     starts: int
     exact_solves: int
     chosen: Chosen | None = None  # from the catalogues, where there are any; then of `optima`
@@ -143,7 +144,7 @@ def _search_catalogues(
     )
 
 
-def _clearances(task: Task, variant: PosedProblem, y: Floats) -> Iterator[Clearance]:
+def _clearances(task: Task, variant: PosedProblem, y: Floats) -> Iterator[ClearanceRow]:
     q = task.scene.path.at(y)[0]
     for band, (_, below) in zip(task.bands, variant.below, strict=True):
         yield prove_clear(task.scene.model, band, below, q[band.rows], y)

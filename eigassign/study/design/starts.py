@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from eigassign.assignment.catalogues.choosing import Chosen
 from eigassign.assignment.exact.design_problem import MET, UnitBox, best_first
 from eigassign.assignment.exact.sequential import End, Optimum, distinct, minimise, worth
-from eigassign.assignment.requirements.requirement import Frequencies
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import EigassignError
 from eigassign.study.design.response import ReducedModels
@@ -202,7 +201,9 @@ def _in_turn(task: Task, variant: PosedProblem, starts: Sequence[Floats]) -> Ite
     for y in spread_designs(task.scene, max(most, min(SCREENED * box.n, MOST_SCREENED)), 0):
         z = box.inside(box.z(y))
         try:
-            ranked.append((_worth_by_frequencies(fewest, asked, box.y(z)), z))
+            seen = asked.without_slopes(box.y(z))
+            worths = max(seen.violation, MET), asked.problem(box.y(z), seen)
+            ranked.append((worths, z))
         except EigassignError:
             ranked.append(((np.inf, np.inf), z))
     apart: list[Floats] = []
@@ -211,11 +212,3 @@ def _in_turn(task: Task, variant: PosedProblem, starts: Sequence[Floats]) -> Ite
         alone = all(np.abs(z - other).max(initial=0.0) > 0.2 for other in apart)  # of the bounds
         (apart if alone else near).append(z)
     yield from (box.y(z) for z in [*apart, *near][:most])
-
-
-def _worth_by_frequencies(task: Task, variant: PosedProblem, y: Floats) -> tuple[float, float]:
-    """Violation and F of a design, without slopes."""
-    asked, scene = variant.requirements, task.scene
-    hz = scene.model.frequencies(scene.path.at(y)[0], y, asked.modes)
-    seen = asked.appraise(y, Frequencies(hz, np.zeros((*hz.shape, len(y)))))
-    return max(seen.violation, MET), variant.problem(y, seen)

@@ -15,12 +15,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.exact.design_problem import DesignProblem, Objective
+from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem, Objective
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.feasibility import constraints_agree
 from eigassign.assignment.program import Bounds
 from eigassign.assignment.requirements.band import ForbiddenBand
-from eigassign.assignment.requirements.requirement import Requirement
+from eigassign.assignment.requirements.requirement import Frequencies, Requirement
 from eigassign.assignment.requirements.sampling import requirements_of, time_weights
 from eigassign.errors import CaseError, EigassignError, MissingMassError
 from eigassign.study.design.clearance import mode_above
@@ -44,6 +44,12 @@ class PosedProblem:
         """The problem with those limits only that are named."""
         some = self.requirements.with_limits(names)
         return replace(self.problem, appraise=lambda y: some.appraise(y, self.response(y)))
+
+    def without_slopes(self, y: Floats) -> Appraisal:
+        """A design as it is appraised, but with slopes 0: only its frequencies are solved."""
+        q = self.response.path.at(y)[0]
+        hz = self.response.model.frequencies(q, y, self.requirements.modes)
+        return self.requirements.appraise(y, Frequencies(hz, np.zeros((*hz.shape, len(y)))))
 
 
 @dataclass(frozen=True)
