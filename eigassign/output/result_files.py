@@ -268,7 +268,7 @@ def sample_files(results: RunResults) -> dict[str, bytes]:
         f"trajectory_{row.name}.csv" if several else "trajectory.csv": trajectory_csv(results, row)
         for row in results.trajectories
     }
-    return {**files, "frequencies.csv": frequencies_csv(results)}
+    return {**files, "frequencies.csv": _number_text(frequency_columns(results))}
 
 
 def trajectory_csv(results: RunResults, row: TrajectoryRow) -> bytes:
@@ -279,11 +279,6 @@ def trajectory_csv(results: RunResults, row: TrajectoryRow) -> bytes:
         places = zip(names, row.tip.T, strict=True)
         columns += [(f"{name} [m]", place.tolist()) for name, place in places]
     return _number_text(columns)
-
-
-def frequencies_csv(results: RunResults) -> bytes:
-    """`frequency_columns` as text."""
-    return _number_text(frequency_columns(results))
 
 
 def frequency_columns(results: RunResults) -> list[Column]:

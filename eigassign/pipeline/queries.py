@@ -154,18 +154,14 @@ def _answer(case: BuiltCase, q: Floats, y: Floats, hz: Floats) -> ModesAnswer:
     coarse = model.discretisation_error(q, y, every)[0] if model.meshed else None
     return ModesAnswer(
         model.n_rigid,
-        [float(value) for value in hz],
-        _pairs(model.q_names, q),
-        _pairs(model.y_names, y),
+        hz.tolist(),
+        tuple(zip(model.q_names, q.tolist(), strict=True)),
+        tuple(zip(model.y_names, y.tolist(), strict=True)),
         ", ".join(shown_point(*point) for point in named if point[0]),
-        None if lost is None else [float(value) for value in lost],
-        None if coarse is None else [float(value) for value in coarse],
+        None if lost is None else lost.tolist(),
+        None if coarse is None else coarse.tolist(),
         rounding_error(model.pencil, model.x(q, y)[0], len(hz)),
     )
-
-
-def _pairs(names: Sequence[str], numbers: Floats) -> tuple[tuple[str, float], ...]:
-    return tuple((name, float(number)) for name, number in zip(names, numbers, strict=True))
 
 
 def _default_q(case: BuiltCase) -> Sequence[float]:

@@ -17,21 +17,17 @@ from eigassign.case.schema.mechanism import Mechanism
 Rule = Callable[[Tree], Iterator[Finding]]
 
 
-def keys_have_values(tree: Tree) -> Iterator[Finding]:
-    """No key and no entry of a list is left empty."""
-    yield from _empty(tree, ())
-
-
-def _empty(node: object, path: KeyPath) -> Iterator[Finding]:
+def keys_have_values(node: object, path: KeyPath = ()) -> Iterator[Finding]:
+    """No key and no entry of a list below ``path`` is left empty."""
     if node is None:
         comma = bool(path) and str(path[-1])[:1].isdigit()
         hint = " (decimals take a point, not a comma)" if comma else ""
         yield path, f"has no value: give one, or leave the key out{hint}"
     for key, inner in node.items() if isinstance(node, Mapping) else ():
-        yield from _empty(inner, (*path, key))
+        yield from keys_have_values(inner, (*path, key))
     for k, inner in enumerate(node) if isinstance(node, tuple) else ():
         if not isinstance(inner, (int, float)):
-            yield from _empty(inner, (*path, k))
+            yield from keys_have_values(inner, (*path, k))
 
 
 def reserved_names_are_not_used(tree: Tree) -> Iterator[Finding]:

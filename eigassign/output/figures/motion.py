@@ -61,11 +61,11 @@ def _sheet(
     return figure, drawing
 
 
-def _note(figure: Figure, text: str, y: float = 0.2) -> Any:
-    """Small grey text at the lower right, ``y`` inches from below."""
+def _note(figure: Figure, text: str, x: float = 0.1, y: float = 0.2) -> Any:
+    """Small grey text, ``x`` and ``y`` inches from the lower right."""
     width, height = figure.get_size_inches()
     return figure.text(
-        1.0 - 0.1 / width, y / height, text,
+        1.0 - x / width, y / height, text,
         ha="right", va="center", size=style.SMALL_PT, color=GREY,
     )  # fmt: skip
 
@@ -149,9 +149,7 @@ def thumbnail(pictures: ModePictures) -> bytes:
         figure = style.new_figure("", height, width, layout=None)
         box = (0.16, 0.42, width - 0.32, height - 0.54)
         _draw_shape(_held(pictures).drawing(figure, box, grain=0.75), pictures, 0)
-        text = f"mode 1: {pictures.frequencies_hz[0]:.4g} Hz"
-        place = (1.0 - 0.06 / width, 0.11 / height)
-        figure.text(*place, text, ha="right", va="center", size=style.SMALL_PT, color=GREY)
+        _note(figure, f"mode 1: {pictures.frequencies_hz[0]:.4g} Hz", 0.06, 0.11)
         return style.encoded(figure, "png")
 
 
@@ -180,7 +178,7 @@ def _draw_mechanism(title: str, poses: DrawnPoses) -> Figure:
 class Animation:
     """``moving`` in its n poses over what stays, ``captions`` (n,) below; it begins anew forever.
 
-    ``still``: poses that are drawn in grey under all frames.
+    ``still``: its first pose is drawn in grey under all frames.
     """
 
     title: str
@@ -192,21 +190,12 @@ class Animation:
 def along_trajectory(title: str, poses: DrawnPoses) -> Animation:
     """Poses evenly spread in time, with the time of each; it takes as long as they have frames.
 
-    The first pose stays, without symbols but for the joints, which stand on the ground.
+    The links and joints of the first pose stay.
     """
     names = poses.of or ("",) * len(poses.lines)
     times = zip(names, poses.time_s, strict=True)
     captions = tuple(f"{short(name, 16)} t = {t:.3g} s".strip() for name, t in times)
-    first = replace(
-        poses,
-        lines=poses.lines[:1],
-        time_s=poses.time_s[:1],
-        joints=tuple(replace(j, places=j.places[:1], axes=j.axes[:1]) for j in poses.joints),
-        bodies=(),
-        springs=(),
-        of=poses.of[:1],
-    )
-    return Animation(short(title, 60), poses, first, captions)
+    return Animation(short(title, 60), poses, poses, captions)
 
 
 def swinging(pictures: ModePictures, mode: int, frames: int = 32) -> Animation:
