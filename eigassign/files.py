@@ -92,6 +92,13 @@ def json_value(text: str | bytes) -> Any:
         raise ValueError("nested too deep") from None
 
 
+def name_of(text: str) -> str:
+    """``text`` if a file may have this name; raises ValueError or TypeError else."""
+    if b"\0" in os.fsencode(text):
+        raise ValueError("a null character in its name")
+    return text
+
+
 def _number(text: str) -> float:
     """The number; raises ValueError where no float is as large."""
     if not math.isfinite(value := float(text)):

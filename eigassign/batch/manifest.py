@@ -25,7 +25,7 @@ from typing import NamedTuple
 from eigassign._version import __version__
 from eigassign.case.schema.sweep import MOST
 from eigassign.errors import StorageError, UsageError
-from eigassign.files import CASE, TABLE, json_value, opened, read_bytes
+from eigassign.files import CASE, TABLE, json_value, name_of, opened, read_bytes
 from eigassign.output.batch.outcome import CaseOutcome, from_line, status_of, to_line
 from eigassign.output.store.atomic import replace_synced
 
@@ -68,7 +68,7 @@ def read_header(folder: Path) -> Header | None:
         whole = {*map(type, (header.cases, i, n))} == {int} and type(header.columns) is bool
         right = whole and 1 <= i <= n and 0 <= header.cases <= MOST * len(header.files)
         names = {*map(type, (*texts, *header.files, *header.keys))} == {str}
-        if not (right and names) or any("\0" in file for file in header.files):
+        if not (right and names and header.plan.isascii() and all(map(name_of, header.files))):
             raise ValueError("no header of a batch")
         return header
     except (FileNotFoundError, NotADirectoryError):

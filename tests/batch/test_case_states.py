@@ -234,6 +234,19 @@ def test_a_file_of_a_terabyte_that_its_record_vouches_for_is_not_read(batch: Bat
     assert ran(batch) == ["mass=0.5"]
 
 
+@pytest.mark.skipif(os.fsencode("\udce9") != b"\xe9", reason="needs names that are bytes")
+@pytest.mark.parametrize("columns", [False, True])
+def test_a_case_file_may_have_a_name_that_is_no_text(tmp_path: Path, columns: bool) -> None:
+    name = os.fsdecode(b"caf\xe9")
+    case(tmp_path, f"{name}.yaml")
+    batch = batch_of(tmp_path, MASSES, file=f"{name}.yaml")
+    assert ran(in_columns(batch) if columns else batch) == DONE
+    row = json.loads((batch.folder / "summary.json").read_text())["cases"][0]
+    assert row["path"] == str(tmp_path / f"{name}.yaml")
+    assert r"caf\udce9.yaml" in (batch.folder / "summary.csv").read_text()
+    assert merge_shards(batch.folder, []).ends == {"ok": 3, "failed": 1}
+
+
 def test_without_batch_json_nothing_runs_again(batch: Batch) -> None:
     before = summaries(batch.folder)
     (batch.folder / "batch.json").unlink()

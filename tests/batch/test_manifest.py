@@ -122,6 +122,8 @@ def test_a_line_of_another_batch_is_none(tmp_path: Path) -> None:
         ('"values": {}', '"values": {"mass": -1e999}'),
         ('"case 1"', "1"),
         ('"run_folder": null', '"run_folder": ["a"]'),
+        ('"run_folder": null', '"run_folder": "\\u0000"'),
+        ('"run_folder": null', '"run_folder": "\\ud800"'),
         ('"index": 1,', '"index": 1.0,'),
         ('"index": 1,', f'"index": 1{"0" * 5000},'),
     ],
@@ -145,6 +147,7 @@ def test_a_header_reads_back_and_a_damaged_one_is_refused(tmp_path: Path) -> Non
     wrong = [whole.replace(b": 10,", each) for each in many]
     wrong += [whole.replace(b"    3\n", each) for each in (b"    0\n", b'    "3"\n')]
     wrong += [whole.replace(b"    2,\n", b"    0,\n"), whole.replace(b'"abc"', b"7")]
+    wrong += [whole.replace(b'"abc"', b'"\\ud800"')]
     wrong += [whole.replace(b'"../arm.yaml"', each) for each in (b"5", b'"a\\u0000b"')]
     assert whole not in wrong
     for damaged in (b"{", b"[]", b"[" * 10**5, b'{"format": 1}', b'{"format": 9}', *wrong):

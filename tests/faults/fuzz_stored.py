@@ -218,12 +218,19 @@ def _scribbled(path: Path, draw: random.Random) -> str:
 
 
 DEEP = 100_000
-TOKENS = (
-    *("null", "true", "false", "0", "-1", "1", "1.5", "-0.0", "1e308", "-1e308", "1e-320"),
-    *("1e999", "-1e999", "NaN", "Infinity", "-Infinity", "1" * 400, "-" + "9" * 30, "1" * 5000),
+NUMBERS = (
+    *("0", "-1", "1", "1.5", "-0.0", "1e308", "-1e308", "1e-320", "1e999", "-1e999"),
+    *("NaN", "Infinity", "-Infinity", "1" * 400, "-" + "9" * 30, "1" * 5000),
+)
+TEXTS = (
     *('""', '"0"', '"\\u0000"', '"\\ud800"', '"\\udcff"', '"a\\nb"', '"\\u001b[2J"', '"\\u202e"'),
     *('"/"', '"."', '".."', '"../../../etc/passwd"', '"/dev/zero"', '"~"', '"=1+1"', '"<b>"'),
     *('"a/b"', '"' + "x" * 300 + '"', '"' + "x" * 10**6 + '"', '"é"', '"ok"', '"error"', '"1e999"'),
+)
+TOKENS = (
+    *NUMBERS,
+    *TEXTS,
+    *("null", "true", "false"),
     *("[]", "{}", "[[]]", "[null]", '{"": null}', "[1, 2, 3]", '["a", 1, 2, 3]', '["a", 1e999]'),
     *("[" * 300 + "]" * 300, "[" * 900 + "]" * 900, "[" * DEEP + "]" * DEEP, "[" * DEEP),
     '{"a": ' * 400 + "1" + "}" * 400,
@@ -267,7 +274,9 @@ def _changed(tree: Any, draw: random.Random) -> tuple[str, str]:
         token = draw.choice(TOKENS)
         return token, f"all is {token:.30}"
     inner, key = draw.choice(spots)
-    token, value = draw.choice(TOKENS), inner[key]
+    value = inner[key]
+    alike = TEXTS if isinstance(value, str) else NUMBERS if isinstance(value, float) else TOKENS
+    token = draw.choice(draw.choice((alike, TOKENS)))
     how = draw.choice(("other", "other", "other", "gone", "renamed", "twice", "more", "exchanged"))
     if how == "other":
         inner[key] = _HERE

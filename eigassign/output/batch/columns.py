@@ -19,11 +19,13 @@ import numpy as np
 
 from eigassign._version import __version__
 from eigassign.case.units import QuantityError, read_quantity
+from eigassign.files import printable
 from eigassign.output.batch.outcome import CaseOutcome
 from eigassign.output.batch.summary import cell
 
 FORMAT = 1  # of columns.h5
 ROWS = 8192  # held at a time, and in a chunk of the file: 64 kB of numbers
+_LONGEST = 1000  # characters of a name: HDF5 has some 64 kB for each
 _TEXTS = ("name", "status", "verdict", "message", "path")
 _NUMBERS = (
     "seconds", "initial_max_relative", "predicted_max_relative", "exact_max_relative",
@@ -69,7 +71,7 @@ class Columns:
         if name not in self._file:
             self._create(name, text=any(isinstance(cell, str) for cell in cells))
         column = self._file[name]
-        made = [cell or "" for cell in cells] if _is_text(column) else np.array(cells, np.float64)
+        made = [*map(_text, cells)] if _is_text(column) else np.array(cells, np.float64)
         column[self._start : self._start + len(cells)] = made
 
     def _create(self, name: str, text: bool) -> None:
@@ -115,9 +117,14 @@ def quantity(value: float | str) -> float | None:
         return None
 
 
+def _text(cell: str | None) -> bytes:
+    """UTF-8, in which what HDF5 cannot hold is written out as Python does it."""
+    return (cell or "").replace("\0", r"\x00").encode(errors="backslashreplace")
+
+
 def _level(name: str) -> str:
-    """``name`` as one level of a path in the file."""
-    return name.replace("/", "|")
+    """``name`` as one level of a path in the file, which HDF5 can hold."""
+    return (printable(name)[:_LONGEST] if name.strip(".") else repr(name)).replace("/", "|")
 
 
 _GROUPS: dict[str, Callable[[CaseOutcome], Iterable[tuple[str, Any]]]] = {

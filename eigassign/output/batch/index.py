@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -16,7 +17,7 @@ from eigassign.output.formats import number, percent, seconds
 from eigassign.output.pages import TEMPLATES, inside, page_of
 
 _STATUS = {"ok": "good", "tolerance": "fair", "failed": "bad", "error": "bad"}  # and its tone
-_TAIL = re.compile(r"(?:[^.]*[^.0-9][^.]*(?:\.[0-9]+)*\.)?[^.]*$")
+_TAIL = re.compile(r"(?<![^.])(?:[0-9]*[^.0-9][^.]*(?:\.[0-9]+)*\.)?[^.]*$")  # in linear time
 _ERRORS = {"worst before": "initial_max_relative", "worst after": "exact_max_relative"}
 
 
@@ -112,4 +113,4 @@ def _links(row: CaseOutcome, folder: Path) -> list[str]:
     place = Path(row.run_folder)
     wanted = (("report.html", "results.json"), ("figures/frequencies.png",))
     there = (next((f for f in names if (folder / place / f).exists()), None) for names in wanted)
-    return ["" if name is None else quote((place / name).as_posix()) for name in there]
+    return ["" if name is None else quote(os.fsencode((place / name).as_posix())) for name in there]

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from eigassign.errors import StorageError
-from eigassign.files import json_value
+from eigassign.files import json_value, name_of
 from eigassign.study.results import RunResults
 
 OUTCOME = "outcome.json"  # in the folder of a case
@@ -80,8 +80,8 @@ def from_line(line: str | bytes, folder: str | Path = "") -> CaseOutcome:
 def from_plain(row: Any) -> CaseOutcome:
     """The outcome that is written as these plain values; raises ValueError or TypeError else."""
     found = CaseOutcome(**row)
-    folder = "" if found.run_folder is None else found.run_folder
-    texts = [found.name, found.path, found.message, found.verdict, found.key, folder]
+    places = [found.path, "" if found.run_folder is None else found.run_folder]
+    texts = [found.name, found.message, found.verdict, found.key, *map(name_of, places)]
     errors = (found.initial_max_relative, found.predicted_max_relative, found.exact_max_relative)
     numbers = [found.seconds, *(error for error in errors if error is not None)]
     for name, number in found.design:

@@ -17,7 +17,7 @@ from typing import Literal
 
 from eigassign._version import __version__
 from eigassign.errors import StorageError, UsageError
-from eigassign.files import CASE, MATRIX, file_digest, json_value, read_bytes, seen_from
+from eigassign.files import CASE, MATRIX, file_digest, json_value, name_of, read_bytes, seen_from
 from eigassign.output.store.atomic import write_synced
 
 MARKER = "run.json"
@@ -93,10 +93,10 @@ def read_record(folder: Path) -> RunRecord | None:
     """
     try:
         found = json_value(read_bytes(folder / MARKER, CASE))
-        named = {str(name): str(digest) for name, digest in found["case_files"].items()}
-        run = RunOf(str(found["case_path"]), str(found["case_sha256"]), named)
+        named = {name_of(name): str(digest) for name, digest in found["case_files"].items()}
+        run = RunOf(name_of(found["case_path"]), str(found["case_sha256"]), named)
         listed = found["files"] if found["eigassign_run"] == _SCHEMA else {}
-        marks = {str(name): (int(m["bytes"]), str(m["sha256"])) for name, m in listed.items()}
+        marks = {name_of(name): (int(m["bytes"]), str(m["sha256"])) for name, m in listed.items()}
         files = {name: FileMark(*mark) for name, mark in marks.items()}
         version, token = str(found.get("eigassign_version")), str(found.get("token"))
         return RunRecord(run, version, token, files)
@@ -154,7 +154,7 @@ def _contents(folder: Path) -> set[str]:
 def _is_as_marked(path: Path, mark: FileMark) -> bool:
     try:
         status = os.lstat(path)
-    except (OSError, ValueError):  # a null character in its name
+    except OSError:
         return False
     if not stat.S_ISREG(status.st_mode) or status.st_size != mark.bytes:
         return False

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -86,6 +88,26 @@ def test_the_columns_as_csv_are_those_of_the_file(tmp_path):
             read = [float(each[name] or "nan") for each in rows]
             np.testing.assert_array_equal(read, found[name][:])
     assert [each["status"] for each in rows] == ["ok", "ok", "error", "ok", "ok"]
+
+
+def test_columns_write_out_what_hdf5_cannot_hold(tmp_path):
+    names = ("", ".", "..", "a\0b", "\ud800", "\udce9", "x" * 10**5, "a/../b", "/")
+    rows = [replace(row(0), message=f"a\0{n}", design=((n, 1.0),), values={n: n}) for n in names]
+    write_files(tmp_path, map(to_line, rows), len(names), names, columns=True)
+    with h5py.File(tmp_path / "columns.h5") as found:
+        assert found["message"].asstr()[4:6].tolist() == [r"a\x00\ud800", r"a\x00\udce9"]
+        assert all(np.nansum(column[:]) == 1.0 for column in found["design"].values())
+        assert len(found["design"]) == len(found["values"]) == len(names)
+    assert len((tmp_path / "columns.csv").read_text().splitlines()) == 1 + len(names)
+
+
+def test_links_of_the_page_are_those_of_folders_whose_names_are_no_text(tmp_path):
+    name = os.fsdecode(b"caf\xe9")
+    (tmp_path / name).mkdir()
+    (tmp_path / name / "results.json").touch()
+    made = to_line(CaseOutcome("c", "arm.yaml", "ok", 0.5, run_folder=name))
+    write_files(tmp_path, [made], 1)
+    assert page_data(tmp_path)["rows"][0][0] == ["caf%E9/results.json", ""]
 
 
 @pytest.mark.parametrize("n", [0, 1])
