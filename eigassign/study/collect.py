@@ -13,7 +13,7 @@ from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.case.case_file import CaseFile
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.study.accuracy import Accuracy, study_motion
-from eigassign.study.comparison import reach_warnings
+from eigassign.study.comparison import ModeStudies, reach_warnings
 from eigassign.study.design.account import assignment_row, limit_notes
 from eigassign.study.design.answer import Answer
 from eigassign.study.design.judgement import SolvedDesigns, crossing_warnings, swap_notes
@@ -24,7 +24,6 @@ from eigassign.study.results import (
     DrawnPoses,
     MassRow,
     Meaning,
-    ModeStudy,
     MovingMode,
     OtherModes,
     RunResults,
@@ -49,7 +48,7 @@ class VerifiedAssignment:
 
 def collect_results(
     scene: Scene,
-    studies: tuple[ModeStudy, ...],
+    studies: ModeStudies,
     accuracy: Accuracy,
     assigned: VerifiedAssignment | None,
     moving: tuple[MovingMode, ...],
@@ -58,7 +57,7 @@ def collect_results(
     """The results of a run; without ``assigned`` those of an expansion only."""
     file, trajectory = scene.file, scene.trajectory
     motion, row = _motion(scene, assigned), _assignment(scene, accuracy, assigned)
-    along = [(s.over_time.worst_taylor, s.mode) for s in studies if s.over_time is not None]
+    along = [(s.over_time.worst_taylor, s.mode) for s in studies.rows if s.over_time is not None]
     followed = assigned is not None and assigned.answer.found is not None  # by exact frequencies
     reach = () if followed else reach_warnings(scene, along)
     one_shot = None if assigned is None else assigned.answer.one_shot
@@ -78,7 +77,7 @@ def collect_results(
         q=np.zeros((0, n)) if trajectory is None else trajectory.q[:, :n],
         trajectories=_trajectories(file, trajectory),
         poses=_poses(scene),
-        studies=studies,
+        studies=studies.rows,
         design=() if assigned is None else design_rows(scene, assigned.answer.y),
         targets=() if assigned is None else assigned.targets,
         others=None if assigned is None else _others(assigned),
@@ -89,6 +88,7 @@ def collect_results(
         notes=(
             *scene.notes,
             *unsolved,
+            *studies.notes,
             *accuracy.notes,
             *_notes(scene, assigned, row),
             *motion[0],

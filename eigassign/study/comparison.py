@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
-from eigassign.errors import CaseError
+from eigassign.errors import CaseError, EigassignError
 from eigassign.modal.model import Model
 from eigassign.study.planning import joint_map, travelled
 from eigassign.study.results import (
@@ -125,35 +125,53 @@ def grid_over(
     )
 
 
-def map_over(model: Model, expansions: Expansions, grid: Grid | None) -> tuple[DesignMap, ...]:
-    """One map for each expanded mode; none without a grid."""
+def map_over(
+    model: Model, expansions: Expansions, grid: Grid | None
+) -> tuple[tuple[DesignMap, ...], tuple[str, ...]]:
+    """One map for each expanded mode; none without a grid.
+
+    Nor where the mechanism has no pose or no modes at one of its points, with a note on that.
+    """
     if grid is None:
-        return ()
+        return (), ()
+    try:
+        compared = compare(model, expansions, grid.points())
+    except EigassignError as error:
+        return (), (f"no map over {' and '.join(grid.names)}: {error}",)
     found = []
-    for values in compare(model, expansions, grid.points()):
+    for values in compared:
         parts = (values.exact_hz, values.taylor_hz, values.linearised_hz)
         shaped = Comparison(*(part.reshape(grid.shape) for part in parts))
         found.append(DesignMap(grid.names, grid.units, grid.axes, shaped))
-    return tuple(found)
+    return tuple(found), ()
 
 
 # --- Mode studies: what the figures show
 
 
-def study_modes(scene: Scene, initial_hz: Floats | None = None) -> tuple[ModeStudy, ...]:
-    """One study for each expanded mode; ``initial_hz`` (n_t, modes) exact on the trajectory."""
+@dataclass(frozen=True)
+class ModeStudies:
+    """One study for each expanded mode, and why there are maps that they lack."""
+
+    rows: tuple[ModeStudy, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def study_modes(scene: Scene, initial_hz: Floats | None = None) -> ModeStudies:
+    """Every expanded mode's study; ``initial_hz`` (n_t, modes) exact on the trajectory."""
     if scene.expanded is None:
-        return ()
+        return ModeStudies()
     model, expansions = scene.model, scene.expanded
     over_time: tuple[Comparison, ...] = ()
     if scene.trajectory is not None:
         x = model.x(scene.trajectory.q, scene.initial)
         over_time = compare(model, expansions, x, initial_hz)
-    over_design = map_over(model, expansions, design_grid(scene))
-    over_q = map_over(model, expansions, q_grid(scene))
+    over_design, no_design = map_over(model, expansions, design_grid(scene))
+    over_q, no_q = map_over(model, expansions, q_grid(scene))
     x0 = (expansions.full.q0, expansions.full.y0)
     parts = zip_longest(expansions.modes, over_time, over_design, over_q)
-    return tuple(ModeStudy(m, expansions.order, *x0, time, y, q) for m, time, y, q in parts)
+    rows = tuple(ModeStudy(m, expansions.order, *x0, time, y, q) for m, time, y, q in parts)
+    return ModeStudies(rows, no_design + no_q)
 
 
 def _counts(scene: Scene) -> Mapping[int, int]:

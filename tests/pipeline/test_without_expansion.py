@@ -130,10 +130,22 @@ def test_an_expansion_point_that_cannot_follow_the_path_ends_nothing(tmp_path: P
     assert any("no one-shot design: " in note for note in result.results.notes)
 
 
-def test_lengths_with_which_a_loop_cannot_be_closed_end_nothing(tmp_path: Path) -> None:
-    text = between((CASES / "four_bar.yaml").read_text(), "design:", "targets:", """design:
-  coupler: {parameter: links.coupler.length, min: 0.1, max: 0.5}
-expansion: {order: auto}
-assignment: {starts: 1}
+def lengths(order: str) -> str:
+    """Couplers too short to close the loop, but for a few."""
+    return between((CASES / "four_bar.yaml").read_text(), "design:", "targets:", f"""design:
+  coupler: {{parameter: links.coupler.length, min: 0.1, max: 0.5}}
+expansion: {{order: {order}, y: [0.45]}}
+assignment: {{starts: 1}}
 """)  # fmt: skip
-    assert "cannot be closed" in without(solved(tmp_path, text))
+
+
+def test_lengths_with_which_a_loop_cannot_be_closed_end_nothing(tmp_path: Path) -> None:
+    assert "cannot be closed" in without(solved(tmp_path, lengths("auto")))
+
+
+def test_a_map_over_lengths_that_do_not_close_a_loop_is_left_out(tmp_path: Path) -> None:
+    result = solved(tmp_path, lengths("4"))
+    (study,) = result.results.studies
+    assert study.over_time is not None
+    assert study.over_design is None
+    assert sum("no map over coupler: " in note for note in result.results.notes) == 1

@@ -12,7 +12,7 @@ from eigassign.study import COARSE, compare, grid_over, q_grid, study_modes
 
 def test_a_map_holds_at_each_point_what_a_solve_there_gives(tmp_path: Path) -> None:
     scene = scene_of(tmp_path, SHIPPED)
-    (study,) = study_modes(scene)
+    (study,) = study_modes(scene).rows
     chart = study.over_design
     assert chart is not None
     assert (chart.names, chart.units) == (("m1", "m2"), ("kg", "kg"))
@@ -27,7 +27,7 @@ def test_a_map_holds_at_each_point_what_a_solve_there_gives(tmp_path: Path) -> N
 
 def test_the_map_over_q_moves_the_elbow_over_what_it_travels(tmp_path: Path) -> None:
     scene = scene_of(tmp_path, SHIPPED)
-    chart = study_modes(scene)[0].over_q
+    chart = study_modes(scene).rows[0].over_q
     assert chart is not None
     assert (chart.names, chart.units) == (("q2",), ("rad",))
     travelled = scene.path.q[:, 1] - scene.path.q[:, 0]
@@ -38,7 +38,7 @@ def test_the_map_over_q_moves_the_elbow_over_what_it_travels(tmp_path: Path) -> 
 def test_known_exact_frequencies_are_used_and_not_solved_again(tmp_path: Path) -> None:
     scene = scene_of(tmp_path, SHIPPED)
     marked = np.full((152, 4), 100.0)
-    (study,) = study_modes(scene, marked)
+    (study,) = study_modes(scene, marked).rows
     assert study.over_time is not None
     assert (study.over_time.exact_hz == 100.0).all()
 
@@ -69,7 +69,7 @@ def test_the_expansion_point_is_on_the_map_even_if_the_path_misses_it(tmp_path: 
 
 
 def test_without_trajectory_and_design_there_is_nothing_to_map(tmp_path: Path) -> None:
-    (study,) = study_modes(scene_of(tmp_path, HEAD + "expansion: {q: [1.8, 5.2]}\n"))
+    (study,) = study_modes(scene_of(tmp_path, HEAD + "expansion: {q: [1.8, 5.2]}\n")).rows
     assert (study.over_time, study.over_design, study.over_q) == (None, None, None)
 
 
