@@ -47,15 +47,16 @@ def mode_slopes(pencil: Pencil, x: Floats, found: Modes, wanted: ArrayLike) -> F
 
 
 def mixed_slopes(
-    pencil: Pencil, x: Floats, count: int, wanted: ArrayLike
+    pencil: Pencil, x: Floats, count: int, wanted: ArrayLike, above: int = 1
 ) -> tuple[Floats, Floats, Floats]:
     """The same, of the mode above too if there is one, and the slopes of neighbours' mixture.
 
-    λ (n, count + 1), slopes (n, count + 1, n_x), those off the diagonal (n, count, n_x); one less
+    λ (n, count + above), slopes (n, count + 1, n_x), those off the diagonal (n, count, n_x); fewer
     where no more modes have mass.
     """
-    found = lowest_modes(pencil, pencil.theta(x), count, 1)
-    return found.lam, *neighbour_slopes(pencil, x, found, wanted)
+    found = lowest_modes(pencil, pencil.theta(x), count, above)
+    own = Modes(found.lam[:, : count + 1], found.phi[..., : count + 1])
+    return found.lam, *neighbour_slopes(pencil, x, own, wanted)
 
 
 def neighbour_slopes(

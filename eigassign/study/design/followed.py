@@ -10,7 +10,7 @@ same. How a shape is carried, and when it is lost, is for `eigassign.modal.exact
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -204,6 +204,12 @@ class Spectrum:
     followed: Modes  # (n, n_followed); NaN, and 0 for φ, where they are not needed
     numbers: Ints  # (n, n_followed): which mode from the lowest each is; 0 where not needed
 
+    @property
+    def solved(self) -> Solved:
+        """The frequencies alone."""
+        hz, followed = (np.sqrt(own.lam) / (2.0 * np.pi) for own in (self.modes, self.followed))
+        return Solved(hz, followed, self.numbers)
+
 
 def follow_all(
     model: Model, path: Trajectories, own: Sequence[Follower], y: Floats, least: int
@@ -242,8 +248,12 @@ def solve_design(
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> Solved:
     """Solve ``count`` or all shown modes, and those followed; raises LostModeError too."""
-    hz, n = scene.exact(y, count, progress), len(scene.path.q)
+    alone = unfollowed(scene.exact(y, count, progress))
     if not own:
-        return Solved(hz, np.zeros((n, 0)), np.zeros((n, 0), dtype=np.intp))
-    found = follow_all(scene.model, scene.path, own, y, 1)
-    return Solved(hz, np.sqrt(found.followed.lam) / (2.0 * np.pi), found.numbers)
+        return alone
+    return replace(follow_all(scene.model, scene.path, own, y, 1).solved, hz=alone.hz)
+
+
+def unfollowed(hz: Floats) -> Solved:
+    """Frequencies (n_t, n_modes) of which none is followed."""
+    return Solved(hz, np.zeros((len(hz), 0)), np.zeros((len(hz), 0), dtype=np.intp))

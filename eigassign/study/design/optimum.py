@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from eigassign.assignment.catalogues.branching import KEEP, ListedValues
 from eigassign.assignment.catalogues.choosing import RELAXED, Chosen, choose
+from eigassign.assignment.checks import frozen
 from eigassign.assignment.exact.design_problem import MET, best_first
 from eigassign.assignment.exact.sequential import End, Optimum, worth
 from eigassign.assignment.requirements.named_modes import followed_modes
-from eigassign.assignment.requirements.requirement import Requirement
+from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import InfeasibleError
 from eigassign.study.design.clearance import prove_clear, wanting
 from eigassign.study.design.one_shot import catalogues
@@ -51,6 +52,13 @@ class Found:
     def best(self) -> Optimum:
         """The best design."""
         return self.optima[0]
+
+    def initial_solved(self, count: int) -> Solved | None:
+        """The initial design as the search has solved it; None without so many modes."""
+        solved = self.variant.response.solved
+        if solved is None or solved.hz.shape[1] < count:
+            return None
+        return replace(solved, hz=frozen(solved.hz[:, :count]))
 
 
 def find_optimum(

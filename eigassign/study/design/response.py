@@ -11,11 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eigassign.assignment.requirements.requirement import Frequencies
+from eigassign.assignment.requirements.requirement import Frequencies, Solved
 from eigassign.errors import AccuracyError, EigassignError, LostModeError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
 from eigassign.modal.exact.condensation import Modes
@@ -23,8 +24,8 @@ from eigassign.modal.model import Model
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.reduce import reduce
 from eigassign.modal.slopes import eigenvalue_slopes, mixed_slopes, mode_slopes, neighbour_slopes
-from eigassign.study.design.followed import Follower, follow_all
-from eigassign.study.scene import AT_LEAST, BLOCK, Scene
+from eigassign.study.design.followed import Follower, Spectrum, follow_all, unfollowed
+from eigassign.study.scene import AT_LEAST, BLOCK, OTHERS, Scene
 
 Floats = NDArray[np.float64]
 
@@ -34,7 +35,7 @@ class DesignResponse:
     """The lowest ``count`` frequencies at every sample and the one above, then those followed.
 
     By exact solves, which are remembered; by reduced ``models``, if any, where they can be trusted,
-    and then without the one above.
+    and then without the one above. Of the ``initial`` design all that is shown is kept: ``solved``.
     """
 
     model: Model
@@ -43,6 +44,8 @@ class DesignResponse:
     count: int
     followers: tuple[Follower, ...] = ()
     models: ReducedModels | None = None
+    initial: Floats | None = None
+    solved: Solved | None = None
     exact_solves: int = 0  # so far
     known: dict[bytes, Frequencies] = field(default_factory=dict)
     lost: list[str] = field(default_factory=list)  # designs at which a followed mode is lost
@@ -70,25 +73,30 @@ class DesignResponse:
     def _exact(self, y: Floats) -> Frequencies:
         q, of_design = self.path.at(y)
         self.exact_solves += len(q)
+        shown = self.initial is not None and np.array_equal(y, self.initial)
         if self.followers:
-            lam, slopes, mixed = self._with_followed(y)
+            found, slopes, mixed = self._with_followed(y)
+            solved = found.solved
+            hz = np.hstack([solved.hz[:, : self.count + 1], solved.followed])
         else:
-            x = self.model.x(q, y)
-            lam, slopes, mixed = _in_blocks(mixed_slopes, self.model, x, self.count, self.wanted)
-        hz, slopes = _in_hz(lam, slopes)
+            x, solve = self.model.x(q, y), partial(mixed_slopes, above=OTHERS if shown else 1)
+            lam, slopes, mixed = _in_blocks(solve, self.model, x, self.count, self.wanted)
+            solved = unfollowed(np.sqrt(lam) / (2.0 * np.pi))
+            hz = solved.hz[:, : self.count + 1]
+        self.solved = solved if shown else self.solved
+        slopes = slopes / (8.0 * np.pi**2 * hz[..., None])
         lower, upper = (hz[:, k : k + mixed.shape[1]] for k in (0, 1))
         mixed = mixed / (4.0 * np.pi**2 * (lower + upper))[..., None]
         follows = self.path.follows_design
         return Frequencies(hz, *(_in_design(part, of_design, follows) for part in (slopes, mixed)))
 
-    def _with_followed(self, y: Floats) -> tuple[Floats, Floats, Floats]:
-        """λ, its slopes in (q, y), and those off the diagonal of numbered modes alone."""
+    def _with_followed(self, y: Floats) -> tuple[Spectrum, Floats, Floats]:
+        """The modes, slopes of λ in (q, y), and those off the diagonal of numbered modes alone."""
         found = follow_all(self.model, self.path, self.followers, y, self.count)
         own = Modes(found.modes.lam[:, : self.count + 1], found.modes.phi[..., : self.count + 1])
         slopes, mixed = neighbour_slopes(self.model.pencil, found.x, own, self.wanted)
         of_followed = mode_slopes(self.model.pencil, found.x, found.followed, self.wanted)
-        lam = np.hstack([own.lam, found.followed.lam])
-        return lam, np.concatenate([slopes, of_followed], axis=1), mixed
+        return found, np.concatenate([slopes, of_followed], axis=1), mixed
 
 
 def _in_design(slopes: Floats, of_design: Floats, follows: bool) -> Floats:
@@ -139,7 +147,8 @@ def response_of(
     moving = np.full(scene.path.q.shape[1], scene.path.follows_design)
     moving[scene.model.pencil.n_joints :] = False  # loads do not follow the design
     wanted = np.append(moving, upper > lower)
-    return DesignResponse(scene.model, scene.path, wanted, count, followers, models)
+    own = scene.model, scene.path, wanted, count, followers, models
+    return DesignResponse(*own, initial=scene.initial)
 
 
 # --- Reduced models

@@ -116,3 +116,12 @@ def test_a_price_below_that_of_the_initial_design_is_no_reason_to_stop(tmp_path:
     found = found_of(tmp_path, priced + "targets: [{mode: 1, at_least: 10 Hz}]\n", [])
     assert found.best.objective < 0.0
     assert found.starts >= 3
+
+
+def test_the_initial_design_is_handed_on_as_the_search_has_solved_it(tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, SHIPPED + "assignment: {starts: 1}\n")
+    found = find_optimum(scene, requirements_of(scene.file, scene.path), [], str)
+    solved = found.initial_solved(4)
+    assert solved is not None
+    np.testing.assert_allclose(solved.hz, scene.exact(scene.initial, 4), rtol=1e-11)
+    assert found.initial_solved(5) is None  # one mode is assigned, and three above it shown
