@@ -182,7 +182,7 @@ def chart_meshes(
     meshes = {
         counts: (k, finer) for k in sorted(effort.factors) for finer, counts in [refined(file, k)]
     }
-    found, solved = list[tuple[float, int, int, Timing]](), list[Floats]()
+    sizes, times, solved = list[tuple[float, int, int]](), list[Timing](), list[Floats]()
     for counts, (factor, finer) in meshes.items():
         model = build_model(finer)
         if not counts or model.n_dof > effort.most_dof:
@@ -190,16 +190,17 @@ def chart_meshes(
         q, y = np.split(x, [len(model.q_names)], axis=1)
         hz, spent = measure(partial(model.frequencies, q, y, max(modes)), effort, len(x))
         solved.append(hz[:, np.array(modes) - 1])
-        found.append((factor, sum(counts), model.n_dof, spent))
-    if len(found) < 2:
+        sizes.append((factor, sum(counts), model.n_dof))
+        times.append(spent)
+    if len(sizes) < 2:
         return ()
     off = np.array(solved) - (limit := solved[-1] + (solved[-1] - solved[-2]) / 15.0)
     worst, relative = (np.abs(e).max(axis=(1, 2)) for e in (off, off / limit))
     with np.errstate(divide="ignore", invalid="ignore"):  # where an error is 0
-        slopes = -np.diff(np.log(worst)) / np.diff(np.log([factor for factor, *_ in found]))
+        slopes = -np.diff(np.log(worst)) / np.diff(np.log([factor for factor, *_ in sizes]))
     orders = [*(float(p) if np.isfinite(p) else None for p in slopes[:-1]), None, None]
-    rows = zip(found, worst.tolist(), relative.tolist(), orders, strict=True)
-    return tuple(MeshRow(*sizes, w, e, order, spent) for (*sizes, spent), w, e, order in rows)
+    rows = zip(sizes, worst.tolist(), relative.tolist(), orders, times, strict=True)
+    return tuple(MeshRow(*size, w, e, order, spent) for size, w, e, order, spent in rows)
 
 
 # --- Which methods no other beats, and what to choose

@@ -204,26 +204,27 @@ def _fits(bench: Bench) -> Iterator[Method]:
 
     Along the trajectory for each design, and over trajectory × box; there of reduced models too.
     """
-    most, effort, over = bench.most_solves, bench.effort, "q, ea.Box(lower, upper)"
-    given = [("of given solves", f"of {k} solves", {"solves": k}) for k in SOLVES if k <= most]
-    to = [("to an accuracy", f"{a:.0e}", {"accuracy": a, "most": most}) for a in effort.accuracies]
-    for family, name, how in [*given, *to]:
-        build = partial(_reduced_or_fitted, bench, {}, how)
-        if bench.place is not None and how.get("solves", 0) <= 25:
-            use = _call(bench, "ea.fit", "model, q, y", **how)
-            yield Method(
-                f"fit {name} along", f"fit {family}, one trajectory", how, build, use, True
-            )
-        if how.get("solves", 9) >= 9:
-            use = f"{_call(bench, 'ea.fit', f'model, {over}', **how)}.along(designs)"
-            yield Method(f"fit {name}", f"fit {family}", how, build, use)
+    effort, most = bench.effort, bench.most_solves
+    wanted = list[tuple[str, str, dict[str, Any], dict[str, Any]]]()
+    for k in [k for k in SOLVES if k <= most]:
+        wanted.append((f"fit of {k} solves", "fit of given solves", {"solves": k}, {}))
+    for a in effort.accuracies:
+        how = {"accuracy": a, "most": most}
+        wanted.append((f"fit {a:.0e}", "fit to an accuracy", how, {}))
     for (m, count), a in product(effort.fitted, effort.accuracies):
         q, y, where = _about(bench, count)
-        basis, how = {"half_order": m, "q": q, "y": y}, {"accuracy": a}
-        of, source = f"of reduced m = {m}, {where}", _call(bench, *REDUCE, half_order=m)
-        use = f"{_call(bench, 'ea.fit', f'{source}, {over}', **how)}.along(designs)"
-        build = partial(_reduced_or_fitted, bench, basis, how)
-        yield Method(f"fit {a:.0e} {of}", f"fit {of}", {**how, **basis}, build, use)
+        of, basis = f"of reduced m = {m}, {where}", {"half_order": m, "q": q, "y": y}
+        wanted.append((f"fit {a:.0e} {of}", f"fit {of}", {"accuracy": a}, basis))
+    for name, family, how, basis in wanted:
+        build, source = partial(_reduced_or_fitted, bench, basis, how), "model"
+        if basis:
+            source = _call(bench, *REDUCE, half_order=basis["half_order"])
+        elif bench.place is not None and how.get("solves", 0) <= 25:
+            along, use = f"{family}, one trajectory", _call(bench, "ea.fit", "model, q, y", **how)
+            yield Method(f"{name} along", along, how, build, use, per_design=True)
+        if how.get("solves", 9) >= 9:
+            use = _call(bench, "ea.fit", f"{source}, q, ea.Box(lower, upper)", **how)
+            yield Method(name, family, {**how, **basis}, build, f"{use}.along(designs)")
 
 
 def _reduced_or_fitted(
