@@ -64,7 +64,7 @@ def test_what_gives_no_number_is_infinitely_wrong(tmp_path: Path) -> None:
     """A first order in masses of up to 2 kg: λ is below 0 where both are heavy."""
     scene = scene_of(tmp_path, SHIPPED.replace("max: 250 g", "max: 2 kg"))
     few = replace(TINY, orders=(1,), half_orders=(1,), expansion_points=(1,), accuracies=())
-    made = compare_methods(scene, few, Request(accuracy=0.5), lambda line: None)
+    made = compare_methods(scene, few, Request((0.5,)), lambda line: None)
     (taylor,) = [p for p in made.points if p.method == "Taylor 1 full"]
     assert 0 < taylor.everywhere.failed < taylor.everywhere.samples
     assert taylor.everywhere.worst_hz == taylor.everywhere.rms_hz == np.inf
