@@ -68,7 +68,7 @@ class Batch:
         """The content of batch.json."""
         folder = Path(os.path.realpath(self.folder))
         files = tuple(relative_path(Path(f.path), folder) for f in self.plan.files)
-        keys = tuple(dict.fromkeys(key for f in self.plan.files for key in f.keys))
+        keys = tuple(dict.fromkeys(key for f in self.plan.files for key in f.variants.keys))
         plan, count = self.plan.digest, len(self.plan)
         return Header(plan, count, self.shard, files, keys, self.options.columns)
 

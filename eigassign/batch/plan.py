@@ -21,7 +21,7 @@ from itertools import accumulate
 from pathlib import Path
 
 from eigassign._version import __version__
-from eigassign.batch.variants import OPTION, Variants, variants_of
+from eigassign.batch.variants import AS_IT_STANDS, OPTION, Variants, variants_of
 from eigassign.case.loading import Unchecked, read
 from eigassign.case.reader import dotted
 from eigassign.case.schema.sweep import text_of
@@ -50,27 +50,19 @@ class Variant:
 
 @dataclass(frozen=True)
 class PlannedFile:
-    """A case file of a batch; ``variants`` is None where it is run as it stands."""
+    """A case file of a batch."""
 
     path: str
     name: str
     content: str  # SHA-256 of what it says, of the version and of what else changes numbers
-    variants: Variants | None = None
+    variants: Variants = AS_IT_STANDS
     prefix: str = ""  # of the names of variants
     is_set: bool = False  # the variants are from --set
 
     @property
-    def keys(self) -> tuple[str, ...]:
-        """Keys that its variants have values of."""
-        return () if self.variants is None else self.variants.keys
-
-    def __len__(self) -> int:
-        return 1 if self.variants is None else len(self.variants)
-
-    @property
     def said(self) -> object:
         """What tells its variants from others; files that values name count by content."""
-        if self.variants is None:
+        if not self.variants.keys:
             return ""
         texts = dict.fromkeys(_texts(self.variants.columns))
         folder = Path(self.path).parent
@@ -79,7 +71,7 @@ class PlannedFile:
 
     def variant(self, k: int, index: int) -> Variant:
         """Its k-th variant, which is the ``index``-th of the batch."""
-        values = {} if self.variants is None else self.variants[k]
+        values = self.variants[k]
         key = key_of(self.content, values, Path(self.path).parent)
         name = self.prefix + _named(self._short, values) if values else self.name
         return Variant(index, name, self.path, values, key)
@@ -87,7 +79,7 @@ class PlannedFile:
     @cached_property
     def _short(self) -> Mapping[str, str]:
         """The end of each key that tells it from all others."""
-        parts = {key: key.split(".") for key in self.keys}
+        parts = {key: key.split(".") for key in self.variants.keys}
         ends = {key: [".".join(p[-n:]) for n in range(1, len(p) + 1)] for key, p in parts.items()}
         return {
             key: next(e for e in mine if sum(e in other for other in ends.values()) == 1)
@@ -117,7 +109,7 @@ class BatchPlan:
 
     @cached_property
     def _ends(self) -> tuple[int, ...]:
-        return tuple(accumulate(map(len, self.files), initial=0))
+        return tuple(accumulate((len(file.variants) for file in self.files), initial=0))
 
     @cached_property
     def digest(self) -> str:
@@ -127,7 +119,7 @@ class BatchPlan:
     @property
     def is_swept(self) -> bool:
         """True where a case file has variants."""
-        return any(file.variants is not None for file in self.files)
+        return any(file.variants.keys for file in self.files)
 
 
 def plan_of(cases: Sequence[Path], settings: Sequence[str] = ()) -> BatchPlan:
@@ -199,7 +191,7 @@ def variant_problem(plan: BatchPlan, index: int, problem: Problem) -> Problem:
     source, variants = read(file.path).source, file.variants
     paths = {key: dotted(key_path(source.tree, key)) for key in variant.values}
     key = next((key for key, path in paths.items() if problem.path.startswith(path)), None)
-    if key is None or variants is None:
+    if key is None:
         return Problem(problem.file, problem.line, problem.column, problem.path, message)
     if file.is_set:
         return Problem(OPTION, 0, 0, key, message)

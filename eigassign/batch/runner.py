@@ -71,7 +71,7 @@ def require_valid(batch: Batch, workers: Workers, say: Callable[[str], None] = s
     if not batch.plan.is_swept or read_header(batch.folder) == batch.header:
         return
     plan = batch.plan
-    indices = [k for k in batch.header.indices() if plan.whose(k)[0].variants is not None]
+    indices = [k for k in batch.header.indices() if plan.whose(k)[0].variants.keys]
     if indices:
         say(f"checking {len(indices)} variant{'s' if len(indices) > 1 else ''}")
     starts = range(0, len(indices), _CHECKED)

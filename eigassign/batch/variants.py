@@ -78,15 +78,18 @@ class Variants:
         return digest.hexdigest()
 
 
-def variants_of(source: Source, folder: Path, settings: Sequence[str] = ()) -> Variants | None:
-    """The variants that ``settings`` say, else the `sweep` of the case; None where neither does.
+AS_IT_STANDS = Variants((), (), grid=True)  # one, without values
+
+
+def variants_of(source: Source, folder: Path, settings: Sequence[str] = ()) -> Variants:
+    """The variants that ``settings`` say, else the `sweep` of the case, else the case as it stands.
 
     ``folder`` is that of the case file, ``settings`` are as written behind ``--set``. Raises
     CaseError for a wrong sweep, and for a key that no case could have.
     """
     given = {"parameters": _set(settings)} if settings else source.tree.get("sweep")
     if given is None:
-        return None
+        return AS_IT_STANDS
     sweep, findings = validated_sweep(given)
     if sweep is not None:
         try:

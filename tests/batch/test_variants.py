@@ -20,14 +20,12 @@ def swept(tmp_path: Path, sweep: str) -> Variants:
     file.write_text(f"{TEXT}sweep:\n{sweep}")
     load(file)  # the file as it stands is in order
     found = variants_of(read(file).source, tmp_path)
-    assert found is not None
     return found
 
 
 def given(*settings: str) -> Variants:
     """The variants that --set says."""
     found = variants_of(read_yaml(TEXT.encode(), "case.yaml"), Path(), settings)
-    assert found is not None
     return found
 
 
