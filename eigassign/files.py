@@ -29,7 +29,7 @@ CASE = 10_000_000  # bytes of a case file
 TABLE = 100_000_000  # of a CSV file: far more than anybody's table, less than memory
 MATRIX = 1_000_000_000  # of a matrix of a superelement
 STORED = 1_000_000_000  # of what this program wrote: cache, reduced models
-_PIECE = 1 << 20
+_PIECE = 1 << 20  # bytes: hashing them takes longer than asking for them
 _KINDS = {
     stat.S_IFDIR: "a folder",
     stat.S_IFIFO: "a pipe",

@@ -9,7 +9,7 @@ from itertools import islice
 
 from eigassign.files import printable
 
-_LONGEST = 60
+_LONGEST = 60  # characters of a value: half a line of a message
 _SYNONYMS = {  # what others call it
     **dict.fromkeys(("hinge", "pin", "pivot", "rotary", "rotation", "rotational"), "revolute"),
     **dict.fromkeys(("slider", "linear", "translation", "translational", "sliding"), "prismatic"),
@@ -25,7 +25,7 @@ _SYNONYMS = {  # what others call it
     "rho": "density",
     **dict.fromkeys(("nu", "poisson", "poissons"), "poissons_ratio"),
 }
-_MOST_NAMES = 20
+_MOST_NAMES = 20  # of those that are known: two lines of a message
 _MOST_CANDIDATES = 200  # names compared with a misspelt one: keeps hostile files cheap
 
 

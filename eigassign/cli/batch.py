@@ -251,10 +251,9 @@ def _tell(batch: Batch, workers: Workers, reporter: Reporter) -> int:
     spent = seconds_of_done(batch)
     todo = [index for index in batch.header.indices() if index not in spent]
     first, last = todo[:_FIRST], todo[_FIRST:][-_LAST:]
-    rows = [(str(index + 1), batch.plan[index].name) for index in first]
-    if len(todo) > _FIRST + _LAST:
-        rows.append(("…", f"{len(todo) - _FIRST - _LAST} more"))
-    rows += [(str(index + 1), batch.plan[index].name) for index in last]
+    rows = [(str(index + 1), batch.plan[index].name) for index in (*first, *last)]
+    if len(todo) > len(rows):
+        rows.insert(_FIRST, ("…", f"{len(todo) - len(rows)} more"))
     if rows:
         print_tables([Table("Cases that would run", ("case", "name"), tuple(rows))])
     show(f"{_cases(len(todo))} would run, {len(spent)} are done and current")

@@ -153,8 +153,6 @@ def errors(results: RunResults) -> Table:
     kinds = _stages(results)
     columns = ("target", "error", *kinds)
     wanted = [target for target in results.targets if target.asked.is_goal]
-    if not wanted:
-        return Table("Distance to the target", columns, ())
     summaries = [pair for target in wanted for pair in _of_target(target)]
     if len(wanted) > 1 and len(results.trajectories) > 1:
         along = ((row.name, results.error_along(row.name)) for row in results.trajectories)
