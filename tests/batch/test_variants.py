@@ -19,14 +19,12 @@ def swept(tmp_path: Path, sweep: str) -> Variants:
     file = tmp_path / "case.yaml"
     file.write_text(f"{TEXT}sweep:\n{sweep}")
     load(file)  # the file as it stands is in order
-    found = variants_of(read(file).source, tmp_path)
-    return found
+    return variants_of(read(file).source, tmp_path)
 
 
 def given(*settings: str) -> Variants:
     """The variants that --set says."""
-    found = variants_of(read_yaml(TEXT.encode(), "case.yaml"), Path(), settings)
-    return found
+    return variants_of(read_yaml(TEXT.encode(), "case.yaml"), Path(), settings)
 
 
 def refused(*settings: str) -> str:
