@@ -92,12 +92,11 @@ class Requirements:
         if self.least_change is not None:
             reference, width = self.least_change
             residuals.append(((y - reference) / width, np.diag(1.0 / width)))
-        excesses = [rows.at(y, found) for rows in self.excesses]
-        return Appraisal(
-            *_stacked(residuals, len(y)), *_stacked(excesses, len(y)), self._pairs(found)
-        )
+        residual, slopes = _stacked(residuals, len(y))
+        excess = _stacked([rows.at(y, found) for rows in self.excesses], len(y))
+        return Appraisal(residual, slopes, *excess, self._pairs(found, len(residual)))
 
-    def _pairs(self, found: Frequencies) -> NeighbourPairs | None:
+    def _pairs(self, found: Frequencies, m: int) -> NeighbourPairs | None:
         """Rows of one mode beside its neighbours; None where nothing is known of these.
 
         Squares of errors of neighbours that are both wanted are smooth together where they meet at
@@ -111,9 +110,7 @@ class Requirements:
             own = rows.of.rows
             met = (o for o in smooth if max(o.rows.start, own.start) < min(o.rows.stop, own.stop))
             parts += rows.beside(found, at.start, [mode for o in met for mode, _ in o.mode_terms])
-        changes = 0 if self.least_change is None else len(self.least_change[0])
-        first = sum(len(rows.edge) for rows in self.residuals) + changes
-        for rows, at in _spans(self.excesses, first):
+        for rows, at in _spans(self.excesses, m):
             parts += rows.beside(found, at.start)
         return joined(parts)
 

@@ -51,14 +51,8 @@ def is_proved(scene: Scene, found: Found) -> bool:
         return best.stationarity <= OPTIMAL and not asked.goals and _are_convex(scene, asked)
     if not _are_convex(scene, asked):
         return False
-    problem = found.variant.problem
-
-    def limits(y: Floats) -> Appraisal:
-        seen = problem.appraise(y)
-        return replace(seen, residual=np.zeros(0), slopes=seen.slopes[:0], pairs=None)
-
-    alone = replace(problem, appraise=limits, prices=None)
-    least = minimise(alone, best.y, scene.file.assignment.steps)
+    limits = found.variant.of(replace(asked, asked=asked.limits, least_change=None))
+    least = minimise(replace(limits, prices=None), best.y, scene.file.assignment.steps)
     return least.seen.violation > MET and least.stationarity <= OPTIMAL
 
 
@@ -117,7 +111,8 @@ def conflict(found: Found, listed: Sequence[ListedValues], steps: int) -> Confli
     answers: list[bool | None] = []
 
     def contradict(rest: list[str]) -> bool:
-        met = _can_be_met(found.variant.with_limits(rest), listed, best.y, steps) if rest else True
+        some = found.variant.of(asked.with_limits(rest))
+        met = not rest or _can_be_met(some, listed, best.y, steps)
         answers.append(met)
         return met is False
 

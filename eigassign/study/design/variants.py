@@ -7,7 +7,6 @@ modes below it is the same everywhere, so each k that the bounds may allow is on
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -40,9 +39,8 @@ class PosedProblem:
     problem: DesignProblem
     response: DesignResponse
 
-    def with_limits(self, names: Collection[str]) -> DesignProblem:
-        """The problem with those limits only that are named."""
-        some = self.requirements.with_limits(names)
+    def of(self, some: Requirements) -> DesignProblem:
+        """The problem with ``some`` of its requirements only."""
         return replace(self.problem, appraise=lambda y: some.appraise(y, self.response(y)))
 
     def without_slopes(self, y: Floats) -> Appraisal:

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.exact.design_problem import Appraisal, DesignProblem
+from eigassign.assignment.exact.design_problem import DesignProblem
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import minimise
 from eigassign.assignment.requirements.frequency import AssignedFrequency
@@ -117,13 +117,10 @@ def _nearest(scene: Scene, wanted: Requirement, k: int, y: Floats, allowed: floa
     asked = Requirements((there,), np.ones(1))
     alone = replace(scene, trajectory=scene.path.chosen([at]))
     own = followers(alone, [replace(there, followed=wanted.followed)])
-    response = response_of(alone, asked.modes, own)
-
-    def appraise(y: Floats) -> Appraisal:
-        return asked.appraise(y, response(y))
-
-    lower, upper = scene.bounds
-    problem = DesignProblem(appraise, lower, upper, scene.constraints)
+    response, (lower, upper) = response_of(alone, asked.modes, own), scene.bounds
+    problem = DesignProblem(
+        lambda y: asked.appraise(y, response(y)), lower, upper, scene.constraints
+    )
     found = []
     for start in (y, 0.5 * (lower + upper), scene.initial):
         try:
