@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.exact.sequential import End
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.brief import Brief
 from eigassign.case.units import is_bare
@@ -655,7 +654,7 @@ class RunResults(Brief):
     @property
     def interrupted(self) -> bool:
         """True where Ctrl-C ended the search: what was found until then is the answer."""
-        return self.assignment is not None and self.assignment.ended == End.INTERRUPTED
+        return self.assignment is not None and self.assignment.ended == "interrupted"
 
     @property
     def shortcoming(self) -> str | None:
