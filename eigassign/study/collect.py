@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,15 +56,9 @@ def collect_results(
 ) -> RunResults:
     """The results of a run; without ``assigned`` those of an expansion only."""
     file, trajectory = scene.file, scene.trajectory
-    motion, row = _motion(scene, assigned), _assignment(scene, accuracy, assigned)
     along = [(s.over_time.worst_taylor, s.mode) for s in studies.rows if s.over_time is not None]
-    followed = assigned is not None and assigned.answer.found is not None  # by exact frequencies
-    reach = () if followed else reach_warnings(scene, along)
-    one_shot = None if assigned is None else assigned.answer.one_shot
-    n = len(file.coordinates)
-    meaning = Meaning() if assigned is None else assigned.meaning
-    unsolved = () if assigned is None else assigned.solved.notes
-    return RunResults(
+    reach, n = reach_warnings(scene, along), len(file.coordinates)
+    results = RunResults(
         title=file.title,
         reference=file.reference,
         case_name=file.path.stem.encode("utf-8", "replace").decode("utf-8"),
@@ -78,28 +72,46 @@ def collect_results(
         trajectories=_trajectories(file, trajectory),
         poses=_poses(scene),
         studies=studies.rows,
-        design=() if assigned is None else design_rows(scene, assigned.answer.y),
-        targets=() if assigned is None else assigned.targets,
-        others=None if assigned is None else _others(assigned),
-        spectrum=None if assigned is None else _spectrum(assigned),
-        solver=None if one_shot is None else solver_row(one_shot),
-        assignment=row,
-        warnings=(*scene.warnings, *_warnings(scene, assigned), *reach, *motion[1]),
-        notes=(
-            *scene.notes,
-            *unsolved,
-            *studies.notes,
-            *accuracy.notes,
-            *_notes(scene, assigned, row),
-            *motion[0],
-            *meaning.notes,
-        ),
+        design=(),
+        targets=(),
+        others=None,
+        solver=None,
+        assignment=None,
+        warnings=(*scene.warnings, *reach),
+        notes=(*scene.notes, *studies.notes, *accuracy.notes),
         timing_s=dict(timing_s),
         tolerance=file.validation.max_error,
-        meaning=meaning,
-        mass=None if assigned is None else _mass(scene, assigned.answer.y),
         discretisation=accuracy.mesh,
         moving=moving,
+    )
+    return results if assigned is None else _with_answer(results, scene, assigned, reach)
+
+
+def _with_answer(
+    results: RunResults, scene: Scene, assigned: VerifiedAssignment, reach: tuple[str, ...]
+) -> RunResults:
+    """The results with those of the answer; ``reach`` matters to one that the expansion gave."""
+    answer, targets, meaning = assigned.answer, assigned.targets, assigned.meaning
+    row = assignment_row(
+        scene, answer, assigned.wanted, targets, results.discretisation, meaning.unreachable
+    )
+    reach = reach if answer.found is None else ()
+    motion = study_motion(scene, assigned.solved.initial.hz)
+    slow, fast = ("", None) if motion is None else (motion.note, motion.warning)
+    warnings = (*scene.warnings, *_warnings(scene, assigned), *reach, fast)
+    notes = (*assigned.solved.notes, *_notes(scene, assigned, row), slow, *meaning.notes)
+    return replace(
+        results,
+        design=design_rows(scene, answer.y),
+        targets=targets,
+        others=_others(assigned),
+        spectrum=_spectrum(assigned),
+        solver=None if answer.one_shot is None else solver_row(answer.one_shot),
+        assignment=row,
+        warnings=tuple(warning for warning in warnings if warning),
+        notes=(*results.notes, *(note for note in notes if note)),
+        meaning=meaning,
+        mass=_mass(scene, answer.y),
     )
 
 
@@ -109,22 +121,8 @@ def _mass(scene: Scene, y: Floats) -> MassRow:
     return MassRow(mass(scene.initial), mass(y), low, high)
 
 
-def _assignment(
-    scene: Scene, accuracy: Accuracy, assigned: VerifiedAssignment | None
-) -> AssignmentRow | None:
-    if assigned is None:
-        return None
-    answer, beyond = assigned.answer, assigned.meaning.unreachable
-    asked = assigned.wanted, assigned.targets
-    return assignment_row(scene, answer, *asked, accuracy.mesh, beyond)
-
-
-def _notes(
-    scene: Scene, assigned: VerifiedAssignment | None, row: AssignmentRow | None
-) -> tuple[str, ...]:
+def _notes(scene: Scene, assigned: VerifiedAssignment, row: AssignmentRow) -> tuple[str, ...]:
     """Notes on the choices on the way to the answer, and on the limits that hold it back."""
-    if assigned is None or row is None:
-        return ()
     swaps = swap_notes(scene.path, assigned.targets)
     missed = [target.label for target in assigned.targets if not target.satisfied]
     return (*assigned.answer.notes, *limit_notes(assigned.answer, row, missed), *swaps)
@@ -144,16 +142,6 @@ def _trajectories(file: CaseFile, path: Trajectories | None) -> tuple[Trajectory
         )
         for k, (part, rows) in enumerate(zip(path.parts, path.rows, strict=True))
     )
-
-
-def _motion(scene: Scene, assigned: VerifiedAssignment | None) -> tuple[list[str], list[str]]:
-    """Notes and warnings on the speed of the motion."""
-    if assigned is None:
-        return [], []
-    study = study_motion(scene, assigned.solved.initial.hz)
-    if study is None:
-        return [], []
-    return [study.note] if study.note else [], [study.warning] if study.warning else []
 
 
 def _poses(scene: Scene) -> DrawnPoses:
@@ -187,10 +175,8 @@ def _modes(target: TargetStudy) -> set[int]:
     )
 
 
-def _warnings(scene: Scene, assigned: VerifiedAssignment | None) -> Iterator[str]:
+def _warnings(scene: Scene, assigned: VerifiedAssignment) -> Iterator[str]:
     """Warnings of results that may mislead: crossing modes, a poor prediction, a worse design."""
-    if assigned is None:
-        return
     modes = tuple(sorted({mode for target in assigned.targets for mode in target.asked.modes}))
     for solved, design in (
         (assigned.solved.initial, "initial"),

@@ -344,14 +344,14 @@ def reach_warnings(scene: Scene, along: Iterable[tuple[float, int]]) -> tuple[st
 
     ``along`` is the worst relative error of the full expansion there, and the mode that has it.
     """
-    file, expansions = scene.file, scene.expansions
+    file = scene.file
     worst, mode = max(along, default=(0.0, 0))
     limit = file.validation.max_error
     if worst <= limit or file.expansion.order == "auto":
         return ()
     off = f"is {100 * worst:.3g} % off" if np.isfinite(worst) else "gives no frequency (λ < 0)"
     return (
-        f"the expansion of order {expansions.full_order} {off} in mode {mode} along the "
+        f"the expansion of order {scene.expansions.full_order} {off} in mode {mode} along the "
         f"trajectory, where {100 * limit:g} % are accepted (validation.max_error): the motion goes "
         "beyond what one point reaches. Write expansion: {order: auto}, which takes the order, and "
         "several points where need be; exact frequencies do not depend on it",
