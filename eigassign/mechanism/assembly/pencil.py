@@ -31,6 +31,11 @@ STACK_LIMIT = 500_000  # numbers: 4 MB
 TINY_STACK = 20_000
 
 
+def theta_at(program: Program, z: Floats) -> Floats:
+    """θ = (1, program(z)) (n_theta, n) at the program's variables z (n_z, n)."""
+    return np.vstack([np.ones((1, z.shape[1])), program.run(Samples(), z)])
+
+
 def theta_slopes(
     program: Program, to_program: Floats, shift: Floats, x: Floats, along: Ints
 ) -> Floats:
@@ -140,12 +145,10 @@ class Pencil(Brief):
         x = np.atleast_2d(x)
         if self.limits is not None:
             self.limits.require(x)
+        z = self.to_program @ x.T + self.shift[:, None]
         if self.rails is not None:
-            self.rails.require(self.to_program @ x.T + self.shift[:, None], x)
-        theta = np.empty((self.n_theta, len(x)))
-        theta[0] = 1.0
-        theta[1:] = self.program.run(Samples(), self.to_program @ x.T + self.shift[:, None])
-        return theta
+            self.rails.require(z, x)
+        return theta_at(self.program, z)
 
     def theta_slopes(self, x: Floats, along: Ints) -> Floats:
         """∂θ/∂x_i (len(along), n_theta, n_samples) in the variables ``along`` of x (n, n_x)."""

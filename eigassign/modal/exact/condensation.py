@@ -29,6 +29,12 @@ class Modes:
     phi: Floats
 
 
+def positive_at_top(phi: Floats) -> Floats:
+    """Modes (…, n_dof, count) whose entries of largest magnitude are positive."""
+    at = np.abs(phi).argmax(axis=-2, keepdims=True)
+    return np.asarray(phi * np.where(np.take_along_axis(phi, at, axis=-2) < 0.0, -1.0, 1.0))
+
+
 def condense(
     M: Floats, elastic: NDArray[np.intp], rigid: NDArray[np.intp]
 ) -> tuple[Floats, Floats]:

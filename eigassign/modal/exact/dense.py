@@ -14,8 +14,14 @@ from scipy.linalg import lapack
 
 from eigassign.errors import LIMP, AccuracyError, MechanismError
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.arguments import NUMBERS, chunks
-from eigassign.modal.exact.condensation import Modes, block, condense_blocks, rigid_coupling
+from eigassign.modal.arguments import chunks
+from eigassign.modal.exact.condensation import (
+    Modes,
+    block,
+    condense_blocks,
+    positive_at_top,
+    rigid_coupling,
+)
 from eigassign.modal.exact.massless import mass_sizes, may_be_roundoff, modes_with_mass
 
 Floats = NDArray[np.float64]
@@ -29,12 +35,10 @@ def solve_dense(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Mod
     if theta.shape[1] == 1:
         lam, phi = solve_single(pencil, theta, count)
         return Modes(lam[None], phi[None])
-    columns = np.arange(theta.shape[1])
-    if pencil.n_dof**2 * len(columns) <= NUMBERS:
-        return _batch(pencil, theta, count, vectors)
-    parts = [
-        _batch(pencil, theta[:, at], count, vectors) for at in chunks(columns, pencil.n_dof**2)
-    ]
+    samples = chunks(np.arange(theta.shape[1]), pencil.n_dof**2)
+    parts = [_batch(pencil, theta[:, at], count, vectors) for at in samples]
+    if len(parts) == 1:
+        return parts[0]
     return Modes(np.concatenate([p.lam for p in parts]), np.concatenate([p.phi for p in parts]))
 
 
@@ -80,11 +84,7 @@ def _with_mass(pencil: Pencil, theta: Floats, mu: Floats, noise: Floats, phi: Fl
         lam[k], modes = modes_with_mass(pencil, theta[:, [k]], count)
         if phi.size:
             phi[k] = modes
-    if not phi.size:
-        return Modes(lam, phi)
-    at = np.abs(phi).argmax(axis=1)
-    largest = np.take_along_axis(phi, at[:, None, :], axis=1)
-    return Modes(lam, phi * np.where(largest < 0.0, -1.0, 1.0))
+    return Modes(lam, positive_at_top(phi) if phi.size else phi)
 
 
 # --- One sample, through LAPACK without detours

@@ -12,7 +12,7 @@ from scipy.sparse import linalg
 from eigassign.errors import LIMP, AccuracyError, MechanismError, MissingMassError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.sparse_factor import factorise
-from eigassign.modal.exact.condensation import Modes, rigid_coupling
+from eigassign.modal.exact.condensation import Modes, positive_at_top, rigid_coupling
 from eigassign.modal.exact.massless import mass_sizes, may_be_roundoff, modes_with_mass
 
 Floats = NDArray[np.float64]
@@ -55,12 +55,6 @@ def _one(pencil: Pencil, theta: Floats, count: int) -> tuple[Floats, Floats]:
     else:
         raise MissingMassError(int(sure.argmin()))
     return lam, positive_at_top(phi)
-
-
-def positive_at_top(phi: Floats) -> Floats:
-    """Modes (…, n_dof, count) whose entries of largest magnitude are positive."""
-    at = np.abs(phi).argmax(axis=-2, keepdims=True)
-    return np.asarray(phi * np.where(np.take_along_axis(phi, at, axis=-2) < 0.0, -1.0, 1.0))
 
 
 def lanczos(

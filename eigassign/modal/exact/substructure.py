@@ -46,11 +46,11 @@ from scipy.sparse import linalg
 from eigassign.errors import AccuracyError, MechanismError
 from eigassign.mechanism.assembly.pencil import Pencil
 from eigassign.mechanism.elements.sparse_factor import definite_factor
-from eigassign.modal.exact.condensation import Modes, condense_blocks
+from eigassign.modal.exact.condensation import Modes, condense_blocks, positive_at_top
 from eigassign.modal.exact.dense import inverse_factor
 from eigassign.modal.exact.inertia import negative_pivots
 from eigassign.modal.exact.massless import mass_sizes, may_be_roundoff
-from eigassign.modal.exact.sparse import block, lanczos, positive_at_top, principal, solve_sparse
+from eigassign.modal.exact.sparse import block, lanczos, principal, solve_sparse
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

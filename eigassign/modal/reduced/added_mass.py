@@ -25,11 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import linalg
 
-from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism.assembly.pencil import Pencil, theta_at
 from eigassign.modal.exact.condensation import rigid_coupling
 from eigassign.modal.exact.sparse import block
 from eigassign.modal.projection import entries
-from eigassign.series.algebra import Samples
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -101,8 +100,7 @@ def added_mass(
         return AddedMass(changed, traces, moved, heavier, scaled, theta0[scaled])
     step = np.where(y0 != 0.0, STEP * np.abs(y0), STEP)
     z = pencil.to_program @ (x0 + np.pad(np.diag(step), ((0, 0), (n, 0)))).T
-    varied = pencil.program.run(Samples(), z + pencil.shift[:, None])
-    changes = np.vstack([np.ones((1, len(y0))), varied]) - theta0[:, None]
+    changes = theta_at(pencil.program, z + pencil.shift[:, None]) - theta0[:, None]
     heavier = ~(flexible @ changes[changed] < 0.0)
     return AddedMass(changed, traces, moved, heavier, scaled, theta0[scaled])
 

@@ -24,10 +24,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from eigassign.errors import AccuracyError
-from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.mechanism.assembly.pencil import Pencil, theta_at
 from eigassign.modal.exact.solver import lowest_modes
 from eigassign.modal.taylor.vectors import vectors_to_order
-from eigassign.series.algebra import Samples
 
 Floats = NDArray[np.float64]
 PROBES = 6  # modes above the guard that may join as they are at the expansion point
@@ -166,19 +165,14 @@ def mean_theta(pencil: Pencil, points: Floats) -> Floats:
     turns = np.zeros(len(pencil.shift))
     turns[:n] = [_is_angle(pencil, z[0], k) for k in range(n)]
     turned = np.concatenate([z + k * turns * (np.pi / 2.0) for k in range(4)])
-    theta = _theta_at(pencil, turned)
+    theta = theta_at(pencil.program, turned.T)
     return np.asarray(theta[:, np.isfinite(theta).all(axis=0)].mean(axis=1))
-
-
-def _theta_at(pencil: Pencil, z: Floats) -> Floats:
-    """θ (n_theta, n) at program variables z (n, n_z)."""
-    return np.vstack([np.ones((1, len(z))), pencil.program.run(Samples(), z.T)])
 
 
 def _is_angle(pencil: Pencil, z: Floats, k: int) -> bool:
     """True where joint coordinate k is an angle: a full turn changes nothing but round-off."""
     turned = np.array([z, z])
     turned[1, k] += 2.0 * np.pi
-    here, there = _theta_at(pencil, turned).T
+    here, there = theta_at(pencil.program, turned.T).T
     scale = np.maximum(np.abs(here), np.abs(there))
     return bool((np.abs(there - here) <= 1e-9 * scale).all())

@@ -18,11 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import UsageError
-from eigassign.mechanism.assembly.pencil import theta_slopes
+from eigassign.mechanism.assembly.pencil import theta_at, theta_slopes
 from eigassign.modal.arguments import chunks
 from eigassign.modal.exact.condensation import condense_blocks
 from eigassign.modal.exact.dense import inverse_factor
-from eigassign.series.algebra import Samples
 from eigassign.series.compiler import Program
 
 Floats = NDArray[np.float64]
@@ -52,8 +51,7 @@ class ReducedPencil:
 
     def theta(self, x: Floats) -> Floats:
         """θ (n_theta, n) at samples x (n, n_x)."""
-        z = self.to_program @ x.T + self.shift[:, None]
-        theta = np.vstack([np.ones((1, len(x))), self.program.run(Samples(), z)])
+        theta = theta_at(self.program, self.to_program @ x.T + self.shift[:, None])
         if not np.isfinite(theta).all():
             raise UsageError("q or y is outside the domain of a section or length")
         return theta
