@@ -9,10 +9,9 @@ that of the user's guess, or found and asked for.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
 from eigassign.case.schema.joints import FREEDOMS
@@ -109,7 +108,8 @@ def _bind_passive(
         tuple(names[v] for v in used),
         "the mechanism",
     )
-    a0, p0 = choose_branch(case, tree, function, used, parameters)
+    a0 = reference(case, parameters)[used]
+    p0 = _Branches(case, tree, function, used, a0).chosen()
     solved = replace(function, a0=a0, p0=p0)
     return parameters.with_passive(
         parameters.recorder.implicit(solved, [parameters.recorder.variable(v) for v in used])
@@ -212,44 +212,176 @@ IMMOBILE = 1e-5  # share of ∂F/∂a beyond what ∂F/∂p can meet; difference
 RANK = 1e-7  # of the largest singular value of ∂F/∂p: those below do not count
 
 
-def choose_branch(
-    case: CaseFile,
-    tree: Topology,
-    function: ImplicitFunction,
-    used: Sequence[int],
-    parameters: ModelParameters,
-) -> tuple[Floats, Floats]:
-    """A solution (a_0, p_0) of the closure at the reference configuration.
+@dataclass(frozen=True, eq=False)
+class _Branches:
+    """The solutions p of the closure at the reference a_0: ways to put the loops together."""
 
-    Raises MechanismError when there is none, when the passive freedoms are not determined, or when
-    several branches exist and the case gives no guess; the branches are then listed.
-    """
-    assembly = getattr(case.mechanism, "assembly", None)
-    a0 = reference(case, parameters)[list(used)]
-    guess = _guess(tree, assembly)
-    drawn = np.zeros(function.size)
-    if guess is None:  # as the file places the joints, where that closes the loops
-        F, check, _ = function.equations(a0[:, None], drawn[:, None])
-        guess = drawn if np.abs(np.concatenate([F, check])).max() < ACCEPT else None
-    starts = guess[None] if guess is not None else _starts(function.size)
-    kinds = [FREEDOMS[case.mechanism.joints[f.joint].type][f.component] for f in tree.passive]
-    turning = np.array([kind != "translation" for kind in kinds], dtype=bool)
-    angles = turning, _balls(case, tree)  # the same after a full turn
-    found = _solutions(function, a0, starts, *angles)
-    if not len(found):
-        others = _solutions(function, a0, _starts(function.size), *angles)
-        n = len(DOFS[case.mechanism.space])
-        message = _unclosable(tree, function, a0, n)
-        if guess is not None and len(others):
-            message = "the guess leads to no closed pose: " + _ambiguous(
-                case, tree, function.names, a0, others
+    case: CaseFile
+    tree: Topology
+    function: ImplicitFunction
+    used: Sequence[int]  # the entries of z that are its arguments
+    a0: Floats
+
+    def chosen(self) -> Floats:
+        """The solution p_0 that the case asks for, or the only one.
+
+        Raises MechanismError when there is none, when the passive freedoms are not determined, or
+        when several branches exist and the case gives no guess; the branches are then listed.
+        """
+        assembly = getattr(self.case.mechanism, "assembly", None)
+        guess, drawn = _guess(self.tree, assembly), np.zeros((1, self.function.size))
+        if guess is None and self._missed(drawn)[0] < ACCEPT:
+            guess = drawn[0]  # as the file places the joints: that closes the loops
+        found = self._solutions(self._starts if guess is None else guess[None])
+        if not len(found):
+            message = self._unclosable()
+            if guess is not None and len(others := self._solutions(self._starts)):
+                message = f"the guess leads to no closed pose: {self._ambiguous(others)}"
+            raise MechanismError("mechanism.assembly" if assembly else "mechanism.joints", message)
+        self._require_determined(found[0])
+        self._require_movable(found[0])
+        if guess is None and len(found) > 1:
+            raise MechanismError("mechanism.joints", self._ambiguous(found))
+        return found[0]
+
+    @property
+    def _starts(self) -> Floats:
+        """Evenly spread starting points (64, n_p) over a turn, or π metres, each way."""
+        return np.pi * (2.0 * kronecker(64, self.function.size) - 1.0)
+
+    def _equations(self, p: Floats) -> tuple[Floats, Floats, Floats]:
+        """F, check and ∂F/∂p at p (n, n_p), see `ImplicitFunction`."""
+        return self.function.equations(np.repeat(self.a0[:, None], len(p), axis=1), p.T)
+
+    def _missed(self, p: Floats) -> Floats:
+        """The largest of all rows that p (n, n_p) leaves, (n,)."""
+        F, check, _ = self._equations(p)
+        return np.asarray(np.abs(np.concatenate([F, check])).max(axis=0))
+
+    def _descended(self, starts: Floats) -> Floats:
+        """Where Newton's steps lead in least squares from many starting points (n, n_p)."""
+        p = starts.T
+        for _ in range(6):
+            p, _ = self.function.newton(np.repeat(self.a0[:, None], len(starts), axis=1), p)
+        return p.T
+
+    def _solutions(self, starts: Floats) -> Floats:
+        """Distinct solutions from many starting points, the nearest to the first start first.
+
+        Rx(α) Ry(β) Rz(γ) = Rx(α + π) Ry(π − β) Rz(γ + π): of balls |β| ≤ π/2.
+        """
+        p, several = self._descended(starts), len(starts) > 1
+        types = [self.case.mechanism.joints[f.joint].type for f in self.tree.passive]
+        kinds = [FREEDOMS[k][f.component] for k, f in zip(types, self.tree.passive, strict=True)]
+        turning = np.array([kind != "translation" for kind in kinds], dtype=bool)
+        distinct: list[Floats] = []
+        for candidate in p[self._missed(p) < ACCEPT]:
+            turned = _wrapped(candidate)
+            for k in self._balls if several else ():
+                if abs(turned[k + 1]) > np.pi / 2:
+                    alpha, beta, gamma = turned[k : k + 3]
+                    turned[k : k + 3] = _wrapped(np.array([alpha, -beta, gamma]) + np.pi)
+            near = np.where(turning & several, turned, candidate)
+            apart = (near - d for d in distinct)  # full turns not counted
+            # solutions within 1e-6 rad or m are one: Newton settles at round-off
+            if all(np.abs(np.where(turning, 2.0 * np.sin(d / 2.0), d)).max() > 1e-6 for d in apart):
+                distinct.append(near)
+        return np.array(distinct).reshape(-1, self.function.size)
+
+    @property
+    def _balls(self) -> list[int]:
+        """The first angle of each spherical joint whose three angles are all passive."""
+        joints, names = self.case.mechanism.joints, [f.joint for f in self.tree.passive]
+        return [
+            k
+            for k, f in enumerate(self.tree.passive)
+            if joints[f.joint].type == "spherical"
+            and f.component == 0
+            and names.count(f.joint) == 3
+        ]
+
+    def _require_determined(self, p0: Floats) -> None:
+        J = self._equations(p0[None])[2][0]
+        missing = self.function.size - int(np.linalg.matrix_rank(J, RANK))
+        if missing:
+            joints = ", ".join(sorted({f.joint for f in self.tree.passive}))
+            n = len(self.tree.freedoms) - len(self.tree.passive)
+            raise MechanismError(
+                "coordinates",
+                f"{missing} more coordinate(s) needed: the mechanism has {n + missing} freedom(s) "
+                f"and {n} coordinate(s), which do not determine the joints {joints}; or "
+                f"{self._at} is a dead point",
             )
-        raise MechanismError("mechanism.assembly" if assembly else "mechanism.joints", message)
-    _check_determined(tree, function, a0, found[0])
-    _check_movable(case, function, used, a0, found[0])
-    if guess is None and len(found) > 1:
-        raise MechanismError("mechanism.joints", _ambiguous(case, tree, function.names, a0, found))
-    return a0, found[0]
+
+    def _require_movable(self, p0: Floats) -> None:
+        """Refuse arguments of p that cannot change: ∂F/∂p ṗ = −∂F/∂a has no solution."""
+        J, n = self._equations(p0[None])[2][0], len(self.a0)
+        steps = self.a0[:, None] + CHANGE * np.hstack([np.eye(n), -np.eye(n)])
+        F = self.function.equations(steps, np.repeat(p0[:, None], 2 * n, axis=1))[0]
+        slope = (F[:, :n] - F[:, n:]) / (2.0 * CHANGE)
+        unmet = np.linalg.norm(slope - J @ (np.linalg.pinv(J) @ slope), axis=0)
+        moves = [c.moves for c in self.case.coordinates.values()]
+        for k, v in enumerate(self.used):
+            held = v < len(moves) and moves[v] == "locked"  # the only pose it has is then enough
+            if unmet[k] > IMMOBILE * np.linalg.norm(slope[:, k]) and not held:
+                raise MechanismError(
+                    "coordinates" if v < len(moves) else "design",
+                    f"{self.function.names[k]} cannot change at {self._at}: the loops pose "
+                    f"{self.function.n_equations} conditions, of which the {self.function.size} "
+                    "passive freedom(s) can meet none more. It is a structure, or stretched to a "
+                    "dead point: give a joint another freedom, lock the coordinate, or choose "
+                    "another pose with mechanism.assembly.at",
+                )
+
+    def _unclosable(self) -> str:
+        """The sentence on loops that do not close: too many conditions, or too little length.
+
+        Conditions beyond the rank of ∂F/∂p at general places are no passive freedom's to meet.
+        """
+        message = f"the loops cannot be closed at {self._at}"
+        n = self.function.n_equations
+        met = int(np.linalg.matrix_rank(self._equations(self._starts)[2], RANK).max())
+        p = self._descended(self._starts)
+        nearest = p[[int(np.nanargmin(self._missed(p)))]]
+        left = _gap(self._equations(nearest)[0], len(DOFS[self.case.mechanism.space]))
+        if met == n:
+            return (
+                f"{message}: links do not reach, or lie beyond a dead point; the nearest pose "
+                f"found leaves {_spelt(left)}. Correct the lengths and positions, or name "
+                "coordinates at which the mechanism can be put together: mechanism.assembly: "
+                "{at: {coordinate: value}}"
+            )
+        joints = ", ".join(dict.fromkeys(f.joint for f in self.tree.passive))
+        # rounded dimensions of a loop with passive joints leave less than 1e-3 m and rad
+        if max(left) < 1e-3:
+            return (
+                f"{message}, but nearly: {_spelt(left)} are left, where {ACCEPT:g} are accepted. "
+                f"They pose {n} conditions, of which {joints} can meet {met}, so that the others "
+                "must agree in their dimensions: give positions, lengths and angles with twelve "
+                "digits, or give joints more freedoms, such as spherical for universal, or "
+                "cylindrical for revolute"
+            )
+        return (
+            f"{message}: they pose {n} conditions, of which {joints} can meet {met}: {n - met} "
+            "coordinate(s) too many, or joints with too few freedoms for dimensions that do not "
+            f"agree. The nearest pose found leaves {_spelt(left)}"
+        )
+
+    @property
+    def _at(self) -> str:
+        pairs = zip(self.function.names, self.a0, strict=True)
+        return ", ".join(f"{name} = {value:.6g}" for name, value in pairs) or "its only pose"
+
+    def _ambiguous(self, found: Floats) -> str:
+        """The sentence that lists all branches, each as it is to be given."""
+        listed = " | ".join(_as_guess(self.tree, p) for p in found)
+        poses = zip(self.case.coordinates, reference_coordinates(self.case), strict=True)
+        at = ", ".join(f"{name}: {value:.6g}" for name, value in poses)
+        return (
+            f"the loops close in {len(found)} ways at {self._at}: {listed}; choose one with "
+            f"mechanism.assembly: {{at: {{{at}}}, guess: {_as_guess(self.tree, found[0])}}} "
+            "(rad, m)"
+        )
 
 
 def reference(case: CaseFile, parameters: ModelParameters) -> Floats:
@@ -286,11 +418,6 @@ def _guess(tree: Topology, assembly: object) -> Floats | None:
     return out
 
 
-def _starts(n: int) -> Floats:
-    """Evenly spread starting points over a turn, or π metres, each way."""
-    return np.pi * (2.0 * kronecker(64, n) - 1.0)
-
-
 def kronecker(count: int, n: int) -> Floats:
     """Evenly spread points (count, n) of the unit cube: (1/2 + k α) mod 1 (Roberts 2018)."""
     return np.mod(0.5 + np.arange(count)[:, None] * strides(n), 1.0)
@@ -304,155 +431,9 @@ def strides(n: int) -> Floats:
     return np.asarray(g ** -np.arange(1.0, n + 1.0))
 
 
-def _balls(case: CaseFile, tree: Topology) -> list[int]:
-    """The first angle of each spherical joint whose three angles are all passive."""
-    found = [k for k, f in enumerate(tree.passive) if f.component == 0]
-    joints = case.mechanism.joints
-    return [
-        k
-        for k in found
-        if joints[tree.passive[k].joint].type == "spherical"
-        and sum(f.joint == tree.passive[k].joint for f in tree.passive) == 3
-    ]
-
-
-def _solutions(
-    function: ImplicitFunction,
-    a0: Floats,
-    starts: Floats,
-    turning: NDArray[np.bool_],
-    balls: Sequence[int] = (),
-) -> Floats:
-    """Distinct solutions from many starting points, the nearest to the first start first.
-
-    Rx(α) Ry(β) Rz(γ) = Rx(α + π) Ry(π − β) Rz(γ + π): ``balls`` are given with |β| ≤ π/2.
-    """
-    n = len(starts)
-    a = np.repeat(a0[:, None], n, axis=1)
-    p = starts.T
-    for _ in range(6):
-        p, _ = function.newton(a, p)
-    F, check, _ = function.equations(a, p)
-    good = np.abs(np.concatenate([F, check])).max(axis=0) < ACCEPT
-    distinct: list[Floats] = []
-    for candidate in p.T[good]:
-        turned = np.mod(candidate + np.pi, 2.0 * np.pi) - np.pi
-        for k in balls if n > 1 else ():
-            if abs(turned[k + 1]) > np.pi / 2:
-                turned[k : k + 3] = [
-                    turned[k] + np.pi,
-                    np.pi - turned[k + 1],
-                    turned[k + 2] + np.pi,
-                ]
-                turned[k : k + 3] = np.mod(turned[k : k + 3] + np.pi, 2.0 * np.pi) - np.pi
-        near = np.where(turning & (n > 1), turned, candidate)
-        apart = (near - d for d in distinct)  # full turns not counted
-        # solutions within 1e-6 rad or m are one: Newton settles at round-off
-        if all(np.abs(np.where(turning, 2.0 * np.sin(d / 2.0), d)).max() > 1e-6 for d in apart):
-            distinct.append(near)
-    return np.array(distinct).reshape(-1, function.size)
-
-
-def _check_determined(tree: Topology, function: ImplicitFunction, a0: Floats, p0: Floats) -> None:
-    J = function.equations(a0[:, None], p0[:, None])[2][0]
-    missing = function.size - int(np.linalg.matrix_rank(J, RANK))
-    if missing:
-        joints = ", ".join(sorted({f.joint for f in tree.passive}))
-        n = len(tree.freedoms) - len(tree.passive)
-        raise MechanismError(
-            "coordinates",
-            f"{missing} more coordinate(s) needed: the mechanism has {n + missing} freedom(s) and "
-            f"{n} coordinate(s), which do not determine the joints {joints}; or "
-            f"{_at(function.names, a0)} is a dead point",
-        )
-
-
-def _check_movable(
-    case: CaseFile, function: ImplicitFunction, used: Sequence[int], a0: Floats, p0: Floats
-) -> None:
-    """Refuse arguments of p that cannot change: ∂F/∂p ṗ = −∂F/∂a has no solution in all rows."""
-    J = function.equations(a0[:, None], p0[:, None])[2][0]
-    steps = np.repeat(a0[:, None], 2 * len(a0), axis=1)
-    steps += CHANGE * np.hstack([np.eye(len(a0)), -np.eye(len(a0))])
-    F = function.equations(steps, np.repeat(p0[:, None], steps.shape[1], axis=1))[0]
-    slope = (F[:, : len(a0)] - F[:, len(a0) :]) / (2.0 * CHANGE)
-    unmet = np.linalg.norm(slope - J @ (np.linalg.pinv(J) @ slope), axis=0)
-    moves = [c.moves for c in case.coordinates.values()]
-    for k, v in enumerate(used):
-        held = v < len(moves) and moves[v] == "locked"  # the only pose it has is then enough
-        if unmet[k] > IMMOBILE * np.linalg.norm(slope[:, k]) and not held:
-            raise MechanismError(
-                "coordinates" if v < len(moves) else "design",
-                f"{function.names[k]} cannot change at {_at(function.names, a0)}: the loops pose "
-                f"{function.n_equations} conditions, of which the {function.size} passive "
-                "freedom(s) can meet none more. It is a structure, or stretched to a dead point: "
-                "give a joint another freedom, lock the coordinate, or choose another pose with "
-                "mechanism.assembly.at",
-            )
-
-
-def _unclosable(tree: Topology, function: ImplicitFunction, a0: Floats, n: int) -> str:
-    """Where the loops do not close, and whether there are too many conditions or too little length.
-
-    Conditions beyond the rank of ∂F/∂p at general places are no passive freedom's to meet.
-    """
-    message = f"the loops cannot be closed at {_at(function.names, a0)}"
-    starts = _starts(function.size).T
-    J = function.equations(np.repeat(a0[:, None], starts.shape[1], axis=1), starts)[2]
-    beyond = function.n_equations - int(np.linalg.matrix_rank(J, RANK).max())
-    if not beyond:
-        gap = _spelt(_nearest(function, a0, n))
-        return (
-            f"{message}: links do not reach, or lie beyond a dead point; the nearest pose found "
-            f"leaves {gap}. Correct the lengths and positions, or name coordinates at which the "
-            "mechanism can be put together: mechanism.assembly: {at: {coordinate: value}}"
-        )
-    joints = ", ".join(dict.fromkeys(f.joint for f in tree.passive))
-    left = _nearest(function, a0, n)
-    # rounded dimensions of a loop with passive joints leave less than 1e-3 m and rad
-    if max(left) < 1e-3:
-        return (
-            f"{message}, but nearly: {_spelt(left)} are left, where {ACCEPT:g} are accepted. They "
-            f"pose {function.n_equations} conditions, of which {joints} can meet "
-            f"{function.n_equations - beyond}, so that the others must agree in their dimensions: "
-            "give positions, lengths and angles with twelve digits, or give joints more freedoms, "
-            "such as spherical for universal, or cylindrical for revolute"
-        )
-    return (
-        f"{message}: they pose {function.n_equations} conditions, of which {joints} can meet "
-        f"{function.n_equations - beyond}: {beyond} coordinate(s) too many, or joints with too few "
-        f"freedoms for dimensions that do not agree. The nearest pose found leaves {_spelt(left)}"
-    )
-
-
-def _nearest(function: ImplicitFunction, a0: Floats, n: int) -> tuple[float, float]:
-    """The smallest gap of the loops, m and rad, that Newton's steps find in least squares."""
-    starts = _starts(function.size)
-    a, p = np.repeat(a0[:, None], len(starts), axis=1), starts.T
-    for _ in range(6):
-        p, _ = function.newton(a, p)
-    F, check, _ = function.equations(a, p)
-    missed = np.abs(np.concatenate([F, check])).max(axis=0)
-    return _gap(F[:, [int(np.nanargmin(missed))]], n)
-
-
-def _at(names: Sequence[str], a: Floats) -> str:
-    return ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, a, strict=True)) or "its only pose"
-
-
-def _ambiguous(
-    case: CaseFile, tree: Topology, names: Sequence[str], a0: Floats, found: Floats
-) -> str:
-    """The sentence that lists all branches, each as it is to be given."""
-    listed = " | ".join(_as_guess(tree, p) for p in found)
-    at = ", ".join(
-        f"{name}: {value:.6g}"
-        for name, value in zip(case.coordinates, reference_coordinates(case), strict=True)
-    )
-    return (
-        f"the loops close in {len(found)} ways at {_at(names, a0)}: {listed}; choose one with "
-        f"mechanism.assembly: {{at: {{{at}}}, guess: {_as_guess(tree, found[0])}}} (rad, m)"
-    )
+def _wrapped(angles: Floats) -> Floats:
+    """The same angles in [−π, π)."""
+    return np.asarray(np.mod(angles + np.pi, 2.0 * np.pi) - np.pi)
 
 
 def _as_guess(tree: Topology, p: Floats) -> str:
