@@ -40,7 +40,7 @@ def read_matrix(file: Path, key: str) -> sparse.csr_array:
         reason = getattr(error, "strerror", None) or error
         raise MechanismError(key, f"cannot read {file.name}: {reason}") from error
     try:
-        matrix = _parsed(data, file.suffix.lower())
+        return _real(_parsed(data, file.suffix.lower()))
     except (_UnfitError, UsageError) as error:
         raise MechanismError(key, f"{file.name} {error}") from error
     except MemoryError as error:
@@ -50,10 +50,6 @@ def read_matrix(file: Path, key: str) -> sparse.csr_array:
         place = f" ({line.group()})" if line else ""
         message = f"cannot read {file.name}{place}: it is damaged, or no matrix of its ending"
         raise MechanismError(key, message) from None
-    try:
-        return _real(matrix)
-    except _UnfitError as error:
-        raise MechanismError(key, f"{file.name} {error}") from error
 
 
 class _UnfitError(Exception):

@@ -6,6 +6,7 @@ of the interior follows from the interface, N_i = −K_ii⁻¹ K_ib N_b, so that
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from eigassign.mechanism.elements.matrix_file import read_matrix
 from eigassign.mechanism.elements.mesh import Entries, LinkMesh, Term, chain_dofs, rigid_motion
 from eigassign.mechanism.elements.sparse_factor import is_semidefinite
 from eigassign.mechanism.kinematics.parameters import ModelParameters, link_type, parameters
-from eigassign.mechanism.kinematics.rotations import DOFS, vector
+from eigassign.mechanism.kinematics.rotations import vector
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -45,8 +46,9 @@ def superelement_mesh(case: CaseFile, parameters: ModelParameters, name: str) ->
     places = {key: vector([float(c) for c in node.position]) for key, node in link.nodes.items()}
     at_interface = rigid_motion(list(places.values()), slots, n, space)
     rigid = [Term(t.coefficient, _follow(K, t.matrix, len(boundary), path)) for t in at_interface]
-    _check_rigid(K, rigid, path)
-    _check_mass(M, rigid, space, path)
+    N = _whole(rigid)
+    _check_rigid(K, N, path)
+    _check_mass(M, N[:, : 2 if space == "planar" else 3], path)
     mass = Entries((n, n))
     add_bodies(case, parameters, name, mass, nodes)
     return LinkMesh(n, nodes, places, [Term(1.0, K)], [Term(1.0, M), *mass.terms()], rigid)
@@ -63,7 +65,7 @@ def weights(case: CaseFile) -> tuple[str, ...]:
 
 def _weight(name: str, mesh: LinkMesh, space: str) -> str:
     """Mass, and place of its centre c, from NᵀMN = [[m 1, −m[c]×], …]."""
-    N = np.sum([t.matrix.toarray() for t in mesh.rigid], axis=0)
+    N = _whole(mesh.rigid)
     J = N.T @ (mesh.mass[0].matrix @ N)
     m = J[0, 0]
     places = (J[1, 2], -J[0, 2]) if space == "planar" else (J[1, 5], J[2, 3], J[0, 4])
@@ -82,8 +84,12 @@ def _follow(K: sparse.csr_array, N: sparse.csr_array, n_b: int, path: str) -> sp
     return sparse.csr_array(dense)
 
 
-def _check_rigid(K: sparse.csr_array, rigid: list[Term], path: str) -> None:
-    N = np.sum([t.matrix.toarray() for t in rigid], axis=0)  # the nodes are numbers, not variables
+def _whole(rigid: Sequence[Term]) -> Floats:
+    """N (n, n_twist): the nodes are numbers, not variables."""
+    return np.asarray(np.sum([t.matrix.toarray() for t in rigid], axis=0))
+
+
+def _check_rigid(K: sparse.csr_array, N: Floats, path: str) -> None:
     size = np.sqrt(np.maximum(K.diagonal(), 0.0))  # |K_ij| ≤ √(K_ii K_jj), in any units
     most = size[:, None] * np.linalg.norm(size[:, None] * N, axis=0)
     if (np.abs(np.asarray(K @ N)) > STRAIN_FREE * most).any():
@@ -94,11 +100,9 @@ def _check_rigid(K: sparse.csr_array, rigid: list[Term], path: str) -> None:
         )
 
 
-def _check_mass(M: sparse.csr_array, rigid: list[Term], space: str, path: str) -> None:
-    """A rigid translation moves the same mass in every direction."""
-    N = np.sum([t.matrix.toarray() for t in rigid], axis=0)
-    moving = DOFS[space].index(5) if space == "planar" else 3
-    masses = np.einsum("ij,ij->j", N[:, :moving], np.asarray(M @ N[:, :moving]))
+def _check_mass(M: sparse.csr_array, N: Floats, path: str) -> None:
+    """A rigid translation, N (n, 2 or 3), moves the same mass in every direction."""
+    masses = np.einsum("ij,ij->j", N, np.asarray(M @ N))
     # a part's mass may differ by direction by 1e-3: files have few digits
     if np.ptp(masses) > 1e-3 * masses.max():
         shown = ", ".join(f"{m:.4g}" for m in masses)

@@ -25,16 +25,15 @@ def out_of_reach(ik: TipProblem, course: Course, k: int, u: Floats) -> Trajector
     near = "(" + ", ".join(f"{x:.6g}" for x in seen.point[0]) + ") m"
     if ik.chain.assembly is not None:
         near += f", at {pose(ik, u)}"
+    key, message = WAYPOINTS, f"is {distance[0]:.3g} m out of reach; the tip comes to {near}"
     # a turn within 1e-6 rad is reached: the blame is the position's
-    if course.attitude is None or turn[0] <= 1e-6:
-        message = f"is {distance[0]:.3g} m out of reach; the tip comes to {near}"
-        return TrajectoryError(WAYPOINTS, f"{course.label(k)} {message}{_bound(ik, course)}", k)
-    key = f"trajectory.{course.attitude.key}"
-    message = (
-        f"cannot be reached with the {course.attitude.key} asked for; the nearest compromise "
-        f"misses the point by {distance[0]:.3g} m and the {course.attitude.key} by "
-        f"{np.degrees(turn[0]):.3g} deg"
-    )
+    if course.attitude is not None and turn[0] > 1e-6:
+        key = f"trajectory.{course.attitude.key}"
+        message = (
+            f"cannot be reached with the {course.attitude.key} asked for; the nearest compromise "
+            f"misses the point by {distance[0]:.3g} m and the {course.attitude.key} by "
+            f"{np.degrees(turn[0]):.3g} deg"
+        )
     return TrajectoryError(key, f"{course.label(k)} {message}{_bound(ik, course)}", k)
 
 

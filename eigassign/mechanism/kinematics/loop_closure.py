@@ -242,12 +242,12 @@ class _Branches:
         self._require_movable(found[0])
         if guess is None and len(found) > 1:
             raise MechanismError("mechanism.joints", self._ambiguous(found))
-        return found[0]
+        return np.asarray(found[0])
 
     @property
     def _starts(self) -> Floats:
         """Evenly spread starting points (64, n_p) over a turn, or π metres, each way."""
-        return np.pi * (2.0 * kronecker(64, self.function.size) - 1.0)
+        return np.asarray(np.pi * (2.0 * kronecker(64, self.function.size) - 1.0))
 
     def _equations(self, p: Floats) -> tuple[Floats, Floats, Floats]:
         """F, check and ∂F/∂p at p (n, n_p), see `ImplicitFunction`."""

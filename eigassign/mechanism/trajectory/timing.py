@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
+from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import UsageError
@@ -32,36 +33,25 @@ class TimingLaw:
 
     def position(self, tau: ArrayLike) -> Floats:
         """s(τ), dimensionless, same shape as ``tau``; UsageError outside [0, 1]."""
-        return self._evaluate(self.pieces, tau)
+        return self._derivative(0, tau)
 
     def velocity(self, tau: ArrayLike) -> Floats:
         """ds/dτ, dimensionless (divide by the duration for 1/s); UsageError outside [0, 1]."""
-        return self._evaluate(tuple(map(_derivative, self.pieces)), tau)
+        return self._derivative(1, tau)
 
     def acceleration(self, tau: ArrayLike) -> Floats:
         """d²s/dτ² (divide by the duration squared for 1/s²), from the right where it jumps."""
-        return self._evaluate(tuple(_derivative(_derivative(p)) for p in self.pieces), tau)
+        return self._derivative(2, tau)
 
-    def _evaluate(self, pieces: tuple[tuple[float, ...], ...], tau: ArrayLike) -> Floats:
+    def _derivative(self, order: int, tau: ArrayLike) -> Floats:
         relative_time = np.asarray(tau, dtype=np.float64)
         if not np.all((relative_time >= 0.0) & (relative_time <= 1.0)):
             raise UsageError(f"the {self.name} timing law is defined for 0 <= tau <= 1 only")
-        value = _horner(pieces[0], relative_time)
-        for start, piece in zip(self.ends, pieces[1:], strict=True):
-            value = np.where(relative_time >= start, _horner(piece, relative_time - start), value)
+        value = np.zeros_like(relative_time)
+        for start, piece in zip((0.0, *self.ends), self.pieces, strict=True):
+            own = polynomial.polyval(relative_time - start, polynomial.polyder(piece, order))
+            value = np.where(relative_time >= start, own, value)
         return value
-
-
-def _horner(coefficients: tuple[float, ...], t: Floats) -> Floats:
-    value = np.zeros_like(t)
-    for coefficient in reversed(coefficients):
-        value = value * t + coefficient
-    return value
-
-
-def _derivative(coefficients: tuple[float, ...]) -> tuple[float, ...]:
-    """d/dτ Σ c_k τ^k = Σ k c_k τ^(k-1)."""
-    return tuple(k * c for k, c in enumerate(coefficients))[1:]
 
 
 POLYNOMIALS: Mapping[str, TimingLaw] = MappingProxyType(

@@ -450,9 +450,14 @@ def rates(trajectory: Trajectory) -> Rates:
     parts = [part for part in _smooth_parts(trajectory) if len(part) > 1]
     samples = np.concatenate([np.zeros(0, dtype=np.intp), *parts])
     q, time_s = trajectory.q, trajectory.time_s
-    found = [_differences(time_s[part], q[part]) for part in parts]
-    nothing = np.zeros((0, q.shape[1]))
-    rate, acceleration = (np.concatenate([nothing, *(f[k] for f in found)]) for k in (0, 1))
+    first: list[Floats] = [np.zeros((0, q.shape[1]))]
+    second = first[:]
+    for part in parts:  # of two samples their difference, and no acceleration
+        order: Literal[1, 2] = 2 if len(part) > 2 else 1
+        rate = np.gradient(q[part], time_s[part], axis=0, edge_order=order)
+        first.append(rate)
+        second.append(np.gradient(rate, time_s[part], axis=0, edge_order=order))
+    rate, acceleration = np.concatenate(first), np.concatenate(second)
     resting = np.ptp(q, axis=0) == 0.0  # loads among them: no round-off of their differences
     rate[:, resting] = acceleration[:, resting] = 0.0
     return Rates(samples, q[samples], rate, acceleration)
@@ -465,10 +470,3 @@ def _smooth_parts(trajectory: Trajectory) -> list[Ints]:
     near = 1e-9 * float(np.ptp(time_s))
     cuts = [time_s[0], *trajectory.corners_s, time_s[-1]]
     return [np.flatnonzero((time_s >= a - near) & (time_s <= b + near)) for a, b in pairwise(cuts)]
-
-
-def _differences(time_s: Floats, q: Floats) -> tuple[Floats, Floats]:
-    """Differences of second order; of two samples their difference, and no acceleration."""
-    order: Literal[1, 2] = 2 if len(time_s) > 2 else 1
-    rate = np.gradient(q, time_s, axis=0, edge_order=order)
-    return rate, np.gradient(rate, time_s, axis=0, edge_order=order)
