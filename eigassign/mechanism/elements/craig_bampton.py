@@ -39,24 +39,15 @@ NEW = 1e-4  # part of a vector of another design, relative, that is worth a dof 
 def reduced_where_asked(
     case: CaseFile, parameters: ModelParameters, name: str, mesh: LinkMesh
 ) -> LinkMesh:
-    """A link's mesh, reduced where it says to what frequency.
+    """A link's mesh, its interior replaced by what moves below the frequency it asks for.
 
-    A ``reduce_to: auto`` that nobody settled leaves the link whole.
+    The mesh as it is where none is asked for (a ``reduce_to: auto`` that nobody settled), or where
+    that would not make it smaller. Raises MechanismError where the stiffness is singular with the
+    interface held.
     """
-    frequency = getattr(case.mechanism.links[name], "reduce_to", None)
-    if not isinstance(frequency, float):
+    frequency_hz = getattr(case.mechanism.links[name], "reduce_to", None)
+    if not isinstance(frequency_hz, float):
         return mesh
-    return reduce_mesh(case, parameters, name, mesh, frequency)
-
-
-def reduce_mesh(
-    case: CaseFile, parameters: ModelParameters, name: str, mesh: LinkMesh, frequency_hz: float
-) -> LinkMesh:
-    """The link with its interior replaced by what moves below ``frequency_hz``.
-
-    The mesh as it is where that would not make it smaller. Raises MechanismError where the
-    stiffness is singular with the interface held.
-    """
     path = f"mechanism.links.{name}"
     nodes = {key: mesh.nodes[key] for key in mesh.nodes if key in interface(case, name)}
     b = np.concatenate([slots[slots >= 0] for slots in nodes.values()])

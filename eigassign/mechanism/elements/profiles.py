@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from eigassign.case.case_file import CaseFile
@@ -22,7 +23,10 @@ from eigassign.series.expression import Scalar, is_constant, one_atom
 
 Floats = NDArray[np.float64]
 TERMS = 5  # Legendre polynomials over an element of a taper
-STATIONS, _ = np.polynomial.legendre.leggauss(5)  # from −1 to 1: where a taper is evaluated
+STATIONS, _SHARES = legendre.leggauss(TERMS)  # from −1 to 1: where a taper is evaluated
+# by what values at the stations give P_0 … P_4, (l, g)
+_PROJECTION = (_SHARES[:, None] * legendre.legvander(STATIONS, TERMS - 1)).T
+_PROJECTION = _PROJECTION * (np.arange(TERMS)[:, None] + 0.5)
 
 
 class BeamValues(NamedTuple):
@@ -140,14 +144,15 @@ def beam_profiles(
     ]
 
 
+def _stations(n: int) -> Floats:
+    """The stations of each of n elements, (n, 5), from −1 to 1 over all of them."""
+    return np.asarray((2.0 * np.arange(n)[:, None] + 1.0 + STATIONS) / n - 1.0)
+
+
 def _legendre_weights(n: int) -> Floats:
     """(n, 5, 5): by what a polynomial's values at `STATIONS` give its P_0 … P_4 over n elements."""
-    legendre = np.polynomial.legendre
-    xi, g = legendre.leggauss(5)
-    places = (2.0 * np.arange(n)[:, None] + 1.0 + xi) / n - 1.0
-    lagrange = legendre.legvander(places, 4) @ np.linalg.inv(legendre.legvander(STATIONS, 4))
-    projected = legendre.legvander(xi, TERMS - 1) * (np.arange(TERMS) + 0.5)
-    return np.asarray(np.einsum("g,gl,ngj->nlj", g, projected, lagrange))
+    vandermonde = legendre.legvander(STATIONS, TERMS - 1)
+    return _PROJECTION @ (legendre.legvander(_stations(n), TERMS - 1) @ np.linalg.inv(vandermonde))
 
 
 def _combined(values: tuple[Scalar | None, ...], weights: Floats) -> Any:
@@ -166,11 +171,8 @@ def _combined(values: tuple[Scalar | None, ...], weights: Floats) -> Any:
 
 def _torsion(at: Callable[[float], BeamValues], n: int) -> Any:
     """GJ over each of n elements, (n, 5) as of `_combined`, from values of its own in each."""
-    legendre = np.polynomial.legendre
-    xi, g = legendre.leggauss(5)
-    places = (2.0 * np.arange(n)[:, None] + 1.0 + xi) / n - 1.0
-    weights = (g[:, None] * legendre.legvander(xi, TERMS - 1) * (np.arange(TERMS) + 0.5)).T
-    rows = [_combined(tuple(at(t).GJ for t in row), weights[None])[0] for row in places.tolist()]
+    weights = _PROJECTION[None]
+    rows = [_combined(tuple(at(t).GJ for t in row), weights)[0] for row in _stations(n).tolist()]
     return np.array(rows) if all(isinstance(row, np.ndarray) for row in rows) else rows
 
 
