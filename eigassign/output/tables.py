@@ -173,16 +173,24 @@ def errors(results: RunResults) -> Table:
 
 
 def required(results: RunResults) -> Table:
-    """Limits and bands: met, or violated by how much at worst, before and after."""
+    """Limits and bands: met, or violated by how much at worst, before and after; amounts."""
     kinds = tuple(kind for kind in _stages(results) if kind != "predicted")
     rows = []
     for target in results.targets:
         if not target.asked.is_goal:
             cells = (getattr(target.error, kind.replace(" ", "_")) for kind in kinds)
             said = ("" if e is None else violated(e.max_relative) for e in cells)
-            rows.append((target.label, *said, "met" if target.satisfied else "VIOLATED"))
+            rows.append((target.label, *said, _met(target.satisfied)))
+    for row in () if results.assignment is None else results.assignment.limits:
+        amounts = {"initial": row.initial, "exact": row.optimal}
+        cells = (f"{number(amounts[k])} {row.unit}" if k in amounts else "" for k in kinds)
+        rows.append((row.words, *map(str.rstrip, cells), _met(row.satisfied)))
     caption = f"Relative to the limit, along {results.along}."
     return Table("Limits and bands", ("limit", *kinds, "verdict"), tuple(rows), caption)
+
+
+def _met(satisfied: bool) -> str:
+    return "met" if satisfied else "VIOLATED"
 
 
 def violated(worst: float) -> str:

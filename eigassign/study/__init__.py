@@ -33,10 +33,11 @@ __all__, __getattr__, __dir__ = face(
         "design.answer": "Answer find_answer",
         "design.clearance": "prove_clear",
         "design.followed": "followers require_one_shape solve_design",
-        "design.judgement": "crossing_warnings verdict",
+        "design.judgement": "crossing_warnings",
         "design.optimum": "Found find_optimum",
         "design.response": ("DesignResponse ReducedModels reduced_models response_of"),
         "design.variants": "Task variant_of",
+        "design.verdict": "Facts Verdict verdict",
         "drawing": "AMPLITUDE draw_modes draw_poses moving_poses rest_pose spread_samples",
         "meaning.overall": "Studies study_meaning",
         "meaning.reach": "proved_ranges unreachable",
@@ -50,7 +51,7 @@ __all__, __getattr__, __dir__ = face(
         "results": (
             "ActiveRow AssignmentRow CatalogueRow ClearanceRow CombinationRow Comparison "
             "DesignMap DesignRow DrawnBody DrawnJoint DrawnPoses DrawnSpring ErrorRow "
-            "ErrorSummary LocalOptimum Meaning ModePictures ModeStudy OptimalityRow "
+            "ErrorSummary LimitRow LocalOptimum Meaning ModePictures ModeStudy OptimalityRow "
             "OtherModes RangeRow RunResults SensitivityRow SolverRow StepRow TargetAlong "
             "TargetStudy ToleranceRows TradeOff TradeOffPoint TrajectoryRow ValidationRow"
         ),

@@ -125,6 +125,7 @@ def _notes(scene: Scene, assigned: VerifiedAssignment, row: AssignmentRow) -> tu
     """Notes on the choices on the way to the answer, and on the limits that hold it back."""
     swaps = swap_notes(scene.path, assigned.targets)
     missed = [target.label for target in assigned.targets if not target.satisfied]
+    missed += [limit.name for limit in row.limits if not limit.satisfied]
     return (*assigned.answer.notes, *limit_notes(assigned.answer, row, missed), *swaps)
 
 

@@ -307,6 +307,29 @@ class ActiveRow:
 
 
 @dataclass(frozen=True)
+class LimitRow:
+    """A limit of a quantity of the design, of its mass say, before and after; SI ``unit``.
+
+    ``violation`` of the answer is relative to the limit, 0 where it is kept. ``extreme`` is what
+    the most extreme design within the bounds has, where none keeps the limit. ``words`` name the
+    limit, ``stated`` says it with the amount of the answer.
+    """
+
+    name: str
+    words: str
+    unit: str
+    lower: float | None
+    upper: float | None
+    initial: float
+    optimal: float
+    satisfied: bool
+    initial_violation: float
+    violation: float
+    extreme: float | None
+    stated: str
+
+
+@dataclass(frozen=True)
 class ClearanceRow:
     """Whether a band is proved clear along a trajectory with ``below`` modes under it.
 
@@ -377,6 +400,8 @@ class AssignmentRow(Brief):
     model_error: float | None
     conflict: tuple[str, ...] = ()  # limits that contradict each other
     catalogue: CatalogueRow | None = None
+    limits: tuple[LimitRow, ...] = ()  # of quantities that need no frequency
+    shortcoming: str | None = None  # why this is no answer to build on, in a sentence
 
 
 # --- What the answer means
@@ -659,17 +684,7 @@ class RunResults(Brief):
     @property
     def shortcoming(self) -> str | None:
         """Why this is not an answer to build on, in a sentence; None if it is."""
-        row, error = self.assignment, self.error
-        if row is None or error is None:
-            return None
-        if row.method == "one_shot" and not self.within_tolerance:
-            return "the expansion is further from exact than validation.max_error allows"
-        if row.verdict not in ("reached", "improved"):
-            return f"{row.verdict.replace('_', ' ')}: {row.reason}"
-        if row.max_error_given and error.exact.max_relative > row.max_error:
-            worst, limit = 100.0 * error.exact.max_relative, 100.0 * row.max_error
-            return f"worst error {worst:.3g} %, over the {limit:g} % of assignment.max_error"
-        return None
+        return None if self.assignment is None else self.assignment.shortcoming
 
     @property
     def error(self) -> ErrorSummary | None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.linear import LinearConstraint
-from eigassign.assignment.requirements.requirement import Requirement
+from eigassign.assignment.requirements.quantity import LimitedQuantity
 from eigassign.assignment.requirements.sampling import design_limits
 from eigassign.brief import Brief
 from eigassign.case.case_file import CaseFile
@@ -138,7 +138,7 @@ class Scene:
         return np.array([p.min for p in parameters]), np.array([p.max for p in parameters])
 
     @cached_property
-    def limits(self) -> tuple[Requirement, ...]:
+    def limits(self) -> tuple[LimitedQuantity, ...]:
         """The limits of quantities of the design, whatever the trajectory."""
         return design_limits(self.file, self.model)
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
+from eigassign.assignment.checks import Floats
 from eigassign.assignment.linear import LinearConstraint
 from eigassign.assignment.requirements.requirement import Quantity, Requirement
 from eigassign.case.case_file import CaseFile
@@ -21,6 +22,8 @@ class LimitedQuantity(Requirement):
 
     is_goal = False
     is_convex = True  # the set of designs that it allows, where the quantity is affine
+    unit: ClassVar[str] = ""  # SI, that its amounts are said in
+    extreme: ClassVar[tuple[str, str]] = ("the least is", "the most is")
 
     @classmethod
     def of_case(cls, file: CaseFile, model: Model) -> Iterator[Self]:
@@ -33,9 +36,65 @@ class LimitedQuantity(Requirement):
         lower, upper = np.array([low]), np.array([high])
         return cls(label, place, ((quantity, 1.0),), slice(0, 1), lower, upper)
 
+    # --- Amounts in words
+
+    @property
+    def noun(self) -> str:
+        """The quantity, before an amount of it."""
+        return self.label
+
+    def amount(self, y: Floats) -> float:
+        """The quantity of a design (n_y,), SI."""
+        value, c = self.terms[0]
+        assert not isinstance(value, int)
+        return float(np.asarray(c * value(y)[0]))
+
+    def slopes(self, y: Floats) -> Floats:
+        """The slopes (n_y,) of the quantity at a design (n_y,)."""
+        value, c = self.terms[0]
+        assert not isinstance(value, int)
+        return np.asarray(c * value(y)[1])
+
+    def violation(self, amount: float, reach: float) -> float:
+        """The way of an amount beyond a limit, relative to that; 0 within both.
+
+        Relative to ``reach`` where that is larger: what the quantity changes over the bounds.
+        """
+        beyond = (s * (amount - edge) / (max(abs(edge), reach) or 1.0) for s, edge in self._edges)
+        return max(0.0, *(one for one in beyond if np.isfinite(one)))
+
+    @property
+    def asked_words(self) -> str:
+        """``mass at most 3 kg``."""
+        return f"{self.noun} {self._asked}"
+
+    def stated(self, amount: float, extreme: float | None) -> str:
+        """``mass 5.47 kg, at most 3 kg``, and where given what the most extreme design has."""
+        words = f"{self.noun} {self._said(amount)}, {self._asked}"
+        if extreme is None:
+            return words
+        return f"{words}; {self.extreme[int(extreme < self._edges[0][1])]} {self._said(extreme)}"
+
+    @property
+    def _asked(self) -> str:
+        limits = zip(("at least", "at most"), self._edges, strict=True)
+        said = (f"{word} {self._said(edge)}" for word, (_, edge) in limits if np.isfinite(edge))
+        return " and ".join(said)
+
+    @property
+    def _edges(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        return (-1.0, float(self.lower[0])), (1.0, float(self.upper[0]))
+
+    def _said(self, amount: float) -> str:
+        return f"{amount:.4g} {self.unit}".rstrip()
+
 
 class MassLimit(LimitedQuantity):
     """The mass in kg of all links and bodies, those that never move included."""
+
+    unit = "kg"
+    noun = "mass"
+    extreme = ("the lightest design has", "the heaviest design has")
 
     @classmethod
     def of_case(cls, file: CaseFile, model: Model) -> Iterator[Self]:

@@ -186,14 +186,14 @@ class Requirement(Brief):
 
     def worst_errors(self, lowest: Solved, highest: Solved) -> Floats:
         """The largest errors (n,), in magnitude, of frequencies between two."""
-        return self._outside(*self.curve_range(lowest, highest))
+        return self.outside(*self.curve_range(lowest, highest))
 
     def least_errors(self, lowest: Solved, highest: Solved) -> Floats:
         """The errors (n,) that no frequency between two avoids."""
         low, high = self.curve_range(lowest, highest)
-        return self._outside(high, low)
+        return self.outside(high, low)
 
-    def _outside(self, low: Floats, high: Floats) -> Floats:
+    def outside(self, low: Floats, high: Floats) -> Floats:
         """The way (n,) of ``low`` below the lower edge, or of ``high`` above the upper one."""
         with_edge = np.isfinite(self.lower)
         below = np.where(with_edge, 1.0 - low / np.where(with_edge, self.lower, 1.0), 0.0)

@@ -55,7 +55,7 @@ def requirements_of(file: CaseFile, path: Trajectories) -> tuple[Requirement, ..
     )
 
 
-def design_limits(file: CaseFile, model: Model) -> tuple[Requirement, ...]:
+def design_limits(file: CaseFile, model: Model) -> tuple[LimitedQuantity, ...]:
     """The limits of quantities of the design."""
     return tuple(one for kind in QUANTITIES for one in kind.of_case(file, model))
 

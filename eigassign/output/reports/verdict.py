@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from eigassign.case.units import handy_unit
 from eigassign.output.formats import capital, percent
 from eigassign.output.tables import violated
-from eigassign.study.results import RunResults, TargetStudy
+from eigassign.study.results import LimitRow, RunResults, TargetStudy
 
 Floats = NDArray[np.float64]
 TONES = {"reached": "good", "improved": "fair"}  # every other verdict is bad
@@ -70,15 +70,15 @@ def verdict_of(results: RunResults) -> Verdict | None:
     row = results.assignment
     if row is None or results.error is None:
         return None
-    misled = row.method == "one_shot" and not results.within_tolerance
-    word = "do_not_use" if misled else row.verdict
-    short, few = results.shortcoming, len(results.targets) <= 3
+    few = len(results.targets) <= 3
+    findings = [_finding(target, row.max_error, few) for target in results.targets]
+    findings += [_broken(limit) for limit in row.limits if not limit.satisfied]
     return Verdict(
-        word=WORDS[word],
-        tone=TONES.get(word, "bad") if short is None else "bad",
-        reason=_sentence(short if misled and short else row.reason),
+        word=WORDS[row.verdict],
+        tone=TONES.get(row.verdict, "bad") if row.shortcoming is None else "bad",
+        reason=_sentence(row.reason),
         asked=tuple(_asked(results)),
-        findings=tuple(_finding(target, row.max_error, few) for target in results.targets),
+        findings=tuple(findings),
         trust=tuple(_trust(results)),
         bars=tuple(_bars(results)),
         cost=tuple(_cost(results)),
@@ -117,6 +117,12 @@ def _finding(target: TargetStudy, accepted: float, detailed: bool) -> Finding:
         more *= len(target.asked.terms) == 1
     tone = "good" if met else "fair" if after < before else "bad"
     return Finding(target.label, *said, tone, tuple(more) if detailed else ())
+
+
+def _broken(limit: LimitRow) -> Finding:
+    """A limit of a quantity that the answer breaks, with its amounts."""
+    before, after = (f"{_few(a)} {limit.unit}".rstrip() for a in (limit.initial, limit.optimal))
+    return Finding(limit.words, before, after, "bad", (limit.stated,))
 
 
 def _between(hz: Floats) -> str:

@@ -5,21 +5,23 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from eigassign.assignment.exact.design_problem import MET
+from eigassign.assignment.exact.design_problem import MET, ON
 from eigassign.assignment.exact.sequential import End
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.study.accuracy import model_error
 from eigassign.study.design.answer import MAX_ERROR, Answer
-from eigassign.study.design.conclusions import is_proved
-from eigassign.study.design.judgement import verdict
+from eigassign.study.design.conclusions import extreme, is_proved
 from eigassign.study.design.variants import Task, variant_of
+from eigassign.study.design.verdict import Facts, verdict
 from eigassign.study.results import (
     ActiveRow,
     AssignmentRow,
     CatalogueRow,
     ClearanceRow,
     CombinationRow,
+    LimitRow,
     LocalOptimum,
     MeshError,
     OptimalityRow,
@@ -28,6 +30,8 @@ from eigassign.study.results import (
 )
 from eigassign.study.scene import Scene
 
+Floats = NDArray[np.float64]
+UNTRUSTED = "the expansion is further from exact than validation.max_error allows"
 FINER = "give the links more elements, raise reduce_to, or write auto"
 
 
@@ -51,29 +55,40 @@ def assignment_row(
     trusted = found is not None or all(t.approximation_error <= accepted for t in targets)
     clearances = () if found is None else found.clearances
     optimality = _optimality(scene, answer)
-    proved = optimality.kind == "proved"
-    contradiction = _in_words(scene, answer, proved)
-    merits = initial, optimal
-    word, reason = verdict(targets, merits, trusted, unreachable, contradiction)
+    limits = tuple(_limits(scene, answer.y))
+    conflicting = () if answer.conflict is None else answer.conflict.names
     unproved = [_why_unproved(row) for row in clearances if not row.clear]
     of_model = {m for one in wanted if one.of_soft_model for m in one.modes}
     raised = model_error(scene, mesh, answer.y, of_model)
     largest = MAX_ERROR if keys.max_error is None else keys.max_error
     at_stake = (t.asked.stake(t.exact_hz, raised) for t in targets)
-    if word == "reached" and any(stake > largest for stake in at_stake):
-        word, reason = "do_not_use", _too_coarse(raised, largest)
-    if word == "reached" and unproved:
-        word, reason = "do_not_use", f"not proved clear along the motion: {'; '.join(unproved)}"
-    if found is not None and found.best.end in (End.SECONDS, End.STEPS, End.INTERRUPTED):
-        reason = f"{reason}; unfinished: {found.best.end.value}"
+    coarse = any(stake > largest for stake in at_stake)
+    ended = (End.SECONDS, End.STEPS, End.INTERRUPTED)
+    said = verdict(
+        Facts(
+            targets=targets,
+            merits=(initial, optimal),
+            limits=limits,
+            doubts=() if trusted else (UNTRUSTED,),
+            unproved=(
+                *((_too_coarse(raised, largest),) if coarse else ()),
+                *((f"not proved clear along the motion: {'; '.join(unproved)}",) * bool(unproved)),
+            ),
+            unreachable=unreachable,
+            conflict=_in_words(scene, answer, optimality.kind == "proved"),
+            of_frequencies=not {row.name for row in limits}.issuperset(conflicting),
+            unfinished="" if found is None or found.best.end not in ended else found.best.end.value,
+            max_error=keys.max_error,
+        )
+    )
     return AssignmentRow(
         method=keys.method,
         objective=keys.objective,
         objective_initial=initial[1],
         objective_optimal=optimal[1],
         optimality=optimality,
-        verdict=word,
-        reason=reason,
+        verdict=said.word,
+        reason=said.reason,
         steps=()
         if found is None
         else tuple(
@@ -93,9 +108,37 @@ def assignment_row(
         max_error_given=keys.max_error is not None,
         clearances=clearances,
         model_error=raised if np.isfinite(raised) else None,
-        conflict=() if answer.conflict is None else answer.conflict.names,
+        conflict=conflicting,
         catalogue=_catalogue(scene, answer, wanted),
+        limits=limits,
+        shortcoming=said.shortcoming,
     )
+
+
+def _limits(scene: Scene, y: Floats) -> Iterator[LimitRow]:
+    """The limits of quantities at the initial design and at y."""
+    lower, upper = scene.bounds
+    for one in scene.limits:
+        before, after = one.amount(scene.initial), one.amount(y)
+        reach = float(np.abs(one.slopes(y)) @ (upper - lower))
+        misses = [one.violation(amount, reach) for amount in (before, after)]
+        kept = misses[1] <= ON
+        least = None if kept else extreme(scene, one, y)
+        low, high = float(one.lower[0]), float(one.upper[0])
+        yield LimitRow(
+            name=one.name,
+            words=one.asked_words,
+            unit=one.unit,
+            lower=low if np.isfinite(low) else None,
+            upper=high if np.isfinite(high) else None,
+            initial=before,
+            optimal=after,
+            satisfied=kept,
+            initial_violation=misses[0],
+            violation=misses[1],
+            extreme=least,
+            stated=one.stated(after, least),
+        )
 
 
 def _in_words(scene: Scene, answer: Answer, proved: bool) -> str:
@@ -103,8 +146,9 @@ def _in_words(scene: Scene, answer: Answer, proved: bool) -> str:
     contradiction, found = answer.conflict, answer.found
     if contradiction is None or found is None:
         return ""
-    limits = map(found.variant.requirements.named, contradiction.names)
-    lines = ((one.in_words, scene.file.problem(one.place, "").line) for one in limits)
+    limits = {one.name: one for one in (*scene.limits, *found.variant.requirements.limits)}
+    named = (limits[name] for name in contradiction.names)
+    lines = ((one.in_words, scene.file.problem(one.place, "").line) for one in named)
     listed = " and ".join(f"{name} (line {line})" for name, line in lines)
     meets = "meets" if proved else "was found that meets"
     if not contradiction.smallest:
@@ -233,7 +277,7 @@ def active_rows(scene: Scene, answer: Answer) -> Iterator[ActiveRow]:
 def limit_notes(answer: Answer, row: AssignmentRow, missed: Collection[str]) -> list[str]:
     """What holds the answer back, and what the one shot's program does not depend on.
 
-    ``missed`` are the labels of the targets that the answer does not meet.
+    ``missed`` are the labels of the targets and limits that the answer does not meet.
     """
     grouped: dict[str, list[str]] = {}
     for limit in row.active:

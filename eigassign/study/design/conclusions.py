@@ -24,7 +24,8 @@ from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import OPTIMAL, End, minimise
 from eigassign.assignment.exact.stationarity import first_order
 from eigassign.assignment.feasibility import smallest
-from eigassign.assignment.requirements.requirement import Requirement
+from eigassign.assignment.requirements.quantity import LimitedQuantity
+from eigassign.assignment.requirements.requirement import Frequencies, Requirement
 from eigassign.errors import EigassignError
 from eigassign.study.design.optimum import Found
 from eigassign.study.design.variants import PosedProblem
@@ -106,18 +107,33 @@ def conflict(found: Found, listed: Sequence[ListedValues], steps: int) -> Confli
         return None
     owners = [asked.owner(int(k))[0] for k in np.flatnonzero(best.seen.excess > MET)]
     missed = tuple(dict.fromkeys(owners))
-    if len(asked.limit_names) > MOST:
+    names = found.variant.limit_names
+    if len(names) > MOST:
         return Conflict(missed, False)
     answers: list[bool | None] = []
 
     def contradict(rest: list[str]) -> bool:
-        some = found.variant.of(asked.with_limits(rest))
-        met = not rest or _can_be_met(some, listed, best.y, steps)
+        met = not rest or _can_be_met(found.variant.with_limits(rest), listed, best.y, steps)
         answers.append(met)
         return met is False
 
-    needed = smallest(asked.limit_names, contradict)
+    needed = smallest(names, contradict)
     return Conflict(missed, False) if None in answers else Conflict(tuple(needed), True)
+
+
+def extreme(scene: Scene, limit: LimitedQuantity, y: Floats) -> float | None:
+    """The amount nearest to a limit that no design within the bounds keeps; None where one does.
+
+    Sought from y, without regard to other limits; of catalogues None.
+    """
+    if scene.file.design.catalogues:
+        return None
+    (lower, upper), n = scene.bounds, len(y)
+    alone, none = Requirements((limit,), np.ones(1)), np.zeros((1, 0))
+    unasked = Frequencies(none, np.zeros((1, 0, n)))
+    problem = DesignProblem(lambda y: alone.appraise(y, unasked), lower, upper)
+    best = minimise(problem, y, scene.file.assignment.steps)
+    return None if best.seen.violation <= MET else limit.amount(best.y)
 
 
 def _can_be_met(

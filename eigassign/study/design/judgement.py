@@ -1,4 +1,4 @@
-"""What a design does to the targets: the distance to each, as it says itself, and the verdict."""
+"""What a design does to the targets: the distance to each, as it says itself; modes that meet."""
 
 from __future__ import annotations
 
@@ -115,65 +115,6 @@ def _row(errors: Floats, weights: Floats) -> ErrorRow:
     """Largest magnitude and root of the weighted mean square."""
     rms = float(np.sqrt(weights @ errors**2 / weights.sum()))
     return ErrorRow(float(np.abs(errors).max()), rms)
-
-
-# --- The verdict
-
-IMPROVED = 0.01  # of the merit of the start
-
-
-def verdict(
-    targets: Sequence[TargetStudy],
-    merits: tuple[tuple[float, float], tuple[float, float]],
-    trusted: bool,
-    unreachable: Sequence[str] = (),
-    conflict: str = "",
-) -> tuple[str, str]:
-    """The verdict, and why in a sentence.
-
-    ``merits`` are (violation, objective) of the initial design and of the answer; ``unreachable``
-    names targets outside the range that their mode can take within the bounds; ``conflict`` says
-    which limits contradict each other.
-    """
-    if not trusted:
-        return "do_not_use", "the numbers that the answer rests on cannot be vouched for"
-    missed = [target for target in targets if not target.satisfied]
-    if not missed:
-        return ("infeasible", conflict) if conflict else ("reached", "every target is met")
-    worst = max(missed, key=lambda target: target.error.exact.max_relative)
-    far = _far(worst)
-    if unreachable:
-        return "unreachable", f"{'; '.join(unreachable)}; the nearest design: {far}"
-    if conflict:
-        return "infeasible", f"{conflict} ({far})"
-    (before_violation, before), (violation, after) = merits
-    if violation > MET:
-        if violation < (1.0 - IMPROVED) * before_violation:
-            return "improved", f"nearer to what is asked, which is not met: {far}"
-        return "do_not_use", f"no design was found that meets what is asked: {far}"
-    if before_violation > MET or after < (1.0 - IMPROVED) * before:
-        return "improved", f"better than the initial design; {far}{_though(worst)}"
-    return "do_not_use", f"no better than the initial design: {far}"
-
-
-def _far(target: TargetStudy) -> str:
-    """The target and how far it is missed: ``mode 1 at 48 Hz: 6.02 % off at worst``."""
-    worst = f"{100 * target.error.exact.max_relative:.3g} %"
-    if target.asked.is_goal:
-        return f"{target.label}: {worst} off at worst"
-    return f"{target.label}: violated by {worst} at worst"
-
-
-def _though(target: TargetStudy) -> str:
-    """Say that the largest error has grown, where the mean one is what has fallen."""
-    before, after = target.error.initial, target.error.exact
-    if not target.asked.is_goal or after.max_relative <= before.max_relative:
-        return ""
-    fell = "" if after.rms_relative >= before.rms_relative else (
-        f", while the rms error fell from {100 * before.rms_relative:.3g} to "
-        f"{100 * after.rms_relative:.3g} %"
-    )  # fmt: skip
-    return f" (before: {100 * before.max_relative:.3g} %){fell}"
 
 
 # --- Followed modes that change their numbers

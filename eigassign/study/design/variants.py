@@ -7,6 +7,7 @@ modes below it is the same everywhere, so each k that the bounds may allow is on
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -39,9 +40,20 @@ class PosedProblem:
     problem: DesignProblem
     response: DesignResponse
 
+    @property
+    def limit_names(self) -> tuple[str, ...]:
+        """The names of all limits, those that every step keeps the last."""
+        kept = (row.name for row in self.problem.constraints)
+        return tuple(dict.fromkeys((*self.requirements.limit_names, *kept)))
+
     def of(self, some: Requirements) -> DesignProblem:
-        """The problem with ``some`` of its requirements only."""
+        """The problem with ``some`` of its requirements, beside limits that every step keeps."""
         return replace(self.problem, appraise=lambda y: some.appraise(y, self.response(y)))
+
+    def with_limits(self, names: Collection[str]) -> DesignProblem:
+        """The problem with those limits only that are named."""
+        kept = tuple(row for row in self.problem.constraints if row.name in names)
+        return replace(self.of(self.requirements.with_limits(names)), constraints=kept)
 
     def without_slopes(self, y: Floats) -> Appraisal:
         """A design as it is appraised, but with slopes 0: only its frequencies are solved."""

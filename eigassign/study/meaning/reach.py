@@ -15,9 +15,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.assignment.exact.design_problem import DesignProblem
+from eigassign.assignment.exact.design_problem import MET, DesignProblem
 from eigassign.assignment.exact.requirements import Requirements
 from eigassign.assignment.exact.sequential import minimise
+from eigassign.assignment.feasibility import constraints_agree
+from eigassign.assignment.program import Bounds
 from eigassign.assignment.requirements.frequency import AssignedFrequency
 from eigassign.assignment.requirements.requirement import Requirement, Solved
 from eigassign.errors import EigassignError
@@ -29,7 +31,7 @@ from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 LIMIT = 1e-4  # of a limit: by so much it must be missed to be called out of reach
-STEPS = 30  # of a search at one sample
+STEPS, STARTS = 30, 3  # of a search at one sample
 
 
 def proved_ranges(scene: Scene) -> tuple[Solved, Solved] | None:
@@ -72,62 +74,102 @@ def unreachable(
     max_error: float,
     ranges: tuple[Solved, Solved] | None,
 ) -> Iterator[str]:
-    """The targets that y misses and that are out of reach at some sample, in words."""
+    """The targets that y misses and that are out of reach at some sample, in words.
+
+    A wanted frequency is out of reach where no design that keeps all limits comes near enough; a
+    limit where no design does that keeps the linear ones: with others it contradicts.
+    """
     for w in wanted:
         if not misses(w, exact, max_error):
             continue
         allowed, errors = _allowed(w, max_error), w.errors(exact)
-        if ranges is not None and w.followed is None:
+        known = ranges is not None and w.followed is None
+        if known and ranges is not None:
             left = w.least_errors(*ranges)
             k = int(left.argmax())
             if left[k] > allowed:
-                low, high = (values[k] for values in w.curve_range(*ranges))
-                yield (
-                    f"{w.label} is out of reach at "
-                    f"{scene.path.where(w.rows.start + k)}: within the bounds it lies between "
-                    f"{low:.4g} and {high:.4g} Hz there (proved)"
-                )
-        elif len(w.terms) == 1:
-            yield from _searched(scene, w, y, errors, allowed)
+                low, high = (float(values[k]) for values in w.curve_range(*ranges))
+                best = low if low > w.lower[k] else high
+                yield _words(scene, w, k, best, "proved for all designs within the bounds")
+                continue
+        others = [*scene.limits, *(one for one in wanted if not one.is_goal)] if w.is_goal else []
+        if len(w.terms) == 1 and (others or not known):
+            yield from _searched(scene, w, others, y, errors, allowed)
+
+
+def _words(scene: Scene, wanted: Requirement, k: int, reached: float, how: str) -> str:
+    """The frequency that is reached at sample k of a target, and the one that was asked for."""
+    asked = float(wanted.hz[k])
+    most = "highest" if reached < asked else "lowest"
+    return (
+        f"{wanted.label} is out of reach at {scene.path.where(wanted.rows.start + k)}: the {most} "
+        f"{wanted.axis} reached there is {reached:.4g} Hz ({how}); {asked:.4g} Hz was asked"
+    )
 
 
 def _searched(
-    scene: Scene, wanted: Requirement, y: Floats, errors: Floats, allowed: float
+    scene: Scene,
+    wanted: Requirement,
+    others: Sequence[Requirement],
+    y: Floats,
+    errors: Floats,
+    allowed: float,
 ) -> Iterator[str]:
     """The first of the samples missed most, above and below, at which no design is near enough."""
     missed = [int(errors.argmax()), *([int(errors.argmin())] if wanted.is_goal else [])]
     for k in dict.fromkeys(k for k in missed if abs(errors[k]) > allowed):
-        nearest = _nearest(scene, wanted, k, y, allowed)
+        nearest = _nearest(scene, wanted, others, k, y, allowed)
         if nearest is not None and abs(nearest / wanted.hz[k] - 1.0) > allowed:
-            yield (
-                f"{wanted.label} is out of reach at "
-                f"{scene.path.where(wanted.rows.start + k)}: no design found within the limits "
-                f"comes nearer than {nearest:.4g} Hz there"
-            )
+            how = f"found from {STARTS} starts, within the limits"
+            yield _words(scene, wanted, k, nearest, how)
             return
 
 
-def _nearest(scene: Scene, wanted: Requirement, k: int, y: Floats, allowed: float) -> float | None:
+def _nearest(
+    scene: Scene,
+    wanted: Requirement,
+    others: Sequence[Requirement],
+    k: int,
+    y: Floats,
+    allowed: float,
+) -> float | None:
     """The frequency nearest to the one wanted at sample k of the target, by a search of its own.
 
-    The search ends with the first start that leads within ``allowed`` of it.
+    Within the linear limits and those of the ``others`` that hold at this sample. The search ends
+    with the first start that leads within ``allowed`` of it. None where none leads to a design
+    within the limits.
     """
-    at, goal, first = wanted.rows.start + k, wanted.hz[k : k + 1], slice(0, 1)
-    there = AssignedFrequency(wanted.label, wanted.place, wanted.terms, first, goal, goal)
-    asked = Requirements((there,), np.ones(1))
+    lower, upper = scene.bounds
+    if not constraints_agree(scene.constraints, Bounds(lower, upper)):
+        return None
+    at, goal = wanted.rows.start + k, wanted.hz[k : k + 1]
+    there = AssignedFrequency(wanted.label, wanted.place, wanted.terms, slice(0, 1), goal, goal)
+    of_modes = (one for one in others if one.mode_terms)  # a band has none: it leaves a choice
+    beside = [_at(one, at) for one in of_modes if one.rows.start <= at < one.rows.stop]
+    of_design = (one for one in others if one.terms and not one.mode_terms)
+    elastic = (one for one in of_design if one.constraint is None)
+    asked = Requirements((there, *beside, *elastic), np.ones(1))
     alone = replace(scene, trajectory=scene.path.chosen([at]))
-    own = followers(alone, [replace(there, followed=wanted.followed)])
-    response, (lower, upper) = response_of(alone, asked.modes, own), scene.bounds
+    followed = [replace(there, followed=wanted.followed), *beside]
+    response = response_of(alone, asked.modes, followers(alone, followed))
     problem = DesignProblem(
         lambda y: asked.appraise(y, response(y)), lower, upper, scene.constraints
     )
     found = []
-    for start in (y, 0.5 * (lower + upper), scene.initial):
+    for start in (y, 0.5 * (lower + upper), scene.initial)[:STARTS]:
         try:
             best = minimise(problem, start, STEPS)
         except EigassignError:
+            continue
+        if best.seen.violation > MET:
             continue
         found.append((abs(best.seen.residual[0]), (best.seen.residual[0] + 1.0) * goal[0]))
         if found[-1][0] <= allowed:
             break
     return float(min(found)[1]) if found else None
+
+
+def _at(one: Requirement, at: int) -> Requirement:
+    """A requirement at one of its samples, which is the only one there is."""
+    own = slice(at - one.rows.start, at - one.rows.start + 1)
+    return replace(one, rows=slice(0, 1), lower=one.lower[own], upper=one.upper[own], along=())

@@ -1,0 +1,135 @@
+"""The verdict: one word and its reason, a function of what a run found out and of nothing else.
+
+In this order, the first that holds:
+
+    infeasible     limits that need no frequency contradict
+    do_not_use     numbers of the answer cannot be vouched for
+    unreachable    a target is out of reach whatever the design
+    infeasible     limits contradict, some of them on frequencies
+    reached        every target is met and every limit kept, to the accuracy that is accepted
+    improved       better than the initial design
+    do_not_use     no better than that
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from eigassign.study.design.judgement import MET
+from eigassign.study.results import LimitRow, TargetStudy
+
+IMPROVED = 0.01  # of the merit of the start
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What the verdict rests on.
+
+    ``merits`` are (violation, objective) of the initial design and of the answer. ``doubts`` say
+    why numbers cannot be vouched for, ``unproved`` what cannot be said to be met though it seems
+    so; ``unreachable`` which targets are out of reach; ``conflict`` which limits contradict, and
+    ``of_frequencies`` whether some of these are on frequencies; ``unfinished`` how a search was
+    ended before it was done. ``max_error`` is the largest error accepted where the case says it.
+    """
+
+    targets: Sequence[TargetStudy]
+    merits: tuple[tuple[float, float], tuple[float, float]]
+    limits: Sequence[LimitRow] = ()
+    doubts: Sequence[str] = ()
+    unproved: Sequence[str] = ()
+    unreachable: Sequence[str] = ()
+    conflict: str = ""
+    of_frequencies: bool = True
+    unfinished: str = ""
+    max_error: float | None = None
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The word, why in a sentence, and why this is no answer to build on; None if it is."""
+
+    word: str
+    reason: str
+    shortcoming: str | None
+
+
+def verdict(facts: Facts) -> Verdict:
+    """The verdict of these facts."""
+    word, reason = _word(facts)
+    if facts.unfinished:
+        reason = f"{reason}; unfinished: {facts.unfinished}"
+    return Verdict(word, reason, _shortcoming(facts, word, reason))
+
+
+def _word(facts: Facts) -> tuple[str, str]:
+    missed = [target for target in facts.targets if not target.satisfied]
+    broken = [row.stated for row in facts.limits if not row.satisfied]
+    if facts.conflict and not facts.of_frequencies:
+        return "infeasible", _beside(facts.conflict, broken)
+    if facts.doubts:
+        return "do_not_use", "; ".join(facts.doubts)
+    worst = max(missed, key=lambda target: target.error.exact.max_relative, default=None)
+    far = [*([] if worst is None else [_far(worst)]), *broken]
+    if facts.unreachable:
+        return "unreachable", f"{'; '.join(facts.unreachable)}; the nearest design: {_all(far)}"
+    if facts.conflict:
+        return "infeasible", _beside(facts.conflict, far)
+    if not far:
+        if facts.unproved:
+            return "do_not_use", "; ".join(facts.unproved)
+        return "reached", "every target is met"
+    (before_violation, before), (violation, after) = facts.merits
+    if violation > MET:
+        if violation < (1.0 - IMPROVED) * before_violation:
+            return "improved", f"nearer to what is asked, which is not met: {_all(far)}"
+        return "do_not_use", f"no design was found that meets what is asked: {_all(far)}"
+    if before_violation > MET or after < (1.0 - IMPROVED) * before:
+        though = "" if worst is None else _though(worst)
+        return "improved", f"better than the initial design; {_all(far)}{though}"
+    return "do_not_use", f"no better than the initial design: {_all(far)}"
+
+
+def _shortcoming(facts: Facts, word: str, reason: str) -> str | None:
+    if word not in ("reached", "improved"):
+        return f"{word.replace('_', ' ')}: {reason}"
+    wanted = [target for target in facts.targets if target.asked.is_goal] or facts.targets
+    error = max(target.error.exact.max_relative for target in wanted)
+    if facts.max_error is None or error <= facts.max_error:
+        return None
+    return f"worst error {100 * error:.3g} %, over the {100 * facts.max_error:g} % of " + (
+        "assignment.max_error"
+    )
+
+
+def _beside(conflict: str, far: Sequence[str]) -> str:
+    return f"{conflict} ({_all(far)})" if far else conflict
+
+
+def _all(far: Sequence[str]) -> str:
+    return "; ".join(far)
+
+
+def _far(target: TargetStudy) -> str:
+    """Where the target ends, and how far off: ``mode 1 at 48 Hz: 45.11 Hz, 6.02 % off at worst``.
+
+    A band has no frequency of its own.
+    """
+    asked, worst = target.asked, f"{100 * target.error.exact.max_relative:.3g} %"
+    said = f"{worst} off at worst" if asked.is_goal else f"violated by {worst} at worst"
+    if not asked.terms:
+        return f"{target.label}: {said}"
+    k = int(asked.outside(target.exact_hz, target.exact_hz).argmax())
+    return f"{target.label}: {target.exact_hz[k]:.4g} Hz, {said}"
+
+
+def _though(target: TargetStudy) -> str:
+    """Say that the largest error has grown, where the mean one is what has fallen."""
+    before, after = target.error.initial, target.error.exact
+    if not target.asked.is_goal or after.max_relative <= before.max_relative:
+        return ""
+    fell = "" if after.rms_relative >= before.rms_relative else (
+        f", while the rms error fell from {100 * before.rms_relative:.3g} to "
+        f"{100 * after.rms_relative:.3g} %"
+    )  # fmt: skip
+    return f" (before: {100 * before.max_relative:.3g} %){fell}"
