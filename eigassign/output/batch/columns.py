@@ -122,6 +122,7 @@ def _text(cell: str | None) -> bytes:
     return (cell or "").replace("\0", r"\x00").encode(errors="backslashreplace")
 
 
+@lru_cache  # of some columns, in every row
 def _level(name: str) -> str:
     """``name`` as one level of a path in the file, which HDF5 can hold."""
     return (printable(name)[:_LONGEST] if name.strip(".") else repr(name)).replace("/", "|")
