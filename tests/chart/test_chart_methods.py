@@ -36,6 +36,7 @@ def test_every_method_has_numbers_and_a_name_of_its_own(compared: Chart) -> None
     names = [p.method for p in compared.points]
     assert len(set(names)) == len(names)
     assert {p.family for p in compared.points} - {"Kriging"} == FAMILIES
+    assert "grid cubic 2" not in names  # a spline of third degree takes four nodes
     for p in compared.points:
         assert (p.estimate is not None) == p.method.startswith("fit "), p.method
         assert np.isfinite(p.everywhere.worst_hz), p.method
@@ -200,6 +201,19 @@ def test_half_of_the_points_and_the_designs_of_all_runs_are_corners_of_the_box(a
     for run in question.runs:
         assert np.ptp(question.points.y[run], axis=0).max() == 0.0
         assert len(question.points[run]) == 9
+
+
+def test_samples_are_fewer_where_an_exact_solve_takes_long(arm: Scene) -> None:
+    bench = build_bench(arm, TINY)
+
+    class Dear(type(bench)):
+        solve_s = 0.1
+
+    every = 30 + 5 * 9  # random ones, and runs at the initial design and four corners
+    half = replace(TINY, most_s=0.5 * every * Dear.solve_s)
+    made = build_question(Dear(arm, half, bench.names, bench.place, bench.lower, bench.upper))
+    assert (made.asked.random_points, made.asked.samples_per_design) == (15, 4)
+    assert len(made.runs) == 4  # the initial design is one of the corners
 
 
 ABSOLUTE = "q2: {joint: elbow, angle: absolute}"
