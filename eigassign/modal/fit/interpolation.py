@@ -35,6 +35,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from itertools import islice, pairwise
 from math import ceil, log10
 
 import numpy as np
@@ -190,7 +191,8 @@ def interpolate(
         checks = reserved if count + reserved == given else 0
         if accuracy is not None:
             checks = 1 if d == 1 else 5 + count // 12
-        new = _held_out(axes, checks)[len(apart) :]
+        members = fresh if space is None else np.vstack([space.indices, fresh])
+        new = _held_out(axes, max(checks - len(apart), 0), np.vstack([members, apart]))
         if count + len(apart) + len(new) > most:
             refuse(f"over {most} are not allowed")
         values = ask(np.vstack([fresh, new]))
@@ -254,16 +256,19 @@ def _start(tops: Ints, whole: NDArray[np.bool_], accuracy: float | None, given: 
     return np.asarray(members[(members <= tops).all(axis=1)])
 
 
-def _held_out(axes: Sequence[Nodes], count: int) -> Ints:
-    """The first ``count`` points of a sequence all over the box, at places that are no nodes."""
+def _held_out(axes: Sequence[Nodes], count: int, taken: Ints) -> Ints:
+    """The first ``count`` points not ``taken``: corners, then places all over that are no nodes."""
     d = len(axes)
     turns = np.arange(d) % 2
     corners = [np.full(d, 1), np.full(d, 2), 1 + turns, 2 - turns] if d > 1 else []
     first = np.array([len(each.v) if len(each.checks) else 0 for each in axes])
     rooms = np.array([len(each.points) for each in axes]) - first
-    spread = first + np.floor(kronecker(count + 1, d)[1:] * rooms).astype(np.intp)
+    spread = first + np.floor(kronecker(len(taken) + count + 1, d)[1:] * rooms).astype(np.intp)
     tops = np.array([len(each.points) - 1 for each in axes])
-    return np.asarray(np.minimum(np.vstack([*corners, spread]), tops)[:count])
+    found = np.minimum(np.vstack([*corners, spread]), tops)
+    known = {*map(tuple, taken.tolist())}
+    new = (row for row in found.tolist() if tuple(row) not in known)
+    return np.array([*islice(new, count)], dtype=np.intp).reshape(-1, d)
 
 
 def _places(axes: Sequence[Nodes], points: Ints) -> Floats:
@@ -334,11 +339,20 @@ def _margin(space: LowerSet, tops: Ints) -> Ints:
 
 
 def _predicted(space: LowerSet, sizes: Floats, rates: Floats, rows: Ints) -> Floats:
-    """|c_γ| (n, n_rows) of several sizes (n, N) and rates (n, d); the constant shows nothing."""
+    """|c_γ| (n, n_rows) of several sizes (n, N) and rates (n, d); the constant shows nothing.
+
+    No size counts as less than those beyond it: on the axes c vanishes where f depends on several
+    axes only together, as on their product.
+    """
     d = space.n_variables
     steps = LAST[:, None, None] * np.eye(d, dtype=np.intp)  # (k, d, d)
     places = space.find((rows - steps[:, :, None]).reshape(-1, d)).reshape(len(LAST), d, len(rows))
     known = np.pad(sizes, ((0, 0), (0, 1)))  # the last for those that are none
+    units = np.eye(d, dtype=np.intp)
+    above = space.find((space.indices[:, None] + units).reshape(-1, d)).reshape(-1, d)
+    for first, last in list(pairwise(space.degree_starts))[::-1]:
+        own = known[:, first:last]
+        np.maximum(own, known[:, above[first:last]].max(axis=2), out=own)
     known[:, 0] = 0.0
     terms = known[:, places] * rates[:, None, :, None] ** LAST[:, None, None]
     terms = np.where(rows.T > 0, terms.max(axis=1), 1.0)

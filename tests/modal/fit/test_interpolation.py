@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -113,6 +114,28 @@ def test_the_power_that_is_a_polynomial_is_found(power: float) -> None:
 def test_an_even_function_does_not_look_finished_before_it_is() -> None:
     found, off, _ = made(lambda v: 1.0 / (1.5 + np.cos(3.0 * v[:, 0])), [NODES], 1e-5)
     assert off <= found.error <= 1e-5
+
+
+@pytest.mark.parametrize(
+    "f",
+    [
+        lambda v: 1.0 / (1.3 - v[:, 0] * v[:, 1]),
+        lambda v: 2.0 + np.exp(v[:, 0] * v[:, 1]),
+        lambda v: 2.0 + 0.5 * np.sin(3.0 * v[:, 0] * v[:, 1]),
+        lambda v: 1.0 / (2.0 + v[:, 0] ** 2 * v[:, 1] ** 2 * np.exp(v[:, 0])),
+    ],
+    ids=["pole", "exponential", "wave", "even"],
+)
+def test_what_depends_on_two_axes_only_together_does_not_look_constant(f: Function) -> None:
+    """Its coefficients vanish on both axes, from which the others seemed to follow."""
+    for accuracy in (1e-2, 1e-3, 1e-4, 1e-6):
+        found, off, _ = made(f, [NODES] * 2, accuracy)
+        assert off <= found.error + 1e-14
+        assert found.error <= accuracy
+    for count in (24, 36, 48, 60):  # of which those held out are no nodes
+        with suppress(AccuracyError):  # most are refused
+            found, off, _ = made(f, [NODES] * 2, None, count)
+            assert off <= 3.0 * found.error + 1e-14, count
 
 
 def test_a_kink_is_refused() -> None:
