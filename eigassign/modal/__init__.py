@@ -43,7 +43,7 @@ __all__, __getattr__, __dir__ = face(
         "fit.region": "Box",
         "fit.source": "FINE",
         "model": "Model",
-        "projection": "project project_terms",
+        "projection": "project project_at project_terms",
         "reduced.added_mass": "added_mass",
         "reduced.basis": "ritz_basis",
         "reduced.error_estimate": "frequency_error largest_outside mode_missing",

@@ -9,7 +9,7 @@ import pytest
 from large import DRIVES, HELD, arm, large
 
 from eigassign.mechanism import Pencil
-from eigassign.modal import project, project_terms
+from eigassign.modal import project, project_at, project_terms
 
 
 def one_by_one(pencil: Pencil, left: np.ndarray, right: np.ndarray, which: int) -> np.ndarray:
@@ -36,6 +36,10 @@ def test_terms_of_many_rows_are_projected_in_parts() -> None:
         for j in range(pencil.n_theta):
             right = V.T @ (pencil.sparse(weights[:, [j]].toarray()[:, 0]) @ V)
             np.testing.assert_allclose(found[which][j], right, atol=1e-12 * np.abs(right).max())
+    theta = pencil.theta(np.array([[1.8, 5.3, 0.1, 0.2]]))
+    terms = np.array(found) * theta[:, 0, None, None]
+    for at, each in zip(project_at(pencil, theta, V.T), terms, strict=True):  # cut as well
+        np.testing.assert_allclose(at, each.sum(axis=0), atol=1e-12 * np.abs(each).max())
 
 
 @pytest.mark.parametrize("limit", [0, 10**6])
