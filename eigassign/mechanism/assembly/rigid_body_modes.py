@@ -100,7 +100,7 @@ def _at_poses(table: CompiledArrays, z: Floats, span: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Resistance:
-    """What springs resist of the motions of the ``free`` columns, see `_rows`."""
+    """The resistance of springs to the motions of the ``free`` columns, see `_rows`."""
 
     case: CaseFile
     motion: Kinematics

@@ -259,7 +259,7 @@ class _Branches:
         return np.asarray(np.abs(np.concatenate([F, check])).max(axis=0))
 
     def _descended(self, starts: Floats) -> Floats:
-        """Where Newton's steps lead in least squares from many starting points (n, n_p)."""
+        """States (n, n_p) that Newton's steps, in least squares, lead to from many starts."""
         p = starts.T
         for _ in range(6):
             p, _ = self.function.newton(np.repeat(self.a0[:, None], len(starts), axis=1), p)
