@@ -90,8 +90,8 @@ def _alarm_of_thread(seconds: float) -> Iterator[None]:
         raise_in(here, None)  # nor what this thread has not heard yet
 
     ringing = threading.Thread(target=ring, daemon=True)
-    ringing.start()
     try:
+        ringing.start()  # it may ring before this returns
         yield
     finally:
         try:

@@ -120,6 +120,25 @@ def test_a_case_in_a_thread_is_ended_too() -> None:
     assert ended == ["after 0.01 s", "not ended", "at the end"]
 
 
+def test_a_time_that_is_over_at_once_ends_nothing_behind_it() -> None:
+    late: list[str] = []
+
+    def work() -> None:
+        try:
+            for _ in range(50):
+                with suppress(OutOfTimeError), limited(1e-6, None):
+                    time.sleep(0.01)
+            for _ in range(70):  # longer than until the next ring
+                time.sleep(0.01)
+        except OutOfTimeError:
+            late.append("rang")
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert not late
+
+
 def test_limits_are_lifted_behind_a_case() -> None:
     before = resource.getrlimit(resource.RLIMIT_AS)
     with pytest.raises(MemoryError), limited(None, 100.0):
