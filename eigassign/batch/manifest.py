@@ -20,7 +20,6 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import NamedTuple
 
 from eigassign._version import __version__
 from eigassign.case.schema.sweep import MOST
@@ -97,7 +96,8 @@ def line_of(row: str, plan: str) -> str:
     return f'{row[:-1]}, "seal": "{seal}"}}\n'
 
 
-class Line(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Line:
     """A whole line of the manifest: of which file, where it begins, its bytes, and its row."""
 
     path: Path

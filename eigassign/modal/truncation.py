@@ -69,7 +69,7 @@ def truncation_error(parts: ReducedLinks, x: Floats, modes: Sequence[int]) -> Fl
     return out
 
 
-def _interior(parts: ReducedLinks, k: int, values: Floats) -> _LinkInterior:
+def _interior(parts: ReducedLinks, k: int, values: Sequence[Floats]) -> _LinkInterior:
     """The factor of K_ii serves the Gram matrix, the constraint modes and β alike."""
     reduction = parts.links[k].reduction
     assert reduction is not None
