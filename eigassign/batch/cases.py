@@ -88,7 +88,7 @@ class Batch:
 
 
 def recorded(place: Path) -> CaseOutcome | None:
-    """How the case of this folder ended; None where its record or a file of it is damaged."""
+    """The outcome of the case of this folder; None where its record or a file of it is damaged."""
     record = read_record(place)
     if record is None or OUTCOME not in record.files or not is_whole(place, record):
         return None

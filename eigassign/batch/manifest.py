@@ -113,7 +113,7 @@ class Line:
 
     @property
     def status(self) -> str:
-        """How its case ended."""
+        """The status of its case."""
         return status_of(self.row)
 
     @property

@@ -61,7 +61,7 @@ class PlannedFile:
 
     @property
     def said(self) -> object:
-        """What tells its variants from others; files that values name count by content."""
+        """The identity of its variants; files that values name count by content."""
         if not self.variants.keys:
             return ""
         texts = dict.fromkeys(_texts(self.variants.columns))

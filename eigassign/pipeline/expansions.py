@@ -116,7 +116,7 @@ def _expansions(
 def _made(
     model: Model, plan: Plan, full_order: int, stored: Mapping[str, Array] | None = None
 ) -> Expansions:
-    """Both expansions, of what is ``stored`` where that is given."""
+    """The two expansions, of what is ``stored`` where that is given."""
     full, linear = (
         expand(
             *(model.pencil, plan.q0, plan.y0, plan.modes, order, linear_in_y),

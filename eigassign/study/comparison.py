@@ -158,7 +158,7 @@ class ModeStudies:
 
 
 def study_modes(scene: Scene, initial_hz: Floats | None = None) -> ModeStudies:
-    """Every expanded mode's study; ``initial_hz`` (n_t, modes) exact on the trajectory."""
+    """The study of each expanded mode; ``initial_hz`` (n_t, modes) exact on the trajectory."""
     if scene.expanded is None:
         return ModeStudies()
     model, expansions = scene.model, scene.expanded

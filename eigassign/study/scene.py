@@ -144,7 +144,7 @@ class Scene:
 
     @property
     def constraints(self) -> tuple[LinearConstraint, ...]:
-        """Those of them that are linear in the design."""
+        """The limits that are linear in the design."""
         return tuple(one.constraint for one in self.limits if one.constraint is not None)
 
     def shown_modes(self, asked: int = 1) -> int:

@@ -42,12 +42,12 @@ class Requirements:
 
     @cached_property
     def goals(self) -> tuple[Requirement, ...]:
-        """Those that the objective is to come near to."""
+        """The requirements that the objective is to come near to."""
         return tuple(one for one in self.asked if one.is_goal)
 
     @cached_property
     def limits(self) -> tuple[Requirement, ...]:
-        """Those that are to be kept."""
+        """The requirements that are to be kept."""
         return tuple(one for one in self.asked if not one.is_goal)
 
     @property

@@ -81,7 +81,7 @@ class AffineEntries:
             self.sums[row, column] = self.sums.get((row, column), 0.0) + value
 
     def finish(self, n_u: int) -> Entries:
-        """All entries; sums among the q̇ become one atom each."""
+        """The entries; sums among the q̇ become one atom each."""
         sums = [
             (row, column, atom, factor)
             for (row, column), value in self.sums.items()

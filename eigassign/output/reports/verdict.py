@@ -49,7 +49,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class FirstScreen:
     """The first screen."""
 
     word: str
@@ -62,7 +62,7 @@ class Verdict:
     cost: tuple[str, ...]
 
 
-def verdict_of(results: RunResults) -> Verdict | None:
+def verdict_of(results: RunResults) -> FirstScreen | None:
     """The verdict of a run; None where nothing was asked for.
 
     Of more than three targets only the worst distance is told.
@@ -73,7 +73,7 @@ def verdict_of(results: RunResults) -> Verdict | None:
     few = len(results.targets) <= 3
     findings = [_finding(target, row.max_error, few) for target in results.targets]
     findings += [_broken(limit) for limit in row.limits if not limit.satisfied]
-    return Verdict(
+    return FirstScreen(
         word=WORDS[row.verdict],
         tone=TONES.get(row.verdict, "bad") if row.shortcoming is None else "bad",
         reason=_sentence(row.reason),

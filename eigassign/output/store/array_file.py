@@ -61,7 +61,7 @@ def put(path: Path, key: str, arrays: Mapping[str, Array], words: Mapping[str, s
 
 
 def get(path: Path, key: str) -> Stored:
-    """What was `put` there; raises OSError as `read_bytes` does, DamagedError as `unpack` does."""
+    """The arrays that were `put` there; raises as `read_bytes` and `unpack` do."""
     return unpack(key, read_bytes(path, STORED))
 
 
