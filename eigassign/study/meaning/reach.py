@@ -90,7 +90,10 @@ def unreachable(
             if left[k] > allowed:
                 low, high = (float(values[k]) for values in w.curve_range(*ranges))
                 best = low if low > w.lower[k] else high
-                yield _words(scene, w, k, best, "proved for all designs within the bounds")
+                how = (
+                    f"within the bounds it lies between {low:.4g} and {high:.4g} Hz there (proved)"
+                )
+                yield _words(scene, w, k, best, how)
                 continue
         others = [*scene.limits, *(one for one in wanted if not one.is_goal)] if w.is_goal else []
         if len(w.terms) == 1 and (others or not known):
@@ -101,9 +104,10 @@ def _words(scene: Scene, wanted: Requirement, k: int, reached: float, how: str) 
     """The frequency that is reached at sample k of a target, and the one that was asked for."""
     asked = float(wanted.hz[k])
     most = "highest" if reached < asked else "lowest"
+    curve = wanted.curve_name if len(wanted.terms) == 1 else f"the {wanted.axis}"
     return (
         f"{wanted.label} is out of reach at {scene.path.where(wanted.rows.start + k)}: the {most} "
-        f"{wanted.axis} reached there is {reached:.4g} Hz ({how}); {asked:.4g} Hz was asked"
+        f"that {curve} reaches there is {reached:.4g} Hz; {asked:.4g} Hz was asked; {how}"
     )
 
 
@@ -120,7 +124,7 @@ def _searched(
     for k in dict.fromkeys(k for k in missed if abs(errors[k]) > allowed):
         nearest = _nearest(scene, wanted, others, k, y, allowed)
         if nearest is not None and abs(nearest / wanted.hz[k] - 1.0) > allowed:
-            how = f"found from {STARTS} starts, within the limits"
+            how = f"no design found from {STARTS} starts within the limits comes nearer"
             yield _words(scene, wanted, k, nearest, how)
             return
 
