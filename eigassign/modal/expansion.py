@@ -57,10 +57,11 @@ class Expansion:
 
         λ(x) ≈ Σ_γ λ_γ (x − x0)^γ,  x = (q, y), q in rad or m, y in SI units
 
-    ``frequencies(q, y)`` (n, n_modes) in Hz, ``eigenvalues(q, y)`` in rad²/s²; ``indices`` γ
-    (N, n_q + n_y), ``coefficients`` λ_γ (n_modes, N); ``error_estimate(q, y)`` relative in Hz,
-    without an exact solve; ``linear_in_design(q)`` is eq. (9), ``inverse`` the series of 1/λ.
-    Neighbouring modes are expanded together, as the matrices of ``clusters``.
+    ``frequencies(q, y)`` (n, n_modes) in Hz, ``eigenvalues(q, y)`` in rad²/s², with ∂λ/∂x
+    ``slopes(q, y)``; ``indices`` γ (N, n_q + n_y), ``coefficients`` λ_γ (n_modes, N);
+    ``error_estimate(q, y)`` relative in Hz, without an exact solve; ``linear_in_design(q)`` is
+    eq. (9), ``inverse`` the same with the series of 1/λ. Neighbouring modes are expanded together,
+    as the matrices of ``clusters``.
     """
 
     modes: tuple[int, ...]
@@ -73,26 +74,31 @@ class Expansion:
     vector_space: LowerSet
     notes: tuple[str, ...]
     pencil: Pencil | None = None  # what was expanded; not stored, needed by ``error_estimate``
+    inverted: bool = False  # the coefficients are those of 1/λ
 
     def __repr__(self) -> str:
         at = ", ".join(f"{value:.6g}" for value in self.x0)
+        of = "1/λ" if self.inverted else "λ"
         return cut(
-            f"<Expansion of λ of {of_modes(self.modes)}: order {self.order}, {len(self.space)} "
+            f"<Expansion of {of} of {of_modes(self.modes)}: order {self.order}, {len(self.space)} "
             f"coefficients in {counted(self.space.n_variables, 'variable')}, about (q, y) = ({at})>"
         )
 
     def eigenvalues(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """λ (n_samples, n_modes) in rad²/s²; q (n_samples, n_q) or (n_q,), y likewise."""
-        return self._at((samples(q, y, len(self.q0), len(self.y0)) - self.x0) @ self.directions.T)
-
-    def _at(self, w: Floats) -> Floats:
-        """λ (n_samples, n_modes) at local variables w (n_samples, n_w)."""
-        return np.hstack(
+        w = self._local(q, y)
+        values = np.hstack(
             [
                 _eigenvalues(c, made(w).reshape(len(w), *c.coefficients.shape[:2]), self.modes)
                 for c, made in zip(self.clusters, self._prepared, strict=True)
             ]
         )
+        with np.errstate(divide="ignore"):
+            return 1.0 / values if self.inverted else values
+
+    def _local(self, q: ArrayLike, y: ArrayLike) -> Floats:
+        """The local variables w (n_samples, n_w)."""
+        return (samples(q, y, len(self.q0), len(self.y0)) - self.x0) @ self.directions.T
 
     @cached_property
     def _prepared(self) -> tuple[Polynomials, ...]:
@@ -134,30 +140,38 @@ class Expansion:
         return reduce(self.pencil, self.q0, self.y0, self.modes, order, given=given)
 
     @cached_property
-    def inverse(self) -> InverseExpansion:
-        """The expansion of 1/λ; UsageError for clusters: their eigenvalues have no series each."""
+    def inverse(self) -> Expansion:
+        """The series of 1/λ; UsageError for clusters: their eigenvalues have no series each.
+
+        Frequencies that fall with added mass have λ = a / (b + m) in the simplest case: 1/λ is
+        linear in m, while λ's own series ends at m = −b. The reciprocal of a truncated series is
+        exact order by order.
+        """
         together = [c.modes for c in self.clusters if len(c.modes) > 1]
         if together:
             raise UsageError(
                 f"modes {together[0]} are expanded as a cluster: 1/λ has no series each"
             )
-        singles = np.array([c.coefficients[0, 0] for c in self.clusters])
-        return InverseExpansion(self, _frozen(reciprocal(self.space, singles)))
+        turned = tuple(
+            replace(c, coefficients=_frozen(reciprocal(self.space, c.coefficients[0]))[None])
+            for c in self.clusters
+        )
+        return replace(self, clusters=turned, inverted=not self.inverted)
 
     def linear_in_design(self, q: ArrayLike) -> tuple[Floats, Floats]:
         """l_0 (n_samples, n_modes) and l (n_samples, n_modes, n_y) of eq. (9) at samples of q.
 
         λ ≈ l_0(q) + Σ_j l_j(q) (y_j − y0_j), rad²/s² over units of y: the terms |β| ≤ 1.
         """
-        l0, slopes = self.gradient(q)
+        l0, slopes = self.slopes(q, self.y0)
         return l0, slopes[:, :, len(self.q0) :]
 
-    def gradient(self, q: ArrayLike) -> tuple[Floats, Floats]:
-        """λ (n_samples, n_modes) and ∂λ/∂x (n_samples, n_modes, n_x) at samples of q, y = y0."""
-        w = (samples(q, self.y0, len(self.q0), len(self.y0)) - self.x0) @ self.directions.T
-        l0, powers = self._at(w), monomials(self.space, w)
-        slopes = [_slopes(c, self.space, powers, self.modes) for c in self.clusters]
-        return l0, np.concatenate(slopes, axis=1) @ self.directions
+    def slopes(self, q: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
+        """λ (n_samples, n_modes) and ∂λ/∂x (n_samples, n_modes, n_x) over units of x."""
+        lam, powers = self.eigenvalues(q, y), monomials(self.space, self._local(q, y))
+        parts = [_slopes(c, self.space, powers, self.modes) for c in self.clusters]
+        slopes = np.concatenate(parts, axis=1) @ self.directions
+        return lam, -np.square(lam)[..., None] * slopes if self.inverted else slopes
 
     @property
     def x0(self) -> Floats:
@@ -347,50 +361,6 @@ def radius_share(expansion: Expansion, q: ArrayLike, y: ArrayLike) -> Floats:
     return np.column_stack(shares)
 
 
-# --- The series of 1/λ: the same coefficients, summed in another way
-
-
-@dataclass(frozen=True, eq=False)
-class InverseExpansion:
-    """Taylor expansion of 1/λ about the point of ``expansion``, over the same set; immutable.
-
-    Frequencies that fall with added mass have λ = a / (b + m) in the simplest case: 1/λ is linear
-    in m, while λ's own series ends at m = −b. The reciprocal of a truncated series is exact order
-    by order.
-    """
-
-    expansion: Expansion
-    coefficients: Floats  # (n_modes, N) over w, s² over units of w
-
-    def __repr__(self) -> str:
-        return repr(self.expansion).replace("Expansion of λ", "InverseExpansion of 1/λ")
-
-    @property
-    def modes(self) -> tuple[int, ...]:
-        """The modes expanded, in the order of the columns."""
-        return self.expansion.modes
-
-    @cached_property
-    def _prepared(self) -> Polynomials:
-        return polynomials(self.expansion.space, self.coefficients)
-
-    def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
-        """f = 1/(2π √μ) in Hz, μ the polynomial, (n_samples, n_modes); NaN where μ < 0."""
-        of = self.expansion
-        w = (samples(q, y, len(of.q0), len(of.y0)) - of.x0) @ of.directions.T
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return np.asarray(0.5 / np.pi / np.sqrt(self._prepared(w)))
-
-    def error_estimate(self, q: ArrayLike, y: ArrayLike) -> Floats:
-        """Estimate of the relative error of ``frequencies``, (n_samples, n_modes); no exact solve.
-
-        As for the expansion of λ: beside the reduced model on the same Taylor vectors.
-        """
-        beside = self.expansion.reduced
-        f = self.frequencies(q, y)
-        return polynomial_error(f, beside.frequencies(q, y), beside.error_estimate(q, y))
-
-
 # --- Several expansions about points along a trajectory: each pose belongs to the nearest one
 
 
@@ -433,12 +403,12 @@ class NearestExpansion:
 
     def linear_in_design(self, q: ArrayLike) -> tuple[Floats, Floats]:
         """l_0 and l of eq. (9); see `Expansion.linear_in_design`."""
-        l0, slopes = self.gradient(q)
+        l0, slopes = self.slopes(q, self.parts[0].y0)
         return l0, slopes[:, :, len(self.parts[0].q0) :]
 
-    def gradient(self, q: ArrayLike) -> tuple[Floats, Floats]:
-        """λ and ∂λ/∂x; see `Expansion.gradient`."""
-        values, slopes = zip(*(part.gradient(q) for part in self.parts), strict=True)
+    def slopes(self, q: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
+        """λ and ∂λ/∂x; see `Expansion.slopes`."""
+        values, slopes = zip(*(part.slopes(q, y) for part in self.parts), strict=True)
         return self.pick(q, values), self.pick(q, slopes)
 
     def pick(self, q: ArrayLike, values: Sequence[Floats]) -> Floats:

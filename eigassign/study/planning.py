@@ -84,8 +84,7 @@ def plan_expansion(
         _require_affordable(file, model, wanted, given=order is None)
         return Plan(q0, y0, wanted, chosen, tuple(note for note in notes if note))
     found = choose_order(file, model, trajectory, q0, y0, chosen, needed)
-    all_notes = tuple(note for note in (*notes, *found.reasons) if note)
-    return Plan(q0, y0, found.order, chosen, all_notes, found.more_q, found.cluster_gap)
+    return replace(found, notes=tuple(note for note in (*notes, *found.notes) if note))
 
 
 def _require_affordable(file: CaseFile, model: Model, order: int, given: bool) -> None:
@@ -363,17 +362,6 @@ def expansion_needed(file: CaseFile) -> bool:
     return file.assignment.method == "one_shot" or not file.targets
 
 
-@dataclass(frozen=True)
-class OrderChoice:
-    """Order, expansion points q and which modes go together, with the reasons."""
-
-    order: int
-    q0: Floats  # (n_q,)
-    more_q: tuple[tuple[float, ...], ...]
-    cluster_gap: float  # relative, in λ
-    reasons: tuple[str, ...]
-
-
 def choose_order(
     file: CaseFile,
     model: Model,
@@ -382,8 +370,8 @@ def choose_order(
     y0: Floats,
     modes: tuple[int, ...],
     needed: bool = True,
-) -> OrderChoice:
-    """Order and expansion points that meet the series' share of the accuracy.
+) -> Plan:
+    """Order and expansion points that meet the series' share, and which modes go together.
 
     They are chosen at few poses and corners of the design's bounds, and confirmed at many more, at
     random designs and at those that are worse than the worst of these. (Choosing at all of them at
@@ -405,10 +393,9 @@ def choose_order(
         if needed:
             raise
         why = f"no expansion, so that nothing is told of one, nor a one-shot design: {error}"
-        return OrderChoice(0, q0, (), CLUSTER_GAP, (why,))
-    _, *more = (part.q0 for part in found.expansions)
-    more_q = tuple(tuple(q.tolist()) for q in more)
-    return OrderChoice(found.order, q0, more_q, found.cluster_gap, tuple(reasons))
+        return Plan(q0, y0, 0, modes, (why,))
+    more_q = tuple(tuple(part.q0.tolist()) for part in found.parts[1:])
+    return Plan(q0, y0, found.order, modes, tuple(reasons), more_q, found.cluster_gap)
 
 
 def _confirmed(
@@ -444,7 +431,7 @@ def _confirmed(
 
 def _largest_estimate(found: ExpansionChoice, x: Floats) -> Floats:
     """The largest estimate of all modes at x (n, n_x), (n,)."""
-    n_q = len(found.expansions[0].q0)
+    n_q = len(found.parts[0].q0)
     return np.asarray(found.error_estimate(x[:, :n_q], x[:, n_q:]).max(axis=1))
 
 

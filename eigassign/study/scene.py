@@ -76,7 +76,7 @@ class Expansions(Brief):
         Raises TrajectoryError where the design y0 cannot follow the path.
         """
         q, of_design = path.at(self.full.y0)
-        l0, slopes = self.linears.gradient(q)
+        l0, slopes = self.linears.slopes(q, self.full.y0)
         by_q, by_y = np.split(slopes, [q.shape[1]], axis=2)
         return l0, by_y + by_q @ of_design if path.follows_design else by_y
 

@@ -38,7 +38,7 @@ def test_several_points_reach_over_it():
     chosen = choose_expansion(model.pencil, X, 1e-3, (1, 2))
     exact = model.frequencies(Q, [0.1], 2)
     assert np.abs(chosen.frequencies(Q, [0.1]) / exact - 1.0).max() <= 1e-3
-    assert len(chosen.expansions) > 1
+    assert len(chosen.parts) > 1
     with pytest.raises(AccuracyError, match="at sample"):
         choose_expansion(model.pencil, X, 1e-7, (1, 2), orders=(2,))
 

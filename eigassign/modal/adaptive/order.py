@@ -57,14 +57,12 @@ LARGE = 100_000
 
 
 @dataclass(frozen=True, eq=False)
-class ExpansionChoice:
-    """Expansions that together are within ``accuracy`` at every sample, and why these.
+class ExpansionChoice(NearestExpansion):
+    """Expansions that together are within the accuracy at every sample, and why these.
 
-    They share y0 and the order; each sample belongs to the one whose q0 is nearest, and modes
-    closer than ``cluster_gap`` (relative in λ) are expanded together.
+    They share the order; modes closer than ``cluster_gap`` (relative in λ) are expanded together.
     """
 
-    expansions: tuple[Expansion, ...]
     cluster_gap: float
     estimate: Floats  # (n, n_modes) at the samples
     beside: AdaptiveReduction
@@ -74,14 +72,10 @@ class ExpansionChoice:
     @property
     def order(self) -> int:
         """Their order, at least 1; where no variable matters, their degree is 0."""
-        return max(self.expansions[0].order, 1)
-
-    def frequencies(self, q: ArrayLike, y: ArrayLike) -> Floats:
-        """(n, n_modes) in Hz, each sample by the nearest expansion."""
-        return NearestExpansion(self.expansions).frequencies(q, y)
+        return max(self.parts[0].order, 1)
 
     def error_estimate(self, q: ArrayLike, y: ArrayLike) -> Floats:
-        """Relative error of ``frequencies``, (n, n_modes); infinite where refused."""
+        """Relative error of ``frequencies`` (n, n_modes), beside the one reduced model."""
         reduced = self.beside.reduced
         f, e = reduced.frequencies(q, y), reduced.error_estimate(q, y)
         return polynomial_error(self.frequencies(q, y), f, e)

@@ -16,7 +16,7 @@ from eigassign.errors import AccuracyError, MissingMassError, UsageError
 from eigassign.modal.arguments import mode_numbers, shown_numbers
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.exact.solver import eigenvalues
-from eigassign.modal.expansion import Expansion, InverseExpansion
+from eigassign.modal.expansion import Expansion
 from eigassign.modal.model import Model, as_model
 from eigassign.modal.reduced.model import ReducedModel
 
@@ -58,7 +58,7 @@ def as_source(given: Any, modes: Sequence[int] | None) -> FitSource:
 
     Raises UsageError for a mode that it does not have, and for what is no source.
     """
-    if isinstance(given, Expansion | InverseExpansion | ReducedModel):
+    if isinstance(given, Expansion | ReducedModel):
         return _stated(given, modes)
     return _exact(as_model(given), modes)
 
@@ -87,15 +87,12 @@ def _exact(model: Model, modes: Sequence[int] | None) -> FitSource:
     return FitSource(wanted, pencil.local_directions[1], pencil.n_q, ask, error, fine)
 
 
-def _stated(
-    given: Expansion | InverseExpansion | ReducedModel, modes: Sequence[int] | None
-) -> FitSource:
+def _stated(given: Expansion | ReducedModel, modes: Sequence[int] | None) -> FitSource:
     """A source that states its error; neighbours of its modes are those of the reduced model."""
     wanted = mode_numbers(given.modes if modes is None else modes)
     if not set(wanted) <= set(given.modes):
         raise UsageError(f"modes {wanted} asked for; the source has {given.modes}")
-    made = given.expansion if isinstance(given, InverseExpansion) else given
-    reduced = made.reduced if isinstance(made, Expansion) else made
+    reduced = given.reduced if isinstance(given, Expansion) else given
     every = tuple(range(1, min(wanted[-1] + 1, reduced.size) + 1))
     beside, n_q = replace(reduced, modes=every), reduced.n_q
     columns, own = [given.modes.index(m) for m in wanted], [m - 1 for m in wanted]

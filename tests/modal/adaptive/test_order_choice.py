@@ -39,7 +39,7 @@ def test_what_is_fixed_stays(x):
     assert dict(mesh.elements) == {"upper": 4, "fore": 3}
     expansion = choose_expansion(build(mesh.elements).pencil, x, 2.5e-3, orders=(4,), start=x[0])
     assert expansion.order == 4
-    np.testing.assert_array_equal(expansion.expansions[0].x0, x[0])
+    np.testing.assert_array_equal(expansion.parts[0].x0, x[0])
 
 
 def test_what_only_several_designs_could_reach_is_refused(x):
@@ -54,8 +54,8 @@ def test_several_points_do_where_one_does_not(x):
     model = build({"upper": 4, "fore": 3})
     x = np.hstack([x[:, :2], np.full((len(x), 2), 0.125)])
     chosen = choose_expansion(model.pencil, x, 1e-4, (1, 2), orders=(3, 4))
-    assert len(chosen.expansions) > 1
-    assert {part.y0.tobytes() for part in chosen.expansions} == {x[0, 2:].tobytes()}
+    assert len(chosen.parts) > 1
+    assert {part.y0.tobytes() for part in chosen.parts} == {x[0, 2:].tobytes()}
     f = chosen.frequencies(x[:, :2], x[:, 2:])
     error = np.abs(f / exact(model, x, (1, 2)) - 1.0)
     assert error.max() <= 1e-4
@@ -67,7 +67,7 @@ def test_many_points_do_while_more_of_them_help(x):
     model = build({"upper": 4, "fore": 3})
     x = np.hstack([x[:, :2], np.full((len(x), 2), 0.125)])
     chosen = choose_expansion(model.pencil, x, 2e-6, orders=(2,))
-    assert 8 < len(chosen.expansions) <= 32
+    assert 8 < len(chosen.parts) <= 32
     f = chosen.frequencies(x[:, :2], x[:, 2:])
     assert np.abs(f / exact(model, x, (1,)) - 1.0).max() <= 2e-6
 
@@ -102,7 +102,7 @@ def test_several_points_are_preferred_to_one_series_of_very_many_terms(x):
     x = np.hstack([x[:, :2], np.full((len(x), 2), 0.1)])
     alone = choose_expansion(model.pencil, x, 1e-5)
     several = choose_expansion(model.pencil, x, 1e-5, orders=(2, 3, 4))
-    assert len(alone.expansions) == 1 < len(several.expansions)
+    assert len(alone.parts) == 1 < len(several.parts)
     assert several.order <= 4 < alone.order
     for chosen in (alone, several):
         hz = chosen.frequencies(x[:, :2], x[:, 2:])
