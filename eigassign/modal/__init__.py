@@ -51,7 +51,7 @@ __all__, __getattr__, __dir__ = face(
         "reduced.pencil": "ritz_pairs",
         "reduced.reduce": "reduce",
         "reduced.residual": "half_solve residual_gram residual_terms",
-        "slopes": "eigenvalue_slopes mixed_slopes",
+        "slopes": "exact_slopes",
         "slow_motion": "change_at motion_effect moving_modes theta_in_time",
         "storage": (
             "FORMAT expansion_arrays reduced_arrays reduced_from_arrays stored_series tree_arrays"

@@ -110,6 +110,16 @@ def chunks(rows: Array, numbers: int) -> Iterator[Array]:
     return (rows[i : i + size] for i in range(0, max(len(rows), 1), size))
 
 
+BLOCK = 2_000_000  # numbers of a batch of matrices: a second or so of dense solves
+AT_LEAST = 128  # samples of a batch: those of large models share most of their work
+
+
+def solve_blocks(x: Floats, n_dof: int) -> Iterator[Floats]:
+    """Rows of x that are solved exactly at once, part by part."""
+    size = max(AT_LEAST, BLOCK // n_dof**2)
+    return (x[i : i + size] for i in range(0, len(x), size))
+
+
 def spread(x: Floats, most: int) -> Floats:
     """Rows of x, at most so many, spread evenly from the first to the last."""
     keep = np.unique(np.linspace(0, len(x) - 1, min(most, len(x))).round().astype(int))

@@ -21,6 +21,7 @@ from eigassign.modal.arguments import samples
 from eigassign.modal.discretisation import discretisation_error
 from eigassign.modal.exact.solver import eigenvalues, modes
 from eigassign.modal.exact.tracking import Tracked, track
+from eigassign.modal.slopes import exact_slopes
 from eigassign.modal.truncation import truncation_error
 
 Floats = NDArray[np.float64]
@@ -103,6 +104,18 @@ class Model:
         """Frequencies (n_samples, count) in Hz and mass-normalised modes (…, n_dof, count)."""
         found = modes(self.pencil, self.x(q, y), count)
         return np.sqrt(found.lam) / (2.0 * np.pi), found.phi
+
+    def slopes(
+        self, q: ArrayLike, y: ArrayLike, count: int = 3, wanted: ArrayLike | None = None
+    ) -> tuple[Floats, Floats]:
+        """λ (n_samples, count) of the lowest elastic modes in rad²/s², and ∂λ/∂x, x = (q, y).
+
+        ∂λ/∂x (n_samples, count, n_x) is taken where ``wanted`` (n_x,) is not 0, everywhere without
+        it; else it is 0. Where modes meet it is that of the mode which the solver returns.
+        """
+        x = self.x(q, y)
+        where = np.ones(x.shape[1]) if wanted is None else wanted
+        return exact_slopes(self.pencil, x, count, where)[:2]
 
     def mass(self, y: ArrayLike) -> float:
         """Mass of all links and bodies in kg, those that never move included, at a design (n_y,).

@@ -19,64 +19,49 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.arguments import chunks
+from eigassign.modal.arguments import chunks, solve_blocks
 from eigassign.modal.exact.condensation import Modes
-from eigassign.modal.exact.solver import lowest_modes, modes_at
+from eigassign.modal.exact.solver import lowest_modes
 
 Floats = NDArray[np.float64]
 
 
-def eigenvalue_slopes(
-    pencil: Pencil, x: Floats, count: int, wanted: ArrayLike
-) -> tuple[Floats, Floats]:
-    """λ (n, count) and ∂λ/∂x (n, count, n_x) of the lowest elastic modes at x (n, n_x).
+def exact_slopes(
+    pencil: Pencil, x: Floats, count: int, wanted: ArrayLike, above: int = 0
+) -> tuple[Floats, Floats, Floats]:
+    """λ (n, count + above) of the lowest elastic modes at x (n, n_x), and slopes by `mode_slopes`.
 
-    Slopes are taken in those variables where ``wanted`` (n_x,) is not 0; else 0 is returned.
+    These are of ``count`` modes; where there are some ``above``, as many as have mass at all
+    samples, of the first of these too, and mixed.
 
     Raises UsageError for more modes than there are or x outside the domain of a section or length,
-    MissingMassError for more modes than have mass, MechanismError where K_E or M_FF is singular.
+    MissingMassError for more than have mass, MechanismError where K_E or M_FF is singular.
     """
-    found = modes_at(pencil, pencil.theta(x), count)
-    return found.lam, mode_slopes(pencil, x, found, wanted)
+    parts = []
+    for some in solve_blocks(x, pencil.n_dof):
+        found = lowest_modes(pencil, pencil.theta(some), count, above)
+        own = Modes(*(values[..., : count + bool(above)] for values in (found.lam, found.phi)))
+        parts.append((found.lam, *mode_slopes(pencil, some, own, wanted, mixed=above > 0)))
+    lam, slopes, mixed = map(_together, zip(*parts, strict=True))
+    return lam, slopes, mixed
 
 
-def mode_slopes(pencil: Pencil, x: Floats, found: Modes, wanted: ArrayLike) -> Floats:
-    """∂λ/∂x (n, count, n_x) of modes found at x, in the same variables."""
-    pairs = [(mode, mode) for mode in range(found.lam.shape[1])]
-    return _slopes(pencil, x, found, pairs, wanted)
+def _together(blocks: Sequence[Floats]) -> Floats:
+    """One array of blocks (n, m, …), of the modes that there are in all."""
+    there = min(each.shape[1] for each in blocks)
+    return np.concatenate([each[:, :there] for each in blocks])
 
 
-def mixed_slopes(
-    pencil: Pencil, x: Floats, count: int, wanted: ArrayLike, above: int = 1
-) -> tuple[Floats, Floats, Floats]:
-    """The same, of the mode above too if there is one, and the slopes of neighbours' mixture.
-
-    λ (n, count + above), slopes (n, count + 1, n_x), those off the diagonal (n, count, n_x); fewer
-    where no more modes have mass.
-    """
-    found = lowest_modes(pencil, pencil.theta(x), count, above)
-    own = Modes(found.lam[:, : count + 1], found.phi[..., : count + 1])
-    return found.lam, *neighbour_slopes(pencil, x, own, wanted)
-
-
-def neighbour_slopes(
-    pencil: Pencil, x: Floats, found: Modes, wanted: ArrayLike
+def mode_slopes(
+    pencil: Pencil, x: Floats, found: Modes, wanted: ArrayLike, mixed: bool = False
 ) -> tuple[Floats, Floats]:
-    """Slopes (n, count, n_x) of modes found at x, and off the diagonal (n, count − 1, n_x)."""
+    """∂λ/∂x (n, m, n_x) of modes found at x; ``mixed``, those off the diagonal (n, m − 1, n_x) too.
+
+    Slopes are taken in those variables where ``wanted`` (n_x,) is not 0; else 0 is returned.
+    """
     there = found.lam.shape[1]
-    pairs = [(k, k) for k in range(there)] + [(k, k + 1) for k in range(there - 1)]
-    slopes = _slopes(pencil, x, found, pairs, wanted)
-    return slopes[:, :there], slopes[:, there:]
-
-
-def _slopes(
-    pencil: Pencil,
-    x: Floats,
-    found: Modes,
-    pairs: Sequence[tuple[int, int]],
-    wanted: ArrayLike,
-) -> Floats:
-    """φ_iᵀ (∂K/∂x − ½ (λ_i + λ_j) ∂M/∂x) φ_j (n, n_pairs, n_x) of pairs of modes (i, j)."""
+    pairs = [(k, k) for k in range(there)]
+    pairs += [(k, k + 1) for k in range(there - 1) if mixed]
     along = np.flatnonzero(wanted)
     rates = pencil.theta_slopes(x, along)
     moving = np.flatnonzero(np.abs(rates).max(axis=(0, 2), initial=0.0) > 0.0)
@@ -93,4 +78,10 @@ def _slopes(
             lam = 0.5 * (found.lam[part, i] + found.lam[part, j])[:, None]
             forms = products @ stiffness - lam * (products @ mass)
             result[part[:, None], k, along] = np.einsum("nt,jtn->nj", forms, own)
-    return result
+    return result[:, :there], result[:, there:]
+
+
+def in_hz(lam: Floats, slopes: Floats) -> tuple[Floats, Floats]:
+    """f = √λ/2π (n, m) in Hz, and ∂f = ∂λ/(8π² f) (n, m, …)."""
+    hz = np.sqrt(lam) / (2.0 * np.pi)
+    return hz, slopes / (8.0 * np.pi**2 * hz[..., None])

@@ -16,13 +16,12 @@ from eigassign.brief import Brief
 from eigassign.case.case_file import CaseFile
 from eigassign.errors import AccuracyError, CaseError, MissingMassError
 from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.modal.arguments import solve_blocks
 from eigassign.modal.expansion import Expansion, NearestExpansion
 from eigassign.modal.model import Model
 from eigassign.study.planning import Plan
 
 Floats = NDArray[np.float64]
-BLOCK = 2_000_000  # numbers of a batch of matrices: a second or so of dense solves
-AT_LEAST = 128  # samples of a batch: those of large models share most of their work
 OTHERS = 3  # modes shown above the highest assigned one
 
 
@@ -77,8 +76,7 @@ class Expansions(Brief):
         """
         q, of_design = path.at(self.full.y0)
         l0, slopes = self.linears.slopes(q, self.full.y0)
-        by_q, by_y = np.split(slopes, [q.shape[1]], axis=2)
-        return l0, by_y + by_q @ of_design if path.follows_design else by_y
+        return l0, path.in_design(slopes, of_design)
 
     def estimate(self, q: Floats, y: Floats) -> Floats:
         """Error estimate of the full expansion, relative in Hz, (n, n_modes)."""
@@ -173,12 +171,12 @@ class Scene:
         samples done and of all, and signals are handled.
         """
         q, count = self.path.at(y)[0], self.shown_modes() if count is None else count
-        block = max(AT_LEAST, BLOCK // self.model.n_dof**2)
-        parts = []
-        for start in range(0, len(q), block):
-            parts.append(self.model.frequencies(q[start : start + block], y, count))
-            if start + block < len(q):
-                progress(start + block, len(q))
+        parts, done = [], 0
+        for some in solve_blocks(q, self.model.n_dof):
+            parts.append(self.model.frequencies(some, y, count))
+            done += len(some)
+            if done < len(q):
+                progress(done, len(q))
         hz = np.concatenate(parts)
         hz.setflags(write=False)
         return hz

@@ -19,7 +19,7 @@ from redesigned_arms import (
 from scenes import SHIPPED, scene_of
 
 from eigassign import Case, load_case
-from eigassign.modal import eigenvalue_slopes, eigenvalues, mixed_slopes
+from eigassign.modal import NearestExpansion, eigenvalues, exact_slopes, expand, reduce
 from eigassign.series import total_degree
 from eigassign.study import Scene
 
@@ -47,7 +47,7 @@ def test_slopes_of_the_coefficient_functions_are_those_of_their_series(name: str
 def test_eigenvalue_slopes_are_those_of_finite_differences(arm: Scene) -> None:
     pencil = arm.model.pencil
     x = np.array([[1.8, 5.2, 0.1, 0.2], [1.9, 5.4, 0.01, 0.05]])
-    lam, slopes = eigenvalue_slopes(pencil, x, 2, np.array([1.0, 1.0, 0.25, 0.25]))
+    lam, slopes = arm.model.slopes(x[:, :2], x[:, 2:], 2, np.array([1.0, 1.0, 0.25, 0.25]))
     np.testing.assert_allclose(lam, eigenvalues(pencil, x, 2), rtol=1e-10)
     for j in range(4):
         step = np.zeros(4)
@@ -59,7 +59,7 @@ def test_eigenvalue_slopes_are_those_of_finite_differences(arm: Scene) -> None:
 def test_slopes_of_neighbours_mixture_are_those_of_the_matrices(arm: Scene) -> None:
     """φ_iᵀ (K' − ½ (λ_i + λ_j) M') φ_j by differences of the dense matrices; of a mode more."""
     q, y = np.array([1.8, 5.2]), np.array([0.1, 0.2])
-    lam, slopes, mixed = mixed_slopes(arm.model.pencil, arm.model.x(q, y), 2, np.ones(4))
+    lam, slopes, mixed = exact_slopes(arm.model.pencil, arm.model.x(q, y), 2, np.ones(4), 1)
     assert lam.shape == (1, 3)
     assert mixed.shape == (1, 2, 4)
     phi = arm.model.modes(q, y, 3)[1][0]
@@ -76,9 +76,9 @@ def test_slopes_of_neighbours_mixture_are_those_of_the_matrices(arm: Scene) -> N
 
 
 def test_a_parameter_without_room_has_no_slope_and_spoils_none(arm: Scene) -> None:
-    x = np.array([[1.8, 5.2, 0.1, 0.2]])
-    both = eigenvalue_slopes(arm.model.pencil, x, 1, np.array([0.0, 0.0, 0.25, 0.25]))[1]
-    one = eigenvalue_slopes(arm.model.pencil, x, 1, np.array([0.0, 0.0, 0.0, 0.25]))[1]
+    x = [1.8, 5.2], [0.1, 0.2]
+    both = arm.model.slopes(*x, 1, np.array([0.0, 0.0, 0.25, 0.25]))[1]
+    one = arm.model.slopes(*x, 1, np.array([0.0, 0.0, 0.0, 0.25]))[1]
     assert one[0, 0, 2] == 0.0
     np.testing.assert_allclose(one[:, :, 3], both[:, :, 3], rtol=1e-12)
 
@@ -96,7 +96,7 @@ def test_slopes_where_coordinates_follow_the_design_are_those_of_extrapolated_di
     y = np.where(y == 0.0, 0.1, y)
     q, of_design = path.at(y)
     scales = np.concatenate([np.ones(q.shape[1]), y])
-    _, slopes = eigenvalue_slopes(model.pencil, model.x(q, y), 2, scales)
+    _, slopes = model.slopes(q, y, 2, scales)
     by_q, by_y = np.split(slopes, [q.shape[1]], axis=2)
     total = by_y + by_q @ of_design  # dλ/dy = ∂λ/∂y + ∂λ/∂q dq/dy
 
@@ -108,3 +108,27 @@ def test_slopes_where_coordinates_follow_the_design_are_those_of_extrapolated_di
     assert worst.max() <= 1e-7
     missing = np.abs(by_y - beside).max(axis=(0, 1)) / np.abs(total).max(axis=(0, 1))
     assert (missing.max() > 1e-2) == path.follows_design  # it would be wrong without the chain rule
+
+
+@pytest.mark.parametrize("kind", ["exact", "series", "linearised", "1/λ", "several", "reduced"])
+def test_slopes_of_whatever_answers_frequencies_are_those_of_its_differences(
+    arm: Scene, kind: str
+) -> None:
+    model, q0, y0 = arm.model, np.array([1.8, 5.2]), np.array([0.1, 0.1])
+    series = expand(model.pencil, q0, y0, (1, 2), 4)
+    made = {
+        "exact": model,
+        "series": series,
+        "linearised": expand(model.pencil, q0, y0, (1, 2), 4, linear_in_y=True),
+        "1/λ": series.inverse,
+        "several": NearestExpansion((expand(model.pencil, q0 - 1.0, y0, (1, 2)), series)),
+        "reduced": reduce(model.pencil, q0, y0, (1, 2)),
+    }[kind]
+    x = np.array([[1.85, 5.3, 0.12, 0.07], [1.7, 5.1, 0.05, 0.2]])
+    lam, slopes = made.slopes(x[:, :2], x[:, 2:])
+    hz = made.frequencies(x[:, :2], x[:, 2:])[:, : lam.shape[1]]
+    np.testing.assert_allclose(np.sqrt(lam) / (2.0 * np.pi), hz, rtol=1e-9)
+    for j, step in enumerate(1e-4 * np.eye(4)):
+        up, down = (made.frequencies(*np.split(x + s * step, [2], axis=1)) for s in (1.0, -1.0))
+        off = (2.0 * np.pi) ** 2 * (up**2 - down**2) / 2e-4
+        np.testing.assert_allclose(slopes[:, :, j], off, rtol=1e-4, atol=1e-6 * lam.max())

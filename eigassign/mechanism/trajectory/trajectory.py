@@ -303,6 +303,11 @@ class Trajectories:
         """True where q depends on the design: along a path of a tip that the design moves."""
         return any(part.trajectory.of_design is not None for part in self.parts)
 
+    def in_design(self, slopes: Floats, of_design: Floats) -> Floats:
+        """Slopes (n, m, n_y) in y alone of those in (q, y), with dq/dy ``of_design`` from `at`."""
+        by_q, by_y = np.split(slopes, [self.q.shape[1]], axis=2)
+        return by_y + by_q @ of_design if self.follows_design else by_y
+
     def at(self, y: Floats) -> tuple[Floats, Floats]:
         """q (n, n_q) and dq/dy (n, n_q, n_y) at design y (n_y,), SI; see `redesign`.
 

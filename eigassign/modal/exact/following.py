@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from eigassign.errors import Candidate, LostModeError
 from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.modal.arguments import solve_blocks
 from eigassign.modal.exact.solver import lowest_modes
 from eigassign.modal.exact.tracking import CLEAR, COINCIDENT, HALVINGS, NEAR, links
 
@@ -95,18 +96,13 @@ def candidates(at: ModesAtPoint, shares: Floats, most: int = 3) -> tuple[Candida
     return tuple(Candidate(j + 1, float(hz[j]), float(shares[j])) for j in kept)
 
 
-def places(
-    pencil: Pencil, x: Floats, least: int, extra: int, block: int | None = None
-) -> list[ModesAtPoint]:
+def places(pencil: Pencil, x: Floats, least: int, extra: int) -> list[ModesAtPoint]:
     """The lowest modes at x (n, n_x), at all as many: ``least``, and up to ``extra`` more.
 
-    They are solved in blocks of so many samples. Raises what `lowest_modes` raises.
+    Raises what `lowest_modes` raises.
     """
-    size = block or len(x)
-    found = [
-        lowest_modes(pencil, pencil.theta(x[at : at + size]), least, extra)
-        for at in range(0, len(x), size)
-    ]
+    blocks = solve_blocks(x, pencil.n_dof)
+    found = [lowest_modes(pencil, pencil.theta(some), least, extra) for some in blocks]
     count = min(part.lam.shape[1] for part in found)
     lam, phi = (
         np.concatenate([getattr(part, name)[..., :count] for part in found])

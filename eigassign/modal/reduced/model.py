@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eigassign.brief import counted, of_modes
+from eigassign.mechanism.assembly.pencil import theta_slopes
 from eigassign.modal.arguments import chunks, samples
 from eigassign.modal.reduced.error_estimate import ErrorTerms, relative_error
-from eigassign.modal.reduced.pencil import ReducedPencil, ritz_values
+from eigassign.modal.reduced.pencil import ReducedPencil, ritz_pairs, ritz_values
 
 Floats = NDArray[np.float64]
 
@@ -58,6 +59,34 @@ class ReducedModel(ReducedPencil):
         parts = [ritz_values(K, M_c) for K, M_c, _ in self.matrices(x)]
         mu = np.concatenate(parts)[:, wanted]
         return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(mu)))
+
+    def slopes(
+        self, q: ArrayLike, y: ArrayLike, wanted: ArrayLike | None = None
+    ) -> tuple[Floats, Floats]:
+        """λ (n_samples, n_modes) in rad²/s² and ∂λ/∂x (n_samples, n_modes, n_x), x = (q, y).
+
+        ∂λ/∂x_i = Σ_j (φᵀK̂_jφ − λ φᵀM̂_jφ) ∂θ_j/∂x_i, where ``wanted`` (n_x,) is not 0, everywhere
+        without it; else they are 0. Raises what `frequencies` raises.
+        """
+        x, columns = samples(q, y, self.n_q, self.n_y), np.array(self.modes) - 1
+        along = np.flatnonzero(np.ones(x.shape[1]) if wanted is None else wanted)
+        rates = theta_slopes(self.program, self.to_program, self.shift, x, along)
+        moving = np.abs(rates).max(axis=(0, 2), initial=0.0) > 0.0
+        stiff, heavy = (terms.chosen(moving[terms.terms]) for terms in self.terms)
+        theta = self.theta(x)
+        lam, slopes = [], []
+        for part in chunks(np.arange(len(x)), self.mass[0].size):
+            K, M_c, coupling = self.at(theta[:, part])
+            mu, z = (a[..., columns] for a in ritz_pairs(K, M_c))
+            phi = z / np.sqrt(mu)[:, None, :]
+            whole = np.concatenate([phi, -coupling @ phi], axis=1)
+            forms = stiff.forms(phi, rates[:, :, part])
+            forms = forms - heavy.forms(whole, rates[:, :, part]) / mu[..., None]
+            lam.append(1.0 / mu)
+            whole_slopes = np.zeros((*forms.shape[:2], x.shape[1]))
+            whole_slopes[..., along] = forms
+            slopes.append(whole_slopes)
+        return np.concatenate(lam), np.concatenate(slopes)
 
     def error_estimate(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """Estimate of the relative error in frequency, (n_samples, n_modes); no exact solve.

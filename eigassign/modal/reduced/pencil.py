@@ -15,10 +15,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from eigassign.errors import UsageError
-from eigassign.mechanism.assembly.pencil import theta_at, theta_slopes
+from eigassign.mechanism.assembly.pencil import theta_at
 from eigassign.modal.arguments import chunks
 from eigassign.modal.exact.condensation import condense_blocks
 from eigassign.modal.exact.dense import inverse_factor
@@ -58,7 +58,7 @@ class ReducedPencil:
 
     def at(self, theta: Floats) -> tuple[Floats, Floats, Floats]:
         """K̂, M̂_c (n, k, k) and the coupling M̂_FF⁻¹ M̂_FE (n, f, k) at θ (n_theta, n)."""
-        stiff, heavy = self._terms
+        stiff, heavy = self.terms
         E, F = slice(0, self.size), slice(self.size, None)
         K, M = stiff(theta), heavy(theta)
         blocks = [heavy.block(M, rows, columns) for rows, columns in ((E, E), (F, E), (F, F))]
@@ -74,36 +74,12 @@ class ReducedPencil:
 
     def uncondensed(self, theta: Floats) -> tuple[Floats, Floats]:
         """K̂ (n, k, k) and M̂ (n, k + f, k + f)."""
-        stiff, heavy = self._terms
+        stiff, heavy = self.terms
         every = slice(None)
         return stiff.block(stiff(theta), every, every), heavy.block(heavy(theta), every, every)
 
-    def eigenvalue_slopes(self, x: Floats, count: int, wanted: ArrayLike) -> tuple[Floats, Floats]:
-        """λ (n, count) and ∂λ/∂x (n, count, n_x) at x (n, n_x).
-
-        ∂λ/∂x_i = Σ_j (φᵀK̂_jφ − λ φᵀM̂_jφ) ∂θ_j/∂x_i; ``wanted`` as in `modal.slopes`.
-        """
-        along = np.flatnonzero(wanted)
-        rates = theta_slopes(self.program, self.to_program, self.shift, x, along)
-        moving = np.abs(rates).max(axis=(0, 2), initial=0.0) > 0.0
-        stiff, heavy = (terms.chosen(moving[terms.terms]) for terms in self._terms)
-        theta = self.theta(x)
-        lam, slopes = [], []
-        for part in chunks(np.arange(len(x)), self.mass[0].size):
-            K, M_c, coupling = self.at(theta[:, part])
-            mu, z = (a[..., :count] for a in ritz_pairs(K, M_c))
-            phi = z / np.sqrt(mu)[:, None, :]
-            whole = np.concatenate([phi, -coupling @ phi], axis=1)
-            forms = stiff.forms(phi, rates[:, :, part])
-            forms = forms - heavy.forms(whole, rates[:, :, part]) / mu[..., None]
-            lam.append(1.0 / mu)
-            whole_slopes = np.zeros((*forms.shape[:2], x.shape[1]))
-            whole_slopes[..., along] = forms
-            slopes.append(whole_slopes)
-        return np.concatenate(lam), np.concatenate(slopes)
-
     @cached_property
-    def _terms(self) -> tuple[SymmetricTerms, SymmetricTerms]:
+    def terms(self) -> tuple[SymmetricTerms, SymmetricTerms]:
         """K̂'s and M̂'s terms."""
         return (
             symmetric_terms(self.stiffness_terms, self.stiffness),

@@ -33,7 +33,7 @@ from eigassign.modal.exact.following import (
 from eigassign.modal.exact.tracking import COINCIDENT, EXTRA
 from eigassign.modal.model import Model
 from eigassign.study.planning import shown_point
-from eigassign.study.scene import AT_LEAST, BLOCK, Scene
+from eigassign.study.scene import Scene
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -218,10 +218,10 @@ def follow_all(
 
     Raises what exact solves raise, TrajectoryError where the design has no pose, LostModeError.
     """
-    x, block = model.x(path.at(y)[0], y), max(AT_LEAST, BLOCK // model.n_dof**2)
+    x = model.x(path.at(y)[0], y)
     extra = EXTRA + max(0, *(each.mode.like - least for each in own))
     while True:
-        samples = places(model.pencil, x, least, extra, block)
+        samples = places(model.pencil, x, least, extra)
         try:
             shapes = [each.along(y, samples) for each in own]
             break

@@ -9,12 +9,10 @@ is made about the design that is asked for. Answers are judged by exact solves a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.requirement import Frequencies, Solved
 from eigassign.errors import AccuracyError, EigassignError, LostModeError
@@ -23,9 +21,9 @@ from eigassign.modal.exact.condensation import Modes
 from eigassign.modal.model import Model
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.reduce import reduce
-from eigassign.modal.slopes import eigenvalue_slopes, mixed_slopes, mode_slopes, neighbour_slopes
+from eigassign.modal.slopes import exact_slopes, in_hz, mode_slopes
 from eigassign.study.design.followed import Follower, Spectrum, follow_all, unfollowed
-from eigassign.study.scene import AT_LEAST, BLOCK, OTHERS, Scene
+from eigassign.study.scene import OTHERS, Scene
 
 Floats = NDArray[np.float64]
 
@@ -58,9 +56,9 @@ class DesignResponse:
         reduced = None if self.models is None else self.models.at(y, self.count)
         if reduced is not None:
             q, of_design = self.path.at(y)
-            found = reduced.eigenvalue_slopes(self.model.x(q, y), self.count, self.wanted)
-            hz, slopes = _in_hz(*found)
-            return Frequencies(hz, _in_design(slopes, of_design, self.path.follows_design))
+            hz, slopes = in_hz(*reduced.slopes(q, y, self.wanted))
+            slopes = self.path.in_design(slopes, of_design)
+            return Frequencies(hz[:, : self.count], slopes[:, : self.count])
         key = y.tobytes()
         if key not in self.known:
             try:
@@ -76,64 +74,28 @@ class DesignResponse:
         shown = self.initial is not None and np.array_equal(y, self.initial)
         if self.followers:
             found, slopes, mixed = self._with_followed(y)
-            solved = found.solved
-            hz = np.hstack([solved.hz[:, : self.count + 1], solved.followed])
+            solved, lam = found.solved, found.modes.lam[:, : self.count + 1]
+            lam = np.hstack([lam, found.followed.lam])
         else:
-            x, solve = self.model.x(q, y), partial(mixed_slopes, above=OTHERS if shown else 1)
-            lam, slopes, mixed = _in_blocks(solve, self.model, x, self.count, self.wanted)
-            solved = unfollowed(np.sqrt(lam) / (2.0 * np.pi))
-            hz = solved.hz[:, : self.count + 1]
+            x, above = self.model.x(q, y), OTHERS if shown else 1
+            lam, slopes, mixed = exact_slopes(self.model.pencil, x, self.count, self.wanted, above)
+            solved, lam = unfollowed(np.sqrt(lam) / (2.0 * np.pi)), lam[:, : self.count + 1]
         self.solved = solved if shown else self.solved
-        slopes = slopes / (8.0 * np.pi**2 * hz[..., None])
+        hz, slopes = in_hz(lam, slopes)
         lower, upper = (hz[:, k : k + mixed.shape[1]] for k in (0, 1))
         mixed = mixed / (4.0 * np.pi**2 * (lower + upper))[..., None]
-        follows = self.path.follows_design
-        return Frequencies(hz, *(_in_design(part, of_design, follows) for part in (slopes, mixed)))
+        return Frequencies(hz, *(self.path.in_design(own, of_design) for own in (slopes, mixed)))
 
     def _with_followed(self, y: Floats) -> tuple[Spectrum, Floats, Floats]:
         """The modes, slopes of λ in (q, y), and those off the diagonal of numbered modes alone."""
-        found = follow_all(self.model, self.path, self.followers, y, self.count)
+        found, pencil = (
+            follow_all(self.model, self.path, self.followers, y, self.count),
+            self.model.pencil,
+        )
         own = Modes(found.modes.lam[:, : self.count + 1], found.modes.phi[..., : self.count + 1])
-        slopes, mixed = neighbour_slopes(self.model.pencil, found.x, own, self.wanted)
-        of_followed = mode_slopes(self.model.pencil, found.x, found.followed, self.wanted)
+        slopes, mixed = mode_slopes(pencil, found.x, own, self.wanted, mixed=True)
+        of_followed = mode_slopes(pencil, found.x, found.followed, self.wanted)[0]
         return found, np.concatenate([slopes, of_followed], axis=1), mixed
-
-
-def _in_design(slopes: Floats, of_design: Floats, follows: bool) -> Floats:
-    """Slopes in y alone of those in (q, y); dq/dy is ``of_design`` where q follows y."""
-    n_q = slopes.shape[2] - of_design.shape[2]
-    by_y = slopes[..., n_q:]
-    return by_y + slopes[..., :n_q] @ of_design if follows else by_y
-
-
-def exact_slopes(model: Model, x: Floats, count: int, wanted: ArrayLike) -> tuple[Floats, Floats]:
-    """The lowest frequencies (n, count) in Hz at x (n, n_x), and their slopes (n, count, n_x).
-
-    ``wanted`` and what is raised are those of `eigenvalue_slopes`.
-    """
-    return _in_hz(*_in_blocks(eigenvalue_slopes, model, x, count, wanted))
-
-
-def _in_blocks(
-    solve: Callable[..., tuple[Floats, ...]],
-    model: Model,
-    x: Floats,
-    count: int,
-    wanted: ArrayLike,
-) -> Iterator[Floats]:
-    """Yield what ``solve`` finds, block by block, of the modes that there are at all samples."""
-    block = max(AT_LEAST, BLOCK // model.n_dof**2)
-    parts = [
-        solve(model.pencil, x[at : at + block], count, wanted) for at in range(0, len(x), block)
-    ]
-    for found in zip(*parts, strict=True):
-        there = min(part.shape[1] for part in found)
-        yield np.concatenate([part[:, :there] for part in found])
-
-
-def _in_hz(lam: Floats, slopes: Floats) -> tuple[Floats, Floats]:
-    hz = np.sqrt(lam) / (2.0 * np.pi)
-    return hz, slopes / (8.0 * np.pi**2 * hz[..., None])
 
 
 def response_of(

@@ -21,9 +21,9 @@ from eigassign.assignment.exact.sequential import End
 from eigassign.brief import Brief
 from eigassign.case.case_file import CaseFile
 from eigassign.modal.model import Model
+from eigassign.modal.slopes import in_hz
 from eigassign.study.built_case import BuiltCase
 from eigassign.study.design.judgement import NEAR
-from eigassign.study.design.response import exact_slopes
 from eigassign.study.updating.measured import PosedMeasurement, read_measurements
 
 Floats = NDArray[np.float64]
@@ -169,7 +169,7 @@ class UpdateProblem:
         """Exact frequencies (m,) in Hz of what was measured, and their slopes (m, n_y)."""
         n_q, count = self.q.shape[1], int(self.columns.max()) + 1
         scales = np.append(np.zeros(n_q), self.upper - self.lower)
-        hz, slopes = exact_slopes(self.model, self.model.x(self.q, y), count, scales)
+        hz, slopes = in_hz(*self.model.slopes(self.q, y, count, scales))
         return hz[self.rows, self.columns], slopes[self.rows, self.columns, n_q:]
 
 
