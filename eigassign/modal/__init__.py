@@ -23,8 +23,9 @@ from eigassign.faces import face
 __all__, __getattr__, __dir__ = face(
     __name__,
     {
-        "adaptive.mesh": "choose_mesh",
-        "adaptive.order": "choose_expansion",
+        "adaptive.cheapest": "cheapest",
+        "adaptive.mesh": "meshes",
+        "adaptive.order": "expansions",
         "adaptive.reduced_model": "reduce_adaptively",
         "discretisation": "discretisation_error",
         "exact.clusters": "clusters",

@@ -50,7 +50,7 @@ def export(
         x = _samples(case)
         made = reduce_adaptively(case.model().pencil, x, accuracy, modes)
     reduced, files = made.reduced, save_reduced(made.reduced, path, case.file.title)
-    return Exported(files, reduced.modes, reduced.size, len(reduced.points), made.error, len(x))
+    return Exported(files, reduced.modes, reduced.size, len(reduced.points), made.worst, len(x))
 
 
 def _samples(case: BuiltCase) -> Floats:

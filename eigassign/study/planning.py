@@ -28,9 +28,10 @@ from eigassign.errors import (
 )
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.trajectory.trajectory import Trajectories
+from eigassign.modal.adaptive.cheapest import R, cheapest
 from eigassign.modal.adaptive.link_reduction import POSES
-from eigassign.modal.adaptive.mesh import MeshChoice, ModesAt, choose_mesh
-from eigassign.modal.adaptive.order import ExpansionChoice, choose_expansion
+from eigassign.modal.adaptive.mesh import MeshChoice, ModesAt, meshes
+from eigassign.modal.adaptive.order import expansions
 from eigassign.modal.arguments import spread
 from eigassign.modal.exact.clusters import CLUSTER_GAP
 from eigassign.modal.exact.inertia import UNCERTAIN, count_below
@@ -270,9 +271,8 @@ def settle_mesh(
 ) -> MeshChoice:
     """The fewest elements that leave the mesh's share of the accuracy all over the design's bounds.
 
-    They are chosen at few poses, at the initial design and the corners of the bounds, and confirmed
-    at more, at random designs and at those that are worse than the worst of these; where that
-    fails, chosen anew. Raises AccuracyError where no mesh will do.
+    They are chosen at few poses, at the initial design and the corners of the bounds, and
+    `confirmed` at more and at random designs. Raises AccuracyError where no mesh will do.
     """
     accuracy = mesh_share(file) - truncation_share(file)
     y, elements = initial_design(file), automatic_elements(file)
@@ -283,27 +283,54 @@ def settle_mesh(
     )
     if len(y):
         every = every.joined(at_random(file, trajectory, q0, y, MESH_FEW))
-    reasons: list[str] = []
-    for _ in range(1 + ATTEMPTS):
-        found = choose_mesh(build, elements, seen.x, accuracy, modes_at)
-        reasons += found.reasons
-        model = build(found.elements)
-        every, error = with_worse_designs(every, partial(_mesh_error, model, modes_at), file)
-        worst = float(error.max())
-        line = f"at {len(error)} poses and designs in all: at most {100.0 * worst:.2g} % too high"
-        if worst <= accuracy:
-            reasons.append(line)
-            return replace(found, error=np.full_like(found.error, worst), reasons=tuple(reasons))
-        reasons.append(f"{line}, chosen anew")
-        top = np.argsort(-error, kind="stable")[:CLIMBERS]
-        seen = seen.joined(replace(every, x=every.x[top], samples=every.samples[top]))
-    raise AccuracyError(f"no mesh was found that leaves {accuracy:.1e}: {reasons[-1]}")
+    return confirmed(
+        lambda at, _: meshes(build, elements, at.x, accuracy, modes_at),
+        lambda found: partial(_mesh_error, build(found.elements), modes_at),
+        lambda worst: f"at most {100.0 * worst:.2g} % too high",
+        *(accuracy, file, seen, every),
+    )
 
 
 def _mesh_error(model: Model, modes_at: ModesAt, x: Floats) -> Floats:
     """The largest mesh error of all modes that matter at x (n, n_x), (n,)."""
     n_q, modes = len(model.q_names), modes_at(model, x)
     return np.asarray(model.discretisation_error(x[:, :n_q], x[:, n_q:], modes).max(axis=1))
+
+
+def confirmed(
+    ladder: Callable[[DesignSamples, float], Iterable[R]],
+    judge: Callable[[R], Callable[[Floats], Floats]],
+    said: Callable[[float], str],
+    accuracy: float,
+    file: CaseFile,
+    seen: DesignSamples,
+    every: DesignSamples,
+    looks: float = np.inf,
+) -> R:
+    """The cheapest rung at the samples ``seen`` that holds at ``every`` one, and at worse designs.
+
+    Where one errs there, by what ``judge`` makes its errors at x (n, n_x), it is chosen anew at all
+    that was looked at; after `ATTEMPTS` of that it is taken. Raises AccuracyError where the ladder
+    has none, or more than so many ``looks`` are needed.
+    """
+    reasons: list[str] = []
+    for attempt in range(1 + ATTEMPTS):
+        found: R = cheapest(ladder(seen, looks), accuracy)
+        reasons += found.reasons
+        if attempt == ATTEMPTS:
+            break
+        every, errors = with_worse_designs(every, judge(found), file)
+        worst = float(errors.max())
+        line = f"at {len(errors)} poses and designs in all: {said(worst)}"
+        if worst <= accuracy:
+            found = replace(found, error=np.full_like(found.error, worst))
+            reasons.append(line)
+            break
+        reasons.append(f"{line}, chosen anew")
+        seen, looks = every, looks - found.looks
+        if len(seen.x) > looks:
+            raise AccuracyError(f"the expansion chosen at few poses and designs errs: {line}")
+    return replace(found, reasons=tuple(reasons))
 
 
 def mesh_share(file: CaseFile) -> float:
@@ -373,12 +400,10 @@ def choose_order(
 ) -> Plan:
     """Order and expansion points that meet the series' share, and which modes go together.
 
-    They are chosen at few poses and corners of the design's bounds, and confirmed at many more, at
-    random designs and at those that are worse than the worst of these. (Choosing at all of them at
-    once takes 1.6 times as long and chooses the same for the shipped cases at 1e-3, 1e-5 and 1e-7.)
-    Where the confirmation fails, they are chosen anew at all that was looked at. Raises
-    AccuracyError, naming the pose, where no order and number of points will do; where they are not
-    ``needed``, the order is then 0.
+    They are chosen at few poses and corners of the design's bounds, and `confirmed` at many more
+    and at random designs. (Choosing at all of them at once takes 1.6 times as long and chooses the
+    same for the shipped cases at 1e-3, 1e-5 and 1e-7.) Raises AccuracyError, naming the pose, where
+    no order and number of points will do; where they are not ``needed``, the order is then 0.
     """
     at_upper = corners(len(y0))
     few, many = (max(8, rows // (1 + len(at_upper))) for rows in (FEW, MANY))  # samples of each
@@ -386,53 +411,23 @@ def choose_order(
     require_little_truncation(file, model, seen.x)
     if len(y0):
         every = every.joined(at_random(file, trajectory, q0, y0, RANDOM))
-    x0, looks = np.concatenate([q0, y0]), np.inf if needed else LOOKS
+    x0, accuracy = np.concatenate([q0, y0]), series_share(file)
     try:
-        found, reasons = _confirmed(file, model, seen, every, x0, modes, looks)
+        found = confirmed(
+            lambda at, looks: expansions(
+                model.pencil, at.x, accuracy, modes, start=x0, place=at.place, most_looks=looks
+            ),
+            lambda found: lambda x: found.error_estimate(*np.split(x, [len(q0)], 1)).max(axis=1),
+            "error at most {:.1e}".format,
+            *(accuracy, file, seen, every, np.inf if needed else LOOKS),
+        )
     except EigassignError as error:  # an accuracy that is not met, or a design without a pose
         if needed:
             raise
         why = f"no expansion, so that nothing is told of one, nor a one-shot design: {error}"
         return Plan(q0, y0, 0, modes, (why,))
     more_q = tuple(tuple(part.q0.tolist()) for part in found.parts[1:])
-    return Plan(q0, y0, found.order, modes, tuple(reasons), more_q, found.cluster_gap)
-
-
-def _confirmed(
-    file: CaseFile,
-    model: Model,
-    seen: DesignSamples,
-    every: DesignSamples,
-    x0: Floats,
-    modes: tuple[int, ...],
-    looks: float,
-) -> tuple[ExpansionChoice, list[str]]:
-    """The choice at the samples ``seen``, confirmed at ``every`` one or made anew; and why."""
-    accuracy, reasons = series_share(file), list[str]()
-    for attempt in range(1 + ATTEMPTS):
-        found = choose_expansion(
-            model.pencil, seen.x, accuracy, modes, start=x0, place=seen.place, most_looks=looks
-        )
-        reasons += found.reasons
-        if attempt == ATTEMPTS:
-            break
-        every, error = with_worse_designs(every, partial(_largest_estimate, found), file)
-        worst = float(error.max())
-        met = worst <= accuracy
-        line = f"at {len(error)} poses and designs in all: error at most {worst:.1e}"
-        reasons.append(line if met else f"{line}, chosen anew")
-        if met:
-            break
-        seen, looks = every, looks - found.looks
-        if len(seen.x) > looks:
-            raise AccuracyError(f"the expansion chosen at few poses and designs errs: {line}")
-    return found, reasons
-
-
-def _largest_estimate(found: ExpansionChoice, x: Floats) -> Floats:
-    """The largest estimate of all modes at x (n, n_x), (n,)."""
-    n_q = len(found.parts[0].q0)
-    return np.asarray(found.error_estimate(x[:, :n_q], x[:, n_q:]).max(axis=1))
+    return Plan(q0, y0, found.order, modes, found.reasons, more_q, found.cluster_gap)
 
 
 # --- Poses of the trajectory at designs all over their bounds

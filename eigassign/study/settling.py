@@ -19,7 +19,8 @@ from eigassign.mechanism.assembly.build import WholeLinks, with_elements, with_r
 from eigassign.mechanism.kinematics.parameters import initial_design
 from eigassign.mechanism.kinematics.travel_limits import resting_pose
 from eigassign.mechanism.trajectory.trajectory import Trajectories
-from eigassign.modal.adaptive.link_reduction import ReductionChoice, choose_reduction
+from eigassign.modal.adaptive.cheapest import cheapest
+from eigassign.modal.adaptive.link_reduction import ReductionChoice, reductions
 from eigassign.modal.adaptive.mesh import MeshChoice
 from eigassign.modal.model import Model
 from eigassign.study.build import build_links, build_model, build_trajectories
@@ -86,7 +87,7 @@ def _chosen_reduction(file: CaseFile, links: WholeLinks) -> ReductionChoice | No
     path, q0 = _path(file, whole)
     x = at_corners(file, path, q0, initial_design(file)).x
     modes_at = modes_that_matter(file, _bands_hz(file, path))
-    return choose_reduction(names, whole, reduced, x, truncation_share(file), modes_at)
+    return cheapest(reductions(names, whole, reduced, x, modes_at), truncation_share(file))
 
 
 def _bands_hz(file: CaseFile, path: Trajectories | None) -> Floats:

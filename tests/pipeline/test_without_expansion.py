@@ -12,7 +12,7 @@ from run_cases import SHIPPED, UNCACHED, automatic, changed, shipped, solved, wr
 from eigassign import load_case
 from eigassign.cli import main
 from eigassign.errors import AccuracyError
-from eigassign.modal import choose_expansion
+from eigassign.modal import cheapest, expansions
 from eigassign.pipeline import Result, expand_case, validate
 
 CASES = SHIPPED.parent
@@ -71,9 +71,9 @@ def test_an_expansion_is_given_up_after_so_many_looks(tmp_path: Path) -> None:
     case = load_case(written(tmp_path, crank()))
     path = case.trajectory
     x = np.hstack([path.q, np.tile(case.initial_design, (len(path.q), 1))])
-    looks = choose_expansion(case.model().pencil, x, 0.5).looks
+    looks = cheapest(expansions(case.model().pencil, x, 0.5), 0.5).looks
     with pytest.raises(AccuracyError, match="no expansion tried reaches"):
-        choose_expansion(case.model().pencil, x, 1e-6, most_looks=looks)
+        cheapest(expansions(case.model().pencil, x, 1e-6, most_looks=looks), 1e-6)
 
 
 def test_the_design_is_the_one_that_is_found_with_an_expansion(tmp_path: Path) -> None:

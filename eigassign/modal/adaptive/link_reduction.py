@@ -7,12 +7,13 @@ less than the sparse ones of the whole mechanism (benchmarks/craig_bampton.py).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.modal.adaptive.cheapest import Rung
 from eigassign.modal.adaptive.mesh import ModesAt
 from eigassign.modal.arguments import spread
 from eigassign.modal.model import Model
@@ -21,26 +22,23 @@ Floats = NDArray[np.float64]
 POSES = 30  # poses and designs at which it is judged; each costs an exact solve
 
 
-@dataclass(frozen=True, eq=False)
-class ReductionChoice:
-    """The frequency in Hz for each link, None where it stays whole, and why."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ReductionChoice(Rung):
+    """The frequency in Hz for each link, None where it stays whole; errors are (n_modes,)."""
 
     frequencies: Mapping[str, float | None]
-    error: Floats  # (n_modes,): bound on the truncation error, largest over the samples
-    reasons: tuple[str, ...]
 
 
-def choose_reduction(
+def reductions(
     names: Sequence[str],
     whole: Model,
     build: Callable[[float], Model],
     x: Floats,
-    accuracy: float,
     modes_at: ModesAt,
-) -> ReductionChoice:
-    """The lowest frequency tried whose truncation error is ≤ ``accuracy`` at x (n, n_x).
+) -> Iterator[ReductionChoice]:
+    """Higher and higher frequencies with bounds on their truncation error at x (n, n_x).
 
-    The links stay as they are in ``whole`` where the model keeps more than half of its dofs.
+    Last, where the model keeps more than half of its dofs, the links as they are in ``whole``.
     """
     x = spread(x, POSES)
     q, y = x[:, : len(whole.q_names)], x[:, len(whole.q_names) :]
@@ -60,7 +58,8 @@ def choose_reduction(
         worst = float(error.max())
         stated = f"truncation error at most {100 * worst:.2g} %" if worst < np.inf else "no bound"
         reasons.append(f"reduced to {frequency:.4g} Hz: {size} of {whole.n_dof} dofs, {stated}")
-        if error.max() <= accuracy:
-            return ReductionChoice(dict.fromkeys(names, float(frequency)), error, tuple(reasons))
+        frequencies = dict.fromkeys(names, float(frequency))
+        yield ReductionChoice(error, tuple(reasons), frequencies=frequencies)
     reasons.append(f"not reduced, it does not pay: {', '.join(names)}")
-    return ReductionChoice(dict.fromkeys(names), np.zeros(len(modes)), tuple(reasons))
+    nothing = np.zeros(len(modes))
+    yield ReductionChoice(nothing, tuple(reasons), frequencies=dict.fromkeys(names))

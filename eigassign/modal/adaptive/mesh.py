@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.errors import AccuracyError
+from eigassign.modal.adaptive.cheapest import Rung
 from eigassign.modal.discretisation import discretisation_error
 from eigassign.modal.exact.roundoff import rounding_error
 from eigassign.modal.model import Model
@@ -20,25 +21,24 @@ Build = Callable[[Mapping[str, int]], Model]
 ModesAt = Callable[[Model, Floats], tuple[int, ...]]  # that matter at x (n, n_x)
 
 
-@dataclass(frozen=True, eq=False)
-class MeshChoice:
-    """Elements per link, the discretisation error that they leave, and why these."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MeshChoice(Rung):
+    """Elements per link, and by how much they raise frequencies at most, (n_modes,)."""
 
     elements: Mapping[str, int]
-    error: Floats  # (n_modes,): the most that a frequency is too high, relative, of all samples
-    reasons: tuple[str, ...]
 
 
-def choose_mesh(
+def meshes(
     build: Build,
     elements: Mapping[str, int | None],
     x: Floats,
     accuracy: float,
     modes_at: ModesAt = lambda _model, _x: (1,),
-) -> MeshChoice:
-    """Elements for the links that have None, the others kept; error ≤ ``accuracy`` at x (n, n_x).
+) -> Iterator[MeshChoice]:
+    """Elements for the links that have None, the others kept, more and more; their error at x.
 
-    It is that of the modes that `modes_at` names, which may depend on the mesh.
+    It is that of the modes that `modes_at` names, which may depend on the mesh. From one mesh to
+    the next there are as many more as ``accuracy`` is thought to need.
 
     Raises AccuracyError where `MAX_ELEMENTS` do not suffice or round-off is in the way.
     """
@@ -55,12 +55,12 @@ def choose_mesh(
                 "that is asked for: a finer mesh makes it worse"
             )
         if model.meshed is None:
-            return MeshChoice(now, np.zeros(len(modes)), ())
+            yield MeshChoice(np.zeros(len(modes)), (), elements=now)
+            return
         found = discretisation_error(model.meshed, x, modes)
         error = found.total.max(axis=0)
         reasons.append(f"{_shown(now)} elements: {_said(error, modes)}")
-        if error.max() <= accuracy:
-            return MeshChoice(dict(now), error, tuple(reasons))
+        yield MeshChoice(error, tuple(reasons), elements=now)
         if not free:
             break
         alone = {name: (now[name], float(found.links[name].max())) for name in free}

@@ -13,7 +13,7 @@ are evaluated: each sample by the nearest point, beside one reduced model of the
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import comb
 
@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.modal.adaptive.cheapest import Rung
 from eigassign.modal.adaptive.reduced_model import (
     AdaptiveReduction,
     central,
@@ -56,18 +57,15 @@ FAIR_COUNT = 8
 LARGE = 100_000
 
 
-@dataclass(frozen=True, eq=False)
-class ExpansionChoice(NearestExpansion):
-    """Expansions that together are within the accuracy at every sample, and why these.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ExpansionChoice(Rung, NearestExpansion):
+    """Expansions of one order with their error estimate (n, n_modes) at the samples.
 
-    They share the order; modes closer than ``cluster_gap`` (relative in λ) are expanded together.
+    Modes closer than ``cluster_gap`` (relative in λ) are expanded together.
     """
 
     cluster_gap: float
-    estimate: Floats  # (n, n_modes) at the samples
     beside: AdaptiveReduction
-    reasons: tuple[str, ...]
-    looks: int  # at samples, and coefficients, that the choice took
 
     @property
     def order(self) -> int:
@@ -99,7 +97,7 @@ class _Trial:
         return self.size * (SEVERAL * (len(self.parts) + 1) if self.parts else 1.0)
 
 
-def choose_expansion(
+def expansions(
     pencil: Pencil,
     x: Floats,
     accuracy: float,
@@ -108,8 +106,8 @@ def choose_expansion(
     start: Floats | None = None,
     place: Callable[[int], str] = row_in_words,
     most_looks: float = np.inf,
-) -> ExpansionChoice:
-    """Expansions of few coefficients whose estimate is ≤ ``accuracy`` at samples x (n, n_x).
+) -> Iterator[ExpansionChoice]:
+    """Expansions from the fewest coefficients on, judged to ``accuracy`` at samples x (n, n_x).
 
     The first point is ``start`` (n_x,) or the most central sample; all share its design. No order
     of over `MOST_TERMS` coefficients is tried. ``place`` says in words what row k of x is. Raises
@@ -120,6 +118,7 @@ def choose_expansion(
         pencil, x, 0.05 * accuracy, modes, place=place, tolerable=0.5 * accuracy
     )
     q, y = x[:, : pencil.n_q], x[:, pencil.n_q :]
+    told = f"{beside.reduced.size} vectors, itself right to {beside.worst:.1e}"
     reduced_hz = beside.reduced.frequencies(q, y)
     x0 = x[central(x)] if start is None else start
     waiting = _first_trials(pencil, x0, modes, orders)
@@ -136,15 +135,14 @@ def choose_expansion(
         part = expand(pencil, q0, y0, modes, trial.order, cluster_gap=trial.gap)
         parts, hz = (*trial.parts, part), (*trial.hz, part.frequencies(q, y))
         chosen = NearestExpansion(parts).pick(q, hz)
-        estimate = polynomial_error(chosen, reduced_hz, beside.estimate)
+        estimate = polynomial_error(chosen, reduced_hz, beside.error)
         error, worst = float(estimate.max()), int(np.argmax(estimate.max(axis=1)))
         several = len(parts) > 1
         reach = "" if several else _reach(part, x, estimate)
         lines[trial.gap, trial.order, several] = _line(parts, error, f"{place(worst)}{reach}")
-        if error <= accuracy:
-            told = f"{beside.reduced.size} vectors, itself right to {beside.error:.1e}"
-            reasons = (f"judged beside a reduced model of {told}", *lines.values())
-            return ExpansionChoice(parts, trial.gap, estimate, beside, reasons, looks)
+        reasons = (f"judged beside a reduced model of {told}", *lines.values())
+        made = parts, estimate, reasons, looks
+        yield ExpansionChoice(*made, cluster_gap=trial.gap, beside=beside)
         if error <= least:
             least, at = error, worst
         if not several:

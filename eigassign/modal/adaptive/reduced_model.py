@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from eigassign.errors import AccuracyError
 from eigassign.mechanism.assembly.pencil import Pencil
+from eigassign.modal.adaptive.cheapest import Rung
 from eigassign.modal.arguments import shown_numbers
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.reduce import reduce
@@ -23,23 +24,16 @@ MAX_POINTS = 12  # expansion points; the shipped cases need 6 at most, to 1e-7
 HALF_ORDERS = (1, 2, 3)
 
 
-@dataclass(frozen=True, eq=False)
-class AdaptiveReduction:
-    """A reduced model with its error ``estimate`` (n, n_modes) at the samples, and why this one."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AdaptiveReduction(Rung):
+    """A reduced model with its error estimate (n, n_modes) at the samples."""
 
     reduced: ReducedModel
-    estimate: Floats
-    reasons: tuple[str, ...] = ()
 
     @property
-    def error(self) -> float:
-        """The largest estimate at any sample."""
-        return float(self.estimate.max())
-
-    @property
-    def worst(self) -> int:
-        """The sample where that is."""
-        return int(np.argmax(self.estimate.max(axis=1)))
+    def at(self) -> int:
+        """The sample where the error is largest."""
+        return int(np.argmax(self.error.max(axis=1)))
 
 
 def row_in_words(k: int) -> str:
@@ -73,21 +67,21 @@ def reduce_adaptively(
         points = [central(x)]
         while len(points) <= MAX_POINTS:
             reduced = reduce(pencil, q[points], y[points], modes, half_order)
-            made = AdaptiveReduction(reduced, reduced.error_estimate(q, y))
-            reasons.append(_line(half_order, made, place(made.worst)))
-            least, at = min((least, at), (made.error, made.worst))
+            made = AdaptiveReduction(reduced.error_estimate(q, y), (), reduced=reduced)
+            reasons.append(_line(half_order, made, place(made.at)))
+            least, at = min((least, at), (made.worst, made.at))
             if reduced.size > limit:
                 break
-            if closest is None or made.error < closest.error:
+            if closest is None or made.worst < closest.worst:
                 closest = made
-            if made.error <= accuracy:
+            if made.worst <= accuracy:
                 best = made
                 break
-            if made.worst in points:
+            if made.at in points:
                 break
-            points.append(made.worst)
+            points.append(made.at)
     found, bound = best or closest, accuracy if tolerable is None else tolerable
-    if found is None or not found.error <= bound:
+    if found is None or not found.worst <= bound:
         raise AccuracyError(
             f"no reduced model of up to {max_size} vectors reaches {bound:.1e}: at {place(at)}, "
             f"(q, y) = {shown_numbers(x[at])}, the estimated error is {least:.1e}"
@@ -98,7 +92,7 @@ def reduce_adaptively(
 def _line(half_order: int, made: AdaptiveReduction, sample: str) -> str:
     points = len(made.reduced.points)
     where = f"{points} point{'s' if points > 1 else ''}"
-    what = f"at most {made.error:.1e}" if np.isfinite(made.error) else "refused"
+    what = f"at most {made.worst:.1e}" if np.isfinite(made.worst) else "refused"
     size = made.reduced.size
     return f"vectors to order {half_order} at {where} ({size} in all): {what} ({sample})"
 

@@ -7,7 +7,7 @@ import pytest
 from paper_arm import FREE, build, exact, samples
 
 from eigassign.errors import AccuracyError
-from eigassign.modal import choose_mesh
+from eigassign.modal import cheapest, meshes
 
 
 @pytest.fixture(scope="module")
@@ -17,11 +17,11 @@ def x() -> np.ndarray:
 
 def test_a_fixed_mesh_that_is_too_coarse_is_refused_with_its_worst_link(x):
     with pytest.raises(AccuracyError, match=r"2 elements: mode 1 at most 0.4 % too high; .*upper"):
-        choose_mesh(build, {"upper": 2, "fore": 2}, x, 1e-4)
+        cheapest(meshes(build, {"upper": 2, "fore": 2}, x, 1e-4), 1e-4)
 
 
 def test_the_choice_is_as_good_as_it_says(x):
-    found = choose_mesh(build, FREE, x, 1e-4, lambda _model, _x: (1, 2))
+    found = cheapest(meshes(build, FREE, x, 1e-4, lambda _model, _x: (1, 2)), 1e-4)
     true = exact(build({"upper": 40, "fore": 40}), x, (1, 2))
     error = exact(build(found.elements), x, (1, 2)) / true - 1.0
     assert (error.max(axis=0) <= found.error).all()
@@ -30,4 +30,4 @@ def test_the_choice_is_as_good_as_it_says(x):
 
 def test_a_mesh_that_round_off_forbids_is_refused(x):
     with pytest.raises(AccuracyError, match="round-off"):
-        choose_mesh(build, FREE, x, 1e-13)
+        cheapest(meshes(build, FREE, x, 1e-13), 1e-13)

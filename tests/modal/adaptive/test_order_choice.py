@@ -7,7 +7,7 @@ import pytest
 from paper_arm import FREE, build, exact, samples
 
 from eigassign.errors import AccuracyError
-from eigassign.modal import choose_expansion, choose_mesh
+from eigassign.modal import cheapest, expansions, meshes
 
 
 @pytest.fixture(scope="module")
@@ -19,25 +19,31 @@ def x() -> np.ndarray:
     ("accuracy", "modes"), [(a, m) for a in (1e-2, 1e-3, 1e-4) for m in ((1,), (1, 2))][:-1]
 )
 def test_mesh_and_expansion_together_meet_the_accuracy(x, accuracy, modes):
-    mesh = choose_mesh(build, FREE, x, 0.5 * accuracy, lambda _model, _x: modes)
-    expansion = choose_expansion(build(mesh.elements).pencil, x, 0.5 * accuracy, modes)
+    mesh = cheapest(
+        meshes(build, FREE, x, 0.5 * accuracy, lambda _model, _x: modes), 0.5 * accuracy
+    )
+    expansion = cheapest(
+        expansions(build(mesh.elements).pencil, x, 0.5 * accuracy, modes), 0.5 * accuracy
+    )
     true = exact(build({"upper": 40, "fore": 40}), x, modes)
     f = expansion.frequencies(x[:, :2], x[:, 2:])
     assert np.abs(f / true - 1.0).max() <= accuracy
 
 
 def test_it_says_what_it_chose_and_why(x):
-    mesh = choose_mesh(build, FREE, x, 5e-4)
+    mesh = cheapest(meshes(build, FREE, x, 5e-4), 5e-4)
     assert mesh.reasons[0] == "2 elements: mode 1 at most 0.4 % too high"
-    expansion = choose_expansion(build(mesh.elements).pencil, x, 5e-4)
+    expansion = cheapest(expansions(build(mesh.elements).pencil, x, 5e-4), 5e-4)
     assert expansion.order == 5
     assert any(line.startswith("order 4: error at most") for line in expansion.reasons)
 
 
 def test_what_is_fixed_stays(x):
-    mesh = choose_mesh(build, {"upper": 4, "fore": 3}, x, 2.5e-3)
+    mesh = cheapest(meshes(build, {"upper": 4, "fore": 3}, x, 2.5e-3), 2.5e-3)
     assert dict(mesh.elements) == {"upper": 4, "fore": 3}
-    expansion = choose_expansion(build(mesh.elements).pencil, x, 2.5e-3, orders=(4,), start=x[0])
+    expansion = cheapest(
+        expansions(build(mesh.elements).pencil, x, 2.5e-3, orders=(4,), start=x[0]), 2.5e-3
+    )
     assert expansion.order == 4
     np.testing.assert_array_equal(expansion.parts[0].x0, x[0])
 
@@ -46,14 +52,14 @@ def test_what_only_several_designs_could_reach_is_refused(x):
     """All points share a design, as an assignment needs it: mode 2 leaves 2e-4 over the box."""
     model = build({"upper": 4, "fore": 3})
     with pytest.raises(AccuracyError, match=r"up to 10 at up to 32 points reaches 5\.0e-05"):
-        choose_expansion(model.pencil, x, 5e-5, (1, 2), orders=(6, 10))
+        cheapest(expansions(model.pencil, x, 5e-5, (1, 2), orders=(6, 10)), 5e-5)
 
 
 def test_several_points_do_where_one_does_not(x):
     """Two modes to 1e-4 over the whole trajectory: no single series of order up to 4 reaches it."""
     model = build({"upper": 4, "fore": 3})
     x = np.hstack([x[:, :2], np.full((len(x), 2), 0.125)])
-    chosen = choose_expansion(model.pencil, x, 1e-4, (1, 2), orders=(3, 4))
+    chosen = cheapest(expansions(model.pencil, x, 1e-4, (1, 2), orders=(3, 4)), 1e-4)
     assert len(chosen.parts) > 1
     assert {part.y0.tobytes() for part in chosen.parts} == {x[0, 2:].tobytes()}
     f = chosen.frequencies(x[:, :2], x[:, 2:])
@@ -66,7 +72,7 @@ def test_many_points_do_while_more_of_them_help(x):
     """An order of 2 to 1e-4 at one design: more than 8 points, which once were the most."""
     model = build({"upper": 4, "fore": 3})
     x = np.hstack([x[:, :2], np.full((len(x), 2), 0.125)])
-    chosen = choose_expansion(model.pencil, x, 2e-6, orders=(2,))
+    chosen = cheapest(expansions(model.pencil, x, 2e-6, orders=(2,)), 2e-6)
     assert 8 < len(chosen.parts) <= 32
     f = chosen.frequencies(x[:, :2], x[:, 2:])
     assert np.abs(f / exact(model, x, (1,)) - 1.0).max() <= 2e-6
@@ -74,7 +80,9 @@ def test_many_points_do_while_more_of_them_help(x):
 
 def test_neighbours_that_do_not_help_are_soon_left_alone(x):
     model = build({"upper": 4, "fore": 3})
-    chosen = choose_expansion(model.pencil, x, 1e-6, (1,), orders=(2, 3, 4, 5, 6, 8, 12, 14))
+    chosen = cheapest(
+        expansions(model.pencil, x, 1e-6, (1,), orders=(2, 3, 4, 5, 6, 8, 12, 14)), 1e-6
+    )
     together = [line for line in chosen.reasons if "as one cluster" in line]
     assert len(together) <= 2 * 3
 
@@ -82,16 +90,16 @@ def test_neighbours_that_do_not_help_are_soon_left_alone(x):
 def test_an_order_that_cannot_do_it_is_refused_at_the_worst_sample(x):
     model = build({"upper": 4, "fore": 3})
     with pytest.raises(AccuracyError, match=r"no expansion of order up to 2 .* at sample \d+"):
-        choose_expansion(model.pencil, x, 1e-7, (1, 2), orders=(2,))
+        cheapest(expansions(model.pencil, x, 1e-7, (1, 2), orders=(2,)), 1e-7)
 
 
 def test_round_off_of_a_fine_mesh_is_no_refusal_while_it_leaves_half_of_the_accuracy(x):
     model = build({"upper": 100, "fore": 100})
     x = x[::3]
-    chosen = choose_expansion(model.pencil, x, 1e-5)
+    chosen = cheapest(expansions(model.pencil, x, 1e-5), 1e-5)
     # without that, the reduced model beside it should reach a twentieth
-    assert 0.05 * 1e-5 < chosen.beside.estimate.max() <= 0.5 * 1e-5
-    assert chosen.estimate.max() <= 1e-5
+    assert 0.05 * 1e-5 < chosen.beside.error.max() <= 0.5 * 1e-5
+    assert chosen.error.max() <= 1e-5
     f = chosen.frequencies(x[:, :2], x[:, 2:])
     assert np.abs(f / exact(model, x, (1,)) - 1.0).max() <= 1e-5
 
@@ -100,11 +108,11 @@ def test_several_points_are_preferred_to_one_series_of_very_many_terms(x):
     """Along the paper's trajectory: one point needs a high order, several do with a low one."""
     model = build({"upper": 2, "fore": 2})
     x = np.hstack([x[:, :2], np.full((len(x), 2), 0.1)])
-    alone = choose_expansion(model.pencil, x, 1e-5)
-    several = choose_expansion(model.pencil, x, 1e-5, orders=(2, 3, 4))
+    alone = cheapest(expansions(model.pencil, x, 1e-5), 1e-5)
+    several = cheapest(expansions(model.pencil, x, 1e-5, orders=(2, 3, 4)), 1e-5)
     assert len(alone.parts) == 1 < len(several.parts)
     assert several.order <= 4 < alone.order
     for chosen in (alone, several):
         hz = chosen.frequencies(x[:, :2], x[:, 2:])
         off = np.abs(hz / exact(model, x, (1,)) - 1.0)
-        assert off.max() <= chosen.estimate.max() <= 1e-5
+        assert off.max() <= chosen.error.max() <= 1e-5

@@ -21,8 +21,8 @@ def test_the_reduced_model_is_as_small_as_the_accuracy_allows(x, accuracy):
     found = reduce_adaptively(model.pencil, x, accuracy, (1,))
     f = found.reduced.frequencies(x[:, :2], x[:, 2:])
     error = np.abs(f / exact(model, x, (1,)) - 1.0)
-    assert (error <= found.estimate).all()
-    assert found.estimate.max() <= accuracy
+    assert (error <= found.error).all()
+    assert found.error.max() <= accuracy
     assert found.reduced.size <= 15
 
 
