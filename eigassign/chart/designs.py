@@ -22,7 +22,7 @@ from eigassign.assignment.requirements.sampling import requirements_of
 from eigassign.chart.question import Effort, measure
 from eigassign.chart.results import DesignRun, excess_over
 from eigassign.errors import EigassignError
-from eigassign.modal.expansion import expand
+from eigassign.modal.expansion import NearestExpansion, expand
 from eigassign.study.design.one_shot import assign_design
 from eigassign.study.design.optimum import find_optimum
 from eigassign.study.design.variants import Task, variant_of
@@ -94,7 +94,8 @@ def chart_designs(
 def _one_shot(task: Task) -> Reached:
     scene, full, order = task.scene, task.scene.expansions.full, task.scene.expansions.order
     linear = expand(scene.model.pencil, full.q0, full.y0, full.modes, order, linear_in_y=True)
-    expanded = replace(scene, expanded=Expansions(full, linear, order, order))
+    both = NearestExpansion((full,)), NearestExpansion((linear,))
+    expanded = replace(scene, expanded=Expansions(*both, order, order))
     told = {"order": order, "q0": full.q0, "y0": full.y0}
     return assign_design(expanded, task.wanted).y, 1, told, {}
 

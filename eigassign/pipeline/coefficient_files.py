@@ -24,14 +24,13 @@ def coefficient_files(scene: Scene, linear_only: bool) -> dict[str, bytes]:
     ``cluster_<k>_coefficients`` (r, r, N) over w = ``directions`` (x − x0) with ``local_indices``.
     """
     expansions = scene.expansions
-    parts = {"linearised": expansions.linear}
-    if not linear_only:
-        parts["full"] = expansions.full
-    for k, other in enumerate(expansions.others, 2):  # further expansion points
-        parts[f"linearised_at_point_{k}"] = other.linear
+    tables = {}
+    each = zip(expansions.linears.parts, expansions.fulls.parts, strict=True)
+    for k, (linear, full) in enumerate(each, 1):
+        where = f"_at_point_{k}" if k > 1 else ""
+        tables[f"linearised{where}"] = _table(linear)
         if not linear_only:
-            parts[f"full_at_point_{k}"] = other.full
-    tables = {name: _table(expansion) for name, expansion in parts.items()}
+            tables[f"full{where}"] = _table(full)
     names = [*scene.model.q_names, *scene.model.y_names]
     point = {"q0": expansions.full.q0, "y0": expansions.full.y0}
     document = {

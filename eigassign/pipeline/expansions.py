@@ -13,7 +13,7 @@ import scipy
 from eigassign._version import __version__
 from eigassign.errors import UsageError
 from eigassign.modal.arguments import MOST_TERMS
-from eigassign.modal.expansion import expand
+from eigassign.modal.expansion import Expansion, NearestExpansion, expand
 from eigassign.modal.model import Model
 from eigassign.modal.storage import ALGORITHM, expansion_arrays, stored_series, tree_arrays
 from eigassign.output.store.array_file import Array, content_key
@@ -31,11 +31,13 @@ def expand_plan(model: Model, plan: Plan, cache: Cache | None) -> tuple[Expansio
     is there to compare with, and of a lower order where its set would be too large.
     """
     full_order = affordable_order(model, plan.order)
-    expansions, known = _expansions(model, plan, full_order, cache)
-    further = [replace(plan, q0=np.array(q), more_q=()) for q in plan.more_q]
-    others = [_expansions(model, at, full_order, cache)[0] for at in further]
-    expansions = replace(expansions, others=tuple(others))
-    full, linear = expansions.full, expansions.linear
+    points = [plan, *(replace(plan, q0=np.array(q)) for q in plan.more_q)]
+    made = [_expansions(model, at, full_order, cache) for at in points]
+    fulls, linears = (
+        NearestExpansion(parts) for parts in zip(*(both for both, _ in made), strict=True)
+    )
+    expansions = Expansions(fulls, linears, plan.order, full_order)
+    (full, linear), known = made[0]
     notes = [_size_note(expansions), *dict.fromkeys(full.notes + linear.notes)]
     if full_order < plan.order:
         notes.append(
@@ -97,8 +99,8 @@ def expansion_size(model: Model, plan: Plan) -> ExpansionSize:
 
 def _expansions(
     model: Model, plan: Plan, full_order: int, cache: Cache | None
-) -> tuple[Expansions, bool]:
-    """The expansions, and True where they come from the cache."""
+) -> tuple[tuple[Expansion, Expansion], bool]:
+    """Both expansions about one point, and True where they come from the cache."""
     one = replace(plan, more_q=())
     if cache is None or expansion_size(model, one).seconds < cache.least_s:
         return _made(model, plan, full_order), False
@@ -109,14 +111,14 @@ def _expansions(
         except UsageError as error:
             _log.warning("cache entry %s cannot be used (%s); computed anew", entry[:12], error)
     fresh = _made(model, plan, full_order)
-    cache.store(entry, expansion_arrays(fresh.full, fresh.linear), _meta(plan))
+    cache.store(entry, expansion_arrays(*fresh), _meta(plan))
     return fresh, False
 
 
 def _made(
     model: Model, plan: Plan, full_order: int, stored: Mapping[str, Array] | None = None
-) -> Expansions:
-    """The two expansions, of what is ``stored`` where that is given."""
+) -> tuple[Expansion, Expansion]:
+    """The full and the linearised expansion, of what is ``stored`` where that is given."""
     full, linear = (
         expand(
             *(model.pencil, plan.q0, plan.y0, plan.modes, order, linear_in_y),
@@ -125,7 +127,7 @@ def _made(
         )
         for k, (order, linear_in_y) in enumerate([(full_order, False), (plan.order, True)])
     )
-    return Expansions(full, linear, plan.order, full_order)
+    return full, linear
 
 
 def expansion_key(model: Model, plan: Plan, full_order: int) -> str:

@@ -235,8 +235,9 @@ def _result(
 ) -> Result:
     first, full, linear = results.targets[0], None, None
     if expansions is not None:
-        full = expansions.fulls if expansions.others else expansions.full
-        linear = expansions.linears if expansions.others else expansions.linear
+        several = len(expansions.fulls.parts) > 1
+        full = expansions.fulls if several else expansions.full
+        linear = expansions.linears if several else expansions.linear
     return Result(
         design={row.name: row.optimal for row in results.design},
         time_s=results.time_s[first.asked.rows],

@@ -130,7 +130,7 @@ def mesh_lines(found: MeshError | None) -> list[str]:
 
 
 def _estimated_lines(scene: Scene, q: Floats) -> list[str]:
-    estimate = scene.expansions.estimate(q, scene.initial).max(axis=0)
+    estimate = scene.expansions.fulls.error_estimate(q, scene.initial).max(axis=0)
     several = scene.trajectory is not None and scene.trajectory.several
     where = "at the expansion point" if scene.trajectory is None else "along the trajectory"
     where = "along all trajectories" if several else where

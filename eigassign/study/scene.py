@@ -27,38 +27,32 @@ OTHERS = 3  # modes shown above the highest assigned one
 
 @dataclass(frozen=True, repr=False)
 class Expansions(Brief):
-    """The full and the partially linearised expansion of the same modes about the same point.
+    """The full and the partially linearised expansions of the same modes about the same points.
 
-    ``order`` is that of the linearised one, as asked for; ``full_order`` may be lower, where the
+    ``order`` is that of the linearised ones, as asked for; ``full_order`` may be lower, where the
     full set would be too large. (The degree of a set may be lower still: where no coordinate
     matters, the linearised set is linear whatever its order.)
     """
 
-    full: Expansion
-    linear: Expansion
+    fulls: NearestExpansion
+    linears: NearestExpansion
     order: int
     full_order: int
-    others: tuple[Expansions, ...] = ()  # about further points along the trajectory, same y0
 
     @property
     def modes(self) -> tuple[int, ...]:
         """The modes that both hold, in the order of their columns."""
-        return self.full.modes
+        return self.fulls.modes
 
     @property
-    def all(self) -> tuple[Expansions, ...]:
-        """One for each expansion point, the first being this one."""
-        return (self, *self.others)
+    def full(self) -> Expansion:
+        """The full expansion about the first point."""
+        return self.fulls.parts[0]
 
     @property
-    def fulls(self) -> NearestExpansion:
-        """The full expansions about all points, the nearest one evaluated."""
-        return NearestExpansion(tuple(part.full for part in self.all))
-
-    @property
-    def linears(self) -> NearestExpansion:
-        """The partially linearised ones."""
-        return NearestExpansion(tuple(part.linear for part in self.all))
+    def linear(self) -> Expansion:
+        """The partially linearised one."""
+        return self.linears.parts[0]
 
     def taylor_hz(self, q: Floats, y: Floats) -> Floats:
         """Full expansion at samples, (n, n_modes) in Hz; each by the nearest point."""
@@ -77,10 +71,6 @@ class Expansions(Brief):
         q, of_design = path.at(self.full.y0)
         l0, slopes = self.linears.slopes(q, self.full.y0)
         return l0, path.in_design(slopes, of_design)
-
-    def estimate(self, q: Floats, y: Floats) -> Floats:
-        """Error estimate of the full expansion, relative in Hz, (n, n_modes)."""
-        return self.fulls.error_estimate(q, y)
 
     def column(self, mode: int) -> int:
         """Column of ``mode`` in what the expansions evaluate to."""
