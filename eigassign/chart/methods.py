@@ -25,19 +25,20 @@ from eigassign.errors import AccuracyError, UsageError
 from eigassign.mechanism.kinematics.loop_closure import kronecker
 from eigassign.modal.exact.condensation import condense
 from eigassign.modal.expansion import NearestExpansion, expand
-from eigassign.modal.fit.fit import fit
+from eigassign.modal.fit.fit import Fit, PathFit, fit
 from eigassign.modal.fit.region import Box
 from eigassign.modal.model import Model
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.reduce import reduce
+from eigassign.modal.surrogate import Surrogate
 from eigassign.series.multi_index import total_degree
 from eigassign.series.power_series import monomials
 from eigassign.study.drawing import spread_samples
 from eigassign.study.planning import choose_order
 
 Floats = NDArray[np.float64]
-Surrogate = Callable[[Floats], Floats]  # points u (k, d) → (k, n_modes)
-Learn = Callable[[Floats, Floats], Surrogate]  # training points u (n, d) in [0, 1], their values
+Learned = Callable[[Floats], Floats]  # points u (k, d) → (k, n_modes)
+Learn = Callable[[Floats, Floats], Learned]  # training points u (n, d) in [0, 1], their values
 REDUCE = "ea.reduce", "model, q0, y0"
 KINDS = ("linear", "cubic", "Chebyshev")
 SOLVES = (3, 4, 5, 6, 7, 9, 11, 13, 17, 25, 42, 60, 84, 120, 160, 220, 300, 400, 550)  # of fits
@@ -112,7 +113,7 @@ def _call(bench: Bench, function: str, arguments: str, **how: object) -> str:
     return f"{function}({', '.join([arguments, *(f'{k}={v!r}' for k, v in named.items())])})"
 
 
-def _answering(made: Any, solves: int, **more: Any) -> Built:
+def _answering(made: Model | Surrogate | Fit | PathFit, solves: int, **more: Any) -> Built:
     return Built(lambda points: made.frequencies(points.q, points.y), solves, **more)
 
 
@@ -298,7 +299,7 @@ def grid_points(kind: str, k: int, d: int) -> Floats:
     return np.array(list(product(axis, repeat=d)))
 
 
-def grid_interpolation(kind: str, u: Floats, f: Floats) -> Surrogate:
+def grid_interpolation(kind: str, u: Floats, f: Floats) -> Learned:
     """Through f on a tensor grid: linear, by cubic splines, or by one polynomial along each axis.
 
     All are splines; that of "Chebyshev" has no knots within.
@@ -317,7 +318,7 @@ def grid_interpolation(kind: str, u: Floats, f: Floats) -> Surrogate:
     return NdBSpline(tuple(knots), np.ascontiguousarray(table), tuple(degrees))
 
 
-def response_surface(degree: int, u: Floats, f: Floats) -> Surrogate:
+def response_surface(degree: int, u: Floats, f: Floats) -> Learned:
     """Least squares over all monomials of 2u − 1 up to total ``degree``."""
     space = total_degree(u.shape[1], degree)
     if len(space) > len(u):
@@ -326,7 +327,7 @@ def response_surface(degree: int, u: Floats, f: Floats) -> Surrogate:
     return lambda u: monomials(space, 2.0 * u - 1.0) @ coefficients
 
 
-def kriging(u: Floats, f: Floats) -> Surrogate:
+def kriging(u: Floats, f: Floats) -> Learned:
     """A Gaussian process with one length scale for each variable."""
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel

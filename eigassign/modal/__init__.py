@@ -3,6 +3,7 @@
 In reading order:
 
     arguments    samples of (q, y), modes and orders as callers give them, checked
+    surrogate    the interface of what answers frequencies in place of exact solves
     exact        exact elastic modes
     slopes       slopes of exact eigenvalues in coordinates and design
     projection   the pencil's terms projected on a basis
@@ -57,6 +58,7 @@ __all__, __getattr__, __dir__ = face(
         "storage": (
             "FORMAT expansion_arrays reduced_arrays reduced_from_arrays stored_series tree_arrays"
         ),
+        "surrogate": "Surrogate",
         "taylor.bordered": "factor_dense factor_sparse",
         "taylor.local_coordinates": "substitute",
         "taylor.recursion": "expand_subspace",

@@ -3,28 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
 from eigassign import Case, load_case
-from eigassign.modal import Model
+from eigassign.modal import Model, Surrogate
 
 ATLAS = Path(__file__).parents[2] / "cases" / "stress"
-
-
-class Approximation(Protocol):
-    modes: tuple[int, ...]
-
-    def frequencies(self, q: object, y: object) -> np.ndarray: ...
-    def error_estimate(self, q: object, y: object) -> np.ndarray: ...
 
 
 def case(name: str) -> Case:
     return load_case(ATLAS / f"{name}.yaml")
 
 
-def judged(model: Model, approximation: Approximation, q: object, y: object) -> np.ndarray:
+def judged(model: Model, approximation: Surrogate, q: object, y: object) -> np.ndarray:
     """True relative errors; every estimate that is given must cover its own: else this fails."""
     pick = np.array(approximation.modes) - 1
     exact = model.frequencies(q, y, max(approximation.modes))[:, pick]
@@ -35,6 +27,6 @@ def judged(model: Model, approximation: Approximation, q: object, y: object) -> 
     return np.where(given, error, np.nan)
 
 
-def answered(approximation: Approximation, q: object, y: object) -> float:
+def answered(approximation: Surrogate, q: object, y: object) -> float:
     """Share of the samples that are not refused."""
     return float(np.isfinite(approximation.error_estimate(q, y)).mean())

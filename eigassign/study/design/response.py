@@ -9,6 +9,8 @@ is made about the design that is asked for. Answers are judged by exact solves a
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,6 +24,7 @@ from eigassign.modal.model import Model
 from eigassign.modal.reduced.model import ReducedModel
 from eigassign.modal.reduced.reduce import reduce
 from eigassign.modal.slopes import exact_slopes, in_hz, mode_slopes
+from eigassign.modal.surrogate import Surrogate
 from eigassign.study.design.followed import Follower, Spectrum, follow_all, unfollowed
 from eigassign.study.scene import OTHERS, Scene
 
@@ -88,10 +91,8 @@ class DesignResponse:
 
     def _with_followed(self, y: Floats) -> tuple[Spectrum, Floats, Floats]:
         """The modes, slopes of λ in (q, y), and those off the diagonal of numbered modes alone."""
-        found, pencil = (
-            follow_all(self.model, self.path, self.followers, y, self.count),
-            self.model.pencil,
-        )
+        found = follow_all(self.model, self.path, self.followers, y, self.count)
+        pencil = self.model.pencil
         own = Modes(found.modes.lam[:, : self.count + 1], found.modes.phi[..., : self.count + 1])
         slopes, mixed = mode_slopes(pencil, found.x, own, self.wanted, mixed=True)
         of_followed = mode_slopes(pencil, found.x, found.followed, self.wanted)[0]
@@ -133,26 +134,24 @@ class ReducedModels:
     def at(self, y: Floats, count: int) -> ReducedModel | None:
         """One whose lowest ``count`` modes hold at y (n_y,); None where no more shall be made."""
         watched = self.path.chosen(self.path.spread(5)).at(y)[0]
-        for k in range(len(self.made) - 1, -1, -1):
-            if len(self.made[k].modes) >= count and self._holds(self.made[k], watched, y):
-                self.made.append(self.made.pop(k))
-                return self.made[-1]
-        if self.left <= 0:
-            return None
-        self.left -= 1
-        poses = self.path.chosen(self.path.spread(3)).at(y)[0]
-        modes = tuple(range(1, count + 1))
-        try:
-            one = reduce(self.model.pencil, poses, np.tile(y, (len(poses), 1)), modes, 1)
-        except AccuracyError:
-            return None
-        if not self._holds(one, watched, y):
-            return None
-        self.made.append(one)
-        return one
+        for one in self._rungs(y, count):
+            if self._holds(one, watched, y):
+                self.made = [*(each for each in self.made if each is not one), one]
+                return one
+        return None
+
+    def _rungs(self, y: Floats, count: int) -> Iterator[ReducedModel]:
+        """Yield those that are there already, and then a new one about y."""
+        yield from (one for one in reversed(self.made) if len(one.modes) >= count)
+        if self.left > 0:
+            self.left -= 1
+            poses = self.path.chosen(self.path.spread(3)).at(y)[0]
+            modes = tuple(range(1, count + 1))
+            with suppress(AccuracyError):
+                yield reduce(self.model.pencil, poses, np.tile(y, (len(poses), 1)), modes, 1)
 
     @staticmethod
-    def _holds(reduced: ReducedModel, q: Floats, y: Floats) -> bool:
+    def _holds(reduced: Surrogate, q: Floats, y: Floats) -> bool:
         try:
             return bool(reduced.error_estimate(q, y).max() <= TRUSTED)
         except EigassignError:
