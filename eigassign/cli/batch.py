@@ -243,8 +243,8 @@ def _tell(batch: Batch, workers: Workers, reporter: Reporter) -> int:
     """List the cases that would run, and say about how long, in how much memory and files."""
     from eigassign.batch.cases import seconds_of_done
     from eigassign.batch.runner import require_valid
+    from eigassign.facts import duration
     from eigassign.output.console import print_tables
-    from eigassign.output.formats import duration
     from eigassign.output.tables import Table
 
     require_valid(batch, workers, reporter.stage)

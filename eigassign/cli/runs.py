@@ -243,7 +243,7 @@ def validate(
 
 def _judged(rows: Sequence[ValidationRow], moves: Sequence[Moved]) -> tuple[str, str]:
     """The status of a validated case, and why it is not ok."""
-    from eigassign.output.formats import percent
+    from eigassign.facts import percent
 
     reasons = [
         f"mode {row.mode}, {row.where}: {percent(row.worst_taylor)} from exact, with the design "

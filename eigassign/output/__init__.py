@@ -2,7 +2,6 @@
 
 In reading order; each imports from those above it only:
 
-    formats       numbers as people read them
     store         files and folders that are written whole or not at all: runs, the cache
     exchange      a reduced model in files: HDF5, NumPy, MATLAB, C99
     result_files  results.json and the CSV files

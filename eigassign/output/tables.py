@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.units import handy_unit, is_bare
-from eigassign.output.formats import capital, number, percent, residual, seconds
+from eigassign.facts import capital, number, percent, residual, seconds
 from eigassign.study.design.judgement import MET
 from eigassign.study.results import (
     Comparison,

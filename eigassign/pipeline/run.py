@@ -20,11 +20,11 @@ from eigassign.assignment.requirements.sampling import requirements_of, with_ins
 from eigassign.brief import counted
 from eigassign.case.suggestions import shown
 from eigassign.errors import EigassignError
+from eigassign.facts import number
 from eigassign.modal.expansion import Expansion, NearestExpansion
 from eigassign.output import tables
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.run import run_figures
-from eigassign.output.formats import number
 from eigassign.output.reports.notebook import Pictured, html
 from eigassign.output.result_files import frequency_columns
 from eigassign.output.store.cache import Cache, default_directory, least_work

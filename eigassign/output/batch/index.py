@@ -11,9 +11,9 @@ from typing import Any
 from urllib.parse import quote
 
 from eigassign._version import __version__
+from eigassign.facts import number, percent, seconds
 from eigassign.output.batch.columns import quantity
 from eigassign.output.batch.outcome import CaseOutcome, from_line
-from eigassign.output.formats import number, percent, seconds
 from eigassign.output.pages import TEMPLATES, inside, page_of
 
 _STATUS = {"ok": "good", "tolerance": "fair", "failed": "bad", "error": "bad"}  # and its tone

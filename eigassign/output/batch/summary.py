@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from typing import TextIO
 
 from eigassign._version import __version__
+from eigassign.facts import percent
 from eigassign.files import printable
 from eigassign.output.batch.outcome import CaseOutcome
-from eigassign.output.formats import percent
 from eigassign.output.tables import Table
 
 FORMAT = 1  # of summary.json

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.units import handy_unit
+from eigassign.facts import percent
 from eigassign.output.figures import graph
 from eigassign.output.figures.curves import suffix
 from eigassign.output.figures.graph import (
@@ -27,7 +28,6 @@ from eigassign.output.figures.graph import (
     labelled,
     short,
 )
-from eigassign.output.formats import percent
 from eigassign.study.results import Comparison, DesignMap, ModeStudy, RunResults
 
 Floats = NDArray[np.float64]

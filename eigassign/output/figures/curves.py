@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.requirement import Requirement
+from eigassign.facts import capital, percent
 from eigassign.output.figures import graph
 from eigassign.output.figures.graph import (
     Curve,
@@ -27,7 +28,6 @@ from eigassign.output.figures.graph import (
     series,
     short,
 )
-from eigassign.output.formats import capital, percent
 from eigassign.study.results import AssignmentRow, OtherModes, RunResults, TargetStudy
 
 Floats = NDArray[np.float64]

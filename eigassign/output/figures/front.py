@@ -14,9 +14,9 @@ from itertools import cycle
 import numpy as np
 
 from eigassign.chart.results import Chart, ChartPoint, Front, excess_over, kind_of
+from eigassign.facts import capital
 from eigassign.output.figures import graph
 from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Panel, Rule
-from eigassign.output.formats import capital
 
 LEAST_EXCESS = 1e-10  # of an objective over the best one: less is the rounding of a search's end
 WHOSE = {True: "eigassign", False: "others"}  # groups of the legend

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.facts import capital, percent
 from eigassign.output.figures import graph
 from eigassign.output.figures.approximation import POINT
 from eigassign.output.figures.curves import OPTIMAL, TARGET
@@ -22,7 +23,6 @@ from eigassign.output.figures.graph import (
     Shade,
     labelled,
 )
-from eigassign.output.formats import capital, percent
 from eigassign.study.results import (
     RangeRow,
     RunResults,

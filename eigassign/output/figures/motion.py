@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.facts import number
 from eigassign.output.figures import graph, style
 from eigassign.output.figures.graph import BLUE, GREY, FigurePlan, short
 from eigassign.output.figures.mechanism import (
@@ -29,7 +30,6 @@ from eigassign.output.figures.mechanism import (
     extent,
     points_of,
 )
-from eigassign.output.formats import number
 from eigassign.study.results import DrawnPoses, ModePictures
 
 if TYPE_CHECKING:

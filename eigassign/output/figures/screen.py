@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eigassign.facts import number
 from eigassign.output.figures import graph
 from eigassign.output.figures.graph import (
     Bars,
@@ -28,7 +29,6 @@ from eigassign.output.figures.graph import (
     Shade,
     short,
 )
-from eigassign.output.formats import number
 from eigassign.study.results import MovingMode
 
 Floats = NDArray[np.float64]

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from eigassign.chart.results import SCHEMA, Chart, Timing, time_in_words
+from eigassign.facts import capital
 from eigassign.files import plain
 from eigassign.output.figures.front import chart_figures
-from eigassign.output.formats import capital
 from eigassign.output.reports import page as report
 from eigassign.output.result_files import dumps
 from eigassign.output.tables import Table

@@ -7,9 +7,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from eigassign.facts import number
 from eigassign.files import plain
 from eigassign.output.figures.update import shown_in, update_figures
-from eigassign.output.formats import number
 from eigassign.output.reports import page as report
 from eigassign.output.result_files import dumps, origin, without
 from eigassign.output.tables import Table

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.case.units import handy_unit
-from eigassign.output.formats import capital, percent
+from eigassign.facts import capital, percent
 from eigassign.output.tables import violated
 from eigassign.study.results import LimitRow, RunResults, TargetStudy
 
