@@ -1,8 +1,103 @@
-"""Numbers as people read them: on the console, in the report and in the figures."""
+"""What is said of a fact once: what it is, its unit, its digits; and numbers as people read them.
+
+A fact is a field or a property of a dataclass. What its name does not say stands in a `Fact` in its
+type, as in ``Annotated[float, Fact("of the answer", unit="Hz")]``. Tables, the files of results and
+the JSON Schema of these are walks over facts.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, is_dataclass
+from functools import cache
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+# --- What is declared
+
+OF_ROW = "that of the row"  # the unit of numbers whose row has a field for it
+
+
+@dataclass(frozen=True)
+class Fact:
+    """What is declared of a fact; of several in one type the outer ones say what they say.
+
+    ``words`` say what it is beyond its name, ``heading`` heads its column, ``unit`` is that of its
+    numbers. ``digits`` is a format, or makes the text of a cell, which ``says_unit`` or does not;
+    ``absent`` is that of None. In files it has another ``name`` where one is given, and a number
+    that is not finite is null there where it ``may_lack``.
+    """
+
+    words: str = ""
+    heading: str = ""
+    unit: str = ""
+    digits: str | Callable[[Any], str] = ""
+    absent: str = ""
+    says_unit: bool = False
+    name: str = ""
+    may_lack: bool = False
+
+    @property
+    def column(self) -> str:
+        """The heading of its column, with the unit where the cells do not say it."""
+        stated = self.unit in ("", OF_ROW) or self.says_unit
+        return self.heading if stated else f"{self.heading} [{self.unit}]"
+
+    def text(self, value: Any) -> str:
+        """The value as people read it."""
+        if value is None:
+            return self.absent
+        if callable(self.digits):
+            return self.digits(value)
+        return f"{value + 0.0:{self.digits}}" if self.digits else str(value)
+
+
+@cache
+def hints(row: Any) -> dict[str, Any]:
+    """The types of all fields and properties, with what they are annotated with."""
+    found = get_type_hints(row, include_extras=True)
+    own = {k: v.fget for k, v in vars(row).items() if isinstance(v, property)}
+    return found | {k: get_type_hints(v, include_extras=True)["return"] for k, v in own.items()}
+
+
+@cache
+def fact(row: Any, name: str) -> Fact:
+    """What is declared of a field or property, or behind a dot of one of its own.
+
+    Its heading is its name without another.
+    """
+    own, _, below = name.partition(".")
+    kind = hints(row)[own]
+    told: dict[str, Any] = {"heading": own.removesuffix("_hz").replace("_", " "), "name": own}
+    if below:
+        row_below: Any = next(filter(is_dataclass, (kind, *_parts(kind))))
+        told = vars(fact(row_below, below))
+    for one in _parts(kind):
+        if isinstance(one, Fact):
+            told = {**told, **{k: v for k, v in vars(one).items() if v}}
+    return Fact(**told)
+
+
+def value_of(row: Any, name: str) -> Any:
+    """The value of a fact; None where there is nothing to have it."""
+    for own in name.split("."):
+        row = None if row is None else getattr(row, own)
+    return row
+
+
+def _parts(kind: Any) -> Iterator[Any]:
+    """What an optional or annotated type is made of, declarations too, the innermost first."""
+    if get_origin(kind) in (Annotated, Union, UnionType):
+        for part in get_args(kind):
+            yield from _parts(part)
+            yield part
+
+
+# --- Numbers as people read them
 
 
 def capital(text: str) -> str:
@@ -13,6 +108,11 @@ def capital(text: str) -> str:
 def number(value: float) -> str:
     """Six significant digits: ``0.228713``; no sign on a zero."""
     return f"{value + 0.0:.6g}"
+
+
+def listed(amounts: Mapping[str, float]) -> str:
+    """``a: 0.228713, b: 2``."""
+    return ", ".join(f"{name}: {number(value)}" for name, value in amounts.items())
 
 
 def percent(fraction: float) -> str:
@@ -27,6 +127,14 @@ def seconds(value: float) -> str:
     return f"{1000.0 * value:.3g} ms" if abs(value) < 1.0 else f"{value:.3g} s"
 
 
+def time_in_words(value: float) -> str:
+    """Three digits, however short: ``12.3 µs``."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9)):
+        if value >= size or (unit == "ns" and value > 0.0):
+            return f"{value / size:.3g} {unit}"
+    return "0"
+
+
 def duration(value: float) -> str:
     """Two digits, in the unit that people would take: ``50 s``, ``3.2 min``, ``27 h``."""
     for size, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
@@ -38,3 +146,18 @@ def duration(value: float) -> str:
 def residual(value: float) -> str:
     """Two digits and a power of ten: ``3.1e-17``."""
     return f"{value:.1e}"
+
+
+def positive_percent(fraction: float) -> str:
+    """The same of what counts above zero only."""
+    return percent(max(fraction, 0.0))
+
+
+# --- Kinds of numbers, each with its unit and digits
+
+Share = Annotated[float, Fact(unit="fraction", digits=percent, says_unit=True)]
+Hertz = Annotated[float, Fact(unit="Hz", digits=".6g")]
+Seconds = Annotated[float, Fact(unit="s", digits=seconds, says_unit=True)]
+Residual = Annotated[float, Fact(digits=residual)]
+InUnit = Annotated[float, Fact(unit=OF_ROW, digits=".6g")]
+Curve = Annotated[NDArray[np.float64], Fact(unit="Hz")]

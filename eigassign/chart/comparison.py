@@ -38,9 +38,9 @@ from eigassign.chart.results import (
     Timing,
     kind_of,
     machine,
-    time_in_words,
 )
 from eigassign.errors import EigassignError
+from eigassign.facts import time_in_words
 from eigassign.mechanism.assembly.build import refined
 from eigassign.study.build import build_model
 from eigassign.study.scene import Scene

@@ -12,14 +12,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 import scipy
 
 from eigassign._version import __version__
+from eigassign.facts import Fact, Hertz, Seconds, Share, time_in_words
 
 SCHEMA = 4  # of chart.json
+_BREAK_EVEN = "evaluations from which it beats exact solves"
+ErrorHz = Annotated[Hertz, Fact(digits=".2e")]
+RelativeError = Annotated[Share, Fact("of the frequency", "relative", digits=".1e")]
 _KINDS = {  # of methods whose family begins so: the first that fits
     "Taylor": "series of λ",
     "1/λ": "series of 1/λ",
@@ -34,14 +38,6 @@ _KINDS = {  # of methods whose family begins so: the first that fits
 def kind_of(family: str) -> str:
     """The kind of a family's methods in words."""
     return next(kind for beginning, kind in _KINDS.items() if family.startswith(beginning))
-
-
-def time_in_words(seconds: float) -> str:
-    """Three digits with a unit: ``12.3 µs``."""
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9)):
-        if seconds >= size or (unit == "ns" and seconds > 0.0):
-            return f"{seconds / size:.3g} {unit}"
-    return "0"
 
 
 def excess_over(best: float, objective: float) -> float:
@@ -83,43 +79,56 @@ class Timing:
     ``repeats`` is 0 where the first run took so long that it alone was timed.
     """
 
-    median_s: float
-    low_s: float
-    high_s: float
+    median_s: Seconds
+    low_s: Seconds
+    high_s: Seconds
     repeats: int
+
+    def __str__(self) -> str:
+        """Median and quartiles; one run alone is marked."""
+        median, low, high = map(time_in_words, (self.median_s, self.low_s, self.high_s))
+        if not self.median_s:
+            return median
+        return f"{median} ({low}–{high})" if self.repeats else f"{median} (once)"
 
 
 @dataclass(frozen=True)
 class Errors:
     """|f − f_exact| over ``samples`` points; ``failed`` gave no number and are infinitely wrong."""
 
-    worst_hz: float
-    rms_hz: float
-    worst_relative: float
+    worst_hz: Annotated[ErrorHz, Fact(heading="worst")]
+    rms_hz: ErrorHz
+    worst_relative: RelativeError
     samples: int
-    failed: int
+    failed: Annotated[int, Fact(heading="no number", digits=lambda n: str(n or ""))]
 
 
 @dataclass(frozen=True)
 class ChartPoint:
     """One method: what it costs and how wrong it is."""
 
-    method: str  # unique in its chart
+    method: Annotated[str, Fact("unique in its chart")]
     family: str
-    ours: bool  # offered by eigassign; the others are what people do without it
+    ours: Annotated[bool, Fact("offered by eigassign; others are what people do without it")]
     parameters: Mapping[str, Any]
-    offline: Timing  # set-up, exact solves included
-    online: Timing  # one evaluation out of a large batch
-    solves: int  # exact eigensolves of the set-up
-    solves_online: float  # exact eigensolves of one evaluation
+    offline: Annotated[Timing, Fact("set-up, exact solves included", "set-up")]
+    online: Annotated[Timing, Fact("one evaluation out of a large batch", "one evaluation")]
+    solves: Annotated[int, Fact("exact eigensolves of the set-up")]
+    solves_online: Annotated[float, Fact("exact eigensolves of one evaluation")]
     everywhere: Errors
-    random: Errors | None  # over random samples of trajectory × design box; None: not possible
-    trajectory: Errors | None  # along the trajectory at several designs
-    break_even: float | None  # evaluations from which it beats exact solves; None: never
+    random: Annotated[Errors | None, Fact("over random samples of trajectory × design box")]
+    trajectory: Annotated[Errors | None, Fact("at several designs", "worst along the trajectory")]
+    break_even: Annotated[float | None, Fact(_BREAK_EVEN, "pays from", "", ",.0f", "never")]
     note: str = ""
-    use: str = ""  # how to ask for it: a line of a case file, or a call
-    at_once: int = 1  # evaluations that come together: a whole trajectory where set up anew for it
-    estimate: float | None = None  # of fits: their own worst estimate, relative; None: has none
+    use: Annotated[str, Fact("how to ask for it: a line of a case file, or a call")] = ""
+    at_once: Annotated[int, Fact("evaluations that come together: those of a trajectory")] = 1
+    estimate: Annotated[float | None, Fact("of fits: their own worst estimate, relative")] = None
+
+    @property
+    def exact_solves(self) -> str:
+        """How many it takes, of set-up and of an evaluation."""
+        each = f" + {self.solves_online:.2g} each" if self.solves_online else ""
+        return f"{self.solves}{each}"
 
     def cost_s(self, evaluations: float | None) -> float:
         """Seconds for set-up and so many evaluations; of one evaluation alone where None."""
@@ -176,13 +185,13 @@ class Advice:
 class MeshRow:
     """One mesh: ``elements`` in all, against the limit that the meshes converge to."""
 
-    factor: float
+    factor: Annotated[float, Fact("of the case's own elements", digits="g")]
     elements: int
-    n_dof: int
-    worst_hz: float
-    worst_relative: float
-    order: float | None  # observed order of convergence to the next finer mesh
-    solve: Timing  # one exact solve
+    n_dof: Annotated[int, Fact("degrees of freedom", "dof")]
+    worst_hz: Annotated[ErrorHz, Fact(heading="worst error")]
+    worst_relative: RelativeError
+    order: Annotated[float | None, Fact("observed, to the next finer mesh", digits=".2f")]
+    solve: Annotated[Timing, Fact("one exact solve", "exact solve")]
 
 
 @dataclass(frozen=True)
@@ -192,14 +201,14 @@ class DesignRun:
     method: str
     ours: bool
     parameters: Mapping[str, Any]
-    seconds: Timing
-    solves: int
+    seconds: Annotated[Timing, Fact(heading="time")]
+    solves: Annotated[int, Fact(heading="exact solves")]
     design: tuple[float, ...]
-    objective: float
-    max_relative: float  # distance to the target in Hz, exact
-    rms_relative: float
-    excess: float  # objective over the best one found by any method: see `excess_over`
-    trace: tuple[tuple[float, float], ...] = ()  # of searches: seconds, the best F so far
+    objective: Annotated[float, Fact(digits=".6e")]
+    max_relative: Annotated[Share, Fact("distance to the target in Hz, exact", "worst")]
+    rms_relative: Annotated[Share, Fact(heading="rms")]
+    excess: Annotated[float, Fact("see `excess_over`", "above best", digits=".1e")]
+    trace: Annotated[tuple[tuple[float, float], ...], Fact("seconds, the best F so far")] = ()
     note: str = ""
 
 

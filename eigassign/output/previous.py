@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from eigassign.case.schema.targets import TARGETS
 from eigassign.errors import UsageError
+from eigassign.facts import Fact, Hertz
 from eigassign.files import STORED, json_value, read_bytes
 from eigassign.output.batch.outcome import CaseOutcome, Range, from_plain, ranges
-from eigassign.output.tables import Table
+from eigassign.output.tables import Table, facts_table
 from eigassign.study.comparison import TRAJECTORY
 from eigassign.study.results import ValidationRow
 
@@ -52,7 +53,7 @@ class Moved:
     what: str
     before: str
     now: str
-    hz: float | None = None
+    hz: Annotated[Hertz | None, Fact(heading="moved by", digits="+.4g")] = None
 
     def __str__(self) -> str:
         by = "" if self.hz is None else f", moved by {self.hz:+.4g} Hz"
@@ -104,18 +105,13 @@ class EarlierResult:
         if not self._compared and not self.moves:
             some = ", ".join([*self._before][:5])
             raise UsageError(f"{self._path}: has none of these frequencies; its cases are {some}")
-        columns = ("case", "what", "before", "now", "moved by")
-        rows = [
-            (m.case, m.what, m.before, m.now, "" if m.hz is None else f"{m.hz:+.4g} Hz")
-            for m in self.moves
-        ]
         caption = f"Frequencies compared: {self._compared}, new ones: {self._new}; "
         caption += f"tolerance {self._tolerance:g} Hz."
         if gone := [case for case in self._before if case not in self._seen]:
             some = ", ".join(gone[:5]) + (", …" if len(gone) > 5 else "")
             caption += f" Cases that are not here any more: {len(gone)} ({some})."
-        word = "Moved" if rows else "Nothing moved"
-        return Table(f"{word} since {self._path}", columns if rows else (), tuple(rows), caption)
+        title = f"{'Moved' if self.moves else 'Nothing moved'} since {self._path}"
+        return facts_table(title, self.moves, "case what before now hz", caption)
 
 
 # --- Reading it

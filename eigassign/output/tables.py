@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case.units import handy_unit, is_bare
-from eigassign.facts import capital, number, percent, residual, seconds
+from eigassign.case.units import is_bare
+from eigassign.facts import OF_ROW, Fact, capital, fact, number, percent, seconds, value_of
 from eigassign.study.design.judgement import MET
 from eigassign.study.results import (
     Comparison,
     DesignRow,
     ErrorSummary,
-    RangeRow,
     RunResults,
     TargetStudy,
     ValidationRow,
@@ -57,6 +57,27 @@ def _is_number(cell: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def facts_table(
+    title: str, rows: Iterable[Any], names: str, caption: str = "", **headings: str
+) -> Table:
+    """The facts of these ``names``, each row's own; what no row has has no column.
+
+    Numbers in the unit of their row are shown in its handy one. ``headings`` are those of facts
+    that are called something else here.
+    """
+    rows = [*rows]
+    told = [(name, fact(type(rows[0]), name)) for name in names.split() if rows]
+    cells = [[one.text(_value(row, name, one)) for row in rows] for name, one in told]
+    shown = [k for k, column in enumerate(cells) if any(column)]
+    columns = tuple(headings.get(told[k][0], told[k][1].column) for k in shown)
+    return Table(title, columns, tuple(zip(*(cells[k] for k in shown), strict=True)), caption)
+
+
+def _value(row: Any, name: str, one: Fact) -> Any:
+    found = value_of(row, name)
+    return found / row.handy[1] if one.unit == OF_ROW and found is not None else found
 
 
 def run_tables(results: RunResults) -> tuple[Table, ...]:
@@ -112,7 +133,7 @@ def design(results: RunResults) -> Table:
     ]
     rows = []
     for row in results.design:
-        unit, size = _unit(row)
+        unit, size = row.handy
         values = (row.initial, row.optimal, row.lower, row.upper)
         rows.append(
             (row.name, row.parameter, unit, *(number(value / size) for value in values),
@@ -130,21 +151,16 @@ def design(results: RunResults) -> Table:
     return Table("Design", (*columns, *more), tuple(rows), caption)
 
 
-def _unit(row: DesignRow) -> tuple[str, float]:
-    """The unit that a parameter is shown in, and its size in SI."""
-    return handy_unit(row.unit, row.initial, row.optimal, row.lower, row.upper)
-
-
 def _by_name(results: RunResults, y: Floats) -> Iterator[str]:
     """The values of a design in these units."""
     for row, value in zip(results.design, y, strict=True):
-        yield number(float(value) / _unit(row)[1])
+        yield number(float(value) / row.handy[1])
 
 
 def _named(results: RunResults) -> Iterator[str]:
     """The parameters with these units: ``wall [mm]``."""
     for row in results.design:
-        unit = _unit(row)[0]
+        unit = row.handy[0]
         yield f"{row.name} [{unit}]" if unit else row.name
 
 
@@ -204,23 +220,13 @@ def _violation(worst: float) -> str:
 
 def clearances(results: RunResults) -> Table:
     """Bands to keep out of: how many modes are below each, and whether that is proved."""
-    rows = tuple(
-        (
-            row.label,
-            str(row.below),
-            percent(max(row.room, 0.0)),
-            "not bounded" if row.raised is None else percent(row.raised),
-            "proved" if row.clear else "NO",
-        )
-        for row in (results.assignment.clearances if results.assignment else ())
-    )
-    columns = ("band", "modes below", "room at least", "model too high by", "clear")
+    rows = results.assignment.clearances if results.assignment else ()
     caption = (
         "Of all modes at every sample, and between the samples. Room is the distance to the "
         "nearest edge, relative to it. Mesh and reduced links put the mode above the band too "
         "high, by no more than stated: the room counts from there."
     )
-    return Table("Clearance", columns, rows, caption)
+    return facts_table("Clearance", rows, "label below room raised clear", caption)
 
 
 def combinations(results: RunResults) -> Table:
@@ -245,7 +251,7 @@ def _choice(row: DesignRow | None, choice: str) -> str:
     """Its name, or the value that it is in the unit of its parameter."""
     if row is None or not is_bare(choice):
         return choice
-    unit, size = _unit(row)
+    unit, size = row.handy
     return f"{number(float(choice) / size)} {unit}".rstrip()
 
 
@@ -282,7 +288,7 @@ def _of_target(target: TargetStudy) -> Iterator[tuple[str, ErrorSummary]]:
 def sensitivity(results: RunResults) -> Table:
     """Slopes of the targeted frequencies at the answer."""
     columns = ("parameter", "target", "Hz per unit", "unit", "% per %", "% per % at most")
-    units = {row.name: _unit(row) for row in results.design}
+    units = {row.name: row.handy for row in results.design}
     rows = []
     for row in results.meaning.sensitivity:
         unit, size = units.get(row.parameter, (row.unit, 1.0))
@@ -300,21 +306,22 @@ def sensitivity(results: RunResults) -> Table:
 
 def limits(results: RunResults) -> Table:
     """Gains from a little more room at each limit that the answer lies on, to first order."""
-    rows = tuple((row.name, row.side, row.words) for row in results.meaning.relaxed)
-    return Table("Limits", ("limit", "side", "relaxed, to first order"), rows)
+    return facts_table("Limits", results.meaning.relaxed, "name side words")
 
 
 def reach(results: RunResults) -> Table:
     """The range of each target's curve within the bounds, over all samples."""
     caption = "Over all designs within the bounds, at any sample; proved."
-    return _ranges("Reach", "least error", results.meaning.reach, caption)
+    rows, names = results.meaning.reach, "label lowest_hz highest_hz error"
+    return facts_table("Reach", rows, names, caption, error="least error")
 
 
 def tolerance(results: RunResults) -> Table:
     """The range of each target's curve while parameters deviate within their tolerances."""
     found = results.meaning.tolerance
-    title, rows = "Tolerance", () if found is None else found.targets
-    return _ranges(title, "worst error", rows, "" if found is None else f"{found.words}.")
+    rows, names = () if found is None else found.targets, "label lowest_hz highest_hz error"
+    caption = "" if found is None else f"{found.words}."
+    return facts_table("Tolerance", rows, names, caption, error="worst error")
 
 
 def trade_off(results: RunResults) -> Table:
@@ -331,14 +338,6 @@ def trade_off(results: RunResults) -> Table:
         rows.append((*cells, *_by_name(results, point.design)))
     caption = "The best design found for each; the last is the answer."
     return Table("Trade-off", columns, tuple(rows), caption)
-
-
-def _ranges(title: str, error: str, found: tuple[RangeRow, ...], caption: str) -> Table:
-    rows = tuple(
-        (row.label, number(row.lowest_hz.min()), number(row.highest_hz.max()), percent(row.error))
-        for row in found
-    )
-    return Table(title, ("target", "lowest Hz", "highest Hz", error), rows, caption)
 
 
 def approximation(results: RunResults) -> Table:
@@ -361,13 +360,10 @@ def approximation(results: RunResults) -> Table:
 
 def solver(results: RunResults) -> Table:
     """The solver's status, and the residuals of its answer, recomputed from the data."""
-    columns = ("status", "iterations", "primal residual", "dual residual", "gap")
-    found = results.solver
-    if found is None:
-        return Table("Solver", columns, ())
-    proof = map(residual, (found.primal_residual, found.dual_residual, found.gap))
+    rows = () if results.solver is None else (results.solver,)
+    names = "status iterations primal_residual dual_residual gap"
     caption = "Residuals recomputed from the data of the scaled program."
-    return Table("Solver", columns, ((found.status, str(found.iterations), *proof),), caption)
+    return facts_table("Solver", rows, names, caption)
 
 
 def timing(results: RunResults) -> Table:
@@ -378,15 +374,8 @@ def timing(results: RunResults) -> Table:
 
 def validation_table(rows: Sequence[ValidationRow]) -> Table:
     """Errors of both expansions, and whether the full one is within the case's tolerance."""
-    columns = ("case", "mode", "where", "points", "order", "Taylor", "linearised in y", "limit",
-               "verdict")  # fmt: skip
-    shown = tuple(
-        (row.case, str(row.mode), row.where, str(row.points), str(row.order),
-         percent(row.worst_taylor), percent(row.worst_linearised), percent(row.limit),
-         "ok" if row.passed else "FAILED")
-        for row in rows
-    )  # fmt: skip
-    return Table("Validation", columns, shown, "Worst relative error in Hz.")
+    names = "case mode where points order worst_taylor worst_linearised limit passed"
+    return facts_table("Validation", rows, names, "Worst relative error in Hz.")
 
 
 def modes_table(

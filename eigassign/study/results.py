@@ -9,15 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from operator import itemgetter
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.brief import Brief
-from eigassign.case.units import is_bare
+from eigassign.case.units import handy_unit, is_bare
+from eigassign.facts import Curve, Fact, Hertz, InUnit, Residual, Share, positive_percent
 
 Floats = NDArray[np.float64]
+Numbers = NDArray[np.intp]
+Kilograms = Annotated[float, Fact(unit="kg", digits=".6g")]
+Violation = Annotated[Share, Fact("relative to the limit, 0 where it is kept")]
 
 
 def frozen(array: Floats) -> Floats:
@@ -97,15 +103,15 @@ class ValidationRow:
     order: int
     where: str  # "trajectory", "box of q and y", ...
     points: int
-    worst_taylor: float  # relative error in Hz, fraction; infinite where λ came out negative
-    worst_linearised: float
-    rms_taylor: float
-    rms_linearised: float
-    limit: float
-    passed: bool
-    lowest_hz: float  # of the exact frequencies there
-    mean_hz: float
-    highest_hz: float
+    worst_taylor: Annotated[Share, Fact(heading="Taylor")]  # infinite where λ came out negative
+    worst_linearised: Annotated[Share, Fact(heading="linearised in y")]
+    rms_taylor: Share
+    rms_linearised: Share
+    limit: Share
+    passed: Annotated[bool, Fact(heading="verdict", digits=lambda ok: "ok" if ok else "FAILED")]
+    lowest_hz: Hertz  # of the exact frequencies there
+    mean_hz: Hertz
+    highest_hz: Hertz
 
 
 # --- What an assignment reaches
@@ -113,20 +119,22 @@ class ValidationRow:
 
 @dataclass(frozen=True)
 class DesignRow:
-    """One design parameter before and after, in SI ``unit``; what was chosen of its catalogue.
-
-    ``price`` is for one unit.
-    """
+    """One design parameter before and after, in SI ``unit``; what was chosen of its catalogue."""
 
     name: str
-    parameter: str
+    parameter: Annotated[str, Fact("its key path in the case file")]
     unit: str
-    initial: float
-    optimal: float
-    lower: float
-    upper: float
-    choice: str | None = None
-    price: float | None = None
+    initial: InUnit
+    optimal: InUnit
+    lower: InUnit
+    upper: InUnit
+    choice: Annotated[str | None, Fact("name or value chosen of its catalogue")] = None
+    price: Annotated[float | None, Fact("of one SI unit")] = None
+
+    @property
+    def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
+        """The unit that people read it in, and the size of that in SI."""
+        return handy_unit(self.unit, self.initial, self.optimal, self.lower, self.upper)
 
     @property
     def chosen(self) -> str:
@@ -143,32 +151,28 @@ class DesignRow:
 class MassRow:
     """Mass of all links and bodies before and after, and its limits if any, in kg."""
 
-    initial: float
-    optimal: float
-    lower: float | None
-    upper: float | None
+    initial: Kilograms
+    optimal: Kilograms
+    lower: Kilograms | None
+    upper: Kilograms | None
 
 
 @dataclass(frozen=True)
 class ErrorRow:
     """Distance to the target in Hz relative to the target: its maximum and root mean square."""
 
-    max_relative: float
-    rms_relative: float
+    max_relative: Share
+    rms_relative: Share
 
 
 @dataclass(frozen=True)
 class ErrorSummary:
-    """The distance to the targets at the initial design, and at the answer: ``exact``.
-
-    ``one_shot`` is the exact distance of the paper's answer, ``predicted`` what the model said
-    before the last step to the answer; each None where there is none.
-    """
+    """The distance to the targets at the initial design, and at the answer: ``exact``."""
 
     initial: ErrorRow
     exact: ErrorRow
-    predicted: ErrorRow | None = None
-    one_shot: ErrorRow | None = None
+    predicted: Annotated[ErrorRow | None, Fact("of the last program", may_lack=True)] = None
+    one_shot: Annotated[ErrorRow | None, Fact("the exact distance of the paper's answer")] = None
 
 
 @dataclass(frozen=True)
@@ -185,9 +189,9 @@ class FollowedRow(Brief):
     """A mode followed by its shape: its ``name``, and which modes (n,) it is, from the lowest."""
 
     name: str
-    like: int  # its number where it is named
-    initial_numbers: NDArray[np.intp]
-    exact_numbers: NDArray[np.intp]
+    like: Annotated[int, Fact("its number where it is named")]
+    initial_numbers: Annotated[Numbers, Fact("at each sample, before", name="initial_modes")]
+    exact_numbers: Annotated[Numbers, Fact("at each sample of the answer", name="exact_modes")]
 
     def part(self, rows: slice) -> FollowedRow:
         """The same at some of the samples."""
@@ -257,23 +261,19 @@ class SolverRow:
 
     status: str
     iterations: int
-    primal_residual: float
-    dual_residual: float
-    gap: float
+    primal_residual: Residual
+    dual_residual: Residual
+    gap: Annotated[Residual, Fact("between the primal and the dual objective")]
 
 
 @dataclass(frozen=True)
 class OptimalityRow:
-    """How far the answer is known to be optimal.
+    """How far the answer is known to be optimal."""
 
-    ``kind``: proved, bounded (within ``gap``, relative) or local. ``stationarity``: what remains
-    of the first-order conditions of the exact problem, recomputed (0: met; None: not asked).
-    """
-
-    kind: str
-    stationarity: float | None
-    gap: float | None
-    words: str
+    kind: Annotated[str, Fact("proved, bounded or local")]
+    stationarity: Annotated[float | None, Fact("what remains of the first-order conditions")]
+    gap: Annotated[Share | None, Fact("of the objective, within which it is bounded")]
+    words: Annotated[str, Fact("the same in words")]
 
 
 @dataclass(frozen=True)
@@ -282,8 +282,8 @@ class StepRow:
 
     design: Floats
     objective: float
-    violation: float
-    radius: float
+    violation: Violation
+    radius: Annotated[float, Fact("of the trust region", unit="widths of the bounds")]
     taken: bool
 
 
@@ -293,40 +293,35 @@ class LocalOptimum:
 
     design: Floats
     objective: float
-    violation: float
+    violation: Violation
 
 
 @dataclass(frozen=True)
 class ActiveRow:
-    """A limit that the answer lies on, and what relaxing it by one SI unit gains (≥ 0)."""
+    """A limit that the answer lies on, and what relaxing it gains."""
 
     name: str
-    kind: str  # bound | constraint | target
-    side: str  # lower | upper
-    multiplier: float
+    kind: Annotated[str, Fact("bound, constraint or target")]
+    side: Annotated[str, Fact("lower or upper")]
+    multiplier: Annotated[float, Fact("fall of the objective for each SI unit of relaxation")]
 
 
 @dataclass(frozen=True)
 class LimitRow:
-    """A limit of a quantity of the design, of its mass say, before and after; SI ``unit``.
-
-    ``violation`` of the answer is relative to the limit, 0 where it is kept. ``extreme`` is what
-    the most extreme design within the bounds has, where none keeps the limit. ``words`` name the
-    limit, ``stated`` says it with the amount of the answer.
-    """
+    """A limit of a quantity of the design, of its mass say, before and after; SI ``unit``."""
 
     name: str
-    words: str
+    words: Annotated[str, Fact("the limit in words")]
     unit: str
-    lower: float | None
-    upper: float | None
-    initial: float
-    optimal: float
+    lower: InUnit | None
+    upper: InUnit | None
+    initial: InUnit
+    optimal: InUnit
     satisfied: bool
-    initial_violation: float
-    violation: float
-    extreme: float | None
-    stated: str
+    initial_violation: Violation
+    violation: Violation
+    extreme: Annotated[InUnit | None, Fact("of the most extreme design, where none keeps it")]
+    stated: Annotated[str, Fact("the limit with the amount of the answer, in words")]
 
 
 @dataclass(frozen=True)
@@ -335,16 +330,15 @@ class ClearanceRow:
 
     ``room`` is the least distance of a mode relative to the edge, less what it may deviate between
     the points looked at, and less ``raised``: how much too high the mode above may be for mesh and
-    reduced links, relative; None where that is not known. ``counted`` says whether inertia
-    confirmed ``below`` at every sample.
+    reduced links, relative; None where that is not known.
     """
 
-    label: str
-    below: int
-    clear: bool
-    room: float
-    counted: bool
-    raised: float | None
+    label: Annotated[str, Fact("the band in words", "band")]
+    below: Annotated[int, Fact("modes under it", "modes below")]
+    clear: Annotated[bool, Fact(digits=lambda clear: "proved" if clear else "NO")]
+    room: Annotated[Share, Fact(heading="room at least", digits=positive_percent)]
+    counted: Annotated[bool, Fact("inertia confirmed the modes below at every sample")]
+    raised: Annotated[Share | None, Fact(heading="model too high by", absent="not bounded")]
 
 
 @dataclass(frozen=True)
@@ -354,54 +348,49 @@ class CombinationRow:
     choices: Mapping[str, str]
     design: Floats
     objective: float
-    violation: float
+    violation: Violation
 
 
 @dataclass(frozen=True)
 class CatalogueRow:
-    """The search of the catalogues: nodes of its tree, relative gap, the best few, best first.
+    """The search of the catalogues; null where it was ended before it could tell."""
 
-    ``nodes`` and ``gap`` are None where the search was ended before it could tell.
-    """
-
-    nodes: int | None
-    gap: float | None
-    best: tuple[CombinationRow, ...]
+    nodes: Annotated[int | None, Fact("of its tree")]
+    gap: Annotated[Share | None, Fact("relative to the objective")]
+    best: Annotated[tuple[CombinationRow, ...], Fact("the best few, the best first")]
 
 
 @dataclass(frozen=True, repr=False)
 class AssignmentRow(Brief):
     """How the answer was found and what it is worth.
 
-    ``objective_initial``, ``objective_optimal`` are of the exact problem: the weighted mean square
-    relative error in Hz, of the worst case the largest weighted error; prices included.
-    ``model_error`` is by how much mesh and reduced links raise the modes with a target at most,
-    relative, at the answer; None where that is not known. (Of bands, see their `ClearanceRow`.)
+    Objectives are those of the exact problem: the weighted mean square relative error in Hz, of the
+    worst case the largest weighted error; prices included.
     """
 
-    method: str
-    objective: str
+    method: Annotated[str, Fact("sequential or one_shot")]
+    objective: Annotated[str, Fact("least_squares or worst_case")]
     objective_initial: float
     objective_optimal: float
     optimality: OptimalityRow
-    verdict: str  # reached | improved | unreachable | infeasible | do_not_use
-    reason: str  # the verdict in a sentence
-    steps: tuple[StepRow, ...]
-    starts: int
-    local_optima: tuple[LocalOptimum, ...]
+    verdict: Annotated[str, Fact("reached, improved, unreachable, infeasible or do_not_use")]
+    reason: Annotated[str, Fact("the verdict in a sentence")]
+    steps: Annotated[tuple[StepRow, ...], Fact("every design tried from the best start")]
+    starts: Annotated[int, Fact("how many designs a search began at")]
+    local_optima: Annotated[tuple[LocalOptimum, ...], Fact("distinct ones, the best first")]
     exact_solves: int
-    ended: str
+    ended: Annotated[str, Fact("how the search did")]
     finished: bool
-    active: tuple[ActiveRow, ...]
-    one_shot: Floats | None  # the paper's design (n_y,)
-    max_error: float
-    max_error_given: bool
-    clearances: tuple[ClearanceRow, ...]
-    model_error: float | None
-    conflict: tuple[str, ...] = ()  # limits that contradict each other
+    active: Annotated[tuple[ActiveRow, ...], Fact("limits that the answer lies on")]
+    one_shot: Annotated[Floats | None, Fact("the paper's design")]
+    max_error: Annotated[Share, Fact("the largest error that is accepted")]
+    max_error_given: Annotated[bool, Fact("the case says so")]
+    clearances: Annotated[tuple[ClearanceRow, ...], Fact("of bands to keep out of")]
+    model_error: Annotated[Share | None, Fact("how much too high mesh and reduced links are")]
+    conflict: Annotated[tuple[str, ...], Fact("limits that contradict each other")] = ()
     catalogue: CatalogueRow | None = None
-    limits: tuple[LimitRow, ...] = ()  # of quantities that need no frequency
-    shortcoming: str | None = None  # why this is no answer to build on, in a sentence
+    limits: Annotated[tuple[LimitRow, ...], Fact("of quantities that need no frequency")] = ()
+    shortcoming: Annotated[str | None, Fact("why this is no answer to build on")] = None
 
 
 # --- What the answer means
@@ -411,35 +400,32 @@ class AssignmentRow(Brief):
 class SensitivityRow:
     """How a frequency along the trajectory changes with one parameter, at the answer.
 
-    ``hz_per_unit`` is ∂f/∂y in Hz per SI ``unit``, ``percent_per_percent`` (y/f) ∂f/∂y: each the
-    mean over the samples, and with ``_largest`` the one of largest magnitude.
+    ``hz_per_unit`` is ∂f/∂y, ``percent_per_percent`` (y/f) ∂f/∂y: each the mean over the samples,
+    and with ``_largest`` the one of largest magnitude.
     """
 
     parameter: str
     unit: str
-    label: str
-    hz_per_unit: float
-    hz_per_unit_largest: float
-    percent_per_percent: float
-    percent_per_percent_largest: float
+    label: Annotated[str, Fact("the target in words", "target")]
+    hz_per_unit: Annotated[float, Fact(unit="Hz per SI unit")]
+    hz_per_unit_largest: Annotated[float, Fact(unit="Hz per SI unit")]
+    percent_per_percent: Annotated[float, Fact(unit="% per %", digits=".3g")]
+    percent_per_percent_largest: Annotated[float, Fact(unit="% per %", digits=".3g")]
 
 
 @dataclass(frozen=True)
 class RelaxedRow:
-    """A limit that the answer lies on, relaxed by ``amount``: what that gains to first order.
+    """A limit that the answer lies on, relaxed by ``amount``: what that gains to first order."""
 
-    ``quantity`` is rms error, worst error (fractions), price or objective; ``words`` say it all.
-    """
-
-    name: str
-    kind: str  # bound | constraint | target
-    side: str
-    amount: float  # of ``unit``; of a target the share of its limit
+    name: Annotated[str, Fact(heading="limit")]
+    kind: Annotated[str, Fact("bound, constraint or target")]
+    side: Annotated[str, Fact("lower or upper", "side")]
+    amount: Annotated[InUnit, Fact("of a target the share of its limit")]
     unit: str
-    quantity: str
+    quantity: Annotated[str, Fact("rms error, worst error (fractions), price or objective")]
     before: float
     after: float
-    words: str
+    words: Annotated[str, Fact("all of it in words", "relaxed, to first order")]
 
 
 @dataclass(frozen=True)
@@ -449,11 +435,11 @@ class RangeRow:
     ``how``: proved (nothing lies outside), sampled, or followed (a followed mode at the corners).
     """
 
-    label: str
-    lowest_hz: Floats
-    highest_hz: Floats
+    label: Annotated[str, Fact("the target in words", "target")]
+    lowest_hz: Annotated[Curve, Fact(digits=lambda hz: f"{hz.min():.6g}")]
+    highest_hz: Annotated[Curve, Fact(digits=lambda hz: f"{hz.max():.6g}")]
     how: str
-    error: float
+    error: Share
 
 
 @dataclass(frozen=True)
@@ -465,9 +451,9 @@ class ToleranceRows:
     """
 
     targets: tuple[RangeRow, ...]
-    before: float
-    after: float
-    words: str
+    before: Share
+    after: Share
+    words: Annotated[str, Fact("the same in words")]
 
 
 @dataclass(frozen=True)
@@ -475,7 +461,7 @@ class TradeOffPoint:
     """The least error found for this ``amount`` of mass or price, and its design (n_y,)."""
 
     amount: float
-    error: float
+    error: Share
     design: Floats
 
 
@@ -487,7 +473,7 @@ class TradeOff(Brief):
     it is, rms or worst, weighted.
     """
 
-    quantity: str  # mass | price
+    quantity: Annotated[str, Fact("mass or price")]
     unit: str
     initial: float
     error: str
@@ -617,9 +603,9 @@ class MeshError:
     """The largest relative error of the mesh in frequency; infinite where it is too coarse."""
 
     modes: tuple[int, ...]
-    error: tuple[float, ...]
-    poses: int  # at which it was judged
-    design: str  # of which it is: initial or optimal
+    error: Annotated[tuple[Share, ...], Fact("of each mode", unit="fraction", may_lack=True)]
+    poses: Annotated[int, Fact("at which it was judged")]
+    design: Annotated[str, Fact("of which it is: initial or optimal")]
 
 
 @dataclass(frozen=True, repr=False)

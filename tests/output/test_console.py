@@ -186,7 +186,7 @@ def test_a_batch_lists_every_case():
     bad = CaseOutcome("leg", "leg.yaml", "error", 0.5, "leg.yaml:3:1: [what] is wrong")
     assert batch_table([good, bad]).rows == (
         ("arm", "ok", "1.25 s", "1.55 %", ""),
-        ("leg", "error", "0.50 s", "", "leg.yaml:3:1: [what] is wrong"),
+        ("leg", "error", "500 ms", "", "leg.yaml:3:1: [what] is wrong"),
     )
 
 

@@ -8,9 +8,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from eigassign.errors import StorageError
+from eigassign.facts import Fact, Seconds, Share
 from eigassign.files import json_value, name_of
 from eigassign.study.results import RunResults
 
@@ -30,21 +31,21 @@ class CaseOutcome:
     target has along the trajectory at the answer.
     """
 
-    name: str
-    path: str  # of the case file
+    name: Annotated[str, Fact(heading="case")]
+    path: Annotated[str, Fact("of the case file")]
     status: Status
-    seconds: float
+    seconds: Annotated[Seconds, Fact(heading="time")]
     message: str = ""
-    run_folder: str | None = None  # as seen from the folder of the batch
-    initial_max_relative: float | None = None
-    predicted_max_relative: float | None = None
-    exact_max_relative: float | None = None
-    design: Sequence[tuple[str, float]] = ()
-    frequencies: Sequence[Range] = ()
+    run_folder: Annotated[str | None, Fact("as seen from the folder of the batch")] = None
+    initial_max_relative: Annotated[Share | None, Fact(heading="worst before")] = None
+    predicted_max_relative: Share | None = None
+    exact_max_relative: Annotated[Share | None, Fact(heading="worst after")] = None
+    design: Annotated[Sequence[tuple[str, float]], Fact("the optimum, SI")] = ()
+    frequencies: Annotated[Sequence[Range], Fact("exact, of each target", unit="Hz")] = ()
     verdict: str = ""
     values: Mapping[str, Any] = field(default_factory=dict)
-    index: int = 0  # place in the batch
-    key: str = ""  # of what was computed
+    index: Annotated[int, Fact("place in the batch")] = 0
+    key: Annotated[str, Fact("of what was computed")] = ""
 
 
 _STATUSES = get_args(Status)

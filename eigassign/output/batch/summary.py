@@ -9,10 +9,9 @@ from collections.abc import Sequence
 from typing import TextIO
 
 from eigassign._version import __version__
-from eigassign.facts import percent
 from eigassign.files import printable
 from eigassign.output.batch.outcome import CaseOutcome
-from eigassign.output.tables import Table
+from eigassign.output.tables import Table, facts_table
 
 FORMAT = 1  # of summary.json
 COLUMNS = (
@@ -24,11 +23,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # spreadsheets run a cell that star
 
 def batch_table(outcomes: Sequence[CaseOutcome]) -> Table:
     """One line a case: name, status, seconds, worst exact error if there is one, message."""
-    rows = []
-    for one in outcomes:
-        worst = "" if one.exact_max_relative is None else percent(one.exact_max_relative)
-        rows.append((one.name, one.status, f"{one.seconds:.2f} s", worst, one.message))
-    return Table("Batch", ("case", "status", "time", "worst error", "message"), tuple(rows))
+    return facts_table("Batch", outcomes, "name status seconds exact_max_relative message")
 
 
 def said(counts: Counter[str]) -> str:

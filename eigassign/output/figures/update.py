@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from eigassign.case.units import handy_unit
 from eigassign.output.figures import graph
 from eigassign.output.figures.curves import LEVEL
 from eigassign.output.figures.graph import Curve, FigurePlan, Graph, Look, Mark, Panel, Rule, Shade
-from eigassign.study.updating.fit import OUTLIER, UpdatedParameter, UpdateResults
+from eigassign.study.updating.fit import OUTLIER, UpdateResults
 
 Floats = NDArray[np.float64]
 _BEFORE = Look(graph.ORANGE, 0.0, marker="s", filled=False)
@@ -104,7 +103,7 @@ def _parameters(results: UpdateResults) -> Graph:
     names = tuple(
         f"{row.name} = {row.value / size:.4g} {unit}".rstrip()  # k1 = 52.47 kN m/rad
         for row in rows
-        for unit, size in [shown_in(row)]
+        for unit, size in [row.handy]
     )
     curves = (
         _segments(at, low, high, _INTERVAL, "95 % interval", lying=True),
@@ -115,8 +114,3 @@ def _parameters(results: UpdateResults) -> Graph:
     panel = Panel("", curves, 0.4 + 0.5 * len(rows), holds=(room,), names=names)
     title, label = "Parameters with their 95 % intervals", "from bound to bound"
     return Graph(title, label, np.zeros(0), (panel,), x_limits=(-0.02, 1.02))
-
-
-def shown_in(row: UpdatedParameter) -> tuple[str, float]:
-    """The unit that a parameter is shown in, and its size in SI."""
-    return handy_unit(row.unit, row.lower, row.upper, row.value, row.initial)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from eigassign.chart.results import SCHEMA, Chart, Timing, time_in_words
-from eigassign.facts import capital
+from eigassign.chart.results import SCHEMA, Chart
+from eigassign.facts import capital, time_in_words
 from eigassign.files import plain
 from eigassign.output.figures.front import chart_figures
 from eigassign.output.reports import page as report
 from eigassign.output.result_files import dumps
-from eigassign.output.tables import Table
+from eigassign.output.tables import Table, facts_table
 
 
 def chart_tables(chart: Chart) -> tuple[Table, ...]:
@@ -23,14 +23,6 @@ def chart_tables(chart: Chart) -> tuple[Table, ...]:
 def main_tables(chart: Chart) -> tuple[Table, ...]:
     """The tables for a terminal: the fronts, the ways to a design and what to choose."""
     return tuple(t for t in (*_fronts(chart), _designs(chart), _choice(chart)) if t.rows)
-
-
-def _spread(timing: Timing) -> str:
-    """Median and quartiles; one run alone is marked."""
-    median, low, high = (time_in_words(s) for s in (timing.median_s, timing.low_s, timing.high_s))
-    if not timing.median_s:
-        return median
-    return f"{median} ({low}–{high})" if timing.repeats else f"{median} (once)"
 
 
 def _choice(chart: Chart, how: bool = False) -> Table:
@@ -79,48 +71,31 @@ def _fronts(chart: Chart) -> Iterator[Table]:
 
 def _methods(chart: Chart) -> Table:
     """The table of all methods, the most accurate first."""
-    columns = (
-        "method", "set-up", "one evaluation", "exact solves", "worst [Hz]", "rms [Hz]",
-        "worst along the trajectory [Hz]", "no number", "pays from",
-    )  # fmt: skip
-    rows = tuple(
-        (p.method, _spread(p.offline), _spread(p.online),
-         f"{p.solves}" + (f" + {p.solves_online:.2g} each" if p.solves_online else ""),
-         f"{p.everywhere.worst_hz:.2e}", f"{p.everywhere.rms_hz:.2e}",
-         "" if p.trajectory is None else f"{p.trajectory.worst_hz:.2e}",
-         str(p.everywhere.failed or ""),
-         "never" if p.break_even is None else f"{p.break_even:,.0f}")
-        for p in sorted(chart.points, key=lambda p: p.everywhere.worst_hz)
-    )  # fmt: skip
+    names = (
+        "method offline online exact_solves everywhere.worst_hz everywhere.rms_hz "
+        "trajectory.worst_hz everywhere.failed break_even"
+    )
+    rows = sorted(chart.points, key=lambda p: p.everywhere.worst_hz)
     caption = (
         'Time as median (quartiles); errors against the same exact solves; "pays from" is the '
         "number of evaluations from which it beats exact solves."
     )
-    return Table("All methods", columns, rows, caption)
+    return facts_table("All methods", rows, names, caption)
 
 
 def _mesh(chart: Chart) -> Table:
     """Meshes from coarse to fine."""
-    columns = ("elements", "factor", "dof", "worst error [Hz]", "relative", "order", "exact solve")
-    rows = tuple(
-        (str(r.elements), f"{r.factor:g}", str(r.n_dof), f"{r.worst_hz:.2e}",
-         f"{r.worst_relative:.1e}", "" if r.order is None else f"{r.order:.2f}", _spread(r.solve))
-        for r in chart.mesh
-    )  # fmt: skip
+    names = "elements factor n_dof worst_hz worst_relative order solve"
     caption = "Against the limit extrapolated from the two finest; factor 1 is the case's own mesh."
-    return Table("Mesh", columns, rows, caption)
+    return facts_table("Mesh", chart.mesh, names, caption)
 
 
 def _designs(chart: Chart) -> Table:
     """Ways to a design, the best objective first."""
-    columns = ("method", "time", "exact solves", "objective", "above best", "worst", "rms", "")
-    rows = tuple(
-        (r.method, _spread(r.seconds), str(r.solves), f"{r.objective:.6e}", f"{r.excess:.1e}",
-         f"{100 * r.max_relative:.4f} %", f"{100 * r.rms_relative:.4f} %", r.note)
-        for r in sorted(chart.designs, key=lambda r: r.excess)
-    )  # fmt: skip
+    names = "method seconds solves objective excess max_relative rms_relative note"
+    rows = sorted(chart.designs, key=lambda r: r.excess)
     caption = "Objective and distances to the target by exact solves along the trajectory."
-    return Table("Designs", columns, rows, caption)
+    return facts_table("Designs", rows, names, caption)
 
 
 def _machine(chart: Chart) -> Table:

@@ -7,13 +7,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from eigassign.facts import number
 from eigassign.files import plain
-from eigassign.output.figures.update import shown_in, update_figures
+from eigassign.output.figures.update import update_figures
 from eigassign.output.reports import page as report
 from eigassign.output.result_files import dumps, origin, without
-from eigassign.output.tables import Table
-from eigassign.study.updating.fit import POOR, UpdatedParameter, UpdateResults
+from eigassign.output.tables import Table, facts_table
+from eigassign.study.updating.fit import POOR, UpdateResults
 
 # --- The verdict and the tables
 
@@ -22,7 +21,7 @@ def headline(results: UpdateResults) -> str:
     """The verdict in a sentence: what the parameters are, and whether that explains anything."""
     found = []
     for row in results.parameters:  # k1 = 52.47 kN m/rad (50.75 to 54.27)
-        unit, size = shown_in(row)
+        unit, size = row.handy
         value, low, high = (f"{each / size:.4g}" for each in (row.value, row.low, row.high))
         found.append(f"{row.name} = {value} {unit}".rstrip() + f" ({low} to {high})")
     chance = "" if results.p_value is None else f", p = {results.p_value:.2g}"
@@ -46,17 +45,6 @@ def update_tables(results: UpdateResults, most: int | None = 30) -> tuple[Table,
 
 def parameters(results: UpdateResults) -> Table:
     """Parameters before and after, with standard deviations and intervals."""
-    columns = ("name", "parameter", "unit", "before", "after", "deviation", "95 % from", "to", "")
-    rows = []
-    for row in results.parameters:
-        unit, size = shown_in(row)
-        initial, value, low, high = (
-            number(each / size) for each in (row.initial, row.value, row.low, row.high)
-        )
-        deviation = "" if row.deviation is None else f"{row.deviation / size:.3g}"
-        rows.append(
-            (row.name, row.parameter, unit, initial, value, deviation, low, high, _remark(row))
-        )
     caption = (
         "The deviation is the standard deviation by the linear model; the interval is that of the "
         "profile likelihood, the other parameters fitted anew at each of its values."
@@ -64,44 +52,27 @@ def parameters(results: UpdateResults) -> Table:
     held = [row.name for row in results.parameters if row.held]
     if held and any(row.deviation is not None for row in results.parameters):
         caption += f" The deviations hold only with {' and '.join(held)} at the bound."
-    return Table("Parameters", columns, tuple(rows), caption)
-
-
-def _remark(row: UpdatedParameter) -> str:
-    """The reason why an interval is one-sided, if it is."""
-    ends = [name for name, at in (("lower", row.low_is_bound), ("upper", row.high_is_bound)) if at]
-    if row.held:
-        return f"held by its {row.held} bound: one-sided"
-    if len(ends) == 2:
-        return "the whole range of its bounds is possible"
-    return f"the {ends[0]} bound is possible: one-sided" if ends else ""
+    names = "name parameter handy initial value deviation low high remark"
+    return facts_table("Parameters", results.parameters, names, caption)
 
 
 def directions(results: UpdateResults) -> Table:
     """Directions that the measurements cannot tell."""
-    rows = tuple(
-        (each.words, ", ".join(f"{name}: {number(v)}" for name, v in each.change.items()))
-        for each in results.unidentified
-    )
     caption = (
         "Changes, in SI units, that alter all measured frequencies together by less than 1.96 "
         "standard deviations, from bound to bound."
     )
-    return Table("Not identified", ("what", "change"), rows, caption)
+    return facts_table("Not identified", results.unidentified, "words change", caption)
 
 
 def fit(results: UpdateResults) -> Table:
     """χ² before and after, and the chance of it."""
-    chance = "none" if results.p_value is None else f"{results.p_value:.3g}"
-    before, after = results.initial_chi_squared, results.chi_squared
-    chi_squared = f"{before:.4g}", f"{after:.4g}"
-    row = (*chi_squared, str(results.degrees), chance, str(results.steps), results.ended)
-    columns = ("χ² before", "χ² after", "degrees of freedom", "p", "steps", "ended")
+    names = "initial_chi_squared chi_squared degrees p_value steps ended"
     caption = (
         "χ² is the sum of squared residuals in standard deviations; p is the chance of so large a "
         "χ² if the model is right and the deviations are those stated."
     )
-    return Table("Fit", columns, (row,), caption)
+    return facts_table("Fit", [results], names, caption)
 
 
 def measurements(results: UpdateResults, most: int | None) -> Table:
@@ -111,18 +82,11 @@ def measurements(results: UpdateResults, most: int | None) -> Table:
     if more:
         worst = sorted(shown, key=lambda row: -abs(row.residual))[:most]
         shown = [row for row in shown if row in worst]
-    columns = ("measurement", "mode", "measured [Hz]", "± [Hz]", "before [Hz]", "after [Hz]",
-               "residual", "")  # fmt: skip
-    rows = tuple(
-        (row.label, str(row.mode), number(row.measured_hz), f"{row.deviation_hz:.3g}",
-         f"{row.initial_hz:.5g}", f"{row.updated_hz:.5g}", f"{row.residual:+.2f}",
-         "outlier" if row.is_outlier else "")
-        for row in shown
-    )  # fmt: skip
+    names = "label mode measured_hz deviation_hz initial_hz updated_hz residual is_outlier"
     caption = "Residuals in standard deviations of the measurement, after updating."
     if more:
         caption += f" The {len(shown)} worst of {len(results.measurements)}."
-    return Table("Measurements", columns, rows, caption)
+    return facts_table("Measurements", shown, names, caption)
 
 
 # --- The files

@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from operator import itemgetter
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +22,8 @@ from eigassign.assignment.exact.identification import Identified, MeasuredFreque
 from eigassign.assignment.exact.sequential import End
 from eigassign.brief import Brief
 from eigassign.case.case_file import CaseFile
+from eigassign.case.units import handy_unit
+from eigassign.facts import Fact, Hertz, InUnit, Seconds, listed
 from eigassign.modal.model import Model
 from eigassign.modal.slopes import in_hz
 from eigassign.study.built_case import BuiltCase
@@ -38,41 +42,56 @@ class UpdatedParameter:
     """One parameter before and after, in SI units; its interval holds it with 95 %."""
 
     name: str
-    parameter: str
+    parameter: Annotated[str, Fact("its key path in the case file")]
     unit: str
-    initial: float
-    value: float
-    deviation: float | None  # standard, while bounds hold; None if one holds it or none is known
-    low: float
-    high: float
-    low_is_bound: bool  # the interval ends there at the bound, which measurements do not exclude
+    initial: Annotated[InUnit, Fact(heading="before")]
+    value: Annotated[InUnit, Fact("the one found", "after")]
+    deviation: Annotated[InUnit | None, Fact("standard, while bounds hold", digits=".3g")]
+    low: Annotated[InUnit, Fact("where its interval begins", "95 % from")]
+    high: Annotated[InUnit, Fact("where its interval ends", "to")]
+    low_is_bound: Annotated[bool, Fact("it begins at a bound that measurements do not exclude")]
     high_is_bound: bool
-    lower: float
-    upper: float
-    held: str  # the bound that holds it, lower or upper; or ""
+    lower: InUnit
+    upper: InUnit
+    held: Annotated[str, Fact("the bound that holds it, lower or upper; or empty")]
+
+    @property
+    def handy(self) -> Annotated[tuple[str, float], Fact(heading="unit", digits=itemgetter(0))]:
+        """The unit that people read it in, and the size of that in SI."""
+        return handy_unit(self.unit, self.lower, self.upper, self.value, self.initial)
+
+    @property
+    def remark(self) -> str:
+        """The reason why the interval is one-sided, if it is."""
+        if self.held:
+            return f"held by its {self.held} bound: one-sided"
+        if self.low_is_bound and self.high_is_bound:
+            return "the whole range of its bounds is possible"
+        ends = "lower" * self.low_is_bound + "upper" * self.high_is_bound
+        return f"the {ends} bound is possible: one-sided" if ends else ""
 
 
 @dataclass(frozen=True)
 class ExplainedMeasurement:
     """One measurement, and the model's frequency before and after, in Hz."""
 
-    label: str
+    label: Annotated[str, Fact(heading="measurement")]
     trajectory: str | None
-    time_s: float | None
+    time_s: Seconds | None
     q: tuple[float, ...]
     mode: int
-    measured_hz: float
-    deviation_hz: float
-    initial_hz: float
-    updated_hz: float
+    measured_hz: Hertz
+    deviation_hz: Annotated[Hertz, Fact("standard", "±", digits=".3g")]
+    initial_hz: Annotated[Hertz, Fact(heading="before", digits=".5g")]
+    updated_hz: Annotated[Hertz, Fact(heading="after", digits=".5g")]
 
     @property
-    def residual(self) -> float:
+    def residual(self) -> Annotated[float, Fact("in standard deviations", digits="+.2f")]:
         """(model − measured)/σ after."""
         return (self.updated_hz - self.measured_hz) / self.deviation_hz
 
     @property
-    def is_outlier(self) -> bool:
+    def is_outlier(self) -> Annotated[bool, Fact("", "remark", digits=lambda n: "outlier" * n)]:
         """True where it is further off than three standard deviations."""
         return abs(self.residual) > OUTLIER
 
@@ -81,8 +100,8 @@ class ExplainedMeasurement:
 class UnidentifiedDirection:
     """A common change of parameters (SI, by name) that the measurements do not notice."""
 
-    change: Mapping[str, float]
-    words: str
+    change: Annotated[Mapping[str, float], Fact("by their names", digits=listed)]
+    words: Annotated[str, Fact("what cannot be told, in words", "what")]
 
 
 @dataclass(frozen=True, repr=False)
@@ -101,12 +120,12 @@ class UpdateResults(Brief):
     covariance: Floats  # (n_y, n_y) in SI units; inf and NaN where not identified
     measurements: tuple[ExplainedMeasurement, ...]
     unidentified: tuple[UnidentifiedDirection, ...]
-    initial_chi_squared: float
-    chi_squared: float
-    degrees: int  # of freedom
-    p_value: float | None  # chance of so large a χ² if model and deviations are right
+    initial_chi_squared: Annotated[float, Fact(heading="χ² before", digits=".4g")]
+    chi_squared: Annotated[float, Fact(heading="χ² after", digits=".4g")]
+    degrees: Annotated[int, Fact(heading="degrees of freedom")]
+    p_value: Annotated[float | None, Fact("chance of so large a χ²", "p", "", ".3g", "none")]
     steps: int
-    ended: str  # how the steps did
+    ended: Annotated[str, Fact("how the steps did")]
     verdict: str  # fitted, poor_fit, not_identified, unfinished
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
