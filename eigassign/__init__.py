@@ -15,7 +15,7 @@ one function, `eigassign.pipeline.run.solve_case`.
     errors         every error raised on purpose, and its exit code
     files          reading files that anybody may have put there, within limits
     brief          short reprs of objects that hold arrays
-    facts          numbers as people read them
+    facts          what is said of a fact once: words, unit, digits; numbers as people read them
     faces          what a package shows to those outside, loaded at first use
     process        the process around a command: errors on stderr, signals, streams, threads
     series         truncated power series and expressions that are evaluated on them

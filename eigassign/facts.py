@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
@@ -28,8 +28,9 @@ class Fact:
 
     ``words`` say what it is beyond its name, ``heading`` heads its column, ``unit`` is that of its
     numbers. ``digits`` is a format, or makes the text of a cell, which ``says_unit`` or does not;
-    ``absent`` is that of None. In files it has another ``name`` where one is given, and a number
-    that is not finite is null there where it ``may_lack``.
+    ``absent`` is that of None. In files it has another ``name`` where one is given; there None is
+    left out of what is ``optional``, a number that is not finite is null where it ``may_lack``, and
+    what ``is_key`` is not said again below.
     """
 
     words: str = ""
@@ -39,7 +40,9 @@ class Fact:
     absent: str = ""
     says_unit: bool = False
     name: str = ""
+    optional: bool = False
     may_lack: bool = False
+    is_key: bool = False
 
     @property
     def column(self) -> str:
@@ -65,6 +68,14 @@ def hints(row: Any) -> dict[str, Any]:
 
 
 @cache
+def written(row: Any) -> dict[str, Fact]:
+    """The facts of a row that files have: its fields, and properties with a ``name`` for it."""
+    told = {name: fact(row, name) for name in hints(row)}
+    own = {field.name for field in fields(row)}
+    return {k: one for k, one in told.items() if (k in own or one.name) and not one.is_key}
+
+
+@cache
 def fact(row: Any, name: str) -> Fact:
     """What is declared of a field or property, or behind a dot of one of its own.
 
@@ -72,7 +83,7 @@ def fact(row: Any, name: str) -> Fact:
     """
     own, _, below = name.partition(".")
     kind = hints(row)[own]
-    told: dict[str, Any] = {"heading": own.removesuffix("_hz").replace("_", " "), "name": own}
+    told: dict[str, Any] = {"heading": own.removesuffix("_hz").replace("_", " ")}
     if below:
         row_below: Any = next(filter(is_dataclass, (kind, *_parts(kind))))
         told = vars(fact(row_below, below))
@@ -153,8 +164,9 @@ def positive_percent(fraction: float) -> str:
     return percent(max(fraction, 0.0))
 
 
-# --- Kinds of numbers, each with its unit and digits
+# --- Kinds of facts, each with its unit and digits
 
+Key = Annotated[str, Fact(is_key=True)]
 Share = Annotated[float, Fact(unit="fraction", digits=percent, says_unit=True)]
 Hertz = Annotated[float, Fact(unit="Hz", digits=".6g")]
 Seconds = Annotated[float, Fact(unit="s", digits=seconds, says_unit=True)]

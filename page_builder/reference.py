@@ -1,8 +1,9 @@
-"""Write the manual's reference: the keys from the schema, the commands from the command line.
+"""Write the manual's reference: keys and fields of results from schemas, commands from the cli.
 
-`python page_builder/reference.py` writes eigassign/docs/reference/keys.md and commands.md. What a
-key is for stands in the docstring of its model in `eigassign.case.schema`, what a command does in
-that of its function in `eigassign.cli`.
+`python page_builder/reference.py` writes keys.md, commands.md and results.md in
+eigassign/docs/reference. What a key is for stands in the docstring of its model in
+`eigassign.case.schema`, what a command does in that of its function in `eigassign.cli`, what a
+field of results is at the field of its row (`eigassign.facts`).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import click
 from eigassign.case import json_schema
 from eigassign.case.units import DIMENSIONS
 from eigassign.cli import cli
+from eigassign.output import NUMBERS, results_schema
 
 FOLDER = Path(__file__).parents[1] / "eigassign" / "docs" / "reference"
 SCHEMA = json_schema()
@@ -300,7 +302,73 @@ def described(name: str, command: click.Command, shared: list[tuple[str, str]]) 
     return "\n\n".join(filter(None, text))
 
 
-PAGES = {"keys.md": keys, "commands.md": commands}
+# --- Results
+
+FILES = {
+    "run": "results.json of a run",
+    "update": "results.json of an update",
+    "batch": "summary.json",
+    "chart": "chart.json",
+}
+PLURALS = {"array": "list", "object": "mapping"}
+WORDS = {"string": "text", "boolean": "true or false", "integer": "whole number", "null": "null"}
+RESULTS = """# Fields of result files
+
+A field is null where there is no such number; what is optional is left out then. Numbers are in SI
+units; a fraction of 0.01 is 1 %. {…} is an object with fields of its own. `eigassign schema run`
+prints the same as a JSON Schema for programs; so do `update`, `batch` and `chart`."""
+
+
+def results() -> str:
+    """The page of all fields of the files of results; what several files have is explained once."""
+    parts, seen = [RESULTS], set[str]()
+    for left_by, heading in FILES.items():
+        schema = results_schema(left_by)
+        parts.append(f"## {heading}")
+        for k, (name, node) in enumerate(schema["$defs"].items()):
+            if (row := titled(name)) not in seen:
+                parts += [f"### {row}", *fields_of(node)] if k else fields_of(node)
+            seen.add(row)
+    return "\n\n".join(parts) + "\n"
+
+
+def titled(name: str) -> str:
+    """``design row`` for DesignRow: the heading of a row, whether its numbers may lack or not."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.removesuffix("WithGaps")).lower()
+
+
+def fields_of(node: Node) -> list[str]:
+    """What a row is, and a table of its fields."""
+    said = [" ".join(p.split()) for p in node["description"].replace("``", "`").split("\n\n")]
+    rows = [
+        f"| `{key}` | {alternatives(held(n))} | {n.get('unit', '')} | {words}{optional} |"
+        for key, n in node["properties"].items()
+        for words in [n["description"] if n["description"] != key.replace("_", " ") else ""]
+        for optional in ["" if key in node["required"] else " (optional)"]
+    ]
+    table = ["| field | value | unit | content |", "|---|---|---|---|", *rows]
+    return [*said, re.sub(r"\| +(?=\|)", "| ", "\n".join(table))]
+
+
+def held(node: Node) -> Iterator[str]:
+    """What a field may hold, in words, one after the other."""
+    if node.get("items") == NUMBERS["items"]:
+        yield "list of numbers"
+        return
+    if "$ref" in node:
+        yield f"[{{…}}](#{anchor(titled(node['$ref'].rpartition('/')[2]))})"
+    for option in node.get("anyOf", ()):
+        yield from held(option)
+    yield from (f"`{word}`" for word in node.get("enum", ()))
+    kinds = node.get("type", ())
+    for kind in [kinds] if isinstance(kinds, str) else kinds:
+        inner = [node.get("items", node.get("additionalProperties", {}))]
+        each = [word for one in node.get("prefixItems", inner) for word in held(one)]
+        of = f" of {', '.join(dict.fromkeys(each))}" if each else ""
+        yield f"{PLURALS[kind]}{of}" if kind in PLURALS else WORDS.get(kind, kind)
+
+
+PAGES = {"keys.md": keys, "commands.md": commands, "results.md": results}
 
 
 if __name__ == "__main__":

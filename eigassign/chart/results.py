@@ -250,3 +250,10 @@ class Chart:
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     seconds: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChartDocument(Chart):
+    """A chart, and which form of it."""
+
+    schema: Annotated[int, Fact("raised when a field goes or means something else")] = SCHEMA

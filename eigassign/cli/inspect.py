@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 _DRAWING = ("out", "force", "figures", "allow_outside")
+LEFT_BY = ("run", "update", "batch", "chart")
 _STATED = ("discretisation_error", "truncation_error")  # where there are such
 
 
@@ -267,12 +268,21 @@ _SINCE = {"same": "as it was", "changed": "changed since", "missing": "not there
 @click.command(
     epilog=arguments.examples(
         "eigassign schema > case.schema.json",
+        "eigassign schema run > results.schema.json",
     )
 )
-def schema() -> int:
-    """Print the JSON Schema of case files, for editors."""
+@click.argument("of", type=click.Choice(["case", *LEFT_BY]), default="case")
+def schema(of: str) -> int:
+    """Print the JSON Schema of case files, for editors, or of the file of results that OF leaves.
 
-    from eigassign.case.schema.document import json_schema
+    A run and an update leave results.json, a batch summary.json, a chart chart.json.
+    """
+    if of == "case":
+        from eigassign.case.schema.document import json_schema
 
-    print_json(json_schema(), indent=2)
+        print_json(json_schema(), indent=2)
+    else:
+        from eigassign.output.schema import results_schema
+
+        print_json(results_schema(of), indent=2)
     return 0

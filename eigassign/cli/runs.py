@@ -121,7 +121,7 @@ def _written(folder: Path | None, seconds: float) -> str:
 
 def _show(outcome: Outcome, as_json: bool) -> None:
     if as_json:
-        from eigassign.output.result_files import results_document
+        from eigassign.output.documents import results_document
 
         print_json({"run_folder": str(outcome.folder), **results_document(outcome.results)})
     else:

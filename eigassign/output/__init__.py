@@ -4,7 +4,8 @@ In reading order; each imports from those above it only:
 
     store         files and folders that are written whole or not at all: runs, the cache
     exchange      a reduced model in files: HDF5, NumPy, MATLAB, C99
-    result_files  results.json and the CSV files
+    documents     rows as JSON: results.json
+    result_files  the CSV files of a run
     tables        the tables of a run as text
     console       results on stdout, progress on stderr
     pages         HTML pages from their templates
@@ -12,6 +13,7 @@ In reading order; each imports from those above it only:
     previous      what an earlier result said, and what has moved since
     figures       the figures of runs, modes and charts, on paper and on screen
     reports       report.html, and what runs, updates and charts leave in a folder; notebooks
+    schema        JSON Schemas of the files of results
 """
 
 from eigassign.faces import face
@@ -38,7 +40,9 @@ __all__, __getattr__, __dir__ = face(
         "previous": "EarlierResult Known",
         "reports.chart": "chart_tables write_chart",
         "reports.page": "page write_modes write_run",
-        "result_files": "results_document sample_files to_json",
+        "documents": "results_document to_json",
+        "result_files": "sample_files",
+        "schema": "FILES NUMBERS results_schema",
         "store.array_file": "DamagedError content_key get pack put unpack",
         "store.cache": "Cache default_directory",
         "store.run_folder": "run_folder",

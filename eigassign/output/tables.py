@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,15 +60,15 @@ def _is_number(cell: str) -> bool:
 
 
 def facts_table(
-    title: str, rows: Iterable[Any], names: str, caption: str = "", **headings: str
+    title: str, rows: Sequence[Any], names: str, caption: str = "", **headings: str
 ) -> Table:
     """The facts of these ``names``, each row's own; what no row has has no column.
 
     Numbers in the unit of their row are shown in its handy one. ``headings`` are those of facts
     that are called something else here.
     """
-    rows = [*rows]
-    told = [(name, fact(type(rows[0]), name)) for name in names.split() if rows]
+    kind: Any = type(rows[0]) if rows else None
+    told = [(name, fact(kind, name)) for name in names.split() if rows]
     cells = [[one.text(_value(row, name, one)) for row in rows] for name, one in told]
     shown = [k for k, column in enumerate(cells) if any(column)]
     columns = tuple(headings.get(told[k][0], told[k][1].column) for k in shown)

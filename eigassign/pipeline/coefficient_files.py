@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eigassign.modal.expansion import Expansion
-from eigassign.output.result_files import dumps
+from eigassign.output.documents import dumps
 from eigassign.output.store.array_file import pack
 from eigassign.study.scene import Scene
 

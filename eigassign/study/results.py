@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from eigassign.assignment.requirements.requirement import Requirement
 from eigassign.brief import Brief
 from eigassign.case.units import handy_unit, is_bare
-from eigassign.facts import Curve, Fact, Hertz, InUnit, Residual, Share, positive_percent
+from eigassign.facts import Curve, Fact, Hertz, InUnit, Key, Residual, Share, positive_percent
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -121,7 +121,7 @@ class ValidationRow:
 class DesignRow:
     """One design parameter before and after, in SI ``unit``; what was chosen of its catalogue."""
 
-    name: str
+    name: Key
     parameter: Annotated[str, Fact("its key path in the case file")]
     unit: str
     initial: InUnit
@@ -171,7 +171,7 @@ class ErrorSummary:
 
     initial: ErrorRow
     exact: ErrorRow
-    predicted: Annotated[ErrorRow | None, Fact("of the last program", may_lack=True)] = None
+    predicted: Annotated[ErrorRow | None, Fact("by the last program", may_lack=True)] = None
     one_shot: Annotated[ErrorRow | None, Fact("the exact distance of the paper's answer")] = None
 
 
@@ -404,8 +404,8 @@ class SensitivityRow:
     and with ``_largest`` the one of largest magnitude.
     """
 
-    parameter: str
-    unit: str
+    parameter: Key
+    unit: Key
     label: Annotated[str, Fact("the target in words", "target")]
     hz_per_unit: Annotated[float, Fact(unit="Hz per SI unit")]
     hz_per_unit_largest: Annotated[float, Fact(unit="Hz per SI unit")]

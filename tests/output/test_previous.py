@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from synthetic_results import make_results
@@ -109,6 +110,27 @@ def test_a_validation_compares_with_the_initial_design_of_a_run_and_with_its_own
         assert len(
             compared(path, Known.of_validation(results.case_name, off), 0.05, "validations").moves
         )
+
+
+@pytest.mark.parametrize("name", ["arm", "pick"])
+def test_files_of_earlier_versions_are_read(tmp_path, name):
+    """Written by version 0.3.0, schema 1: a wanted frequency and a limit; two trajectories."""
+    folder = Path(__file__).parent / "earlier"
+    lines = json.loads((folder / "summary.json").read_text())["cases"]
+    (row,) = [CaseOutcome(**line) for line in lines if line["name"] == name]
+    for file in ("summary.json", f"{name}.json"):
+        found = compared(folder / file, Known.of_outcome(row), 1e-9)
+        assert found.moves == []
+        assert f"compared: {len(row.frequencies)}, new ones: 0" in found.table().caption
+        off = replace(row, frequencies=[(n, *(hz + 0.1 for hz in h)) for n, *h in row.frequencies])
+        assert len(compared(folder / file, Known.of_outcome(off), 0.05).moves) == len(lines)
+    rows = json.loads((folder / "validation.json").read_text())
+    rows = [ValidationRow(**line) for line in rows if line["case"] == name]
+    now = Known.of_validation(name, rows)
+    assert compared(folder / "validation.json", now, 1e-9, "validations").moves == []
+    along = compared(folder / f"{name}.json", now, 1e-6, "validations")
+    assert along.moves == []
+    assert "compared: 0" not in along.table().caption
 
 
 @pytest.mark.parametrize(

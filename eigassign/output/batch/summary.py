@@ -5,10 +5,12 @@ from __future__ import annotations
 import csv
 import json
 from collections import Counter
-from collections.abc import Sequence
-from typing import TextIO
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, TextIO
 
 from eigassign._version import __version__
+from eigassign.facts import Fact
 from eigassign.files import printable
 from eigassign.output.batch.outcome import CaseOutcome
 from eigassign.output.tables import Table, facts_table
@@ -19,6 +21,16 @@ COLUMNS = (
     "exact_max_relative", "design", "message", "path", "run_folder",
 )  # fmt: skip
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # spreadsheets run a cell that starts so
+
+
+@dataclass(frozen=True)
+class SummaryDocument:
+    """The cases in their order, and how many ended how."""
+
+    format: int
+    version: Annotated[str, Fact("of eigassign")]
+    cases: Sequence[CaseOutcome]
+    counts: Annotated[Mapping[str, int], Fact("by status")]
 
 
 def batch_table(outcomes: Sequence[CaseOutcome]) -> Table:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from eigassign.chart.results import SCHEMA, Chart
+from eigassign.chart.results import Chart, ChartDocument
 from eigassign.facts import capital, time_in_words
-from eigassign.files import plain
+from eigassign.output.documents import document, dumps
 from eigassign.output.figures.front import chart_figures
 from eigassign.output.reports import page as report
-from eigassign.output.result_files import dumps
 from eigassign.output.tables import Table, facts_table
 
 
@@ -113,7 +112,7 @@ def write_chart(
 
     Every point in chart.json can be computed again from its parameters.
     """
-    data = f"{dumps(plain({'schema': SCHEMA, **vars(chart)}))}\n".encode()
+    data = f"{dumps(document(ChartDocument(**vars(chart)), may_lack=True))}\n".encode()
     line = f"{capital(chart.advice[0].words)}." if chart.advice else None
     report.write_page(
         chart, chart_tables(chart), chart_figures(chart), folder, formats, kind,

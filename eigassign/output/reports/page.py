@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eigassign._version import __version__
+from eigassign.output.documents import to_json
 from eigassign.output.figures.graph import FigurePlan
 from eigassign.output.figures.motion import mode_figures
 from eigassign.output.figures.paper import render
@@ -24,7 +25,7 @@ from eigassign.output.figures.run import run_figures
 from eigassign.output.figures.screen import moving_modes, screen_figures, screen_table
 from eigassign.output.pages import TEMPLATES, inside, page_of
 from eigassign.output.reports.verdict import verdict_of
-from eigassign.output.result_files import sample_files, to_json
+from eigassign.output.result_files import sample_files
 from eigassign.output.tables import Table, run_tables
 from eigassign.study.results import ModePictures, RunResults
 

@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from eigassign.files import plain
+import numpy as np
+from numpy.typing import NDArray
+
+from eigassign.facts import Fact
+from eigassign.output import documents
+from eigassign.output.documents import Document, dumps
 from eigassign.output.figures.update import update_figures
 from eigassign.output.reports import page as report
-from eigassign.output.result_files import dumps, origin, without
 from eigassign.output.tables import Table, facts_table
-from eigassign.study.updating.fit import POOR, UpdateResults
+from eigassign.study.updating.fit import (
+    POOR,
+    ExplainedMeasurement,
+    FitRow,
+    UnidentifiedDirection,
+    UpdatedParameter,
+    UpdateResults,
+)
+
+Floats = NDArray[np.float64]
 
 # --- The verdict and the tables
 
@@ -24,15 +37,16 @@ def headline(results: UpdateResults) -> str:
         unit, size = row.handy
         value, low, high = (f"{each / size:.4g}" for each in (row.value, row.low, row.high))
         found.append(f"{row.name} = {value} {unit}".rstrip() + f" ({low} to {high})")
-    chance = "" if results.p_value is None else f", p = {results.p_value:.2g}"
-    fit = f"χ² = {results.chi_squared:.3g} with {results.degrees} degrees of freedom{chance}"
+    of = results.fit
+    chance = "" if of.p_value is None else f", p = {of.p_value:.2g}"
+    fit = f"χ² = {of.chi_squared:.3g} with {of.degrees} degrees of freedom{chance}"
     verdict = {
         "fitted": f"Explained: the model fits the measurements ({fit})",
         "poor_fit": f"NOT EXPLAINED: the measurements are further off than their standard "
         f"deviations allow ({fit}, below {POOR:g}); the intervals do not hold",
         "not_identified": f"NOT IDENTIFIED: {'; '.join(d.words for d in results.unidentified)} "
         f"({fit})",
-        "unfinished": f"UNFINISHED: the fit ended before its optimum ({results.ended}; {fit})",
+        "unfinished": f"UNFINISHED: the fit ended before its optimum ({of.ended}; {fit})",
     }[results.verdict]
     return f"{verdict}. {', '.join(found)}."
 
@@ -72,7 +86,7 @@ def fit(results: UpdateResults) -> Table:
         "χ² is the sum of squared residuals in standard deviations; p is the chance of so large a "
         "χ² if the model is right and the deviations are those stated."
     )
-    return facts_table("Fit", [results], names, caption)
+    return facts_table("Fit", [results.fit], names, caption)
 
 
 def measurements(results: UpdateResults, most: int | None) -> Table:
@@ -104,29 +118,37 @@ def write_update(
     )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class UpdateDocument(Document):
+    """What an update found."""
+
+    verdict: Annotated[str, Fact("fitted, poor_fit, not_identified or unfinished")]
+    headline: Annotated[str, Fact("the verdict in words")]
+    parameters: Mapping[str, UpdatedParameter]
+    covariance: Annotated[Floats, Fact("of the parameters, SI", may_lack=True)]
+    correlation: Annotated[Floats, Fact("of the parameters", may_lack=True)]
+    not_identified: Sequence[UnidentifiedDirection]
+    fit: FitRow
+    measurements: Sequence[ExplainedMeasurement]
+    warnings: Sequence[str]
+    notes: Sequence[str]
+    timing_s: Annotated[Mapping[str, float], Fact("by stage", unit="s")]
+
+
 def document(results: UpdateResults) -> dict[str, Any]:
     """Plain values in a fixed order; what is not identified has no deviation (null)."""
-    return {
-        **origin(results),
-        "verdict": results.verdict,
-        "headline": headline(results),
-        "parameters": {row.name: without(row, "name") for row in results.parameters},
-        "covariance": plain(results.covariance),
-        "correlation": plain(results.correlation),
-        "not_identified": [asdict(each) for each in results.unidentified],
-        "fit": {
-            "initial_chi_squared": results.initial_chi_squared,
-            "chi_squared": results.chi_squared,
-            "degrees_of_freedom": results.degrees,
-            "p_value": results.p_value,
-            "steps": results.steps,
-            "ended": results.ended,
-        },
-        "measurements": [
-            {**asdict(row), "residual": row.residual, "outlier": row.is_outlier}
-            for row in results.measurements
-        ],
-        "warnings": results.warnings,
-        "notes": results.notes,
-        "timing_s": dict(results.timing_s),
-    }
+    made = UpdateDocument(
+        **vars(documents.beginning(results)),
+        verdict=results.verdict,
+        headline=headline(results),
+        parameters={row.name: row for row in results.parameters},
+        covariance=results.covariance,
+        correlation=results.correlation,
+        not_identified=results.unidentified,
+        fit=results.fit,
+        measurements=results.measurements,
+        warnings=results.warnings,
+        notes=results.notes,
+        timing_s=results.timing_s,
+    )
+    return dict(documents.document(made))

@@ -23,7 +23,7 @@ from eigassign.assignment.exact.sequential import End
 from eigassign.brief import Brief
 from eigassign.case.case_file import CaseFile
 from eigassign.case.units import handy_unit
-from eigassign.facts import Fact, Hertz, InUnit, Seconds, listed
+from eigassign.facts import Fact, Hertz, InUnit, Key, Seconds, listed
 from eigassign.modal.model import Model
 from eigassign.modal.slopes import in_hz
 from eigassign.study.built_case import BuiltCase
@@ -36,12 +36,15 @@ OUTLIER = 3.0  # standard deviations
 
 # --- Results
 
+Residual = Annotated[float, Fact("in standard deviations", digits="+.2f", name="residual")]
+Outlier = Annotated[bool, Fact(heading="remark", digits=lambda n: "outlier" * n, name="outlier")]
+
 
 @dataclass(frozen=True)
 class UpdatedParameter:
     """One parameter before and after, in SI units; its interval holds it with 95 %."""
 
-    name: str
+    name: Key
     parameter: Annotated[str, Fact("its key path in the case file")]
     unit: str
     initial: Annotated[InUnit, Fact(heading="before")]
@@ -86,12 +89,12 @@ class ExplainedMeasurement:
     updated_hz: Annotated[Hertz, Fact(heading="after", digits=".5g")]
 
     @property
-    def residual(self) -> Annotated[float, Fact("in standard deviations", digits="+.2f")]:
+    def residual(self) -> Residual:
         """(model − measured)/σ after."""
         return (self.updated_hz - self.measured_hz) / self.deviation_hz
 
     @property
-    def is_outlier(self) -> Annotated[bool, Fact("", "remark", digits=lambda n: "outlier" * n)]:
+    def is_outlier(self) -> Outlier:
         """True where it is further off than three standard deviations."""
         return abs(self.residual) > OUTLIER
 
@@ -102,6 +105,18 @@ class UnidentifiedDirection:
 
     change: Annotated[Mapping[str, float], Fact("by their names", digits=listed)]
     words: Annotated[str, Fact("what cannot be told, in words", "what")]
+
+
+@dataclass(frozen=True)
+class FitRow:
+    """The fit: χ² is the sum of squared residuals in standard deviations."""
+
+    initial_chi_squared: Annotated[float, Fact(heading="χ² before", digits=".4g")]
+    chi_squared: Annotated[float, Fact(heading="χ² after", digits=".4g")]
+    degrees: Annotated[int, Fact(heading="degrees of freedom", name="degrees_of_freedom")]
+    p_value: Annotated[float | None, Fact("chance of so large a χ²", "p", "", ".3g", "none")]
+    steps: int
+    ended: Annotated[str, Fact("how the steps did")]
 
 
 @dataclass(frozen=True, repr=False)
@@ -120,12 +135,7 @@ class UpdateResults(Brief):
     covariance: Floats  # (n_y, n_y) in SI units; inf and NaN where not identified
     measurements: tuple[ExplainedMeasurement, ...]
     unidentified: tuple[UnidentifiedDirection, ...]
-    initial_chi_squared: Annotated[float, Fact(heading="χ² before", digits=".4g")]
-    chi_squared: Annotated[float, Fact(heading="χ² after", digits=".4g")]
-    degrees: Annotated[int, Fact(heading="degrees of freedom")]
-    p_value: Annotated[float | None, Fact("chance of so large a χ²", "p", "", ".3g", "none")]
-    steps: int
-    ended: Annotated[str, Fact("how the steps did")]
+    fit: FitRow
     verdict: str  # fitted, poor_fit, not_identified, unfinished
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
@@ -252,12 +262,11 @@ def collect_update(
             for k, each in enumerate(problem.measured)
         ),
         unidentified=directions,
-        initial_chi_squared=found.initial_chi_squared,
-        chi_squared=found.chi_squared,
-        degrees=found.degrees,
-        p_value=found.p_value,
-        steps=len(found.fit.steps),
-        ended=str(found.fit.end),
+        fit=FitRow(
+            *(found.initial_chi_squared, found.chi_squared, found.degrees, found.p_value),
+            len(found.fit.steps),
+            str(found.fit.end),
+        ),
         verdict=_verdict(found),
         notes=(*problem.notes, *_notes(problem, found)),
         warnings=(*map(str, case.file.warnings), *_warnings(problem, found)),
