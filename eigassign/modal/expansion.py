@@ -86,7 +86,7 @@ class Expansion:
 
     def eigenvalues(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """λ (n_samples, n_modes) in rad²/s²; q (n_samples, n_q) or (n_q,), y likewise."""
-        w = self._local(q, y)
+        w = self.local(q, y)
         values = np.hstack(
             [
                 _eigenvalues(c, made(w).reshape(len(w), *c.coefficients.shape[:2]), self.modes)
@@ -96,7 +96,7 @@ class Expansion:
         with np.errstate(divide="ignore"):
             return 1.0 / values if self.inverted else values
 
-    def _local(self, q: ArrayLike, y: ArrayLike) -> Floats:
+    def local(self, q: ArrayLike, y: ArrayLike) -> Floats:
         """The local variables w (n_samples, n_w)."""
         return (samples(q, y, len(self.q0), len(self.y0)) - self.x0) @ self.directions.T
 
@@ -168,7 +168,7 @@ class Expansion:
 
     def slopes(self, q: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
         """λ (n_samples, n_modes) and ∂λ/∂x (n_samples, n_modes, n_x) over units of x."""
-        lam, powers = self.eigenvalues(q, y), monomials(self.space, self._local(q, y))
+        lam, powers = self.eigenvalues(q, y), monomials(self.space, self.local(q, y))
         parts = [_slopes(c, self.space, powers, self.modes) for c in self.clusters]
         slopes = np.concatenate(parts, axis=1) @ self.directions
         return lam, -np.square(lam)[..., None] * slopes if self.inverted else slopes
@@ -344,11 +344,11 @@ def radius_share(expansion: Expansion, q: ArrayLike, y: ArrayLike) -> Floats:
     pairs of degrees, for in a symmetric pose every other one vanishes. Above 1 more order only
     harms. NaN below order 4, where nothing can be said.
     """
-    x = samples(q, y, len(expansion.q0), len(expansion.y0)) - expansion.x0
+    w = expansion.local(q, y)
     p, starts = expansion.order, expansion.space.degree_starts
     if p < 4:
-        return np.full((len(x), len(expansion.clusters)), np.nan)
-    powers = monomials(expansion.space, x @ expansion.directions.T)
+        return np.full((len(w), len(expansion.clusters)), np.nan)
+    powers = monomials(expansion.space, w)
     shares = []
     for cluster in expansion.clusters:
         size = []  # ‖t_k(w)‖ of the cluster's matrix for k = p, p − 1, p − 2, p − 3

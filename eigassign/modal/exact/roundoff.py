@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from eigassign.errors import AccuracyError, MechanismError
 from eigassign.mechanism.assembly.pencil import Pencil
-from eigassign.modal.exact.solver import modes_at
+from eigassign.modal.exact.solver import lowest_modes
 
 Floats = NDArray[np.float64]
 # No powers of two, beside 1; so many, for some models spread widely at one in ten of them only.
@@ -32,9 +32,9 @@ def rounding_error(pencil: Pencil, x: Floats, count: int) -> float:
     Infinite where other roundings of the same matrices have no such modes.
     """
     theta = pencil.theta(x[None])
-    plain = modes_at(pencil, theta, count).lam
+    plain = lowest_modes(pencil, theta, count, 0).lam
     try:
-        lam = modes_at(pencil, theta * SCALES, count).lam
+        lam = lowest_modes(pencil, theta * SCALES, count, 0).lam
     except (AccuracyError, MechanismError):
         return np.inf
     spread = float(np.abs(lam / plain - 1.0).max())

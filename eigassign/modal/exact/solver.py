@@ -37,11 +37,6 @@ def modes(pencil: Pencil, x: Floats, count: int) -> Modes:
     return _solve(pencil, pencil.theta(x), count, vectors=True)
 
 
-def modes_at(pencil: Pencil, theta: Floats, count: int) -> Modes:
-    """The same where θ (n_theta, n_samples) is known already."""
-    return _solve(pencil, theta, count, vectors=True)
-
-
 def _solve(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
     elastic, count = len(pencil.elastic), whole(count, "count")
     if not 1 <= count <= elastic:
@@ -54,11 +49,11 @@ def _solve(pencil: Pencil, theta: Floats, count: int, vectors: bool) -> Modes:
 
 
 def lowest_modes(pencil: Pencil, theta: Floats, least: int, extra: int) -> Modes:
-    """The lowest ``least`` modes, and up to ``extra`` more where so many have mass."""
+    """The lowest ``least`` modes at θ (n_theta, n_samples), and up to ``extra`` more with mass."""
     count = max(min(least + extra, len(pencil.elastic)), least)
     while True:
         try:
-            return modes_at(pencil, theta, count)
+            return _solve(pencil, theta, count, vectors=True)
         except MissingMassError as error:
             if count == least:
                 raise
